@@ -1,0 +1,3 @@
+"""pilotage: the open navigation lab for mobile robots."""
+
+__version__ = "0.1.0"

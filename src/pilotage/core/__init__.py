@@ -1,0 +1,1 @@
+"""Value types, angles, random streams, the registry of components, and errors."""

@@ -1,0 +1,92 @@
+"""Base of every config: frozen, nothing unknown accepted, finite numbers; errors become one line."""
+
+from __future__ import annotations
+
+from typing import Any, TypeVar
+
+from pydantic import BaseModel, ConfigDict, ValidationError
+
+from pilotage.core.errors import InputError, nearest
+
+
+class Config(BaseModel):
+    """A frozen pydantic model that refuses unknown keys, NaN and infinities."""
+
+    model_config = ConfigDict(
+        extra="forbid", frozen=True, allow_inf_nan=False, validate_default=True, strict=False
+    )
+
+
+ConfigT = TypeVar("ConfigT", bound=BaseModel)
+
+
+def validate(model: type[ConfigT], values: Any, where: str) -> ConfigT:
+    """Validate ``values`` against ``model``.
+
+    Parameters
+    ----------
+    where
+        Dotted place of the values in the user's file, put before each key in the message.
+
+    Raises
+    ------
+    InputError
+        One line naming the first wrong key, what was expected and found, and for an unknown key the
+        nearest right one.
+    """
+    if not isinstance(values, dict):
+        raise InputError(f"{where or 'file'}: expected a mapping of keys, found {_show(values)}")
+    try:
+        return model.model_validate(values)
+    except ValidationError as error:
+        raise InputError(describe(error, model, where)) from None
+
+
+def describe(error: ValidationError, model: type[BaseModel], where: str) -> str:
+    """Turn a pydantic error into one line: place, expected, found, nearest right name."""
+    errors = error.errors(include_url=False)
+    # An unknown key is the likelier slip and explains a missing one: say it first.
+    first = next((e for e in errors if e["type"] == "extra_forbidden"), errors[0])
+    path = [str(part) for part in first["loc"]]
+    place = ".".join([where, *path] if where else path)
+    if first["type"] == "extra_forbidden":
+        known = _fields_at(model, path[:-1])
+        close = nearest(path[-1], known)
+        hint = f"did you mean '{close}'?" if close else "known keys: " + ", ".join(sorted(known))
+        return f"{place}: unknown key; {hint}"
+    if first["type"] == "missing":
+        return f"{place}: missing; it has to be given"
+    message = first["msg"].removeprefix("Value error, ")
+    message = message[:1].lower() + message[1:]
+    return f"{place}: {message}, found {_show(first['input'])}"
+
+
+def _fields_at(model: type[BaseModel], path: list[str]) -> list[str]:
+    """Names of the fields of the model that ``path`` leads to."""
+    current: type[BaseModel] = model
+    for part in path:
+        field = current.model_fields.get(part)
+        inner = _model_in(field.annotation) if field is not None else None
+        if inner is None:
+            continue
+        current = inner
+    return list(current.model_fields)
+
+
+def _model_in(annotation: Any) -> type[BaseModel] | None:
+    """Return the first model found inside an annotation such as ``Optional[Model]``."""
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return annotation
+    for argument in getattr(annotation, "__args__", ()):
+        found = _model_in(argument)
+        if found is not None:
+            return found
+    return None
+
+
+def _show(value: Any) -> str:
+    """A short rendering of an offending value."""
+    if value is None:
+        return "nothing"
+    text = repr(value) if isinstance(value, str) else str(value)
+    return text if len(text) <= 80 else text[:77] + "..."

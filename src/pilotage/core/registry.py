@@ -1,0 +1,89 @@
+"""A registry per role: a name, the class that fills the role, and the config it takes.
+
+A room that holds implementations imports all its modules once (``load_modules``), so adding one
+touches its own module only.
+"""
+
+from __future__ import annotations
+
+import importlib
+import pkgutil
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Any, Generic, TypeVar
+
+from pilotage.core.config import Config, validate
+from pilotage.core.errors import unknown_name
+
+T = TypeVar("T")
+C = TypeVar("C", bound=type)
+
+
+@dataclass(frozen=True, slots=True)
+class Entry(Generic[T]):
+    """One registered implementation."""
+
+    name: str
+    factory: Callable[..., T]
+    config: type[Config]
+
+
+class Registry(Generic[T]):
+    """Names to implementations of one role.
+
+    Parameters
+    ----------
+    role
+        What the entries are, as it is called in messages and mission files ("planner").
+    package
+        The package whose modules register themselves here; imported at the first look-up.
+    """
+
+    def __init__(self, role: str, package: str) -> None:
+        self.role = role
+        self._package = package
+        self._entries: dict[str, Entry[T]] = {}
+        self._loaded = False
+
+    def add(self, name: str, config: type[Config]) -> Callable[[C], C]:
+        """Register the decorated class under ``name`` with its config model."""
+
+        def register(cls: C) -> C:
+            if name in self._entries:
+                raise ValueError(f"{self.role} '{name}' is registered twice")
+            self._entries[name] = Entry(name, cls, config)
+            return cls
+
+        return register
+
+    def entry(self, name: str) -> Entry[T]:
+        """Look a name up; InputError with the nearest right name where it is unknown."""
+        self._load()
+        if name not in self._entries:
+            raise unknown_name(self.role, name, self._entries)
+        return self._entries[name]
+
+    def configure(self, name: str, parameters: dict[str, Any], where: str) -> Config:
+        """Validate ``parameters`` against the config of ``name``."""
+        return validate(self.entry(name).config, parameters, where)
+
+    def names(self) -> list[str]:
+        """Return all registered names, sorted."""
+        self._load()
+        return sorted(self._entries)
+
+    def __iter__(self) -> Iterator[Entry[T]]:
+        self._load()
+        return iter([self._entries[name] for name in sorted(self._entries)])
+
+    def _load(self) -> None:
+        if not self._loaded:
+            load_modules(self._package)
+            self._loaded = True
+
+
+def load_modules(package: str) -> None:
+    """Import every module directly inside ``package``, so that registrations run."""
+    module = importlib.import_module(package)
+    for info in pkgutil.iter_modules(module.__path__):
+        importlib.import_module(f"{package}.{info.name}")

@@ -1,0 +1,1 @@
+"""What the world is made of: segments, landmarks, grids, distance fields; and their file formats."""

@@ -1,0 +1,68 @@
+"""Distance to the nearest obstacle, sampled on a grid: what planners ask thousands of times a path."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from pilotage.core.errors import InputError
+from pilotage.core.types import FloatArray
+from pilotage.kernels import field
+from pilotage.maps.segment_map import SegmentMap
+
+MAX_NODES = 50_000_000
+"""Beyond this a field would need more than 400 MB."""
+
+
+@dataclass(frozen=True, slots=True)
+class DistanceField:
+    """Distances at the nodes of a square grid; between nodes they are interpolated bilinearly.
+
+    Attributes
+    ----------
+    distance_m
+        (ny, nx) distance from node (row, column) to the nearest obstacle; row 0 has the lowest y.
+    origin_xy_m
+        Position of node (0, 0).
+    resolution_m
+        Spacing of the nodes.
+    segments_m, circles_m
+        (N, 4) and (M, 3): the geometry that the field was sampled from, for exact checks near the
+        threshold; both empty where the field comes from a grid.
+    """
+
+    distance_m: FloatArray
+    origin_xy_m: tuple[float, float]
+    resolution_m: float
+    segments_m: FloatArray
+    circles_m: FloatArray
+
+    @staticmethod
+    def from_map(world: SegmentMap, resolution_m: float = 0.1) -> DistanceField:
+        """Sample the exact distance of a segment map; the bounds' edge is no obstacle by itself."""
+        if not resolution_m > 0.0:
+            raise InputError(f"distance field: expected a resolution above 0 m, found {resolution_m}")
+        xmin, ymin, xmax, ymax = world.bounds_m
+        nx = math.ceil((xmax - xmin) / resolution_m) + 1
+        ny = math.ceil((ymax - ymin) / resolution_m) + 1
+        if nx * ny > MAX_NODES:
+            raise InputError(
+                f"distance field: {nx} x {ny} nodes need {nx * ny * 8 / 1e9:.1f} GB; "
+                f"take a resolution coarser than {resolution_m} m"
+            )
+        values = field.sample_distance(xmin, ymin, resolution_m, nx, ny, world.segments_m, world.circles_m)
+        return DistanceField(values, (xmin, ymin), resolution_m, world.segments_m, world.circles_m)
+
+    @property
+    def bounds_m(self) -> tuple[float, float, float, float]:
+        """xmin, ymin, xmax, ymax that the nodes span."""
+        ny, nx = self.distance_m.shape
+        x0, y0 = self.origin_xy_m
+        return x0, y0, x0 + (nx - 1) * self.resolution_m, y0 + (ny - 1) * self.resolution_m
+
+    def at(self, points_xy_m: FloatArray) -> FloatArray:
+        """Interpolated distance at points (K, 2); outside the grid 0. Returns (K,)."""
+        points = np.ascontiguousarray(points_xy_m, dtype=np.float64).reshape(-1, 2)
+        return field.interpolate(points, self.distance_m, *self.origin_xy_m, self.resolution_m)

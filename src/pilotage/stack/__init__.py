@@ -1,0 +1,1 @@
+"""What would run on the robot: navigator over exploration, planning, control, localization, mapping, perception."""

@@ -1,0 +1,1 @@
+"""Global planners, path smoothers and the local planner between waypoints."""

@@ -1,0 +1,110 @@
+"""What a planner is asked and what it answers; the registries of planners and smoothers."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from enum import StrEnum
+from typing import Protocol
+
+import numpy as np
+
+from pilotage.core.registry import Registry
+from pilotage.core.types import FloatArray, Goal, Pose2
+from pilotage.maps.distance_field import DistanceField
+
+
+@dataclass(frozen=True, slots=True)
+class Path:
+    """A path for the robot's centre.
+
+    Attributes
+    ----------
+    states
+        (N, 3) x, y, theta, densely sampled (at most 5 cm apart), first the start and last the goal.
+    waypoints
+        (W, 3) the sparse states that the local planner drives between, first the start and last the goal.
+    length_m
+        Length of the continuous curve.
+    turning_radius_m
+        Smallest radius that the path asks for; 0 where it turns on the spot.
+    """
+
+    states: FloatArray
+    waypoints: FloatArray
+    length_m: float
+    turning_radius_m: float
+
+
+class PlanStatus(StrEnum):
+    """How a planning query ended."""
+
+    FOUND = "found"
+    NO_PATH = "no path"
+    START_BLOCKED = "start blocked"
+    GOAL_BLOCKED = "goal blocked"
+
+
+@dataclass(frozen=True, slots=True)
+class PlanRequest:
+    """One planning query.
+
+    Attributes
+    ----------
+    field
+        Distance to everything the robot knows of.
+    rng
+        The planner's own random stream.
+    clearance_m
+        Distance to keep from obstacles; None takes the planner's own setting.
+    """
+
+    start: Pose2
+    goal: Goal
+    field: DistanceField
+    rng: np.random.Generator
+    clearance_m: float | None = None
+
+
+def _no_edges() -> FloatArray:
+    return np.zeros((0, 4))
+
+
+@dataclass(frozen=True, slots=True)
+class PlanResult:
+    """The answer: a path, or a status and a reason that say why there is none.
+
+    Attributes
+    ----------
+    tree_edges_m
+        (E, 4) x0, y0, x1, y1 of the search tree's edges, for pictures; empty where there is no tree.
+    first_solution_s, planning_time_s
+        Wall time until the first valid solution and until the end; nan where there was none.
+    """
+
+    status: PlanStatus
+    reason: str
+    path: Path | None
+    first_solution_s: float
+    planning_time_s: float
+    iterations: int = 0
+    tree_edges_m: FloatArray = field(default_factory=_no_edges)
+
+
+class Planner(Protocol):
+    """Finds a path on the robot's map."""
+
+    def plan(self, request: PlanRequest) -> PlanResult:
+        """Answer one query; never raises for what can fail in the field."""
+        ...
+
+
+class Smoother(Protocol):
+    """Shortens a path without losing its validity."""
+
+    def smooth(self, path: Path, request: PlanRequest, clearance_m: float) -> Path:
+        """Return a path from the same start to the same goal that is valid and no longer than ``path``."""
+        ...
+
+
+PLANNERS: Registry[Planner] = Registry("planner", "pilotage.stack.planning")
+SMOOTHERS: Registry[Smoother] = Registry("smoother", "pilotage.stack.planning")
