@@ -56,6 +56,14 @@ class Registry(Generic[T]):
 
         return register
 
+    def add_config(self, name: str) -> Callable[[C], C]:
+        """Register a class that is its own config: one whose description is all there is to it."""
+
+        def register(cls: C) -> C:
+            return self.add(name, cls)(cls)
+
+        return register
+
     def entry(self, name: str) -> Entry[T]:
         """Look a name up; InputError with the nearest right name where it is unknown."""
         self._load()

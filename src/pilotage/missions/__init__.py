@@ -1,1 +1,1 @@
-"""TODO"""
+"""The mission files that we ship, and the schema that every mission file follows."""

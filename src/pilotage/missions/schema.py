@@ -1,0 +1,171 @@
+"""The schema of a mission file: world, robot, stack, run.
+
+Components of the stack are named here but configured where they live: a mission holds each
+component's ``name`` and its parameters, and the room that registers the name validates them.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Any, Literal
+
+from pydantic import ConfigDict, Field, model_validator
+
+from pilotage.core.config import Config
+from pilotage.sensors.sensor import NonNegative, Positive
+
+Point = tuple[float, float]
+
+
+class ComponentChoice(Config):
+    """A registered name and, beside it, the parameters of that component."""
+
+    model_config = ConfigDict(extra="allow", frozen=True)
+
+    name: str
+
+    @property
+    def parameters(self) -> dict[str, Any]:
+        """All keys but the name."""
+        return dict(self.model_extra or {})
+
+
+class PoseConfig(Config):
+    """A start pose."""
+
+    x_m: float
+    y_m: float
+    theta_rad: float = Field(default=0.0, ge=-2 * math.pi, le=2 * math.pi)
+
+
+class GoalConfig(Config):
+    """A goal; without a heading any heading will do."""
+
+    x_m: float
+    y_m: float
+    theta_rad: float | None = Field(default=None, ge=-2 * math.pi, le=2 * math.pi)
+    tolerance_m: Positive = 0.3
+
+
+class BoxObstacle(Config):
+    """A box along the line from one point to another."""
+
+    kind: Literal["box"]
+    from_m: Point
+    to_m: Point
+    thickness_m: Positive = 0.3
+
+
+class CircleObstacle(Config):
+    """A round obstacle."""
+
+    kind: Literal["circle"]
+    centre_m: Point
+    radius_m: Positive
+
+
+class AcrossPathObstacle(Config):
+    """A box put across the planned path; place and size drawn from the run's seed."""
+
+    kind: Literal["across-path"]
+    length_m: tuple[Positive, Positive] = (1.5, 3.0)
+    thickness_m: Positive = 0.3
+    along: tuple[NonNegative, NonNegative] = (0.2, 0.8)
+
+
+class TrapObstacle(Config):
+    """A U-shaped trap open towards the robot, across the planned path; place and size from the seed."""
+
+    kind: Literal["u-trap"]
+    width_m: tuple[Positive, Positive] = (3.0, 3.6)
+    depth_m: tuple[Positive, Positive] = (2.0, 2.5)
+    thickness_m: Positive = 0.2
+    along: tuple[NonNegative, NonNegative] = (0.15, 0.85)
+
+
+Obstacle = Annotated[
+    BoxObstacle | CircleObstacle | AcrossPathObstacle | TrapObstacle, Field(discriminator="kind")
+]
+
+
+class WorldConfig(Config):
+    """The map (a shipped name or a file), where to start and go, and what should not be there."""
+
+    map: str
+    start: PoseConfig
+    goal: GoalConfig | None = None
+    obstacles: tuple[Obstacle, ...] = ()
+
+
+class BodyConfig(Config):
+    """The robot's body: a disc."""
+
+    radius_m: Positive = 0.30
+
+
+class MotionConfig(Config):
+    """Differential drive: how it moves and its limits."""
+
+    name: Literal["differential-drive"] = "differential-drive"
+    max_speed_m_s: Positive = 1.0
+    max_turn_rate_rad_s: Positive = 2.0
+    max_acceleration_m_s2: Positive = 2.0
+    max_turn_acceleration_rad_s2: Positive = 8.0
+
+
+class RobotConfig(Config):
+    """Body, motion and sensors (each a registered ``name`` with its parameters)."""
+
+    body: BodyConfig = BodyConfig()
+    motion: MotionConfig = MotionConfig()
+    sensors: dict[str, ComponentChoice]
+
+
+class InitialConfig(Config):
+    """What the robot believes at the start: the start pose with an error drawn from this covariance."""
+
+    x_var_m2: NonNegative = 0.01
+    y_var_m2: NonNegative = 0.01
+    theta_var_rad2: NonNegative = 0.01
+
+
+class StackConfig(Config):
+    """One component for each role; None where the mission does without."""
+
+    initial: InitialConfig = InitialConfig()
+    navigator: ComponentChoice
+    localizer: ComponentChoice
+    planner: ComponentChoice
+    smoother: ComponentChoice | None = None
+    local_planner: ComponentChoice | None = None
+    controller: ComponentChoice | None = None
+    reactive: ComponentChoice | None = None
+    mapper: ComponentChoice | None = None
+    escape: ComponentChoice | None = None
+
+
+class RunConfig(Config):
+    """Time step, time limit and seed."""
+
+    dt_s: float = Field(default=0.1, gt=0.0, le=10.0)
+    time_limit_s: Positive = 600.0
+    seed: int = Field(default=0, ge=0)
+    settle_s: NonNegative = 1.0
+    """Errors count after this long: the start error is drawn, not earned."""
+
+
+class Mission(Config):
+    """A whole mission."""
+
+    mission: str = Field(min_length=1)
+    description: str = ""
+    world: WorldConfig
+    robot: RobotConfig
+    stack: StackConfig
+    run: RunConfig = RunConfig()
+
+    @model_validator(mode="after")
+    def _steps(self) -> Mission:
+        if self.run.time_limit_s < self.run.dt_s:
+            raise ValueError("run.time_limit_s must be at least run.dt_s")
+        return self

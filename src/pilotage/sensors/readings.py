@@ -1,0 +1,57 @@
+"""What sensors say: one frozen value a reading, gathered by sensor name in ``Readings``."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
+from typing import TypeAlias
+
+from pilotage.core.types import FloatArray, IntArray
+
+
+@dataclass(frozen=True, slots=True)
+class OdometryIncrement:
+    """Motion since the last odometry reading: distance along the arc and change of heading."""
+
+    distance_m: float
+    angle_rad: float
+
+
+@dataclass(frozen=True, slots=True)
+class LidarScan:
+    """Ranges (N,) in beam order, counter-clockwise; ``max_range_m`` where nothing was hit."""
+
+    ranges_m: FloatArray
+
+
+@dataclass(frozen=True, slots=True)
+class BeaconReadings:
+    """Beacons seen at once: ids (K,), ranges (K,) and bearings (K,) in the sensor's frame."""
+
+    ids: IntArray
+    ranges_m: FloatArray
+    bearings_rad: FloatArray
+
+
+@dataclass(frozen=True, slots=True)
+class UltrasonicReading:
+    """Distance to the nearest return in the cone; ``saturated`` says that nothing was in reach."""
+
+    range_m: float
+    saturated: bool
+
+
+Reading: TypeAlias = OdometryIncrement | LidarScan | BeaconReadings | UltrasonicReading
+
+
+def _empty() -> Mapping[str, Reading]:
+    return MappingProxyType({})
+
+
+@dataclass(frozen=True, slots=True)
+class Readings:
+    """What arrived in one step: time and the sensors that fired, by their name in the mission."""
+
+    t_s: float
+    by_sensor: Mapping[str, Reading] = field(default_factory=_empty)

@@ -1,0 +1,52 @@
+"""What every sensor's config has: a rate and a place on the body; and the registry of sensors."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated
+
+from pydantic import Field
+
+from pilotage.core.config import Config
+from pilotage.core.errors import InputError
+from pilotage.core.registry import Registry
+
+NonNegative = Annotated[float, Field(ge=0.0)]
+Positive = Annotated[float, Field(gt=0.0)]
+
+
+class Mount(Config):
+    """Pose of a sensor in the base frame: x forward, y left, counter-clockwise."""
+
+    x_m: float = 0.0
+    y_m: float = 0.0
+    theta_rad: float = Field(default=0.0, ge=-math.pi, le=math.pi)
+
+
+class SensorConfig(Config):
+    """Rate and mounting pose; every sensor's config derives from this one and adds its own fields."""
+
+    rate_hz: Positive = 10.0
+    mount: Mount = Mount()
+
+    def every_steps(self, dt_s: float, name: str) -> int:
+        """How many control steps lie between two readings.
+
+        Raises
+        ------
+        InputError
+            If the rate is not a whole fraction of the step rate.
+        """
+        steps = 1.0 / (self.rate_hz * dt_s)
+        whole = round(steps)
+        if whole < 1 or abs(steps - whole) > 1e-6 * steps:
+            raise InputError(
+                f"robot.sensors.{name}.rate_hz: expected a whole fraction of {1.0 / dt_s:g} Hz "
+                f"(run.dt_s = {dt_s:g} s), found {self.rate_hz:g}"
+            )
+        return whole
+
+
+SENSORS: Registry[SensorConfig] = Registry("sensor", "pilotage.sensors")
+"""Sensor names to their configs; for a sensor the config is the whole description."""
+

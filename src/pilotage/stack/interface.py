@@ -1,0 +1,83 @@
+"""The robot's plug: readings in, command out. A simulator, a recorded log or a real robot fits it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Protocol
+
+from pilotage.core.types import Event, FloatArray, Pose2, Twist
+from pilotage.sensors.readings import Readings
+
+
+class BeliefStatus(StrEnum):
+    """Whether the robot knows where it is."""
+
+    LOCALIZED = "localized"
+    LOST = "lost"
+
+
+@dataclass(frozen=True, slots=True)
+class Belief:
+    """What the robot believes: pose in the map frame and its covariance (3, 3) in m^2, m rad, rad^2."""
+
+    pose: Pose2
+    cov: FloatArray
+    status: BeliefStatus = BeliefStatus.LOCALIZED
+
+
+class StackStatus(StrEnum):
+    """How far the task has come, as the robot itself sees it."""
+
+    RUNNING = "running"
+    ARRIVED = "arrived"
+    FAILED = "failed"
+
+
+@dataclass(frozen=True, slots=True)
+class PlannedPath:
+    """A plan as it was adopted, for the record: when, its states (N, 3), waypoints (W, 3), tree (E, 4)."""
+
+    t_s: float
+    states: FloatArray
+    waypoints: FloatArray
+    tree_edges_m: FloatArray
+    length_m: float
+    planning_time_s: float
+    first_solution_s: float
+
+
+class Stack(Protocol):
+    """What runs on the robot."""
+
+    @property
+    def belief(self) -> Belief:
+        """The current belief."""
+        ...
+
+    @property
+    def status(self) -> tuple[StackStatus, str]:
+        """The task's status and, where it failed, why."""
+        ...
+
+    def prepare(self) -> None:
+        """Plan before the start (the off-line part)."""
+        ...
+
+    def step(self, readings: Readings) -> Twist:
+        """Take in what the sensors said, give the next command."""
+        ...
+
+    def telemetry(self) -> Mapping[str, float]:
+        """Numbers of the last step worth recording; the same keys at every step."""
+        ...
+
+    def drain_events(self) -> list[Event]:
+        """Events since the last call."""
+        ...
+
+    @property
+    def plans(self) -> list[PlannedPath]:
+        """All plans adopted so far."""
+        ...
