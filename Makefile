@@ -1,0 +1,104 @@
+# Everything runs from a clean clone: the first target that needs it makes the environment.
+# Needed beforehand: Python 3.11 or later with its venv module, git and make.
+
+SHELL := /bin/sh
+.DEFAULT_GOAL := help
+MAKEFLAGS += --no-print-directory
+
+VENV := .venv
+PY := $(VENV)/bin/python
+# The first of these that is new enough makes the environment; `make setup PYTHON=...` names another.
+PYTHON ?= python3 python3.13 python3.12 python3.11
+UV ?= uv
+JOBS ?= 2
+ARGS ?=
+MISSION ?= museum-1
+
+PIP := $(PY) -m pip --disable-pip-version-check --no-input
+# What the environment was made from: another lock, another pyproject or a moved folder renews it.
+FINGERPRINT = { pwd; cat requirements.lock pyproject.toml | cksum; }
+STAMP := $(VENV)/.made-from
+BENCH_STAMP := $(VENV)/.bench-made-from
+
+.PHONY: help setup demo test check format format-check lint types contracts locks examples bench lock clean
+
+help:  ## this list
+	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/  make \1|\2/p' Makefile | awk -F'|' '{ printf "%-20s %s\n", $$1, $$2 }'
+
+setup:  ## make .venv from the hashed lock, with the pilotage command in it
+	@set -e; \
+	[ -x $(PY) ] && [ "$$(cat $(STAMP) 2>/dev/null)" = "$$($(FINGERPRINT))" ] && exit 0; \
+	if ! $(PY) -m pip --version >/dev/null 2>&1 || \
+	  { [ -f $(STAMP) ] && [ "$$(head -n 1 $(STAMP))" != "$$(pwd)" ]; }; then \
+	  found=; old=; \
+	  for candidate in $(PYTHON); do \
+	    command -v "$$candidate" >/dev/null 2>&1 || continue; \
+	    if "$$candidate" -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null; \
+	    then found=$$candidate; break; else old="$$old, found $$("$$candidate" -V 2>&1)"; fi; \
+	  done; \
+	  [ -n "$$found" ] || { echo "make setup: needs Python 3.11 or later$$old; install one or name it by PYTHON=..." >&2; exit 2; }; \
+	  "$$found" -c 'import venv, ensurepip' 2>/dev/null || { \
+	    version=$$("$$found" -c 'import sys; print("%d.%d" % sys.version_info[:2])'); \
+	    echo "make setup: $$found has no venv module; on Debian or Ubuntu: sudo apt install python$$version-venv" >&2; exit 2; }; \
+	  echo "making .venv with $$("$$found" -V)"; \
+	  "$$found" -m venv --clear $(VENV); \
+	fi; \
+	rm -f $(STAMP); \
+	echo "installing the lock (about 200 MB to fetch the first time)"; \
+	$(PIP) install --quiet --require-hashes -r requirements.lock; \
+	$(PIP) install --quiet --no-deps --no-build-isolation --editable .; \
+	$(FINGERPRINT) > $(STAMP); \
+	echo "ready: $(VENV)/bin/pilotage"
+
+demo: setup  ## run the night watch and name the report to open
+	@$(PY) -m pilotage.cli.main run $(MISSION) $(ARGS)
+	@echo "open the report named above in any browser; it needs no network"
+
+test: setup  ## run the tests (ARGS="-k name" picks some, JOBS=4 takes more processes)
+	@$(PY) -m pytest -n $(JOBS) --dist worksteal $(ARGS)
+
+check: format-check lint types contracts locks test  ## all that CI runs (the examples are among the tests)
+
+format: setup  ## format the code
+	@$(PY) -m ruff format .
+	@$(PY) -m ruff check --fix --select I .
+
+format-check: setup
+	@$(PY) -m ruff format --check .
+
+lint: setup
+	@$(PY) -m ruff check .
+
+types: setup
+	@$(PY) -m mypy
+
+contracts: setup
+	@$(VENV)/bin/lint-imports --no-logo
+
+# A lock names packages and hashes, never where they were fetched from.
+locks:
+	@! grep -nE '://|--(extra-)?index-url|--find-links' requirements.lock requirements-bench.lock
+
+examples: setup  ## run the examples alone
+	@$(PY) -m pytest tests/unit/test_examples.py $(ARGS)
+
+bench: setup  ## compare with the peers: installs them, prints a table of ratios
+	@set -e; \
+	if [ "$$(cat $(BENCH_STAMP) 2>/dev/null)" != "$$(cksum < requirements-bench.lock)" ]; then \
+	  echo "installing the peers"; \
+	  $(PIP) install --quiet --require-hashes -r requirements-bench.lock; \
+	  cksum < requirements-bench.lock > $(BENCH_STAMP); \
+	fi
+	@$(PY) -m benchmarks.peers $(ARGS)
+
+COMPILE = $(UV) pip compile --quiet --universal --python-version 3.11 --generate-hashes --no-header --no-annotate
+
+lock:  ## resolve both locks again (UPGRADE=--upgrade takes newer versions); needs uv
+	@command -v $(UV) >/dev/null || { echo "make lock: needs uv; name it by UV=..." >&2; exit 2; }
+	@$(COMPILE) $(UPGRADE) --extra dev pyproject.toml -o requirements.lock
+	@$(COMPILE) $(UPGRADE) --extra bench --constraint requirements.lock pyproject.toml -o requirements-bench.lock
+	@$(MAKE) locks
+
+clean:  ## remove .venv and the tools' caches; runs/ and studies/ stay
+	@rm -rf $(VENV) .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache build dist
+	@find src tests examples benchmarks -name __pycache__ -type d -prune -exec rm -rf {} + 2>/dev/null || true

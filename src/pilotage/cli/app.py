@@ -1,0 +1,69 @@
+"""The table of commands, and one call of one of them."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from pilotage import __version__
+from pilotage.cli.components import components
+from pilotage.cli.missions import missions
+from pilotage.cli.plan import plan
+from pilotage.cli.report import report
+from pilotage.cli.run import run
+from pilotage.cli.schema import schema
+from pilotage.core.errors import InputError
+
+app = typer.Typer(
+    name="pilotage",
+    help="The open navigation lab for mobile robots: one mission file in, a run and its evidence out.",
+    epilog="Exit codes: 0 done, 1 the task failed in the field, 2 bad input.",
+    add_completion=False,
+    rich_markup_mode=None,
+    pretty_exceptions_enable=False,
+)
+
+for _command in (run, plan, report, missions, components, schema):
+    app.command()(_command)
+
+
+def _version(wanted: bool) -> None:
+    if wanted:
+        print(f"pilotage {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def _options(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version.")
+    ] = False,
+) -> None:
+    """Take the options that stand before the command."""
+
+
+def dispatch(arguments: list[str]) -> int:
+    """Run the command that ``arguments`` name and return its exit code.
+
+    Raises
+    ------
+    InputError
+        What cannot be parsed, in one line with the nearest right name.
+    """
+    command = typer.main.get_command(app)
+    try:
+        with command.make_context("pilotage", arguments or ["--help"]) as context:
+            return int(command.invoke(context) or 0)
+    except typer.Exit as stop:
+        return stop.exit_code
+    except typer.TyperException as error:
+        raise InputError(_one_line(error)) from None
+
+
+def _one_line(error: typer.TyperException) -> str:
+    """Render a usage error as what is wrong and where the right usage is told."""
+    text = error.format_message().rstrip(".")
+    text = text[:1].lower() + text[1:]
+    context = getattr(error, "ctx", None)
+    return f"{text}; see '{context.command_path} --help'" if context is not None else text

@@ -1,0 +1,67 @@
+"""The entry point: run one command, turn what went wrong into one line and an exit code.
+
+Exit codes: 0 done, 1 the task failed in the field, 2 bad input, 130 interrupted, 141 the reader of
+the output went away, 70 a bug (the only case that shows a traceback).
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Sequence
+
+BAD_INPUT = 2
+BUG = 70
+INTERRUPTED = 130
+BROKEN_PIPE = 141
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run one command and return the exit code.
+
+    Parameters
+    ----------
+    arguments
+        The words after ``pilotage``; None takes them from the process.
+    """
+    # Everything is imported inside, so that Ctrl-C during an import is one line as well.
+    try:
+        return _run(sys.argv[1:] if arguments is None else list(arguments))
+    except KeyboardInterrupt:
+        return _say("interrupted", INTERRUPTED)
+    except BrokenPipeError:
+        # The interpreter flushes standard output once more at exit: give it somewhere to go.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return BROKEN_PIPE
+
+
+def _run(arguments: list[str]) -> int:
+    from pilotage.cli.app import dispatch
+    from pilotage.core.errors import InputError
+
+    try:
+        code = dispatch(arguments)
+        sys.stdout.flush()
+    except InputError as error:
+        return _say(str(error), BAD_INPUT)
+    except BrokenPipeError:
+        raise
+    except OSError as error:
+        place = f"{error.filename}: " if error.filename else ""
+        return _say(f"{place}{error.strerror or error}", BAD_INPUT)
+    except Exception:
+        import traceback
+
+        traceback.print_exc()
+        return _say("this is a bug in pilotage; please report it with the lines above", BUG)
+    return code
+
+
+def _say(text: str, code: int) -> int:
+    """One line on standard error."""
+    print(f"pilotage: {' '.join(text.split())}", file=sys.stderr)
+    return code
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,124 @@
+"""What the commands print: JSON objects, two-column lists, and the progress line of a run."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import sys
+import time
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, redirect_stdout
+from typing import TYPE_CHECKING, Any, TextIO
+
+if TYPE_CHECKING:
+    from pilotage.experiments.run import Progress
+
+
+def print_json(value: Mapping[str, Any]) -> None:
+    """Print one JSON object on one line; what is not a finite number becomes null."""
+    print(json.dumps(plain(value), allow_nan=False))
+
+
+def plain(value: Any) -> Any:
+    """Return ``value`` as JSON knows it: numpy scalars and arrays unpacked, NaN and infinity as None."""
+    if isinstance(value, Mapping):
+        return {str(key): plain(item) for key, item in value.items()}
+    if isinstance(value, str | bool | int) or value is None:
+        return value
+    if isinstance(value, float):
+        return float(value) if math.isfinite(value) else None
+    if isinstance(value, list | tuple | set | frozenset):
+        return [plain(item) for item in value]
+    if hasattr(value, "tolist"):
+        return plain(value.tolist())
+    return str(value)
+
+
+@contextmanager
+def stdout_for_json(wanted: bool) -> Iterator[None]:
+    """Send what libraries print to standard error, so that standard output holds the object alone."""
+    if not wanted:
+        yield
+        return
+    with redirect_stdout(sys.stderr):
+        yield
+
+
+def print_columns(rows: Iterable[Sequence[str]]) -> None:
+    """Print rows with every column but the last padded to its widest cell."""
+    cells = [tuple(row) for row in rows]
+    if not cells:
+        return
+    widths = [max(len(row[i]) for row in cells) for i in range(len(cells[0]) - 1)]
+    for row in cells:
+        padded = [cell.ljust(width) for cell, width in zip(row, [*widths, 0], strict=True)]
+        print("  ".join(padded).rstrip())
+
+
+class ProgressLine:
+    """Where a run stands, on standard error: one line that rewrites itself on a terminal.
+
+    Elsewhere a plain line from time to time, so that a log shows life and stays short.
+
+    Parameters
+    ----------
+    stream
+        Standard error.
+    clock_s
+        A monotonic clock.
+    """
+
+    _TERMINAL_PERIOD_S = 0.1
+    _LOG_PERIOD_S = 10.0
+
+    def __init__(self, stream: TextIO, clock_s: Callable[[], float] = time.monotonic) -> None:
+        self._stream = stream
+        self._clock_s = clock_s
+        self._terminal = stream.isatty() and os.environ.get("TERM") != "dumb"
+        self._period_s = self._TERMINAL_PERIOD_S if self._terminal else self._LOG_PERIOD_S
+        self._next_s = clock_s() + (0.0 if self._terminal else self._period_s)
+        self._drawn = False
+
+    def __call__(self, progress: Progress) -> None:
+        """Show ``progress`` if it is time for it."""
+        now_s = self._clock_s()
+        if now_s < self._next_s:
+            return
+        self._next_s = now_s + self._period_s
+        text = progress_text(progress)
+        self._stream.write(f"\r{text}\x1b[K" if self._terminal else f"{text}\n")
+        self._stream.flush()
+        self._drawn = self._terminal
+
+    def close(self) -> None:
+        """Wipe the line."""
+        if self._drawn:
+            self._stream.write("\r\x1b[K")
+            self._stream.flush()
+            self._drawn = False
+
+
+@contextmanager
+def progress_line(wanted: bool) -> Iterator[Callable[[Progress], None] | None]:
+    """Yield what shows a run's progress, or None; the line is gone afterwards, whatever happened."""
+    if not wanted:
+        yield None
+        return
+    line = ProgressLine(sys.stderr)
+    try:
+        yield line
+    finally:
+        line.close()
+
+
+def progress_text(progress: Progress) -> str:
+    """One line: simulated time, distance to go, position error and sigma."""
+
+    def show(value: float, digits: int) -> str:
+        return f"{value:.{digits}f}" if math.isfinite(value) else "-"
+
+    return (
+        f"t {show(progress.t_s, 1):>6} s   to go {show(progress.distance_to_go_m, 1):>6} m   "
+        f"error {show(progress.position_error_m, 3):>6} m   sigma {show(progress.sigma_m, 3):>6} m"
+    )

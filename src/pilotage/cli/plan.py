@@ -1,0 +1,57 @@
+"""``pilotage plan``: one planning query on a map."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Any
+
+import typer
+
+from pilotage.cli.options import Json, Overrides, Seed
+from pilotage.cli.output import print_columns, print_json, stdout_for_json
+from pilotage.core.errors import InputError
+
+
+def plan(
+    map_: Annotated[str, typer.Argument(metavar="MAP", help="A shipped map's name or a map file.")],
+    start: Annotated[str, typer.Option(metavar="X,Y[,TH]", help="Start in metres and radians.")],
+    goal: Annotated[str, typer.Option(metavar="X,Y[,TH]", help="Goal; without TH any heading will do.")],
+    planner: Annotated[str, typer.Option(help="Registered name of the planner.")] = "rrt-star-dubins",
+    overrides: Overrides = None,
+    seed: Seed = None,
+    json: Json = False,
+) -> int:
+    """Plan a path on a map and say how long it is against the shortest one."""
+    from pilotage.experiments.planning import plan_on_map
+
+    from_, to = parse_pose(start, "--start"), parse_pose(goal, "--goal")
+    with stdout_for_json(json):
+        answer = plan_on_map(map_, from_, to, planner, overrides or (), seed or 0)
+    if json:
+        print_json(answer)
+    else:
+        print_columns((key, _show(value)) for key, value in answer.items() if key != "path")
+    return 0 if answer["success"] else 1
+
+
+def parse_pose(text: str, option: str) -> tuple[float, ...]:
+    """Read ``X,Y`` or ``X,Y,TH``.
+
+    Raises
+    ------
+    InputError
+        If it is not two or three finite numbers.
+    """
+    try:
+        values = tuple(float(part) for part in text.split(","))
+    except ValueError:
+        values = ()
+    if len(values) not in (2, 3) or not all(math.isfinite(value) for value in values):
+        raise InputError(f"{option}: expected X,Y or X,Y,TH in metres and radians, found '{text}'")
+    return values
+
+
+def _show(value: Any) -> str:
+    if isinstance(value, float):
+        return f"{value:.4g}" if math.isfinite(value) else "-"
+    return str(value)

@@ -1,0 +1,52 @@
+"""``pilotage run``: one mission, from its file to its run folder and report."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from pilotage.cli.options import Json, Overrides, Seed
+from pilotage.cli.output import print_json, progress_line, stdout_for_json
+
+
+def run(
+    mission: Annotated[str, typer.Argument(metavar="MISSION|FILE", help="A shipped name or a YAML file.")],
+    seed: Seed = None,
+    overrides: Overrides = None,
+    out: Annotated[Path, typer.Option(help="Folder in which the run's own folder is made.")] = Path("runs"),
+    json: Json = False,
+    report: Annotated[bool, typer.Option(help="Write report.html into the run folder.")] = True,
+    quiet: Annotated[bool, typer.Option("--quiet", help="Show neither progress nor summary.")] = False,
+) -> int:
+    """Run a mission and report on it."""
+    from pilotage.experiments.mission import load_mission
+    from pilotage.experiments.run import run_mission
+
+    with stdout_for_json(json), progress_line(not quiet) as on_progress:
+        result = run_mission(load_mission(mission, overrides or (), seed), out=out, on_progress=on_progress)
+    page = _write_report(result.run_dir, json) if report and result.run_dir is not None else None
+    if json:
+        print_json(result.metrics)
+    elif not quiet:
+        _print_summary(result.metrics, page or result.run_dir)
+    return 0 if result.success else 1
+
+
+def _write_report(run_dir: Path, json: bool) -> Path:
+    from pilotage.report import write_report
+
+    with stdout_for_json(json):
+        return write_report(run_dir)
+
+
+def _print_summary(metrics: dict[str, Any], result_path: Path | None) -> None:
+    from rich.console import Console
+
+    from pilotage.report import summary_table
+
+    Console(file=sys.stdout).print(summary_table(metrics))
+    if result_path is not None:
+        print(f"{'report' if result_path.suffix == '.html' else 'run'}: {result_path}")
