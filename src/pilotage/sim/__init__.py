@@ -1,1 +1,1 @@
-"""TODO"""
+"""The true world: bodies, collisions, and what each sensor would read."""

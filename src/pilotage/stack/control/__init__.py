@@ -1,1 +1,1 @@
-"""TODO"""
+"""Path following, reactions to what is near, and ways out of a trap."""

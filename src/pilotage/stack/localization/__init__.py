@@ -1,1 +1,1 @@
-"""TODO"""
+"""Where the robot is: filters from readings to a belief."""

@@ -1,1 +1,1 @@
-"""TODO"""
+"""What the robot adds to its map while it drives."""

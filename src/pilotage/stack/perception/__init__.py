@@ -1,1 +1,1 @@
-"""TODO"""
+"""From raw readings to what matters: which returns the map does not explain."""

@@ -1,0 +1,20 @@
+"""Chi-square quantiles: every gate and every band is named by its probability."""
+
+from __future__ import annotations
+
+from scipy.special import chdtr, chdtri
+
+
+def chi_square_quantile(probability: float, dof: float) -> float:
+    """Value that a chi-square variable with ``dof`` degrees of freedom stays below with ``probability``."""
+    return float(chdtri(dof, 1.0 - probability))
+
+
+def chi_square_cdf(value: float, dof: float) -> float:
+    """Probability that a chi-square variable with ``dof`` degrees of freedom stays below ``value``."""
+    return float(chdtr(dof, value))
+
+
+def gated_mean(gate: float, dof: float) -> float:
+    """Mean of a chi-square variable given that it passed ``gate``: n F_{n+2}(g) / F_n(g)."""
+    return dof * chi_square_cdf(gate, dof + 2) / chi_square_cdf(gate, dof)

@@ -1,0 +1,51 @@
+"""Odometry: how a pose follows an increment of distance and heading, and how sure the increment is."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+
+import numpy as np
+
+from pilotage.core.types import FloatArray, Pose2
+from pilotage.kernels import motion
+
+
+class OdometryModel(StrEnum):
+    """The exact arc, or the night-watch report's mid-angle model (its eq. 1-3)."""
+
+    EXACT_ARC = "exact-arc"
+    MID_ANGLE = "mid-angle"
+
+
+def move(pose: Pose2, distance_m: float, angle_rad: float, model: OdometryModel) -> Pose2:
+    """Return the pose after driving ``distance_m`` along an arc that turns by ``angle_rad``."""
+    step = motion.exact_arc if model is OdometryModel.EXACT_ARC else motion.mid_angle
+    return Pose2(*step(pose.x_m, pose.y_m, pose.theta_rad, distance_m, angle_rad))
+
+
+def move_jacobians(
+    pose: Pose2, distance_m: float, angle_rad: float, model: OdometryModel
+) -> tuple[FloatArray, FloatArray]:
+    """Return the Jacobians of ``move``: F (3, 3) in the pose, G (3, 2) in distance and angle."""
+    F, G = np.empty((3, 3)), np.empty((3, 2))
+    motion.arc_jacobians(pose.theta_rad, distance_m, angle_rad, model is OdometryModel.EXACT_ARC, F, G)
+    return F, G
+
+
+def increment_variances(
+    distance_m: float,
+    angle_rad: float,
+    distance_var_m2_per_m: float,
+    distance_var_m2_per_rad: float,
+    angle_var_rad2_per_rad: float,
+    angle_var_rad2_per_m: float,
+) -> tuple[float, float]:
+    """Variances of an odometry increment: noise grows with the way driven and the angle turned.
+
+    A random walk's variance adds up, so it is proportional to the distance (m^2) and the angle (rad^2).
+    """
+    way, turn = abs(distance_m), abs(angle_rad)
+    return (
+        distance_var_m2_per_m * way + distance_var_m2_per_rad * turn,
+        angle_var_rad2_per_rad * turn + angle_var_rad2_per_m * way,
+    )

@@ -1,0 +1,24 @@
+"""The role of escape: a way out where turning does not help; and its registry."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Protocol
+
+from pilotage.core.registry import Registry
+from pilotage.core.types import Pose2, Twist
+
+
+class Escape(Protocol):
+    """Gets the robot out of a trap. Built as ``cls(config, knowledge)``."""
+
+    def begin(self, trail: Sequence[Pose2]) -> None:
+        """Start an escape; ``trail`` is the way the robot came by, oldest first."""
+        ...
+
+    def step(self, pose: Pose2) -> Twist | None:
+        """Give the next command, or None when the escape is over."""
+        ...
+
+
+ESCAPES: Registry[Escape] = Registry("escape", "pilotage.stack.control")

@@ -1,0 +1,58 @@
+"""The prediction that every localizer shares: odometry increments and their covariance."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pilotage.core.config import Config
+from pilotage.core.types import FloatArray
+from pilotage.kernels import ekf
+from pilotage.models.odometry import OdometryModel, increment_variances
+from pilotage.sensors.readings import OdometryIncrement
+from pilotage.sensors.sensor import NonNegative, Positive
+from pilotage.sensors.wheel_odometry import WheelOdometryConfig
+
+
+class OdometryNoise(Config):
+    """Noise that the filter believes in; a field left out is taken from the sensor's data sheet."""
+
+    distance_var_m2_per_m: NonNegative | None = None
+    distance_var_m2_per_rad: NonNegative | None = None
+    angle_var_rad2_per_rad: NonNegative | None = None
+    angle_var_rad2_per_m: NonNegative | None = None
+
+
+class OdometryPrediction:
+    """Moves pose and covariance by odometry increments.
+
+    Parameters
+    ----------
+    var_scale
+        Factor on all variances, for experiments with a filter that is wrong about its noise.
+    """
+
+    def __init__(
+        self,
+        sensor: WheelOdometryConfig,
+        believed: OdometryNoise,
+        var_scale: Positive,
+        model: OdometryModel,
+    ) -> None:
+        def pick(own: float | None, sheet: float) -> float:
+            return var_scale * (sheet if own is None else own)
+
+        self._densities = (
+            pick(believed.distance_var_m2_per_m, sensor.distance_var_m2_per_m),
+            pick(believed.distance_var_m2_per_rad, sensor.distance_var_m2_per_rad),
+            pick(believed.angle_var_rad2_per_rad, sensor.angle_var_rad2_per_rad),
+            pick(believed.angle_var_rad2_per_m, sensor.angle_var_rad2_per_m),
+        )
+        self._exact = model is OdometryModel.EXACT_ARC
+        self._Q = np.zeros((2, 2))
+
+    def move(self, pose: FloatArray, cov: FloatArray, odometry: OdometryIncrement) -> None:
+        """Move ``pose`` (3,) and ``cov`` (3, 3) in place."""
+        self._Q[0, 0], self._Q[1, 1] = increment_variances(
+            odometry.distance_m, odometry.angle_rad, *self._densities
+        )
+        ekf.predict(pose, cov, odometry.distance_m, odometry.angle_rad, self._Q, self._exact)

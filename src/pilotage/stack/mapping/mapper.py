@@ -1,0 +1,26 @@
+"""The role: readings and belief in, additions to the robot's map out; and its registry."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+from pilotage.core.registry import Registry
+from pilotage.core.types import FloatArray
+from pilotage.sensors.readings import Readings
+from pilotage.stack.interface import Belief
+
+
+class Mapper(Protocol):
+    """Puts what was seen on the robot's own map. Built as ``cls(config, knowledge)``."""
+
+    @property
+    def circles_m(self) -> FloatArray:
+        """(M, 3) x, y, radius of everything added so far."""
+        ...
+
+    def step(self, readings: Readings, belief: Belief) -> bool:
+        """Take in one step; True where something was added."""
+        ...
+
+
+MAPPERS: Registry[Mapper] = Registry("mapper", "pilotage.stack.mapping")

@@ -1,0 +1,84 @@
+"""The obstacle layer: scan points that the known map does not explain, believed after some hits."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from pydantic import Field
+
+from pilotage.core.config import Config
+from pilotage.core.types import FloatArray
+from pilotage.kernels import unexpected
+from pilotage.maps.distance_field import DistanceField
+from pilotage.sensors.lidar import LidarConfig
+from pilotage.sensors.readings import LidarScan, Readings
+from pilotage.sensors.sensor import Positive
+from pilotage.stack.interface import Belief
+from pilotage.stack.knowledge import Knowledge
+from pilotage.stack.mapping.mapper import MAPPERS
+
+
+class ObstacleLayerConfig(Config):
+    """How near a return must be to count, how far from known walls, and how often it must be seen."""
+
+    reach_m: Positive = 3.0
+    tolerance_m: Positive = 0.15
+    cell_m: Positive = 0.1
+    hits: int = Field(default=3, ge=1, le=1000)
+    sigmas: Positive = 3.0
+    """The tolerance grows with the pose's uncertainty by this many standard deviations."""
+
+
+@MAPPERS.add("obstacle-layer", ObstacleLayerConfig)
+class ObstacleLayer:
+    """Cells of a grid over the known map, each turned into a disc that covers it once it is believed.
+
+    What it learns it keeps: an obstacle that goes away stays on the map. Points within the tolerance of
+    a known wall are taken for the wall, so an obstacle flush with a wall is seen only where it stands out.
+    """
+
+    def __init__(self, config: ObstacleLayerConfig, knowledge: Knowledge) -> None:
+        self._config = config
+        self._lidar, lidar = knowledge.one_sensor(LidarConfig, "obstacle-layer")
+        self._mount = lidar.mount
+        self._first = float(lidar.beam_angles_rad()[0])
+        self._step = lidar.beam_step_rad
+        self._reach_m = min(config.reach_m, lidar.max_range_m)
+        self._known = DistanceField.from_map(knowledge.world_map)
+        xmin, ymin, xmax, ymax = knowledge.world_map.bounds_m
+        shape = (math.ceil((ymax - ymin) / config.cell_m), math.ceil((xmax - xmin) / config.cell_m))
+        self._hits = np.zeros(shape, dtype=np.int64)
+        self._origin = (xmin, ymin)
+        self.circles_m: FloatArray = np.zeros((0, 3))
+
+    def step(self, readings: Readings, belief: Belief) -> bool:
+        """Add the unexplained points of a scan; True where a cell came to be believed."""
+        scan = readings.by_sensor.get(self._lidar)
+        if not isinstance(scan, LidarScan):
+            return False
+        pose, cov, config = belief.pose, belief.cov, self._config
+        c, s = math.cos(pose.theta_rad), math.sin(pose.theta_rad)
+        spread_m = config.sigmas * math.sqrt(max(cov[0, 0], cov[1, 1]))
+        points = unexpected.unexplained_points(
+            scan.ranges_m,
+            pose.x_m + c * self._mount.x_m - s * self._mount.y_m,
+            pose.y_m + s * self._mount.x_m + c * self._mount.y_m,
+            pose.theta_rad + self._mount.theta_rad + self._first,
+            self._step,
+            self._reach_m,
+            config.tolerance_m + spread_m,
+            config.sigmas * math.sqrt(cov[2, 2]),
+            self._known.distance_m,
+            *self._known.origin_xy_m,
+            self._known.resolution_m,
+        )
+        if points.shape[0] == 0:
+            return False
+        centres = unexpected.confirm_cells(points, self._hits, *self._origin, config.cell_m, config.hits)
+        if centres.shape[0] == 0:
+            return False
+        radius = config.cell_m * math.sqrt(0.5)  # the disc around a cell
+        discs = np.column_stack([centres, np.full(centres.shape[0], radius)])
+        self.circles_m = np.concatenate([self.circles_m, discs])
+        return True
