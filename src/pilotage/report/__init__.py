@@ -1,1 +1,52 @@
-"""TODO"""
+"""Figures, tables and pages from saved runs: reads run folders, never live objects.
+
+``import pilotage.report`` is cheap; matplotlib is loaded when a report is written.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+
+def write_report(run_dir: Path) -> Path:
+    """Write ``report.html`` into a run folder: one self-contained page with vector figures.
+
+    Parameters
+    ----------
+    run_dir
+        Folder that a run left behind: ``metrics.json`` and ``trace.parquet`` at least; without the other
+        files the figures that need them are left out, with a word.
+
+    Returns
+    -------
+    The path of the page. An older page is replaced in one go.
+
+    Raises
+    ------
+    InputError
+        One line, where the folder is not a run folder or one of its files is broken.
+    """
+    from pilotage.report.page import write_report as write
+
+    return write(run_dir)
+
+
+def summary_table(metrics: Mapping[str, object]) -> Table:
+    """Return a run's metrics as a table for the terminal: grouped, aligned, in humane units.
+
+    Parameters
+    ----------
+    metrics
+        The run's object, the keys of ``metrics.json``; whatever is missing is left out.
+    """
+    from pilotage.report.terminal import summary_table as table
+
+    return table(metrics)
+
+
+__all__ = ["summary_table", "write_report"]

@@ -1,0 +1,36 @@
+"""How each kind of event is called and drawn, and which of them happened at a place worth marking."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from pilotage.report.style import BLUE, GREEN, INK, MUTED, ORANGE, PURPLE, VERMILLION
+
+
+@dataclass(frozen=True, slots=True)
+class EventKind:
+    """Name in plain words, colour, and whether the map marks where it happened."""
+
+    name: str
+    colour: str
+    on_map: bool
+
+
+_KINDS = {
+    "plan": EventKind("plan", BLUE, False),
+    "replan": EventKind("replan", PURPLE, True),
+    "avoid-start": EventKind("avoidance begins", ORANGE, True),
+    "avoid-end": EventKind("avoidance ends", ORANGE, False),
+    "escape": EventKind("backs out", VERMILLION, True),
+    "hall": EventKind("narrow hall", BLUE, True),
+    "arrived": EventKind("arrived", GREEN, False),
+    "collision": EventKind("collision", VERMILLION, True),
+    "stuck": EventKind("stuck", VERMILLION, True),
+    "failed": EventKind("failed", VERMILLION, True),
+    "obstacle-mapped": EventKind("obstacle mapped", MUTED, False),
+}
+
+
+def event_kind(slug: str) -> EventKind:
+    """Return how to show a kind; one that is not known by name is shown under its own slug."""
+    return _KINDS.get(slug) or EventKind(slug.replace("-", " "), INK, True)

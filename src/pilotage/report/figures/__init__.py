@@ -1,0 +1,1 @@
+"""One file a figure; each takes a run's data and returns an illustration, also for a run without them."""

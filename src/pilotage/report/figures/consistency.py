@@ -1,0 +1,173 @@
+"""Does the filter know how well it knows? NEES, NIS and the beacons they come from."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.ticker import MaxNLocator
+from scipy.special import gammaincinv
+
+from pilotage.core.types import FloatArray
+from pilotage.report import quantities
+from pilotage.report.run_folder import RunData
+from pilotage.report.series import running_mean
+from pilotage.report.style import (
+    BLUE,
+    GREEN,
+    INK,
+    SKY,
+    Illustration,
+    Key,
+    logarithmic,
+    note,
+    render,
+    series,
+    stacked_axes,
+    time_limits,
+)
+
+SLUG = "consistency"
+TITLE = "Consistency: NEES, NIS and beacons"
+PROBABILITY = 0.95
+POSE_DOF = 3
+WINDOW_S = 10.0
+_BAND_BUCKET_S = 1.0
+_PERCENT = f"{100.0 * PROBABILITY:g}\u00a0%"
+
+
+def chi_square_band(
+    dof: FloatArray | float, probability: float = PROBABILITY
+) -> tuple[FloatArray, FloatArray]:
+    """Return the two-sided band that a chi-square variable of ``dof`` degrees keeps with a probability.
+
+    The quantile is that of the gamma distribution, 2 P^-1(dof / 2, p) with P the regularised incomplete
+    gamma function.
+    """
+    half = np.asarray(dof, dtype=np.float64) / 2.0
+    tail = (1.0 - probability) / 2.0
+    low, high = (np.asarray(2.0 * gammaincinv(half, p), dtype=np.float64) for p in (tail, 1.0 - tail))
+    return low, high
+
+
+def consistency_figure(run: RunData) -> Illustration:
+    """Draw NEES and NIS per degree of freedom with their chi-square bands, and the beacons behind them."""
+    trace, t_s = run.trace, run.trace.t_s
+    if not any(trace.has(name) for name in ("nees", "nis", "beacons_seen")):
+        return Illustration(
+            SLUG, TITLE, "", "The run recorded neither NEES nor NIS: nothing was estimated against a truth."
+        )
+    figure, panels = stacked_axes(
+        ["NEES (3 is ideal)", "NIS per degree of freedom (1 is ideal)", "Beacons seen and accepted"],
+        (115.0, 115.0, 70.0),
+    )
+    time_limits(panels, t_s)
+    window = _steps(t_s, WINDOW_S)
+    low, high = chi_square_band(float(POSE_DOF))
+    shares = []
+    nees = trace["nees"]
+    if trace.has("nees"):
+        _statistic(panels[0], t_s, nees, np.full_like(t_s, low), np.full_like(t_s, high), POSE_DOF, window)
+        shares.append(_inside("NEES", nees, np.full_like(t_s, low), np.full_like(t_s, high), run))
+    else:
+        note(panels[0], "not recorded")
+    dof = trace["nis_dof"]
+    if trace.has("nis", "nis_dof"):
+        dof = np.where(dof > 0.0, dof, np.nan)
+        nis = trace["nis"] / dof
+        nis_low, nis_high = (edge / dof for edge in chi_square_band(dof))
+        smooth_low, smooth_high = (edge / _typical(dof, t_s) for edge in chi_square_band(_typical(dof, t_s)))
+        _statistic(panels[1], t_s, nis, smooth_low, smooth_high, 1.0, window)
+        shares.append(_inside("NIS", nis, nis_low, nis_high, run))
+    else:
+        note(panels[1], "not recorded")
+    _beacons(panels[2], run)
+    seen, accepted = np.nansum(trace["beacons_seen"]), np.nansum(trace["beacons_accepted"])
+    refused = (
+        f" The gate let {quantities.count(accepted)} of {quantities.count(seen)} sightings through."
+        if seen > 0
+        else ""
+    )
+    caption = (
+        "NEES weighs the true error with the filter's covariance, NIS each innovation with its own; both "
+        f"axes are logarithmic. The band holds a single step's value with {_PERCENT} probability "
+        f"(chi-square, {POSE_DOF} degrees of freedom for the pose; for NIS two a beacon, the band "
+        "of the usual number in each second). "
+        + ("Inside the band: " + ", ".join(text for text in shares if text) + ". " if any(shares) else "")
+        + f"The dark line is the mean of the last {WINDOW_S:g} s. Above the band the filter is too sure of "
+        f"itself, below it too modest. Neighbouring steps are correlated: one run alone "
+        f"proves little.{refused}"
+    )
+    keys = (
+        Key("each step", SKY),
+        Key(f"mean of {WINDOW_S:g} s", INK),
+        Key("ideal", GREEN, "dash"),
+        Key(f"{_PERCENT} band", GREEN, "band", opacity=0.2),
+        Key("beacons seen", SKY, "band"),
+        Key("accepted", BLUE),
+    )
+    alt = "NEES and NIS over time with their 95 % bands, and the number of beacons seen and accepted"
+    return Illustration(SLUG, TITLE, alt, caption, render(figure, SLUG, alt), keys)
+
+
+def _statistic(
+    axes: Axes,
+    t_s: FloatArray,
+    values: FloatArray,
+    low: FloatArray,
+    high: FloatArray,
+    ideal: float,
+    window: int,
+) -> None:
+    """Draw one statistic with its band, its ideal and its running mean on a logarithmic axis."""
+    floor = ideal / 60.0
+    # Beyond a thousand times the ideal the filter is lost, and how lost is not read off this panel.
+    ceiling = float(np.clip(1.3 * np.nanmax(values), 4.0 * ideal, 1e3 * ideal))
+    logarithmic(axes, floor, ceiling)
+    bucket = max(1, _steps(t_s, _BAND_BUCKET_S))
+    edges = np.append(np.arange(0, len(t_s), bucket), len(t_s) - 1)
+    axes.fill_between(
+        t_s[edges], low[edges], high[edges], color=GREEN, alpha=0.14, linewidth=0.0, step="post"
+    )
+    axes.axhline(ideal, color=GREEN, linewidth=0.9, linestyle=(0, (5, 3)))
+    series(axes, t_s, np.clip(values, floor, None), SKY, linewidth=0.5)
+    series(axes, t_s, running_mean(values, window), INK, linewidth=1.2)
+
+
+def _beacons(axes: Axes, run: RunData) -> None:
+    trace, t_s = run.trace, run.trace.t_s
+    if not trace.has("beacons_seen"):
+        note(axes, "not recorded")
+        return
+    seen = trace["beacons_seen"]
+    axes.set_ylim(0.0, float(np.nanmax(seen)) + 1.0)
+    axes.yaxis.set_major_locator(MaxNLocator(4, integer=True))
+    bucket = max(1, len(t_s) // 1000)
+    axes.fill_between(t_s[::bucket], 0.0, seen[::bucket], color=SKY, alpha=0.35, linewidth=0.0, step="mid")
+    series(axes, t_s, trace["beacons_accepted"], BLUE, linewidth=0.7, drawstyle="steps-mid")
+
+
+def _steps(t_s: FloatArray, duration_s: float) -> int:
+    """How many steps a duration has."""
+    if len(t_s) < 2:
+        return 1
+    return max(1, round(duration_s / max(float(np.median(np.diff(t_s))), 1e-6)))
+
+
+def _typical(dof: FloatArray, t_s: FloatArray) -> FloatArray:
+    """The median degrees of freedom of each second: a band that follows every step would be a smear."""
+    bucket = _steps(t_s, _BAND_BUCKET_S)
+    typical = np.full_like(dof, np.nan)
+    for first in range(0, len(dof), bucket):
+        part = dof[first : first + bucket]
+        part = part[np.isfinite(part)]
+        if part.size:
+            typical[first : first + bucket] = np.median(part)
+    return typical
+
+
+def _inside(name: str, values: FloatArray, low: FloatArray, high: FloatArray, run: RunData) -> str:
+    known = run.settled() & np.isfinite(values) & np.isfinite(low)
+    if not bool(known.any()):
+        return ""
+    within = (values[known] >= low[known]) & (values[known] <= high[known])
+    return f"{name} {quantities.share(float(np.mean(within)))} of the steps"

@@ -1,0 +1,54 @@
+"""The answer in one sentence: did it work, how long did it take, how well did the robot know where it was."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+from pilotage.report import quantities
+from pilotage.report.run_folder import number
+
+
+def outcome(metrics: Mapping[str, Any]) -> bool | None:
+    """Return whether the task succeeded; None where the run does not say."""
+    success = metrics.get("success")
+    return success if isinstance(success, bool) else None
+
+
+def headline(metrics: Mapping[str, Any]) -> str:
+    """Return one sentence with the run's answer and its main numbers, those that there are."""
+    success = outcome(metrics)
+    duration = number(metrics.get("duration_s"))
+    after = f" after {quantities.duration(duration)}" if math.isfinite(duration) else ""
+    if success is None:
+        answer = f"Ended{after}"
+    elif success:
+        goal = number(metrics.get("goal_error_m"))
+        where = "Reached the goal" if math.isfinite(goal) else "Done"
+        answer = f"{where}{after}"
+        collisions = number(metrics.get("collisions"))
+        if collisions == 0.0:
+            answer += " without a collision"
+        elif collisions > 0.0:
+            answer += f" with {quantities.count(collisions)} collision{'s' if collisions > 1 else ''}"
+    else:
+        reason = str(metrics.get("reason") or "no reason given").strip().rstrip(".")
+        answer = f"Failed{after}: {reason}"
+    details = []
+    rmse, worst = number(metrics.get("position_rmse_m")), number(metrics.get("position_max_m"))
+    if math.isfinite(rmse):
+        text = f"position known to {quantities.length(rmse)} (RMSE)"
+        details.append(text + (f", at worst {quantities.length(worst)} off" if math.isfinite(worst) else ""))
+    driven, planned = number(metrics.get("path_length_m")), number(metrics.get("planned_length_m"))
+    shortest = number(metrics.get("shortest_length_m"))
+    if math.isfinite(driven):
+        text = f"{quantities.length(driven)} driven"
+        if math.isfinite(planned) and shortest > 0.0:
+            text += (
+                f" on a plan of {quantities.length(planned)}, "
+                f"{quantities.significant(planned / shortest, 4)} times the shortest possible path "
+                f"of {quantities.length(shortest)}"
+            )
+        details.append(text)
+    return f"{answer}; {'; '.join(details)}." if details else f"{answer}."

@@ -1,0 +1,256 @@
+"""What each metric is called, how it is written and what it means in plain words.
+
+The page and the terminal show the same catalogue; a metric that is not in it is shown under its own name.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from pilotage.report import quantities
+from pilotage.report.run_folder import number
+
+Write = Callable[[float], str]
+
+NOT_MEASURES = frozenset({"mission", "seed", "success", "reason", "run_dir", "name"})
+"""Keys that identify a run or tell its outcome; they stand above the table, not in it."""
+
+
+@dataclass(frozen=True, slots=True)
+class Metric:
+    """One metric of the catalogue."""
+
+    key: str
+    name: str
+    write: Write
+    meaning: str
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """One metric of a run, as it is shown."""
+
+    key: str
+    name: str
+    value: str
+    meaning: str
+    band: str = ""
+
+
+def _plain(value: float) -> str:
+    return quantities.significant(value, 3)
+
+
+def _rate(value: float) -> str:
+    return f"{quantities.count(value)} / s" if math.isfinite(value) else quantities.NOTHING
+
+
+GROUPS: tuple[tuple[str, tuple[Metric, ...]], ...] = (
+    (
+        "Run",
+        (
+            Metric("duration_s", "duration", quantities.duration, "Simulated time from start to end."),
+            Metric("path_length_m", "way driven", quantities.length, "Length of the true path."),
+            Metric(
+                "distance_to_goal_m",
+                "left to the goal",
+                quantities.length,
+                "Distance that was still to go at the end.",
+            ),
+            Metric(
+                "goal_error_m", "goal missed by", quantities.length, "Distance of the true end from the goal."
+            ),
+            Metric(
+                "attempts", "avoidance attempts", quantities.count, "How often an avoidance had to begin."
+            ),
+            Metric("replans", "replans", quantities.count, "New global plans after the first."),
+            Metric("collisions", "collisions", quantities.count, "Contacts of the body with anything solid."),
+            Metric(
+                "min_clearance_m",
+                "least clearance",
+                quantities.length,
+                "Closest that the edge of the body came to anything solid.",
+            ),
+        ),
+    ),
+    (
+        "Localization",
+        (
+            Metric(
+                "position_rmse_m",
+                "position error, RMSE",
+                quantities.length,
+                "Root mean square distance between estimated and true position, after the start phase.",
+            ),
+            Metric(
+                "position_max_m",
+                "position error, worst",
+                quantities.length,
+                "The worst single step after the start phase.",
+            ),
+            Metric(
+                "heading_rmse_rad",
+                "heading error, RMSE",
+                quantities.angle,
+                "Root mean square error of the heading.",
+            ),
+            Metric(
+                "final_error_x_m",
+                "error at the end, x",
+                quantities.length,
+                "Estimate minus truth at the last step.",
+            ),
+            Metric("final_error_y_m", "error at the end, y", quantities.length, "Likewise, across."),
+            Metric(
+                "final_error_theta_rad",
+                "error at the end, heading",
+                quantities.angle,
+                "Likewise, of the heading.",
+            ),
+            Metric(
+                "accepted_fraction",
+                "sightings accepted",
+                quantities.share,
+                "Share of the beacon sightings that passed the filter's gate.",
+            ),
+        ),
+    ),
+    (
+        "Consistency",
+        (
+            Metric(
+                "nees_mean",
+                "NEES, mean",
+                _plain,
+                "Squared true error weighed by the filter's covariance; 3 is ideal, more is overconfident.",
+            ),
+            Metric(
+                "nis_mean",
+                "NIS a degree of freedom, mean",
+                _plain,
+                "Squared innovation weighed by its own covariance, corrected for the gate; 1 is ideal.",
+            ),
+        ),
+    ),
+    (
+        "Planning",
+        (
+            Metric(
+                "planned_length_m", "planned path", quantities.length, "Length of the first planned path."
+            ),
+            Metric(
+                "shortest_length_m",
+                "shortest possible path",
+                quantities.length,
+                "Exact shortest path at the same clearance, from a visibility graph.",
+            ),
+            Metric("planned_over_shortest", "planned over shortest", _plain, "1 cannot be beaten."),
+            Metric("planning_time_s", "planning time", quantities.duration, "Wall time of the first plan."),
+            Metric(
+                "first_solution_s",
+                "first solution after",
+                quantities.duration,
+                "Wall time until some path was known.",
+            ),
+            Metric("expansions", "expansions", quantities.count, "Nodes that the search opened."),
+            Metric("path_nodes", "nodes of the path", quantities.count, "Cells or nodes on the path found."),
+            Metric("path_cost", "cost of the path", _plain, "In the planner's own unit."),
+        ),
+    ),
+    (
+        "Exploration",
+        (
+            Metric("coverage_visited", "visited, of all cells", quantities.share, "Cells the body stood on."),
+            Metric(
+                "coverage_reachable",
+                "visited, of the reachable",
+                quantities.share,
+                "Of the cells that the body can stand on.",
+            ),
+            Metric(
+                "visited_accuracy",
+                "visited cells right",
+                quantities.share,
+                "Cells rightly marked as visited.",
+            ),
+            Metric(
+                "feature_precision", "features right", quantities.share, "Of the features on the robot's map."
+            ),
+            Metric("feature_recall", "features found", quantities.share, "Of the features that are there."),
+            Metric("free_accuracy", "free cells right", quantities.share, "Of the cells marked as free."),
+            Metric("explored_accuracy", "explored cells right", quantities.share, "Of all explored cells."),
+        ),
+    ),
+    (
+        "Computing",
+        (
+            Metric("steps", "control steps", quantities.count, "Steps of the closed loop."),
+            Metric("wall_time_s", "wall time", quantities.duration, "What the run took on this machine."),
+            Metric("steps_per_s", "speed", _rate, "Control steps a second, planning apart."),
+        ),
+    ),
+)
+
+_BANDED = {"nees_mean": ("nees_low", "nees_high"), "nis_mean": ("nis_low", "nis_high")}
+_FOLDED = frozenset({"final_error"} | {key for pair in _BANDED.values() for key in pair})
+
+
+def metric_rows(metrics: Mapping[str, Any]) -> list[tuple[str, list[Row]]]:
+    """Return the metrics of a run by group, without what the run does not have.
+
+    Parameters
+    ----------
+    metrics
+        The run's object; None and NaN are left out, keys that are not in the catalogue come last.
+    """
+    values = _flatten(metrics)
+    groups = []
+    known = set()
+    for title, catalogue in GROUPS:
+        rows = []
+        for metric in catalogue:
+            known.add(metric.key)
+            value = values.get(metric.key, math.nan)
+            if math.isfinite(value):
+                rows.append(
+                    Row(
+                        metric.key,
+                        metric.name,
+                        metric.write(value),
+                        metric.meaning,
+                        _band(metric.key, values),
+                    )
+                )
+        if rows:
+            groups.append((title, rows))
+    others = [
+        Row(key, key.replace("_", " "), quantities.significant(value, 4), "")
+        for key, value in values.items()
+        if key not in known | _FOLDED | NOT_MEASURES and math.isfinite(value)
+    ]
+    return [*groups, ("Further", others)] if others else groups
+
+
+def _flatten(metrics: Mapping[str, Any]) -> dict[str, float]:
+    """Return all numbers by one level of names, with the ratio that everybody asks for."""
+    values = {}
+    for key, value in metrics.items():
+        if isinstance(value, Mapping):
+            values.update({f"{key}_{inner}": number(part) for inner, part in value.items()})
+        else:
+            values[key] = number(value)
+    planned, shortest = values.get("planned_length_m", math.nan), values.get("shortest_length_m", math.nan)
+    if shortest > 0.0:
+        values["planned_over_shortest"] = planned / shortest
+    return values
+
+
+def _band(key: str, values: Mapping[str, float]) -> str:
+    low_key, high_key = _BANDED.get(key, ("", ""))
+    low, high = values.get(low_key, math.nan), values.get(high_key, math.nan)
+    if not (math.isfinite(low) and math.isfinite(high)):
+        return ""
+    return f"{_plain(low)} to {_plain(high)}"

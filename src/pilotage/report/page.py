@@ -1,0 +1,151 @@
+"""Puts a run's report together: one page, self-contained, no outside requests."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Callable
+from pathlib import Path
+
+from pilotage.report import quantities
+from pilotage.report.figures.clearance import clearance_figure
+from pilotage.report.figures.close_ups import close_ups_figure
+from pilotage.report.figures.consistency import consistency_figure
+from pilotage.report.figures.control import control_figure
+from pilotage.report.figures.covariance import covariance_figure
+from pilotage.report.figures.map import map_figure
+from pilotage.report.figures.pose_error import pose_error_figure
+from pilotage.report.figures.timeline import timeline_figure
+from pilotage.report.figures.ultrasonic import ultrasonic_figure
+from pilotage.report.headline import headline, outcome
+from pilotage.report.markup import (
+    contents,
+    document,
+    escape,
+    events_section,
+    figure_section,
+    layer_rules,
+    metrics_section,
+    tiles,
+)
+from pilotage.report.metrics_table import metric_rows
+from pilotage.report.run_folder import RunData, number, read_run
+from pilotage.report.style import Illustration, drawing_style
+
+REPORT_FILE = "report.html"
+
+FIGURES: tuple[Callable[[RunData], Illustration], ...] = (
+    map_figure,
+    close_ups_figure,
+    timeline_figure,
+    pose_error_figure,
+    covariance_figure,
+    consistency_figure,
+    control_figure,
+    ultrasonic_figure,
+    clearance_figure,
+)
+_LONGEST_MISSION = 100_000
+
+
+def write_report(run_dir: Path) -> Path:
+    """Write ``report.html`` into a run folder and return its path; see ``pilotage.report``."""
+    page = run_page(read_run(run_dir))
+    path = run_dir / REPORT_FILE
+    # Written beside and renamed: a reader never sees half a page.
+    beside = path.with_name(f".{path.name}.{os.getpid()}")
+    try:
+        beside.write_text(page, encoding="utf-8")
+        beside.replace(path)
+    finally:
+        beside.unlink(missing_ok=True)
+    return path
+
+
+def run_page(run: RunData) -> str:
+    """Return the report of a run as HTML."""
+    with drawing_style():
+        figures = [draw(run) for draw in FIGURES]
+    sections: list[str] = []
+    entries: list[tuple[str, str]] = []
+    drawn = 0
+    for figure in figures:
+        drawn += bool(figure.svg)
+        sections.append(figure_section(drawn, figure))
+        entries.append((figure.slug, figure.title))
+        # What happened explains the map and the numbers; the numbers come before their curves.
+        if figure.slug == "timeline":
+            sections += [events_section(run.events), metrics_section(metric_rows(run.metrics))]
+            entries += [("events", "Events"), ("metrics", "Numbers")]
+    if run.mission_text:
+        sections.append(_mission_section(run.mission_text))
+        entries.append(("mission", "The mission as it ran"))
+    description = str(run.mission.get("description") or "")
+    return document(
+        title=escape(f"{run.name}: run report"),
+        layers="".join(layer_rules(figure) for figure in figures),
+        eyebrow=_eyebrow(run),
+        heading=escape(run.name),
+        description=f'<p class="description">{escape(description)}</p>' if description else "",
+        outcome=_outcome(run),
+        headline=escape(headline(run.metrics)),
+        tiles=tiles(_tiles(run)),
+        contents=contents(entries),
+        body="\n".join(sections),
+        footer=escape(
+            f"Made by pilotage from the run folder {run.run_dir.name}. Angles are counter-clockwise; "
+            "true values come from the simulator, the robot never sees them."
+        ),
+    )
+
+
+def _eyebrow(run: RunData) -> str:
+    parts = ["pilotage run report"]
+    if run.metrics.get("seed") is not None:
+        parts.append(f"seed {run.metrics['seed']}")
+    parts.append(f"{quantities.count(run.trace.steps)} steps")
+    return escape(" · ".join(parts))
+
+
+def _outcome(run: RunData) -> str:
+    success = outcome(run.metrics)
+    look, text = {True: ("good", "✓ success"), False: ("bad", "✗ failed"), None: ("", "outcome not said")}[
+        success
+    ]
+    return f'<span class="outcome {look}">{text}</span>'
+
+
+def _tiles(run: RunData) -> list[tuple[str, str]]:
+    """Return the handful of numbers that most readers came for."""
+    values = {key: number(value) for key, value in run.metrics.items()}
+
+    def value(key: str) -> float:
+        return values.get(key, math.nan)
+
+    planned, shortest = value("planned_length_m"), value("shortest_length_m")
+    ratio = planned / shortest if shortest > 0.0 else math.nan
+    entries = (
+        ("duration", value("duration_s"), quantities.duration),
+        ("position RMSE", value("position_rmse_m"), quantities.length),
+        ("worst position error", value("position_max_m"), quantities.length),
+        ("heading RMSE", value("heading_rmse_rad"), quantities.angle),
+        ("plan over shortest", ratio, lambda x: f"{x:.3f} ×"),
+        ("least clearance", value("min_clearance_m"), quantities.length),
+        ("NEES (ideal 3)", value("nees_mean"), lambda x: f"{x:.2f}"),
+        ("collisions", value("collisions"), quantities.count),
+    )
+    return [(name, write(x)) for name, x, write in entries if math.isfinite(x)]
+
+
+def _mission_section(text: str) -> str:
+    shown = (
+        text
+        if len(text) <= _LONGEST_MISSION
+        else text[:_LONGEST_MISSION] + "\n# ... the rest is in mission.yaml"
+    )
+    return (
+        '<section id="mission"><h2><a href="#mission">The mission as it ran</a></h2>'
+        "<p>The run folder&#x27;s <code>mission.yaml</code> holds everything that is needed to run it again: "
+        "<code>pilotage run mission.yaml</code>.</p>"
+        f"<details><summary>Show it</summary><pre>{escape(shown)}</pre></details></section>"
+    )

@@ -1,0 +1,53 @@
+"""Numbers as one says them: millimetres where metres would be all zeros, minutes where seconds run on."""
+
+from __future__ import annotations
+
+import math
+
+NOTHING = "–"
+
+
+def significant(value: float, digits: int = 3) -> str:
+    """Write a number with so many significant digits, never in powers of ten, with thousands apart."""
+    if not math.isfinite(value):
+        return NOTHING
+    if value == 0.0:
+        return "0"
+    decimals = max(0, digits - 1 - math.floor(math.log10(abs(value))))
+    return f"{value:,.{decimals}f}".replace(",", "\u202f").replace("-", "−")
+
+
+def length(value_m: float) -> str:
+    """Write a length in mm below 0.1 m, in m from there."""
+    if not math.isfinite(value_m):
+        return NOTHING
+    if abs(value_m) < 0.1:
+        return f"{significant(1000.0 * value_m)}\u00a0mm"
+    return f"{value_m:.2f}\u00a0m".replace("-", "−")
+
+
+def angle(value_rad: float) -> str:
+    """Write an angle in degrees."""
+    return f"{significant(math.degrees(value_rad))}°" if math.isfinite(value_rad) else NOTHING
+
+
+def duration(value_s: float) -> str:
+    """Write a duration in ms, in s, or from two minutes on in minutes and seconds."""
+    if not math.isfinite(value_s):
+        return NOTHING
+    if 0.0 < abs(value_s) < 0.1:
+        return f"{significant(1000.0 * value_s)}\u00a0ms"
+    if abs(value_s) < 120.0:
+        return f"{value_s:.2f}\u00a0s" if abs(value_s) < 10.0 else f"{value_s:.1f}\u00a0s"
+    minutes, seconds = divmod(round(value_s), 60)
+    return f"{minutes}\u00a0min {seconds:02d}\u00a0s"
+
+
+def share(value: float) -> str:
+    """Write a share of one in percent."""
+    return f"{100.0 * value:.1f}\u00a0%" if math.isfinite(value) else NOTHING
+
+
+def count(value: float) -> str:
+    """Write a whole number."""
+    return f"{round(value):,}".replace(",", "\u202f") if math.isfinite(value) else NOTHING
