@@ -1,0 +1,397 @@
+"""The command line: exit codes, one-line errors, JSON purity, the nearest right name, Ctrl-C."""
+
+from __future__ import annotations
+
+import errno
+import io
+import json
+import math
+import os
+import subprocess
+import sys
+import types
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from pilotage import __version__
+from pilotage.cli.main import main
+from pilotage.cli.output import ProgressLine, plain, progress_line, progress_text
+from pilotage.cli.plan import parse_pose
+from pilotage.core.errors import InputError
+
+
+@dataclass(frozen=True)
+class Progress:
+    t_s: float
+    distance_to_go_m: float
+    position_error_m: float
+    sigma_m: float
+
+
+@dataclass
+class Lab:
+    """Stands in for the rooms that the command line calls; remembers what it was asked."""
+
+    metrics: dict[str, Any] = field(default_factory=lambda: {"mission": "museum-1", "nees_mean": math.nan})
+    success: bool = True
+    error: BaseException | None = None
+    asked: dict[str, Any] = field(default_factory=dict)
+    run_dir: Path = Path("runs/museum-1-0-abc")
+
+    def load_mission(self, name: str, overrides: Sequence[str] = (), seed: int | None = None) -> str:
+        self.asked |= {"name": name, "overrides": list(overrides), "seed": seed}
+        return name
+
+    def run_mission(
+        self, mission: str, *, out: Path | None = None, on_progress: Callable[[Any], None] | None = None
+    ) -> types.SimpleNamespace:
+        self.asked |= {"mission": mission, "out": out, "shows_progress": on_progress is not None}
+        sys.stdout.write("a library talks\n")
+        if on_progress is not None:
+            on_progress(Progress(0.1, 66.0, 0.01, 0.02))
+        if self.error is not None:
+            raise self.error
+        return types.SimpleNamespace(metrics=self.metrics, success=self.success, run_dir=self.run_dir)
+
+    def write_report(self, run_dir: Path) -> Path:
+        self.asked["reported"] = run_dir
+        sys.stdout.write("a library talks\n")
+        return run_dir / "report.html"
+
+    def plan_on_map(self, *query: Any) -> dict[str, Any]:
+        self.asked["query"] = query
+        return {
+            "success": self.success,
+            "planned_length_m": 24.5,
+            "first_solution_s": math.nan,
+            "path": [[1]],
+        }
+
+
+@pytest.fixture
+def lab(monkeypatch: pytest.MonkeyPatch) -> Lab:
+    """Put a stand-in behind the commands."""
+    lab = Lab()
+
+    def module(name: str, **functions: Any) -> None:
+        stand_in = types.ModuleType(name)
+        vars(stand_in).update(functions)
+        monkeypatch.setitem(sys.modules, name, stand_in)
+
+    module("pilotage.experiments.mission", load_mission=lab.load_mission)
+    module("pilotage.experiments.run", run_mission=lab.run_mission)
+    module("pilotage.experiments.planning", plan_on_map=lab.plan_on_map)
+    module(
+        "pilotage.experiments.catalogue",
+        missions=lambda: [("museum-1", "the night watch"), ("museum-hall", "a corridor")],
+        components=lambda name: [("gate", "float", "0.99")] if name else [("planner", "a-star", "a grid")],
+        mission_schema=lambda: {"title": "Mission"},
+    )
+    module("pilotage.report", write_report=lab.write_report, summary_table=lambda metrics: str(metrics))
+    return lab
+
+
+@dataclass
+class Answer:
+    code: int
+    out: str
+    err: str
+
+
+@pytest.fixture
+def pilotage(capsys: pytest.CaptureFixture[str]) -> Callable[..., Answer]:
+    """Call the command line in this process."""
+
+    def call(*words: str) -> Answer:
+        code = main(words)
+        return Answer(code, *capsys.readouterr())
+
+    return call
+
+
+Call = Callable[..., Answer]
+
+
+# run
+
+
+def test_a_run_prints_its_summary_and_names_its_report(lab: Lab, pilotage: Call) -> None:
+    answer = pilotage("run", "museum-1")
+    assert answer.code == 0
+    assert "museum-1" in answer.out
+    assert answer.out.splitlines()[-1] == "report: runs/museum-1-0-abc/report.html"
+    assert lab.asked["seed"] is None
+    assert lab.asked["out"] == Path("runs")
+
+
+def test_a_run_passes_on_what_it_was_told(lab: Lab, pilotage: Call) -> None:
+    words = ["--seed", "7", "--set", "a.b=1", "--set", "c=2", "--out", "else where"]
+    assert pilotage("run", "x.yaml", *words).code == 0
+    assert lab.asked["name"] == lab.asked["mission"] == "x.yaml"
+    assert lab.asked["overrides"] == ["a.b=1", "c=2"]
+    assert lab.asked["seed"] == 7
+    assert lab.asked["out"] == Path("else where")
+
+
+@pytest.mark.usefixtures("lab")
+def test_json_is_one_object_alone_on_standard_output(pilotage: Call) -> None:
+    answer = pilotage("run", "museum-1", "--json")
+    assert answer.code == 0
+    assert json.loads(answer.out) == {"mission": "museum-1", "nees_mean": None}
+    assert answer.out.count("\n") == 1
+    assert "a library talks" in answer.err
+
+
+@pytest.mark.parametrize("options", [(), ("--json",), ("--quiet",)])
+def test_a_failure_in_the_field_is_exit_code_1(lab: Lab, pilotage: Call, options: tuple[str, ...]) -> None:
+    lab.success = False
+    assert pilotage("run", "museum-1", *options).code == 1
+
+
+def test_without_a_report_the_run_folder_is_named(lab: Lab, pilotage: Call) -> None:
+    answer = pilotage("run", "museum-1", "--no-report")
+    assert answer.out.splitlines()[-1] == "run: runs/museum-1-0-abc"
+    assert "reported" not in lab.asked
+
+
+def test_quiet_shows_no_summary_and_no_progress(lab: Lab, pilotage: Call) -> None:
+    answer = pilotage("run", "museum-1", "--quiet")
+    assert answer.out.replace("a library talks\n", "") == ""
+    assert not lab.asked["shows_progress"]
+
+
+# What goes wrong
+
+
+@pytest.mark.parametrize("options", [(), ("--json",)])
+@pytest.mark.parametrize(
+    ("error", "code", "line"),
+    [
+        (InputError("unknown mission 'x';\n did you mean 'y'?"), 2, "unknown mission 'x'; did you mean 'y'?"),
+        (PermissionError(errno.EACCES, "Permission denied", "runs/a"), 2, "runs/a: Permission denied"),
+        (OSError(errno.ENOSPC, "No space left on device"), 2, "No space left on device"),
+        (OSError("odd"), 2, "odd"),
+        (KeyboardInterrupt(), 130, "interrupted"),
+    ],
+)
+def test_what_the_user_can_mend_is_one_line(
+    lab: Lab, pilotage: Call, error: BaseException, code: int, line: str, options: tuple[str, ...]
+) -> None:
+    lab.error = error
+    answer = pilotage("run", "museum-1", *options)
+    assert answer.code == code
+    assert answer.err.replace("a library talks\n", "") == f"pilotage: {line}\n"
+    assert answer.out.replace("a library talks\n", "") == ""
+
+
+def test_a_bug_keeps_its_traceback_and_is_no_failure_in_the_field(lab: Lab, pilotage: Call) -> None:
+    lab.error = ZeroDivisionError("float division by zero")
+    answer = pilotage("run", "museum-1", "--json")
+    assert answer.code == 70
+    assert "Traceback" in answer.err
+    assert "bug in pilotage" in answer.err.splitlines()[-1]
+    assert answer.out == ""
+
+
+@pytest.mark.usefixtures("lab")
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (["rum", "museum-1"], ["'rum'", "'run'"]),
+        (["zzz"], ["'zzz'", "pilotage --help"]),
+        (["run"], ["missing", "MISSION", "pilotage run --help"]),
+        (["run", "museum-1", "--sed", "3"], ["--sed", "--seed"]),
+        (["--versoin"], ["--versoin", "--version"]),
+        (["run", "museum-1", "--seed", "three"], ["--seed", "whole number", "'three'"]),
+        (["run", "museum-1", "--seed", "-1"], ["--seed", ">= 0", "'-1'"]),
+        (["run", "museum-1", "--seed", "1.5"], ["--seed", "'1.5'"]),
+        (["run", "museum-1", "--seed"], ["--seed"]),
+        (["run", "museum-1", "museum-2"], ["museum-2"]),
+        (["plan", "museum", "--start", "1,1"], ["missing", "--goal"]),
+        (["plan", "museum", "--start", "1;1", "--goal", "2,2"], ["--start", "X,Y", "'1;1'"]),
+        (["plan", "museum", "--start", "1,1", "--goal", "nan,2"], ["--goal", "X,Y", "'nan,2'"]),
+    ],
+)
+def test_wrong_usage_is_one_line_that_names_the_right_one(
+    pilotage: Call, words: list[str], told: list[str]
+) -> None:
+    answer = pilotage(*words)
+    assert answer.code == 2
+    assert answer.out == ""
+    assert answer.err.startswith("pilotage: ")
+    assert answer.err.count("\n") == 1
+    for part in told:
+        assert part in answer.err
+
+
+# The other commands
+
+
+def test_plan_hands_its_query_on(lab: Lab, pilotage: Call) -> None:
+    answer = pilotage("plan", "museum", "--start", "1,1,0", "--goal", "-2,2.5", "--set", "a=1", "--json")
+    assert answer.code == 0
+    assert json.loads(answer.out)["first_solution_s"] is None
+    assert lab.asked["query"] == ("museum", (1.0, 1.0, 0.0), (-2.0, 2.5), "rrt-star-dubins", ["a=1"], 0)
+
+
+def test_plan_without_a_path_is_exit_code_1(lab: Lab, pilotage: Call) -> None:
+    lab.success = False
+    answer = pilotage("plan", "museum", "--start", "1,1", "--goal", "2,2")
+    assert answer.code == 1
+    assert "planned_length_m  24.5" in answer.out
+    assert "first_solution_s  -" in answer.out
+
+
+@pytest.mark.usefixtures("lab")
+def test_the_lists_are_printed(pilotage: Call) -> None:
+    assert pilotage("missions").out == "museum-1     the night watch\nmuseum-hall  a corridor\n"
+    assert json.loads(pilotage("missions", "--json").out)["museum-hall"] == "a corridor"
+    assert pilotage("components").out == "planner  a-star  a grid\n"
+    assert pilotage("components", "ekf").out == "gate  float  0.99\n"
+    assert json.loads(pilotage("schema").out) == {"title": "Mission"}
+
+
+def test_report_writes_a_page_and_names_it(lab: Lab, pilotage: Call) -> None:
+    answer = pilotage("report", "runs/x")
+    assert answer.out.splitlines()[-1] == "runs/x/report.html"
+    assert lab.asked["reported"] == Path("runs/x")
+
+
+def test_version_and_help(pilotage: Call) -> None:
+    assert pilotage("--version") == Answer(0, f"pilotage {__version__}\n", "")
+    bare, asked = pilotage(), pilotage("--help")
+    assert bare == asked
+    assert asked.code == 0
+    assert "Exit codes" in asked.out
+
+
+@pytest.mark.parametrize("command", ["run", "plan", "report", "missions", "components", "schema"])
+def test_every_command_has_help(pilotage: Call, command: str) -> None:
+    answer = pilotage(command, "--help")
+    assert answer.code == 0
+    assert f"pilotage {command}" in answer.out
+
+
+# Parts
+
+
+@pytest.mark.parametrize(
+    ("text", "values"), [("1,2", (1.0, 2.0)), ("-1, 2.5 ,-3.1", (-1.0, 2.5, -3.1)), ("1e1,0", (10.0, 0.0))]
+)
+def test_a_pose_is_read(text: str, values: tuple[float, ...]) -> None:
+    assert parse_pose(text, "--start") == values
+
+
+@pytest.mark.parametrize("text", ["", "1", "1,2,3,4", "a,b", "1,,2", "inf,0", "1,nan"])
+def test_what_is_no_pose_is_refused(text: str) -> None:
+    with pytest.raises(InputError, match="--start: expected X,Y or X,Y,TH"):
+        parse_pose(text, "--start")
+
+
+def test_plain_values_are_json() -> None:
+    value = {
+        1: np.float64(2.0),
+        "nan": np.float64(math.nan),
+        "inf": [math.inf, -math.inf, 0.5],
+        "array": np.array([[1.0, math.nan]]),
+        "flag": np.bool_(True),
+        "count": np.int64(3),
+        "path": Path("a/b"),
+        "none": None,
+        "true": True,
+    }
+    assert plain(value) == {
+        "1": 2.0,
+        "nan": None,
+        "inf": [None, None, 0.5],
+        "array": [[1.0, None]],
+        "flag": True,
+        "count": 3,
+        "path": "a/b",
+        "none": None,
+        "true": True,
+    }
+
+
+class Terminal(io.StringIO):
+    def isatty(self) -> bool:
+        return True
+
+
+class Clock:
+    now_s = 0.0
+
+    def __call__(self) -> float:
+        return self.now_s
+
+
+def test_progress_tells_time_distance_error_and_sigma() -> None:
+    text = progress_text(Progress(12.34, 45.6, 0.0123, math.nan))
+    assert " ".join(text.split()) == "t 12.3 s to go 45.6 m error 0.012 m sigma - m"
+
+
+def test_on_a_terminal_one_line_rewrites_itself_and_is_wiped(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("TERM", "xterm")
+    stream, clock = Terminal(), Clock()
+    line = ProgressLine(stream, clock)
+    for clock.now_s in np.linspace(0.0, 1.0, 101):
+        line(Progress(1.0, 2.0, 3.0, 4.0))
+    line.close()
+    assert 9 <= stream.getvalue().count("\rt ") <= 11
+    assert "\n" not in stream.getvalue()
+    assert stream.getvalue().endswith("\r\x1b[K")
+
+
+def test_elsewhere_a_plain_line_comes_now_and_then() -> None:
+    stream, clock = io.StringIO(), Clock()
+    line = ProgressLine(stream, clock)
+    for clock.now_s in np.linspace(0.0, 25.0, 251):
+        line(Progress(1.0, 2.0, 3.0, 4.0))
+    line.close()
+    assert stream.getvalue().count("\n") == 2
+    assert "\r" not in stream.getvalue()
+
+
+def test_the_line_is_wiped_also_when_the_run_breaks_off(monkeypatch: pytest.MonkeyPatch) -> None:
+    terminal = Terminal()
+    monkeypatch.setattr(sys, "stderr", terminal)
+    monkeypatch.setenv("TERM", "xterm")
+
+    def broken_run() -> None:
+        with progress_line(True) as show:
+            assert show is not None
+            show(Progress(1.0, 2.0, 3.0, 4.0))
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        broken_run()
+    assert terminal.getvalue().endswith("\r\x1b[K")
+
+
+# The process
+
+
+def test_help_imports_nothing_heavy() -> None:
+    script = """
+import sys
+from pilotage.cli.main import main
+code = main(["--help"]) or main(["run", "--help"])
+heavy = {"numba", "numpy", "scipy", "matplotlib", "pyarrow", "rich", "yaml"} & set(sys.modules)
+sys.exit(code or ", ".join(sorted(heavy)) or 0)
+"""
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+def test_a_closed_pipe_is_quiet() -> None:
+    reader, writer = os.pipe()
+    os.close(reader)
+    command = [sys.executable, "-m", "pilotage.cli.main", "--help"]
+    done = subprocess.run(command, stdout=writer, stderr=subprocess.PIPE, text=True, check=False)
+    os.close(writer)
+    assert (done.returncode, done.stderr) == (141, "")
