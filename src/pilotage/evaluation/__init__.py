@@ -1,1 +1,1 @@
-"""TODO"""
+"""Judging: trajectory errors, consistency, path quality. The only place where truth meets estimate."""

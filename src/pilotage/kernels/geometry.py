@@ -11,6 +11,9 @@ from pilotage.kernels.jit import kernel
 
 FloatArray = NDArray[np.float64]
 
+NO_SEGMENTS: FloatArray = np.zeros((0, 4))
+NO_CIRCLES: FloatArray = np.zeros((0, 3))
+
 
 @kernel
 def point_segment_distance(px: float, py: float, x0: float, y0: float, x1: float, y1: float) -> float:
@@ -78,3 +81,12 @@ def sees(
         if point_segment_distance(circles[i, 0], circles[i, 1], ax, ay, bx, by) <= circles[i, 2]:
             return False
     return True
+
+
+@kernel
+def least_distance(points: FloatArray, segments: FloatArray, circles: FloatArray) -> float:
+    """Least ``distance_to_nearest`` over points (K, 2); inf where there are no points."""
+    best = math.inf
+    for k in range(points.shape[0]):
+        best = min(best, distance_to_nearest(points[k, 0], points[k, 1], segments, circles))
+    return best

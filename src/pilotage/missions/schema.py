@@ -12,6 +12,7 @@ from typing import Annotated, Any, Literal
 from pydantic import ConfigDict, Field, model_validator
 
 from pilotage.core.config import Config
+from pilotage.maps.map_file import MapFile
 from pilotage.sensors.sensor import NonNegative, Positive
 
 Point = tuple[float, float]
@@ -89,9 +90,9 @@ Obstacle = Annotated[
 
 
 class WorldConfig(Config):
-    """The map (a shipped name or a file), where to start and go, and what should not be there."""
+    """The map (a shipped name, a file, or the map itself), where to start and go, and what should not be there."""
 
-    map: str
+    map: str | MapFile
     start: PoseConfig
     goal: GoalConfig | None = None
     obstacles: tuple[Obstacle, ...] = ()

@@ -37,13 +37,15 @@ class StackStatus(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class PlannedPath:
-    """A plan as it was adopted, for the record: when, its states (N, 3), waypoints (W, 3), tree (E, 4)."""
+    """A plan as it was adopted, for the record: when, its states (N, 3), waypoints (W, 3), tree (E, 4),
+    the clearance it was made at and how long it took."""
 
     t_s: float
     states: FloatArray
     waypoints: FloatArray
     tree_edges_m: FloatArray
     length_m: float
+    clearance_m: float
     planning_time_s: float
     first_solution_s: float
 
@@ -75,6 +77,16 @@ class Stack(Protocol):
 
     def drain_events(self) -> list[Event]:
         """Events since the last call."""
+        ...
+
+    @property
+    def mapped_circles_m(self) -> FloatArray:
+        """(M, 3) x, y, radius of what the robot put on its own map."""
+        ...
+
+    @property
+    def counts(self) -> Mapping[str, int]:
+        """What the stack counted: attempts, replans, escapes."""
         ...
 
     @property

@@ -1,1 +1,1 @@
-"""TODO"""
+"""Explorers: where to go next when the map is not known."""

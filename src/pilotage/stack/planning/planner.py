@@ -91,7 +91,12 @@ class PlanResult:
 
 
 class Planner(Protocol):
-    """Finds a path on the robot's map."""
+    """Finds a path on the robot's map. Built as ``cls(config)``."""
+
+    @property
+    def clearance_m(self) -> float:
+        """Distance that it keeps from obstacles where a request names none."""
+        ...
 
     def plan(self, request: PlanRequest) -> PlanResult:
         """Answer one query; never raises for what can fail in the field."""

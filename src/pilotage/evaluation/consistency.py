@@ -1,0 +1,92 @@
+"""NEES and NIS: whether a filter is as good as it says."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pilotage.core.angles import wrap_array_to_pi
+from pilotage.core.types import FloatArray
+
+RESAMPLES = 1000
+BOOTSTRAP_SEED = 20240607
+"""Fixed: the band of a run must not change from one evaluation to the next."""
+
+
+@dataclass(frozen=True, slots=True)
+class Band:
+    """A mean and the ends of its confidence band."""
+
+    mean: float
+    low: float
+    high: float
+
+
+def nees(truth: FloatArray, estimate: FloatArray, cov: FloatArray) -> FloatArray:
+    """Normalized estimation error squared, e' P^-1 e (Bar-Shalom et al. 2001, eq. 5.4.2-1).
+
+    Parameters
+    ----------
+    truth, estimate
+        (N, 3) x, y, theta; the heading's error is wrapped.
+    cov
+        (N, 3, 3).
+
+    Returns
+    -------
+    (N,) values with mean 3 for a consistent filter; nan where the covariance is singular.
+    """
+    error = truth - estimate
+    error[:, 2] = wrap_array_to_pi(error[:, 2])
+    out = np.full(truth.shape[0], np.nan)
+    regular = np.linalg.det(cov) > 0.0
+    if regular.any():
+        solved = np.linalg.solve(cov[regular], error[regular][:, :, None])[:, :, 0]
+        out[regular] = np.einsum("ni,ni->n", error[regular], solved)
+    return out
+
+
+def correlated_mean(values: FloatArray, level: float = 0.95) -> Band:
+    """Mean of a correlated series with a band from the moving-block bootstrap.
+
+    Neighbouring steps are not independent, so a band from the number of steps would be far too narrow.
+    The block is as long as twice the series' integrated autocorrelation time, at least the cube root of
+    its length (Kuensch 1989), at most a quarter of it.
+
+    Parameters
+    ----------
+    values
+        (N,); nan are left out.
+    """
+    series = values[np.isfinite(values)]
+    n = series.shape[0]
+    if n == 0:
+        return Band(float("nan"), float("nan"), float("nan"))
+    mean = float(series.mean())
+    if n < 8:
+        return Band(mean, float("nan"), float("nan"))
+    block = int(np.clip(np.ceil(2.0 * correlation_steps(series)), np.ceil(n ** (1 / 3)), max(n // 4, 1)))
+    sums = np.concatenate([[0.0], np.cumsum(series)])
+    block_means = (sums[block:] - sums[:-block]) / block
+    rng = np.random.default_rng(BOOTSTRAP_SEED)
+    blocks = -(-n // block)
+    picks = rng.integers(0, block_means.shape[0], size=(RESAMPLES, blocks))
+    means = block_means[picks].mean(axis=1)
+    low, high = np.quantile(means, [(1 - level) / 2, (1 + level) / 2])
+    return Band(mean, float(low), float(high))
+
+
+def correlation_steps(series: FloatArray) -> float:
+    """Integrated autocorrelation time in steps, 1 + 2 sum rho_k up to the first rho_k below 0.05."""
+    centred = series - series.mean()
+    variance = float(centred @ centred)
+    if variance == 0.0:
+        return 1.0
+    n = series.shape[0]
+    size = 1 << (2 * n - 1).bit_length()
+    spectrum = np.fft.rfft(centred, size)
+    rho = np.fft.irfft(spectrum * np.conj(spectrum), size)[:n] / variance
+    below = np.flatnonzero(rho < 0.05)
+    stop = int(below[0]) if below.size else n
+    return float(1.0 + 2.0 * rho[1:stop].sum())

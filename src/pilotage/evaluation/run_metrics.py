@@ -1,0 +1,155 @@
+"""The metrics of one run, from its trace; their keys are the JSON keys of the command line."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from pilotage.core.angles import wrap_array_to_pi, wrap_to_pi
+from pilotage.core.types import FloatArray
+from pilotage.evaluation.consistency import correlated_mean, nees
+from pilotage.evaluation.halls import hall_offset_m
+from pilotage.evaluation.shortest_path import shortest_path
+from pilotage.maps.segment_map import SegmentMap
+from pilotage.missions.schema import Mission
+from pilotage.stack.interface import PlannedPath
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """How a run ended, as seen from outside.
+
+    Attributes
+    ----------
+    loop_s
+        Wall time of the control steps, planning apart.
+    counts
+        What the stack counted: attempts, replans, escapes.
+    """
+
+    arrived: bool
+    reason: str
+    loop_s: float
+    plans: Sequence[PlannedPath]
+    counts: Mapping[str, int]
+
+
+def poses(trace: Mapping[str, FloatArray], prefix: str) -> FloatArray:
+    """(N, 3) x, y, theta of the columns that begin with ``prefix``."""
+    return np.column_stack([trace[f"{prefix}_x_m"], trace[f"{prefix}_y_m"], trace[f"{prefix}_theta_rad"]])
+
+
+def covariances(trace: Mapping[str, FloatArray]) -> FloatArray:
+    """(N, 3, 3) covariances of the belief."""
+    xx, xy, yy = trace["cov_xx_m2"], trace["cov_xy_m2"], trace["cov_yy_m2"]
+    xt, yt, tt = trace["cov_xt_m_rad"], trace["cov_yt_m_rad"], trace["cov_tt_rad2"]
+    return np.array([[xx, xy, xt], [xy, yy, yt], [xt, yt, tt]]).transpose(2, 0, 1)
+
+
+def run_metrics(
+    mission: Mission, trace: dict[str, FloatArray], outcome: Outcome, floor: SegmentMap
+) -> dict[str, object]:
+    """Compute a run's metrics; adds the column ``nees`` to the trace.
+
+    Errors count after ``run.settle_s``: the start error is drawn from the initial covariance.
+    """
+    steps = trace["t_s"].shape[0]
+    metrics: dict[str, object] = {
+        "mission": mission.mission,
+        "seed": mission.run.seed,
+        "success": False,
+        "reason": outcome.reason,
+        "duration_s": float(trace["t_s"][-1]) if steps else 0.0,
+        "steps": steps,
+        "steps_per_s": steps / outcome.loop_s,
+        **dict(outcome.counts),
+    }
+    metrics |= _planning(mission, outcome, floor)
+    trace["nees"] = np.zeros(0)
+    if steps == 0:
+        return metrics
+    truth, estimate = poses(trace, "true"), poses(trace, "est")
+    trace["nees"] = nees(truth.copy(), estimate, covariances(trace))
+    collisions = int(trace["collisions"][-1])
+    metrics["collisions"] = collisions
+    metrics["min_clearance_m"] = float(trace["clearance_m"].min())
+    metrics["path_length_m"] = float(np.hypot(*np.diff(truth[:, :2], axis=0).T).sum())
+    metrics |= _errors(mission, trace, truth, estimate)
+    metrics |= _consistency(mission, trace)
+    metrics["hall_offset_m"] = hall_offset_m(truth, floor)
+    goal = mission.world.goal
+    if goal is None:
+        metrics["success"] = outcome.arrived and collisions == 0
+        return metrics
+    goal_error = math.hypot(truth[-1, 0] - goal.x_m, truth[-1, 1] - goal.y_m)
+    metrics["goal_error_m"] = goal_error
+    reached = goal_error <= goal.tolerance_m
+    metrics["success"] = outcome.arrived and collisions == 0 and reached
+    if outcome.arrived and not reached:
+        metrics["reason"] = f"the robot says it arrived, but stands {goal_error:.2f} m from its goal"
+    return metrics
+
+
+def _planning(mission: Mission, outcome: Outcome, floor: SegmentMap) -> dict[str, object]:
+    """Length and times of the first plan, beside the shortest path at the same clearance."""
+    if not outcome.plans:
+        return {}
+    plan = outcome.plans[0]
+    metrics: dict[str, object] = {
+        "planned_length_m": plan.length_m,
+        "planning_time_s": plan.planning_time_s,
+        "first_solution_s": plan.first_solution_s,
+    }
+    goal = mission.world.goal
+    if goal is not None and plan.clearance_m is not None:
+        start = mission.world.start
+        shortest = shortest_path(floor, (start.x_m, start.y_m), (goal.x_m, goal.y_m), plan.clearance_m)
+        if shortest is not None:
+            metrics["shortest_length_m"] = shortest.length_m
+    return metrics
+
+
+def _errors(
+    mission: Mission, trace: Mapping[str, FloatArray], truth: FloatArray, estimate: FloatArray
+) -> dict[str, object]:
+    counted = trace["t_s"] > mission.run.settle_s
+    final = estimate[-1] - truth[-1]
+    metrics: dict[str, object] = {
+        "final_error": {
+            "x_m": float(final[0]),
+            "y_m": float(final[1]),
+            "theta_rad": wrap_to_pi(float(final[2])),
+        }
+    }
+    if not counted.any():
+        return metrics
+    error = estimate[counted] - truth[counted]
+    distance = np.hypot(error[:, 0], error[:, 1])
+    heading = wrap_array_to_pi(error[:, 2])
+    metrics["position_rmse_m"] = float(np.sqrt(np.mean(distance**2)))
+    metrics["position_max_m"] = float(distance.max())
+    metrics["heading_rmse_rad"] = float(np.sqrt(np.mean(heading**2)))
+    return metrics
+
+
+def _consistency(mission: Mission, trace: Mapping[str, FloatArray]) -> dict[str, object]:
+    """NEES (3 is ideal) and NIS per degree of freedom (1 is ideal), corrected for what the gate cuts off."""
+    counted = trace["t_s"] > mission.run.settle_s
+    band = correlated_mean(trace["nees"][counted])
+    metrics: dict[str, object] = {"nees_mean": band.mean, "nees_low": band.low, "nees_high": band.high}
+    if "nis" not in trace:
+        return metrics
+    nis, expected = trace["nis"][counted], trace["nis_expected"][counted]
+    measured = np.isfinite(nis)
+    if measured.any():
+        # Weighted by the degrees of freedom: a ratio of sums, its band that of the weighted terms.
+        weight = expected[measured].mean()
+        band = correlated_mean(nis[measured] / weight)
+        metrics |= {"nis_mean": band.mean, "nis_low": band.low, "nis_high": band.high}
+    seen = trace["beacons_seen"][counted].sum() if "beacons_seen" in trace else 0.0
+    if seen > 0.0:
+        metrics["accepted_fraction"] = float(trace["beacons_accepted"][counted].sum() / seen)
+    return metrics

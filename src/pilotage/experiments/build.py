@@ -1,0 +1,181 @@
+"""From a mission to objects: the robot's stack first, then the world that it meets."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any, TypeVar
+
+import numpy as np
+
+from pilotage.core.angles import wrap_to_pi
+from pilotage.core.errors import InputError
+from pilotage.core.random import RandomStreams
+from pilotage.core.registry import Registry
+from pilotage.core.types import Goal, Pose2
+from pilotage.experiments.obstacles import Obstacles, place_obstacles
+from pilotage.experiments.world_map import load_map
+from pilotage.maps.map_file import LandmarkMap
+from pilotage.missions.schema import ComponentChoice, Mission
+from pilotage.sensors.sensor import SENSORS, SensorConfig
+from pilotage.sim.simulator import Simulator
+from pilotage.sim.world import World
+from pilotage.stack.control.controller import CONTROLLERS
+from pilotage.stack.control.escape import ESCAPES
+from pilotage.stack.control.reactive import REACTIVES
+from pilotage.stack.interface import Belief, Stack
+from pilotage.stack.knowledge import Knowledge
+from pilotage.stack.localization.localizer import LOCALIZERS
+from pilotage.stack.mapping.mapper import MAPPERS
+from pilotage.stack.navigator.navigator import NAVIGATORS, Parts
+from pilotage.stack.planning.local_planner import LOCAL_PLANNERS
+from pilotage.stack.planning.planner import PLANNERS, SMOOTHERS
+
+T = TypeVar("T")
+
+
+@dataclass(frozen=True, slots=True)
+class Experiment:
+    """Everything that one run needs, ready to step."""
+
+    mission: Mission
+    floor: LandmarkMap
+    world: World
+    obstacles: Obstacles
+    simulator: Simulator
+    stack: Stack
+
+
+def build(mission: Mission) -> Experiment:
+    """Build a mission.
+
+    The stack plans before the world is finished, because some obstacles are put across the planned path.
+
+    Raises
+    ------
+    InputError
+        Where the mission asks for something that does not exist or cannot be.
+    """
+    floor = load_map(mission.world.map)
+    start = _start(mission, floor)
+    goal = _goal(mission, floor)
+    streams = RandomStreams(mission.run.seed)
+    sensors = build_sensors(mission)
+    stack = _build_stack(mission, floor, start, goal, sensors, streams)
+    stack.prepare()
+    planned = stack.plans[0].states if stack.plans else None
+    obstacles = place_obstacles(
+        mission.world.obstacles,
+        floor.walls,
+        start,
+        goal,
+        planned,
+        mission.robot.body.radius_m,
+        streams.stream("world"),
+    )
+    geometry = floor.walls.with_obstacles(obstacles.segments_m, obstacles.circles_m)
+    world = World(floor.walls, geometry, floor.landmarks)
+    simulator = Simulator(
+        world, mission.robot.body, mission.robot.motion, sensors, start, mission.run.dt_s, streams
+    )
+    return Experiment(mission, floor, world, obstacles, simulator, stack)
+
+
+def build_sensors(mission: Mission) -> dict[str, SensorConfig]:
+    """Validate every sensor of the robot and its rate."""
+    sensors: dict[str, SensorConfig] = {}
+    for name, choice in mission.robot.sensors.items():
+        config = SENSORS.configure(choice.name, choice.parameters, f"robot.sensors.{name}")
+        assert isinstance(config, SensorConfig)
+        config.every_steps(mission.run.dt_s, name)
+        sensors[name] = config
+    return sensors
+
+
+def _start(mission: Mission, floor: LandmarkMap) -> Pose2:
+    start, radius = mission.world.start, mission.robot.body.radius_m
+    _check_place("world.start", start.x_m, start.y_m, radius, floor)
+    return Pose2(start.x_m, start.y_m, wrap_to_pi(start.theta_rad))
+
+
+def _goal(mission: Mission, floor: LandmarkMap) -> Goal | None:
+    goal = mission.world.goal
+    if goal is None:
+        return None
+    _check_place("world.goal", goal.x_m, goal.y_m, mission.robot.body.radius_m, floor)
+    theta = None if goal.theta_rad is None else wrap_to_pi(goal.theta_rad)
+    return Goal(goal.x_m, goal.y_m, theta)
+
+
+def _check_place(where: str, x_m: float, y_m: float, radius_m: float, floor: LandmarkMap) -> None:
+    """A place must be on the floor and leave room for the body."""
+    xmin, ymin, xmax, ymax = floor.walls.bounds_m
+    if not floor.walls.contains(x_m, y_m):
+        raise InputError(
+            f"{where}: expected a place on the map '{floor.name}' ({xmin:g} to {xmax:g}, {ymin:g} to {ymax:g} m), "
+            f"found ({x_m:g}, {y_m:g})"
+        )
+    clear = floor.walls.distance_m(x_m, y_m)
+    if clear < radius_m:
+        raise InputError(
+            f"{where}: expected at least the body's radius of {radius_m:g} m to the nearest wall, "
+            f"found {clear:.3f} m at ({x_m:g}, {y_m:g}); move it or make the body smaller"
+        )
+
+
+def initial_belief(mission: Mission, start: Pose2, streams: RandomStreams) -> Belief:
+    """What the robot believes at first: the start with an error drawn from the initial covariance."""
+    initial = mission.stack.initial
+    variances = np.array([initial.x_var_m2, initial.y_var_m2, initial.theta_var_rad2])
+    error = np.sqrt(variances) * streams.stream("initial").standard_normal(3)
+    pose = Pose2(
+        start.x_m + float(error[0]),
+        start.y_m + float(error[1]),
+        wrap_to_pi(start.theta_rad + float(error[2])),
+    )
+    return Belief(pose, np.diag(variances))
+
+
+def _build_stack(
+    mission: Mission,
+    floor: LandmarkMap,
+    start: Pose2,
+    goal: Goal | None,
+    sensors: dict[str, SensorConfig],
+    streams: RandomStreams,
+) -> Stack:
+    roles, robot = mission.stack, mission.robot
+    knowledge = Knowledge(
+        world_map=floor.walls,
+        landmarks=floor.landmarks,
+        sensors=sensors,
+        body_radius_m=robot.body.radius_m,
+        max_speed_m_s=robot.motion.max_speed_m_s,
+        max_turn_rate_rad_s=robot.motion.max_turn_rate_rad_s,
+        dt_s=mission.run.dt_s,
+        initial=initial_belief(mission, start, streams),
+        goal=goal,
+        goal_tolerance_m=math.inf if mission.world.goal is None else mission.world.goal.tolerance_m,
+        streams=streams,
+    )
+    parts = Parts(
+        localizer=_component(LOCALIZERS, roles.localizer, "localizer", knowledge),
+        planner=_optional(PLANNERS, roles.planner, "planner"),
+        smoother=_optional(SMOOTHERS, roles.smoother, "smoother"),
+        local_planner=_optional(LOCAL_PLANNERS, roles.local_planner, "local_planner", knowledge),
+        controller=_optional(CONTROLLERS, roles.controller, "controller", knowledge),
+        reactive=_optional(REACTIVES, roles.reactive, "reactive", knowledge),
+        mapper=_optional(MAPPERS, roles.mapper, "mapper", knowledge),
+        escape=_optional(ESCAPES, roles.escape, "escape", knowledge),
+    )
+    return _component(NAVIGATORS, roles.navigator, "navigator", knowledge, parts)
+
+
+def _component(registry: Registry[T], choice: ComponentChoice, role: str, *context: Any) -> T:
+    """Build a component from its registered name and parameters."""
+    config = registry.configure(choice.name, choice.parameters, f"stack.{role}")
+    return registry.entry(choice.name).factory(config, *context)
+
+
+def _optional(registry: Registry[T], choice: ComponentChoice | None, role: str, *context: Any) -> T | None:
+    return None if choice is None else _component(registry, choice, role, *context)

@@ -1,0 +1,208 @@
+"""Unexpected obstacles: fixed ones, and those that the seed puts across the planned path."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import ndimage
+
+from pilotage.core.errors import InputError
+from pilotage.core.types import FloatArray, Goal, Pose2
+from pilotage.kernels import geometry
+from pilotage.maps.distance_field import DistanceField
+from pilotage.maps.segment_map import SegmentMap, box_segments
+from pilotage.missions.schema import (
+    AcrossPathObstacle,
+    BoxObstacle,
+    CircleObstacle,
+    Obstacle,
+    TrapObstacle,
+)
+
+MAX_DRAWS = 2000
+ENDS_CLEAR_M = 2.5
+"""An obstacle drawn by the seed keeps this far from start and goal."""
+PASSAGE_M = 0.5
+"""A way around must remain at this clearance."""
+
+
+@dataclass(frozen=True, slots=True)
+class Obstacles:
+    """Geometry of all unexpected obstacles.
+
+    Attributes
+    ----------
+    segments_m, circles_m
+        (K, 4) and (L, 3).
+    polygons_m
+        One (4, 2) outline a box, for pictures.
+    """
+
+    segments_m: FloatArray
+    circles_m: FloatArray
+    polygons_m: list[FloatArray]
+
+
+def place_obstacles(
+    obstacles: Sequence[Obstacle],
+    world: SegmentMap,
+    start: Pose2,
+    goal: Goal | None,
+    planned: FloatArray | None,
+    body_radius_m: float,
+    rng: np.random.Generator,
+) -> Obstacles:
+    """Place every obstacle of a mission.
+
+    Parameters
+    ----------
+    planned
+        (N, 3) states of the path that the robot has planned; None where it has none.
+
+    Raises
+    ------
+    InputError
+        If a fixed obstacle stands on the start, or no place is found for one that the seed draws.
+    """
+    placed = Obstacles(np.zeros((0, 4)), np.zeros((0, 3)), [])
+    for index, obstacle in enumerate(obstacles):
+        where = f"world.obstacles.{index}"
+        if isinstance(obstacle, CircleObstacle):
+            circle = np.array([[*obstacle.centre_m, obstacle.radius_m]])
+            placed = _with(placed, [], circle)
+        elif isinstance(obstacle, BoxObstacle):
+            placed = _with(placed, [_box_between(obstacle, where)], None)
+        elif planned is not None and planned.shape[0] > 1:
+            boxes = _draw_across(obstacle, world, placed, start, goal, planned, rng, where)
+            placed = _with(placed, boxes, None)
+        clear = geometry.distance_to_nearest(start.x_m, start.y_m, placed.segments_m, placed.circles_m)
+        if clear < body_radius_m:
+            raise InputError(f"{where}: expected the start to be free, found the obstacle standing on it")
+    return placed
+
+
+def _with(placed: Obstacles, boxes: Sequence[FloatArray], circle: FloatArray | None) -> Obstacles:
+    return Obstacles(
+        np.concatenate([placed.segments_m, *boxes]),
+        placed.circles_m if circle is None else np.concatenate([placed.circles_m, circle]),
+        [*placed.polygons_m, *(box[:, :2] for box in boxes)],
+    )
+
+
+def _box_between(obstacle: BoxObstacle, where: str) -> FloatArray:
+    """A box whose middle line runs between the two given points."""
+    (x0, y0), (x1, y1) = obstacle.from_m, obstacle.to_m
+    length = math.hypot(x1 - x0, y1 - y0)
+    if length == 0.0:
+        raise InputError(f"{where}: expected two different ends, found the same point twice")
+    return box_segments(
+        (x0 + x1) / 2, (y0 + y1) / 2, length, obstacle.thickness_m, math.atan2(y1 - y0, x1 - x0)
+    )
+
+
+def _draw_across(
+    obstacle: AcrossPathObstacle | TrapObstacle,
+    world: SegmentMap,
+    placed: Obstacles,
+    start: Pose2,
+    goal: Goal | None,
+    planned: FloatArray,
+    rng: np.random.Generator,
+    where: str,
+) -> list[FloatArray]:
+    """Draw places along the path until one is free of walls and leaves a way around."""
+    before = world.with_obstacles(placed.segments_m, placed.circles_m)
+    for _ in range(MAX_DRAWS):
+        index = int(rng.uniform(*obstacle.along) * (planned.shape[0] - 1))
+        x, y, theta = planned[index]
+        if isinstance(obstacle, TrapObstacle):
+            boxes = _trap(obstacle, x, y, theta, rng)
+        else:
+            length = rng.uniform(*obstacle.length_m)
+            # The box's own middle is a little off the path, so that either side may be the nearer one.
+            off = rng.uniform(-0.25, 0.25) * length
+            boxes = [
+                box_segments(
+                    x - off * math.sin(theta),
+                    y + off * math.cos(theta),
+                    length,
+                    obstacle.thickness_m,
+                    theta + math.pi / 2,
+                )
+            ]
+        sides = np.concatenate(boxes)
+        ends = [(start.x_m, start.y_m)] + ([] if goal is None else [(goal.x_m, goal.y_m)])
+        if any(_distance_to_hull(px, py, sides) < ENDS_CLEAR_M for px, py in ends):
+            continue
+        if not _free_of_walls(sides, before):
+            continue
+        if goal is None or _passable(before.with_obstacles(sides, np.zeros((0, 3))), start, goal):
+            return boxes
+    raise InputError(
+        f"{where}: expected room for a {obstacle.kind} across the planned path with a way around it, "
+        f"found none in {MAX_DRAWS} draws; make it smaller"
+    )
+
+
+def _trap(
+    obstacle: TrapObstacle, x: float, y: float, theta: float, rng: np.random.Generator
+) -> list[FloatArray]:
+    """Three boxes: a back across the path at (x, y), and two sides towards the coming robot."""
+    width, depth = rng.uniform(*obstacle.width_m), rng.uniform(*obstacle.depth_m)
+    thick = obstacle.thickness_m
+    c, s = math.cos(theta), math.sin(theta)
+    # In the path's frame: the back's inner face at 0, the sides reach to -depth; inside width x depth.
+    back = box_segments(x + c * thick / 2, y + s * thick / 2, width + 2 * thick, thick, theta + math.pi / 2)
+    boxes = [back]
+    for side in (1.0, -1.0):
+        along, across = -depth / 2, side * (width + thick) / 2
+        boxes.append(
+            box_segments(x + c * along - s * across, y + s * along + c * across, depth, thick, theta)
+        )
+    return boxes
+
+
+def _distance_to_hull(x: float, y: float, sides: FloatArray) -> float:
+    """Distance to the nearest corner or side of an obstacle (its inside counts by its sides)."""
+    return float(geometry.distance_to_nearest(x, y, sides, geometry.NO_CIRCLES))
+
+
+def _free_of_walls(sides: FloatArray, world: SegmentMap) -> bool:
+    """Whether the rectangle around the obstacle, in its own frame, meets no wall."""
+    points = np.concatenate([sides[:, :2], sides[:, 2:]])
+    axis = sides[0, 2:] - sides[0, :2]
+    axis = axis / np.hypot(*axis)
+    frame = np.column_stack([axis, [-axis[1], axis[0]]])
+    local = points @ frame
+    low, high = local.min(axis=0), local.max(axis=0)
+    corners = np.array([[low[0], low[1]], [high[0], low[1]], [high[0], high[1]], [low[0], high[1]]])
+    hull = corners @ frame.T
+    xmin, ymin, xmax, ymax = world.bounds_m
+    inside = (hull >= [xmin, ymin]).all() and (hull <= [xmax, ymax]).all()
+    # Walk over the rectangle finely enough that no wall slips between the points.
+    steps = np.ceil((high - low) / 0.1).astype(int) + 1
+    grid = np.stack(
+        np.meshgrid(np.linspace(low[0], high[0], steps[0]), np.linspace(low[1], high[1], steps[1])), axis=-1
+    ).reshape(-1, 2)
+    least = geometry.least_distance(
+        np.ascontiguousarray(grid @ frame.T), world.segments_m, world.circles_m
+    )
+    return bool(inside and least > 0.1)
+
+
+def _passable(world: SegmentMap, start: Pose2, goal: Goal) -> bool:
+    """Whether start and goal are connected for a disc of radius ``PASSAGE_M``."""
+    field = DistanceField.from_map(world)
+    labels, _ = ndimage.label(field.distance_m >= PASSAGE_M)
+    x0, y0 = field.origin_xy_m
+
+    def label(x: float, y: float) -> int:
+        row = round((y - y0) / field.resolution_m)
+        col = round((x - x0) / field.resolution_m)
+        return int(labels[row, col])
+
+    first = label(start.x_m, start.y_m)
+    return first != 0 and first == label(goal.x_m, goal.y_m)

@@ -1,0 +1,97 @@
+"""One row a step: truth, belief, command and telemetry, side by side for the first time."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from pilotage.core.types import Event, FloatArray, Twist
+from pilotage.sensors.readings import Readings, UltrasonicReading
+from pilotage.sensors.ultrasonic import UltrasonicConfig
+from pilotage.sim.simulator import Simulator
+from pilotage.stack.interface import Stack
+
+TRUTH_COLUMNS = ("t_s", "true_x_m", "true_y_m", "true_theta_rad")
+BELIEF_COLUMNS = (
+    "est_x_m",
+    "est_y_m",
+    "est_theta_rad",
+    "cov_xx_m2",
+    "cov_xy_m2",
+    "cov_yy_m2",
+    "cov_xt_m_rad",
+    "cov_yt_m_rad",
+    "cov_tt_rad2",
+)
+MOTION_COLUMNS = ("v_cmd_m_s", "w_cmd_rad_s", "v_true_m_s", "w_true_rad_s", "clearance_m", "collisions")
+
+
+class Recorder:
+    """Collects rows as plain numbers; columns are made once at the end."""
+
+    def __init__(self, simulator: Simulator, stack: Stack, sensors: dict[str, object]) -> None:
+        self._simulator = simulator
+        self._stack = stack
+        self._sonars = [name for name, config in sensors.items() if isinstance(config, UltrasonicConfig)]
+        self._telemetry_columns = tuple(stack.telemetry())
+        self._rows: list[tuple[float, ...]] = []
+        self.events: list[Event] = []
+
+    def __len__(self) -> int:
+        return len(self._rows)
+
+    def record(self, readings: Readings, command: Twist) -> None:
+        """Record the step that has just been taken."""
+        body, belief = self._simulator.body, self._stack.belief
+        truth, pose, cov = body.pose, belief.pose, belief.cov
+        self._rows.append(
+            (
+                readings.t_s,
+                truth.x_m,
+                truth.y_m,
+                truth.theta_rad,
+                pose.x_m,
+                pose.y_m,
+                pose.theta_rad,
+                cov[0, 0],
+                cov[0, 1],
+                cov[1, 1],
+                cov[0, 2],
+                cov[1, 2],
+                cov[2, 2],
+                command.v_m_s,
+                command.w_rad_s,
+                body.twist.v_m_s,
+                body.twist.w_rad_s,
+                body.clearance_m,
+                body.collisions,
+                *[_sonar_m(readings, name) for name in self._sonars],
+                *self._stack.telemetry().values(),
+            )
+        )
+        self.events += self._stack.drain_events()
+
+    def note(self, kind: str, text: str) -> None:
+        """Record an event that the stack cannot know of."""
+        self.events.append(Event(self._simulator.t_s, kind, text))
+
+    def trace(self) -> dict[str, FloatArray]:
+        """Columns by name, each (steps,)."""
+        names = (
+            *TRUTH_COLUMNS,
+            *BELIEF_COLUMNS,
+            *MOTION_COLUMNS,
+            *(f"us_{name}_m" for name in self._sonars),
+            *self._telemetry_columns,
+        )
+        table = np.array(self._rows, dtype=np.float64).reshape(-1, len(names))
+        return {name: np.ascontiguousarray(table[:, i]) for i, name in enumerate(names)}
+
+
+def _sonar_m(readings: Readings, name: str) -> float:
+    """An ultrasonic distance; nan where there is none or it is saturated."""
+    reading = readings.by_sensor.get(name)
+    if isinstance(reading, UltrasonicReading) and not reading.saturated:
+        return reading.range_m
+    return math.nan

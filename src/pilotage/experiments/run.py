@@ -1,0 +1,143 @@
+"""One run of one mission: build, step until it ends, evaluate, write the run folder."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from pilotage.core.types import STOP, FloatArray
+from pilotage.evaluation.run_metrics import Outcome, run_metrics
+from pilotage.experiments.build import Experiment, build, build_sensors
+from pilotage.experiments.recorder import Recorder
+from pilotage.experiments.run_folder import write_run_folder
+from pilotage.missions.schema import Mission
+from pilotage.stack.interface import StackStatus
+
+PROGRESS_EVERY_S = 0.1
+
+
+@dataclass(frozen=True, slots=True)
+class Progress:
+    """Where a run stands, for a progress line."""
+
+    t_s: float
+    distance_to_go_m: float
+    position_error_m: float
+    sigma_m: float
+
+
+@dataclass(frozen=True, slots=True)
+class RunRecord:
+    """A finished run in memory."""
+
+    experiment: Experiment
+    trace: dict[str, FloatArray]
+    outcome: Outcome
+    recorder: Recorder
+
+
+@dataclass(frozen=True, slots=True)
+class RunResult:
+    """What came out: the metrics, whether the task succeeded, and where the evidence is."""
+
+    metrics: dict[str, object]
+    success: bool
+    run_dir: Path | None
+
+
+def run_mission(
+    mission: Mission,
+    *,
+    out: Path | None = None,
+    save: bool = True,
+    on_progress: Callable[[Progress], None] | None = None,
+) -> RunResult:
+    """Run a mission.
+
+    Parameters
+    ----------
+    out
+        Folder that the run folder is made in; None takes ``runs`` in the working folder.
+    save
+        Whether to write a run folder at all.
+    on_progress
+        Called about ten times a second.
+
+    Raises
+    ------
+    InputError
+        Where the mission cannot be built; nothing has been written then.
+    """
+    begin = time.perf_counter()
+    record = simulate(mission, on_progress)
+    metrics = run_metrics(mission, record.trace, record.outcome, record.experiment.floor.walls)
+    metrics["wall_time_s"] = time.perf_counter() - begin
+    run_dir = None
+    if save:
+        run_dir = write_run_folder(Path("runs") if out is None else out, record, metrics)
+        metrics["run_dir"] = str(run_dir)
+    return RunResult(metrics, bool(metrics["success"]), run_dir)
+
+
+def simulate(mission: Mission, on_progress: Callable[[Progress], None] | None = None) -> RunRecord:
+    """Build a mission and step it to its end."""
+    experiment = build(mission)
+    simulator, stack = experiment.simulator, experiment.stack
+    recorder = Recorder(simulator, stack, dict(build_sensors(mission)))
+    recorder.events += stack.drain_events()
+    limit = math.ceil(mission.run.time_limit_s / mission.run.dt_s)
+    planned_s = sum(plan.planning_time_s for plan in stack.plans)
+    begin = last_told = time.perf_counter()
+    command, status, reason = STOP, *stack.status
+    for _ in range(limit):
+        if status is StackStatus.FAILED:
+            break
+        readings = simulator.step(command)
+        command = stack.step(readings)
+        recorder.record(readings, command)
+        status, reason = stack.status
+        if simulator.body.collisions:
+            recorder.note("collision", "the body touched something")
+            break
+        if status is StackStatus.ARRIVED:
+            break
+        if on_progress is not None and time.perf_counter() - last_told > PROGRESS_EVERY_S:
+            last_told = time.perf_counter()
+            on_progress(_progress(experiment))
+    loop_s = time.perf_counter() - begin
+    all_planning_s = sum(plan.planning_time_s for plan in stack.plans)
+    outcome = Outcome(
+        arrived=status is StackStatus.ARRIVED,
+        reason=_reason(experiment, status, reason),
+        loop_s=max(loop_s - (all_planning_s - planned_s), 1e-9),
+        plans=stack.plans,
+        counts=dict(stack.counts),
+    )
+    return RunRecord(experiment, recorder.trace(), outcome, recorder)
+
+
+def _reason(experiment: Experiment, status: StackStatus, reason: str) -> str:
+    """Why the run ended, in one line."""
+    body, mission = experiment.simulator.body, experiment.mission
+    if body.collisions:
+        pose = body.pose
+        return f"collision at ({pose.x_m:.2f}, {pose.y_m:.2f}) after {experiment.simulator.t_s:.1f} s"
+    if status is StackStatus.RUNNING:
+        return f"time limit of {mission.run.time_limit_s:g} s reached"
+    return reason or str(status)
+
+
+def _progress(experiment: Experiment) -> Progress:
+    truth, belief = experiment.simulator.truth, experiment.stack.belief
+    to_go = experiment.stack.telemetry().get("distance_to_go_m", math.nan)
+    return Progress(
+        experiment.simulator.t_s,
+        to_go,
+        math.hypot(truth.x_m - belief.pose.x_m, truth.y_m - belief.pose.y_m),
+        float(np.sqrt(max(np.linalg.eigvalsh(belief.cov[:2, :2])[-1], 0.0))),
+    )

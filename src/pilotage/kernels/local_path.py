@@ -1,0 +1,62 @@
+"""Points along a Dubins curve at a constant step, and whether the robot fits along them."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pilotage.kernels.dubins import pose_at, shortest
+from pilotage.kernels.geometry import distance_to_nearest
+from pilotage.kernels.jit import kernel
+
+FloatArray = NDArray[np.float64]
+
+
+@kernel
+def stepped_curve(
+    x0: float,
+    y0: float,
+    th0: float,
+    x1: float,
+    y1: float,
+    th1: float,
+    radius: float,
+    step: float,
+    to_the_end: bool,
+    longest: float,
+) -> FloatArray:
+    """States (N, 3) every ``step`` along the shortest Dubins curve between two poses.
+
+    Without ``to_the_end`` the last piece, shorter than a step, is left out, so that every piece is driven
+    in the same time. Empty (0, 3) where the curve is longer than ``longest``.
+    """
+    word, l0, l1, l2 = shortest(x0, y0, th0, x1, y1, th1, radius)
+    length = l0 + l1 + l2
+    if not length <= longest:
+        return np.empty((0, 3))
+    pieces = int(length / step + 1e-9)
+    rest = length - pieces * step > 1e-6
+    count = pieces + 1 + (1 if to_the_end and rest else 0)
+    states = np.empty((count, 3))
+    for i in range(pieces + 1):
+        states[i, 0], states[i, 1], states[i, 2] = pose_at(x0, y0, th0, radius, word, l0, l1, l2, i * step)
+    if count > pieces + 1:
+        states[count - 1, 0], states[count - 1, 1], states[count - 1, 2] = x1, y1, th1
+    return states
+
+
+@kernel
+def fits(states: FloatArray, clearance: float, segments: FloatArray, circles: FloatArray) -> bool:
+    """Whether every state keeps ``clearance``; a start that is nearer may only move away.
+
+    The states are a control step apart, a few centimetres; the distance is 1-Lipschitz in between.
+    """
+    least = clearance
+    for i in range(states.shape[0]):
+        here = distance_to_nearest(states[i, 0], states[i, 1], segments, circles)
+        if i == 0:
+            least = min(clearance, here)
+        elif here < least - 1e-9:
+            return False
+        least = max(least, min(clearance, here))
+    return True

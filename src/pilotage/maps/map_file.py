@@ -1,0 +1,74 @@
+"""Segment maps in YAML files: bounds, walls, landmarks."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated, Any
+
+import numpy as np
+from pydantic import Field
+
+from pilotage.core.config import Config, validate
+from pilotage.core.errors import InputError
+from pilotage.maps.landmarks import Landmarks
+from pilotage.maps.segment_map import SegmentMap
+
+Coordinates = tuple[float, float, float, float]
+
+
+class LandmarkEntry(Config):
+    """One landmark."""
+
+    id: int
+    x_m: float
+    y_m: float
+
+
+class MapFile(Config):
+    """The file's schema: metres, x right, y up."""
+
+    map: str
+    description: str = ""
+    bounds_m: Coordinates | None = None
+    walls_m: Annotated[tuple[Coordinates, ...], Field(min_length=1)]
+    circles_m: tuple[tuple[float, float, float], ...] = ()
+    landmarks: tuple[LandmarkEntry, ...] = ()
+    walls_count: int | None = None
+    """Where given, the number of walls that the file must hold: a file cut in half is noticed."""
+
+
+@dataclass(frozen=True, slots=True)
+class LandmarkMap:
+    """A segment map with its landmarks."""
+
+    name: str
+    walls: SegmentMap
+    landmarks: Landmarks
+
+
+def parse_map(values: dict[str, Any], where: str) -> LandmarkMap:
+    """Build a map from a parsed file.
+
+    Raises
+    ------
+    InputError
+        One line where a key is unknown or missing, a number is not finite, or walls are missing.
+    """
+    return build_map(validate(MapFile, values, where), where)
+
+
+def build_map(entry: MapFile, where: str) -> LandmarkMap:
+    """Build a map from a validated entry; InputError where walls are missing."""
+    if entry.walls_count is not None and entry.walls_count != len(entry.walls_m):
+        raise InputError(
+            f"{where}: expected {entry.walls_count} walls (walls_count), found {len(entry.walls_m)}; "
+            "the file seems to be cut short"
+        )
+    walls = SegmentMap.of(np.array(entry.walls_m), np.array(entry.circles_m).reshape(-1, 3))
+    if entry.bounds_m is not None:
+        walls = SegmentMap(walls.segments_m, walls.circles_m, entry.bounds_m)
+    landmarks = Landmarks(
+        np.array([mark.id for mark in entry.landmarks], dtype=np.int64),
+        np.array([[mark.x_m, mark.y_m] for mark in entry.landmarks]).reshape(-1, 2),
+    )
+    return LandmarkMap(entry.map, walls, landmarks)

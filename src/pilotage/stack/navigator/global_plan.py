@@ -1,0 +1,92 @@
+"""The global plan: asked for, smoothed, adopted, and measured progress on."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Sequence
+
+import numpy as np
+
+from pilotage.core.types import FloatArray, Goal, Pose2
+from pilotage.maps.distance_field import DistanceField
+from pilotage.maps.segment_map import SegmentMap
+from pilotage.stack.interface import PlannedPath
+from pilotage.stack.navigator.progress import PathProgress
+from pilotage.stack.planning.planner import Path, Planner, PlanRequest, PlanResult, Smoother
+
+
+class GlobalPlan:
+    """Holds the current path and every plan adopted before it."""
+
+    def __init__(
+        self,
+        planner: Planner,
+        smoother: Smoother | None,
+        world_map: SegmentMap,
+        goal: Goal,
+        rng: np.random.Generator,
+    ) -> None:
+        self._planner = planner
+        self._smoother = smoother
+        self._map = world_map
+        self._goal = goal
+        self._rng = rng
+        self.path: Path | None = None
+        self.progress: PathProgress | None = None
+        self.circles_m: FloatArray = world_map.circles_m
+        self.history: list[PlannedPath] = []
+
+    @property
+    def clearance_m(self) -> float:
+        """What the planner keeps from obstacles of its own accord."""
+        return self._planner.clearance_m
+
+    def make(
+        self, t_s: float, start: Pose2, mapped_m: FloatArray, clearances_m: Sequence[float]
+    ) -> PlanResult:
+        """Plan on the map with what was found on it, at the first clearance that gives a path; adopt it.
+
+        Returns the last result; its path is None where no clearance gave one.
+        """
+        begin = time.perf_counter()
+        world = self._map.with_obstacles(np.zeros((0, 4)), mapped_m)
+        field = DistanceField.from_map(world)
+        result: PlanResult | None = None
+        for clearance_m in clearances_m:
+            request = PlanRequest(start, self._goal, field, self._rng, clearance_m)
+            result = self._planner.plan(request)
+            if result.path is not None:
+                path = result.path
+                if self._smoother is not None:
+                    path = self._smoother.smooth(path, request, clearance_m)
+                self._adopt(t_s, path, result, clearance_m, time.perf_counter() - begin, world.circles_m)
+                break
+        assert result is not None
+        return result
+
+    def _adopt(
+        self,
+        t_s: float,
+        path: Path,
+        result: PlanResult,
+        clearance_m: float,
+        planning_s: float,
+        circles_m: FloatArray,
+    ) -> None:
+        self.path = path
+        self.progress = PathProgress(path.states, path.waypoints)
+        self.circles_m = circles_m
+        first = result.first_solution_s if math.isfinite(result.first_solution_s) else planning_s
+        self.history.append(
+            PlannedPath(
+                t_s,
+                path.states,
+                path.waypoints,
+                result.tree_edges_m,
+                path.length_m,
+                clearance_m,
+                planning_s,
+                first,
+            )
+        )

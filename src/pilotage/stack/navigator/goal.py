@@ -1,0 +1,339 @@
+"""The goal navigator: the night watch's loop of localizing, planning, following and reacting."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from enum import IntEnum
+
+import numpy as np
+from pydantic import Field
+
+from pilotage.core.config import Config
+from pilotage.core.errors import InputError
+from pilotage.core.types import STOP, Event, FloatArray, Pose2, Twist
+from pilotage.sensors.readings import Readings
+from pilotage.sensors.sensor import NonNegative, Positive
+from pilotage.stack.control.reactive import Reaction, ReactionKind
+from pilotage.stack.interface import Belief, PlannedPath, StackStatus
+from pilotage.stack.knowledge import Knowledge
+from pilotage.stack.navigator.following import WaypointFollower
+from pilotage.stack.navigator.global_plan import GlobalPlan
+from pilotage.stack.navigator.navigator import NAVIGATORS, Parts
+
+NO_REACTION = Reaction(ReactionKind.NONE, 0.0, math.inf, math.inf)
+
+
+class Mode(IntEnum):
+    """What the robot is doing, as the trace records it."""
+
+    FOLLOW = 0
+    LATERAL = 1
+    AVOID = 2
+    ESCAPE = 3
+    REPLAN = 4
+    ARRIVED = 5
+
+
+class GoalNavigatorConfig(Config):
+    """When to watch, when to give up a plan, and when it is done."""
+
+    arrival_m: Positive = 0.15
+    watch_ahead_m: NonNegative = 0.9
+    """Where this much of the local path ahead comes too near a mapped obstacle: stop and replan; 0: never."""
+    watch_margin_m: NonNegative = 0.06
+    """Too near: below the body's radius plus this."""
+    stall_s: Positive = 20.0
+    stall_progress_m: Positive = 0.5
+    waypoint_ahead_m: Positive = 0.4
+    straight_ahead_m: Positive = 1.2
+    straight_below_rad: Positive = 0.35
+    """A plan that turns less than this over the next stretch goes straight on: a hall may be centred."""
+    fallback_margins_m: tuple[Positive, ...] = (0.10, 0.06)
+    """Replans that fail at the planner's clearance try the body's radius plus these."""
+    cruise_speed_m_s: Positive = 0.5
+    max_replans: int = Field(default=30, ge=0)
+
+
+@NAVIGATORS.add("goal", GoalNavigatorConfig)
+class GoalNavigator:
+    """Drives to a goal.
+
+    Plans globally before the start; then at every step localizes, maps what is unexpected, follows the
+    local plan, and reacts. After an avoidance it replans locally; globally, with the obstacle on the
+    robot's own map, where no next waypoint can be reached, the robot is trapped, or it gets no further.
+    """
+
+    def __init__(self, config: GoalNavigatorConfig, knowledge: Knowledge, parts: Parts) -> None:
+        if knowledge.goal is None:
+            raise InputError("navigator 'goal': expected world.goal, found none")
+        if parts.planner is None or parts.local_planner is None or parts.controller is None:
+            raise InputError(
+                "navigator 'goal': expected stack.planner, stack.local_planner and stack.controller, "
+                "found one of them missing"
+            )
+        self._config = config
+        self._goal = knowledge.goal
+        self._tolerance_m = knowledge.goal_tolerance_m
+        self._radius_m = knowledge.body_radius_m
+        self._segments = knowledge.world_map.segments_m
+        self._known_circles = knowledge.world_map.circles_m
+        self._localizer = parts.localizer
+        self._reactive = parts.reactive
+        self._mapper = parts.mapper
+        self._escape = parts.escape
+        self._plan = GlobalPlan(
+            parts.planner,
+            parts.smoother,
+            knowledge.world_map,
+            knowledge.goal,
+            knowledge.streams.stream("planner"),
+        )
+        self._follower = WaypointFollower(parts.local_planner, parts.controller, knowledge.dt_s)
+        self._t_s = 0.0
+        self._status, self._reason = StackStatus.RUNNING, ""
+        self._mode = Mode.FOLLOW
+        self._to_go_m = math.nan
+        self._best_m, self._best_t_s = math.inf, 0.0
+        self._trail: list[Pose2] = []
+        self._avoiding = self._escaping = self._in_hall = False
+        self._reaction = NO_REACTION
+        self._events: list[Event] = []
+        self.counts = {"attempts": 0, "replans": 0, "escapes": 0}
+
+    # --- the plug -----------------------------------------------------------------------------------
+
+    @property
+    def belief(self) -> Belief:
+        """The localizer's belief."""
+        return self._localizer.belief
+
+    @property
+    def status(self) -> tuple[StackStatus, str]:
+        """Running, arrived or failed, and why."""
+        return self._status, self._reason
+
+    @property
+    def plans(self) -> list[PlannedPath]:
+        """Every plan adopted so far."""
+        return self._plan.history
+
+    @property
+    def mapped_circles_m(self) -> FloatArray:
+        """(M, 3) what the robot put on its own map."""
+        return self._known_circles[:0] if self._mapper is None else self._mapper.circles_m
+
+    def prepare(self) -> None:
+        """Plan from the initial belief; without a path the task has failed before it starts."""
+        result = self._plan.make(
+            0.0, self.belief.pose, self.mapped_circles_m, (self._plan.clearance_m,)
+        )
+        if result.path is None:
+            self._fail(f"{result.status}: {result.reason}")
+        else:
+            self._took_plan("plan")
+
+    def step(self, readings: Readings) -> Twist:
+        """One control step."""
+        self._t_s = readings.t_s
+        belief = self._localizer.step(readings)
+        if self._mapper is not None:
+            self._mapper.step(readings, belief)
+        self._follower.rest()
+        self._reaction = NO_REACTION
+        if self._status is not StackStatus.RUNNING:
+            return STOP
+        return self._drive(readings, belief.pose)
+
+    def telemetry(self) -> Mapping[str, float]:
+        """Reference, parts of the command, mode and progress, with the localizer's own numbers."""
+        reference, control = self._follower.reference, self._follower.control
+        return {
+            "ref_x_m": math.nan if reference is None else reference.x_m,
+            "ref_y_m": math.nan if reference is None else reference.y_m,
+            "ref_theta_rad": math.nan if reference is None else reference.theta_rad,
+            "w_feedforward_rad_s": self._follower.feedforward.w_rad_s,
+            "w_proportional_rad_s": control.proportional_rad_s,
+            "w_integral_rad_s": control.integral_rad_s,
+            "w_reactive_rad_s": self._reaction.w_rad_s,
+            "path_error_m": control.error_m,
+            "mode": float(self._mode),
+            "distance_to_go_m": self._to_go_m,
+            **self._localizer.telemetry(),
+        }
+
+    def drain_events(self) -> list[Event]:
+        """Events since the last call."""
+        events, self._events = self._events, []
+        return events
+
+    # --- the loop -----------------------------------------------------------------------------------
+
+    def _drive(self, readings: Readings, pose: Pose2) -> Twist:
+        assert self._plan.progress is not None
+        self._trail.append(pose)
+        self._to_go_m = self._plan.progress.update(pose)
+        if self._escaping:
+            return self._continue_escape(pose)
+        if self._reactive is not None:
+            self._reaction = self._reactive.step(
+                readings, pose, self._segments, self._plan.circles_m, self._goes_straight()
+            )
+        kind = self._reaction.kind
+        if kind is ReactionKind.TRAPPED:
+            return self._begin_escape("turning found no way out")
+        if self._stalled():
+            return self._begin_escape(f"no progress for {self._config.stall_s:g} s")
+        if kind is ReactionKind.AVOID:
+            return self._avoid()
+        if self._avoiding:
+            self._avoiding = False
+            self._follower.drop()
+            self._say("avoid-end", "the way in front is free again")
+        if kind is ReactionKind.HALL and not self._near_goal():
+            return self._take_the_middle()
+        if self._in_hall:
+            self._in_hall = False
+            self._follower.drop()
+        return self._follow(pose)
+
+    def _follow(self, pose: Pose2) -> Twist:
+        """Follow the local path; plan a new one at each waypoint; replan globally where none leads on."""
+        if not self._follower.active:
+            if self._near_goal():
+                return self._arrive()
+            if not self._replan_locally(pose):
+                return self._replan_globally(pose, "no next waypoint can be reached on the robot's own map")
+        elif self._path_is_blocked():
+            return self._replan_globally(pose, "a mapped obstacle stands on the local path")
+        command = self._follower.step(pose)
+        self._mode = Mode.FOLLOW
+        if self._reaction.kind is ReactionKind.LATERAL:
+            self._mode = Mode.LATERAL
+            return Twist(command.v_m_s, command.w_rad_s + self._reaction.w_rad_s)
+        return command
+
+    def _avoid(self) -> Twist:
+        self._mode = Mode.AVOID
+        if not self._avoiding:
+            self._avoiding = True
+            self.counts["attempts"] += 1
+            side = "left" if self._reaction.w_rad_s > 0.0 else "right"
+            self._say(
+                "avoid-start",
+                f"something unexpected {self._reaction.front_m:.2f} m ahead: turning {side}, "
+                f"attempt {self.counts['attempts']}",
+            )
+        return Twist(self._reaction.speed_limit_m_s, self._reaction.w_rad_s)
+
+    def _take_the_middle(self) -> Twist:
+        self._mode = Mode.LATERAL
+        if not self._in_hall:
+            self._in_hall = True
+            self._say("hall", "walls close on both sides: taking the middle")
+        self._follower.drop()
+        return Twist(self._config.cruise_speed_m_s, self._reaction.w_rad_s)
+
+    # --- escapes and replans ------------------------------------------------------------------------
+
+    def _begin_escape(self, why: str) -> Twist:
+        if self._escape is None:
+            return self._fail(f"stuck: {why}, and the stack has no escape")
+        self.counts["escapes"] += 1
+        self._say("escape", f"{why}: backing out the way it came")
+        self._escape.begin(self._trail)
+        self._escaping = True
+        self._avoiding = False
+        self._follower.drop()
+        self._mode = Mode.ESCAPE
+        return STOP
+
+    def _continue_escape(self, pose: Pose2) -> Twist:
+        assert self._escape is not None
+        command = self._escape.step(pose)
+        self._mode = Mode.ESCAPE
+        if command is not None:
+            return command
+        self._escaping = False
+        if self._reactive is not None:
+            self._reactive.reset()
+        return self._replan_globally(pose, "backed out")
+
+    def _replan_locally(self, pose: Pose2) -> bool:
+        path, progress = self._plan.path, self._plan.progress
+        assert path is not None
+        assert progress is not None
+        first = progress.next_waypoint(self._config.waypoint_ahead_m)
+        return self._follower.replan(pose, path.waypoints, first, self._segments, self._all_circles())
+
+    def _replan_globally(self, pose: Pose2, why: str) -> Twist:
+        """Plan anew on the robot's own map; back out where even that finds no way."""
+        self._mode = Mode.REPLAN
+        self._follower.drop()
+        if self.counts["replans"] >= self._config.max_replans:
+            return self._fail(f"stuck: gave up after {self.counts['replans']} replans")
+        self.counts["replans"] += 1
+        margins = [self._radius_m + margin for margin in self._config.fallback_margins_m]
+        clearances = [self._plan.clearance_m, *(c for c in margins if c < self._plan.clearance_m)]
+        result = self._plan.make(self._t_s, pose, self.mapped_circles_m, clearances)
+        if result.path is None:
+            return self._begin_escape(f"replanning found {result.status} ({result.reason})")
+        self._took_plan("replan", why)
+        return STOP
+
+    def _took_plan(self, kind: str, why: str = "") -> None:
+        plan = self._plan.history[-1]
+        self._best_m, self._best_t_s = math.inf, self._t_s
+        self._to_go_m = plan.length_m
+        because = f"{why}: " if why else ""
+        self._say(
+            kind, f"{because}{plan.length_m:.2f} m to go, planned in {plan.planning_time_s * 1e3:.0f} ms"
+        )
+
+    # --- questions ----------------------------------------------------------------------------------
+
+    def _all_circles(self) -> FloatArray:
+        """Everything round on the robot's own map: what it was told of and what it found."""
+        return np.concatenate([self._known_circles, self.mapped_circles_m])
+
+    def _goes_straight(self) -> bool:
+        path, progress = self._plan.path, self._plan.progress
+        assert path is not None
+        assert progress is not None
+        turn = progress.turn_ahead_rad(path.states, self._config.straight_ahead_m)
+        return turn < self._config.straight_below_rad
+
+    def _path_is_blocked(self) -> bool:
+        if self._mapper is None or self._config.watch_ahead_m == 0.0:
+            return False
+        ahead = self._follower.clearance_ahead_m(self._config.watch_ahead_m, self._mapper.circles_m)
+        return ahead < self._radius_m + self._config.watch_margin_m
+
+    def _near_goal(self) -> bool:
+        pose = self.belief.pose
+        away = math.hypot(pose.x_m - self._goal.x_m, pose.y_m - self._goal.y_m)
+        return away <= self._config.arrival_m or (away <= self._tolerance_m and self._to_go_m < 0.02)
+
+    def _stalled(self) -> bool:
+        """Whether the distance to go has not shrunk for too long."""
+        if self._to_go_m < self._best_m - self._config.stall_progress_m:
+            self._best_m, self._best_t_s = self._to_go_m, self._t_s
+        stalled = self._t_s - self._best_t_s > self._config.stall_s
+        if stalled:
+            self._best_t_s = self._t_s
+        return stalled
+
+    # --- ends ---------------------------------------------------------------------------------------
+
+    def _arrive(self) -> Twist:
+        self._status, self._mode = StackStatus.ARRIVED, Mode.ARRIVED
+        self._say("arrived", "the robot says that it has reached its goal")
+        return STOP
+
+    def _fail(self, why: str) -> Twist:
+        self._status, self._reason = StackStatus.FAILED, why
+        self._say("failed", why)
+        return STOP
+
+    def _say(self, kind: str, text: str) -> None:
+        self._events.append(Event(self._t_s, kind, text))

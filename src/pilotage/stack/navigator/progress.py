@@ -1,0 +1,69 @@
+"""How far along its path the robot is, and whether it still gets on."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pilotage.core.types import FloatArray, Pose2
+
+WINDOW_BACK_M = 1.0
+WINDOW_AHEAD_M = 4.0
+
+
+class PathProgress:
+    """Projects the estimate on a path; the projection moves within a window, so crossings do not jump.
+
+    Parameters
+    ----------
+    states
+        (N, 3) dense states of the path.
+    waypoints
+        (W, 3) sparse states on the path, in order.
+    """
+
+    def __init__(self, states: FloatArray, waypoints: FloatArray) -> None:
+        self._points = states[:, :2]
+        steps = np.hypot(*np.diff(self._points, axis=0).T)
+        self._along_m = np.concatenate([[0.0], np.cumsum(steps)])
+        self.length_m = float(self._along_m[-1])
+        self.at_m = 0.0
+        self.waypoint_along_m = self._locate(waypoints)
+
+    def _locate(self, waypoints: FloatArray) -> FloatArray:
+        """Distance along the path of every waypoint: the nearest state not before the last one's."""
+        along = np.empty(waypoints.shape[0])
+        start = 0
+        for i, waypoint in enumerate(waypoints):
+            # Look ahead only as far as twice the straight way, so that a later crossing is not taken.
+            here = self._along_m[start]
+            gap = np.hypot(*(waypoint[:2] - self._points[start]))
+            stop = int(np.searchsorted(self._along_m, here + 3.0 * gap + 0.2)) + 1
+            window = self._points[start:stop]
+            start += int(np.argmin(np.hypot(window[:, 0] - waypoint[0], window[:, 1] - waypoint[1])))
+            along[i] = self._along_m[start]
+        along[-1] = self.length_m
+        return along
+
+    def update(self, pose: Pose2) -> float:
+        """Project the estimate; returns the distance left to go."""
+        low = int(np.searchsorted(self._along_m, self.at_m - WINDOW_BACK_M))
+        high = int(np.searchsorted(self._along_m, self.at_m + WINDOW_AHEAD_M)) + 1
+        window = self._points[low:high]
+        dx, dy = window[:, 0] - pose.x_m, window[:, 1] - pose.y_m
+        self.at_m = float(self._along_m[low + int(np.argmin(dx * dx + dy * dy))])
+        return self.length_m - self.at_m
+
+    def next_waypoint(self, ahead_m: float) -> int:
+        """Index of the first waypoint at least ``ahead_m`` farther along (the last one at the end)."""
+        index = int(np.searchsorted(self.waypoint_along_m, self.at_m + ahead_m))
+        return min(index, self.waypoint_along_m.shape[0] - 1)
+
+    def turn_ahead_rad(self, states: FloatArray, reach_m: float) -> float:
+        """Largest change of heading along the next ``reach_m`` of the path."""
+        low = int(np.searchsorted(self._along_m, self.at_m))
+        high = int(np.searchsorted(self._along_m, self.at_m + reach_m)) + 1
+        headings = states[low:high, 2]
+        if headings.shape[0] < 2:
+            return 0.0
+        turns = np.mod(headings - headings[0] + np.pi, 2.0 * np.pi) - np.pi
+        return float(np.max(np.abs(turns)))

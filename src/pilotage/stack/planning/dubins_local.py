@@ -1,0 +1,88 @@
+"""The night-watch report's local planner: Dubins curves from the estimate to the next waypoint."""
+
+from __future__ import annotations
+
+import math
+
+from pydantic import Field
+
+from pilotage.core.config import Config
+from pilotage.core.errors import InputError
+from pilotage.core.types import FloatArray, Pose2
+from pilotage.kernels import local_path
+from pilotage.sensors.sensor import NonNegative, Positive
+from pilotage.stack.knowledge import Knowledge
+from pilotage.stack.planning.local_planner import LOCAL_PLANNERS, LocalPath
+
+
+class DubinsLocalConfig(Config):
+    """Speed, turning radius, and when a waypoint is passed over.
+
+    A curve longer than ``detour_ratio`` times the straight way plus ``detour_m`` is a loop: the waypoint lies
+    beside or behind the robot, and the next one is taken instead.
+    """
+
+    speed_m_s: Positive = 0.5
+    turning_radius_m: Positive = 0.5
+    margin_m: NonNegative = 0.05
+    """The local path keeps the body's radius plus this from everything on the robot's map."""
+    look_ahead: int = Field(default=5, ge=1, le=100)
+    """How many waypoints are tried."""
+    detour_ratio: float = Field(default=1.3, ge=1.0, le=10.0)
+    detour_m: NonNegative = 0.2
+
+
+@LOCAL_PLANNERS.add("dubins", DubinsLocalConfig)
+class DubinsLocalPlanner:
+    """From the current estimate to the next waypoint, one point a control step at constant speed.
+
+    Fails (None) where no curve to any of the next waypoints is free on the robot's map: the way is
+    blocked, or the robot stands across it.
+    """
+
+    def __init__(self, config: DubinsLocalConfig, knowledge: Knowledge) -> None:
+        if config.speed_m_s > knowledge.max_speed_m_s:
+            raise InputError(
+                f"stack.local_planner.speed_m_s: expected at most robot.motion.max_speed_m_s = "
+                f"{knowledge.max_speed_m_s:g}, found {config.speed_m_s:g}"
+            )
+        if config.speed_m_s / config.turning_radius_m > knowledge.max_turn_rate_rad_s:
+            raise InputError(
+                f"stack.local_planner.turning_radius_m: expected at least speed over turn rate = "
+                f"{config.speed_m_s / knowledge.max_turn_rate_rad_s:g} m, found {config.turning_radius_m:g}"
+            )
+        self._config = config
+        self._step_m = config.speed_m_s * knowledge.dt_s
+        self._clearance_m = knowledge.body_radius_m + config.margin_m
+
+    def plan(
+        self,
+        pose: Pose2,
+        waypoints: FloatArray,
+        first: int,
+        segments_m: FloatArray,
+        circles_m: FloatArray,
+    ) -> LocalPath | None:
+        """Try the next waypoints in turn; take the first whose curve is short and free."""
+        config = self._config
+        last = waypoints.shape[0] - 1
+        for index in range(first, min(first + config.look_ahead, last + 1)):
+            x, y, theta = waypoints[index]
+            straight = math.hypot(x - pose.x_m, y - pose.y_m)
+            states = local_path.stepped_curve(
+                pose.x_m,
+                pose.y_m,
+                pose.theta_rad,
+                x,
+                y,
+                theta,
+                config.turning_radius_m,
+                self._step_m,
+                index == last,
+                config.detour_ratio * straight + config.detour_m,
+            )
+            if states.shape[0] < 2:
+                continue
+            if local_path.fits(states, self._clearance_m, segments_m, circles_m):
+                return LocalPath(states, config.speed_m_s, index)
+        return None
