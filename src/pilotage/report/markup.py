@@ -56,14 +56,15 @@ def layer_rules(figure: Illustration) -> str:
 
 def swatch(key: Key) -> str:
     """Return the little sample of a legend entry."""
+    stroke = f'stroke="{key.colour}"'
     shapes = {
-        "line": 'd="M1 6h20" stroke-width="2.4"',
-        "dash": 'd="M1 6h20" stroke-width="2" stroke-dasharray="5 3"',
-        "dot": 'd="M2 6h20" stroke-width="2.4" stroke-dasharray="0 4.5" stroke-linecap="round"',
-        "band": f'd="M1 1h20v10h-20z" stroke="none" fill="{key.colour}" fill-opacity="{key.opacity:g}"',
-        "spot": f'd="M11 1.5 15.5 6 11 10.5 6.5 6z" stroke="none" fill="{key.colour}"',
+        "line": f'd="M1 6h20" {stroke} stroke-width="2.4"',
+        "dash": f'd="M1 6h20" {stroke} stroke-width="2" stroke-dasharray="5 3"',
+        "dot": f'd="M2 6h20" {stroke} stroke-width="2.4" stroke-dasharray="0 4.5" stroke-linecap="round"',
+        "band": f'd="M1 1h20v10h-20z" fill="{key.colour}" fill-opacity="{key.opacity:g}"',
+        "spot": f'd="M11 1.5 15.5 6 11 10.5 6.5 6z" fill="{key.colour}"',
     }
-    shape = f'<path stroke="{key.colour}" {shapes[key.look]}/>'
+    shape = f"<path {shapes[key.look]}/>"
     return f'<svg class="swatch" viewBox="0 0 22 12" aria-hidden="true">{shape}</svg>'
 
 

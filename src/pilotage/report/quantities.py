@@ -13,7 +13,9 @@ def significant(value: float, digits: int = 3) -> str:
         return NOTHING
     if value == 0.0:
         return "0"
-    decimals = max(0, digits - 1 - math.floor(math.log10(abs(value))))
+    # The exponent of the rounded number: 0.9996 is 1.00, not 1.000.
+    exponent = int(f"{value:.{digits - 1}e}".partition("e")[2])
+    decimals = max(0, digits - 1 - exponent)
     return f"{value:,.{decimals}f}".replace(",", "\u202f").replace("-", "−")
 
 

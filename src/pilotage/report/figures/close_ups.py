@@ -88,7 +88,7 @@ def close_ups_figure(run: RunData) -> Illustration:
 
 def _moments(run: RunData, path: FloatArray) -> list[Moment]:
     """Return the moments worth a look, at most one in a window."""
-    known = np.isfinite(path).all(axis=1)
+    known = np.isfinite(path[:, 0] + path[:, 1])
     if not bool(known.any()):
         return []
     trace = run.trace
@@ -100,7 +100,7 @@ def _moments(run: RunData, path: FloatArray) -> list[Moment]:
             step = min(int(np.searchsorted(trace.t_s, event.t_s)), trace.steps - 1)
             found.append(Moment(step, f"{event_kind(event.kind).name} ({number})"))
             break
-    dx, dy = (layers.estimated_path(run) - path).T
+    dx, dy = np.transpose(layers.estimated_path(run) - path)
     error = np.where(run.settled(), np.hypot(dx, dy), np.nan)
     if bool(np.isfinite(error).any()):
         step = int(np.nanargmax(error))

@@ -166,7 +166,7 @@ def _draw_ellipses(axes: Axes, run: RunData, size_m: float) -> int:
     steps = _evenly_along(layers.estimated_path(run), spacing_m)
     to_scale = layers.ellipse_outlines(run, steps)
     one_shape(
-        axes, to_scale, facecolor="none", edgecolor=BLACK, linewidth=0.5, zorder=8.5, gid="layer-ellipses"
+        axes, to_scale, facecolor="none", edgecolor=BLACK, linewidth=0.3, zorder=8.5, gid="layer-ellipses"
     )
     if magnification > 1:
         # The start's wide ellipse would cover the map.

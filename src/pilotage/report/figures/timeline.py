@@ -29,7 +29,7 @@ from pilotage.report.style import (
 
 SLUG = "timeline"
 TITLE = "What happened and when"
-MOST_ROWS = 4
+MOST_ROWS = 6
 _ROW_PT = 2.0 * RADIUS_PT + 3.0
 _MODE_PT = 13.0
 
