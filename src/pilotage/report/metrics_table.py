@@ -66,7 +66,14 @@ GROUPS: tuple[tuple[str, tuple[Metric, ...]], ...] = (
             Metric(
                 "attempts", "avoidance attempts", quantities.count, "How often an avoidance had to begin."
             ),
+            Metric("escapes", "escapes", quantities.count, "How often it backed out of a trap."),
             Metric("replans", "replans", quantities.count, "New global plans after the first."),
+            Metric(
+                "hall_offset_m",
+                "off the hall's middle",
+                quantities.length,
+                "Distance from the middle at the end of the narrow corridor.",
+            ),
             Metric("collisions", "collisions", quantities.count, "Contacts of the body with anything solid."),
             Metric(
                 "min_clearance_m",

@@ -54,6 +54,7 @@ _RC: Any = {
     "axes.unicode_minus": True,
     "path.simplify": True,
     "path.simplify_threshold": 0.15,
+    "axes.facecolor": "none",
     "axes.edgecolor": FAINT,
     "axes.linewidth": 0.7,
     "axes.labelcolor": MUTED,
