@@ -488,12 +488,12 @@ def _printed(metrics: dict[str, Any]) -> str:
 
 def test_summary_table() -> None:
     text = _printed(_metrics(600))
-    for part in ("two-rooms", "seed 3", "success", "5.60\u00a0mm", "0.120°", "1.02", "2.70 to 3.20"):
+    for part in ("two-rooms", "seed 3", "success", "5.60\u00a0mm", "0.120°", "1.017", "2.70 to 3.20"):
         assert part in text
     failed = _printed({"success": False, "reason": "stuck [bold]here[/bold]", "position_rmse_m": math.nan})
     assert "failed: stuck [bold]here[/bold]" in failed
     assert "nan" not in failed
-    assert "not said" in _printed({})
+    assert "outcome not said" in _printed({})
 
 
 def test_quantities_are_humane() -> None:

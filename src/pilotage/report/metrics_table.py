@@ -44,6 +44,10 @@ def _plain(value: float) -> str:
     return quantities.significant(value, 3)
 
 
+def _ratio(value: float) -> str:
+    return f"{value:.3f}"
+
+
 def _rate(value: float) -> str:
     return f"{quantities.count(value)} / s" if math.isfinite(value) else quantities.NOTHING
 
@@ -130,15 +134,15 @@ GROUPS: tuple[tuple[str, tuple[Metric, ...]], ...] = (
         (
             Metric(
                 "nees_mean",
-                "NEES, mean",
+                "NEES",
                 _plain,
-                "Squared true error weighed by the filter's covariance; 3 is ideal, more is overconfident.",
+                "Mean squared true error weighed by the filter's covariance; 3 is ideal, more is too sure.",
             ),
             Metric(
                 "nis_mean",
-                "NIS a degree of freedom, mean",
+                "NIS per degree of freedom",
                 _plain,
-                "Squared innovation weighed by its own covariance, corrected for the gate; 1 is ideal.",
+                "Mean squared innovation weighed by its own covariance, corrected for the gate; 1 is ideal.",
             ),
         ),
     ),
@@ -154,7 +158,7 @@ GROUPS: tuple[tuple[str, tuple[Metric, ...]], ...] = (
                 quantities.length,
                 "Exact shortest path at the same clearance, from a visibility graph.",
             ),
-            Metric("planned_over_shortest", "planned over shortest", _plain, "1 cannot be beaten."),
+            Metric("planned_over_shortest", "planned over shortest", _ratio, "1 cannot be beaten."),
             Metric("planning_time_s", "planning time", quantities.duration, "Wall time of the first plan."),
             Metric(
                 "first_solution_s",

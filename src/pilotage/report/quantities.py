@@ -16,7 +16,7 @@ def significant(value: float, digits: int = 3) -> str:
     # The exponent of the rounded number: 0.9996 is 1.00, not 1.000.
     exponent = int(f"{value:.{digits - 1}e}".partition("e")[2])
     decimals = max(0, digits - 1 - exponent)
-    return f"{value:,.{decimals}f}".replace(",", "\u202f").replace("-", "−")
+    return f"{value:,.{decimals}f}".replace(",", "\u00a0").replace("-", "−")
 
 
 def length(value_m: float) -> str:
@@ -52,4 +52,4 @@ def share(value: float) -> str:
 
 def count(value: float) -> str:
     """Write a whole number."""
-    return f"{round(value):,}".replace(",", "\u202f") if math.isfinite(value) else NOTHING
+    return f"{round(value):,}".replace(",", "\u00a0") if math.isfinite(value) else NOTHING

@@ -275,7 +275,8 @@ def logarithmic(axes: Axes, low: float, high: float) -> None:
         low, high = middle / 2.0, middle * 2.0
     axes.set_yscale("log")
     axes.set_ylim(low, high)
-    steps = (1.0, 2.0, 5.0) if high / low < 60.0 else (1.0,)
+    ratio = high / low
+    steps = (1.0, 1.5, 2.0, 3.0, 5.0, 7.0) if ratio < 8.0 else (1.0, 2.0, 5.0) if ratio < 60.0 else (1.0,)
     decades = range(math.floor(math.log10(low)), math.ceil(math.log10(high)) + 1)
     ticks = [step * 10.0**decade for decade in decades for step in steps]
     ticks = [tick for tick in ticks if low <= tick <= high]

@@ -26,8 +26,7 @@ def summary_table(metrics: Mapping[str, object]) -> Table:
     table.add_column("group", style="dim", no_wrap=True)
     table.add_column("metric", no_wrap=True)
     table.add_column("value", justify="right", no_wrap=True)
-    table.add_column("95 % band", style="dim", no_wrap=True)
-    table.add_row("", Text("outcome"), _outcome(metrics), "", end_section=True)
+    table.add_column("band", style="dim", no_wrap=True)
     for title, rows in metric_rows(metrics):
         for index, row in enumerate(rows):
             # Text, not str: square brackets of a name or reason are no markup.
@@ -45,13 +44,14 @@ def _title(metrics: Mapping[str, object]) -> Text:
     title = Text(str(metrics.get("mission") or "run"), style="bold")
     if metrics.get("seed") is not None:
         title.append(f"  seed {metrics['seed']}", style="dim")
-    return title
+    # In the title, where a long reason may run over lines without widening a column.
+    return title.append("\n").append_text(_outcome(metrics))
 
 
 def _outcome(metrics: Mapping[str, object]) -> Text:
     success = outcome(metrics)
     if success is None:
-        return Text("not said", style="yellow")
+        return Text("outcome not said", style="yellow")
     if success:
         return Text("success", style="bold green")
-    return Text(f"failed: {metrics.get('reason') or 'no reason given'}", style="bold red", no_wrap=False)
+    return Text(f"failed: {metrics.get('reason') or 'no reason given'}", style="bold red")

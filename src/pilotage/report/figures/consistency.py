@@ -97,14 +97,14 @@ def consistency_figure(run: RunData) -> Illustration:
         f"itself, below it too modest. Neighbouring steps are correlated: one run alone "
         f"proves little.{refused}"
     )
-    keys = (
+    statistics = (
         Key("each step", SKY),
         Key(f"mean of {WINDOW_S:g} s", INK),
         Key("ideal", GREEN, "dash"),
         Key(f"{_PERCENT} band", GREEN, "band", opacity=0.2),
-        Key("beacons seen", SKY, "band"),
-        Key("accepted", BLUE),
     )
+    beacons = (Key("beacons seen", SKY, "band"), Key("accepted", BLUE)) if trace.has("beacons_seen") else ()
+    keys = (*statistics, *beacons)
     alt = "NEES and NIS over time with their 95 % bands, and the number of beacons seen and accepted"
     return Illustration(SLUG, TITLE, alt, caption, render(figure, SLUG, alt), keys)
 

@@ -79,6 +79,7 @@ def pose_error_figure(run: RunData) -> Illustration:
         + (f" (here: {', '.join(inside)} of the steps)" if inside else "")
         + f". The grey start phase, {quantities.duration(run.settle_s)}, does not count: the start error is "
         "drawn from the initial covariance. 1 mrad is 0.057°."
+        + (" This run ended within it." if len(t_s) and t_s[-1] <= run.settle_s else "")
     )
     keys = (
         Key("error", BLUE),

@@ -54,7 +54,9 @@ def timeline_figure(run: RunData) -> Illustration:
         note(panels[1], "not recorded")
     _modes(panels[2], used)
     dt_s = float(np.median(np.diff(t_s))) if len(t_s) > 1 else 0.1
-    spent = [f"{mode.name} {float(np.sum(trace['mode'] == mode.number)) * dt_s:.1f}\u00a0s" for mode, _ in used]
+    spent = [
+        f"{mode.name} {float(np.sum(trace['mode'] == mode.number)) * dt_s:.1f}\u00a0s" for mode, _ in used
+    ]
     caption = (
         "Each number is an event of the list below; thin lines carry it down to the way that was still to go."
         + (f" Time spent: {', '.join(spent)}." if spent else "")
