@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from pilotage.kernels.dubins import pose_at, shortest
 from pilotage.kernels.geometry import distance_to_nearest
 from pilotage.kernels.jit import kernel
+from pilotage.kernels.motion import exact_arc
 
 FloatArray = NDArray[np.float64]
 
@@ -60,3 +61,24 @@ def fits(states: FloatArray, clearance: float, segments: FloatArray, circles: Fl
             return False
         least = max(least, min(clearance, here))
     return True
+
+
+@kernel
+def arc_fits(
+    x: float,
+    y: float,
+    th: float,
+    v: float,
+    w: float,
+    horizon: float,
+    pieces: int,
+    clearance: float,
+    segments: FloatArray,
+    circles: FloatArray,
+) -> bool:
+    """Whether driving at ``v`` and ``w`` for ``horizon`` seconds keeps ``clearance``, as in ``fits``."""
+    states = np.empty((pieces + 1, 3))
+    for i in range(pieces + 1):
+        t = horizon * i / pieces
+        states[i, 0], states[i, 1], states[i, 2] = exact_arc(x, y, th, v * t, w * t)
+    return fits(states, clearance, segments, circles)

@@ -37,6 +37,8 @@ class UltrasonicReactionConfig(Config):
     """Two walls no farther apart than this are a hall; the robot takes its middle. 0 switches it off."""
     hall_gain_rad_s_per_m: Positive = 1.5
     hall_turn_limit_rad_s: Positive = 0.5
+    hall_exit_m: NonNegative = 1.3
+    """The cones look about this far ahead: their view of the hall ends that much before the hall does."""
     ignore_mapped: bool = True
     mapped_tolerance_m: Positive = 0.3
     mapped_widening_rad: NonNegative = 0.06
@@ -66,6 +68,7 @@ class UltrasonicReaction:
         self._dt_s = knowledge.dt_s
         self._side = 0.0
         self._turned_rad = 0.0
+        self._hall_seen_at: Pose2 | None = None
 
     def reset(self) -> None:
         """End an avoidance turn."""
@@ -85,8 +88,19 @@ class UltrasonicReaction:
             return self._avoid(view, front)
         self.reset()
         if straight and view.left_beside_m + view.right_beside_m <= config.hall_width_m:
+            self._hall_seen_at = pose
             return self._centre(view)
+        if straight and self._still_inside_hall(pose):
+            return Reaction(ReactionKind.HALL, 0.0, math.inf, view.front_m)
+        self._hall_seen_at = None
         return self._repel(view)
+
+    def _still_inside_hall(self, pose: Pose2) -> bool:
+        """Whether the robot has not yet driven as far as the cones looked when they last saw the hall."""
+        seen = self._hall_seen_at
+        if seen is None:
+            return False
+        return math.hypot(pose.x_m - seen.x_m, pose.y_m - seen.y_m) < self._config.hall_exit_m
 
     def _avoid(self, view: SonarView, front_m: float) -> Reaction:
         """Turn towards the side whose objects are farther, and keep to that side until it is free."""

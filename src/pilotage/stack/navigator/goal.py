@@ -14,6 +14,7 @@ from pilotage.core.errors import InputError
 from pilotage.core.types import STOP, Event, FloatArray, Pose2, Twist
 from pilotage.sensors.readings import Readings
 from pilotage.sensors.sensor import NonNegative, Positive
+from pilotage.stack.control.guard import ArcGuard, GuardConfig
 from pilotage.stack.control.reactive import Reaction, ReactionKind
 from pilotage.stack.interface import Belief, PlannedPath, StackStatus
 from pilotage.stack.knowledge import Knowledge
@@ -53,6 +54,7 @@ class GoalNavigatorConfig(Config):
     """Replans that fail at the planner's clearance try the body's radius plus these."""
     cruise_speed_m_s: Positive = 0.5
     max_replans: int = Field(default=30, ge=0)
+    guard: GuardConfig = GuardConfig()
 
 
 @NAVIGATORS.add("goal", GoalNavigatorConfig)
@@ -90,6 +92,7 @@ class GoalNavigator:
             knowledge.streams.stream("planner"),
         )
         self._follower = WaypointFollower(parts.local_planner, parts.controller, knowledge.dt_s)
+        self._guard = ArcGuard(config.guard, knowledge.body_radius_m)
         self._t_s = 0.0
         self._status, self._reason = StackStatus.RUNNING, ""
         self._mode = Mode.FOLLOW
@@ -143,7 +146,10 @@ class GoalNavigator:
         self._reaction = NO_REACTION
         if self._status is not StackStatus.RUNNING:
             return STOP
-        return self._drive(readings, belief.pose)
+        command = self._drive(readings, belief.pose)
+        if self._guard.allows(command, belief.pose, self._segments, self._all_circles()):
+            return command
+        return self._refuse(command, belief.pose)
 
     def telemetry(self) -> Mapping[str, float]:
         """Reference, parts of the command, mode and progress, with the localizer's own numbers."""
@@ -289,6 +295,15 @@ class GoalNavigator:
         self._say(
             kind, f"{because}{plan.length_m:.2f} m to go, planned in {plan.planning_time_s * 1e3:.0f} ms"
         )
+
+    def _refuse(self, command: Twist, pose: Pose2) -> Twist:
+        """A command that the guard refuses: turn on the spot, or think again."""
+        if self._mode is Mode.AVOID:
+            return Twist(0.0, command.w_rad_s)
+        if self._mode is Mode.ESCAPE:
+            self._escaping = False
+            return self._replan_globally(pose, "the way back is blocked")
+        return self._replan_globally(pose, "the robot's own map leaves no room for the command")
 
     # --- questions ----------------------------------------------------------------------------------
 

@@ -1,0 +1,48 @@
+"""The last word before a command leaves: do not drive where the robot's own map says there is no room."""
+
+from __future__ import annotations
+
+from pilotage.core.config import Config
+from pilotage.core.types import FloatArray, Pose2, Twist
+from pilotage.kernels import local_path
+from pilotage.sensors.sensor import NonNegative, Positive
+
+PIECES = 4
+
+
+class GuardConfig(Config):
+    """How far ahead in time a command is looked at, and how near it may come."""
+
+    horizon_s: Positive = 0.4
+    margin_m: NonNegative = 0.03
+
+
+class ArcGuard:
+    """Checks the arc that a command would drive against everything on the robot's own map.
+
+    A disc turns on the spot without touching anything, so a refused command keeps its turn rate and
+    loses its speed. The braking distance, v^2 / (2 a), has to lie within the horizon.
+    """
+
+    def __init__(self, config: GuardConfig, body_radius_m: float) -> None:
+        self._horizon_s = config.horizon_s
+        self._clearance_m = body_radius_m + config.margin_m
+
+    def allows(self, command: Twist, pose: Pose2, segments_m: FloatArray, circles_m: FloatArray) -> bool:
+        """Whether the command can be driven for the horizon."""
+        if command.v_m_s == 0.0:
+            return True
+        return bool(
+            local_path.arc_fits(
+                pose.x_m,
+                pose.y_m,
+                pose.theta_rad,
+                command.v_m_s,
+                command.w_rad_s,
+                self._horizon_s,
+                PIECES,
+                self._clearance_m,
+                segments_m,
+                circles_m,
+            )
+        )
