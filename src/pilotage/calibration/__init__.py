@@ -1,1 +1,1 @@
-"""TODO"""
+"""Recorded logs to noise and bias parameters, with intervals."""

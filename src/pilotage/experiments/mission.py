@@ -76,7 +76,9 @@ def read_mission(name_or_path: str) -> dict[str, Any]:
 def _anchor_map(values: dict[str, Any], folder: Path) -> None:
     """Let a map file's relative path start from the mission file's folder."""
     world = values.get("world")
-    source = world.get("map") if isinstance(world, dict) else None
+    if not isinstance(world, dict):
+        return
+    source = world.get("map")
     if isinstance(source, str) and (folder / source).is_file():
         world["map"] = str(folder / source)
 
@@ -122,13 +124,13 @@ def _renames(old: dict[str, Any], new: dict[str, Any]) -> bool:
     return "name" in new and new["name"] != old.get("name")
 
 
-def apply_override(values: dict[str, Any], override: str) -> None:
-    """Apply one ``dotted.key=value`` in place.
+def parse_override(override: str) -> tuple[list[str], Any]:
+    """Split ``dotted.key=value`` into the key's parts and the value, which is read as YAML.
 
     Raises
     ------
     InputError
-        If the text is not of that form or the key leads through something that has no keys.
+        If the text is not of that form.
     """
     key, equals, text = override.partition("=")
     parts = key.strip().split(".")
@@ -140,6 +142,18 @@ def apply_override(values: dict[str, Any], override: str) -> None:
         raise InputError(f"--set '{override}': the value is not YAML") from None
     if isinstance(value, str):
         value = _number(value)
+    return parts, value
+
+
+def apply_override(values: dict[str, Any], override: str) -> None:
+    """Apply one ``dotted.key=value`` in place.
+
+    Raises
+    ------
+    InputError
+        If the text is not of that form or the key leads through something that has no keys.
+    """
+    parts, value = parse_override(override)
     top = list(Mission.model_fields)
     if parts[0] not in top:
         close = nearest(parts[0], top)
@@ -185,7 +199,5 @@ def _put(place: Any, part: str, value: Any, override: str) -> None:
 
 def _index(place: list[Any], part: str, override: str) -> int:
     if not part.isdigit() or int(part) >= len(place):
-        raise InputError(
-            f"--set '{override}': expected an index from 0 to {len(place) - 1}, found '{part}'"
-        )
+        raise InputError(f"--set '{override}': expected an index from 0 to {len(place) - 1}, found '{part}'")
     return int(part)

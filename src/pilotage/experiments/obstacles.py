@@ -187,9 +187,7 @@ def _free_of_walls(sides: FloatArray, world: SegmentMap) -> bool:
     grid = np.stack(
         np.meshgrid(np.linspace(low[0], high[0], steps[0]), np.linspace(low[1], high[1], steps[1])), axis=-1
     ).reshape(-1, 2)
-    least = geometry.least_distance(
-        np.ascontiguousarray(grid @ frame.T), world.segments_m, world.circles_m
-    )
+    least = geometry.least_distance(np.ascontiguousarray(grid @ frame.T), world.segments_m, world.circles_m)
     return bool(inside and least > 0.1)
 
 

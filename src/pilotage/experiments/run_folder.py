@@ -112,13 +112,13 @@ def _replace(draft: Path, final: Path) -> None:
         if final.exists():
             old = Path(tempfile.mkdtemp(prefix=f".{final.name}-old-", dir=final.parent))
             try:
-                os.rename(final, old / "run")
+                final.rename(old / "run")
             except FileNotFoundError:  # another process was quicker
                 pass
             finally:
                 shutil.rmtree(old, ignore_errors=True)
         try:
-            os.rename(draft, final)
+            draft.rename(final)
             return
         except OSError:
             if not final.exists():

@@ -46,7 +46,7 @@ def advance_disc(
     # Clearance is 1-Lipschitz in position: from here no contact can happen on the way.
     if clearance > abs(distance) or (distance == 0.0):
         return ex, ey, etheta, 1.0, end
-    pieces = max(1, int(math.ceil(abs(distance) / (0.25 * radius))))
+    pieces = max(1, math.ceil(abs(distance) / (0.25 * radius)))
     last, last_clearance = 0.0, clearance
     for i in range(pieces):
         part = (i + 1) / pieces

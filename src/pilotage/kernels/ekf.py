@@ -70,7 +70,7 @@ def joseph_update2(
     v0, v1 = innovation[0], innovation[1]
     nis = v0 * (i00 * v0 + i01 * v1) + v1 * (i01 * v0 + i11 * v1)
     if nis > gate:
-        return nis
+        return float(nis)
     K = np.empty((3, 2))
     for i in range(3):
         K[i, 0] = PH[i, 0] * i00 + PH[i, 1] * i01
@@ -94,7 +94,7 @@ def joseph_update2(
                     value += K[i, a] * R[a, b] * K[j, b]
             cov[i, j] = value
             cov[j, i] = value
-    return nis
+    return float(nis)
 
 
 @kernel

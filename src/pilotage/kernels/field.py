@@ -36,12 +36,12 @@ def interpolate_at(
     ny, nx = distance.shape
     if not (0.0 <= u <= nx - 1 and 0.0 <= v <= ny - 1):
         return 0.0
-    col = min(int(math.floor(u)), nx - 2)
-    row = min(int(math.floor(v)), ny - 2)
+    col = min(math.floor(u), nx - 2)
+    row = min(math.floor(v), ny - 2)
     fu, fv = u - col, v - row
     low = distance[row, col] * (1.0 - fu) + distance[row, col + 1] * fu
     high = distance[row + 1, col] * (1.0 - fu) + distance[row + 1, col + 1] * fu
-    return low * (1.0 - fv) + high * fv
+    return float(low * (1.0 - fv) + high * fv)
 
 
 @kernel

@@ -50,7 +50,8 @@ def _cache_folder() -> Path:
     return Path(tempfile.mkdtemp(prefix="pilotage-kernels-"))
 
 
-numba.config.CACHE_DIR = str(_cache_folder())
+# numba takes the folder when a function is decorated, so this has to come first.
+setattr(numba.config, "CACHE_DIR", str(_cache_folder()))  # noqa: B010 - numba's stub lacks the name
 
 
 def kernel(function: F) -> F:

@@ -88,8 +88,8 @@ def _beams_between(offset: float, width: float, step: float, beams: int) -> tupl
 
     A billionth of a beam is added at both ends, so that no beam slips between two walls that meet.
     """
-    low = max(0, int(math.ceil(offset / step - 1e-9)))
-    high = min(beams, int(math.floor((offset + width) / step + 1e-9)) + 1)
+    low = max(0, math.ceil(offset / step - 1e-9))
+    high = min(beams, math.floor((offset + width) / step + 1e-9) + 1)
     return low, high
 
 

@@ -60,8 +60,8 @@ def confirm_cells(
     centres = np.empty((points.shape[0], 2))
     count = 0
     for k in range(points.shape[0]):
-        col = int(math.floor((points[k, 0] - x0) / cell))
-        row = int(math.floor((points[k, 1] - y0) / cell))
+        col = math.floor((points[k, 0] - x0) / cell)
+        row = math.floor((points[k, 1] - y0) / cell)
         if not (0 <= row < ny and 0 <= col < nx):
             continue
         hits[row, col] += 1

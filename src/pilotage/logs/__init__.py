@@ -1,1 +1,1 @@
-"""TODO"""
+"""Recorded data in and out."""

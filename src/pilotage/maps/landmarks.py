@@ -21,7 +21,9 @@ class Landmarks:
         ids = np.ascontiguousarray(self.ids, dtype=np.int64).reshape(-1)
         points = np.ascontiguousarray(self.points_xy_m, dtype=np.float64).reshape(-1, 2)
         if ids.shape[0] != points.shape[0]:
-            raise InputError(f"landmarks: expected one id a point, found {ids.shape[0]} and {points.shape[0]}")
+            raise InputError(
+                f"landmarks: expected one id a point, found {ids.shape[0]} and {points.shape[0]}"
+            )
         if np.unique(ids).shape[0] != ids.shape[0]:
             raise InputError("landmarks: expected every id once, found one twice")
         if not np.isfinite(points).all():

@@ -90,7 +90,7 @@ Obstacle = Annotated[
 
 
 class WorldConfig(Config):
-    """The map (a shipped name, a file, or the map itself), where to start and go, and what should not be there."""
+    """The map (a shipped name, a file, or the map itself), start, goal, and what should not be there."""
 
     map: str | MapFile
     start: PoseConfig

@@ -31,4 +31,4 @@ class LidarConfig(SensorConfig):
     def beam_angles_rad(self) -> FloatArray:
         """Directions (N,) of the beams in the sensor's frame."""
         first = -self.field_of_view_rad / 2.0 if self.beams > 1 else 0.0
-        return first + self.beam_step_rad * np.arange(self.beams)
+        return first + self.beam_step_rad * np.arange(self.beams, dtype=np.float64)

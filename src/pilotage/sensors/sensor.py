@@ -49,4 +49,3 @@ class SensorConfig(Config):
 
 SENSORS: Registry[SensorConfig] = Registry("sensor", "pilotage.sensors")
 """Sensor names to their configs; for a sensor the config is the whole description."""
-

@@ -1,1 +1,4 @@
-"""What would run on the robot: navigator over exploration, planning, control, localization, mapping, perception."""
+"""What would run on the robot.
+
+Navigator over exploration over planning and control over localization and mapping over perception.
+"""

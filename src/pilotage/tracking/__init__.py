@@ -1,1 +1,1 @@
-"""TODO"""
+"""Video to the path of the robot: ground truth by camera."""

@@ -128,9 +128,7 @@ class GoalNavigator:
 
     def prepare(self) -> None:
         """Plan from the initial belief; without a path the task has failed before it starts."""
-        result = self._plan.make(
-            0.0, self.belief.pose, self.mapped_circles_m, (self._plan.clearance_m,)
-        )
+        result = self._plan.make(0.0, self.belief.pose, self.mapped_circles_m, (self._plan.clearance_m,))
         if result.path is None:
             self._fail(f"{result.status}: {result.reason}")
         else:

@@ -56,7 +56,7 @@ class PathProgress:
     def next_waypoint(self, ahead_m: float) -> int:
         """Index of the first waypoint at least ``ahead_m`` farther along (the last one at the end)."""
         index = int(np.searchsorted(self.waypoint_along_m, self.at_m + ahead_m))
-        return min(index, self.waypoint_along_m.shape[0] - 1)
+        return min(index, int(self.waypoint_along_m.shape[0]) - 1)
 
     def turn_ahead_rad(self, states: FloatArray, reach_m: float) -> float:
         """Largest change of heading along the next ``reach_m`` of the path."""

@@ -49,9 +49,7 @@ class SonarRing:
         edge of the cone is not taken for news.
     """
 
-    def __init__(
-        self, sensors: dict[str, UltrasonicConfig], tolerance_m: float, widening_rad: float
-    ) -> None:
+    def __init__(self, sensors: dict[str, UltrasonicConfig], tolerance_m: float, widening_rad: float) -> None:
         self._sensors = sensors
         self._tolerance_m = tolerance_m
         self._widening_rad = widening_rad

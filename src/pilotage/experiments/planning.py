@@ -1,0 +1,115 @@
+"""One planning query on a map, without a robot."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from pilotage.core.angles import wrap_to_pi
+from pilotage.core.errors import InputError
+from pilotage.core.random import RandomStreams
+from pilotage.core.types import Goal, Pose2
+from pilotage.evaluation.shortest_path import shortest_path
+from pilotage.experiments.mission import parse_override
+from pilotage.experiments.world_map import load_map
+from pilotage.maps.map_file import LandmarkMap
+from pilotage.stack.navigator.global_plan import GlobalPlan
+from pilotage.stack.planning.planner import PLANNERS, SMOOTHERS
+
+SMOOTHER = "shortcut"
+
+
+def plan_on_map(
+    map_name_or_path: str,
+    start: Sequence[float],
+    goal: Sequence[float],
+    planner: str,
+    overrides: Sequence[str] = (),
+    seed: int = 0,
+) -> dict[str, Any]:
+    """Plan from ``start`` to ``goal`` (x, y in m and, where given, theta in rad).
+
+    Parameters
+    ----------
+    overrides
+        ``parameter=value`` for the planner, ``smoother.parameter=value`` for the smoother, or
+        ``smoother=none`` for the planner's path as it is.
+
+    Returns
+    -------
+    success, reason, planned_length_m, shortest_length_m (exact, at the same clearance), planning_time_s,
+    first_solution_s, path_nodes and path, a list of [x, y, theta].
+
+    Raises
+    ------
+    InputError
+        Where the map, the planner, a parameter or a place is not what it should be.
+    """
+    floor = load_map(map_name_or_path)
+    _check_on_map("--start", start, floor)
+    _check_on_map("--goal", goal, floor)
+    own, smoothing, smoother_name = _split(overrides)
+    config = PLANNERS.configure(planner, own, f"planner '{planner}'")
+    smoother_config = SMOOTHERS.configure(smoother_name, smoothing, f"smoother '{smoother_name}'")
+    to = Goal(goal[0], goal[1], wrap_to_pi(goal[2]) if len(goal) > 2 else None)
+    plan = GlobalPlan(
+        PLANNERS.entry(planner).factory(config),
+        SMOOTHERS.entry(smoother_name).factory(smoother_config),
+        floor.walls,
+        to,
+        RandomStreams(seed).stream("planner"),
+    )
+    pose = Pose2(start[0], start[1], wrap_to_pi(start[2]) if len(start) > 2 else 0.0)
+    result = plan.make(0.0, pose, floor.walls.circles_m[:0], (plan.clearance_m,))
+    answer: dict[str, Any] = {
+        "success": result.path is not None,
+        "reason": str(result.status) if not result.reason else f"{result.status}: {result.reason}",
+        "planner": planner,
+        "seed": seed,
+        "clearance_m": plan.clearance_m,
+        "iterations": result.iterations,
+    }
+    if plan.path is None:
+        return answer
+    adopted = plan.history[-1]
+    shortest = shortest_path(floor.walls, (start[0], start[1]), (goal[0], goal[1]), plan.clearance_m)
+    answer |= {
+        "planned_length_m": adopted.length_m,
+        "shortest_length_m": None if shortest is None else shortest.length_m,
+        "planning_time_s": adopted.planning_time_s,
+        "first_solution_s": adopted.first_solution_s,
+        "path_nodes": int(adopted.waypoints.shape[0]),
+        "path": adopted.states.tolist(),
+    }
+    return answer
+
+
+def _split(overrides: Sequence[str]) -> tuple[dict[str, Any], dict[str, Any], str]:
+    """Sort overrides into the planner's parameters, the smoother's, and the smoother's name."""
+    own: dict[str, Any] = {}
+    smoothing: dict[str, Any] = {}
+    name = SMOOTHER
+    for override in overrides:
+        parts, value = parse_override(override)
+        if parts[:2] in (["stack", "planner"], ["stack", "smoother"]):
+            parts = parts[1:]
+        if parts in (["smoother"], ["smoother", "name"]):
+            name = str(value)
+        elif parts[0] == "smoother" and len(parts) == 2:
+            smoothing[parts[1]] = value
+        elif parts[0] == "planner" and len(parts) == 2:
+            own[parts[1]] = value
+        elif len(parts) == 1:
+            own[parts[0]] = value
+        else:
+            raise InputError(f"--set '{override}': expected a parameter of the planner or of the smoother")
+    return own, smoothing, name
+
+
+def _check_on_map(option: str, place: Sequence[float], floor: LandmarkMap) -> None:
+    if not floor.walls.contains(place[0], place[1]):
+        xmin, ymin, xmax, ymax = floor.walls.bounds_m
+        raise InputError(
+            f"{option}: expected a place on the map '{floor.name}' ({xmin:g} to {xmax:g}, "
+            f"{ymin:g} to {ymax:g} m), found ({place[0]:g}, {place[1]:g})"
+        )
