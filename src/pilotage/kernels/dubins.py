@@ -199,7 +199,7 @@ def sample(
 ) -> FloatArray:
     """States (N, 3) x, y, theta evenly along a curve, at most ``spacing`` apart, with both its ends."""
     total = l0 + l1 + l2
-    count = max(1, int(math.ceil(total / spacing - 1e-9)))
+    count = max(1, math.ceil(total / spacing - 1e-9))
     out = np.empty((count + 1, 3))
     for i in range(count + 1):
         s = total if i == count else total * i / count

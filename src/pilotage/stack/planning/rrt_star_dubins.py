@@ -1,0 +1,233 @@
+"""RRT* with Dubins curves: the report's planner, guided, exact in its checks and anytime."""
+
+from __future__ import annotations
+
+import math
+import time
+from typing import Literal
+
+import numpy as np
+from pydantic import Field
+
+from pilotage.core.angles import wrap_array_to_pi
+from pilotage.core.config import Config
+from pilotage.core.errors import InputError
+from pilotage.core.types import FloatArray
+from pilotage.kernels import dubins, guide, rrt_star, rrt_tree
+from pilotage.kernels.clearance import Space, first_blocked, least_step, skin, slack_at
+from pilotage.stack.planning.driving_space import (
+    CHECK_SPACING_M,
+    STATE_SPACING_M,
+    blocked_end,
+    clearance_of,
+    failure,
+    space_for,
+)
+from pilotage.stack.planning.planner import PLANNERS, Path, PlanRequest, PlanResult, PlanStatus
+
+CHUNK = 256
+"""Iterations between looks at the clock and at the incumbent."""
+
+NO_BOUND = rrt_star.Bound(np.zeros((1, 1)), 0.0, 0.0, 1.0)
+NO_GUIDE = np.zeros((0, 3))
+
+
+class RrtStarDubinsConfig(Config):
+    """Settings of RRT*-Dubins.
+
+    ``validation_distance_m`` is the largest spacing between checked states along an edge; the check goes
+    finer by itself where an obstacle could hide in between, and the finished path is checked every
+    centimetre. ``guide_bias`` is the share of samples near a rough way found on the distance field, later
+    near the incumbent: 0 is plain RRT*. With ``stop`` 'first' the search ends at the first solution (the
+    report's way), with 'optimize' after ``iterations``. A time budget makes the result depend on the
+    machine; without one the same seed gives the same path.
+    """
+
+    turning_radius_m: float = Field(0.5, gt=0.0, le=100.0)
+    validation_distance_m: float = Field(0.5, gt=0.0, le=100.0)
+    max_connection_distance_m: float = Field(1.5, gt=0.0, le=1000.0)
+    clearance_m: float = Field(0.46, ge=0.0, le=100.0)
+    goal_bias: float = Field(0.05, ge=0.0, le=1.0)
+    guide_bias: float = Field(0.6, ge=0.0, le=0.95)
+    guide_spread_m: float = Field(0.6, gt=0.0, le=100.0)
+    free_heading_share: float = Field(0.8, ge=0.0, le=1.0)
+    rewire_factor: float = Field(3.7, gt=math.e * (1.0 + 1.0 / 3.0), le=20.0)
+    iterations: int = Field(20_000, ge=1, le=5_000_000)
+    time_budget_s: float | None = Field(None, gt=0.0)
+    stop: Literal["first", "optimize"] = "first"
+
+
+@PLANNERS.add("rrt-star-dubins", RrtStarDubinsConfig)
+class RrtStarDubinsPlanner:
+    """Sampling-based planner for forward driving with a turning radius (see ``kernels.rrt_star``).
+
+    Asymptotically optimal with ``stop='optimize'`` (Karaman and Frazzoli 2011). Fails to find ways whose
+    free width is below about a millimetre.
+
+    Raises
+    ------
+    InputError
+        From ``plan`` where the request's clearance or poses are not finite.
+    """
+
+    def __init__(self, config: RrtStarDubinsConfig) -> None:
+        self._config = config
+
+    @property
+    def clearance_m(self) -> float:
+        """Distance that it keeps from obstacles where a request names none."""
+        return self._config.clearance_m
+
+    def plan(self, request: PlanRequest) -> PlanResult:
+        """Answer one query; the path's waypoints are the nodes of the tree."""
+        began = time.perf_counter()
+        config = self._config
+        clearance_m = clearance_of(request, config.clearance_m)
+        if not math.isfinite(request.start.theta_rad):
+            raise InputError(f"plan: expected a finite start heading, found {request.start.theta_rad}")
+        space = space_for(request.field, clearance_m)
+        blocked = blocked_end(request, space, clearance_m)
+        if blocked is not None:
+            return failure(*blocked, time.perf_counter() - began)
+        way, bound, proof = _look_around(request, space, clearance_m, config)
+        if proof is not None:
+            return failure(PlanStatus.NO_PATH, proof, time.perf_counter() - began)
+        search = self._search(request, space, clearance_m)
+        goal = request.goal
+        goal_heading = 0.0 if goal.theta_rad is None else goal.theta_rad
+        tree = rrt_tree.make_tree(
+            request.start.as_array(),
+            np.array([goal.x_m, goal.y_m, goal_heading]),
+            request.field.bounds_m,
+            config.max_connection_distance_m,
+            config.iterations,
+        )
+        if rrt_star.try_goal(tree, rrt_tree.START, space, search):
+            rrt_tree.join_goal(tree)
+        first_s, checked_cost = math.nan, math.inf
+        best: Path | None = None
+        done = 0
+        while True:
+            cost = float(tree.cost[rrt_tree.GOAL])
+            if cost < checked_cost - 1e-9:
+                path, failing = _extract(tree, space, clearance_m, config.turning_radius_m)
+                if path is None:
+                    rrt_tree.cut(tree, failing)
+                    continue
+                if best is None:
+                    first_s = time.perf_counter() - began
+                best, checked_cost = path, cost
+                if config.guide_bias > 0.0:
+                    way = path.states[:: max(1, round(0.25 / STATE_SPACING_M))].copy()
+            elapsed = time.perf_counter() - began
+            out_of_time = config.time_budget_s is not None and elapsed > config.time_budget_s
+            if done >= config.iterations or out_of_time or (best is not None and config.stop == "first"):
+                break
+            chunk = min(CHUNK, config.iterations - done)
+            ran = rrt_star.grow(tree, space, search, bound, way, request.rng, chunk, best is None)
+            done += int(ran)
+            if ran < chunk and not tree.cost[rrt_tree.GOAL] < checked_cost:
+                break
+        elapsed = time.perf_counter() - began
+        edges = _tree_edges(tree)
+        if best is None:
+            reason = f"no path found in {done} iterations"
+            if config.time_budget_s is not None and elapsed > config.time_budget_s:
+                reason += f", time budget {config.time_budget_s:g} s"
+            return PlanResult(PlanStatus.NO_PATH, reason, None, math.nan, elapsed, done, edges)
+        reason = f"{best.length_m:.2f} m after {done} iterations"
+        return PlanResult(PlanStatus.FOUND, reason, best, first_s, elapsed, done, edges)
+
+    def _search(self, request: PlanRequest, space: Space, clearance_m: float) -> rrt_star.Search:
+        """Settings for the kernel; edges keep a little more clearance for what checks may step over."""
+        config = self._config
+        step = least_step(config.validation_distance_m, clearance_m, config.turning_radius_m)
+        extra = skin(step, clearance_m, config.turning_radius_m)
+        for x, y in ((request.start.x_m, request.start.y_m), (request.goal.x_m, request.goal.y_m)):
+            # Where an end touches the clearance's edge there is no room for more.
+            extra = min(extra, max(0.0, float(slack_at(x, y, space, clearance_m))))
+        return rrt_star.Search(
+            radius=config.turning_radius_m,
+            connection=config.max_connection_distance_m,
+            clearance=clearance_m + extra,
+            min_step=step,
+            goal_bias=config.goal_bias,
+            guide_bias=config.guide_bias,
+            free_heading=config.free_heading_share,
+            spread=config.guide_spread_m,
+            rewire_factor=config.rewire_factor,
+            goal_heading_free=request.goal.theta_rad is None,
+        )
+
+
+def _look_around(
+    request: PlanRequest, space: Space, clearance_m: float, config: RrtStarDubinsConfig
+) -> tuple[FloatArray, rrt_star.Bound, str | None]:
+    """Rough way to the goal, lower bound of the cost-to-go, and the proof where there is no way at all."""
+    stride = max(1, int(clearance_m / (2.0 * space.resolution)))
+    cell = stride * space.resolution
+    if min(space.distance.shape) < 3 * stride:
+        return NO_GUIDE, NO_BOUND, None
+    classes = guide.classify(space, stride, clearance_m)
+    start = guide.nearest_node(request.start.x_m, request.start.y_m, classes, space, stride)
+    goal = guide.nearest_node(request.goal.x_m, request.goal.y_m, classes, space, stride)
+    cost, move = guide.cost_to_go(classes, space, stride, clearance_m, guide.TIGHT_FACTOR, *goal)
+    if cost[start] == guide.UNREACHED:
+        if 2.0 * clearance_m < cell * math.sqrt(5.0):
+            # Walls are thinner than the grid can tell apart: no proof.
+            return NO_GUIDE, NO_BOUND, None
+        ends = [
+            min(k * stride, n - 1)
+            for ij in (start, goal)
+            for k, n in zip(ij, space.distance.shape, strict=True)
+        ]
+        widest_m = guide.widest_way(space.distance, *ends) + space.resolution * math.sqrt(0.5)
+        return (
+            NO_GUIDE,
+            NO_BOUND,
+            f"no way from start to goal keeps {clearance_m:g} m from the obstacles: "
+            f"the widest way needs a clearance of at most {math.ceil(widest_m * 1000.0) / 1000.0:g} m",
+        )
+    way = guide.trace(move, space, stride, *start, 3) if config.guide_bias > 0.0 else NO_GUIDE
+    if config.stop == "first" or config.guide_bias == 0.0:
+        return way, NO_BOUND, None
+    loose, _ = guide.cost_to_go(classes, space, stride, clearance_m, 1, *goal)
+    metres = np.where(loose == guide.UNREACHED, np.inf, loose * (cell / guide.UNIT / 1.03) - cell)
+    return way, rrt_star.Bound(metres, space.x0, space.y0, cell), None
+
+
+def _extract(
+    tree: rrt_tree.Tree, space: Space, clearance_m: float, radius_m: float
+) -> tuple[Path | None, int]:
+    """The way to the goal as a path, or None and the node whose edge fails the check at a centimetre."""
+    nodes = rrt_tree.way_to(tree, rrt_tree.GOAL)
+    pieces = [tree.pose[nodes[:1]]]
+    for node in nodes[1:]:
+        curve = _edge(tree, node, radius_m)
+        if first_blocked(dubins.sample(*curve, CHECK_SPACING_M), space, clearance_m) >= 0:
+            return None, int(node)
+        pieces.append(dubins.sample(*curve, STATE_SPACING_M)[1:])
+    last = nodes[-1]
+    if len(nodes) > 1:
+        tree.pose[last, 2] = dubins.pose_at(*_edge(tree, last, radius_m), float(tree.lengths[last].sum()))[2]
+    states = np.concatenate(pieces)
+    states[-1] = tree.pose[last]
+    states[:, 2] = wrap_array_to_pi(states[:, 2])
+    waypoints = tree.pose[nodes]
+    waypoints[:, 2] = wrap_array_to_pi(waypoints[:, 2])
+    return Path(states, waypoints, float(tree.cost[last]), radius_m), -1
+
+
+def _edge(
+    tree: rrt_tree.Tree, node: int, radius_m: float
+) -> tuple[float, float, float, float, int, float, float, float]:
+    """The curve into a node: start, radius, word and lengths."""
+    x, y, th = tree.pose[tree.parent[node]]
+    l0, l1, l2 = tree.lengths[node]
+    return x, y, th, radius_m, int(tree.word[node]), l0, l1, l2
+
+
+def _tree_edges(tree: rrt_tree.Tree) -> FloatArray:
+    """Straight lines (E, 4) from the nodes' parents to the nodes."""
+    nodes = np.flatnonzero(tree.parent >= 0)
+    return np.hstack([tree.pose[tree.parent[nodes], :2], tree.pose[nodes, :2]])

@@ -1,0 +1,158 @@
+"""Smoothers: shorten a planned path without losing its validity, or leave it as it is."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from pydantic import Field
+
+from pilotage.core.angles import wrap_array_to_pi
+from pilotage.core.config import Config
+from pilotage.core.types import BoolArray, FloatArray, IntArray
+from pilotage.kernels import dubins, shortcut
+from pilotage.kernels.clearance import Space, least_step, skin, slack_at
+from pilotage.stack.planning.driving_space import (
+    CHECK_SPACING_M,
+    STATE_SPACING_M,
+    is_valid,
+    space_for,
+    spaced_waypoints,
+)
+from pilotage.stack.planning.planner import SMOOTHERS, Path, PlanRequest
+
+LEAST_RADIUS_M = 1e-3
+"""Stands for turning on the spot, so that every path is made of Dubins curves."""
+
+
+class NoSmootherConfig(Config):
+    """The report's behaviour has no settings."""
+
+
+@SMOOTHERS.add("none", NoSmootherConfig)
+class NoSmoother:
+    """Returns the path as it is: the report leaves smoothing to the local planner."""
+
+    def __init__(self, config: NoSmootherConfig) -> None:
+        self._config = config
+
+    def smooth(self, path: Path, request: PlanRequest, clearance_m: float) -> Path:  # noqa: ARG002
+        """Return ``path`` itself."""
+        return path
+
+
+class ShortcutSmootherConfig(Config):
+    """Settings of the shortcut smoother.
+
+    ``sample_spacing_m`` is the spacing of the states between which shortcuts are tried (wider on paths
+    of more than ``max_samples`` of them: their number decides the time), ``rounds`` the most repetitions,
+    ``waypoint_spacing_m`` the spacing of the waypoints handed to the local planner.
+    """
+
+    waypoint_spacing_m: float = Field(1.5, gt=0.0, le=1000.0)
+    sample_spacing_m: float = Field(0.3, ge=0.01, le=100.0)
+    max_samples: int = Field(400, ge=10, le=10_000)
+    rounds: int = Field(3, ge=1, le=50)
+
+
+@SMOOTHERS.add("shortcut", ShortcutSmootherConfig)
+class ShortcutSmoother:
+    """Best chain of Dubins shortcuts, then local tightening; deterministic, it draws nothing.
+
+    The result keeps the path's turning radius and the clearance, checked every centimetre, and is never
+    longer than the input: where nothing better is found, the input comes back with evenly spaced
+    waypoints. It does not leave the way around obstacles that the input takes, unless a shortcut does.
+    """
+
+    def __init__(self, config: ShortcutSmootherConfig) -> None:
+        self._config = config
+
+    def smooth(self, path: Path, request: PlanRequest, clearance_m: float) -> Path:
+        """Return a path from the same start to the same goal that is valid and no longer than ``path``."""
+        space = space_for(request.field, clearance_m)
+        radius_m = max(path.turning_radius_m, LEAST_RADIUS_M)
+        step = least_step(CHECK_SPACING_M * 5.0, clearance_m, radius_m)
+        extra = skin(step, clearance_m, radius_m)
+        for state in (path.states[0], path.states[-1]):
+            extra = min(extra, max(0.0, float(slack_at(state[0], state[1], space, clearance_m))))
+        rules = shortcut.Rules(radius_m, clearance_m + extra, step, request.goal.theta_rad is None)
+        best = _Chain.of(path)
+        for _ in range(self._config.rounds):
+            shorter = self._round(best, space, rules)
+            if not (shorter.length_m < best.length_m and shorter.is_valid(space, clearance_m)):
+                break
+            gain_m = best.length_m - shorter.length_m
+            best = shorter
+            if gain_m < 1e-4 * best.length_m:
+                break
+        waypoints = spaced_waypoints(best.states, self._config.waypoint_spacing_m)
+        return Path(best.states, waypoints, best.length_m, path.turning_radius_m)
+
+    def _round(self, chain: _Chain, space: Space, rules: shortcut.Rules) -> _Chain:
+        """One pass of shortcuts and tightening."""
+        steps = np.hypot(np.diff(chain.states[:, 0]), np.diff(chain.states[:, 1]))
+        s = np.concatenate([[0.0], np.cumsum(steps)])
+        if s[-1] <= 0.0:
+            return chain
+        # The states' chords are a little shorter than the curve.
+        s *= chain.length_m / s[-1]
+        count = min(self._config.max_samples, math.ceil(s[-1] / self._config.sample_spacing_m) + 1)
+        picked = np.unique(np.searchsorted(s, np.linspace(0.0, s[-1], max(2, count)) - 1e-9))
+        picked[-1] = len(s) - 1
+        samples = np.ascontiguousarray(chain.states[picked])
+        nodes, kept = shortcut.best_chain(samples, s[picked], space, rules)
+        ranges = np.column_stack([picked[nodes[:-1]], picked[nodes[1:]]])
+        way = shortcut.tighten(samples[nodes], kept, space, rules, 0.4, 0.01)
+        way, kept, was = shortcut.split(way, kept, space, rules, self._config.sample_spacing_m)
+        way = shortcut.tighten(way, kept, space, rules, 0.2, 0.004)
+        return _Chain.through(way, kept, ranges[was], chain, s, rules)
+
+
+class _Chain:
+    """A dense path and its parts that are checked at a finer spacing than its states."""
+
+    def __init__(self, states: FloatArray, length_m: float, fine: FloatArray) -> None:
+        self.states, self.length_m, self._fine = states, length_m, fine
+
+    @staticmethod
+    def of(path: Path) -> _Chain:
+        """The input as it is."""
+        return _Chain(path.states, path.length_m, path.states)
+
+    @staticmethod
+    def through(
+        way: FloatArray,
+        kept: BoolArray,
+        ranges: IntArray,
+        old: _Chain,
+        s: FloatArray,
+        rules: shortcut.Rules,
+    ) -> _Chain:
+        """Join curves through waypoints (K, 3) with the kept pieces, ranges of the old path's states."""
+        coarse, fine = [old.states[:1]], [old.states[:1]]
+        length_m = 0.0
+        for i in range(len(kept)):
+            if kept[i]:
+                low, high = int(ranges[i, 0]), int(ranges[i, 1])
+                coarse.append(old.states[low + 1 : high + 1])
+                fine.append(old.states[low + 1 : high + 1])
+                length_m += float(s[high] - s[low])
+                continue
+            free = rules.goal_heading_free and i == len(kept) - 1
+            x, y, th = way[i]
+            gx, gy, gth = way[i + 1]
+            word, l0, l1, l2 = shortcut.connect(x, y, th, gx, gy, gth, free, rules.radius)
+            curve = (x, y, th, rules.radius, word, l0, l1, l2)
+            coarse.append(dubins.sample(*curve, STATE_SPACING_M)[1:])
+            fine.append(dubins.sample(*curve, CHECK_SPACING_M)[1:])
+            length_m += l0 + l1 + l2
+        states = np.concatenate(coarse)
+        states[-1, :2] = old.states[-1, :2]
+        if not rules.goal_heading_free:
+            states[-1, 2] = old.states[-1, 2]
+        states[:, 2] = wrap_array_to_pi(states[:, 2])
+        return _Chain(states, length_m, np.concatenate(fine))
+
+    def is_valid(self, space: Space, clearance_m: float) -> bool:
+        """Whether every centimetre keeps the clearance."""
+        return is_valid(self._fine, space, clearance_m)
