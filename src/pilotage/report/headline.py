@@ -36,6 +36,9 @@ def headline(metrics: Mapping[str, Any]) -> str:
         reason = str(metrics.get("reason") or "no reason given").strip().rstrip(".")
         answer = f"Failed{after}: {reason}"
     details = []
+    missed = number(metrics.get("goal_error_m"))
+    if not success and math.isfinite(missed):
+        details.append(f"{quantities.length(missed)} from the goal")
     rmse, worst = number(metrics.get("position_rmse_m")), number(metrics.get("position_max_m"))
     if math.isfinite(rmse):
         text = f"position known to {quantities.length(rmse)} (RMSE)"

@@ -104,10 +104,10 @@ def events_section(events: Sequence[Event]) -> str:
             f'<td class="value">{time}</td><td>{escape(kind.name)}</td><td>{escape(event.text)}</td></tr>'
         )
     return (
-        f'{head}<table class="events"><thead><tr><th scope="col">no.</th>'
+        f'{head}<div class="long"><table class="events"><thead><tr><th scope="col">no.</th>'
         '<th scope="col" class="value">time</th><th scope="col">kind</th>'
         '<th scope="col">what happened</th></tr></thead>'
-        f"<tbody>{''.join(rows)}</tbody></table></section>"
+        f"<tbody>{''.join(rows)}</tbody></table></div></section>"
     )
 
 

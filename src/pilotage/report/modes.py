@@ -23,7 +23,7 @@ class Mode:
 
 
 FOLLOW = Mode(0, "follow the path", "follow", FAINT)
-LATERAL = Mode(1, "lateral repulsion", "lateral", BLUE)
+LATERAL = Mode(1, "lateral repulsion, hall", "lateral", BLUE)
 AVOID = Mode(2, "avoid", "avoid", ORANGE)
 ESCAPE = Mode(3, "back out", "back out", VERMILLION)
 REPLAN = Mode(4, "stopped to replan", "replan", PURPLE)

@@ -11,7 +11,6 @@ from pilotage.report.style import (
     GREEN,
     MUTED,
     ORANGE,
-    PURPLE,
     SKY,
     VERMILLION,
     Illustration,
@@ -36,7 +35,7 @@ _PARTS = (
     ("w_feedforward_rad_s", "feed-forward", GREEN, 2),
     ("w_reactive_rad_s", "reactive", VERMILLION, 2),
     ("v_true_m_s", "true speed", SKY, 3),
-    ("v_cmd_m_s", "commanded speed", PURPLE, 3),
+    ("v_cmd_m_s", "commanded speed", BLACK, 3),
 )
 
 
@@ -74,8 +73,8 @@ def control_figure(run: RunData) -> Illustration:
             series(axes, t_s, trace[column] * scale, colour, linewidth=width)
     caption = (
         "The lateral error is what the controller sees, the distance of its own estimate from the reference. "
-        "The commanded turn rate is the sum of four parts: feed-forward along the path, proportional and "
-        "integral on the error, and the reactive part that keeps off walls and obstacles."
+        "While it follows the path the commanded turn rate is the sum of four parts: feed-forward along the "
+        "path, proportional and integral on the error, and the reactive part that keeps off walls."
     )
     keys = tuple(
         Key(f"{name} part" if panel in (1, 2) else name, colour)

@@ -76,17 +76,14 @@ def draw_tree(axes: Axes, run: RunData) -> None:
 
 def draw_plans(axes: Axes, run: RunData, linewidth: float = 4.5) -> None:
     """Draw the planned paths as broad bands under the driven ones: the first, then what replaced it."""
-    # The last replans lie on top: they are what was driven.
-    for index, plan in enumerate(run.plans):
-        line(
-            axes,
-            plan.path[:, :2],
-            "plan" if index == 0 else "replans",
-            color=SKY if index == 0 else PURPLE,
-            linewidth=linewidth,
-            alpha=0.45,
-            zorder=2 + 0.01 * index,
-        )
+    # All replans as one line with gaps: thirty translucent ones on each other would be one solid bar.
+    gap = np.full((1, 2), np.nan)
+    first = [plan.path[:, :2] for plan in run.plans[:1]]
+    later = [part for plan in run.plans[1:] for part in (plan.path[:, :2], gap)]
+    for layer, parts, colour, zorder in (("plan", first, SKY, 2.0), ("replans", later, PURPLE, 2.1)):
+        if parts:
+            together = np.concatenate(parts)
+            line(axes, together, layer, color=colour, linewidth=linewidth, alpha=0.45, zorder=zorder)
 
 
 def draw_paths(axes: Axes, run: RunData, linewidth: float = 2.2) -> None:
