@@ -27,6 +27,7 @@ from pilotage.core.types import Event
 from pilotage.report import quantities, summary_table, write_report
 from pilotage.report.figures.consistency import chi_square_band
 from pilotage.report.figures.layers import ellipse_outlines
+from pilotage.report.figures.map import view_limits
 from pilotage.report.figures.placing import LabelPlacer, along
 from pilotage.report.run_folder import read_run
 from pilotage.report.series import band, decimate, merge_spans, running_mean, spans
@@ -571,3 +572,20 @@ def test_labels_keep_off_lines_and_each_other() -> None:
         assert abs(y - 50.0) > 6.0
         for other_x, other_y in places[:i]:
             assert max(abs(x - other_x), abs(y - other_y)) > 6.0
+
+
+def test_map_shows_the_whole_floor_or_the_part_that_matters(tmp_path: Path) -> None:
+    whole = view_limits(read_run(fabricate_run(tmp_path / "whole", steps=50)))
+    assert whole is not None
+    assert whole[0] < 0.0
+    assert whole[2] > 12.0
+    floor = _world() | {
+        "bounds_m": [-60, -60, 60, 60],
+        "segments_m": [[-60, -60, 60, -60], [60, -60, 60, 60]],
+    }
+    run = fabricate_run(tmp_path / "part", steps=50, world=floor)
+    part = view_limits(read_run(run))
+    assert part is not None
+    assert part[0] > -20.0
+    assert part[3] < 30.0
+    assert "Only the part of the floor around the run is shown." in page_of(run)

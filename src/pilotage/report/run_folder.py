@@ -90,6 +90,12 @@ class World:
     start: tuple[float, float, float | None] | None = None
     goal: tuple[float, float, float | None] | None = None
 
+    @property
+    def has_obstacles(self) -> bool:
+        """Whether there was anything that the robot was not told about."""
+        unexpected = (self.obstacle_segments_m, self.obstacle_circles_m, self.obstacle_polygons_m)
+        return any(len(things) > 0 for things in unexpected)
+
 
 @dataclass(frozen=True, slots=True)
 class Plan:

@@ -73,15 +73,16 @@ def close_ups_figure(run: RunData) -> Illustration:
         "that moment, the dashed ring is where it believed to be; the small black ellipses hold it with 95 % "
         "probability and are to scale."
     )
-    keys = (
-        Key("true path", BLUE),
-        Key("estimated path", VERMILLION, "dash"),
-        Key("reference", GREEN),
-        Key("first plan", SKY, "band"),
-        Key("replans", PURPLE, "band"),
-        Key("unexpected obstacle", ORANGE, "band", opacity=1.0),
-        Key("mapped by the robot", BLACK, "spot"),
+    candidates = (
+        (True, Key("true path", BLUE)),
+        (run.trace.has("est_x_m"), Key("estimated path", VERMILLION, "dash")),
+        (run.trace.has("ref_x_m"), Key("reference", GREEN)),
+        (bool(run.plans), Key("first plan", SKY, "band")),
+        (len(run.plans) > 1, Key("replans", PURPLE, "band")),
+        (run.world.has_obstacles, Key("unexpected obstacle", ORANGE, "band", opacity=1.0)),
+        (len(run.mapped_points_m) > 0, Key("mapped by the robot", BLACK, "spot")),
     )
+    keys = tuple(key for there, key in candidates if there)
     alt = "Close-ups of the map: " + "; ".join(moment.title for moment in moments)
     return Illustration(SLUG, TITLE, alt, caption, render(figure, SLUG, alt), keys)
 
@@ -109,6 +110,7 @@ def _moments(run: RunData, path: FloatArray) -> list[Moment]:
     if bool(np.isfinite(clearance).any()):
         step = int(np.nanargmin(clearance))
         found.append(Moment(step, f"least clearance, {quantities.length(float(clearance[step]))}"))
+    found.append(Moment(int(np.flatnonzero(known)[-1]), "the end"))
     apart: list[Moment] = []
     for moment in found:
         if known[moment.step] and all(

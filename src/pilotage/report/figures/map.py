@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import TypeAlias
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -34,9 +35,15 @@ from pilotage.report.style import (
 
 SLUG = "map"
 TITLE = "The map"
+
+Limits: TypeAlias = tuple[float, float, float, float]
+"""x_min, y_min, x_max, y_max in metres."""
+
 _LEFT_PT, _RIGHT_PT, _TOP_PT, _BOTTOM_PT = 34.0, 6.0, 6.0, 30.0
 _MOST_HEIGHT_PT, _LEAST_HEIGHT_PT = 900.0, 150.0
 _MOST_BEACON_LABELS = 150
+# A run that needs less than this share of the floor is shown with its surroundings only.
+_SMALL_PART = 0.55
 _MAGNIFICATIONS = (1000, 500, 200, 100, 50, 20, 10, 5, 2)
 
 
@@ -62,42 +69,63 @@ def map_figure(run: RunData) -> Illustration:
     _draw_events(axes, run, placer, points_per_m)
     _draw_beacons(axes, run, placer, points_per_m)
 
-    caption = _caption(run, magnification)
+    caption = _caption(run, limits, magnification)
     alt = f"Map of the run {run.name} with walls, planned, true and estimated path and the places of events"
     return Illustration(SLUG, TITLE, alt, caption, render(figure, SLUG, alt), _keys(run, magnification))
 
 
-def view_limits(run: RunData) -> tuple[float, float, float, float] | None:
-    """Return x_min, y_min, x_max, y_max of what the map must show; None where there is nothing to show.
+def view_limits(run: RunData) -> Limits | None:
+    """Return what the map shows; None where there is nothing to show.
 
-    A lost estimate may be anywhere, so it only counts where nothing else does.
+    That is the whole world, or only the run's surroundings where the run keeps to a small part of it.
     """
+    whole = _extent(_world_points(run), 0.015, 0.3)
     world = run.world
+    ends = [pose[:2] for pose in (world.start, world.goal) if pose is not None]
+    visited = [
+        layers.true_path(run),
+        *(plan.path[:, :2] for plan in run.plans),
+        np.array(ends).reshape(-1, 2),
+    ]
+    near = _extent(np.concatenate(visited), 0.6, 10.0 * (world.robot_radius_m or 0.3))
+    if whole is None:
+        # A lost estimate may be anywhere, so it only counts where nothing else does.
+        return near or _extent(layers.estimated_path(run), 0.1, 1.0)
+    if near is None:
+        return whole
+    side = max(near[2] - near[0], near[3] - near[1])
+    if side > _SMALL_PART * min(whole[2] - whole[0], whole[3] - whole[1]):
+        return whole
+    x, y = 0.5 * (near[0] + near[2]), 0.5 * (near[1] + near[3])
+    return x - 0.5 * side, y - 0.5 * side, x + 0.5 * side, y + 0.5 * side
+
+
+def _world_points(run: RunData) -> FloatArray:
+    """(n, 2) points that span the world and everything that truly happened in it."""
+    world = run.world
+    discs = [discs for discs in (world.circles_m, world.obstacle_circles_m) if len(discs)]
     parts = [
         world.segments_m.reshape(-1, 2),
         world.obstacle_segments_m.reshape(-1, 2),
         *world.obstacle_polygons_m,
-        layers.true_path(run),
+        *(disc[:, :2] + side * disc[:, 2:] for disc in discs for side in (-1.0, 1.0)),
         np.array([(landmark.x_m, landmark.y_m) for landmark in world.landmarks]).reshape(-1, 2),
-        *(
-            discs[:, :2] + side * discs[:, 2:]
-            for discs in (world.circles_m, world.obstacle_circles_m)
-            for side in (-1, 1)
-        ),
-        *(plan.path[:, :2] for plan in run.plans),
     ]
     if world.bounds_m is not None:
         parts.append(np.array(world.bounds_m).reshape(2, 2))
-    points = np.concatenate(parts)
+    if sum(len(part) for part in parts):
+        parts += [layers.true_path(run), *(plan.path[:, :2] for plan in run.plans)]
+    return np.concatenate(parts)
+
+
+def _extent(points: FloatArray, relative: float, least_m: float) -> Limits | None:
+    """Return the limits of the finite points with a margin, in parts of their size and at least in metres."""
     points = points[np.isfinite(points).all(axis=1)]
-    if not len(points):
-        points = layers.estimated_path(run)
-        points = points[np.isfinite(points).all(axis=1)]
     if not len(points):
         return None
     (x_min, y_min), (x_max, y_max) = points.min(axis=0), points.max(axis=0)
-    margin = 0.015 * max(x_max - x_min, y_max - y_min) + 0.3
-    return x_min - margin, y_min - margin, x_max + margin, y_max + margin
+    margin = max(relative * max(x_max - x_min, y_max - y_min), least_m)
+    return float(x_min - margin), float(y_min - margin), float(x_max + margin), float(y_max + margin)
 
 
 def place_at(run: RunData, t_s: float) -> tuple[float, float] | None:
@@ -111,7 +139,7 @@ def place_at(run: RunData, t_s: float) -> tuple[float, float] | None:
     return None
 
 
-def _map_axes(limits: tuple[float, float, float, float]) -> tuple[Figure, Axes, float]:
+def _map_axes(limits: Limits) -> tuple[Figure, Axes, float]:
     """Return a figure whose axes have equal scales and fill it, and its points a metre."""
     x_min, y_min, x_max, y_max = limits
     width = WIDTH_PT - _LEFT_PT - _RIGHT_PT
@@ -285,7 +313,11 @@ def _ranges(numbers: list[int]) -> str:
 
 def _draw_beacons(axes: Axes, run: RunData, placer: LabelPlacer, points_per_m: float) -> None:
     """Draw the beacons, their identity readable but discreet."""
-    landmarks = run.world.landmarks
+    (x_min, x_max), (y_min, y_max) = axes.get_xlim(), axes.get_ylim()
+    # Markers end at the map's rim, but words would run on over the page.
+    landmarks = [
+        mark for mark in run.world.landmarks if x_min < mark.x_m < x_max and y_min < mark.y_m < y_max
+    ]
     if not landmarks:
         return
     xs, ys = [landmark.x_m for landmark in landmarks], [landmark.y_m for landmark in landmarks]
@@ -327,9 +359,6 @@ def _draw_beacons(axes: Axes, run: RunData, placer: LabelPlacer, points_per_m: f
 def _keys(run: RunData, magnification: int) -> tuple[Key, ...]:
     """Return the entries for what is drawn, and nothing else."""
     world, trace = run.world, run.trace
-    has_obstacles = bool(
-        len(world.obstacle_segments_m) or len(world.obstacle_circles_m) or len(world.obstacle_polygons_m)
-    )
     candidates = (
         (trace.has("true_x_m"), Key("true path", BLUE, "line", "true")),
         (trace.has("est_x_m"), Key("estimated path", VERMILLION, "dash", "estimated")),
@@ -338,7 +367,7 @@ def _keys(run: RunData, magnification: int) -> tuple[Key, ...]:
         (len(run.plans) > 1, Key(f"replans ({len(run.plans) - 1})", PURPLE, "band", "replans")),
         (len(run.shortest_path_m) > 1, Key("exact shortest path", BLACK, "dot", "shortest")),
         (any(len(plan.tree) for plan in run.plans), Key("search tree", layers.TREE_COLOUR, "line", "tree")),
-        (has_obstacles, Key("unexpected obstacles", ORANGE, "band", "obstacles", 1.0)),
+        (world.has_obstacles, Key("unexpected obstacles", ORANGE, "band", "obstacles", 1.0)),
         (len(run.mapped_points_m) > 0, Key("obstacle points the robot mapped", BLACK, "spot", "mapped")),
         (bool(world.landmarks), Key("beacons", GREEN, "spot", "beacons")),
         (magnification > 0, Key("95 % ellipses to scale", BLACK, "line", "ellipses")),
@@ -348,9 +377,12 @@ def _keys(run: RunData, magnification: int) -> tuple[Key, ...]:
     return tuple(key for there, key in candidates if there)
 
 
-def _caption(run: RunData, magnification: int) -> str:
+def _caption(run: RunData, limits: Limits, magnification: int) -> str:
     radius = run.world.robot_radius_m
     parts = ["Numbers are those of the event list. Tick a layer off to see what lies beneath it."]
+    ends = run.world.segments_m.reshape(-1, 2)
+    if bool(((ends < limits[:2]) | (ends > limits[2:])).any()):
+        parts.append("Only the part of the floor around the run is shown.")
     if radius is not None:
         parts.append(
             "The robot's disc at start (open) and end (filled) is to scale, "
