@@ -124,7 +124,8 @@ def draw_mapped_points(axes: Axes, run: RunData, size_m: float) -> None:
     if not len(points):
         return
     _, kept = np.unique(np.floor(points / size_m).astype(np.int64), axis=0, return_index=True)
-    half = 0.5 * size_m
+    # Smaller than its cell, so that what was mapped and what is there can both be seen.
+    half = 0.3 * size_m
     squares = [
         Outline(
             [(x - half, y - half), (x + half, y - half), (x + half, y + half), (x - half, y + half), (x, y)],
