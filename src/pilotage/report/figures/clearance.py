@@ -37,14 +37,9 @@ def clearance_figure(run: RunData) -> Illustration:
     axes.axhline(0.0, color=VERMILLION, linewidth=1.4)
     series(axes, t_s, clearance, BLUE, linewidth=1.0)
     axes.plot([t_s[least]], [least_m], "o", color=VERMILLION, markersize=5.0)
-    before_end = t_s[least] < 0.7 * t_s[-1]
-    axes.annotate(
-        f"least: {quantities.length(least_m)} at {t_s[least]:.1f} s",
-        (float(t_s[least]), least_m),
-        xytext=(8 if before_end else -8, 9),
-        textcoords="offset points",
-        ha="left" if before_end else "right",
-    )
+    # Said beside the title: over the curve it would hide what comes just before or after.
+    text = f"● least: {quantities.length(least_m)} at {t_s[least]:.1f} s"
+    axes.set_title(text, loc="right", color=VERMILLION, fontsize=9.0)
     caption = (
         "The true distance between the edge of the robot's body and the nearest wall or obstacle, known or "
         "not. Zero is contact."
