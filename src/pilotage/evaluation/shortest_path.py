@@ -152,7 +152,7 @@ def _cheapest(
     way.reverse()
     arc_of = {(int(a), int(b)): float(sweep) for (a, b), sweep in zip(pairs, sweeps, strict=True)}
     line = [np.array([ends[0]], dtype=np.float64)]
-    for a, b in itertools.pairwise(way):
+    for a, b in itertools.pairwise(way[1:-1]):
         sweep = arc_of.get((a, b), -arc_of.get((b, a), 0.0))
         if sweep != 0.0 and circle[a] == circle[b]:
             x, y, radius = nodes[circle[a]]
