@@ -112,8 +112,8 @@ def _check_place(where: str, x_m: float, y_m: float, radius_m: float, floor: Lan
     xmin, ymin, xmax, ymax = floor.walls.bounds_m
     if not floor.walls.contains(x_m, y_m):
         raise InputError(
-            f"{where}: expected a place on the map '{floor.name}' ({xmin:g} to {xmax:g}, {ymin:g} to {ymax:g} m), "
-            f"found ({x_m:g}, {y_m:g})"
+            f"{where}: expected a place on the map '{floor.name}' ({xmin:g} to {xmax:g}, "
+            f"{ymin:g} to {ymax:g} m), found ({x_m:g}, {y_m:g})"
         )
     clear = floor.walls.distance_m(x_m, y_m)
     if clear < radius_m:

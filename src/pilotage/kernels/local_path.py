@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
 from pilotage.kernels.dubins import pose_at, shortest
 from pilotage.kernels.geometry import distance_to_nearest
 from pilotage.kernels.jit import kernel
-from pilotage.kernels.motion import exact_arc
+from pilotage.kernels.motion import exact_arc, wrap
 
 FloatArray = NDArray[np.float64]
 
@@ -44,6 +46,35 @@ def stepped_curve(
     if count > pieces + 1:
         states[count - 1, 0], states[count - 1, 1], states[count - 1, 2] = x1, y1, th1
     return states
+
+
+@kernel
+def resampled(states: FloatArray, step: float, longest: float) -> FloatArray:
+    """States (M, 3) every ``step`` along a chain of dense states (N, 3), at most ``longest`` of it.
+
+    The chain is taken as straight between its states. The last state is kept where the chain ends first.
+    """
+    out = np.empty((int(longest / step) + 2, 3))
+    out[0] = states[0]
+    count = 1
+    driven = 0.0  # along the chain, up to the state that the current piece begins with
+    for i in range(states.shape[0] - 1):
+        dx, dy = states[i + 1, 0] - states[i, 0], states[i + 1, 1] - states[i, 1]
+        piece = math.sqrt(dx * dx + dy * dy)
+        turn = wrap(states[i + 1, 2] - states[i, 2])
+        while count * step <= driven + piece and count * step <= longest and piece > 0.0:
+            part = (count * step - driven) / piece
+            out[count, 0] = states[i, 0] + part * dx
+            out[count, 1] = states[i, 1] + part * dy
+            out[count, 2] = wrap(states[i, 2] + part * turn)
+            count += 1
+        driven += piece
+        if count * step > longest:
+            return out[:count].copy()
+    if driven - (count - 1) * step > 1e-6:
+        out[count] = states[states.shape[0] - 1]
+        count += 1
+    return out[:count].copy()
 
 
 @kernel

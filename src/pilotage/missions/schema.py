@@ -25,6 +25,12 @@ class ComponentChoice(Config):
 
     name: str
 
+    @model_validator(mode="before")
+    @classmethod
+    def _bare_name(cls, data: Any) -> Any:
+        """A bare name stands for the component with its defaults."""
+        return {"name": data} if isinstance(data, str) else data
+
     @property
     def parameters(self) -> dict[str, Any]:
         """All keys but the name."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 
 from pilotage.core.angles import wrap_to_pi
 from pilotage.core.config import Config
@@ -20,44 +19,52 @@ class BackOutConfig(Config):
     speed_m_s: Positive = 0.25
     preview_m: Positive = 0.4
     turn_limit_rad_s: Positive = 0.6
+    least_m: Positive = 0.3
+    """With less trail than this behind it, the robot turns on the spot instead."""
+    turn_rad: Positive = 1.6
 
 
 @ESCAPES.add("back-out", BackOutConfig)
 class BackOut:
     """Reverses along the robot's own trail by pure pursuit: that ground was free a moment ago.
 
-    Ends after the distance or at the trail's beginning. Something that moved in behind is not seen.
+    The trail is used up as it is driven back, so a second escape starts where the first one ended. Where
+    nothing is left of it the robot turns on the spot, to look for a way with another heading. Something
+    that moved in behind is not seen.
     """
 
     def __init__(self, config: BackOutConfig, knowledge: Knowledge) -> None:
         self._config = config
         self._dt_s = knowledge.dt_s
-        self._way: list[Pose2] = []
+        self._trail: list[Pose2] = []
         self._left_m = 0.0
+        self._turn_left_rad = 0.0
 
-    def begin(self, trail: Sequence[Pose2]) -> None:
-        """Take the last stretch of the trail, newest last."""
-        way: list[Pose2] = []
+    def begin(self, trail: list[Pose2]) -> None:
+        """Start at the trail's newest end; points driven back over are taken off it."""
+        config = self._config
+        self._trail = trail
         length = 0.0
-        for pose in reversed(trail):
-            if way:
-                length += math.hypot(pose.x_m - way[-1].x_m, pose.y_m - way[-1].y_m)
-            way.append(pose)
-            if length >= self._config.distance_m + self._config.preview_m:
+        for newer, older in zip(reversed(trail), reversed(trail[:-1]), strict=False):
+            length += _distance_m(newer, older)
+            if length >= config.distance_m:
                 break
-        self._way = way[::-1]
-        self._left_m = min(length, self._config.distance_m)
+        self._left_m = min(length, config.distance_m)
+        self._turn_left_rad = config.turn_rad if length < config.least_m else 0.0
 
     def step(self, pose: Pose2) -> Twist | None:
         """Reverse towards the trail point that lies the preview distance behind."""
         config = self._config
-        while len(self._way) > 1 and self._distance(pose, self._way[-1]) < config.preview_m:
-            self._way.pop()
-        if not self._way or self._left_m <= 0.0 or self._distance(pose, self._way[-1]) < 0.05:
+        if self._turn_left_rad > 0.0:
+            self._turn_left_rad -= config.turn_limit_rad_s * self._dt_s
+            return Twist(0.0, config.turn_limit_rad_s)
+        while len(self._trail) > 1 and _distance_m(pose, self._trail[-1]) < config.preview_m:
+            self._trail.pop()
+        if not self._trail or self._left_m <= 0.0 or _distance_m(pose, self._trail[-1]) < 0.05:
             return None
         self._left_m -= config.speed_m_s * self._dt_s
-        target = self._way[-1]
-        ahead = max(self._distance(pose, target), 1e-6)
+        target = self._trail[-1]
+        ahead = max(_distance_m(pose, target), 1e-6)
         # Driving backwards is driving forwards with the heading turned about: same turn rate.
         bearing = wrap_to_pi(
             math.atan2(target.y_m - pose.y_m, target.x_m - pose.x_m) - pose.theta_rad - math.pi
@@ -65,6 +72,6 @@ class BackOut:
         w = 2.0 * config.speed_m_s * math.sin(bearing) / ahead
         return Twist(-config.speed_m_s, min(max(w, -config.turn_limit_rad_s), config.turn_limit_rad_s))
 
-    @staticmethod
-    def _distance(a: Pose2, b: Pose2) -> float:
-        return math.hypot(a.x_m - b.x_m, a.y_m - b.y_m)
+
+def _distance_m(a: Pose2, b: Pose2) -> float:
+    return math.hypot(a.x_m - b.x_m, a.y_m - b.y_m)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Protocol
 
 from pilotage.core.registry import Registry
@@ -12,8 +11,8 @@ from pilotage.core.types import Pose2, Twist
 class Escape(Protocol):
     """Gets the robot out of a trap. Built as ``cls(config, knowledge)``."""
 
-    def begin(self, trail: Sequence[Pose2]) -> None:
-        """Start an escape; ``trail`` is the way the robot came by, oldest first."""
+    def begin(self, trail: list[Pose2]) -> None:
+        """Start an escape; ``trail`` is the way the robot came by, oldest first, for the escape to use up."""
         ...
 
     def step(self, pose: Pose2) -> Twist | None:

@@ -14,7 +14,7 @@ class GuardConfig(Config):
     """How far ahead in time a command is looked at, and how near it may come."""
 
     horizon_s: Positive = 0.4
-    margin_m: NonNegative = 0.03
+    margin_m: NonNegative = 0.02
 
 
 class ArcGuard:
@@ -28,8 +28,10 @@ class ArcGuard:
         self._horizon_s = config.horizon_s
         self._clearance_m = body_radius_m + config.margin_m
 
-    def allows(self, command: Twist, pose: Pose2, segments_m: FloatArray, circles_m: FloatArray) -> bool:
-        """Whether the command can be driven for the horizon."""
+    def allows(
+        self, command: Twist, pose: Pose2, segments_m: FloatArray, circles_m: FloatArray, most_m: float
+    ) -> bool:
+        """Whether the command can be driven for the horizon, keeping its clearance but at most ``most_m``."""
         if command.v_m_s == 0.0:
             return True
         return bool(
@@ -41,7 +43,7 @@ class ArcGuard:
                 command.w_rad_s,
                 self._horizon_s,
                 PIECES,
-                self._clearance_m,
+                min(self._clearance_m, most_m),
                 segments_m,
                 circles_m,
             )

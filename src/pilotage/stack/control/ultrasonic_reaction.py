@@ -33,7 +33,7 @@ class UltrasonicReactionConfig(Config):
     """Nearer than this the robot turns on the spot."""
     trapped_after_rad: Positive = Field(default=2.4, le=4 * math.pi)
     """Turned this far without a way out: trapped."""
-    hall_width_m: NonNegative = 2.2
+    hall_width_m: NonNegative = 1.8
     """Two walls no farther apart than this are a hall; the robot takes its middle. 0 switches it off."""
     hall_gain_rad_s_per_m: Positive = 1.5
     hall_turn_limit_rad_s: Positive = 0.5

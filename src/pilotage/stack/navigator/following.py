@@ -8,7 +8,7 @@ from pilotage.core.angles import wrap_to_pi
 from pilotage.core.types import STOP, FloatArray, Pose2, Twist
 from pilotage.kernels import geometry
 from pilotage.stack.control.controller import Control, Controller
-from pilotage.stack.planning.local_planner import LocalPath, LocalPlanner
+from pilotage.stack.planning.local_planner import LocalPath, LocalPlanner, RouteAhead
 
 NO_CONTROL = Control(STOP, 0.0, 0.0, 0.0)
 
@@ -31,11 +31,6 @@ class WaypointFollower:
         """Whether a local path is being followed and has points left."""
         return self._local is not None and self._index + 1 < self._local.states.shape[0]
 
-    @property
-    def waypoint(self) -> int | None:
-        """Index of the waypoint that is being driven to."""
-        return None if self._local is None else self._local.waypoint
-
     def drop(self) -> None:
         """Forget the local path: the robot was moved by something else."""
         self._local = None
@@ -46,11 +41,9 @@ class WaypointFollower:
         self.control = NO_CONTROL
         self.feedforward = STOP
 
-    def replan(
-        self, pose: Pose2, waypoints: FloatArray, first: int, segments_m: FloatArray, circles_m: FloatArray
-    ) -> bool:
+    def replan(self, pose: Pose2, route: RouteAhead, segments_m: FloatArray, circles_m: FloatArray) -> bool:
         """Plan from the estimate to the next reachable waypoint; False where there is none."""
-        self._local = self._local_planner.plan(pose, waypoints, first, segments_m, circles_m)
+        self._local = self._local_planner.plan(pose, route, segments_m, circles_m)
         self._index = 0
         return self._local is not None
 

@@ -75,7 +75,7 @@ class GlobalPlan:
         circles_m: FloatArray,
     ) -> None:
         self.path = path
-        self.progress = PathProgress(path.states, path.waypoints)
+        self.progress = PathProgress(path.states, path.waypoints, clearance_m)
         self.circles_m = circles_m
         first = result.first_solution_s if math.isfinite(result.first_solution_s) else planning_s
         self.history.append(

@@ -12,6 +12,7 @@ from pydantic import Field
 from pilotage.core.config import Config
 from pilotage.core.errors import InputError
 from pilotage.core.types import STOP, Event, FloatArray, Pose2, Twist
+from pilotage.kernels import geometry
 from pilotage.sensors.readings import Readings
 from pilotage.sensors.sensor import NonNegative, Positive
 from pilotage.stack.control.guard import ArcGuard, GuardConfig
@@ -21,6 +22,9 @@ from pilotage.stack.knowledge import Knowledge
 from pilotage.stack.navigator.following import WaypointFollower
 from pilotage.stack.navigator.global_plan import GlobalPlan
 from pilotage.stack.navigator.navigator import NAVIGATORS, Parts
+
+HERE_TOLERANCE_M = 0.005
+"""Slack between what a plan keeps and what is checked while driving it."""
 
 NO_REACTION = Reaction(ReactionKind.NONE, 0.0, math.inf, math.inf)
 
@@ -42,7 +46,7 @@ class GoalNavigatorConfig(Config):
     arrival_m: Positive = 0.15
     watch_ahead_m: NonNegative = 0.9
     """Where this much of the local path ahead comes too near a mapped obstacle: stop and replan; 0: never."""
-    watch_margin_m: NonNegative = 0.06
+    watch_margin_m: NonNegative = 0.03
     """Too near: below the body's radius plus this."""
     stall_s: Positive = 20.0
     stall_progress_m: Positive = 0.5
@@ -145,7 +149,9 @@ class GoalNavigator:
         if self._status is not StackStatus.RUNNING:
             return STOP
         command = self._drive(readings, belief.pose)
-        if self._guard.allows(command, belief.pose, self._segments, self._all_circles()):
+        if self._guard.allows(
+            command, belief.pose, self._segments, self._all_circles(), self._room_asked_m()
+        ):
             return command
         return self._refuse(command, belief.pose)
 
@@ -175,10 +181,10 @@ class GoalNavigator:
 
     def _drive(self, readings: Readings, pose: Pose2) -> Twist:
         assert self._plan.progress is not None
-        self._trail.append(pose)
         self._to_go_m = self._plan.progress.update(pose)
         if self._escaping:
             return self._continue_escape(pose)
+        self._trail.append(pose)
         if self._reactive is not None:
             self._reaction = self._reactive.step(
                 readings, pose, self._segments, self._plan.circles_m, self._goes_straight()
@@ -264,11 +270,9 @@ class GoalNavigator:
         return self._replan_globally(pose, "backed out")
 
     def _replan_locally(self, pose: Pose2) -> bool:
-        path, progress = self._plan.path, self._plan.progress
-        assert path is not None
-        assert progress is not None
-        first = progress.next_waypoint(self._config.waypoint_ahead_m)
-        return self._follower.replan(pose, path.waypoints, first, self._segments, self._all_circles())
+        assert self._plan.progress is not None
+        route = self._plan.progress.route_ahead(self._config.waypoint_ahead_m)
+        return self._follower.replan(pose, route, self._segments, self._all_circles())
 
     def _replan_globally(self, pose: Pose2, why: str) -> Twist:
         """Plan anew on the robot's own map; back out where even that finds no way."""
@@ -277,9 +281,7 @@ class GoalNavigator:
         if self.counts["replans"] >= self._config.max_replans:
             return self._fail(f"stuck: gave up after {self.counts['replans']} replans")
         self.counts["replans"] += 1
-        margins = [self._radius_m + margin for margin in self._config.fallback_margins_m]
-        clearances = [self._plan.clearance_m, *(c for c in margins if c < self._plan.clearance_m)]
-        result = self._plan.make(self._t_s, pose, self.mapped_circles_m, clearances)
+        result = self._plan.make(self._t_s, pose, self.mapped_circles_m, self._clearances(pose))
         if result.path is None:
             return self._begin_escape(f"replanning found {result.status} ({result.reason})")
         self._took_plan("replan", why)
@@ -305,22 +307,36 @@ class GoalNavigator:
 
     # --- questions ----------------------------------------------------------------------------------
 
+    def _clearances(self, pose: Pose2) -> list[float]:
+        """Clearances to try in turn: the planner's own, the fallbacks, and what there is where it stands."""
+        config = self._config
+        here = geometry.distance_to_nearest(pose.x_m, pose.y_m, self._segments, self._all_circles())
+        asked = [self._plan.clearance_m, *(self._radius_m + margin for margin in config.fallback_margins_m)]
+        squeezed = max(here - HERE_TOLERANCE_M, self._radius_m + HERE_TOLERANCE_M)
+        return [c for c in asked if c <= self._plan.clearance_m] + (
+            [squeezed] if squeezed < min(asked) else []
+        )
+
+    def _room_asked_m(self) -> float:
+        """What the guard may ask for: on its own trail no more than the body needs, else what the plan keeps."""
+        if self._mode is Mode.ESCAPE:
+            return self._radius_m + HERE_TOLERANCE_M
+        return self._plan.history[-1].clearance_m - HERE_TOLERANCE_M
+
     def _all_circles(self) -> FloatArray:
         """Everything round on the robot's own map: what it was told of and what it found."""
         return np.concatenate([self._known_circles, self.mapped_circles_m])
 
     def _goes_straight(self) -> bool:
-        path, progress = self._plan.path, self._plan.progress
-        assert path is not None
-        assert progress is not None
-        turn = progress.turn_ahead_rad(path.states, self._config.straight_ahead_m)
+        assert self._plan.progress is not None
+        turn = self._plan.progress.turn_ahead_rad(self._config.straight_ahead_m)
         return turn < self._config.straight_below_rad
 
     def _path_is_blocked(self) -> bool:
         if self._mapper is None or self._config.watch_ahead_m == 0.0:
             return False
         ahead = self._follower.clearance_ahead_m(self._config.watch_ahead_m, self._mapper.circles_m)
-        return ahead < self._radius_m + self._config.watch_margin_m
+        return ahead < min(self._radius_m + self._config.watch_margin_m, self._room_asked_m())
 
     def _near_goal(self) -> bool:
         pose = self.belief.pose

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from pilotage.core.types import FloatArray, Pose2
+from pilotage.stack.planning.local_planner import RouteAhead
 
 WINDOW_BACK_M = 1.0
 WINDOW_AHEAD_M = 4.0
@@ -19,9 +20,14 @@ class PathProgress:
         (N, 3) dense states of the path.
     waypoints
         (W, 3) sparse states on the path, in order.
+    clearance_m
+        What the path keeps from obstacles.
     """
 
-    def __init__(self, states: FloatArray, waypoints: FloatArray) -> None:
+    def __init__(self, states: FloatArray, waypoints: FloatArray, clearance_m: float) -> None:
+        self._clearance_m = clearance_m
+        self._states = states
+        self._waypoints = waypoints
         self._points = states[:, :2]
         steps = np.hypot(*np.diff(self._points, axis=0).T)
         self._along_m = np.concatenate([[0.0], np.cumsum(steps)])
@@ -58,11 +64,22 @@ class PathProgress:
         index = int(np.searchsorted(self.waypoint_along_m, self.at_m + ahead_m))
         return min(index, int(self.waypoint_along_m.shape[0]) - 1)
 
-    def turn_ahead_rad(self, states: FloatArray, reach_m: float) -> float:
+    def route_ahead(self, skip_m: float) -> RouteAhead:
+        """What lies ahead: the waypoints at least ``skip_m`` farther along, and the plan's own states."""
+        first = self.next_waypoint(skip_m)
+        here = int(np.searchsorted(self._along_m, self.at_m))
+        return RouteAhead(
+            self._waypoints[first:],
+            np.maximum(self.waypoint_along_m[first:] - self.at_m, 0.0),
+            self._states[here:],
+            self._clearance_m,
+        )
+
+    def turn_ahead_rad(self, reach_m: float) -> float:
         """Largest change of heading along the next ``reach_m`` of the path."""
         low = int(np.searchsorted(self._along_m, self.at_m))
         high = int(np.searchsorted(self._along_m, self.at_m + reach_m)) + 1
-        headings = states[low:high, 2]
+        headings = self._states[low:high, 2]
         if headings.shape[0] < 2:
             return 0.0
         turns = np.mod(headings - headings[0] + np.pi, 2.0 * np.pi) - np.pi

@@ -6,20 +6,24 @@ import math
 
 from pydantic import Field
 
+from pilotage.core.angles import wrap_to_pi
 from pilotage.core.config import Config
 from pilotage.core.errors import InputError
 from pilotage.core.types import FloatArray, Pose2
 from pilotage.kernels import local_path
 from pilotage.sensors.sensor import NonNegative, Positive
 from pilotage.stack.knowledge import Knowledge
-from pilotage.stack.planning.local_planner import LOCAL_PLANNERS, LocalPath
+from pilotage.stack.planning.local_planner import LOCAL_PLANNERS, LocalPath, RouteAhead
+
+PLAN_TOLERANCE_M = 0.005
+"""The plan is driven from the estimate, which lies beside it by about this much."""
 
 
 class DubinsLocalConfig(Config):
     """Speed, turning radius, and when a waypoint is passed over.
 
-    A curve longer than ``detour_ratio`` times the straight way plus ``detour_m`` is a loop: the waypoint lies
-    beside or behind the robot, and the next one is taken instead.
+    A curve longer than ``detour_ratio`` times the way along the plan plus ``detour_m`` is a loop: the
+    waypoint lies beside or behind the robot, and the next one is taken instead.
     """
 
     speed_m_s: Positive = 0.5
@@ -30,6 +34,9 @@ class DubinsLocalConfig(Config):
     """How many waypoints are tried."""
     detour_ratio: float = Field(default=1.3, ge=1.0, le=10.0)
     detour_m: NonNegative = 0.2
+    on_plan_m: NonNegative = 0.15
+    on_plan_rad: NonNegative = 0.3
+    """This near to the plan, in position and heading, the plan itself may be followed."""
 
 
 @LOCAL_PLANNERS.add("dubins", DubinsLocalConfig)
@@ -56,19 +63,13 @@ class DubinsLocalPlanner:
         self._clearance_m = knowledge.body_radius_m + config.margin_m
 
     def plan(
-        self,
-        pose: Pose2,
-        waypoints: FloatArray,
-        first: int,
-        segments_m: FloatArray,
-        circles_m: FloatArray,
+        self, pose: Pose2, route: RouteAhead, segments_m: FloatArray, circles_m: FloatArray
     ) -> LocalPath | None:
-        """Try the next waypoints in turn; take the first whose curve is short and free."""
+        """Try the next waypoints in turn; take the first whose curve is short and free, else the plan."""
         config = self._config
-        last = waypoints.shape[0] - 1
-        for index in range(first, min(first + config.look_ahead, last + 1)):
-            x, y, theta = waypoints[index]
-            straight = math.hypot(x - pose.x_m, y - pose.y_m)
+        last = route.waypoints.shape[0] - 1
+        for index in range(min(config.look_ahead, last + 1)):
+            x, y, theta = route.waypoints[index]
             states = local_path.stepped_curve(
                 pose.x_m,
                 pose.y_m,
@@ -79,10 +80,33 @@ class DubinsLocalPlanner:
                 config.turning_radius_m,
                 self._step_m,
                 index == last,
-                config.detour_ratio * straight + config.detour_m,
+                config.detour_ratio * route.ahead_m[index] + config.detour_m,
             )
-            if states.shape[0] < 2:
-                continue
-            if local_path.fits(states, self._clearance_m, segments_m, circles_m):
-                return LocalPath(states, config.speed_m_s, index)
+            if self._is_free(states, route, segments_m, circles_m):
+                return LocalPath(states, config.speed_m_s)
+        return self._along_the_plan(pose, route, segments_m, circles_m)
+
+    def _along_the_plan(
+        self, pose: Pose2, route: RouteAhead, segments_m: FloatArray, circles_m: FloatArray
+    ) -> LocalPath | None:
+        """The plan itself up to the next waypoint, where the robot is still on it.
+
+        The shortest curve to a waypoint may cut a corner that the plan goes around.
+        """
+        if route.states.shape[0] < 2:
+            return None
+        x, y, theta = route.states[0]
+        aside = math.hypot(x - pose.x_m, y - pose.y_m)
+        turned = abs(wrap_to_pi(theta - pose.theta_rad))
+        if aside > self._config.on_plan_m or turned > self._config.on_plan_rad:
+            return None
+        states = local_path.resampled(route.states, self._step_m, max(route.ahead_m[0], self._step_m))
+        if self._is_free(states, route, segments_m, circles_m):
+            return LocalPath(states, self._config.speed_m_s)
         return None
+
+    def _is_free(
+        self, states: FloatArray, route: RouteAhead, segments_m: FloatArray, circles_m: FloatArray
+    ) -> bool:
+        clearance = min(self._clearance_m, route.clearance_m - PLAN_TOLERANCE_M)
+        return states.shape[0] > 1 and local_path.fits(states, clearance, segments_m, circles_m)

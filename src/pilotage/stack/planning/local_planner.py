@@ -19,27 +19,41 @@ class LocalPath:
         (N, 3) x, y, theta; the first is where the plan was made from.
     speed_m_s
         Constant speed along them.
-    waypoint
-        Index of the waypoint that the path ends in.
     """
 
     states: FloatArray
     speed_m_s: float
-    waypoint: int
+
+
+@dataclass(frozen=True, slots=True)
+class RouteAhead:
+    """The global plan as far as the local planner needs it.
+
+    Attributes
+    ----------
+    waypoints
+        (W, 3) waypoints still ahead, the nearest first, the last one the goal.
+    ahead_m
+        (W,) distance along the plan from the robot to each of them.
+    states
+        (N, 3) dense states of the plan from beside the robot onwards.
+    clearance_m
+        What the plan keeps from obstacles: the local path cannot ask for more.
+    """
+
+    waypoints: FloatArray
+    ahead_m: FloatArray
+    states: FloatArray
+    clearance_m: float
 
 
 class LocalPlanner(Protocol):
     """Plans the next few metres. Built as ``cls(config, knowledge)``."""
 
     def plan(
-        self,
-        pose: Pose2,
-        waypoints: FloatArray,
-        first: int,
-        segments_m: FloatArray,
-        circles_m: FloatArray,
+        self, pose: Pose2, route: RouteAhead, segments_m: FloatArray, circles_m: FloatArray
     ) -> LocalPath | None:
-        """Plan to the first reachable of ``waypoints[first:]``; None where none of the next few is."""
+        """Plan to the first waypoint that can be reached; None where none of the next few can."""
         ...
 
 

@@ -1,0 +1,201 @@
+"""Missions: loading, overriding, refusing; building worlds."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+
+from pilotage.core.errors import InputError
+from pilotage.core.types import Goal, Pose2
+from pilotage.experiments.build import build, initial_belief
+from pilotage.experiments.mission import load_mission, shipped_missions
+from pilotage.experiments.obstacles import place_obstacles
+from pilotage.experiments.run_folder import resolved_yaml
+from pilotage.experiments.world_map import load_map
+from pilotage.kernels import geometry
+from pilotage.maps.map_file import MapFile
+from pilotage.missions.schema import AcrossPathObstacle, BoxObstacle, Mission, TrapObstacle
+from support.robots import ROOM
+
+MUSEUM = load_map("museum")
+
+
+def test_every_shipped_mission_is_valid_and_called_what_its_file_is() -> None:
+    names = shipped_missions()
+    assert {"museum-1", "museum-2", "museum-route", "museum-concave", "museum-hall"} <= set(names)
+    for name in names:
+        mission = load_mission(name)
+        assert mission.mission == name
+        assert mission.description
+
+
+def test_the_museum_has_the_reports_walls_and_beacons() -> None:
+    assert MUSEUM.walls.segments_m.shape == (32, 4)
+    assert len(MUSEUM.landmarks) == 35
+    assert MUSEUM.walls.bounds_m == (0.0, 0.0, 40.0, 40.0)
+
+
+def test_a_mission_resolves_to_a_file_that_loads_as_itself(tmp_path: Path) -> None:
+    for name in shipped_missions():
+        mission = load_mission(name, seed=7)
+        path = tmp_path / f"{name}.yaml"
+        path.write_text(resolved_yaml(mission))
+        assert load_mission(str(path)) == mission
+
+
+def test_overrides_reach_every_depth() -> None:
+    mission = load_mission(
+        "museum-1",
+        [
+            "stack.localizer.gate=0.99",
+            "robot.sensors.lidar.range_var_m2=1e-5",
+            "world.obstacles.0.thickness_m=0.4",
+            "stack.localizer.odometry.angle_var_rad2_per_rad=0.01334",
+            "stack.smoother=none",
+        ],
+        seed=3,
+    )
+    assert mission.stack.localizer.parameters["gate"] == 0.99
+    assert mission.robot.sensors["lidar"].parameters["range_var_m2"] == 1e-5
+    box = mission.world.obstacles[0]
+    assert isinstance(box, BoxObstacle)
+    assert box.thickness_m == 0.4
+    assert mission.run.seed == 3
+    assert mission.stack.smoother is not None
+    assert mission.stack.smoother.name == "none"
+
+
+def test_a_new_name_drops_the_old_ones_parameters() -> None:
+    mission = load_mission("museum-1", ["stack.localizer.name=dead-reckoning"])
+    assert mission.stack.localizer.parameters == {}
+    same = load_mission("museum-1", ["stack.localizer.name=ekf-landmarks"])
+    assert same.stack.localizer.parameters == {"gate": 0.999}
+
+
+@pytest.mark.parametrize(
+    ("override", "message"),
+    [
+        ("stack.localizer.gaet=0.9", "did you mean 'gate'"),
+        ("stack.localizer.name=ekf-landmark", "did you mean 'ekf-landmarks'"),
+        ("robot.body.radius=0.3", "did you mean 'radius_m'"),
+        ("robot.body.radius_m=nan", "finite"),
+        ("robot.body.radius_m=-1", "greater than 0"),
+        ("robot.body.radius_m=wide", "valid number"),
+        ("stack.initial.x_var_m2=-0.1", "greater than or equal to 0"),
+        ("robot.sensors.lidar.range_var_m2=-1", "greater than or equal to 0"),
+        ("robot.sensors.lidar.range_var_m2=nan", "finite"),
+        ("robot.sensors.lidar.rate_hz=7", "whole fraction"),
+        ("robot.sensors.lidar.name=lidr", "did you mean 'lidar'"),
+        ("world.start.x_m=0.1", "body's radius"),
+        ("world.start.x_m=-5", "on the map"),
+        ("world.goal.x_m=99", "on the map"),
+        ("world.map=musuem", "did you mean 'museum'"),
+        ("wrold.map=museum", "did you mean 'world'"),
+        ("stack.localizer", "KEY=VALUE"),
+        ("run.seed=-1", "greater than or equal to 0"),
+        ("run.dt_s=0", "greater than 0"),
+        ("world.obstacles.9.thickness_m=1", "index from 0 to 1"),
+        ("stack.localizer.gate=1.5", "less than 1"),
+        ("stack.local_planner.speed_m_s=5", "max_speed_m_s"),
+    ],
+)
+def test_bad_input_is_one_line_with_the_remedy(override: str, message: str) -> None:
+    with pytest.raises(InputError) as caught:
+        build(load_mission("museum-1", [override]))
+    text = str(caught.value)
+    assert message in text
+    assert "\n" not in text
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("map: half\nwalls_count: 3\nwalls_m:\n  - [0, 0, 1, 0]\n", "cut short"),
+        ("map: half\nwalls_m:\n  - [0, 0, 1,", "line 3"),
+        ("map: half\nwalls_m:\n  - [0, 0, 1]\n", "walls_m.0"),
+        ("map: half\nwalls_m: []\n", "at least 1 item"),
+        ("map: half\nwalls_m:\n  - [0, 0, .nan, 1]\n", "finite"),
+        ("- just\n- a list\n", "mapping"),
+        ("map: half\nwals_m:\n  - [0, 0, 1, 0]\n", "did you mean 'walls_m'"),
+    ],
+)
+def test_broken_maps_are_refused(tmp_path: Path, text: str, message: str) -> None:
+    path = tmp_path / "half a map.yaml"
+    path.write_text(text)
+    with pytest.raises(InputError) as caught:
+        load_map(str(path))
+    assert message in str(caught.value)
+    assert "half a map.yaml" in str(caught.value)
+
+
+def test_a_map_beside_its_mission_is_found(tmp_path: Path) -> None:
+    (tmp_path / "room.yaml").write_text("map: room\nwalls_m:\n  - [0, 0, 9, 0]\n  - [9, 0, 9, 9]\n")
+    mission = tmp_path / "mine.yaml"
+    mission.write_text(
+        yaml.safe_dump({"extends": "museum-1", "mission": "mine", "world": {"map": "room.yaml"}})
+    )
+    loaded = load_mission(str(mission))
+    assert isinstance(loaded.world.map, str)
+    assert load_map(loaded.world.map).name == "room"
+
+
+def test_a_map_may_stand_in_the_mission_itself() -> None:
+    values = load_mission("museum-1").model_dump()
+    values["world"]["map"] = {"map": "inline", "walls_m": [(0, 0, 9, 0)]}
+    mission = Mission.model_validate(values)
+    assert isinstance(mission.world.map, MapFile)
+    assert load_map(mission.world.map).walls.segments_m.tolist() == [[0, 0, 9, 0]]
+
+
+def test_the_start_error_has_the_initial_covariance() -> None:
+    from pilotage.core.random import RandomStreams
+
+    mission = load_mission("museum-1")
+    start = Pose2(1.0, 1.0, 0.0)
+    errors = np.array(
+        [initial_belief(mission, start, RandomStreams(s)).pose.as_array() - [1, 1, 0] for s in range(2000)]
+    )
+    # Standard error of a variance from 2000 draws is 3.2 %: a false alarm once in 10^4.
+    assert errors.var(axis=0) == pytest.approx([0.01, 0.01, 0.01], rel=0.13)
+
+
+PATH = np.column_stack([np.linspace(0.5, 39.5, 400), np.full(400, 20.0), np.zeros(400)])
+
+
+@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("kind", ["across", "trap"])
+def test_drawn_obstacles_stand_on_the_path_free_of_walls_with_a_way_around(seed: int, kind: str) -> None:
+    obstacle = AcrossPathObstacle(kind="across-path") if kind == "across" else TrapObstacle(kind="u-trap")
+    walls = MUSEUM.walls
+    start, goal = Pose2(12.0, 20.0, 0.0), Goal(37.0, 20.0)
+    path = PATH[120:380]
+    placed = place_obstacles([obstacle], walls, start, goal, path, 0.3, np.random.default_rng(seed))
+    on_path = [geometry.distance_to_nearest(x, y, placed.segments_m, geometry.NO_CIRCLES) for x, y, _ in path]
+    assert min(on_path) < 0.1
+    for polygon in placed.polygons_m:
+        assert geometry.least_distance(polygon, walls.segments_m, walls.circles_m) > 0.0
+    if kind == "trap":
+        assert len(placed.polygons_m) == 3
+        corners = np.concatenate(placed.polygons_m)
+        assert np.ptp(corners[:, 1]) >= 3.0
+        assert np.ptp(corners[:, 0]) >= 2.0
+
+
+def test_an_obstacle_on_the_start_is_refused() -> None:
+    box = BoxObstacle(kind="box", from_m=(1.0, 2.0), to_m=(3.0, 2.0))
+    with pytest.raises(InputError, match="standing on it"):
+        place_obstacles([box], ROOM, Pose2(2.0, 2.2, 0.0), None, None, 0.3, np.random.default_rng(0))
+
+
+def test_an_obstacle_without_room_is_refused() -> None:
+    trap = TrapObstacle(kind="u-trap", width_m=(30.0, 31.0))
+    path = PATH[:40] * np.array([0.2, 0.2, 1.0])
+    with pytest.raises(InputError, match="make it smaller"):
+        place_obstacles(
+            [trap], ROOM, Pose2(1.0, 4.0, 0.0), Goal(9.0, 4.0), path, 0.3, np.random.default_rng(0)
+        )
+    assert math.isfinite(path.sum())
