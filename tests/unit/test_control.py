@@ -133,7 +133,7 @@ def test_backing_out_follows_the_trail_in_reverse() -> None:
     escape = BackOut(BackOutConfig(distance_m=2.0), knowledge_of())
     last, before = trail[-1], trail[-2]
     pose = Pose2(last.x_m, last.y_m, math.atan2(last.y_m - before.y_m, last.x_m - before.x_m))
-    escape.begin(trail)
+    escape.begin(list(trail))
     driven = 0.0
     for _ in range(1000):
         command = escape.step(pose)
@@ -147,17 +147,32 @@ def test_backing_out_follows_the_trail_in_reverse() -> None:
     assert driven == pytest.approx(2.0, abs=0.1)
 
 
-def test_backing_out_without_a_trail_is_over_at_once() -> None:
-    escape = BackOut(BackOutConfig(), knowledge_of())
+def test_backing_out_without_a_trail_turns_on_the_spot() -> None:
+    escape = BackOut(BackOutConfig(turn_rad=1.2, turn_limit_rad_s=0.6), knowledge_of())
     escape.begin([])
-    assert escape.step(Pose2(0, 0, 0)) is None
+    commands = [escape.step(Pose2(0, 0, 0)) for _ in range(21)]
+    assert commands[-1] is None
+    turned = sum(0.1 * command.w_rad_s for command in commands if command is not None)
+    assert turned == pytest.approx(1.2)
+    assert all(command.v_m_s == 0.0 for command in commands if command is not None)
+
+
+def test_a_second_escape_starts_where_the_first_one_ended() -> None:
+    trail = [Pose2(0.05 * i, 0.0, 0.0) for i in range(200)]
+    escape = BackOut(BackOutConfig(distance_m=2.0), knowledge_of())
+    pose = trail[-1]
+    for _ in range(2):
+        escape.begin(trail)
+        while (command := escape.step(pose)) is not None:
+            pose = move(pose, command.v_m_s * 0.1, command.w_rad_s * 0.1, OdometryModel.EXACT_ARC)
+    assert pose.x_m == pytest.approx(9.95 - 4.0, abs=0.2)
 
 
 def test_the_guard_refuses_driving_into_the_map_but_not_away_from_it() -> None:
     guard = ArcGuard(GuardConfig(horizon_s=0.5, margin_m=0.03), 0.3)
     wall = np.array([[1.0, -5.0, 1.0, 5.0]])
     here = Pose2(0.6, 0.0, 0.0)
-    assert not guard.allows(Twist(0.5, 0.0), here, wall, NO_CIRCLES)
-    assert guard.allows(Twist(0.0, 1.0), here, wall, NO_CIRCLES)
-    assert guard.allows(Twist(-0.5, 0.0), Pose2(0.69, 0.0, 0.0), wall, NO_CIRCLES)
-    assert guard.allows(Twist(0.5, 0.0), Pose2(0.2, 0.0, 0.0), wall, NO_CIRCLES)
+    assert not guard.allows(Twist(0.5, 0.0), here, wall, NO_CIRCLES, 1.0)
+    assert guard.allows(Twist(0.0, 1.0), here, wall, NO_CIRCLES, 1.0)
+    assert guard.allows(Twist(-0.5, 0.0), Pose2(0.69, 0.0, 0.0), wall, NO_CIRCLES, 1.0)
+    assert guard.allows(Twist(0.5, 0.0), Pose2(0.2, 0.0, 0.0), wall, NO_CIRCLES, 1.0)

@@ -145,10 +145,10 @@ def test_a_map_beside_its_mission_is_found(tmp_path: Path) -> None:
 
 def test_a_map_may_stand_in_the_mission_itself() -> None:
     values = load_mission("museum-1").model_dump()
-    values["world"]["map"] = {"map": "inline", "walls_m": [(0, 0, 9, 0)]}
+    values["world"]["map"] = {"map": "inline", "walls_m": [(0, 0, 9, 0), (9, 0, 9, 9)]}
     mission = Mission.model_validate(values)
     assert isinstance(mission.world.map, MapFile)
-    assert load_map(mission.world.map).walls.segments_m.tolist() == [[0, 0, 9, 0]]
+    assert load_map(mission.world.map).walls.segments_m.tolist() == [[0, 0, 9, 0], [9, 0, 9, 9]]
 
 
 def test_the_start_error_has_the_initial_covariance() -> None:

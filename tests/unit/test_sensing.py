@@ -28,13 +28,12 @@ from pilotage.sim.world import World
 from support.robots import BEACONS, ROOM, sensors
 
 WORLD = World(ROOM, ROOM, BEACONS)
+START = Pose2(2.0, 4.0, 0.0)
 ALPHA = 1e-4
 """False-alarm rate of each statistical test here; the seeds are fixed, so a pass stays a pass."""
 
 
-def simulator(
-    configs: dict[str, SensorConfig], seed: int = 0, start: Pose2 = Pose2(2.0, 4.0, 0.0)
-) -> Simulator:
+def simulator(configs: dict[str, SensorConfig], seed: int = 0, start: Pose2 = START) -> Simulator:
     return Simulator(WORLD, BodyConfig(), MotionConfig(), configs, start, 0.1, RandomStreams(seed))
 
 

@@ -12,7 +12,7 @@ from pilotage.core.angles import wrap_array_to_pi, wrap_to_pi
 from pilotage.core.types import FloatArray
 from pilotage.evaluation.consistency import correlated_mean, nees
 from pilotage.evaluation.halls import hall_offset_m
-from pilotage.evaluation.shortest_path import shortest_path
+from pilotage.evaluation.shortest_path import ShortestPath, shortest_path
 from pilotage.maps.segment_map import SegmentMap
 from pilotage.missions.schema import Mission
 from pilotage.stack.interface import PlannedPath
@@ -26,6 +26,8 @@ class Outcome:
     ----------
     loop_s
         Wall time of the control steps, planning apart.
+    shortest
+        Exact shortest path at the first plan's clearance; None for a prescribed route.
     counts
         What the stack counted: attempts, replans, escapes.
     """
@@ -34,7 +36,16 @@ class Outcome:
     reason: str
     loop_s: float
     plans: Sequence[PlannedPath]
+    shortest: ShortestPath | None
     counts: Mapping[str, int]
+
+
+def shortest_for(mission: Mission, plans: Sequence[PlannedPath], floor: SegmentMap) -> ShortestPath | None:
+    """Exact shortest path to hold against the first plan; None where there is nothing to compare."""
+    goal, start = mission.world.goal, mission.world.start
+    if goal is None or not plans or plans[0].given:
+        return None
+    return shortest_path(floor, (start.x_m, start.y_m), (goal.x_m, goal.y_m), plans[0].clearance_m)
 
 
 def poses(trace: Mapping[str, FloatArray], prefix: str) -> FloatArray:
@@ -67,7 +78,7 @@ def run_metrics(
         "steps_per_s": steps / outcome.loop_s,
         **dict(outcome.counts),
     }
-    metrics |= _planning(mission, outcome, floor)
+    metrics |= _planning(outcome)
     trace["nees"] = np.zeros(0)
     if steps == 0:
         return metrics
@@ -93,7 +104,7 @@ def run_metrics(
     return metrics
 
 
-def _planning(mission: Mission, outcome: Outcome, floor: SegmentMap) -> dict[str, object]:
+def _planning(outcome: Outcome) -> dict[str, object]:
     """Length and times of the first plan, beside the shortest path at the same clearance."""
     if not outcome.plans:
         return {}
@@ -103,12 +114,8 @@ def _planning(mission: Mission, outcome: Outcome, floor: SegmentMap) -> dict[str
         "planning_time_s": plan.planning_time_s,
         "first_solution_s": plan.first_solution_s,
     }
-    goal = mission.world.goal
-    if goal is not None and plan.clearance_m is not None:
-        start = mission.world.start
-        shortest = shortest_path(floor, (start.x_m, start.y_m), (goal.x_m, goal.y_m), plan.clearance_m)
-        if shortest is not None:
-            metrics["shortest_length_m"] = shortest.length_m
+    if outcome.shortest is not None:
+        metrics["shortest_length_m"] = outcome.shortest.length_m
     return metrics
 
 

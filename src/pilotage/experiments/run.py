@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from pilotage.core.types import STOP, FloatArray
-from pilotage.evaluation.run_metrics import Outcome, run_metrics
+from pilotage.evaluation.run_metrics import Outcome, run_metrics, shortest_for
 from pilotage.experiments.build import Experiment, build, build_sensors
 from pilotage.experiments.recorder import Recorder
 from pilotage.experiments.run_folder import write_run_folder
@@ -116,6 +116,7 @@ def simulate(mission: Mission, on_progress: Callable[[Progress], None] | None = 
         reason=_reason(experiment, status, reason),
         loop_s=max(loop_s - (all_planning_s - planned_s), 1e-9),
         plans=stack.plans,
+        shortest=shortest_for(mission, stack.plans, experiment.floor.walls),
         counts=dict(stack.counts),
     )
     return RunRecord(experiment, recorder.trace(), outcome, recorder)

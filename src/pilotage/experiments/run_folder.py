@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import yaml
 
-from pilotage.evaluation.shortest_path import shortest_path
 from pilotage.experiments.world_map import shipped_maps
 from pilotage.missions.schema import Mission
 
@@ -157,16 +156,6 @@ def _plans(record: RunRecord) -> dict[str, Any]:
         arrays[f"t_{i}"] = np.array(plan.t_s)
         arrays[f"length_{i}"] = np.array(plan.length_m)
         arrays[f"planning_time_{i}"] = np.array(plan.planning_time_s)
-    shortest = np.zeros((0, 2))
-    mission = experiment.mission
-    if experiment.stack.plans and mission.world.goal is not None:
-        start, goal = mission.world.start, mission.world.goal
-        found = shortest_path(
-            experiment.floor.walls,
-            (start.x_m, start.y_m),
-            (goal.x_m, goal.y_m),
-            experiment.stack.plans[0].clearance_m,
-        )
-        shortest = shortest if found is None else found.points_xy_m
-    arrays["shortest_path"] = shortest
+    shortest = record.outcome.shortest
+    arrays["shortest_path"] = np.zeros((0, 2)) if shortest is None else shortest.points_xy_m
     return arrays

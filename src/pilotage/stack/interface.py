@@ -38,7 +38,7 @@ class StackStatus(StrEnum):
 @dataclass(frozen=True, slots=True)
 class PlannedPath:
     """A plan as it was adopted, for the record: when, its states (N, 3), waypoints (W, 3), tree (E, 4),
-    the clearance it was made at and how long it took."""
+    the clearance it was made at, whether it was prescribed, and how long it took."""
 
     t_s: float
     states: FloatArray
@@ -46,6 +46,7 @@ class PlannedPath:
     tree_edges_m: FloatArray
     length_m: float
     clearance_m: float
+    given: bool
     planning_time_s: float
     first_solution_s: float
 

@@ -86,6 +86,7 @@ class GlobalPlan:
                 result.tree_edges_m,
                 path.length_m,
                 clearance_m,
+                result.given,
                 planning_s,
                 first,
             )

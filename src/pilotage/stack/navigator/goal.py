@@ -318,7 +318,7 @@ class GoalNavigator:
         )
 
     def _room_asked_m(self) -> float:
-        """What the guard may ask for: on its own trail no more than the body needs, else what the plan keeps."""
+        """What the guard may ask for: what the plan keeps, and on its own trail only what the body needs."""
         if self._mode is Mode.ESCAPE:
             return self._radius_m + HERE_TOLERANCE_M
         return self._plan.history[-1].clearance_m - HERE_TOLERANCE_M

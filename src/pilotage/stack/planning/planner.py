@@ -77,6 +77,8 @@ class PlanResult:
     ----------
     tree_edges_m
         (E, 4) x0, y0, x1, y1 of the search tree's edges, for pictures; empty where there is no tree.
+    given
+        Whether the path was prescribed rather than searched for: no shortest path is held against it.
     first_solution_s, planning_time_s
         Wall time until the first valid solution and until the end; nan where there was none.
     """
@@ -87,6 +89,7 @@ class PlanResult:
     first_solution_s: float
     planning_time_s: float
     iterations: int = 0
+    given: bool = False
     tree_edges_m: FloatArray = field(default_factory=_no_edges)
 
 

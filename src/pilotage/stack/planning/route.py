@@ -115,7 +115,9 @@ class RoutePlanner:
             min(arcs, default=config.turning_radius_m),
         )
         took = time.perf_counter() - began
-        return PlanResult(PlanStatus.FOUND, f"{length_m:.2f} m of programmed route", path, took, took)
+        return PlanResult(
+            PlanStatus.FOUND, f"{length_m:.2f} m of programmed route", path, took, took, given=True
+        )
 
     def _points_between(self, start: Pose2, goal: Goal) -> FloatArray:
         """The route's points with the start in place of those passed and the goal in place of the last."""
