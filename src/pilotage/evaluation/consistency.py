@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pilotage.core.angles import wrap_array_to_pi
+from pilotage.core.chi_square import chi_square_quantile
 from pilotage.core.types import FloatArray
 
 RESAMPLES = 1000
@@ -45,6 +46,28 @@ def nees(truth: FloatArray, estimate: FloatArray, cov: FloatArray) -> FloatArray
         solved = np.linalg.solve(cov[regular], error[regular][:, :, None])[:, :, 0]
         out[regular] = np.einsum("ni,ni->n", error[regular], solved)
     return out
+
+
+def fraction_in_band(values: FloatArray, dof: int, probability: float = 0.999) -> float:
+    """Share of the steps at which the mean over independent runs lies in its pointwise band.
+
+    At one step the runs are independent, so the sum of their NEES is chi-square with runs x dof degrees
+    of freedom, whatever the correlation from step to step (Bar-Shalom et al. 2001, section 5.4.2).
+
+    Parameters
+    ----------
+    values
+        (R, N) one row a run.
+    dof
+        Degrees of freedom of one value.
+    probability
+        Of the two-sided band.
+    """
+    runs = values.shape[0]
+    low = chi_square_quantile((1.0 - probability) / 2.0, runs * dof) / runs
+    high = chi_square_quantile((1.0 + probability) / 2.0, runs * dof) / runs
+    means = values.mean(axis=0)
+    return float(np.mean((means >= low) & (means <= high)))
 
 
 def correlated_mean(values: FloatArray, level: float = 0.95) -> Band:

@@ -89,8 +89,8 @@ class PlanResult:
     first_solution_s: float
     planning_time_s: float
     iterations: int = 0
-    given: bool = False
     tree_edges_m: FloatArray = field(default_factory=_no_edges)
+    given: bool = False
 
 
 class Planner(Protocol):

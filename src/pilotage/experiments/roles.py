@@ -1,0 +1,30 @@
+"""Every role that a mission can fill, and the registry of those who fill it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from pilotage.core.registry import Registry
+from pilotage.sensors.sensor import SENSORS
+from pilotage.stack.control.controller import CONTROLLERS
+from pilotage.stack.control.escape import ESCAPES
+from pilotage.stack.control.reactive import REACTIVES
+from pilotage.stack.localization.localizer import LOCALIZERS
+from pilotage.stack.mapping.mapper import MAPPERS
+from pilotage.stack.navigator.navigator import NAVIGATORS
+from pilotage.stack.planning.local_planner import LOCAL_PLANNERS
+from pilotage.stack.planning.planner import PLANNERS, SMOOTHERS
+
+REGISTRIES: dict[str, Registry[Any]] = {
+    "sensor": SENSORS,
+    "navigator": NAVIGATORS,
+    "localizer": LOCALIZERS,
+    "planner": PLANNERS,
+    "smoother": SMOOTHERS,
+    "local_planner": LOCAL_PLANNERS,
+    "controller": CONTROLLERS,
+    "reactive": REACTIVES,
+    "mapper": MAPPERS,
+    "escape": ESCAPES,
+}
+"""Roles by their key under ``stack`` (sensors: under ``robot.sensors``)."""

@@ -1,0 +1,239 @@
+"""One example a component: parameters that work, and a small task that it must do."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from pilotage.core.random import RandomStreams
+from pilotage.core.types import Goal, Pose2, Twist
+from pilotage.kernels import geometry
+from pilotage.maps.distance_field import DistanceField
+from pilotage.missions.schema import BodyConfig, MotionConfig
+from pilotage.sensors.readings import Readings, UltrasonicReading
+from pilotage.sim.sensing import SIMULATED
+from pilotage.sim.simulator import Simulator
+from pilotage.sim.world import World
+from pilotage.stack.control.pi_follower import PiFollower, PiFollowerConfig
+from pilotage.stack.interface import StackStatus
+from pilotage.stack.localization.ekf_landmarks import EkfLandmarkLocalizer, EkfLandmarksConfig
+from pilotage.stack.navigator.navigator import Parts
+from pilotage.stack.planning.dubins_local import DubinsLocalConfig, DubinsLocalPlanner
+from pilotage.stack.planning.local_planner import RouteAhead
+from pilotage.stack.planning.planner import Path, PlanRequest, PlanStatus
+from pilotage.stack.planning.rrt_star_dubins import RrtStarDubinsConfig, RrtStarDubinsPlanner
+from support.robots import BEACONS, ROOM, knowledge_of, sensors
+
+START, GOAL = Pose2(2.0, 2.0, 0.0), Goal(8.0, 6.0)
+WORLD = World(ROOM, ROOM, BEACONS)
+NO_CIRCLES = ROOM.circles_m
+
+
+@dataclass(frozen=True)
+class Example:
+    """Parameters, the task, and the names of floats that are pure numbers."""
+
+    works: Callable[[Any, Any], None]
+    parameters: dict[str, Any] = field(default_factory=dict)
+    pure_numbers: frozenset[str] = frozenset()
+
+
+def simulator(configs: dict[str, Any] | None = None) -> Simulator:
+    """The small robot in the small room."""
+    return Simulator(WORLD, BodyConfig(), MotionConfig(), configs or sensors(), START, 0.1, RandomStreams(0))
+
+
+def sensor_reads(_: Any, config: Any) -> None:
+    """The same world gives the same reading twice."""
+    assert type(config) in SIMULATED
+    readings = [simulator({"it": config}).step(Twist(0.1, 0.0)).by_sensor["it"] for _ in range(2)]
+    assert repr(readings[0]) == repr(readings[1])
+
+
+def localizer_follows(factory: Any, config: Any) -> None:
+    """Driven through the room, it stays within 5 sigma of the truth and keeps its covariance positive."""
+    sim = simulator()
+    localizer = factory(config, knowledge_of(start=START, variances=(1e-4, 1e-4, 1e-4)))
+    keys = set(localizer.telemetry())
+    for step in range(60):
+        belief = localizer.step(sim.step(Twist(0.3, 0.4 if step < 30 else -0.4)))
+        assert (belief.cov == belief.cov.T).all()
+        assert np.linalg.eigvalsh(belief.cov).min() > 0.0
+        assert set(localizer.telemetry()) == keys
+        error = np.hypot(sim.truth.x_m - belief.pose.x_m, sim.truth.y_m - belief.pose.y_m)
+        assert error < 5.0 * np.sqrt(np.linalg.eigvalsh(belief.cov[:2, :2])[-1])
+    handed_out = belief.cov.copy()
+    localizer.step(sim.step(Twist(0.3, 0.0)))
+    assert (belief.cov == handed_out).all(), "a belief that was handed out must not change"
+
+
+def request(seed: int = 0, goal: Goal = GOAL) -> PlanRequest:
+    """A planning query in the room."""
+    return PlanRequest(START, goal, DistanceField.from_map(ROOM), np.random.default_rng(seed), 0.4)
+
+
+def assert_valid(path: Path, goal: Goal) -> None:
+    """Starts at the start, ends at the goal, keeps its clearance, has its waypoints on it."""
+    assert np.allclose(path.states[0, :2], [START.x_m, START.y_m], atol=1e-6)
+    assert np.allclose(path.states[-1, :2], [goal.x_m, goal.y_m], atol=1e-6)
+    assert geometry.least_distance(np.ascontiguousarray(path.states[:, :2]), ROOM.segments_m, NO_CIRCLES) >= (
+        0.4 - 1e-6
+    )
+    assert np.hypot(*np.diff(path.states[:, :2], axis=0).T).max() <= 0.05 + 1e-9
+    for x, y, _ in path.waypoints:
+        assert np.hypot(path.states[:, 0] - x, path.states[:, 1] - y).min() < 0.05
+
+
+def planner_plans(factory: Any, config: Any) -> None:
+    """A valid path, the same for the same seed; blocked ends are a status, not an exception."""
+    results = [factory(config).plan(request()) for _ in range(2)]
+    assert results[0].status is PlanStatus.FOUND
+    assert results[0].path is not None
+    assert_valid(results[0].path, GOAL)
+    assert (results[0].path.states == results[1].path.states).all()
+    assert factory(config).clearance_m > 0.0
+    in_the_wall = factory(config).plan(
+        PlanRequest(Pose2(5.0, 1.0, 0.0), GOAL, DistanceField.from_map(ROOM), np.random.default_rng(0), 0.4)
+    )
+    assert in_the_wall.path is None
+    assert in_the_wall.reason
+
+
+def smoother_smooths(factory: Any, config: Any) -> None:
+    """Never longer, never invalid, the same ends."""
+    result = RrtStarDubinsPlanner(RrtStarDubinsConfig(stop="first")).plan(request())
+    assert result.path is not None
+    before = result.path.states.copy()
+    smooth = factory(config).smooth(result.path, request(), 0.4)
+    assert smooth.length_m <= result.path.length_m + 1e-9
+    assert_valid(smooth, GOAL)
+    assert (result.path.states == before).all()
+
+
+def local_planner_reaches_the_waypoint(factory: Any, config: Any) -> None:
+    """Points at a constant step; a wall in between is not crossed."""
+    planner = factory(config, knowledge_of())
+    way = np.column_stack([np.linspace(2.0, 3.5, 31), np.full(31, 2.0), np.zeros(31)])
+    route = RouteAhead(way[[-1]], np.array([1.5]), way, 0.4)
+    local = planner.plan(START, route, ROOM.segments_m, NO_CIRCLES)
+    assert local is not None
+    steps = np.hypot(*np.diff(local.states[:, :2], axis=0).T)
+    assert np.allclose(steps[:-1], local.speed_m_s * 0.1, atol=1e-3)
+    beyond = np.array([[6.0, 2.0, 0.0]])
+    through_the_wall = RouteAhead(beyond, np.array([4.0]), way[:1], 0.4)
+    assert planner.plan(START, through_the_wall, ROOM.segments_m, NO_CIRCLES) is None
+
+
+def controller_turns_to_the_reference(factory: Any, config: Any) -> None:
+    """Left for a reference to the left, right for one to the right; a reset forgets."""
+    controller = factory(config, knowledge_of())
+    turns = []
+    for side in (0.3, -0.3):
+        controller.reset()
+        for _ in range(5):
+            control = controller.step(START, Pose2(2.5, 2.0 + side, 0.0), Twist(0.5, 0.0))
+        turns.append(control.twist.w_rad_s)
+    assert turns[0] > 0.0 > turns[1]
+    assert abs(turns[0] + turns[1]) < 1e-9
+
+
+def reactive_reacts(factory: Any, config: Any) -> None:
+    """Nothing near, no reaction; something in front, it turns."""
+    reactive = factory(config, knowledge_of())
+    clear = {name: UltrasonicReading(3.0, True) for name in ("front", "left", "right")}
+    near = {**clear, "front": UltrasonicReading(0.5, False)}
+    empty = np.zeros((0, 4))
+    assert reactive.step(Readings(0.1, clear), START, empty, NO_CIRCLES, True).w_rad_s == 0.0
+    assert reactive.step(Readings(0.2, near), START, empty, NO_CIRCLES, True).w_rad_s != 0.0
+
+
+def mapper_maps(factory: Any, config: Any) -> None:
+    """An unexpected disc comes to the map where it is; known walls do not."""
+    surprise = ROOM.with_obstacles(np.zeros((0, 4)), np.array([[3.5, 2.0, 0.3]]))
+    sim = Simulator(
+        World(ROOM, surprise, BEACONS), BodyConfig(), MotionConfig(), sensors(), START, 0.1, RandomStreams(0)
+    )
+    knowledge = knowledge_of(variances=(1e-6, 1e-6, 1e-6))
+    mapper = factory(config, knowledge)
+    for _ in range(20):
+        mapper.step(sim.step(Twist(0.0, 0.0)), knowledge.initial)
+    assert mapper.circles_m.shape[0] > 0
+    away = np.hypot(mapper.circles_m[:, 0] - 3.5, mapper.circles_m[:, 1] - 2.0)
+    assert (np.abs(away - 0.3) < 0.15).all()
+
+
+def escape_ends(factory: Any, config: Any) -> None:
+    """It moves backwards along its trail, and it ends."""
+    escape = factory(config, knowledge_of())
+    escape.begin([Pose2(0.5 + 0.05 * i, 2.0, 0.0) for i in range(80)])
+    pose = Pose2(4.45, 2.0, 0.0)
+    for _ in range(1000):
+        command = escape.step(pose)
+        if command is None:
+            break
+        pose = Pose2(pose.x_m + 0.1 * command.v_m_s, 2.0, 0.0)
+    assert command is None
+    assert pose.x_m < 4.0
+
+
+def navigator_arrives(factory: Any, config: Any) -> None:
+    """Put together from the plainest parts, it drives to its goal."""
+    knowledge = knowledge_of(start=START, goal=GOAL, variances=(1e-4, 1e-4, 1e-4))
+    parts = Parts(
+        localizer=EkfLandmarkLocalizer(EkfLandmarksConfig(), knowledge),
+        planner=RrtStarDubinsPlanner(RrtStarDubinsConfig(clearance_m=0.4, iterations=2000)),
+        smoother=None,
+        local_planner=DubinsLocalPlanner(DubinsLocalConfig(), knowledge),
+        controller=PiFollower(PiFollowerConfig(), knowledge),
+        reactive=None,
+        mapper=None,
+        escape=None,
+    )
+    stack = factory(config, knowledge, parts)
+    stack.prepare()
+    sim, command = simulator(), Twist(0.0, 0.0)
+    keys = set(stack.telemetry())
+    for _ in range(600):
+        command = stack.step(sim.step(command))
+        assert set(stack.telemetry()) == keys
+        if stack.status[0] is not StackStatus.RUNNING:
+            break
+    assert stack.status[0] is StackStatus.ARRIVED
+    assert np.hypot(sim.truth.x_m - GOAL.x_m, sim.truth.y_m - GOAL.y_m) < 0.3
+    assert {event.kind for event in stack.drain_events()} >= {"plan", "arrived"}
+    assert stack.drain_events() == []
+
+
+ROUTE = {"points_m": [[2.0, 2.0], [3.0, 4.0], [7.0, 4.0], [8.0, 6.0]], "turning_radius_m": 0.4}
+
+EXAMPLES: dict[tuple[str, str], Example] = {
+    ("sensor", "wheel-odometry"): Example(
+        sensor_reads, pure_numbers=frozenset({"distance_scale", "angle_scale"})
+    ),
+    ("sensor", "lidar"): Example(sensor_reads, {"beams": 181}),
+    ("sensor", "beacons"): Example(sensor_reads),
+    ("sensor", "ultrasonic"): Example(sensor_reads, {"range_var_m2": 1e-4}),
+    ("localizer", "ekf-landmarks"): Example(
+        localizer_follows,
+        {"gate": 0.999},
+        frozenset({"gate", "measurement_var_scale", "odometry_var_scale"}),
+    ),
+    ("localizer", "dead-reckoning"): Example(
+        localizer_follows, pure_numbers=frozenset({"odometry_var_scale"})
+    ),
+    ("planner", "rrt-star-dubins"): Example(
+        planner_plans, {"iterations": 2000}, frozenset({"goal_bias", "guide_bias", "rewire_factor"})
+    ),
+    ("planner", "route"): Example(planner_plans, ROUTE),
+    ("smoother", "shortcut"): Example(smoother_smooths),
+    ("smoother", "none"): Example(smoother_smooths),
+    ("local_planner", "dubins"): Example(local_planner_reaches_the_waypoint),
+    ("controller", "pi-follower"): Example(controller_turns_to_the_reference),
+    ("reactive", "ultrasonic"): Example(reactive_reacts),
+    ("mapper", "obstacle-layer"): Example(mapper_maps, pure_numbers=frozenset({"sigmas"})),
+    ("escape", "back-out"): Example(escape_ends),
+    ("navigator", "goal"): Example(navigator_arrives),
+}
