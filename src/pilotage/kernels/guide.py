@@ -21,10 +21,10 @@ IntArray = NDArray[np.int64]
 UNIT = 5
 """Cost of a move to the next cell."""
 UNREACHED = np.int64(2**62)
-TIGHT_FACTOR = 6
-"""A move over cells that may or may not be free costs this many times a free one."""
-BUCKETS = 128
-"""More than the dearest move, 11 * TIGHT_FACTOR."""
+TIGHT_FACTOR = 2
+"""A move over nodes that are not free themselves costs this many times a free one."""
+BUCKETS = 32
+"""More than the dearest move."""
 
 MOVES = np.array(
     [
@@ -71,6 +71,49 @@ def classify(space: Space, stride: int, clearance: float) -> IntArray:
 
 
 @kernel
+def position(space: Space, stride: int, row: int, col: int) -> tuple[float, float]:
+    """Where a node lies."""
+    ny, nx = space.distance.shape
+    h = space.resolution
+    return space.x0 + min(col * stride, nx - 1) * h, space.y0 + min(row * stride, ny - 1) * h
+
+
+@kernel
+def _gate_is_open(
+    xa: float, ya: float, xb: float, yb: float, half: float, space: Space, clearance: float
+) -> bool:
+    """Whether a free point may lie on the side that the cells of two neighbouring nodes share.
+
+    Bisection with the Lipschitz bound: never wrong when it says no, and then nothing passes from one
+    cell to the other.
+    """
+    if space.margin == 0.0:
+        return True
+    mx, my = 0.5 * (xa + xb), 0.5 * (ya + yb)
+    along_x, along_y = (0.0, 1.0) if abs(xb - xa) > abs(yb - ya) else (1.0, 0.0)
+    ny, nx = space.distance.shape
+    top_x, top_y = space.x0 + (nx - 1) * space.resolution, space.y0 + (ny - 1) * space.resolution
+    pieces = 1
+    while True:
+        length = 2.0 * half / pieces
+        perhaps = False
+        for i in range(pieces):
+            t = -half + (i + 0.5) * length
+            x = min(max(mx + t * along_x, space.x0), top_x)
+            y = min(max(my + t * along_y, space.y0), top_y)
+            d = exact_distance(x, y, space)
+            if d >= clearance:
+                return True
+            if d + 0.5 * length >= clearance:
+                perhaps = True
+        if not perhaps:
+            return False
+        if pieces >= 32:
+            return True
+        pieces *= 2
+
+
+@kernel
 def _jumps_a_wall(xa: float, ya: float, xb: float, yb: float, space: Space, clearance: float) -> bool:
     """Whether a move between two free nodes passes through thin geometry (only for small clearances)."""
     length = math.hypot(xb - xa, yb - ya)
@@ -84,6 +127,59 @@ def _jumps_a_wall(xa: float, ya: float, xb: float, yb: float, space: Space, clea
 
 
 @kernel
+def _open_side(
+    gates: IntArray,
+    classes: IntArray,
+    space: Space,
+    stride: int,
+    clearance: float,
+    row: int,
+    col: int,
+    side: int,
+) -> bool:
+    """Whether one can pass from a node's cell to its right (side 0) or upper (1) neighbour; remembered."""
+    known = gates[side, row, col]
+    if known < 0:
+        r, c = (row, col + 1) if side == 0 else (row + 1, col)
+        if classes[row, col] == 0 or classes[r, c] == 0:
+            known = 0
+        elif classes[row, col] == 2 and classes[r, c] == 2:
+            known = 1
+        else:
+            xa, ya = position(space, stride, row, col)
+            xb, yb = position(space, stride, r, c)
+            half = 0.5 * stride * space.resolution
+            known = 1 if _gate_is_open(xa, ya, xb, yb, half, space, clearance) else 0
+        gates[side, row, col] = known
+    return bool(known == 1)
+
+
+@kernel
+def _move_is_open(
+    gates: IntArray,
+    classes: IntArray,
+    space: Space,
+    stride: int,
+    clearance: float,
+    row: int,
+    col: int,
+    dr: int,
+    dc: int,
+) -> bool:
+    """Whether a move to one of the eight neighbours is open, a diagonal one around either corner."""
+    r, c = row + dr, col + dc
+    left, low = min(col, c), min(row, r)
+    across = dc == 0 or _open_side(gates, classes, space, stride, clearance, row, left, 0)
+    if across and (dr == 0 or _open_side(gates, classes, space, stride, clearance, low, c, 1)):
+        return True
+    if dr == 0 or dc == 0:
+        return False
+    return _open_side(gates, classes, space, stride, clearance, low, col, 1) and _open_side(
+        gates, classes, space, stride, clearance, r, left, 0
+    )
+
+
+@kernel
 def cost_to_go(
     classes: IntArray,
     space: Space,
@@ -92,22 +188,28 @@ def cost_to_go(
     tight_factor: int,
     goal_row: int,
     goal_col: int,
+    until_row: int,
+    until_col: int,
 ) -> tuple[IntArray, IntArray]:
     """Cost of the cheapest way from each node to the goal, and the move that begins it.
+
+    Moves over nodes that are not free cost ``tight_factor`` times as much as others. Nodes farther than
+    the one at ``until_row``, ``until_col`` are not all reached; -1 reaches all.
 
     Returns (rows, columns) costs in units of a fifth of a cell (``UNREACHED`` where there is no way) and
     (rows, columns) row of ``MOVES`` to take towards the goal (-1 at the goal and where there is none).
     """
     rows, cols = classes.shape
-    ny, nx = space.distance.shape
     cost = np.full(rows * cols, UNREACHED)
     move = np.full(rows * cols, -1, np.int64)
     head = np.full(BUCKETS, -1, np.int64)
     after = np.full(rows * cols, -1, np.int64)
     before = np.full(rows * cols, -1, np.int64)
     queued = np.zeros(rows * cols, np.bool_)
+    gates = np.full((2, rows, cols), -1, np.int64)
     small = 2.0 * clearance < stride * space.resolution * math.sqrt(5.0)
     start = goal_row * cols + goal_col
+    until = until_row * cols + until_col
     cost[start] = 0
     head[0] = start
     queued[start] = True
@@ -123,6 +225,8 @@ def cost_to_go(
             before[after[u]] = -1
         queued[u] = False
         waiting -= 1
+        if u == until:
+            break
         row, col = u // cols, u % cols
         for k in range(MOVES.shape[0]):
             dc, dr = MOVES[k, 0], MOVES[k, 1]
@@ -134,21 +238,23 @@ def cost_to_go(
             if kind == 0:
                 continue
             if k >= 8:
-                # The two nodes that a knight's move passes between.
+                # The two nodes that a knight's move passes between: such moves are for open ground.
                 if abs(dc) == 2:
                     side = min(classes[row, col + dc // 2], classes[r, col + dc // 2])
                 else:
                     side = min(classes[row + dr // 2, col], classes[row + dr // 2, c])
-                kind = min(kind, side)
-                if kind == 0:
+                if min(kind, side) < 2:
                     continue
             reached = cost[u] + MOVES[k, 2] * (1 if kind == 2 else tight_factor)
             if reached >= cost[v]:
                 continue
+            # Between free nodes a way is taken for granted; elsewhere the cells' sides are looked at.
+            plain = kind == 2 and (k < 4 or k >= 8 or max(classes[row, c], classes[r, col]) == 2)
+            if not plain and not _move_is_open(gates, classes, space, stride, clearance, row, col, dr, dc):
+                continue
             if small:
-                h = space.resolution
-                xa, ya = space.x0 + min(col * stride, nx - 1) * h, space.y0 + min(row * stride, ny - 1) * h
-                xb, yb = space.x0 + min(c * stride, nx - 1) * h, space.y0 + min(r * stride, ny - 1) * h
+                xa, ya = position(space, stride, row, col)
+                xb, yb = position(space, stride, r, c)
                 if _jumps_a_wall(xa, ya, xb, yb, space, clearance):
                     continue
             if queued[v]:
@@ -177,14 +283,13 @@ def cost_to_go(
 def nearest_node(x: float, y: float, classes: IntArray, space: Space, stride: int) -> tuple[int, int]:
     """Row and column of the best class of node around a point, the nearest among equals."""
     rows, cols = classes.shape
-    ny, nx = space.distance.shape
     h = space.resolution
     col0 = min(max(math.floor((x - space.x0) / (stride * h)), 0), cols - 2)
     row0 = min(max(math.floor((y - space.y0) / (stride * h)), 0), rows - 2)
     best_row, best_col, best_kind, best = row0, col0, -1, math.inf
     for row in range(row0, row0 + 2):
         for col in range(col0, col0 + 2):
-            xn, yn = space.x0 + min(col * stride, nx - 1) * h, space.y0 + min(row * stride, ny - 1) * h
+            xn, yn = position(space, stride, row, col)
             away = math.hypot(xn - x, yn - y)
             kind = classes[row, col]
             if kind > best_kind or (kind == best_kind and away < best):
@@ -195,7 +300,6 @@ def nearest_node(x: float, y: float, classes: IntArray, space: Space, stride: in
 @kernel
 def trace(move: IntArray, space: Space, stride: int, row: int, col: int, half_window: int) -> FloatArray:
     """Way from a node to the goal as states (K, 3): node positions averaged along the way, with headings."""
-    ny, nx = space.distance.shape
     count, r, c = 1, row, col
     while move[r, c] >= 0:
         k = move[r, c]
@@ -204,8 +308,7 @@ def trace(move: IntArray, space: Space, stride: int, row: int, col: int, half_wi
     raw = np.empty((count, 2))
     r, c = row, col
     for i in range(count):
-        raw[i, 0] = space.x0 + min(c * stride, nx - 1) * space.resolution
-        raw[i, 1] = space.y0 + min(r * stride, ny - 1) * space.resolution
+        raw[i, 0], raw[i, 1] = position(space, stride, r, c)
         k = move[r, c]
         if k >= 0:
             r, c = r + MOVES[k, 1], c + MOVES[k, 0]

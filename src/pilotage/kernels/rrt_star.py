@@ -119,7 +119,7 @@ def _draw(
         else:
             k = int(u * (last + 1))
         k = min(k, last)
-        away = search.spread * math.sqrt(rng.random())
+        away = search.spread * rng.random()
         turn = rng.random() * 2.0 * math.pi
         x, y = guide[k, 0] + away * math.cos(turn), guide[k, 1] + away * math.sin(turn)
         th = guide[k, 2] + 0.5 * (rng.random() + rng.random() - 1.0)

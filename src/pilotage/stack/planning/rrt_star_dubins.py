@@ -15,6 +15,7 @@ from pilotage.core.errors import InputError
 from pilotage.core.types import FloatArray
 from pilotage.kernels import dubins, guide, rrt_star, rrt_tree
 from pilotage.kernels.clearance import Space, first_blocked, least_step, skin, slack_at
+from pilotage.kernels.field import sample_distance
 from pilotage.stack.planning.driving_space import (
     CHECK_SPACING_M,
     STATE_SPACING_M,
@@ -24,6 +25,9 @@ from pilotage.stack.planning.driving_space import (
     space_for,
 )
 from pilotage.stack.planning.planner import PLANNERS, Path, PlanRequest, PlanResult, PlanStatus
+
+MAX_GUIDE_NODES = 1_000_000
+"""A field finer than this would cost more than the guide saves."""
 
 CHUNK = 256
 """Iterations between looks at the clock and at the incumbent."""
@@ -164,6 +168,7 @@ def _look_around(
     request: PlanRequest, space: Space, clearance_m: float, config: RrtStarDubinsConfig
 ) -> tuple[FloatArray, rrt_star.Bound, str | None]:
     """Rough way to the goal, lower bound of the cost-to-go, and the proof where there is no way at all."""
+    space = _fine_enough(space, clearance_m)
     stride = max(1, int(clearance_m / (2.0 * space.resolution)))
     cell = stride * space.resolution
     if min(space.distance.shape) < 3 * stride:
@@ -171,7 +176,7 @@ def _look_around(
     classes = guide.classify(space, stride, clearance_m)
     start = guide.nearest_node(request.start.x_m, request.start.y_m, classes, space, stride)
     goal = guide.nearest_node(request.goal.x_m, request.goal.y_m, classes, space, stride)
-    cost, move = guide.cost_to_go(classes, space, stride, clearance_m, guide.TIGHT_FACTOR, *goal)
+    cost, move = guide.cost_to_go(classes, space, stride, clearance_m, guide.TIGHT_FACTOR, *goal, *start)
     if cost[start] == guide.UNREACHED:
         if 2.0 * clearance_m < cell * math.sqrt(5.0):
             # Walls are thinner than the grid can tell apart: no proof.
@@ -191,9 +196,23 @@ def _look_around(
     way = guide.trace(move, space, stride, *start, 3) if config.guide_bias > 0.0 else NO_GUIDE
     if config.stop == "first" or config.guide_bias == 0.0:
         return way, NO_BOUND, None
-    loose, _ = guide.cost_to_go(classes, space, stride, clearance_m, 1, *goal)
+    loose, _ = guide.cost_to_go(classes, space, stride, clearance_m, 1, *goal, -1, -1)
     metres = np.where(loose == guide.UNREACHED, np.inf, loose * (cell / guide.UNIT / 1.03) - cell)
     return way, rrt_star.Bound(metres, space.x0, space.y0, cell), None
+
+
+def _fine_enough(space: Space, clearance_m: float) -> Space:
+    """The space with a finer field where a coarse one would let the guide pass through thin walls."""
+    if space.margin == 0.0 or space.resolution <= clearance_m / 2.0:
+        return space
+    ny, nx = space.distance.shape
+    width, height = (nx - 1) * space.resolution, (ny - 1) * space.resolution
+    spacing = max(clearance_m / 2.0, math.sqrt(width * height / MAX_GUIDE_NODES))
+    nx, ny = math.floor(width / spacing) + 1, math.floor(height / spacing) + 1
+    if spacing >= space.resolution or min(nx, ny) < 3:
+        return space
+    distance = sample_distance(space.x0, space.y0, spacing, nx, ny, space.segments, space.circles)
+    return space._replace(distance=distance, resolution=spacing)
 
 
 def _extract(
