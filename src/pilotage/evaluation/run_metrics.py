@@ -152,9 +152,11 @@ def _consistency(mission: Mission, trace: Mapping[str, FloatArray]) -> dict[str,
     nis, expected = trace["nis"][counted], trace["nis_expected"][counted]
     measured = np.isfinite(nis)
     if measured.any():
-        # Weighted by the degrees of freedom: a ratio of sums, its band that of the weighted terms.
-        weight = expected[measured].mean()
-        band = correlated_mean(nis[measured] / weight)
+        # A ratio of sums r = sum(nis) / sum(expected); its band is that of the linearized terms, in which
+        # a changing number of beacons cancels.
+        ratio = nis[measured].sum() / expected[measured].sum()
+        terms = ratio + (nis[measured] - ratio * expected[measured]) / expected[measured].mean()
+        band = correlated_mean(terms)
         metrics |= {"nis_mean": band.mean, "nis_low": band.low, "nis_high": band.high}
     seen = trace["beacons_seen"][counted].sum() if "beacons_seen" in trace else 0.0
     if seen > 0.0:

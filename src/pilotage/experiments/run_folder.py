@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import yaml
 
+from pilotage.experiments.roles import REGISTRIES
 from pilotage.experiments.world_map import shipped_maps
 from pilotage.missions.schema import Mission
 
@@ -22,8 +23,13 @@ if TYPE_CHECKING:
 
 
 def resolved_yaml(mission: Mission, record: RunRecord | None = None) -> str:
-    """The mission in full, defaults included; a map that came from a file is written into it."""
+    """The mission in full, every component's defaults included; a map from a file is written into it."""
     values = mission.model_dump(mode="json")
+    for role, choice in values["stack"].items():
+        if role in REGISTRIES and choice is not None:
+            values["stack"][role] = _resolved(role, choice, f"stack.{role}")
+    for name, choice in values["robot"]["sensors"].items():
+        values["robot"]["sensors"][name] = _resolved("sensor", choice, f"robot.sensors.{name}")
     source = mission.world.map
     if record is not None and isinstance(source, str) and source not in shipped_maps():
         floor = record.experiment.floor
@@ -38,6 +44,13 @@ def resolved_yaml(mission: Mission, record: RunRecord | None = None) -> str:
             ],
         }
     return yaml.safe_dump(values, sort_keys=False, allow_unicode=True)
+
+
+def _resolved(role: str, choice: dict[str, Any], where: str) -> dict[str, Any]:
+    """A component's name with all its parameters, those left to their defaults too."""
+    parameters = {key: value for key, value in choice.items() if key != "name"}
+    config = REGISTRIES[role].configure(choice["name"], parameters, where)
+    return {"name": choice["name"], **config.model_dump(mode="json")}
 
 
 def run_name(mission: Mission) -> str:
