@@ -26,7 +26,9 @@ class GlobalPlan:
         world_map: SegmentMap,
         goal: Goal,
         rng: np.random.Generator,
+        least_clearance_m: float = 0.0,
     ) -> None:
+        self._least_clearance_m = least_clearance_m
         self._planner = planner
         self._smoother = smoother
         self._map = world_map
@@ -39,8 +41,8 @@ class GlobalPlan:
 
     @property
     def clearance_m(self) -> float:
-        """What the planner keeps from obstacles of its own accord."""
-        return self._planner.clearance_m
+        """What the planner keeps from obstacles of its own accord, and at least what the body needs."""
+        return max(self._planner.clearance_m, self._least_clearance_m)
 
     def make(
         self, t_s: float, start: Pose2, mapped_m: FloatArray, clearances_m: Sequence[float]

@@ -94,6 +94,7 @@ class GoalNavigator:
             knowledge.world_map,
             knowledge.goal,
             knowledge.streams.stream("planner"),
+            knowledge.body_radius_m + config.guard.margin_m,
         )
         self._follower = WaypointFollower(parts.local_planner, parts.controller, knowledge.dt_s)
         self._guard = ArcGuard(config.guard, knowledge.body_radius_m)

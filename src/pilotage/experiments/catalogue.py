@@ -1,0 +1,97 @@
+"""What can be named in a mission file: missions, components, their parameters, the schema."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from pydantic_core import PydanticUndefined
+
+from pilotage.core.config import Config
+from pilotage.core.errors import unknown_name
+from pilotage.experiments.mission import read_mission, shipped_missions
+from pilotage.experiments.roles import REGISTRIES
+from pilotage.missions.schema import Mission
+
+
+def missions() -> list[tuple[str, str]]:
+    """Name and description of every shipped mission."""
+    return [(name, str(read_mission(name).get("description", ""))) for name in shipped_missions()]
+
+
+def components(name: str | None = None) -> list[tuple[str, str, str]]:
+    """Role, name and first line of every component; or parameter, default and type of one of them.
+
+    Raises
+    ------
+    InputError
+        If there is no component of that name.
+    """
+    entries = [(role, entry) for role, registry in REGISTRIES.items() for entry in registry]
+    if name is None:
+        return [(role, entry.name, _first_line(entry.factory.__doc__)) for role, entry in entries]
+    found = [(role, entry) for role, entry in entries if entry.name == name]
+    if not found:
+        raise unknown_name("component", name, {entry.name for _, entry in entries})
+    rows: list[tuple[str, str, str]] = []
+    for role, entry in found:
+        rows.append((f"{role} '{name}'", "", _first_line(entry.factory.__doc__)))
+        rows += _parameters(entry.config)
+    return rows
+
+
+def _parameters(config: type[Config]) -> list[tuple[str, str, str]]:
+    """Parameter, default, and what values it takes."""
+    schema = config.model_json_schema()
+    rows = []
+    for name, field in config.model_fields.items():
+        if field.is_required():
+            default = "required"
+        elif field.default is PydanticUndefined or isinstance(field.default, Config):
+            default = "see schema"
+        else:
+            default = "none" if field.default is None else f"{field.default}"
+        rows.append((name, default, _values(schema["properties"][name])))
+    return rows
+
+
+def _values(schema: dict[str, Any]) -> str:
+    """The values that a JSON schema allows, in a few words."""
+    if "anyOf" in schema:
+        return " or ".join(_values(part) for part in schema["anyOf"])
+    if "enum" in schema:
+        return " | ".join(str(value) for value in schema["enum"])
+    if "$ref" in schema:
+        return str(schema["$ref"].rsplit("/", 1)[-1])
+    words = [str(schema.get("type", "value"))]
+    bounds = (("minimum", ">="), ("exclusiveMinimum", ">"), ("maximum", "<="), ("exclusiveMaximum", "<"))
+    words += [f"{sign} {schema[key]:g}" for key, sign in bounds if key in schema]
+    return " ".join(words)
+
+
+def mission_schema() -> dict[str, Any]:
+    """JSON schema of a mission file, with the parameters of every component that a role can take."""
+    schema = Mission.model_json_schema()
+    definitions = schema["$defs"]
+    choices: dict[str, dict[str, Any]] = {}
+    for role, registry in REGISTRIES.items():
+        options = []
+        for entry in registry:
+            parameters = entry.config.model_json_schema()
+            definitions |= parameters.pop("$defs", {})
+            parameters["properties"] = {"name": {"const": entry.name}, **parameters.get("properties", {})}
+            parameters["required"] = ["name", *parameters.get("required", [])]
+            parameters["title"] = entry.name
+            options.append(parameters)
+        definitions[f"role-{role}"] = {"oneOf": options}
+        choices[role] = {"$ref": f"#/$defs/role-{role}"}
+    stack = definitions["StackConfig"]["properties"]
+    for role, choice in choices.items():
+        if role in stack:
+            stack[role] = choice if "default" not in stack[role] else {"anyOf": [choice, {"type": "null"}]}
+    definitions["RobotConfig"]["properties"]["sensors"]["additionalProperties"] = choices["sensor"]
+    schema["properties"]["extends"] = {"type": "string", "description": "a shipped mission to start from"}
+    return schema
+
+
+def _first_line(text: str | None) -> str:
+    return (text or "").strip().split("\n", 1)[0]
