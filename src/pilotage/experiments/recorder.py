@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 
 from pilotage.core.types import Event, FloatArray, Twist
+from pilotage.evaluation.run_metrics import Outcome
+from pilotage.experiments.build import Experiment
 from pilotage.sensors.readings import Readings, UltrasonicReading
 from pilotage.sensors.ultrasonic import UltrasonicConfig
 from pilotage.sim.simulator import Simulator
@@ -25,6 +28,16 @@ BELIEF_COLUMNS = (
     "cov_tt_rad2",
 )
 MOTION_COLUMNS = ("v_cmd_m_s", "w_cmd_rad_s", "v_true_m_s", "w_true_rad_s", "clearance_m", "collisions")
+
+
+@dataclass(frozen=True, slots=True)
+class RunRecord:
+    """A finished run in memory: its objects, its trace (columns by name), its end and its events."""
+
+    experiment: Experiment
+    trace: dict[str, FloatArray]
+    outcome: Outcome
+    events: list[Event]
 
 
 class Recorder:

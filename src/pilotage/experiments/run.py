@@ -10,10 +10,10 @@ from pathlib import Path
 
 import numpy as np
 
-from pilotage.core.types import STOP, FloatArray
+from pilotage.core.types import STOP
 from pilotage.evaluation.run_metrics import Outcome, run_metrics, shortest_for
 from pilotage.experiments.build import Experiment, build, build_sensors
-from pilotage.experiments.recorder import Recorder
+from pilotage.experiments.recorder import Recorder, RunRecord
 from pilotage.experiments.run_folder import write_run_folder
 from pilotage.missions.schema import Mission
 from pilotage.stack.interface import StackStatus
@@ -29,16 +29,6 @@ class Progress:
     distance_to_go_m: float
     position_error_m: float
     sigma_m: float
-
-
-@dataclass(frozen=True, slots=True)
-class RunRecord:
-    """A finished run in memory."""
-
-    experiment: Experiment
-    trace: dict[str, FloatArray]
-    outcome: Outcome
-    recorder: Recorder
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,7 +109,7 @@ def simulate(mission: Mission, on_progress: Callable[[Progress], None] | None = 
         shortest=shortest_for(mission, stack.plans, experiment.floor.walls),
         counts=dict(stack.counts),
     )
-    return RunRecord(experiment, recorder.trace(), outcome, recorder)
+    return RunRecord(experiment, recorder.trace(), outcome, recorder.events)
 
 
 def _reason(experiment: Experiment, status: StackStatus, reason: str) -> str:

@@ -9,17 +9,15 @@ import os
 import shutil
 import tempfile
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import yaml
 
+from pilotage.experiments.recorder import RunRecord
 from pilotage.experiments.roles import REGISTRIES
 from pilotage.experiments.world_map import shipped_maps
 from pilotage.missions.schema import Mission
-
-if TYPE_CHECKING:
-    from pilotage.experiments.run import RunRecord
 
 
 def resolved_yaml(mission: Mission, record: RunRecord | None = None) -> str:
@@ -84,7 +82,7 @@ def write_run_folder(out: Path, record: RunRecord, metrics: dict[str, object]) -
         (draft / "events.jsonl").write_text(
             "".join(
                 json.dumps({"t_s": event.t_s, "kind": event.kind, "text": event.text}) + "\n"
-                for event in record.recorder.events
+                for event in record.events
             ),
             encoding="utf-8",
         )
