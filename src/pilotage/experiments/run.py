@@ -81,7 +81,7 @@ def simulate(mission: Mission, on_progress: Callable[[Progress], None] | None = 
     recorder = Recorder(simulator, stack, dict(build_sensors(mission)))
     recorder.events += stack.drain_events()
     limit = math.ceil(mission.run.time_limit_s / mission.run.dt_s)
-    planned_s = sum(plan.planning_time_s for plan in stack.plans)
+    planned_s = stack.planning_time_s
     begin = last_told = time.perf_counter()
     command, status, reason = STOP, *stack.status
     for _ in range(limit):
@@ -100,11 +100,10 @@ def simulate(mission: Mission, on_progress: Callable[[Progress], None] | None = 
             last_told = time.perf_counter()
             on_progress(_progress(experiment))
     loop_s = time.perf_counter() - begin
-    all_planning_s = sum(plan.planning_time_s for plan in stack.plans)
     outcome = Outcome(
         arrived=status is StackStatus.ARRIVED,
         reason=_reason(experiment, status, reason),
-        loop_s=max(loop_s - (all_planning_s - planned_s), 1e-9),
+        loop_s=max(loop_s - (stack.planning_time_s - planned_s), 1e-9),
         plans=stack.plans,
         shortest=shortest_for(mission, stack.plans, experiment.floor.walls),
         counts=dict(stack.counts),

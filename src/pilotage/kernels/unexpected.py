@@ -52,21 +52,31 @@ def unexplained_points(
 
 @kernel
 def confirm_cells(
-    points: FloatArray, hits: IntArray, x0: float, y0: float, cell: float, threshold: int
+    points: FloatArray,
+    hits: IntArray,
+    sums: FloatArray,
+    x0: float,
+    y0: float,
+    cell: float,
+    threshold: int,
 ) -> FloatArray:
-    """Count points (K, 2) into ``hits`` (ny, nx), in place; return the centres (C, 2) of the cells whose
-    count reaches ``threshold`` by this call."""
+    """Count points (K, 2) into ``hits`` (ny, nx) and add them to ``sums`` (ny, nx, 2), both in place.
+
+    Returns the mean points (C, 2) of the cells whose count reaches ``threshold`` by this call.
+    """
     ny, nx = hits.shape
-    centres = np.empty((points.shape[0], 2))
+    means = np.empty((points.shape[0], 2))
     count = 0
     for k in range(points.shape[0]):
         col = math.floor((points[k, 0] - x0) / cell)
         row = math.floor((points[k, 1] - y0) / cell)
-        if not (0 <= row < ny and 0 <= col < nx):
+        if not (0 <= row < ny and 0 <= col < nx) or hits[row, col] >= threshold:
             continue
         hits[row, col] += 1
+        sums[row, col, 0] += points[k, 0]
+        sums[row, col, 1] += points[k, 1]
         if hits[row, col] == threshold:
-            centres[count, 0] = x0 + (col + 0.5) * cell
-            centres[count, 1] = y0 + (row + 0.5) * cell
+            means[count, 0] = sums[row, col, 0] / threshold
+            means[count, 1] = sums[row, col, 1] / threshold
             count += 1
-    return centres[:count].copy()
+    return means[:count].copy()

@@ -91,6 +91,11 @@ class Stack(Protocol):
         ...
 
     @property
+    def planning_time_s(self) -> float:
+        """Wall time spent planning globally, queries without a path included."""
+        ...
+
+    @property
     def plans(self) -> list[PlannedPath]:
         """All plans adopted so far."""
         ...

@@ -24,7 +24,9 @@ class ObstacleLayerConfig(Config):
 
     reach_m: Positive = 3.0
     tolerance_m: Positive = 0.15
-    cell_m: Positive = 0.1
+    cell_m: Positive = 0.05
+    disc_m: Positive = 0.03
+    """Radius of the disc that a believed cell puts on the map, around the mean of its hits."""
     hits: int = Field(default=3, ge=1, le=1000)
     sigmas: Positive = 3.0
     """The tolerance grows with the pose's uncertainty by this many standard deviations."""
@@ -32,7 +34,7 @@ class ObstacleLayerConfig(Config):
 
 @MAPPERS.add("obstacle-layer", ObstacleLayerConfig)
 class ObstacleLayer:
-    """Cells of a grid over the known map, each turned into a disc that covers it once it is believed.
+    """Cells of a grid over the known map, each turned into a disc around its hits once it is believed.
 
     What it learns it keeps: an obstacle that goes away stays on the map. Points within the tolerance of
     a known wall are taken for the wall, so an obstacle flush with a wall is seen only where it stands out.
@@ -49,6 +51,7 @@ class ObstacleLayer:
         xmin, ymin, xmax, ymax = knowledge.world_map.bounds_m
         shape = (math.ceil((ymax - ymin) / config.cell_m), math.ceil((xmax - xmin) / config.cell_m))
         self._hits = np.zeros(shape, dtype=np.int64)
+        self._sums = np.zeros((*shape, 2))
         self._origin = (xmin, ymin)
         self.circles_m: FloatArray = np.zeros((0, 3))
 
@@ -75,10 +78,11 @@ class ObstacleLayer:
         )
         if points.shape[0] == 0:
             return False
-        centres = unexpected.confirm_cells(points, self._hits, *self._origin, config.cell_m, config.hits)
-        if centres.shape[0] == 0:
+        means = unexpected.confirm_cells(
+            points, self._hits, self._sums, *self._origin, config.cell_m, config.hits
+        )
+        if means.shape[0] == 0:
             return False
-        radius = config.cell_m * math.sqrt(0.5)  # the disc around a cell
-        discs = np.column_stack([centres, np.full(centres.shape[0], radius)])
+        discs = np.column_stack([means, np.full(means.shape[0], config.disc_m)])
         self.circles_m = np.concatenate([self.circles_m, discs])
         return True

@@ -38,6 +38,7 @@ class GlobalPlan:
         self.progress: PathProgress | None = None
         self.circles_m: FloatArray = world_map.circles_m
         self.history: list[PlannedPath] = []
+        self.planning_time_s = 0.0
 
     @property
     def clearance_m(self) -> float:
@@ -65,6 +66,7 @@ class GlobalPlan:
                 self._adopt(t_s, path, result, clearance_m, time.perf_counter() - begin, world.circles_m)
                 break
         assert result is not None
+        self.planning_time_s += time.perf_counter() - begin
         return result
 
     def _adopt(

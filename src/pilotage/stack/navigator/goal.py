@@ -26,6 +26,9 @@ from pilotage.stack.navigator.navigator import NAVIGATORS, Parts
 HERE_TOLERANCE_M = 0.005
 """Slack between what a plan keeps and what is checked while driving it."""
 
+MAPPED_TOLERANCE_M = 0.02
+"""What the robot maps is drawn a little too large: where it stands there was room for it."""
+
 NO_REACTION = Reaction(ReactionKind.NONE, 0.0, math.inf, math.inf)
 
 
@@ -84,6 +87,8 @@ class GoalNavigator:
         self._radius_m = knowledge.body_radius_m
         self._segments = knowledge.world_map.segments_m
         self._known_circles = knowledge.world_map.circles_m
+        self._nothing = self._known_circles[:0]
+        self._circles = self._last_mapped = self._known_circles
         self._localizer = parts.localizer
         self._reactive = parts.reactive
         self._mapper = parts.mapper
@@ -127,9 +132,14 @@ class GoalNavigator:
         return self._plan.history
 
     @property
+    def planning_time_s(self) -> float:
+        """Wall time spent planning globally, queries without a path included."""
+        return self._plan.planning_time_s
+
+    @property
     def mapped_circles_m(self) -> FloatArray:
         """(M, 3) what the robot put on its own map."""
-        return self._known_circles[:0] if self._mapper is None else self._mapper.circles_m
+        return self._nothing if self._mapper is None else self._mapper.circles_m
 
     def prepare(self) -> None:
         """Plan from the initial belief; without a path the task has failed before it starts."""
@@ -150,9 +160,9 @@ class GoalNavigator:
         if self._status is not StackStatus.RUNNING:
             return STOP
         command = self._drive(readings, belief.pose)
-        if self._guard.allows(
-            command, belief.pose, self._segments, self._all_circles(), self._room_asked_m()
-        ):
+        # Its own trail it has driven before: there only the known walls are asked.
+        circles = self._known_circles if self._mode is Mode.ESCAPE else self._all_circles()
+        if self._guard.allows(command, belief.pose, self._segments, circles, self._room_asked_m()):
             return command
         return self._refuse(command, belief.pose)
 
@@ -313,7 +323,7 @@ class GoalNavigator:
         config = self._config
         here = geometry.distance_to_nearest(pose.x_m, pose.y_m, self._segments, self._all_circles())
         asked = [self._plan.clearance_m, *(self._radius_m + margin for margin in config.fallback_margins_m)]
-        squeezed = max(here - HERE_TOLERANCE_M, self._radius_m + HERE_TOLERANCE_M)
+        squeezed = max(here - HERE_TOLERANCE_M, self._radius_m - MAPPED_TOLERANCE_M)
         return [c for c in asked if c <= self._plan.clearance_m] + (
             [squeezed] if squeezed < min(asked) else []
         )
@@ -326,7 +336,11 @@ class GoalNavigator:
 
     def _all_circles(self) -> FloatArray:
         """Everything round on the robot's own map: what it was told of and what it found."""
-        return np.concatenate([self._known_circles, self.mapped_circles_m])
+        mapped = self.mapped_circles_m
+        if mapped is not self._last_mapped:
+            self._last_mapped = mapped
+            self._circles = np.concatenate([self._known_circles, mapped])
+        return self._circles
 
     def _goes_straight(self) -> bool:
         assert self._plan.progress is not None
