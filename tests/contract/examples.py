@@ -19,7 +19,8 @@ from pilotage.sim.simulator import Simulator
 from pilotage.sim.world import World
 from pilotage.stack.control.pi_follower import PiFollower, PiFollowerConfig
 from pilotage.stack.interface import StackStatus
-from pilotage.stack.localization.ekf_landmarks import EkfLandmarkLocalizer, EkfLandmarksConfig
+from pilotage.stack.localization.ekf_landmarks import EkfLandmarkLocalizer
+from pilotage.stack.localization.landmark_filter import LandmarkFilterConfig
 from pilotage.stack.navigator.navigator import Parts
 from pilotage.stack.planning.dubins_local import DubinsLocalConfig, DubinsLocalPlanner
 from pilotage.stack.planning.local_planner import RouteAhead
@@ -183,7 +184,7 @@ def navigator_arrives(factory: Any, config: Any) -> None:
     """Put together from the plainest parts, it drives to its goal."""
     knowledge = knowledge_of(start=START, goal=GOAL, variances=(1e-4, 1e-4, 1e-4))
     parts = Parts(
-        localizer=EkfLandmarkLocalizer(EkfLandmarksConfig(), knowledge),
+        localizer=EkfLandmarkLocalizer(LandmarkFilterConfig(), knowledge),
         planner=RrtStarDubinsPlanner(RrtStarDubinsConfig(clearance_m=0.4, iterations=2000)),
         smoother=None,
         local_planner=DubinsLocalPlanner(DubinsLocalConfig(), knowledge),
@@ -209,6 +210,8 @@ def navigator_arrives(factory: Any, config: Any) -> None:
 
 ROUTE = {"points_m": [[2.0, 2.0], [3.0, 4.0], [7.0, 4.0], [8.0, 6.0]], "turning_radius_m": 0.4}
 
+FILTER_NUMBERS = frozenset({"gate", "measurement_var_scale", "odometry_var_scale"})
+
 EXAMPLES: dict[tuple[str, str], Example] = {
     ("sensor", "wheel-odometry"): Example(
         sensor_reads, pure_numbers=frozenset({"distance_scale", "angle_scale"})
@@ -216,11 +219,9 @@ EXAMPLES: dict[tuple[str, str], Example] = {
     ("sensor", "lidar"): Example(sensor_reads, {"beams": 181}),
     ("sensor", "beacons"): Example(sensor_reads),
     ("sensor", "ultrasonic"): Example(sensor_reads, {"range_var_m2": 1e-4}),
-    ("localizer", "ekf-landmarks"): Example(
-        localizer_follows,
-        {"gate": 0.999},
-        frozenset({"gate", "measurement_var_scale", "odometry_var_scale"}),
-    ),
+    ("localizer", "ekf-landmarks"): Example(localizer_follows, {"gate": 0.999}, FILTER_NUMBERS),
+    ("localizer", "iekf-landmarks"): Example(localizer_follows, {"gate": 0.999}, FILTER_NUMBERS),
+    ("localizer", "ukf-landmarks"): Example(localizer_follows, {"gate": 0.999}, FILTER_NUMBERS),
     ("localizer", "dead-reckoning"): Example(
         localizer_follows, pure_numbers=frozenset({"odometry_var_scale"})
     ),

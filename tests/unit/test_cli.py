@@ -23,14 +23,7 @@ from pilotage.cli.main import main
 from pilotage.cli.output import ProgressLine, plain, progress_line, progress_text
 from pilotage.cli.plan import parse_pose
 from pilotage.core.errors import InputError
-
-
-@dataclass(frozen=True)
-class Progress:
-    t_s: float
-    distance_to_go_m: float
-    position_error_m: float
-    sigma_m: float
+from pilotage.experiments.run import Progress
 
 
 @dataclass

@@ -93,7 +93,7 @@ def test_beacons_are_seen_with_their_ids_and_noise() -> None:
 
 
 def test_saturated_ultrasonic_readings_are_flagged() -> None:
-    sim = simulator({"front": UltrasonicConfig(), "back": UltrasonicConfig(mount={"theta_rad": math.pi})})  # type: ignore[arg-type]
+    sim = simulator({"front": UltrasonicConfig(), "back": UltrasonicConfig(mount={"theta_rad": math.pi})})
     by_sensor = sim.step(Twist(0.0, 0.0)).by_sensor
     front, back = by_sensor["front"], by_sensor["back"]
     assert isinstance(front, UltrasonicReading)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from pilotage.core.config import Config
@@ -22,6 +24,10 @@ class OdometryNoise(Config):
     angle_var_rad2_per_m: NonNegative | None = None
 
 
+Predict = Callable[[FloatArray, FloatArray, float, float, FloatArray, bool], None]
+"""A kernel that moves pose (3,) and covariance (3, 3) in place by distance, angle and their Q."""
+
+
 class OdometryPrediction:
     """Moves pose and covariance by odometry increments.
 
@@ -29,6 +35,8 @@ class OdometryPrediction:
     ----------
     var_scale
         Factor on all variances, for experiments with a filter that is wrong about its noise.
+    predict
+        The arithmetic: linearized (EKF) or by points (UKF).
     """
 
     def __init__(
@@ -37,6 +45,7 @@ class OdometryPrediction:
         believed: OdometryNoise,
         var_scale: Positive,
         model: OdometryModel,
+        predict: Predict = ekf.predict,
     ) -> None:
         def pick(own: float | None, sheet: float) -> float:
             return var_scale * (sheet if own is None else own)
@@ -47,6 +56,7 @@ class OdometryPrediction:
             pick(believed.angle_var_rad2_per_rad, sensor.angle_var_rad2_per_rad),
             pick(believed.angle_var_rad2_per_m, sensor.angle_var_rad2_per_m),
         )
+        self._predict = predict
         self._exact = model is OdometryModel.EXACT_ARC
         self._Q = np.zeros((2, 2))
 
@@ -55,4 +65,4 @@ class OdometryPrediction:
         self._Q[0, 0], self._Q[1, 1] = increment_variances(
             odometry.distance_m, odometry.angle_rad, *self._densities
         )
-        ekf.predict(pose, cov, odometry.distance_m, odometry.angle_rad, self._Q, self._exact)
+        self._predict(pose, cov, odometry.distance_m, odometry.angle_rad, self._Q, self._exact)

@@ -1,0 +1,143 @@
+"""What every Kalman filter on beacons does: odometry predicts, ranges and bearings correct."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+
+import numpy as np
+from pydantic import Field
+
+from pilotage.core.chi_square import chi_square_quantile, gated_mean
+from pilotage.core.config import Config
+from pilotage.core.errors import InputError
+from pilotage.core.types import Pose2
+from pilotage.kernels import ekf
+from pilotage.models.odometry import OdometryModel
+from pilotage.sensors.beacon import BeaconConfig
+from pilotage.sensors.readings import BeaconReadings, OdometryIncrement, Readings
+from pilotage.sensors.sensor import Positive
+from pilotage.sensors.wheel_odometry import WheelOdometryConfig
+from pilotage.stack.interface import Belief
+from pilotage.stack.knowledge import Knowledge
+from pilotage.stack.localization.odometry_prediction import OdometryNoise, OdometryPrediction, Predict
+
+MEASUREMENT_DOF = 2
+"""Range and bearing."""
+
+
+class LandmarkFilterConfig(Config):
+    """The gate is a probability: the share of true measurements that it lets through.
+
+    Variances left out are taken from the sensors' data sheets; the scales serve experiments with a
+    filter that is wrong about its noise.
+    """
+
+    gate: float = Field(default=0.999, gt=0.0, lt=1.0)
+    range_var_m2: Positive | None = None
+    bearing_var_rad2: Positive | None = None
+    measurement_var_scale: Positive = 1.0
+    odometry_model: OdometryModel = OdometryModel.EXACT_ARC
+    odometry: OdometryNoise = OdometryNoise()
+    odometry_var_scale: Positive = 1.0
+
+
+Update = Callable[..., int]
+
+
+class LandmarkFilter:
+    """A filter with known correspondences; the arithmetic of its two steps is handed in.
+
+    Parameters
+    ----------
+    name
+        As registered, for messages.
+    predict, update
+        Kernels with the arguments of ``ekf.predict`` and ``ekf.update_range_bearings``.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        predict: Predict,
+        update: Update,
+        config: LandmarkFilterConfig,
+        knowledge: Knowledge,
+    ) -> None:
+        self._update_kernel = update
+        self._odometry, odometry = knowledge.one_sensor(WheelOdometryConfig, name)
+        self._beacons, beacons = knowledge.one_sensor(BeaconConfig, name)
+        if len(knowledge.landmarks) == 0:
+            raise InputError(f"{name}: expected a map with landmarks, found none")
+        self._prediction = OdometryPrediction(
+            odometry, config.odometry, config.odometry_var_scale, config.odometry_model, predict
+        )
+        order = np.argsort(knowledge.landmarks.ids)
+        self._ids = knowledge.landmarks.ids[order]
+        self._points = knowledge.landmarks.points_xy_m[order]
+        self._mount = np.array([beacons.mount.x_m, beacons.mount.y_m, beacons.mount.theta_rad])
+        range_var = beacons.range_var_m2 if config.range_var_m2 is None else config.range_var_m2
+        bearing_var = beacons.bearing_var_rad2 if config.bearing_var_rad2 is None else config.bearing_var_rad2
+        if range_var == 0.0 or bearing_var == 0.0:
+            raise InputError(
+                f"{name}: a beacon sensor without noise leaves the filter no measurement variance; "
+                "set stack.localizer.range_var_m2 and stack.localizer.bearing_var_rad2 above 0"
+            )
+        self._R = config.measurement_var_scale * np.diag([range_var, bearing_var])
+        self._gate = chi_square_quantile(config.gate, MEASUREMENT_DOF)
+        self._expected_nis = gated_mean(self._gate, MEASUREMENT_DOF)
+        self._pose = knowledge.initial.pose.as_array()
+        self._cov = knowledge.initial.cov.copy()
+        self.belief = knowledge.initial
+        self._telemetry = _telemetry(0, 0, 0.0, 0.0)
+
+    def step(self, readings: Readings) -> Belief:
+        """Predict by the odometry increment, then update by every beacon seen."""
+        odometry = readings.by_sensor.get(self._odometry)
+        if isinstance(odometry, OdometryIncrement):
+            self._prediction.move(self._pose, self._cov, odometry)
+        seen = readings.by_sensor.get(self._beacons)
+        if isinstance(seen, BeaconReadings):
+            self._update(seen)
+        else:
+            self._telemetry = _telemetry(0, 0, 0.0, 0.0)
+        self.belief = Belief(Pose2.from_array(self._pose), self._cov.copy())
+        return self.belief
+
+    def _update(self, seen: BeaconReadings) -> None:
+        count = seen.ids.shape[0]
+        nis = np.empty(count)
+        outcome = np.empty(count, dtype=np.int64)
+        used = self._update_kernel(
+            self._pose,
+            self._cov,
+            seen.ids,
+            seen.ranges_m,
+            seen.bearings_rad,
+            self._ids,
+            self._points,
+            self._mount,
+            self._R,
+            self._gate,
+            nis,
+            outcome,
+        )
+        total = float(nis[outcome == ekf.OUTCOME_ACCEPTED].sum()) if used else 0.0
+        self._telemetry = _telemetry(count, used, total, used * self._expected_nis)
+
+    def telemetry(self) -> Mapping[str, float]:
+        """Beacons seen and accepted; NIS summed over the accepted, its degrees of freedom and its mean."""
+        return self._telemetry
+
+
+def _telemetry(seen: int, accepted: int, nis: float, expected: float) -> dict[str, float]:
+    """One step's numbers; without a measurement there is no NIS."""
+    if accepted == 0:
+        nis = expected = math.nan
+    return {
+        "beacons_seen": float(seen),
+        "beacons_accepted": float(accepted),
+        "nis": nis,
+        "nis_dof": float(MEASUREMENT_DOF * accepted),
+        "nis_expected": expected,
+    }
