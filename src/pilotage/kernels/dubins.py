@@ -71,15 +71,24 @@ def word_lengths(
             radius * _turn(last * (th1 - arrive)),
         )
     if first == last:
-        straight = between
-        heading = math.atan2(vy, vx) if between > SNAP_RAD * radius else th0
-    else:
-        squared = between * between - 4.0 * radius * radius
-        # Circles that touch have a tangent of length zero, which rounding may make imaginary.
-        if squared < -1e-12 * radius * radius:
-            return math.inf, math.inf, math.inf
-        straight = math.sqrt(max(0.0, squared))
-        heading = math.atan2(vy, vx) + first * math.atan2(2.0 * radius, straight)
+        if between <= SNAP_RAD * radius:
+            return radius * _turn(first * (th1 - th0)), between, 0.0
+        heading = math.atan2(vy, vx)
+        # Rounding turns a short straight by this much: what then seems a full circle is none.
+        doubt = max(SNAP_RAD, 1e-15 * (abs(ax) + abs(ay) + abs(bx) + abs(by) + radius) / between)
+        arc0 = _turn(first * (heading - th0))
+        if arc0 >= TWO_PI - doubt:
+            heading, arc0 = th0, 0.0
+        arc1 = _turn(first * (th1 - heading))
+        if arc1 >= TWO_PI - doubt:
+            arc0, arc1 = _turn(first * (th1 - th0)), 0.0
+        return radius * arc0, between, radius * arc1
+    squared = between * between - 4.0 * radius * radius
+    # Circles that touch have a tangent of length zero, which rounding may make imaginary.
+    if squared < -1e-12 * radius * radius:
+        return math.inf, math.inf, math.inf
+    straight = math.sqrt(max(0.0, squared))
+    heading = math.atan2(vy, vx) + first * math.atan2(2.0 * radius, straight)
     return radius * _turn(first * (heading - th0)), straight, radius * _turn(last * (th1 - heading))
 
 

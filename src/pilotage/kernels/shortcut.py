@@ -62,6 +62,21 @@ def connect(
 
 
 @kernel
+def arc_lengths(states: FloatArray, radius: float) -> FloatArray:
+    """Arc length (N,) at each of the states (N, 3) of a path made of Dubins curves, from its beginning."""
+    out = np.zeros(states.shape[0])
+    for i in range(1, states.shape[0]):
+        ax, ay, ath = states[i - 1, 0], states[i - 1, 1], states[i - 1, 2]
+        bx, by, bth = states[i, 0], states[i, 1], states[i, 2]
+        chord = math.hypot(bx - ax, by - ay)
+        _, l0, l1, l2 = dubins.shortest(ax, ay, ath, bx, by, bth, radius)
+        length = l0 + l1 + l2
+        # Where rounding, or turning on the spot, asks for a loop there is none.
+        out[i] = out[i - 1] + (length if length <= 1.2 * chord + 2.0 * radius else chord)
+    return out
+
+
+@kernel
 def _is_free(
     x: float, y: float, th: float, word: int, l0: float, l1: float, l2: float, space: Space, rules: Rules
 ) -> bool:

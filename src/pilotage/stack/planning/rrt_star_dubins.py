@@ -29,6 +29,9 @@ from pilotage.stack.planning.planner import PLANNERS, Path, PlanRequest, PlanRes
 MAX_GUIDE_NODES = 1_000_000
 """A field finer than this would cost more than the guide saves."""
 
+MAX_TREE_NODES = 500_000
+"""A full tree ends the search: this many nodes take 80 MB."""
+
 CHUNK = 256
 """Iterations between looks at the clock and at the incumbent."""
 
@@ -104,7 +107,7 @@ class RrtStarDubinsPlanner:
             np.array([goal.x_m, goal.y_m, goal_heading]),
             request.field.bounds_m,
             config.max_connection_distance_m,
-            config.iterations,
+            min(config.iterations, MAX_TREE_NODES),
         )
         if rrt_star.try_goal(tree, rrt_tree.START, space, search):
             rrt_tree.join_goal(tree)

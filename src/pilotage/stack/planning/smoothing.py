@@ -90,12 +90,9 @@ class ShortcutSmoother:
 
     def _round(self, chain: _Chain, space: Space, rules: shortcut.Rules) -> _Chain:
         """One pass of shortcuts and tightening."""
-        steps = np.hypot(np.diff(chain.states[:, 0]), np.diff(chain.states[:, 1]))
-        s = np.concatenate([[0.0], np.cumsum(steps)])
+        s = shortcut.arc_lengths(np.ascontiguousarray(chain.states), rules.radius)
         if s[-1] <= 0.0:
             return chain
-        # The states' chords are a little shorter than the curve.
-        s *= chain.length_m / s[-1]
         count = min(self._config.max_samples, math.ceil(s[-1] / self._config.sample_spacing_m) + 1)
         picked = np.unique(np.searchsorted(s, np.linspace(0.0, s[-1], max(2, count)) - 1e-9))
         picked[-1] = len(s) - 1
