@@ -25,14 +25,24 @@ def run(
     from pilotage.experiments.mission import load_mission
     from pilotage.experiments.run import run_mission
 
+    loaded = load_mission(mission, overrides or (), seed)
+    if not quiet and sys.stderr.isatty():
+        _tell_if_cold()
     with stdout_for_json(json), progress_line(not quiet) as on_progress:
-        result = run_mission(load_mission(mission, overrides or (), seed), out=out, on_progress=on_progress)
+        result = run_mission(loaded, out=out, on_progress=on_progress)
     page = _write_report(result.run_dir, json) if report and result.run_dir is not None else None
     if json:
         print_json(result.metrics)
     elif not quiet:
         _print_summary(result.metrics, page or result.run_dir)
     return 0 if result.success else 1
+
+
+def _tell_if_cold() -> None:
+    from pilotage.kernels.jit import cache_is_cold
+
+    if cache_is_cold():
+        print("compiling the kernels; only the first run takes this long", file=sys.stderr)
 
 
 def _write_report(run_dir: Path, json: bool) -> Path:

@@ -15,6 +15,7 @@ from pilotage.evaluation.run_metrics import Outcome, run_metrics, shortest_for
 from pilotage.experiments.build import Experiment, build, build_sensors
 from pilotage.experiments.recorder import Recorder, RunRecord
 from pilotage.experiments.run_folder import write_run_folder
+from pilotage.experiments.warm_up import warm_up
 from pilotage.missions.schema import Mission
 from pilotage.stack.interface import StackStatus
 
@@ -63,6 +64,7 @@ def run_mission(
     InputError
         Where the mission cannot be built; nothing has been written then.
     """
+    warm_up(mission, simulate)
     begin = time.perf_counter()
     record = simulate(mission, on_progress)
     metrics = run_metrics(mission, record.trace, record.outcome, record.experiment.floor.walls)

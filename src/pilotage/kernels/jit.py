@@ -16,6 +16,8 @@ from typing import Any, TypeVar, cast
 import numba
 import numpy as np
 
+__all__ = ["cache_is_cold", "kernel"]
+
 F = TypeVar("F", bound=Callable[..., Any])
 
 
@@ -50,8 +52,14 @@ def _cache_folder() -> Path:
     return Path(tempfile.mkdtemp(prefix="pilotage-kernels-"))
 
 
+_CACHE = _cache_folder()
 # numba takes the folder when a function is decorated, so this has to come first.
-setattr(numba.config, "CACHE_DIR", str(_cache_folder()))  # noqa: B010 - numba's stub lacks the name
+setattr(numba.config, "CACHE_DIR", str(_CACHE))  # noqa: B010 - numba's stub lacks the name
+
+
+def cache_is_cold() -> bool:
+    """Whether no kernel has been compiled yet: the first run will take its time."""
+    return next(_CACHE.rglob("*.nbi"), None) is None
 
 
 def kernel(function: F) -> F:
