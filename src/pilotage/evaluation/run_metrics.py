@@ -158,7 +158,8 @@ def _consistency(mission: Mission, trace: Mapping[str, FloatArray]) -> dict[str,
         terms = ratio + (nis[measured] - ratio * expected[measured]) / expected[measured].mean()
         band = correlated_mean(terms)
         metrics |= {"nis_mean": band.mean, "nis_low": band.low, "nis_high": band.high}
-    seen = trace["beacons_seen"][counted].sum() if "beacons_seen" in trace else 0.0
-    if seen > 0.0:
-        metrics["accepted_fraction"] = float(trace["beacons_accepted"][counted].sum() / seen)
+    for what in ("beacons", "lines"):
+        seen = trace[f"{what}_seen"][counted].sum() if f"{what}_seen" in trace else 0.0
+        if seen > 0.0:
+            metrics["accepted_fraction"] = float(trace[f"{what}_accepted"][counted].sum() / seen)
     return metrics

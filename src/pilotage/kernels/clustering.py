@@ -1,0 +1,103 @@
+"""Single-linkage clusters of an angle-ordered scan without the matrix of all distances."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pilotage.kernels.jit import kernel
+from pilotage.kernels.motion import TWO_PI
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+DROPPED = -1
+"""Label of a reading that is no return, or whose cluster is too small."""
+
+
+@kernel
+def _root(parent: IntArray, i: int) -> int:
+    while parent[i] != i:
+        parent[i] = parent[parent[i]]
+        i = parent[i]
+    return i
+
+
+@kernel
+def _join(
+    parent: IntArray,
+    ranges: FloatArray,
+    points: FloatArray,
+    i: int,
+    j: int,
+    max_range: float,
+    cutoff2: float,
+) -> None:
+    """Put two points into one component where they are near enough; the least index is the root."""
+    if not ranges[j] <= max_range:
+        return
+    dx, dy = points[i, 0] - points[j, 0], points[i, 1] - points[j, 1]
+    if dx * dx + dy * dy <= cutoff2:
+        a, b = _root(parent, i), _root(parent, j)
+        parent[max(a, b)] = min(a, b)
+
+
+@kernel
+def scan_clusters(
+    ranges: FloatArray, points: FloatArray, step: float, max_range: float, cutoff: float, least: int
+) -> IntArray:
+    """Cluster labels (N,) of the points (N, 2) of a scan whose beams lie ``step`` apart.
+
+    Cutting a single-linkage tree at ``cutoff`` leaves the connected components of the graph that joins
+    points no farther apart than ``cutoff``. Seen from the sensor, two such points at ranges r and s and an
+    angle D apart obey cutoff >= max(r, s) sin D for D <= 90 deg, and cutoff >= max(r, s) beyond: so a point
+    farther than the cutoff needs comparing only with those inside an angle of asin(cutoff / r), either way
+    round, and the components are the same as from all pairs. Labels count from 0 in the order of the first
+    beam; ``DROPPED`` for readings over ``max_range`` and clusters of fewer than ``least`` points.
+    """
+    n = ranges.shape[0]
+    parent = np.arange(n)
+    cutoff2 = cutoff * cutoff
+    for i in range(n):
+        if not ranges[i] <= max_range:
+            continue
+        near_end, far_start = n, n
+        if ranges[i] > cutoff and step > 0.0:
+            reach = math.asin(cutoff / ranges[i])
+            # A beam more than the angle allows, against rounding; then those met the other way round.
+            near_end = min(n, i + math.floor(reach / step) + 2)
+            far_start = max(near_end, i + math.ceil((TWO_PI - reach) / step) - 1)
+        for j in range(i + 1, near_end):
+            _join(parent, ranges, points, i, j, max_range, cutoff2)
+        for j in range(far_start, n):
+            _join(parent, ranges, points, i, j, max_range, cutoff2)
+    size = np.zeros(n, dtype=np.int64)
+    for i in range(n):
+        if ranges[i] <= max_range:
+            size[_root(parent, i)] += 1
+    label_of = np.full(n, DROPPED)
+    labels = np.full(n, DROPPED)
+    count = 0
+    for i in range(n):
+        if not ranges[i] <= max_range:
+            continue
+        root = _root(parent, i)
+        if size[root] < least:
+            continue
+        if label_of[root] == DROPPED:
+            label_of[root] = count
+            count += 1
+        labels[i] = label_of[root]
+    return labels
+
+
+@kernel
+def beam_directions(first: float, step: float, beams: int) -> FloatArray:
+    """Unit vectors (beams, 2) of a fan in the sensor's frame."""
+    out = np.empty((beams, 2))
+    for k in range(beams):
+        out[k, 0] = math.cos(first + k * step)
+        out[k, 1] = math.sin(first + k * step)
+    return out

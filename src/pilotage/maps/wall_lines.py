@@ -1,0 +1,115 @@
+"""The walls of a map as a line matcher wants them: merged where collinear and touching, in normal form."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from pilotage.core.angles import wrap_to_pi
+from pilotage.core.types import FloatArray, IntArray
+from pilotage.maps.segment_map import SegmentMap
+
+
+@dataclass(frozen=True, slots=True)
+class WallLines:
+    """Walls of a map.
+
+    Attributes
+    ----------
+    segments_m
+        (W, 4) x0, y0, x1, y1 of the merged walls.
+    normals
+        (W, 2) distance rho >= 0 in m of the wall's infinite line from the map's origin, and angle alpha in
+        rad of its normal: x cos(alpha) + y sin(alpha) = rho.
+    line_of
+        (W,) number of the infinite line that a wall lies on; walls with a gap between them may share one.
+    """
+
+    segments_m: FloatArray
+    normals: FloatArray
+    line_of: IntArray
+
+    def __len__(self) -> int:
+        return int(self.segments_m.shape[0])
+
+    @staticmethod
+    def of(
+        world: SegmentMap, offset_tolerance_m: float = 1e-3, angle_tolerance_rad: float = 1e-3
+    ) -> WallLines:
+        """Merge the segments of a map that lie on one line and touch; pieces of no length are left out.
+
+        Tolerances apply to a wall's own normal form, so a map drawn by hand with walls a few
+        millimetres askew keeps them apart.
+        """
+        pieces = [np.asarray(piece, dtype=np.float64) for piece in world.segments_m]
+        pieces = [piece for piece in pieces if math.hypot(*(piece[2:] - piece[:2])) > 0.0]
+        pieces.sort(key=lambda piece: -math.hypot(*(piece[2:] - piece[:2])))
+        lines: list[tuple[float, float]] = []
+        spans: list[list[tuple[float, float]]] = []
+        for piece in pieces:
+            number = next(
+                (
+                    k
+                    for k, line in enumerate(lines)
+                    if _on_line(piece, line, offset_tolerance_m, angle_tolerance_rad)
+                ),
+                None,
+            )
+            if number is None:
+                lines.append(normal_form(piece))
+                spans.append([])
+                number = len(lines) - 1
+            rho_alpha = lines[number]
+            ends = sorted((_along(piece[:2], rho_alpha), _along(piece[2:], rho_alpha)))
+            spans[number].append((ends[0], ends[1]))
+        segments, normals, line_of = [], [], []
+        for number, (rho, alpha) in enumerate(lines):
+            for low, high in _merged(spans[number], offset_tolerance_m):
+                foot = rho * math.cos(alpha), rho * math.sin(alpha)
+                tangent = -math.sin(alpha), math.cos(alpha)
+                segments.append([foot[k % 2] + (low, high)[k // 2] * tangent[k % 2] for k in range(4)])
+                normals.append([rho, alpha])
+                line_of.append(number)
+        return WallLines(
+            np.array(segments, dtype=np.float64).reshape(-1, 4),
+            np.array(normals, dtype=np.float64).reshape(-1, 2),
+            np.array(line_of, dtype=np.int64),
+        )
+
+
+def normal_form(segment: FloatArray) -> tuple[float, float]:
+    """Distance rho >= 0 and angle alpha of the normal of the infinite line through a segment (4,)."""
+    dx, dy = float(segment[2] - segment[0]), float(segment[3] - segment[1])
+    alpha = math.atan2(-dx, dy)
+    rho = float(segment[0]) * math.cos(alpha) + float(segment[1]) * math.sin(alpha)
+    if rho < 0.0:
+        rho, alpha = -rho, alpha + math.pi
+    return rho, wrap_to_pi(alpha)
+
+
+def _along(point: FloatArray, line: tuple[float, float]) -> float:
+    return float(-point[0] * math.sin(line[1]) + point[1] * math.cos(line[1]))
+
+
+def _on_line(segment: FloatArray, line: tuple[float, float], offset_m: float, angle_rad: float) -> bool:
+    """Whether both ends lie on the line and the segment runs along it."""
+    rho, alpha = line
+    for x, y in (segment[:2], segment[2:]):
+        if abs(x * math.cos(alpha) + y * math.sin(alpha) - rho) > offset_m:
+            return False
+    dx, dy = segment[2] - segment[0], segment[3] - segment[1]
+    across = abs(dx * math.cos(alpha) + dy * math.sin(alpha))
+    return bool(across <= angle_rad * math.hypot(dx, dy))
+
+
+def _merged(spans: list[tuple[float, float]], touching_m: float) -> list[tuple[float, float]]:
+    """Union of intervals, joined where they overlap or touch."""
+    merged: list[tuple[float, float]] = []
+    for low, high in sorted(spans):
+        if merged and low <= merged[-1][1] + touching_m:
+            merged[-1] = (merged[-1][0], max(merged[-1][1], high))
+        else:
+            merged.append((low, high))
+    return merged

@@ -1,0 +1,128 @@
+"""The EKF on walls: odometry predicts, straight lines in the laser scan correct; no beacons."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+import numpy as np
+from pydantic import Field
+
+from pilotage.core.chi_square import gated_mean
+from pilotage.core.config import Config
+from pilotage.core.errors import InputError
+from pilotage.core.types import FloatArray, Pose2
+from pilotage.kernels import joint_association
+from pilotage.models.odometry import OdometryModel
+from pilotage.sensors.lidar import LidarConfig
+from pilotage.sensors.readings import LidarScan, OdometryIncrement, Readings
+from pilotage.sensors.sensor import Positive
+from pilotage.sensors.wheel_odometry import WheelOdometryConfig
+from pilotage.stack.interface import Belief
+from pilotage.stack.knowledge import Knowledge
+from pilotage.stack.localization.localizer import LOCALIZERS
+from pilotage.stack.localization.odometry_prediction import OdometryNoise, OdometryPrediction
+from pilotage.stack.localization.wall_matching import LINE_DOF, Matches, WallMatcher, WallMatchingConfig
+from pilotage.stack.perception.lines import DetectedLines, LineExtractionConfig, LineExtractor
+
+
+class EkfWallsConfig(Config):
+    """The gate is a probability: the share of true measurements that it lets through.
+
+    The range variance left out is taken from the scanner's data sheet; the scales serve experiments with
+    a filter that is wrong about its noise.
+    """
+
+    gate: float = Field(default=0.999, gt=0.0, lt=1.0)
+    range_var_m2: Positive | None = None
+    measurement_var_scale: Positive = 1.0
+    odometry_model: OdometryModel = OdometryModel.EXACT_ARC
+    odometry: OdometryNoise = OdometryNoise()
+    odometry_var_scale: Positive = 1.0
+    lines: LineExtractionConfig = LineExtractionConfig()
+    matching: WallMatchingConfig = WallMatchingConfig()
+
+
+@LOCALIZERS.add("ekf-walls", EkfWallsConfig)
+class EkfWallsLocalizer:
+    """Extended Kalman filter on the walls of the map (after night-watch report 3.2, its faults mended).
+
+    Lines of a scan are measured in normal form, distance and angle, so that the heading is observable
+    (Arras & Siegwart 1997); they are matched to the walls jointly, and update in Joseph form.
+
+    Fails where walls run in one direction only (the pose along them is dead reckoning then), and after a
+    wrong start: a pose far outside its covariance finds no walls, or wrong ones in a map that repeats.
+    """
+
+    def __init__(self, config: EkfWallsConfig, knowledge: Knowledge) -> None:
+        self._odometry, odometry = knowledge.one_sensor(WheelOdometryConfig, "ekf-walls")
+        self._lidar, lidar = knowledge.one_sensor(LidarConfig, "ekf-walls")
+        range_var = lidar.range_var_m2 if config.range_var_m2 is None else config.range_var_m2
+        if range_var == 0.0:
+            raise InputError(
+                "ekf-walls: a scanner without noise leaves the filter no measurement variance; "
+                "set stack.localizer.range_var_m2 above 0"
+            )
+        self._prediction = OdometryPrediction(
+            odometry, config.odometry, config.odometry_var_scale, config.odometry_model
+        )
+        self._extractor = LineExtractor(config.lines, lidar, range_var, knowledge.streams.stream("ekf-walls"))
+        # Only the covariances are scaled: which points make a line is no matter of belief.
+        self._var_scale = config.measurement_var_scale
+        self._mount = np.array([lidar.mount.x_m, lidar.mount.y_m, lidar.mount.theta_rad])
+        self._matcher = WallMatcher(config.matching, config.gate, knowledge.world_map, self._mount)
+        gates = self._matcher.joint_gates
+        self._expected_nis = [0.0, *(gated_mean(gates[k], LINE_DOF * k) for k in range(1, len(gates)))]
+        self._pose = knowledge.initial.pose.as_array()
+        self._cov = knowledge.initial.cov.copy()
+        self.belief = knowledge.initial
+        self.last_update: tuple[DetectedLines, Matches] | None = None
+        self._telemetry = _telemetry(0, 0, 0.0, 0.0)
+
+    def step(self, readings: Readings) -> Belief:
+        """Predict by the odometry increment, then update by the lines of the scan."""
+        odometry = readings.by_sensor.get(self._odometry)
+        if isinstance(odometry, OdometryIncrement):
+            self._prediction.move(self._pose, self._cov, odometry)
+        self._telemetry = _telemetry(0, 0, 0.0, 0.0)
+        scan = readings.by_sensor.get(self._lidar)
+        if isinstance(scan, LidarScan):
+            self._update(scan.ranges_m)
+        self.belief = Belief(Pose2.from_array(self._pose), self._cov.copy())
+        return self.belief
+
+    def _update(self, ranges_m: FloatArray) -> None:
+        lines = self._extractor.extract(ranges_m)
+        lines.covs[:] *= self._var_scale
+        matches = self._matcher.match(self._pose, self._cov, lines)
+        nis = np.empty(len(lines))
+        total = joint_association.update_walls(
+            self._pose,
+            self._cov,
+            self._mount,
+            lines.rho_alpha,
+            lines.covs,
+            self._matcher.walls.normals,
+            matches.walls,
+            nis,
+        )
+        self.last_update = lines, matches
+        used = matches.count
+        self._telemetry = _telemetry(len(lines), used, total, self._expected_nis[used])
+
+    def telemetry(self) -> Mapping[str, float]:
+        """Lines seen and matched; NIS of the accepted together, its degrees of freedom and its mean."""
+        return self._telemetry
+
+
+def _telemetry(seen: int, accepted: int, nis: float, expected: float) -> dict[str, float]:
+    """One step's numbers; without a measurement there is no NIS."""
+    if accepted == 0:
+        nis = expected = math.nan
+    return {
+        "lines_seen": float(seen),
+        "lines_accepted": float(accepted),
+        "nis": nis,
+        "nis_dof": float(LINE_DOF * accepted),
+        "nis_expected": expected,
+    }

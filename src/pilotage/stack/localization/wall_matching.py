@@ -1,0 +1,130 @@
+"""Detected lines matched to the walls of the map: gated, overlapping, in sight, and jointly compatible."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from pydantic import Field
+
+from pilotage.core.chi_square import chi_square_quantile
+from pilotage.core.config import Config
+from pilotage.core.types import FloatArray, IntArray
+from pilotage.kernels import joint_association, wall_candidates
+from pilotage.maps.segment_map import SegmentMap
+from pilotage.maps.wall_lines import WallLines
+from pilotage.sensors.sensor import NonNegative
+from pilotage.stack.perception.lines import MAX_LINES, DetectedLines
+
+LINE_DOF = 2
+"""Distance and angle."""
+
+UNMATCHED = joint_association.UNMATCHED
+AMBIGUOUS = joint_association.AMBIGUOUS
+
+
+class WallMatchingConfig(Config):
+    """When a line may be a wall. Gate and ambiguity are probabilities of chi-square variables."""
+
+    ambiguity: float = Field(default=0.99, gt=0.0, lt=1.0)
+    """Another explanation less likely than the best by no more than this quantile makes a line ambiguous."""
+    overlap: float = Field(default=0.8, gt=0.0, le=1.0)
+    """Share of a line that must lie beside its wall."""
+    slack_m: NonNegative = 0.05
+    sigmas: NonNegative = 3.0
+    """The wall's ends give way by the slack and by this many standard deviations of the pose."""
+    options: int = Field(default=8, ge=1, le=64)
+    """Walls considered for one line."""
+    max_nodes: int = Field(default=5000, ge=1)
+    """Trial updates after which the search is cut short."""
+
+
+@dataclass(frozen=True, slots=True)
+class Matches:
+    """Which wall each line of a scan was matched to.
+
+    Attributes
+    ----------
+    walls
+        (L,) index into the map's ``WallLines``, ``UNMATCHED`` or ``AMBIGUOUS``.
+    distances
+        (L,) least squared Mahalanobis distance, before the update, to a wall that the line overlaps.
+    """
+
+    walls: IntArray
+    distances: FloatArray
+
+    @property
+    def count(self) -> int:
+        """Number of matched lines."""
+        return int((self.walls >= 0).sum())
+
+
+class WallMatcher:
+    """Matches all lines of a scan to the walls of a map at once (Neira & Tardos 2001).
+
+    Parameters
+    ----------
+    gate
+        Probability of the chi-square gates: of each line alone, two degrees of freedom, and of all
+        matched lines of a scan together, two a line.
+    mount
+        (3,) pose of the scanner in the base frame.
+    """
+
+    def __init__(self, config: WallMatchingConfig, gate: float, world: SegmentMap, mount: FloatArray) -> None:
+        self._config = config
+        self._mount = mount
+        self._circles = world.circles_m
+        self.walls = WallLines.of(world)
+        self._gate = chi_square_quantile(gate, LINE_DOF)
+        self.joint_gates = np.array(
+            [0.0, *(chi_square_quantile(gate, LINE_DOF * k) for k in range(1, MAX_LINES + 1))]
+        )
+        self._margin = chi_square_quantile(config.ambiguity, LINE_DOF)
+
+    def match(self, pose: FloatArray, cov: FloatArray, lines: DetectedLines) -> Matches:
+        """Match lines seen from about ``pose`` (3,) with covariance ``cov`` (3, 3); changes neither."""
+        config, walls = self._config, self.walls
+        count = len(lines)
+        options = np.empty((count, config.options), dtype=np.int64)
+        distances = np.empty(count)
+        counts = wall_candidates.candidates(
+            pose,
+            cov,
+            self._mount,
+            lines.rho_alpha,
+            lines.covs,
+            lines.ends_m,
+            walls.normals,
+            walls.line_of,
+            walls.segments_m,
+            self._gate,
+            config.slack_m,
+            config.sigmas,
+            config.overlap,
+            options,
+            distances,
+        )
+        pairs = np.empty(count, dtype=np.int64)
+        joint_association.associate(
+            pose,
+            cov,
+            self._mount,
+            lines.rho_alpha,
+            lines.covs,
+            lines.ends_m,
+            walls.normals,
+            walls.segments_m,
+            self._circles,
+            options,
+            counts,
+            self.joint_gates,
+            self._margin,
+            config.slack_m,
+            config.sigmas,
+            config.overlap,
+            config.max_nodes,
+            pairs,
+        )
+        return Matches(pairs, distances)
