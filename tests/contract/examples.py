@@ -71,6 +71,18 @@ def localizer_follows(factory: Any, config: Any) -> None:
     assert (belief.cov == handed_out).all(), "a belief that was handed out must not change"
 
 
+def localizer_runs(factory: Any, config: Any) -> None:
+    """A filter kept for comparison: it may be lost, but its numbers stay numbers."""
+    sim = simulator()
+    localizer = factory(config, knowledge_of(start=START, variances=(1e-4, 1e-4, 1e-4)))
+    keys = set(localizer.telemetry())
+    for step in range(60):
+        belief = localizer.step(sim.step(Twist(0.3, 0.4 if step < 30 else -0.4)))
+        assert np.isfinite(belief.cov).all()
+        assert np.linalg.eigvalsh(belief.cov).min() > 0.0
+        assert set(localizer.telemetry()) == keys
+
+
 def request(seed: int = 0, goal: Goal = GOAL) -> PlanRequest:
     """A planning query in the room."""
     return PlanRequest(START, goal, DistanceField.from_map(ROOM), np.random.default_rng(seed), 0.4)
@@ -224,6 +236,14 @@ EXAMPLES: dict[tuple[str, str], Example] = {
     ("localizer", "ukf-landmarks"): Example(localizer_follows, {"gate": 0.999}, FILTER_NUMBERS),
     ("localizer", "dead-reckoning"): Example(
         localizer_follows, pure_numbers=frozenset({"odometry_var_scale"})
+    ),
+    ("localizer", "ekf-walls"): Example(
+        localizer_follows,
+        {"gate": 0.99, "matching": {"overlap": 0.7}},
+        frozenset({"gate", "measurement_var_scale", "odometry_var_scale"}),
+    ),
+    ("localizer", "ekf-walls-report"): Example(
+        localizer_runs, {"threshold_chi2": 2.0, "distance_var_m2": 5.0}, frozenset({"threshold_chi2"})
     ),
     ("planner", "rrt-star-dubins"): Example(
         planner_plans, {"iterations": 2000}, frozenset({"goal_bias", "guide_bias", "rewire_factor"})

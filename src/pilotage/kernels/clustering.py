@@ -101,3 +101,14 @@ def beam_directions(first: float, step: float, beams: int) -> FloatArray:
         out[k, 0] = math.cos(first + k * step)
         out[k, 1] = math.sin(first + k * step)
     return out
+
+
+@kernel
+def scan_points(ranges: FloatArray, directions: FloatArray) -> FloatArray:
+    """Points (N, 2) of a scan in the sensor's frame; the sensor itself where a range is no number."""
+    out = np.zeros((ranges.shape[0], 2))
+    for k in range(ranges.shape[0]):
+        if math.isfinite(ranges[k]):
+            out[k, 0] = ranges[k] * directions[k, 0]
+            out[k, 1] = ranges[k] * directions[k, 1]
+    return out

@@ -25,7 +25,7 @@ CONFIDENCE_LOG = math.log(0.001)
 
 
 @kernel
-def _near_line(
+def near_line(
     points: FloatArray, rest: IntArray, count: int, rho: float, alpha: float, threshold: float, out: IntArray
 ) -> int:
     """Collect the points of ``rest[:count]`` within ``threshold`` of a line; returns their number."""
@@ -61,7 +61,7 @@ def _longest_run(points: FloatArray, near: IntArray, count: int, alpha: float, g
 
 
 @kernel
-def _sample_line(
+def sample_line(
     points: FloatArray,
     rest: IntArray,
     count: int,
@@ -120,7 +120,7 @@ def _grow(
     """Refit and gather in turn until a line gains nothing; fills ``run`` and returns its length."""
     size = 0
     for _ in range(MAX_GROWTH):
-        found = _near_line(points, rest, count, rho, alpha, threshold, near)
+        found = near_line(points, rest, count, rho, alpha, threshold, near)
         start, end = _longest_run(points, near, found, alpha, gap)
         same = end - start == size
         for k in range(end - start):
@@ -200,7 +200,7 @@ def extract_lines(
                 rest[count] = i
                 count += 1
         while count >= least_points and found < lines.shape[0]:
-            rho, alpha, drawn = _sample_line(points, rest, count, threshold, iterations, uniforms, drawn)
+            rho, alpha, drawn = sample_line(points, rest, count, threshold, iterations, uniforms, drawn)
             size = _grow(points, rest, count, rho, alpha, threshold, gap, near, run)
             if size < least_points:
                 break

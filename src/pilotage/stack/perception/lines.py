@@ -105,7 +105,7 @@ class LineExtractor:
     def extract(self, ranges_m: FloatArray) -> DetectedLines:
         """Find the lines of one scan (N,)."""
         config = self._config
-        points = self._directions * ranges_m[:, None]
+        points = clustering.scan_points(ranges_m, self._directions)
         clusters = clustering.scan_clusters(
             ranges_m, points, self._step, self._max_range, config.cutoff_m, config.cluster_points
         )

@@ -1,0 +1,100 @@
+"""Is the wall EKF as good as it says? NEES and NIS over independent runs, and filters that must fail.
+
+The seeds are fixed: a pass stays a pass; the stated rates are those at which a right filter would fail on
+fresh seeds.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+import pytest
+
+from pilotage.core.types import FloatArray
+from pilotage.evaluation.consistency import fraction_in_band, nees
+from pilotage.evaluation.run_metrics import covariances, poses
+from pilotage.experiments.mission import load_mission
+from pilotage.experiments.run import simulate
+
+RUNS = 24
+LIMIT_S = 30
+SETTLE = 10
+
+
+@dataclass(frozen=True)
+class Sample:
+    """NEES (R, N), largest errors after two seconds (R,), and NIS over its expectation."""
+
+    nees: FloatArray
+    worst_m: FloatArray
+    nis_ratio: float
+
+
+@cache
+def sample(*overrides: str) -> Sample:
+    """Drive the first part of the route on walls alone with ``RUNS`` seeds."""
+    rows, worst, nis, expected = [], [], 0.0, 0.0
+    for seed in range(RUNS):
+        mission = load_mission("museum-walls", [f"run.time_limit_s={LIMIT_S}", *overrides], seed)
+        trace = simulate(mission).trace
+        truth, estimate = poses(trace, "true"), poses(trace, "est")
+        worst.append(float(np.hypot(*(estimate - truth)[20:, :2].T).max()))
+        rows.append(nees(truth, estimate, covariances(trace))[SETTLE:])
+        nis += float(np.nansum(trace["nis"][SETTLE:]))
+        expected += float(np.nansum(trace["nis_expected"][SETTLE:]))
+    return Sample(np.array(rows), np.array(worst), nis / expected)
+
+
+def test_it_knows_where_it_is_to_a_hand() -> None:
+    assert sample().worst_m.max() < 0.1
+
+
+def test_nees_lies_in_its_pointwise_band() -> None:
+    # 99.9 % band at each step; 95 % of 290 correlated steps inside fails for a right filter below 1e-3.
+    assert fraction_in_band(sample().nees, 3, 0.999) >= 0.95
+
+
+def test_mean_nees_is_three() -> None:
+    # The runs are independent, the steps are not: the standard error comes from the runs' means.
+    means = sample().nees.mean(axis=1)
+    error = means.std(ddof=1) / np.sqrt(RUNS)
+    assert abs(means.mean() - 3.0) < 3.8 * error  # Student with 23 degrees of freedom: false alarm 1e-3
+    assert 2.5 <= means.mean() <= 3.5
+
+
+def test_nis_is_one() -> None:
+    # About 9e4 degrees of freedom: standard error 0.005; 0.02 away is a false alarm of 1e-4.
+    assert sample().nis_ratio == pytest.approx(1.0, abs=0.02)
+
+
+@pytest.mark.parametrize(
+    "override",
+    [
+        "stack.localizer.measurement_var_scale=2",
+        "stack.localizer.measurement_var_scale=0.5",
+        "stack.localizer.odometry_var_scale=2",
+        "stack.localizer.odometry_var_scale=0.5",
+    ],
+)
+def test_a_filter_that_is_wrong_by_a_factor_of_two_is_found_out(override: str) -> None:
+    wrong = sample(override)
+    means = wrong.nees.mean(axis=1)
+    nees_passes = (
+        fraction_in_band(wrong.nees, 3, 0.999) >= 0.95
+        and abs(means.mean() - 3.0) < 3.8 * means.std(ddof=1) / np.sqrt(RUNS)
+        and 2.5 <= means.mean() <= 3.5
+    )
+    nis_passes = abs(wrong.nis_ratio - 1.0) <= 0.02
+    assert not (nees_passes and nis_passes)
+
+
+def test_the_reports_filter_is_lost_where_ours_is_not() -> None:
+    lost = 0
+    for seed in range(4):
+        overrides = ["stack.localizer.name=ekf-walls-report", "run.time_limit_s=60"]
+        trace = simulate(load_mission("museum-walls", overrides, seed)).trace
+        error = np.hypot(*(poses(trace, "est") - poses(trace, "true"))[:, :2].T)
+        lost += bool(error.max() > 0.5)
+    assert lost >= 3
