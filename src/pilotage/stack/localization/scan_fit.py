@@ -1,0 +1,106 @@
+"""How well a scan fits the map from a pose: what it explains, and what speaks against it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from pilotage.core.types import FloatArray
+from pilotage.kernels import pose_hypotheses
+from pilotage.maps.segment_map import SegmentMap
+from pilotage.sensors.lidar import LidarConfig
+
+
+@dataclass(frozen=True, slots=True)
+class Fit:
+    """Shares of a scan's beams, 0 to 1."""
+
+    explained: float
+    contradicted: float
+
+
+class ScanFit:
+    """Compares scans with what the map makes one expect.
+
+    Parameters
+    ----------
+    near_m
+        A reading within this of the expected one is explained.
+    beyond_m
+        A reading longer than expected by more than this passes through a wall of the map.
+    """
+
+    def __init__(
+        self, world: SegmentMap, lidar: LidarConfig, max_range_m: float, near_m: float, beyond_m: float
+    ) -> None:
+        self._world = world
+        self._first = float(lidar.beam_angles_rad()[0])
+        self._step = lidar.beam_step_rad
+        self._mount = lidar.mount
+        self._max_range = min(max_range_m, lidar.max_range_m)
+        self._near = near_m
+        self._beyond = beyond_m
+
+    def sensor_pose(self, pose: FloatArray) -> tuple[float, float, float]:
+        """Pose of the scanner for a pose of the robot (3,)."""
+        c, s = math.cos(pose[2]), math.sin(pose[2])
+        mount = self._mount
+        return (
+            pose[0] + c * mount.x_m - s * mount.y_m,
+            pose[1] + s * mount.x_m + c * mount.y_m,
+            pose[2] + mount.theta_rad,
+        )
+
+    def robot_poses(self, sensor_poses: FloatArray) -> FloatArray:
+        """Poses (H, 3) of the robot for poses (H, 3) of its scanner."""
+        theta = sensor_poses[:, 2] - self._mount.theta_rad
+        c, s = np.cos(theta), np.sin(theta)
+        x = sensor_poses[:, 0] - c * self._mount.x_m + s * self._mount.y_m
+        y = sensor_poses[:, 1] - s * self._mount.x_m - c * self._mount.y_m
+        return np.column_stack([x, y, theta])
+
+    def of(self, pose: FloatArray, ranges_m: FloatArray, extra_m: float = 0.0) -> Fit:
+        """Fit of a scan from a pose (3,) of the robot; ``extra_m`` widens both tolerances."""
+        x, y, theta = self.sensor_pose(pose)
+        explained, contradicted = pose_hypotheses.scan_fit(
+            x,
+            y,
+            theta + self._first,
+            self._step,
+            ranges_m,
+            self._max_range,
+            1,
+            self._near + extra_m,
+            self._beyond + extra_m,
+            self._world.segments_m,
+            self._world.circles_m,
+        )
+        return Fit(explained, contradicted)
+
+    def best(
+        self,
+        sensor_poses: FloatArray,
+        ranges_m: FloatArray,
+        stride: int,
+        extra_m: float,
+        least_explained: float,
+        most_contradicted: float,
+    ) -> FloatArray:
+        """The sensor poses (K, 3) among (H, 3) that fit the scan, best first, from every stride-th beam."""
+        kept = pose_hypotheses.fitting_poses(
+            sensor_poses,
+            self._first,
+            self._step,
+            ranges_m,
+            self._max_range,
+            stride,
+            self._near + extra_m,
+            self._beyond + extra_m,
+            least_explained,
+            most_contradicted,
+            self._world.segments_m,
+            self._world.circles_m,
+        )
+        return sensor_poses[kept[:, 0].astype(np.int64)]
