@@ -43,7 +43,7 @@ class Outcome:
 def shortest_for(mission: Mission, plans: Sequence[PlannedPath], floor: SegmentMap) -> ShortestPath | None:
     """Exact shortest path to hold against the first plan; None where there is nothing to compare."""
     goal, start = mission.world.goal, mission.world.start
-    if goal is None or not plans or plans[0].given:
+    if goal is None or not plans or plans[0].given or not mission.stack.initial.known:
         return None
     return shortest_path(floor, (start.x_m, start.y_m), (goal.x_m, goal.y_m), plans[0].clearance_m)
 

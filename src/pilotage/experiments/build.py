@@ -14,6 +14,7 @@ from pilotage.core.random import RandomStreams
 from pilotage.core.registry import Registry
 from pilotage.core.types import Goal, Pose2
 from pilotage.experiments.obstacles import Obstacles, place_obstacles
+from pilotage.experiments.places import settle_places
 from pilotage.experiments.world_map import load_map
 from pilotage.maps.map_file import LandmarkMap
 from pilotage.missions.schema import ComponentChoice, Mission
@@ -57,8 +58,13 @@ def build(mission: Mission) -> Experiment:
         Where the mission asks for something that does not exist or cannot be.
     """
     floor = load_map(mission.world.map)
+    mission = settle_places(mission, floor.walls)
     start = _start(mission, floor)
     goal = _goal(mission, floor)
+    for number, kidnap in enumerate(mission.world.kidnaps):
+        assert kidnap.to is not None, "settled above"
+        radius = mission.robot.body.radius_m
+        _check_place(f"world.kidnaps.{number}.to", kidnap.to.x_m, kidnap.to.y_m, radius, floor)
     streams = RandomStreams(mission.run.seed)
     sensors = build_sensors(mission)
     stack = _build_stack(mission, floor, start, goal, sensors, streams)
@@ -145,6 +151,9 @@ def _build_stack(
     streams: RandomStreams,
 ) -> Stack:
     roles, robot = mission.stack, mission.robot
+    initial = initial_belief(mission, start, streams)
+    if not roles.initial.known:
+        initial = Belief.anywhere(floor.walls.bounds_m)
     knowledge = Knowledge(
         world_map=floor.walls,
         landmarks=floor.landmarks,
@@ -153,7 +162,7 @@ def _build_stack(
         max_speed_m_s=robot.motion.max_speed_m_s,
         max_turn_rate_rad_s=robot.motion.max_turn_rate_rad_s,
         dt_s=mission.run.dt_s,
-        initial=initial_belief(mission, start, streams),
+        initial=initial,
         goal=goal,
         goal_tolerance_m=math.inf if mission.world.goal is None else mission.world.goal.tolerance_m,
         streams=streams,

@@ -10,13 +10,14 @@ from pathlib import Path
 
 import numpy as np
 
-from pilotage.core.types import STOP
+from pilotage.core.angles import wrap_to_pi
+from pilotage.core.types import STOP, Pose2
 from pilotage.evaluation.run_metrics import Outcome, run_metrics, shortest_for
 from pilotage.experiments.build import Experiment, build, build_sensors
 from pilotage.experiments.recorder import Recorder, RunRecord
 from pilotage.experiments.run_folder import write_run_folder
 from pilotage.experiments.warm_up import warm_up
-from pilotage.missions.schema import Mission
+from pilotage.missions.schema import Kidnap, Mission
 from pilotage.stack.interface import StackStatus
 
 PROGRESS_EVERY_S = 0.1
@@ -67,7 +68,9 @@ def run_mission(
     warm_up(mission, simulate)
     begin = time.perf_counter()
     record = simulate(mission, on_progress)
-    metrics = run_metrics(mission, record.trace, record.outcome, record.experiment.floor.walls)
+    metrics = run_metrics(
+        record.experiment.mission, record.trace, record.outcome, record.experiment.floor.walls
+    )
     metrics["wall_time_s"] = time.perf_counter() - begin
     run_dir = None
     if save:
@@ -79,6 +82,7 @@ def run_mission(
 def simulate(mission: Mission, on_progress: Callable[[Progress], None] | None = None) -> RunRecord:
     """Build a mission and step it to its end."""
     experiment = build(mission)
+    mission = experiment.mission
     simulator, stack = experiment.simulator, experiment.stack
     recorder = Recorder(simulator, stack, dict(build_sensors(mission)))
     recorder.events += stack.drain_events()
@@ -86,9 +90,12 @@ def simulate(mission: Mission, on_progress: Callable[[Progress], None] | None = 
     planned_s = stack.planning_time_s
     begin = last_told = time.perf_counter()
     command, status, reason = STOP, *stack.status
+    kidnaps = sorted(mission.world.kidnaps, key=lambda kidnap: kidnap.at_s)
     for _ in range(limit):
         if status is StackStatus.FAILED:
             break
+        while kidnaps and simulator.t_s >= kidnaps[0].at_s:
+            _carry(experiment, recorder, kidnaps.pop(0))
         readings = simulator.step(command)
         command = stack.step(readings)
         recorder.record(readings, command)
@@ -111,6 +118,15 @@ def simulate(mission: Mission, on_progress: Callable[[Progress], None] | None = 
         counts=dict(stack.counts),
     )
     return RunRecord(experiment, recorder.trace(), outcome, recorder.events)
+
+
+def _carry(experiment: Experiment, recorder: Recorder, kidnap: Kidnap) -> None:
+    """Carry the robot elsewhere; nobody tells it."""
+    assert kidnap.to is not None, "settled by the build"
+    experiment.simulator.body.carry_to(Pose2(kidnap.to.x_m, kidnap.to.y_m, wrap_to_pi(kidnap.to.theta_rad)))
+    recorder.note(
+        "kidnap", f"the robot is carried to ({kidnap.to.x_m:.2f}, {kidnap.to.y_m:.2f}) and not told"
+    )
 
 
 def _reason(experiment: Experiment, status: StackStatus, reason: str) -> str:

@@ -95,13 +95,32 @@ Obstacle = Annotated[
 ]
 
 
+class RandomPlace(Config):
+    """A pose drawn from the run's seed among those that a body can drive to from ``world.start``."""
+
+    clearance_m: Positive = 0.6
+
+
+class Kidnap(Config):
+    """The robot is carried elsewhere and not told; without ``to``, to a random place."""
+
+    at_s: NonNegative
+    to: PoseConfig | None = None
+    clearance_m: Positive = 0.6
+
+
 class WorldConfig(Config):
-    """The map (a shipped name, a file, or the map itself), start, goal, and what should not be there."""
+    """The map (a shipped name, a file, or the map itself), start, goal, and what should not be there.
+
+    With ``random_start`` the run begins elsewhere than at ``start``.
+    """
 
     map: str | MapFile
     start: PoseConfig
     goal: GoalConfig | None = None
     obstacles: tuple[Obstacle, ...] = ()
+    random_start: RandomPlace | None = None
+    kidnaps: tuple[Kidnap, ...] = ()
 
 
 class BodyConfig(Config):
@@ -134,6 +153,8 @@ class InitialConfig(Config):
     x_var_m2: NonNegative = 0.01
     y_var_m2: NonNegative = 0.01
     theta_var_rad2: NonNegative = 0.01
+    known: bool = True
+    """False: the robot is told nothing, and the variances do not count."""
 
 
 class StackConfig(Config):

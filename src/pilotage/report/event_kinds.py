@@ -27,6 +27,9 @@ _KINDS = {
     "collision": EventKind("collision", VERMILLION, True),
     "stuck": EventKind("stuck", VERMILLION, True),
     "failed": EventKind("failed", VERMILLION, True),
+    "kidnap": EventKind("carried elsewhere", VERMILLION, True),
+    "lost": EventKind("lost, wandering", ORANGE, True),
+    "found": EventKind("found itself", GREEN, True),
     "obstacle-mapped": EventKind("obstacle mapped", MUTED, False),
 }
 

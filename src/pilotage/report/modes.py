@@ -9,7 +9,7 @@ import numpy as np
 from pilotage.core.types import FloatArray
 from pilotage.report.run_folder import Trace
 from pilotage.report.series import merge_spans, spans
-from pilotage.report.style import BLUE, FAINT, GREEN, ORANGE, PURPLE, VERMILLION
+from pilotage.report.style import BLUE, FAINT, GREEN, INK, ORANGE, PURPLE, VERMILLION
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,7 +28,8 @@ AVOID = Mode(2, "avoid", "avoid", ORANGE)
 ESCAPE = Mode(3, "back out", "back out", VERMILLION)
 REPLAN = Mode(4, "stopped to replan", "replan", PURPLE)
 ARRIVED = Mode(5, "arrived", "arrived", GREEN)
-MODES = (FOLLOW, LATERAL, AVOID, ESCAPE, REPLAN, ARRIVED)
+WANDER = Mode(6, "lost: wandering", "lost", INK)
+MODES = (FOLLOW, LATERAL, AVOID, ESCAPE, REPLAN, ARRIVED, WANDER)
 
 
 def mode_spans(trace: Trace, mode: Mode) -> FloatArray:

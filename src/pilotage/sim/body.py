@@ -35,6 +35,14 @@ class DifferentialDriveBody:
         """The true pose."""
         return Pose2(self._x, self._y, self._theta)
 
+    def carry_to(self, pose: Pose2) -> None:
+        """Set the body down elsewhere, standing still; its wheels do not turn meanwhile."""
+        self._x, self._y, self._theta = pose.x_m, pose.y_m, pose.theta_rad
+        self.twist = Twist(0.0, 0.0)
+        distance = geometry.distance_to_nearest(self._x, self._y, self._segments, self._circles)
+        self.clearance_m = float(distance) - self._radius_m
+        self._touching = False
+
     def step(self, command: Twist, dt_s: float) -> tuple[float, float]:
         """Drive for ``dt_s``; return the distance driven along the arc and the angle turned."""
         limits = self._limits

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import Protocol
+
+import numpy as np
 
 from pilotage.core.types import Event, FloatArray, Pose2, Twist
 from pilotage.sensors.readings import Readings
@@ -25,6 +28,14 @@ class Belief:
     pose: Pose2
     cov: FloatArray
     status: BeliefStatus = BeliefStatus.LOCALIZED
+
+    @staticmethod
+    def anywhere(bounds_m: tuple[float, float, float, float]) -> Belief:
+        """Lost: mean and covariance of a pose spread evenly over a floor (xmin, ymin, xmax, ymax)."""
+        xmin, ymin, xmax, ymax = bounds_m
+        middle = Pose2(0.5 * (xmin + xmax), 0.5 * (ymin + ymax), 0.0)
+        variances = [(xmax - xmin) ** 2 / 12.0, (ymax - ymin) ** 2 / 12.0, math.pi**2 / 3.0]
+        return Belief(middle, np.diag(variances), BeliefStatus.LOST)
 
 
 class StackStatus(StrEnum):

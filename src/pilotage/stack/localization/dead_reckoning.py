@@ -12,7 +12,7 @@ from pilotage.sensors.sensor import Positive
 from pilotage.sensors.wheel_odometry import WheelOdometryConfig
 from pilotage.stack.interface import Belief
 from pilotage.stack.knowledge import Knowledge
-from pilotage.stack.localization.localizer import LOCALIZERS
+from pilotage.stack.localization.localizer import LOCALIZERS, require_initial_pose
 from pilotage.stack.localization.odometry_prediction import OdometryNoise, OdometryPrediction
 
 
@@ -33,6 +33,7 @@ class DeadReckoningLocalizer:
     """
 
     def __init__(self, config: DeadReckoningConfig, knowledge: Knowledge) -> None:
+        require_initial_pose(knowledge, "dead-reckoning")
         self._odometry, sensor = knowledge.one_sensor(WheelOdometryConfig, "dead-reckoning")
         self._prediction = OdometryPrediction(
             sensor, config.odometry, config.odometry_var_scale, config.odometry_model

@@ -12,16 +12,17 @@ from pilotage.core.chi_square import gated_mean
 from pilotage.core.config import Config
 from pilotage.core.errors import InputError
 from pilotage.core.types import FloatArray, Pose2
-from pilotage.kernels import joint_association
 from pilotage.models.odometry import OdometryModel
 from pilotage.sensors.lidar import LidarConfig
 from pilotage.sensors.readings import LidarScan, OdometryIncrement, Readings
 from pilotage.sensors.sensor import Positive
 from pilotage.sensors.wheel_odometry import WheelOdometryConfig
-from pilotage.stack.interface import Belief
+from pilotage.stack.interface import Belief, BeliefStatus
 from pilotage.stack.knowledge import Knowledge
-from pilotage.stack.localization.localizer import LOCALIZERS
+from pilotage.stack.localization.localizer import LOCALIZERS, require_initial_pose
 from pilotage.stack.localization.odometry_prediction import OdometryNoise, OdometryPrediction
+from pilotage.stack.localization.recovery import Recovery, RecoveryConfig
+from pilotage.stack.localization.wall_correction import correct
 from pilotage.stack.localization.wall_matching import LINE_DOF, Matches, WallMatcher, WallMatchingConfig
 from pilotage.stack.perception.lines import DetectedLines, LineExtractionConfig, LineExtractor
 
@@ -41,6 +42,8 @@ class EkfWallsConfig(Config):
     odometry_var_scale: Positive = 1.0
     lines: LineExtractionConfig = LineExtractionConfig()
     matching: WallMatchingConfig = WallMatchingConfig()
+    recovery: RecoveryConfig | None = RecoveryConfig()
+    """How a wrong belief is noticed and the pose found again; None: never."""
 
 
 @LOCALIZERS.add("ekf-walls", EkfWallsConfig)
@@ -50,8 +53,11 @@ class EkfWallsLocalizer:
     Lines of a scan are measured in normal form, distance and angle, so that the heading is observable
     (Arras & Siegwart 1997); they are matched to the walls jointly, and update in Joseph form.
 
-    Fails where walls run in one direction only (the pose along them is dead reckoning then), and after a
-    wrong start: a pose far outside its covariance finds no walls, or wrong ones in a map that repeats.
+    A belief that the scans contradict is given up: the status is lost then, with the covariance of knowing
+    nothing, until the search through the map has one pose left. So it starts without a pose, too.
+
+    Fails where walls run in one direction only (the pose along them is dead reckoning then), and in a map
+    that repeats itself farther than the robot sees.
     """
 
     def __init__(self, config: EkfWallsConfig, knowledge: Knowledge) -> None:
@@ -71,11 +77,26 @@ class EkfWallsLocalizer:
         self._var_scale = config.measurement_var_scale
         self._mount = np.array([lidar.mount.x_m, lidar.mount.y_m, lidar.mount.theta_rad])
         self._matcher = WallMatcher(config.matching, config.gate, knowledge.world_map, self._mount)
+        if config.recovery is None:
+            require_initial_pose(knowledge, "ekf-walls without recovery")
+            self._recovery = None
+        else:
+            self._recovery = Recovery(
+                config.recovery,
+                knowledge,
+                lidar,
+                config.lines.max_range_m,
+                self._matcher,
+                self._mount,
+                self._prediction,
+            )
         gates = self._matcher.joint_gates
         self._expected_nis = [0.0, *(gated_mean(gates[k], LINE_DOF * k) for k in range(1, len(gates)))]
         self._pose = knowledge.initial.pose.as_array()
         self._cov = knowledge.initial.cov.copy()
         self.belief = knowledge.initial
+        self._unknown = Belief.anywhere(knowledge.world_map.bounds_m)
+        self._lost = knowledge.initial.status is BeliefStatus.LOST
         self.last_update: tuple[DetectedLines, Matches] | None = None
         self._telemetry = _telemetry(0, 0, 0.0, 0.0)
 
@@ -83,36 +104,55 @@ class EkfWallsLocalizer:
         """Predict by the odometry increment, then update by the lines of the scan."""
         odometry = readings.by_sensor.get(self._odometry)
         if isinstance(odometry, OdometryIncrement):
-            self._prediction.move(self._pose, self._cov, odometry)
+            self._move(odometry)
         self._telemetry = _telemetry(0, 0, 0.0, 0.0)
         scan = readings.by_sensor.get(self._lidar)
         if isinstance(scan, LidarScan):
-            self._update(scan.ranges_m)
-        self.belief = Belief(Pose2.from_array(self._pose), self._cov.copy())
+            lines = self._extractor.extract(scan.ranges_m)
+            lines.covs[:] *= self._var_scale
+            if self._lost:
+                self._find(lines, scan.ranges_m)
+            else:
+                self._update(lines, scan.ranges_m)
+        self.belief = self._unknown if self._lost else Belief(Pose2.from_array(self._pose), self._cov.copy())
         return self.belief
 
-    def _update(self, ranges_m: FloatArray) -> None:
-        lines = self._extractor.extract(ranges_m)
-        lines.covs[:] *= self._var_scale
-        matches = self._matcher.match(self._pose, self._cov, lines)
-        nis = np.empty(len(lines))
-        total = joint_association.update_walls(
-            self._pose,
-            self._cov,
-            self._mount,
-            lines.rho_alpha,
-            lines.covs,
-            self._matcher.walls.normals,
-            matches.walls,
-            nis,
-        )
+    def _move(self, odometry: OdometryIncrement) -> None:
+        if not self._lost:
+            self._prediction.move(self._pose, self._cov, odometry)
+        elif self._recovery is not None:
+            self._recovery.move(odometry)
+
+    def _update(self, lines: DetectedLines, ranges_m: FloatArray) -> None:
+        matches, total = correct(self._pose, self._cov, self._mount, lines, self._matcher)
         self.last_update = lines, matches
         used = matches.count
         self._telemetry = _telemetry(len(lines), used, total, self._expected_nis[used])
+        if self._recovery is not None:
+            self._lost = self._recovery.gives_up(self._pose, self._cov, ranges_m, len(lines), used)
+
+    def _find(self, lines: DetectedLines, ranges_m: FloatArray) -> None:
+        assert self._recovery is not None, "never lost without it"
+        self.last_update = None
+        self._telemetry = _telemetry(len(lines), 0, 0.0, 0.0)
+        found = self._recovery.find(lines, ranges_m)
+        if found is not None:
+            self._pose, self._cov, self._lost = found.pose, found.cov, False
+
+    @property
+    def look_bearing_rad(self) -> float | None:
+        """Direction, in the robot's frame, worth driving in to find out where it is; None where any is."""
+        if not self._lost or self._recovery is None:
+            return None
+        return self._recovery.look_bearing_rad
 
     def telemetry(self) -> Mapping[str, float]:
         """Lines seen and matched; NIS of the accepted together, its degrees of freedom and its mean."""
-        return self._telemetry
+        return {
+            **self._telemetry,
+            "localized": 0.0 if self._lost else 1.0,
+            "hypotheses": 0.0 if self._recovery is None else float(self._recovery.hypotheses),
+        }
 
 
 def _telemetry(seen: int, accepted: int, nis: float, expected: float) -> dict[str, float]:

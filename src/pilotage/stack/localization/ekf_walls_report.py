@@ -18,7 +18,7 @@ from pilotage.sensors.sensor import NonNegative, Positive
 from pilotage.sensors.wheel_odometry import WheelOdometryConfig
 from pilotage.stack.interface import Belief
 from pilotage.stack.knowledge import Knowledge
-from pilotage.stack.localization.localizer import LOCALIZERS
+from pilotage.stack.localization.localizer import LOCALIZERS, require_initial_pose
 
 CUTOFF_M = 0.5
 CLUSTER_POINTS = 10
@@ -52,6 +52,7 @@ class EkfWallsReportLocalizer:
     """
 
     def __init__(self, config: EkfWallsReportConfig, knowledge: Knowledge) -> None:
+        require_initial_pose(knowledge, "ekf-walls-report")
         self._odometry, _ = knowledge.one_sensor(WheelOdometryConfig, "ekf-walls-report")
         self._lidar, lidar = knowledge.one_sensor(LidarConfig, "ekf-walls-report")
         self._step = lidar.beam_step_rad

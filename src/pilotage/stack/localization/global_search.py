@@ -1,4 +1,4 @@
-"""Where in the map the robot may be, without a prior: hypotheses from crossing lines, tracked until one is left."""
+"""Where the robot may be, without a prior: hypotheses from crossing lines, followed until one is left."""
 
 from __future__ import annotations
 
@@ -38,10 +38,10 @@ class GlobalSearchConfig(Config):
     """Every how many-th beam sifts the poses at first."""
     explained_share: float = Field(default=0.5, ge=0.0, le=1.0)
     """A hypothesis that explains less is dropped."""
-    contradicted_share: float = Field(default=0.03, ge=0.0, le=1.0)
+    contradicted_share: float = Field(default=0.02, ge=0.0, le=1.0)
     """So is one that more beams contradict, in ``patience`` scans one after the other."""
     patience: int = Field(default=2, ge=1)
-    rival_share: float = Field(default=0.08, gt=0.0, lt=1.0)
+    rival_share: float = Field(default=0.04, gt=0.0, lt=1.0)
     """So is one that explains this much less than the best."""
     believed_share: float = Field(default=0.75, ge=0.0, le=1.0)
     """The only hypothesis left is believed once it explains this much."""
@@ -61,6 +61,7 @@ class GlobalSearchConfig(Config):
 class Hypothesis:
     """A pose that the robot may have, followed as a filter of its own."""
 
+    name: int
     pose: FloatArray
     cov: FloatArray
     explained: float
@@ -99,6 +100,7 @@ class GlobalSearch:
         self._prediction = prediction
         self._radius = body_radius_m
         self.hypotheses: list[Hypothesis] = []
+        self._made = 0
 
     def reset(self) -> None:
         """Forget all hypotheses."""
@@ -148,7 +150,8 @@ class GlobalSearch:
             if any(self._same(pose, other.pose) for other in started):
                 continue
             cov = np.diag([config.std_m**2, config.std_m**2, config.std_rad**2])
-            hypothesis = Hypothesis(pose.copy(), cov, 0.0)
+            self._made += 1
+            hypothesis = Hypothesis(self._made, pose.copy(), cov, 0.0)
             correct(hypothesis.pose, hypothesis.cov, self._mount, lines, self._matcher)
             fit = self._fit.of(hypothesis.pose, ranges_m)
             hypothesis.explained = fit.explained
@@ -160,7 +163,9 @@ class GlobalSearch:
     def _crossing_pairs(self, lines: DetectedLines) -> list[tuple[int, int]]:
         ends = lines.ends_m
         lengths = np.hypot(ends[:, 2] - ends[:, 0], ends[:, 3] - ends[:, 1])
-        long = [int(k) for k in np.argsort(-lengths, kind="stable") if lengths[k] >= self._config.line_length_m]
+        long = [
+            int(k) for k in np.argsort(-lengths, kind="stable") if lengths[k] >= self._config.line_length_m
+        ]
         pairs = []
         for place, j in enumerate(long):
             for i in long[:place]:

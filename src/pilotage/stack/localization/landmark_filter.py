@@ -20,6 +20,7 @@ from pilotage.sensors.sensor import Positive
 from pilotage.sensors.wheel_odometry import WheelOdometryConfig
 from pilotage.stack.interface import Belief
 from pilotage.stack.knowledge import Knowledge
+from pilotage.stack.localization.localizer import require_initial_pose
 from pilotage.stack.localization.odometry_prediction import OdometryNoise, OdometryPrediction, Predict
 
 MEASUREMENT_DOF = 2
@@ -64,6 +65,7 @@ class LandmarkFilter:
         config: LandmarkFilterConfig,
         knowledge: Knowledge,
     ) -> None:
+        require_initial_pose(knowledge, name)
         self._update_kernel = update
         self._odometry, odometry = knowledge.one_sensor(WheelOdometryConfig, name)
         self._beacons, beacons = knowledge.one_sensor(BeaconConfig, name)

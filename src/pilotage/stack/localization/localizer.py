@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
+from pilotage.core.errors import InputError
 from pilotage.core.registry import Registry
 from pilotage.sensors.readings import Readings
-from pilotage.stack.interface import Belief
+from pilotage.stack.interface import Belief, BeliefStatus
+from pilotage.stack.knowledge import Knowledge
 
 
 class Localizer(Protocol):
@@ -25,6 +27,31 @@ class Localizer(Protocol):
     def telemetry(self) -> Mapping[str, float]:
         """Numbers of the last step; the same keys at every step."""
         ...
+
+
+@runtime_checkable
+class Seeker(Protocol):
+    """A localizer that, while it is lost, knows where to look."""
+
+    @property
+    def look_bearing_rad(self) -> float | None:
+        """Direction, in the robot's frame, worth driving in; None where any is as good."""
+        ...
+
+
+def require_initial_pose(knowledge: Knowledge, name: str) -> None:
+    """Refuse a start without a pose.
+
+    Raises
+    ------
+    InputError
+        If the initial pose is unknown; said by localizers that cannot find it by themselves.
+    """
+    if knowledge.initial.status is BeliefStatus.LOST:
+        raise InputError(
+            f"{name}: expected an initial pose, found stack.initial.known = false; set it to true or take "
+            "a localizer that finds its pose by itself, such as ekf-walls"
+        )
 
 
 LOCALIZERS: Registry[Localizer] = Registry("localizer", "pilotage.stack.localization")

@@ -17,10 +17,12 @@ from pilotage.sensors.readings import Readings
 from pilotage.sensors.sensor import NonNegative, Positive
 from pilotage.stack.control.guard import ArcGuard, GuardConfig
 from pilotage.stack.control.reactive import Reaction, ReactionKind
-from pilotage.stack.interface import Belief, PlannedPath, StackStatus
+from pilotage.stack.control.wander import WanderConfig
+from pilotage.stack.interface import Belief, BeliefStatus, PlannedPath, StackStatus
 from pilotage.stack.knowledge import Knowledge
 from pilotage.stack.navigator.following import WaypointFollower
 from pilotage.stack.navigator.global_plan import GlobalPlan
+from pilotage.stack.navigator.lost import LostDriving
 from pilotage.stack.navigator.navigator import NAVIGATORS, Parts
 
 HERE_TOLERANCE_M = 0.005
@@ -41,6 +43,7 @@ class Mode(IntEnum):
     ESCAPE = 3
     REPLAN = 4
     ARRIVED = 5
+    WANDER = 6
 
 
 class GoalNavigatorConfig(Config):
@@ -62,6 +65,7 @@ class GoalNavigatorConfig(Config):
     cruise_speed_m_s: Positive = 0.5
     max_replans: int = Field(default=30, ge=0)
     guard: GuardConfig = GuardConfig()
+    wander: WanderConfig = WanderConfig()
 
 
 @NAVIGATORS.add("goal", GoalNavigatorConfig)
@@ -71,6 +75,7 @@ class GoalNavigator:
     Plans globally before the start; then at every step localizes, maps what is unexpected, follows the
     local plan, and reacts. After an avoidance it replans locally; globally, with the obstacle on the
     robot's own map, where no next waypoint can be reached, the robot is trapped, or it gets no further.
+    While its localizer is lost it wanders about by its scanner, maps nothing, and plans once it is found.
     """
 
     def __init__(self, config: GoalNavigatorConfig, knowledge: Knowledge, parts: Parts) -> None:
@@ -103,6 +108,7 @@ class GoalNavigator:
         )
         self._follower = WaypointFollower(parts.local_planner, parts.controller, knowledge.dt_s)
         self._guard = ArcGuard(config.guard, knowledge.body_radius_m)
+        self._lost = LostDriving(config.wander, knowledge, parts.localizer)
         self._t_s = 0.0
         self._status, self._reason = StackStatus.RUNNING, ""
         self._mode = Mode.FOLLOW
@@ -142,7 +148,12 @@ class GoalNavigator:
         return self._nothing if self._mapper is None else self._mapper.circles_m
 
     def prepare(self) -> None:
-        """Plan from the initial belief; without a path the task has failed before it starts."""
+        """Plan from the initial belief; without a path the task has failed before it starts.
+
+        A robot that is lost plans once it knows where it is.
+        """
+        if self.belief.status is BeliefStatus.LOST:
+            return
         result = self._plan.make(0.0, self.belief.pose, self.mapped_circles_m, (self._plan.clearance_m,))
         if result.path is None:
             self._fail(f"{result.status}: {result.reason}")
@@ -153,12 +164,16 @@ class GoalNavigator:
         """One control step."""
         self._t_s = readings.t_s
         belief = self._localizer.step(readings)
-        if self._mapper is not None:
-            self._mapper.step(readings, belief)
         self._follower.rest()
         self._reaction = NO_REACTION
         if self._status is not StackStatus.RUNNING:
             return STOP
+        if belief.status is BeliefStatus.LOST:
+            return self._wander_about(readings)
+        if self._mapper is not None:
+            self._mapper.step(readings, belief)
+        if self._lost.active:
+            return self._find_the_way_again(belief.pose)
         command = self._drive(readings, belief.pose)
         # Its own trail it has driven before: there only the known walls are asked.
         circles = self._known_circles if self._mode is Mode.ESCAPE else self._all_circles()
@@ -217,6 +232,27 @@ class GoalNavigator:
             self._in_hall = False
             self._follower.drop()
         return self._follow(pose)
+
+    def _wander_about(self, readings: Readings) -> Twist:
+        """Lost: keep clear of everything and look around until the localizer knows more."""
+        if not self._lost.active:
+            self._lost.active = True
+            self._avoiding = self._escaping = self._in_hall = False
+            self._follower.drop()
+            self._say("lost", "the robot does not know where it is: wandering until it does")
+        self._mode = Mode.WANDER
+        return self._lost.step(readings)
+
+    def _find_the_way_again(self, pose: Pose2) -> Twist:
+        self._lost.active = False
+        self._trail = []
+        if self._reactive is not None:
+            self._reactive.reset()
+        self._say("found", f"the robot knows where it is: ({pose.x_m:.2f}, {pose.y_m:.2f})")
+        command = self._replan_globally(pose, "found again")
+        if self._plan.path is None:
+            return self._fail("no path to the goal from where the robot found itself")
+        return command
 
     def _follow(self, pose: Pose2) -> Twist:
         """Follow the local path; plan a new one at each waypoint; replan globally where none leads on."""

@@ -1,0 +1,99 @@
+"""Driving about safely without knowing where: towards open floor, by the scanner alone."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from pydantic import Field
+
+from pilotage.core.angles import wrap_array_to_pi
+from pilotage.core.config import Config
+from pilotage.core.types import STOP, FloatArray, Twist
+from pilotage.kernels import clustering, wander
+from pilotage.sensors.lidar import LidarConfig
+from pilotage.sensors.readings import LidarScan, Readings
+from pilotage.sensors.sensor import NonNegative, Positive
+from pilotage.stack.knowledge import Knowledge
+
+
+class WanderConfig(Config):
+    """Where it likes to go and how near it lets things come."""
+
+    speed_m_s: Positive = 0.8
+    margin_m: Positive = 0.12
+    """Free on each side of the body in a lane that counts as open."""
+    stop_m: Positive = 0.7
+    """With less free ahead of the centre it turns on the spot,"""
+    go_m: Positive = 1.2
+    """until there is this much."""
+    reach_m: Positive = 12.0
+    turn_cost_m_per_rad: NonNegative = 1.5
+    """A lane this much longer is worth turning one radian for."""
+    led_reach_m: Positive = 1.5
+    """With somewhere to go to, a lane need not be longer than this."""
+    gain_per_s: Positive = 1.5
+    max_turn_rate_rad_s: Positive = 0.8
+    directions: int = Field(default=41, ge=3)
+
+
+class Wanderer:
+    """Turns towards the longest open lane in view and drives down it.
+
+    It forgets everything from one scan to the next but the sense of a turn on the spot, so that it does
+    not waver in a corner. Fails among things that the scanner's plane does not meet, and it explores
+    nothing on purpose: it may come back to where it was.
+    """
+
+    def __init__(
+        self, config: WanderConfig, knowledge: Knowledge, lidar_name: str, lidar: LidarConfig
+    ) -> None:
+        self._config = config
+        self._name = lidar_name
+        self._half_width = knowledge.body_radius_m + config.margin_m
+        self._directions = clustering.beam_directions(
+            float(lidar.beam_angles_rad()[0]) + lidar.mount.theta_rad, lidar.beam_step_rad, lidar.beams
+        )
+        self._arm = np.array([lidar.mount.x_m, lidar.mount.y_m])
+        half_view = min(0.5 * lidar.field_of_view_rad, math.pi) - 0.2
+        self._headings = np.linspace(-half_view, half_view, config.directions)
+        self._turning = 0.0
+        self._command = STOP
+
+    @staticmethod
+    def of(config: WanderConfig, knowledge: Knowledge) -> Wanderer | None:
+        """A wanderer for a robot with a scanner; None for one without."""
+        scanners = list(knowledge.sensors_of(LidarConfig).items())
+        return Wanderer(config, knowledge, *scanners[0]) if scanners else None
+
+    def step(self, readings: Readings, bearing_rad: float | None = None) -> Twist:
+        """Choose a command from the scan; without a new scan, go on as before.
+
+        ``bearing_rad``, in the robot's frame, is where it would like to go, as far as the floor is free.
+        """
+        scan = readings.by_sensor.get(self._name)
+        if isinstance(scan, LidarScan):
+            self._command = self._choose(scan.ranges_m, bearing_rad)
+        return self._command
+
+    def _choose(self, ranges_m: FloatArray, bearing_rad: float | None) -> Twist:
+        config = self._config
+        points = clustering.scan_points(ranges_m, self._directions) + self._arm
+        free = wander.free_lengths(points, self._headings, self._half_width, config.reach_m)
+        if bearing_rad is None:
+            worth = free - config.turn_cost_m_per_rad * np.abs(self._headings)
+        else:
+            away = np.abs(wrap_array_to_pi(self._headings - bearing_rad))
+            worth = np.minimum(free, config.led_reach_m) - config.turn_cost_m_per_rad * away
+        best = float(self._headings[int(np.argmax(worth))])
+        ahead = float(wander.free_lengths(points, np.zeros(1), self._half_width, config.reach_m)[0])
+        if ahead < (config.stop_m if self._turning == 0.0 else config.go_m):
+            if self._turning == 0.0:
+                self._turning = math.copysign(config.max_turn_rate_rad_s, best)
+            return Twist(0.0, self._turning)
+        self._turning = 0.0
+        turn = config.gain_per_s * best
+        turn = min(max(turn, -config.max_turn_rate_rad_s), config.max_turn_rate_rad_s)
+        # Slower in a turn and before a wall, so that the lane ahead stays the one that was looked at.
+        slow = max(0.0, math.cos(best)) * min(1.0, (ahead - 0.5 * config.stop_m) / config.go_m)
+        return Twist(config.speed_m_s * slow, turn)

@@ -1,0 +1,122 @@
+"""Noticing that the robot is not where it believes to be, and finding out where it is."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from pydantic import Field
+
+from pilotage.core.config import Config
+from pilotage.core.types import FloatArray
+from pilotage.sensors.lidar import LidarConfig
+from pilotage.sensors.readings import OdometryIncrement
+from pilotage.sensors.sensor import Positive
+from pilotage.stack.knowledge import Knowledge
+from pilotage.stack.localization.global_search import GlobalSearch, GlobalSearchConfig, Hypothesis
+from pilotage.stack.localization.odometry_prediction import OdometryPrediction
+from pilotage.stack.localization.scan_fit import ScanFit
+from pilotage.stack.localization.viewpoint import Viewpoint, ViewpointConfig
+from pilotage.stack.localization.wall_matching import WallMatcher
+from pilotage.stack.perception.lines import DetectedLines
+
+LINES_AT_LEAST = 2
+"""One line that is no wall of the map may be an obstacle; two say more."""
+
+
+class RecoveryConfig(Config):
+    """When a belief is given up, and how a new one is found. Shares are of a scan's beams."""
+
+    search: GlobalSearchConfig = GlobalSearchConfig()
+    viewpoint: ViewpointConfig = ViewpointConfig()
+    near_m: Positive = 0.1
+    """A range this near the expected one is explained."""
+    beyond_m: Positive = 0.3
+    """A range longer than expected by more than this passes through a wall of the map."""
+    contradicted_share: float = Field(default=0.15, gt=0.0, le=1.0)
+    """A belief that this much of a scan contradicts is given up,"""
+    contradicted_scans: int = Field(default=2, ge=1)
+    """in so many scans one after the other."""
+    explained_share: float = Field(default=0.15, ge=0.0, lt=1.0)
+    """So is one that explains less than this,"""
+    explained_scans: int = Field(default=10, ge=1)
+    """in so many: a crowd around the robot may hide the walls for a while."""
+    blatant_share: float = Field(default=0.35, ge=0.0, lt=1.0)
+    """A scan that explains less than this and shows walls of which none is where it should be: at once."""
+    sure_m: Positive = 0.3
+    """A belief less certain than this is not put to the question."""
+
+
+class Recovery:
+    """Watches a belief and, once it is given up, searches for the pose."""
+
+    def __init__(
+        self,
+        config: RecoveryConfig,
+        knowledge: Knowledge,
+        lidar: LidarConfig,
+        max_range_m: float,
+        matcher: WallMatcher,
+        mount: FloatArray,
+        prediction: OdometryPrediction,
+    ) -> None:
+        self._config = config
+        self._fit = ScanFit(knowledge.world_map, lidar, max_range_m, config.near_m, config.beyond_m)
+        self._search = GlobalSearch(
+            config.search,
+            knowledge.world_map,
+            self._fit,
+            matcher,
+            mount,
+            prediction,
+            knowledge.body_radius_m,
+        )
+        self._viewpoint = Viewpoint(config.viewpoint, knowledge.world_map, lidar, knowledge.body_radius_m)
+        self._contradicted = self._unexplained = 0
+
+    @property
+    def hypotheses(self) -> int:
+        """How many poses are being followed."""
+        return len(self._search.hypotheses)
+
+    def gives_up(
+        self, pose: FloatArray, cov: FloatArray, ranges_m: FloatArray, seen: int, matched: int
+    ) -> bool:
+        """Whether a scan, of whose lines some were matched, shows a belief to be wrong."""
+        config = self._config
+        spread_m = 3.0 * math.sqrt(cov[0, 0] + cov[1, 1])
+        if spread_m > config.sure_m:
+            return False
+        fit = self._fit.of(pose, ranges_m, spread_m)
+        contradicted = fit.contradicted > config.contradicted_share
+        self._contradicted = self._contradicted + 1 if contradicted else 0
+        unexplained = fit.explained < config.explained_share
+        self._unexplained = self._unexplained + 1 if unexplained else 0
+        wrong = (
+            self._contradicted >= config.contradicted_scans
+            or self._unexplained >= config.explained_scans
+            or (seen >= LINES_AT_LEAST and matched == 0 and fit.explained < config.blatant_share)
+        )
+        if wrong:
+            self._contradicted = self._unexplained = 0
+            self._search.reset()
+        return wrong
+
+    @property
+    def look_bearing_rad(self) -> float | None:
+        """Direction, in the robot's frame, of what would tell the hypotheses apart; None where unknown."""
+        hypotheses = self._search.hypotheses
+        names = tuple(hypothesis.name for hypothesis in hypotheses)
+        poses = np.array([hypothesis.pose for hypothesis in hypotheses]).reshape(-1, 3)
+        return self._viewpoint.bearing_rad(names, poses)
+
+    def move(self, odometry: OdometryIncrement) -> None:
+        """Carry the hypotheses along."""
+        self._search.move(odometry)
+
+    def find(self, lines: DetectedLines, ranges_m: FloatArray) -> Hypothesis | None:
+        """Weigh the hypotheses by a scan; returns the one to be believed, if there is."""
+        found = self._search.look(lines, ranges_m)
+        if found is not None:
+            self._search.reset()
+        return found
