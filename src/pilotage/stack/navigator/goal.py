@@ -4,24 +4,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from enum import IntEnum
 
 import numpy as np
-from pydantic import Field
 
-from pilotage.core.config import Config
 from pilotage.core.errors import InputError
 from pilotage.core.types import STOP, Event, FloatArray, Pose2, Twist
 from pilotage.kernels import geometry
 from pilotage.sensors.readings import Readings
-from pilotage.sensors.sensor import NonNegative, Positive
-from pilotage.stack.control.guard import ArcGuard, GuardConfig
+from pilotage.stack.control.guard import ArcGuard
 from pilotage.stack.control.reactive import Reaction, ReactionKind
-from pilotage.stack.control.wander import WanderConfig
 from pilotage.stack.interface import Belief, BeliefStatus, PlannedPath, StackStatus
 from pilotage.stack.knowledge import Knowledge
 from pilotage.stack.navigator.following import WaypointFollower
 from pilotage.stack.navigator.global_plan import GlobalPlan
+from pilotage.stack.navigator.goal_config import GoalNavigatorConfig, Mode
 from pilotage.stack.navigator.lost import LostDriving
 from pilotage.stack.navigator.navigator import NAVIGATORS, Parts
 
@@ -32,40 +28,6 @@ MAPPED_TOLERANCE_M = 0.02
 """What the robot maps is drawn a little too large: where it stands there was room for it."""
 
 NO_REACTION = Reaction(ReactionKind.NONE, 0.0, math.inf, math.inf)
-
-
-class Mode(IntEnum):
-    """What the robot is doing, as the trace records it."""
-
-    FOLLOW = 0
-    LATERAL = 1
-    AVOID = 2
-    ESCAPE = 3
-    REPLAN = 4
-    ARRIVED = 5
-    WANDER = 6
-
-
-class GoalNavigatorConfig(Config):
-    """When to watch, when to give up a plan, and when it is done."""
-
-    arrival_m: Positive = 0.15
-    watch_ahead_m: NonNegative = 0.9
-    """Where this much of the local path ahead comes too near a mapped obstacle: stop and replan; 0: never."""
-    watch_margin_m: NonNegative = 0.03
-    """Too near: below the body's radius plus this."""
-    stall_s: Positive = 20.0
-    stall_progress_m: Positive = 0.5
-    waypoint_ahead_m: Positive = 0.4
-    straight_ahead_m: Positive = 1.2
-    straight_below_rad: Positive = 0.35
-    """A plan that turns less than this over the next stretch goes straight on: a hall may be centred."""
-    fallback_margins_m: tuple[Positive, ...] = (0.10, 0.06)
-    """Replans that fail at the planner's clearance try the body's radius plus these."""
-    cruise_speed_m_s: Positive = 0.5
-    max_replans: int = Field(default=30, ge=0)
-    guard: GuardConfig = GuardConfig()
-    wander: WanderConfig = WanderConfig()
 
 
 @NAVIGATORS.add("goal", GoalNavigatorConfig)

@@ -1,0 +1,46 @@
+"""What can be set about the goal navigator, and the modes that its trace records."""
+
+from __future__ import annotations
+
+from enum import IntEnum
+
+from pydantic import Field
+
+from pilotage.core.config import Config
+from pilotage.sensors.sensor import NonNegative, Positive
+from pilotage.stack.control.guard import GuardConfig
+from pilotage.stack.control.wander import WanderConfig
+
+
+class Mode(IntEnum):
+    """What the robot is doing, as the trace records it."""
+
+    FOLLOW = 0
+    LATERAL = 1
+    AVOID = 2
+    ESCAPE = 3
+    REPLAN = 4
+    ARRIVED = 5
+    WANDER = 6
+
+
+class GoalNavigatorConfig(Config):
+    """When to watch, when to give up a plan, and when it is done."""
+
+    arrival_m: Positive = 0.15
+    watch_ahead_m: NonNegative = 0.9
+    """Where this much of the local path ahead comes too near a mapped obstacle: stop and replan; 0: never."""
+    watch_margin_m: NonNegative = 0.03
+    """Too near: below the body's radius plus this."""
+    stall_s: Positive = 20.0
+    stall_progress_m: Positive = 0.5
+    waypoint_ahead_m: Positive = 0.4
+    straight_ahead_m: Positive = 1.2
+    straight_below_rad: Positive = 0.35
+    """A plan that turns less than this over the next stretch goes straight on: a hall may be centred."""
+    fallback_margins_m: tuple[Positive, ...] = (0.10, 0.06)
+    """Replans that fail at the planner's clearance try the body's radius plus these."""
+    cruise_speed_m_s: Positive = 0.5
+    max_replans: int = Field(default=30, ge=0)
+    guard: GuardConfig = GuardConfig()
+    wander: WanderConfig = WanderConfig()
