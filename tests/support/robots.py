@@ -45,8 +45,9 @@ def knowledge_of(
     goal: Goal | None = Goal(8.0, 6.0),  # noqa: B008 - frozen
     variances: tuple[float, float, float] = (0.01, 0.01, 0.01),
     seed: int = 0,
+    initial: Belief | None = None,
 ) -> Knowledge:
-    """What the robot knows in the room."""
+    """What the robot knows in the room; ``initial`` replaces the start and its variances."""
     return Knowledge(
         world_map=world,
         landmarks=BEACONS,
@@ -55,7 +56,7 @@ def knowledge_of(
         max_speed_m_s=1.0,
         max_turn_rate_rad_s=2.0,
         dt_s=0.1,
-        initial=Belief(start, np.diag(variances)),
+        initial=Belief(start, np.diag(variances)) if initial is None else initial,
         goal=goal,
         goal_tolerance_m=0.3,
         streams=RandomStreams(seed),

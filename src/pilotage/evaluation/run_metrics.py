@@ -9,13 +9,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from pilotage.core.angles import wrap_array_to_pi, wrap_to_pi
-from pilotage.core.types import FloatArray
+from pilotage.core.types import BoolArray, FloatArray
 from pilotage.evaluation.consistency import correlated_mean, nees
 from pilotage.evaluation.halls import hall_offset_m
 from pilotage.evaluation.shortest_path import ShortestPath, shortest_path
 from pilotage.maps.segment_map import SegmentMap
 from pilotage.missions.schema import Mission
 from pilotage.stack.interface import PlannedPath
+
+WRONG_M, WRONG_RAD = 0.5, 0.1
+"""A pose farther from the truth than this is wrong."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,7 +68,8 @@ def run_metrics(
 ) -> dict[str, object]:
     """Compute a run's metrics; adds the column ``nees`` to the trace.
 
-    Errors count after ``run.settle_s``: the start error is drawn from the initial covariance.
+    Errors count after ``run.settle_s``, because the start error is drawn from the initial covariance, and
+    while the robot holds itself for localized: an honest "lost" claims no pose.
     """
     steps = trace["t_s"].shape[0]
     metrics: dict[str, object] = {
@@ -90,6 +94,7 @@ def run_metrics(
     metrics["path_length_m"] = float(np.hypot(*np.diff(truth[:, :2], axis=0).T).sum())
     metrics |= _errors(mission, trace, truth, estimate)
     metrics |= _consistency(mission, trace)
+    metrics |= _recovery(mission, trace, truth, estimate)
     metrics["hall_offset_m"] = hall_offset_m(truth, floor)
     goal = mission.world.goal
     if goal is None:
@@ -119,10 +124,42 @@ def _planning(outcome: Outcome) -> dict[str, object]:
     return metrics
 
 
+def _counted(mission: Mission, trace: Mapping[str, FloatArray]) -> BoolArray:
+    """(N,) at which steps errors count."""
+    counted = trace["t_s"] > mission.run.settle_s
+    if "localized" in trace:
+        counted &= trace["localized"] > 0.5
+    return counted
+
+
+def _recovery(
+    mission: Mission, trace: Mapping[str, FloatArray], truth: FloatArray, estimate: FloatArray
+) -> dict[str, object]:
+    """How long a robot that can be lost was lost, and how long it was wrong without knowing."""
+    if "localized" not in trace:
+        return {}
+    claimed, dt_s = trace["localized"] > 0.5, mission.run.dt_s
+    if claimed.all() and mission.stack.initial.known:
+        return {}
+    error = estimate - truth
+    wrong = np.hypot(error[:, 0], error[:, 1]) > WRONG_M
+    wrong |= np.abs(wrap_array_to_pi(error[:, 2])) > WRONG_RAD
+    metrics: dict[str, object] = {
+        "lost_s": float(dt_s * (~claimed).sum()),
+        "wrong_s": float(dt_s * (claimed & wrong).sum()),
+    }
+    found = np.flatnonzero(claimed & ~np.concatenate([[mission.stack.initial.known], claimed[:-1]]))
+    if found.size:
+        since = np.flatnonzero(claimed[: found[-1]])
+        begin = float(trace["t_s"][since[-1]]) if since.size else 0.0
+        metrics["found_after_s"] = float(trace["t_s"][found[-1]]) - begin
+    return metrics
+
+
 def _errors(
     mission: Mission, trace: Mapping[str, FloatArray], truth: FloatArray, estimate: FloatArray
 ) -> dict[str, object]:
-    counted = trace["t_s"] > mission.run.settle_s
+    counted = _counted(mission, trace)
     final = estimate[-1] - truth[-1]
     metrics: dict[str, object] = {
         "final_error": {
@@ -144,7 +181,7 @@ def _errors(
 
 def _consistency(mission: Mission, trace: Mapping[str, FloatArray]) -> dict[str, object]:
     """NEES (3 is ideal) and NIS per degree of freedom (1 is ideal), corrected for what the gate cuts off."""
-    counted = trace["t_s"] > mission.run.settle_s
+    counted = _counted(mission, trace)
     band = correlated_mean(trace["nees"][counted])
     metrics: dict[str, object] = {"nees_mean": band.mean, "nees_low": band.low, "nees_high": band.high}
     if "nis" not in trace:

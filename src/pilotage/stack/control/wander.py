@@ -26,7 +26,9 @@ class WanderConfig(Config):
     stop_m: Positive = 0.7
     """With less free ahead of the centre it turns on the spot,"""
     go_m: Positive = 1.2
-    """until there is this much."""
+    """until there is this much,"""
+    aligned_rad: Positive = 0.4
+    """in a direction this near the best."""
     reach_m: Positive = 12.0
     turn_cost_m_per_rad: NonNegative = 1.5
     """A lane this much longer is worth turning one radian for."""
@@ -57,7 +59,8 @@ class Wanderer:
         self._arm = np.array([lidar.mount.x_m, lidar.mount.y_m])
         half_view = min(0.5 * lidar.field_of_view_rad, math.pi) - 0.2
         self._headings = np.linspace(-half_view, half_view, config.directions)
-        self._turning = 0.0
+        self._turning = self._turned_rad = 0.0
+        self._dt_s = knowledge.dt_s
         self._command = STOP
 
     @staticmethod
@@ -76,6 +79,26 @@ class Wanderer:
             self._command = self._choose(scan.ranges_m, bearing_rad)
         return self._command
 
+    def _turns_on(self, ahead: float, best: float) -> bool:
+        """Whether to turn on the spot: begun before a wall, ended before a lane that is the best one too.
+
+        Ending it before any lane that is free could lead straight back to the wall. After a whole turn any
+        lane will do.
+        """
+        config = self._config
+        if self._turning == 0.0:
+            if ahead >= config.stop_m:
+                return False
+            self._turning = math.copysign(config.max_turn_rate_rad_s, best)
+            self._turned_rad = 0.0
+            return True
+        self._turned_rad += abs(self._turning) * self._dt_s
+        aligned = ahead >= config.go_m and abs(best) <= config.aligned_rad
+        if aligned or (self._turned_rad > 2.0 * math.pi and ahead >= config.stop_m):
+            self._turning = 0.0
+            return False
+        return True
+
     def _choose(self, ranges_m: FloatArray, bearing_rad: float | None) -> Twist:
         config = self._config
         points = clustering.scan_points(ranges_m, self._directions) + self._arm
@@ -87,11 +110,8 @@ class Wanderer:
             worth = np.minimum(free, config.led_reach_m) - config.turn_cost_m_per_rad * away
         best = float(self._headings[int(np.argmax(worth))])
         ahead = float(wander.free_lengths(points, np.zeros(1), self._half_width, config.reach_m)[0])
-        if ahead < (config.stop_m if self._turning == 0.0 else config.go_m):
-            if self._turning == 0.0:
-                self._turning = math.copysign(config.max_turn_rate_rad_s, best)
+        if self._turns_on(ahead, best):
             return Twist(0.0, self._turning)
-        self._turning = 0.0
         turn = config.gain_per_s * best
         turn = min(max(turn, -config.max_turn_rate_rad_s), config.max_turn_rate_rad_s)
         # Slower in a turn and before a wall, so that the lane ahead stays the one that was looked at.

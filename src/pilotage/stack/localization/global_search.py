@@ -46,8 +46,11 @@ class GlobalSearchConfig(Config):
     believed_share: float = Field(default=0.75, ge=0.0, le=1.0)
     """The only hypothesis left is believed once it explains this much."""
     confirm_m: NonNegative = 0.5
-    """And once it has been followed over this distance."""
+    """And once it has been followed over this distance,"""
+    turn_counts_m_per_rad: NonNegative = 0.25
+    """a turn counting like this much of a way, because it shows what was behind,"""
     confirm_scans: int = Field(default=8, ge=1)
+    """and over so many scans."""
     std_m: Positive = 0.05
     std_rad: Positive = 0.01
     """Spread given to a new hypothesis before its lines correct it."""
@@ -108,9 +111,10 @@ class GlobalSearch:
 
     def move(self, odometry: OdometryIncrement) -> None:
         """Carry all hypotheses along."""
+        turn_m = self._config.turn_counts_m_per_rad * abs(odometry.angle_rad)
         for hypothesis in self.hypotheses:
             self._prediction.move(hypothesis.pose, hypothesis.cov, odometry)
-            hypothesis.driven_m += abs(odometry.distance_m)
+            hypothesis.driven_m += abs(odometry.distance_m) + turn_m
 
     def look(self, lines: DetectedLines, ranges_m: FloatArray) -> Hypothesis | None:
         """Weigh the hypotheses by a scan; returns the one to be believed, if there is."""

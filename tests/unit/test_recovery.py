@@ -1,0 +1,217 @@
+"""Lost robots: poses from crossing lines, places that tell them apart, safe wandering, honest status."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from pilotage.core.angles import wrap_to_pi
+from pilotage.core.errors import InputError
+from pilotage.core.random import RandomStreams
+from pilotage.core.types import FloatArray, Pose2, Twist
+from pilotage.experiments.build import build
+from pilotage.experiments.mission import load_mission
+from pilotage.experiments.places import random_pose
+from pilotage.experiments.run_folder import resolved_yaml
+from pilotage.experiments.world_map import load_map
+from pilotage.kernels import geometry, viewpoints, wander
+from pilotage.maps.distance_field import DistanceField
+from pilotage.maps.segment_map import SegmentMap, box_segments
+from pilotage.missions.schema import BodyConfig, MotionConfig, PoseConfig
+from pilotage.models.odometry import OdometryModel
+from pilotage.sensors.wheel_odometry import WheelOdometryConfig
+from pilotage.sim.simulator import Simulator
+from pilotage.sim.world import World
+from pilotage.stack.control.wander import WanderConfig, Wanderer
+from pilotage.stack.interface import Belief, BeliefStatus
+from pilotage.stack.localization.ekf_walls import EkfWallsConfig, EkfWallsLocalizer
+from pilotage.stack.localization.global_search import GlobalSearch, GlobalSearchConfig
+from pilotage.stack.localization.localizer import LOCALIZERS
+from pilotage.stack.localization.odometry_prediction import OdometryNoise, OdometryPrediction
+from pilotage.stack.localization.scan_fit import ScanFit
+from pilotage.stack.localization.wall_matching import WallMatcher, WallMatchingConfig
+from support.robots import BEACONS, ROOM, knowledge_of, sensors
+from support.walls import LIDAR, extractor, scan_of
+
+MUSEUM = load_map("museum").walls
+BOX = SegmentMap.of(box_segments(5.0, 4.0, 10.0, 8.0, 0.0))
+
+
+def search_in(world: SegmentMap) -> GlobalSearch:
+    """A global search for a scanner at the robot's centre."""
+    mount = np.zeros(3)
+    prediction = OdometryPrediction(WheelOdometryConfig(), OdometryNoise(), 1.0, OdometryModel.EXACT_ARC)
+    return GlobalSearch(
+        GlobalSearchConfig(),
+        world,
+        ScanFit(world, LIDAR, 19.9, 0.1, 0.3),
+        WallMatcher(WallMatchingConfig(), 0.999, world, mount),
+        mount,
+        prediction,
+        0.3,
+    )
+
+
+def is_near(pose: FloatArray, truth: Pose2) -> bool:
+    """Within a hand and two degrees."""
+    away = math.hypot(pose[0] - truth.x_m, pose[1] - truth.y_m)
+    return away < 0.1 and abs(wrap_to_pi(float(pose[2]) - truth.theta_rad)) < 0.035
+
+
+def lost_in(world: SegmentMap, start: Pose2) -> tuple[Simulator, EkfWallsLocalizer]:
+    """A robot at ``start`` that is told nothing."""
+    knowledge = knowledge_of(world=world, start=start, initial=Belief.anywhere(world.bounds_m))
+    sim = Simulator(
+        World(world, world, BEACONS), BodyConfig(), MotionConfig(), sensors(), start, 0.1, RandomStreams(1)
+    )
+    return sim, EkfWallsLocalizer(EkfWallsConfig(), knowledge)
+
+
+def test_the_true_pose_is_among_the_hypotheses_of_one_scan() -> None:
+    rng = np.random.default_rng(1)
+    for seed in range(40):
+        drawn = random_pose(MUSEUM, PoseConfig(x_m=1.0, y_m=1.0), 0.45, rng)
+        truth = Pose2(drawn.x_m, drawn.y_m, drawn.theta_rad)
+        ranges = scan_of(MUSEUM, truth, rng)
+        search = search_in(MUSEUM)
+        assert search.look(extractor(seed).extract(ranges), ranges) is None, "one scan is never enough"
+        assert any(is_near(hypothesis.pose, truth) for hypothesis in search.hypotheses)
+
+
+def test_a_room_that_looks_the_same_from_both_ends_keeps_two_hypotheses() -> None:
+    sim, localizer = lost_in(BOX, Pose2(3.0, 3.0, 0.4))
+    for step in range(150):
+        belief = localizer.step(sim.step(Twist(0.4, 0.5 if step % 100 < 50 else -0.5)))
+        assert belief.status is BeliefStatus.LOST
+        assert localizer.telemetry()["localized"] == 0.0
+    assert localizer.telemetry()["hypotheses"] == 2.0
+    assert localizer.look_bearing_rad is None, "nowhere in this room would they differ"
+
+
+def test_in_a_room_with_a_mark_it_finds_itself_and_says_so_only_then() -> None:
+    marked = BOX.with_obstacles(np.array([[7.0, 0.0, 7.0, 3.0]]), np.zeros((0, 3)))
+    sim, localizer = lost_in(marked, Pose2(2.0, 2.0, 0.4))
+    statuses = []
+    for step in range(120):
+        belief = localizer.step(sim.step(Twist(0.3, 0.5 if step % 80 < 40 else -0.5)))
+        statuses.append(belief.status)
+        if belief.status is BeliefStatus.LOCALIZED:
+            assert is_near(belief.pose.as_array(), sim.truth)
+        else:
+            assert math.sqrt(belief.cov[0, 0]) > 2.0, "lost means knowing nothing"
+    assert statuses[0] is BeliefStatus.LOST
+    assert statuses[-1] is BeliefStatus.LOCALIZED
+
+
+def test_a_robot_carried_elsewhere_notices_at_once() -> None:
+    knowledge = knowledge_of(start=Pose2(2.0, 2.0, 0.0), variances=(1e-4, 1e-4, 1e-4))
+    sim = Simulator(
+        World(ROOM, ROOM, BEACONS),
+        BodyConfig(),
+        MotionConfig(),
+        sensors(),
+        Pose2(2.0, 2.0, 0.0),
+        0.1,
+        RandomStreams(0),
+    )
+    localizer = EkfWallsLocalizer(EkfWallsConfig(), knowledge)
+    for _ in range(10):
+        assert localizer.step(sim.step(Twist(0.2, 0.3))).status is BeliefStatus.LOCALIZED
+    sim.body.carry_to(Pose2(8.0, 6.5, 2.0))
+    statuses = [localizer.step(sim.step(Twist(0.2, 0.3))).status for _ in range(3)]
+    assert statuses[-1] is BeliefStatus.LOST
+
+
+def test_only_localizers_that_search_start_without_a_pose() -> None:
+    nowhere = knowledge_of(initial=Belief.anywhere(ROOM.bounds_m))
+    for entry in LOCALIZERS:
+        if entry.name == "ekf-walls":
+            assert entry.factory(EkfWallsConfig(), nowhere).belief.status is BeliefStatus.LOST
+            with pytest.raises(InputError, match="known"):
+                entry.factory(EkfWallsConfig(recovery=None), nowhere)
+        else:
+            with pytest.raises(InputError, match="ekf-walls"):
+                entry.factory(entry.config(), nowhere)
+
+
+def test_the_telling_place_is_where_the_views_differ() -> None:
+    """A box with a niche in one end wall, and two poses half a turn apart: the niche tells them apart."""
+    segments = np.array(
+        [[0, 0, 10, 0], [10, 0, 10, 8], [10, 8, 0, 8], [0, 8, 0, 0], [6.5, 8, 6.5, 6], [6.5, 6, 9, 6]], float
+    )
+    field = DistanceField.from_map(SegmentMap.of(segments), 0.25)
+    free = field.distance_m >= 0.42
+    poses = np.array([[8.0, 7.0, math.pi], [2.0, 1.0, 0.0]])
+    path = viewpoints.telling_path(
+        free, 0.0, 0.0, 0.25, poses, 2.3, 28, 20.0, 0.5, 0.08, 6000, segments, np.zeros((0, 3))
+    )
+    assert path.shape[0] >= 2
+    assert np.hypot(*(path[0] - poses[0, :2])) < 0.25
+    assert np.hypot(*np.diff(path, axis=0).T).max() < 0.36
+    twins = viewpoints.telling_path(
+        free, 0.0, 0.0, 0.25, poses[[0, 0]], 2.3, 28, 20.0, 0.5, 0.08, 6000, segments, np.zeros((0, 3))
+    )
+    assert twins.shape[0] == 0
+
+
+def test_a_lane_is_as_long_as_the_floor_is_free() -> None:
+    points = np.array([[2.0, 0.1], [1.0, 0.5], [-1.0, 0.0]])
+    lengths = wander.free_lengths(points, np.array([0.0, math.pi / 2, math.pi]), 0.4, 5.0)
+    assert lengths == pytest.approx([2.0, 5.0, 1.0])
+
+
+@pytest.mark.parametrize("bearing", [None, 0.0, 2.0, -3.0])
+def test_wandering_touches_nothing(bearing: float | None) -> None:
+    """Even where it is led into the walls all the time."""
+    for seed in range(4):
+        rng = np.random.default_rng(seed)
+        drawn = random_pose(ROOM, PoseConfig(x_m=2.0, y_m=2.0), 0.5, rng)
+        start = Pose2(drawn.x_m, drawn.y_m, drawn.theta_rad)
+        knowledge = knowledge_of(start=start)
+        sim = Simulator(
+            World(ROOM, ROOM, BEACONS),
+            BodyConfig(),
+            MotionConfig(),
+            sensors(),
+            start,
+            0.1,
+            RandomStreams(seed),
+        )
+        wanderer = Wanderer.of(WanderConfig(), knowledge)
+        assert wanderer is not None
+        command, way = Twist(0.0, 0.0), 0.0
+        for _ in range(400):
+            before = sim.truth
+            command = wanderer.step(sim.step(command), bearing)
+            way += math.hypot(sim.truth.x_m - before.x_m, sim.truth.y_m - before.y_m)
+            assert sim.body.clearance_m > 0.02
+        assert sim.body.collisions == 0
+        if bearing is None:
+            assert way > 5.0
+
+
+def test_random_places_are_drawn_from_the_seed_and_recorded() -> None:
+    mission = load_mission("museum-lost", seed=4)
+    settled = build(mission).mission
+    assert settled.world.random_start is None
+    assert settled == build(mission).mission
+    assert build(load_mission("museum-lost", seed=5)).mission.world.start != settled.world.start
+    assert "random_start: null" in resolved_yaml(settled)
+    carried = build(load_mission("museum-kidnap", seed=4)).mission.world.kidnaps[0].to
+    assert carried is not None
+    assert MUSEUM.distance_m(carried.x_m, carried.y_m) >= 0.6
+
+
+def test_random_places_are_connected_to_the_start() -> None:
+    walled_off = BOX.with_obstacles(np.array([[5.0, 0.0, 5.0, 8.0]]), np.zeros((0, 3)))
+    rng = np.random.default_rng(0)
+    for _ in range(50):
+        pose = random_pose(walled_off, PoseConfig(x_m=1.0, y_m=1.0), 0.5, rng)
+        assert pose.x_m <= 4.5 + 1e-9
+        assert (
+            geometry.distance_to_nearest(pose.x_m, pose.y_m, walled_off.segments_m, np.zeros((0, 3))) >= 0.5
+        )
+    with pytest.raises(InputError, match="nearest wall"):
+        random_pose(walled_off, PoseConfig(x_m=0.1, y_m=1.0), 0.5, rng)
