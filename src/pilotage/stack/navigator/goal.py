@@ -27,6 +27,9 @@ HERE_TOLERANCE_M = 0.005
 MAPPED_TOLERANCE_M = 0.02
 """What the robot maps is drawn a little too large: where it stands there was room for it."""
 
+PLAN_AGAIN_S = 1.0
+"""A robot that found itself where no plan begins drives on for this long before the next."""
+
 NO_REACTION = Reaction(ReactionKind.NONE, 0.0, math.inf, math.inf)
 
 
@@ -135,7 +138,7 @@ class GoalNavigator:
         if self._mapper is not None:
             self._mapper.step(readings, belief)
         if self._lost.active:
-            return self._find_the_way_again(belief.pose)
+            return self._find_the_way_again(readings, belief.pose)
         command = self._drive(readings, belief.pose)
         # Its own trail it has driven before: there only the known walls are asked.
         circles = self._known_circles if self._mode is Mode.ESCAPE else self._all_circles()
@@ -205,16 +208,24 @@ class GoalNavigator:
         self._mode = Mode.WANDER
         return self._lost.step(readings)
 
-    def _find_the_way_again(self, pose: Pose2) -> Twist:
+    def _find_the_way_again(self, readings: Readings, pose: Pose2) -> Twist:
+        """Plan from where the robot found itself; drive on as before while there is no room for a plan."""
+        self._mode = Mode.WANDER
+        if self._t_s < self._lost.plan_at_s:
+            return self._lost.step(readings)
+        result = self._plan.make(self._t_s, pose, self.mapped_circles_m, self._clearances(pose))
+        self.counts["replans"] += 1
+        if result.path is None:
+            if self.counts["replans"] >= self._config.max_replans:
+                return self._fail(f"stuck: found itself, but {result.status} ({result.reason})")
+            self._lost.plan_at_s = self._t_s + PLAN_AGAIN_S
+            return self._lost.step(readings)
         self._lost.active = False
         self._trail = []
         if self._reactive is not None:
             self._reactive.reset()
-        self._say("found", f"the robot knows where it is: ({pose.x_m:.2f}, {pose.y_m:.2f})")
-        command = self._replan_globally(pose, "found again")
-        if self._plan.path is None:
-            return self._fail("no path to the goal from where the robot found itself")
-        return command
+        self._took_plan("found", f"the robot knows where it is, ({pose.x_m:.2f}, {pose.y_m:.2f})")
+        return STOP
 
     def _follow(self, pose: Pose2) -> Twist:
         """Follow the local path; plan a new one at each waypoint; replan globally where none leads on."""

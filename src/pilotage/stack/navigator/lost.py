@@ -9,23 +9,31 @@ from pilotage.stack.knowledge import Knowledge
 from pilotage.stack.localization.localizer import Localizer, Seeker
 
 
+LED_S, FREE_S = 15.0, 10.0
+"""It is led for so long, then goes where it likes: what stands in the way may be on no map."""
+
+
 class LostDriving:
     """Wanders by the scanner; without one the robot stands still.
 
     Attributes
     ----------
     active
-        Whether the robot was lost at the last step.
+        Whether the robot was lost and has had no plan since.
+    plan_at_s
+        When to plan, once it is found.
     """
 
     def __init__(self, config: WanderConfig, knowledge: Knowledge, localizer: Localizer) -> None:
         self._wanderer = Wanderer.of(config, knowledge)
         self._seeker = localizer if isinstance(localizer, Seeker) else None
         self.active = False
+        self.plan_at_s = 0.0
 
     def step(self, readings: Readings) -> Twist:
         """Choose a command, led by the localizer where it knows what would help."""
         if self._wanderer is None:
             return STOP
-        bearing = None if self._seeker is None else self._seeker.look_bearing_rad
+        led = readings.t_s % (LED_S + FREE_S) < LED_S
+        bearing = self._seeker.look_bearing_rad if led and self._seeker is not None else None
         return self._wanderer.step(readings, bearing)
