@@ -8,7 +8,6 @@ from pilotage.stack.control.wander import WanderConfig, Wanderer
 from pilotage.stack.knowledge import Knowledge
 from pilotage.stack.localization.localizer import Localizer, Seeker
 
-
 LED_S, FREE_S = 15.0, 10.0
 """It is led for so long, then goes where it likes: what stands in the way may be on no map."""
 
