@@ -13,6 +13,9 @@ from pilotage.kernels.motion import TWO_PI, wrap
 
 FloatArray = NDArray[np.float64]
 
+BEAM_SLACK = 1e-9
+"""In beams, added at both ends of an obstacle, so that no beam slips between two walls that meet."""
+
 SIGHT_MARGIN_M = 1e-6
 """A line of sight ends this far before its target: a beacon on a wall is not hidden by that wall."""
 
@@ -30,67 +33,87 @@ def fan_ranges(
 ) -> FloatArray:
     """Ranges (beams,) of a fan whose beam k looks along ``first + k * step`` in the map frame.
 
-    Each obstacle is met only by the beams inside the angle it subtends, so the work is the number of
-    (beam, obstacle) pairs that can meet at all. ``max_range`` where nothing is hit.
+    ``max_range`` where nothing is hit; all 0 inside a circle.
     """
-    ranges = np.full(beams, max_range)
     cosines = np.empty(beams)
     sines = np.empty(beams)
     # Rotating by a constant step costs two products a beam; the drift over a fan stays below 1e-12.
-    c, s = math.cos(first), math.sin(first)
+    c, s = 1.0, 0.0
     cs, ss = math.cos(step), math.sin(step)
     for k in range(beams):
         cosines[k] = c
         sines[k] = s
         c, s = c * cs - s * ss, s * cs + c * ss
-    if beams == 1:
-        step = TWO_PI
+    return table_fan_ranges(x, y, first, step, cosines, sines, max_range, segments, circles)
+
+
+@kernel
+def table_fan_ranges(
+    x: float,
+    y: float,
+    theta: float,
+    step: float,
+    cosines: FloatArray,
+    sines: FloatArray,
+    max_range: float,
+    segments: FloatArray,
+    circles: FloatArray,
+) -> FloatArray:
+    """``fan_ranges`` with the beams' directions from the first one given as a table.
+
+    Each obstacle is met only by the beams inside the angle it subtends, so the work is the number of
+    (beam, obstacle) pairs that can meet at all. Obstacles are turned into the fan's own frame, in which
+    ``theta``, the first beam's direction in the map, is 0 and the table never changes.
+    """
+    beams = cosines.shape[0]
+    ranges = np.full(beams, max_range)
+    per_step = 1.0 / (step if beams > 1 else TWO_PI)
+    ct, st = math.cos(theta), math.sin(theta)
     for i in range(segments.shape[0]):
-        ax, ay = segments[i, 0] - x, segments[i, 1] - y
-        bx, by = segments[i, 2] - x, segments[i, 3] - y
-        cross = ax * by - ay * bx
-        if cross == 0.0:
-            continue  # seen edge-on (or of no length): no beam meets it in more than a point
+        px, py = segments[i, 0] - x, segments[i, 1] - y
+        qx, qy = segments[i, 2] - x, segments[i, 3] - y
+        cross = px * qy - py * qx
+        lx, ly = qx - px, qy - py
+        # Seen edge-on (or of no length) no beam meets it in more than a point; its line may be out of reach.
+        if cross == 0.0 or cross * cross >= max_range * max_range * (lx * lx + ly * ly):
+            continue
         if cross < 0.0:  # order the ends counter-clockwise
-            ax, ay, bx, by, cross = bx, by, ax, ay, -cross
+            px, py, qx, qy, cross = qx, qy, px, py, -cross
+        ax, ay = ct * px + st * py, ct * py - st * px
+        bx, by = ct * qx + st * qy, ct * qy - st * qx
         ex, ey = bx - ax, by - ay
         width = math.atan2(cross, ax * bx + ay * by)  # in (0, pi)
-        offset = (math.atan2(ay, ax) - first) % TWO_PI
+        offset = math.atan2(ay, ax)
+        if offset < 0.0:
+            offset += TWO_PI
         # The second turn serves obstacles that begin before the first beam.
         for turn in range(2):
-            low, high = _beams_between(offset - turn * TWO_PI, width, step, beams)
+            start = offset - turn * TWO_PI
+            low = max(0, math.ceil(start * per_step - BEAM_SLACK))
+            high = min(beams, math.floor((start + width) * per_step + BEAM_SLACK) + 1)
             for k in range(low, high):
                 # On the line a + u e: range = (a x e) / (d x e), and a x e = a x b.
                 denominator = cosines[k] * ey - sines[k] * ex
-                if denominator > 0.0:
-                    ranges[k] = min(ranges[k], cross / denominator)
+                ranges[k] = min(ranges[k], cross / denominator) if denominator > 0.0 else ranges[k]
     for i in range(circles.shape[0]):
-        cx, cy, radius = circles[i, 0] - x, circles[i, 1] - y, circles[i, 2]
+        px, py, radius = circles[i, 0] - x, circles[i, 1] - y, circles[i, 2]
+        cx, cy = ct * px + st * py, ct * py - st * px
         centre = math.hypot(cx, cy)
         if centre <= radius:
             ranges[:] = 0.0
             return ranges
         half = math.asin(radius / centre)
-        offset = (math.atan2(cy, cx) - half - first) % TWO_PI
+        offset = (math.atan2(cy, cx) - half) % TWO_PI
         for turn in range(2):
-            low, high = _beams_between(offset - turn * TWO_PI, 2.0 * half, step, beams)
+            start = offset - turn * TWO_PI
+            low = max(0, math.ceil(start * per_step - BEAM_SLACK))
+            high = min(beams, math.floor((start + 2.0 * half) * per_step + BEAM_SLACK) + 1)
             for k in range(low, high):
                 along = cx * cosines[k] + cy * sines[k]
                 across = cx * sines[k] - cy * cosines[k]
                 rest = max(radius * radius - across * across, 0.0)
                 ranges[k] = min(ranges[k], along - math.sqrt(rest))
     return ranges
-
-
-@kernel
-def _beams_between(offset: float, width: float, step: float, beams: int) -> tuple[int, int]:
-    """Half-open range of the beams whose direction lies in [offset, offset + width] from the first beam.
-
-    A billionth of a beam is added at both ends, so that no beam slips between two walls that meet.
-    """
-    low = max(0, math.ceil(offset / step - 1e-9))
-    high = min(beams, math.floor((offset + width) / step + 1e-9) + 1)
-    return low, high
 
 
 @kernel

@@ -102,6 +102,8 @@ class SimulatedLidar:
         self._config = config
         self._step = config.beam_step_rad
         self._first = float(config.beam_angles_rad()[0])
+        from_first = config.beam_angles_rad() - self._first
+        self._cosines, self._sines = np.cos(from_first), np.sin(from_first)
         self._std = math.sqrt(config.range_var_m2)
         self._segments, self._circles = world.geometry.segments_m, world.geometry.circles_m
         self._rng = rng
@@ -113,8 +115,16 @@ class SimulatedLidar:
         """Scan from where the sensor is now."""
         c = self._config
         x, y, theta = _mounted(motion.pose, c.mount)
-        exact = scan.fan_ranges(
-            x, y, theta + self._first, self._step, c.beams, c.max_range_m, self._segments, self._circles
+        exact = scan.table_fan_ranges(
+            x,
+            y,
+            theta + self._first,
+            self._step,
+            self._cosines,
+            self._sines,
+            c.max_range_m,
+            self._segments,
+            self._circles,
         )
         normals = self._rng.standard_normal(c.beams)
         return LidarScan(scan.add_range_noise(exact, normals, self._std, c.max_range_m))
