@@ -90,6 +90,7 @@ bench: setup  ## compare with the peers: installs them, prints a table of ratios
 	  cksum < requirements-bench.lock > $(BENCH_STAMP); \
 	fi
 	@$(PY) -m benchmarks.peers $(ARGS)
+	@$(PY) -m benchmarks.ekf_peer
 
 COMPILE = $(UV) pip compile --quiet --universal --python-version 3.11 --generate-hashes --no-header --no-annotate
 
