@@ -119,6 +119,7 @@ def test_bad_input_is_one_line_with_the_remedy(override: str, message: str) -> N
     ("text", "message"),
     [
         ("map: half\nwalls_count: 3\nwalls_m:\n  - [0, 0, 1, 0]\n", "cut short"),
+        ("map: half\nlandmarks_count: 1\nwalls_m:\n  - [0, 0, 1, 1]\n", "cut short"),
         ("map: half\nwalls_m:\n  - [0, 0, 1,", "line 3"),
         ("map: half\nwalls_m:\n  - [0, 0, 1]\n", "walls_m.0"),
         ("map: half\nwalls_m: []\n", "at least 1 item"),

@@ -34,7 +34,8 @@ class MapFile(Config):
     circles_m: tuple[tuple[float, float, float], ...] = ()
     landmarks: tuple[LandmarkEntry, ...] = ()
     walls_count: int | None = None
-    """Where given, the number of walls that the file must hold: a file cut in half is noticed."""
+    landmarks_count: int | None = None
+    """Where given, how many the file must hold: a file cut in half is noticed."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,11 +60,16 @@ def parse_map(values: dict[str, Any], where: str) -> LandmarkMap:
 
 def build_map(entry: MapFile, where: str) -> LandmarkMap:
     """Build a map from a validated entry; InputError where walls are missing."""
-    if entry.walls_count is not None and entry.walls_count != len(entry.walls_m):
-        raise InputError(
-            f"{where}: expected {entry.walls_count} walls (walls_count), found {len(entry.walls_m)}; "
-            "the file seems to be cut short"
-        )
+    counts = (
+        ("walls", entry.walls_count, len(entry.walls_m)),
+        ("landmarks", entry.landmarks_count, len(entry.landmarks)),
+    )
+    for what, expected, found in counts:
+        if expected is not None and expected != found:
+            raise InputError(
+                f"{where}: expected {expected} {what} ({what}_count), found {found}; "
+                "the file seems to be cut short"
+            )
     walls = SegmentMap.of(np.array(entry.walls_m), np.array(entry.circles_m).reshape(-1, 3))
     if entry.bounds_m is not None:
         walls = SegmentMap(walls.segments_m, walls.circles_m, entry.bounds_m)
