@@ -91,7 +91,10 @@ def run_metrics(
     collisions = int(trace["collisions"][-1])
     metrics["collisions"] = collisions
     metrics["min_clearance_m"] = float(trace["clearance_m"].min())
-    metrics["path_length_m"] = float(np.hypot(*np.diff(truth[:, :2], axis=0).T).sum())
+    driven = np.hypot(*np.diff(truth[:, :2], axis=0).T)
+    # A robot that was carried did not drive there.
+    carried = driven > 2.0 * mission.robot.motion.max_speed_m_s * mission.run.dt_s
+    metrics["path_length_m"] = float(driven[~carried].sum())
     metrics |= _errors(mission, trace, truth, estimate)
     metrics |= _consistency(mission, trace)
     metrics |= _recovery(mission, trace, truth, estimate)

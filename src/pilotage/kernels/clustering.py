@@ -26,22 +26,37 @@ def _root(parent: IntArray, i: int) -> int:
 
 
 @kernel
-def _join(
+def _join_between(
     parent: IntArray,
+    run_end: IntArray,
     ranges: FloatArray,
     points: FloatArray,
     i: int,
-    j: int,
+    start: int,
+    end: int,
     max_range: float,
     cutoff2: float,
 ) -> None:
-    """Put two points into one component where they are near enough; the least index is the root."""
-    if not ranges[j] <= max_range:
-        return
-    dx, dy = points[i, 0] - points[j, 0], points[i, 1] - points[j, 1]
-    if dx * dx + dy * dy <= cutoff2:
-        a, b = _root(parent, i), _root(parent, j)
-        parent[max(a, b)] = min(a, b)
+    """Join point i with those of [start, end) that are near enough; the least index is the root.
+
+    ``run_end`` (N,) holds the last beam of each unbroken run of neighbours: a run that is joined already is
+    stepped over as a whole.
+    """
+    j = start
+    root = _root(parent, i)
+    while j < end:
+        if not ranges[j] <= max_range:
+            j += 1
+            continue
+        other = _root(parent, j)
+        if other != root:
+            dx, dy = points[i, 0] - points[j, 0], points[i, 1] - points[j, 1]
+            if dx * dx + dy * dy > cutoff2:
+                j += 1
+                continue
+            parent[max(root, other)] = min(root, other)
+            root = min(root, other)
+        j = run_end[j] + 1
 
 
 @kernel
@@ -60,6 +75,14 @@ def scan_clusters(
     n = ranges.shape[0]
     parent = np.arange(n)
     cutoff2 = cutoff * cutoff
+    run_end = np.arange(n)
+    for i in range(n - 2, -1, -1):
+        dx, dy = points[i + 1, 0] - points[i, 0], points[i + 1, 1] - points[i, 1]
+        if ranges[i] <= max_range and ranges[i + 1] <= max_range and dx * dx + dy * dy <= cutoff2:
+            run_end[i] = run_end[i + 1]
+    for i in range(1, n):
+        if run_end[i] == run_end[i - 1]:
+            parent[i] = parent[i - 1]
     for i in range(n):
         if not ranges[i] <= max_range:
             continue
@@ -69,10 +92,8 @@ def scan_clusters(
             # A beam more than the angle allows, against rounding; then those met the other way round.
             near_end = min(n, i + math.floor(reach / step) + 2)
             far_start = max(near_end, i + math.ceil((TWO_PI - reach) / step) - 1)
-        for j in range(i + 1, near_end):
-            _join(parent, ranges, points, i, j, max_range, cutoff2)
-        for j in range(far_start, n):
-            _join(parent, ranges, points, i, j, max_range, cutoff2)
+        _join_between(parent, run_end, ranges, points, i, i + 1, near_end, max_range, cutoff2)
+        _join_between(parent, run_end, ranges, points, i, far_start, n, max_range, cutoff2)
     size = np.zeros(n, dtype=np.int64)
     for i in range(n):
         if ranges[i] <= max_range:

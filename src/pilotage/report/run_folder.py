@@ -343,4 +343,17 @@ def _read_trace(path: Path) -> Trace:
         # A column of words (a sensor's state, say) is no series that could be drawn.
         if pa.types.is_floating(column.type) or pa.types.is_integer(column.type):
             columns[name] = np.asarray(column.to_numpy(), dtype=np.float64)
-    return Trace(columns, table.num_rows)
+    return Trace(_without_lost_poses(columns), table.num_rows)
+
+
+def _without_lost_poses(columns: dict[str, FloatArray]) -> dict[str, FloatArray]:
+    """Leave out what a lost robot's belief holds in place of a pose: it claims none, so none is drawn."""
+    localized = columns.get("localized")
+    if localized is None or not bool((localized < 0.5).any()):
+        return columns
+    return {
+        name: np.where(localized < 0.5, np.nan, values)
+        if name.startswith(("est_", "cov_", "nees"))
+        else values
+        for name, values in columns.items()
+    }
