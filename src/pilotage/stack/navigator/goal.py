@@ -363,8 +363,11 @@ class GoalNavigator:
         return ahead < min(self._radius_m + self._config.watch_margin_m, self._room_asked_m())
 
     def _near_goal(self) -> bool:
+        """Whether this is the end: near the goal, and not merely passing by it with way left to go."""
         pose = self.belief.pose
         away = math.hypot(pose.x_m - self._goal.x_m, pose.y_m - self._goal.y_m)
+        if self._to_go_m > away + self._tolerance_m:
+            return False
         return away <= self._config.arrival_m or (away <= self._tolerance_m and self._to_go_m < 0.02)
 
     def _stalled(self) -> bool:
