@@ -249,6 +249,9 @@ EXAMPLES: dict[tuple[str, str], Example] = {
         planner_plans, {"iterations": 2000}, frozenset({"goal_bias", "guide_bias", "rewire_factor"})
     ),
     ("planner", "route"): Example(planner_plans, ROUTE),
+    ("planner", "astar"): Example(planner_plans),
+    ("planner", "dijkstra"): Example(planner_plans),
+    ("planner", "theta-star"): Example(planner_plans),
     ("smoother", "shortcut"): Example(smoother_smooths),
     ("smoother", "none"): Example(smoother_smooths),
     ("local_planner", "dubins"): Example(local_planner_reaches_the_waypoint),

@@ -7,6 +7,7 @@ from typing import Annotated
 import typer
 
 from pilotage import __version__
+from pilotage.cli.bench_scen import bench_scen
 from pilotage.cli.components import components
 from pilotage.cli.missions import missions
 from pilotage.cli.plan import plan
@@ -24,7 +25,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
 )
 
-for _command in (run, plan, report, missions, components, schema):
+for _command in (run, plan, bench_scen, report, missions, components, schema):
     app.command()(_command)
 
 

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from pathlib import Path
 from typing import Annotated, Any
 
 import typer
@@ -13,25 +15,46 @@ from pilotage.core.errors import InputError
 
 
 def plan(
-    map_: Annotated[str, typer.Argument(metavar="MAP", help="A shipped map's name or a map file.")],
+    map_: Annotated[
+        str, typer.Argument(metavar="MAP", help="A shipped map's name or a map file: walls or a grid.")
+    ],
     start: Annotated[str, typer.Option(metavar="X,Y[,TH]", help="Start in metres and radians.")],
     goal: Annotated[str, typer.Option(metavar="X,Y[,TH]", help="Goal; without TH any heading will do.")],
-    planner: Annotated[str, typer.Option(help="Registered name of the planner.")] = "rrt-star-dubins",
+    planner: Annotated[
+        str | None, typer.Option(help="Registered name; default rrt-star-dubins, astar on grids.")
+    ] = None,
     overrides: Overrides = None,
     seed: Seed = None,
     json: Json = False,
 ) -> int:
     """Plan a path on a map and say how long it is against the shortest one."""
-    from pilotage.experiments.planning import plan_on_map
-
     from_, to = parse_pose(start, "--start"), parse_pose(goal, "--goal")
     with stdout_for_json(json):
-        answer = plan_on_map(map_, from_, to, planner, overrides or (), seed or 0)
+        answer = _answer(map_, from_, to, planner, overrides or (), seed or 0)
     if json:
         print_json(answer)
     else:
         print_columns((key, _show(value)) for key, value in answer.items() if key != "path")
     return 0 if answer["success"] else 1
+
+
+def _answer(
+    map_: str,
+    start: tuple[float, ...],
+    goal: tuple[float, ...],
+    planner: str | None,
+    overrides: Sequence[str],
+    seed: int,
+) -> dict[str, Any]:
+    """Ask on a grid where the file holds one, else on a map of walls."""
+    if Path(map_).suffix:
+        from pilotage.experiments.grid_planning import is_grid_map, plan_on_grid
+
+        if is_grid_map(map_):
+            return plan_on_grid(Path(map_), start, goal, planner or "astar", overrides)
+    from pilotage.experiments.planning import plan_on_map
+
+    return plan_on_map(map_, start, goal, planner or "rrt-star-dubins", overrides, seed)
 
 
 def parse_pose(text: str, option: str) -> tuple[float, ...]:

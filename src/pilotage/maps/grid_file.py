@@ -1,0 +1,65 @@
+"""A grid map from whatever file holds one."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from pilotage.core.errors import InputError
+from pilotage.core.types import Pose2
+from pilotage.maps.grid_image import read_hazard_image
+from pilotage.maps.memory import require_memory
+from pilotage.maps.moving_ai import read_moving_ai_map
+from pilotage.maps.occupancy_grid import CORNER, OccupancyGrid
+from pilotage.maps.ros_map import read_ros_map
+
+IMAGES = frozenset({".png", ".pgm", ".pbm", ".bmp", ".tif", ".tiff", ".jpg", ".jpeg"})
+GRID_SUFFIXES = frozenset({".map", ".npy", ".yaml", ".yml"}) | IMAGES
+
+
+def read_grid(path: Path, resolution_m: float | None = None, origin: Pose2 | None = None) -> OccupancyGrid:
+    """Read a grid map by the suffix of its file.
+
+    Parameters
+    ----------
+    resolution_m, origin
+        For files that do not say: images (white is an obstacle) need a resolution; MovingAI maps and
+        arrays (``.npy``, see ``OccupancyGrid.of``) take 1 m without one. Not for ROS maps, which say.
+
+    Raises
+    ------
+    InputError
+        Where the file is missing or is not what its suffix says, or the resolution is missing.
+    """
+    suffix = path.suffix.lower()
+    if suffix in (".yaml", ".yml"):
+        if resolution_m is not None or origin is not None:
+            raise InputError(
+                f"{path}: resolution and origin: expected in the YAML file, found both there and here"
+            )
+        return read_ros_map(path).grid
+    place = CORNER if origin is None else origin
+    if suffix == ".map":
+        return read_moving_ai_map(path).grid(1.0 if resolution_m is None else resolution_m, place)
+    if suffix == ".npy":
+        return OccupancyGrid.of(_read_array(path), 1.0 if resolution_m is None else resolution_m, place)
+    if suffix in IMAGES:
+        if resolution_m is None:
+            raise InputError(f"{path}: expected a resolution in metres a pixel for an image, found none")
+        return read_hazard_image(path, resolution_m, place)
+    raise InputError(f"{path}: expected a grid map ({', '.join(sorted(GRID_SUFFIXES))}), found '{suffix}'")
+
+
+def _read_array(path: Path) -> np.ndarray[tuple[int, ...], np.dtype[np.generic]]:
+    """Load a NumPy file without running anything that it may hold."""
+    if not path.is_file():
+        raise InputError(f"array '{path}': expected a .npy file there, found none")
+    try:
+        mapped: np.ndarray[tuple[int, ...], np.dtype[np.generic]] = np.load(
+            path, mmap_mode="r", allow_pickle=False
+        )
+    except (ValueError, EOFError, OSError) as error:
+        raise InputError(f"array '{path}': expected a NumPy array of two dimensions, found {error}") from None
+    require_memory(2 * mapped.nbytes, f"array '{path}'")
+    return mapped

@@ -1,0 +1,116 @@
+"""Grey images as arrays and as grid maps: PNG, PGM, and whatever else Pillow reads."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image, UnidentifiedImageError
+
+from pilotage.core.errors import InputError
+from pilotage.core.types import Pose2
+from pilotage.maps.memory import require_memory
+from pilotage.maps.occupancy_grid import CORNER, FREE, OCCUPIED, OccupancyGrid
+
+ByteArray = NDArray[np.uint8]
+
+WHITE_FROM = 128
+
+
+def read_grey(path: Path, size: tuple[int, int] | None = None) -> tuple[ByteArray, ByteArray | None]:
+    """Read an image of 8 bits a pixel whose colours are all grey.
+
+    Parameters
+    ----------
+    size
+        Rows and columns that it has to have.
+
+    Returns
+    -------
+    grey, alpha
+        (rows, columns) each; alpha is None where the image has none.
+
+    Raises
+    ------
+    InputError
+        Where the image is missing, unreadable, coloured, of another depth or size, or too large.
+    """
+    if not path.is_file():
+        raise InputError(f"image '{path}': expected an image there, found none")
+    # Pillow guards against large images; here the memory that there is decides.
+    limit, Image.MAX_IMAGE_PIXELS = Image.MAX_IMAGE_PIXELS, None
+    try:
+        with Image.open(path) as image:
+            columns, rows = image.size
+            if size is not None and (rows, columns) != size:
+                raise InputError(
+                    f"image '{path}': expected {size[1]} x {size[0]} pixels, found {columns} x {rows}"
+                )
+            require_memory(rows * columns * (len(image.getbands()) + 2), f"image '{path}'")
+            return _grey(image, path)
+    except UnidentifiedImageError:
+        raise InputError(
+            f"image '{path}': expected a PNG, PGM or other image, found another format"
+        ) from None
+    except (OSError, SyntaxError, ValueError) as error:
+        raise InputError(f"image '{path}': cannot be read ({error}); it may be cut short") from None
+    finally:
+        Image.MAX_IMAGE_PIXELS = limit
+
+
+def _grey(image: Image.Image, path: Path) -> tuple[ByteArray, ByteArray | None]:
+    if image.mode == "P" or (image.mode in ("1", "L", "RGB") and "transparency" in image.info):
+        image = image.convert("RGBA" if "transparency" in image.info else "RGB")
+    if image.mode == "1":
+        image = image.convert("L")
+    if image.mode not in ("L", "LA", "RGB", "RGBA"):
+        raise InputError(
+            f"image '{path}': expected grey pixels of 8 bits, found Pillow's mode {image.mode}; convert it"
+        )
+    array = np.asarray(image)
+    if array.ndim == 2:
+        return array, None
+    colours = array[..., : 3 if image.mode.startswith("RGB") else 1]
+    grey = np.ascontiguousarray(colours[..., 0])
+    if (colours != grey[..., None]).any():
+        raise InputError(f"image '{path}': expected grey pixels, found coloured ones; convert it to grey")
+    return grey, np.ascontiguousarray(array[..., -1]) if image.mode.endswith("A") else None
+
+
+def write_grey(path: Path, grey: ByteArray, alpha: ByteArray | None = None) -> None:
+    """Write an image without loss; by suffix ``.pgm`` (which holds no alpha) or ``.png``.
+
+    Raises
+    ------
+    InputError
+        For another suffix, and for alpha in a PGM file.
+    """
+    if path.suffix.lower() not in (".png", ".pgm"):
+        raise InputError(f"image '{path}': expected a name ending in .png or .pgm; others may lose something")
+    if alpha is not None and path.suffix.lower() == ".pgm":
+        raise InputError(f"image '{path}': PGM holds no transparency; take .png")
+    image = Image.fromarray(grey)
+    if alpha is not None:
+        image = Image.merge("LA", (image, Image.fromarray(alpha)))
+    image.save(path)
+
+
+def read_hazard_image(
+    path: Path, resolution_m: float, origin: Pose2 = CORNER, size: tuple[int, int] | None = None
+) -> OccupancyGrid:
+    """Read an obstacle map where white is an obstacle and black is free ground.
+
+    Raises
+    ------
+    InputError
+        As ``read_grey``, and for a resolution that is not above 0.
+    """
+    grey, _ = read_grey(path, size)
+    cells = np.where(grey >= WHITE_FROM, np.int8(OCCUPIED), np.int8(FREE))
+    return OccupancyGrid(cells, resolution_m, origin)
+
+
+def write_hazard_image(path: Path, grid: OccupancyGrid) -> None:
+    """Write an obstacle map: white where blocked, black elsewhere."""
+    write_grey(path, np.where(grid.blocked(), np.uint8(255), np.uint8(0)))

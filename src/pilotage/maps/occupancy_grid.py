@@ -1,0 +1,174 @@
+"""Occupancy grids: square cells that are free, occupied, something between, or unknown.
+
+**Rows and columns.** Row 0 is the top row, as images, MovingAI files and elevation models have it: its
+cells have the largest y of the grid's own frame, and y falls as the row grows. Column 0 has the smallest
+x. The grid's own frame sits in the outer lower-left corner of the lower-left cell, which is what ``origin``
+places in the map frame (as ROS map files do). Nothing else in pilotage states this again.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from pilotage.core.errors import InputError
+from pilotage.core.types import BoolArray, FloatArray, IntArray, Pose2
+from pilotage.kernels import grid_distance
+from pilotage.maps.memory import require_memory
+
+OccupancyArray = NDArray[np.int8]
+
+FREE, OCCUPIED, UNKNOWN = 0, 100, -1
+"""As in ROS's ``nav_msgs/OccupancyGrid``: per cent, and -1."""
+
+OCCUPIED_FROM = 65
+"""Occupancy in per cent from which a cell counts as blocked."""
+
+CORNER = Pose2(0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class OccupancyGrid:
+    """A grid map.
+
+    Attributes
+    ----------
+    cells
+        (rows, columns) int8 in per cent: 0 free to 100 occupied, -1 unknown; read-only.
+    resolution_m
+        Side of a cell.
+    origin
+        Pose of the lower-left cell's outer corner in the map frame; its heading turns the whole grid.
+    """
+
+    cells: OccupancyArray
+    resolution_m: float
+    origin: Pose2 = CORNER
+
+    def __post_init__(self) -> None:
+        cells = self.cells
+        if cells.ndim != 2 or cells.size == 0:
+            raise InputError(
+                f"grid: expected cells in rows and columns, found an array of shape {cells.shape}"
+            )
+        if cells.dtype != np.int8:
+            raise InputError(f"grid: expected cells of type int8, found {cells.dtype}; use OccupancyGrid.of")
+        if cells.min() < UNKNOWN or cells.max() > OCCUPIED:
+            raise InputError(f"grid: expected cells from -1 to 100, found {cells.min()} to {cells.max()}")
+        if not (math.isfinite(self.resolution_m) and self.resolution_m > 0.0):
+            raise InputError(f"grid: expected a resolution above 0 m, found {self.resolution_m}")
+        if not all(math.isfinite(value) for value in self.origin.as_array()):
+            raise InputError(f"grid: expected a finite origin, found {self.origin}")
+        if cells.flags.writeable or not cells.flags.c_contiguous:
+            cells = cells.copy()
+            cells.flags.writeable = False
+            object.__setattr__(self, "cells", cells)
+
+    @staticmethod
+    def of(values: ArrayLike, resolution_m: float, origin: Pose2 = CORNER) -> OccupancyGrid:
+        """Build from an array: booleans (True is occupied), per cent with -1, or probabilities.
+
+        Whole numbers are per cent; floats are probabilities from 0 to 1, NaN for unknown.
+        """
+        array = np.asarray(values)
+        if array.dtype == np.bool_:
+            return OccupancyGrid(array.view(np.int8) * np.int8(OCCUPIED), resolution_m, origin)
+        if array.dtype.kind == "f":
+            known = np.isfinite(array)
+            if ((array < 0.0) | (array > 1.0)).any():
+                raise InputError("grid: expected probabilities from 0 to 1, found others")
+            per_cent = np.rint(np.where(known, array, 0.0) * 100.0)
+            return OccupancyGrid(np.where(known, per_cent, UNKNOWN).astype(np.int8), resolution_m, origin)
+        if array.dtype.kind not in "iu":
+            raise InputError(f"grid: expected booleans or numbers, found {array.dtype}")
+        if array.size and (int(array.min()) < UNKNOWN or int(array.max()) > OCCUPIED):
+            raise InputError(f"grid: expected cells from -1 to 100, found {array.min()} to {array.max()}")
+        return OccupancyGrid(array.astype(np.int8), resolution_m, origin)
+
+    @property
+    def rows(self) -> int:
+        """Number of rows."""
+        return int(self.cells.shape[0])
+
+    @property
+    def columns(self) -> int:
+        """Number of columns."""
+        return int(self.cells.shape[1])
+
+    @property
+    def size_m(self) -> tuple[float, float]:
+        """Width and height in the grid's own frame."""
+        return self.columns * self.resolution_m, self.rows * self.resolution_m
+
+    def blocked(self, occupied_from: int = OCCUPIED_FROM, unknown_is_free: bool = False) -> BoolArray:
+        """(rows, columns) whether a cell is an obstacle."""
+        blocked: BoolArray = self.cells >= occupied_from
+        return blocked if unknown_is_free else blocked | (self.cells < 0)
+
+    def contains(self, row: int, column: int) -> bool:
+        """Whether there is such a cell."""
+        return 0 <= row < self.rows and 0 <= column < self.columns
+
+    def cells_at(self, points_xy_m: FloatArray) -> IntArray:
+        """Row and column (K, 2) of the cells that points (K, 2) lie in; outside the grid as they come.
+
+        With origin (0, -10) and 10 m cells these are equations 3.1 and 3.2 of the rover report.
+        """
+        points = np.asarray(points_xy_m, dtype=np.float64).reshape(-1, 2)
+        x, y = points[:, 0] - self.origin.x_m, points[:, 1] - self.origin.y_m
+        if self.origin.theta_rad != 0.0:
+            c, s = math.cos(self.origin.theta_rad), math.sin(self.origin.theta_rad)
+            x, y = c * x + s * y, c * y - s * x
+        height = self.rows * self.resolution_m
+        indices = np.stack([(height - y) / self.resolution_m, x / self.resolution_m], axis=1)
+        # Far beyond the grid is outside as well, without leaving the range of whole numbers.
+        return np.floor(np.clip(indices, -1.0, 2.0**40)).astype(np.int64)
+
+    def cell_at(self, x_m: float, y_m: float) -> tuple[int, int]:
+        """Row and column of the cell that a point lies in; outside the grid as they come."""
+        row, column = self.cells_at(np.array([[x_m, y_m]]))[0]
+        return int(row), int(column)
+
+    def centres_m(self, cells: IntArray | FloatArray) -> FloatArray:
+        """Centres (K, 2) x, y in the map frame of cells (K, 2) row, column."""
+        places = np.asarray(cells, dtype=np.float64).reshape(-1, 2)
+        x = (places[:, 1] + 0.5) * self.resolution_m
+        y = (self.rows - places[:, 0] - 0.5) * self.resolution_m
+        c, s = math.cos(self.origin.theta_rad), math.sin(self.origin.theta_rad)
+        return np.stack([self.origin.x_m + c * x - s * y, self.origin.y_m + s * x + c * y], axis=1)
+
+    def inflated(self, radius_m: float, unknown_is_free: bool = False) -> OccupancyGrid:
+        """Return a grid where cells nearer than ``radius_m`` to a blocked one, by centres, are occupied."""
+        if not (math.isfinite(radius_m) and radius_m >= 0.0):
+            raise InputError(f"grid: expected a radius of 0 m or more to inflate by, found {radius_m}")
+        near = near_blocked(self.blocked(unknown_is_free=unknown_is_free), radius_m / self.resolution_m)
+        return OccupancyGrid(np.where(near, np.int8(OCCUPIED), self.cells), self.resolution_m, self.origin)
+
+
+def squared_distances(blocked: BoolArray) -> NDArray[np.uint32]:
+    """(rows, columns) exact squared distance in cells, centre to centre, to the nearest blocked cell.
+
+    Raises
+    ------
+    InputError
+        For grids of more than 32,767 cells a side, and where memory does not suffice.
+    """
+    if max(blocked.shape) >= grid_distance.FAR:
+        raise InputError(
+            f"grid: expected at most {grid_distance.FAR - 1} cells a side for distances, "
+            f"found {blocked.shape}"
+        )
+    require_memory(4 * blocked.size, "distances on the grid")
+    return grid_distance.squared_distance(np.ascontiguousarray(blocked))
+
+
+def near_blocked(blocked: BoolArray, radius_cells: float) -> BoolArray:
+    """(rows, columns) whether a cell is blocked or its centre nearer than a radius to a blocked one's."""
+    if radius_cells <= 1.0 or not blocked.any():
+        return blocked.copy()
+    # Distances are whole when squared, so the comparison is exact: 5 cells away is not nearer than 5.
+    near: BoolArray = squared_distances(blocked) < radius_cells * radius_cells * (1.0 - 1e-12)
+    return near

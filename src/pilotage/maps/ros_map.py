@@ -1,0 +1,157 @@
+"""Maps of ROS's map_server: a YAML file with thresholds and an image beside it.
+
+The rules are those of the Navigation 2 map server: lightness s in [0, 1] means occupancy p = 1 - s, or
+p = s with ``negate``. ``trinary``: occupied above ``occupied_thresh``, free below ``free_thresh``, else
+unknown. ``scale``: the same, but between the thresholds from 0 to 100 in proportion, and what is not
+opaque is unknown. ``raw``: the pixel's value itself from 0 to 100, others unknown.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+import yaml
+from pydantic import Field, field_validator, model_validator
+
+from pilotage.core.config import Config, validate
+from pilotage.core.errors import InputError
+from pilotage.core.types import Pose2
+from pilotage.maps.grid_image import ByteArray, read_grey, write_grey
+from pilotage.maps.occupancy_grid import FREE, OCCUPIED, UNKNOWN, OccupancyArray, OccupancyGrid
+
+
+class RosMapFile(Config):
+    """The YAML file. ``origin`` is the pose x, y, yaw of the lower-left pixel's outer corner."""
+
+    image: str = Field(min_length=1)
+    mode: Literal["trinary", "scale", "raw"] = "trinary"
+    resolution: float = Field(gt=0.0)
+    origin: tuple[float, float, float]
+    negate: bool = False
+    occupied_thresh: float = Field(0.65, ge=0.0, le=1.0)
+    free_thresh: float = Field(0.25, ge=0.0, le=1.0)
+
+    @field_validator("origin", mode="before")
+    @classmethod
+    def _yaw_may_be_missing(cls, value: Any) -> Any:
+        return [*value, 0.0] if isinstance(value, list | tuple) and len(value) == 2 else value
+
+    @model_validator(mode="after")
+    def _thresholds_in_order(self) -> RosMapFile:
+        if not self.free_thresh < self.occupied_thresh:
+            raise ValueError(f"expected free_thresh below occupied_thresh {self.occupied_thresh}")
+        return self
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RosMap:
+    """A map as its files have it, so that it can be written back without loss.
+
+    Attributes
+    ----------
+    file
+        What the YAML file says.
+    pixels, alpha
+        (rows, columns) grey values as stored; alpha is None where the image has none.
+    """
+
+    file: RosMapFile
+    pixels: ByteArray
+    alpha: ByteArray | None = None
+
+    @staticmethod
+    def of(grid: OccupancyGrid, image: str) -> RosMap:
+        """Describe a grid so that nothing is lost: trinary where that is enough, else raw.
+
+        Parameters
+        ----------
+        image
+            Name of the image file, ending in .pgm or .png.
+        """
+        cells = grid.cells
+        origin = (grid.origin.x_m, grid.origin.y_m, grid.origin.theta_rad)
+        trinary = bool(np.isin(cells, (FREE, OCCUPIED, UNKNOWN)).all())
+        # 205 is what map_saver writes for unknown: just above its threshold for free.
+        values = np.arange(256, dtype=np.uint8)
+        if trinary:
+            values[[FREE, OCCUPIED, UNKNOWN]] = 254, 0, 205
+        file = RosMapFile(
+            image=image,
+            mode="trinary" if trinary else "raw",
+            resolution=grid.resolution_m,
+            origin=origin,
+            free_thresh=0.196,
+        )
+        return RosMap(file, values[cells.view(np.uint8)])
+
+    @property
+    def grid(self) -> OccupancyGrid:
+        """The map as a grid."""
+        x, y, yaw = self.file.origin
+        return OccupancyGrid(self._cells(), self.file.resolution, Pose2(x, y, yaw))
+
+    def _cells(self) -> OccupancyArray:
+        file = self.file
+        if file.mode == "raw":
+            raw = np.arange(256)
+            return np.where(raw <= OCCUPIED, raw, UNKNOWN).astype(np.int8)[self.pixels]
+        if file.mode == "trinary" and self.alpha is not None:
+            # map_server counts transparency as one more channel beside red, green and blue.
+            shade = (3.0 * self.pixels + self.alpha) / (4.0 * 255.0)
+            return self._occupancy(shade)
+        cells = self._occupancy(np.arange(256) / 255.0)[self.pixels]
+        if file.mode == "scale" and self.alpha is not None:
+            cells[self.alpha < 255] = UNKNOWN
+        return cells
+
+    def _occupancy(self, shade: Any) -> OccupancyArray:
+        """Per cent from lightness, in the modes trinary and scale."""
+        file = self.file
+        p = shade if file.negate else 1.0 - shade
+        between: Any = UNKNOWN
+        if file.mode == "scale":
+            between = np.rint((p - file.free_thresh) / (file.occupied_thresh - file.free_thresh) * 100.0)
+        cells = np.where(p > file.occupied_thresh, OCCUPIED, np.where(p < file.free_thresh, FREE, between))
+        return np.asarray(cells.astype(np.int8))
+
+
+def read_ros_map(path: Path) -> RosMap:
+    """Read a YAML file and its image, which lies beside it unless its path is absolute.
+
+    Raises
+    ------
+    InputError
+        Where a file is missing, a key is wrong, or the image is not grey.
+    """
+    return parse_ros_map(_load_yaml(path), path)
+
+
+def parse_ros_map(values: Any, path: Path) -> RosMap:
+    """Build a map from the parsed YAML file at ``path``; InputError as ``read_ros_map``."""
+    file = validate(RosMapFile, values, str(path))
+    image = path.parent / file.image
+    if not image.is_file():
+        raise InputError(f"{path}: image: expected a file '{image}', found none")
+    return RosMap(file, *read_grey(image))
+
+
+def write_ros_map(path: Path, ros_map: RosMap) -> None:
+    """Write the YAML file and, beside it, the image. What is there under these names is replaced."""
+    file = ros_map.file.model_copy(update={"image": Path(ros_map.file.image).name})
+    write_grey(path.parent / file.image, ros_map.pixels, ros_map.alpha)
+    values = file.model_dump()
+    values["negate"] = int(file.negate)
+    values["origin"] = list(file.origin)
+    path.write_text(yaml.safe_dump(values, sort_keys=False, default_flow_style=None, width=1000))
+
+
+def _load_yaml(path: Path) -> Any:
+    if not path.is_file():
+        raise InputError(f"map '{path}': expected a map file, found none there")
+    try:
+        return yaml.safe_load(path.read_text(encoding="utf-8"))
+    except (yaml.YAMLError, UnicodeDecodeError) as error:
+        raise InputError(f"{path}: expected YAML, found something else ({error})") from None
