@@ -173,3 +173,24 @@ def check_times(table: Table, t_s: FloatArray, *, repeats: bool = False) -> None
         raise InputError(
             f"{table.place(row)}: expected a time after {t_s[row - 1]:.6f} s, found {what} ({t_s[row]:.6f} s)"
         )
+
+
+def check_gaps(table: Table, t_s: FloatArray, factor: float = 1.5) -> None:
+    """Refuse a step in time longer than ``factor`` times the usual one: something was lost there.
+
+    Raises
+    ------
+    InputError
+        File and line of the first row after a gap.
+    """
+    if t_s.shape[0] < 3:
+        return
+    steps = np.diff(t_s)
+    usual = float(np.median(steps))
+    wide = np.flatnonzero(steps > factor * usual)
+    if wide.size:
+        row = int(wide[0]) + 1
+        raise InputError(
+            f"{table.place(row)}: expected a row every {usual:g} s, "
+            f"found a gap of {steps[row - 1]:.6g} s before it; cut the log there"
+        )
