@@ -9,6 +9,7 @@ import typer
 from pilotage import __version__
 from pilotage.cli.bench_scen import bench_scen
 from pilotage.cli.components import components
+from pilotage.cli.evaluate import evaluate
 from pilotage.cli.missions import missions
 from pilotage.cli.plan import plan
 from pilotage.cli.report import report
@@ -25,7 +26,18 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
 )
 
-for _command in (run, plan, bench_scen, report, missions, components, schema):
+COMMANDS = (
+    run,
+    plan,
+    bench_scen,
+    evaluate,
+    report,
+    missions,
+    components,
+    schema,
+)
+
+for _command in COMMANDS:
     app.command()(_command)
 
 

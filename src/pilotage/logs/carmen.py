@@ -1,0 +1,158 @@
+"""CARMEN logs, plain or gzipped: laser scans and odometry, as the Radish recordings are written.
+
+Lines that are read (all others are passed over):
+
+    ODOM x y theta v w acceleration ipc_time host logger_time
+    FLASER n r_1 .. r_n  x y theta  odom_x odom_y odom_theta  ipc_time host logger_time
+    ROBOTLASER1 type start_angle field_of_view step max_range accuracy remission_mode
+        n r_1 .. r_n  m rem_1 .. rem_m  laser_x laser_y laser_theta  x y theta
+        v w forward_safety side_safety turn_axis  ipc_time host logger_time
+
+A FLASER scan says nothing of its angles: n beams are spread from -90 deg over 180 deg with steps of
+180 deg / n (n = 180, the SICK scanner at one degree) or 180 deg / (n - 1) (odd n).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from pilotage.core.errors import InputError
+from pilotage.core.types import FloatArray
+from pilotage.logs.text import read_lines
+
+
+@dataclass(frozen=True, slots=True)
+class CarmenLog:
+    """Scans and odometry in the order of the file.
+
+    Attributes
+    ----------
+    t_s
+        (N,) times of the scans. Real logs were not always written in the order of time.
+    ranges_m
+        (N, B) in beam order, counter-clockwise.
+    angles_rad
+        (B,) directions of the beams in the scanner's frame.
+    laser_poses, robot_poses
+        (N, 3) x, y, theta as the log gives them: corrected ones in a corrected log.
+    odometry_t_s, odometry
+        (M,) and (M, 3) of the ODOM lines.
+    backward_times
+        How many scans carry a time before that of the scan before.
+    """
+
+    t_s: FloatArray
+    ranges_m: FloatArray
+    angles_rad: FloatArray
+    laser_poses: FloatArray
+    robot_poses: FloatArray
+    odometry_t_s: FloatArray
+    odometry: FloatArray
+    backward_times: int
+
+
+@dataclass(frozen=True, slots=True)
+class _Scan:
+    t_s: float
+    ranges_m: list[float]
+    first_rad: float
+    step_rad: float
+    laser: list[float]
+    robot: list[float]
+
+
+def read_carmen(path: Path) -> CarmenLog:
+    """Read a log.
+
+    Raises
+    ------
+    InputError
+        File and line of what is cut short or not finite, of a scan with another number of beams than the
+        ones before, or where there is no scan at all.
+    """
+    scans: list[_Scan] = []
+    odometry: list[list[float]] = []
+    for number, line in enumerate(read_lines(path), start=1):
+        words = line.split()
+        if not words:
+            continue
+        where = f"{path} line {number}"
+        if words[0] in {"FLASER", "ROBOTLASER1"}:
+            scan = _flaser(words, where) if words[0] == "FLASER" else _robotlaser(words, where)
+            if scans and len(scan.ranges_m) != len(scans[0].ranges_m):
+                raise InputError(
+                    f"{where}: expected {len(scans[0].ranges_m)} beams as before, found {len(scan.ranges_m)}"
+                )
+            scans.append(scan)
+        elif words[0] == "ODOM":
+            _expect(words, 10, where)
+            odometry.append([*_floats(words[1:4], where), *_floats(words[7:8], where)])
+    if not scans:
+        raise InputError(f"{path}: expected FLASER or ROBOTLASER1 lines, found none")
+    beams = len(scans[0].ranges_m)
+    t_s = np.array([scan.t_s for scan in scans])
+    poses = np.array(odometry).reshape(-1, 4)
+    return CarmenLog(
+        t_s,
+        np.array([scan.ranges_m for scan in scans]),
+        scans[0].first_rad + scans[0].step_rad * np.arange(beams, dtype=np.float64),
+        np.array([scan.laser for scan in scans]),
+        np.array([scan.robot for scan in scans]),
+        poses[:, 3].copy(),
+        poses[:, :3].copy(),
+        int(np.count_nonzero(np.diff(t_s) < 0.0)),
+    )
+
+
+def _flaser(words: list[str], where: str) -> _Scan:
+    beams = _count(words, 1, where)
+    _expect(words, beams + 11, where)
+    numbers = _floats(words[2 : beams + 9], where)
+    step = math.pi / (beams - 1 if beams % 2 else beams)
+    return _Scan(
+        numbers[-1],
+        numbers[:beams],
+        -0.5 * math.pi,
+        step,
+        numbers[beams : beams + 3],
+        numbers[beams + 3 : -1],
+    )
+
+
+def _robotlaser(words: list[str], where: str) -> _Scan:
+    beams = _count(words, 8, where)
+    remissions = _count(words, 9 + beams, where)
+    tail = 10 + beams + remissions
+    _expect(words, tail + 14, where)
+    first, _, step = _floats(words[2:5], where)
+    numbers = _floats(words[tail : tail + 12], where)
+    return _Scan(numbers[11], _floats(words[9 : 9 + beams], where), first, step, numbers[:3], numbers[3:6])
+
+
+def _count(words: list[str], index: int, where: str) -> int:
+    """Read a whole number of values."""
+    if len(words) <= index or not words[index].isdigit():
+        found = words[index] if len(words) > index else "the end of the line"
+        raise InputError(f"{where}: {words[0]}: expected a number of values, found {found}")
+    return int(words[index])
+
+
+def _expect(words: list[str], least: int, where: str) -> None:
+    if len(words) < least:
+        raise InputError(
+            f"{where}: {words[0]}: expected {least} words, found {len(words)}; the line is cut short"
+        )
+
+
+def _floats(words: list[str], where: str) -> list[float]:
+    try:
+        values = [float(word) for word in words]
+    except ValueError as error:
+        raise InputError(f"{where}: expected numbers, {error}") from None
+    if not all(math.isfinite(value) for value in values):
+        raise InputError(f"{where}: expected finite numbers, found NaN or infinity")
+    return values

@@ -1,0 +1,84 @@
+"""Gyroscope and magnetometer logs: ``t, x, y, z`` in seconds and degrees a second or gauss."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from enum import StrEnum
+from pathlib import Path
+
+from pilotage.core.errors import InputError
+from pilotage.core.types import FloatArray
+from pilotage.logs.text import check_times, read_table
+
+COLUMNS = ("t", "x", "y", "z")
+
+
+class HeadingSensor(StrEnum):
+    """What a log's numbers are."""
+
+    GYROSCOPE = "gyroscope"
+    MAGNETOMETER = "magnetometer"
+
+
+_WORDS = {
+    HeadingSensor.GYROSCOPE: ("gyro",),
+    HeadingSensor.MAGNETOMETER: ("compass", "magnet", "mag_"),
+}
+
+
+@dataclass(frozen=True, slots=True)
+class HeadingLog:
+    """One sensor's log.
+
+    Attributes
+    ----------
+    name
+        The recording's name: its folder's, or the file's own.
+    t_s
+        (N,) increasing, in general not evenly spaced.
+    values
+        (N, 3): rad/s about the axes (gyroscope) or gauss along them (magnetometer).
+    """
+
+    name: str
+    sensor: HeadingSensor
+    t_s: FloatArray
+    values: FloatArray
+
+
+def read_heading_log(path: Path) -> HeadingLog:
+    """Read a log; its file name says which sensor it is of.
+
+    Raises
+    ------
+    InputError
+        File and line of what is wrong, or a name that tells no sensor.
+    """
+    sensor = sensor_of(path)
+    if sensor is None:
+        words = sorted(word for group in _WORDS.values() for word in group)
+        raise InputError(f"{path}: expected one of {', '.join(words)} in the file's name, to know the sensor")
+    table = read_table(path, COLUMNS, separator=",", header=True)
+    t_s = table.values[:, 0].copy()
+    check_times(table, t_s)
+    values = table.values[:, 1:].copy()
+    if sensor is HeadingSensor.GYROSCOPE:
+        values *= math.pi / 180.0
+    return HeadingLog(path.resolve().parent.name, sensor, t_s, values)
+
+
+def sensor_of(path: Path) -> HeadingSensor | None:
+    """Tell the sensor by the file's name."""
+    name = path.name.lower()
+    return next((kind for kind, words in _WORDS.items() if any(word in name for word in words)), None)
+
+
+def find_heading_logs(place: Path) -> list[Path]:
+    """Return the logs in a folder and the folders in it, or the file itself."""
+    if not place.is_dir():
+        return [place]
+    found = sorted(path for path in place.rglob("*.csv") if sensor_of(path) is not None)
+    if not found:
+        raise InputError(f"{place}: expected gyroscope or magnetometer logs (*.csv) in it, found none")
+    return found

@@ -1,0 +1,168 @@
+"""The UTIAS multi-robot data set (Leung et al., IJRR 2011): one robot's log with truth and landmarks.
+
+Files of one folder: ``RobotN_Odometry.dat`` (t, v, w: logged velocity commands), ``RobotN_Measurement.dat``
+(t, barcode, range, bearing), ``RobotN_Groundtruth.dat`` (t, x, y, theta), ``Barcodes.dat`` (subject,
+barcode) and ``Landmark_Groundtruth.dat`` (subject, x, y, std x, std y). Subjects 1-5 are robots.
+
+The camera now and then misreads a barcode (3 of 2399 readings of robot 4 in set 6). Such readings are left
+out and named; where they are more than one in a hundred, the barcodes and the measurements do not belong
+together and the log is refused.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from pilotage.core.errors import InputError
+from pilotage.core.types import FloatArray, IntArray
+from pilotage.logs.text import Table, check_times, read_table
+from pilotage.maps.landmarks import Landmarks
+
+ROBOTS = range(1, 6)
+"""Subjects that move; the others are landmarks."""
+TRUTH_GAP_S = 0.5
+"""Longer than this without truth is a gap: nothing can be scored in it."""
+MISREAD_SHARE = 0.01
+"""More unknown barcodes than this share of the readings are no misreadings."""
+BARCODES = range(1, 100)
+"""Barcodes have two digits; what is outside comes from a damaged file."""
+
+
+@dataclass(frozen=True, slots=True)
+class MrclamLog:
+    """One robot's recording.
+
+    Attributes
+    ----------
+    odometry_t_s, speed_m_s, turn_rate_rad_s
+        (N,) logged velocity commands. Times are rounded to milliseconds, so two rows may share one.
+    measurement_t_s, subjects, ranges_m, bearings_rad
+        (M,) in the order of time; robots and landmarks, by subject.
+    truth_t_s, truth
+        (K,) and (K, 3) x, y, theta.
+    truth_gaps_s
+        (G, 2) begin and end of the stretches over 0.5 s without truth.
+    landmarks
+        The known points, by subject.
+    misread
+        File and line of the readings that were left out because nobody wears their barcode.
+    """
+
+    robot: int
+    odometry_t_s: FloatArray
+    speed_m_s: FloatArray
+    turn_rate_rad_s: FloatArray
+    measurement_t_s: FloatArray
+    subjects: IntArray
+    ranges_m: FloatArray
+    bearings_rad: FloatArray
+    truth_t_s: FloatArray
+    truth: FloatArray
+    truth_gaps_s: FloatArray
+    landmarks: Landmarks
+    misread: tuple[str, ...] = ()
+
+    @property
+    def of_landmarks(self) -> IntArray:
+        """Rows of the measurements that are of landmarks, not of robots."""
+        return np.flatnonzero(np.isin(self.subjects, self.landmarks.ids)).astype(np.int64)
+
+
+def read_mrclam(folder: Path, robot: int) -> MrclamLog:
+    """Read one robot's recording.
+
+    Raises
+    ------
+    InputError
+        File and line of what is missing, not finite, backward in time, or of a barcode that nobody wears.
+    """
+    if robot not in ROBOTS:
+        raise InputError(f"{folder}: expected a robot from {ROBOTS[0]} to {ROBOTS[-1]}, found {robot}")
+    if not folder.is_dir():
+        raise InputError(f"{folder}: expected the folder of a MRCLAM data set, found none there")
+    odometry = _timed(folder / f"Robot{robot}_Odometry.dat", ("t_s", "v_m_s", "w_rad_s"), repeats=True)
+    # One camera picture shows several barcodes at the same time.
+    seen = _timed(
+        folder / f"Robot{robot}_Measurement.dat", ("t_s", "barcode", "range_m", "bearing_rad"), repeats=True
+    )
+    truth = _timed(folder / f"Robot{robot}_Groundtruth.dat", ("t_s", "x_m", "y_m", "theta_rad"))
+    t_s = truth.values[:, 0].copy()
+    wide = np.flatnonzero(np.diff(t_s) > TRUTH_GAP_S)
+    negative = np.flatnonzero(seen.values[:, 2] < 0.0)
+    if negative.size:
+        raise InputError(
+            f"{seen.place(int(negative[0]))}: range_m: expected a range >= 0, found a negative one"
+        )
+    subjects, misread = _subjects(seen, read_barcodes(folder / "Barcodes.dat"))
+    known = subjects >= 0
+    return MrclamLog(
+        robot,
+        odometry.values[:, 0].copy(),
+        odometry.values[:, 1].copy(),
+        odometry.values[:, 2].copy(),
+        seen.values[known, 0],
+        subjects[known],
+        seen.values[known, 2],
+        seen.values[known, 3],
+        t_s,
+        truth.values[:, 1:].copy(),
+        np.column_stack([t_s[wide], t_s[wide + 1]]),
+        read_landmarks(folder / "Landmark_Groundtruth.dat"),
+        misread,
+    )
+
+
+def read_barcodes(path: Path) -> dict[int, int]:
+    """Read which subject wears which barcode; returns barcode to subject."""
+    table = read_table(path, ("subject", "barcode"))
+    pairs: dict[int, int] = {}
+    for row in range(table.values.shape[0]):
+        subject, barcode = _whole(table, row, 0, "subject"), _whole(table, row, 1, "barcode")
+        if barcode in pairs:
+            raise InputError(f"{table.place(row)}: expected every barcode once, found {barcode} again")
+        pairs[barcode] = subject
+    return pairs
+
+
+def read_landmarks(path: Path) -> Landmarks:
+    """Read the landmarks' places, by subject."""
+    table = read_table(path, ("subject", "x_m", "y_m", "x_std_m", "y_std_m"))
+    ids = [_whole(table, row, 0, "subject") for row in range(table.values.shape[0])]
+    for row, subject in enumerate(ids):
+        if subject in ids[:row]:
+            raise InputError(f"{table.place(row)}: expected every subject once, found {subject} again")
+    return Landmarks(np.array(ids, dtype=np.int64), table.values[:, 1:3])
+
+
+def _timed(path: Path, columns: tuple[str, ...], *, repeats: bool = False) -> Table:
+    table = read_table(path, columns)
+    check_times(table, table.values[:, 0], repeats=repeats)
+    return table
+
+
+def _subjects(seen: Table, barcodes: dict[int, int]) -> tuple[IntArray, tuple[str, ...]]:
+    """Subjects (M,) of the readings, -1 where the barcode is unknown, and where those stand."""
+    subjects = np.full(seen.values.shape[0], -1, dtype=np.int64)
+    unknown: list[str] = []
+    for row in range(subjects.shape[0]):
+        barcode = _whole(seen, row, 1, "barcode")
+        subjects[row] = barcodes.get(barcode, -1)
+        if subjects[row] >= 0:
+            continue
+        unknown.append(seen.place(row))
+        if barcode not in BARCODES or len(unknown) > MISREAD_SHARE * subjects.shape[0]:
+            raise InputError(
+                f"{seen.place(row)}: expected a barcode of Barcodes.dat, found {barcode}"
+                + (f" ({len(unknown)} unknown ones so far)" if len(unknown) > 1 else "")
+            )
+    return subjects, tuple(unknown)
+
+
+def _whole(table: Table, row: int, column: int, name: str) -> int:
+    value = float(table.values[row, column])
+    if value != int(value):
+        raise InputError(f"{table.place(row)}: {name}: expected a whole number, found {value:g}")
+    return int(value)

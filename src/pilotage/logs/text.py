@@ -1,0 +1,196 @@
+"""Text logs, plain or gzipped: lines, tables of numbers, and times that must not run backwards.
+
+Every complaint names the file and the line, so that the user can look at the place.
+"""
+
+from __future__ import annotations
+
+import gzip
+import zlib
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from pilotage.core.errors import InputError
+from pilotage.core.types import FloatArray, IntArray
+
+_GZIP_MAGIC = b"\x1f\x8b"
+
+
+@dataclass(frozen=True, slots=True)
+class Table:
+    """Numbers of a text file.
+
+    Attributes
+    ----------
+    path
+        Where they come from.
+    values
+        (N, C), all finite.
+    lines
+        (N,) line of the file, counted from 1, that each row stands on.
+    """
+
+    path: Path
+    values: FloatArray
+    lines: IntArray
+
+    def place(self, row: int) -> str:
+        """Name the file and the line of a row."""
+        return f"{self.path} line {int(self.lines[row])}"
+
+
+def read_lines(path: Path) -> list[str]:
+    """Read a text file, gzipped or not, into its lines.
+
+    Raises
+    ------
+    InputError
+        Where it cannot be read, is not text, or its compressed data end too early.
+    """
+    try:
+        data = path.read_bytes()
+        if data[:2] == _GZIP_MAGIC:
+            data = gzip.decompress(data)
+        return data.decode("utf-8-sig").splitlines()
+    except (EOFError, zlib.error, gzip.BadGzipFile):
+        raise InputError(f"{path} line {_whole_lines(path) + 1}: the compressed file is cut short") from None
+    except UnicodeDecodeError as error:
+        line = data[: error.start].count(b"\n") + 1
+        raise InputError(f"{path} line {line}: expected text, found bytes that are not UTF-8") from None
+    except OSError as error:
+        raise InputError(f"{path}: expected a readable file, found: {error.strerror or error}") from None
+
+
+def _whole_lines(path: Path) -> int:
+    """Count the whole lines that a damaged gzip file still holds."""
+    unpacker = zlib.decompressobj(wbits=31)
+    try:
+        return unpacker.decompress(path.read_bytes()).count(b"\n")
+    except zlib.error:
+        return 0
+
+
+def read_table(
+    path: Path, columns: Sequence[str], *, separator: str | None = None, header: bool = False
+) -> Table:
+    """Read a file that holds one row of numbers a line.
+
+    Parameters
+    ----------
+    columns
+        Names of the columns. Without ``header`` a line must hold just these, in this order.
+    separator
+        Between the numbers; None is any white space.
+    header
+        Whether the first line names the columns; those asked for are picked by name in any order.
+
+    Raises
+    ------
+    InputError
+        File and line of the first thing wrong: a missing column, a line that is too short or too long,
+        what is no number, NaN and infinity.
+    """
+    picked: list[int] | None = None
+    width = len(columns)
+    rows: list[list[float]] = []
+    places: list[int] = []
+    lines = read_lines(path)
+    for number, line in enumerate(lines, start=1):
+        text = line.strip()
+        if not text or text.startswith("#"):
+            continue
+        words = text.split(separator)
+        if header and picked is None:
+            picked = _pick(path, number, words, columns)
+            width = len(words)
+            continue
+        if len(words) != width:
+            raise InputError(
+                f"{path} line {number}: expected {width} columns"
+                + ("" if header else f" ({' '.join(columns)})")
+                + f", found {len(words)}{_last(number, len(lines), len(words) < width)}"
+            )
+        rows.append(_numbers(path, number, words if picked is None else [words[i] for i in picked], columns))
+        places.append(number)
+    if not rows:
+        raise InputError(f"{path} line {len(lines) + 1}: expected rows of numbers, found the end of the file")
+    return Table(path, np.array(rows), np.array(places, dtype=np.int64))
+
+
+def _pick(path: Path, number: int, names: Sequence[str], columns: Sequence[str]) -> list[int]:
+    found = [name.strip() for name in names]
+    missing = [name for name in columns if name not in found]
+    if missing:
+        raise InputError(
+            f"{path} line {number}: expected the columns {', '.join(columns)}; "
+            f"missing: {', '.join(missing)}; found: {', '.join(found)}"
+        )
+    return [found.index(name) for name in columns]
+
+
+def _last(number: int, total: int, short: bool) -> str:
+    return "; the file seems to be cut short" if short and number == total else ""
+
+
+def _numbers(path: Path, number: int, words: Sequence[str], columns: Sequence[str]) -> list[float]:
+    try:
+        values = [float(word) for word in words]
+    except ValueError:
+        bad = next(i for i, word in enumerate(words) if not _is_number(word))
+        raise InputError(
+            f"{path} line {number}: {columns[bad]}: expected a number, found '{words[bad].strip()}'"
+        ) from None
+    for name, value in zip(columns, values, strict=True):
+        if not abs(value) < float("inf"):
+            raise InputError(f"{path} line {number}: {name}: expected a finite number, found {value}")
+    return values
+
+
+def _is_number(word: str) -> bool:
+    try:
+        float(word)
+    except ValueError:
+        return False
+    return True
+
+
+def check_times(table: Table, t_s: FloatArray, *, repeats: bool = False) -> None:
+    """Refuse times that run backwards and, unless ``repeats``, times that are there twice.
+
+    Raises
+    ------
+    InputError
+        File and line of the first such row.
+    """
+    steps = np.diff(t_s)
+    wrong = np.flatnonzero(steps < 0.0 if repeats else steps <= 0.0)
+    if wrong.size:
+        row = int(wrong[0]) + 1
+        what = "the same time again" if steps[row - 1] == 0.0 else "a time before it"
+        raise InputError(
+            f"{table.place(row)}: expected a time after {t_s[row - 1]:.6f} s, found {what} ({t_s[row]:.6f} s)"
+        )
+
+
+def check_gaps(table: Table, t_s: FloatArray, factor: float = 1.5) -> None:
+    """Refuse a step in time longer than ``factor`` times the usual one: something was lost there.
+
+    Raises
+    ------
+    InputError
+        File and line of the first row after a gap.
+    """
+    if t_s.shape[0] < 3:
+        return
+    steps = np.diff(t_s)
+    usual = float(np.median(steps))
+    wide = np.flatnonzero(steps > factor * usual)
+    if wide.size:
+        row = int(wide[0]) + 1
+        raise InputError(
+            f"{table.place(row)}: expected a row every {usual:g} s, "
+            f"found a gap of {steps[row - 1]:.6g} s before it; cut the log there"
+        )

@@ -1,0 +1,46 @@
+"""Fabricated odometry logs: a robot that drives as told, and odometry with known errors."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pilotage.core.types import FloatArray
+from pilotage.logs.odometry_steps import OdometryForm, OdometrySteps, arc_ends
+
+
+def drive(way_m: FloatArray, turn_rad: FloatArray, heading_rad: float = 0.0) -> tuple[FloatArray, FloatArray]:
+    """True poses (N, 3) before and after each step."""
+    poses = np.zeros((way_m.shape[0] + 1, 3))
+    poses[0, 2] = heading_rad
+    for i in range(way_m.shape[0]):
+        poses[i + 1] = arc_ends(poses[i : i + 1], way_m[i : i + 1], turn_rad[i : i + 1])[0]
+    return poses[:-1], poses[1:]
+
+
+def log(
+    way_m: FloatArray,
+    turn_rad: FloatArray,
+    distance_error_m: FloatArray,
+    angle_error_rad: FloatArray,
+    *,
+    name: str = "log",
+    heading_rad: float = 0.0,
+) -> OdometrySteps:
+    """A log whose odometry errs by so much in each step."""
+    start, truth = drive(way_m, turn_rad, heading_rad)
+    claimed = arc_ends(start, way_m + distance_error_m, turn_rad + angle_error_rad)
+    return OdometrySteps(
+        name, OdometryForm.INCREMENTS, 0.1 * np.arange(1, way_m.shape[0] + 1), start, truth, claimed
+    )
+
+
+def offset_log(shift_m: FloatArray, heading_rad: float, seed: int, std_m: float = 3.5e-3) -> OdometrySteps:
+    """A straight drive of 500 steps of 0.1 m whose claims are shifted by (2,) in the map, with noise along x."""
+    n = 500
+    start, truth = drive(np.full(n, 0.1), np.zeros(n), heading_rad)
+    claimed = truth.copy()
+    claimed[:, :2] += shift_m
+    claimed[:, 0] += np.random.default_rng(seed).normal(0.0, std_m, n)
+    return OdometrySteps(
+        f"heading {heading_rad:.2f}", OdometryForm.RESET, 0.1 * np.arange(n), start, truth, claimed
+    )
