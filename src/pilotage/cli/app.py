@@ -8,6 +8,7 @@ import typer
 
 from pilotage import __version__
 from pilotage.cli.components import components
+from pilotage.cli.map_score import map_score
 from pilotage.cli.missions import missions
 from pilotage.cli.plan import plan
 from pilotage.cli.report import report
@@ -24,7 +25,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
 )
 
-for _command in (run, plan, report, missions, components, schema):
+for _command in (run, plan, map_score, report, missions, components, schema):
     app.command()(_command)
 
 
