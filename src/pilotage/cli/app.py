@@ -10,6 +10,7 @@ from pilotage import __version__
 from pilotage.cli.bench_scen import bench_scen
 from pilotage.cli.components import components
 from pilotage.cli.evaluate import evaluate
+from pilotage.cli.map_score import map_score
 from pilotage.cli.missions import missions
 from pilotage.cli.plan import plan
 from pilotage.cli.report import report
@@ -31,6 +32,7 @@ COMMANDS = (
     plan,
     bench_scen,
     evaluate,
+    map_score,
     report,
     missions,
     components,
