@@ -35,12 +35,17 @@ def log(
 
 
 def offset_log(shift_m: FloatArray, heading_rad: float, seed: int, std_m: float = 3.5e-3) -> OdometrySteps:
-    """A straight drive of 500 steps of 0.1 m whose claims are shifted by (2,) in the map, with noise along x."""
+    """A straight drive of 500 steps of 0.1 m; its claims are shifted by (2,) in the map, with noise in x."""
     n = 500
     start, truth = drive(np.full(n, 0.1), np.zeros(n), heading_rad)
     claimed = truth.copy()
     claimed[:, :2] += shift_m
     claimed[:, 0] += np.random.default_rng(seed).normal(0.0, std_m, n)
     return OdometrySteps(
-        f"heading {heading_rad:.2f}", OdometryForm.RESET, 0.1 * np.arange(n), start, truth, claimed
+        f"heading {heading_rad:.2f}",
+        OdometryForm.RESET,
+        0.1 * np.arange(n, dtype=np.float64),
+        start,
+        truth,
+        claimed,
     )

@@ -48,8 +48,9 @@ def normal_estimate(value: float, std: float, dof: float) -> Estimate:
 
 def variance_estimate(variance: float, dof: float) -> Estimate:
     """Interval of a variance of independent normal values: ``dof s^2 / sigma^2`` is chi-square."""
-    low, high = stats.chi2.ppf([0.5 + 0.5 * LEVEL, 0.5 - 0.5 * LEVEL], dof)
-    return Estimate(variance, variance * dof / float(low), variance * dof / float(high))
+    above = float(stats.chi2.ppf(0.5 + 0.5 * LEVEL, dof))
+    below = float(stats.chi2.ppf(0.5 - 0.5 * LEVEL, dof))
+    return Estimate(variance, variance * dof / above, variance * dof / below)
 
 
 @dataclass(frozen=True, slots=True)

@@ -22,13 +22,13 @@ def parameter_yaml(found: OdometryCalibration, sensor: str = "odometry") -> str:
         f"    {sensor}:",
         "      name: wheel-odometry",
     ]
-    for name in (
+    densities = (
         "distance_var_m2_per_m",
         "distance_var_m2_per_rad",
         "angle_var_rad2_per_rad",
         "angle_var_rad2_per_m",
-    ):
-        lines.append(_line(name, getattr(found, name), getattr(assumed, name)))
+    )
+    lines += [_line(name, getattr(found, name), getattr(assumed, name)) for name in densities]
     for name in ("distance_scale", "angle_scale"):
         estimate: Estimate | None = getattr(found, name)
         if estimate is not None and estimate.holds(1.0):
