@@ -4,22 +4,26 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from pilotage.kernels.jit import cache_is_cold
 from pilotage.missions.schema import ComponentChoice, Mission
 
 STEPS = 3
+FIRST_LIMIT_S = 300.0
+"""Simulated time of the rehearsal on a machine where nothing is compiled yet."""
 _WARM: set[tuple[str, ...]] = set()
 
 
 def warm_up(mission: Mission, simulate: Callable[[Mission], object]) -> None:
     """Take the first steps of a mission once, so that its times are not those of a compiler.
 
-    Done once a process for each set of components. What the mission's later course alone needs (a replan
-    around an obstacle, say) may still be compiled on the way.
+    Done once a process for each set of components. With an empty cache the mission is rehearsed whole:
+    what its later course needs (a replan around an obstacle, say) is compiled then too.
     """
     key = _components(mission)
     if key in _WARM:
         return
-    short = mission.run.model_copy(update={"time_limit_s": STEPS * mission.run.dt_s})
+    limit_s = FIRST_LIMIT_S if cache_is_cold() else STEPS * mission.run.dt_s
+    short = mission.run.model_copy(update={"time_limit_s": min(limit_s, mission.run.time_limit_s)})
     simulate(mission.model_copy(update={"run": short}))
     _WARM.add(key)
 
