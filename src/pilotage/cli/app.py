@@ -14,6 +14,7 @@ from pilotage.cli.plan import plan
 from pilotage.cli.report import report
 from pilotage.cli.run import run
 from pilotage.cli.schema import schema
+from pilotage.cli.track import track
 from pilotage.core.errors import InputError
 
 app = typer.Typer(
@@ -25,7 +26,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
 )
 
-for _command in (run, plan, map_score, report, missions, components, schema):
+for _command in (run, plan, track, map_score, report, missions, components, schema):
     app.command()(_command)
 
 

@@ -58,6 +58,40 @@ class Sheet:
         x, y, w = H @ np.array([point_px[0], point_px[1], 1.0])
         return np.asarray((H[:2, :2] - np.outer([x / w, y / w], H[2, :2])) / w)
 
+    def camera_m(self, image_shape: tuple[int, int]) -> Floats | None:
+        """Where the camera is over the floor, from how a square looks through it.
+
+        Assumes square pixels and the optical axis through the middle of the picture. Zhang, "A flexible new
+        technique for camera calibration", 2000, for one view.
+
+        Returns
+        -------
+        Floats | None
+            x, y, z in metres; None where the view is so straight from above that it does not tell.
+        """
+        centred = np.array([[1.0, 0.0, -image_shape[1] / 2.0], [0.0, 1.0, -image_shape[0] / 2.0], [0.0, 0.0, 1.0]])
+        H = centred @ self.to_image
+        first, second, third = (H / np.linalg.norm(H[:, :2])).T
+        # The floor's axes are at right angles and equally long: either condition gives the focal length.
+        across = first[2] * second[2]
+        unequal = first[2] ** 2 - second[2] ** 2
+        weight = np.array([across, unequal])
+        value = -np.array(
+            [first[:2] @ second[:2], first[:2] @ first[:2] - second[:2] @ second[:2]],
+        )
+        bend = float(weight @ weight)
+        focal_squared = float(weight @ value) / bend if bend > 0.0 else -1.0
+        if not (0.1 * max(image_shape)) ** 2 < focal_squared < (20.0 * max(image_shape)) ** 2:
+            return None
+        unproject = np.diag([focal_squared**-0.5, focal_squared**-0.5, 1.0])
+        axis_x, axis_y, origin = unproject @ first, unproject @ second, unproject @ third
+        scale = 2.0 / (np.linalg.norm(axis_x) + np.linalg.norm(axis_y))
+        axis_x, axis_y, origin = axis_x * scale, axis_y * scale, origin * scale
+        rotation = np.column_stack([axis_x, axis_y, np.cross(axis_x, axis_y)])
+        camera = -np.linalg.solve(rotation, origin)
+        # Image y points down, floor y up: the third axis may point into the floor.
+        return np.array([camera[0], camera[1], abs(camera[2])])
+
 
 def project(H: Floats, points: Floats) -> Floats:
     """Send points, shape (N, 2), through a homography."""
