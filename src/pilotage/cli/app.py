@@ -16,6 +16,7 @@ from pilotage.cli.plan import plan
 from pilotage.cli.report import report
 from pilotage.cli.run import run
 from pilotage.cli.schema import schema
+from pilotage.cli.track import track
 from pilotage.core.errors import InputError
 
 app = typer.Typer(
@@ -32,6 +33,7 @@ COMMANDS = (
     plan,
     bench_scen,
     evaluate,
+    track,
     map_score,
     report,
     missions,

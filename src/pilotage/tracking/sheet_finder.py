@@ -1,0 +1,187 @@
+"""Find the sheet in a film: the largest even quadrilateral, its sides fitted to the edges in the picture.
+
+Several frames are searched on their own and have to agree, so that a foot over a corner or a hand in the
+picture spoils some of them and not the answer.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pilotage.tracking.film import Image
+from pilotage.tracking.opencv import opencv
+from pilotage.tracking.sheet import in_map_order, turning
+
+Floats = NDArray[np.float64]
+
+_THRESHOLDS = 9
+_LEAST_AREA = 0.05
+"""Of the picture; less is no map that a robot could be measured on."""
+_LEAST_FIT = 0.85
+"""Overlap of region and quadrilateral over their union."""
+_FRAMES = 9
+_AGREE = 0.02
+"""Of the picture's longer side: corners within this are the same sheet."""
+
+
+def find_corners(samples: Sequence[Image]) -> tuple[Floats, float] | None:
+    """Find the corners of the sheet.
+
+    Parameters
+    ----------
+    samples
+        Frames spread over the film.
+
+    Returns
+    -------
+    tuple[Floats, float] | None
+        Corners in pixels of the samples (lower left, lower right, upper right, upper left), shape (4, 2),
+        and their standard deviation in pixels; None where no sheet is seen.
+    """
+    chosen = [samples[i] for i in np.unique(np.linspace(0, len(samples) - 1, _FRAMES).astype(int))]
+    quads = [(image, _best_quadrilateral(image)) for image in chosen]
+    refined = [refine_corners(image, quad) for image, quad in quads if quad is not None]
+    if not refined:
+        return None
+    side = max(chosen[0].shape[:2])
+    corners = np.array([quad for quad, _ in refined])
+    # The frame that most others agree with, and the median of those.
+    apart = np.abs(corners[:, None] - corners[None]).max(axis=(2, 3))
+    agreeing = corners[apart[np.argmin(np.median(apart, axis=1))] < _AGREE * side]
+    if len(agreeing) < max(1, len(chosen) // 3):
+        return None
+    middle = np.median(agreeing, axis=0)
+    spread = float(np.median(np.abs(agreeing - middle))) * 1.4826
+    return middle, float(np.hypot(spread, np.median([rms for _, rms in refined])))
+
+
+def refine_corners(image: Image, corners: Floats) -> tuple[Floats, float]:
+    """Fit the four sides to the edges in the picture and intersect them.
+
+    Returns
+    -------
+    tuple[Floats, float]
+        Corners, shape (4, 2), and the standard deviation of a corner in pixels; corners that would move
+        further than the searched band stay where they were.
+    """
+    grey = opencv().GaussianBlur(image.min(axis=2), (0, 0), 1.0).astype(np.float32)
+    centre = corners.mean(axis=0)
+    current, deviation = corners, 1.0
+    for band in (0.03, 0.012):
+        lines, deviations = [], []
+        for start, end in zip(current, np.roll(current, -1, axis=0), strict=True):
+            points = _edge_points(grey, start, end, centre, max(4.0, band * float(np.hypot(*(end - start)))))
+            line, spread = _robust_line(points)
+            lines.append(line)
+            deviations.append(spread / np.sqrt(max(len(points) / 4.0, 1.0)))
+        moved = np.array([_meet(lines[i - 1], lines[i]) for i in range(4)])
+        reach = 2.0 * band * float(np.max(np.hypot(*(current - np.roll(current, 1, axis=0)).T)))
+        if not np.all(np.isfinite(moved)) or np.hypot(*(moved - current).T).max() > reach:
+            break
+        current, deviation = moved, float(np.mean(deviations))
+    return current, deviation
+
+
+def _best_quadrilateral(image: Image) -> Floats | None:
+    """Return the most sheet-like quadrilateral of one frame."""
+    cv2 = opencv()
+    best, best_score = None, 0.0
+    light = cv2.GaussianBlur(image.min(axis=2), (5, 5), 0)
+    dark = cv2.GaussianBlur(255 - image.max(axis=2), (5, 5), 0)
+    for channel in (light, dark):
+        low, high = np.percentile(channel[::4, ::4], [10.0, 99.0])
+        for threshold in np.linspace(low, high, _THRESHOLDS + 2)[1:-1]:
+            mask = cv2.morphologyEx(
+                (channel > threshold).astype(np.uint8), cv2.MORPH_OPEN, np.ones((3, 3), np.uint8)
+            )
+            outlines, _ = cv2.findContours(mask, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE)
+            for outline in outlines:
+                quad, score = _as_quadrilateral(outline, image.shape[:2])
+                if quad is not None and score > best_score:
+                    best, best_score = quad, score
+    return None if best is None else in_map_order(best)
+
+
+def _as_quadrilateral(outline: NDArray[np.int32], shape: tuple[int, int]) -> tuple[Floats | None, float]:
+    cv2 = opencv()
+    height, width = shape
+    if cv2.contourArea(outline) < _LEAST_AREA * height * width:
+        return None, 0.0
+    hull = cv2.convexHull(outline)
+    length = cv2.arcLength(hull, True)
+    quad = None
+    for share in np.linspace(0.01, 0.12, 23):
+        corners = cv2.approxPolyDP(hull, share * length, True).reshape(-1, 2)
+        if len(corners) <= 4:
+            quad = corners.astype(np.float64) if len(corners) == 4 else None
+            break
+    if quad is None or not np.all(turning(quad) * turning(quad)[0] > 0.0):
+        return None, 0.0
+    fit = _overlap_over_union(outline, quad, shape)
+    if fit < _LEAST_FIT:
+        return None, 0.0
+    # A sheet with a corner on the border of the picture goes on beyond it: more likely a table or a wall.
+    margin = 2.0
+    inside = (quad > margin).all() and (quad < np.array([width, height]) - 1 - margin).all()
+    area_share = cv2.contourArea(quad.astype(np.float32)) / (height * width)
+    return quad, float(fit**2 * np.sqrt(area_share) * (1.0 if inside else 0.4))
+
+
+def _overlap_over_union(outline: NDArray[np.int32], quad: Floats, shape: tuple[int, int]) -> float:
+    cv2 = opencv()
+    region = cv2.drawContours(np.zeros(shape, np.uint8), [outline], -1, 1, -1)
+    ideal = cv2.fillConvexPoly(np.zeros(shape, np.uint8), np.rint(quad).astype(np.int32), 1)
+    common, either = int(np.count_nonzero(region & ideal)), int(np.count_nonzero(region | ideal))
+    return common / max(either, 1)
+
+
+def _edge_points(
+    grey: NDArray[np.float32], start: Floats, end: Floats, centre: Floats, reach: float
+) -> Floats:
+    """Strongest edge across a side at many places along it, shape (N, 2)."""
+    cv2 = opencv()
+    along = (end - start) / max(float(np.hypot(*(end - start))), 1e-9)
+    inward = np.array([-along[1], along[0]])
+    inward = inward if inward @ (centre - 0.5 * (start + end)) > 0.0 else -inward
+    share = np.linspace(0.04, 0.96, 80)[:, None]
+    offsets = np.arange(-reach, reach + 0.25, 0.5)
+    base = start + share * (end - start)
+    x = (base[:, :1] + offsets * inward[0]).astype(np.float32)
+    y = (base[:, 1:] + offsets * inward[1]).astype(np.float32)
+    profile = cv2.remap(grey, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+    # Half a pixel a step: the difference over four steps is the slope over two pixels.
+    slope = profile[:, 4:] - profile[:, :-4]
+    rising = slope if np.median(slope.sum(axis=1)) >= 0.0 else -slope
+    strongest = rising.argmax(axis=1)
+    strength = rising[np.arange(len(rising)), strongest]
+    clear = strength > max(0.4 * float(np.median(strength)), 3.0)
+    offset = offsets[2:-2][strongest]
+    return np.asarray((base + offset[:, None] * inward)[clear])
+
+
+def _robust_line(points: Floats) -> tuple[Floats, float]:
+    """Fit ``n . p = d`` by least squares, outliers weighed down; returns (nx, ny, d) and the spread."""
+    if len(points) < 10:
+        return np.full(3, np.nan), float("nan")
+    weight = np.ones(len(points))
+    line, spread = np.zeros(3), 1.0
+    for _ in range(12):
+        middle = np.average(points, axis=0, weights=weight)
+        away = points - middle
+        _, vectors = np.linalg.eigh((away * weight[:, None]).T @ away)
+        normal = vectors[:, 0]
+        residual = away @ normal
+        spread = max(1.4826 * float(np.median(np.abs(residual))), 0.1)
+        weight = 1.0 / (1.0 + (residual / (2.0 * spread)) ** 2) ** 2
+        line = np.array([normal[0], normal[1], normal @ middle])
+    return line, spread
+
+
+def _meet(first: Floats, second: Floats) -> Floats:
+    matrix = np.array([first[:2], second[:2]])
+    if not np.all(np.isfinite(matrix)) or abs(np.linalg.det(matrix)) < 1e-6:
+        return np.full(2, np.nan)
+    return np.linalg.solve(matrix, np.array([first[2], second[2]]))
