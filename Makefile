@@ -91,6 +91,7 @@ bench: setup  ## compare with the peers: installs them, prints a table of ratios
 	fi
 	@$(PY) -m benchmarks.peers $(ARGS)
 	@$(PY) -m benchmarks.ekf_peer
+	@$(PY) -m benchmarks.grid_peers
 
 COMPILE = $(UV) pip compile --quiet --universal --python-version 3.11 --generate-hashes --no-header --no-annotate
 

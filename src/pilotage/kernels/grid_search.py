@@ -134,8 +134,10 @@ def search(
         ring *= 2
     head = np.full(ring, -1, np.int64)
     # Every improvement is noted: as an entry of the queue and to set the gains back at the end.
-    noted = np.empty(1 << 16, np.uint32)
-    after = np.empty(1 << 16, np.int32)
+    # Memory that is never written to costs nothing; growing costs a copy.
+    room = max(64, states.shape[0] // 4)
+    noted = np.empty(room, np.uint32)
+    after = np.empty(room, np.int32)
     offset = offsets(stride)
     row_step, column_step = np.array(ROW_STEP), np.array(COLUMN_STEP)
     goal_row, goal_column = goal // stride, goal % stride

@@ -1,0 +1,136 @@
+"""Elevation models from files: raw arrays with a JSON side file, and GeoTIFF."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pilotage.core.errors import InputError
+from pilotage.core.types import Pose2
+from pilotage.maps.elevation import ElevationModel, HeightArray
+from pilotage.maps.memory import require_memory
+from pilotage.maps.occupancy_grid import CORNER
+
+FORMATS = {
+    "uint16-le": "<u2",
+    "uint16-be": ">u2",
+    "int16-le": "<i2",
+    "int16-be": ">i2",
+    "float32-le": "<f4",
+    "float32-be": ">f4",
+}
+
+
+def read_elevation(path: Path, origin: Pose2 | None = None) -> ElevationModel:
+    """Read a JSON side file (and the raw array that it describes) or a GeoTIFF.
+
+    Without ``origin`` a GeoTIFF lies where it says, another model with its corner at 0, 0.
+    Cells that are not square are stretched along the rows, linearly, until they are.
+
+    Raises
+    ------
+    InputError
+        Where a file is missing, cut short, or does not say what is needed; for a GeoTIFF also where
+        rasterio is not installed.
+    """
+    if not path.is_file():
+        raise InputError(f"elevation '{path}': expected a file there, found none")
+    if path.suffix.lower() == ".json":
+        return _read_raw(path, CORNER if origin is None else origin)
+    if path.suffix.lower() in (".tif", ".tiff"):
+        return _read_geotiff(path, origin)
+    raise InputError(f"elevation '{path}': expected a .json side file or a .tif, found '{path.suffix}'")
+
+
+def _read_raw(path: Path, origin: Pose2) -> ElevationModel:
+    """Keys: ``size`` (one number or [rows, columns]), ``format``, ``metresPerPixel`` or, apart for rows and
+    columns, ``metresPerPixelLat`` and ``metresPerPixelLon``; ``elevationMin`` and ``elevationMax`` for whole
+    numbers that stand for the part in between; ``file``, else the same name ending in .bin.
+    """
+    try:
+        side: Any = json.loads(path.read_text(encoding="utf-8"))
+    except ValueError as error:
+        raise InputError(f"{path}: expected JSON, found something else ({error})") from None
+    if not isinstance(side, dict):
+        raise InputError(f"{path}: expected an object with size and format, found another value")
+    size = side.get("size")
+    shape = [size, size] if isinstance(size, int) else size
+    if not (isinstance(shape, list) and len(shape) == 2 and all(isinstance(n, int) and n > 1 for n in shape)):
+        raise InputError(f"{path}: size: expected a number or [rows, columns] above 1, found {size!r}")
+    rows, columns = shape
+    name = side.get("format")
+    if name not in FORMATS:
+        raise InputError(f"{path}: format: expected one of {', '.join(FORMATS)}, found {name!r}")
+    dtype = np.dtype(FORMATS[name])
+    row_m = _positive(side, "metresPerPixelLat", path)
+    column_m = _positive(side, "metresPerPixelLon", path)
+    require_memory(12 * rows * columns, f"{path}: an elevation model of {columns} x {rows} cells")
+    raw = path.parent / side["file"] if isinstance(side.get("file"), str) else path.with_suffix(".bin")
+    if not raw.is_file():
+        raise InputError(f"{path}: expected its array in '{raw}', found none")
+    if raw.stat().st_size != rows * columns * dtype.itemsize:
+        raise InputError(
+            f"{raw}: expected {rows * columns * dtype.itemsize} bytes for {columns} x {rows} values, "
+            f"found {raw.stat().st_size}; the file seems to be cut short or of another size"
+        )
+    heights = np.fromfile(raw, dtype=dtype).reshape(rows, columns).astype(np.float32)
+    if "elevationMin" in side or "elevationMax" in side:
+        low, high = _number(side, "elevationMin", path), _number(side, "elevationMax", path)
+        whole = np.iinfo(dtype).max if dtype.kind in "iu" else 1.0
+        heights = np.float32(low) + heights * np.float32((high - low) / whole)
+    return _squared(heights, row_m, column_m, origin)
+
+
+def _number(side: dict[str, Any], key: str, path: Path) -> float:
+    value = side.get(key)
+    if not isinstance(value, int | float) or not math.isfinite(value):
+        raise InputError(f"{path}: {key}: expected a number, found {value!r}")
+    return float(value)
+
+
+def _positive(side: dict[str, Any], key: str, path: Path) -> float:
+    key = key if key in side else "metresPerPixel"
+    value = _number(side, key, path)
+    if value <= 0.0:
+        raise InputError(f"{path}: {key}: expected a resolution above 0 m, found {value}")
+    return value
+
+
+def _read_geotiff(path: Path, origin: Pose2 | None) -> ElevationModel:
+    """The first band; the cells' size in the file's own units, which have to be metres."""
+    try:
+        import rasterio
+    except ImportError:
+        raise InputError(
+            f"elevation '{path}': GeoTIFF needs rasterio; install pilotage with the extra 'terrain'"
+        ) from None
+    try:
+        with rasterio.open(path) as source:
+            require_memory(12 * source.width * source.height, f"elevation '{path}'")
+            band = source.read(1, masked=True).astype(np.float32)
+            column_m, row_m = abs(source.transform.a), abs(source.transform.e)
+            corner = Pose2(float(source.bounds.left), float(source.bounds.bottom), 0.0)
+            geographic = source.crs is not None and source.crs.is_geographic
+    except rasterio.errors.RasterioError as error:
+        raise InputError(f"elevation '{path}': cannot be read ({error})") from None
+    if geographic:
+        raise InputError(f"elevation '{path}': expected metres, found degrees; project it first (gdalwarp)")
+    heights = np.asarray(band.filled(np.nan), dtype=np.float32)
+    return _squared(heights, row_m, column_m, corner if origin is None else origin)
+
+
+def _squared(heights: HeightArray, row_m: float, column_m: float, origin: Pose2) -> ElevationModel:
+    """Stretch the rows linearly until the cells are square."""
+    if math.isclose(row_m, column_m, rel_tol=1e-9):
+        return ElevationModel(heights, row_m, origin)
+    columns = heights.shape[1]
+    count = max(2, round(columns * column_m / row_m))
+    at = np.clip((np.arange(count) + 0.5) * row_m / column_m - 0.5, 0.0, columns - 1.0)
+    left = np.minimum(at.astype(np.int64), columns - 2)
+    part = (at - left).astype(np.float32)
+    stretched = heights[:, left] * (1.0 - part) + heights[:, left + 1] * part
+    return ElevationModel(np.asarray(stretched, dtype=np.float32), row_m, origin)

@@ -1,0 +1,64 @@
+"""Landmarks as coloured points on a grey picture of the ground."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+from scipy import ndimage
+
+from pilotage.core.errors import InputError
+from pilotage.core.types import Pose2
+from pilotage.maps.landmarks import Landmarks
+from pilotage.maps.memory import require_memory
+from pilotage.maps.occupancy_grid import CORNER, OccupancyGrid
+
+YELLOW = (255, 220, 0)
+
+COLOURED_FROM = 48
+"""Least difference of a pixel's greatest and least channel that is a colour, not a grey."""
+
+
+def read_landmark_image(path: Path, resolution_m: float, origin: Pose2 = CORNER) -> Landmarks:
+    """Take the coloured spots of an image as landmarks: one each, at its middle, numbered from the top.
+
+    Spots that touch, over corners too, are one landmark.
+
+    Raises
+    ------
+    InputError
+        Where the image is missing or unreadable, or has no coloured spot.
+    """
+    if not path.is_file():
+        raise InputError(f"image '{path}': expected an image there, found none")
+    limit, Image.MAX_IMAGE_PIXELS = Image.MAX_IMAGE_PIXELS, None
+    try:
+        with Image.open(path) as image:
+            columns, rows = image.size
+            require_memory(12 * rows * columns, f"image '{path}'")
+            pixels = np.asarray(image.convert("RGB"))
+    except (OSError, SyntaxError, ValueError) as error:
+        raise InputError(f"image '{path}': cannot be read ({error}); it may be cut short") from None
+    finally:
+        Image.MAX_IMAGE_PIXELS = limit
+    coloured = pixels.max(axis=2) - pixels.min(axis=2) >= COLOURED_FROM
+    labels, count = ndimage.label(coloured, np.ones((3, 3), dtype=np.int64))
+    if count == 0:
+        raise InputError(f"image '{path}': expected landmarks as coloured points, found grey pixels only")
+    middles = np.array(ndimage.center_of_mass(coloured, labels, np.arange(1, count + 1)))
+    place = OccupancyGrid.of(np.zeros(coloured.shape, np.bool_), resolution_m, origin)
+    return Landmarks(np.arange(count), place.centres_m(middles))
+
+
+def write_landmark_image(
+    path: Path, ground: NDArray[np.uint8], grid: OccupancyGrid, marks: Landmarks
+) -> None:
+    """Write a grey picture (rows, columns) of ``grid`` with the landmarks as yellow crosses."""
+    pixels = np.repeat(ground[..., None], 3, axis=2)
+    for row_step, column_step in ((0, 0), (0, 1), (1, 0), (0, -1), (-1, 0)):
+        cells = grid.cells_at(marks.points_xy_m) + np.array([row_step, column_step])
+        inside = ((cells >= 0) & (cells < ground.shape)).all(axis=1)
+        pixels[tuple(cells[inside].T)] = YELLOW
+    Image.fromarray(pixels).save(path)

@@ -1,0 +1,196 @@
+"""Elevation, slopes, the crater terrain and its images."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.interpolate import CubicSpline
+
+from pilotage.core.errors import InputError
+from pilotage.core.types import FloatArray, Pose2
+from pilotage.maps.crater_terrain import CraterTerrainConfig, crater_terrain
+from pilotage.maps.elevation import ElevationModel
+from pilotage.maps.elevation_file import read_elevation
+from pilotage.maps.grid_image import read_grey, read_hazard_image
+from pilotage.maps.landmark_image import read_landmark_image
+from pilotage.maps.occupancy_grid import squared_distances
+from pilotage.maps.terrain_images import write_terrain_images
+from pilotage.stack.planning.grid_space import GridSpace
+
+SMALL = CraterTerrainConfig(
+    rows=150,
+    columns=225,
+    resolution_m=200.0,
+    least_crater_m=600.0,
+    craters_per_km2=0.1,
+    landmarks_per_km2=0.02,
+)
+
+
+class TestElevation:
+    def test_slope_of_a_plane(self) -> None:
+        rows, columns = np.indices((7, 9))
+        model = ElevationModel((columns * 3.0 - rows * 4.0).astype(np.float32), 10.0)
+        assert np.allclose(model.slope_rad(), math.atan(0.5), atol=1e-6)
+        assert model.hazards(26.0).blocked().all()
+        assert not model.hazards(27.0).blocked().any()
+
+    def test_unknown_heights_are_unknown_hazards(self) -> None:
+        heights = np.zeros((5, 5), np.float32)
+        heights[2, 2] = math.nan
+        cells = ElevationModel(heights, 1.0).hazards(20.0).cells
+        assert cells[0, 0] == 0
+        assert cells[2, 1] == -1
+
+    def test_slopes_toward_the_sun_are_brighter(self) -> None:
+        """Light from the north-west."""
+        ramp = np.tile(np.arange(5, dtype=np.float32), (5, 1))
+        assert ElevationModel(ramp, 1.0).shaded()[2, 2] > ElevationModel(-ramp, 1.0).shaded()[2, 2]
+        assert ElevationModel(ramp.T, 1.0).shaded()[2, 2] > ElevationModel(-ramp.T, 1.0).shaded()[2, 2]
+
+    @pytest.mark.parametrize("limit", [0.0, 90.0, -3.0, math.nan])
+    def test_misuse(self, limit: float) -> None:
+        model = ElevationModel(np.zeros((2, 2), np.float32), 1.0)
+        with pytest.raises(InputError, match="slope limit"):
+            model.hazards(limit)
+        with pytest.raises(InputError, match="resolution"):
+            ElevationModel(np.zeros((2, 2), np.float32), 0.0)
+
+
+class TestFiles:
+    SIDE: dict[str, Any] = {  # noqa: RUF012 - read only
+        "size": [2, 3],
+        "format": "uint16-le",
+        "metresPerPixel": 10.0,
+        "elevationMin": -100.0,
+        "elevationMax": 555.35,
+    }
+
+    def write(self, folder: Path, **change: Any) -> Path:
+        np.array([[0, 1000, 65535], [0, 0, 0]], "<u2").tofile(folder / "ground.bin")
+        side = {key: value for key, value in (self.SIDE | change).items() if value is not None}
+        (folder / "ground.json").write_text(json.dumps(side))
+        return folder / "ground.json"
+
+    def test_raw_array_with_side_file(self, tmp_path: Path) -> None:
+        model = read_elevation(self.write(tmp_path), Pose2(1.0, 2.0, 0.0))
+        assert np.allclose(model.elevation_m[0], [-100.0, -90.0, 555.35], atol=1e-3)
+        assert (model.resolution_m, model.origin.x_m) == (10.0, 1.0)
+
+    def test_cells_become_square(self, tmp_path: Path) -> None:
+        path = self.write(tmp_path, metresPerPixel=None, metresPerPixelLat=10.0, metresPerPixelLon=20.0)
+        model = read_elevation(path)
+        assert model.elevation_m.shape == (2, 6)
+        assert model.elevation_m[0, 1] == pytest.approx(-100.0 + 0.25 * 10.0, abs=1e-2)
+
+    @pytest.mark.parametrize(
+        ("change", "match"),
+        [
+            ({"size": [3, 3]}, "18 bytes"),
+            ({"size": "big"}, "size"),
+            ({"format": "uint7"}, "format"),
+            ({"metresPerPixel": 0}, "above 0"),
+            ({"elevationMax": None}, "elevationMax"),
+            ({"file": "other.bin"}, "other.bin"),
+            ({"size": 3_000_000}, "needs about"),
+        ],
+    )
+    def test_bad_files_are_refused(self, tmp_path: Path, change: dict[str, Any], match: str) -> None:
+        with pytest.raises(InputError, match=match):
+            read_elevation(self.write(tmp_path, **change))
+
+    def test_missing_or_other(self, tmp_path: Path) -> None:
+        for name in ("none.json", "none.tif"):
+            with pytest.raises(InputError, match="found none"):
+                read_elevation(tmp_path / name)
+        (tmp_path / "a.json").write_text("{")
+        (tmp_path / "a.txt").write_text("")
+        for name in ("a.json", "a.txt"):
+            with pytest.raises(InputError, match="expected"):
+                read_elevation(tmp_path / name)
+
+
+class TestCraterTerrain:
+    def test_same_seed_same_ground(self) -> None:
+        one, two = crater_terrain(SMALL), crater_terrain(SMALL)
+        other = crater_terrain(SMALL.model_copy(update={"seed": SMALL.seed + 1}))
+        assert (one.elevation.elevation_m == two.elevation.elevation_m).all()
+        assert (one.landmarks.points_xy_m == two.landmarks.points_xy_m).all()
+        assert not (one.elevation.elevation_m == other.elevation.elevation_m).all()
+        assert (one.hazards.cells == one.elevation.hazards(SMALL.slope_limit_deg).cells).all()
+
+    def test_images_hold_what_was_made(self, tmp_path: Path) -> None:
+        terrain = crater_terrain(SMALL)
+        ground, obstacles, marks = write_terrain_images(tmp_path / "mars", terrain)
+        assert (read_grey(ground)[0] == terrain.elevation.shaded()).all()
+        origin = terrain.hazards.origin
+        assert (read_hazard_image(obstacles, 200.0, origin).cells == terrain.hazards.cells).all()
+        found = read_landmark_image(marks, 200.0, origin).points_xy_m
+        true = terrain.landmarks.points_xy_m
+        away = np.hypot(*(true[:, None] - found[None]).transpose(2, 0, 1))
+        # Crosses that touch are read as one.
+        alone = np.sort(np.hypot(*(true[:, None] - true[None]).transpose(2, 0, 1)), axis=1)[:, 1] > 900.0
+        inside = (true > 400.0).all(axis=1) & (true < [44_600.0, 29_600.0]).all(axis=1)
+        assert np.count_nonzero(alone & inside) > 5
+        assert away.min(axis=1)[alone & inside].max() <= 100.0 * math.sqrt(2.0) + 1e-6
+        with pytest.raises(InputError, match="coloured points"):
+            read_landmark_image(ground, 200.0, origin)
+
+    def test_the_default_suits_the_rovers_tasks(self) -> None:
+        """Hazards on a fifth of the map; P0, P1, P2 joined by free ground; no straight way from P1 to P2."""
+        terrain = crater_terrain(CraterTerrainConfig())
+        grid = terrain.hazards
+        assert grid.cells.shape == (3000, 4500)
+        blocked = grid.blocked()
+        assert blocked.mean() >= 0.2
+        cells = [grid.cell_at(*place) for place in ((42380, 11590), (33070, 19010.0000002), (10870, 25670))]
+        assert cells[1:] == [(1097, 3307), (432, 1087)]
+        space = GridSpace(blocked)
+        assert space.connected(cells[0], cells[1])
+        assert space.connected(cells[1], cells[2])
+        assert not space.sees(cells[1], cells[2], cut_corners=True)
+        first = along(TASK_1_M)
+        away_m = 10.0 * np.sqrt(squared_distances(blocked)[tuple(grid.cells_at(first).T)])
+        assert 20.0 < away_m.min() < 100.0
+        second = space.shortest(cells[1], cells[2])
+        assert second is not None
+        for way_m in (first, grid.centres_m(second.cells[::5])):
+            assert stretches_without(terrain.landmarks.points_xy_m, way_m) >= 3
+
+
+def along(corners_m: FloatArray) -> FloatArray:
+    """Points about 10 m apart, by a curve of third degree through the corners."""
+    s = np.arange(len(corners_m))
+    return np.asarray(CubicSpline(s, corners_m)(np.linspace(0.0, s[-1], 120 * len(s))))
+
+
+def stretches_without(marks_m: FloatArray, way_m: FloatArray) -> int:
+    """How many stretches of over 1 km have no landmark within 500 m."""
+    away_m = np.hypot(*(way_m[:, None] - marks_m[None]).transpose(2, 0, 1)).min(axis=1)
+    s_m = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(way_m, axis=0).T))])
+    seen_m = s_m[away_m < 500.0]
+    return int(np.count_nonzero(np.diff(seen_m) > 1000.0))
+
+
+TASK_1_M = np.array(
+    [
+        [42380.0, 11590.0],
+        [42228.6, 12778.8],
+        [41877.9, 13925.0],
+        [41343.2, 14997.8],
+        [40643.3, 15971.0],
+        [39800.7, 16823.7],
+        [38839.9, 17540.9],
+        [37786.4, 18113.5],
+        [36665.3, 18538.9],
+        [35499.6, 18820.8],
+        [34309.5, 18970.4],
+        [33110.4, 19010.0],
+    ]
+)
+"""The move to the pose P1 with the report's gains, 30,000 s apart."""
