@@ -70,6 +70,7 @@ class Annotator:
         self._mask: Image = np.zeros(self._shape[:2], np.uint8)
         self._last: NDArray[np.int32] | None = None
         self._frame = 0
+        self._radius_m = 0.0 if scene.look is None else scene.look.radius_m
         size_m, grid = scene.options.size_m, scene.options.grid
         for k in range(grid + 1):
             at = size_m * k / grid
@@ -91,7 +92,7 @@ class Annotator:
         cv2.copyTo(self._overlay, self._mask, picture)
         if sighting is not None:
             angle = np.linspace(0.0, 2.0 * np.pi, 37)
-            rim = sighting.centre_m + sighting.radius_m * np.column_stack([np.cos(angle), np.sin(angle)])
+            rim = sighting.centre_m + self._radius_m * np.column_stack([np.cos(angle), np.sin(angle)])
             cv2.polylines(picture, [self._pixels(rim)], True, _DISC, 2, cv2.LINE_AA)
         found = "" if sighting is not None else "  robot not found"
         label = f"frame {self._frame}{found}"

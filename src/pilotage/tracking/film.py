@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pilotage.core.errors import InputError
-from pilotage.tracking.opencv import opencv
+from pilotage.tracking.opencv import hushed, opencv
 
 Image = NDArray[np.uint8]
 Advance = Callable[[int, int], None]
@@ -122,7 +122,8 @@ def _opened(path: Path) -> Iterator[Any]:
     cv2 = opencv()
     if not path.is_file():
         raise InputError(f"{path}: no such video file")
-    capture = cv2.VideoCapture(str(path), cv2.CAP_FFMPEG)
+    with hushed():
+        capture = cv2.VideoCapture(str(path), cv2.CAP_FFMPEG)
     try:
         if not capture.isOpened():
             raise InputError(f"{path}: this is not a video that can be decoded")

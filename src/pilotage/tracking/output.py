@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import io
 import json
 import queue
 import threading
@@ -13,7 +14,7 @@ from pilotage.core.errors import InputError
 from pilotage.maps.cell_map_text import features_only, format_cell_map
 from pilotage.tracking.drawing import Annotator, top_view
 from pilotage.tracking.film import Image
-from pilotage.tracking.opencv import opencv
+from pilotage.tracking.opencv import hushed, opencv
 from pilotage.tracking.robot_finder import Sighting
 from pilotage.tracking.scene import Scene
 from pilotage.tracking.track import Track
@@ -46,10 +47,11 @@ class AnnotatedFilm:
         # VP8 halves the colours' resolution: odd sizes are cut by a pixel.
         self._size = (width - width % 2, height - height % 2)
         self._annotator = Annotator(scene)
-        self._writer = cv2.VideoWriter(
-            str(self._partial), cv2.VideoWriter_fourcc(*"VP80"), scene.film.fps, self._size
-        )
+        code = cv2.VideoWriter_fourcc(*"VP80")
+        with hushed():
+            self._writer = cv2.VideoWriter(str(self._partial), code, scene.film.fps, self._size)
         if not self._writer.isOpened():
+            self._partial.unlink(missing_ok=True)
             raise InputError(
                 "this OpenCV cannot write VP8 video; leave out --out, or install its pip package"
             )
@@ -105,8 +107,6 @@ def write_track(folder: Path, track: Track) -> list[Path]:
 
 
 def _csv(rows: list[dict[str, Any]]) -> str:
-    import io
-
     text = io.StringIO()
     writer = csv.DictWriter(text, _COLUMNS, lineterminator="\n")
     writer.writeheader()

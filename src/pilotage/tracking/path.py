@@ -47,7 +47,6 @@ class Path:
 def build_path(
     sightings: Sequence[tuple[int, Sighting]],
     sheet: Sheet,
-    radius_m: float,
     camera_m: Floats | None = None,
     height_m: float = 0.0,
 ) -> Path:
@@ -59,8 +58,6 @@ def build_path(
         Frame numbers and what was seen in them.
     sheet
         Geometry of the sheet.
-    radius_m
-        Learned radius of the disc.
     camera_m
         Where the camera is, x, y, z; needed to take the height back.
     height_m
@@ -69,15 +66,14 @@ def build_path(
     numbers = np.array([frame for frame, _ in sightings], dtype=np.int64)
     seen_m = np.array([one.centre_m for _, one in sightings]).reshape(-1, 2)
     points_px = project(sheet.to_image, seen_m)
-    hidden_m = np.maximum(radius_m - np.array([one.radius_m for _, one in sightings]), 0.0)
+    hidden_m = np.array([one.spread_m for _, one in sightings])
     points_m = seen_m
     if camera_m is not None and height_m > 0.0:
         points_m = seen_m + (camera_m[:2] - seen_m) * height_m / camera_m[2]
     jitter_px = _jitter(numbers, points_px)
     metres_per_px = np.array([np.linalg.norm(sheet.metres_per_px(point)) / 2**0.5 for point in points_px])
     from_pixels = np.hypot(jitter_px, sheet.corner_std_px) * metres_per_px
-    # A disc that looks smaller by d can lie anywhere within d of what is seen: d / sqrt(3) if evenly.
-    return Path(numbers, points_px, points_m, np.hypot(from_pixels, hidden_m / 3**0.5), jitter_px)
+    return Path(numbers, points_px, points_m, np.hypot(from_pixels, hidden_m), jitter_px)
 
 
 def visited_cells(path: Path, size_m: float, grid: int) -> NDArray[np.bool_]:

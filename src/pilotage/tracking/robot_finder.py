@@ -1,9 +1,8 @@
 """Find the robot's disc in each frame.
 
-Colour alone sits off the disc's centre: boards and wheels cover part of it, unevenly. What is left of the rim
-still fixes the disc: the coloured pixels are sent to the floor, and their smallest enclosing circle is taken
-there, where the disc is round. Pixels that would make the circle larger than the disc is known to be (a
-reflection, a wire) are dropped, the furthest first.
+Colour alone sits off the disc's centre: boards and wheels cover part of it, unevenly. What is left of the
+rim still fixes the disc. First the coloured pixels are sent to the floor, where the disc is round, and their
+smallest enclosing circle is taken; then a disc of the learned radius is laid so that it holds the colour and no paper.
 """
 
 from __future__ import annotations
@@ -32,16 +31,31 @@ _TOLERANCE = 1.06
 _JUMP = 1.5
 """In radii: how far the robot may be from where it was, for each frame since."""
 _MOST_JUMP = 8.0
+_PATCH_RADIUS = 18
+"""Pixels of the disc's radius on the patch of floor where it is fitted."""
 _LEAST_SHARE = 0.2
 """Of the learned number of pixels; less is not the robot."""
 
 
 @dataclass(frozen=True, slots=True)
 class Sighting:
-    """The robot in one frame: centre and radius on the floor, and how many pixels say so."""
+    """The robot in one frame.
+
+    Attributes
+    ----------
+    centre_m
+        Centre of the disc, sent to the floor, shape (2,).
+    radius_m
+        Radius of the circle around the coloured pixels.
+    spread_m
+        Standard deviation of the places that would fit about as well.
+    pixels
+        Coloured pixels.
+    """
 
     centre_m: Floats
     radius_m: float
+    spread_m: float
     pixels: int
 
 
@@ -124,7 +138,7 @@ def learn_look(
     if not seen:
         raise InputError("no robot of this colour is on the map in this video; give its colour by --hsv")
     # Half covered discs look smaller, reflections larger: a quantile above the median is the disc.
-    radius = radius_m if radius_m is not None else float(np.quantile([one.radius_m for one in seen], 0.6))
+    radius = radius_m if radius_m is not None else float(np.quantile([one.radius_m for one in seen], 0.7))
     return RobotLook(colour, radius, float(np.median([one.pixels for one in seen])))
 
 
@@ -135,6 +149,14 @@ class _View:
         self._background = background
         self._reduction = reduction
         self._to_floor = sheet.to_floor
+        self._to_image = sheet.to_image
+        x, y = background.region.offset
+        middle = 0.5 * (reduction - 1) / reduction
+        self._from_full = np.array(
+            [[1.0 / reduction, 0.0, -middle - x], [0.0, 1.0 / reduction, -middle - y], [0.0, 0.0, 1.0]]
+        )
+        away = np.arange(-_PATCH_RADIUS, _PATCH_RADIUS + 1)
+        self._disc = (away[:, None] ** 2 + away**2 <= _PATCH_RADIUS**2).astype(np.float32)
         rows, columns = background.image.shape[:2]
         cv2 = opencv()
         joined_px = max(3, round(_JOIN * float(np.sqrt(np.count_nonzero(background.region.mask)))) | 1)
@@ -163,12 +185,42 @@ class _View:
             box = (slice(top, top + height), slice(left, left + width))
             own = labels[box] == label
             inside = not bool(np.any(own & self._rim[box]))
-            sighting = self._disc(np.where(own, mask[box], 0).astype(np.uint8), (left, top), radius_m)
+            coloured = np.where(own, mask[box], 0).astype(np.uint8)
+            sighting = self._circle(coloured, (left, top), radius_m)
+            if sighting is not None and radius_m is not None:
+                sighting = self._fitted(sighting, coloured, (left, top), foreground, radius_m)
             if sighting is not None:
                 found.append((sighting, inside))
         return found
 
-    def _disc(self, mask: Image, corner: tuple[int, int], radius_m: float | None) -> Sighting | None:
+    def _fitted(
+        self, first: Sighting, coloured: Image, corner: tuple[int, int], foreground: Image, radius_m: float
+    ) -> Sighting:
+        """Lay the disc so that it holds the colour and no paper, on a patch of the floor seen from above."""
+        cv2 = opencv()
+        step_m = radius_m / _PATCH_RADIUS
+        half = round(2.2 * _PATCH_RADIUS)
+        origin_m = first.centre_m - half * step_m
+        to_metres = np.array([[step_m, 0.0, origin_m[0]], [0.0, step_m, origin_m[1]], [0.0, 0.0, 1.0]])
+        to_cut = self._from_full @ self._to_image @ to_metres
+        size = (2 * half + 1, 2 * half + 1)
+        shift = np.array([[1.0, 0.0, -corner[0]], [0.0, 1.0, -corner[1]], [0.0, 0.0, 1.0]])
+        how = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
+        colour = cv2.warpPerspective(coloured, shift @ to_cut, size, flags=how).astype(np.float32)
+        body = cv2.warpPerspective(foreground, to_cut, size, flags=how).astype(np.float32)
+        gain = (colour - (255.0 - body)) / 255.0
+        score = cv2.filter2D(gain, cv2.CV_32F, self._disc, borderType=cv2.BORDER_CONSTANT)
+        # All places within a few pixels' worth of the best: their middle is steadier than the best one.
+        worth = np.clip(score - (score.max() - 0.02 * float(self._disc.sum())), 0.0, None)
+        rows, columns = np.nonzero(worth)
+        weights = worth[rows, columns]
+        places = np.column_stack([columns, rows]).astype(np.float64)
+        middle = np.average(places, axis=0, weights=weights)
+        variance = np.average(((places - middle) ** 2).mean(axis=1), weights=weights)
+        spread_m = float(np.sqrt(variance)) * step_m
+        return Sighting(origin_m + middle * step_m, first.radius_m, spread_m, first.pixels)
+
+    def _circle(self, mask: Image, corner: tuple[int, int], radius_m: float | None) -> Sighting | None:
         cv2 = opencv()
         count, labels, stats, _ = cv2.connectedComponentsWithStats(mask)
         areas = stats[:, cv2.CC_STAT_AREA].astype(np.float64)
@@ -182,7 +234,7 @@ class _View:
         # The middle of a reduced pixel in pixels of the film.
         full = points * self._reduction + 0.5 * (self._reduction - 1)
         centre, radius = enclosing_circle(project(self._to_floor, full), radius_m)
-        return Sighting(centre, radius, int(areas[kept].sum()))
+        return Sighting(centre, radius, 0.0, int(areas[kept].sum()))
 
 
 def enclosing_circle(points: Floats, most_radius: float | None = None) -> tuple[Floats, float]:

@@ -124,13 +124,7 @@ def follow(
         count = number + 1
         if advance is not None:
             advance(count, scene.film.frames)
-    path = build_path(
-        sightings,
-        scene.sheet,
-        0.0 if look is None else look.radius_m,
-        scene.camera_m,
-        scene.options.height_m,
-    )
+    path = build_path(sightings, scene.sheet, scene.camera_m, scene.options.height_m)
     return Track(scene, count, path, visited_cells(path, scene.options.size_m, scene.options.grid))
 
 
