@@ -2,7 +2,8 @@
 
 Colour alone sits off the disc's centre: boards and wheels cover part of it, unevenly. What is left of the
 rim still fixes the disc. First the coloured pixels are sent to the floor, where the disc is round, and their
-smallest enclosing circle is taken; then a disc of the learned radius is laid so that it holds the colour and no paper.
+smallest enclosing circle is taken; then a disc of the learned radius is laid so that it holds the colour and
+no paper.
 """
 
 from __future__ import annotations
