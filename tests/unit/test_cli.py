@@ -270,6 +270,68 @@ def test_every_command_has_help(pilotage: Call, command: str) -> None:
     assert f"pilotage {command}" in answer.out
 
 
+# A whole run, nothing standing in
+
+
+def test_a_run_that_fails_in_the_field_leaves_its_evidence(pilotage: Call, tmp_path: Path) -> None:
+    words = ["--set", "run.time_limit_s=1", "--seed", "5", "--json", "--out", str(tmp_path / "new" / "runs")]
+    answer = pilotage("run", "museum-1", *words)
+    assert answer.code == 1
+    told = json.loads(answer.out)
+    assert told["success"] is False
+    assert "time limit" in told["reason"]
+    run_dir = Path(told["run_dir"])
+    assert [run_dir] == list((tmp_path / "new" / "runs").iterdir())
+    assert json.loads((run_dir / "metrics.json").read_text()) == told
+    assert (run_dir / "report.html").stat().st_size > 0
+    again = pilotage("run", str(run_dir / "mission.yaml"), "--json", "--no-report", "--out", str(tmp_path))
+    clocks = {"run_dir", "wall_time_s", "steps_per_s", "planning_time_s", "first_solution_s"}
+    repeated = json.loads(again.out)
+    assert {key: repeated[key] for key in told.keys() - clocks} == {
+        key: told[key] for key in told.keys() - clocks
+    }
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (["museum1"], "did you mean 'museum-1'?"),
+        (["nothing.yaml"], "'nothing.yaml': expected a YAML file"),
+        (["museum-1", "--set", "stack.localiser.gate=0.9"], "did you mean 'localizer'?"),
+        (["museum-1", "--set", "stack.localizer.gat=0.9"], "did you mean 'gate'?"),
+        (["museum-1", "--set", "stack.localizer.name=ekf-landmark"], "did you mean 'ekf-landmarks'?"),
+        (["museum-1", "--set", "robot.body.radius_m=30 cm"], "found '30 cm'"),
+        (["museum-1", "--set", "stack.initial.x_var_m2=nan"], "finite number, found nan"),
+        (["museum-1", "--set", "robot.sensors.odometry.distance_var_m2_per_m=-1"], "found -1"),
+        (["museum-1", "--set", "world.start.x_m=0"], "world.start: expected"),
+        (["museum-1", "--set", "world.goal.x_m=100"], "world.goal: expected"),
+        (["museum-1", "--set", "world.map=museun"], "did you mean 'museum'?"),
+        (["museum-1", "--set", "gate"], "expected KEY=VALUE"),
+    ],
+)
+def test_bad_input_is_one_line_and_writes_nothing(
+    pilotage: Call, tmp_path: Path, words: list[str], told: str
+) -> None:
+    answer = pilotage("run", *words, "--out", str(tmp_path / "runs"))
+    assert (answer.code, answer.out) == (2, "")
+    assert answer.err.startswith("pilotage: ")
+    assert answer.err.count("\n") == 1
+    assert told in answer.err
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_run_interrupted_while_it_writes_leaves_nothing(
+    pilotage: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def interrupt(*_: object, **__: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(np, "savez_compressed", interrupt)
+    answer = pilotage("run", "museum-1", "--set", "run.time_limit_s=1", "--json", "--out", str(tmp_path))
+    assert answer == Answer(130, "", "pilotage: interrupted\n")
+    assert list(tmp_path.iterdir()) == []
+
+
 # Parts
 
 
@@ -388,3 +450,29 @@ def test_a_closed_pipe_is_quiet() -> None:
     done = subprocess.run(command, stdout=writer, stderr=subprocess.PIPE, text=True, check=False)
     os.close(writer)
     assert (done.returncode, done.stderr) == (141, "")
+
+
+def test_a_stream_that_was_closed_is_no_bug() -> None:
+    shell = f"'{sys.executable}' -m pilotage.cli.main zzz >&-; echo $? >&2; exec 2>&-; "
+    done = subprocess.run(
+        ["sh", "-c", shell + f"'{sys.executable}' -m pilotage.cli.main --version"],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.stdout == f"pilotage {__version__}\n"
+    assert done.stderr.count("\n") == 2
+    assert done.stderr.splitlines()[-1] == "2"
+
+
+def test_a_terminal_that_lacks_a_character_shows_a_question_mark() -> None:
+    script = "import sys; from pilotage.cli.main import main; main(['run', '\u2212.yaml']); print('\u2212')"
+    done = subprocess.run(
+        [sys.executable, "-c", script],
+        capture_output=True,
+        text=True,
+        check=False,
+        env={**os.environ, "PYTHONIOENCODING": "ascii"},
+    )
+    assert done.stdout == "?\n"
+    assert done.stderr.startswith("pilotage: mission file '?.yaml'")

@@ -6,9 +6,11 @@ the output went away, 70 a bug (the only case that shows a traceback).
 
 from __future__ import annotations
 
+import io
 import os
 import sys
 from collections.abc import Sequence
+from pathlib import Path
 
 BAD_INPUT = 2
 BUG = 70
@@ -26,6 +28,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """
     # Everything is imported inside, so that Ctrl-C during an import is one line as well.
     try:
+        _steady_streams()
         return _run(sys.argv[1:] if arguments is None else list(arguments))
     except KeyboardInterrupt:
         return _say("interrupted", INTERRUPTED)
@@ -33,6 +36,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
         # The interpreter flushes standard output once more at exit: give it somewhere to go.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return BROKEN_PIPE
+
+
+def _steady_streams() -> None:
+    """A stream that was closed leads nowhere; a character that its encoding lacks is shown as '?'."""
+    for name in ("stdout", "stderr"):
+        stream = getattr(sys, name)
+        if stream is None:
+            setattr(sys, name, Path(os.devnull).open("w"))  # noqa: SIM115 - open until the process ends
+        elif isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="replace")
 
 
 def _run(arguments: list[str]) -> int:
