@@ -40,6 +40,15 @@ class TestElevation:
         assert model.hazards(26.0).blocked().all()
         assert not model.hazards(27.0).blocked().any()
 
+    def test_heights_between_the_cells(self) -> None:
+        """Row 0 is on top; the grid is turned by a quarter about its corner."""
+        model = ElevationModel(
+            np.array([[0.0, 10.0], [20.0, 40.0]], np.float32), 2.0, Pose2(5.0, 0.0, math.pi / 2)
+        )
+        points = np.array([[4.0, 1.0], [2.0, 1.0], [4.0, 3.0], [3.0, 2.0]])
+        assert np.allclose(model.heights_at(points), [20.0, 0.0, 40.0, 17.5])
+        assert np.isnan(model.heights_at(np.array([[9.0, 9.0]]))).all()
+
     def test_unknown_heights_are_unknown_hazards(self) -> None:
         heights = np.zeros((5, 5), np.float32)
         heights[2, 2] = math.nan

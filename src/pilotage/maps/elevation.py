@@ -6,9 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import ndimage
 
 from pilotage.core.errors import InputError
-from pilotage.core.types import Pose2
+from pilotage.core.types import FloatArray, Pose2
 from pilotage.maps.occupancy_grid import CORNER, FREE, OCCUPIED, UNKNOWN, OccupancyGrid
 
 HeightArray = NDArray[np.float32]
@@ -42,6 +43,20 @@ class ElevationModel:
             raise InputError("elevation: expected finite heights or NaN, found infinity")
         heights.flags.writeable = False
         object.__setattr__(self, "elevation_m", heights)
+
+    def heights_at(self, points_xy_m: FloatArray) -> FloatArray:
+        """Heights (K,) at points (K, 2) in the map frame, bilinear between cell centres; NaN outside."""
+        points = np.asarray(points_xy_m, dtype=np.float64).reshape(-1, 2)
+        x, y = points[:, 0] - self.origin.x_m, points[:, 1] - self.origin.y_m
+        c, s = np.cos(self.origin.theta_rad), np.sin(self.origin.theta_rad)
+        columns = (c * x + s * y) / self.resolution_m - 0.5
+        rows = self.elevation_m.shape[0] - 0.5 - (c * y - s * x) / self.resolution_m
+        at = np.stack([rows, columns])
+        # The outer half of the outermost cells has their height.
+        heights = ndimage.map_coordinates(self.elevation_m.astype(np.float64), at, order=1, mode="nearest")
+        last = np.array(self.elevation_m.shape)[:, None] - 0.5
+        heights[((at < -0.5) | (at > last)).any(axis=0)] = np.nan
+        return np.asarray(heights, dtype=np.float64)
 
     def slope_rad(self) -> HeightArray:
         """(rows, columns) steepest slope by central differences; NaN beside unknown heights."""

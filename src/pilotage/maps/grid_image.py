@@ -93,7 +93,8 @@ def write_grey(path: Path, grey: ByteArray, alpha: ByteArray | None = None) -> N
     image = Image.fromarray(grey)
     if alpha is not None:
         image = Image.merge("LA", (image, Image.fromarray(alpha)))
-    image.save(path)
+    # PNG loses nothing at any level; the default takes five times as long.
+    image.save(path, compress_level=1)
 
 
 def read_hazard_image(

@@ -61,4 +61,4 @@ def write_landmark_image(
         cells = grid.cells_at(marks.points_xy_m) + np.array([row_step, column_step])
         inside = ((cells >= 0) & (cells < ground.shape)).all(axis=1)
         pixels[tuple(cells[inside].T)] = YELLOW
-    Image.fromarray(pixels).save(path)
+    Image.fromarray(pixels).save(path, compress_level=1)
