@@ -16,7 +16,9 @@ from pilotage.cli.output import print_columns, print_json
 
 
 def track(
-    video: Annotated[str, typer.Argument(metavar="VIDEO", help="A film by a fixed camera that sees the map.")],
+    video: Annotated[
+        str, typer.Argument(metavar="VIDEO", help="A film by a fixed camera that sees the map.")
+    ],
     corners: Annotated[
         str | None,
         typer.Option(
@@ -37,7 +39,8 @@ def track(
         float, typer.Option(metavar="M", help="Height of that disc over the floor, taken back in metres.")
     ] = 0.0,
     out: Annotated[
-        str | None, typer.Option(metavar="DIR", help="Write JSON, CSV, map picture, text maps, annotated film.")
+        str | None,
+        typer.Option(metavar="DIR", help="Write JSON, CSV, map picture, text maps, annotated film."),
     ] = None,
     json: Json = False,
 ) -> int:
@@ -96,7 +99,7 @@ def track(
 
 @contextmanager
 def _progress(what: str) -> Iterator[Callable[[int, int], None]]:
-    """Yield what shows how far a pass over the film is: a bar on a terminal, now and then a line elsewhere."""
+    """Yield what shows how far a pass is: a bar on a terminal, a line now and then elsewhere."""
     terminal = sys.stderr.isatty()
     period_s = 0.1 if terminal else 10.0
     due_s = time.monotonic() + (0.0 if terminal else period_s)

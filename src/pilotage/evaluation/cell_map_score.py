@@ -9,8 +9,8 @@ feature_precision_neutral
     The same with true feature cells touched by less than 8 % left out, whatever the robot says of them: the
     truth itself is known to 3 mm, which is 4 % of a cell's side.
 feature_recall, feature_recall_all
-    Correct features over the true features that a robot can observe (line cells, and box cells with a box-free
-    neighbour to the north, south, east or west), and over all true features.
+    Correct features over the true features that a robot can observe (line cells, and box cells with a
+    box-free neighbour to the north, south, east or west), and over all true features.
 free_accuracy
     Correct free cells over all free cells on the robot's map.
 explored_accuracy

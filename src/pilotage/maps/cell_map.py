@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import IntEnum
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +18,7 @@ from pilotage.core.errors import InputError
 States = NDArray[np.uint8]
 Mask = NDArray[np.bool_]
 Floats = NDArray[np.float64]
+_T = TypeVar("_T", bound=np.generic)
 
 
 class CellState(IntEnum):
@@ -134,7 +136,7 @@ def grown(mask: Mask) -> Mask:
     return result
 
 
-def _shifted(values: NDArray[np.generic], rows: int, columns: int, fill: np.generic) -> NDArray[np.generic]:
+def _shifted(values: NDArray[_T], rows: int, columns: int, fill: _T) -> NDArray[_T]:
     height, width = values.shape
     result = np.full_like(values, fill)
     inside_rows = slice(max(rows, 0), height + min(rows, 0))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from pathlib import Path
 from typing import Annotated
 
@@ -88,7 +89,7 @@ def length_inside(points_m: Floats, x_edges_m: Floats, y_edges_m: Floats) -> Flo
         Lengths, shape (rows, columns); what lies outside the grid is left out.
     """
     inside = np.zeros((y_edges_m.size - 1, x_edges_m.size - 1))
-    for start, end in zip(points_m[:-1], points_m[1:], strict=True):
+    for start, end in pairwise(points_m):
         step = end - start
         cuts = [0.0, 1.0]
         for edges, first, along in ((x_edges_m, start[0], step[0]), (y_edges_m, start[1], step[1])):
@@ -109,4 +110,4 @@ def _overlap(edges_m: Floats, low_m: float, high_m: float) -> Floats:
     """Share of each interval that lies between two bounds."""
     lower, upper = min(low_m, high_m), max(low_m, high_m)
     common = np.minimum(edges_m[1:], upper) - np.maximum(edges_m[:-1], lower)
-    return np.maximum(common, 0.0) / np.diff(edges_m)
+    return np.asarray(np.maximum(common, 0.0) / np.diff(edges_m))

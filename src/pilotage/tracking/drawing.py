@@ -49,7 +49,9 @@ def top_view(track: Track) -> Image:
         return np.rint(np.column_stack([scaled[:, 0], side - 1 - scaled[:, 1]])).astype(np.int32)
 
     for segment, tape in zip(scene.marks.edges_m, scene.marks.is_tape, strict=True):
-        cv2.polylines(picture, [pixels(segment.reshape(2, 2))], False, _TAPE if tape else _BOX, 2, cv2.LINE_AA)
+        cv2.polylines(
+            picture, [pixels(segment.reshape(2, 2))], False, _TAPE if tape else _BOX, 2, cv2.LINE_AA
+        )
     if len(track.path.frames):
         points = pixels(track.path.points_m)
         cv2.polylines(picture, [points], False, _PATH, 2, cv2.LINE_AA)

@@ -52,7 +52,9 @@ class AnnotatedFilm:
             self._writer = cv2.VideoWriter(str(self._partial), code, scene.film.fps, self._size)
         if not self._writer.isOpened():
             self._partial.unlink(missing_ok=True)
-            raise InputError("this OpenCV cannot write VP8 video; leave out --out, or install its pip package")
+            raise InputError(
+                "this OpenCV cannot write VP8 video; leave out --out, or install its pip package"
+            )
         self._queue: queue.Queue[tuple[Image, Sighting | None] | None] = queue.Queue(_WAITING)
         self._failure: BaseException | None = None
         self._thread = threading.Thread(target=self._write_all, daemon=True)

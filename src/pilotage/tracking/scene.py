@@ -63,7 +63,9 @@ class TrackOptions:
         if self.radius_m is not None and not 0.0 < self.radius_m < 0.5 * self.size_m:
             raise InputError(f"--radius: expected metres between 0 and half the map, found {self.radius_m}")
         if not 0.0 <= self.height_m < self.size_m:
-            raise InputError(f"--height: expected metres >= 0 and below the map's size, found {self.height_m}")
+            raise InputError(
+                f"--height: expected metres >= 0 and below the map's size, found {self.height_m}"
+            )
 
 
 @dataclass(frozen=True, slots=True)
@@ -117,7 +119,9 @@ def learn_scene(path: Path, options: TrackOptions, advance: Advance | None = Non
     look: RobotLook | None = None
     if film.frames > 1:
         background, look = _learn_robot(film.samples, background, sheet, film.reduction, options)
-    marks = find_marks(_empty_top_view(background, reduced_corners), background.paper, options.size_m, options.grid)
+    marks = find_marks(
+        _empty_top_view(background, reduced_corners), background.paper, options.size_m, options.grid
+    )
     return Scene(film, options, sheet, background, marks, look)
 
 
@@ -132,7 +136,7 @@ def _find_sheet(film: FilmSummary, options: TrackOptions, path: Path) -> Sheet:
     found = find_corners(film.samples)
     if found is None:
         raise InputError(
-            f"{path}: no map found: no even four-cornered sheet stands out in this video; give it by --corners"
+            f"{path}: no map found: no even four-cornered sheet stands out in this video; try --corners"
         )
     corners, deviation = found
     full = corners * film.reduction + 0.5 * (film.reduction - 1)

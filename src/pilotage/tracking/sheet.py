@@ -69,7 +69,9 @@ class Sheet:
         Floats | None
             x, y, z in metres; None where the view is so straight from above that it does not tell.
         """
-        centred = np.array([[1.0, 0.0, -image_shape[1] / 2.0], [0.0, 1.0, -image_shape[0] / 2.0], [0.0, 0.0, 1.0]])
+        centred = np.array(
+            [[1.0, 0.0, -image_shape[1] / 2.0], [0.0, 1.0, -image_shape[0] / 2.0], [0.0, 0.0, 1.0]]
+        )
         H = centred @ self.to_image
         first, second, third = (H / np.linalg.norm(H[:, :2])).T
         # The floor's axes are at right angles and equally long: either condition gives the focal length.

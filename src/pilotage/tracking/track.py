@@ -87,7 +87,9 @@ class Track:
                     "y_m": round(float(m[1]), 5),
                     "std_m": round(float(std), 5),
                 }
-                for frame, px, m, std in zip(path.frames, path.points_px, path.points_m, path.std_m, strict=True)
+                for frame, px, m, std in zip(
+                    path.frames, path.points_px, path.points_m, path.std_m, strict=True
+                )
             ],
         }
 
