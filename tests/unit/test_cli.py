@@ -19,6 +19,7 @@ import numpy as np
 import pytest
 
 from pilotage import __version__
+from pilotage.cli.app import COMMANDS
 from pilotage.cli.main import main
 from pilotage.cli.output import ProgressLine, plain, progress_line, progress_text
 from pilotage.cli.plan import parse_pose
@@ -108,6 +109,8 @@ def pilotage(capsys: pytest.CaptureFixture[str]) -> Callable[..., Answer]:
 
 
 Call = Callable[..., Answer]
+
+DOCS = Path(__file__).parents[2] / "docs"
 
 
 # run
@@ -263,8 +266,9 @@ def test_version_and_help(pilotage: Call) -> None:
     assert "Exit codes" in asked.out
 
 
-@pytest.mark.parametrize("command", ["run", "plan", "report", "missions", "components", "schema"])
-def test_every_command_has_help(pilotage: Call, command: str) -> None:
+@pytest.mark.parametrize("command", [function.__name__.replace("_", "-") for function in COMMANDS])
+def test_every_command_has_help_and_stands_in_the_docs(pilotage: Call, command: str) -> None:
+    assert f"`{command}" in (DOCS / "command-line.md").read_text()
     answer = pilotage(command, "--help")
     assert answer.code == 0
     assert f"pilotage {command}" in answer.out
@@ -280,6 +284,8 @@ def test_a_run_that_fails_in_the_field_leaves_its_evidence(pilotage: Call, tmp_p
     told = json.loads(answer.out)
     assert told["success"] is False
     assert "time limit" in told["reason"]
+    explained = (DOCS / "run-folder.md").read_text()
+    assert [key for key in told if f"`{key}`" not in explained] == []
     run_dir = Path(told["run_dir"])
     assert [run_dir] == list((tmp_path / "new" / "runs").iterdir())
     assert json.loads((run_dir / "metrics.json").read_text()) == told
@@ -318,6 +324,25 @@ def test_bad_input_is_one_line_and_writes_nothing(
     assert answer.err.count("\n") == 1
     assert told in answer.err
     assert list(tmp_path.iterdir()) == []
+
+
+def test_where_nothing_can_be_written_no_run_begins(
+    lab: Lab, pilotage: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    file = tmp_path / "file"
+    file.touch()
+    for out in (file, file / "below"):
+        answer = pilotage("run", "museum-1", "--out", str(out))
+        assert (answer.code, answer.out) == (2, "")
+        assert answer.err == f"pilotage: --out: expected a folder, found a file: '{file}'\n"
+    # Root may write anywhere, so the refusal is pretended.
+    monkeypatch.setattr(os, "access", lambda *_: False)
+    for words in ((), ("--out", "a/b")):
+        answer = pilotage("run", "museum-1", *words)
+        assert (answer.code, answer.out) == (2, "")
+        assert answer.err.count("\n") == 1
+        assert "read-only" in answer.err
+    assert lab.asked == {}
 
 
 def test_a_run_interrupted_while_it_writes_leaves_nothing(

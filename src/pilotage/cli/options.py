@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+from pathlib import Path
 from typing import Annotated, TypeAlias
 
 import typer
@@ -22,8 +24,28 @@ def parse_seed(text: str) -> int:
     return int(text)
 
 
+def parse_out(text: str) -> Path:
+    """Read a folder to write into, which may yet have to be made.
+
+    Raises
+    ------
+    InputError
+        If it cannot be made or written to: better told before a run than after it.
+    """
+    out = Path(text)
+    there = next(folder for folder in (out, *out.absolute().parents) if folder.exists())
+    if not there.is_dir():
+        raise InputError(f"--out: expected a folder, found a file: '{there}'")
+    if not os.access(there, os.W_OK | os.X_OK):
+        raise InputError(f"--out: expected a folder that can be written to, found '{there}' read-only")
+    return out
+
+
 Json: TypeAlias = Annotated[
     bool, typer.Option("--json", help="Print one JSON object on standard output and nothing else there.")
+]
+Out: TypeAlias = Annotated[
+    Path, typer.Option(metavar="DIR", parser=parse_out, help="Folder in which the run's own folder is made.")
 ]
 Overrides: TypeAlias = Annotated[
     list[str] | None,

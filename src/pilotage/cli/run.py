@@ -8,7 +8,7 @@ from typing import Annotated, Any
 
 import typer
 
-from pilotage.cli.options import Json, Overrides, Seed
+from pilotage.cli.options import Json, Out, Overrides, Seed
 from pilotage.cli.output import print_json, progress_line, stdout_for_json
 
 
@@ -16,7 +16,7 @@ def run(
     mission: Annotated[str, typer.Argument(metavar="MISSION|FILE", help="A shipped name or a YAML file.")],
     seed: Seed = None,
     overrides: Overrides = None,
-    out: Annotated[Path, typer.Option(help="Folder in which the run's own folder is made.")] = Path("runs"),
+    out: Out = Path("runs"),
     json: Json = False,
     report: Annotated[bool, typer.Option(help="Write report.html into the run folder.")] = True,
     quiet: Annotated[bool, typer.Option("--quiet", help="Show neither progress nor summary.")] = False,

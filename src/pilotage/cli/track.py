@@ -99,7 +99,7 @@ def track(
 
 @contextmanager
 def _progress(what: str) -> Iterator[Callable[[int, int], None]]:
-    """Yield what shows how far a pass over the film is: a bar on a terminal, else a line now and then."""
+    """Yield what shows how far a pass is: a bar on a terminal, a line now and then elsewhere."""
     terminal = sys.stderr.isatty()
     period_s = 0.1 if terminal else 10.0
     due_s = time.monotonic() + (0.0 if terminal else period_s)

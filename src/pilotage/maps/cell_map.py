@@ -18,7 +18,7 @@ from pilotage.core.errors import InputError
 States = NDArray[np.uint8]
 Mask = NDArray[np.bool_]
 Floats = NDArray[np.float64]
-S = TypeVar("S", bound=np.generic)
+_T = TypeVar("_T", bound=np.generic)
 
 
 class CellState(IntEnum):
@@ -136,7 +136,7 @@ def grown(mask: Mask) -> Mask:
     return result
 
 
-def _shifted(values: NDArray[S], rows: int, columns: int, fill: S) -> NDArray[S]:
+def _shifted(values: NDArray[_T], rows: int, columns: int, fill: _T) -> NDArray[_T]:
     height, width = values.shape
     result = np.full_like(values, fill)
     inside_rows = slice(max(rows, 0), height + min(rows, 0))

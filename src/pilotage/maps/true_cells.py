@@ -110,5 +110,4 @@ def _overlap(edges_m: Floats, low_m: float, high_m: float) -> Floats:
     """Share of each interval that lies between two bounds."""
     lower, upper = min(low_m, high_m), max(low_m, high_m)
     common = np.minimum(edges_m[1:], upper) - np.maximum(edges_m[:-1], lower)
-    shares: Floats = np.maximum(common, 0.0) / np.diff(edges_m)
-    return shares
+    return np.asarray(np.maximum(common, 0.0) / np.diff(edges_m))

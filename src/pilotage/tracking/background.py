@@ -55,9 +55,16 @@ class Background:
         return result
 
     def cleared_of(self, where: Image) -> Background:
-        """Return the background with paper where ``where`` is set: a robot that never moved is none."""
-        around = opencv().dilate(where, np.ones((7, 7), np.uint8)) > 0
-        image = np.where(around[..., None], np.rint(self.paper).astype(np.uint8), self.image)
+        """Return the background with paper around what ``where`` shows: a robot that never moved."""
+        cv2 = opencv()
+        whole = cv2.morphologyEx(where, cv2.MORPH_OPEN, np.ones((3, 3), np.uint8))
+        outlines, _ = cv2.findContours(whole, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE)
+        around = np.zeros_like(where)
+        for outline in outlines:
+            # Boards that hide a part of the colour belong to the robot too: half as wide again takes them in.
+            (x, y), radius = cv2.minEnclosingCircle(outline)
+            cv2.circle(around, (round(x), round(y)), round(1.5 * radius) + 2, 255, -1)
+        image = np.where(around[..., None] > 0, np.rint(self.paper).astype(np.uint8), self.image)
         return Background(image.astype(np.uint8), self.paper, self.threshold, self.region)
 
 

@@ -93,7 +93,7 @@ def visited_cells(path: Path, size_m: float, grid: int) -> NDArray[np.bool_]:
 
 
 def _jitter(frames: NDArray[np.int64], points: Floats) -> float:
-    """Standard deviation between frames: a smooth path has no second difference, noise has sqrt(6) of it."""
+    """Noise from frame to frame: a smooth path has no second difference, noise has sqrt(6) of it."""
     if len(points) < 3:
         return 0.0
     bend = (points[2:] - 2.0 * points[1:-1] + points[:-2])[np.diff(frames, 2) == 0] / 6**0.5

@@ -33,11 +33,12 @@ class HsvRange:
         cv2 = opencv()
         hsv = cv2.cvtColor(cut, cv2.COLOR_BGR2HSV)
         if self.low[0] <= self.high[0]:
-            result: Image = cv2.inRange(hsv, self.low, self.high)
-            return result
+            inside: Image = cv2.inRange(hsv, self.low, self.high)
+            return inside
         above = cv2.inRange(hsv, self.low, (_HUES - 1, *self.high[1:]))
         below = cv2.inRange(hsv, (0, *self.low[1:]), self.high)
-        return np.asarray(cv2.bitwise_or(above, below))
+        both: Image = cv2.bitwise_or(above, below)
+        return both
 
 
 def parse_hsv(text: str) -> HsvRange:

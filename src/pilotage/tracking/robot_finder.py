@@ -8,6 +8,7 @@ no paper.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -32,6 +33,8 @@ _TOLERANCE = 1.06
 _JUMP = 1.5
 """In radii: how far the robot may be from where it was, for each frame since."""
 _MOST_JUMP = 8.0
+_ALIKE = 0.4
+"""Numbers of pixels whose logarithms differ by less are alike."""
 _PATCH_RADIUS = 18
 """Pixels of the disc's radius on the patch of floor where it is fitted."""
 _LEAST_SHARE = 0.2
@@ -102,17 +105,25 @@ class RobotFinder:
         return best
 
     def _choose(self, candidates: list[tuple[Sighting, bool]]) -> Sighting | None:
-        """Near where it was, else the most pixels, things that reach in over the edge last."""
+        """Near where it was, else anywhere, things that reach in over the edge last; the likest in size."""
         if self._last is not None:
             reach = min(_JUMP * (1 + self._missed), _MOST_JUMP) * self._look.radius_m
             last = self._last.centre_m
             near = [one for one, _ in candidates if float(np.hypot(*(one.centre_m - last))) < reach]
             if near:
-                return max(near, key=lambda one: one.pixels)
-            if self._missed < _MOST_JUMP:
-                return None
-        ranked = sorted(candidates, key=lambda pair: (not pair[1], pair[0].pixels))
+                return max(near, key=self._likeness)
+            # In a film of few frames a second it may have jumped: then it looks in every way as learned.
+            candidates = [
+                (one, inside)
+                for one, inside in candidates
+                if inside and (self._likeness(one) > -_ALIKE or self._missed >= _MOST_JUMP)
+            ]
+        ranked = sorted(candidates, key=lambda pair: (pair[1], self._likeness(pair[0])))
         return ranked[-1][0] if ranked else None
+
+    def _likeness(self, one: Sighting) -> float:
+        """The number of pixels is as learned: 0; twice or half as many: the same amount below."""
+        return -abs(math.log(one.pixels / self._look.pixels))
 
 
 def learn_look(

@@ -136,7 +136,7 @@ def _find_sheet(film: FilmSummary, options: TrackOptions, path: Path) -> Sheet:
     found = find_corners(film.samples)
     if found is None:
         raise InputError(
-            f"{path}: no map found: no four-cornered sheet stands out in this video; give it by --corners"
+            f"{path}: no map found: no even four-cornered sheet stands out in this video; try --corners"
         )
     corners, deviation = found
     full = corners * film.reduction + 0.5 * (film.reduction - 1)

@@ -22,7 +22,16 @@ _LEAST_AREA = 0.05
 """Of the picture; less is no map that a robot could be measured on."""
 _LEAST_FIT = 0.85
 """Overlap of region and quadrilateral over their union."""
+_LEAST_PAPER = 0.5
+"""Share of the quadrilateral that has to be of one colour."""
+_PAPER_REACH = 40.0
+_LEAST_SUPPORT = 0.35
+"""Share of each side that has to show an edge on one straight line."""
 _FRAMES = 9
+_PLACES = 80
+"""Places along a side where its edge is sought."""
+_SYSTEMATIC_PX = 0.3
+"""Lenses bend lines and paper curls: averaging over an edge does not help against that."""
 _AGREE = 0.02
 """Of the picture's longer side: corners within this are the same sheet."""
 
@@ -43,7 +52,8 @@ def find_corners(samples: Sequence[Image]) -> tuple[Floats, float] | None:
     """
     chosen = [samples[i] for i in np.unique(np.linspace(0, len(samples) - 1, _FRAMES).astype(int))]
     quads = [(image, _best_quadrilateral(image)) for image in chosen]
-    refined = [refine_corners(image, quad) for image, quad in quads if quad is not None]
+    fitted = [refine_corners(image, quad) for image, quad in quads if quad is not None]
+    refined = [(quad, deviation) for quad, deviation, support in fitted if support >= _LEAST_SUPPORT]
     if not refined:
         return None
     side = max(chosen[0].shape[:2])
@@ -55,34 +65,39 @@ def find_corners(samples: Sequence[Image]) -> tuple[Floats, float] | None:
         return None
     middle = np.median(agreeing, axis=0)
     spread = float(np.median(np.abs(agreeing - middle))) * 1.4826
-    return middle, float(np.hypot(spread, np.median([rms for _, rms in refined])))
+    fitted_std = float(np.median([deviation for _, deviation in refined]))
+    return middle, float(np.linalg.norm([spread, fitted_std, _SYSTEMATIC_PX]))
 
 
-def refine_corners(image: Image, corners: Floats) -> tuple[Floats, float]:
+def refine_corners(image: Image, corners: Floats) -> tuple[Floats, float, float]:
     """Fit the four sides to the edges in the picture and intersect them.
 
     Returns
     -------
-    tuple[Floats, float]
-        Corners, shape (4, 2), and the standard deviation of a corner in pixels; corners that would move
-        further than the searched band stay where they were.
+    tuple[Floats, float, float]
+        Corners, shape (4, 2); the standard deviation of a corner in pixels; and the share of the worst side
+        that shows an edge where the line was laid. Corners that would move further than the searched band
+        stay where they were.
     """
     grey = opencv().GaussianBlur(image.min(axis=2), (0, 0), 1.0).astype(np.float32)
     centre = corners.mean(axis=0)
-    current, deviation = corners, 1.0
+    current, deviation, support = corners, 1.0, 0.0
     for band in (0.03, 0.012):
-        lines, deviations = [], []
+        lines, deviations, supports = [], [], []
         for start, end in zip(current, np.roll(current, -1, axis=0), strict=True):
             points = _edge_points(grey, start, end, centre, max(4.0, band * float(np.hypot(*(end - start)))))
             line, spread = _robust_line(points)
             lines.append(line)
+            off = np.abs(points @ line[:2] - line[2])
+            near = max(1.5, 0.004 * float(np.hypot(*(end - start))))
+            supports.append(np.count_nonzero(off < near) / _PLACES)
             deviations.append(spread / np.sqrt(max(len(points) / 4.0, 1.0)))
         moved = np.array([_meet(lines[i - 1], lines[i]) for i in range(4)])
         reach = 2.0 * band * float(np.max(np.hypot(*(current - np.roll(current, 1, axis=0)).T)))
         if not np.all(np.isfinite(moved)) or np.hypot(*(moved - current).T).max() > reach:
             break
-        current, deviation = moved, float(np.mean(deviations))
-    return current, deviation
+        current, deviation, support = moved, float(np.mean(deviations)), min(supports)
+    return current, deviation, support
 
 
 def _best_quadrilateral(image: Image) -> Floats | None:
@@ -100,7 +115,7 @@ def _best_quadrilateral(image: Image) -> Floats | None:
             outlines, _ = cv2.findContours(mask, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE)
             for outline in outlines:
                 quad, score = _as_quadrilateral(outline, image.shape[:2])
-                if quad is not None and score > best_score:
+                if quad is not None and score > best_score and _even(image, quad):
                     best, best_score = quad, score
     return None if best is None else in_map_order(best)
 
@@ -130,12 +145,23 @@ def _as_quadrilateral(outline: NDArray[np.int32], shape: tuple[int, int]) -> tup
     return quad, float(fit**2 * np.sqrt(area_share) * (1.0 if inside else 0.4))
 
 
+def _even(image: Image, quad: Floats) -> bool:
+    """Whether most of a quadrilateral is of one colour, as a sheet is and a textured floor is not."""
+    cv2 = opencv()
+    inside = cv2.fillConvexPoly(np.zeros(image.shape[:2], np.uint8), np.rint(quad).astype(np.int32), 1)
+    pixels = image[::4, ::4][inside[::4, ::4] > 0].astype(np.float32)
+    if len(pixels) < 50:
+        return False
+    away = np.abs(pixels - np.median(pixels, axis=0)).max(axis=1)
+    return bool(np.mean(away < _PAPER_REACH) > _LEAST_PAPER)
+
+
 def _overlap_over_union(outline: NDArray[np.int32], quad: Floats, shape: tuple[int, int]) -> float:
     cv2 = opencv()
     region = cv2.drawContours(np.zeros(shape, np.uint8), [outline], -1, 1, -1)
     ideal = cv2.fillConvexPoly(np.zeros(shape, np.uint8), np.rint(quad).astype(np.int32), 1)
-    common, either = int(np.count_nonzero(region & ideal)), int(np.count_nonzero(region | ideal))
-    return common / max(either, 1)
+    both, either = int(np.count_nonzero(region & ideal)), int(np.count_nonzero(region | ideal))
+    return both / max(either, 1)
 
 
 def _edge_points(
@@ -146,7 +172,7 @@ def _edge_points(
     along = (end - start) / max(float(np.hypot(*(end - start))), 1e-9)
     inward = np.array([-along[1], along[0]])
     inward = inward if inward @ (centre - 0.5 * (start + end)) > 0.0 else -inward
-    share = np.linspace(0.04, 0.96, 80)[:, None]
+    share = np.linspace(0.04, 0.96, _PLACES)[:, None]
     offsets = np.arange(-reach, reach + 0.25, 0.5)
     base = start + share * (end - start)
     x = (base[:, :1] + offsets * inward[0]).astype(np.float32)
