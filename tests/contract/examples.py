@@ -220,6 +220,25 @@ def navigator_arrives(factory: Any, config: Any) -> None:
     assert stack.drain_events() == []
 
 
+def navigator_keeps_its_command(factory: Any, config: Any) -> None:
+    """The same command for the time given, then a stop."""
+    knowledge = knowledge_of(start=START, variances=(1e-4, 1e-4, 1e-4))
+    localizer = EkfLandmarkLocalizer(LandmarkFilterConfig(), knowledge)
+    stack = factory(config, knowledge, Parts(localizer, None, None, None, None, None, None, None))
+    stack.prepare()
+    sim, command = simulator(), Twist(0.0, 0.0)
+    keys = set(stack.telemetry())
+    commands = []
+    while stack.status[0] is StackStatus.RUNNING:
+        command = stack.step(sim.step(command))
+        commands.append(command)
+        assert set(stack.telemetry()) == keys
+    assert commands == [Twist(0.2, 0.1)] * 20 + [Twist(0.0, 0.0)]
+    assert stack.status[0] is StackStatus.ARRIVED
+    assert [event.kind for event in stack.drain_events()] == ["arrived"]
+    assert stack.drain_events() == []
+
+
 ROUTE = {"points_m": [[2.0, 2.0], [3.0, 4.0], [7.0, 4.0], [8.0, 6.0]], "turning_radius_m": 0.4}
 
 FILTER_NUMBERS = frozenset({"gate", "measurement_var_scale", "odometry_var_scale"})
@@ -260,4 +279,7 @@ EXAMPLES: dict[tuple[str, str], Example] = {
     ("mapper", "obstacle-layer"): Example(mapper_maps, pure_numbers=frozenset({"sigmas"})),
     ("escape", "back-out"): Example(escape_ends),
     ("navigator", "goal"): Example(navigator_arrives),
+    ("navigator", "open-loop"): Example(
+        navigator_keeps_its_command, {"speed_m_s": 0.2, "turn_rate_rad_s": 0.1, "duration_s": 2.0}
+    ),
 }

@@ -121,9 +121,8 @@ def calibrate_odometry(logs: Sequence[OdometrySteps]) -> OdometryCalibration:
         assert offset is not None
         warnings.append(f"{names}: the offset is that of a step along a wrong axis, not of a bias")
     usable = [not off for off in astray]
-    if not any(use and bool(_moves(log).any()) for use, log in zip(usable, logs, strict=True)) and any(
-        astray
-    ):
+    told = any(use and bool(_moves(log).any()) for use, log in zip(usable, logs, strict=True))
+    if any(astray) and not told:
         usable = [True] * len(logs)
         warnings.append("the distance noise is taken along the wrong axis: no other log moves")
     errors = tuple(

@@ -50,7 +50,9 @@ Out: TypeAlias = Annotated[
 Overrides: TypeAlias = Annotated[
     list[str] | None,
     typer.Option(
-        "--set", metavar="KEY=VALUE", help="Change one key, such as stack.localizer.gate=0.99; repeatable."
+        "--set",
+        metavar="KEY=VALUE|@FILE",
+        help="Change one key, such as stack.localizer.gate=0.99, or all that a YAML file holds; repeatable.",
     ),
 ]
 Seed: TypeAlias = Annotated[

@@ -33,7 +33,8 @@ def load_mission(name_or_path: str, overrides: Sequence[str] = (), seed: int | N
         A shipped mission's name or the path of a YAML file.
     overrides
         ``dotted.key=value``; the value is read as YAML. Changing a component's ``name`` drops the
-        parameters of the old one.
+        parameters of the old one. ``@FILE`` lays a YAML file over the mission, such as the parameters
+        that a calibration wrote.
     seed
         Replaces ``run.seed`` where given.
 
@@ -44,10 +45,28 @@ def load_mission(name_or_path: str, overrides: Sequence[str] = (), seed: int | N
     """
     values = read_mission(name_or_path)
     for override in overrides:
-        apply_override(values, override)
+        if override.startswith("@"):
+            values = merge(values, read_parameters(override[1:]))
+        else:
+            apply_override(values, override)
     if seed is not None:
         values.setdefault("run", {})["seed"] = seed
     return validate(Mission, values, "")
+
+
+def read_parameters(file: str) -> dict[str, Any]:
+    """Read a file of parameters that is laid over a mission; only what a mission knows may be in it."""
+    path = Path(file)
+    if not path.is_file():
+        raise InputError(f"--set '@{file}': expected a YAML file of parameters, found none there")
+    values = parse_yaml(read_text(path), file)
+    unknown = [str(key) for key in values if key not in Mission.model_fields]
+    if unknown:
+        known = list(Mission.model_fields)
+        close = nearest(unknown[0], known)
+        hint = f"did you mean '{close}'?" if close else "known: " + ", ".join(known)
+        raise InputError(f"{file}: unknown key '{unknown[0]}'; {hint}")
+    return values
 
 
 def read_mission(name_or_path: str) -> dict[str, Any]:

@@ -10,8 +10,9 @@ import numpy as np
 from pilotage.core.types import Event, FloatArray, Twist
 from pilotage.evaluation.run_metrics import Outcome
 from pilotage.experiments.build import Experiment
-from pilotage.sensors.readings import Readings, UltrasonicReading
+from pilotage.sensors.readings import OdometryIncrement, Readings, UltrasonicReading
 from pilotage.sensors.ultrasonic import UltrasonicConfig
+from pilotage.sensors.wheel_odometry import WheelOdometryConfig
 from pilotage.sim.simulator import Simulator
 from pilotage.stack.interface import Stack
 
@@ -27,6 +28,8 @@ BELIEF_COLUMNS = (
     "cov_yt_m_rad",
     "cov_tt_rad2",
 )
+ODOMETRY_COLUMNS = ("odom_distance_m", "odom_angle_rad")
+"""The wheel odometry's reading of the step; nan where there was none."""
 MOTION_COLUMNS = ("v_cmd_m_s", "w_cmd_rad_s", "v_true_m_s", "w_true_rad_s", "clearance_m", "collisions")
 
 
@@ -47,6 +50,8 @@ class Recorder:
         self._simulator = simulator
         self._stack = stack
         self._sonars = [name for name, config in sensors.items() if isinstance(config, UltrasonicConfig)]
+        wheels = [name for name, config in sensors.items() if isinstance(config, WheelOdometryConfig)]
+        self._wheels = wheels[0] if wheels else None
         self._telemetry_columns = tuple(stack.telemetry())
         self._rows: list[tuple[float, ...]] = []
         self.events: list[Event] = []
@@ -79,6 +84,7 @@ class Recorder:
                 body.twist.w_rad_s,
                 body.clearance_m,
                 body.collisions,
+                *_odometry(readings, self._wheels),
                 *[_sonar_m(readings, name) for name in self._sonars],
                 *self._stack.telemetry().values(),
             )
@@ -95,11 +101,20 @@ class Recorder:
             *TRUTH_COLUMNS,
             *BELIEF_COLUMNS,
             *MOTION_COLUMNS,
+            *ODOMETRY_COLUMNS,
             *(f"us_{name}_m" for name in self._sonars),
             *self._telemetry_columns,
         )
         table = np.array(self._rows, dtype=np.float64).reshape(-1, len(names))
         return {name: np.ascontiguousarray(table[:, i]) for i, name in enumerate(names)}
+
+
+def _odometry(readings: Readings, name: str | None) -> tuple[float, float]:
+    """Distance and angle of the odometry increment; nan where there is none."""
+    reading = None if name is None else readings.by_sensor.get(name)
+    if isinstance(reading, OdometryIncrement):
+        return reading.distance_m, reading.angle_rad
+    return math.nan, math.nan
 
 
 def _sonar_m(readings: Readings, name: str) -> float:

@@ -113,7 +113,10 @@ class RosMap:
         p = shade if file.negate else 1.0 - shade
         between: Any = UNKNOWN
         if file.mode == "scale":
-            between = np.rint((p - file.free_thresh) / (file.occupied_thresh - file.free_thresh) * 100.0)
+            # Thresholds may lie so close that nothing is between them; what is beyond is replaced below.
+            span = max(file.occupied_thresh - file.free_thresh, np.finfo(float).tiny)
+            with np.errstate(over="ignore"):
+                between = np.rint(np.clip((p - file.free_thresh) / span, 0.0, 1.0) * 100.0)
         cells = np.where(p > file.occupied_thresh, OCCUPIED, np.where(p < file.free_thresh, FREE, between))
         return np.asarray(cells.astype(np.int8))
 

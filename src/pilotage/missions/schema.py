@@ -163,7 +163,7 @@ class StackConfig(Config):
     initial: InitialConfig = InitialConfig()
     navigator: ComponentChoice
     localizer: ComponentChoice
-    planner: ComponentChoice
+    planner: ComponentChoice | None = None
     smoother: ComponentChoice | None = None
     local_planner: ComponentChoice | None = None
     controller: ComponentChoice | None = None
