@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Annotated
 
@@ -75,6 +75,9 @@ def track(
     finally:
         if writer is not None:
             writer.close(keep=done)
+        if folder is not None and not done:
+            with suppress(OSError):  # it held something before: leave it
+                folder.rmdir()
     written = [] if folder is None else write_track(folder, result)
     values = result.as_dict()
     broke = scene.film.broke_at_frame
