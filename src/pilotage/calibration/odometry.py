@@ -31,7 +31,7 @@ from pilotage.calibration.offset_shape import OffsetComparison, compare_offsets
 from pilotage.core.angles import wrap_array_to_pi
 from pilotage.core.errors import InputError
 from pilotage.core.types import BoolArray, FloatArray
-from pilotage.logs.odometry_steps import OdometrySteps, arc_lengths
+from pilotage.logs.odometry_steps import OdometryForm, OdometrySteps, arc_lengths
 
 NO_NOISE = 1e-9
 """Errors that scatter less than this (m, rad) are rounding: the log says nothing about that noise."""
@@ -253,6 +253,8 @@ def _heading_offset(used: Sequence[LogErrors]) -> Estimate | None:
     """Mean angle from the true direction of motion to the claimed one; None where it is not recorded."""
     angles = []
     for log in used:
+        if log.steps.form is OdometryForm.INCREMENTS:
+            continue  # distance and turn say nothing of the direction
         steps, moves = log.steps, _moves(log.steps)
         step, middle = steps.claimed[:, :2] - steps.start[:, :2], steps.middle_heading_rad
         left = -step[:, 0] * np.sin(middle) + step[:, 1] * np.cos(middle)
