@@ -8,6 +8,7 @@ import typer
 
 from pilotage import __version__
 from pilotage.cli.bench_scen import bench_scen
+from pilotage.cli.calibrate import calibrate
 from pilotage.cli.components import components
 from pilotage.cli.evaluate import evaluate
 from pilotage.cli.map_score import map_score
@@ -33,6 +34,7 @@ COMMANDS = (
     plan,
     bench_scen,
     evaluate,
+    calibrate,
     track,
     map_score,
     report,

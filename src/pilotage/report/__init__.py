@@ -14,13 +14,14 @@ if TYPE_CHECKING:
 
 
 def write_report(run_dir: Path) -> Path:
-    """Write ``report.html`` into a run folder: one self-contained page with vector figures.
+    """Write ``report.html`` into a run or calibration folder: one self-contained page with vector figures.
 
     Parameters
     ----------
     run_dir
         Folder that a run left behind: ``metrics.json`` and ``trace.parquet`` at least; without the other
-        files the figures that need them are left out, with a word.
+        files the figures that need them are left out, with a word. A calibration's folder is told by its
+        ``calibration.json``.
 
     Returns
     -------
@@ -31,6 +32,10 @@ def write_report(run_dir: Path) -> Path:
     InputError
         One line, where the folder is not a run folder or one of its files is broken.
     """
+    if (run_dir / "calibration.json").is_file():
+        from pilotage.report.calibration.page import write_calibration_report
+
+        return write_calibration_report(run_dir)
     from pilotage.report.page import write_report as write
 
     return write(run_dir)

@@ -1,0 +1,94 @@
+"""``pilotage calibrate``: logs, or runs driven for it, to noise and bias parameters."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from pilotage.cli.options import Json, Overrides, Seed
+from pilotage.cli.output import print_columns, print_json, stdout_for_json
+from pilotage.core.errors import InputError, unknown_name
+
+KINDS = ("odometry", "range", "heading")
+
+
+def calibrate(
+    what: Annotated[str, typer.Argument(metavar="odometry|range|heading", help="What to calibrate.")],
+    logs: Annotated[
+        list[Path] | None,
+        typer.Argument(
+            metavar="[LOG...]", help="Recordings; without any the calibration runs are simulated."
+        ),
+    ] = None,
+    seed: Seed = None,
+    overrides: Overrides = None,
+    out: Annotated[Path, typer.Option(help="Folder in which the calibration's own folder is made.")] = Path(
+        "runs"
+    ),
+    sensor: Annotated[
+        str, typer.Option(help="odometry: the sensor's name in the mission, for the parameter file.")
+    ] = "odometry",
+    wheel_base: Annotated[
+        float | None, typer.Option(metavar="M", help="odometry: the wheel base that it was told, in metres.")
+    ] = None,
+    axis: Annotated[
+        str, typer.Option(metavar="x|y|z", help="heading: the axis that the robot turns about.")
+    ] = "z",
+    report: Annotated[bool, typer.Option(help="Write report.html into the calibration's folder.")] = True,
+    json: Json = False,
+) -> int:
+    """Estimate noise and systematic errors of a sensor, each with a 95 % interval."""
+    if what not in KINDS:
+        raise unknown_name("calibration", what, KINDS)
+    if logs and (overrides or seed is not None):
+        raise InputError(
+            "calibrate: --set and --seed are for simulated runs; leave them out where logs are given"
+        )
+    if wheel_base is not None and not (math.isfinite(wheel_base) and wheel_base > 0.0):
+        raise InputError(f"--wheel-base: expected metres above 0, found {wheel_base:g}")
+    from pilotage.experiments import calibrate as lab
+
+    places = logs or []
+    with stdout_for_json(json):
+        if what == "odometry":
+            result = lab.odometry_from(
+                places, out, overrides=overrides or (), seed=seed or 0, wheel_base_m=wheel_base, sensor=sensor
+            )
+        elif what == "range":
+            result = lab.range_from(places, out, overrides=overrides or (), seed=seed or 0)
+        else:
+            result = lab.heading_from(places, out, axis=axis)
+        answer: dict[str, Any] = dict(result.answer)
+        if report:
+            from pilotage.report import write_report
+
+            answer["report"] = str(write_report(result.folder))
+    if json:
+        print_json(answer)
+    else:
+        _print(answer)
+    return 0
+
+
+def _print(answer: Mapping[str, Any]) -> None:
+    """Print the estimates with their intervals, the offset's shape and where everything is."""
+    rows = []
+    for key, value in answer.items():
+        if isinstance(value, Mapping) and {"value", "low", "high"} <= set(value):
+            rows.append((key, f"{value['value']:.5g}", f"{value['low']:.5g} to {value['high']:.5g}"))
+        elif isinstance(value, str | bool):
+            rows.append((key, str(value), ""))
+    offset = answer.get("offset")
+    if isinstance(offset, Mapping):
+        rows.append(("offset", str(offset["shape"]), str(offset["explanation"])))
+    for entry in answer.get("magnetometer", ()):
+        rows += [
+            (f"magnetometer_offset_{axis}_gauss", f"{e['value']:.5g}", f"{e['low']:.5g} to {e['high']:.5g}")
+            for axis, e in entry["offset_gauss"].items()
+        ]
+    rows += [("warning", "", text) for text in answer.get("warnings", ())]
+    print_columns(rows)

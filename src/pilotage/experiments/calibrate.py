@@ -1,0 +1,163 @@
+"""From logs, or from runs driven for it, to a calibration folder: JSON, the data, a parameter file."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pilotage.calibration.heading import calibrate_heading
+from pilotage.calibration.odometry import LogErrors, OdometryCalibration, calibrate_odometry
+from pilotage.calibration.odometry_summary import odometry_summary
+from pilotage.calibration.parameter_file import parameter_yaml
+from pilotage.calibration.steady import SteadyReadings, calibrate_steady
+from pilotage.core.errors import InputError
+from pilotage.core.types import FloatArray
+from pilotage.experiments.calibration_runs import drive_odometry_runs, listen_in_the_room
+from pilotage.experiments.run_folder import clean
+from pilotage.logs.heading_csv import find_heading_logs, read_heading_log
+from pilotage.logs.odometry_csv import read_odometry_csv
+from pilotage.logs.odometry_steps import OdometrySteps
+from pilotage.logs.run_trace import TRACE, read_run_odometry
+from pilotage.logs.steady_csv import read_steady_csv
+from pilotage.sensors.wheel_odometry import WheelOdometryConfig
+
+CALIBRATION_FILE, DATA_FILE, PARAMETER_FILE = "calibration.json", "data.npz", "parameters.yaml"
+
+
+@dataclass(frozen=True, slots=True)
+class CalibrationResult:
+    """The JSON object and the folder that holds it with its data."""
+
+    answer: dict[str, object]
+    folder: Path
+
+
+def odometry_from(
+    places: Sequence[Path],
+    out: Path,
+    *,
+    overrides: Sequence[str] = (),
+    seed: int = 0,
+    wheel_base_m: float | None = None,
+    sensor: str = "odometry",
+) -> CalibrationResult:
+    """Calibrate odometry from CSV files, folders of them and run folders, or drive the runs first."""
+    given = None
+    if not places:
+        folders, given = drive_odometry_runs(overrides, seed, out)
+        places = folders
+    logs = _unique([log for place in places for log in _odometry_logs(place)])
+    found = calibrate_odometry(logs)
+    answer = {"calibration": "odometry", "simulated": given is not None}
+    answer |= odometry_summary(found, wheel_base_m)
+    if given is not None:
+        answer["given"] = _held(found, given)
+    data = {f"{i}/{key}": value for i, log in enumerate(found.logs) for key, value in _arrays(log).items()}
+    return _write(out, answer, data, {PARAMETER_FILE: parameter_yaml(found, sensor)})
+
+
+def range_from(
+    places: Sequence[Path], out: Path, *, overrides: Sequence[str] = (), seed: int = 0
+) -> CalibrationResult:
+    """Calibrate range sensors from CSV files of readings at rest, or listen in the room first."""
+    if places:
+        series = [
+            SteadyReadings(path.stem, column.quantity, column.unit, column.values)
+            for path in places
+            for column in read_steady_csv(path)
+        ]
+    else:
+        series = listen_in_the_room(overrides, seed)
+    found = [calibrate_steady(readings) for readings in series]
+    answer: dict[str, object] = {"calibration": "range", "simulated": not places}
+    for result in found:
+        r = result.readings
+        quantity = r.quantity.partition(" ")[0]
+        answer[f"{r.sensor}_{quantity}_var_{r.unit}2"] = result.var.as_dict()
+        answer[f"{r.sensor}_{quantity}_mean_{r.unit}"] = result.mean.as_dict()
+    answer["sensors"] = [result.as_dict() for result in found]
+    data = {str(i): result.readings.values for i, result in enumerate(found)}
+    return _write(out, answer, data, {})
+
+
+def heading_from(places: Sequence[Path], out: Path, *, axis: str = "z") -> CalibrationResult:
+    """Calibrate gyroscopes and magnetometers from their logs."""
+    if not places:
+        raise InputError(
+            "calibrate heading: expected gyroscope or magnetometer logs; "
+            "the simulated robot has no such sensor"
+        )
+    logs = [read_heading_log(path) for place in places for path in find_heading_logs(place)]
+    found = calibrate_heading(logs, axis)
+    answer = {"calibration": "heading", "simulated": False, **found.as_dict()}
+    data: dict[str, FloatArray] = {}
+    for i, log in enumerate(logs):
+        data |= {f"{i}/{log.sensor}/t_s": log.t_s, f"{i}/{log.sensor}/values": log.values}
+    return _write(out, answer, data, {})
+
+
+def _odometry_logs(place: Path) -> list[OdometrySteps]:
+    """Read a CSV file, a run folder, or all CSV files of a folder."""
+    if not place.is_dir():
+        return [read_odometry_csv(place)]
+    files = sorted(place.glob("*.csv"))
+    if files and not (place / TRACE).exists():
+        return [read_odometry_csv(path) for path in files]
+    return [read_run_odometry(place)]
+
+
+def _unique(logs: list[OdometrySteps]) -> list[OdometrySteps]:
+    """Refuse a log given twice: it would narrow every interval for nothing."""
+    for i, log in enumerate(logs):
+        for other in logs[:i]:
+            if log.claimed.shape == other.claimed.shape and np.array_equal(log.claimed, other.claimed):
+                raise InputError(f"calibrate odometry: expected different logs, found '{log.name}' twice")
+    return logs
+
+
+def _held(found: OdometryCalibration, given: WheelOdometryConfig) -> dict[str, object]:
+    """What the simulated robot was given, and whether the intervals hold it."""
+    out: dict[str, object] = {}
+    for name, value in given.model_dump().items():
+        estimate = getattr(found, name, None)
+        if isinstance(value, float) and estimate is not None:
+            out[name] = {"value": value, "recovered": estimate.holds(value)}
+    return out
+
+
+def _arrays(log: LogErrors) -> dict[str, FloatArray]:
+    steps = log.steps
+    return {
+        "t_s": steps.t_s,
+        "start": steps.start,
+        "truth": steps.truth,
+        "claimed": steps.claimed,
+        "distance_error_m": log.distance_m,
+        "angle_error_rad": log.angle_rad,
+    }
+
+
+def _write(
+    out: Path, answer: dict[str, object], data: Mapping[str, FloatArray], texts: Mapping[str, str]
+) -> CalibrationResult:
+    """Write ``calibrate-<what>-<hash>``; the same data and answer have the same name."""
+    digest = hashlib.sha256(json.dumps(clean(answer), sort_keys=True).encode())
+    for key in sorted(data):
+        digest.update(np.ascontiguousarray(data[key]).tobytes())
+    folder = out / f"calibrate-{answer['calibration']}-{digest.hexdigest()[:8]}"
+    folder.mkdir(parents=True, exist_ok=True)
+    for name, text in texts.items():
+        (folder / name).write_text(text, encoding="utf-8")
+    named: dict[str, Any] = {**answer, "calibration_dir": str(folder)}
+    if PARAMETER_FILE in texts:
+        named["parameter_file"] = str(folder / PARAMETER_FILE)
+    np.savez_compressed(folder / DATA_FILE, allow_pickle=False, **dict(data))
+    # Last: a folder with this file is whole.
+    (folder / CALIBRATION_FILE).write_text(json.dumps(clean(named), indent=2) + "\n", encoding="utf-8")
+    return CalibrationResult(named, folder)

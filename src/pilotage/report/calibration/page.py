@@ -1,0 +1,207 @@
+"""The page itself: estimates, offset, figures, parameter file."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from pilotage.report.calibration.folder import CalibrationData, read_calibration
+from pilotage.report.calibration.heading_figures import heading_figures
+from pilotage.report.calibration.odometry_figures import odometry_figures
+from pilotage.report.calibration.range_figures import range_figures
+from pilotage.report.markup import contents, document, escape, figure_section, layer_rules, tiles
+from pilotage.report.style import drawing_style
+
+REPORT_FILE = "report.html"
+_FIGURES = {"odometry": odometry_figures, "range": range_figures, "heading": heading_figures}
+_TITLES = {
+    "odometry": "Odometry calibration",
+    "range": "Calibration of the range sensors",
+    "heading": "Calibration of gyroscope and magnetometer",
+}
+_UNITS = (
+    ("_rad_sqrt_s", "rad/√s"),
+    ("_m2_per_m", "m²/m"),
+    ("_m2_per_rad", "m²/rad"),
+    ("_rad2_per_rad", "rad²/rad"),
+    ("_rad2_per_m", "rad²/m"),
+    ("_rad2_per_s", "rad²/s"),
+    ("_rad_per_m", "rad/m"),
+    ("_m_per_step", "m a step"),
+    ("_rad_per_step", "rad a step"),
+    ("_cov_m_rad", "m rad"),
+    ("_rad_s", "rad/s"),
+    ("_per_step_m2", "m² a step"),
+    ("_per_step_rad2", "rad² a step"),
+    ("_m2", "m²"),
+    ("_rad2", "rad²"),
+    ("_rad", "rad"),
+    ("_m", "m"),
+)
+_MEANINGS = {
+    "distance_var_per_step_m2": "Variance of the distance error of one step of the logs.",
+    "angle_var_per_step_rad2": "Variance of the heading error of one step of the logs.",
+    "distance_var_m2_per_m": "Distance variance that grows with the way driven.",
+    "distance_var_m2_per_rad": "Distance variance that grows with the angle turned.",
+    "angle_var_rad2_per_rad": "Heading variance that grows with the angle turned.",
+    "angle_var_rad2_per_m": "Heading variance that grows with the way driven.",
+    "cross_cov_m_rad": "Covariance of distance and heading error of the same step.",
+    "distance_scale": "Claimed over true distance: 1 is ideal.",
+    "angle_scale": "Claimed over true turn: 1 is ideal.",
+    "wheel_base_ratio": "True wheel base over the one that the odometry was told.",
+    "wheel_base_m": "True wheel base.",
+    "curvature_rad_per_m": "Heading error that comes with every metre: wheels of unequal size.",
+    "heading_offset_rad": "Angle between the heading and the direction of travel.",
+    "distance_offset_m_per_step": "Distance error of a step however short.",
+    "angle_offset_rad_per_step": "Heading error of a step however small.",
+    "gyro_bias_rad_s": "What the gyroscope reads at rest about the turning axis.",
+    "gyro_angle_random_walk_rad_sqrt_s": "White noise: how the integrated angle's error grows.",
+    "gyro_angle_var_rad2_per_s": "The same as a variance per second.",
+    "gyro_bias_instability_rad_s": "How far the bias wanders; an upper bound in short logs.",
+}
+
+
+def write_calibration_report(folder: Path) -> Path:
+    """Write ``report.html`` into a calibration folder and return its path."""
+    page = calibration_page(read_calibration(folder))
+    path = folder / REPORT_FILE
+    # Written beside and renamed: a reader never sees half a page.
+    beside = path.with_name(f".{path.name}.{os.getpid()}")
+    try:
+        beside.write_text(page, encoding="utf-8")
+        beside.replace(path)
+    finally:
+        beside.unlink(missing_ok=True)
+    return path
+
+
+def calibration_page(data: CalibrationData) -> str:
+    """Return the page as HTML."""
+    with drawing_style():
+        figures = _FIGURES[data.kind](data)
+    sections = [_estimates(data), _offset(data), *(figure_section(i + 1, f) for i, f in enumerate(figures))]
+    entries = [("estimates", "Estimates")]
+    entries += [("offset", "The shape of the offset")] if sections[1] else []
+    entries += [(figure.slug, figure.title) for figure in figures]
+    if data.parameters:
+        sections.append(_parameters(data.parameters))
+        entries.append(("parameters", "Parameter file"))
+    title = _TITLES[data.kind]
+    source = "simulated calibration runs" if data.answer.get("simulated") else "recorded logs"
+    return document(
+        title=escape(f"{title}: {data.folder.name}"),
+        layers="".join(layer_rules(figure) for figure in figures),
+        eyebrow=escape(f"pilotage calibration · {source}"),
+        heading=escape(title),
+        description="",
+        outcome="",
+        headline=escape(_headline(data.answer)),
+        tiles=tiles(_tiles(data.answer)),
+        contents=contents(entries),
+        body="\n".join(section for section in sections if section),
+        footer=escape(f"Made by pilotage from {data.folder.name}; intervals hold the truth 95 times in 100."),
+    )
+
+
+def scientific(value: float, digits: int = 4) -> str:
+    """Write a number plainly where it is near 1, else with a power of ten."""
+    if not math.isfinite(value):
+        return "–"
+    if value == 0.0 or 1e-3 <= abs(value) < 1e4:
+        return f"{value:.{digits}g}".replace("-", "−")
+    mantissa, _, exponent = f"{value:.{digits - 1}e}".partition("e")
+    power = str(int(exponent)).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
+    return f"{mantissa} × 10{power}".replace("-", "−")
+
+
+def _found(answer: Mapping[str, Any]) -> list[tuple[str, Mapping[str, float]]]:
+    """The estimates that were found, in the answer's order."""
+    return [
+        (key, value)
+        for key, value in answer.items()
+        if isinstance(value, Mapping) and {"value", "low", "high"} <= set(value)
+    ]
+
+
+def _unit(key: str) -> str:
+    return next((unit for ending, unit in _UNITS if key.endswith(ending)), "")
+
+
+def _name(key: str) -> str:
+    """The key in words, without its unit."""
+    ending = next((ending for ending, _ in _UNITS if key.endswith(ending)), "")
+    words = key.removesuffix(ending.replace("_cov", "")).split("_")
+    return " ".join({"var": "variance", "cov": "covariance"}.get(word, word) for word in words)
+
+
+def _value(key: str, value: float) -> str:
+    """The number with its unit; ratios with enough digits to tell them from 1."""
+    return f"{scientific(value, 4 if _unit(key) else 5)} {_unit(key)}".strip()
+
+
+def _estimates(data: CalibrationData) -> str:
+    rows = []
+    for key, value in _found(data.answer):
+        low, high = (_value(key, value[end]) for end in ("low", "high"))
+        rows.append(
+            f'<tr><th scope="row">{escape(_name(key))}</th>'
+            f'<td class="value">{escape(_value(key, value["value"]))}</td>'
+            f'<td>{escape(_MEANINGS.get(key, ""))} <span class="range">95 %: {escape(low)} to {escape(high)}.'
+            "</span></td></tr>"
+        )
+    missing = [_name(key) for key, value in data.answer.items() if value is None]
+    untold = f'<p class="absent">Not told by these logs: {escape(", ".join(missing))}.</p>' if missing else ""
+    warnings = "".join(f'<p class="absent">{escape(text)}.</p>' for text in data.answer.get("warnings", ()))
+    return (
+        '<section id="estimates"><h2><a href="#estimates">Estimates</a></h2>'
+        '<table class="metrics"><thead><tr>'
+        '<th scope="col">what</th><th scope="col" class="value">value</th><th scope="col">what it means</th>'
+        f"</tr></thead><tbody>{''.join(rows)}</tbody></table>{untold}{warnings}</section>"
+    )
+
+
+def _offset(data: CalibrationData) -> str:
+    offset = data.answer.get("offset")
+    if not isinstance(offset, Mapping):
+        return ""
+    rows = "".join(
+        f'<tr><th scope="row">{escape(str(model["shape"]))}</th>'
+        f'<td class="value">{model["free_parameters"]}</td>'
+        f'<td class="value">{1e3 * model["rms_m"]:.3f} mm</td><td>{model["delta_bic"]:.1f}</td></tr>'
+        for model in offset["models"]
+    )
+    return (
+        '<section id="offset"><h2><a href="#offset">The shape of the offset</a></h2>'
+        f"<p><b>{escape(str(offset['shape']))}</b>: {escape(str(offset['explanation']))}.</p>"
+        '<table><thead><tr><th scope="col">shape</th><th scope="col" class="value">free parameters</th>'
+        '<th scope="col" class="value">error left a step</th>'
+        '<th scope="col">BIC above the best (6 is strong, 10 decisive)</th></tr></thead>'
+        f"<tbody>{rows}</tbody></table></section>"
+    )
+
+
+def _parameters(text: str) -> str:
+    return (
+        '<section id="parameters"><h2><a href="#parameters">Parameter file</a></h2>'
+        f"<p>Lay it over any mission: <code>pilotage run MISSION --set @parameters.yaml</code>.</p>"
+        f"<pre>{escape(text)}</pre></section>"
+    )
+
+
+def _headline(answer: Mapping[str, Any]) -> str:
+    kind = answer["calibration"]
+    if kind == "odometry":
+        logs = answer["logs"]
+        used = sum(bool(log["used"]) for log in logs)
+        shape = (answer.get("offset") or {}).get("shape", "none")
+        return f"{len(logs)} logs, {used} of them used; offset: {shape}."
+    if kind == "range":
+        return f"{len(answer['sensors'])} quantities of sensors that look at the same thing all the time."
+    return f"{len(answer['gyroscope'])} gyroscope axes, {len(answer['magnetometer'])} magnetometers turned."
+
+
+def _tiles(answer: Mapping[str, Any]) -> list[tuple[str, str]]:
+    return [(_name(key), _value(key, value["value"])) for key, value in _found(answer)[:4]]

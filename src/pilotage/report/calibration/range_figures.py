@@ -1,0 +1,62 @@
+"""Fitted normals over the histograms of a sensor at rest (night-watch report, figures 10 and 11)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from pilotage.report.calibration.folder import CalibrationData
+from pilotage.report.calibration.plots import histogram, panels_in_a_row
+from pilotage.report.style import BLUE, SKY, VERMILLION, Illustration, Key, render, series
+
+
+def range_figures(data: CalibrationData) -> list[Illustration]:
+    """Draw every quantity of every sensor."""
+    return [_figure(data, i, entry) for i, entry in enumerate(data.answer["sensors"])]
+
+
+def _figure(data: CalibrationData, index: int, entry: Mapping[str, Any]) -> Illustration:
+    values = data.arrays[str(index)]
+    unit = "m" if "mean_m" in entry else "rad"
+    expected = entry.get(f"expected_{unit}")
+    name = f"{entry['sensor']}, {entry['quantity']}"
+    figure, (readings, spread) = panels_in_a_row(
+        [f"{entry['quantity']} [{unit}]", "its distribution"], ["reading", f"{entry['quantity']} [{unit}]"]
+    )
+    series(readings, np.arange(1.0, len(values) + 1.0), values, BLUE, linewidth=0.7)
+    if expected is not None:
+        readings.axhline(expected, color=BLUE, linewidth=1.0, linestyle=(0, (4, 3)))
+    if float(np.ptp(values)) == 0.0:
+        half = 0.05 * max(abs(float(values[0])), 0.1)
+        readings.set_ylim(values[0] - half, values[0] + half)
+    histogram(spread, values, expected)
+    slug = f"sensor-{index + 1}"
+    alt = f"{len(values)} readings of {name} and their histogram with the fitted normal"
+    keys = (
+        Key("readings", BLUE),
+        Key("expected", BLUE, "dash"),
+        Key("share of the readings", SKY, "band", opacity=1.0),
+        Key("fitted normal", VERMILLION),
+    )
+    return Illustration(slug, name, alt, _caption(entry, unit), render(figure, slug, alt), keys)
+
+
+def _caption(entry: Mapping[str, Any], unit: str) -> str:
+    mean, var = entry[f"mean_{unit}"], entry[f"var_{unit}2"]
+    parts = [
+        f"{entry['readings']} readings: mean {mean['value']:.6g} {unit} "
+        f"({mean['low']:.6g} to {mean['high']:.6g}), "
+        f"variance {var['value']:.4g} {unit}² ({var['low']:.4g} to {var['high']:.4g})."
+    ]
+    if entry.get(f"expected_{unit}") is not None:
+        parts.append(f"Expected: {entry[f'expected_{unit}']:.6g} {unit}.")
+    if entry.get(f"given_var_{unit}2") is not None:
+        verdict = "inside" if entry["recovered"] else "outside"
+        parts.append(
+            f"The sensor was given {entry[f'given_var_{unit}2']:.4g} {unit}²: {verdict} the interval."
+        )
+    if entry.get("normality_p") is not None:
+        parts.append(f"{entry['normality_test']}: p = {entry['normality_p']:.2g}.")
+    return " ".join(parts)
