@@ -13,13 +13,13 @@ from functools import cached_property
 import numpy as np
 
 from pilotage.core.types import STOP, FloatArray, Goal, Pose2
-from pilotage.experiments.build import build
-from pilotage.experiments.mission import load_mission
-from pilotage.experiments.world_map import load_map
+from pilotage.experiments.floor.build import build
+from pilotage.experiments.floor.mission import load_floor_mission
+from pilotage.experiments.floor.world_map import load_map
 from pilotage.kernels import geometry
 from pilotage.maps.distance_field import DistanceField
 from pilotage.maps.map_file import LandmarkMap
-from pilotage.missions.schema import Mission
+from pilotage.missions.floor import FloorMission
 from pilotage.sensors.lidar import LidarConfig
 from pilotage.sensors.readings import LidarScan
 from pilotage.sim.sensing import Motion, SimulatedLidar
@@ -105,9 +105,9 @@ class Museum:
         return DistanceField.from_map(self.floor.walls)
 
     @cached_property
-    def mission(self) -> Mission:
+    def mission(self) -> FloorMission:
         """The programmed route with all sensors on."""
-        return load_mission(ROUTE)
+        return load_floor_mission(ROUTE)
 
     @property
     def route_xy_m(self) -> list[tuple[float, float]]:
@@ -215,7 +215,7 @@ class Museum:
         Every step simulates the body, collisions, odometry, scanner, beacons and three ultrasonic cones,
         and runs the robot's stack: EKF, local planner, path follower, map of obstacles, guard.
         """
-        experiment = build(load_mission(ROUTE, seed=seed))
+        experiment = build(load_floor_mission(ROUTE, seed=seed))
         simulator, stack = experiment.simulator, experiment.stack
         command, steps = STOP, 0
         begin = time.perf_counter()

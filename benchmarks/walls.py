@@ -14,7 +14,7 @@ import time
 import numpy as np
 
 from pilotage.core.types import FloatArray, Pose2
-from pilotage.experiments.world_map import load_map
+from pilotage.experiments.floor.world_map import load_map
 from pilotage.kernels import scan
 from pilotage.sensors.lidar import LidarConfig
 from pilotage.stack.localization.wall_matching import WallMatcher, WallMatchingConfig

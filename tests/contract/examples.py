@@ -12,7 +12,7 @@ from pilotage.core.random import RandomStreams
 from pilotage.core.types import Goal, Pose2, Twist
 from pilotage.kernels import geometry
 from pilotage.maps.distance_field import DistanceField
-from pilotage.missions.schema import BodyConfig, MotionConfig
+from pilotage.missions.floor import BodyConfig, MotionConfig
 from pilotage.sensors.readings import Readings, UltrasonicReading
 from pilotage.sim.sensing import SIMULATED
 from pilotage.sim.simulator import Simulator

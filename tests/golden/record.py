@@ -6,8 +6,8 @@ import json
 from pathlib import Path
 from typing import Any
 
-from pilotage.experiments.mission import load_mission
-from pilotage.experiments.run import simulate
+from pilotage.experiments.floor.mission import load_floor_mission
+from pilotage.experiments.floor.simulate import simulate
 
 RUNS: dict[str, tuple[str, list[str], int]] = {
     "route": ("museum-route", ["run.time_limit_s=30"], 1),
@@ -28,7 +28,7 @@ COLUMNS = (
 
 def recorded(mission: str, overrides: list[str], seed: int) -> dict[str, Any]:
     """A few rows of one run."""
-    record = simulate(load_mission(mission, overrides, seed))
+    record = simulate(load_floor_mission(mission, overrides, seed))
     steps = record.trace["t_s"].shape[0]
     rows = {
         str(step): {column: float(record.trace[column][step]) for column in COLUMNS}

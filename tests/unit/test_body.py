@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from pilotage.core.types import Pose2, Twist
 from pilotage.maps.segment_map import SegmentMap
-from pilotage.missions.schema import BodyConfig, MotionConfig
+from pilotage.missions.floor import BodyConfig, MotionConfig
 from pilotage.sim.body import DifferentialDriveBody
 
 ROOM = SegmentMap.of(

@@ -24,7 +24,7 @@ from pilotage.cli.main import main
 from pilotage.cli.output import ProgressLine, plain, progress_line, progress_text
 from pilotage.cli.plan import parse_pose
 from pilotage.core.errors import InputError
-from pilotage.experiments.run import Progress
+from pilotage.experiments.progress import Progress, metres
 
 
 @dataclass
@@ -47,7 +47,7 @@ class Lab:
         self.asked |= {"mission": mission, "out": out, "shows_progress": on_progress is not None}
         sys.stdout.write("a library talks\n")
         if on_progress is not None:
-            on_progress(Progress(0.1, 66.0, 0.01, 0.02))
+            on_progress(Progress(0.1, (("to go", "66.0 m"),)))
         if self.error is not None:
             raise self.error
         return types.SimpleNamespace(metrics=self.metrics, success=self.success, run_dir=self.run_dir)
@@ -411,7 +411,11 @@ class Clock:
 
 
 def test_progress_tells_time_distance_error_and_sigma() -> None:
-    text = progress_text(Progress(12.34, 45.6, 0.0123, math.nan))
+    text = progress_text(
+        Progress(
+            12.34, (("to go", metres(45.6, 1)), ("error", metres(0.0123, 3)), ("sigma", metres(math.nan, 3)))
+        )
+    )
     assert " ".join(text.split()) == "t 12.3 s to go 45.6 m error 0.012 m sigma - m"
 
 
@@ -420,7 +424,7 @@ def test_on_a_terminal_one_line_rewrites_itself_and_is_wiped(monkeypatch: pytest
     stream, clock = Terminal(), Clock()
     line = ProgressLine(stream, clock)
     for clock.now_s in np.linspace(0.0, 1.0, 101):
-        line(Progress(1.0, 2.0, 3.0, 4.0))
+        line(Progress(1.0, (("to go", "2 m"),)))
     line.close()
     assert 9 <= stream.getvalue().count("\rt ") <= 11
     assert "\n" not in stream.getvalue()
@@ -431,7 +435,7 @@ def test_elsewhere_a_plain_line_comes_now_and_then() -> None:
     stream, clock = io.StringIO(), Clock()
     line = ProgressLine(stream, clock)
     for clock.now_s in np.linspace(0.0, 25.0, 251):
-        line(Progress(1.0, 2.0, 3.0, 4.0))
+        line(Progress(1.0, (("to go", "2 m"),)))
     line.close()
     assert stream.getvalue().count("\n") == 2
     assert "\r" not in stream.getvalue()
@@ -445,7 +449,7 @@ def test_the_line_is_wiped_also_when_the_run_breaks_off(monkeypatch: pytest.Monk
     def broken_run() -> None:
         with progress_line(True) as show:
             assert show is not None
-            show(Progress(1.0, 2.0, 3.0, 4.0))
+            show(Progress(1.0, (("to go", "2 m"),)))
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):

@@ -11,15 +11,16 @@ import yaml
 
 from pilotage.core.errors import InputError
 from pilotage.core.types import Goal, Pose2
-from pilotage.experiments.build import build, initial_belief
-from pilotage.experiments.mission import load_mission, shipped_missions
-from pilotage.experiments.obstacles import place_obstacles
-from pilotage.experiments.run import simulate
-from pilotage.experiments.run_folder import resolved_yaml
-from pilotage.experiments.world_map import load_map
+from pilotage.experiments.floor.build import build, initial_belief
+from pilotage.experiments.floor.mission import load_floor_mission
+from pilotage.experiments.floor.obstacles import place_obstacles
+from pilotage.experiments.floor.simulate import simulate
+from pilotage.experiments.floor.world_map import load_map
+from pilotage.experiments.mission import shipped_missions
+from pilotage.experiments.resolve import resolved_yaml
 from pilotage.kernels import geometry
 from pilotage.maps.map_file import MapFile
-from pilotage.missions.schema import AcrossPathObstacle, BoxObstacle, Mission, TrapObstacle
+from pilotage.missions.floor import AcrossPathObstacle, BoxObstacle, FloorMission, TrapObstacle
 from support.robots import ROOM
 
 MUSEUM = load_map("museum")
@@ -29,7 +30,7 @@ def test_every_shipped_mission_is_valid_and_called_what_its_file_is() -> None:
     names = shipped_missions()
     assert {"museum-1", "museum-2", "museum-route", "museum-concave", "museum-hall"} <= set(names)
     for name in names:
-        mission = load_mission(name)
+        mission = load_floor_mission(name)
         assert mission.mission == name
         assert mission.description
 
@@ -42,10 +43,10 @@ def test_the_museum_has_the_reports_walls_and_beacons() -> None:
 
 def test_a_mission_resolves_to_a_file_that_loads_as_itself(tmp_path: Path) -> None:
     for name in shipped_missions():
-        mission = load_mission(name, seed=7)
+        mission = load_floor_mission(name, seed=7)
         path = tmp_path / f"{name}.yaml"
         path.write_text(resolved_yaml(mission))
-        again = load_mission(str(path))
+        again = load_floor_mission(str(path))
         assert resolved_yaml(again) == resolved_yaml(mission)
         # Nothing is left to a default that could change.
         if again.stack.navigator.name == "goal":
@@ -55,7 +56,7 @@ def test_a_mission_resolves_to_a_file_that_loads_as_itself(tmp_path: Path) -> No
 
 
 def test_overrides_reach_every_depth() -> None:
-    mission = load_mission(
+    mission = load_floor_mission(
         "museum-1",
         [
             "stack.localizer.gate=0.99",
@@ -81,15 +82,15 @@ def test_a_file_of_parameters_is_laid_over_a_mission(tmp_path: Path) -> None:
     path.write_text(
         "robot: {sensors: {odometry: {name: wheel-odometry, distance_scale: 1.01}}}\nrun: {seed: 4}\n"
     )
-    mission = load_mission("museum-1", [f"@{path}", "run.seed=5"])
+    mission = load_floor_mission("museum-1", [f"@{path}", "run.seed=5"])
     assert mission.robot.sensors["odometry"].parameters["distance_scale"] == 1.01
     assert mission.robot.sensors["odometry"].parameters["rate_hz"] == 10
     assert mission.run.seed == 5
     path.write_text("robots: {}\n")
     with pytest.raises(InputError, match="did you mean 'robot'"):
-        load_mission("museum-1", [f"@{path}"])
+        load_floor_mission("museum-1", [f"@{path}"])
     with pytest.raises(InputError, match="found none there"):
-        load_mission("museum-1", [f"@{tmp_path / 'none.yaml'}"])
+        load_floor_mission("museum-1", [f"@{tmp_path / 'none.yaml'}"])
 
 
 def test_calibration_runs_are_what_they_are_called() -> None:
@@ -99,7 +100,7 @@ def test_calibration_runs_are_what_they_are_called() -> None:
         ("calibrate-xy", math.pi / 4, 50.0, 0.0),
         ("calibrate-theta", 0.0, 0.0, 50.0),
     ):
-        record = simulate(load_mission(name))
+        record = simulate(load_floor_mission(name))
         assert record.outcome.arrived
         trace = record.trace
         end = [trace["true_x_m"][-1], trace["true_y_m"][-1]]
@@ -110,9 +111,9 @@ def test_calibration_runs_are_what_they_are_called() -> None:
 
 
 def test_a_new_name_drops_the_old_ones_parameters() -> None:
-    mission = load_mission("museum-1", ["stack.localizer.name=dead-reckoning"])
+    mission = load_floor_mission("museum-1", ["stack.localizer.name=dead-reckoning"])
     assert mission.stack.localizer.parameters == {}
-    same = load_mission("museum-1", ["stack.localizer.name=ekf-landmarks"])
+    same = load_floor_mission("museum-1", ["stack.localizer.name=ekf-landmarks"])
     assert same.stack.localizer.parameters == {"gate": 0.999}
 
 
@@ -145,7 +146,7 @@ def test_a_new_name_drops_the_old_ones_parameters() -> None:
 )
 def test_bad_input_is_one_line_with_the_remedy(override: str, message: str) -> None:
     with pytest.raises(InputError) as caught:
-        build(load_mission("museum-1", [override]))
+        build(load_floor_mission("museum-1", [override]))
     text = str(caught.value)
     assert message in text
     assert "\n" not in text
@@ -179,15 +180,15 @@ def test_a_map_beside_its_mission_is_found(tmp_path: Path) -> None:
     mission.write_text(
         yaml.safe_dump({"extends": "museum-1", "mission": "mine", "world": {"map": "room.yaml"}})
     )
-    loaded = load_mission(str(mission))
+    loaded = load_floor_mission(str(mission))
     assert isinstance(loaded.world.map, str)
     assert load_map(loaded.world.map).name == "room"
 
 
 def test_a_map_may_stand_in_the_mission_itself() -> None:
-    values = load_mission("museum-1").model_dump()
+    values = load_floor_mission("museum-1").model_dump()
     values["world"]["map"] = {"map": "inline", "walls_m": [(0, 0, 9, 0), (9, 0, 9, 9)]}
-    mission = Mission.model_validate(values)
+    mission = FloorMission.model_validate(values)
     assert isinstance(mission.world.map, MapFile)
     assert load_map(mission.world.map).walls.segments_m.tolist() == [[0, 0, 9, 0], [9, 0, 9, 9]]
 
@@ -195,7 +196,7 @@ def test_a_map_may_stand_in_the_mission_itself() -> None:
 def test_the_start_error_has_the_initial_covariance() -> None:
     from pilotage.core.random import RandomStreams
 
-    mission = load_mission("museum-1")
+    mission = load_floor_mission("museum-1")
     start = Pose2(1.0, 1.0, 0.0)
     errors = np.array(
         [initial_belief(mission, start, RandomStreams(s)).pose.as_array() - [1, 1, 0] for s in range(2000)]

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from scipy import ndimage
 
 from pilotage.core.errors import InputError
-from pilotage.experiments.world_map import load_map
+from pilotage.experiments.floor.world_map import load_map
 from pilotage.maps.rasterize import rasterized
 from pilotage.maps.segment_map import SegmentMap
 

@@ -11,15 +11,16 @@ from pilotage.core.angles import wrap_to_pi
 from pilotage.core.errors import InputError
 from pilotage.core.random import RandomStreams
 from pilotage.core.types import FloatArray, Pose2, Twist
-from pilotage.experiments.build import build
-from pilotage.experiments.mission import load_mission
-from pilotage.experiments.places import random_pose
-from pilotage.experiments.run_folder import resolved_yaml
-from pilotage.experiments.world_map import load_map
+from pilotage.experiments.floor.build import build
+from pilotage.experiments.floor.mission import load_floor_mission
+from pilotage.experiments.floor.places import random_pose
+from pilotage.experiments.floor.world_map import load_map
+from pilotage.experiments.resolve import resolved_yaml
 from pilotage.kernels import geometry, viewpoints, wander
 from pilotage.maps.distance_field import DistanceField
 from pilotage.maps.segment_map import SegmentMap, box_segments
-from pilotage.missions.schema import BodyConfig, MotionConfig, PoseConfig
+from pilotage.missions.floor import BodyConfig, MotionConfig
+from pilotage.missions.mission import PoseConfig
 from pilotage.models.odometry import OdometryModel
 from pilotage.sensors.wheel_odometry import WheelOdometryConfig
 from pilotage.sim.simulator import Simulator
@@ -193,13 +194,13 @@ def test_wandering_touches_nothing(bearing: float | None) -> None:
 
 
 def test_random_places_are_drawn_from_the_seed_and_recorded() -> None:
-    mission = load_mission("museum-lost", seed=4)
+    mission = load_floor_mission("museum-lost", seed=4)
     settled = build(mission).mission
     assert settled.world.random_start is None
     assert settled == build(mission).mission
-    assert build(load_mission("museum-lost", seed=5)).mission.world.start != settled.world.start
+    assert build(load_floor_mission("museum-lost", seed=5)).mission.world.start != settled.world.start
     assert "random_start: null" in resolved_yaml(settled)
-    carried = build(load_mission("museum-kidnap", seed=4)).mission.world.kidnaps[0].to
+    carried = build(load_floor_mission("museum-kidnap", seed=4)).mission.world.kidnaps[0].to
     assert carried is not None
     assert MUSEUM.distance_m(carried.x_m, carried.y_m) >= 0.6
 

@@ -11,7 +11,7 @@ from scipy import stats
 from pilotage.core.errors import InputError
 from pilotage.core.random import RandomStreams
 from pilotage.core.types import Pose2, Twist
-from pilotage.missions.schema import BodyConfig, MotionConfig
+from pilotage.missions.floor import BodyConfig, MotionConfig
 from pilotage.sensors.lidar import LidarConfig
 from pilotage.sensors.readings import (
     BeaconReadings,

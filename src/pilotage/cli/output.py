@@ -12,7 +12,7 @@ from contextlib import contextmanager, redirect_stdout
 from typing import TYPE_CHECKING, Any, TextIO
 
 if TYPE_CHECKING:
-    from pilotage.experiments.run import Progress
+    from pilotage.experiments.progress import Progress
 
 
 def print_json(value: Mapping[str, Any]) -> None:
@@ -113,12 +113,6 @@ def progress_line(wanted: bool) -> Iterator[Callable[[Progress], None] | None]:
 
 
 def progress_text(progress: Progress) -> str:
-    """One line: simulated time, distance to go, position error and sigma."""
-
-    def show(value: float, digits: int) -> str:
-        return f"{value:.{digits}f}" if math.isfinite(value) else "-"
-
-    return (
-        f"t {show(progress.t_s, 1):>6} s   to go {show(progress.distance_to_go_m, 1):>6} m   "
-        f"error {show(progress.position_error_m, 3):>6} m   sigma {show(progress.sigma_m, 3):>6} m"
-    )
+    """One line: simulated time and the numbers of a run of its kind."""
+    words = [f"t {progress.t_s:>6.1f} s", *(f"{label} {text}" for label, text in progress.numbers)]
+    return "   ".join(words)

@@ -14,7 +14,7 @@ from pilotage.evaluation.consistency import correlated_mean, nees
 from pilotage.evaluation.halls import hall_offset_m
 from pilotage.evaluation.shortest_path import ShortestPath, shortest_path
 from pilotage.maps.segment_map import SegmentMap
-from pilotage.missions.schema import Mission
+from pilotage.missions.floor import FloorMission
 from pilotage.stack.interface import PlannedPath
 
 WRONG_M, WRONG_RAD = 0.5, 0.1
@@ -43,7 +43,9 @@ class Outcome:
     counts: Mapping[str, int]
 
 
-def shortest_for(mission: Mission, plans: Sequence[PlannedPath], floor: SegmentMap) -> ShortestPath | None:
+def shortest_for(
+    mission: FloorMission, plans: Sequence[PlannedPath], floor: SegmentMap
+) -> ShortestPath | None:
     """Exact shortest path to hold against the first plan; None where there is nothing to compare."""
     goal, start = mission.world.goal, mission.world.start
     if goal is None or not plans or plans[0].given or not mission.stack.initial.known:
@@ -64,7 +66,7 @@ def covariances(trace: Mapping[str, FloatArray]) -> FloatArray:
 
 
 def run_metrics(
-    mission: Mission, trace: dict[str, FloatArray], outcome: Outcome, floor: SegmentMap
+    mission: FloorMission, trace: dict[str, FloatArray], outcome: Outcome, floor: SegmentMap
 ) -> dict[str, object]:
     """Compute a run's metrics; adds the column ``nees`` to the trace.
 
@@ -127,7 +129,7 @@ def _planning(outcome: Outcome) -> dict[str, object]:
     return metrics
 
 
-def _counted(mission: Mission, trace: Mapping[str, FloatArray]) -> BoolArray:
+def _counted(mission: FloorMission, trace: Mapping[str, FloatArray]) -> BoolArray:
     """(N,) at which steps errors count."""
     counted = trace["t_s"] > mission.run.settle_s
     if "localized" in trace:
@@ -136,7 +138,7 @@ def _counted(mission: Mission, trace: Mapping[str, FloatArray]) -> BoolArray:
 
 
 def _recovery(
-    mission: Mission, trace: Mapping[str, FloatArray], truth: FloatArray, estimate: FloatArray
+    mission: FloorMission, trace: Mapping[str, FloatArray], truth: FloatArray, estimate: FloatArray
 ) -> dict[str, object]:
     """How long a robot that can be lost was lost, and how long it was wrong without knowing."""
     if "localized" not in trace:
@@ -160,7 +162,7 @@ def _recovery(
 
 
 def _errors(
-    mission: Mission, trace: Mapping[str, FloatArray], truth: FloatArray, estimate: FloatArray
+    mission: FloorMission, trace: Mapping[str, FloatArray], truth: FloatArray, estimate: FloatArray
 ) -> dict[str, object]:
     counted = _counted(mission, trace)
     final = estimate[-1] - truth[-1]
@@ -182,7 +184,7 @@ def _errors(
     return metrics
 
 
-def _consistency(mission: Mission, trace: Mapping[str, FloatArray]) -> dict[str, object]:
+def _consistency(mission: FloorMission, trace: Mapping[str, FloatArray]) -> dict[str, object]:
     """NEES (3 is ideal) and NIS per degree of freedom (1 is ideal), corrected for what the gate cuts off."""
     counted = _counted(mission, trace)
     band = correlated_mean(trace["nees"][counted])

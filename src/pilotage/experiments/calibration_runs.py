@@ -10,10 +10,10 @@ import numpy as np
 from pilotage.calibration.steady import SteadyReadings
 from pilotage.core.errors import InputError
 from pilotage.core.types import STOP
-from pilotage.experiments.build import build, build_sensors
-from pilotage.experiments.mission import load_mission
+from pilotage.experiments.floor.build import build, build_sensors
+from pilotage.experiments.floor.mission import load_floor_mission
 from pilotage.experiments.run import run_mission
-from pilotage.missions.schema import Mission
+from pilotage.missions.floor import FloorMission
 from pilotage.sensors.beacon import BeaconConfig
 from pilotage.sensors.lidar import LidarConfig
 from pilotage.sensors.readings import BeaconReadings, LidarScan, Reading, UltrasonicReading
@@ -36,7 +36,8 @@ def drive_odometry_runs(
     Every run has a seed of its own: with a common one the noise of all four would be the same draws.
     """
     missions = [
-        load_mission(name, overrides, len(ODOMETRY_RUNS) * seed + i) for i, name in enumerate(ODOMETRY_RUNS)
+        load_floor_mission(name, overrides, len(ODOMETRY_RUNS) * seed + i)
+        for i, name in enumerate(ODOMETRY_RUNS)
     ]
     wheels = [c for c in build_sensors(missions[0]).values() if isinstance(c, WheelOdometryConfig)]
     if len(wheels) != 1:
@@ -55,7 +56,7 @@ def listen_in_the_room(overrides: Sequence[str], seed: int) -> list[SteadyReadin
     LiDAR and beacons from the middle of the room, an ultrasonic with the robot 2 m from the wall and turned
     so that the sensor faces it. What a perfect sensor would read comes from the same place without noise.
     """
-    mission = load_mission(ROOM, overrides, seed)
+    mission = load_floor_mission(ROOM, overrides, seed)
     out: list[SteadyReadings] = []
     for name, config in build_sensors(mission).items():
         place: list[str] = []
@@ -68,8 +69,8 @@ def listen_in_the_room(overrides: Sequence[str], seed: int) -> list[SteadyReadin
         elif not isinstance(config, LidarConfig | BeaconConfig):
             continue
         here = [*overrides, *place]
-        noisy = _listen(load_mission(ROOM, here, seed), name, READINGS)
-        exact = _listen(load_mission(ROOM, [*here, *_silence(name, config)], seed), name, 1)
+        noisy = _listen(load_floor_mission(ROOM, here, seed), name, READINGS)
+        exact = _listen(load_floor_mission(ROOM, [*here, *_silence(name, config)], seed), name, 1)
         out += _series(name, config, noisy, exact[0])
     if not out:
         raise InputError(
@@ -84,7 +85,7 @@ def _silence(name: str, config: SensorConfig) -> list[str]:
     return [f"robot.sensors.{name}.{field}=0" for field in variances]
 
 
-def _listen(mission: Mission, sensor: str, count: int) -> list[Reading]:
+def _listen(mission: FloorMission, sensor: str, count: int) -> list[Reading]:
     """Stand still and take so many readings of one sensor."""
     simulator = build(mission).simulator
     readings: list[Reading] = []

@@ -12,7 +12,8 @@ import yaml
 
 from pilotage.core.config import validate
 from pilotage.core.errors import InputError, nearest, unknown_name
-from pilotage.missions.schema import Mission
+from pilotage.experiments.kinds import KINDS, kind_name
+from pilotage.missions.mission import TOP_KEYS, Mission
 
 SHIPPED = resources.files("pilotage.missions") / "files"
 
@@ -51,7 +52,7 @@ def load_mission(name_or_path: str, overrides: Sequence[str] = (), seed: int | N
             apply_override(values, override)
     if seed is not None:
         values.setdefault("run", {})["seed"] = seed
-    return validate(Mission, values, "")
+    return validate(KINDS[kind_name(values)]().schema, values, "")
 
 
 def read_parameters(file: str) -> dict[str, Any]:
@@ -60,9 +61,9 @@ def read_parameters(file: str) -> dict[str, Any]:
     if not path.is_file():
         raise InputError(f"--set '@{file}': expected a YAML file of parameters, found none there")
     values = parse_yaml(read_text(path), file)
-    unknown = [str(key) for key in values if key not in Mission.model_fields]
+    unknown = [str(key) for key in values if key not in TOP_KEYS]
     if unknown:
-        known = list(Mission.model_fields)
+        known = list(TOP_KEYS)
         close = nearest(unknown[0], known)
         hint = f"did you mean '{close}'?" if close else "known: " + ", ".join(known)
         raise InputError(f"{file}: unknown key '{unknown[0]}'; {hint}")
@@ -173,7 +174,7 @@ def apply_override(values: dict[str, Any], override: str) -> None:
         If the text is not of that form or the key leads through something that has no keys.
     """
     parts, value = parse_override(override)
-    top = list(Mission.model_fields)
+    top = list(TOP_KEYS)
     if parts[0] not in top:
         close = nearest(parts[0], top)
         hint = f"did you mean '{close}'?" if close else "known: " + ", ".join(top)

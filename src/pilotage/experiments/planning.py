@@ -10,8 +10,8 @@ from pilotage.core.errors import InputError
 from pilotage.core.random import RandomStreams
 from pilotage.core.types import Goal, Pose2
 from pilotage.evaluation.shortest_path import shortest_path
+from pilotage.experiments.floor.world_map import load_map
 from pilotage.experiments.mission import parse_override
-from pilotage.experiments.world_map import load_map
 from pilotage.maps.map_file import LandmarkMap
 from pilotage.stack.navigator.global_plan import GlobalPlan
 from pilotage.stack.planning.planner import PLANNERS, SMOOTHERS

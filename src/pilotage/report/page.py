@@ -34,7 +34,9 @@ from pilotage.report.style import Illustration, drawing_style
 
 REPORT_FILE = "report.html"
 
-FIGURES: tuple[Callable[[RunData], Illustration], ...] = (
+Draw = Callable[[RunData], Illustration]
+
+FLOOR_FIGURES: tuple[Draw, ...] = (
     map_figure,
     close_ups_figure,
     timeline_figure,
@@ -45,6 +47,8 @@ FIGURES: tuple[Callable[[RunData], Illustration], ...] = (
     ultrasonic_figure,
     clearance_figure,
 )
+FIGURES: dict[str, tuple[Draw, ...]] = {"floor": FLOOR_FIGURES}
+"""What is drawn of a run, by the kind of its mission."""
 _LONGEST_MISSION = 100_000
 
 
@@ -65,7 +69,7 @@ def write_report(run_dir: Path) -> Path:
 def run_page(run: RunData) -> str:
     """Return the report of a run as HTML."""
     with drawing_style():
-        figures = [draw(run) for draw in FIGURES]
+        figures = [draw(run) for draw in FIGURES.get(run.kind, FLOOR_FIGURES)]
     sections: list[str] = []
     entries: list[tuple[str, str]] = []
     drawn = 0

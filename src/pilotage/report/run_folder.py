@@ -130,6 +130,12 @@ class RunData:
         return str(self.metrics.get("mission") or self.mission.get("mission") or self.run_dir.name)
 
     @property
+    def kind(self) -> str:
+        """The kind of world that the mission has."""
+        world = self.mission.get("world")
+        return str(world.get("kind", "floor")) if isinstance(world, Mapping) else "floor"
+
+    @property
     def settle_s(self) -> float:
         """Errors count after this long (the start error is drawn, not earned)."""
         run = self.mission.get("run")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pilotage.core.types import Pose2, Twist
 from pilotage.kernels import disc, geometry
 from pilotage.maps.segment_map import SegmentMap
-from pilotage.missions.schema import BodyConfig, MotionConfig
+from pilotage.missions.floor import BodyConfig, MotionConfig
 
 CONTACT_M = 1e-6
 """Below this clearance the body counts as touching."""

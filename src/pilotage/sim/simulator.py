@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 from pilotage.core.random import RandomStreams
 from pilotage.core.types import Pose2, Twist
-from pilotage.missions.schema import BodyConfig, MotionConfig
+from pilotage.missions.floor import BodyConfig, MotionConfig
 from pilotage.sensors.readings import Reading, Readings
 from pilotage.sensors.sensor import SensorConfig
 from pilotage.sim.body import DifferentialDriveBody

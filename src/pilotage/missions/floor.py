@@ -1,48 +1,16 @@
-"""The schema of a mission file: world, robot, stack, run.
-
-Components of the stack are named here but configured where they live: a mission holds each
-component's ``name`` and its parameters, and the room that registers the name validates them.
-"""
+"""Missions on a floor: walls, landmarks, and what should not be there."""
 
 from __future__ import annotations
 
 import math
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
-from pydantic import ConfigDict, Field, model_validator
+from pydantic import Field
 
 from pilotage.core.config import Config
 from pilotage.maps.map_file import MapFile
+from pilotage.missions.mission import ComponentChoice, Mission, Point, PoseConfig
 from pilotage.sensors.sensor import NonNegative, Positive
-
-Point = tuple[float, float]
-
-
-class ComponentChoice(Config):
-    """A registered name and, beside it, the parameters of that component."""
-
-    model_config = ConfigDict(extra="allow", frozen=True)
-
-    name: str
-
-    @model_validator(mode="before")
-    @classmethod
-    def _bare_name(cls, data: Any) -> Any:
-        """A bare name stands for the component with its defaults."""
-        return {"name": data} if isinstance(data, str) else data
-
-    @property
-    def parameters(self) -> dict[str, Any]:
-        """All keys but the name."""
-        return dict(self.model_extra or {})
-
-
-class PoseConfig(Config):
-    """A start pose."""
-
-    x_m: float
-    y_m: float
-    theta_rad: float = Field(default=0.0, ge=-2 * math.pi, le=2 * math.pi)
 
 
 class GoalConfig(Config):
@@ -115,6 +83,7 @@ class WorldConfig(Config):
     With ``random_start`` the run begins elsewhere than at ``start``.
     """
 
+    kind: Literal["floor"] = "floor"
     map: str | MapFile
     start: PoseConfig
     goal: GoalConfig | None = None
@@ -172,28 +141,9 @@ class StackConfig(Config):
     escape: ComponentChoice | None = None
 
 
-class RunConfig(Config):
-    """Time step, time limit and seed."""
+class FloorMission(Mission):
+    """A mission on a floor with walls and landmarks."""
 
-    dt_s: float = Field(default=0.1, gt=0.0, le=10.0)
-    time_limit_s: Positive = 600.0
-    seed: int = Field(default=0, ge=0)
-    settle_s: NonNegative = 1.0
-    """Errors count after this long: the start error is drawn, not earned."""
-
-
-class Mission(Config):
-    """A whole mission."""
-
-    mission: str = Field(min_length=1)
-    description: str = ""
     world: WorldConfig
     robot: RobotConfig
     stack: StackConfig
-    run: RunConfig = RunConfig()
-
-    @model_validator(mode="after")
-    def _steps(self) -> Mission:
-        if self.run.time_limit_s < self.run.dt_s:
-            raise ValueError("run.time_limit_s must be at least run.dt_s")
-        return self

@@ -9,7 +9,8 @@ import numpy as np
 
 from pilotage.core.types import Event, FloatArray, Twist
 from pilotage.evaluation.run_metrics import Outcome
-from pilotage.experiments.build import Experiment
+from pilotage.experiments.floor.build import Experiment
+from pilotage.missions.floor import FloorMission
 from pilotage.sensors.readings import OdometryIncrement, Readings, UltrasonicReading
 from pilotage.sensors.ultrasonic import UltrasonicConfig
 from pilotage.sensors.wheel_odometry import WheelOdometryConfig
@@ -41,6 +42,11 @@ class RunRecord:
     trace: dict[str, FloatArray]
     outcome: Outcome
     events: list[Event]
+
+    @property
+    def mission(self) -> FloorMission:
+        """The mission with its random places drawn."""
+        return self.experiment.mission
 
 
 class Recorder:

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from pilotage.kernels.jit import cache_is_cold
-from pilotage.missions.schema import ComponentChoice, Mission
+from pilotage.missions.floor import FloorMission
+from pilotage.missions.mission import ComponentChoice
 
 STEPS = 3
 FIRST_LIMIT_S = 300.0
@@ -13,7 +14,7 @@ FIRST_LIMIT_S = 300.0
 _WARM: set[tuple[str, ...]] = set()
 
 
-def warm_up(mission: Mission, simulate: Callable[[Mission], object]) -> None:
+def warm_up(mission: FloorMission, simulate: Callable[[FloorMission], object]) -> None:
     """Take the first steps of a mission once, so that its times are not those of a compiler.
 
     Done once a process for each set of components. With an empty cache the mission is rehearsed whole:
@@ -28,7 +29,7 @@ def warm_up(mission: Mission, simulate: Callable[[Mission], object]) -> None:
     _WARM.add(key)
 
 
-def _components(mission: Mission) -> tuple[str, ...]:
+def _components(mission: FloorMission) -> tuple[str, ...]:
     """Names of everything that a mission is made of."""
     roles = dict(mission.stack)
     chosen = [

@@ -11,13 +11,14 @@ from pilotage.core.errors import InputError
 from pilotage.core.random import RandomStreams
 from pilotage.maps.distance_field import DistanceField
 from pilotage.maps.segment_map import SegmentMap
-from pilotage.missions.schema import Kidnap, Mission, PoseConfig
+from pilotage.missions.floor import FloorMission, Kidnap
+from pilotage.missions.mission import PoseConfig
 
 GRID_M = 0.1
 MAX_DRAWS = 100_000
 
 
-def settle_places(mission: Mission, floor: SegmentMap) -> Mission:
+def settle_places(mission: FloorMission, floor: SegmentMap) -> FloorMission:
     """Return the mission with its random places drawn, so that it can be recorded and run again as it is."""
     world = mission.world
     if world.random_start is None and all(kidnap.to is not None for kidnap in world.kidnaps):

@@ -4,20 +4,19 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any, TypeVar
 
 import numpy as np
 
 from pilotage.core.angles import wrap_to_pi
 from pilotage.core.errors import InputError
 from pilotage.core.random import RandomStreams
-from pilotage.core.registry import Registry
 from pilotage.core.types import Goal, Pose2
-from pilotage.experiments.obstacles import Obstacles, place_obstacles
-from pilotage.experiments.places import settle_places
-from pilotage.experiments.world_map import load_map
+from pilotage.experiments.components import build_component, optional_component
+from pilotage.experiments.floor.obstacles import Obstacles, place_obstacles
+from pilotage.experiments.floor.places import settle_places
+from pilotage.experiments.floor.world_map import load_map
 from pilotage.maps.map_file import LandmarkMap
-from pilotage.missions.schema import ComponentChoice, Mission
+from pilotage.missions.floor import FloorMission
 from pilotage.sensors.sensor import SENSORS, SensorConfig
 from pilotage.sim.simulator import Simulator
 from pilotage.sim.world import World
@@ -32,14 +31,12 @@ from pilotage.stack.navigator.navigator import NAVIGATORS, Parts
 from pilotage.stack.planning.local_planner import LOCAL_PLANNERS
 from pilotage.stack.planning.planner import PLANNERS, SMOOTHERS
 
-T = TypeVar("T")
-
 
 @dataclass(frozen=True, slots=True)
 class Experiment:
     """Everything that one run needs, ready to step."""
 
-    mission: Mission
+    mission: FloorMission
     floor: LandmarkMap
     world: World
     obstacles: Obstacles
@@ -47,7 +44,7 @@ class Experiment:
     stack: Stack
 
 
-def build(mission: Mission) -> Experiment:
+def build(mission: FloorMission) -> Experiment:
     """Build a mission.
 
     The stack plans before the world is finished, because some obstacles are put across the planned path.
@@ -87,7 +84,7 @@ def build(mission: Mission) -> Experiment:
     return Experiment(mission, floor, world, obstacles, simulator, stack)
 
 
-def build_sensors(mission: Mission) -> dict[str, SensorConfig]:
+def build_sensors(mission: FloorMission) -> dict[str, SensorConfig]:
     """Validate every sensor of the robot and its rate."""
     sensors: dict[str, SensorConfig] = {}
     for name, choice in mission.robot.sensors.items():
@@ -98,13 +95,13 @@ def build_sensors(mission: Mission) -> dict[str, SensorConfig]:
     return sensors
 
 
-def _start(mission: Mission, floor: LandmarkMap) -> Pose2:
+def _start(mission: FloorMission, floor: LandmarkMap) -> Pose2:
     start, radius = mission.world.start, mission.robot.body.radius_m
     _check_place("world.start", start.x_m, start.y_m, radius, floor)
     return Pose2(start.x_m, start.y_m, wrap_to_pi(start.theta_rad))
 
 
-def _goal(mission: Mission, floor: LandmarkMap) -> Goal | None:
+def _goal(mission: FloorMission, floor: LandmarkMap) -> Goal | None:
     goal = mission.world.goal
     if goal is None:
         return None
@@ -129,7 +126,7 @@ def _check_place(where: str, x_m: float, y_m: float, radius_m: float, floor: Lan
         )
 
 
-def initial_belief(mission: Mission, start: Pose2, streams: RandomStreams) -> Belief:
+def initial_belief(mission: FloorMission, start: Pose2, streams: RandomStreams) -> Belief:
     """What the robot believes at first: the start with an error drawn from the initial covariance."""
     initial = mission.stack.initial
     variances = np.array([initial.x_var_m2, initial.y_var_m2, initial.theta_var_rad2])
@@ -143,7 +140,7 @@ def initial_belief(mission: Mission, start: Pose2, streams: RandomStreams) -> Be
 
 
 def _build_stack(
-    mission: Mission,
+    mission: FloorMission,
     floor: LandmarkMap,
     start: Pose2,
     goal: Goal | None,
@@ -168,23 +165,13 @@ def _build_stack(
         streams=streams,
     )
     parts = Parts(
-        localizer=_component(LOCALIZERS, roles.localizer, "localizer", knowledge),
-        planner=_optional(PLANNERS, roles.planner, "planner"),
-        smoother=_optional(SMOOTHERS, roles.smoother, "smoother"),
-        local_planner=_optional(LOCAL_PLANNERS, roles.local_planner, "local_planner", knowledge),
-        controller=_optional(CONTROLLERS, roles.controller, "controller", knowledge),
-        reactive=_optional(REACTIVES, roles.reactive, "reactive", knowledge),
-        mapper=_optional(MAPPERS, roles.mapper, "mapper", knowledge),
-        escape=_optional(ESCAPES, roles.escape, "escape", knowledge),
+        localizer=build_component(LOCALIZERS, roles.localizer, "localizer", knowledge),
+        planner=optional_component(PLANNERS, roles.planner, "planner"),
+        smoother=optional_component(SMOOTHERS, roles.smoother, "smoother"),
+        local_planner=optional_component(LOCAL_PLANNERS, roles.local_planner, "local_planner", knowledge),
+        controller=optional_component(CONTROLLERS, roles.controller, "controller", knowledge),
+        reactive=optional_component(REACTIVES, roles.reactive, "reactive", knowledge),
+        mapper=optional_component(MAPPERS, roles.mapper, "mapper", knowledge),
+        escape=optional_component(ESCAPES, roles.escape, "escape", knowledge),
     )
-    return _component(NAVIGATORS, roles.navigator, "navigator", knowledge, parts)
-
-
-def _component(registry: Registry[T], choice: ComponentChoice, role: str, *context: Any) -> T:
-    """Build a component from its registered name and parameters."""
-    config = registry.configure(choice.name, choice.parameters, f"stack.{role}")
-    return registry.entry(choice.name).factory(config, *context)
-
-
-def _optional(registry: Registry[T], choice: ComponentChoice | None, role: str, *context: Any) -> T | None:
-    return None if choice is None else _component(registry, choice, role, *context)
+    return build_component(NAVIGATORS, roles.navigator, "navigator", knowledge, parts)

@@ -1,0 +1,64 @@
+"""The kind ``floor``: a robot among walls and landmarks."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pilotage.evaluation.run_metrics import run_metrics
+from pilotage.experiments.floor.files import plans_of, world_of
+from pilotage.experiments.floor.recorder import RunRecord
+from pilotage.experiments.floor.simulate import simulate
+from pilotage.experiments.floor.warm_up import warm_up
+from pilotage.experiments.floor.world_map import shipped_maps
+from pilotage.experiments.progress import OnProgress
+from pilotage.missions.floor import FloorMission
+from pilotage.missions.mission import Mission
+
+
+class FloorKind:
+    """Missions with ``world.kind: floor``; see ``pilotage.experiments.kinds.Kind``."""
+
+    schema: type[Mission] = FloorMission
+
+    def warm_up(self, mission: Mission) -> None:
+        """Take the first steps once."""
+        assert isinstance(mission, FloorMission)
+        warm_up(mission, simulate)
+
+    def simulate(self, mission: Mission, on_progress: OnProgress | None = None) -> RunRecord:
+        """Build a mission and step it to its end."""
+        assert isinstance(mission, FloorMission)
+        return simulate(mission, on_progress)
+
+    def metrics(self, record: RunRecord) -> dict[str, object]:
+        """Position errors, consistency, path quality, clearance."""
+        return run_metrics(record.mission, record.trace, record.outcome, record.experiment.floor.walls)
+
+    def write_files(self, record: RunRecord, folder: Path) -> None:
+        """``world.json`` and ``plans.npz``."""
+        (folder / "world.json").write_text(json.dumps(world_of(record)), encoding="utf-8")
+        np.savez_compressed(folder / "plans.npz", allow_pickle=False, **plans_of(record))
+
+    def inline(self, record: RunRecord, values: dict[str, Any]) -> None:
+        """Write a map that came from a file into the mission."""
+        source = record.mission.world.map
+        if not isinstance(source, str) or source in shipped_maps():
+            return
+        floor = record.experiment.floor
+        values["world"]["map"] = {
+            "map": floor.name,
+            "bounds_m": list(floor.walls.bounds_m),
+            "walls_m": floor.walls.segments_m.tolist(),
+            "circles_m": floor.walls.circles_m.tolist(),
+            "landmarks": [
+                {"id": int(i), "x_m": float(x), "y_m": float(y)}
+                for i, (x, y) in zip(floor.landmarks.ids, floor.landmarks.points_xy_m, strict=True)
+            ],
+        }
+
+
+FLOOR = FloorKind()

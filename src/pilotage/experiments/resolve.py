@@ -1,0 +1,43 @@
+"""A mission in full: every component's defaults written out."""
+
+from __future__ import annotations
+
+import hashlib
+from typing import Any
+
+import yaml
+
+from pilotage.experiments.kinds import Record, kind_of
+from pilotage.experiments.roles import REGISTRIES
+from pilotage.missions.mission import Mission
+
+
+def resolved_yaml(mission: Mission, record: Record | None = None) -> str:
+    """The mission in full, every component's defaults included; with a record, what came from files too."""
+    values = mission.model_dump(mode="json")
+    for role, choice in values["stack"].items():
+        if role in REGISTRIES and choice is not None:
+            values["stack"][role] = _resolved(role, choice, f"stack.{role}")
+    for name, choice in values["robot"].get("sensors", {}).items():
+        values["robot"]["sensors"][name] = _resolved("sensor", choice, f"robot.sensors.{name}")
+    if record is not None:
+        kind_of(mission).inline(record, values)
+    return yaml.safe_dump(values, sort_keys=False, allow_unicode=True)
+
+
+def _resolved(role: str, choice: dict[str, Any], where: str) -> dict[str, Any]:
+    """A component's name with all its parameters, those left to their defaults too."""
+    parameters = {key: value for key, value in choice.items() if key != "name"}
+    config = REGISTRIES[role].configure(choice["name"], parameters, where)
+    return {"name": choice["name"], **config.model_dump(mode="json")}
+
+
+def run_name(mission: Mission) -> str:
+    """``<mission>-<seed>-<hash>``: the same mission and seed have the same name."""
+    digest = hashlib.sha256(resolved_yaml(mission).encode()).hexdigest()[:8]
+    return f"{_slug(mission.mission)}-{mission.run.seed}-{digest}"
+
+
+def _slug(text: str) -> str:
+    """A name fit for a folder."""
+    return "".join(c if c.isalnum() or c in "-_." else "-" for c in text).strip(".") or "mission"

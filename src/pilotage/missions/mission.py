@@ -1,0 +1,74 @@
+"""What every mission file holds, whatever its world: a name, a world of some kind, robot, stack, run.
+
+Components of the stack are named here but configured where they live: a mission holds each
+component's ``name`` and its parameters, and the room that registers the name validates them.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from pydantic import ConfigDict, Field, model_validator
+
+from pilotage.core.config import Config
+from pilotage.sensors.sensor import NonNegative, Positive
+
+TOP_KEYS = ("mission", "description", "world", "robot", "stack", "run")
+DEFAULT_KIND = "floor"
+
+Point = tuple[float, float]
+
+
+class ComponentChoice(Config):
+    """A registered name and, beside it, the parameters of that component."""
+
+    model_config = ConfigDict(extra="allow", frozen=True)
+
+    name: str
+
+    @model_validator(mode="before")
+    @classmethod
+    def _bare_name(cls, data: Any) -> Any:
+        """A bare name stands for the component with its defaults."""
+        return {"name": data} if isinstance(data, str) else data
+
+    @property
+    def parameters(self) -> dict[str, Any]:
+        """All keys but the name."""
+        return dict(self.model_extra or {})
+
+
+class PoseConfig(Config):
+    """A start pose."""
+
+    x_m: float
+    y_m: float
+    theta_rad: float = Field(default=0.0, ge=-2 * math.pi, le=2 * math.pi)
+
+
+class RunConfig(Config):
+    """Time step, time limit and seed."""
+
+    dt_s: float = Field(default=0.1, gt=0.0, le=10.0)
+    time_limit_s: Positive = 600.0
+    seed: int = Field(default=0, ge=0)
+    settle_s: NonNegative = 1.0
+    """Errors count after this long: the start error is drawn, not earned."""
+
+
+class Mission(Config):
+    """What missions of all kinds have in common; ``world.kind`` says which kind it is.
+
+    Each kind is a subclass in a module of its own that adds ``world``, ``robot`` and ``stack``.
+    """
+
+    mission: str = Field(min_length=1)
+    description: str = ""
+    run: RunConfig = RunConfig()
+
+    @model_validator(mode="after")
+    def _steps(self) -> Mission:
+        if self.run.time_limit_s < self.run.dt_s:
+            raise ValueError("run.time_limit_s must be at least run.dt_s")
+        return self
