@@ -56,6 +56,10 @@ class Kind(Protocol):
         """
         ...
 
+    def oracles(self, mission: Mission) -> Mapping[str, str]:
+        """The oracles that ``run.oracles`` can name in this mission, and what each one does."""
+        ...
+
     def metrics(self, record: Any) -> dict[str, object]:
         """The numbers of a run by their JSON keys; ``success`` among them."""
         ...
@@ -103,3 +107,19 @@ def kind_of(mission: Mission) -> Kind:
         if isinstance(mission, kind.schema):
             return kind
     raise TypeError(f"expected a mission of a kind in {', '.join(KINDS)}, found {type(mission).__name__}")
+
+
+def check_oracles(kind: Kind, mission: Mission) -> None:
+    """Refuse an oracle that the mission has no place for.
+
+    Raises
+    ------
+    InputError
+        With the nearest right name, or that missions of this kind have none.
+    """
+    known = kind.oracles(mission)
+    for name in mission.run.oracles:
+        if not known:
+            raise InputError(f"run.oracles: expected none in the mission '{mission.mission}', found '{name}'")
+        if name not in known:
+            raise unknown_name("run.oracles", name, known)

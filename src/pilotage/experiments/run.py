@@ -6,7 +6,7 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
-from pilotage.experiments.kinds import Record, kind_of
+from pilotage.experiments.kinds import Record, check_oracles, kind_of
 from pilotage.experiments.progress import OnProgress
 from pilotage.experiments.run_folder import write_run_folder
 from pilotage.missions.mission import Mission
@@ -45,6 +45,7 @@ def run_mission(
         Where the mission cannot be built; nothing has been written then.
     """
     kind = kind_of(mission)
+    check_oracles(kind, mission)
     kind.warm_up(mission)
     begin = time.perf_counter()
     record = kind.simulate(mission, on_progress)
@@ -59,4 +60,6 @@ def run_mission(
 
 def simulate(mission: Mission, on_progress: OnProgress | None = None) -> Record:
     """Build a mission and step it to its end, without judging it."""
-    return kind_of(mission).simulate(mission, on_progress)
+    kind = kind_of(mission)
+    check_oracles(kind, mission)
+    return kind.simulate(mission, on_progress)

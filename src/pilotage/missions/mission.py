@@ -55,6 +55,8 @@ class RunConfig(Config):
     seed: int = Field(default=0, ge=0)
     settle_s: NonNegative = 1.0
     """Errors count after this long: the start error is drawn, not earned."""
+    oracles: tuple[str, ...] = ()
+    """Modules that know the truth in this run, to find out what the real ones cost."""
 
 
 class Mission(Config):

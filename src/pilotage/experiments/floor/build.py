@@ -13,6 +13,7 @@ from pilotage.core.random import RandomStreams
 from pilotage.core.types import Goal, Pose2
 from pilotage.experiments.components import build_component, optional_component
 from pilotage.experiments.floor.obstacles import Obstacles, place_obstacles
+from pilotage.experiments.floor.oracles import Truth, with_oracles, without_noise
 from pilotage.experiments.floor.places import settle_places
 from pilotage.experiments.floor.world_map import load_map
 from pilotage.maps.map_file import LandmarkMap
@@ -78,9 +79,24 @@ def build(mission: FloorMission) -> Experiment:
     )
     geometry = floor.walls.with_obstacles(obstacles.segments_m, obstacles.circles_m)
     world = World(floor.walls, geometry, floor.landmarks)
+    oracles = frozenset(mission.run.oracles)
+    truth = None
+    if oracles:
+        # The obstacles stay where the robot without oracles meets them: only the modules differ.
+        truth = Truth(geometry, world.obstacle_segments_m, world.obstacle_circles_m, start, mission.run.dt_s)
+        stack = _build_stack(mission, floor, start, goal, sensors, streams, oracles, truth)
+        stack.prepare()
     simulator = Simulator(
-        world, mission.robot.body, mission.robot.motion, sensors, start, mission.run.dt_s, streams
+        world,
+        mission.robot.body,
+        mission.robot.motion,
+        without_noise(sensors) if "sensors" in oracles else sensors,
+        start,
+        mission.run.dt_s,
+        streams,
     )
+    if truth is not None:
+        truth.simulator = simulator
     return Experiment(mission, floor, world, obstacles, simulator, stack)
 
 
@@ -146,6 +162,8 @@ def _build_stack(
     goal: Goal | None,
     sensors: dict[str, SensorConfig],
     streams: RandomStreams,
+    oracles: frozenset[str] = frozenset(),
+    truth: Truth | None = None,
 ) -> Stack:
     roles, robot = mission.stack, mission.robot
     initial = initial_belief(mission, start, streams)
@@ -174,4 +192,6 @@ def _build_stack(
         mapper=optional_component(MAPPERS, roles.mapper, "mapper", knowledge),
         escape=optional_component(ESCAPES, roles.escape, "escape", knowledge),
     )
+    if truth is not None:
+        parts = with_oracles(parts, oracles, truth)
     return build_component(NAVIGATORS, roles.navigator, "navigator", knowledge, parts)

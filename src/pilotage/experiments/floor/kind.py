@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +11,7 @@ import numpy as np
 
 from pilotage.evaluation.run_metrics import run_metrics
 from pilotage.experiments.floor.files import plans_of, world_of
+from pilotage.experiments.floor.oracles import applicable
 from pilotage.experiments.floor.recorder import RunRecord
 from pilotage.experiments.floor.simulate import simulate
 from pilotage.experiments.floor.warm_up import warm_up
@@ -33,6 +35,11 @@ class FloorKind:
         """Build a mission and step it to its end."""
         assert isinstance(mission, FloorMission)
         return simulate(mission, on_progress)
+
+    def oracles(self, mission: Mission) -> Mapping[str, str]:
+        """Those that can stand in for something in this stack."""
+        assert isinstance(mission, FloorMission)
+        return applicable(dict(mission.stack))
 
     def metrics(self, record: RunRecord) -> dict[str, object]:
         """Position errors, consistency, path quality, clearance."""
