@@ -1,0 +1,91 @@
+"""Intervals for what a handful of independent trials says; all by scipy."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import stats
+
+from pilotage.core.types import FloatArray
+
+LEVEL = 0.95
+RESAMPLES = 2000
+
+
+@dataclass(frozen=True, slots=True)
+class Summary:
+    """A metric over independent trials: how many, mean with its interval, median, variance, extremes."""
+
+    n: int
+    mean: float
+    low: float
+    high: float
+    median: float
+    variance: float
+    smallest: float
+    largest: float
+
+
+def bootstrap_mean(values: FloatArray) -> tuple[float, float]:
+    """95 % bootstrap interval of the mean (BCa: Efron 1987; ``scipy.stats.bootstrap``).
+
+    Seeded, so that the same values always give the same interval. Equal values give a point, one value
+    gives (nan, nan). With few trials it is too short: 93 % cover at 20, 90 % at 10 normal values.
+
+    Parameters
+    ----------
+    values
+        (n,) finite numbers from independent trials.
+    """
+    if values.size < 2:
+        return math.nan, math.nan
+    if np.ptp(values) == 0.0:
+        return float(values[0]), float(values[0])
+    found = stats.bootstrap(
+        (values,),
+        np.mean,
+        confidence_level=LEVEL,
+        n_resamples=RESAMPLES,
+        method="BCa",
+        rng=np.random.default_rng(0),
+    ).confidence_interval
+    if math.isfinite(found.low) and math.isfinite(found.high):
+        return float(found.low), float(found.high)
+    # BCa has no acceleration where almost all values are equal.
+    found = stats.bootstrap(
+        (values,),
+        np.mean,
+        confidence_level=LEVEL,
+        n_resamples=RESAMPLES,
+        method="percentile",
+        rng=np.random.default_rng(0),
+    ).confidence_interval
+    return float(found.low), float(found.high)
+
+
+def summarize(values: FloatArray) -> Summary:
+    """Summarize a metric over trials; what is not finite is left out and not counted."""
+    finite = values[np.isfinite(values)]
+    if finite.size == 0:
+        return Summary(0, *([math.nan] * 7))
+    low, high = bootstrap_mean(finite)
+    return Summary(
+        n=int(finite.size),
+        mean=float(finite.mean()),
+        low=low,
+        high=high,
+        median=float(np.median(finite)),
+        variance=float(finite.var(ddof=1)) if finite.size > 1 else math.nan,
+        smallest=float(finite.min()),
+        largest=float(finite.max()),
+    )
+
+
+def wilson(successes: int, trials: int) -> tuple[float, float]:
+    """95 % Wilson interval of a success rate; (nan, nan) without trials."""
+    if trials == 0:
+        return math.nan, math.nan
+    found = stats.binomtest(successes, trials).proportion_ci(LEVEL, method="wilson")
+    return float(found.low), float(found.high)
