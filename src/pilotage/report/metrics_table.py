@@ -258,6 +258,15 @@ def metric_rows(metrics: Mapping[str, Any]) -> list[tuple[str, list[Row]]]:
     return [*groups, ("Further", others)] if others else groups
 
 
+def metric_of(key: str) -> Metric:
+    """The catalogue's entry for a key; one made from the key where there is none."""
+    for _, catalogue in GROUPS:
+        for metric in catalogue:
+            if metric.key == key:
+                return metric
+    return Metric(key, key.replace("_", " "), lambda value: quantities.significant(value, 4), "")
+
+
 def _flatten(metrics: Mapping[str, Any]) -> dict[str, float]:
     """Return all numbers by one level of names, with the ratio that everybody asks for."""
     values = {}

@@ -1,0 +1,73 @@
+"""The median and the worst trial as pictures, each with what replays it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from pilotage.report.markup import escape
+from pilotage.report.metrics_table import metric_of
+from pilotage.report.study.view import StudyView
+
+
+@dataclass(frozen=True, slots=True)
+class Example:
+    """A trial that was run again for its picture.
+
+    ``link`` is the page of that run, relative to the study's folder; ``svg`` its map.
+    """
+
+    title: str
+    row: int
+    text: str
+    link: str
+    command: str
+    svg: str
+
+
+def rows_to_show(view: StudyView) -> list[tuple[str, int]]:
+    """The worst and the median trial by the metric that answers the question: (what it is, row).
+
+    A trial that failed in the field is worse than any that succeeded.
+    """
+    column = view.column(view.primary)
+    success = view.column("success")
+    badness = column if view.lower_is_better else -column
+    badness = np.where(np.isfinite(badness), badness, np.inf)
+    failed = np.where(np.isfinite(success) & (success < 0.5), 1.0, 0.0)
+    if not view.row.size:
+        return []
+    order = np.lexsort((view.row, badness, failed))
+    worst, median = int(view.row[order[-1]]), int(view.row[order[(len(order) - 1) // 2]])
+    return [("The worst trial", worst)] + ([("The median trial", median)] if median != worst else [])
+
+
+def describe(view: StudyView, row: int) -> str:
+    """Which setting, which seed, what it gave."""
+    at = int(np.flatnonzero(view.row == row)[0])
+    metric = metric_of(view.primary)
+    value = metric.write(float(view.column(view.primary)[at]))
+    ended = "" if view.column("success")[at] != 0.0 else "; it failed"
+    return f"{view.cells[int(view.cell[at])].name}, seed {int(view.seed[at])}: {metric.name} {value}{ended}."
+
+
+def examples_section(examples: Sequence[Example]) -> str:
+    """The section; empty without examples."""
+    if not examples:
+        return ""
+    parts = []
+    for example in examples:
+        link = (
+            f'<p><a href="{escape(example.link)}">Its report, with a replay</a> · '
+            f"<code>{escape(example.command)}</code></p>"
+        )
+        parts.append(
+            f'<figure class="example"><h3>{escape(example.title)}</h3><div class="plot" tabindex="0">'
+            f"{example.svg}</div><figcaption>{escape(example.text)}</figcaption>{link}</figure>"
+        )
+    return (
+        '<section id="trials"><h2><a href="#trials">The median and the worst trial</a></h2>'
+        f"{''.join(parts)}</section>"
+    )

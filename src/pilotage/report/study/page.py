@@ -1,0 +1,102 @@
+"""Puts a study's page together: self-contained, with vector figures."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+from pilotage.evaluation.judge import Judgement, judge
+from pilotage.report.markup import contents, document, escape, figure_section, layer_rules, tiles
+from pilotage.report.quantities import count
+from pilotage.report.study.answer import answer
+from pilotage.report.study.examples import Example, examples_section
+from pilotage.report.study.figures import factor_figures, settings_figure
+from pilotage.report.study.tables import (
+    cells_table,
+    comparisons_table,
+    consistency_table,
+    failures_table,
+    lower_is_better,
+)
+from pilotage.report.study.view import StudyView
+from pilotage.report.style import drawing_style
+
+REPORT_FILE = "report.html"
+
+
+def study_page(view: StudyView, examples: tuple[Example, ...] = ()) -> str:
+    """Return the page of a study as HTML."""
+    judgement = judge_view(view)
+    lower = lower_is_better(view.metrics) | {view.primary: view.lower_is_better}
+    with drawing_style():
+        side_by_side = settings_figure(view, judgement)
+        figures = [*([side_by_side] if side_by_side is not None else []), *factor_figures(view, judgement)]
+    sections = [
+        *((f.slug, f.title, figure_section(number, f)) for number, f in enumerate(figures, start=1)),
+        ("cells", "Every setting", cells_table(view, judgement, lower)),
+        ("comparisons", "Comparisons", comparisons_table(view, judgement)),
+        ("consistency", "Consistency", consistency_table(view)),
+        ("trials", "The median and the worst trial", examples_section(examples)),
+        ("failures", "Trials that broke", failures_table(view)),
+        ("again", "To run it again", _again(view)),
+    ]
+    present = [entry for entry in sections if entry[2]]
+    return document(
+        title=escape(f"{view.name}: study report"),
+        layers="".join(layer_rules(figure) for figure in figures),
+        eyebrow=escape(f"pilotage study report · mission {view.mission} · {count(view.row.size)} trials"),
+        heading=escape(view.name),
+        description=f'<p class="description">{escape(view.question)}</p>' if view.question else "",
+        outcome="",
+        headline=escape(answer(view, judgement)),
+        tiles=tiles(_tiles(view)),
+        contents=contents([(slug, title) for slug, title, _ in present]),
+        body="\n".join(section for _, _, section in present),
+        footer=escape(
+            "Made by pilotage from the study's database. Settings are compared on the same seeds; intervals "
+            "are 95 %."
+        ),
+    )
+
+
+def write_page(view: StudyView, folder: Path, examples: tuple[Example, ...] = ()) -> Path:
+    """Write ``report.html`` into the study's folder in one go and return its path."""
+    path = folder / REPORT_FILE
+    beside = path.with_name(f".{path.name}.{os.getpid()}")
+    try:
+        beside.write_text(study_page(view, examples), encoding="utf-8")
+        beside.replace(path)
+    finally:
+        beside.unlink(missing_ok=True)
+    return path
+
+
+def judge_view(view: StudyView) -> Judgement:
+    """Judge all that the page shows."""
+    names = dict.fromkeys([*view.metrics, view.primary, "success"])
+    values = {name: view.column(name) for name in names if name in view.values or name in view.metrics}
+    values.setdefault(view.primary, view.column(view.primary))
+    return judge(view.cell, view.trial, values, len(view.cells), view.baseline)
+
+
+def _tiles(view: StudyView) -> list[tuple[str, str]]:
+    entries = [
+        ("trials", count(view.row.size)),
+        ("settings", count(len(view.cells))),
+        ("trials each", count(view.trials_per_cell)),
+        ("broken trials", count(len(view.failures))),
+    ]
+    return [*entries, ("still to run", count(view.waiting))] if view.waiting else entries
+
+
+def _again(view: StudyView) -> str:
+    last = view.first_seed + view.trials_per_cell - 1
+    return (
+        '<section id="again"><h2><a href="#again">To run it again</a></h2>'
+        f"<p>Seeds {view.first_seed} to {last}, the same in every setting. The folder&#x27;s "
+        "<code>study.yaml</code> holds everything that is needed: "
+        "<code>pilotage study study.yaml</code>. Any single trial: "
+        "<code>pilotage run --from STUDY:ROW</code>.</p>"
+        f"<details><summary>Show the definition</summary><pre>{escape(view.definition)}</pre></details>"
+        "</section>"
+    )
