@@ -13,7 +13,7 @@ from pilotage.report.study.view import StudyView
 SURE = 0.05
 
 
-def best_cell(view: StudyView, judgement: Judgement, metric: str, lower: bool) -> int | None:
+def best_cell(judgement: Judgement, metric: str, lower: bool) -> int | None:
     """The cell with the best mean; None where no cell has one."""
     means = [summary.mean for summary in judgement.summaries.get(metric, ())]
     known = [(mean, index) for index, mean in enumerate(means) if math.isfinite(mean)]
@@ -34,7 +34,7 @@ def interval(metric: Metric, summary: Summary) -> str:
 def answer(view: StudyView, judgement: Judgement) -> str:
     """One sentence: which setting is best, by how much against the baseline, and how surely."""
     metric = metric_of(view.primary)
-    best = best_cell(view, judgement, view.primary, view.lower_is_better)
+    best = best_cell(judgement, view.primary, view.lower_is_better)
     if best is None:
         return f"No trial gave {metric.name}."
     summary = judgement.summaries[view.primary][best]

@@ -20,7 +20,7 @@ IDEAL = ("nees", "nis")
 
 def cells_table(view: StudyView, judgement: Judgement, lower: dict[str, bool]) -> str:
     """Mean, interval and variance of each metric in each cell, beside what was published."""
-    best = {m: best_cell(view, judgement, m, lower[m]) for m in view.metrics if not m.startswith(IDEAL)}
+    best = {m: best_cell(judgement, m, lower[m]) for m in view.metrics if not m.startswith(IDEAL)}
     head = "".join(f'<th scope="col" class="value">{escape(metric_of(m).name)}</th>' for m in view.metrics)
     rows = []
     for cell in view.cells:
