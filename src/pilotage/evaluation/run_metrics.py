@@ -13,6 +13,7 @@ from pilotage.core.types import BoolArray, FloatArray
 from pilotage.evaluation.consistency import correlated_mean, nees
 from pilotage.evaluation.halls import hall_offset_m
 from pilotage.evaluation.shortest_path import ShortestPath, shortest_path
+from pilotage.evaluation.split_errors import split_errors
 from pilotage.maps.segment_map import SegmentMap
 from pilotage.missions.floor import FloorMission
 from pilotage.stack.interface import PlannedPath
@@ -181,7 +182,8 @@ def _errors(
     metrics["position_rmse_m"] = float(np.sqrt(np.mean(distance**2)))
     metrics["position_max_m"] = float(distance.max())
     metrics["heading_rmse_rad"] = float(np.sqrt(np.mean(heading**2)))
-    return metrics
+    everywhere = np.hypot(estimate[:, 0] - truth[:, 0], estimate[:, 1] - truth[:, 1])
+    return metrics | split_errors(trace, everywhere, counted)
 
 
 def _consistency(mission: FloorMission, trace: Mapping[str, FloatArray]) -> dict[str, object]:

@@ -102,6 +102,20 @@ GROUPS: tuple[tuple[str, tuple[Metric, ...]], ...] = (
                 quantities.length,
                 "The worst single step after the start phase.",
             ),
+            *(
+                Metric(
+                    f"position_rmse_{part}_m",
+                    f"position error, {words}",
+                    quantities.length,
+                    f"RMSE of the position over the steps {meaning}.",
+                )
+                for part, words, meaning in (
+                    ("following", "following", "in which the path follower drove"),
+                    ("reactive", "reacting", "in which reactive control drove"),
+                    ("narrow", "narrow ground", "with something solid within 0.5 m of the body"),
+                    ("open", "open ground", "with nothing solid within 0.5 m of the body"),
+                )
+            ),
             Metric(
                 "heading_rmse_rad",
                 "heading error, RMSE",
