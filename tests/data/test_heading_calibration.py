@@ -8,12 +8,14 @@ import pytest
 
 from pilotage.calibration.heading import calibrate_heading
 from pilotage.logs.heading_csv import find_heading_logs, read_heading_log
+from pilotage.logs.reckoning_mat import read_reckoning_mat
 from support.recordings import recording
 
 
 def test_the_recorded_heading_sensors() -> None:
     """Bias about +1.1 deg/s at rest; two turns about z, 720 degrees net."""
-    logs = [read_heading_log(path) for path in find_heading_logs(recording("heading"))]
+    paths = [path for path in find_heading_logs(recording("heading")) if path.suffix == ".csv"]
+    logs = [read_heading_log(path) for path in paths]
     found = calibrate_heading(logs)
     assert found.yaw_bias_rad_s is not None
     assert found.yaw_bias_rad_s.value == pytest.approx(math.radians(1.12), abs=math.radians(0.02))
@@ -32,3 +34,16 @@ def test_the_recorded_heading_sensors() -> None:
     assert ellipse.axes == "xz"
     assert ellipse.offset_gauss[1].value == pytest.approx(-0.244, abs=0.01)
     assert ellipse.residual_gauss < 0.1 * ellipse.radius_gauss
+
+
+def test_the_recorded_drive_with_a_reference_heading() -> None:
+    """Encoder and gyroscope with GPS truth: bias about -0.0054 rad/s."""
+    drive = read_reckoning_mat(recording("heading/Plaza2_.mat"))
+    (found,) = calibrate_heading([], drives=[drive]).drives
+    assert found.bias_rad_s.value == pytest.approx(-0.0054, abs=2e-4)
+    assert found.bias_rad_s.high - found.bias_rad_s.low < 2e-3
+    # It turned to the right all the way; a scale of 0.985 explains what a bias alone leaves.
+    assert found.scale is not None
+    assert found.scale.value == pytest.approx(0.985, abs=0.001)
+    assert found.bias_with_scale_rad_s is not None
+    assert found.bias_with_scale_rad_s.value == pytest.approx(-0.00697, abs=5e-5)

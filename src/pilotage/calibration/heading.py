@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from pilotage.calibration.gyro_reference import GyroReferenceCalibration, calibrate_against_reference
 from pilotage.calibration.gyroscope import GyroscopeCalibration, calibrate_at_rest, is_moving, turns_of
 from pilotage.calibration.intervals import Estimate
 from pilotage.calibration.magnetometer import (
@@ -15,6 +16,7 @@ from pilotage.calibration.magnetometer import (
 )
 from pilotage.core.errors import InputError
 from pilotage.logs.heading_csv import HeadingLog, HeadingSensor
+from pilotage.logs.reckoning_mat import ReckoningLog
 
 AXES = "xyz"
 
@@ -27,12 +29,16 @@ class HeadingCalibration:
     gyroscope: tuple[GyroscopeCalibration, ...]
     magnetometer: tuple[MagnetometerCalibration, ...]
     resting_field: tuple[tuple[HeadingLog, tuple[Estimate, Estimate, Estimate]], ...]
+    drives: tuple[GyroReferenceCalibration, ...] = ()
 
     @property
     def yaw_bias_rad_s(self) -> Estimate | None:
-        """Bias of the yaw gyroscope at rest."""
+        """Bias of the yaw gyroscope at rest; without such a log, of the drive that tells it best."""
         at_rest = self.yaw_at_rest
-        return None if at_rest is None else at_rest.bias_rad_s
+        if at_rest is not None:
+            return at_rest.bias_rad_s
+        biases = [drive.bias_rad_s for drive in self.drives]
+        return min(biases, key=lambda bias: bias.high - bias.low, default=None)
 
     @property
     def yaw_at_rest(self) -> GyroscopeCalibration | None:
@@ -52,6 +58,7 @@ class HeadingCalibration:
             "gyro_angle_var_rad2_per_s": _dict(_squared(walk)),
             "gyro_bias_instability_rad_s": _dict(floor),
             "gyroscope": [_gyroscope(entry) for entry in self.gyroscope],
+            "gyroscope_while_driving": [_drive(entry) for entry in self.drives],
             "magnetometer": [_magnetometer(entry) for entry in self.magnetometer],
             "magnetometer_at_rest": [
                 {"log": log.name, "field_gauss": {a: e.as_dict() for a, e in zip(AXES, means, strict=True)}}
@@ -60,8 +67,12 @@ class HeadingCalibration:
         }
 
 
-def calibrate_heading(logs: Sequence[HeadingLog], axis: str = "z") -> HeadingCalibration:
+def calibrate_heading(
+    logs: Sequence[HeadingLog], axis: str = "z", drives: Sequence[ReckoningLog] = ()
+) -> HeadingCalibration:
     """Calibrate all logs; biases found at rest are taken off the turns.
+
+    ``drives`` are of a robot with a reference heading; each may be of another gyroscope.
 
     Raises
     ------
@@ -70,7 +81,7 @@ def calibrate_heading(logs: Sequence[HeadingLog], axis: str = "z") -> HeadingCal
     """
     if axis not in AXES or len(axis) != 1:
         raise InputError(f"calibrate heading: expected an axis x, y or z, found '{axis}'")
-    if not logs:
+    if not logs and not drives:
         raise InputError("calibrate heading: expected at least one log, found none")
     gyro = [log for log in logs if log.sensor is HeadingSensor.GYROSCOPE]
     compass = [log for log in logs if log.sensor is HeadingSensor.MAGNETOMETER]
@@ -85,6 +96,7 @@ def calibrate_heading(logs: Sequence[HeadingLog], axis: str = "z") -> HeadingCal
         (*at_rest, *turning),
         tuple(calibrate_turned(log) for log in compass if turned(log)),
         tuple((log, noise_at_rest(log)) for log in compass if not turned(log)),
+        tuple(calibrate_against_reference(drive) for drive in drives),
     )
 
 
@@ -115,6 +127,18 @@ def _gyroscope(entry: GyroscopeCalibration) -> dict[str, object]:
             "allan_deviation_rad_s": entry.allan.deviation_rad_s.tolist(),
         }
     return out | {"turn_rad": entry.turn_rad, "scale_if_whole_turns": entry.scale}
+
+
+def _drive(entry: GyroReferenceCalibration) -> dict[str, object]:
+    return {
+        "log": entry.log.name,
+        "steps": int(entry.log.t_s.shape[0]),
+        "duration_s": float(entry.log.dt_s.sum()),
+        "reference_gaps_s": entry.gaps_s,
+        "bias_rad_s": entry.bias_rad_s.as_dict(),
+        "bias_with_scale_rad_s": _dict(entry.bias_with_scale_rad_s),
+        "scale": _dict(entry.scale),
+    }
 
 
 def _magnetometer(entry: MagnetometerCalibration) -> dict[str, object]:

@@ -20,9 +20,10 @@ from pilotage.core.errors import InputError
 from pilotage.core.types import FloatArray
 from pilotage.experiments.calibration_runs import drive_odometry_runs, listen_in_the_room
 from pilotage.experiments.run_folder import clean
-from pilotage.logs.heading_csv import find_heading_logs, read_heading_log
+from pilotage.logs.heading_csv import DRIVE_SUFFIX, find_heading_logs, read_heading_log
 from pilotage.logs.odometry_csv import read_odometry_csv
 from pilotage.logs.odometry_steps import OdometrySteps
+from pilotage.logs.reckoning_mat import read_reckoning_mat
 from pilotage.logs.run_trace import TRACE, read_run_odometry
 from pilotage.logs.steady_csv import read_steady_csv
 from pilotage.sensors.wheel_odometry import WheelOdometryConfig
@@ -93,12 +94,16 @@ def heading_from(places: Sequence[Path], out: Path, *, axis: str = "z") -> Calib
             "calibrate heading: expected gyroscope or magnetometer logs; "
             "the simulated robot has no such sensor"
         )
-    logs = [read_heading_log(path) for place in places for path in find_heading_logs(place)]
-    found = calibrate_heading(logs, axis)
+    paths = [path for place in places for path in find_heading_logs(place)]
+    logs = [read_heading_log(path) for path in paths if path.suffix != DRIVE_SUFFIX]
+    drives = [read_reckoning_mat(path) for path in paths if path.suffix == DRIVE_SUFFIX]
+    found = calibrate_heading(logs, axis, drives)
     answer = {"calibration": "heading", "simulated": False, **found.as_dict()}
     data: dict[str, FloatArray] = {}
     for i, log in enumerate(logs):
         data |= {f"{i}/{log.sensor}/t_s": log.t_s, f"{i}/{log.sensor}/values": log.values}
+    for i, drive in enumerate(found.drives):
+        data |= {f"drive-{i}/t_s": drive.log.t_s, f"drive-{i}/drift_rad": drive.drift_rad}
     return _write(out, answer, data, {})
 
 

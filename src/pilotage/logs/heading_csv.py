@@ -11,6 +11,7 @@ from pilotage.core.errors import InputError
 from pilotage.core.types import FloatArray
 from pilotage.logs.text import check_times, read_table
 
+DRIVE_SUFFIX = ".mat"
 COLUMNS = ("t", "x", "y", "z")
 
 
@@ -75,10 +76,13 @@ def sensor_of(path: Path) -> HeadingSensor | None:
 
 
 def find_heading_logs(place: Path) -> list[Path]:
-    """Return the logs in a folder and the folders in it, or the file itself."""
+    """Return the logs in a folder and the folders in it (drives with a reference too), or the file itself."""
     if not place.is_dir():
         return [place]
     found = sorted(path for path in place.rglob("*.csv") if sensor_of(path) is not None)
+    found += sorted(place.rglob(f"*{DRIVE_SUFFIX}"))
     if not found:
-        raise InputError(f"{place}: expected gyroscope or magnetometer logs (*.csv) in it, found none")
+        raise InputError(
+            f"{place}: expected gyroscope or magnetometer logs (*.csv, or *.mat of a drive) in it, found none"
+        )
     return found

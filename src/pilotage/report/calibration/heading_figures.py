@@ -35,7 +35,35 @@ def heading_figures(data: CalibrationData) -> list[Illustration]:
     turned = [values for values in points if float(values.std(axis=0).max()) > 0.02]
     for i, (entry, values) in enumerate(zip(data.answer["magnetometer"], turned, strict=False)):
         figures.append(_ellipse_figure(i, entry, values))
+    drives = data.answer.get("gyroscope_while_driving") or ()
+    figures += [_drift_figure(data, i, entry) for i, entry in enumerate(drives)]
     return figures
+
+
+def _drift_figure(data: CalibrationData, index: int, entry: Mapping[str, Any]) -> Illustration:
+    slug, title = f"drive-{index + 1}", f"Gyroscope while driving, log {entry['log']}"
+    alt = "Heading by the gyroscope minus the reference heading over time, with the line of the fitted bias"
+    t_s, drift = data.arrays[f"drive-{index}/t_s"], data.arrays[f"drive-{index}/drift_rad"]
+    figure, (axes,) = panels_in_a_row(["claimed minus true heading [rad]"], ["time [s]"], 200.0)
+    since = t_s - t_s[0]
+    bias = entry["bias_rad_s"]
+    axes.plot(since, drift, color=BLUE)
+    axes.plot(since, bias["value"] * since, color=VERMILLION, linewidth=1.4, linestyle=(0, (5, 3)))
+    axes.set_xlim(0.0, float(since[-1]))
+    scale = entry["scale"]
+    at_rest = entry["bias_with_scale_rad_s"]
+    turns = (
+        "The robot hardly turned, so its scale cannot be told."
+        if scale is None
+        else f"Estimated with a scale, it claims {scale['value']:.4f} ({scale['low']:.4f} to "
+        f"{scale['high']:.4f}) of each true turn and {1e3 * at_rest['value']:.3f} mrad/s while not turning."
+    )
+    caption = (
+        f"On the mean the gyroscope claims {1e3 * bias['value']:.3f} mrad/s too much "
+        f"({1e3 * bias['low']:.3f} to {1e3 * bias['high']:.3f}). {turns}"
+    )
+    keys = (Key("error of the summed turns", BLUE), Key("fitted bias alone", VERMILLION, "dash"))
+    return Illustration(slug, title, alt, caption, render(figure, slug, alt), keys)
 
 
 def _allan_figure(entries: list[Mapping[str, Any]]) -> Illustration:
