@@ -290,6 +290,11 @@ EXAMPLES: dict[tuple[str, str], Example] = {
         {"gate": 0.99, "matching": {"overlap": 0.7}},
         frozenset({"gate", "measurement_var_scale", "odometry_var_scale"}),
     ),
+    ("localizer", "mcl-likelihood-field"): Example(
+        localizer_follows,
+        {"beams": 90},
+        FILTER_NUMBERS | {"kld_error", "kld_probability", "spread"},
+    ),
     ("heading_filter", "encoder-gyro"): Example(
         heading_filter_follows, {"process_var": 0.1}, SCALAR_FILTER_NUMBERS
     ),
