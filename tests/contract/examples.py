@@ -282,6 +282,9 @@ EXAMPLES: dict[tuple[str, str], Example] = {
     ("localizer", "ekf-landmarks"): Example(localizer_follows, {"gate": 0.999}, FILTER_NUMBERS),
     ("localizer", "iekf-landmarks"): Example(localizer_follows, {"gate": 0.999}, FILTER_NUMBERS),
     ("localizer", "ukf-landmarks"): Example(localizer_follows, {"gate": 0.999}, FILTER_NUMBERS),
+    ("localizer", "ekf-augmented"): Example(
+        localizer_follows, {"systematic": {"distance_scale_var": 1e-3}}, FILTER_NUMBERS
+    ),
     ("localizer", "dead-reckoning"): Example(
         localizer_follows, pure_numbers=frozenset({"odometry_var_scale"})
     ),
