@@ -7,7 +7,10 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+import pytest
 
+from pilotage.core.angles import wrap_to_pi
+from pilotage.core.errors import InputError
 from pilotage.core.random import RandomStreams
 from pilotage.core.types import Goal, Pose2, Twist
 from pilotage.kernels import geometry
@@ -20,6 +23,7 @@ from pilotage.sim.world import World
 from pilotage.stack.control.pi_follower import PiFollower, PiFollowerConfig
 from pilotage.stack.interface import StackStatus
 from pilotage.stack.localization.ekf_landmarks import EkfLandmarkLocalizer
+from pilotage.stack.localization.heading_filters import HeadingEstimate
 from pilotage.stack.localization.landmark_filter import LandmarkFilterConfig
 from pilotage.stack.navigator.navigator import Parts
 from pilotage.stack.planning.dubins_local import DubinsLocalConfig, DubinsLocalPlanner
@@ -81,6 +85,29 @@ def localizer_runs(factory: Any, config: Any) -> None:
         assert np.isfinite(belief.cov).all()
         assert np.linalg.eigvalsh(belief.cov).min() > 0.0
         assert set(localizer.telemetry()) == keys
+
+
+def heading_filter_follows(factory: Any, config: Any) -> None:
+    """A turn, a rest and a turn back: within 5 sigma, a variance that stays positive, one line on misuse."""
+    rng = np.random.default_rng(3)
+    heading_filter = factory(config, HeadingEstimate(0.5, 1e-4))
+    heading, dt = 0.5, 0.05
+    for step in range(400):
+        rate = (0.8, 0.0, -0.8, 0.0)[step // 100]
+        resting = rate == 0.0
+        heading = wrap_to_pi(heading + rate * dt)
+        encoder = rate * dt + (0.0 if resting else 0.004 * float(rng.normal()))
+        gyro = rate + 0.015 + 0.001 * float(rng.normal())
+        compass = wrap_to_pi(heading + 0.05 * float(rng.normal())) if step % 4 == 0 else None
+        estimate = heading_filter.step(encoder, gyro, dt, resting, compass)
+        assert estimate == heading_filter.estimate
+        assert estimate.variance_rad2 > 0.0
+        assert abs(wrap_to_pi(estimate.heading_rad - heading)) < 5.0 * np.sqrt(estimate.variance_rad2)
+    heading_filter.step(None, 0.1, dt, False)
+    heading_filter.step(0.1, None, dt, False)
+    for bad in ((None, None, dt), (0.1, 0.1, 0.0), (np.nan, 0.1, dt), (0.1, np.inf, dt), (0.1, 0.1, np.nan)):
+        with pytest.raises(InputError, match="expected"):
+            heading_filter.step(*bad, False)
 
 
 def request(seed: int = 0, goal: Goal = GOAL) -> PlanRequest:
@@ -243,6 +270,8 @@ ROUTE = {"points_m": [[2.0, 2.0], [3.0, 4.0], [7.0, 4.0], [8.0, 6.0]], "turning_
 
 FILTER_NUMBERS = frozenset({"gate", "measurement_var_scale", "odometry_var_scale"})
 
+SCALAR_FILTER_NUMBERS = frozenset({"process_var", "measurement_var", "initial_var"})
+
 EXAMPLES: dict[tuple[str, str], Example] = {
     ("sensor", "wheel-odometry"): Example(
         sensor_reads, pure_numbers=frozenset({"distance_scale", "angle_scale"})
@@ -253,6 +282,9 @@ EXAMPLES: dict[tuple[str, str], Example] = {
     ("localizer", "ekf-landmarks"): Example(localizer_follows, {"gate": 0.999}, FILTER_NUMBERS),
     ("localizer", "iekf-landmarks"): Example(localizer_follows, {"gate": 0.999}, FILTER_NUMBERS),
     ("localizer", "ukf-landmarks"): Example(localizer_follows, {"gate": 0.999}, FILTER_NUMBERS),
+    ("localizer", "ekf-augmented"): Example(
+        localizer_follows, {"systematic": {"distance_scale_var": 1e-3}}, FILTER_NUMBERS
+    ),
     ("localizer", "dead-reckoning"): Example(
         localizer_follows, pure_numbers=frozenset({"odometry_var_scale"})
     ),
@@ -260,6 +292,20 @@ EXAMPLES: dict[tuple[str, str], Example] = {
         localizer_follows,
         {"gate": 0.99, "matching": {"overlap": 0.7}},
         frozenset({"gate", "measurement_var_scale", "odometry_var_scale"}),
+    ),
+    ("localizer", "mcl-likelihood-field"): Example(
+        localizer_follows,
+        {"beams": 90},
+        FILTER_NUMBERS | {"kld_error", "kld_probability", "spread"},
+    ),
+    ("heading_filter", "encoder-gyro"): Example(
+        heading_filter_follows, {"process_var": 0.1}, SCALAR_FILTER_NUMBERS
+    ),
+    ("heading_filter", "encoder-magnetometer"): Example(
+        heading_filter_follows, {"process_var": 0.1}, SCALAR_FILTER_NUMBERS
+    ),
+    ("heading_filter", "gyro-bias"): Example(
+        heading_filter_follows, {"gate": 0.9999}, pure_numbers=frozenset({"gate"})
     ),
     ("localizer", "ekf-walls-report"): Example(
         localizer_runs, {"threshold_chi2": 2.0, "distance_var_m2": 5.0}, frozenset({"threshold_chi2"})

@@ -9,6 +9,7 @@ from pilotage.sensors.sensor import SENSORS
 from pilotage.stack.control.controller import CONTROLLERS
 from pilotage.stack.control.escape import ESCAPES
 from pilotage.stack.control.reactive import REACTIVES
+from pilotage.stack.localization.heading_filters import HEADING_FILTERS
 from pilotage.stack.localization.localizer import LOCALIZERS
 from pilotage.stack.mapping.mapper import MAPPERS
 from pilotage.stack.navigator.navigator import NAVIGATORS
@@ -19,6 +20,7 @@ REGISTRIES: dict[str, Registry[Any]] = {
     "sensor": SENSORS,
     "navigator": NAVIGATORS,
     "localizer": LOCALIZERS,
+    "heading_filter": HEADING_FILTERS,
     "planner": PLANNERS,
     "smoother": SMOOTHERS,
     "local_planner": LOCAL_PLANNERS,

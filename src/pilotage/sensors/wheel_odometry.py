@@ -16,7 +16,10 @@ ANGLE_VAR_FLOOR_RAD2_PER_M = 1.0e-6
 
 @SENSORS.add_config("wheel-odometry")
 class WheelOdometryConfig(SensorConfig):
-    """Noise densities (variance per metre driven, per radian turned) and systematic scale errors."""
+    """Noise densities (variance per metre driven, per radian turned) and systematic errors.
+
+    Scales are claimed over true motion; the bias is a turn claimed at rest, as where a gyroscope measures it.
+    """
 
     distance_var_m2_per_m: NonNegative = CALIBRATED_DISTANCE_VAR_M2_PER_M
     distance_var_m2_per_rad: NonNegative = 0.0
@@ -24,3 +27,4 @@ class WheelOdometryConfig(SensorConfig):
     angle_var_rad2_per_m: NonNegative = ANGLE_VAR_FLOOR_RAD2_PER_M
     distance_scale: float = Field(default=1.0, gt=0.5, lt=2.0)
     angle_scale: float = Field(default=1.0, gt=0.5, lt=2.0)
+    angle_bias_rad_s: float = Field(default=0.0, gt=-1.0, lt=1.0)

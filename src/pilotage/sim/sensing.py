@@ -64,6 +64,7 @@ class SimulatedWheelOdometry:
     def __init__(self, config: WheelOdometryConfig, _world: World, rng: np.random.Generator) -> None:
         self._config = config
         self._rng = rng
+        self._drift = config.angle_bias_rad_s / config.rate_hz
         self._distance = self._angle = 0.0
         self._distance_var = self._angle_var = 0.0
 
@@ -89,7 +90,9 @@ class SimulatedWheelOdometry:
         noise = self._rng.standard_normal(2)
         reading = OdometryIncrement(
             self._config.distance_scale * self._distance + math.sqrt(self._distance_var) * float(noise[0]),
-            self._config.angle_scale * self._angle + math.sqrt(self._angle_var) * float(noise[1]),
+            self._config.angle_scale * self._angle
+            + self._drift
+            + math.sqrt(self._angle_var) * float(noise[1]),
         )
         self._distance = self._angle = self._distance_var = self._angle_var = 0.0
         return reading
@@ -166,7 +169,7 @@ class SimulatedBeacons:
         noise = self._stds * self._rng.standard_normal((2, len(self._ids)))
         index = self._index[:count]
         ranges = self._ranges[:count] + noise[0, index]
-        bearings = self._bearings[:count] + noise[1, index]
+        bearings = self._bearings[:count] + c.bearing_offset_rad + noise[1, index]
         return BeaconReadings(self._ids[index], np.abs(ranges), _wrap_small(bearings))
 
 

@@ -103,7 +103,8 @@ class LandmarkFilter:
             self._update(seen)
         else:
             self._telemetry = _telemetry(0, 0, 0.0, 0.0)
-        self.belief = Belief(Pose2.from_array(self._pose), self._cov.copy())
+        # A filter may estimate more than the pose, which comes first.
+        self.belief = Belief(Pose2.from_array(self._pose), self._cov[:3, :3].copy())
         return self.belief
 
     def _update(self, seen: BeaconReadings) -> None:

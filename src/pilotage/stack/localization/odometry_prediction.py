@@ -57,12 +57,14 @@ class OdometryPrediction:
             pick(believed.angle_var_rad2_per_m, sensor.angle_var_rad2_per_m),
         )
         self._predict = predict
-        self._exact = model is OdometryModel.EXACT_ARC
+        self.exact = model is OdometryModel.EXACT_ARC
         self._Q = np.zeros((2, 2))
+
+    def variances(self, odometry: OdometryIncrement) -> tuple[float, float]:
+        """Variances of an increment's distance and angle."""
+        return increment_variances(odometry.distance_m, odometry.angle_rad, *self._densities)
 
     def move(self, pose: FloatArray, cov: FloatArray, odometry: OdometryIncrement) -> None:
         """Move ``pose`` (3,) and ``cov`` (3, 3) in place."""
-        self._Q[0, 0], self._Q[1, 1] = increment_variances(
-            odometry.distance_m, odometry.angle_rad, *self._densities
-        )
-        self._predict(pose, cov, odometry.distance_m, odometry.angle_rad, self._Q, self._exact)
+        self._Q[0, 0], self._Q[1, 1] = self.variances(odometry)
+        self._predict(pose, cov, odometry.distance_m, odometry.angle_rad, self._Q, self.exact)

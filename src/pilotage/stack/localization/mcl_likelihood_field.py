@@ -1,0 +1,238 @@
+"""Monte-Carlo localization on the distance field of a map, drawn in segments or in cells."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+from pydantic import Field
+from scipy.special import ndtri
+
+from pilotage.core.config import Config
+from pilotage.core.errors import InputError
+from pilotage.core.types import FloatArray, Pose2
+from pilotage.kernels import particles
+from pilotage.maps.nearest_obstacles import NearestObstacles
+from pilotage.maps.ros_map import read_ros_map
+from pilotage.models.odometry import OdometryModel
+from pilotage.sensors.lidar import LidarConfig
+from pilotage.sensors.readings import LidarScan, OdometryIncrement, Readings
+from pilotage.sensors.sensor import NonNegative, Positive
+from pilotage.sensors.wheel_odometry import WheelOdometryConfig
+from pilotage.stack.interface import Belief
+from pilotage.stack.knowledge import Knowledge
+from pilotage.stack.localization.localizer import LOCALIZERS, require_initial_pose
+from pilotage.stack.localization.odometry_prediction import OdometryNoise, OdometryPrediction
+
+NAME = "mcl-likelihood-field"
+TABLE_PER_STD, TABLE_STDS = 50, 12
+"""The table of a beam's density: entries per standard deviation, and how many of these."""
+FLOOR = np.diag([1e-12, 1e-12, 1e-12])
+"""Added to the particles' covariance, which is singular where the start is exact and nothing has moved."""
+
+
+class MclConfig(Config):
+    """The cloud's size, the map it is weighed on, and the density of a beam.
+
+    Variances left out are taken from the sensors' data sheets; the scales serve experiments with a filter
+    that is wrong about its noise.
+    """
+
+    least_particles: int = Field(default=400, ge=20, le=1_000_000)
+    most_particles: int = Field(default=2000, ge=20, le=1_000_000)
+    kld_error: float = Field(default=0.02, gt=0.0, lt=1.0)
+    """Kullback-Leibler distance of the cloud from the posterior that is to be kept,"""
+    kld_probability: float = Field(default=0.99, gt=0.5, lt=1.0)
+    """with this probability (Fox 2003)."""
+    bin_m: Positive = 0.05
+    bin_rad: float = Field(default=0.02, gt=1e-4, le=math.pi)
+    effective_share: float = Field(default=0.5, gt=0.0, lt=1.0)
+    """A scan that would leave a smaller share of effective particles is let in by parts."""
+    spread: float = Field(default=0.3, ge=0.0, lt=1.0)
+    """Width of the kernel that moves resampled particles apart, in standard deviations of the cloud."""
+    most_rounds: int = Field(default=30, ge=1)
+    """Parts after which the rest of a scan is let in at once."""
+    resolution_m: Positive = 0.05
+    grid_file: str | None = None
+    """A ROS map_server file to be localized on; None: the mission's walls."""
+    beams: int = Field(default=60, ge=1)
+    max_range_m: Positive = 19.9
+    """Readings beyond are left out."""
+    range_var_m2: Positive | None = None
+    field_std_m: NonNegative = 0.01
+    """What the map is wrong by; added to the range's variance."""
+    random_share: float = Field(default=0.05, gt=0.0, lt=1.0)
+    """Share of readings that are no wall of the map."""
+    measurement_var_scale: Positive = 1.0
+    odometry_model: OdometryModel = OdometryModel.EXACT_ARC
+    odometry: OdometryNoise = OdometryNoise()
+    odometry_var_scale: Positive = 1.0
+
+
+@LOCALIZERS.add(NAME, MclConfig)
+class MclLikelihoodFieldLocalizer:
+    """Monte-Carlo localization with the likelihood field (Thrun et al. 2005, tables 6.3, 8.2 and 8.4).
+
+    The cloud has as many particles as KLD sampling asks for. A scan far sharper than the cloud would leave
+    a single particle alive; it is let in by parts, and the cloud is resampled and spread out between them.
+
+    The field knows no direction: a wall seen aslant is taken to be as uncertain across as along the beam,
+    so the filter believes a little less than it could. Fails after a wrong start or when carried away
+    (particles are only where they once were), and where the belief is no single hump: the spreading keeps
+    mean and covariance, and would draw two humps together.
+    """
+
+    def __init__(self, config: MclConfig, knowledge: Knowledge) -> None:
+        require_initial_pose(knowledge, NAME)
+        if config.most_particles < config.least_particles:
+            raise InputError(
+                f"stack.localizer.most_particles: expected at least least_particles "
+                f"({config.least_particles}), found {config.most_particles}"
+            )
+        self._config = config
+        self._odometry, odometry = knowledge.one_sensor(WheelOdometryConfig, NAME)
+        self._lidar, lidar = knowledge.one_sensor(LidarConfig, NAME)
+        self._prediction = OdometryPrediction(
+            odometry, config.odometry, config.odometry_var_scale, config.odometry_model
+        )
+        self._field = _field_of(config, knowledge)
+        self._picked = np.unique(np.linspace(0, lidar.beams - 1, min(config.beams, lidar.beams)).astype(int))
+        angles = lidar.beam_angles_rad()[self._picked] + lidar.mount.theta_rad
+        self._directions = np.column_stack([np.cos(angles), np.sin(angles)])
+        self._mount_xy = np.array([lidar.mount.x_m, lidar.mount.y_m])
+        self._max_range = min(config.max_range_m, lidar.max_range_m)
+        self._table, self._table_step = _beam_density(config, lidar)
+        self._rng = knowledge.streams.stream(NAME)
+        self._quantile = float(ndtri(config.kld_probability))
+        self._poses = _draw(knowledge.initial, config.most_particles, self._rng)
+        self._wanted = config.most_particles
+        self._rounds, self._effective = 0, float(config.most_particles)
+        self.belief = knowledge.initial
+
+    @property
+    def particles(self) -> FloatArray:
+        """Poses (N, 3) of the cloud, all of the same weight; a copy."""
+        return self._poses.copy()
+
+    def step(self, readings: Readings) -> Belief:
+        """Move the cloud by the odometry increment, then weigh it by the scan."""
+        odometry = readings.by_sensor.get(self._odometry)
+        if isinstance(odometry, OdometryIncrement):
+            self._move(odometry)
+        scan = readings.by_sensor.get(self._lidar)
+        moments = self._weigh(scan.ranges_m) if isinstance(scan, LidarScan) else None
+        if moments is None:
+            self._rounds, self._effective = 0, float(self._poses.shape[0])
+            moments = _moments(self._poses, np.full(self._poses.shape[0], 1.0 / self._poses.shape[0]))
+        mean, cov = moments
+        self.belief = Belief(Pose2.from_array(mean), cov)
+        return self.belief
+
+    def telemetry(self) -> Mapping[str, float]:
+        """Size of the cloud, how much of it was effective, and how many parts the scan was let in by."""
+        return {
+            "particles": float(self._poses.shape[0]),
+            "effective_particles": self._effective,
+            "scan_parts": float(self._rounds),
+        }
+
+    def _move(self, odometry: OdometryIncrement) -> None:
+        distance_var, angle_var = self._prediction.variances(odometry)
+        particles.sample_motion(
+            self._poses,
+            odometry.distance_m,
+            odometry.angle_rad,
+            math.sqrt(distance_var),
+            math.sqrt(angle_var),
+            self._rng.standard_normal((self._poses.shape[0], 2)),
+            self._prediction.exact,
+        )
+
+    def _weigh(self, ranges_m: FloatArray) -> tuple[FloatArray, FloatArray] | None:
+        """Weigh and resample the cloud; returns the weighted mean and covariance, None for an empty scan."""
+        ranges = ranges_m[self._picked]
+        seen = ranges < self._max_range  # neither beyond reach nor NaN
+        if not seen.any():
+            return None
+        points = self._mount_xy + ranges[seen, None] * self._directions[seen]
+        remaining, self._rounds = 1.0, 0
+        while True:
+            self._rounds += 1
+            likelihoods = self._log_likelihoods(points)
+            part = remaining
+            if self._rounds < self._config.most_rounds:
+                enough = self._config.effective_share * self._poses.shape[0]
+                part = particles.largest_exponent(likelihoods, remaining, enough)
+            remaining -= part
+            self._effective = particles.effective_count(likelihoods, part)
+            weights = particles.normalized(likelihoods, part)
+            moments = _moments(self._poses, weights)
+            self._resample(weights, *moments)
+            if remaining <= 0.0:
+                return moments
+
+    def _log_likelihoods(self, points: FloatArray) -> FloatArray:
+        out = np.empty(self._poses.shape[0])
+        field = self._field
+        particles.log_likelihoods(
+            self._poses,
+            points,
+            field.index,
+            *field.origin_xy_m,
+            field.resolution_m,
+            field.items,
+            self._table,
+            self._table_step,
+            out,
+        )
+        return out
+
+    def _resample(self, weights: FloatArray, mean: FloatArray, cov: FloatArray) -> None:
+        config = self._config
+        count = min(max(self._wanted, config.least_particles), config.most_particles)
+        drawn = particles.low_variance_indices(weights, count, float(self._rng.random()))
+        self._poses = self._poses[drawn]
+        normals = self._rng.standard_normal((count, 3))
+        root = np.asarray(np.linalg.cholesky(cov), dtype=np.float64)
+        particles.spread_out(self._poses, mean, root, config.spread, normals)
+        bins = particles.occupied_bins(self._poses, config.bin_m, config.bin_rad)
+        self._wanted = math.ceil(particles.kld_count(bins, config.kld_error, self._quantile))
+
+
+def _moments(poses: FloatArray, weights: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Mean (3,) and covariance (3, 3) of the cloud."""
+    mean, cov = np.empty(3), np.empty((3, 3))
+    particles.moments(poses, weights, mean, cov)
+    return mean, cov + FLOOR
+
+
+def _field_of(config: MclConfig, knowledge: Knowledge) -> NearestObstacles:
+    """Distances from the walls, or from the occupied cells of a grid: unknown cells reflect nothing."""
+    if config.grid_file is None:
+        return NearestObstacles.from_map(knowledge.world_map, config.resolution_m)
+    return NearestObstacles.from_grid(read_ros_map(Path(config.grid_file)).grid)
+
+
+def _beam_density(config: MclConfig, lidar: LidarConfig) -> tuple[FloatArray, float]:
+    """Logarithm of a beam's density over its distance from the map, and the table's step."""
+    range_var = lidar.range_var_m2 if config.range_var_m2 is None else config.range_var_m2
+    std = math.sqrt(config.measurement_var_scale * (range_var + config.field_std_m**2))
+    if std == 0.0:
+        raise InputError(
+            f"{NAME}: a scanner without noise leaves the filter no measurement variance; "
+            "set stack.localizer.range_var_m2 or field_std_m above 0"
+        )
+    z = np.arange(TABLE_STDS * TABLE_PER_STD + 1) / TABLE_PER_STD
+    hit = (1.0 - config.random_share) * np.exp(-0.5 * z * z) / (std * math.sqrt(2.0 * math.pi))
+    return np.log(hit + config.random_share / lidar.max_range_m), std / TABLE_PER_STD
+
+
+def _draw(initial: Belief, count: int, rng: np.random.Generator) -> FloatArray:
+    """Particles (N, 3) of the initial belief."""
+    values, vectors = np.linalg.eigh(initial.cov)
+    root = vectors * np.sqrt(np.maximum(values, 0.0))
+    poses = initial.pose.as_array() + rng.standard_normal((count, 3)) @ root.T
+    poses[:, 2] = np.mod(poses[:, 2] + math.pi, 2.0 * math.pi) - math.pi
+    return np.ascontiguousarray(poses)

@@ -1,0 +1,97 @@
+"""Distance fields from grids, and nearest obstacles: exact where it counts, bounded elsewhere."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from pilotage.core.errors import InputError
+from pilotage.core.types import Pose2
+from pilotage.maps.distance_field import DistanceField
+from pilotage.maps.nearest_obstacles import NearestObstacles
+from pilotage.maps.occupancy_grid import OccupancyGrid
+from pilotage.maps.segment_map import SegmentMap
+
+WORLD = SegmentMap.of(
+    np.array(
+        [[0, 0, 10, 0], [10, 0, 10, 8], [10, 8, 0, 8], [0, 8, 0, 0], [5, 0, 5.3, 3], [2, 5, 4, 7]], float
+    ),
+    np.array([[7.5, 5.0, 0.6]]),
+)
+NEAREST = NearestObstacles.from_map(WORLD, 0.1)
+
+
+@settings(max_examples=200)
+@given(st.floats(0, 10), st.floats(0, 8))
+def test_never_too_near_and_little_too_far(x: float, y: float) -> None:
+    exact = abs(WORLD.distance_m(x, y))
+    found = float(NEAREST.at(np.array([[x, y]]))[0])
+    inside = math.hypot(x - 7.5, y - 5.0) < 0.6
+    assert inside or exact - 1e-9 <= found <= exact + math.sqrt(2.0) * 0.1 + 1e-9
+
+
+@settings(max_examples=100)
+@given(st.floats(0.1, 0.9), st.floats(-0.03, 0.03))
+def test_exact_beside_a_wall_also_behind_the_outermost(along: float, aside: float) -> None:
+    points = np.array([[10 * along, aside], [2 + 2 * along - 0.7071 * aside, 5 + 2 * along + 0.7071 * aside]])
+    assert NEAREST.at(points) == pytest.approx(np.abs([aside, aside]), abs=1e-5)
+
+
+def grid(theta: float = 0.0) -> OccupancyGrid:
+    """A wall one cell thick, a block, some unknown cells."""
+    cells = np.zeros((40, 60), dtype=np.int8)
+    cells[10, 5:50] = 100
+    cells[20:25, 30:40] = 100
+    cells[0:3, 0:3] = -1
+    return OccupancyGrid.of(cells, 0.1, Pose2(-1.0, 2.0, theta))
+
+
+@pytest.mark.parametrize("theta", [0.0, 0.5, -2.0])
+def test_a_grids_field_is_the_brute_force_one(theta: float) -> None:
+    some = grid(theta)
+    occupied = some.centres_m(np.argwhere(some.blocked()))
+    rng = np.random.default_rng(0)
+    cells = rng.integers(2, [38, 58], size=(300, 2))
+    points = some.centres_m(cells)
+    brute = np.hypot(*(points[:, None] - occupied[None]).transpose(2, 0, 1)).min(axis=1)
+    found = DistanceField.from_grid(some).at(points)
+    # Straight: the nodes are the centres. Turned: interpolated twice, half a diagonal off at most.
+    assert found == pytest.approx(brute, abs=1e-9 if theta == 0.0 else 0.071)
+
+
+def test_unknown_cells_block_unless_they_are_said_to_be_free() -> None:
+    corner = grid().centres_m(np.array([[1, 1]]))
+    assert DistanceField.from_grid(grid()).at(corner)[0] == 0.0
+    assert DistanceField.from_grid(grid(), unknown_is_free=True).at(corner)[0] > 0.9
+
+
+def test_an_empty_grid_is_as_far_from_obstacles_as_it_is_wide() -> None:
+    empty = OccupancyGrid.of(np.zeros((3, 4), dtype=np.int8), 0.5)
+    assert DistanceField.from_grid(empty).distance_m == pytest.approx(np.full((3, 4), 2.5))
+    with pytest.raises(InputError, match="occupied cells"):
+        NearestObstacles.from_grid(empty)
+
+
+@pytest.mark.parametrize("theta", [0.0, 0.7, 3.0])
+def test_nearest_cells_are_discs_as_wide_as_the_cell(theta: float) -> None:
+    some = grid(theta)
+    occupied = some.centres_m(np.argwhere(some.blocked(unknown_is_free=True)))
+    points = some.centres_m(np.random.default_rng(1).uniform([0, 0], [39, 59], size=(300, 2)))
+    brute = np.hypot(*(points[:, None] - occupied[None]).transpose(2, 0, 1)).min(axis=1) - 0.05
+    found = NearestObstacles.from_grid(some).at(points)
+    outside = brute > 0.0
+    assert (found[outside] >= brute[outside] - 1e-9).all()
+    assert (found[outside] <= brute[outside] + 2.0 * math.sqrt(2.0) * 0.1).all()
+    near = outside & (brute < 0.03)
+    assert np.median(found[near] - brute[near]) < 1e-9
+
+
+def test_misuse_is_told() -> None:
+    with pytest.raises(InputError, match="resolution above 0"):
+        NearestObstacles.from_map(WORLD, 0.0)
+    with pytest.raises(InputError, match="walls or discs"):
+        NearestObstacles.from_map(SegmentMap(np.zeros((0, 4)), np.zeros((0, 3)), (0.0, 0.0, 1.0, 1.0)))

@@ -1,0 +1,153 @@
+"""The particle filter's arithmetic."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.stats import chi2, norm
+
+from pilotage.core.errors import InputError
+from pilotage.core.types import FloatArray
+from pilotage.evaluation.run_metrics import poses
+from pilotage.experiments.mission import load_mission
+from pilotage.experiments.run import simulate
+from pilotage.experiments.world_map import load_map
+from pilotage.kernels import particles
+from pilotage.maps.rasterize import rasterized
+from pilotage.maps.ros_map import RosMap, write_ros_map
+from pilotage.sensors.readings import LidarScan, Readings
+from pilotage.stack.localization.mcl_likelihood_field import MclConfig, MclLikelihoodFieldLocalizer
+from support.robots import ROOM, knowledge_of
+
+MCL = "stack.localizer.name=mcl-likelihood-field"
+
+
+def cloud(count: int = 500, seed: int = 0) -> FloatArray:
+    """Particles about a pose near the cut of the heading."""
+    rng = np.random.default_rng(seed)
+    root = np.array([[0.1, 0, 0], [0.05, 0.08, 0], [0.02, -0.03, 0.1]])
+    drawn = np.array([1.0, 2.0, 3.1]) + rng.standard_normal((count, 3)) @ root.T
+    drawn[:, 2] = (drawn[:, 2] + math.pi) % (2 * math.pi) - math.pi
+    return np.ascontiguousarray(drawn)
+
+
+@settings(max_examples=60)
+@given(st.lists(st.floats(0.0, 1.0), min_size=1, max_size=30), st.integers(1, 100), st.floats(0, 0.999))
+def test_every_particle_is_drawn_as_often_as_its_weight_says(
+    raw: list[float], count: int, start: float
+) -> None:
+    weights = np.array(raw) + 1e-3
+    weights /= weights.sum()
+    drawn = particles.low_variance_indices(weights, count, start)
+    times = np.bincount(drawn, minlength=weights.shape[0])
+    assert times.sum() == count
+    assert (np.abs(times - count * weights) < 1.0 + 1e-9).all()
+
+
+@settings(max_examples=40)
+@given(st.integers(0, 1000), st.floats(1.0, 500.0))
+def test_tempering_leaves_as_much_of_the_cloud_as_is_asked_for(seed: int, sharpness: float) -> None:
+    likelihoods = -sharpness * np.random.default_rng(seed).chisquare(3, size=200)
+    part = particles.largest_exponent(likelihoods, 1.0, 100.0)
+    assert 0.0 < part <= 1.0
+    left = particles.effective_count(likelihoods, part)
+    assert left >= 100.0 - 1e-6
+    assert part == 1.0 or left == pytest.approx(100.0, abs=0.1)
+
+
+def test_spreading_keeps_mean_and_covariance() -> None:
+    before = cloud(200_000)
+    weights = np.full(before.shape[0], 1.0 / before.shape[0])
+    mean, cov, mean_after, cov_after = np.empty(3), np.empty((3, 3)), np.empty(3), np.empty((3, 3))
+    particles.moments(before, weights, mean, cov)
+    after = before.copy()
+    normals = np.random.default_rng(1).standard_normal(after.shape)
+    particles.spread_out(after, mean, np.asarray(np.linalg.cholesky(cov), dtype=np.float64), 0.5, normals)
+    particles.moments(after, weights, mean_after, cov_after)
+    assert mean_after == pytest.approx(mean, abs=2e-3)
+    assert cov_after == pytest.approx(cov, rel=0.02, abs=2e-4)
+    assert (after[:, 2] < math.pi).all()
+    assert (after[:, 2] >= -math.pi).all()
+
+
+def test_moments_know_the_circle() -> None:
+    some = cloud()
+    mean, cov = np.empty(3), np.empty((3, 3))
+    particles.moments(some, np.full(500, 1 / 500), mean, cov)
+    assert abs(mean[2]) > 3.0
+    assert cov[2, 2] == pytest.approx(0.0113, rel=0.3)
+    assert (cov == cov.T).all()
+
+
+def test_the_kld_bound_is_foxs() -> None:
+    # n = chi2_{k-1, 1-delta} / (2 eps); his eq. 7 is the Wilson-Hilferty form of it.
+    for bins in (10, 100, 2000):
+        exact = chi2.ppf(0.99, bins - 1) / (2 * 0.05)
+        assert particles.kld_count(bins, 0.05, float(norm.ppf(0.99))) == pytest.approx(exact, rel=0.01)
+    assert particles.kld_count(1, 0.05, 2.3) == 1.0
+
+
+def test_bins_are_counted_once() -> None:
+    some = np.array([[0.01, 0.01, 0.0], [0.02, 0.02, 0.005], [-0.01, 0.01, 0.0], [0.01, 0.01, 3.0]])
+    assert particles.occupied_bins(some, 0.05, 0.1) == 3
+
+
+def test_motion_spreads_as_the_noise_says() -> None:
+    moved = np.zeros((100_000, 3))
+    normals = np.random.default_rng(2).standard_normal((100_000, 2))
+    particles.sample_motion(moved, 1.0, 0.0, 0.05, 0.02, normals, True)
+    assert moved[:, 0].std() == pytest.approx(0.05, rel=0.02)
+    assert moved[:, 2].std() == pytest.approx(0.02, rel=0.02)
+    assert moved[:, 1].std() == pytest.approx(0.5 * 0.02, rel=0.02)
+
+
+def test_a_vague_start_takes_more_particles_and_parts_than_a_sure_belief() -> None:
+    mission = load_mission("museum-walls", [MCL, "run.time_limit_s=5"], 0)
+    trace = simulate(mission).trace
+    assert trace["scan_parts"][0] > 3
+    assert trace["particles"][-1] < 2000
+    assert trace["scan_parts"][10:].max() <= 3
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_it_tracks_the_route(seed: int) -> None:
+    record = simulate(load_mission("museum-walls", [MCL], seed))
+    assert record.outcome.arrived, record.outcome.reason
+    error = np.hypot(*(poses(record.trace, "est") - poses(record.trace, "true"))[:, :2].T)
+    assert error[20:].max() < 0.05
+    assert np.sqrt(np.mean(error[20:] ** 2)) < 0.005
+
+
+def test_it_tracks_on_an_occupancy_grid(tmp_path: Path) -> None:
+    grid = rasterized(load_map("museum").walls, 0.05)
+    write_ros_map(tmp_path / "museum.yaml", RosMap.of(grid, "museum.pgm"))
+    file = f"stack.localizer.grid_file={tmp_path / 'museum.yaml'}"
+    # A cell is 5 cm wide, and thin walls are drawn two cells thick.
+    overrides = [MCL, file, "stack.localizer.field_std_m=0.05", "run.time_limit_s=60"]
+    trace = simulate(load_mission("museum-walls", overrides, 0)).trace
+    error = np.hypot(*(poses(trace, "est") - poses(trace, "true"))[:, :2].T)
+    assert error[20:].max() < 0.1
+
+
+def test_a_scan_without_returns_leaves_the_belief_and_strange_ranges_do_no_harm() -> None:
+    localizer = MclLikelihoodFieldLocalizer(MclConfig(), knowledge_of(ROOM))
+    before = localizer.step(Readings(0.1, {"lidar": LidarScan(np.full(539, 20.0))}))
+    assert localizer.telemetry()["scan_parts"] == 0
+    for ranges in (np.full(539, np.nan), np.full(539, np.inf), np.zeros(539)):
+        after = localizer.step(Readings(0.2, {"lidar": LidarScan(ranges)}))
+        assert np.isfinite(after.cov).all()
+        assert np.linalg.eigvalsh(after.cov).min() > 0.0
+    assert before.pose.x_m == pytest.approx(2.0, abs=0.05)
+    assert localizer.particles.shape[1] == 3
+
+
+def test_misuse_is_told() -> None:
+    with pytest.raises(InputError, match="at least least_particles"):
+        MclLikelihoodFieldLocalizer(MclConfig(least_particles=500, most_particles=100), knowledge_of())
+    with pytest.raises(InputError, match="expected a map file"):
+        MclLikelihoodFieldLocalizer(MclConfig(grid_file="no-such.yaml"), knowledge_of())
