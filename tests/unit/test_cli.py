@@ -7,6 +7,7 @@ import io
 import json
 import math
 import os
+import signal
 import subprocess
 import sys
 import types
@@ -302,6 +303,8 @@ def test_a_run_that_fails_in_the_field_leaves_its_evidence(pilotage: Call, tmp_p
     ("words", "told"),
     [
         (["museum1"], "did you mean 'museum-1'?"),
+        (["museum"], "did you mean 'museum-1'?"),
+        (["museum-1", "--set", "stack.planner.name=rrt"], "did you mean 'rrt-star-dubins'?"),
         (["nothing.yaml"], "'nothing.yaml': expected a YAML file"),
         (["museum-1", "--set", "stack.localiser.gate=0.9"], "did you mean 'localizer'?"),
         (["museum-1", "--set", "stack.localizer.gat=0.9"], "did you mean 'gate'?"),
@@ -345,16 +348,19 @@ def test_where_nothing_can_be_written_no_run_begins(
     assert lab.asked == {}
 
 
+@pytest.mark.parametrize(("number", "code", "told"), [(2, 130, "interrupted"), (15, 143, "ended by SIGTERM")])
 def test_a_run_interrupted_while_it_writes_leaves_nothing(
-    pilotage: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    pilotage: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, number: int, code: int, told: str
 ) -> None:
     def interrupt(*_: object, **__: object) -> None:
-        raise KeyboardInterrupt
+        signal.raise_signal(number)
 
     monkeypatch.setattr(np, "savez_compressed", interrupt)
+    before = signal.getsignal(signal.SIGTERM)
     answer = pilotage("run", "museum-1", "--set", "run.time_limit_s=1", "--json", "--out", str(tmp_path))
-    assert answer == Answer(130, "", "pilotage: interrupted\n")
+    assert answer == Answer(code, "", f"pilotage: {told}\n")
     assert list(tmp_path.iterdir()) == []
+    assert signal.getsignal(signal.SIGTERM) == before
 
 
 # Parts

@@ -131,3 +131,69 @@ class TestPlanning:
         assert not is_grid_map(str(tmp_path / "walls.yaml"))
         assert is_grid_map("a.map")
         assert not is_grid_map("museum")
+
+
+class TestPlanOnElevation:
+    """A ridge of 45 degrees across a plain, with a gap; 10 m cells."""
+
+    @pytest.fixture
+    def ridge(self, tmp_path: Path) -> Path:
+        heights = np.zeros((20, 30), np.float32)
+        heights[:, 14:16] = 10.0
+        heights[:4] = 0.0
+        path = tmp_path / "ridge.npy"
+        np.save(path, heights)
+        return path
+
+    SETTINGS = ("map.resolution_m=10",)
+
+    def test_steep_ground_is_walked_around(self, ridge: Path) -> None:
+        over = plan_on_grid(ridge, (55, 55), (255, 55), overrides=self.SETTINGS, slope_limit_deg=80.0)
+        around = plan_on_grid(ridge, (55, 55), (255, 55), overrides=self.SETTINGS, slope_limit_deg=20.0)
+        assert (over["climb_m"], over["descent_m"]) == (pytest.approx(10.0), pytest.approx(10.0))
+        assert over["steepest_deg"] == pytest.approx(45.0, abs=3.0)
+        assert around["climb_m"] == pytest.approx(0.0)
+        assert around["planned_length_m"] > over["planned_length_m"] + 50.0
+
+    def test_slope_as_a_cost(self, ridge: Path) -> None:
+        dear = [*self.SETTINGS, "map.slope_that_doubles_deg=2"]
+        answer = plan_on_grid(ridge, (55, 55), (255, 55), overrides=dear, slope_limit_deg=80.0)
+        assert answer["climb_m"] == pytest.approx(0.0)
+
+    @pytest.mark.parametrize(
+        ("words", "told"),
+        [
+            (("--start", "145,55", "--goal", "255,55"), "--start: expected free ground, found (145, 55)"),
+            (("--start", "55,55", "--goal", "145,55"), "which is steeper than 20 deg"),
+            (("--start", "55,55", "--goal", "300,55"), "--goal: expected a place on the map, 300 x 200 m"),
+            (("--start", "55,55", "--goal", "9,9", "--set", "map.resolution_m=0"), "greater than 0, found 0"),
+            (("--start", "55,55", "--goal", "9,9", "--set", "map.slope_that_doubles_deg=2", "--planner",
+              "theta-star"), "theta-star"),
+            (("--start", "55,55", "--goal", "9,9", "--slope-limit", "90"), "between 0 and 90 deg"),
+        ],
+    )  # fmt: skip
+    def test_bad_input_is_one_line(
+        self, ridge: Path, capsys: pytest.CaptureFixture[str], words: tuple[str, ...], told: str
+    ) -> None:
+        arguments = ["plan", str(ridge), "--slope-limit", "20", "--set", "map.resolution_m=10", *words]
+        assert main(arguments) == 2
+        answer = capsys.readouterr()
+        assert answer.out == ""
+        assert answer.err.count("\n") == 1
+        assert told in answer.err
+
+    def test_a_limit_is_for_elevation(self, ridge: Path, capsys: pytest.CaptureFixture[str]) -> None:
+        places = ["--start", "1,1", "--goal", "2,2"]
+        assert main(["plan", "museum", "--slope-limit", "20", *places]) == 2
+        assert "elevation model" in capsys.readouterr().err
+        side = ridge.with_suffix(".json")
+        side.write_text("{}")
+        assert main(["plan", str(side), *places]) == 2
+        assert "expected --slope-limit DEG" in capsys.readouterr().err
+        assert main(["plan", str(side), "--slope-limit", "20", *places]) == 2
+        assert "size: expected" in capsys.readouterr().err
+        grid = ridge.with_suffix(".map")
+        grid.write_text(MAP)
+        dear = ["--set", "map.slope_that_doubles_deg=2"]
+        assert main(["plan", str(grid), *dear, "--start", "0.5,2.5", "--goal", "1.5,0.5"]) == 2
+        assert "expected an elevation model" in capsys.readouterr().err

@@ -9,6 +9,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from scipy.interpolate import CubicSpline
 
 from pilotage.core.errors import InputError
@@ -48,6 +50,15 @@ class TestElevation:
         points = np.array([[4.0, 1.0], [2.0, 1.0], [4.0, 3.0], [3.0, 2.0]])
         assert np.allclose(model.heights_at(points), [20.0, 0.0, 40.0, 17.5])
         assert np.isnan(model.heights_at(np.array([[9.0, 9.0]]))).all()
+
+    @given(st.integers(0, 2**32 - 1))
+    @settings(max_examples=30, deadline=None)
+    def test_single_cells_have_the_same_slope(self, seed: int) -> None:
+        rng = np.random.default_rng(seed)
+        heights = rng.normal(0.0, 20.0, tuple(rng.integers(2, 9, 2)))
+        ground = ElevationModel(heights.astype(np.float32), 7.0)
+        cells = np.argwhere(np.ones(heights.shape, dtype=np.bool_))
+        np.testing.assert_allclose(ground.slopes_at(cells), ground.slope_rad().ravel(), rtol=1e-5)
 
     def test_unknown_heights_are_unknown_hazards(self) -> None:
         heights = np.zeros((5, 5), np.float32)

@@ -1,21 +1,31 @@
 """The entry point: run one command, turn what went wrong into one line and an exit code.
 
-Exit codes: 0 done, 1 the task failed in the field, 2 bad input, 130 interrupted, 141 the reader of
-the output went away, 70 a bug (the only case that shows a traceback).
+Exit codes: 0 done, 1 the task failed in the field, 2 bad input, 130 interrupted, 143 asked to end by
+SIGTERM, 141 the reader of the output went away, 70 a bug (the only case that shows a traceback).
 """
 
 from __future__ import annotations
 
 import io
 import os
+import signal
 import sys
-from collections.abc import Sequence
+import threading
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
+from types import FrameType
+from typing import NoReturn
 
 BAD_INPUT = 2
 BUG = 70
 INTERRUPTED = 130
 BROKEN_PIPE = 141
+TERMINATED = 143
+
+
+class _Terminated(KeyboardInterrupt):
+    """SIGTERM, raised where Ctrl-C would be, so that what is half-written is cleared away."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -29,13 +39,35 @@ def main(arguments: Sequence[str] | None = None) -> int:
     # Everything is imported inside, so that Ctrl-C during an import is one line as well.
     try:
         _steady_streams()
-        return _run(sys.argv[1:] if arguments is None else list(arguments))
+        with _ended_by_sigterm():
+            return _run(sys.argv[1:] if arguments is None else list(arguments))
+    except _Terminated:
+        return _say("ended by SIGTERM", TERMINATED)
     except KeyboardInterrupt:
         return _say("interrupted", INTERRUPTED)
     except BrokenPipeError:
         # The interpreter flushes standard output once more at exit: give it somewhere to go.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return BROKEN_PIPE
+
+
+@contextmanager
+def _ended_by_sigterm() -> Iterator[None]:
+    """Let SIGTERM unwind as Ctrl-C does; only a process's main thread can ask for that."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+
+    def end(signum: int, frame: FrameType | None) -> NoReturn:  # noqa: ARG001 - as signal calls it
+        # Once is enough: a second one must not cut the clearing away short.
+        signal.signal(signal.SIGTERM, signal.SIG_IGN)
+        raise _Terminated
+
+    before = signal.signal(signal.SIGTERM, end)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
 
 
 def _steady_streams() -> None:

@@ -16,12 +16,19 @@ from pilotage.core.errors import InputError
 
 def plan(
     map_: Annotated[
-        str, typer.Argument(metavar="MAP", help="A shipped map's name or a map file: walls or a grid.")
+        str,
+        typer.Argument(
+            metavar="MAP", help="A shipped map's name or a file: walls, a grid, an elevation model."
+        ),
     ],
     start: Annotated[str, typer.Option(metavar="X,Y[,TH]", help="Start in metres and radians.")],
     goal: Annotated[str, typer.Option(metavar="X,Y[,TH]", help="Goal; without TH any heading will do.")],
     planner: Annotated[
         str | None, typer.Option(help="Registered name; default rrt-star-dubins, astar on grids.")
+    ] = None,
+    slope_limit: Annotated[
+        float | None,
+        typer.Option(metavar="DEG", help="MAP is an elevation model; what is steeper is a hazard."),
     ] = None,
     overrides: Overrides = None,
     seed: Seed = None,
@@ -30,7 +37,7 @@ def plan(
     """Plan a path on a map and say how long it is against the shortest one."""
     from_, to = parse_pose(start, "--start"), parse_pose(goal, "--goal")
     with stdout_for_json(json):
-        answer = _answer(map_, from_, to, planner, overrides or (), seed or 0)
+        answer = _answer(map_, from_, to, planner, overrides or (), seed or 0, slope_limit)
     if json:
         print_json(answer)
     else:
@@ -45,13 +52,16 @@ def _answer(
     planner: str | None,
     overrides: Sequence[str],
     seed: int,
+    slope_limit_deg: float | None,
 ) -> dict[str, Any]:
     """Ask on a grid where the file holds one, else on a map of walls."""
     if Path(map_).suffix:
         from pilotage.experiments.grid_planning import is_grid_map, plan_on_grid
 
         if is_grid_map(map_):
-            return plan_on_grid(Path(map_), start, goal, planner or "astar", overrides)
+            return plan_on_grid(Path(map_), start, goal, planner or "astar", overrides, slope_limit_deg)
+    if slope_limit_deg is not None:
+        raise InputError(f"--slope-limit: expected an elevation model's file, found the map '{map_}'")
     from pilotage.experiments.planning import plan_on_map
 
     return plan_on_map(map_, start, goal, planner or "rrt-star-dubins", overrides, seed)

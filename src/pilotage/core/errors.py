@@ -18,8 +18,17 @@ class InputError(PilotageError):
 
 
 def nearest(name: str, known: Iterable[str]) -> str | None:
-    """Return the known name most like ``name``, or None where none is near."""
-    matches = difflib.get_close_matches(name, list(known), n=1, cutoff=0.5)
+    """Return the known name most like ``name``, or None where none is near.
+
+    One that begins with what was typed is nearer than any other, the shortest of several: ``rrt`` means
+    ``rrt-star-dubins``, however much is left out.
+    """
+    names = list(known)
+    typed = name.lower()
+    longer = [other for other in names if len(typed) > 1 and other.lower().startswith(typed)]
+    if longer:
+        return min(longer, key=lambda other: (len(other), other))
+    matches = difflib.get_close_matches(name, names, n=1, cutoff=0.5)
     return matches[0] if matches else None
 
 

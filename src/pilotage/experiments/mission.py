@@ -121,7 +121,8 @@ def parse_yaml(text: str, where: str) -> dict[str, Any]:
         problem = getattr(error, "problem", None) or "not YAML"
         raise InputError(f"{where}{line}: expected YAML, found: {problem}") from None
     if not isinstance(values, dict):
-        raise InputError(f"{where}: expected a mapping of keys, found {type(values).__name__}")
+        found = "an empty file" if values is None else f"a {type(values).__name__}"
+        raise InputError(f"{where}: expected a mapping of keys, found {found}")
     return values
 
 

@@ -13,8 +13,9 @@ from pilotage.evaluation.shortest_path import shortest_path
 from pilotage.experiments.floor.world_map import load_map
 from pilotage.experiments.mission import parse_override
 from pilotage.maps.map_file import LandmarkMap
+from pilotage.stack.interface import PlannedPath
 from pilotage.stack.navigator.global_plan import GlobalPlan
-from pilotage.stack.planning.planner import PLANNERS, SMOOTHERS
+from pilotage.stack.planning.planner import PLANNERS, SMOOTHERS, PlanResult
 
 SMOOTHER = "shortcut"
 
@@ -63,7 +64,7 @@ def plan_on_map(
     result = plan.make(0.0, pose, floor.walls.circles_m[:0], (plan.clearance_m,))
     answer: dict[str, Any] = {
         "success": result.path is not None,
-        "reason": str(result.status) if not result.reason else f"{result.status}: {result.reason}",
+        "reason": _reason(result, plan.history[-1] if plan.history else None),
         "planner": planner,
         "seed": seed,
         "clearance_m": plan.clearance_m,
@@ -82,6 +83,16 @@ def plan_on_map(
         "path": adopted.states.tolist(),
     }
     return answer
+
+
+def _reason(result: PlanResult, planned: PlannedPath | None) -> str:
+    """How it ended; of a path its length as it is handed out, and what it was before smoothing."""
+    if planned is None or result.path is None:
+        return str(result.status) if not result.reason else f"{result.status}: {result.reason}"
+    length = f"{planned.length_m:.2f} m"
+    before = f"{result.path.length_m:.2f} m"
+    smoothed = "" if length == before else f", smoothed from {before}"
+    return f"{result.status}: {length} after {result.iterations} iterations{smoothed}"
 
 
 def _split(overrides: Sequence[str]) -> tuple[dict[str, Any], dict[str, Any], str]:

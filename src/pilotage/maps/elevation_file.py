@@ -12,6 +12,7 @@ import numpy as np
 from pilotage.core.errors import InputError
 from pilotage.core.types import Pose2
 from pilotage.maps.elevation import ElevationModel, HeightArray
+from pilotage.maps.grid_file import read_array
 from pilotage.maps.memory import require_memory
 from pilotage.maps.occupancy_grid import CORNER
 
@@ -25,11 +26,18 @@ FORMATS = {
 }
 
 
-def read_elevation(path: Path, origin: Pose2 | None = None) -> ElevationModel:
-    """Read a JSON side file (and the raw array that it describes) or a GeoTIFF.
+def read_elevation(
+    path: Path, origin: Pose2 | None = None, resolution_m: float | None = None
+) -> ElevationModel:
+    """Read a JSON side file (and the raw array that it describes), a GeoTIFF, or a NumPy array of heights.
 
     Without ``origin`` a GeoTIFF lies where it says, another model with its corner at 0, 0.
     Cells that are not square are stretched along the rows, linearly, until they are.
+
+    Parameters
+    ----------
+    resolution_m
+        Side of a cell, for arrays (``.npy``) only: the other files say.
 
     Raises
     ------
@@ -39,11 +47,25 @@ def read_elevation(path: Path, origin: Pose2 | None = None) -> ElevationModel:
     """
     if not path.is_file():
         raise InputError(f"elevation '{path}': expected a file there, found none")
+    if path.suffix.lower() == ".npy":
+        return _read_npy(path, resolution_m, CORNER if origin is None else origin)
+    if resolution_m is not None:
+        raise InputError(f"elevation '{path}': expected its resolution in the file, found one here as well")
     if path.suffix.lower() == ".json":
         return _read_raw(path, CORNER if origin is None else origin)
     if path.suffix.lower() in (".tif", ".tiff"):
         return _read_geotiff(path, origin)
-    raise InputError(f"elevation '{path}': expected a .json side file or a .tif, found '{path.suffix}'")
+    raise InputError(f"elevation '{path}': expected a .json side file, .tif or .npy, found '{path.suffix}'")
+
+
+def _read_npy(path: Path, resolution_m: float | None, origin: Pose2) -> ElevationModel:
+    if resolution_m is None:
+        raise InputError(f"elevation '{path}': expected a resolution in metres a cell, found none")
+    heights = read_array(path)
+    if heights.dtype.kind not in "iuf":
+        raise InputError(f"elevation '{path}': expected heights as numbers, found {heights.dtype}")
+    require_memory(12 * heights.size, f"elevation '{path}'")
+    return ElevationModel(heights.astype(np.float32), resolution_m, origin)
 
 
 def _read_raw(path: Path, origin: Pose2) -> ElevationModel:

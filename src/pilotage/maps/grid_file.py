@@ -43,7 +43,7 @@ def read_grid(path: Path, resolution_m: float | None = None, origin: Pose2 | Non
     if suffix == ".map":
         return read_moving_ai_map(path).grid(1.0 if resolution_m is None else resolution_m, place)
     if suffix == ".npy":
-        return OccupancyGrid.of(_read_array(path), 1.0 if resolution_m is None else resolution_m, place)
+        return OccupancyGrid.of(read_array(path), 1.0 if resolution_m is None else resolution_m, place)
     if suffix in IMAGES:
         if resolution_m is None:
             raise InputError(f"{path}: expected a resolution in metres a pixel for an image, found none")
@@ -51,7 +51,7 @@ def read_grid(path: Path, resolution_m: float | None = None, origin: Pose2 | Non
     raise InputError(f"{path}: expected a grid map ({', '.join(sorted(GRID_SUFFIXES))}), found '{suffix}'")
 
 
-def _read_array(path: Path) -> np.ndarray[tuple[int, ...], np.dtype[np.generic]]:
+def read_array(path: Path) -> np.ndarray[tuple[int, ...], np.dtype[np.generic]]:
     """Load a NumPy file without running anything that it may hold."""
     if not path.is_file():
         raise InputError(f"array '{path}': expected a .npy file there, found none")

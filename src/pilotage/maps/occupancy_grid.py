@@ -112,10 +112,10 @@ class OccupancyGrid:
         """Whether there is such a cell."""
         return 0 <= row < self.rows and 0 <= column < self.columns
 
-    def cells_at(self, points_xy_m: FloatArray) -> IntArray:
-        """Row and column (K, 2) of the cells that points (K, 2) lie in; outside the grid as they come.
+    def places_at(self, points_xy_m: FloatArray) -> FloatArray:
+        """Places (K, 2) of points (K, 2) in rows and columns, counted from the top left corner.
 
-        With origin (0, -10) and 10 m cells these are equations 3.1 and 3.2 of the rover report.
+        Cell (r, c) is the square from (r, c) to (r + 1, c + 1).
         """
         points = np.asarray(points_xy_m, dtype=np.float64).reshape(-1, 2)
         x, y = points[:, 0] - self.origin.x_m, points[:, 1] - self.origin.y_m
@@ -123,22 +123,36 @@ class OccupancyGrid:
             c, s = math.cos(self.origin.theta_rad), math.sin(self.origin.theta_rad)
             x, y = c * x + s * y, c * y - s * x
         height = self.rows * self.resolution_m
-        indices = np.stack([(height - y) / self.resolution_m, x / self.resolution_m], axis=1)
+        return np.stack([(height - y) / self.resolution_m, x / self.resolution_m], axis=1)
+
+    def cells_at(self, points_xy_m: FloatArray) -> IntArray:
+        """Row and column (K, 2) of the cells that points (K, 2) lie in; outside the grid as they come.
+
+        With origin (0, -10) and 10 m cells these are equations 3.1 and 3.2 of the rover report.
+        """
         # Far beyond the grid is outside as well, without leaving the range of whole numbers.
-        return np.floor(np.clip(indices, -1.0, 2.0**40)).astype(np.int64)
+        return np.floor(np.clip(self.places_at(points_xy_m), -1.0, 2.0**40)).astype(np.int64)
 
     def cell_at(self, x_m: float, y_m: float) -> tuple[int, int]:
         """Row and column of the cell that a point lies in; outside the grid as they come."""
         row, column = self.cells_at(np.array([[x_m, y_m]]))[0]
         return int(row), int(column)
 
-    def centres_m(self, cells: IntArray | FloatArray) -> FloatArray:
-        """Centres (K, 2) x, y in the map frame of cells (K, 2) row, column."""
-        places = np.asarray(cells, dtype=np.float64).reshape(-1, 2)
-        x = (places[:, 1] + 0.5) * self.resolution_m
-        y = (self.rows - places[:, 0] - 0.5) * self.resolution_m
+    def points_m(self, places: IntArray | FloatArray) -> FloatArray:
+        """Points (K, 2) x, y in the map frame of places (K, 2) in rows and columns; undoes ``places_at``.
+
+        Of whole rows and columns these are the cells' top left corners, as the rover report has it in
+        equations 5.1 and 5.2 (origin (0, -10), 10 m cells).
+        """
+        at = np.asarray(places, dtype=np.float64).reshape(-1, 2)
+        x = at[:, 1] * self.resolution_m
+        y = (self.rows - at[:, 0]) * self.resolution_m
         c, s = math.cos(self.origin.theta_rad), math.sin(self.origin.theta_rad)
         return np.stack([self.origin.x_m + c * x - s * y, self.origin.y_m + s * x + c * y], axis=1)
+
+    def centres_m(self, cells: IntArray | FloatArray) -> FloatArray:
+        """Centres (K, 2) x, y in the map frame of cells (K, 2) row, column."""
+        return self.points_m(np.asarray(cells, dtype=np.float64).reshape(-1, 2) + 0.5)
 
     def inflated(self, radius_m: float, unknown_is_free: bool = False) -> OccupancyGrid:
         """Return a grid where cells nearer than ``radius_m`` to a blocked one, by centres, are occupied."""
