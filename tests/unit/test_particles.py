@@ -14,9 +14,9 @@ from scipy.stats import chi2, norm
 from pilotage.core.errors import InputError
 from pilotage.core.types import FloatArray
 from pilotage.evaluation.run_metrics import poses
-from pilotage.experiments.mission import load_mission
-from pilotage.experiments.run import simulate
-from pilotage.experiments.world_map import load_map
+from pilotage.experiments.floor.mission import load_floor_mission
+from pilotage.experiments.floor.simulate import simulate
+from pilotage.experiments.floor.world_map import load_map
 from pilotage.kernels import particles
 from pilotage.maps.rasterize import rasterized
 from pilotage.maps.ros_map import RosMap, write_ros_map
@@ -107,7 +107,7 @@ def test_motion_spreads_as_the_noise_says() -> None:
 
 
 def test_a_vague_start_takes_more_particles_and_parts_than_a_sure_belief() -> None:
-    mission = load_mission("museum-walls", [MCL, "run.time_limit_s=5"], 0)
+    mission = load_floor_mission("museum-walls", [MCL, "run.time_limit_s=5"], 0)
     trace = simulate(mission).trace
     assert trace["scan_parts"][0] > 3
     assert trace["particles"][-1] < 2000
@@ -116,7 +116,7 @@ def test_a_vague_start_takes_more_particles_and_parts_than_a_sure_belief() -> No
 
 @pytest.mark.parametrize("seed", [0, 1])
 def test_it_tracks_the_route(seed: int) -> None:
-    record = simulate(load_mission("museum-walls", [MCL], seed))
+    record = simulate(load_floor_mission("museum-walls", [MCL], seed))
     assert record.outcome.arrived, record.outcome.reason
     error = np.hypot(*(poses(record.trace, "est") - poses(record.trace, "true"))[:, :2].T)
     assert error[20:].max() < 0.05
@@ -129,7 +129,7 @@ def test_it_tracks_on_an_occupancy_grid(tmp_path: Path) -> None:
     file = f"stack.localizer.grid_file={tmp_path / 'museum.yaml'}"
     # A cell is 5 cm wide, and thin walls are drawn two cells thick.
     overrides = [MCL, file, "stack.localizer.field_std_m=0.05", "run.time_limit_s=60"]
-    trace = simulate(load_mission("museum-walls", overrides, 0)).trace
+    trace = simulate(load_floor_mission("museum-walls", overrides, 0)).trace
     error = np.hypot(*(poses(trace, "est") - poses(trace, "true"))[:, :2].T)
     assert error[20:].max() < 0.1
 
