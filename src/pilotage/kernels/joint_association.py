@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from pilotage.kernels.ekf import joseph_update2
 from pilotage.kernels.jit import kernel
 from pilotage.kernels.wall_candidates import in_sight, overlap_share
-from pilotage.kernels.wall_line import wall_innovation
+from pilotage.kernels.wall_line import innovation_distance, wall_innovation
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -196,3 +196,23 @@ def update_walls(
         nis[i] = joseph_update2(pose, cov, H, v, covs[i], math.inf)
         total += nis[i]
     return total
+
+
+@kernel
+def pair_distances(
+    pose: FloatArray,
+    cov: FloatArray,
+    mount: FloatArray,
+    lines: FloatArray,
+    covs: FloatArray,
+    walls: FloatArray,
+    pairs: IntArray,
+    out: FloatArray,
+) -> None:
+    """Fill ``out`` (L,) with the squared Mahalanobis distance of each paired line to its own wall, taken
+    alone; what is not paired keeps what it had."""
+    z, H, v = np.empty(2), np.empty((2, 3)), np.empty(2)
+    for i in range(lines.shape[0]):
+        if pairs[i] >= 0:
+            wall_innovation(pose, mount, walls[pairs[i]], lines[i], z, H, v)
+            out[i] = innovation_distance(cov, H, v, covs[i])

@@ -17,6 +17,7 @@ from pilotage.report.figures.map import map_figure
 from pilotage.report.figures.pose_error import pose_error_figure
 from pilotage.report.figures.timeline import timeline_figure
 from pilotage.report.figures.ultrasonic import ultrasonic_figure
+from pilotage.report.figures.updates import updates_figure
 from pilotage.report.headline import headline, outcome
 from pilotage.report.markup import (
     contents,
@@ -70,6 +71,8 @@ def run_page(run: RunData) -> str:
     """Return the report of a run as HTML."""
     with drawing_style():
         figures = [draw(run) for draw in FIGURES.get(run.kind, FLOOR_FIGURES)]
+        if run.updates:
+            figures.append(updates_figure(run))
     sections: list[str] = []
     entries: list[tuple[str, str]] = []
     drawn = 0

@@ -19,6 +19,7 @@ import yaml
 
 from pilotage.core.errors import InputError
 from pilotage.core.types import BoolArray, Event, FloatArray
+from pilotage.report.scan_updates import RecordedUpdate, read_updates
 
 METRICS_FILE = "metrics.json"
 TRACE_FILE = "trace.parquet"
@@ -26,6 +27,7 @@ MISSION_FILE = "mission.yaml"
 EVENTS_FILE = "events.jsonl"
 WORLD_FILE = "world.json"
 PLANS_FILE = "plans.npz"
+UPDATES_FILE = "updates.npz"
 
 
 @dataclass(frozen=True, slots=True)
@@ -123,6 +125,7 @@ class RunData:
     mapped_points_m: FloatArray
     shortest_path_m: FloatArray
     trace: Trace
+    updates: tuple[RecordedUpdate, ...] = ()
 
     @property
     def name(self) -> str:
@@ -181,6 +184,7 @@ def read_run(run_dir: Path) -> RunData:
         mapped_points_m=mapped_points,
         shortest_path_m=shortest_path,
         trace=_read_trace(run_dir / TRACE_FILE),
+        updates=_read_updates(run_dir / UPDATES_FILE),
     )
 
 
@@ -332,6 +336,15 @@ def _read_plans(path: Path) -> tuple[tuple[Plan, ...], FloatArray, FloatArray]:
             )
         )
     return tuple(plans), rows("mapped_points", 2), rows("shortest_path", 2)
+
+
+def _read_updates(path: Path) -> tuple[RecordedUpdate, ...]:
+    if not path.is_file():
+        return ()
+    try:
+        return read_updates(path)
+    except (OSError, ValueError, EOFError, KeyError, IndexError, zipfile.BadZipFile) as error:
+        raise _broken(path, error) from None
 
 
 def _read_trace(path: Path) -> Trace:

@@ -10,12 +10,13 @@ import numpy as np
 from pilotage.core.types import Event, FloatArray, Twist
 from pilotage.evaluation.run_metrics import Outcome
 from pilotage.experiments.floor.build import Experiment
+from pilotage.experiments.floor.update_album import UpdateAlbum
 from pilotage.missions.floor import FloorMission
 from pilotage.sensors.readings import OdometryIncrement, Readings, UltrasonicReading
 from pilotage.sensors.ultrasonic import UltrasonicConfig
 from pilotage.sensors.wheel_odometry import WheelOdometryConfig
 from pilotage.sim.simulator import Simulator
-from pilotage.stack.interface import Stack
+from pilotage.stack.interface import Explaining, Stack
 
 TRUTH_COLUMNS = ("t_s", "true_x_m", "true_y_m", "true_theta_rad")
 BELIEF_COLUMNS = (
@@ -42,6 +43,7 @@ class RunRecord:
     trace: dict[str, FloatArray]
     outcome: Outcome
     events: list[Event]
+    album: UpdateAlbum
 
     @property
     def mission(self) -> FloorMission:
@@ -61,6 +63,7 @@ class Recorder:
         self._telemetry_columns = tuple(stack.telemetry())
         self._rows: list[tuple[float, ...]] = []
         self.events: list[Event] = []
+        self.album = UpdateAlbum()
 
     def __len__(self) -> int:
         return len(self._rows)
@@ -96,6 +99,9 @@ class Recorder:
             )
         )
         self.events += self._stack.drain_events()
+        update = self._stack.last_update if isinstance(self._stack, Explaining) else None
+        if update is not None:
+            self.album.offer(readings.t_s, update)
 
     def note(self, kind: str, text: str) -> None:
         """Record an event that the stack cannot know of."""

@@ -91,10 +91,10 @@ def draw_paths(axes: Axes, run: RunData, linewidth: float = 2.2) -> None:
     trace = run.trace
     reference = np.stack([trace["ref_x_m"], trace["ref_y_m"]], axis=1)
     line(axes, _without_jumps(reference), "reference", color=GREEN, linewidth=0.9, zorder=6)
-    line(axes, true_path(run), "true", color=BLUE, linewidth=linewidth, zorder=7)
+    line(axes, _cut_where_carried(run, true_path(run)), "true", color=BLUE, linewidth=linewidth, zorder=7)
     line(
         axes,
-        estimated_path(run),
+        _cut_where_carried(run, estimated_path(run)),
         "estimated",
         color=VERMILLION,
         linewidth=0.45 * linewidth,
@@ -223,6 +223,13 @@ def circles(axes: Axes, discs: FloatArray, layer: str, **look: Any) -> None:
         if math.isfinite(x + y + radius)
     ]
     one_shape(axes, outlines, gid=f"layer-{layer}", **look)
+
+
+def _cut_where_carried(run: RunData, points: FloatArray) -> FloatArray:
+    """Break a path where the robot was carried elsewhere: it did not drive there."""
+    carried = [event.t_s for event in run.events if event.kind == "kidnap" and math.isfinite(event.t_s)]
+    steps = np.searchsorted(run.trace.t_s, np.array(carried) + 1e-9)
+    return np.insert(points, steps[(steps > 0) & (steps < len(points))], np.nan, axis=0)
 
 
 def _without_jumps(points: FloatArray) -> FloatArray:

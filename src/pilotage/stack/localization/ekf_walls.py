@@ -23,7 +23,8 @@ from pilotage.stack.localization.localizer import LOCALIZERS, require_initial_po
 from pilotage.stack.localization.odometry_prediction import OdometryNoise, OdometryPrediction
 from pilotage.stack.localization.recovery import Recovery, RecoveryConfig
 from pilotage.stack.localization.wall_correction import correct
-from pilotage.stack.localization.wall_matching import LINE_DOF, Matches, WallMatcher, WallMatchingConfig
+from pilotage.stack.localization.wall_matching import LINE_DOF, WallMatcher, WallMatchingConfig
+from pilotage.stack.localization.wall_update import WallUpdate
 from pilotage.stack.perception.lines import DetectedLines, LineExtractionConfig, LineExtractor
 
 
@@ -97,7 +98,7 @@ class EkfWallsLocalizer:
         self.belief = knowledge.initial
         self._unknown = Belief.anywhere(knowledge.world_map.bounds_m)
         self._lost = knowledge.initial.status is BeliefStatus.LOST
-        self.last_update: tuple[DetectedLines, Matches] | None = None
+        self.last_update: WallUpdate | None = None
         self._telemetry = _telemetry(0, 0, 0.0, 0.0)
 
     def step(self, readings: Readings) -> Belief:
@@ -106,6 +107,7 @@ class EkfWallsLocalizer:
         if isinstance(odometry, OdometryIncrement):
             self._move(odometry)
         self._telemetry = _telemetry(0, 0, 0.0, 0.0)
+        self.last_update = None
         scan = readings.by_sensor.get(self._lidar)
         if isinstance(scan, LidarScan):
             lines = self._extractor.extract(scan.ranges_m)
@@ -124,8 +126,9 @@ class EkfWallsLocalizer:
             self._recovery.move(odometry)
 
     def _update(self, lines: DetectedLines, ranges_m: FloatArray) -> None:
+        pose, cov = self._pose.copy(), self._cov.copy()
         matches, total = correct(self._pose, self._cov, self._mount, lines, self._matcher)
-        self.last_update = lines, matches
+        self.last_update = WallUpdate(pose, cov, self._pose.copy(), lines, matches, self._matcher)
         used = matches.count
         self._telemetry = _telemetry(len(lines), used, total, self._expected_nis[used])
         if self._recovery is not None:
@@ -133,7 +136,6 @@ class EkfWallsLocalizer:
 
     def _find(self, lines: DetectedLines, ranges_m: FloatArray) -> None:
         assert self._recovery is not None, "never lost without it"
-        self.last_update = None
         self._telemetry = _telemetry(len(lines), 0, 0.0, 0.0)
         found = self._recovery.find(lines, ranges_m)
         if found is not None:

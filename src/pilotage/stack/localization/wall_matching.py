@@ -74,10 +74,10 @@ class WallMatcher:
 
     def __init__(self, config: WallMatchingConfig, gate: float, world: SegmentMap, mount: FloatArray) -> None:
         self._config = config
-        self._mount = mount
+        self.mount = mount
         self._circles = world.circles_m
         self.walls = WallLines.of(world)
-        self._gate = chi_square_quantile(gate, LINE_DOF)
+        self.gate = chi_square_quantile(gate, LINE_DOF)
         self.joint_gates = np.array(
             [0.0, *(chi_square_quantile(gate, LINE_DOF * k) for k in range(1, MAX_LINES + 1))]
         )
@@ -92,14 +92,14 @@ class WallMatcher:
         counts = wall_candidates.candidates(
             pose,
             cov,
-            self._mount,
+            self.mount,
             lines.rho_alpha,
             lines.covs,
             lines.ends_m,
             walls.normals,
             walls.line_of,
             walls.segments_m,
-            self._gate,
+            self.gate,
             config.slack_m,
             config.sigmas,
             config.overlap,
@@ -110,7 +110,7 @@ class WallMatcher:
         joint_association.associate(
             pose,
             cov,
-            self._mount,
+            self.mount,
             lines.rho_alpha,
             lines.covs,
             lines.ends_m,

@@ -13,7 +13,14 @@ from pilotage.kernels import geometry
 from pilotage.sensors.readings import Readings
 from pilotage.stack.control.guard import ArcGuard
 from pilotage.stack.control.reactive import Reaction, ReactionKind
-from pilotage.stack.interface import Belief, BeliefStatus, PlannedPath, StackStatus
+from pilotage.stack.interface import (
+    Belief,
+    BeliefStatus,
+    ExplainableUpdate,
+    Explaining,
+    PlannedPath,
+    StackStatus,
+)
 from pilotage.stack.knowledge import Knowledge
 from pilotage.stack.navigator.following import WaypointFollower
 from pilotage.stack.navigator.global_plan import GlobalPlan
@@ -91,6 +98,11 @@ class GoalNavigator:
     def belief(self) -> Belief:
         """The localizer's belief."""
         return self._localizer.belief
+
+    @property
+    def last_update(self) -> ExplainableUpdate | None:
+        """The localizer's last update, where it can be explained."""
+        return self._localizer.last_update if isinstance(self._localizer, Explaining) else None
 
     @property
     def status(self) -> tuple[StackStatus, str]:

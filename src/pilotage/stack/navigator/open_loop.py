@@ -10,7 +10,7 @@ from pilotage.core.config import Config
 from pilotage.core.types import STOP, Event, FloatArray, Twist
 from pilotage.sensors.readings import Readings
 from pilotage.sensors.sensor import Positive
-from pilotage.stack.interface import Belief, PlannedPath, StackStatus
+from pilotage.stack.interface import Belief, ExplainableUpdate, Explaining, PlannedPath, StackStatus
 from pilotage.stack.knowledge import Knowledge
 from pilotage.stack.navigator.navigator import NAVIGATORS, Parts
 
@@ -50,6 +50,11 @@ class OpenLoopNavigator:
     def belief(self) -> Belief:
         """The localizer's belief."""
         return self._localizer.belief
+
+    @property
+    def last_update(self) -> ExplainableUpdate | None:
+        """The localizer's last update, where it can be explained."""
+        return self._localizer.last_update if isinstance(self._localizer, Explaining) else None
 
     @property
     def status(self) -> tuple[StackStatus, str]:

@@ -1,0 +1,95 @@
+"""Updates worth a picture, chosen while the run goes on: a run has hundreds, a reader looks at six."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from pilotage.stack.interface import ExplainableUpdate, LineVerdict, ScanUpdate
+
+APART_S = 3.0
+"""Two pictures of the same kind are at least so far apart: the next scan looks like the last."""
+MOST_LEFT_OUT = 2
+EVENLY = 2
+
+VERDICTS = tuple(LineVerdict)
+"""In the order in which they are numbered in the file."""
+
+
+@dataclass(frozen=True, slots=True)
+class Picture:
+    """An update, when it was, and why it was chosen."""
+
+    t_s: float
+    why: str
+    score: float
+    update: ScanUpdate
+
+
+class UpdateAlbum:
+    """Keeps the first update, those with most lines left out, the farthest that was still accepted, and a
+    few evenly spaced ones; its size does not grow with the run."""
+
+    def __init__(self) -> None:
+        self._first: list[Picture] = []
+        self._left_out: list[Picture] = []
+        self._farthest: list[Picture] = []
+        self._evenly: list[Picture] = []
+        self._stride, self._offered = 1, 0
+
+    def offer(self, t_s: float, update: ExplainableUpdate) -> None:
+        """Look at an update; explain and keep it if it is worth it."""
+        if not self._first:
+            self._first.append(Picture(t_s, "first update", 0.0, update.explained()))
+        self._best(self._left_out, MOST_LEFT_OUT, t_s, "most lines left out", float(update.left_out), update)
+        if self._offered:  # the first has a start's error to mend: it would always be the farthest
+            self._best(self._farthest, 1, t_s, "largest chi-square accepted", update.largest_accepted, update)
+        if self._offered % self._stride == 0:
+            self._evenly.append(Picture(t_s, "on the way", 0.0, update.explained()))
+            if len(self._evenly) > 4 * EVENLY:  # every other one goes, and the rest come half as often
+                self._evenly = self._evenly[::2]
+                self._stride *= 2
+        self._offered += 1
+
+    def _best(
+        self, kept: list[Picture], most: int, t_s: float, why: str, score: float, update: ExplainableUpdate
+    ) -> None:
+        """Keep the ``most`` highest scores above 0 that are apart from each other."""
+        near = [k for k, picture in enumerate(kept) if t_s - picture.t_s < APART_S]
+        rivals = near or ([] if len(kept) < most else [int(np.argmin([p.score for p in kept]))])
+        if score <= max((kept[k].score for k in rivals), default=0.0):
+            return
+        kept[:] = [picture for k, picture in enumerate(kept) if k not in rivals]
+        kept.append(Picture(t_s, why, score, update.explained()))
+
+    def pictures(self) -> list[Picture]:
+        """The chosen ones in their order, each update once."""
+        inner = np.linspace(0, len(self._evenly) - 1, EVENLY + 2)[1:-1] if self._evenly else np.empty(0)
+        evenly = [self._evenly[round(float(k))] for k in inner]
+        by_time: dict[float, Picture] = {}
+        for picture in (*self._first, *self._left_out, *self._farthest, *evenly):
+            by_time.setdefault(picture.t_s, picture)
+        return [by_time[t_s] for t_s in sorted(by_time)]
+
+    def arrays(self) -> dict[str, Any]:
+        """The pictures as arrays for one file; empty without any."""
+        arrays: dict[str, Any] = {}
+        for k, picture in enumerate(self.pictures()):
+            update = picture.update
+            arrays |= {
+                f"t_s_{k}": np.array(picture.t_s),
+                f"why_{k}": np.array(picture.why),
+                f"sensor_pose_{k}": update.sensor_pose,
+                f"sensor_pose_after_{k}": update.sensor_pose_after,
+                f"points_m_{k}": update.points_m.astype(np.float32),
+                f"clusters_{k}": update.clusters.astype(np.int16),
+                f"members_{k}": update.members.astype(np.int16),
+                f"ends_m_{k}": update.ends_m,
+                f"walls_m_{k}": update.walls_m,
+                f"distances_{k}": update.distances,
+                f"gate_{k}": np.array(update.gate),
+                f"verdicts_{k}": np.array([VERDICTS.index(v) for v in update.verdicts], dtype=np.int16),
+            }
+        return arrays
