@@ -56,7 +56,7 @@ def read_updates(path: Path) -> tuple[RecordedUpdate, ...]:
     """
     with np.load(path, allow_pickle=False) as archive:
         arrays = {name: np.asarray(archive[name]) for name in archive.files}
-    updates = []
+    updates: list[RecordedUpdate] = []
     while f"t_s_{len(updates)}" in arrays:
         k = len(updates)
         pose = np.asarray(arrays[f"sensor_pose_{k}"], dtype=np.float64).reshape(3)
