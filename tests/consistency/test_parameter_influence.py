@@ -1,5 +1,7 @@
-"""What the filters' parameters do (night-watch report 3.4, figures 21 to 23): variances ten times too small or
-too large, and gates from strict to loose, on the programmed route, for beacons and for walls.
+"""What the filters' parameters do (night-watch report 3.4, figures 21 to 23).
+
+Variances ten times too small or too large, and gates from strict to loose, on the programmed route, for
+beacons and for walls.
 
 The differences are factors, not percents: the least of those asserted is more than five standard errors.
 """
