@@ -1,4 +1,4 @@
-"""Is the landmark EKF as good as it says? NEES and NIS over independent runs, and filters that must fail.
+"""Is the EKF on beacons, ekf-landmarks, as good as it says? NEES, NIS over runs, and filters that must fail.
 
 Each statistic misses faults that the other catches, so both are asked. The seeds are fixed: a pass stays
 a pass; the stated rates are those at which a right filter would fail on fresh seeds.

@@ -1,0 +1,103 @@
+"""Are the unscented and the iterated filter and dead reckoning as good as they say? Is every estimator asked?
+
+The seeds are fixed: a pass stays a pass; the stated rates are those at which a right filter would fail on
+fresh seeds.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pilotage.core.types import FloatArray
+from pilotage.evaluation.consistency import fraction_in_band, nees
+from pilotage.evaluation.run_metrics import covariances, poses
+from pilotage.experiments.floor.mission import load_floor_mission
+from pilotage.experiments.floor.simulate import simulate
+from pilotage.stack.localization.heading_filters import HEADING_FILTERS
+from pilotage.stack.localization.localizer import LOCALIZERS
+
+RUNS, SETTLE = 24, 10
+ON_BEACONS = ("ukf-landmarks", "iekf-landmarks")
+SURE_START = ("x_var_m2=1e-8", "y_var_m2=1e-8", "theta_var_rad2=1e-8")
+"""So that what odometry adds is what there is."""
+
+ASKED_IN = {
+    "dead-reckoning": "test_other_filters.py",
+    "ekf-augmented": "test_augmented_filter.py",
+    "ekf-landmarks": "test_landmark_filter.py",
+    "ekf-walls": "test_wall_filter.py",
+    "ekf-walls-report": "test_wall_filter.py",  # which shows that it is not
+    "encoder-gyro": "test_heading_filters.py",
+    "encoder-magnetometer": "test_heading_filters.py",
+    "gyro-bias": "test_heading_filters.py",
+    "iekf-landmarks": "test_other_filters.py",
+    "mcl-likelihood-field": "test_particle_filter.py",
+    "ukf-landmarks": "test_other_filters.py",
+}
+
+
+def test_every_estimator_is_asked_in_one_of_these_files() -> None:
+    assert sorted(ASKED_IN) == sorted([*LOCALIZERS.names(), *HEADING_FILTERS.names()])
+    for name, file in ASKED_IN.items():
+        assert name in (Path(__file__).parent / file).read_text()
+
+
+@dataclass(frozen=True)
+class Sample:
+    """NEES (R, N), and NIS over its expectation (nan without measurements)."""
+
+    nees: FloatArray
+    nis: float
+
+
+@cache
+def sample(name: str, *overrides: str) -> Sample:
+    """Drive the first part of the route."""
+    rows, nis, expected = [], 0.0, 0.0
+    for seed in range(RUNS):
+        settings = [f"stack.localizer.name={name}", "run.time_limit_s=20", *overrides]
+        if name == "dead-reckoning":
+            settings += [f"stack.initial.{entry}" for entry in SURE_START]
+        trace = simulate(load_floor_mission("museum-route", settings, seed)).trace
+        rows.append(nees(poses(trace, "true"), poses(trace, "est"), covariances(trace))[SETTLE:])
+        if "nis" in trace:
+            nis += float(np.nansum(trace["nis"][SETTLE:]))
+            expected += float(np.nansum(trace["nis_expected"][SETTLE:]))
+    return Sample(np.array(rows), nis / expected if expected else float("nan"))
+
+
+def nees_passes(values: FloatArray) -> bool:
+    """Pointwise in the 99.9 % band for 95 % of the steps, and in the mean; false alarm about 2e-3."""
+    means = values.mean(axis=1)
+    in_the_mean = abs(means.mean() - 3.0) < 3.8 * means.std(ddof=1) / np.sqrt(RUNS)
+    return bool(in_the_mean) and fraction_in_band(values, 3, 0.999) >= 0.95
+
+
+@pytest.mark.parametrize("name", ON_BEACONS)
+def test_filters_on_beacons(name: str) -> None:
+    found = sample(name)
+    assert nees_passes(found.nees)
+    # About 2.3e4 measurements of two degrees of freedom: standard error 0.0066, false alarm 2e-4.
+    assert found.nis == pytest.approx(1.0, abs=0.025)
+
+
+@pytest.mark.parametrize("name", ON_BEACONS)
+@pytest.mark.parametrize("factor", ["0.5", "2"])
+@pytest.mark.parametrize("key", ["measurement_var_scale", "odometry_var_scale"])
+def test_wrong_by_a_factor_of_two_on_beacons_is_found_out(name: str, key: str, factor: str) -> None:
+    wrong = sample(name, f"stack.localizer.{key}={factor}")
+    assert not (nees_passes(wrong.nees) and abs(wrong.nis - 1.0) <= 0.025)
+
+
+def test_dead_reckoning() -> None:
+    assert nees_passes(sample("dead-reckoning").nees)
+
+
+@pytest.mark.parametrize("factor", ["0.5", "2"])
+def test_dead_reckoning_wrong_by_a_factor_of_two_is_found_out(factor: str) -> None:
+    assert not nees_passes(sample("dead-reckoning", f"stack.localizer.odometry_var_scale={factor}").nees)
