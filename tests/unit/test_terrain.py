@@ -118,6 +118,12 @@ class TestFiles:
             ({"elevationMax": None}, "elevationMax"),
             ({"file": "other.bin"}, "other.bin"),
             ({"size": 3_000_000}, "needs about"),
+            ({"format": ["uint16-le"]}, "format"),
+            ({"metresPerPixel": True}, "expected a number"),
+            ({"metresPerPixel": 10**400}, "expected a number"),
+            ({"metresPerPixel": 1e-300}, "resolution from"),
+            ({"metresPerPixelLon": 1e20, "metresPerPixelLat": 1.0}, "needs about"),
+            ({"elevationMax": 1e20}, "heights up to"),
         ],
     )
     def test_bad_files_are_refused(self, tmp_path: Path, change: dict[str, Any], match: str) -> None:

@@ -65,7 +65,8 @@ def _read_npy(path: Path, resolution_m: float | None, origin: Pose2) -> Elevatio
     if heights.dtype.kind not in "iuf":
         raise InputError(f"elevation '{path}': expected heights as numbers, found {heights.dtype}")
     require_memory(12 * heights.size, f"elevation '{path}'")
-    return ElevationModel(heights.astype(np.float32), resolution_m, origin)
+    with np.errstate(over="ignore"):  # what becomes infinite is refused
+        return ElevationModel(heights.astype(np.float32), resolution_m, origin)
 
 
 def _read_raw(path: Path, origin: Pose2) -> ElevationModel:
@@ -81,11 +82,13 @@ def _read_raw(path: Path, origin: Pose2) -> ElevationModel:
         raise InputError(f"{path}: expected an object with size and format, found another value")
     size = side.get("size")
     shape = [size, size] if isinstance(size, int) else size
-    if not (isinstance(shape, list) and len(shape) == 2 and all(isinstance(n, int) and n > 1 for n in shape)):
-        raise InputError(f"{path}: size: expected a number or [rows, columns] above 1, found {size!r}")
+    if not (isinstance(shape, list) and len(shape) == 2 and all(type(n) is int and n > 1 for n in shape)):
+        raise InputError(
+            f"{path}: size: expected a number or [rows, columns] above 1, found {str(size)[:40]}"
+        )
     rows, columns = shape
     name = side.get("format")
-    if name not in FORMATS:
+    if not isinstance(name, str) or name not in FORMATS:
         raise InputError(f"{path}: format: expected one of {', '.join(FORMATS)}, found {name!r}")
     dtype = np.dtype(FORMATS[name])
     row_m = _positive(side, "metresPerPixelLat", path)
@@ -109,8 +112,9 @@ def _read_raw(path: Path, origin: Pose2) -> ElevationModel:
 
 def _number(side: dict[str, Any], key: str, path: Path) -> float:
     value = side.get(key)
-    if not isinstance(value, int | float) or not math.isfinite(value):
-        raise InputError(f"{path}: {key}: expected a number, found {value!r}")
+    # Compared first: JSON's whole numbers may be too long for a float.
+    if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) < 1e30:
+        raise InputError(f"{path}: {key}: expected a number, found {str(value)[:40]}")
     return float(value)
 
 
@@ -149,8 +153,9 @@ def _squared(heights: HeightArray, row_m: float, column_m: float, origin: Pose2)
     """Stretch the rows linearly until the cells are square."""
     if math.isclose(row_m, column_m, rel_tol=1e-9):
         return ElevationModel(heights, row_m, origin)
-    columns = heights.shape[1]
+    rows, columns = heights.shape
     count = max(2, round(columns * column_m / row_m))
+    require_memory(12 * rows * count, f"an elevation model stretched to {count} x {rows} square cells")
     at = np.clip((np.arange(count) + 0.5) * row_m / column_m - 0.5, 0.0, columns - 1.0)
     left = np.minimum(at.astype(np.int64), columns - 2)
     part = (at - left).astype(np.float32)
