@@ -139,13 +139,26 @@ def _read_geotiff(path: Path, origin: Pose2 | None) -> ElevationModel:
             require_memory(12 * source.width * source.height, f"elevation '{path}'")
             band = source.read(1, masked=True).astype(np.float32)
             column_m, row_m = abs(source.transform.a), abs(source.transform.e)
-            corner = Pose2(float(source.bounds.left), float(source.bounds.bottom), 0.0)
-            geographic = source.crs is not None and source.crs.is_geographic
+            south = min(source.bounds.bottom, source.bounds.top)
+            corner = Pose2(float(source.bounds.left), float(south), 0.0)
+            turned = source.transform.b != 0.0 or source.transform.d != 0.0
+            upside_down = source.transform.e > 0.0
+            crs = source.crs
+            geographic = crs is not None and crs.is_geographic
+            metres = crs is None or not crs.is_projected or crs.linear_units_factor[1] == 1.0
     except rasterio.errors.RasterioError as error:
         raise InputError(f"elevation '{path}': cannot be read ({error})") from None
     if geographic:
         raise InputError(f"elevation '{path}': expected metres, found degrees; project it first (gdalwarp)")
+    if turned:
+        raise InputError(f"elevation '{path}': expected rows that run east, found turned ones; gdalwarp it")
+    if not metres:
+        raise InputError(
+            f"elevation '{path}': expected metres, found {crs.linear_units}; project it (gdalwarp)"
+        )
     heights = np.asarray(band.filled(np.nan), dtype=np.float32)
+    if upside_down:
+        heights = heights[::-1]
     return _squared(heights, row_m, column_m, corner if origin is None else origin)
 
 
