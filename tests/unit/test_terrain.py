@@ -137,9 +137,8 @@ class TestFiles:
         """North up, south up (turned over), and turned, which is refused."""
         rasterio = pytest.importorskip("rasterio", reason="GeoTIFF needs the extra terrain")
         path = tmp_path / "ground.tif"
-        place = rasterio.transform.Affine.translation(1000.0, 500.0)
-        place *= rasterio.transform.Affine.rotation(math.degrees(turned_rad))
-        place *= rasterio.transform.Affine.scale(10.0, row_m)
+        c, s = math.cos(turned_rad), math.sin(turned_rad)
+        place = rasterio.transform.Affine(10.0 * c, -row_m * s, 1000.0, 10.0 * s, row_m * c, 500.0)
         heights = np.array([[1.0, 1.0, 1.0], [2.0, 2.0, -9.0]], np.float32)
         size = {"height": 2, "width": 3, "count": 1, "dtype": "float32"}
         with rasterio.open(
