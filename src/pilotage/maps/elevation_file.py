@@ -138,11 +138,12 @@ def _read_geotiff(path: Path, origin: Pose2 | None) -> ElevationModel:
         with rasterio.open(path) as source:
             require_memory(12 * source.width * source.height, f"elevation '{path}'")
             band = source.read(1, masked=True).astype(np.float32)
-            column_m, row_m = abs(source.transform.a), abs(source.transform.e)
-            south = min(source.bounds.bottom, source.bounds.top)
-            corner = Pose2(float(source.bounds.left), float(south), 0.0)
-            turned = source.transform.b != 0.0 or source.transform.d != 0.0
-            upside_down = source.transform.e > 0.0
+            place = source.transform
+            south = min(place.f, place.f + place.e * source.height)
+            corner = Pose2(float(min(place.c, place.c + place.a * source.width)), float(south), 0.0)
+            column_m, row_m = abs(place.a), abs(place.e)
+            turned = place.b != 0.0 or place.d != 0.0 or place.a < 0.0
+            upside_down = place.e > 0.0
             crs = source.crs
             geographic = crs is not None and crs.is_geographic
             metres = crs is None or not crs.is_projected or crs.linear_units_factor[1] == 1.0
