@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import example, given
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import array_shapes, arrays
 from scipy import ndimage
@@ -18,7 +18,7 @@ from scipy import ndimage
 from pilotage.core.errors import InputError
 from pilotage.core.types import BoolArray, FloatArray
 from pilotage.kernels import grid_components, grid_distance, grid_moves, grid_search
-from pilotage.stack.planning.grid_space import Cell, GridPath, GridSpace
+from pilotage.stack.planning.grid_space import Cell, GridPath, GridSpace, Search
 
 SHAPES = array_shapes(min_dims=2, max_dims=2, min_side=1, max_side=14)
 OPEN_OR_DENSE = st.sampled_from([0.1, 0.25, 0.4, 0.5])
@@ -85,19 +85,65 @@ def assert_legal(mask: BoolArray, path: GridPath, start: Cell, goal: Cell, cut: 
         assert b in set(steps(mask, a, cut))
 
 
-@given(problems(), st.booleans(), st.booleans())
+@given(problems(), st.booleans(), st.sampled_from(Search))
+@settings(max_examples=300, deadline=None)
 def test_paths_are_optimal_and_legal(
-    problem: tuple[BoolArray, Cell, Cell], cut: bool, informed: bool
+    problem: tuple[BoolArray, Cell, Cell], cut: bool, search: Search
 ) -> None:
     mask, start, goal = problem
     best = reference(mask, start, goal, cut)
-    path = GridSpace(mask).shortest(start, goal, cut, informed)
+    path = GridSpace(mask).shortest(start, goal, cut, search)
     if path is None:
         assert math.isinf(best)
         return
     assert path.length_cells == pytest.approx(best, abs=1e-9)
     assert path.cost == path.length_cells
     assert_legal(mask, path, start, goal, cut)
+
+
+@given(st.integers(0, 2**32 - 1), st.booleans())
+@settings(max_examples=150, deadline=None)
+def test_jumps_find_what_cells_find(seed: int, cut: bool) -> None:
+    """On grids wider and higher than a word of bits, of rubble and of blocks, both ways."""
+    rng = np.random.default_rng(seed)
+    mask = rng.random(tuple(rng.integers(1, 220, 2))) < rng.choice([0.0, 0.003, 0.02, 0.2, 0.4])
+    if rng.random() < 0.5:
+        mask = ndimage.binary_dilation(mask, iterations=int(rng.integers(1, 4)))
+    free = np.argwhere(~mask)
+    if len(free) < 2:
+        return
+    space = GridSpace(mask)
+    for _ in range(4):
+        start, goal = ((int(r), int(c)) for r, c in free[rng.choice(len(free), 2, replace=False)])
+        jumped = space.shortest(start, goal, cut, Search.JUMPS, tell_looked_at=True)
+        stepped = space.shortest(start, goal, cut, Search.CELLS)
+        assert (jumped is None) == (stepped is None)
+        if jumped is None or stepped is None:
+            continue
+        assert jumped.length_cells == pytest.approx(stepped.length_cells, abs=1e-9)
+        assert_legal(mask, jumped, start, goal, cut)
+        assert not mask.ravel()[jumped.looked_at].any()
+
+
+def test_jumps_in_wide_arithmetic() -> None:
+    """A serpentine that outgrows 32 bits takes the second scale."""
+    mask = np.zeros((2001, 60), dtype=np.bool_)
+    mask[1::4, :-1] = True
+    mask[3::4, 1:] = True
+    mask = np.repeat(mask, 2, axis=1)
+    space = GridSpace(mask)
+    jumped = space.shortest((0, 0), (2000, 0), search=Search.JUMPS)
+    stepped = space.shortest((0, 0), (2000, 0), search=Search.CELLS)
+    assert jumped is not None
+    assert stepped is not None
+    assert stepped.length_cells > grid_search.NARROW.straight * math.sqrt(2.0)
+    assert jumped.length_cells == stepped.length_cells
+
+
+def test_no_jumps_where_cells_differ_in_cost() -> None:
+    space = GridSpace(np.zeros((3, 3), np.bool_), np.ones((3, 3)))
+    with pytest.raises(InputError, match="without cell costs"):
+        space.shortest((0, 0), (2, 2), search=Search.JUMPS)
 
 
 @given(problems(), st.booleans(), st.integers(0, 2**32 - 1), st.sampled_from([1.5, 8.0, 500.0]))

@@ -55,6 +55,11 @@ class TestScenarios:
             world, scenario(world, f"{unreachable} -1", f"{unreachable} inf", f"{unreachable} 0")
         )
         assert (answer["optimal"], answer["unreachable"], answer["worst_error"]) == (3, 3, 0.0)
+        on_obstacle = "0 a.map 5 3 0 0 2 0"
+        answer = run_scenario(
+            world, scenario(world, *(f"{on_obstacle} {none}" for none in ("-1", "inf", "0")))
+        )
+        assert (answer["optimal"], answer["unreachable"], answer["worst_error"]) == (3, 3, 0.0)
         answer = run_scenario(world, scenario(world, f"{unreachable} 5.0"))
         assert (answer["optimal"], answer["success"]) == (0, False)
         assert math.isinf(answer["worst_error"])

@@ -118,11 +118,41 @@ class TestFiles:
             ({"elevationMax": None}, "elevationMax"),
             ({"file": "other.bin"}, "other.bin"),
             ({"size": 3_000_000}, "needs about"),
+            ({"format": ["uint16-le"]}, "format"),
+            ({"metresPerPixel": True}, "expected a number"),
+            ({"metresPerPixel": 10**400}, "expected a number"),
+            ({"metresPerPixel": 1e-300}, "resolution from"),
+            ({"metresPerPixelLon": 1e20, "metresPerPixelLat": 1.0}, "needs about"),
+            ({"elevationMax": 1e20}, "heights up to"),
         ],
     )
     def test_bad_files_are_refused(self, tmp_path: Path, change: dict[str, Any], match: str) -> None:
         with pytest.raises(InputError, match=match):
             read_elevation(self.write(tmp_path, **change))
+
+    @pytest.mark.parametrize(
+        ("turned_rad", "row_m", "first"), [(0.0, -10.0, 1.0), (0.0, 10.0, 2.0), (0.3, -10.0, None)]
+    )
+    def test_geotiff(self, tmp_path: Path, turned_rad: float, row_m: float, first: float | None) -> None:
+        """North up, south up (turned over), and turned, which is refused."""
+        rasterio = pytest.importorskip("rasterio", reason="GeoTIFF needs the extra terrain")
+        path = tmp_path / "ground.tif"
+        c, s = math.cos(turned_rad), math.sin(turned_rad)
+        place = rasterio.transform.Affine(10.0 * c, -row_m * s, 1000.0, 10.0 * s, row_m * c, 500.0)
+        heights = np.array([[1.0, 1.0, 1.0], [2.0, 2.0, -9.0]], np.float32)
+        size = {"height": 2, "width": 3, "count": 1, "dtype": "float32"}
+        with rasterio.open(
+            path, "w", driver="GTiff", crs="EPSG:32633", transform=place, nodata=-9.0, **size
+        ) as f:
+            f.write(heights, 1)
+        if first is None:
+            with pytest.raises(InputError, match="rows that run east"):
+                read_elevation(path)
+            return
+        model = read_elevation(path)
+        assert model.elevation_m[0, 0] == first
+        assert np.isnan(model.elevation_m).sum() == 1
+        assert (model.origin.x_m, model.origin.y_m) == (1000.0, 480.0 if row_m < 0.0 else 500.0)
 
     def test_missing_or_other(self, tmp_path: Path) -> None:
         for name in ("none.json", "none.tif"):

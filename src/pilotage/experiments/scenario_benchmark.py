@@ -108,7 +108,7 @@ class _Spaces:
             _warm(space, start, goal)
             self._made[key] = space
         for name, cell in (("start", start), ("goal", goal)):
-            if not self._made[key].is_free(cell) and scenario.lengths[i] >= 0.0:
+            if not self._made[key].is_free(cell) and not scenario.without_path[i]:
                 raise InputError(
                     f"{path}: problem {i + 1}: expected a {name} on free ground, found terrain "
                     f"'{chr(letters[cell])}' at x {cell[1]}, y {cell[0]}; is this the scenario's map?"
@@ -125,9 +125,7 @@ def _warm(space: GridSpace, start: Cell, goal: Cell) -> None:
 
 def _errors(scenario: Scenario, lengths: np.ndarray[Any, np.dtype[np.float64]]) -> Any:
     """How far each found length is from the printed one; infinite where only one of them is a path."""
-    printed = scenario.lengths
-    apart = (scenario.starts != scenario.goals).any(axis=1)
-    none_printed = ~np.isfinite(printed) | (printed < 0.0) | ((printed == 0.0) & apart)
+    printed, none_printed = scenario.lengths, scenario.without_path
     none_found = np.isinf(lengths)
     both = ~none_printed & ~none_found
     errors = np.full(len(lengths), math.inf)

@@ -96,7 +96,7 @@ def search(
     weights: UintArray | None,
     lightest: int,
     heaviest: int,
-) -> tuple[int, IntArray, int]:
+) -> tuple[int, IntArray, int, UintArray]:
     """Find a shortest path between two free cells of a padded grid.
 
     A step costs ``straight`` or ``diagonal``; with weights, that times the sum of both cells' weights.
@@ -126,6 +126,8 @@ def search(
         Flat indices from start to goal; empty where there is none.
     expansions
         Cells whose successors were looked at, counted again where they were opened again.
+    queued
+        Flat indices of the cells that were queued, again where a better way to one was found.
     """
     straight, diagonal, top, shift = scale.straight, scale.diagonal, scale.top, scale.shift
     # Along an edge the octile distance grows by no more than the edge costs.
@@ -230,7 +232,7 @@ def search(
     path = trace(states, start, goal, offset) if best > 0 else np.empty(0, np.int64)
     for i in range(n_noted):
         gain[noted[i]] = 0
-    return status, path, expansions
+    return status, path, expansions, noted[:n_noted]
 
 
 @kernel

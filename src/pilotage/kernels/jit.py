@@ -15,10 +15,16 @@ from typing import Any, TypeVar, cast
 
 import numba
 import numpy as np
+from numba.cpython.unsafe import numbers as _bits
 
-__all__ = ["cache_is_cold", "kernel"]
+__all__ = ["cache_is_cold", "kernel", "leading_zeros", "trailing_zeros"]
 
 F = TypeVar("F", bound=Callable[..., Any])
+
+
+leading_zeros = cast(Callable[[np.uint64], int], _bits.leading_zeros)
+trailing_zeros = cast(Callable[[np.uint64], int], _bits.trailing_zeros)
+"""How many bits of a word, not 0, are 0 before the highest and after the lowest one set: one instruction."""
 
 
 def _digest() -> str:

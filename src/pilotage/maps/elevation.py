@@ -13,6 +13,9 @@ from pilotage.maps.occupancy_grid import CORNER, FREE, OCCUPIED, UNKNOWN, Occupa
 
 HeightArray = NDArray[np.float32]
 
+FINEST_M, HIGHEST_M = 1e-6, 1e9
+"""What is beyond is a mistake in units or a mark for unknown, and would leave the range of floats."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ElevationModel:
@@ -36,10 +39,13 @@ class ElevationModel:
         heights = np.array(self.elevation_m, dtype=np.float32)
         if heights.ndim != 2 or min(heights.shape) < 2:
             raise InputError(f"elevation: expected at least 2 x 2 heights, found {heights.shape}")
-        if not (np.isfinite(self.resolution_m) and self.resolution_m > 0.0):
-            raise InputError(f"elevation: expected a resolution above 0 m, found {self.resolution_m}")
-        if np.isinf(heights).any():
-            raise InputError("elevation: expected finite heights or NaN, found infinity")
+        if not FINEST_M <= self.resolution_m <= HIGHEST_M:
+            raise InputError(
+                f"elevation: expected a resolution from {FINEST_M:g} to {HIGHEST_M:g} m, "
+                f"found {self.resolution_m}"
+            )
+        if (np.abs(heights) > HIGHEST_M).any():
+            raise InputError(f"elevation: expected heights up to {HIGHEST_M:g} m or NaN, found higher ones")
         heights.flags.writeable = False
         object.__setattr__(self, "elevation_m", heights)
 

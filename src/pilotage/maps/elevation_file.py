@@ -65,7 +65,8 @@ def _read_npy(path: Path, resolution_m: float | None, origin: Pose2) -> Elevatio
     if heights.dtype.kind not in "iuf":
         raise InputError(f"elevation '{path}': expected heights as numbers, found {heights.dtype}")
     require_memory(12 * heights.size, f"elevation '{path}'")
-    return ElevationModel(heights.astype(np.float32), resolution_m, origin)
+    with np.errstate(over="ignore"):  # what becomes infinite is refused
+        return ElevationModel(heights.astype(np.float32), resolution_m, origin)
 
 
 def _read_raw(path: Path, origin: Pose2) -> ElevationModel:
@@ -81,11 +82,13 @@ def _read_raw(path: Path, origin: Pose2) -> ElevationModel:
         raise InputError(f"{path}: expected an object with size and format, found another value")
     size = side.get("size")
     shape = [size, size] if isinstance(size, int) else size
-    if not (isinstance(shape, list) and len(shape) == 2 and all(isinstance(n, int) and n > 1 for n in shape)):
-        raise InputError(f"{path}: size: expected a number or [rows, columns] above 1, found {size!r}")
+    if not (isinstance(shape, list) and len(shape) == 2 and all(type(n) is int and n > 1 for n in shape)):
+        raise InputError(
+            f"{path}: size: expected a number or [rows, columns] above 1, found {str(size)[:40]}"
+        )
     rows, columns = shape
     name = side.get("format")
-    if name not in FORMATS:
+    if not isinstance(name, str) or name not in FORMATS:
         raise InputError(f"{path}: format: expected one of {', '.join(FORMATS)}, found {name!r}")
     dtype = np.dtype(FORMATS[name])
     row_m = _positive(side, "metresPerPixelLat", path)
@@ -109,8 +112,9 @@ def _read_raw(path: Path, origin: Pose2) -> ElevationModel:
 
 def _number(side: dict[str, Any], key: str, path: Path) -> float:
     value = side.get(key)
-    if not isinstance(value, int | float) or not math.isfinite(value):
-        raise InputError(f"{path}: {key}: expected a number, found {value!r}")
+    # Compared first: JSON's whole numbers may be too long for a float.
+    if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) < 1e30:
+        raise InputError(f"{path}: {key}: expected a number, found {str(value)[:40]}")
     return float(value)
 
 
@@ -134,14 +138,28 @@ def _read_geotiff(path: Path, origin: Pose2 | None) -> ElevationModel:
         with rasterio.open(path) as source:
             require_memory(12 * source.width * source.height, f"elevation '{path}'")
             band = source.read(1, masked=True).astype(np.float32)
-            column_m, row_m = abs(source.transform.a), abs(source.transform.e)
-            corner = Pose2(float(source.bounds.left), float(source.bounds.bottom), 0.0)
-            geographic = source.crs is not None and source.crs.is_geographic
+            place = source.transform
+            south = min(place.f, place.f + place.e * source.height)
+            corner = Pose2(float(min(place.c, place.c + place.a * source.width)), float(south), 0.0)
+            column_m, row_m = abs(place.a), abs(place.e)
+            turned = place.b != 0.0 or place.d != 0.0 or place.a < 0.0
+            upside_down = place.e > 0.0
+            crs = source.crs
+            geographic = crs is not None and crs.is_geographic
+            metres = crs is None or not crs.is_projected or crs.linear_units_factor[1] == 1.0
     except rasterio.errors.RasterioError as error:
         raise InputError(f"elevation '{path}': cannot be read ({error})") from None
     if geographic:
         raise InputError(f"elevation '{path}': expected metres, found degrees; project it first (gdalwarp)")
+    if turned:
+        raise InputError(f"elevation '{path}': expected rows that run east, found turned ones; gdalwarp it")
+    if not metres:
+        raise InputError(
+            f"elevation '{path}': expected metres, found {crs.linear_units}; project it (gdalwarp)"
+        )
     heights = np.asarray(band.filled(np.nan), dtype=np.float32)
+    if upside_down:
+        heights = heights[::-1]
     return _squared(heights, row_m, column_m, corner if origin is None else origin)
 
 
@@ -149,8 +167,9 @@ def _squared(heights: HeightArray, row_m: float, column_m: float, origin: Pose2)
     """Stretch the rows linearly until the cells are square."""
     if math.isclose(row_m, column_m, rel_tol=1e-9):
         return ElevationModel(heights, row_m, origin)
-    columns = heights.shape[1]
+    rows, columns = heights.shape
     count = max(2, round(columns * column_m / row_m))
+    require_memory(12 * rows * count, f"an elevation model stretched to {count} x {rows} square cells")
     at = np.clip((np.arange(count) + 0.5) * row_m / column_m - 0.5, 0.0, columns - 1.0)
     left = np.minimum(at.astype(np.int64), columns - 2)
     part = (at - left).astype(np.float32)

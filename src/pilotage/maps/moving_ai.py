@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,6 +22,9 @@ WATER = b"W"
 """Passable among itself, but not from ground."""
 
 KNOWN = b".GSW@OT"
+
+FARTHEST = 2**31
+"""No place on any map is beyond."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -73,6 +77,13 @@ class Scenario:
 
     def __len__(self) -> int:
         return int(self.lengths.shape[0])
+
+    @property
+    def without_path(self) -> BoolArray:
+        """(N,) where the file says so: by a length below 0, infinite, or of 0 between two places."""
+        apart = (self.starts != self.goals).any(axis=1)
+        none: BoolArray = ~np.isfinite(self.lengths) | (self.lengths < 0.0) | ((self.lengths == 0.0) & apart)
+        return none
 
 
 def read_moving_ai_map(path: Path) -> MovingAiMap:
@@ -159,7 +170,10 @@ def read_scenario(path: Path) -> Scenario:
         try:
             if len(fields) < numbers + 2:
                 raise ValueError
-            problems.append([*map(int, fields[-numbers:-1]), float(fields[-1])])
+            problem = [*map(int, fields[-numbers:-1]), float(fields[-1])]
+            if max(map(abs, problem[:-1])) > FARTHEST or math.isnan(problem[-1]):
+                raise ValueError
+            problems.append(problem)
         except ValueError:
             raise InputError(
                 f"{path}: line {count}: expected a problem of {numbers + 2} fields, found {line[:80]!r}"

@@ -131,7 +131,9 @@ class OccupancyGrid:
         With origin (0, -10) and 10 m cells these are equations 3.1 and 3.2 of the rover report.
         """
         # Far beyond the grid is outside as well, without leaving the range of whole numbers.
-        return np.floor(np.clip(self.places_at(points_xy_m), -1.0, 2.0**40)).astype(np.int64)
+        with np.errstate(over="ignore", invalid="ignore"):
+            places = np.nan_to_num(self.places_at(points_xy_m), nan=-1.0)
+        return np.floor(np.clip(places, -1.0, 2.0**40)).astype(np.int64)
 
     def cell_at(self, x_m: float, y_m: float) -> tuple[int, int]:
         """Row and column of the cell that a point lies in; outside the grid as they come."""

@@ -11,10 +11,10 @@ from pydantic import Field
 from pilotage.core.config import Config
 from pilotage.stack.planning.field_search import plan_over_nodes
 from pilotage.stack.planning.grid_planner import GRID_PLANNERS, GridRequest, GridResult
-from pilotage.stack.planning.grid_space import Cell, GridPath, GridSpace
+from pilotage.stack.planning.grid_space import Cell, GridPath, GridSpace, Search
 from pilotage.stack.planning.planner import PLANNERS, PlanRequest, PlanResult, PlanStatus
 
-Search: TypeAlias = Callable[[GridSpace, Cell, Cell], GridPath | None]
+Find: TypeAlias = Callable[[GridSpace, Cell, Cell], GridPath | None]
 
 
 class GridSearchConfig(Config):
@@ -77,7 +77,7 @@ class DijkstraPlanner:
         return plan_over_nodes(request, self._find, self._config.clearance_m, self._config.waypoint_spacing_m)
 
     def _find(self, space: GridSpace, start: Cell, goal: Cell) -> GridPath | None:
-        return space.shortest(start, goal, self._config.corner_cutting, informed=False)
+        return space.shortest(start, goal, self._config.corner_cutting, Search.DIJKSTRA)
 
 
 @PLANNERS.add("theta-star", GridSearchConfig)
@@ -110,7 +110,7 @@ class ThetaStarPlanner:
         return space.any_angle(start, goal, self._config.corner_cutting)
 
 
-def _answer(request: GridRequest, find: Search) -> GridResult:
+def _answer(request: GridRequest, find: Find) -> GridResult:
     """Check the ends, search, and say how it went."""
     began = time.perf_counter()
     space = request.space

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
+from enum import StrEnum
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,7 @@ from numpy.typing import NDArray
 
 from pilotage.core.errors import InputError
 from pilotage.core.types import BoolArray, FloatArray, IntArray
-from pilotage.kernels import grid_components, grid_moves, grid_search, grid_theta
+from pilotage.kernels import grid_components, grid_jump, grid_moves, grid_search, grid_theta
 from pilotage.maps.memory import require_memory
 
 Cell = tuple[int, int]
@@ -24,6 +25,22 @@ COST_UNIT = 1024
 
 BYTES_PER_CELL = 12
 """State, gain and queue of a search that looks at every cell."""
+
+JUMPS_FROM_CELLS = 6.0
+"""Mean length of a row's free stretches from which on jumps pay; in finer rubble cell by cell is quicker."""
+
+
+class Search(StrEnum):
+    """How a shortest path is looked for; what is found is as short."""
+
+    AUTO = "auto"
+    """Jumps on uniform costs, where free stretches are long enough; else cell by cell."""
+    JUMPS = "jumps"
+    """A* from jump point to jump point; for uniform costs only."""
+    CELLS = "cells"
+    """A* from cell to cell."""
+    DIJKSTRA = "dijkstra"
+    """From cell to cell without an estimate of what is left."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -40,12 +57,16 @@ class GridPath:
         The same, every step times the mean of both cells' cost factors; equal to the length without any.
     expansions
         Cells whose successors were looked at.
+    looked_at
+        (M,) flat indices, row by row, of the cells that were queued, some of them again; empty unless asked
+        for.
     """
 
     cells: IntArray
     length_cells: float
     cost: float
     expansions: int
+    looked_at: IntArray = field(default_factory=lambda: np.zeros(0, np.int64))
 
 
 class GridSpace:
@@ -82,6 +103,8 @@ class GridSpace:
         self._tables: dict[bool, NDArray[np.uint32]] = {}
         self._runs: dict[bool, grid_components.Runs] = {}
         self._gains: dict[int, NDArray[Any]] = {}
+        self._bits: tuple[NDArray[np.uint64], NDArray[np.uint64]] | None = None
+        self._jumping: bool | None = None
         self._theta: tuple[FloatArray, NDArray[np.uint32]] | None = None
         self._factors = cost_factors
         self._weights, self._lightest, self._heaviest = _weights(blocked, cost_factors)
@@ -117,25 +140,38 @@ class GridSpace:
         )
 
     def shortest(
-        self, start: Cell, goal: Cell, cut_corners: bool = False, informed: bool = True
+        self,
+        start: Cell,
+        goal: Cell,
+        cut_corners: bool = False,
+        search: Search = Search.AUTO,
+        tell_looked_at: bool = False,
     ) -> GridPath | None:
         """Find a cheapest path with steps to the eight neighbours, or None where there is none.
 
-        Exactly optimal (see ``kernels.grid_search``; with cost factors, for the rounded ones). Without
-        ``informed`` it is Dijkstra's search.
+        Exactly optimal (see ``kernels.grid_search``; with cost factors, for the rounded ones).
+
+        Raises
+        ------
+        InputError
+            For jumps on a grid with cost factors: they would pass by what is cheaper.
         """
+        if search == Search.JUMPS and self._weights is not None:
+            raise InputError("jumps: expected a grid without cell costs, found some; take cells")
         if not self._both_free(start, goal) or not self.connected(start, goal, cut_corners):
             return None
         if start == goal:
             return GridPath(np.array([start]), 0.0, 0.0, 0)
+        if search == Search.AUTO:
+            search = Search.JUMPS if self._jumps_pay(cut_corners) else Search.CELLS
         ends = self._index(start), self._index(goal)
         if self._weights is not None:
             scale = grid_search.weighted_scale(self._lightest, self._heaviest)
-            return self._search(*ends, scale, informed, cut_corners)
-        result = self._search(*ends, grid_search.NARROW, informed, cut_corners)
+            return self._search(*ends, scale, search, cut_corners, tell_looked_at)
+        result = self._search(*ends, grid_search.NARROW, search, cut_corners, tell_looked_at)
         proven = grid_search.NARROW.straight * math.sqrt(2.0)
         if result is None or result.length_cells > proven:
-            result = self._search(*ends, grid_search.WIDE, informed, cut_corners)
+            result = self._search(*ends, grid_search.WIDE, search, cut_corners, tell_looked_at)
         return result
 
     def any_angle(self, start: Cell, goal: Cell, cut_corners: bool = False) -> GridPath | None:
@@ -167,26 +203,57 @@ class GridSpace:
         return self._path(path, expansions)
 
     def _search(
-        self, start: int, goal: int, scale: grid_search.Scale, informed: bool, cut_corners: bool
+        self,
+        start: int,
+        goal: int,
+        scale: grid_search.Scale,
+        search: Search,
+        cut_corners: bool,
+        tell_looked_at: bool,
     ) -> GridPath | None:
         """Run the kernel; None where the costs outgrow the scale."""
         bits = 32 if scale.top < 2**32 else 64
         if bits not in self._gains:
             self._gains[bits] = np.zeros(self._states.size, np.uint32 if bits == 32 else np.uint64)
-        status, path, expansions = grid_search.search(
-            self._states,
-            self._gains[bits],
-            self._stride,
-            start,
-            goal,
-            scale,
-            informed,
-            self._table(cut_corners),
-            self._weights,
-            self._lightest,
-            self._heaviest,
-        )
-        return self._path(path, expansions) if status == grid_search.FOUND else None
+        gain = self._gains[bits]
+        table = self._table(cut_corners)
+        if search == Search.JUMPS:
+            if self._bits is None:
+                by_row = grid_jump.packed(self._states.reshape(-1, self._stride))
+                self._bits = by_row, grid_jump.transposed(by_row, self._stride)
+            scale = scale._replace(shift=scale.shift + grid_jump.WIDER_SHIFT)
+            status, path, expansions, queued = grid_jump.jump_search(
+                *self._bits, self._states, gain, self._stride, start, goal, scale, table, cut_corners
+            )
+        else:
+            status, path, expansions, queued = grid_search.search(
+                self._states,
+                gain,
+                self._stride,
+                start,
+                goal,
+                scale,
+                search != Search.DIJKSTRA,
+                table,
+                self._weights,
+                self._lightest,
+                self._heaviest,
+            )
+        if status != grid_search.FOUND:
+            return None
+        result = self._path(path, expansions)
+        if tell_looked_at:
+            row, column = np.divmod(queued.astype(np.int64), self._stride)
+            result = replace(result, looked_at=(row - 1) * self.columns + column - 1)
+        return result
+
+    def _jumps_pay(self, cut_corners: bool) -> bool:
+        """Whether a row's free stretches are long, by the runs that were found for ``connected``."""
+        if self._jumping is None:
+            runs = self._runs[cut_corners]
+            free = int(runs.end.sum(dtype=np.int64)) - int(runs.begin.sum(dtype=np.int64))
+            self._jumping = self._weights is None and free >= JUMPS_FROM_CELLS * len(runs.begin)
+        return self._jumping
 
     def _path(self, indices: IntArray, expansions: int) -> GridPath:
         cells = np.stack([indices // self._stride - 1, indices % self._stride - 1], axis=1)
