@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from contract.sheet_examples import explorer_explores, sheet_sensor_reads
 from pilotage.core.angles import wrap_to_pi
 from pilotage.core.errors import InputError
 from pilotage.core.random import RandomStreams
@@ -328,4 +329,11 @@ EXAMPLES: dict[tuple[str, str], Example] = {
     ("navigator", "open-loop"): Example(
         navigator_keeps_its_command, {"speed_m_s": 0.2, "turn_rate_rad_s": 0.1, "duration_s": 2.0}
     ),
+    ("sensor", "wheel-encoders"): Example(sheet_sensor_reads),
+    ("sensor", "gyroscope"): Example(sheet_sensor_reads, pure_numbers=frozenset({"scale_error"})),
+    ("sensor", "magnetometer"): Example(sheet_sensor_reads),
+    ("sensor", "infrared"): Example(sheet_sensor_reads, pure_numbers=frozenset({"range_std_fraction"})),
+    ("sensor", "line-sensor"): Example(sheet_sensor_reads),
+    ("explorer", "random-walk"): Example(explorer_explores),
+    ("explorer", "surround-check"): Example(explorer_explores, pure_numbers=frozenset({"far_cells"})),
 }

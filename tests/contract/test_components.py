@@ -18,7 +18,7 @@ CASES = [
     for role, registry in REGISTRIES.items()
     for entry in registry
 ]
-UNITS = {"m", "s", "rad", "hz", "m2", "rad2", "per", "ratio", "share", "deg"}
+UNITS = {"m", "s", "rad", "hz", "m2", "rad2", "per", "ratio", "share", "deg", "ut"}
 
 
 @pytest.mark.parametrize(("role", "registry", "entry"), CASES)

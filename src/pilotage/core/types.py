@@ -43,6 +43,17 @@ STOP = Twist(0.0, 0.0)
 
 
 @dataclass(frozen=True, slots=True)
+class WheelSpeeds:
+    """Turn rates of the two wheels of a differential drive."""
+
+    left_rad_s: float
+    right_rad_s: float
+
+
+STANDSTILL = WheelSpeeds(0.0, 0.0)
+
+
+@dataclass(frozen=True, slots=True)
 class Goal:
     """Where to go; a heading of None leaves the heading free."""
 

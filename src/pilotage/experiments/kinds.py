@@ -79,7 +79,16 @@ def _floor() -> Kind:
     return FLOOR
 
 
-KINDS: dict[str, Callable[[], Kind]] = {"floor": _floor}
+def _sheet() -> Kind:
+    from pilotage.experiments.sheet.kind import SHEET
+
+    return SHEET
+
+
+KINDS: dict[str, Callable[[], Kind]] = {
+    "floor": _floor,
+    "sheet": _sheet,
+}
 """Each kind's loader by the ``world.kind`` of its missions."""
 
 

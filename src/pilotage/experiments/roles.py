@@ -9,6 +9,7 @@ from pilotage.sensors.sensor import SENSORS
 from pilotage.stack.control.controller import CONTROLLERS
 from pilotage.stack.control.escape import ESCAPES
 from pilotage.stack.control.reactive import REACTIVES
+from pilotage.stack.exploration.explorer import EXPLORERS
 from pilotage.stack.localization.heading_filters import HEADING_FILTERS
 from pilotage.stack.localization.localizer import LOCALIZERS
 from pilotage.stack.mapping.mapper import MAPPERS
@@ -28,5 +29,6 @@ REGISTRIES: dict[str, Registry[Any]] = {
     "reactive": REACTIVES,
     "mapper": MAPPERS,
     "escape": ESCAPES,
+    "explorer": EXPLORERS,
 }
 """Roles by their key under ``stack`` (sensors: under ``robot.sensors``)."""

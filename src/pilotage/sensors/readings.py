@@ -42,7 +42,55 @@ class UltrasonicReading:
     saturated: bool
 
 
-Reading: TypeAlias = OdometryIncrement | LidarScan | BeaconReadings | UltrasonicReading
+@dataclass(frozen=True, slots=True)
+class EncoderCounts:
+    """Counts (N,) of each wheel in the N samples since the last step, oldest first."""
+
+    left: IntArray
+    right: IntArray
+
+
+@dataclass(frozen=True, slots=True)
+class GyroscopeRates:
+    """Turn rates (N,) of the N samples since the last step, oldest first."""
+
+    rates_rad_s: FloatArray
+
+
+@dataclass(frozen=True, slots=True)
+class MagneticField:
+    """Horizontal field in the sensor's frame, x forward and y left."""
+
+    x_ut: float
+    y_ut: float
+
+
+@dataclass(frozen=True, slots=True)
+class InfraredReading:
+    """Distance to the first return along the beam; ``saturated`` says that nothing was in reach."""
+
+    range_m: float
+    saturated: bool
+
+
+@dataclass(frozen=True, slots=True)
+class LineReading:
+    """Whether the floor below is dark."""
+
+    dark: bool
+
+
+Reading: TypeAlias = (
+    OdometryIncrement
+    | LidarScan
+    | BeaconReadings
+    | UltrasonicReading
+    | EncoderCounts
+    | GyroscopeRates
+    | MagneticField
+    | InfraredReading
+    | LineReading
+)
 
 
 def _empty() -> Mapping[str, Reading]:

@@ -8,13 +8,55 @@ from typing import TypeVar
 
 from pilotage.core.errors import InputError
 from pilotage.core.random import RandomStreams
-from pilotage.core.types import Goal
+from pilotage.core.types import Goal, Pose2
 from pilotage.maps.landmarks import Landmarks
 from pilotage.maps.segment_map import SegmentMap
+from pilotage.missions.sheet import FirmwareConfig, WheelDriveConfig
 from pilotage.sensors.sensor import SensorConfig
 from pilotage.stack.interface import Belief
 
 S = TypeVar("S", bound=SensorConfig)
+
+
+@dataclass(frozen=True, slots=True)
+class SheetKnowledge:
+    """What an exploring robot knows of itself and of the sheet: everything but what is on it.
+
+    Attributes
+    ----------
+    size_m, cells
+        Width and height of the sheet, and how many columns and rows its cell map has.
+    edge_is_dark
+        Whether its line sensors read dark beyond the edge.
+    drive
+        The data sheet of its drive, not the truth.
+    fusion, avoidance, firmware
+        The mission's switches.
+    """
+
+    size_m: tuple[float, float]
+    cells: tuple[int, int]
+    edge_is_dark: bool
+    tape_width_m: float
+    start: Pose2
+    body_radius_m: float
+    drive: WheelDriveConfig
+    sensors: Mapping[str, SensorConfig]
+    dt_s: float
+    time_limit_s: float
+    fusion: bool
+    avoidance: bool
+    firmware: FirmwareConfig
+    streams: RandomStreams
+
+    def sensors_of(self, kind: type[S]) -> dict[str, S]:
+        """All sensors of one kind by name."""
+        return {name: config for name, config in self.sensors.items() if isinstance(config, kind)}
+
+    @property
+    def cell_m(self) -> tuple[float, float]:
+        """Width and height of a cell."""
+        return self.size_m[0] / self.cells[0], self.size_m[1] / self.cells[1]
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,0 +1,1 @@
+"""Running missions on a sheet."""

@@ -1,0 +1,21 @@
+"""A triangulating infrared distance sensor."""
+
+from __future__ import annotations
+
+from pydantic import Field
+
+from pilotage.sensors.sensor import SENSORS, NonNegative, Positive, SensorConfig
+
+
+@SENSORS.add_config("infrared")
+class InfraredConfig(SensorConfig):
+    """Range along one narrow beam; its error grows with the range, beyond ``max_range_m`` it sees nothing.
+
+    ``reliable_range_m`` is what the robot believes of it: returns farther away are there, but not to be used.
+    """
+
+    rate_hz: float = Field(default=20.0, gt=0.0)
+    range_std_fraction: NonNegative = 0.035
+    min_range_m: NonNegative = 0.0
+    max_range_m: Positive = 0.8
+    reliable_range_m: Positive = 0.3

@@ -1,0 +1,67 @@
+"""The exploration report's reactive avoidance: a potential field of the goal and what the sensors see."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+from pilotage.core.angles import wrap_to_pi
+from pilotage.core.types import Pose2, WheelSpeeds
+from pilotage.missions.sheet import WheelDriveConfig
+from pilotage.sensors.infrared import InfraredConfig
+from pilotage.sensors.readings import InfraredReading, Readings
+from pilotage.stack.control.wheel_pursuit import TURN_FIRST_RAD, turn, wheel_speeds
+
+ATTRACTION, REPULSION = 0.01, 10_000.0
+"""Forces in units of millimetres: attraction per mm, repulsion over mm squared."""
+TRIGGER_FRONT_M, TRIGGER_SIDE_M = 0.12, 0.15
+FRONT_RAD = 0.5
+"""A sensor that looks less than this aside is a front sensor."""
+MM = 1000.0
+
+
+class PotentialField:
+    """Bends the way to a goal around what the infrared sensors see (exploration report, ch. 2.3).
+
+    F = k_a d towards the goal - sum of k_r / r^2 along each sensor that is triggered. Fails as all potential
+    fields do, where attraction and repulsion cancel: in front of a wide box and in corners.
+    """
+
+    def __init__(self, sensors: Mapping[str, InfraredConfig], drive: WheelDriveConfig) -> None:
+        self._sensors = dict(sensors)
+        self._drive = drive
+        self._ranges: dict[str, float] = {}
+
+    def sense(self, readings: Readings) -> None:
+        """Keep the latest ranges."""
+        for name in self._sensors:
+            reading = readings.by_sensor.get(name)
+            if isinstance(reading, InfraredReading):
+                self._ranges[name] = math.inf if reading.saturated else max(reading.range_m, 0.005)
+
+    @property
+    def triggered(self) -> bool:
+        """Whether anything is too near."""
+        return any(self._too_near(name) for name in self._sensors)
+
+    def command(self, pose: Pose2, x_m: float, y_m: float) -> WheelSpeeds | None:
+        """The command along the force; None where nothing is near."""
+        if not self.triggered:
+            return None
+        fx = ATTRACTION * MM * (x_m - pose.x_m)
+        fy = ATTRACTION * MM * (y_m - pose.y_m)
+        for name, config in self._sensors.items():
+            if self._too_near(name):
+                theta = pose.theta_rad + config.mount.theta_rad
+                push = REPULSION / (MM * self._ranges[name]) ** 2
+                fx -= push * math.cos(theta)
+                fy -= push * math.sin(theta)
+        off = wrap_to_pi(math.atan2(fy, fx) - pose.theta_rad)
+        if abs(off) > TURN_FIRST_RAD:
+            return turn(off, self._drive)
+        half = 0.5 * self._drive.max_wheel_speed_rad_s * self._drive.wheel_radius_m
+        return wheel_speeds(half * math.cos(off), 3.0 * off, self._drive)
+
+    def _too_near(self, name: str) -> bool:
+        aside = abs(self._sensors[name].mount.theta_rad) > FRONT_RAD
+        return self._ranges.get(name, math.inf) < (TRIGGER_SIDE_M if aside else TRIGGER_FRONT_M)

@@ -1,0 +1,113 @@
+"""The exploring robot's pose: way from the encoders along a heading by encoders, or by a gyroscope too."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from pilotage.core.angles import wrap_to_pi
+from pilotage.core.errors import InputError
+from pilotage.core.types import Pose2
+from pilotage.sensors.gyroscope import GyroscopeConfig
+from pilotage.sensors.readings import EncoderCounts, GyroscopeRates, Readings
+from pilotage.sensors.wheel_encoders import WheelEncodersConfig
+from pilotage.stack.interface import Belief
+from pilotage.stack.knowledge import SheetKnowledge
+from pilotage.stack.localization.heading_filters import (
+    HEADING_FILTERS,
+    EncoderGyroConfig,
+    EncoderGyroFilter,
+    HeadingErrors,
+    HeadingEstimate,
+)
+
+ALIGN_S = 1.0
+"""The gyroscope's bias is its mean over the first moments, in which the robot stands still."""
+WAY_VAR_PER_M = 4.0e-4
+"""Variance of the way over a metre: 2 % of slip and the like."""
+
+
+class WheelPose:
+    """Position from encoders along the heading (exploration report, ch. 2.2), with the firmware's faults.
+
+    Raises
+    ------
+    InputError
+        Where fusion is asked for and the robot has no gyroscope.
+    """
+
+    def __init__(self, knowledge: SheetKnowledge) -> None:
+        drive, firmware = knowledge.drive, knowledge.firmware
+        ((self._encoders, encoders),) = knowledge.sensors_of(WheelEncodersConfig).items()
+        gyros = list(knowledge.sensors_of(GyroscopeConfig))
+        if knowledge.fusion and not gyros:
+            raise InputError("stack.fusion: expected a gyroscope among robot.sensors, found none")
+        self._gyro = gyros[0] if knowledge.fusion else None
+        self._rad_per_count = 2.0 * math.pi / encoders.counts_per_turn
+        self._radius, self._separation = drive.wheel_radius_m, drive.wheel_separation_m
+        self._truncated = firmware.truncated_wheel_speed
+        self._late_steps = max(1, round(firmware.pose_period_s / knowledge.dt_s))
+        self._dt_s = knowledge.dt_s
+        self._pose = knowledge.start
+        config = EncoderGyroConfig(errors=HeadingErrors())
+        assert "encoder-gyro" in HEADING_FILTERS.names()
+        self._heading = EncoderGyroFilter(config, HeadingEstimate(knowledge.start.theta_rad, 1e-6))
+        self._bias_sum, self._bias_count = 0.0, 0
+        self._steps = 0
+        self._cov = np.zeros((3, 3))
+        self.belief = Belief(self._pose, np.diag([1e-8, 1e-8, 1e-6]))
+
+    @property
+    def aligned(self) -> bool:
+        """Whether the robot may move: the gyroscope's bias has been taken."""
+        return self._gyro is None or self._steps * self._dt_s >= ALIGN_S
+
+    def step(self, readings: Readings) -> Belief:
+        """Take in one control period."""
+        self._steps += 1
+        counts, rates = readings.by_sensor.get(self._encoders), None
+        if self._gyro is not None:
+            rates = readings.by_sensor.get(self._gyro)
+        if not isinstance(counts, EncoderCounts):
+            return self.belief
+        if not self.aligned and isinstance(rates, GyroscopeRates):
+            self._bias_sum += float(rates.rates_rad_s.sum())
+            self._bias_count += rates.rates_rad_s.size
+            return self.belief
+        if self._steps % self._late_steps:
+            return self.belief
+        rate = None
+        if isinstance(rates, GyroscopeRates):
+            rate = float(rates.rates_rad_s.mean()) - self._bias_sum / max(self._bias_count, 1)
+        # A late update knows the wheel speeds of the last period only.
+        late = self._late_steps
+        left, right = self._turned(counts.left), self._turned(counts.right)
+        self._move(late * left, late * right, rate, late * self._dt_s)
+        return self.belief
+
+    def _turned(self, counts: np.ndarray[tuple[int], np.dtype[np.int64]]) -> float:
+        """Angle of a wheel in this period; in the firmware, by whole rad/s (truncated towards zero)."""
+        if not self._truncated:
+            return float(counts.sum()) * self._rad_per_count
+        sample_s = self._dt_s / counts.size
+        return float(np.trunc(counts * self._rad_per_count / sample_s).sum()) * sample_s
+
+    def _move(self, left_rad: float, right_rad: float, rate: float | None, dt_s: float) -> None:
+        way = 0.5 * self._radius * (left_rad + right_rad)
+        turn = self._radius * (right_rad - left_rad) / self._separation
+        before = self._pose.theta_rad
+        estimate = self._heading.step(turn, rate, dt_s, resting=False)
+        theta = before + 0.5 * wrap_to_pi(estimate.heading_rad - before)
+        c, s = math.cos(theta), math.sin(theta)
+        self._pose = Pose2(self._pose.x_m + way * c, self._pose.y_m + way * s, estimate.heading_rad)
+        # First order, the heading's own variance from its filter: P <- F P F' + G q G'.
+        F = np.array([[1.0, 0.0, -way * s], [0.0, 1.0, way * c], [0.0, 0.0, 1.0]])
+        self._cov = F @ self._cov @ F.T
+        along = WAY_VAR_PER_M * abs(way)
+        self._cov[0, 0] += along * c * c
+        self._cov[1, 1] += along * s * s
+        self._cov[0, 1] += along * c * s
+        self._cov[1, 0] = self._cov[0, 1]
+        self._cov[2, 2] = estimate.variance_rad2
+        self.belief = Belief(self._pose, self._cov + 1e-10 * np.eye(3))
