@@ -30,6 +30,9 @@ from pilotage.report.markup import (
     tiles,
 )
 from pilotage.report.metrics_table import metric_rows
+from pilotage.report.replay.floor import floor_scene
+from pilotage.report.replay.scene import ReplayScene
+from pilotage.report.replay.section import SLUG, TITLE, replay_section, script_source, style
 from pilotage.report.run_folder import RunData, number, read_run
 from pilotage.report.style import Illustration, drawing_style
 
@@ -50,6 +53,8 @@ FLOOR_FIGURES: tuple[Draw, ...] = (
 )
 FIGURES: dict[str, tuple[Draw, ...]] = {"floor": FLOOR_FIGURES}
 """What is drawn of a run, by the kind of its mission."""
+SCENES: dict[str, Callable[[RunData], ReplayScene | None]] = {"floor": floor_scene}
+"""How a run of each kind becomes a scene to replay."""
 _LONGEST_MISSION = 100_000
 
 
@@ -73,8 +78,8 @@ def run_page(run: RunData) -> str:
         figures = [draw(run) for draw in FIGURES.get(run.kind, FLOOR_FIGURES)]
         if run.updates:
             figures.append(updates_figure(run))
-    sections: list[str] = []
-    entries: list[tuple[str, str]] = []
+    sections: list[str] = [replay_section(SCENES.get(run.kind, floor_scene)(run))]
+    entries: list[tuple[str, str]] = [(SLUG, TITLE)]
     drawn = 0
     for figure in figures:
         drawn += bool(figure.svg)
@@ -90,7 +95,8 @@ def run_page(run: RunData) -> str:
     description = str(run.mission.get("description") or "")
     return document(
         title=escape(f"{run.name}: run report"),
-        layers="".join(layer_rules(figure) for figure in figures),
+        layers="".join(layer_rules(figure) for figure in figures) + style(),
+        script_source=script_source(),
         eyebrow=_eyebrow(run),
         heading=escape(run.name),
         description=f'<p class="description">{escape(description)}</p>' if description else "",

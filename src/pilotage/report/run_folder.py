@@ -20,6 +20,7 @@ import yaml
 from pilotage.core.errors import InputError
 from pilotage.core.types import BoolArray, Event, FloatArray
 from pilotage.report.scan_updates import RecordedUpdate, read_updates
+from pilotage.report.sightings import Sightings, read_sightings
 
 METRICS_FILE = "metrics.json"
 TRACE_FILE = "trace.parquet"
@@ -28,6 +29,7 @@ EVENTS_FILE = "events.jsonl"
 WORLD_FILE = "world.json"
 PLANS_FILE = "plans.npz"
 UPDATES_FILE = "updates.npz"
+SCANS_FILE = "scans.npz"
 
 
 @dataclass(frozen=True, slots=True)
@@ -126,6 +128,7 @@ class RunData:
     shortest_path_m: FloatArray
     trace: Trace
     updates: tuple[RecordedUpdate, ...] = ()
+    sightings: Sightings = field(default_factory=Sightings)
 
     @property
     def name(self) -> str:
@@ -185,6 +188,7 @@ def read_run(run_dir: Path) -> RunData:
         shortest_path_m=shortest_path,
         trace=_read_trace(run_dir / TRACE_FILE),
         updates=_read_updates(run_dir / UPDATES_FILE),
+        sightings=_read_sightings(run_dir / SCANS_FILE),
     )
 
 
@@ -336,6 +340,15 @@ def _read_plans(path: Path) -> tuple[tuple[Plan, ...], FloatArray, FloatArray]:
             )
         )
     return tuple(plans), rows("mapped_points", 2), rows("shortest_path", 2)
+
+
+def _read_sightings(path: Path) -> Sightings:
+    if not path.is_file():
+        return Sightings()
+    try:
+        return read_sightings(path)
+    except (OSError, ValueError, EOFError, KeyError, IndexError, zipfile.BadZipFile) as error:
+        raise _broken(path, error) from None
 
 
 def _read_updates(path: Path) -> tuple[RecordedUpdate, ...]:

@@ -46,12 +46,15 @@ class FloorKind:
         return run_metrics(record.mission, record.trace, record.outcome, record.experiment.floor.walls)
 
     def write_files(self, record: RunRecord, folder: Path) -> None:
-        """``world.json``, ``plans.npz``, and ``updates.npz`` where the localizer can explain itself."""
+        """``world.json``, ``plans.npz``, ``scans.npz``, and ``updates.npz`` where the localizer explains itself."""
         (folder / "world.json").write_text(json.dumps(world_of(record)), encoding="utf-8")
         np.savez_compressed(folder / "plans.npz", allow_pickle=False, **plans_of(record))
         updates = record.album.arrays()
         if updates:
             np.savez_compressed(folder / "updates.npz", allow_pickle=False, **updates)
+        sightings = record.sightings.arrays()
+        if sightings:
+            np.savez_compressed(folder / "scans.npz", allow_pickle=False, **sightings)
 
     def inline(self, record: RunRecord, values: dict[str, Any]) -> None:
         """Write a map that came from a file into the mission."""

@@ -10,6 +10,7 @@ import numpy as np
 from pilotage.core.types import Event, FloatArray, Twist
 from pilotage.evaluation.run_metrics import Outcome
 from pilotage.experiments.floor.build import Experiment
+from pilotage.experiments.floor.sightings import Sightings
 from pilotage.experiments.floor.update_album import UpdateAlbum
 from pilotage.missions.floor import FloorMission
 from pilotage.sensors.readings import OdometryIncrement, Readings, UltrasonicReading
@@ -44,6 +45,7 @@ class RunRecord:
     outcome: Outcome
     events: list[Event]
     album: UpdateAlbum
+    sightings: Sightings
 
     @property
     def mission(self) -> FloorMission:
@@ -64,6 +66,7 @@ class Recorder:
         self._rows: list[tuple[float, ...]] = []
         self.events: list[Event] = []
         self.album = UpdateAlbum()
+        self.sightings = Sightings(sensors)
 
     def __len__(self) -> int:
         return len(self._rows)
@@ -98,6 +101,7 @@ class Recorder:
                 *self._stack.telemetry().values(),
             )
         )
+        self.sightings.record(readings)
         self.events += self._stack.drain_events()
         update = self._stack.last_update if isinstance(self._stack, Explaining) else None
         if update is not None:

@@ -1,0 +1,84 @@
+"""What the robot saw, kept small enough for a replay: scans thinned and quantised, the beacons by their ids."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from pilotage.core.types import FloatArray, IntArray
+from pilotage.sensors.beacon import BeaconConfig
+from pilotage.sensors.lidar import LidarConfig
+from pilotage.sensors.readings import BeaconReadings, LidarScan, Readings
+
+APART_S = 0.2
+"""Scans at least so far apart: at five a second the eye sees them move with the robot."""
+MOST_BEAMS = 108
+MOST_SCANS = 4000
+"""Beyond that every other scan goes and the rest come half as often: the file does not grow with the run."""
+LEVELS = 65534
+"""A range is a whole number of ``max_range_m / LEVELS``; 65535 says that nothing was in reach."""
+NOTHING = 65535
+
+
+class Sightings:
+    """Collects scans of the first lidar and the ids that the first beacon sensor saw, step by step."""
+
+    def __init__(self, sensors: dict[str, object]) -> None:
+        self._lidar, self._config = _first(sensors, LidarConfig)
+        self._beacons, _ = _first(sensors, BeaconConfig)
+        self._stride = 1 if self._config is None else max(1, math.ceil(self._config.beams / MOST_BEAMS))
+        self._apart_s = APART_S
+        self._scan_t_s: list[float] = []
+        self._scans: list[FloatArray] = []
+        self._seen: list[IntArray] = []
+        self._nothing: IntArray = np.empty(0, dtype=np.int64)
+
+    def record(self, readings: Readings) -> None:
+        """Keep what this step's readings show; called once a step."""
+        seen = self._nothing
+        if self._beacons is not None:
+            reading = readings.by_sensor.get(self._beacons)
+            if isinstance(reading, BeaconReadings):
+                seen = reading.ids
+        self._seen.append(seen)
+        if self._lidar is None:
+            return
+        scan = readings.by_sensor.get(self._lidar)
+        # A microsecond of slack: step times are sums of dt.
+        due = not self._scan_t_s or readings.t_s - self._scan_t_s[-1] >= self._apart_s - 1e-6
+        if isinstance(scan, LidarScan) and due:
+            self._scan_t_s.append(readings.t_s)
+            self._scans.append(scan.ranges_m[:: self._stride].astype(np.float32))
+            if len(self._scans) > MOST_SCANS:
+                self._scans, self._scan_t_s = self._scans[::2], self._scan_t_s[::2]
+                self._apart_s *= 2.0
+
+    def arrays(self) -> dict[str, Any]:
+        """The sightings as arrays for one file; empty where the robot has no such sensor."""
+        arrays: dict[str, Any] = {}
+        if self._config is not None and self._scans:
+            mount = self._config.mount
+            resolution_m = self._config.max_range_m / LEVELS
+            ranges = np.stack(self._scans).astype(np.float64)
+            hit = np.isfinite(ranges) & (ranges >= 0.0) & (ranges < self._config.max_range_m)
+            arrays |= {
+                "scan_t_s": np.array(self._scan_t_s),
+                "scan_ranges": np.where(hit, np.rint(np.where(hit, ranges, 0.0) / resolution_m), NOTHING).astype(
+                    np.uint16
+                ),
+                "scan_resolution_m": np.array(resolution_m),
+                "scan_angles_rad": self._config.beam_angles_rad()[:: self._stride],
+                "scan_mount": np.array([mount.x_m, mount.y_m, mount.theta_rad]),
+            }
+        if self._beacons is not None:
+            counts = np.array([len(ids) for ids in self._seen], dtype=np.int64)
+            ids = np.concatenate([self._nothing, *self._seen]).astype(np.int32)
+            arrays |= {"beacon_counts": counts.astype(np.uint16), "beacon_ids": ids}
+        return arrays
+
+
+def _first(sensors: dict[str, object], config: type[Any]) -> tuple[str | None, Any]:
+    """Name and config of the first sensor of a kind."""
+    return next(((name, c) for name, c in sensors.items() if isinstance(c, config)), (None, None))

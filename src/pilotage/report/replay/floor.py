@@ -1,0 +1,243 @@
+"""The scene of a run on a floor: map, truth, belief, what was seen, plans and reference."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from pilotage.core.chi_square import chi_square_quantile
+from pilotage.core.types import FloatArray, IntArray
+from pilotage.report.event_kinds import event_kind
+from pilotage.report.modes import MODES
+from pilotage.report.replay.scene import (
+    Circles,
+    Lines,
+    Marks,
+    PathTrack,
+    PoseTrack,
+    ReplayScene,
+    ScanTrack,
+    SceneEvent,
+    Series,
+    SightTrack,
+    States,
+)
+from pilotage.report.run_folder import RunData
+from pilotage.report.style import BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILLION
+
+MOST_FRAMES = 20_000
+"""A longer run is thinned; a page must stay one that can be sent by mail."""
+MOST_SCAN_VALUES = 400_000
+MOST_PATH_POINTS = 1500
+DEFAULT_RADIUS_M = 0.2
+
+
+def floor_scene(run: RunData) -> ReplayScene | None:
+    """Return what there is to replay; None where the run left no true path and no estimate."""
+    trace = run.trace
+    truth = trace.has("true_x_m", "true_y_m")
+    if trace.steps < 2 or not (truth or trace.has("est_x_m", "est_y_m")):
+        return None
+    t_s = trace.t_s
+    if not bool(np.isfinite(t_s).all()) or bool((np.diff(t_s) <= 0.0).any()):
+        return None
+    stride = math.ceil(trace.steps / MOST_FRAMES)
+    frames = np.arange(0, trace.steps, stride)
+    if frames[-1] != trace.steps - 1:
+        frames = np.append(frames, trace.steps - 1)
+
+    def column(name: str) -> FloatArray:
+        values = trace[name][frames]
+        return np.where(np.isfinite(values), values, np.nan)
+
+    poses = _poses(run, column)
+    scan, thinned_scans = _scan(run, 0)
+    note = [
+        f"Every {stride}th step of the run is shown." if stride > 1 else "",
+        "Scans are thinned, in time and in beams." if thinned_scans else "",
+    ]
+    return ReplayScene(
+        t_s=t_s[frames],
+        bounds_m=_bounds(run, poses),
+        lines=_lines(run),
+        circles=(
+            Circles("walls", run.world.circles_m, "ink"),
+            Circles("unexpected obstacles", run.world.obstacle_circles_m, VERMILLION),
+        ),
+        marks=_marks(run),
+        paths=_paths(run),
+        poses=poses,
+        scans=scan,
+        sights=_sights(run, frames, 0),
+        states=_states(column),
+        series=_series(column),
+        events=tuple(
+            SceneEvent(e.t_s, event_kind(e.kind).name, e.text, event_kind(e.kind).colour)
+            for e in run.events
+            if math.isfinite(e.t_s)
+        ),
+        breaks=_breaks(run, t_s[frames]),
+        note=" ".join(part for part in note if part),
+    )
+
+
+def _poses(run: RunData, column: object) -> tuple[PoseTrack, ...]:
+    assert callable(column)
+    radius_m = run.world.robot_radius_m or DEFAULT_RADIUS_M
+    tracks = []
+    if run.trace.has("true_x_m", "true_y_m"):
+        tracks.append(
+            PoseTrack(
+                "true pose",
+                *(column(f"true_{axis}") for axis in ("x_m", "y_m", "theta_rad")),
+                colour=BLUE,
+                radius_m=radius_m,
+                trail=True,
+            )
+        )
+    if run.trace.has("est_x_m", "est_y_m"):
+        cov = np.stack([column(f"cov_{axis}_m2") for axis in ("xx", "xy", "yy")], axis=1)
+        tracks.append(
+            PoseTrack(
+                "estimate, 95 % ellipse",
+                *(column(f"est_{axis}") for axis in ("x_m", "y_m", "theta_rad")),
+                colour=ORANGE,
+                look="outline",
+                radius_m=radius_m,
+                cov_m2=cov,
+                absent="lost",
+            )
+        )
+    if run.trace.has("ref_x_m", "ref_y_m"):
+        ref = (column(f"ref_{axis}") for axis in ("x_m", "y_m", "theta_rad"))
+        tracks.append(PoseTrack("reference", *ref, colour=PURPLE, look="point"))
+    return tuple(tracks)
+
+
+def _lines(run: RunData) -> tuple[Lines, ...]:
+    world = run.world
+    return (
+        Lines("unexpected obstacles", world.obstacle_polygons_m, VERMILLION, fill=True),
+        Lines("unexpected obstacles", _segments(world.obstacle_segments_m), VERMILLION, 2.5),
+        Lines("walls", _segments(world.segments_m), "ink", 2.2),
+    )
+
+
+def _segments(table: FloatArray) -> tuple[FloatArray, ...]:
+    return tuple(row.reshape(2, 2) for row in table)
+
+
+def _marks(run: RunData) -> tuple[Marks, ...]:
+    world = run.world
+    marks = []
+    if world.landmarks:
+        points = np.array([[mark.x_m, mark.y_m] for mark in world.landmarks])
+        marks.append(Marks("landmarks", points, tuple(mark.id for mark in world.landmarks), GREEN))
+    for name, place, look in (("start", world.start, "ring"), ("goal", world.goal, "cross")):
+        if place is not None:
+            marks.append(Marks(name, np.array([place[:2]], dtype=np.float64), (name,), "muted", look))
+    return tuple(marks)
+
+
+def _paths(run: RunData) -> tuple[PathTrack, ...]:
+    plans = [(p.t_s, p.path[:, :2]) for p in run.plans if math.isfinite(p.t_s) and len(p.path) > 1]
+    if not plans:
+        return ()
+    plans.sort(key=lambda plan: plan[0])
+    thinned = tuple(path[_evenly(len(path), MOST_PATH_POINTS)] for _, path in plans)
+    return (PathTrack("plan", np.array([t for t, _ in plans]), thinned, PURPLE),)
+
+
+def _evenly(n: int, most: int) -> IntArray:
+    return np.unique(np.linspace(0, n - 1, min(n, most)).round().astype(np.int64))
+
+
+def _scan(run: RunData, seen_from: int) -> tuple[tuple[ScanTrack, ...], bool]:
+    seen = run.sightings
+    if not seen.ranges_m.size:
+        return (), False
+    beams = seen.ranges_m.shape[1]
+    stride = max(1, math.ceil(seen.ranges_m.size / MOST_SCAN_VALUES))
+    del beams
+    track = ScanTrack(
+        "scan",
+        seen.scan_t_s[::stride],
+        seen.ranges_m[::stride],
+        seen.angles_rad,
+        seen.mount,
+        seen_from,
+        SKY,
+    )
+    return (track,), True
+
+
+def _sights(run: RunData, frames: IntArray, seen_from: int) -> tuple[SightTrack, ...]:
+    """Beacons seen at the frames; an id that the map does not hold (two maps mixed) draws nothing."""
+    seen = run.sightings
+    if len(seen.beacon_counts) != run.trace.steps or not len(seen.beacon_ids):
+        return ()
+    places = {mark.id: (mark.x_m, mark.y_m) for mark in run.world.landmarks}
+    starts = np.concatenate([[0], np.cumsum(seen.beacon_counts)])
+    counts, points = [], []
+    for frame in frames:
+        ids = seen.beacon_ids[starts[frame] : starts[frame + 1]]
+        found = [places[str(i)] for i in ids if str(i) in places]
+        counts.append(len(found))
+        points += found
+    table = np.array(points, dtype=np.float64).reshape(-1, 2)
+    return (SightTrack("beacons seen", np.array(counts), table, seen_from, GREEN),)
+
+
+def _states(column: object) -> States | None:
+    assert callable(column)
+    mode = column("mode")
+    if not bool(np.isfinite(mode).any()):
+        return None
+    numbers = np.full(len(mode), -1, dtype=np.int64)
+    for index, known in enumerate(MODES):
+        numbers[mode == known.number] = index
+    return States("mode", numbers, tuple(m.name for m in MODES), tuple(m.colour for m in MODES))
+
+
+def _series(column: object) -> tuple[Series, ...]:
+    assert callable(column)
+    error = np.hypot(column("est_x_m") - column("true_x_m"), column("est_y_m") - column("true_y_m"))
+    xx, xy, yy = column("cov_xx_m2"), column("cov_xy_m2"), column("cov_yy_m2")
+    # Larger eigenvalue of the position's covariance: the long half axis of the ellipse on the map.
+    largest = 0.5 * (xx + yy) + np.sqrt(0.25 * (xx - yy) ** 2 + xy**2)
+    half_axis = np.sqrt(np.maximum(largest, 0.0) * chi_square_quantile(0.95, 2))
+    series = [
+        Series("position error", "m", error, BLUE, band=half_axis, band_name="95 % half axis"),
+        Series(
+            "speed",
+            "m/s",
+            column("v_true_m_s"),
+            BLUE,
+            other=column("v_cmd_m_s"),
+            other_name="command",
+        ),
+        Series("clearance", "m", column("clearance_m"), GREEN),
+    ]
+    return tuple(s for s in series if bool(np.isfinite(s.values).any()))
+
+
+def _breaks(run: RunData, t_s: FloatArray) -> IntArray:
+    """Frames that a carried robot begins anew at."""
+    times = [e.t_s for e in run.events if e.kind == "kidnap" and math.isfinite(e.t_s)]
+    frames = np.searchsorted(t_s, np.array(times) + 1e-6, side="left")
+    return np.asarray(frames[frames < len(t_s)], dtype=np.int64)
+
+
+def _bounds(run: RunData, poses: tuple[PoseTrack, ...]) -> tuple[float, float, float, float]:
+    if run.world.bounds_m is not None:
+        return run.world.bounds_m
+    x = np.concatenate([p.x_m for p in poses] + [run.world.segments_m[:, [0, 2]].reshape(-1)])
+    y = np.concatenate([p.y_m for p in poses] + [run.world.segments_m[:, [1, 3]].reshape(-1)])
+    pad = 1.0
+    return (
+        float(np.nanmin(x)) - pad,
+        float(np.nanmin(y)) - pad,
+        float(np.nanmax(x)) + pad,
+        float(np.nanmax(y)) + pad,
+    )
