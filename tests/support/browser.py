@@ -1,4 +1,4 @@
-"""Drives a real Chromium over its debugging pipe: NUL-separated JSON on file descriptors 3 and 4, no library."""
+"""Drives a real Chromium over its debugging pipe: JSON messages on file descriptors 3 and 4, no library."""
 
 from __future__ import annotations
 
@@ -110,7 +110,11 @@ class Browser:
     def size(self, width: int, height: int, touch: bool = False) -> None:
         """Give the page a size."""
         self.call(
-            "Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=1, mobile=touch
+            "Emulation.setDeviceMetricsOverride",
+            width=width,
+            height=height,
+            deviceScaleFactor=1,
+            mobile=touch,
         )
         if touch:
             self.call("Emulation.setTouchEmulationEnabled", enabled=True, maxTouchPoints=2)
@@ -146,7 +150,14 @@ class Browser:
         button = "none" if kind == "mouseWheel" else "left"
         buttons = 0 if kind in {"mouseWheel", "mouseReleased"} else 1
         self.call(
-            "Input.dispatchMouseEvent", type=kind, x=x, y=y, button=button, buttons=buttons, clickCount=1, **more
+            "Input.dispatchMouseEvent",
+            type=kind,
+            x=x,
+            y=y,
+            button=button,
+            buttons=buttons,
+            clickCount=1,
+            **more,
         )
 
     def touch(self, kind: str, *points: tuple[float, float]) -> None:

@@ -124,7 +124,11 @@ def contents(entries: Sequence[tuple[str, str]]) -> str:
 
 def document(script_source: str = "'none'", **parts: str) -> str:
     """Return the whole page; ``script_source`` is the one script that its policy lets run."""
-    return _PAGE.substitute(parts, script_source=script_source, style=resources.files(__package__).joinpath("page.css").read_text("utf-8"))
+    return _PAGE.substitute(
+        parts,
+        script_source=script_source,
+        style=resources.files(__package__).joinpath("page.css").read_text("utf-8"),
+    )
 
 
 _PAGE = Template(
@@ -133,7 +137,8 @@ _PAGE = Template(
 <head>
 <meta charset="utf-8">
 <meta name="viewport" content="width=device-width, initial-scale=1">
-<meta http-equiv="Content-Security-Policy" content="default-src 'none'; style-src 'unsafe-inline'; script-src $script_source">
+<meta http-equiv="Content-Security-Policy"
+content="default-src 'none'; style-src 'unsafe-inline'; script-src $script_source">
 <title>$title</title>
 <style>
 $style

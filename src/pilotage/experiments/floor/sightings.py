@@ -1,4 +1,4 @@
-"""What the robot saw, kept small enough for a replay: scans thinned and quantised, the beacons by their ids."""
+"""What the robot saw, kept small for a replay: scans thinned and quantised, the beacons by their ids."""
 
 from __future__ import annotations
 
@@ -65,9 +65,9 @@ class Sightings:
             hit = np.isfinite(ranges) & (ranges >= 0.0) & (ranges < self._config.max_range_m)
             arrays |= {
                 "scan_t_s": np.array(self._scan_t_s),
-                "scan_ranges": np.where(hit, np.rint(np.where(hit, ranges, 0.0) / resolution_m), NOTHING).astype(
-                    np.uint16
-                ),
+                "scan_ranges": np.where(
+                    hit, np.rint(np.where(hit, ranges, 0.0) / resolution_m), NOTHING
+                ).astype(np.uint16),
                 "scan_resolution_m": np.array(resolution_m),
                 "scan_angles_rad": self._config.beam_angles_rad()[:: self._stride],
                 "scan_mount": np.array([mount.x_m, mount.y_m, mount.theta_rad]),

@@ -55,7 +55,9 @@ def simulate(mission: FloorMission, on_progress: OnProgress | None = None) -> Ru
         shortest=shortest_for(mission, stack.plans, experiment.floor.walls),
         counts=dict(stack.counts),
     )
-    return RunRecord(experiment, recorder.trace(), outcome, recorder.events, recorder.album, recorder.sightings)
+    return RunRecord(
+        experiment, recorder.trace(), outcome, recorder.events, recorder.album, recorder.sightings
+    )
 
 
 def _carry(experiment: Experiment, recorder: Recorder, kidnap: Kidnap) -> None:

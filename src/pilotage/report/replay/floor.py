@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 
@@ -25,6 +26,8 @@ from pilotage.report.replay.scene import (
 )
 from pilotage.report.run_folder import RunData
 from pilotage.report.style import BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILLION
+
+Column = Callable[[str], FloatArray]
 
 MOST_FRAMES = 20_000
 """A longer run is thinned; a page must stay one that can be sent by mail."""
@@ -54,7 +57,7 @@ def floor_scene(run: RunData) -> ReplayScene | None:
     poses = _poses(run, column)
     scan, thinned_scans = _scan(run, 0)
     note = [
-        f"Every {stride}th step of the run is shown." if stride > 1 else "",
+        f"One step in {stride} is shown." if stride > 1 else "",
         "Scans are thinned, in time and in beams." if thinned_scans else "",
     ]
     return ReplayScene(
@@ -82,15 +85,16 @@ def floor_scene(run: RunData) -> ReplayScene | None:
     )
 
 
-def _poses(run: RunData, column: object) -> tuple[PoseTrack, ...]:
-    assert callable(column)
+def _poses(run: RunData, column: Column) -> tuple[PoseTrack, ...]:
     radius_m = run.world.robot_radius_m or DEFAULT_RADIUS_M
     tracks = []
     if run.trace.has("true_x_m", "true_y_m"):
         tracks.append(
             PoseTrack(
                 "true pose",
-                *(column(f"true_{axis}") for axis in ("x_m", "y_m", "theta_rad")),
+                column("true_x_m"),
+                column("true_y_m"),
+                column("true_theta_rad"),
                 colour=BLUE,
                 radius_m=radius_m,
                 trail=True,
@@ -101,7 +105,9 @@ def _poses(run: RunData, column: object) -> tuple[PoseTrack, ...]:
         tracks.append(
             PoseTrack(
                 "estimate, 95 % ellipse",
-                *(column(f"est_{axis}") for axis in ("x_m", "y_m", "theta_rad")),
+                column("est_x_m"),
+                column("est_y_m"),
+                column("est_theta_rad"),
                 colour=ORANGE,
                 look="outline",
                 radius_m=radius_m,
@@ -110,8 +116,8 @@ def _poses(run: RunData, column: object) -> tuple[PoseTrack, ...]:
             )
         )
     if run.trace.has("ref_x_m", "ref_y_m"):
-        ref = (column(f"ref_{axis}") for axis in ("x_m", "y_m", "theta_rad"))
-        tracks.append(PoseTrack("reference", *ref, colour=PURPLE, look="point"))
+        x, y, theta = column("ref_x_m"), column("ref_y_m"), column("ref_theta_rad")
+        tracks.append(PoseTrack("reference", x, y, theta, colour=PURPLE, look="point"))
     return tuple(tracks)
 
 
@@ -157,9 +163,7 @@ def _scan(run: RunData, seen_from: int) -> tuple[tuple[ScanTrack, ...], bool]:
     seen = run.sightings
     if not seen.ranges_m.size:
         return (), False
-    beams = seen.ranges_m.shape[1]
     stride = max(1, math.ceil(seen.ranges_m.size / MOST_SCAN_VALUES))
-    del beams
     track = ScanTrack(
         "scan",
         seen.scan_t_s[::stride],
@@ -189,8 +193,7 @@ def _sights(run: RunData, frames: IntArray, seen_from: int) -> tuple[SightTrack,
     return (SightTrack("beacons seen", np.array(counts), table, seen_from, GREEN),)
 
 
-def _states(column: object) -> States | None:
-    assert callable(column)
+def _states(column: Column) -> States | None:
     mode = column("mode")
     if not bool(np.isfinite(mode).any()):
         return None
@@ -200,8 +203,7 @@ def _states(column: object) -> States | None:
     return States("mode", numbers, tuple(m.name for m in MODES), tuple(m.colour for m in MODES))
 
 
-def _series(column: object) -> tuple[Series, ...]:
-    assert callable(column)
+def _series(column: Column) -> tuple[Series, ...]:
     error = np.hypot(column("est_x_m") - column("true_x_m"), column("est_y_m") - column("true_y_m"))
     xx, xy, yy = column("cov_xx_m2"), column("cov_xy_m2"), column("cov_yy_m2")
     # Larger eigenvalue of the position's covariance: the long half axis of the ellipse on the map.

@@ -47,7 +47,8 @@ def replay_section(scene: ReplayScene | None) -> str:
     note = f" {escape(scene.note)}" if scene.note else ""
     return (
         f"{head}{_PLAYER.replace('{speeds}', speeds)}"
-        '<noscript><p class="absent">The replay needs JavaScript; the rest of the page does not.</p></noscript>'
+        '<noscript><p class="absent">The replay needs JavaScript; the rest of the page does not.</p>'
+        "</noscript>"
         '<p class="absent" id="replay-trouble" role="alert" hidden></p>'
         '<p class="replay-help">Space plays, ← → move by a second (with shift ten), ↑ ↓ change the speed, '
         "+ − zoom, f follows, 0 shows all. Drag or pinch the map; the wheel zooms once the map is clicked. "
@@ -59,19 +60,22 @@ def replay_section(scene: ReplayScene | None) -> str:
 
 _PLAYER = """<div class="replay" id="replay-player" role="group" aria-label="Replay of the run" hidden>
 <div class="replay-views"><div class="replay-stage">
-<canvas data-replay-map tabindex="0" role="application" aria-label="Map: robot, estimate, scan, beacons and plan at the \
-time of the slider; plus and minus zoom"></canvas>
-<div class="replay-said"><span data-replay-state></span><span data-replay-absent></span><span data-replay-factor></span></div>
+<canvas data-replay-map tabindex="0" role="application" aria-label="Map: robot, estimate, scan, beacons \
+and plan at the time of the slider; plus and minus zoom"></canvas>
+<div class="replay-said"><span data-replay-state></span><span data-replay-absent></span>
+<span data-replay-factor></span></div>
 <div class="replay-zoom"><button type="button" data-replay-in aria-label="Zoom in">+</button>
 <button type="button" data-replay-out aria-label="Zoom out">−</button>
 <button type="button" data-replay-fit aria-label="Show the whole map">⤢</button></div></div>
-<canvas data-replay-series role="application" aria-label="Curves over time; a click goes to that moment"></canvas></div>
+<canvas data-replay-series role="application"
+aria-label="Curves over time; a click goes to that moment"></canvas></div>
 <div class="replay-time"><input type="range" data-replay-scrub aria-label="Time">
 <div class="replay-ticks" data-replay-ticks aria-hidden="true"></div></div>
 <div class="replay-bar"><button type="button" data-replay-play aria-pressed="false">▶ play</button>
 <span data-replay-clock></span>
 <label>speed <select data-replay-speed>{speeds}</select></label>
-<label>ellipse <select data-replay-exaggerate><option value="auto">enlarged</option><option value="1">true size</option>
+<label>ellipse <select data-replay-exaggerate><option value="auto">enlarged</option>
+<option value="1">true size</option>
 <option value="10">× 10</option><option value="100">× 100</option></select></label>
 <label><input type="checkbox" data-replay-follow> follow the robot</label></div>
 <p class="replay-event" data-replay-event aria-live="off"></p>

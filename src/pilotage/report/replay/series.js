@@ -146,6 +146,9 @@ class ReplaySeries {
       const said = [this.number(series.values[i])];
       if (series.band) said.push(`${series.band_name} ${this.number(series.band[i])}`);
       if (series.other) said.push(`${series.other_name} ${this.number(series.other[i])}`);
+      // Beside the title there may be room for the value only.
+      const title = pen.measureText(`${series.title} [${series.unit}]`).width * 1.15 + 16;
+      while (said.length > 1 && title + pen.measureText(said.join(" · ")).width > this.width - this.right) said.pop();
       pen.fillText(said.join(" · "), this.width - this.right, this.panel(k).top - 7);
     });
   }
