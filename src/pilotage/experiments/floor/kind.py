@@ -46,7 +46,7 @@ class FloorKind:
         return run_metrics(record.mission, record.trace, record.outcome, record.experiment.floor.walls)
 
     def write_files(self, record: RunRecord, folder: Path) -> None:
-        """``world.json``, ``plans.npz``, ``scans.npz``; ``updates.npz`` of a localizer that explains itself."""
+        """``world.json``, ``plans.npz``, ``scans.npz``; ``updates.npz`` where updates are explained."""
         (folder / "world.json").write_text(json.dumps(world_of(record)), encoding="utf-8")
         np.savez_compressed(folder / "plans.npz", allow_pickle=False, **plans_of(record))
         updates = record.album.arrays()
