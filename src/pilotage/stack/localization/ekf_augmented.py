@@ -129,6 +129,10 @@ class EkfAugmentedLocalizer(LandmarkFilter):
             found[name], found[f"{name}_std"] = float(value), float(std)
         return found
 
+    @property
+    def _bearing_offset_rad(self) -> float:
+        return float(self._pose[augmented.BEARING_OFFSET])
+
     def _predict(
         self, state: FloatArray, cov: FloatArray, distance: float, angle: float, Q: FloatArray, exact: bool
     ) -> None:

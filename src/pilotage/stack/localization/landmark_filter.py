@@ -11,7 +11,7 @@ from pydantic import Field
 from pilotage.core.chi_square import chi_square_quantile, gated_mean
 from pilotage.core.config import Config
 from pilotage.core.errors import InputError
-from pilotage.core.types import Pose2
+from pilotage.core.types import BoolArray, Pose2
 from pilotage.kernels import ekf
 from pilotage.models.odometry import OdometryModel
 from pilotage.sensors.beacon import BeaconConfig
@@ -20,11 +20,16 @@ from pilotage.sensors.sensor import Positive
 from pilotage.sensors.wheel_odometry import WheelOdometryConfig
 from pilotage.stack.interface import Belief
 from pilotage.stack.knowledge import Knowledge
+from pilotage.stack.localization.beacon_fix import fix_from_beacons
 from pilotage.stack.localization.localizer import require_initial_pose
 from pilotage.stack.localization.odometry_prediction import OdometryNoise, OdometryPrediction, Predict
 
 MEASUREMENT_DOF = 2
 """Range and bearing."""
+WIDENING = 2.0
+"""A filter in doubt multiplies the pose's standard deviations by this at every sighting until one passes."""
+MOST_HEADING_VAR = math.pi**2 / 3.0
+"""Of a heading of which nothing is known."""
 
 
 class LandmarkFilterConfig(Config):
@@ -41,6 +46,10 @@ class LandmarkFilterConfig(Config):
     odometry_model: OdometryModel = OdometryModel.EXACT_ARC
     odometry: OdometryNoise = OdometryNoise()
     odometry_var_scale: Positive = 1.0
+    doubt_after: int | None = Field(default=5, ge=1)
+    """Sightings one after the other of which the gate let nothing through, until the filter doubts itself
+    rather than the sensor: it takes its pose from the beacons alone, or where these do not agree on one
+    widens its covariance. None: never."""
 
 
 Update = Callable[..., int]
@@ -86,8 +95,10 @@ class LandmarkFilter:
                 "set stack.localizer.range_var_m2 and stack.localizer.bearing_var_rad2 above 0"
             )
         self._R = config.measurement_var_scale * np.diag([range_var, bearing_var])
+        self._gate_probability = config.gate
         self._gate = chi_square_quantile(config.gate, MEASUREMENT_DOF)
         self._expected_nis = gated_mean(self._gate, MEASUREMENT_DOF)
+        self._doubt_after, self._rejected = config.doubt_after, 0
         self._pose = knowledge.initial.pose.as_array()
         self._cov = knowledge.initial.cov.copy()
         self.belief = knowledge.initial
@@ -127,6 +138,31 @@ class LandmarkFilter:
         )
         total = float(nis[outcome == ekf.OUTCOME_ACCEPTED].sum()) if used else 0.0
         self._telemetry = _telemetry(count, used, total, used * self._expected_nis)
+        known = outcome != ekf.OUTCOME_UNKNOWN
+        self._rejected = 0 if used else self._rejected + int(known.any())
+        if self._doubt_after is not None and known.any() and self._rejected >= self._doubt_after:
+            self._doubt(seen, known)
+
+    def _doubt(self, seen: BeaconReadings, known: BoolArray) -> None:
+        """Begin anew where the beacons agree on a pose, else believe the old one less."""
+        points = self._points[np.searchsorted(self._ids, seen.ids[known])]
+        bearings = seen.bearings_rad[known] - self._bearing_offset_rad
+        fix = fix_from_beacons(points, seen.ranges_m[known], bearings, self._mount, self._R)
+        if fix is not None and fix.chi2 <= chi_square_quantile(self._gate_probability, fix.dof):
+            self._pose[:3] = fix.pose
+            self._cov[:3, :], self._cov[:, :3] = 0.0, 0.0
+            self._cov[:3, :3] = fix.cov
+            self._rejected = 0
+            return
+        stds = np.ones(self._pose.shape[0])
+        stds[:3] = WIDENING
+        stds[2] = min(WIDENING, math.sqrt(MOST_HEADING_VAR / max(float(self._cov[2, 2]), 1e-12)))
+        self._cov *= np.outer(stds, stds)  # correlations stay as they are
+
+    @property
+    def _bearing_offset_rad(self) -> float:
+        """By how much bearings are believed to read too large."""
+        return 0.0
 
     def telemetry(self) -> Mapping[str, float]:
         """Beacons seen and accepted; NIS summed over the accepted, its degrees of freedom and its mean."""
