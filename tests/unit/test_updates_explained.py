@@ -142,3 +142,11 @@ def test_the_path_is_cut_where_the_robot_was_carried(tmp_path: Path) -> None:
 def test_the_record_costs_the_run_nothing_it_would_draw_differently() -> None:
     traces = [simulate(load_floor_mission("museum-walls", ["run.time_limit_s=5"], 2)).trace for _ in range(2)]
     assert (traces[0]["est_x_m"] == traces[1]["est_x_m"]).all()
+
+
+def test_the_consistency_figure_counts_lines_where_there_are_no_beacons(tmp_path: Path) -> None:
+    result = run_mission(load_floor_mission("museum-walls", ["run.time_limit_s=5"], 1), out=tmp_path)
+    assert result.run_dir is not None
+    page = write_report(result.run_dir).read_text()
+    assert "Lines seen and accepted" in page
+    assert "Beacons seen and accepted" not in page

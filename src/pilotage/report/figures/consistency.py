@@ -27,7 +27,7 @@ from pilotage.report.style import (
 )
 
 SLUG = "consistency"
-TITLE = "Consistency: NEES, NIS and beacons"
+TITLE = "Consistency: NEES, NIS and what was seen"
 PROBABILITY = 0.95
 POSE_DOF = 3
 WINDOW_S = 10.0
@@ -52,12 +52,17 @@ def chi_square_band(
 def consistency_figure(run: RunData) -> Illustration:
     """Draw NEES and NIS per degree of freedom with their chi-square bands, and the beacons behind them."""
     trace, t_s = run.trace, run.trace.t_s
-    if not any(trace.has(name) for name in ("nees", "nis", "beacons_seen")):
+    what = measured(run)
+    if not any(trace.has(name) for name in ("nees", "nis", f"{what}_seen")):
         return Illustration(
             SLUG, TITLE, "", "The run recorded neither NEES nor NIS: nothing was estimated against a truth."
         )
     figure, panels = stacked_axes(
-        ["NEES (3 is ideal)", "NIS per degree of freedom (1 is ideal)", "Beacons seen and accepted"],
+        [
+            "NEES (3 is ideal)",
+            "NIS per degree of freedom (1 is ideal)",
+            f"{what.capitalize()} seen and accepted",
+        ],
         (115.0, 115.0, 70.0),
     )
     time_limits(panels, t_s)
@@ -80,17 +85,17 @@ def consistency_figure(run: RunData) -> Illustration:
         shares.append(_inside("NIS", nis, nis_low, nis_high, run))
     else:
         note(panels[1], "not recorded")
-    _beacons(panels[2], run)
-    seen, accepted = np.nansum(trace["beacons_seen"]), np.nansum(trace["beacons_accepted"])
+    _measurements(panels[2], run)
+    seen, accepted = np.nansum(trace[f"{what}_seen"]), np.nansum(trace[f"{what}_accepted"])
     refused = (
-        f" The gate let {quantities.count(accepted)} of {quantities.count(seen)} sightings through."
+        f" The gate let {quantities.count(accepted)} of {quantities.count(seen)} {what} through."
         if seen > 0
         else ""
     )
     caption = (
         "NEES weighs the true error with the filter's covariance, NIS each innovation with its own; both "
         f"axes are logarithmic. The band holds a single step's value with {_PERCENT} probability "
-        f"(chi-square, {POSE_DOF} degrees of freedom for the pose; for NIS two a beacon, the band "
+        f"(chi-square, {POSE_DOF} degrees of freedom for the pose; for NIS two a {what[:-1]}, the band "
         "of the usual number in each second). "
         + ("Inside the band: " + ", ".join(text for text in shares if text) + ". " if any(shares) else "")
         + f"The dark line is the mean of the last {WINDOW_S:g} s. Above the band the filter is too sure of "
@@ -103,9 +108,9 @@ def consistency_figure(run: RunData) -> Illustration:
         Key("ideal", GREEN, "dash"),
         Key(f"{_PERCENT} band", GREEN, "band", opacity=0.2),
     )
-    beacons = (Key("beacons seen", SKY, "band"), Key("accepted", BLUE)) if trace.has("beacons_seen") else ()
-    keys = (*statistics, *beacons)
-    alt = "NEES and NIS over time with their 95 % bands, and the number of beacons seen and accepted"
+    counts = (Key(f"{what} seen", SKY, "band"), Key("accepted", BLUE)) if trace.has(f"{what}_seen") else ()
+    keys = (*statistics, *counts)
+    alt = f"NEES and NIS over time with their 95 % bands, and the number of {what} seen and accepted"
     return Illustration(SLUG, TITLE, alt, caption, render(figure, SLUG, alt), keys)
 
 
@@ -133,17 +138,22 @@ def _statistic(
     series(axes, t_s, running_mean(values, window), INK, linewidth=1.2)
 
 
-def _beacons(axes: Axes, run: RunData) -> None:
-    trace, t_s = run.trace, run.trace.t_s
-    if not trace.has("beacons_seen"):
+def measured(run: RunData) -> str:
+    """What the localizer counts: beacons, or lines of a scan."""
+    return "lines" if run.trace.has("lines_seen") else "beacons"
+
+
+def _measurements(axes: Axes, run: RunData) -> None:
+    trace, t_s, what = run.trace, run.trace.t_s, measured(run)
+    if not trace.has(f"{what}_seen"):
         note(axes, "not recorded")
         return
-    seen = trace["beacons_seen"]
+    seen = trace[f"{what}_seen"]
     axes.set_ylim(0.0, float(np.nanmax(seen)) + 1.0)
     axes.yaxis.set_major_locator(MaxNLocator(4, integer=True))
     bucket = max(1, len(t_s) // 1000)
     axes.fill_between(t_s[::bucket], 0.0, seen[::bucket], color=SKY, alpha=0.35, linewidth=0.0, step="mid")
-    series(axes, t_s, trace["beacons_accepted"], BLUE, linewidth=0.7, drawstyle="steps-mid")
+    series(axes, t_s, trace[f"{what}_accepted"], BLUE, linewidth=0.7, drawstyle="steps-mid")
 
 
 def _steps(t_s: FloatArray, duration_s: float) -> int:
