@@ -19,7 +19,7 @@ from pilotage.experiments.floor.mission import load_floor_mission
 from pilotage.experiments.floor.simulate import simulate
 from pilotage.stack.localization.ekf_augmented import SystematicErrors
 
-RUNS, STEPS, SETTLE = 30, 500, 10
+RUNS, STEPS, SETTLE = 30, 300, 10
 PRIOR = SystematicErrors()
 STD = {
     "robot.sensors.odometry.distance_scale": PRIOR.distance_scale_var**0.5,
