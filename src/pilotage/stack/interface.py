@@ -42,7 +42,7 @@ class LineVerdict(StrEnum):
     """What became of a line of a scan."""
 
     ACCEPTED = "accepted"
-    AMBIGUOUS = "ambiguous: more than one wall would do"
+    AMBIGUOUS = "ambiguous: another explanation is as likely"
     GATED = "beyond the gate"
     NO_WALL = "beside no wall of the map"
     AT_ODDS = "hidden from here, or at odds with the others"

@@ -44,7 +44,7 @@ CLUSTER_COLOURS = (BLUE, ORANGE, PURPLE, "#7a5400", "#5b4b9a")
 """In turn; neighbours differ."""
 VERDICT_COLOURS = {
     LineVerdict.ACCEPTED: GREEN,
-    LineVerdict.AMBIGUOUS: ORANGE,
+    LineVerdict.AMBIGUOUS: "#9a6700",
     LineVerdict.GATED: VERMILLION,
     LineVerdict.NO_WALL: VERMILLION,
     LineVerdict.AT_ODDS: VERMILLION,
@@ -75,19 +75,21 @@ def updates_figure(run: RunData) -> Illustration:
         top -= height + _PANEL_GAP_PT
     caption = (
         "Scans where the robot believed itself to be just before the update, in metres like the map: what "
-        "does not lie on a wall yet is what the update mends. Points are coloured by cluster, small clusters "
-        "grey; a numbered line runs along the points that it was fitted to, and the wall that it was matched "
-        "to is green. The list gives each line's squared Mahalanobis distance from its wall (chi-square, two "
+        "does not lie on a wall yet is what the update mends. Points are coloured by cluster, those of none "
+        "(small clusters, no return) grey; a numbered line runs along the points that it was fitted to, and "
+        "the wall that it was matched to is green. The list gives each line's squared Mahalanobis distance from its wall (chi-square, two "
         "degrees of freedom) against the gate, and what became of it. The disc is the robot before, the ring "
         "after. Shown are the first update, those with most lines left out, the farthest line that was still "
         "accepted, and some on the way."
     )
-    keys = (
-        Key("wall of the map", INK),
-        Key("matched wall", GREEN, "band"),
-        Key("points by cluster", BLUE, "spot"),
-        Key("fitted line", BLACK),
+    candidates = (
+        (True, Key("wall of the map", INK)),
+        (True, Key("matched wall", GREEN, "band")),
+        (True, Key("points by cluster", BLUE, "spot")),
+        (True, Key("fitted line", BLACK)),
+        (run.world.has_obstacles, Key("unexpected obstacle", ORANGE, "band", opacity=1.0)),
     )
+    keys = tuple(key for there, key in candidates if there)
     alt = "Scans with their clusters, fitted lines and matched walls: " + "; ".join(
         f"{update.why} at {update.t_s:.1f} s" for update in updates
     )
@@ -108,6 +110,7 @@ def _panel(axes: Axes, run: RunData, update: RecordedUpdate, width_pt: float) ->
     layers.segments(axes, accepted, "matched", color="#b4e3d5", linewidth=7.5, zorder=4)
     layers.segments(axes, run.world.segments_m, "walls", color=INK, linewidth=1.0, zorder=5)
     layers.circles(axes, run.world.circles_m, "walls", facecolor="#c5ccd3", edgecolor=INK, zorder=5)
+    layers.draw_obstacles(axes, run.world)
     labels = np.unique(update.clusters)
     for label in labels:
         colour = FAINT if label < 0 else CLUSTER_COLOURS[int(label) % len(CLUSTER_COLOURS)]
