@@ -77,10 +77,10 @@ def updates_figure(run: RunData) -> Illustration:
         "Scans where the robot believed itself to be just before the update, in metres like the map: what "
         "does not lie on a wall yet is what the update mends. Points are coloured by cluster, those of none "
         "(small clusters, no return) grey; a numbered line runs along the points that it was fitted to, and "
-        "the wall that it was matched to is green. The list gives each line's squared Mahalanobis distance from its wall (chi-square, two "
-        "degrees of freedom) against the gate, and what became of it. The disc is the robot before, the ring "
-        "after. Shown are the first update, those with most lines left out, the farthest line that was still "
-        "accepted, and some on the way."
+        "the wall that it was matched to is green. The list gives each line's squared Mahalanobis distance "
+        "from its wall (chi-square, two degrees of freedom) against the gate, and what became of it. The "
+        "disc is the robot before, the ring after. Shown are the first update, those with most lines left "
+        "out, the farthest line that was still accepted, and some on the way."
     )
     candidates = (
         (True, Key("wall of the map", INK)),
