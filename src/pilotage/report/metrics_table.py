@@ -63,6 +63,9 @@ GROUPS: tuple[tuple[str, tuple[Metric, ...]], ...] = (
         "Run",
         (
             Metric("duration_s", "duration", quantities.duration, "Simulated time from start to end."),
+            Metric(
+                "travel_time_s", "travel time", quantities.duration, "Of the planned way at a constant speed."
+            ),
             Metric("path_length_m", "way driven", quantities.length, "Length of the true path."),
             Metric(
                 "distance_to_goal_m",

@@ -69,7 +69,7 @@ def shares(mask: NDArray[np.bool_], step: int) -> NDArray[np.uint8]:
     counts = np.add.reduceat(mask.view(np.uint8), at_row, axis=0, dtype=np.uint16)
     counts = np.add.reduceat(counts, at_column, axis=1, dtype=np.uint32)
     sizes = np.diff(np.append(at_row, rows))[:, None] * np.diff(np.append(at_column, columns))
-    return np.asarray((255 * counts) // sizes, dtype=np.uint8)
+    return np.asarray((255 * counts + sizes // 2) // sizes, dtype=np.uint8)
 
 
 def load_ground(choice: GroundChoice) -> Ground:

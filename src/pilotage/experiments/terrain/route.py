@@ -138,7 +138,7 @@ def route_metrics(
     if result.path is None:
         return answer
     answer |= {
-        "duration_s": float(trace["t_s"][-1]),
+        "travel_time_s": float(trace["t_s"][-1]),
         "planned_length_m": result.path.length_cells * grid.resolution_m,
         "path_cost": result.path.cost,
         "path_nodes": len(result.path.cells),
