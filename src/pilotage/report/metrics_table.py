@@ -92,7 +92,7 @@ GROUPS: tuple[tuple[str, tuple[Metric, ...]], ...] = (
                 "min_clearance_m",
                 "least clearance",
                 quantities.length,
-                "Closest that the edge of the body came to anything solid.",
+                "Closest that the body's edge, or the planned way, came to anything solid.",
             ),
         ),
     ),

@@ -36,7 +36,7 @@ def angle(value_rad: float) -> str:
 
 
 def duration(value_s: float) -> str:
-    """Write a duration in ms, in s, from two minutes on in minutes and seconds, from two days on in days."""
+    """Write a duration in ms, s, minutes and seconds (from 2 min), hours (from 3 h), days (from 2 days)."""
     if not math.isfinite(value_s):
         return NOTHING
     if 0.0 < abs(value_s) < 0.1:
@@ -45,6 +45,9 @@ def duration(value_s: float) -> str:
         return f"{value_s:.2f}\u00a0s" if abs(value_s) < 10.0 else f"{value_s:.1f}\u00a0s"
     if abs(value_s) >= 2.0 * 86_400.0:
         return f"{significant(value_s / 86_400.0, 4)}\u00a0days"
+    if abs(value_s) >= 3.0 * 3600.0:
+        hours, minutes = divmod(round(value_s / 60.0), 60)
+        return f"{hours}\u00a0h {minutes:02d}\u00a0min"
     minutes, seconds = divmod(round(value_s), 60)
     return f"{minutes}\u00a0min {seconds:02d}\u00a0s"
 
