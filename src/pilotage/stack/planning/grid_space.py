@@ -216,11 +216,12 @@ class GridSpace:
         return self._jumping
 
     def _path(self, indices: IntArray, expansions: int) -> GridPath:
-        cells = np.stack([indices // self._stride - 1, indices % self._stride - 1], axis=1)
-        steps = np.hypot(*np.diff(cells, axis=0).T)
-        length = _exact_sum(steps)
+        rows = indices // self._stride
+        cells = np.column_stack([rows - 1, indices - rows * self._stride - 1])
+        length = _length(cells)
         if self._factors is None:
             return GridPath(cells, length, length, expansions)
+        steps = np.hypot(*np.diff(cells, axis=0).T)
         factors = self._factors[cells[:, 0], cells[:, 1]]
         return GridPath(cells, length, _exact_sum(steps * (factors[:-1] + factors[1:]) / 2.0), expansions)
 
@@ -234,6 +235,16 @@ class GridSpace:
 
     def _index(self, cell: Cell) -> int:
         return (int(cell[0]) + 1) * self._stride + int(cell[1]) + 1
+
+
+def _length(cells: IntArray) -> float:
+    """Length of the lines from cell to cell; single steps are counted rather than summed."""
+    steps = cells[1:] - cells[:-1]
+    squares = steps[:, 0] * steps[:, 0] + steps[:, 1] * steps[:, 1]
+    if len(squares) and squares.max() > 2:
+        return _exact_sum(np.sqrt(squares))
+    diagonal = int(squares.sum()) - len(squares)
+    return len(squares) - diagonal + diagonal * math.sqrt(2.0)
 
 
 def _exact_sum(values: FloatArray) -> float:
