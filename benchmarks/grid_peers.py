@@ -5,8 +5,8 @@
 The hazards of the crater terrain, 4500 x 3000 cells, from P1 to P2 of the rover's second task; every side
 searches the same cells with steps of 1 and sqrt(2) and may cut corners, as the peers always do. pilotage's
 time is that of a whole query on a new map, from the mask to the path: copy with a frame, connected
-components, search. The peers' arrays of costs are made beforehand and not counted. Sides take turns (A B C
-A B C ...) and medians are compared. scikit-image is asked once.
+components, bits, search. The peers' arrays of costs are made beforehand and not counted. Sides take turns
+(A B C A B C ...) and medians are compared. scikit-image is asked once.
 
 Exit code 0 where every bar is cleared, 1 where not, a peer that is not installed included.
 """

@@ -13,61 +13,87 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from pilotage.core.types import FloatArray, Pose2
+from pilotage.evaluation.relief import Relief, relief
 from pilotage.maps.elevation import ElevationModel
 from pilotage.maps.elevation_file import read_elevation
-from pilotage.maps.occupancy_grid import OccupancyGrid
 from pilotage.stack.planning.grid_space import GridSpace
 
-SLOPE_THAT_DOUBLES_RAD = np.deg2rad(5.0)
+SLOPE_THAT_DOUBLES_DEG = 5.0
 """On this slope a metre costs two."""
 
+SLOPE_LIMIT_DEG = 20.0
+"""What is steeper, over cells of 463 m, is not driven on at all."""
 
-def load(folder: Path) -> tuple[ElevationModel, FloatArray]:
-    """The elevation, its frame x east and y north in Bradbury Landing, and the stops (N, 2)."""
+
+def load(folder: Path) -> tuple[ElevationModel, FloatArray, float]:
+    """The elevation, its frame x east and y north in Bradbury Landing, the stops (N, 2), the odometer."""
     side = json.loads((folder / "gale-mola.json").read_text())
     landing = side["origin"]
     x_m = landing["pixelCol"] * side["metresPerPixelLon"]
     y_m = (side["size"] - landing["pixelRow"]) * side["metresPerPixelLat"]
-    stops = json.loads((folder / "msl-traverse.json").read_text())["points"]
+    traverse = json.loads((folder / "msl-traverse.json").read_text())
+    stops = traverse["points"]
     # The file's z points south.
     driven = np.array([[stop["x"], -stop["z"]] for stop in stops])
-    return read_elevation(folder / "gale-mola.json", Pose2(-x_m, -y_m, 0.0)), driven
+    elevation = read_elevation(folder / "gale-mola.json", Pose2(-x_m, -y_m, 0.0))
+    return elevation, driven, float(traverse["totalMetres"])
 
 
-def told(name: str, way_m: FloatArray, ground: ElevationModel) -> str:
+def told(name: str, way_m: FloatArray, ground: ElevationModel) -> Relief:
     """Length, climb and steepest slope, every 100 m on the same elevation for both ways."""
-    s_m = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(way_m, axis=0).T))])
-    at_m = np.append(np.arange(0.0, s_m[-1], 100.0), s_m[-1])
-    points = np.column_stack([np.interp(at_m, s_m, way_m[:, k]) for k in (0, 1)])
-    rises = np.diff(ground.heights_at(points))
-    steepest = np.rad2deg(np.arctan(np.abs(rises / np.diff(at_m)).max()))
-    climb_m = rises[rises > 0.0].sum()
-    return f"{name:8s} {s_m[-1] / 1000.0:5.1f} km, climbs {climb_m:4.0f} m, steepest {steepest:4.1f} deg"
+    profile = relief(ground, way_m, 100.0)
+    steepest = np.rad2deg(profile.steepest_rad)
+    climbs = f"climbs {profile.climb_m:4.0f} m"
+    print(f"{name:8s} {profile.s_m[-1] / 1000.0:5.1f} km, {climbs}, steepest {steepest:4.1f} deg")
+    return profile
 
 
 folder = Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).parents[2] / "shared" / "data" / "gale"
 if not folder.is_dir():
     print(f"nothing to show: no data in {folder}")
     sys.exit()
-ground, driven = load(folder)
-slope = ground.slope_rad().astype(np.float64)
-grid = OccupancyGrid.of(np.zeros(slope.shape, np.bool_), ground.resolution_m, ground.origin)
-space = GridSpace(grid.blocked(), 1.0 + (slope / SLOPE_THAT_DOUBLES_RAD) ** 2)
+ground, driven, odometer_m = load(folder)
+grid = ground.hazards(SLOPE_LIMIT_DEG)
+space = GridSpace(grid.blocked(), ground.cost_factors(SLOPE_THAT_DOUBLES_DEG))
 path = space.shortest(grid.cell_at(*driven[0]), grid.cell_at(*driven[-1]))
 assert path is not None
 planned = np.concatenate([driven[:1], grid.centres_m(path.cells)[1:-1], driven[-1:]])
-print(told("planned", planned, ground))
-print(told("driven", driven, ground))
+ways = {"driven": (driven, "tab:orange"), "planned": (planned, "tab:blue")}
+profiles = {name: told(name, way_m, ground) for name, (way_m, _) in ways.items()}
+print(f"The rover's odometer says {odometer_m / 1000.0:.1f} km: it turned and slipped between its stops.")
 
-figure, axes = plt.subplots(figsize=(9, 9))
+figure, (axes, along) = plt.subplots(1, 2, figsize=(11, 8), width_ratios=(3, 2), layout="constrained")
 left, bottom = ground.origin.x_m / 1000.0, ground.origin.y_m / 1000.0
 extent = (left, left + grid.size_m[0] / 1000.0, bottom, bottom + grid.size_m[1] / 1000.0)
-axes.imshow(ground.shaded(), cmap="gray", extent=extent)
-for way_m, style, name in ((driven, "tab:orange", "driven"), (planned, "tab:cyan", "planned")):
-    axes.plot(*(way_m.T / 1000.0), color=style, label=name)
 low, high = driven.min(axis=0) / 1000.0 - 4.0, driven.max(axis=0) / 1000.0 + 4.0
+# Heights between the lowest and the highest that the picture shows.
+near = [grid.cell_at(*(1000.0 * corner)) for corner in (low, high)]
+shown = ground.elevation_m[near[1][0] : near[0][0], near[0][1] : near[1][1]]
+heights = axes.imshow(
+    ground.elevation_m, cmap="bone", vmin=shown.min() - 800.0, vmax=shown.max(), extent=extent
+)
+x, y = (np.linspace(extent[k], extent[k + 1], n) for k, n in ((0, grid.columns), (2, grid.rows)))
+axes.contour(
+    x, y[::-1], ground.elevation_m, np.arange(-5000, 3000, 100), colors="k", linewidths=0.3, alpha=0.5
+)
+for name, (way_m, colour) in ways.items():
+    axes.plot(*(way_m.T / 1000.0), color="white", linewidth=3.5)
+    axes.plot(*(way_m.T / 1000.0), color=colour, linewidth=1.8, label=name)
+    along.plot(profiles[name].s_m / 1000.0, profiles[name].elevation_m, color=colour, label=name)
+for place, name in ((driven[0], "Bradbury Landing"), (driven[-1], "today")):
+    axes.plot(*(place / 1000.0), "o", color="black", markeredgecolor="white")
+    axes.annotate(
+        name,
+        place / 1000.0,
+        (8, -3),
+        textcoords="offset points",
+        bbox={"fc": "white", "ec": "none", "pad": 1.5},
+    )
 axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), xlabel="east, km", ylabel="north, km")
-axes.set_title("From Bradbury Landing, on the elevation by MOLA")
-axes.legend()
+axes.set_title("Gale Crater by MOLA; contours every 100 m")
+figure.colorbar(heights, ax=axes, label="height, m", shrink=0.7)
+along.set(xlabel="distance along the way, km", ylabel="height, m", title="Heights along both ways")
+along.legend()
+along.grid(alpha=0.3)
 figure.savefig("curiosity.png", dpi=120)
 print("drawn: curiosity.png")

@@ -103,8 +103,8 @@ def plan_on_grid(
     space = GridSpace(blocked, ground.cost_factors)
     hazard = "an obstacle" if slope_limit_deg is None else f"steeper than {slope_limit_deg:g} deg"
     ends = ("--start", start), ("--goal", goal)
-    cells = [_cell(option, place, grid, space, hazard) for option, place in ends]
-    result = GRID_PLANNERS.entry(planner).factory(config).search(GridRequest(space, *cells))
+    from_, to = (free_cell(option, place, grid, space, hazard) for option, place in ends)
+    result = GRID_PLANNERS.entry(planner).factory(config).search(GridRequest(space, from_, to))
     answer: dict[str, Any] = {
         "success": result.path is not None,
         "reason": f"{result.status}: {result.reason}",
@@ -112,8 +112,8 @@ def plan_on_grid(
         "rows": grid.rows,
         "columns": grid.columns,
         "resolution_m": grid.resolution_m,
-        "start_cell": list(cells[0]),
-        "goal_cell": list(cells[1]),
+        "start_cell": list(from_),
+        "goal_cell": list(to),
         "planning_time_s": result.planning_time_s,
     }
     if result.path is None:
@@ -182,7 +182,18 @@ def _split(overrides: Sequence[str]) -> tuple[dict[str, Any], dict[str, Any]]:
     return own, of_map
 
 
-def _cell(option: str, place: Sequence[float], grid: OccupancyGrid, space: GridSpace, hazard: str) -> Cell:
+def free_cell(
+    option: str, place: Sequence[float], grid: OccupancyGrid, space: GridSpace, hazard: str
+) -> Cell:
+    """The cell in which a place lies; InputError where there is none or it is blocked.
+
+    Parameters
+    ----------
+    option
+        Where the user gave the place.
+    hazard
+        What a blocked cell is, in words.
+    """
     cell = grid.cell_at(place[0], place[1])
     if not grid.contains(*cell):
         width_m, height_m = grid.size_m
@@ -196,7 +207,7 @@ def _cell(option: str, place: Sequence[float], grid: OccupancyGrid, space: GridS
         value = int(grid.cells[cell])
         what = "unknown" if value < 0 else hazard
         if value == 0:
-            what = "too near to an obstacle (map.inflation_m)"
+            what = "too near to an obstacle (inflation_m)"
         raise InputError(
             f"{option}: expected free ground, found ({place[0]:g}, {place[1]:g}) in row {cell[0]} and "
             f"column {cell[1]}, which is {what}"

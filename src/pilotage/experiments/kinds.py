@@ -85,9 +85,16 @@ def _sheet() -> Kind:
     return SHEET
 
 
+def _terrain() -> Kind:
+    from pilotage.experiments.terrain.kind import TERRAIN
+
+    return TERRAIN
+
+
 KINDS: dict[str, Callable[[], Kind]] = {
     "floor": _floor,
     "sheet": _sheet,
+    "terrain": _terrain,
 }
 """Each kind's loader by the ``world.kind`` of its missions."""
 

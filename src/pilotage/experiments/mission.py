@@ -94,13 +94,18 @@ def read_mission(name_or_path: str) -> dict[str, Any]:
 
 
 def _anchor_map(values: dict[str, Any], folder: Path) -> None:
-    """Let a map file's relative path start from the mission file's folder."""
+    """Let the relative paths of a map's files start from the mission file's folder."""
     world = values.get("world")
     if not isinstance(world, dict):
         return
-    source = world.get("map")
-    if isinstance(source, str) and (folder / source).is_file():
-        world["map"] = str(folder / source)
+    ground = world.get("ground")
+    places = [(world, "map")]
+    if isinstance(ground, dict):
+        places += [(ground, key) for key in ("file", "obstacles", "environment", "landmarks")]
+    for holder, key in places:
+        source = holder.get(key)
+        if isinstance(source, str) and (folder / source).is_file():
+            holder[key] = str(folder / source)
 
 
 def read_text(path: Path) -> str:

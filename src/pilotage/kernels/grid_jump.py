@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pilotage.kernels.grid_bits import LEAD, WordArray, blocked_around, is_set, run_down, run_up
 from pilotage.kernels.grid_moves import (
     COLUMN_STEP,
     DIRECTION,
@@ -33,144 +34,10 @@ from pilotage.kernels.grid_moves import (
     signed,
 )
 from pilotage.kernels.grid_search import FOUND, NO_PATH, OUT_OF_RANGE, Scale, octile
-from pilotage.kernels.jit import kernel, leading_zeros, trailing_zeros
-
-WordArray = NDArray[np.uint64]
+from pilotage.kernels.jit import kernel
 
 WIDER_SHIFT = 2
 """Buckets are so many times doubled against a search cell by cell: there is less to keep in order."""
-
-LEAD = 64
-"""Blocked bits before the first of a line, so that a word may begin up to so many bits before it."""
-
-
-def packed(lines: ByteArray) -> WordArray:
-    """Bits of whether cells (L, C) are blocked, (L, words): bit i of a line is cell i - ``LEAD``."""
-    n_lines, length = lines.shape
-    words = LEAD // 64 + -(-length // 64) + 2
-    out = np.full((n_lines, 8 * words), 255, np.uint8)
-    bits = np.packbits(lines >> 7, axis=1, bitorder="little")
-    if length % 8:
-        # Beyond the last cell all is blocked.
-        bits[:, -1] |= np.uint8(255 << length % 8 & 255)
-    out[:, LEAD // 8 : LEAD // 8 + bits.shape[1]] = bits
-    return out.view("<u8").astype(np.uint64, copy=False)
-
-
-@kernel
-def transposed(rows: WordArray, n_columns: int) -> WordArray:
-    """The same bits by columns, (``n_columns``, words), block by block of 64 x 64."""
-    n_rows = rows.shape[0]
-    words = LEAD // 64 + (n_rows + 63) // 64 + 2
-    out = np.full((n_columns, words), ~np.uint64(0), np.uint64)
-    block = np.empty(64, np.uint64)
-    for block_row in range((n_rows + 63) // 64):
-        top = 64 * block_row
-        for block_column in range((n_columns + 63) // 64):
-            for i in range(64):
-                inside = top + i < n_rows
-                block[i] = rows[top + i, 1 + block_column] if inside else ~np.uint64(0)
-            _transpose(block)
-            left = 64 * block_column
-            for i in range(min(64, n_columns - left)):
-                out[left + i, 1 + block_row] = block[i]
-    return out
-
-
-@kernel
-def _transpose(block: WordArray) -> None:
-    """Transpose 64 x 64 bits in place by swapping ever smaller squares (Warren, Hacker's Delight)."""
-    half = 32
-    mask = np.uint64(0x00000000FFFFFFFF)
-    while half > 0:
-        k = 0
-        while k < 64:
-            swap = ((block[k] >> np.uint64(half)) ^ block[k + half]) & mask
-            block[k] ^= swap << np.uint64(half)
-            block[k + half] ^= swap
-            k = (k + half + 1) & ~half
-        half //= 2
-        mask ^= mask << np.uint64(half)
-
-
-@kernel
-def _word(bits: WordArray, line: int, position: int) -> np.uint64:
-    """64 bits of a line from a position on."""
-    k, shift = position >> 6, np.uint64(position & 63)
-    low = bits[np.uint64(line), np.uint64(k)] >> shift
-    return np.uint64(
-        low | (bits[np.uint64(line), np.uint64(k + 1)] << np.uint64(1)) << (np.uint64(63) - shift)
-    )
-
-
-@kernel
-def _is_set(bits: WordArray, line: int, position: int) -> bool:
-    word = bits[np.uint64(line), np.uint64(position >> 6)]
-    return bool(word >> np.uint64(position & 63) & np.uint64(1))
-
-
-@kernel
-def run_up(bits: WordArray, line: int, position: int, goal: int, cut_corners: bool) -> int:
-    """Cells from a free one up its line to the next jump point or the goal; 0 where an obstacle comes first.
-
-    ``goal`` is its position if it lies on this line, else 0.
-    """
-    at = position + 1
-    while True:
-        ahead = _word(bits, line, at)
-        one, other = _word(bits, line - 1, at), _word(bits, line + 1, at)
-        if cut_corners:
-            # Beside the cell blocked, beside the next one free.
-            forced = (one & ~_word(bits, line - 1, at + 1)) | (other & ~_word(bits, line + 1, at + 1))
-        else:
-            # Beside the cell before blocked, beside the cell free.
-            forced = (_word(bits, line - 1, at - 1) & ~one) | (_word(bits, line + 1, at - 1) & ~other)
-        stop = ahead | forced
-        if stop != np.uint64(0):
-            here = at + trailing_zeros(stop)
-            if position < goal <= here:
-                return goal - position
-            return 0 if _is_set(bits, line, here) else here - position
-        at += 64
-
-
-@kernel
-def run_down(bits: WordArray, line: int, position: int, goal: int, cut_corners: bool) -> int:
-    """As ``run_up``, towards lower positions."""
-    at = position - 64
-    while True:
-        ahead = _word(bits, line, at)
-        one, other = _word(bits, line - 1, at), _word(bits, line + 1, at)
-        if cut_corners:
-            forced = (one & ~_word(bits, line - 1, at - 1)) | (other & ~_word(bits, line + 1, at - 1))
-        else:
-            forced = (_word(bits, line - 1, at + 1) & ~one) | (_word(bits, line + 1, at + 1) & ~other)
-        stop = ahead | forced
-        if stop != np.uint64(0):
-            here = at + 63 - leading_zeros(stop)
-            if here <= goal < position:
-                return position - goal
-            return 0 if _is_set(bits, line, here) else position - here
-        at -= 64
-
-
-@kernel
-def _blocked_around(by_row: WordArray, row: int, position: int) -> int:
-    """The eight neighbours as ``grid_moves.blocked_around`` has them."""
-    three = np.uint64(7)
-    above = signed(_word(by_row, row - 1, position - 1) & three)
-    here = signed(_word(by_row, row, position - 1) & three)
-    below = signed(_word(by_row, row + 1, position - 1) & three)
-    return int(
-        here >> 2
-        | above >> 2 << 1
-        | (above >> 1 & 1) << 2
-        | (above & 1) << 3
-        | (here & 1) << 4
-        | (below & 1) << 5
-        | (below >> 1 & 1) << 6
-        | below >> 2 << 7
-    )
 
 
 @kernel
@@ -209,11 +76,11 @@ def _jump(
             return steps
         if cut_corners:
             # Beside the step that came here blocked, and free beyond.
-            if _is_set(by_row, row, at_column - column_step) and not _is_set(
+            if is_set(by_row, row, at_column - column_step) and not is_set(
                 by_row, row + row_step, at_column - column_step
             ):
                 return steps
-            if _is_set(by_row, row - row_step, at_column) and not _is_set(
+            if is_set(by_row, row - row_step, at_column) and not is_set(
                 by_row, row - row_step, at_column + column_step
             ):
                 return steps
@@ -231,10 +98,10 @@ def _jump(
             found = run_down(by_column, column, at_row, on_column, cut_corners)
         if found > 0:
             return steps
-        if _is_set(by_row, row + row_step, at_column + column_step):
+        if is_set(by_row, row + row_step, at_column + column_step):
             return 0
         if not cut_corners and (
-            _is_set(by_row, row, at_column + column_step) or _is_set(by_row, row + row_step, at_column)
+            is_set(by_row, row, at_column + column_step) or is_set(by_row, row + row_step, at_column)
         ):
             return 0
 
@@ -257,7 +124,7 @@ def jump_search(
     Parameters
     ----------
     by_row, by_column
-        The padded grid as bits (``packed``, ``transposed``).
+        The padded grid as bits (``grid_bits.packed``, ``transposed``).
     states, gain, stride, start, goal, scale, table
         As there; the ``OPEN`` and direction bits of ``states`` are scratch, ``gain`` is 0 before and after.
 
@@ -313,7 +180,7 @@ def jump_search(
         expansions += 1
         row = cell // stride
         column = cell - row * stride
-        around = _blocked_around(by_row, row, column + LEAD)
+        around = blocked_around(by_row, row, column + LEAD)
         moves = signed(table[NO_DIRECTION if cell == start else came, around])
         if n_noted + 8 > noted.shape[0]:
             noted, after = doubled(noted), doubled(after)

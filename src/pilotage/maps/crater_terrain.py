@@ -96,6 +96,7 @@ def crater_terrain(config: CraterTerrainConfig) -> CraterTerrain:
     heights += _scarps(config, streams.stream("scarps"))
     _add_craters(heights, config, streams.stream("craters"))
     origin = Pose2(*config.origin_m, 0.0)
+    heights.flags.writeable = False
     elevation = ElevationModel(heights, config.resolution_m, origin)
     hazards = elevation.hazards(config.slope_limit_deg)
     return CraterTerrain(elevation, hazards, _landmarks(config, streams.stream("boulders")))

@@ -36,7 +36,7 @@ class ElevationModel:
     origin: Pose2 = CORNER
 
     def __post_init__(self) -> None:
-        heights = np.array(self.elevation_m, dtype=np.float32)
+        heights = np.asarray(self.elevation_m, dtype=np.float32)
         if heights.ndim != 2 or min(heights.shape) < 2:
             raise InputError(f"elevation: expected at least 2 x 2 heights, found {heights.shape}")
         if not FINEST_M <= self.resolution_m <= HIGHEST_M:
@@ -44,8 +44,13 @@ class ElevationModel:
                 f"elevation: expected a resolution from {FINEST_M:g} to {HIGHEST_M:g} m, "
                 f"found {self.resolution_m}"
             )
-        if (np.abs(heights) > HIGHEST_M).any():
+        # Passing over NaN, and without another array of the map's size.
+        low, high = np.fmin.reduce(heights, axis=None), np.fmax.reduce(heights, axis=None)
+        if max(-low, high) > HIGHEST_M:
             raise InputError(f"elevation: expected heights up to {HIGHEST_M:g} m or NaN, found higher ones")
+        if heights.flags.writeable:
+            # A file mapped read-only stays where it is.
+            heights = heights.copy()
         heights.flags.writeable = False
         object.__setattr__(self, "elevation_m", heights)
 

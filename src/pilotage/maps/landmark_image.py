@@ -21,15 +21,22 @@ COLOURED_FROM = 48
 """Least difference of a pixel's greatest and least channel that is a colour, not a grey."""
 
 
-def read_landmark_image(path: Path, resolution_m: float, origin: Pose2 = CORNER) -> Landmarks:
+def read_landmark_image(
+    path: Path, resolution_m: float, origin: Pose2 = CORNER, size: tuple[int, int] | None = None
+) -> Landmarks:
     """Take the coloured spots of an image as landmarks: one each, at its middle, numbered from the top.
 
     Spots that touch, over corners too, are one landmark.
 
+    Parameters
+    ----------
+    size
+        Rows and columns that it has to have.
+
     Raises
     ------
     InputError
-        Where the image is missing or unreadable, or has no coloured spot.
+        Where the image is missing, unreadable or of another size, or has no coloured spot.
     """
     if not path.is_file():
         raise InputError(f"image '{path}': expected an image there, found none")
@@ -37,6 +44,10 @@ def read_landmark_image(path: Path, resolution_m: float, origin: Pose2 = CORNER)
     try:
         with Image.open(path) as image:
             columns, rows = image.size
+            if size is not None and (rows, columns) != size:
+                raise InputError(
+                    f"image '{path}': expected {size[1]} x {size[0]} pixels, found {columns} x {rows}"
+                )
             require_memory(12 * rows * columns, f"image '{path}'")
             pixels = np.asarray(image.convert("RGB"))
     except (OSError, SyntaxError, ValueError) as error:

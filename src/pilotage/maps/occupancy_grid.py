@@ -105,8 +105,10 @@ class OccupancyGrid:
 
     def blocked(self, occupied_from: int = OCCUPIED_FROM, unknown_is_free: bool = False) -> BoolArray:
         """(rows, columns) whether a cell is an obstacle."""
-        blocked: BoolArray = self.cells >= occupied_from
-        return blocked if unknown_is_free else blocked | (self.cells < 0)
+        if unknown_is_free:
+            return np.asarray(self.cells >= occupied_from)
+        # Unsigned, unknown is 255 and so above any per cent: one pass and one array for both questions.
+        return np.asarray(self.cells.view(np.uint8) >= max(0, occupied_from))
 
     def contains(self, row: int, column: int) -> bool:
         """Whether there is such a cell."""

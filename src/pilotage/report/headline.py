@@ -54,4 +54,15 @@ def headline(metrics: Mapping[str, Any]) -> str:
                 f"of {quantities.length(shortest)}"
             )
         details.append(text)
+    elif success and math.isfinite(planned):
+        details.append(_planned(metrics, planned))
     return f"{answer}; {'; '.join(details)}." if details else f"{answer}."
+
+
+def _planned(metrics: Mapping[str, Any], planned_m: float) -> str:
+    """A way that was planned and not driven."""
+    took, travel = number(metrics.get("planning_time_s")), number(metrics.get("travel_time_s"))
+    text = f"a way of {quantities.length(planned_m)}"
+    if math.isfinite(took):
+        text += f" planned in {quantities.duration(took)}"
+    return text + (f", {quantities.duration(travel)} of driving" if math.isfinite(travel) else "")

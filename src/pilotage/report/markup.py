@@ -138,7 +138,7 @@ _PAGE = Template(
 <meta charset="utf-8">
 <meta name="viewport" content="width=device-width, initial-scale=1">
 <meta http-equiv="Content-Security-Policy"
-content="default-src 'none'; style-src 'unsafe-inline'; script-src $script_source">
+content="default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src $script_source">
 <title>$title</title>
 <style>
 $style

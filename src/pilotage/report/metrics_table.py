@@ -15,8 +15,10 @@ from pilotage.report.run_folder import number
 
 Write = Callable[[float], str]
 
-NOT_MEASURES = frozenset({"mission", "seed", "success", "reason", "run_dir", "name"})
-"""Keys that identify a run or tell its outcome; they stand above the table, not in it."""
+NOT_MEASURES = frozenset(
+    {"mission", "seed", "success", "reason", "run_dir", "name", "rows", "columns", "resolution_m"}
+)
+"""Keys that identify a run or tell its outcome, or repeat its settings; they are not in the table."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,6 +46,10 @@ def _plain(value: float) -> str:
     return quantities.significant(value, 3)
 
 
+def _degrees(value: float) -> str:
+    return f"{quantities.significant(value)}°" if math.isfinite(value) else quantities.NOTHING
+
+
 def _ratio(value: float) -> str:
     return f"{value:.3f}"
 
@@ -57,6 +63,9 @@ GROUPS: tuple[tuple[str, tuple[Metric, ...]], ...] = (
         "Run",
         (
             Metric("duration_s", "duration", quantities.duration, "Simulated time from start to end."),
+            Metric(
+                "travel_time_s", "travel time", quantities.duration, "Of the planned way at a constant speed."
+            ),
             Metric("path_length_m", "way driven", quantities.length, "Length of the true path."),
             Metric(
                 "distance_to_goal_m",
@@ -83,7 +92,7 @@ GROUPS: tuple[tuple[str, tuple[Metric, ...]], ...] = (
                 "min_clearance_m",
                 "least clearance",
                 quantities.length,
-                "Closest that the edge of the body came to anything solid.",
+                "Closest that the body's edge, or the planned way, came to anything solid.",
             ),
         ),
     ),
@@ -196,6 +205,24 @@ GROUPS: tuple[tuple[str, tuple[Metric, ...]], ...] = (
             Metric("expansions", "expansions", quantities.count, "Nodes that the search opened."),
             Metric("path_nodes", "nodes of the path", quantities.count, "Cells or nodes on the path found."),
             Metric("path_cost", "cost of the path", _plain, "In the planner's own unit."),
+            Metric(
+                "preparation_time_s",
+                "making the grid ready",
+                quantities.duration,
+                "Wall time for inflation and cell costs, before the search.",
+            ),
+        ),
+    ),
+    (
+        "Ground",
+        (
+            Metric("hazard_fraction", "hazards", quantities.share, "Share of the map that is too steep."),
+            Metric("climb_m", "climbs", quantities.length, "Sum of all that goes up along the path."),
+            Metric("descent_m", "descends", quantities.length, "Sum of all that goes down."),
+            Metric("steepest_deg", "steepest, along the path", _degrees, "Greatest rise or fall on the way."),
+            Metric(
+                "max_slope_deg", "steepest ground", _degrees, "Greatest slope of the ground under the path."
+            ),
         ),
     ),
     (

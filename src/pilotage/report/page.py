@@ -15,6 +15,8 @@ from pilotage.report.figures.control import control_figure
 from pilotage.report.figures.covariance import covariance_figure
 from pilotage.report.figures.map import map_figure
 from pilotage.report.figures.pose_error import pose_error_figure
+from pilotage.report.figures.terrain_map import hazard_map_figure, looked_at_figure, terrain_map_figure
+from pilotage.report.figures.terrain_profile import hazard_distance_figure, terrain_profile_figure
 from pilotage.report.figures.timeline import timeline_figure
 from pilotage.report.figures.ultrasonic import ultrasonic_figure
 from pilotage.report.figures.updates import updates_figure
@@ -51,7 +53,14 @@ FLOOR_FIGURES: tuple[Draw, ...] = (
     ultrasonic_figure,
     clearance_figure,
 )
-FIGURES: dict[str, tuple[Draw, ...]] = {"floor": FLOOR_FIGURES}
+TERRAIN_FIGURES: tuple[Draw, ...] = (
+    terrain_map_figure,
+    hazard_map_figure,
+    looked_at_figure,
+    terrain_profile_figure,
+    hazard_distance_figure,
+)
+FIGURES: dict[str, tuple[Draw, ...]] = {"floor": FLOOR_FIGURES, "terrain": TERRAIN_FIGURES}
 """What is drawn of a run, by the kind of its mission."""
 SCENES: dict[str, Callable[[RunData], ReplayScene | None]] = {"floor": floor_scene}
 """How a run of each kind becomes a scene to replay."""
@@ -81,12 +90,14 @@ def run_page(run: RunData) -> str:
     sections: list[str] = [replay_section(SCENES.get(run.kind, floor_scene)(run))]
     entries: list[tuple[str, str]] = [(SLUG, TITLE)]
     drawn = 0
+    slugs = [figure.slug for figure in figures]
+    explained = "timeline" if "timeline" in slugs else slugs[0]
     for figure in figures:
         drawn += bool(figure.svg)
         sections.append(figure_section(drawn, figure))
         entries.append((figure.slug, figure.title))
         # What happened explains the map and the numbers; the numbers come before their curves.
-        if figure.slug == "timeline":
+        if figure.slug == explained:
             sections += [events_section(run.events), metrics_section(metric_rows(run.metrics))]
             entries += [("events", "Events"), ("metrics", "Numbers")]
     if run.mission_text:
@@ -137,7 +148,7 @@ def _tiles(run: RunData) -> list[tuple[str, str]]:
 
     planned, shortest = value("planned_length_m"), value("shortest_length_m")
     ratio = planned / shortest if shortest > 0.0 else math.nan
-    entries = (
+    entries: tuple[tuple[str, float, Callable[[float], str]], ...] = (
         ("duration", value("duration_s"), quantities.duration),
         ("position RMSE", value("position_rmse_m"), quantities.length),
         ("worst position error", value("position_max_m"), quantities.length),
@@ -147,6 +158,13 @@ def _tiles(run: RunData) -> list[tuple[str, str]]:
         ("NEES (ideal 3)", value("nees_mean"), lambda x: f"{x:.2f}"),
         ("collisions", value("collisions"), quantities.count),
     )
+    if run.kind == "terrain":
+        entries += (
+            ("planned way", planned, quantities.length),
+            ("travel time", value("travel_time_s"), quantities.duration),
+            ("planning time", value("planning_time_s"), quantities.duration),
+            ("cells opened", value("expansions"), quantities.count),
+        )
     return [(name, write(x)) for name, x, write in entries if math.isfinite(x)]
 
 

@@ -20,11 +20,13 @@ def significant(value: float, digits: int = 3) -> str:
 
 
 def length(value_m: float) -> str:
-    """Write a length in mm below 0.1 m, in m from there."""
+    """Write a length in mm below 0.1 m, in m from there, in km from 10 km on."""
     if not math.isfinite(value_m):
         return NOTHING
     if abs(value_m) < 0.1:
         return f"{significant(1000.0 * value_m)}\u00a0mm"
+    if abs(value_m) >= 10_000.0:
+        return f"{significant(value_m / 1000.0, 4)}\u00a0km"
     return f"{value_m:.2f}\u00a0m".replace("-", "−")
 
 
@@ -34,13 +36,18 @@ def angle(value_rad: float) -> str:
 
 
 def duration(value_s: float) -> str:
-    """Write a duration in ms, in s, or from two minutes on in minutes and seconds."""
+    """Write a duration in ms, s, minutes and seconds (from 2 min), hours (from 3 h), days (from 2 days)."""
     if not math.isfinite(value_s):
         return NOTHING
     if 0.0 < abs(value_s) < 0.1:
         return f"{significant(1000.0 * value_s)}\u00a0ms"
     if abs(value_s) < 120.0:
         return f"{value_s:.2f}\u00a0s" if abs(value_s) < 10.0 else f"{value_s:.1f}\u00a0s"
+    if abs(value_s) >= 2.0 * 86_400.0:
+        return f"{significant(value_s / 86_400.0, 4)}\u00a0days"
+    if abs(value_s) >= 3.0 * 3600.0:
+        hours, minutes = divmod(round(value_s / 60.0), 60)
+        return f"{hours}\u00a0h {minutes:02d}\u00a0min"
     minutes, seconds = divmod(round(value_s), 60)
     return f"{minutes}\u00a0min {seconds:02d}\u00a0s"
 

@@ -12,11 +12,15 @@ from pilotage.stack.planning.planner import PlanStatus
 
 @dataclass(frozen=True, slots=True)
 class GridRequest:
-    """One query on a grid: from the centre of one cell to that of another."""
+    """One query on a grid: from the centre of one cell to that of another.
+
+    With ``tell_looked_at`` the path says which cells the search queued, where the planner can tell.
+    """
 
     space: GridSpace
     start: Cell
     goal: Cell
+    tell_looked_at: bool = False
 
 
 @dataclass(frozen=True, slots=True)

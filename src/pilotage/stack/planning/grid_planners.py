@@ -14,7 +14,7 @@ from pilotage.stack.planning.grid_planner import GRID_PLANNERS, GridRequest, Gri
 from pilotage.stack.planning.grid_space import Cell, GridPath, GridSpace, Search
 from pilotage.stack.planning.planner import PLANNERS, PlanRequest, PlanResult, PlanStatus
 
-Find: TypeAlias = Callable[[GridSpace, Cell, Cell], GridPath | None]
+Find: TypeAlias = Callable[[GridSpace, Cell, Cell, bool], GridPath | None]
 
 
 class GridSearchConfig(Config):
@@ -51,8 +51,8 @@ class AstarPlanner:
         """Answer one query on a distance field."""
         return plan_over_nodes(request, self._find, self._config.clearance_m, self._config.waypoint_spacing_m)
 
-    def _find(self, space: GridSpace, start: Cell, goal: Cell) -> GridPath | None:
-        return space.shortest(start, goal, self._config.corner_cutting)
+    def _find(self, space: GridSpace, start: Cell, goal: Cell, tell: bool = False) -> GridPath | None:
+        return space.shortest(start, goal, self._config.corner_cutting, tell_looked_at=tell)
 
 
 @PLANNERS.add("dijkstra", GridSearchConfig)
@@ -76,8 +76,8 @@ class DijkstraPlanner:
         """Answer one query on a distance field."""
         return plan_over_nodes(request, self._find, self._config.clearance_m, self._config.waypoint_spacing_m)
 
-    def _find(self, space: GridSpace, start: Cell, goal: Cell) -> GridPath | None:
-        return space.shortest(start, goal, self._config.corner_cutting, Search.DIJKSTRA)
+    def _find(self, space: GridSpace, start: Cell, goal: Cell, tell: bool = False) -> GridPath | None:
+        return space.shortest(start, goal, self._config.corner_cutting, Search.DIJKSTRA, tell)
 
 
 @PLANNERS.add("theta-star", GridSearchConfig)
@@ -106,7 +106,7 @@ class ThetaStarPlanner:
             request, self._find, self._config.clearance_m, self._config.waypoint_spacing_m, any_angle=True
         )
 
-    def _find(self, space: GridSpace, start: Cell, goal: Cell) -> GridPath | None:
+    def _find(self, space: GridSpace, start: Cell, goal: Cell, tell: bool = False) -> GridPath | None:  # noqa: ARG002
         return space.any_angle(start, goal, self._config.corner_cutting)
 
 
@@ -123,7 +123,7 @@ def _answer(request: GridRequest, find: Find) -> GridResult:
             where = "is blocked" if space.contains(cell) else f"lies outside {space.rows} x {space.columns}"
             reason = f"the {name}, row {cell[0]} and column {cell[1]}, {where}"
             return GridResult(status, reason, None, time.perf_counter() - began)
-    path = find(space, request.start, request.goal)
+    path = find(space, request.start, request.goal, request.tell_looked_at)
     took = time.perf_counter() - began
     if path is None:
         reason = "start and goal lie on ground that is not connected"

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, replace
-from enum import StrEnum
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -12,11 +11,11 @@ from numpy.typing import NDArray
 
 from pilotage.core.errors import InputError
 from pilotage.core.types import BoolArray, FloatArray, IntArray
-from pilotage.kernels import grid_components, grid_jump, grid_moves, grid_search, grid_theta
+from pilotage.kernels import grid_bits, grid_components, grid_jump, grid_moves, grid_search, grid_theta
 from pilotage.maps.memory import require_memory
+from pilotage.stack.planning.grid_path import Cell, GridPath, Search
 
-Cell = tuple[int, int]
-"""Row and column; row 0 as the mask's."""
+__all__ = ["Cell", "GridPath", "GridSpace", "Search"]
 
 MAX_CELLS = 2**31 - 1
 
@@ -26,47 +25,8 @@ COST_UNIT = 1024
 BYTES_PER_CELL = 12
 """State, gain and queue of a search that looks at every cell."""
 
-JUMPS_FROM_CELLS = 6.0
+JUMPS_FROM_CELLS = 11.0
 """Mean length of a row's free stretches from which on jumps pay; in finer rubble cell by cell is quicker."""
-
-
-class Search(StrEnum):
-    """How a shortest path is looked for; what is found is as short."""
-
-    AUTO = "auto"
-    """Jumps on uniform costs, where free stretches are long enough; else cell by cell."""
-    JUMPS = "jumps"
-    """A* from jump point to jump point; for uniform costs only."""
-    CELLS = "cells"
-    """A* from cell to cell."""
-    DIJKSTRA = "dijkstra"
-    """From cell to cell without an estimate of what is left."""
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class GridPath:
-    """A path over cells.
-
-    Attributes
-    ----------
-    cells
-        (N, 2) row, column from start to goal: every cell stepped on, or the bends of an any-angle path.
-    length_cells
-        Sum of the straight lines between the cells' centres, a cell's side being 1.
-    cost
-        The same, every step times the mean of both cells' cost factors; equal to the length without any.
-    expansions
-        Cells whose successors were looked at.
-    looked_at
-        (M,) flat indices, row by row, of the cells that were queued, some of them again; empty unless asked
-        for.
-    """
-
-    cells: IntArray
-    length_cells: float
-    cost: float
-    expansions: int
-    looked_at: IntArray = field(default_factory=lambda: np.zeros(0, np.int64))
 
 
 class GridSpace:
@@ -219,8 +179,8 @@ class GridSpace:
         table = self._table(cut_corners)
         if search == Search.JUMPS:
             if self._bits is None:
-                by_row = grid_jump.packed(self._states.reshape(-1, self._stride))
-                self._bits = by_row, grid_jump.transposed(by_row, self._stride)
+                by_row = grid_bits.packed(self._states.reshape(-1, self._stride))
+                self._bits = by_row, grid_bits.transposed(by_row, self._stride)
             scale = scale._replace(shift=scale.shift + grid_jump.WIDER_SHIFT)
             status, path, expansions, queued = grid_jump.jump_search(
                 *self._bits, self._states, gain, self._stride, start, goal, scale, table, cut_corners
@@ -256,11 +216,12 @@ class GridSpace:
         return self._jumping
 
     def _path(self, indices: IntArray, expansions: int) -> GridPath:
-        cells = np.stack([indices // self._stride - 1, indices % self._stride - 1], axis=1)
-        steps = np.hypot(*np.diff(cells, axis=0).T)
-        length = _exact_sum(steps)
+        rows = indices // self._stride
+        cells = np.column_stack([rows - 1, indices - rows * self._stride - 1])
+        length = _length(cells)
         if self._factors is None:
             return GridPath(cells, length, length, expansions)
+        steps = np.hypot(*np.diff(cells, axis=0).T)
         factors = self._factors[cells[:, 0], cells[:, 1]]
         return GridPath(cells, length, _exact_sum(steps * (factors[:-1] + factors[1:]) / 2.0), expansions)
 
@@ -274,6 +235,16 @@ class GridSpace:
 
     def _index(self, cell: Cell) -> int:
         return (int(cell[0]) + 1) * self._stride + int(cell[1]) + 1
+
+
+def _length(cells: IntArray) -> float:
+    """Length of the lines from cell to cell; single steps are counted rather than summed."""
+    steps = cells[1:] - cells[:-1]
+    squares = steps[:, 0] * steps[:, 0] + steps[:, 1] * steps[:, 1]
+    if len(squares) and squares.max() > 2:
+        return _exact_sum(np.sqrt(squares))
+    diagonal = int(squares.sum()) - len(squares)
+    return len(squares) - diagonal + diagonal * math.sqrt(2.0)
 
 
 def _exact_sum(values: FloatArray) -> float:

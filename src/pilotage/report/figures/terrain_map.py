@@ -1,0 +1,175 @@
+"""The way over the ground and over the hazards, and what the search looked at."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patheffects import Normal, Stroke
+from matplotlib.transforms import Affine2D
+from numpy.typing import NDArray
+
+from pilotage.core.types import FloatArray
+from pilotage.report import quantities
+from pilotage.report.run_folder import RunData
+from pilotage.report.style import BLUE, GREEN, ORANGE, SKY, VERMILLION, WIDTH_PT, Illustration, Key, render
+from pilotage.report.terrain_pictures import Picture, TerrainPictures, read_pictures
+
+_LEFT_PT, _RIGHT_PT, _TOP_PT, _BOTTOM_PT = 44.0, 8.0, 8.0, 32.0
+_MOST_HEIGHT_PT = 900.0
+_NOTHING = "The run left no picture of its ground."
+
+Rgb = NDArray[np.uint8]
+
+
+def terrain_map_figure(run: RunData) -> Illustration:
+    """Draw the way over the shaded ground, hazards tinted."""
+    slug, title = "terrain", "The way over the ground"
+    pictures = read_pictures(run.run_dir)
+    if pictures is None:
+        return Illustration(slug, title, "", _NOTHING)
+    if pictures.ground is None:
+        return Illustration(slug, title, "", "The ground was given as hazards only; see below.")
+    figure, axes = _ground_axes(pictures)
+    _show(axes, pictures, _tinted(pictures.ground, pictures.hazards, ORANGE, 0.45))
+    _way(axes, run, pictures, SKY)
+    limit = pictures.slope_limit_deg
+    steep = f"steeper than {limit:g}°" if math.isfinite(limit) else "hazards"
+    alt = "Shaded map of the ground with the planned way"
+    keys = (Key("planned way", SKY), Key(steep, ORANGE, "band"))
+    caption = f"The ground lit from the north-west, what is {steep} tinted. {_told(run)}"
+    return Illustration(slug, title, alt, caption, render(figure, slug, alt), keys)
+
+
+def hazard_map_figure(run: RunData) -> Illustration:
+    """Draw the way over the hazards, white on black as obstacle maps are."""
+    slug, title = "hazards", "The way between the hazards"
+    pictures = read_pictures(run.run_dir)
+    if pictures is None:
+        return Illustration(slug, title, "", _NOTHING)
+    figure, axes = _ground_axes(pictures)
+    _show(axes, pictures, np.repeat(pictures.hazards[..., None], 3, axis=2))
+    _way(axes, run, pictures)
+    alt = "Map of the hazards, white, with the planned way"
+    share = quantities.share(float(pictures.hazards.mean()) / 255.0)
+    caption = f"Hazards are white, as in the obstacle map of the report; they cover {share} of the map."
+    return Illustration(
+        slug, title, alt, caption, render(figure, slug, alt), (Key("planned way", VERMILLION),)
+    )
+
+
+def looked_at_figure(run: RunData) -> Illustration:
+    """Draw where the search went."""
+    slug, title = "looked-at", "What the search looked at"
+    pictures = read_pictures(run.run_dir)
+    if pictures is None or pictures.looked_at is None:
+        return Illustration(slug, title, "", "The planner does not tell what it looked at.")
+    figure, axes = _ground_axes(pictures)
+    grey = (255 - (pictures.hazards.astype(np.uint16) * 90) // 255).astype(np.uint8)
+    _show(axes, pictures, _tinted(grey, _spread(pictures.looked_at), BLUE, 1.0))
+    _way(axes, run, pictures)
+    expansions = quantities.count(float(run.metrics.get("expansions") or 0))
+    alt = "Map of the cells that the search queued"
+    caption = (
+        f"Cells that the search put into its queue, blue; hazards grey. It opened {expansions} cells. A "
+        "search by jump points passes over all between them unqueued, so that only corners and turns show."
+    )
+    keys = (Key("planned way", VERMILLION), Key("queued", BLUE, "band"))
+    return Illustration(slug, title, alt, caption, render(figure, slug, alt), keys)
+
+
+def _told(run: RunData) -> str:
+    """Length and effort in a sentence."""
+    planned = run.metrics.get("planned_length_m")
+    if not isinstance(planned, float):
+        return "No way was found."
+    nodes = quantities.count(float(run.metrics.get("path_nodes") or 0))
+    return f"The way is {quantities.length(planned)} long and has {nodes} nodes."
+
+
+def _ground_axes(pictures: TerrainPictures) -> tuple[Figure, Axes]:
+    """Axes to scale around the whole map, in kilometres where it is large."""
+    corners = _corners(pictures)
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    width = WIDTH_PT - _LEFT_PT - _RIGHT_PT
+    height = min(_MOST_HEIGHT_PT, width * (high[1] - low[1]) / (high[0] - low[0]))
+    total = height + _TOP_PT + _BOTTOM_PT
+    figure = Figure(figsize=(WIDTH_PT / 72.0, total / 72.0))
+    axes = figure.add_axes((_LEFT_PT / WIDTH_PT, _BOTTOM_PT / total, width / WIDTH_PT, height / total))
+    axes.set_aspect("equal")
+    axes.set_xlim(low[0], high[0])
+    axes.set_ylim(low[1], high[1])
+    axes.grid(visible=False)
+    unit = _unit(pictures)
+    axes.set_xlabel(f"x [{'km' if unit > 1.0 else 'm'}]", labelpad=2.0)
+    axes.set_ylabel(f"y [{'km' if unit > 1.0 else 'm'}]", labelpad=2.0)
+    return figure, axes
+
+
+def _unit(pictures: TerrainPictures) -> float:
+    """Metres of the axes' unit."""
+    return 1000.0 if pictures.size_m.max() >= 5000.0 else 1.0
+
+
+def _corners(pictures: TerrainPictures) -> FloatArray:
+    width, height = pictures.size_m
+    own = np.array([[0.0, 0.0], [width, 0.0], [width, height], [0.0, height]])
+    return np.asarray(_to_map(pictures).transform(own))
+
+
+def _to_map(pictures: TerrainPictures) -> Affine2D:
+    x, y, turned = pictures.origin
+    unit = _unit(pictures)
+    return Affine2D().rotate(turned).translate(x, y).scale(1.0 / unit)
+
+
+def _show(axes: Axes, pictures: TerrainPictures, rgb: Rgb) -> None:
+    width, height = pictures.size_m
+    limits = axes.get_xlim(), axes.get_ylim()
+    axes.imshow(
+        rgb,
+        extent=(0.0, width, 0.0, height),
+        # Without resampling the picture goes into the page as it is.
+        interpolation="none",
+        transform=_to_map(pictures) + axes.transData,
+        zorder=0.1,
+    )
+    axes.set_xlim(limits[0])
+    axes.set_ylim(limits[1])
+
+
+def _way(axes: Axes, run: RunData, pictures: TerrainPictures, colour: str = VERMILLION) -> None:
+    unit = _unit(pictures)
+    dark = [Stroke(linewidth=3.4, foreground="#12212f"), Normal()]
+    points = np.column_stack([run.trace["path_x_m"], run.trace["path_y_m"]]) / unit
+    if len(points) > 1:
+        axes.plot(*points.T, color=colour, linewidth=1.8, path_effects=dark, zorder=5)
+    for name, place, dot in (("start", pictures.start, GREEN), ("goal", pictures.goal, VERMILLION)):
+        x, y = place / unit
+        axes.plot([x], [y], "o", color=dot, markersize=8.0, markeredgecolor="white", zorder=6)
+        axes.annotate(
+            name,
+            (x, y),
+            xytext=(0.0, 9.0),
+            textcoords="offset points",
+            ha="center",
+            color="white",
+            fontsize=9.5,
+            fontweight="bold",
+            path_effects=[Stroke(linewidth=2.6, foreground="#12212f"), Normal()],
+            zorder=7,
+        )
+
+
+def _tinted(grey: Picture, share: Picture, colour: str, strength: float) -> Rgb:
+    """A grey picture mixed with a colour by the share of marked cells."""
+    tint = np.array([int(colour[i : i + 2], 16) for i in (1, 3, 5)], dtype=np.float32)
+    part = share.astype(np.float32)[..., None] * np.float32(strength / 255.0)
+    return np.asarray(grey[..., None] * (1.0 - part) + tint * part, dtype=np.uint8)
+
+
+def _spread(share: Picture) -> Picture:
+    """Make single queued cells visible: one of sixteen in a block is shown in full."""
+    return np.asarray(np.minimum(255, share.astype(np.uint16) * 16), dtype=np.uint8)

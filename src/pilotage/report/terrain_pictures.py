@@ -1,0 +1,88 @@
+"""Reads the small pictures of ground and hazards that a run on terrain leaves in its folder."""
+
+from __future__ import annotations
+
+import zipfile
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pilotage.core.errors import InputError
+from pilotage.core.types import FloatArray
+
+PICTURES_FILE = "terrain.npz"
+
+Picture = NDArray[np.uint8]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TerrainPictures:
+    """What is there of them.
+
+    Attributes
+    ----------
+    ground
+        (rows, columns) grey, lit from one side; None where nothing is known but hazards.
+    hazards, looked_at
+        Shares of blocked cells and of cells that the search queued, 0 to 255; the latter None where it
+        was not told.
+    size_m, origin
+        Width and height, and the pose of the lower left corner.
+    start, goal
+        Where they were asked for.
+    slope_limit_deg
+        NaN where hazards were given as such.
+    """
+
+    ground: Picture | None
+    hazards: Picture
+    looked_at: Picture | None
+    size_m: FloatArray
+    origin: FloatArray
+    start: FloatArray
+    goal: FloatArray
+    slope_limit_deg: float
+
+
+def read_pictures(run_dir: Path) -> TerrainPictures | None:
+    """The pictures in a run folder, None where it has none.
+
+    Raises
+    ------
+    InputError
+        Where the file is broken.
+    """
+    path = run_dir / PICTURES_FILE
+    if not path.is_file():
+        return None
+    try:
+        with np.load(path, allow_pickle=False) as archive:
+            arrays = {name: archive[name] for name in archive.files}
+        return TerrainPictures(
+            _picture(arrays.get("ground")),
+            _must(_picture(arrays["hazards"])),
+            _picture(arrays.get("looked_at")),
+            np.asarray(arrays["size_m"], dtype=np.float64),
+            np.asarray(arrays["origin"], dtype=np.float64),
+            np.asarray(arrays["start"], dtype=np.float64),
+            np.asarray(arrays["goal"], dtype=np.float64),
+            float(arrays["slope_limit_deg"]),
+        )
+    except (OSError, ValueError, EOFError, KeyError, TypeError, zipfile.BadZipFile) as error:
+        raise InputError(f"{path}: cannot be read, {error}; run the mission again") from None
+
+
+def _picture(array: NDArray[np.generic] | None) -> Picture | None:
+    if array is None:
+        return None
+    if array.ndim != 2 or array.size == 0:
+        raise ValueError(f"expected a picture, found shape {array.shape}")
+    return np.asarray(array, dtype=np.uint8)
+
+
+def _must(picture: Picture | None) -> Picture:
+    if picture is None:
+        raise ValueError("expected hazards")
+    return picture
