@@ -8,10 +8,12 @@ from pilotage.core.registry import Registry
 from pilotage.sensors.sensor import SENSORS
 from pilotage.stack.control.controller import CONTROLLERS
 from pilotage.stack.control.escape import ESCAPES
+from pilotage.stack.control.polar_pose import POSE_CONTROLLERS
 from pilotage.stack.control.reactive import REACTIVES
 from pilotage.stack.exploration.explorer import EXPLORERS
 from pilotage.stack.localization.heading_filters import HEADING_FILTERS
 from pilotage.stack.localization.localizer import LOCALIZERS
+from pilotage.stack.localization.rover_estimators import ESTIMATORS
 from pilotage.stack.mapping.mapper import MAPPERS
 from pilotage.stack.navigator.navigator import NAVIGATORS
 from pilotage.stack.planning.local_planner import LOCAL_PLANNERS
@@ -30,5 +32,7 @@ REGISTRIES: dict[str, Registry[Any]] = {
     "mapper": MAPPERS,
     "escape": ESCAPES,
     "explorer": EXPLORERS,
+    "estimator": ESTIMATORS,
+    "pose_controller": POSE_CONTROLLERS,
 }
 """Roles by their key under ``stack`` (sensors: under ``robot.sensors``)."""

@@ -9,7 +9,7 @@ from pydantic import Field
 
 from pilotage.core.config import Config
 from pilotage.maps.map_file import MapFile
-from pilotage.missions.mission import ComponentChoice, Mission, Point, PoseConfig
+from pilotage.missions.mission import ComponentChoice, InitialConfig, Mission, Point, PoseConfig
 from pilotage.sensors.sensor import NonNegative, Positive
 
 
@@ -114,16 +114,6 @@ class RobotConfig(Config):
     body: BodyConfig = BodyConfig()
     motion: MotionConfig = MotionConfig()
     sensors: dict[str, ComponentChoice]
-
-
-class InitialConfig(Config):
-    """What the robot believes at the start: the start pose with an error drawn from this covariance."""
-
-    x_var_m2: NonNegative = 0.01
-    y_var_m2: NonNegative = 0.01
-    theta_var_rad2: NonNegative = 0.01
-    known: bool = True
-    """False: the robot is told nothing, and the variances do not count."""
 
 
 class StackConfig(Config):

@@ -47,6 +47,16 @@ class PoseConfig(Config):
     theta_rad: float = Field(default=0.0, ge=-2 * math.pi, le=2 * math.pi)
 
 
+class InitialConfig(Config):
+    """What the robot believes at the start: the start pose with an error drawn from this covariance."""
+
+    x_var_m2: NonNegative = 0.01
+    y_var_m2: NonNegative = 0.01
+    theta_var_rad2: NonNegative = 0.01
+    known: bool = True
+    """False: the robot is told nothing, and the variances do not count."""
+
+
 class RunConfig(Config):
     """Time step, time limit and seed."""
 

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from typing import Annotated, Literal
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from pilotage.core.config import Config
 from pilotage.maps.crater_terrain import CraterTerrainConfig
-from pilotage.missions.mission import ComponentChoice, Mission, PoseConfig
+from pilotage.maps.map_file import LandmarkEntry
+from pilotage.missions.mission import ComponentChoice, InitialConfig, Mission, PoseConfig
 from pilotage.sensors.sensor import NonNegative, Positive
 
 Origin = tuple[float, float, float]
@@ -59,27 +61,33 @@ GroundChoice = Annotated[
 ]
 
 
-class PointConfig(Config):
-    """A place to go to."""
+class PlaceConfig(Config):
+    """A place to go to, and for a drive to a pose the heading there."""
 
     x_m: float
     y_m: float
+    theta_rad: float | None = Field(default=None, ge=-2 * math.pi, le=2 * math.pi)
+    tolerance_m: Positive = 0.001
+    """A drive to a pose ends at the first sample this near."""
 
 
 class TerrainWorld(Config):
-    """Ground, start and goal."""
+    """Ground, start and goal; landmarks in a table take the place of those that the ground has."""
 
     kind: Literal["terrain"]
     ground: GroundChoice
     start: PoseConfig
-    goal: PointConfig
+    goal: PlaceConfig
+    landmarks: str | tuple[LandmarkEntry, ...] | None = None
+    """The table itself, or a CSV file with the columns id, x_m, y_m."""
 
 
 class RoverConfig(Config):
-    """The rover: how fast it drives, and its wheelbase."""
+    """The rover: how fast it drives, its wheelbase, its odometer and landmark sensor."""
 
     speed_m_s: Positive = 0.04
     wheelbase_m: Positive = 3.0
+    sensors: dict[str, ComponentChoice] = Field(default_factory=dict)
 
 
 class CostMapConfig(Config):
@@ -94,11 +102,35 @@ class CostMapConfig(Config):
     slope_that_doubles_deg: float | None = Field(None, gt=0.0, lt=90.0)
 
 
-class TerrainStack(Config):
-    """What would run on the rover."""
+class SplineConfig(Config):
+    """The curve along a planned path (section 5 of the rover report)."""
 
-    planner: ComponentChoice
+    samples: int = Field(default=10_000, ge=2, le=10_000_000)
+    clear: bool = True
+    """Whether knots are added until the curve keeps clear of hazards; the report's curve is not checked."""
+
+
+class TerrainStack(Config):
+    """What would run on the rover: a planner or a pose controller finds the way, an estimator follows it."""
+
+    planner: ComponentChoice | None = None
     cost_map: CostMapConfig = CostMapConfig()
+    spline: SplineConfig | None = None
+    pose_controller: ComponentChoice | None = None
+    estimator: ComponentChoice | None = None
+    initial: InitialConfig = InitialConfig(
+        x_var_m2=36.0, y_var_m2=36.0, theta_var_rad2=math.radians(1.0) ** 2
+    )
+    ellipse_probability: float = Field(default=0.95, gt=0.0, lt=1.0)
+    """Of the ellipses drawn and counted."""
+
+    @model_validator(mode="after")
+    def _one_way(self) -> TerrainStack:
+        if (self.planner is None) == (self.pose_controller is None):
+            raise ValueError("expected either a planner or a pose_controller, found both or neither")
+        if self.estimator is not None and self.planner is not None and self.spline is None:
+            raise ValueError("expected a spline: an estimator needs a path with headings, cells have none")
+        return self
 
 
 class TerrainMission(Mission):

@@ -4,34 +4,32 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from pilotage.core.types import Event, FloatArray
+from pilotage.core.random import RandomStreams
+from pilotage.core.types import Event, Pose2
 from pilotage.experiments.progress import OnProgress
+from pilotage.experiments.terrain.estimation import estimate
 from pilotage.experiments.terrain.ground import Ground, load_ground, shares
+from pilotage.experiments.terrain.motion import Motion, along_route, drive_to_pose
+from pilotage.experiments.terrain.record import TerrainRecord, estimation_trace, motion_metrics, motion_trace
 from pilotage.experiments.terrain.route import Route, ask, cost_map, planner_of, route_metrics, trace_of
+from pilotage.maps.landmarks import Landmarks
 from pilotage.missions.mission import Mission
 from pilotage.missions.terrain import TerrainMission
+from pilotage.sensors.beacon import BeaconConfig
+from pilotage.sensors.wheel_odometry import WheelOdometryConfig
+from pilotage.sim.rover_sensing import landmark_log
+from pilotage.stack.interface import Belief
+from pilotage.stack.localization.rover_estimators import ESTIMATORS
 from pilotage.stack.planning.grid_planner import GridRequest
 from pilotage.stack.planning.grid_space import GridSpace
 
 PICTURE_COLUMNS = 1125
 """Ground and hazards are kept for the report no wider and no higher than this."""
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class TerrainRecord:
-    """A finished run in memory; see ``pilotage.experiments.kinds.Record``."""
-
-    mission: TerrainMission
-    ground: Ground
-    route: Route
-    trace: Mapping[str, FloatArray]
-    events: list[Event]
 
 
 class TerrainKind:
@@ -42,6 +40,11 @@ class TerrainKind:
     def warm_up(self, mission: Mission) -> None:
         """Answer a small query with the mission's own planner, so that its times are not a compiler's."""
         assert isinstance(mission, TerrainMission)
+        if mission.stack.planner is None:
+            _warm_up_estimator()
+            return
+        if mission.stack.estimator is not None:
+            _warm_up_estimator()
         weighted = mission.stack.cost_map.slope_that_doubles_deg is not None
         side = 24
         blocked = np.zeros((side, side), dtype=np.bool_)
@@ -53,13 +56,21 @@ class TerrainKind:
         """Load the ground and plan on it."""
         assert isinstance(mission, TerrainMission)
         ground = load_ground(mission.world.ground)
+        route, events = _plan(mission, ground)
         began = time.perf_counter()
-        space = cost_map(ground, mission.stack.cost_map)
-        route = ask(mission, ground, space, time.perf_counter() - began)
-        trace = trace_of(route, ground, mission.robot.speed_m_s)
-        found = route.result.path is not None
-        events = [Event(0.0, "plan" if found else "failed", route.result.reason)]
-        return TerrainRecord(mission, ground, route, trace, events)
+        motion = _move(mission, ground, route)
+        if motion is None:
+            assert route is not None
+            trace = trace_of(route, ground, mission.robot.speed_m_s)
+            return TerrainRecord(mission, ground, route, None, None, trace, events, 1.0)
+        way = motion_trace(motion, ground)
+        events.append(Event(float(motion.t_s[-1]), "arrived" if motion.done else "failed", motion.reason))
+        estimation = None
+        if mission.stack.estimator is not None and len(motion.t_s) > 1:
+            estimation = estimate(mission, ground, motion.poses)
+            way |= estimation_trace(estimation, motion, mission.stack.ellipse_probability)
+        loop_s = max(time.perf_counter() - began, 1e-9)
+        return TerrainRecord(mission, ground, route, motion, estimation, way, events, loop_s)
 
     def oracles(self, mission: Mission) -> Mapping[str, str]:  # noqa: ARG002
         """None: a planner on a known map has nothing that the truth could tell it."""
@@ -67,7 +78,11 @@ class TerrainKind:
 
     def metrics(self, record: TerrainRecord) -> dict[str, object]:
         """Length, cost and effort of the plan, and the ground along it."""
-        return route_metrics(record.route, record.ground, record.mission, record.trace)
+        planned: dict[str, object] = {}
+        if record.route is not None:
+            along = trace_of(record.route, record.ground, record.mission.robot.speed_m_s)
+            planned = route_metrics(record.route, record.ground, record.mission, along)
+        return planned if record.motion is None else planned | motion_metrics(record)
 
     def write_files(self, record: TerrainRecord, folder: Path) -> None:
         """``terrain.npz``: small pictures of ground, hazards and what the search looked at."""
@@ -76,7 +91,7 @@ class TerrainKind:
         pictures: dict[str, Any] = {"hazards": hazards}
         if seen is not None:
             pictures["ground"] = seen
-        path = record.route.result.path
+        path = None if record.route is None else record.route.result.path
         if path is not None and len(path.looked_at):
             looked_at = np.zeros(grid.rows * grid.columns, dtype=np.bool_)
             looked_at[path.looked_at] = True
@@ -90,6 +105,10 @@ class TerrainKind:
             "goal": np.array([world.goal.x_m, world.goal.y_m]),
             "slope_limit_deg": np.array(np.nan if limit is None else limit),
         }
+        if record.route is not None:
+            places["route"] = record.route.path_xy_m
+        if record.estimation is not None:
+            places["landmarks"] = record.estimation.landmarks.points_xy_m
         np.savez_compressed(folder / "terrain.npz", allow_pickle=False, **pictures, **places)
 
     def inline(self, record: TerrainRecord, values: dict[str, Any]) -> None:  # noqa: ARG002
@@ -98,6 +117,36 @@ class TerrainKind:
         for key in ("file", "obstacles", "environment", "landmarks"):
             if isinstance(ground.get(key), str):
                 ground[key] = str(Path(ground[key]).absolute())
+
+
+def _plan(mission: TerrainMission, ground: Ground) -> tuple[Route | None, list[Event]]:
+    """The planned path, where the mission has a planner, and what to tell of it."""
+    if mission.stack.planner is None:
+        return None, []
+    began = time.perf_counter()
+    space = cost_map(ground, mission.stack.cost_map)
+    route = ask(mission, ground, space, time.perf_counter() - began)
+    found = route.result.path is not None
+    return route, [Event(0.0, "plan" if found else "failed", route.result.reason)]
+
+
+def _move(mission: TerrainMission, ground: Ground, route: Route | None) -> Motion | None:
+    """The true way; None where the mission only plans."""
+    if route is None:
+        return drive_to_pose(mission, ground)
+    spline = mission.stack.spline
+    return None if spline is None else along_route(mission, spline, route, ground)
+
+
+def _warm_up_estimator() -> None:
+    """Run the estimators over a log of two steps."""
+    truth = np.array([[0.0, 0.0, 0.0], [0.4, 0.0, 0.0], [0.8, 0.0, 0.0]])
+    marks = Landmarks(np.array([0]), np.array([[5.0, 5.0]]))
+    seer = ("seer", BeaconConfig(field_of_view_rad=6.28, max_range_m=100.0))
+    log = landmark_log(truth, ("odometer", WheelOdometryConfig()), seer, marks, RandomStreams(0))
+    initial = Belief(Pose2(0.0, 0.0, 0.0), np.eye(3))
+    for entry in ESTIMATORS:
+        entry.factory(entry.config()).estimate(initial, log, marks, seer[1])
 
 
 TERRAIN = TerrainKind()

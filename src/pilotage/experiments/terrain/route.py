@@ -48,6 +48,7 @@ class Route:
 def planner_of(mission: TerrainMission) -> GridPlanner:
     """The mission's planner; InputError where it is none on grids or a parameter is wrong."""
     choice = mission.stack.planner
+    assert choice is not None, "a mission that plans has a planner"
     config = GRID_PLANNERS.configure(choice.name, choice.parameters, "stack.planner")
     return GRID_PLANNERS.entry(choice.name).factory(config)
 
@@ -125,7 +126,7 @@ def route_metrics(
         "seed": mission.run.seed,
         "success": result.path is not None,
         "reason": f"{result.status}: {result.reason}",
-        "planner": mission.stack.planner.name,
+        "planner": None if mission.stack.planner is None else mission.stack.planner.name,
         "rows": grid.rows,
         "columns": grid.columns,
         "resolution_m": grid.resolution_m,

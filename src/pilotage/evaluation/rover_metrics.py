@@ -1,0 +1,101 @@
+"""How well a rover's estimated path and its covariance agree with the true one."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from pilotage.core.angles import wrap_array_to_pi
+from pilotage.core.chi_square import chi_square_quantile, gated_mean
+from pilotage.core.types import BoolArray, FloatArray, IntArray
+from pilotage.evaluation.consistency import correlated_mean, nees
+
+STRETCH_M = 1000.0
+"""A way of this length without a landmark is a stretch to get over."""
+
+
+def in_ellipse(truth: FloatArray, poses: FloatArray, covs: FloatArray, probability: float) -> BoolArray:
+    """(T,) whether the true position is inside the position's ellipse at each step."""
+    error = truth[:, :2] - poses[:, :2]
+    xx, xy, yy = covs[:, 0, 0], covs[:, 0, 1], covs[:, 1, 1]
+    determinant = xx * yy - xy * xy
+    squared = (
+        yy * error[:, 0] ** 2 - 2.0 * xy * error[:, 0] * error[:, 1] + xx * error[:, 1] ** 2
+    ) / determinant
+    return np.asarray(squared <= chi_square_quantile(probability, 2))
+
+
+def stretches_without(seen: IntArray, step_m: FloatArray) -> list[tuple[int, int]]:
+    """Ways of more than ``STRETCH_M`` without a sighting: (first, last) step of each."""
+    blind = np.concatenate([[False], seen == 0, [False]])
+    edges = np.flatnonzero(np.diff(blind.astype(np.int8)))
+    way = np.concatenate([[0.0], np.cumsum(step_m)])
+    pairs = zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True)
+    return [(a, b - 1) for a, b in pairs if way[b] - way[a] > STRETCH_M]
+
+
+def estimation_metrics(
+    truth: FloatArray,
+    poses: FloatArray,
+    covs: FloatArray,
+    probability: float,
+    seen: IntArray,
+    nis: FloatArray,
+    outcome: IntArray,
+    gate: float,
+) -> dict[str, object]:
+    """Errors and consistency of a path of T steps.
+
+    Parameters
+    ----------
+    truth, poses, covs
+        (T, 3), (T, 3) and (T, 3, 3) after each step.
+    seen
+        (T,) sightings of each step.
+    nis, outcome
+        (S,) of the sightings; accepted where the outcome is 1.
+    """
+    error = poses - truth
+    distance = np.hypot(error[:, 0], error[:, 1])
+    heading = wrap_array_to_pi(error[:, 2])
+    step_m = np.concatenate([[0.0], np.hypot(*np.diff(truth[:, :2], axis=0).T)])
+    band = correlated_mean(nees(truth.copy(), poses, covs))
+    metrics: dict[str, object] = {
+        "position_rmse_m": float(np.sqrt(np.mean(distance**2))),
+        "position_max_m": float(distance.max()),
+        "heading_rmse_rad": float(np.sqrt(np.mean(heading**2))),
+        "final_error": {
+            "x_m": float(error[-1, 0]),
+            "y_m": float(error[-1, 1]),
+            "theta_rad": float(heading[-1]),
+        },
+        "final_position_error_m": float(distance[-1]),
+        "ellipse_coverage": float(in_ellipse(truth, poses, covs, probability).mean()),
+        "nees_mean": band.mean,
+        "nees_low": band.low,
+        "nees_high": band.high,
+        "blind_stretches": len(stretches_without(seen, step_m)),
+    }
+    accepted = outcome == 1
+    if accepted.any():
+        # Per degree of freedom, corrected for what the gate cuts off.
+        ratio = nis[accepted] / gated_mean(chi_square_quantile(gate, 2), 2)
+        nis_band = correlated_mean(ratio)
+        metrics |= {"nis_mean": nis_band.mean, "nis_low": nis_band.low, "nis_high": nis_band.high}
+        metrics["accepted_fraction"] = float(accepted.sum() / (outcome >= 0).sum())
+        metrics["sightings"] = len(outcome)
+    return metrics
+
+
+def root_determinant(covs: FloatArray) -> FloatArray:
+    """(T,) square root of the determinant of the position's covariance, in m^2."""
+    return np.sqrt(np.maximum(covs[:, 0, 0] * covs[:, 1, 1] - covs[:, 0, 1] ** 2, 0.0))
+
+
+def ellipse_axes(covs: FloatArray, probability: float) -> FloatArray:
+    """(T, 3) half axes and the major one's direction, of position ellipses."""
+    values, vectors = np.linalg.eigh(covs[:, :2, :2])
+    scale = math.sqrt(chi_square_quantile(probability, 2))
+    axes = scale * np.sqrt(np.maximum(values, 0.0))
+    return np.column_stack([axes[:, 1], axes[:, 0], np.arctan2(vectors[:, 1, 1], vectors[:, 0, 1])])

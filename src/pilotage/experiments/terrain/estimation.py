@@ -1,0 +1,143 @@
+"""Logging a true way and estimating it from the log."""
+
+from __future__ import annotations
+
+import csv
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TypeVar
+
+import numpy as np
+
+from pilotage.core.angles import wrap_to_pi
+from pilotage.core.errors import InputError
+from pilotage.core.random import RandomStreams
+from pilotage.core.types import FloatArray, IntArray, Pose2
+from pilotage.experiments.components import build_component
+from pilotage.experiments.terrain.ground import Ground
+from pilotage.maps.landmarks import Landmarks
+from pilotage.missions.terrain import TerrainMission
+from pilotage.sensors.beacon import BeaconConfig
+from pilotage.sensors.landmark_log import LandmarkLog
+from pilotage.sensors.sensor import SENSORS, SensorConfig
+from pilotage.sensors.wheel_odometry import WheelOdometryConfig
+from pilotage.sim.rover_sensing import landmark_log
+from pilotage.stack.interface import Belief
+from pilotage.stack.localization.rover_estimators import ESTIMATORS, LogEstimate
+
+S = TypeVar("S", bound=SensorConfig)
+NO_LANDMARKS = Landmarks(np.zeros(0, dtype=np.int64), np.zeros((0, 2)))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Estimation:
+    """What the estimator was given and what it said."""
+
+    log: LandmarkLog
+    landmarks: Landmarks
+    initial: Belief
+    estimate: LogEstimate
+
+
+def estimate(mission: TerrainMission, ground: Ground, truth: FloatArray) -> Estimation:
+    """Log the drive along (N, 3) true poses and estimate it.
+
+    Raises
+    ------
+    InputError
+        Where the robot lacks the odometer, or a table of landmarks cannot be used.
+    """
+    choice = mission.stack.estimator
+    assert choice is not None
+    sensors = _sensors(mission)
+    odometer = _one(sensors, WheelOdometryConfig)
+    if odometer is None:
+        raise InputError("robot.sensors: expected one wheel-odometry for the estimator, found none")
+    seer = _one(sensors, BeaconConfig)
+    landmarks = landmarks_of(mission, ground)
+    streams = RandomStreams(mission.run.seed)
+    log = landmark_log(truth, odometer, seer, landmarks, streams)
+    initial = _initial(mission, truth[0], streams)
+    estimator = build_component(ESTIMATORS, choice, "estimator")
+    return Estimation(
+        log,
+        landmarks,
+        initial,
+        estimator.estimate(initial, log, landmarks, None if seer is None else seer[1]),
+    )
+
+
+def landmarks_of(mission: TerrainMission, ground: Ground) -> Landmarks:
+    """The mission's table of landmarks, else those of the ground, else none."""
+    table = mission.world.landmarks
+    if isinstance(table, str):
+        return read_landmark_table(Path(table))
+    if table is not None:
+        ids = np.array([entry.id for entry in table], dtype=np.int64)
+        return Landmarks(ids, np.array([(entry.x_m, entry.y_m) for entry in table]).reshape(-1, 2))
+    return NO_LANDMARKS if ground.landmarks is None else ground.landmarks
+
+
+def read_landmark_table(path: Path) -> Landmarks:
+    """Read a CSV file with the columns id, x_m, y_m.
+
+    Raises
+    ------
+    InputError
+        File and line of what is wrong.
+    """
+    try:
+        lines = path.read_text(encoding="utf-8-sig").splitlines()
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"landmarks '{path}': expected a CSV file, found: {error}") from None
+    rows = csv.DictReader(lines)
+    missing = [name for name in ("id", "x_m", "y_m") if name not in (rows.fieldnames or ())]
+    if missing:
+        raise InputError(f"{path} line 1: expected the columns id, x_m, y_m, found no {missing[0]}")
+    entries = []
+    for row in rows:
+        try:
+            entry = int(row["id"]), float(row["x_m"]), float(row["y_m"])
+        except (TypeError, ValueError):
+            raise InputError(f"{path} line {rows.line_num}: expected a whole id and two numbers") from None
+        if not (math.isfinite(entry[1]) and math.isfinite(entry[2])):
+            raise InputError(f"{path} line {rows.line_num}: expected finite numbers")
+        entries.append(entry)
+    table = np.array(entries).reshape(-1, 3)
+    return Landmarks(table[:, 0].astype(np.int64), table[:, 1:])
+
+
+def seen_per_step(log: LandmarkLog) -> IntArray:
+    """(T,) sightings of each step."""
+    return np.diff(log.first)
+
+
+def _sensors(mission: TerrainMission) -> dict[str, SensorConfig]:
+    sensors: dict[str, SensorConfig] = {}
+    for name, choice in mission.robot.sensors.items():
+        config = SENSORS.configure(choice.name, choice.parameters, f"robot.sensors.{name}")
+        if not isinstance(config, WheelOdometryConfig | BeaconConfig):
+            raise InputError(
+                f"robot.sensors.{name}: a rover carries wheel-odometry and beacons, found {choice.name}"
+            )
+        sensors[name] = config
+    return sensors
+
+
+def _one(sensors: Mapping[str, SensorConfig], kind: type[S]) -> tuple[str, S] | None:
+    found = [(name, config) for name, config in sensors.items() if isinstance(config, kind)]
+    if len(found) > 1:
+        raise InputError(
+            f"robot.sensors: expected one {kind.__name__.removesuffix('Config')}, found {len(found)}"
+        )
+    return found[0] if found else None
+
+
+def _initial(mission: TerrainMission, true_start: FloatArray, streams: RandomStreams) -> Belief:
+    """The true start with an error drawn from the initial covariance."""
+    initial = mission.stack.initial
+    variances = np.array([initial.x_var_m2, initial.y_var_m2, initial.theta_var_rad2])
+    x, y, theta = (true_start + np.sqrt(variances) * streams.stream("initial").standard_normal(3)).tolist()
+    return Belief(Pose2(x, y, wrap_to_pi(theta)), np.diag(variances))
