@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from contract.rover_examples import estimator_estimates, pose_controller_arrives
 from contract.sheet_examples import explorer_explores, sheet_sensor_reads
 from pilotage.core.angles import wrap_to_pi
 from pilotage.core.errors import InputError
@@ -334,6 +335,11 @@ EXAMPLES: dict[tuple[str, str], Example] = {
     ("sensor", "magnetometer"): Example(sheet_sensor_reads),
     ("sensor", "infrared"): Example(sheet_sensor_reads, pure_numbers=frozenset({"range_std_fraction"})),
     ("sensor", "line-sensor"): Example(sheet_sensor_reads),
+    ("estimator", "dead-reckoning"): Example(estimator_estimates, {"covariance": "first-order"}),
+    ("estimator", "ekf-landmarks"): Example(
+        estimator_estimates, {"gate": 0.999}, pure_numbers=frozenset({"gate"})
+    ),
+    ("pose_controller", "polar"): Example(pose_controller_arrives, {"max_steering_rad": 1.2}),
     ("explorer", "random-walk"): Example(explorer_explores),
     ("explorer", "surround-check"): Example(explorer_explores, pure_numbers=frozenset({"far_cells"})),
 }

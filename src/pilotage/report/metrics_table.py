@@ -87,6 +87,8 @@ GROUPS: tuple[tuple[str, tuple[Metric, ...]], ...] = (
                 quantities.length,
                 "Distance from the middle at the end of the narrow corridor.",
             ),
+            Metric("hazard_contacts", "samples on hazards", quantities.count, "Of the way, or off the map."),
+            Metric("goal_error_rad", "heading at the goal off by", quantities.angle, "At the last sample."),
             Metric("collisions", "collisions", quantities.count, "Contacts of the body with anything solid."),
             Metric(
                 "min_clearance_m",
@@ -144,6 +146,25 @@ GROUPS: tuple[tuple[str, tuple[Metric, ...]], ...] = (
                 quantities.angle,
                 "Likewise, of the heading.",
             ),
+            Metric(
+                "final_position_error_m",
+                "error at the end",
+                quantities.length,
+                "Distance of the last estimate from the truth.",
+            ),
+            Metric(
+                "ellipse_coverage",
+                "truth inside its ellipse",
+                quantities.share,
+                "Share of the steps; over many runs it should be the ellipse's probability.",
+            ),
+            Metric(
+                "blind_stretches",
+                "stretches without landmarks",
+                quantities.count,
+                "Ways of more than 1 km on which none was in sight.",
+            ),
+            Metric("sightings", "sightings", quantities.count, "Of landmarks, over the whole way."),
             Metric(
                 "accepted_fraction",
                 "sightings accepted",

@@ -15,7 +15,13 @@ from pilotage.report.figures.control import control_figure
 from pilotage.report.figures.covariance import covariance_figure
 from pilotage.report.figures.map import map_figure
 from pilotage.report.figures.pose_error import pose_error_figure
-from pilotage.report.figures.terrain_map import hazard_map_figure, looked_at_figure, terrain_map_figure
+from pilotage.report.figures.terrain_estimate import drive_figure, rover_error_figure, uncertainty_figure
+from pilotage.report.figures.terrain_map import (
+    close_up_figure,
+    hazard_map_figure,
+    looked_at_figure,
+    terrain_map_figure,
+)
 from pilotage.report.figures.terrain_profile import hazard_distance_figure, terrain_profile_figure
 from pilotage.report.figures.timeline import timeline_figure
 from pilotage.report.figures.ultrasonic import ultrasonic_figure
@@ -55,8 +61,12 @@ FLOOR_FIGURES: tuple[Draw, ...] = (
 )
 TERRAIN_FIGURES: tuple[Draw, ...] = (
     terrain_map_figure,
+    close_up_figure,
     hazard_map_figure,
     looked_at_figure,
+    drive_figure,
+    rover_error_figure,
+    uncertainty_figure,
     terrain_profile_figure,
     hazard_distance_figure,
 )
@@ -85,6 +95,9 @@ def run_page(run: RunData) -> str:
     """Return the report of a run as HTML."""
     with drawing_style():
         figures = [draw(run) for draw in FIGURES.get(run.kind, FLOOR_FIGURES)]
+        if run.kind == "terrain":
+            # Its missions differ in what they do at all: what they do not do is not missing.
+            figures = [figure for figure in figures if figure.svg or figure.slug == "hazards"]
         if run.updates:
             figures.append(updates_figure(run))
     sections: list[str] = [replay_section(SCENES.get(run.kind, floor_scene)(run))]

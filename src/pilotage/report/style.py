@@ -121,8 +121,10 @@ def drawing_style() -> AbstractContextManager[None]:
     return mpl.rc_context(_RC)
 
 
-def stacked_axes(titles: Sequence[str], heights_pt: Sequence[float]) -> tuple[Figure, list[Axes]]:
-    """Return a figure of panels one above the other that share their time axis.
+def stacked_axes(
+    titles: Sequence[str], heights_pt: Sequence[float], *, share_time: bool = True
+) -> tuple[Figure, list[Axes]]:
+    """Return a figure of panels one above the other that share their time axis, or have one each.
 
     Parameters
     ----------
@@ -131,7 +133,8 @@ def stacked_axes(titles: Sequence[str], heights_pt: Sequence[float]) -> tuple[Fi
     heights_pt
         One a panel: the height of its drawing area.
     """
-    total = _TOP_PT + sum(heights_pt) + _GAP_PT * (len(heights_pt) - 1) + _BOTTOM_PT
+    gap = _GAP_PT if share_time else _GAP_PT + _BOTTOM_PT
+    total = _TOP_PT + sum(heights_pt) + gap * (len(heights_pt) - 1) + _BOTTOM_PT
     figure = Figure(figsize=(WIDTH_PT / 72.0, total / 72.0))
     width = (WIDTH_PT - _LEFT_PT - _RIGHT_PT) / WIDTH_PT
     top = total - _TOP_PT
@@ -139,12 +142,12 @@ def stacked_axes(titles: Sequence[str], heights_pt: Sequence[float]) -> tuple[Fi
     for index, (title, height) in enumerate(zip(titles, heights_pt, strict=True)):
         axes = figure.add_axes((_LEFT_PT / WIDTH_PT, (top - height) / total, width, height / total))
         axes.set_title(title)
-        if index < len(titles) - 1:
+        if share_time and index < len(titles) - 1:
             axes.tick_params(axis="x", labelbottom=False, length=0)
         else:
             axes.set_xlabel("time [s]", labelpad=3.0)
         panels.append(axes)
-        top -= height + _GAP_PT
+        top -= height + gap
     return figure, panels
 
 

@@ -34,6 +34,8 @@ class TerrainPictures:
         Where they were asked for.
     slope_limit_deg
         NaN where hazards were given as such.
+    landmarks
+        (M, 2) known points; none where the mission has no estimator.
     """
 
     ground: Picture | None
@@ -44,6 +46,7 @@ class TerrainPictures:
     start: FloatArray
     goal: FloatArray
     slope_limit_deg: float
+    landmarks: FloatArray
 
 
 def read_pictures(run_dir: Path) -> TerrainPictures | None:
@@ -69,6 +72,7 @@ def read_pictures(run_dir: Path) -> TerrainPictures | None:
             np.asarray(arrays["start"], dtype=np.float64),
             np.asarray(arrays["goal"], dtype=np.float64),
             float(arrays["slope_limit_deg"]),
+            np.asarray(arrays.get("landmarks", np.zeros((0, 2))), dtype=np.float64).reshape(-1, 2),
         )
     except (OSError, ValueError, EOFError, KeyError, TypeError, zipfile.BadZipFile) as error:
         raise InputError(f"{path}: cannot be read, {error}; run the mission again") from None

@@ -11,6 +11,7 @@ import numpy as np
 from pilotage.core.angles import wrap_array_to_pi
 from pilotage.core.types import Event, FloatArray
 from pilotage.evaluation.consistency import nees
+from pilotage.evaluation.relief import relief
 from pilotage.evaluation.rover_metrics import ellipse_axes, estimation_metrics, root_determinant
 from pilotage.experiments.terrain.estimation import Estimation, seen_per_step
 from pilotage.experiments.terrain.ground import Ground
@@ -63,6 +64,7 @@ def motion_trace(motion: Motion, ground: Ground) -> dict[str, FloatArray]:
     }
     if ground.elevation is not None:
         trace["elevation_m"] = ground.elevation.heights_at(motion.poses[:, :2])
+        trace["slope_rad"] = ground.elevation.slopes_at(ground.hazards.cells_at(motion.poses[:, :2]))
     return trace
 
 
@@ -134,6 +136,9 @@ def motion_metrics(record: TerrainRecord) -> dict[str, object]:
         "end": {"x_m": motion.poses[-1, 0], "y_m": motion.poses[-1, 1], "theta_rad": motion.poses[-1, 2]},
         **goal_errors(mission, motion),
     }
+    if record.ground.elevation is not None and steps > 0:
+        profile = relief(record.ground.elevation, motion.poses[:, :2])
+        metrics |= {"climb_m": profile.climb_m, "descent_m": profile.descent_m}
     if record.estimation is None:
         return metrics
     found = record.estimation.estimate

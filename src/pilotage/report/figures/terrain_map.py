@@ -13,12 +13,15 @@ from numpy.typing import NDArray
 
 from pilotage.core.types import FloatArray
 from pilotage.report import quantities
+from pilotage.report.figures.terrain_estimate import ellipses_told, estimate_layers, thinned
 from pilotage.report.run_folder import RunData
 from pilotage.report.style import BLUE, GREEN, ORANGE, SKY, VERMILLION, WIDTH_PT, Illustration, Key, render
 from pilotage.report.terrain_pictures import Picture, TerrainPictures, read_pictures
 
 _LEFT_PT, _RIGHT_PT, _TOP_PT, _BOTTOM_PT = 44.0, 8.0, 8.0, 32.0
 _MOST_HEIGHT_PT = 900.0
+MARGIN = 0.06
+"""Around the way seen from near, as a share of its extent."""
 _NOTHING = "The run left no picture of its ground."
 
 Rgb = NDArray[np.uint8]
@@ -34,13 +37,34 @@ def terrain_map_figure(run: RunData) -> Illustration:
         return Illustration(slug, title, "", "The ground was given as hazards only; see below.")
     figure, axes = _ground_axes(pictures)
     _show(axes, pictures, _tinted(pictures.ground, pictures.hazards, ORANGE, 0.45))
-    _way(axes, run, pictures, SKY)
+    drawn = _way(axes, run, pictures, SKY)
     limit = pictures.slope_limit_deg
     steep = f"steeper than {limit:g}°" if math.isfinite(limit) else "hazards"
-    alt = "Shaded map of the ground with the planned way"
-    keys = (Key("planned way", SKY), Key(steep, ORANGE, "band"))
+    alt = "Shaded map of the ground with the way"
+    keys = (*drawn, Key(steep, ORANGE, "band"))
     caption = f"The ground lit from the north-west, what is {steep} tinted. {_told(run)}"
     return Illustration(slug, title, alt, caption, render(figure, slug, alt), keys)
+
+
+def close_up_figure(run: RunData) -> Illustration:
+    """Draw the way and its estimate, hazards tinted, as large as the page allows."""
+    slug, title = "close-up", "The way from near"
+    pictures = read_pictures(run.run_dir)
+    if pictures is None or not run.trace.has("true_x_m", "est_x_m"):
+        return Illustration(slug, title, "", "The mission has no estimator.")
+    unit = _unit(pictures)
+    shown = np.column_stack([run.trace[name] for name in ("true_x_m", "true_y_m")]) / unit
+    estimate = np.column_stack([run.trace[name] for name in ("est_x_m", "est_y_m")]) / unit
+    both = np.vstack([shown, estimate])
+    margin = MARGIN * float(np.ptp(both, axis=0).max())
+    low, high = both.min(axis=0) - margin, both.max(axis=0) + margin
+    figure, axes = _ground_axes(pictures, low, high)
+    ground = pictures.hazards if pictures.ground is None else pictures.ground
+    _show(axes, pictures, _tinted(ground, pictures.hazards, ORANGE, 0.45))
+    keys = _way(axes, run, pictures, SKY)
+    alt = "The way, its estimate and the ellipses from near"
+    caption = f"Ellipses stand at equal distances along the way. {ellipses_told(run)}".rstrip()
+    return Illustration(slug, title, alt, caption, render(figure, slug, alt), tuple(keys))
 
 
 def hazard_map_figure(run: RunData) -> Illustration:
@@ -51,13 +75,11 @@ def hazard_map_figure(run: RunData) -> Illustration:
         return Illustration(slug, title, "", _NOTHING)
     figure, axes = _ground_axes(pictures)
     _show(axes, pictures, np.repeat(pictures.hazards[..., None], 3, axis=2))
-    _way(axes, run, pictures)
-    alt = "Map of the hazards, white, with the planned way"
+    drawn = _way(axes, run, pictures, SKY if run.trace.has("est_x_m") else VERMILLION)
+    alt = "Map of the hazards, white, with the way"
     share = quantities.share(float(pictures.hazards.mean()) / 255.0)
     caption = f"Hazards are white, as in the obstacle map of the report; they cover {share} of the map."
-    return Illustration(
-        slug, title, alt, caption, render(figure, slug, alt), (Key("planned way", VERMILLION),)
-    )
+    return Illustration(slug, title, alt, caption, render(figure, slug, alt), tuple(drawn))
 
 
 def looked_at_figure(run: RunData) -> Illustration:
@@ -82,6 +104,9 @@ def looked_at_figure(run: RunData) -> Illustration:
 
 def _told(run: RunData) -> str:
     """Length and effort in a sentence."""
+    driven = run.metrics.get("path_length_m")
+    if isinstance(driven, float):
+        return f"The way is {quantities.length(driven)} long. {ellipses_told(run)}".rstrip()
     planned = run.metrics.get("planned_length_m")
     if not isinstance(planned, float):
         return "No way was found."
@@ -89,10 +114,13 @@ def _told(run: RunData) -> str:
     return f"The way is {quantities.length(planned)} long and has {nodes} nodes."
 
 
-def _ground_axes(pictures: TerrainPictures) -> tuple[Figure, Axes]:
-    """Axes to scale around the whole map, in kilometres where it is large."""
+def _ground_axes(
+    pictures: TerrainPictures, low: FloatArray | None = None, high: FloatArray | None = None
+) -> tuple[Figure, Axes]:
+    """Axes to scale around a part of the map or all of it, in kilometres where it is large."""
     corners = _corners(pictures)
-    low, high = corners.min(axis=0), corners.max(axis=0)
+    if low is None or high is None:
+        low, high = corners.min(axis=0), corners.max(axis=0)
     width = WIDTH_PT - _LEFT_PT - _RIGHT_PT
     height = min(_MOST_HEIGHT_PT, width * (high[1] - low[1]) / (high[0] - low[0]))
     total = height + _TOP_PT + _BOTTOM_PT
@@ -140,12 +168,18 @@ def _show(axes: Axes, pictures: TerrainPictures, rgb: Rgb) -> None:
     axes.set_ylim(limits[1])
 
 
-def _way(axes: Axes, run: RunData, pictures: TerrainPictures, colour: str = VERMILLION) -> None:
+def _way(axes: Axes, run: RunData, pictures: TerrainPictures, colour: str = VERMILLION) -> list[Key]:
+    """Draw the way, planned or true, with its estimate where there is one; return what was drawn."""
     unit = _unit(pictures)
     dark = [Stroke(linewidth=3.4, foreground="#12212f"), Normal()]
-    points = np.column_stack([run.trace["path_x_m"], run.trace["path_y_m"]]) / unit
+    driven = run.trace.has("true_x_m", "true_y_m")
+    names = ("true_x_m", "true_y_m") if driven else ("path_x_m", "path_y_m")
+    points = thinned(np.column_stack([run.trace[name] for name in names])) / unit
+    keys = [Key("true way" if driven else "planned way", colour)]
     if len(points) > 1:
         axes.plot(*points.T, color=colour, linewidth=1.8, path_effects=dark, zorder=5)
+    if run.trace.has("est_x_m", "ellipse_major_m"):
+        keys += estimate_layers(axes, run, pictures.landmarks, unit)
     for name, place, dot in (("start", pictures.start, GREEN), ("goal", pictures.goal, VERMILLION)):
         x, y = place / unit
         axes.plot([x], [y], "o", color=dot, markersize=8.0, markeredgecolor="white", zorder=6)
@@ -161,6 +195,7 @@ def _way(axes: Axes, run: RunData, pictures: TerrainPictures, colour: str = VERM
             path_effects=[Stroke(linewidth=2.6, foreground="#12212f"), Normal()],
             zorder=7,
         )
+    return keys
 
 
 def _tinted(grey: Picture, share: Picture, colour: str, strength: float) -> Rgb:

@@ -62,9 +62,7 @@ def hazard_distance_figure(run: RunData) -> Illustration:
     if not trace.has("distance_m", "hazard_distance_m") or trace.steps < 2:
         return Illustration(slug, title, "", "There is no way to measure along.")
     unit, s = _distances(run)
-    figure, (axes,) = stacked_axes(
-        ["Distance of the cells' centres from the nearest hazard's edge [m]"], (130.0,)
-    )
+    figure, (axes,) = stacked_axes(["Distance from the nearest hazard's edge [m]"], (130.0,))
     away = trace["hazard_distance_m"]
     series(axes, s, away, GREEN)
     least = int(np.argmin(away))
@@ -76,8 +74,12 @@ def hazard_distance_figure(run: RunData) -> Illustration:
     )
     alt = f"Distance from hazards along the way; the least is {quantities.length(float(away[least]))}"
     caption = (
-        "A shortest way touches the corners that it turns around: half a cell is the least that a path over "
-        "cells' centres can keep without an inflation."
+        ""
+        if trace.has("true_x_m")
+        else (
+            "A shortest way touches the corners that it turns around: half a cell is the least that a "
+            "path over cells' centres can keep without an inflation."
+        )
     )
     return Illustration(
         slug, title, alt, caption, render(figure, slug, alt), (Key("distance from hazards", GREEN),)

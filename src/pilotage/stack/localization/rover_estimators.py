@@ -101,6 +101,10 @@ class LandmarkLogFilter:
 
     Updates are iterated and in Joseph form: after a kilometre without landmarks the first bearing is far
     from linear, and equation 4.17 with the covariance before the prediction is a slip that loses symmetry.
+
+    Fails slowly beyond some 2 km without a landmark (heading uncertain by more than 3 degrees): its
+    covariance is then too small for a while. Sightings refused one after the other make it less sure, so
+    that it comes back.
     """
 
     def __init__(self, config: LandmarkLogFilterConfig) -> None:
