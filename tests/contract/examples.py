@@ -335,5 +335,7 @@ EXAMPLES: dict[tuple[str, str], Example] = {
     ("sensor", "infrared"): Example(sheet_sensor_reads, pure_numbers=frozenset({"range_std_fraction"})),
     ("sensor", "line-sensor"): Example(sheet_sensor_reads),
     ("explorer", "random-walk"): Example(explorer_explores),
-    ("explorer", "surround-check"): Example(explorer_explores, pure_numbers=frozenset({"far_cells"})),
+    ("explorer", "surround-check"): Example(
+        explorer_explores, {"margin_cells": 1}, pure_numbers=frozenset({"far_cells"})
+    ),
 }
