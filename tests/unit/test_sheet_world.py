@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -172,6 +173,6 @@ def test_line_sensors_see_tape_and_the_dark_floor() -> None:
         ({"more": WheelEncodersConfig()}, "expected one WheelEncoders"),
     ],
 )
-def test_rates_that_do_not_fit_are_told(change: dict, complaint: str) -> None:
+def test_rates_that_do_not_fit_are_told(change: dict[str, Any], complaint: str) -> None:
     with pytest.raises(InputError, match=complaint):
         sheet_simulator(sheet_sensors() | change, RandomStreams(0))
