@@ -47,7 +47,9 @@ def test_a_return_is_an_obstacle_with_a_border_and_what_lies_before_it_is_explor
         max_size=12,
     )
 )
-def test_marks_never_fall_back_and_borders_are_those_of_the_map(beams: list[tuple[float, float, float, float, bool]]) -> None:
+def test_marks_never_fall_back_and_borders_are_those_of_the_map(
+    beams: list[tuple[float, float, float, float, bool]],
+) -> None:
     marks = CellMarks(sheet_knowledge())
     before = marks.cells.states
     for x, y, theta, length, saturated in beams:

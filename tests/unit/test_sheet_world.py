@@ -142,7 +142,7 @@ def test_infrared_errors_grow_with_the_range() -> None:
         sheet = SheetFile(size_m=(4.0, 4.0), cells=(10, 10), obstacles=((2.3, 1.5, 2.6, 2.5),))
         sensors = sheet_sensors() | {"ir": InfraredConfig()}
         sim = sheet_simulator(sensors, RandomStreams(3), sheet, Pose2(x, 2.0, 0.0), EXACT)
-        found = []
+        found: list[float] = []
         while len(found) < 400:
             reading = sim.step(WheelSpeeds(0.0, 0.0)).by_sensor.get("ir")
             if isinstance(reading, InfraredReading):

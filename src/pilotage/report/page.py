@@ -38,6 +38,7 @@ from pilotage.report.replay.section import SLUG, TITLE, replay_section, script_s
 from pilotage.report.run_folder import RunData, number, read_run
 from pilotage.report.sheet.maps import accuracy_figure, printed_figure
 from pilotage.report.sheet.path import coverage_figure, path_figure
+from pilotage.report.sheet.replay import sheet_scene
 from pilotage.report.style import Illustration, drawing_style
 
 REPORT_FILE = "report.html"
@@ -75,7 +76,7 @@ FIGURES: dict[str, tuple[Draw, ...]] = {
     "sheet": SHEET_FIGURES,
 }
 """What is drawn of a run, by the kind of its mission."""
-SCENES: dict[str, Callable[[RunData], ReplayScene | None]] = {"floor": floor_scene}
+SCENES: dict[str, Callable[[RunData], ReplayScene | None]] = {"floor": floor_scene, "sheet": sheet_scene}
 """How a run of each kind becomes a scene to replay."""
 _LONGEST_MISSION = 100_000
 

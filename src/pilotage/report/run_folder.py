@@ -20,8 +20,8 @@ import yaml
 from pilotage.core.errors import InputError
 from pilotage.core.types import BoolArray, Event, FloatArray
 from pilotage.report.scan_updates import RecordedUpdate, read_updates
-from pilotage.report.sightings import Sightings, read_sightings
 from pilotage.report.sheet_data import SheetData, read_sheet
+from pilotage.report.sightings import Sightings, read_sightings
 
 METRICS_FILE = "metrics.json"
 TRACE_FILE = "trace.parquet"
