@@ -9,11 +9,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from pilotage.core.angles import wrap_to_pi
 from pilotage.core.random import RandomStreams
 from pilotage.core.types import Pose2, WheelSpeeds
 from pilotage.maps.cell_map import CellMap, CellState, grown
 from pilotage.missions.sheet import FirmwareConfig
 from pilotage.sensors.infrared import InfraredConfig
+from pilotage.sensors.magnetometer import MagnetometerConfig
 from pilotage.sensors.readings import InfraredReading, LineReading, Readings
 from pilotage.stack.control.potential_field import PotentialField
 from pilotage.stack.control.wheel_pursuit import pursue, wheel_speeds
@@ -100,6 +102,24 @@ def test_the_pose_follows_and_its_covariance_is_positive_definite() -> None:
     assert math.hypot(found.x_m - truth.x_m, found.y_m - truth.y_m) < 0.03
     assert np.linalg.eigvalsh(pose.belief.cov).min() > 0.0
     assert pose.belief.pose == found
+
+
+def heading_error(magnetometer: MagnetometerConfig | None) -> float:
+    sensors = sheet_sensors() | ({} if magnetometer is None else {"compass": magnetometer})
+    knowledge = sheet_knowledge(fusion=False, magnetometer=magnetometer is not None, sensors=sensors)
+    pose, sim = WheelPose(knowledge), sheet_simulator(sensors, RandomStreams(5))
+    errors = []
+    for step in range(6000):
+        found = pose.step(sim.step(WheelSpeeds(-1.0, 1.0) if step % 2000 < 1500 else WheelSpeeds(0.0, 0.0)))
+        errors.append(abs(wrap_to_pi(found.theta_rad - sim.truth.theta_rad)))
+    return max(errors)
+
+
+def test_a_magnetometer_ends_the_drift_unless_iron_bends_its_field() -> None:
+    clean = MagnetometerConfig(hard_iron_ut=(0.0, 0.0), soft_iron_ratio=1.0, disturbance_ut=0.0)
+    drift, corrected = heading_error(None), heading_error(clean)
+    assert corrected < 0.5 * drift
+    assert heading_error(MagnetometerConfig()) > 3.0 * corrected
 
 
 def test_whole_rad_s_come_out_short() -> None:

@@ -95,6 +95,8 @@ class SheetStackConfig(Config):
     explorer: ComponentChoice
     fusion: bool = True
     """Whether the heading comes from encoders and gyroscope fused, or from encoders alone."""
+    magnetometer: bool = False
+    """Whether a magnetometer then corrects the heading; the report's robot could, its experiments did not."""
     avoidance: bool = True
     """Whether something reacts to obstacles that the explorer did not plan for."""
     firmware: FirmwareConfig = FirmwareConfig()

@@ -10,14 +10,16 @@ from pilotage.core.angles import wrap_to_pi
 from pilotage.core.errors import InputError
 from pilotage.core.types import FloatArray, Pose2
 from pilotage.sensors.gyroscope import GyroscopeConfig
-from pilotage.sensors.readings import EncoderCounts, GyroscopeRates, Readings
+from pilotage.sensors.magnetometer import MagnetometerConfig
+from pilotage.sensors.readings import EncoderCounts, GyroscopeRates, MagneticField, Readings
 from pilotage.sensors.wheel_encoders import WheelEncodersConfig
 from pilotage.stack.interface import Belief
 from pilotage.stack.knowledge import SheetKnowledge
 from pilotage.stack.localization.heading_filters import (
-    HEADING_FILTERS,
     EncoderGyroConfig,
     EncoderGyroFilter,
+    EncoderMagnetometerConfig,
+    EncoderMagnetometerFilter,
     HeadingErrors,
     HeadingEstimate,
 )
@@ -48,12 +50,12 @@ class WheelPose:
         self._gyro = gyros[0] if knowledge.fusion else None
         self._rad_per_count = 2.0 * math.pi / encoders.counts_per_turn
         self._radius, self._separation = drive.wheel_radius_m, drive.wheel_separation_m
+        self._compass = _Compass(knowledge) if knowledge.magnetometer else None
         self._truncated = firmware.truncated_wheel_speed
         self._late_steps = max(1, round(firmware.pose_period_s / knowledge.dt_s))
         self._dt_s = knowledge.dt_s
         self._pose = knowledge.start
         config = EncoderGyroConfig(errors=HeadingErrors())
-        assert "encoder-gyro" in HEADING_FILTERS.names()
         self._heading = EncoderGyroFilter(config, HeadingEstimate(knowledge.start.theta_rad, 1e-6))
         self._bias_sum, self._bias_count = 0.0, 0
         self._steps = 0
@@ -77,6 +79,8 @@ class WheelPose:
     def step(self, readings: Readings) -> Pose2:
         """Take in one control period."""
         self._steps += 1
+        if self._compass is not None:
+            self._compass.look(readings)
         counts, rates = readings.by_sensor.get(self._encoders), None
         if self._gyro is not None:
             rates = readings.by_sensor.get(self._gyro)
@@ -111,11 +115,50 @@ class WheelPose:
         turn = self._radius * (right_rad - left_rad) / self._separation
         before = self._pose.theta_rad
         estimate = self._heading.step(turn, rate, dt_s, resting=False)
+        if self._compass is not None:
+            estimate = self._compass.correct(estimate, dt_s)
         theta = before + 0.5 * wrap_to_pi(estimate.heading_rad - before)
         c, s = math.cos(theta), math.sin(theta)
         self._pose = Pose2(self._pose.x_m + way * c, self._pose.y_m + way * s, estimate.heading_rad)
         self._cov.move(way, c, s)
         self._cov.tt = estimate.variance_rad2
+
+
+class _Compass:
+    """The report's second filter: the heading of the first predicts, the magnetometer corrects.
+
+    The first reading stands for the start's heading. Iron, on the robot and in the floor, is not
+    calibrated away: what that does is why the report left the sensor out of its experiments.
+    """
+
+    def __init__(self, knowledge: SheetKnowledge) -> None:
+        found = knowledge.sensors_of(MagnetometerConfig)
+        if len(found) != 1:
+            raise InputError(
+                f"stack.magnetometer: expected one magnetometer among robot.sensors, found {len(found)}"
+            )
+        ((self._name, _),) = found.items()
+        self._start_rad = self._last_rad = knowledge.start.theta_rad
+        self._filter = EncoderMagnetometerFilter(
+            EncoderMagnetometerConfig(errors=HeadingErrors()), HeadingEstimate(self._start_rad, 1e-6)
+        )
+        self._first: float | None = None
+        self._measured: float | None = None
+
+    def look(self, readings: Readings) -> None:
+        """Keep a reading until the next correction."""
+        field = readings.by_sensor.get(self._name)
+        if isinstance(field, MagneticField):
+            raw = -math.atan2(field.y_ut, field.x_ut)
+            self._first = raw if self._first is None else self._first
+            self._measured = wrap_to_pi(self._start_rad + raw - self._first)
+
+    def correct(self, estimate: HeadingEstimate, dt_s: float) -> HeadingEstimate:
+        """Turn as the first filter turned, then correct by what was read."""
+        turn = wrap_to_pi(estimate.heading_rad - self._last_rad)
+        self._last_rad = estimate.heading_rad
+        measured, self._measured = self._measured, None
+        return self._filter.step(turn, None, dt_s, resting=False, magnetometer_heading_rad=measured)
 
 
 class _Covariance:
