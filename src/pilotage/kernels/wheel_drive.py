@@ -84,6 +84,19 @@ def drive(
 
 
 @kernel
-def counts_since(turned: float, counted: int, counts_per_turn: int) -> int:
-    """Whole encoder counts of a wheel's angle since ``counted``."""
-    return math.floor(turned * counts_per_turn / (2.0 * math.pi)) - counted
+def read_counts(
+    turned_left: float, turned_right: float, counted: IntArray, counts_per_turn: int, samples: int
+) -> IntArray:
+    """Whole encoder counts since the last reading, (2, ``samples``), left and right.
+
+    ``counted`` (2,), what has been told so far, is brought up to date. Counts are spread over the samples as
+    evenly as whole counts go.
+    """
+    out = np.zeros((2, samples), dtype=np.int64)
+    for side in range(2):
+        turned = turned_left if side == 0 else turned_right
+        new = math.floor(turned * counts_per_turn / (2.0 * math.pi)) - counted[side]
+        counted[side] += new
+        for k in range(samples):
+            out[side, k] = new * (k + 1) // samples - new * k // samples
+    return out

@@ -85,6 +85,8 @@ class FirmwareConfig(Config):
     """Wheel speeds enter the position as whole numbers of rad/s."""
     pose_period_s: NonNegative = 0.0
     """The pose is brought up to date this often, by the wheel speeds of that moment; 0: at every step."""
+    lines_at_centre: bool = False
+    """A tape is marked where the robot's centre is, 70 mm behind the sensor that saw it."""
 
 
 class SheetStackConfig(Config):
@@ -93,6 +95,8 @@ class SheetStackConfig(Config):
     explorer: ComponentChoice
     fusion: bool = True
     """Whether the heading comes from encoders and gyroscope fused, or from encoders alone."""
+    magnetometer: bool = False
+    """Whether a magnetometer then corrects the heading; the report's robot could, its experiments did not."""
     avoidance: bool = True
     """Whether something reacts to obstacles that the explorer did not plan for."""
     firmware: FirmwareConfig = FirmwareConfig()

@@ -249,7 +249,9 @@ GROUPS: tuple[tuple[str, tuple[Metric, ...]], ...] = (
     (
         "Exploration",
         (
-            Metric("coverage_visited", "visited, of all cells", quantities.share, "Cells the body stood on."),
+            Metric(
+                "coverage_visited", "visited, of all cells", quantities.share, "Cells that its centre was in."
+            ),
             Metric(
                 "coverage_reachable",
                 "visited, of the reachable",
@@ -268,6 +270,31 @@ GROUPS: tuple[tuple[str, tuple[Metric, ...]], ...] = (
             Metric("feature_recall", "features found", quantities.share, "Of the features that are there."),
             Metric("free_accuracy", "free cells right", quantities.share, "Of the cells marked as free."),
             Metric("explored_accuracy", "explored cells right", quantities.share, "Of all explored cells."),
+            Metric(
+                "feature_precision_neutral",
+                "features right, fairly",
+                quantities.share,
+                "Without the true features that take less than 8 % of their cell.",
+            ),
+            Metric(
+                "feature_recall_all", "features found, of all", quantities.share, "Also those inside boxes."
+            ),
+            Metric("visited_cells", "cells visited", quantities.count, "Cells that its centre was in."),
+            Metric("reachable_cells", "cells reachable", quantities.count, "Cells the body can stand in."),
+            Metric("feature_cells", "features mapped", quantities.count, "OBSTACLE and LINE on its map."),
+            Metric("free_cells", "free cells mapped", quantities.count, "VISITED, EXPLORED and BORDER."),
+            Metric("cells_left", "cells given up", quantities.count, "Left unvisited, each with a reason."),
+            Metric(
+                "time_to_95_s", "95 % after", quantities.duration, "Until 95 % of the reachable were visited."
+            ),
+            Metric("covered_width_m", "covered width", quantities.length, "Extent of the visited cells, x."),
+            Metric("covered_height_m", "covered height", quantities.length, "Likewise, y."),
+            Metric(
+                "overhang_max_m",
+                "over the edge",
+                quantities.length,
+                "How far the body reached beyond the sheet.",
+            ),
         ),
     ),
     (
@@ -275,6 +302,12 @@ GROUPS: tuple[tuple[str, tuple[Metric, ...]], ...] = (
         (
             Metric("steps", "control steps", quantities.count, "Steps of the closed loop."),
             Metric("wall_time_s", "wall time", quantities.duration, "What the run took on this machine."),
+            Metric(
+                "real_time_factor",
+                "times real time",
+                lambda value: f"{value:.0f} ×",
+                "Simulated over wall time, on one core.",
+            ),
             Metric("steps_per_s", "speed", _rate, "Control steps a second, planning apart."),
         ),
     ),

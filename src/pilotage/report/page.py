@@ -42,6 +42,9 @@ from pilotage.report.replay.floor import floor_scene
 from pilotage.report.replay.scene import ReplayScene
 from pilotage.report.replay.section import SLUG, TITLE, replay_section, script_source, style
 from pilotage.report.run_folder import RunData, number, read_run
+from pilotage.report.sheet.maps import accuracy_figure, printed_figure
+from pilotage.report.sheet.path import coverage_figure, path_figure
+from pilotage.report.sheet.replay import sheet_scene
 from pilotage.report.style import Illustration, drawing_style
 
 REPORT_FILE = "report.html"
@@ -70,9 +73,20 @@ TERRAIN_FIGURES: tuple[Draw, ...] = (
     terrain_profile_figure,
     hazard_distance_figure,
 )
-FIGURES: dict[str, tuple[Draw, ...]] = {"floor": FLOOR_FIGURES, "terrain": TERRAIN_FIGURES}
+SHEET_FIGURES: tuple[Draw, ...] = (
+    path_figure,
+    coverage_figure,
+    accuracy_figure,
+    printed_figure,
+    pose_error_figure,
+)
+FIGURES: dict[str, tuple[Draw, ...]] = {
+    "floor": FLOOR_FIGURES,
+    "terrain": TERRAIN_FIGURES,
+    "sheet": SHEET_FIGURES,
+}
 """What is drawn of a run, by the kind of its mission."""
-SCENES: dict[str, Callable[[RunData], ReplayScene | None]] = {"floor": floor_scene}
+SCENES: dict[str, Callable[[RunData], ReplayScene | None]] = {"floor": floor_scene, "sheet": sheet_scene}
 """How a run of each kind becomes a scene to replay."""
 _LONGEST_MISSION = 100_000
 
@@ -104,7 +118,7 @@ def run_page(run: RunData) -> str:
     entries: list[tuple[str, str]] = [(SLUG, TITLE)]
     drawn = 0
     slugs = [figure.slug for figure in figures]
-    explained = "timeline" if "timeline" in slugs else slugs[0]
+    explained = next((slug for slug in ("timeline", "coverage") if slug in slugs), slugs[0])
     for figure in figures:
         drawn += bool(figure.svg)
         sections.append(figure_section(drawn, figure))
@@ -166,6 +180,8 @@ def _tiles(run: RunData) -> list[tuple[str, str]]:
         ("position RMSE", value("position_rmse_m"), quantities.length),
         ("worst position error", value("position_max_m"), quantities.length),
         ("heading RMSE", value("heading_rmse_rad"), quantities.angle),
+        ("visited, of the reachable", value("coverage_reachable"), quantities.share),
+        ("features right", value("feature_precision"), quantities.share),
         ("plan over shortest", ratio, lambda x: f"{x:.3f} ×"),
         ("least clearance", value("min_clearance_m"), quantities.length),
         ("NEES (ideal 3)", value("nees_mean"), lambda x: f"{x:.2f}"),

@@ -20,6 +20,7 @@ import yaml
 from pilotage.core.errors import InputError
 from pilotage.core.types import BoolArray, Event, FloatArray
 from pilotage.report.scan_updates import RecordedUpdate, read_updates
+from pilotage.report.sheet_data import SheetData, read_sheet
 from pilotage.report.sightings import Sightings, read_sightings
 
 METRICS_FILE = "metrics.json"
@@ -129,6 +130,7 @@ class RunData:
     trace: Trace
     updates: tuple[RecordedUpdate, ...] = ()
     sightings: Sightings = field(default_factory=Sightings)
+    sheet: SheetData | None = None
 
     @property
     def name(self) -> str:
@@ -189,6 +191,7 @@ def read_run(run_dir: Path) -> RunData:
         trace=_read_trace(run_dir / TRACE_FILE),
         updates=_read_updates(run_dir / UPDATES_FILE),
         sightings=_read_sightings(run_dir / SCANS_FILE),
+        sheet=read_sheet(run_dir),
     )
 
 

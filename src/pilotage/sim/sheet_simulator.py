@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from itertools import pairwise
 from typing import TypeVar
 
 import numpy as np
@@ -12,7 +11,7 @@ import numpy as np
 from pilotage.core.angles import wrap_to_pi
 from pilotage.core.errors import InputError
 from pilotage.core.random import RandomStreams
-from pilotage.core.types import FloatArray, IntArray, Pose2, WheelSpeeds
+from pilotage.core.types import FloatArray, Pose2, WheelSpeeds
 from pilotage.kernels import boxes, wheel_drive
 from pilotage.missions.sheet import DriveErrorsConfig, SheetBodyConfig, WheelDriveConfig
 from pilotage.sensors.gyroscope import GyroscopeConfig
@@ -60,7 +59,7 @@ class SheetSimulator:
         self._encoders, encoders = _only(sensors, WheelEncodersConfig)
         self._counts_per_turn = encoders.counts_per_turn
         self._samples = _samples(encoders.rate_hz, dt_s, self._encoders)
-        self._counted = [0, 0]
+        self._counted = np.zeros(2, dtype=np.int64)
         self._slip_rng = streams.stream("slip")
         self._slip = np.zeros((0, self._samples, 2))
         self._rates = np.zeros(self._samples)
@@ -157,12 +156,14 @@ class SheetSimulator:
 
     def _read_encoders(self) -> EncoderCounts:
         """Whole counts of this step, spread over its samples as evenly as whole counts go."""
-        out = []
-        for side, turned in enumerate((wheel_drive.TURNED_LEFT, wheel_drive.TURNED_RIGHT)):
-            new = wheel_drive.counts_since(self._state[turned], self._counted[side], self._counts_per_turn)
-            self._counted[side] += new
-            out.append(_spread(int(new), self._samples))
-        return EncoderCounts(out[0], out[1])
+        counts = wheel_drive.read_counts(
+            self._state[wheel_drive.TURNED_LEFT],
+            self._state[wheel_drive.TURNED_RIGHT],
+            self._counted,
+            self._counts_per_turn,
+            self._samples,
+        )
+        return EncoderCounts(counts[0], counts[1])
 
 
 class _Gyroscope:
@@ -188,11 +189,6 @@ class _Gyroscope:
         reading = self._scale * rates + self._bias + self._noise[self._at]
         self._at += 1
         return GyroscopeRates(reading)
-
-
-def _spread(count: int, samples: int) -> IntArray:
-    edges = [count * k // samples for k in range(samples + 1)]
-    return np.array([b - a for a, b in pairwise(edges)], dtype=np.int64)
 
 
 def _samples(rate_hz: float, dt_s: float, name: str) -> int:

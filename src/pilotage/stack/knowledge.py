@@ -30,7 +30,7 @@ class SheetKnowledge:
         Whether its line sensors read dark beyond the edge.
     drive
         The data sheet of its drive, not the truth.
-    fusion, avoidance, firmware
+    fusion, avoidance, firmware, magnetometer
         The mission's switches.
     """
 
@@ -48,6 +48,7 @@ class SheetKnowledge:
     avoidance: bool
     firmware: FirmwareConfig
     streams: RandomStreams
+    magnetometer: bool = False
 
     def sensors_of(self, kind: type[S]) -> dict[str, S]:
         """All sensors of one kind by name."""

@@ -72,6 +72,7 @@ def build(mission: SheetMission) -> SheetExperiment:
         avoidance=mission.stack.avoidance,
         firmware=mission.stack.firmware,
         streams=streams,
+        magnetometer=mission.stack.magnetometer,
     )
     explorer = build_component(EXPLORERS, mission.stack.explorer, "explorer", knowledge)
     return SheetExperiment(mission, sheet, world, simulator, explorer)

@@ -13,7 +13,7 @@ from pilotage.sensors.readings import InfraredReading, Readings
 from pilotage.stack.control.wheel_pursuit import TURN_FIRST_RAD, turn, wheel_speeds
 
 ATTRACTION, REPULSION = 0.01, 10_000.0
-"""Forces in units of millimetres: attraction per mm, repulsion over mm squared."""
+"""Forces in units of millimetres: attraction times mm, repulsion over mm."""
 TRIGGER_FRONT_M, TRIGGER_SIDE_M = 0.12, 0.15
 FRONT_RAD = 0.5
 """A sensor that looks less than this aside is a front sensor."""
@@ -23,8 +23,10 @@ MM = 1000.0
 class PotentialField:
     """Bends the way to a goal around what the infrared sensors see (exploration report, ch. 2.3).
 
-    F = k_a d towards the goal - sum of k_r / r^2 along each sensor that is triggered. Fails as all potential
-    fields do, where attraction and repulsion cancel: in front of a wide box and in corners.
+    F = k_a d towards the goal - sum of k_r / r along each sensor that is triggered, r from the robot's
+    centre. With the report's constants a triggered sensor outweighs any goal on the sheet: the robot turns
+    away until nothing is near, and comes back. Fails as all potential fields do, in front of a wide box
+    and in corners.
     """
 
     def __init__(self, sensors: Mapping[str, InfraredConfig], drive: WheelDriveConfig) -> None:
@@ -53,7 +55,8 @@ class PotentialField:
         for name, config in self._sensors.items():
             if self._too_near(name):
                 theta = pose.theta_rad + config.mount.theta_rad
-                push = REPULSION / (MM * self._ranges[name]) ** 2
+                arm = math.hypot(config.mount.x_m, config.mount.y_m)
+                push = REPULSION / (MM * (arm + self._ranges[name]))
                 fx -= push * math.cos(theta)
                 fy -= push * math.sin(theta)
         off = wrap_to_pi(math.atan2(fy, fx) - pose.theta_rad)

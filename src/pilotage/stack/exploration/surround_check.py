@@ -39,6 +39,9 @@ class SurroundCheckConfig(Config):
     """A goal is dropped after so many control periods with less than 10 mm of progress each: after 2 s."""
     far_cells: Positive = 1.5
     """A hop is far where its goal lies more cells away than this."""
+    margin_cells: int = Field(default=3, ge=0)
+    """The outermost cells, which it neither visits nor explores. All its printed maps keep 3 cells away from
+    the edge: pose errors take it over the edge much less often, and a third of the map stays unknown."""
     avoid: Literal["far-hops", "always"] = "far-hops"
     give_up_s: Positive = 60.0
     """Stuck where no cell was new for so long."""
@@ -49,8 +52,9 @@ class SurroundCheck:
     """Next cell by the states around (exploration report, ch. 2.1): explored first, unknown as a heading.
 
     Where none of the four is either, it hops to the nearest explored cell by straight distance, whatever
-    stands between. With ``avoid: always`` the potential field also acts on the next cell, but never
-    against it: a cell that it cannot enter is dropped, so that the explorer is not blocked.
+    stands between; a goal that takes too long is dropped and chosen anew. With ``avoid: always`` the
+    potential field also acts on the way to the next cell, and a goal that was dropped where something was
+    near is passed over until another one was reached, so that the field does not block the explorer.
     Fails by its pose, and where the nearest explored cell is behind a box.
     """
 
@@ -60,14 +64,16 @@ class SurroundCheck:
         self._dt_s = knowledge.dt_s
         self._plan_every = max(1, round(config.planning_period_s / knowledge.dt_s))
         self._pose = WheelPose(knowledge)
-        self._marks = CellMarks(knowledge)
+        self._marks = CellMarks(knowledge, config.margin_cells)
         infrared = knowledge.sensors_of(InfraredConfig)
         self._field = PotentialField(infrared, knowledge.drive) if knowledge.avoidance else None
+        self._always = config.avoid == "always"
         self._goal: tuple[int, int] | None = None
         self._facing: float | None = None
         self._far = False
         self._slow_periods = 0
         self._refused: set[tuple[int, int]] = set()
+        self._looked: set[tuple[int, int]] = set()
         self._steps = 0
         self._new_at_s, self._new_count = 0.0, 0
         self._status, self._reason = StackStatus.RUNNING, ""
@@ -101,7 +107,7 @@ class SurroundCheck:
     def step(self, readings: Readings) -> WheelSpeeds:
         """Localize, map, choose, drive."""
         self._steps += 1
-        pose = self._pose.step(readings).pose
+        pose = self._pose.step(readings)
         if len(readings.by_sensor) > 2:
             self._marks.step(readings, pose)
             if self._field is not None:
@@ -134,79 +140,69 @@ class SurroundCheck:
 
     def _plan(self, t_s: float) -> None:
         """Choose the next cell once the last one was reached or dropped."""
-        pose = self._pose.belief.pose
+        pose = self._pose.pose
         if self._goal is not None:
             x, y = self._marks.centre_of(*self._goal)
             if math.hypot(x - pose.x_m, y - pose.y_m) <= self._config.goal_tolerance_m:
                 self._goal = None
-            elif self._states()[self._goal] <= CellState.BORDER:
+                self._refused.clear()
+            elif self._marks.state(*self._goal) <= CellState.BORDER:
                 self._goal = None  # It has turned out to be no place to go to.
             elif self._slow_periods >= self._config.stuck_periods:
-                self._refused.add(self._goal)
+                if self._always and self._field is not None and self._field.triggered:
+                    self._refused.add(self._goal)
                 self._goal = None
         if self._goal is None and self._facing is None:
             self._choose(t_s)
 
     def _choose(self, t_s: float) -> None:
-        pose = self._pose.belief.pose
+        pose = self._pose.pose
         here = self._marks.cell_of(pose.x_m, pose.y_m)
-        states = self._states()
         if here is not None:
-            for row, column in AROUND:
-                cell = (here[0] + row, here[1] + column)
-                if not (0 <= cell[0] < states.shape[0] and 0 <= cell[1] < states.shape[1]):
-                    continue
-                if states[cell] == CellState.EXPLORED and cell not in self._refused:
+            around = [(here[0] + row, here[1] + column) for row, column in AROUND]
+            for cell in around:
+                if self._marks.state(*cell) == CellState.EXPLORED and cell not in self._refused:
                     return self._go(cell, far=False)
-                if states[cell] == CellState.UNKNOWN and cell not in self._refused:
-                    self._refused.add(cell)  # It looks there once.
+            for cell, (row, column) in zip(around, AROUND, strict=True):
+                if self._marks.state(*cell) == CellState.UNKNOWN and cell not in self._looked:
+                    self._looked.add(cell)  # It looks there once: what stays unknown would hold it for good.
                     self._facing = math.atan2(row, column)
                     return None
-        return self._hop(states, t_s)
+        return self._hop(t_s)
 
-    def _hop(self, states: np.ndarray[tuple[int, int], np.dtype[np.uint8]], t_s: float) -> None:
+    def _hop(self, t_s: float) -> None:
         """To the nearest explored cell by straight distance."""
-        pose = self._pose.belief.pose
-        explored = np.argwhere(states == CellState.EXPLORED)
-        if not len(explored):
+        pose = self._pose.pose
+        explored = [(int(row), int(column)) for row, column in self._marks.explored()]
+        if not explored:
             self._end(StackStatus.ARRIVED, "no explored cell is left to visit", t_s)
             return
-        open_cells = [
-            tuple(map(int, cell)) for cell in explored if tuple(map(int, cell)) not in self._refused
-        ]
-        if not open_cells:
-            # The firmware knows no refusals: it tries them all again.
-            self._refused.clear()
-            open_cells = [tuple(map(int, cell)) for cell in explored]
+        open_cells = [cell for cell in explored if cell not in self._refused] or explored
         away = [
             math.hypot(x - pose.x_m, y - pose.y_m)
             for x, y in (self._marks.centre_of(row, column) for row, column in open_cells)
         ]
-        row, column = open_cells[int(np.argmin(away))]
-        cell_m = min(self._marks.centre_of(1, 1)[0] - self._marks.centre_of(0, 0)[0], 1.0)
-        self._go((row, column), far=min(away) > self._config.far_cells * cell_m)
+        cell = open_cells[int(np.argmin(away))]
+        self._go(cell, far=min(away) > self._config.far_cells * min(self._marks.cell_m))
 
     def _go(self, cell: tuple[int, int], far: bool) -> None:
         self._goal, self._far, self._slow_periods = cell, far, 0
-
-    def _states(self) -> np.ndarray[tuple[int, int], np.dtype[np.uint8]]:
-        return self._marks.cells.states
 
     # --- driving ------------------------------------------------------------------------------------
 
     def _drive_on(self) -> WheelSpeeds:
         assert self._goal is not None
         self._slow_periods += 1  # No period of 10 ms makes 10 mm.
-        pose = self._pose.belief.pose
+        pose = self._pose.pose
         x, y = self._marks.centre_of(*self._goal)
-        if self._field is not None and (self._far or self._config.avoid == "always"):
+        if self._field is not None and (self._far or self._always):
             command = self._field.command(pose, x, y)
             if command is not None:
                 return command
         return pursue(pose, x, y, self._drive)
 
     def _count_progress(self, t_s: float) -> None:
-        count = int(self._marks.visited.sum())
+        count = self._marks.visited_count
         if count > self._new_count:
             self._new_count, self._new_at_s = count, t_s
         elif t_s - self._new_at_s > self._config.give_up_s:

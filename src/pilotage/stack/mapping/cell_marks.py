@@ -6,7 +6,8 @@ import math
 
 import numpy as np
 
-from pilotage.core.types import BoolArray, Pose2
+from pilotage.core.types import BoolArray, IntArray, Pose2
+from pilotage.kernels import cell_beam
 from pilotage.maps.cell_map import CellMap, CellState
 from pilotage.sensors.infrared import InfraredConfig
 from pilotage.sensors.line_sensor import LineSensorConfig
@@ -21,39 +22,56 @@ class CellMarks:
     """Marks OBSTACLE, LINE, VISITED and EXPLORED cells (exploration report, ch. 2.1, mapping task).
 
     A return within a sensor's reliable range is an obstacle; what lies before it, and the reliable range
-    of a sensor that sees nothing, is explored. Wrong marks of high priority stay for good: this is
-    what the pose's drift does to the report's maps.
+    of a sensor that sees nothing, is explored. Features are marked anywhere, everything else keeps
+    ``margin_cells`` away from the map's edge. Wrong marks of high priority stay for good: this is what the
+    pose's drift does to the report's maps.
     """
 
-    def __init__(self, knowledge: SheetKnowledge) -> None:
+    def __init__(self, knowledge: SheetKnowledge, margin_cells: int = 0) -> None:
         columns, rows = knowledge.cells
-        self._cell = knowledge.cell_m
+        self._margin = margin_cells
+        self._line_at_centre = knowledge.firmware.lines_at_centre
+        self.cell_m = knowledge.cell_m
         self._states = np.full((rows, columns), CellState.UNKNOWN, dtype=np.uint8)
         self.visited: BoolArray = np.zeros((rows, columns), dtype=np.bool_)
+        self.visited_count = 0
         self._infrared = list(knowledge.sensors_of(InfraredConfig).items())
         self._lines = list(knowledge.sensors_of(LineSensorConfig).items())
-        self._edge_is_dark = knowledge.edge_is_dark
 
     @property
     def cells(self) -> CellMap:
         """The map with borders around obstacles."""
-        return CellMap(self._states.copy()).with_borders()
+        return CellMap(self._states.copy())
+
+    def state(self, row: int, column: int) -> CellState:
+        """What is known of a cell; the margin and what lies beyond the sheet are a border."""
+        rows, columns = self._states.shape
+        low = self._margin
+        if not (low <= row < rows - low and low <= column < columns - low):
+            return CellState.BORDER
+        return CellState(int(self._states[row, column]))
+
+    def explored(self) -> IntArray:
+        """(N, 2) rows and columns of the explored cells."""
+        return np.argwhere(self._states == CellState.EXPLORED)
 
     def cell_of(self, x_m: float, y_m: float) -> tuple[int, int] | None:
         """Row and column of a point; None off the sheet."""
-        column, row = math.floor(x_m / self._cell[0]), math.floor(y_m / self._cell[1])
+        column, row = math.floor(x_m / self.cell_m[0]), math.floor(y_m / self.cell_m[1])
         rows, columns = self._states.shape
         return (row, column) if 0 <= row < rows and 0 <= column < columns else None
 
     def centre_of(self, row: int, column: int) -> tuple[float, float]:
         """Middle of a cell in metres."""
-        return (column + 0.5) * self._cell[0], (row + 0.5) * self._cell[1]
+        return (column + 0.5) * self.cell_m[0], (row + 0.5) * self.cell_m[1]
 
     def step(self, readings: Readings, pose: Pose2) -> None:
         """Take in the readings of one sensing period."""
         here = self.cell_of(pose.x_m, pose.y_m)
         if here is not None:
-            self.visited[here] = True
+            if not self.visited[here]:
+                self.visited[here] = True
+                self.visited_count += 1
             self._mark(here, CellState.VISITED)
         c, s = math.cos(pose.theta_rad), math.sin(pose.theta_rad)
         for name, config in self._infrared:
@@ -66,7 +84,7 @@ class CellMarks:
                 mount = sensor.mount
                 x = pose.x_m + c * mount.x_m - s * mount.y_m
                 y = pose.y_m + s * mount.x_m + c * mount.y_m
-                self._mark(self.cell_of(x, y), CellState.LINE)
+                self._mark(here if self._line_at_centre else self.cell_of(x, y), CellState.LINE)
 
     def _beam(
         self, config: InfraredConfig, reading: InfraredReading, pose: Pose2, c: float, s: float
@@ -74,24 +92,21 @@ class CellMarks:
         mount = config.mount
         x = pose.x_m + c * mount.x_m - s * mount.y_m
         y = pose.y_m + s * mount.x_m + c * mount.y_m
-        theta = pose.theta_rad + mount.theta_rad
-        ux, uy = math.cos(theta), math.sin(theta)
-        sees = not reading.saturated and reading.range_m <= config.reliable_range_m
-        length = min(reading.range_m, config.reliable_range_m)
-        end = self.cell_of(x + length * ux, y + length * uy)
-        step = STEP_SHARE * min(self._cell)
-        for k in range(math.ceil(length / step)):
-            cell = self.cell_of(x + k * step * ux, y + k * step * uy)
-            if not (sees and cell == end):
-                self._mark(cell, CellState.EXPLORED)
-        # The stretch between the robot's middle and the sensor is under its own body.
-        for k in range(math.ceil(math.hypot(mount.x_m, mount.y_m) / step)):
-            share = k * step / max(math.hypot(mount.x_m, mount.y_m), step)
-            cell = self.cell_of(pose.x_m + share * (x - pose.x_m), pose.y_m + share * (y - pose.y_m))
-            self._mark(cell, CellState.EXPLORED)
-        if sees:
-            self._mark(end, CellState.OBSTACLE)
+        cell_beam.mark_beam(
+            self._states,
+            pose.x_m,
+            pose.y_m,
+            x,
+            y,
+            pose.theta_rad + mount.theta_rad,
+            min(reading.range_m, config.reliable_range_m),
+            not reading.saturated and reading.range_m <= config.reliable_range_m,
+            self.cell_m[0],
+            self.cell_m[1],
+            STEP_SHARE * min(self.cell_m),
+            self._margin,
+        )
 
     def _mark(self, cell: tuple[int, int] | None, state: CellState) -> None:
-        if cell is not None and self._states[cell] > state:
-            self._states[cell] = state
+        if cell is not None:
+            cell_beam.mark(self._states, cell[0], cell[1], np.uint8(state), self._margin)

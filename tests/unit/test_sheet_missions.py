@@ -1,0 +1,173 @@
+"""Missions on a sheet end to end: five configurations, run folders, reports, bad input; their metrics."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pilotage.cli.main import main
+from pilotage.core.errors import InputError
+from pilotage.evaluation.sheet_visits import VisitedCells, reachable_cells
+from pilotage.experiments.mission import load_mission
+from pilotage.experiments.run import run_mission
+from pilotage.experiments.sheet.sheets import load_sheet
+from pilotage.experiments.sheet.simulate import simulate
+from pilotage.maps.cell_map_text import read_cell_map
+from pilotage.maps.ros_map import read_ros_map
+from pilotage.maps.true_cells import SheetFile
+from pilotage.missions.sheet import SheetMission
+
+REPORT = "stack.explorer.name=surround-check"
+
+
+def metrics(name: str, *overrides: str, seed: int = 0) -> dict[str, object]:
+    return run_mission(load_mission(name, overrides, seed), save=False).metrics
+
+
+@pytest.mark.parametrize(
+    ("name", "overrides"),
+    [
+        ("romi-baseline", ()),
+        *(
+            ("romi-explore", (REPORT, f"stack.fusion={fusion}", f"stack.avoidance={avoidance}"))
+            for fusion in ("on", "off")
+            for avoidance in ("on", "off")
+        ),
+    ],
+)
+def test_every_configuration_ends_with_a_reason(name: str, overrides: tuple[str, ...]) -> None:
+    found = metrics(name, *overrides, "run.time_limit_s=400")
+    assert found["reason"]
+    assert isinstance(found["coverage_visited"], float)
+    assert 0.0 < found["coverage_visited"] < 1.0
+
+
+def test_the_same_seed_gives_the_same_run_and_another_one_another() -> None:
+    traces = []
+    for seed in (3, 3, 4):
+        mission = load_mission("romi-explore", (REPORT, "run.time_limit_s=40"), seed)
+        assert isinstance(mission, SheetMission)
+        traces.append(simulate(mission).trace["true_x_m"])
+    assert np.array_equal(traces[0], traces[1])
+    assert not np.array_equal(traces[0], traces[2])
+
+
+def test_a_switch_leaves_the_other_modules_their_draws() -> None:
+    """The robot's true drive and its gyroscope's bias do not depend on the switches."""
+    first = []
+    for fusion in ("on", "off"):
+        mission = load_mission("romi-explore", (REPORT, f"stack.fusion={fusion}"), 1)
+        assert isinstance(mission, SheetMission)
+        mission = mission.model_copy(update={"run": mission.run.model_copy(update={"time_limit_s": 0.5})})
+        from pilotage.experiments.sheet.build import build
+
+        first.append(build(mission).simulator._drive)
+    assert np.array_equal(first[0], first[1])
+
+
+def test_the_run_folder_holds_map_and_report(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    arguments = ["run", "romi-explore", "--set", REPORT, "--set", "run.time_limit_s=30"]
+    assert main([*arguments, "--out", str(tmp_path), "--json", "--seed", "2"]) == 1
+    found = json.loads(capsys.readouterr().out)
+    folder = Path(found["run_dir"])
+    assert "time limit" in found["reason"]
+    cells = read_cell_map(folder / "cells.txt")
+    with np.load(folder / "cells.npz") as archive:
+        assert np.array_equal(archive["states"], cells.states)
+        assert archive["visited"].sum() == found["visited_cells"]
+    assert read_ros_map(folder / "map.yaml").grid.cells.shape == cells.shape
+    page = (folder / "report.html").read_text(encoding="utf-8")
+    for slug in ("sheet-path", "coverage", "accuracy", "printed-map", "pose-error"):
+        assert f'<section id="{slug}"><h2>' in page
+    assert page.count('role="img"') == 5
+    # It reruns from what it wrote, to the same numbers.
+    again = run_mission(load_mission(str(folder / "mission.yaml")), save=False).metrics
+    assert again["position_rmse_m"] == found["position_rmse_m"]
+    # The map scores the same by itself, but for marks that overwrote visited cells.
+    assert main(["map-score", str(folder / "cells.txt"), str(sheet_file(tmp_path)), "--json"]) == 0
+    score = json.loads(capsys.readouterr().out)
+    assert score["feature_precision"] == pytest.approx(found["feature_precision"], nan_ok=True)
+
+
+def sheet_file(folder: Path) -> Path:
+    path = folder / "sheet.yaml"
+    sheet = load_sheet("treasure-hunt").model_dump(mode="json")
+    path.write_text(json.dumps(sheet), encoding="utf-8")
+    return path
+
+
+def test_a_broken_cell_file_is_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    main(["run", "romi-baseline", "--set", "run.time_limit_s=2", "--out", str(tmp_path), "--json"])
+    folder = Path(json.loads(capsys.readouterr().out)["run_dir"])
+    (folder / "cells.npz").write_bytes(b"no archive")
+    assert main(["report", str(folder)]) == 2
+    error = capsys.readouterr().err.strip()
+    assert error.count("\n") == 0
+    assert "cells.npz" in error
+
+
+@pytest.mark.parametrize(
+    ("override", "complaint"),
+    [
+        ("world.sheet={size_m: [1.8, 1.8], cells: [0, 25]}", "cells"),
+        ("world.sheet={size_m: [0, 1.8]}", "size_m"),
+        ("world.sheet=treasure-hnt", "treasure-hunt"),
+        ("world.sheet=no/such.yaml", "none there"),
+        ("world.start={x_m: 0.4, y_m: 0.5}", "with room for the body"),
+        ("world.start={x_m: 2.4, y_m: 0.5}", "on the sheet"),
+        ("stack.fusion=perhaps", "fusion"),
+        ("robot.sensors.lidar={name: lidar}", "cannot carry"),
+        ("robot.errors.slip=[0.02, 0.01]", "smaller bound first"),
+        ("stack.explorer.name=surround-chek", "surround-check"),
+        ("run.dt_s=0.003", "rate_hz"),
+    ],
+)
+def test_bad_input_is_one_line(override: str, complaint: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["run", "romi-explore", "--set", override, "--out", "/nonexistent", "--json"]) == 2
+    captured = capsys.readouterr()
+    assert captured.out == ""
+    assert captured.err.strip().count("\n") == 0
+    assert complaint in captured.err
+
+
+def test_any_sheet_will_do() -> None:
+    """Not square, no boxes, odd cells: it runs, writes what it can, and a cell too small is no failure."""
+    sheet = "world.sheet={size_m: [1.2, 0.9], cells: [8, 9]}"
+    found = metrics("romi-explore", REPORT, sheet, "run.time_limit_s=20", "stack.explorer.margin_cells=0")
+    assert found["reachable_cells"]
+    one = "world.sheet={size_m: [0.6, 0.6], cells: [1, 1]}"
+    assert metrics("romi-explore", REPORT, one, "run.time_limit_s=5")["reason"]
+
+
+def test_the_reachable_cells_of_the_shipped_sheet() -> None:
+    assert int(reachable_cells(load_sheet("treasure-hunt"), 0.0815).sum()) == 406
+
+
+def test_reachable_cells_by_hand() -> None:
+    """A sheet of 4 x 4 cells of 0.1 m and a body of 0.1 m: only the four inner cells have room."""
+    sheet = SheetFile(size_m=(0.4, 0.4), cells=(4, 4))
+    assert np.argwhere(reachable_cells(sheet, 0.1)).tolist() == [[1, 1], [1, 2], [2, 1], [2, 2]]
+    boxed = SheetFile(size_m=(0.4, 0.4), cells=(4, 4), obstacles=((0.18, 0.18, 0.22, 0.22),))
+    assert not reachable_cells(boxed, 0.1).any()
+
+
+def test_visited_cells_count_once_and_only_on_the_sheet() -> None:
+    visits = VisitedCells((1.0, 1.0), (10, 10))
+    for t_s, x in enumerate((0.05, 0.06, 0.15, 0.05, -0.01, 1.5)):
+        visits.add(x, 0.05, float(t_s))
+    assert visits.count == int(visits.visited.sum()) == 2
+    assert visits.first_s[0, :2].tolist() == [0.0, 2.0]
+    assert math.isnan(visits.first_s[5, 5])
+
+
+def test_fusion_needs_a_gyroscope() -> None:
+    mission = load_mission("romi-explore", (REPORT, "run.time_limit_s=1"))
+    assert isinstance(mission, SheetMission)
+    sensors = {name: choice for name, choice in mission.robot.sensors.items() if name != "gyroscope"}
+    robot = mission.robot.model_copy(update={"sensors": sensors})
+    with pytest.raises(InputError, match="gyroscope"):
+        simulate(mission.model_copy(update={"robot": robot}))

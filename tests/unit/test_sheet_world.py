@@ -1,0 +1,178 @@
+"""The simulated robot on its sheet: boxes, drive, sensors."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from pilotage.core.errors import InputError
+from pilotage.core.random import RandomStreams
+from pilotage.core.types import Pose2, WheelSpeeds
+from pilotage.kernels import boxes, wheel_drive
+from pilotage.maps.true_cells import SheetFile
+from pilotage.missions.sheet import DriveErrorsConfig, WheelDriveConfig
+from pilotage.sensors.gyroscope import GyroscopeConfig
+from pilotage.sensors.infrared import InfraredConfig
+from pilotage.sensors.readings import EncoderCounts, GyroscopeRates, InfraredReading, LineReading
+from pilotage.sensors.wheel_encoders import WheelEncodersConfig
+from pilotage.sim.sheet_simulator import SheetSimulator
+from pilotage.sim.sheet_world import true_drive
+from support.sheets import sheet_sensors, sheet_simulator
+
+EXACT = DriveErrorsConfig(
+    radius_difference=0.0, separation_error=(0.0, 0.0), slip=(0.0, 0.0), slip_std_m_sqrt_m=0.0
+)
+BOXES = np.array([[0.2, 0.1, 0.5, 0.4], [0.45, 0.35, 0.9, 0.6]])
+EMPTY = SheetFile(size_m=(4.0, 4.0), cells=(10, 10))
+MIDDLE = Pose2(2.0, 2.0, 0.0)
+
+coordinate = st.floats(-0.2, 1.2)
+
+
+@given(coordinate, coordinate, st.floats(-math.pi, math.pi))
+def test_a_beam_ends_where_the_first_box_begins(x: float, y: float, theta: float) -> None:
+    """Against a march along the beam in steps of half a millimetre."""
+    found = boxes.beam_range(x, y, theta, BOXES, 0.8)
+    along = np.arange(0.0, 0.8, 5e-4)
+    points = np.column_stack([x + along * math.cos(theta), y + along * math.sin(theta)])
+    inside = np.array([boxes.distance_to_boxes(px, py, BOXES) == 0.0 for px, py in points])
+    marched = along[inside.argmax()] if inside.any() else 0.8
+    # A march may step over a corner that the beam cuts.
+    assert found <= marched + 1e-9
+    if found < 0.8:
+        end = boxes.distance_to_boxes(x + found * math.cos(theta), y + found * math.sin(theta), BOXES)
+        assert end < 1e-9
+    if inside.any():
+        assert marched - found < 5e-3 or found == 0.0 or not inside[: int(found / 5e-4)].any()
+
+
+@given(coordinate, coordinate)
+def test_distance_to_boxes_is_the_least_over_their_points(x: float, y: float) -> None:
+    found = boxes.distance_to_boxes(x, y, BOXES)
+    each = [math.hypot(x - min(max(x, x0), x1), y - min(max(y, y0), y1)) for x0, y0, x1, y1 in BOXES.tolist()]
+    assert found == pytest.approx(min(each), abs=1e-12)
+
+
+def drive_for(sim: SheetSimulator, command: WheelSpeeds, seconds: float) -> np.ndarray:
+    counts = np.zeros(2, dtype=np.int64)
+    for _ in range(round(seconds * 100)):
+        reading = sim.step(command).by_sensor["encoders"]
+        assert isinstance(reading, EncoderCounts)
+        counts += [int(reading.left.sum()), int(reading.right.sum())]
+    return counts
+
+
+def test_an_exact_robot_drives_what_its_encoders_say() -> None:
+    sim = sheet_simulator(sheet_sensors(), RandomStreams(0), EMPTY, MIDDLE, EXACT)
+    counts = drive_for(sim, WheelSpeeds(2.0, 2.0), 10.0)
+    way = 2.0 * math.pi * 0.035 * counts.mean() / 1440
+    assert counts[0] == counts[1]
+    assert sim.truth.x_m - 2.0 == pytest.approx(way, abs=2 * math.pi * 0.035 / 1440)
+    # Behind the command by the motors' lag: v (t - lag).
+    assert way == pytest.approx(0.07 * (10.0 - 0.05), abs=3e-4)
+
+
+def test_a_turn_on_the_spot_follows_the_separation() -> None:
+    sim = sheet_simulator(sheet_sensors(), RandomStreams(0), EMPTY, MIDDLE, EXACT)
+    counts = drive_for(sim, WheelSpeeds(-1.0, 1.0), 2.0)
+    angle = 2.0 * math.pi * 0.035 * (counts[1] - counts[0]) / 1440 / 0.1421
+    assert sim.truth.theta_rad == pytest.approx(angle, abs=2e-3)
+
+
+def test_slip_and_unequal_wheels_are_drawn_within_what_is_stated() -> None:
+    motion, errors = WheelDriveConfig(), DriveErrorsConfig()
+    drawn = np.array([true_drive(motion, errors, np.random.default_rng(seed)) for seed in range(200)])
+    ratio = drawn[:, wheel_drive.RADIUS_LEFT] / drawn[:, wheel_drive.RADIUS_RIGHT] - 1.0
+    assert np.allclose(np.abs(ratio), 0.005, atol=1e-4)
+    assert (ratio > 0.0).any()
+    assert (ratio < 0.0).any()
+    off = np.abs(drawn[:, wheel_drive.SEPARATION] / motion.wheel_separation_m - 1.0)
+    assert ((off >= 0.01 - 1e-12) & (off <= 0.02 + 1e-12)).all()
+    slip = drawn[:, [wheel_drive.SLIP_LEFT, wheel_drive.SLIP_RIGHT]]
+    assert ((slip >= 0.01) & (slip <= 0.02)).all()
+
+
+def test_the_body_stops_at_a_box_while_the_wheels_turn_on_and_can_back_off() -> None:
+    sheet = SheetFile(size_m=(4.0, 4.0), cells=(10, 10), obstacles=((2.3, 1.5, 2.6, 2.5),))
+    sim = sheet_simulator(sheet_sensors(), RandomStreams(0), sheet, MIDDLE, EXACT)
+    counts = drive_for(sim, WheelSpeeds(3.0, 3.0), 6.0)
+    assert sim.contacts == 1
+    assert sim.touching
+    assert -1e-9 <= sim.clearance_m < 1e-3
+    assert 2.0 * math.pi * 0.035 * counts.mean() / 1440 > 0.5
+    before = sim.truth.x_m
+    drive_for(sim, WheelSpeeds(-3.0, -3.0), 1.0)
+    assert sim.truth.x_m < before - 0.05
+    assert not sim.touching
+
+
+def test_there_is_no_wall_at_the_edge() -> None:
+    sim = sheet_simulator(sheet_sensors(), RandomStreams(0), EMPTY, Pose2(3.8, 2.0, 0.0), EXACT)
+    assert sim.on_sheet
+    drive_for(sim, WheelSpeeds(3.0, 3.0), 4.0)
+    assert not sim.on_sheet
+    assert sim.contacts == 0
+
+
+def test_the_gyroscope_has_a_bias_of_either_sign_and_a_scale_error() -> None:
+    """False-alarm rate: below 1e-6 (six standard deviations of the mean)."""
+    signs = set()
+    for seed in range(12):
+        sensors = sheet_sensors() | {"gyroscope": GyroscopeConfig(bias_walk_rad_s_sqrt_s=0.0)}
+        sim = sheet_simulator(sensors, RandomStreams(seed), EMPTY, MIDDLE, EXACT)
+        rates = []
+        for _ in range(300):
+            reading = sim.step(WheelSpeeds(0.0, 0.0)).by_sensor["gyroscope"]
+            assert isinstance(reading, GyroscopeRates)
+            rates += reading.rates_rad_s.tolist()
+        mean = float(np.mean(rates))
+        assert abs(abs(mean) - math.radians(1.0)) < 6.0 * math.radians(0.15) / math.sqrt(600)
+        signs.add(mean > 0.0)
+    assert signs == {True, False}
+
+
+def test_infrared_errors_grow_with_the_range() -> None:
+    """Standard deviation 3.5 % of the range; 400 readings, band of 6 standard errors."""
+    for x in (1.9, 2.05):
+        sheet = SheetFile(size_m=(4.0, 4.0), cells=(10, 10), obstacles=((2.3, 1.5, 2.6, 2.5),))
+        sensors = sheet_sensors() | {"ir": InfraredConfig()}
+        sim = sheet_simulator(sensors, RandomStreams(3), sheet, Pose2(x, 2.0, 0.0), EXACT)
+        found: list[float] = []
+        while len(found) < 400:
+            reading = sim.step(WheelSpeeds(0.0, 0.0)).by_sensor.get("ir")
+            if isinstance(reading, InfraredReading):
+                found.append(reading.range_m)
+        std = float(np.std(found)) / (2.3 - x)
+        assert abs(std - 0.035) < 6.0 * 0.035 / math.sqrt(2 * 400)
+        assert abs(float(np.mean(found)) - (2.3 - x)) < 6.0 * 0.035 * (2.3 - x) / 20.0
+
+
+def test_line_sensors_see_tape_and_the_dark_floor() -> None:
+    sheet = SheetFile(size_m=(4.0, 4.0), cells=(10, 10), lines=(((2.5, 1.0), (2.5, 3.0)),))
+    sim = sheet_simulator(sheet_sensors(), RandomStreams(0), sheet, MIDDLE, EXACT)
+    dark = []
+    while sim.truth.x_m < 2.7:
+        reading = sim.step(WheelSpeeds(3.0, 3.0)).by_sensor.get("line_left")
+        if isinstance(reading, LineReading) and reading.dark:
+            dark.append(sim.truth.x_m + 0.07)
+    assert dark
+    assert all(abs(x - 2.5) < 0.5 * 0.015 + 6e-3 for x in dark)
+
+
+@pytest.mark.parametrize(
+    ("change", "complaint"),
+    [
+        ({"encoders": WheelEncodersConfig(rate_hz=150.0)}, "multiple of 100 Hz"),
+        ({"gyroscope": GyroscopeConfig(rate_hz=100.0)}, "the encoders' 200 Hz"),
+        ({"ir_left": InfraredConfig(rate_hz=30.0)}, "whole fraction"),
+        ({"more": WheelEncodersConfig()}, "expected one WheelEncoders"),
+    ],
+)
+def test_rates_that_do_not_fit_are_told(change: dict[str, Any], complaint: str) -> None:
+    with pytest.raises(InputError, match=complaint):
+        sheet_simulator(sheet_sensors() | change, RandomStreams(0))
