@@ -114,9 +114,7 @@ def add_odometry(
                 shared[DISTANCE_SCALE] = -steps[i, 1]
             elif row == 2:
                 residual = (
-                    turn
-                    - (1.0 + systematic[TURN_SCALE]) * steps[i, 2]
-                    - systematic[TURN_PER_M] * steps[i, 3]
+                    turn - (1.0 + systematic[TURN_SCALE]) * steps[i, 2] - systematic[TURN_PER_M] * steps[i, 3]
                 )
                 first[2], second[2] = -1.0, 1.0
                 shared[TURN_SCALE], shared[TURN_PER_M] = -steps[i, 2], -steps[i, 3]

@@ -15,7 +15,7 @@ import numpy as np
 from pydantic import Field
 
 from pilotage.core.config import Config
-from pilotage.core.types import BoolArray, FloatArray, IntArray
+from pilotage.core.types import FloatArray, IntArray
 from pilotage.kernels import line_landmarks
 from pilotage.stack.localization.observations import Observations
 
@@ -245,9 +245,7 @@ class LineMap:
             seen.owner[seen.owner > j] -= 1
         self.count -= 1
 
-    def _merge(
-        self, seen: Observations, maker: _Maker, beams: Observations, crossings: Observations
-    ) -> bool:
+    def _merge(self, seen: Observations, maker: _Maker, beams: Observations, crossings: Observations) -> bool:
         merged = False
         for j in range(self.count - 1, self.edges - 1, -1):
             if self.kinds[j] != maker.kind:
@@ -285,6 +283,7 @@ class LineMap:
                 nearest, best = off, i
         return best
 
-    def belongs(self, kind: Kind) -> BoolArray:
-        """(count,) which landmarks are of one kind."""
-        return np.asarray(self.kinds[: self.count] == kind)
+    def walls(self) -> FloatArray:
+        """(S, 4) ends of all walls."""
+        own = self.of_kind(Kind.WALL)
+        return np.array([self.segment(j).ravel() for j in own]).reshape(-1, 4)

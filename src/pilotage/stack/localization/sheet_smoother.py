@@ -107,9 +107,7 @@ class SheetSmoother:
     def add_crossing(self, at: tuple[float, float]) -> None:
         """Add a point of the map where a line was crossed just now."""
         values = self.keyframes.to_frame(*at)
-        self.crossings.add(
-            self.keyframes.count - 1, values, self._config.crossing_std_m, self.position_std_m
-        )
+        self.crossings.add(self.keyframes.count - 1, values, self._config.crossing_std_m, self.position_std_m)
         self._fresh += 1
 
     def solve(self, steps: int = 1) -> None:
@@ -197,9 +195,7 @@ class SheetSmoother:
         first[np.diag_indices(4)] += weights
         right -= weights * (self.keyframes.poses[0] - self._start)
         turn_per_m = errors.radius_difference_std / self._separation
-        shared = np.array(
-            [gyro.scale_std, errors.turn_scale_std, turn_per_m, errors.distance_scale_std]
-        )
+        shared = np.array([gyro.scale_std, errors.turn_scale_std, turn_per_m, errors.distance_scale_std])
         mean = np.array([0.0, 0.0, 0.0, -errors.slip_mean])
         for k in range(sheet_graph.SYSTEMATIC):
             _hold(corner, right_corner, k, self.keyframes.systematic[k] - mean[k], float(shared[k]))
