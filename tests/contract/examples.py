@@ -335,5 +335,8 @@ EXAMPLES: dict[tuple[str, str], Example] = {
     ("sensor", "infrared"): Example(sheet_sensor_reads, pure_numbers=frozenset({"range_std_fraction"})),
     ("sensor", "line-sensor"): Example(sheet_sensor_reads),
     ("explorer", "random-walk"): Example(explorer_explores),
+    ("explorer", "frontier"): Example(
+        explorer_explores, pure_numbers=frozenset({"depth_std", "speed_share"})
+    ),
     ("explorer", "surround-check"): Example(explorer_explores, pure_numbers=frozenset({"far_cells"})),
 }

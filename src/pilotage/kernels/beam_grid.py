@@ -55,14 +55,14 @@ def add_beams(
         last = -1
         t = 0.0
         while t < clear:
-            column, row = int(math.floor((x + t * ux) / width_m)), int(math.floor((y + t * uy) / height_m))
+            column, row = math.floor((x + t * ux) / width_m), math.floor((y + t * uy) / height_m)
             if 0 <= row < rows and 0 <= column < columns and row * columns + column != last:
                 last = row * columns + column
                 odds[row, column] = max(odds[row, column] + free_odds, -limit)
             t += 0.5 * resolution
         if hit:
-            column = int(math.floor((x + length * ux) / width_m))
-            row = int(math.floor((y + length * uy) / height_m))
+            column = math.floor((x + length * ux) / width_m)
+            row = math.floor((y + length * uy) / height_m)
             if 0 <= row < rows and 0 <= column < columns:
                 share = resolution / (resolution + 2.0 * std)
                 odds[row, column] = min(odds[row, column] + hit_odds * share, limit)
@@ -71,7 +71,7 @@ def add_beams(
 @kernel
 def mark_depth(depth: FloatArray, x: float, y: float, width_m: float, height_m: float) -> None:
     """Note how far a point lies from the sides of its cell, where that is more than was noted before."""
-    column, row = int(math.floor(x / width_m)), int(math.floor(y / height_m))
+    column, row = math.floor(x / width_m), math.floor(y / height_m)
     if 0 <= row < depth.shape[0] and 0 <= column < depth.shape[1]:
         across = min(x - column * width_m, (column + 1) * width_m - x)
         up = min(y - row * height_m, (row + 1) * height_m - y)

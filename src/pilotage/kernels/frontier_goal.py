@@ -30,7 +30,7 @@ def entry_node(
     points: FloatArray,
 ) -> int:
     """The node by which to come to a point at the least cost, the last bit being straight; -1 for none."""
-    column, row = int(round(x / width_m)), int(round(y / height_m))
+    column, row = round(x / width_m), round(y / height_m)
     if 0 <= row < rows and 0 <= column < columns and cost[row * columns + column] < np.inf:
         return row * columns + column
     best, node = np.inf, -1

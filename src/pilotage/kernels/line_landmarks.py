@@ -22,7 +22,7 @@ BoolArray = NDArray[np.bool_]
 def observed_points(
     poses: FloatArray, frame: IntArray, values: FloatArray, n: int, is_beam: bool, points: FloatArray
 ) -> None:
-    """Fill ``points`` (M, 4): where each beam ended (or sensor crossed) on the map, and the beam's direction."""
+    """Fill ``points`` (M, 4): where on the map each beam ended or line was crossed; its direction."""
     for k in range(n):
         i = frame[k]
         c, s = math.cos(poses[i, 2]), math.sin(poses[i, 2])
@@ -107,7 +107,7 @@ def associate(
 def measure_extents(
     points: FloatArray, landmark: IntArray, n: int, lines: FloatArray, n_lines: int, extents: FloatArray
 ) -> None:
-    """Set each line's extent to that of its points: the third outermost at either end, or the last there is."""
+    """Set each line's extent to that of its points: of many the third outermost at either end."""
     outer = np.empty((n_lines, 2, 3))
     outer[:, 0, :] = np.inf
     outer[:, 1, :] = -np.inf
@@ -211,8 +211,8 @@ def find_line(
             continue
         # The run of points around the first of the pair.
         sorted_along = np.sort(along[:n_in])
-        low = high = np.searchsorted(sorted_along, 0.0)
-        low = high = min(low, n_in - 1)
+        low = min(int(np.searchsorted(sorted_along, 0.0)), n_in - 1)
+        high = low
         while low > 0 and sorted_along[low] - sorted_along[low - 1] <= longest_gap:
             low -= 1
         while high + 1 < n_in and sorted_along[high + 1] - sorted_along[high] <= longest_gap:

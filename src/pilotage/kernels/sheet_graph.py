@@ -162,7 +162,7 @@ def beam_residual(
     jacobian[2] = (-(ny * ox - nx * oy) - reach * (ny * ux - nx * uy)) / ahead
     jacobian[3] = (-(nx * py - ny * px) - reach * (nx * uy - ny * ux)) / ahead
     jacobian[4] = 1.0 / ahead
-    return reach - beam[4]
+    return float(reach - beam[4])
 
 
 @kernel
@@ -179,7 +179,7 @@ def crossing_residual(
     jacobian[2] = ny * ox - nx * oy
     jacobian[3] = nx * py - ny * px
     jacobian[4] = -1.0
-    return nx * px + ny * py - line[1]
+    return float(nx * px + ny * py - line[1])
 
 
 @kernel

@@ -11,6 +11,7 @@ from pilotage.kernels.geometry import point_segment_distance
 from pilotage.kernels.jit import kernel
 
 FloatArray = NDArray[np.float64]
+NO_POINTS = np.zeros((0, 2))
 FAR_M = 1.0
 """Clearances above are not told apart."""
 
@@ -33,13 +34,28 @@ def clearance_at(x: float, y: float, segments: FloatArray, points: FloatArray) -
 
 @kernel
 def clearance_field(
-    rows: int, columns: int, width_m: float, height_m: float, segments: FloatArray, points: FloatArray
+    rows: int,
+    columns: int,
+    width_m: float,
+    height_m: float,
+    segments: FloatArray,
+    points: FloatArray,
+    reach_m: float,
 ) -> FloatArray:
-    """(rows, columns) clearance at the nodes (column * width, row * height)."""
+    """(rows, columns) clearance at nodes (column * width, row * height); points count within reach."""
     field = np.empty((rows, columns))
     for row in range(rows):
         for column in range(columns):
-            field[row, column] = clearance_at(column * width_m, row * height_m, segments, points)
+            field[row, column] = clearance_at(column * width_m, row * height_m, segments, NO_POINTS)
+    # Points are many and matter close by only.
+    for k in range(points.shape[0]):
+        x, y = points[k, 0], points[k, 1]
+        first, last = math.ceil((y - reach_m) / height_m), int((y + reach_m) / height_m)
+        for row in range(max(first, 0), min(last + 1, rows)):
+            left, right = math.ceil((x - reach_m) / width_m), int((x + reach_m) / width_m)
+            for column in range(max(left, 0), min(right + 1, columns)):
+                away = math.hypot(column * width_m - x, row * height_m - y)
+                field[row, column] = min(field[row, column], away)
     return field
 
 
@@ -97,6 +113,17 @@ def best_stands(
             if not wanted[row, column]:
                 continue
             best = -np.inf
+            x, y = (column + 0.5) * cell_width_m, (row + 0.5) * cell_height_m
+            side = 0.5 * min(cell_width_m, cell_height_m)
+            room = clearance_at(x, y, segments, points) - body_m
+            if room + 0.5 * math.hypot(cell_width_m, cell_height_m) < 0.0:
+                continue
+            on_sheet = min(min(x, width - x), min(y, height - y)) - body_m + overhang_m
+            if on_sheet >= 0.0 and room - keep_off_m >= side and room >= 0.05:
+                # Nothing is better than the middle.
+                here = out[row, column]
+                here[0], here[1], here[2], here[3] = x, y, side, room
+                continue
             for i in range(1, steps):
                 for j in range(1, steps):
                     x, y = (column + i / steps) * cell_width_m, (row + j / steps) * cell_height_m

@@ -18,6 +18,8 @@ CREEP_M_S = 0.02
 REACHED_M, PASSED_M = 0.006, 0.010
 """How near the last and the other waypoints are come to."""
 PROGRESS_M = 0.002
+CAREFUL = 0.6
+"""Share of its speed that it takes close to something."""
 
 
 class WaypointDrive:
@@ -41,6 +43,7 @@ class WaypointDrive:
         self._slow_at_end = True
         self._nearest, self._since_s = math.inf, 0.0
         self.moves_ahead = False
+        self.is_careful = False
 
     def follow(self, waypoints: list[Point], t_s: float, slow_at_end: bool, back: bool = False) -> None:
         """Take new waypoints; ``back``: the last piece is driven backwards."""
@@ -81,7 +84,7 @@ class WaypointDrive:
             self.moves_ahead = False
             w = min(max(TURN_GAIN_PER_S * off, -self._turn_rate), self._turn_rate)
             return wheel_speeds(0.0, math.copysign(max(abs(w), 0.25), w), self._drive)
-        v = self._speed
+        v = self._speed * (CAREFUL if self.is_careful else 1.0)
         if not last or self._slow_at_end:
             v = min(v, max(CREEP_M_S, SLOW_GAIN_PER_S * away))
         v *= max(0.2, 1.0 - 2.0 * abs(off))

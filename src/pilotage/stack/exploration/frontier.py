@@ -16,13 +16,14 @@ from pilotage.stack.control.waypoint_drive import WaypointDrive
 from pilotage.stack.control.wheel_pursuit import wheel_speeds
 from pilotage.stack.exploration.explorer import EXPLORERS, LeftCell
 from pilotage.stack.exploration.frontier_config import FrontierConfig
+from pilotage.stack.exploration.frontier_inspections import Inspections
 from pilotage.stack.exploration.frontier_reasons import reasons, summary
-from pilotage.stack.exploration.frontier_returns import best_look
+from pilotage.stack.exploration.frontier_returns import Look, best_look
 from pilotage.stack.exploration.frontier_senses import Senses
+from pilotage.stack.exploration.sheet_features import cell_map, line_cells, obstacle_cells, tape_ends
 from pilotage.stack.interface import Belief, StackStatus
 from pilotage.stack.knowledge import SheetKnowledge
-from pilotage.stack.mapping.sheet_features import cell_map, line_cells, obstacle_cells
-from pilotage.stack.planning.sheet_room import SheetRoom
+from pilotage.stack.planning.sheet_room import Point, SheetRoom
 
 Cell = tuple[int, int]
 
@@ -31,8 +32,12 @@ OVERHANG_M = 0.004
 KEEP_OFF_M = 0.004
 DEEP_M = 0.020
 """A goal counts as visited this deep inside it, on the way to the next."""
-GUARD_AHEAD_M, GUARD_ROOM_M = 0.05, 0.008
+GUARD_AHEAD_M, GUARD_ROOM_M = 0.05, 0.011
+"""It stops for what would come this near within so much way: a few millimetres are driven while it brakes."""
+CAUTION_ROOM_M = 0.022
+"""With less room ahead it drives more slowly."""
 REVIEW_DEPTH_M = 0.008
+SHALLOW_M = 0.004
 BACK_SPEED_M_S, BACK_S = 0.035, 0.5
 PENALTY_M = 0.5
 """What one failed try makes a goal dearer."""
@@ -74,12 +79,12 @@ class FrontierExplorer:
         self._doing, self._until_s = Doing.REST, config.first_rest_s
         self._rested_s = self._looked_s = 0.0
         self._goal: Cell | None = None
-        self._goal_depth_m = 0.0
         self._tries = np.zeros((shape.rows, shape.columns), np.int64)
         self._stands: FloatArray | None = None
         self._map_is_old = True
         self._reviews = 0
         self._looks = self._stops = 0
+        self._inspections = Inspections(config.tape_end_m, config.inspections)
         self._left: tuple[LeftCell, ...] = ()
         self._status, self._reason = StackStatus.RUNNING, ""
         self._events: list[Event] = []
@@ -160,9 +165,11 @@ class FrontierExplorer:
 
     def _keep_up(self, t_s: float) -> None:
         """After beams and line sensors spoke: solve in time, look whether the way is still free."""
-        if self._doing is Doing.GO and self._goal is not None:
-            if self._grid.depth_m[self._goal] >= min(DEEP_M, self._goal_depth_m - 0.004):
-                self._decide(t_s)
+        if self._driver.moves_ahead and self._senses.is_over_edge():
+            self._back_from_edge(t_s)
+            return
+        if self._goal is not None and self._grid.depth_m[self._goal] >= DEEP_M:
+            self._decide(t_s)
         age_s = self._smoother.keyframes.t_s - self._smoother.solved_s
         if age_s > self._config.solve_every_s and (self._smoother.has_news or age_s > 10.0):
             self._solve()
@@ -174,6 +181,15 @@ class FrontierExplorer:
             self._refresh_room()
             self._fail(t_s, "stopped", "something stands in the way")
             self._decide(t_s)
+
+    def _back_from_edge(self, t_s: float) -> None:
+        """Both line sensors are over the sheet's edge: turn back, whatever the pose says."""
+        if self._doing is not Doing.LOOK:
+            self._fail(t_s, "edge", "the sheet's edge came sooner than expected")
+        self._driver.stop()
+        self._solve()
+        self._looked_s = t_s
+        self._doing, self._until_s = Doing.BACK, t_s + BACK_S
 
     def _solve(self, steps: int = 1, anew: bool = False) -> None:
         """Smooth, and bring the map up to date."""
@@ -214,6 +230,7 @@ class FrontierExplorer:
         ahead = x + share * (to_x - x), y + share * (to_y - y)
         near = self._senses.recent
         room = near.room_along((x, y), ahead, self._room.body_m)
+        self._driver.is_careful = room < CAUTION_ROOM_M
         return room < GUARD_ROOM_M and room < near.room_along((x, y), (x, y), self._room.body_m) - 0.0015
 
     # --- deciding -----------------------------------------------------------------------------------
@@ -221,11 +238,12 @@ class FrontierExplorer:
     def _settled(self) -> BoolArray:
         """Cells whose visit is sure, by how deep inside them the path led."""
         c = self._config
-        if self._reviews:
-            return np.asarray(self._grid.depth_m >= REVIEW_DEPTH_M)
-        return np.asarray(
-            self._grid.depth_m >= c.depth_m + min(c.depth_std * self._smoother.position_std_m, 0.016)
-        )
+        wanted = c.depth_m + min(c.depth_std * self._smoother.position_std_m, DEEP_M - 0.004)
+        deep = np.full_like(self._grid.depth_m, REVIEW_DEPTH_M if self._reviews else wanted)
+        if self._stands is not None:
+            # Of some cells only a sliver can be entered.
+            deep = np.minimum(deep, np.maximum(self._stands[:, :, 2] - 0.004, SHALLOW_M))
+        return np.asarray(self._grid.depth_m >= deep)
 
     def _decide(self, t_s: float) -> None:
         """Rest, return to a landmark, visit a cell, or end."""
@@ -251,32 +269,47 @@ class FrontierExplorer:
                 self._senses.sensors_ahead_m,
             )
             if look is not None:
-                way = [*self._room.way(parent, look.node, (x, y), look.begin), look.end]
-                if look.back:
-                    way.append(look.begin)
-                self._looks += 1
-                self._doing = Doing.LOOK
-                self._driver.follow(way, t_s, slow_at_end=True, back=look.back)
+                self._look(look, (x, y), parent, t_s)
                 return
-        if not self._choose(pose, cost, parent, t_s):
+        if not self._choose(pose, cost, parent, t_s) and not self._inspect((x, y), cost, parent, t_s):
             self._review(t_s)
+
+    def _look(self, look: Look, here: Point, parent: IntArray, t_s: float) -> None:
+        """Set out to see a landmark."""
+        way = [*self._room.way(parent, look.node, here, look.begin), look.end]
+        if look.back:
+            way.append(look.begin)
+        self._looks += 1
+        self._doing = Doing.LOOK
+        self._driver.follow(way, t_s, slow_at_end=True, back=look.back)
+
+    def _inspect(self, here: Point, cost: FloatArray, parent: IntArray, t_s: float) -> bool:
+        """Set out to see where a tape ends; False where that is known of all."""
+        self._solve()
+        ends = tape_ends(self._smoother.map, self._senses.floor_samples(), self._tape_width_m)
+        ahead_m = self._senses.sensors_ahead_m
+        look = self._inspections.next_look(self._smoother.map, ends, self._room, cost, ahead_m)
+        if look is None:
+            return False
+        self._look(look, here, parent, t_s)
+        return True
 
     def _choose(
         self, pose: tuple[float, float, float], cost: FloatArray, parent: IntArray, t_s: float
     ) -> bool:
         """Set out for the best goal; False where none can be reached."""
-        c, settled = self._config, self._settled()
-        wanted = ~settled & (self._tries < c.tries)
+        c = self._config
         if self._stands is None:
-            half = 0.5 * min(self._grid.shape.cell_width_m, self._grid.shape.cell_height_m)
-            self._stands = self._room.stands(self._grid.depth_m < half, OVERHANG_M, KEEP_OFF_M)
+            self._stands = self._room.stands(self._grid.depth_m < DEEP_M, OVERHANG_M, KEEP_OFF_M)
+        settled = self._settled()
+        wanted = ~settled & (self._tries < c.tries)
         no_room = self._stands[:, :, 3] < c.room_m
         cell, node = frontier_goal.choose_goal(
             wanted,
             settled | no_room,
             self._stands,
             self._grid.unknown_share(),
-            PENALTY_M * self._tries,
+            np.asarray(PENALTY_M * self._tries, dtype=np.float64),
             cost,
             self._room.rows,
             self._room.columns,
@@ -294,7 +327,7 @@ class FrontierExplorer:
             return False
         row, column = divmod(cell, self._grid.shape.columns)
         stand_x, stand_y, depth, _ = self._stands[row, column]
-        self._goal, self._goal_depth_m = (row, column), float(depth)
+        self._goal = (row, column)
         end = float(stand_x), float(stand_y)
         way = self._room.way(parent, node, pose[:2], end)
         self._doing = Doing.GO
@@ -321,6 +354,7 @@ class FrontierExplorer:
     def _review(self, t_s: float) -> None:
         """Nothing is left by what is known: smooth the whole run, look again, or end."""
         self._solve(steps=3, anew=True)
+        self._senses.recent.forget()
         self._refresh_room()
         self._reviews += 1
         x, y, _ = pose = self._smoother.keyframes.pose

@@ -42,3 +42,7 @@ class FrontierConfig(Config):
     stuck_s: float = Field(default=6.0, gt=0.0)
     reviews: int = Field(default=4, ge=0)
     """How often it looks again, with the whole run smoothed, for cells that it missed."""
+    tape_end_m: float = Field(default=0.03, gt=0.0)
+    """The ends of tapes are looked for until they are known this well."""
+    inspections: int = Field(default=40, ge=0)
+    """How often, at most."""

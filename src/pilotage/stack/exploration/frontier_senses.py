@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from pilotage.core.errors import InputError
+from pilotage.core.rows import Rows
 from pilotage.core.types import FloatArray
 from pilotage.sensors.gyroscope import GyroscopeConfig
 from pilotage.sensors.infrared import InfraredConfig
@@ -23,11 +24,12 @@ from pilotage.stack.exploration.frontier_config import FrontierConfig
 from pilotage.stack.knowledge import SheetKnowledge
 from pilotage.stack.localization.keyframes import NO_GYROSCOPE, GyroscopeErrors
 from pilotage.stack.localization.line_crossings import CrossingDetector
-from pilotage.stack.localization.observations import Rows
 from pilotage.stack.localization.sheet_smoother import SheetSmoother
 from pilotage.stack.mapping.sheet_grid import SheetGrid, SheetShape
 from pilotage.stack.planning.sheet_room import RecentPoints
 
+OVER_EDGE_WIDTHS = 1.8
+"""All line sensors dark for so many widths of a tape: that is no tape."""
 NEAR_M = 0.13
 """Beams this short are exact enough to steer clear by."""
 
@@ -79,6 +81,8 @@ class Senses:
             knowledge.streams.stream("explorer/landmarks"),
         )
         self.grid = SheetGrid(SheetShape.of(knowledge.size_m, knowledge.cells, config.resolution_m))
+        self._tape_width_m = knowledge.tape_width_m
+        self._dark_m, self._last_at = 0.0, (knowledge.start.x_m, knowledge.start.y_m)
         self.floor = Rows(4)
         self.recent = RecentPoints()
 
@@ -109,7 +113,12 @@ class Senses:
                 self._line(line_sensor, detector, line.dark, pose)
                 spoke = True
         if spoke:
-            self.grid.be_at(pose[0], pose[1])
+            x, y = pose[:2]
+            all_dark = all(detector.is_dark for _, detector in self._lines.values())
+            driven = math.hypot(x - self._last_at[0], y - self._last_at[1])
+            self._dark_m = self._dark_m + driven if all_dark else 0.0
+            self._last_at = x, y
+            self.grid.be_at(x, y)
         return spoke
 
     def _beam(
@@ -147,6 +156,10 @@ class Senses:
         crossing = detector.step(dark, at, self.smoother.position_std_m)
         if crossing is not None:
             self.smoother.add_crossing(crossing.at)
+
+    def is_over_edge(self) -> bool:
+        """Whether all line sensors have read dark for longer than a tape is wide."""
+        return self.edges_seen and self._dark_m > OVER_EDGE_WIDTHS * self._tape_width_m
 
     def floor_samples(self) -> FloatArray:
         """(M, 3) x, y on the map and 1 where a line sensor read dark."""

@@ -8,9 +8,9 @@ import numpy as np
 from pydantic import Field
 
 from pilotage.core.config import Config
+from pilotage.core.rows import doubled
 from pilotage.core.types import FloatArray
 from pilotage.kernels import sheet_graph
-from pilotage.stack.localization.observations import doubled
 
 Positive = Field(gt=0.0)
 
@@ -34,7 +34,7 @@ class OdometryErrorsConfig(Config):
 
 
 class GyroscopeErrors:
-    """What the smoother takes from the gyroscope's data sheet; without a gyroscope nothing is believed of it."""
+    """What the smoother takes from the gyroscope's data sheet."""
 
     def __init__(
         self, walk_rad_sqrt_s: float, drift_rad_s_sqrt_s: float, bias_std: float, scale_std: float

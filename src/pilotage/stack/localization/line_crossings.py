@@ -39,6 +39,11 @@ class CrossingDetector:
         self._was_at: Point | None = None
         self._entered: Point | None = None
 
+    @property
+    def is_dark(self) -> bool:
+        """What it read last."""
+        return self._was_dark
+
     def step(self, dark: bool, at: Point, position_std_m: float) -> Crossing | None:
         """Take in one reading made at a point of the map."""
         before, self._was_at = self._was_at, at

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from enum import IntEnum
+from typing import TypeAlias
 
 import numpy as np
 from pydantic import Field
@@ -18,6 +19,8 @@ from pilotage.core.config import Config
 from pilotage.core.types import FloatArray, IntArray
 from pilotage.kernels import line_landmarks
 from pilotage.stack.localization.observations import Observations
+
+SavedLines: TypeAlias = tuple[FloatArray, FloatArray, IntArray, int]
 
 ROOM = 256
 """Landmarks at most."""
@@ -133,7 +136,9 @@ class LineMap:
         ends = np.array([low if low_m is None else low_m, high if high_m is None else high_m])
         return np.column_stack([x + offset * nx - ends * ny, y + offset * ny + ends * nx])
 
-    def update(self, poses: FloatArray, beams: Observations, crossings: Observations) -> bool:
+    def update(
+        self, poses: FloatArray, beams: Observations, crossings: Observations, merge: bool = True
+    ) -> bool:
         """Associate everything anew, find new landmarks, merge; True where some were merged."""
         merged = False
         for seen, maker in ((beams, self._walls), (crossings, self._tapes)):
@@ -146,7 +151,7 @@ class LineMap:
         for seen in (beams, crossings):
             self._measure(seen)
         for seen, maker in ((beams, self._walls), (crossings, self._tapes)):
-            merged |= self._merge(seen, maker, beams, crossings)
+            merged |= merge and self._merge(seen, maker, beams, crossings)
         if merged:
             for seen in (beams, crossings):
                 self._measure(seen)
@@ -181,7 +186,7 @@ class LineMap:
     def _discover(self, seen: Observations, maker: _Maker) -> None:
         free = np.flatnonzero(seen.owner < 0)
         if maker.kind is Kind.WALL:
-            free = free[seen.spread[free] < 0.012][-600:]
+            free = free[seen.spread[free] < 0.008][-600:]
         elif self.edges:
             width, height = self._size
             x, y = seen.points[free, 0], seen.points[free, 1]
@@ -267,7 +272,7 @@ class LineMap:
         px = x + offset * math.cos(angle) - middle * math.sin(angle)
         py = y + offset * math.sin(angle) + middle * math.cos(angle)
         period = 2.0 * math.pi if maker.kind is Kind.WALL else math.pi
-        turned = min(self._config.merge_angle_rad + 0.008 / max(2.0 * half, 0.03), 0.25)
+        turned = min(self._config.merge_angle_rad + 0.004 / max(2.0 * half, 0.03), 0.12)
         nearest, best = self._config.merge_std * std_m, -1
         for i in range(self.edges, j):
             if self.kinds[i] != maker.kind:
@@ -282,6 +287,15 @@ class LineMap:
             if apart <= maker.gap_m and off < nearest:
                 nearest, best = off, i
         return best
+
+    def saved(self) -> SavedLines:
+        """What ``restore`` takes."""
+        return self.lines.copy(), self.extents.copy(), self.kinds.copy(), self.count
+
+    def restore(self, saved: SavedLines) -> None:
+        """Go back to what was saved."""
+        lines, extents, kinds, self.count = saved
+        self.lines[:], self.extents[:], self.kinds[:] = lines, extents, kinds
 
     def walls(self) -> FloatArray:
         """(S, 4) ends of all walls."""

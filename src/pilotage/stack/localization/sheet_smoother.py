@@ -14,6 +14,7 @@ from itertools import count
 
 import numpy as np
 from pydantic import Field
+from scipy.stats import chi2
 
 from pilotage.core.angles import wrap_to_pi
 from pilotage.core.config import Config
@@ -26,6 +27,12 @@ from pilotage.stack.localization.observations import Observations
 
 RELAXED, STRICT = 30.0, 3.0
 """Standard deviations at which a residual weighs a quarter: just after landmarks were merged, and always."""
+
+JUMP_GATE = float(chi2.ppf(0.9999, 3))
+GROWN_M, GROWN_RAD = 0.012, math.radians(1.5)
+"""What a position and a heading may lose, at most, between two solutions (standard deviations)."""
+DISTRUST = 10.0
+"""Observations under suspicion are taken for so much less exact."""
 
 EDGE_ANGLE_STD_RAD, EDGE_OFFSET_STD_M = 3e-4, 5e-4
 
@@ -77,7 +84,8 @@ class SheetSmoother:
         self.beams, self.crossings = Observations(5), Observations(2)
         self._fresh = 0
         self.solved_s = 0.0
-        self.solves = 0
+        self.solves = self.rejected = 0
+        self._solved_beams = self._solved_crossings = 0
         self.cov: FloatArray = np.diag(
             np.array([config.start_position_std_m] * 2 + [config.start_heading_std_rad]) ** 2
         )
@@ -111,23 +119,47 @@ class SheetSmoother:
         self._fresh += 1
 
     def solve(self, steps: int = 1) -> None:
-        """Take Gauss-Newton steps over everything so far; more of them where landmarks were merged."""
+        """Take Gauss-Newton steps over everything so far; more of them where landmarks were merged.
+
+        A pose that jumps farther than its covariance allows was drawn by a wrong association: then all is
+        set back, and what was observed since the last solution is left out of it and merged with nothing.
+        """
         self.keyframes.close()
+        n, landmarks = self.keyframes.count, self.map
+        poses, systematic = self.keyframes.poses[:n].copy(), self.keyframes.systematic.copy()
+        lines, cov = landmarks.saved(), self.cov
+        self._iterate(steps, merge=True)
+        if not self._is_plausible(self.keyframes.poses[n - 1] - poses[n - 1], cov):
+            self.rejected += 1
+            self.keyframes.poses[:n] = poses
+            self.keyframes.systematic[:] = systematic
+            landmarks.restore(lines)
+            for seen, since in ((self.beams, self._solved_beams), (self.crossings, self._solved_crossings)):
+                seen.spread[since : seen.count] *= DISTRUST
+            self._iterate(1, merge=False)
+        self.keyframes.corrected()
+        self._solved_beams, self._solved_crossings = self.beams.count, self.crossings.count
+        self.solved_s = self.keyframes.t_s
+        self.solves += 1
+        self._fresh = 0
+
+    def _is_plausible(self, jump: FloatArray, cov: FloatArray) -> bool:
+        """Whether the newest pose moved no farther than it may, given how sure it was before."""
+        grown = cov + np.diag([GROWN_M**2, GROWN_M**2, GROWN_RAD**2])
+        return float(jump[:3] @ np.linalg.solve(grown, jump[:3])) < JUMP_GATE
+
+    def _iterate(self, steps: int, merge: bool) -> None:
         relaxed = 0
         for step in count():
             if relaxed == 0:
                 if step >= steps:
                     break
-                merged = self.map.update(self.keyframes.poses, self.beams, self.crossings)
+                merged = self.map.update(self.keyframes.poses, self.beams, self.crossings, merge)
                 relaxed = 2 if merged else 0
                 self._step(RELAXED if merged else STRICT)
             else:
                 relaxed -= 1
                 self._step(RELAXED if relaxed else STRICT)
-        self.keyframes.corrected()
-        self.solved_s = self.keyframes.t_s
-        self.solves += 1
-        self._fresh = 0
 
     def _step(self, robust: float) -> None:
         keyframes, landmarks = self.keyframes, self.map

@@ -6,12 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pilotage.core.rows import Rows
 from pilotage.core.types import BoolArray, FloatArray
 from pilotage.kernels import beam_grid
-from pilotage.stack.localization.observations import Rows
 
 HIT_ODDS, FREE_ODDS, LIMIT_ODDS = 1.5, -0.25, 8.0
-"""A hit outweighs six beams that pass: passing beams are many and correlated, and must not wear walls away."""
+"""A hit outweighs six beams that pass: those are many and correlated, and must not wear walls away."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,7 +105,8 @@ class SheetGrid:
 
     def unknown_share(self) -> FloatArray:
         """(rows, columns) share of each cell that no beam has passed or hit."""
-        return self._by_cell(self.odds == 0.0).mean(axis=(1, 3))
+        share: FloatArray = self._by_cell(self.odds == 0.0).mean(axis=(1, 3))
+        return share
 
     def explored(self) -> BoolArray:
         """(rows, columns) cells of which beams found a third free and nothing in the way."""

@@ -15,6 +15,8 @@ Point = tuple[float, float]
 SNUG_FACTOR = 3.0
 """A metre close to something costs so much, where nothing else is to be had."""
 SHEET_SLACK_M = 0.002
+WAY_OUT, WAY_OUT_ROOM_M, WAY_OUT_FACTOR = 4, 0.001, 10.0
+"""From where it should not stand: nodes around that may be used, with how much room, and what they cost."""
 NEVER_M = 9.0
 """Where points lie that stand for none."""
 
@@ -42,6 +44,7 @@ class SheetRoom:
         self.segments: FloatArray = np.zeros((0, 4))
         self.points: FloatArray = np.zeros((0, 2))
         self._factor: FloatArray = np.zeros((0, 0))
+        self._free_m: FloatArray = np.zeros((0, 0))
         self.update(self.segments, self.points)
 
     def update(self, segments: FloatArray, points: FloatArray) -> None:
@@ -49,26 +52,35 @@ class SheetRoom:
         self.segments, self.points = np.ascontiguousarray(segments), np.ascontiguousarray(points)
         width, height = self.shape.fine_size_m
         field = sheet_space.clearance_field(
-            self.rows, self.columns, width, height, self.segments, self.points
+            self.rows,
+            self.columns,
+            width,
+            height,
+            self.segments,
+            self.points,
+            self.body_m + self.wide_m,
         )
-        room = field - self.body_m
+        self._free_m = room = field - self.body_m
         snug = np.clip((self.wide_m - room) / self.wide_m, 0.0, 1.0)
         factor = 1.0 + (SNUG_FACTOR - 1.0) * snug
         self._factor = np.where((room < self.room_m + 0.002) | self._off_sheet, np.inf, factor)
 
     def costs(self, x: float, y: float) -> tuple[FloatArray, IntArray]:
-        """Costs to all nodes, and predecessors, from the nearest free node to a point."""
+        """Costs to all nodes, and predecessors, from the node nearest to a point."""
         width, height = self.shape.fine_size_m
         column = min(max(round(x / width), 0), self.columns - 1)
         row = min(max(round(y / height), 0), self.rows - 1)
-        if not self._factor[row, column] < math.inf:
-            r0, c0 = max(row - 4, 0), max(column - 4, 0)
-            window = self._factor[r0 : row + 5, c0 : column + 5]
-            free = np.argwhere(window < math.inf)
-            if free.shape[0]:
-                away = np.hypot(free[:, 0] + r0 - row, free[:, 1] + c0 - column)
-                row, column = (int(v) for v in free[int(np.argmin(away))] + (r0, c0))
-        return travel_cost.travel_costs(self._factor, row * self.columns + column, width, height)
+        factor = self._factor
+        if not factor[row, column] < math.inf:
+            # It stands closer to something than it would go: around it, ways out are let be.
+            factor = factor.copy()
+            window = (
+                slice(max(row - WAY_OUT, 0), row + WAY_OUT + 1),
+                slice(max(column - WAY_OUT, 0), column + WAY_OUT + 1),
+            )
+            let_be = np.isinf(factor[window]) & (self._free_m[window] > WAY_OUT_ROOM_M)
+            factor[window] = np.where(let_be, WAY_OUT_FACTOR, factor[window])
+        return travel_cost.travel_costs(factor, row * self.columns + column, width, height)
 
     def stands(self, wanted: BoolArray, overhang_m: float, keep_off_m: float, steps: int = 12) -> FloatArray:
         """(rows, columns, 4) where to stand in the wanted cells; see ``kernels.sheet_space.best_stands``."""
@@ -145,6 +157,10 @@ class RecentPoints:
         """Add one; the oldest goes."""
         self.points[self._next] = x, y
         self._next = (self._next + 1) % self.points.shape[0]
+
+    def forget(self) -> None:
+        """Forget them all."""
+        self.points[:] = NEVER_M
 
     def shift(self, dx: float, dy: float) -> None:
         """Move them with a correction of the pose."""

@@ -7,6 +7,8 @@ line sensors saw it: half-way from the last dark sample along it to the first br
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -22,18 +24,28 @@ BEHIND_M = 0.001
 """A box less than this far into a cell is left out of it."""
 
 
-def joined_extents(landmarks: LineMap, kind: Kind, reach_m: float) -> dict[int, tuple[float, float]]:
+def joined_extents(
+    landmarks: LineMap, kind: Kind, reach_m: float, extents: FloatArray
+) -> dict[int, tuple[float, float]]:
     """Extents of the landmarks of one kind, prolonged or cut to where they meet another."""
     own = landmarks.of_kind(kind)
-    return {j: (_joined(landmarks, j, 0, own, reach_m), _joined(landmarks, j, 1, own, reach_m)) for j in own}
+    return {
+        j: (
+            _joined(landmarks, j, 0, own, reach_m, extents),
+            _joined(landmarks, j, 1, own, reach_m, extents),
+        )
+        for j in own
+    }
 
 
-def _joined(landmarks: LineMap, j: int, end: int, others: list[int], reach_m: float) -> float:
+def _joined(
+    landmarks: LineMap, j: int, end: int, others: list[int], reach_m: float, extents: FloatArray
+) -> float:
     """Where one end of a landmark lies along it."""
     angle, offset, x, y = landmarks.lines[j]
     tangent = np.array([-math.sin(angle), math.cos(angle)])
     foot = np.array([x + offset * math.cos(angle), y + offset * math.sin(angle)])
-    seen = float(landmarks.extents[j, end])
+    seen = float(extents[j, end])
     best, at = reach_m, seen
     for i in others:
         angle_i, offset_i, x_i, y_i = landmarks.lines[i]
@@ -44,16 +56,16 @@ def _joined(landmarks: LineMap, j: int, end: int, others: list[int], reach_m: fl
         along = (offset_i - float((foot - (x_i, y_i)) @ normal)) / slope
         meeting = foot + along * tangent - (x_i, y_i)
         along_i = normal[0] * meeting[1] - normal[1] * meeting[0]
-        low, high = landmarks.extents[i]
+        low, high = extents[i]
         if low - reach_m < along_i < high + reach_m and abs(along - seen) < best:
             best, at = abs(along - seen), along
-    return at
+    return float(at)
 
 
 def obstacle_cells(landmarks: LineMap, shape: SheetShape) -> BoolArray:
     """(rows, columns) cells behind the walls."""
     cells = np.zeros((shape.rows, shape.columns), np.bool_)
-    for j, (low, high) in joined_extents(landmarks, Kind.WALL, WALL_CORNER_M).items():
+    for j, (low, high) in joined_extents(landmarks, Kind.WALL, WALL_CORNER_M, landmarks.extents).items():
         angle = float(landmarks.lines[j, 0])
         behind = BEHIND_M * np.array([math.cos(angle), math.sin(angle)])
         if high - low > 2.0 * BEHIND_M:
@@ -71,35 +83,61 @@ def line_cells(landmarks: LineMap, samples: FloatArray, tape_width_m: float, sha
         (M, 3) x, y on the map and 1 where a line sensor read dark there.
     """
     cells = np.zeros((shape.rows, shape.columns), np.bool_)
-    for low, high, j in _tapes(landmarks, samples, tape_width_m):
-        cells |= length_inside(landmarks.segment(j, low, high), *shape.edges_m) > 0.0
+    for low, high in pairwise(tape_ends(landmarks, samples, tape_width_m)):
+        if low.landmark == high.landmark:
+            ends = landmarks.segment(low.landmark, low.middle_m, high.middle_m)
+            cells |= length_inside(ends, *shape.edges_m) > 0.0
     return cells
 
 
-def _tapes(landmarks: LineMap, samples: FloatArray, tape_width_m: float) -> list[tuple[float, float, int]]:
-    """Each tape's extent: joined to others, else as far as it was seen."""
-    grown: dict[int, tuple[float, float]] = {}
-    for j in landmarks.of_kind(Kind.TAPE):
+@dataclass(frozen=True, slots=True)
+class TapeEnd:
+    """One end of a tape.
+
+    Attributes
+    ----------
+    landmark, sign
+        Which line, and -1 or 1 for its lower or upper end along it.
+    at_m, bright_m
+        Along the line: the outermost place where it was seen, and the first beyond where it was seen to be
+        no more (as far as a gap may be, where that was never seen).
+    joined
+        Whether it meets another tape here; then both places are the corner.
+    """
+
+    landmark: int
+    sign: int
+    at_m: float
+    bright_m: float
+    joined: bool
+
+    @property
+    def middle_m(self) -> float:
+        """The best guess of where it ends."""
+        return 0.5 * (self.at_m + self.bright_m)
+
+
+def tape_ends(landmarks: LineMap, samples: FloatArray, tape_width_m: float) -> list[TapeEnd]:
+    """Both ends of each tape, lower and upper in turn; see ``line_cells``."""
+    extents = landmarks.extents.copy()
+    own = landmarks.of_kind(Kind.TAPE)
+    bright_along = {}
+    for j in own:
         off, along = _along(landmarks, j, samples)
-        near = np.abs(off) < 0.4 * tape_width_m
-        dark = samples[:, 2] > 0.0
-        low, high = landmarks.extents[j]
-        grown[j] = (
-            -_seen_until(-low, -along[near & dark], -along[near & ~dark]),
-            _seen_until(high, along[near & dark], along[near & ~dark]),
-        )
-        landmarks.extents[j] = grown[j]
-    joined = joined_extents(landmarks, Kind.TAPE, TAPE_CORNER_M)
+        near, is_dark = np.abs(off) < 0.4 * tape_width_m, samples[:, 2] > 0.0
+        dark, bright = along[near & is_dark], along[near & ~is_dark]
+        low, high = extents[j]
+        extents[j] = -_seen_until(-low, -dark, -bright), _seen_until(high, dark, bright)
+        bright_along[j] = bright
     result = []
-    for j, (low, high) in joined.items():
-        off, along = _along(landmarks, j, samples)
-        near = np.abs(off) < 0.4 * tape_width_m
-        bright = along[near & (samples[:, 2] == 0.0)]
-        if low == landmarks.extents[j, 0]:
-            low = -_half_way(-low, -bright)
-        if high == landmarks.extents[j, 1]:
-            high = _half_way(high, bright)
-        result.append((float(low), float(high), j))
+    for j, ends in joined_extents(landmarks, Kind.TAPE, TAPE_CORNER_M, extents).items():
+        for end, sign in enumerate((-1, 1)):
+            at, seen = ends[end], float(extents[j, end])
+            if at != seen:
+                result.append(TapeEnd(j, sign, at, at, joined=True))
+                continue
+            beyond = _first_beyond(sign * at, sign * bright_along[j])
+            result.append(TapeEnd(j, sign, at, sign * beyond, joined=False))
     return result
 
 
@@ -124,11 +162,10 @@ def _seen_until(end: float, dark: FloatArray, bright: FloatArray) -> float:
     return end
 
 
-def _half_way(end: float, bright: FloatArray) -> float:
-    """Half-way to the first bright sample beyond an end, not farther than half a gap."""
+def _first_beyond(end: float, bright: FloatArray) -> float:
+    """The first bright sample beyond an end, not farther than a gap may be."""
     beyond = bright[bright > end]
-    gap = float(beyond.min()) - end if beyond.shape[0] else LONGEST_GAP_M
-    return end + 0.5 * min(gap, 0.7 * LONGEST_GAP_M)
+    return min(float(beyond.min()), end + LONGEST_GAP_M) if beyond.shape[0] else end + LONGEST_GAP_M
 
 
 def cell_map(grid: SheetGrid, obstacles: BoolArray, lines: BoolArray) -> CellMap:
