@@ -38,7 +38,7 @@ CAUTION_ROOM_M = 0.022
 """With less room ahead it drives more slowly."""
 REVIEW_DEPTH_M = 0.008
 SHALLOW_M = 0.004
-BACK_SPEED_M_S, BACK_S = 0.035, 0.5
+BACK_SPEED_M_S, BACK_S, BACK_ROOM_M = 0.035, 0.5, 0.006
 PENALTY_M = 0.5
 """What one failed try makes a goal dearer."""
 
@@ -159,7 +159,7 @@ class FrontierExplorer:
             return STANDSTILL if not self._driver.waypoints else command
         if self._driver.is_stuck(t_s):
             self._fail(t_s, "stuck", "no nearer to the next waypoint")
-            self._doing, self._until_s = Doing.BACK, t_s + BACK_S
+            self._back_off(t_s)
             return STANDSTILL
         return command
 
@@ -189,7 +189,17 @@ class FrontierExplorer:
         self._driver.stop()
         self._solve()
         self._looked_s = t_s
-        self._doing, self._until_s = Doing.BACK, t_s + BACK_S
+        self._back_off(t_s)
+
+    def _back_off(self, t_s: float) -> None:
+        """Drive back a little, where there is room behind."""
+        if self._map_is_old:
+            self._refresh_room()
+        x, y, theta = self._smoother.keyframes.pose
+        back_m = BACK_SPEED_M_S * BACK_S
+        behind = x - back_m * math.cos(theta), y - back_m * math.sin(theta)
+        self._doing = Doing.BACK
+        self._until_s = t_s + (BACK_S if self._room.clear((x, y), behind) > BACK_ROOM_M else 0.0)
 
     def _solve(self, steps: int = 1, anew: bool = False) -> None:
         """Smooth, and bring the map up to date."""

@@ -30,6 +30,7 @@ from pilotage.stack.planning.sheet_room import RecentPoints
 
 OVER_EDGE_WIDTHS = 1.8
 """All line sensors dark for so many widths of a tape: that is no tape."""
+THIN_M = 0.009
 NEAR_M = 0.13
 """Beams this short are exact enough to steer clear by."""
 
@@ -177,8 +178,19 @@ class Senses:
         loose = beams.seen[(beams.owner < 0) & (beams.spread[: beams.count] < 0.0115)][:, :2]
         if loose.shape[0]:
             loose = loose[self.grid.is_occupied(loose)]
-            loose = np.unique(np.round(loose / 0.009), axis=0) * 0.009
+            loose = thinned(loose)
         return walls, np.concatenate([loose.reshape(-1, 2), self.recent.known])
+
+
+def thinned(points_m: FloatArray) -> FloatArray:
+    """(P, 2) the mean of the points (N, 2) in each square of ``THIN_M``."""
+    squares, owner, counts = np.unique(
+        np.floor(points_m / THIN_M), axis=0, return_inverse=True, return_counts=True
+    )
+    sums = np.zeros_like(squares)
+    np.add.at(sums, owner.ravel(), points_m)
+    means: FloatArray = sums / counts[:, None]
+    return means
 
 
 def _errors(gyro: GyroscopeConfig) -> GyroscopeErrors:
