@@ -341,6 +341,9 @@ EXAMPLES: dict[tuple[str, str], Example] = {
     ),
     ("pose_controller", "polar"): Example(pose_controller_arrives, {"max_steering_rad": 1.2}),
     ("explorer", "random-walk"): Example(explorer_explores),
+    ("explorer", "frontier"): Example(
+        explorer_explores, pure_numbers=frozenset({"depth_std", "speed_share"})
+    ),
     ("explorer", "surround-check"): Example(
         explorer_explores, {"margin_cells": 1}, pure_numbers=frozenset({"far_cells"})
     ),

@@ -1,0 +1,391 @@
+"""The explorer that finishes: it goes on until no reachable cell is left, and says why the others were."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from enum import StrEnum
+
+import numpy as np
+
+from pilotage.core.types import STANDSTILL, BoolArray, Event, FloatArray, IntArray, WheelSpeeds
+from pilotage.kernels import frontier_goal
+from pilotage.maps.cell_map import CellMap
+from pilotage.sensors.readings import Readings
+from pilotage.stack.control.waypoint_drive import WaypointDrive
+from pilotage.stack.control.wheel_pursuit import wheel_speeds
+from pilotage.stack.exploration.explorer import EXPLORERS, LeftCell
+from pilotage.stack.exploration.frontier_config import FrontierConfig
+from pilotage.stack.exploration.frontier_inspections import Inspections
+from pilotage.stack.exploration.frontier_reasons import reasons, summary
+from pilotage.stack.exploration.frontier_returns import Look, best_look
+from pilotage.stack.exploration.frontier_senses import Senses
+from pilotage.stack.exploration.sheet_features import cell_map, line_cells, obstacle_cells, tape_ends
+from pilotage.stack.interface import Belief, StackStatus
+from pilotage.stack.knowledge import SheetKnowledge
+from pilotage.stack.planning.sheet_room import Point, SheetRoom
+
+Cell = tuple[int, int]
+
+OVERHANG_M = 0.004
+"""The body may reach over the sheet's edge by this much."""
+KEEP_OFF_M = 0.004
+DEEP_M = 0.020
+"""A goal counts as visited this deep inside it, on the way to the next."""
+GUARD_AHEAD_M, GUARD_ROOM_M = 0.05, 0.011
+"""It stops for what would come this near within so much way: a few millimetres are driven while it brakes."""
+CAUTION_ROOM_M = 0.022
+"""With less room ahead it drives more slowly."""
+REVIEW_DEPTH_M = 0.008
+SHALLOW_M = 0.004
+BACK_SPEED_M_S, BACK_S, BACK_ROOM_M = 0.035, 0.5, 0.006
+PENALTY_M = 0.5
+"""What one failed try makes a goal dearer."""
+
+
+class Doing(StrEnum):
+    """What it is about."""
+
+    REST = "rest"
+    GO = "go"
+    LOOK = "look"
+    BACK = "back"
+    DONE = "done"
+
+
+@EXPLORERS.add("frontier", FrontierConfig)
+class FrontierExplorer:
+    """Visits every cell it can, nearest and most telling first, on a map and a pose that correct each other.
+
+    Goals are unvisited cells at the frontier of what was visited, chosen by travel cost and information
+    gain (Yamauchi 1997; Burgard and others 2005); ways are planned on the map as it grows, unknown floor
+    being taken for free. When the position becomes unsure it returns to a landmark. The pose comes from
+    ``SheetSmoother``; at the end the whole run is smoothed once more, cells whose visit then proves
+    doubtful are visited again, and only when none is left is it done.
+    Ignores the firmware switches: it counts encoders itself.
+    """
+
+    def __init__(self, config: FrontierConfig, knowledge: SheetKnowledge) -> None:
+        self._config, self._avoidance = config, knowledge.avoidance
+        self._hardware = knowledge.drive
+        self._tape_width_m = knowledge.tape_width_m
+        self._senses = Senses(config, knowledge)
+        self._smoother, self._grid = self._senses.smoother, self._senses.grid
+        shape = self._grid.shape
+        self._room = SheetRoom(shape, knowledge.body_radius_m, config.room_m, config.wide_m)
+        self._driver = WaypointDrive(
+            knowledge.drive, config.speed_share, config.turn_rate_rad_s, config.stuck_s
+        )
+        self._doing, self._until_s = Doing.REST, config.first_rest_s
+        self._rested_s = self._looked_s = 0.0
+        self._goal: Cell | None = None
+        self._tries = np.zeros((shape.rows, shape.columns), np.int64)
+        self._stands: FloatArray | None = None
+        self._map_is_old = True
+        self._reviews = 0
+        self._looks = self._stops = 0
+        self._inspections = Inspections(config.tape_end_m, config.inspections)
+        self._left: tuple[LeftCell, ...] = ()
+        self._status, self._reason = StackStatus.RUNNING, ""
+        self._events: list[Event] = []
+
+    # --- what others ask ----------------------------------------------------------------------------
+
+    @property
+    def belief(self) -> Belief:
+        """Pose by the smoother."""
+        return self._smoother.belief
+
+    @property
+    def status(self) -> tuple[StackStatus, str]:
+        """Arrived once no reachable cell is left."""
+        return self._status, self._reason
+
+    @property
+    def cells(self) -> CellMap:
+        """The map as it would be printed now."""
+        shape, landmarks = self._grid.shape, self._smoother.map
+        lines = line_cells(landmarks, self._senses.floor_samples(), self._tape_width_m, shape)
+        return cell_map(self._grid, obstacle_cells(landmarks, shape), lines)
+
+    @property
+    def visited(self) -> BoolArray:
+        """Cells that the smoothed path leads through."""
+        return self._grid.visited
+
+    @property
+    def left(self) -> tuple[LeftCell, ...]:
+        """Cells not visited, with reasons, once it is done."""
+        return self._left
+
+    def telemetry(self) -> Mapping[str, float]:
+        """How sure of the position, where it is going, and what it has put on the map."""
+        x, y = self._driver.waypoints[-1] if self._driver.waypoints else (math.nan, math.nan)
+        return {
+            "goal_x_m": x,
+            "goal_y_m": y,
+            "position_std_m": self._smoother.position_std_m,
+            "landmarks": float(self._smoother.map.count),
+        }
+
+    def drain_events(self) -> list[Event]:
+        """Events since the last call."""
+        events, self._events = self._events, []
+        return events
+
+    # --- one control period -------------------------------------------------------------------------
+
+    def step(self, readings: Readings) -> WheelSpeeds:
+        """Sense, decide where nothing is under way, drive."""
+        if self._doing is Doing.DONE:
+            return STANDSTILL
+        t_s = readings.t_s
+        if self._senses.step(readings):
+            self._keep_up(t_s)
+        if self._doing is Doing.REST:
+            if t_s < self._until_s:
+                return STANDSTILL
+            self._solve()
+            self._decide(t_s)
+        elif self._doing is Doing.BACK:
+            if t_s < self._until_s:
+                return wheel_speeds(-BACK_SPEED_M_S, 0.0, self._hardware)
+            self._decide(t_s)
+        if self._doing not in (Doing.GO, Doing.LOOK):
+            return STANDSTILL
+        command = self._driver.step(self._smoother.keyframes.pose, t_s)
+        if not self._driver.waypoints:
+            self._arrive(t_s)
+            return STANDSTILL if not self._driver.waypoints else command
+        if self._driver.is_stuck(t_s):
+            self._fail(t_s, "stuck", "no nearer to the next waypoint")
+            self._back_off(t_s)
+            return STANDSTILL
+        return command
+
+    def _keep_up(self, t_s: float) -> None:
+        """After beams and line sensors spoke: solve in time, look whether the way is still free."""
+        if self._driver.moves_ahead and self._senses.is_over_edge():
+            self._back_from_edge(t_s)
+            return
+        if self._goal is not None and self._grid.depth_m[self._goal] >= DEEP_M:
+            self._decide(t_s)
+        age_s = self._smoother.keyframes.t_s - self._smoother.solved_s
+        if age_s > self._config.solve_every_s and (self._smoother.has_news or age_s > 10.0):
+            self._solve()
+            if self._driver.waypoints and not self._way_is_free():
+                self._decide(t_s)
+        if self._avoidance and self._driver.moves_ahead and self._in_the_way():
+            self._stops += 1
+            self._solve()
+            self._refresh_room()
+            self._fail(t_s, "stopped", "something stands in the way")
+            self._decide(t_s)
+
+    def _back_from_edge(self, t_s: float) -> None:
+        """Both line sensors are over the sheet's edge: turn back, whatever the pose says."""
+        if self._doing is not Doing.LOOK:
+            self._fail(t_s, "edge", "the sheet's edge came sooner than expected")
+        self._driver.stop()
+        self._solve()
+        self._looked_s = t_s
+        self._back_off(t_s)
+
+    def _back_off(self, t_s: float) -> None:
+        """Drive back a little, where there is room behind."""
+        if self._map_is_old:
+            self._refresh_room()
+        x, y, theta = self._smoother.keyframes.pose
+        back_m = BACK_SPEED_M_S * BACK_S
+        behind = x - back_m * math.cos(theta), y - back_m * math.sin(theta)
+        self._doing = Doing.BACK
+        self._until_s = t_s + (BACK_S if self._room.clear((x, y), behind) > BACK_ROOM_M else 0.0)
+
+    def _solve(self, steps: int = 1, anew: bool = False) -> None:
+        """Smooth, and bring the map up to date."""
+        before = self._smoother.keyframes.pose
+        self._smoother.solve(steps)
+        after = self._smoother.keyframes.pose
+        self._senses.recent.shift(after[0] - before[0], after[1] - before[1])
+        poses = self._smoother.keyframes.poses[: self._smoother.keyframes.count]
+        if anew or self._smoother.solves % self._config.gather_every_solves == 0:
+            self._grid.gather_anew(poses)
+        else:
+            self._grid.gather(poses)
+        self._map_is_old = True
+
+    def _refresh_room(self) -> None:
+        self._room.update(*self._senses.obstacles())
+        self._stands = None
+        self._map_is_old = False
+
+    def _way_is_free(self) -> bool:
+        """Whether the next pieces of the way keep their room, by the map as it is now."""
+        if self._map_is_old:
+            self._refresh_room()
+        x, y, _ = self._smoother.keyframes.pose
+        here, least = (x, y), min(self._config.room_m - 0.003, self._room.at(x, y) - 0.002)
+        for waypoint in self._driver.waypoints[:2]:
+            if self._room.clear(here, waypoint) < least:
+                return False
+            here = waypoint
+        return True
+
+    def _in_the_way(self) -> bool:
+        """Whether what beams hit lately stands close before the body."""
+        x, y, _ = self._smoother.keyframes.pose
+        to_x, to_y = self._driver.waypoints[0]
+        away = math.hypot(to_x - x, to_y - y)
+        share = min(1.0, GUARD_AHEAD_M / max(away, 1e-6))
+        ahead = x + share * (to_x - x), y + share * (to_y - y)
+        near = self._senses.recent
+        room = near.room_along((x, y), ahead, self._room.body_m)
+        self._driver.is_careful = room < CAUTION_ROOM_M
+        return room < GUARD_ROOM_M and room < near.room_along((x, y), (x, y), self._room.body_m) - 0.0015
+
+    # --- deciding -----------------------------------------------------------------------------------
+
+    def _settled(self) -> BoolArray:
+        """Cells whose visit is sure, by how deep inside them the path led."""
+        c = self._config
+        wanted = c.depth_m + min(c.depth_std * self._smoother.position_std_m, DEEP_M - 0.004)
+        deep = np.full_like(self._grid.depth_m, REVIEW_DEPTH_M if self._reviews else wanted)
+        if self._stands is not None:
+            # Of some cells only a sliver can be entered.
+            deep = np.minimum(deep, np.maximum(self._stands[:, :, 2] - 0.004, SHALLOW_M))
+        return np.asarray(self._grid.depth_m >= deep)
+
+    def _decide(self, t_s: float) -> None:
+        """Rest, return to a landmark, visit a cell, or end."""
+        self._driver.stop()
+        self._goal = None
+        c = self._config
+        if t_s - self._rested_s > c.rest_every_s and c.rest_s > 0.0:
+            self._doing, self._until_s, self._rested_s = Doing.REST, t_s + c.rest_s, t_s
+            return
+        if self._map_is_old:
+            self._refresh_room()
+        x, y, _ = pose = self._smoother.keyframes.pose
+        cost, parent = self._room.costs(x, y)
+        unsure = self._smoother.position_std_m > c.return_std_m
+        if unsure and t_s - self._looked_s > c.return_pause_s:
+            self._looked_s = t_s
+            look = best_look(
+                self._smoother.map,
+                self._smoother.cov[:2, :2],
+                self._room,
+                cost,
+                (x, y),
+                self._senses.sensors_ahead_m,
+            )
+            if look is not None:
+                self._look(look, (x, y), parent, t_s)
+                return
+        if not self._choose(pose, cost, parent, t_s) and not self._inspect((x, y), cost, parent, t_s):
+            self._review(t_s)
+
+    def _look(self, look: Look, here: Point, parent: IntArray, t_s: float) -> None:
+        """Set out to see a landmark."""
+        way = [*self._room.way(parent, look.node, here, look.begin), look.end]
+        if look.back:
+            way.append(look.begin)
+        self._looks += 1
+        self._doing = Doing.LOOK
+        self._driver.follow(way, t_s, slow_at_end=True, back=look.back)
+
+    def _inspect(self, here: Point, cost: FloatArray, parent: IntArray, t_s: float) -> bool:
+        """Set out to see where a tape ends; False where that is known of all."""
+        self._solve()
+        ends = tape_ends(self._smoother.map, self._senses.floor_samples(), self._tape_width_m)
+        ahead_m = self._senses.sensors_ahead_m
+        look = self._inspections.next_look(self._smoother.map, ends, self._room, cost, ahead_m)
+        if look is None:
+            return False
+        self._look(look, here, parent, t_s)
+        return True
+
+    def _choose(
+        self, pose: tuple[float, float, float], cost: FloatArray, parent: IntArray, t_s: float
+    ) -> bool:
+        """Set out for the best goal; False where none can be reached."""
+        c = self._config
+        if self._stands is None:
+            self._stands = self._room.stands(self._grid.depth_m < DEEP_M, OVERHANG_M, KEEP_OFF_M)
+        settled = self._settled()
+        wanted = ~settled & (self._tries < c.tries)
+        no_room = self._stands[:, :, 3] < c.room_m
+        cell, node = frontier_goal.choose_goal(
+            wanted,
+            settled | no_room,
+            self._stands,
+            self._grid.unknown_share(),
+            np.asarray(PENALTY_M * self._tries, dtype=np.float64),
+            cost,
+            self._room.rows,
+            self._room.columns,
+            *self._grid.shape.fine_size_m,
+            pose,
+            c.room_m,
+            self._room.body_m,
+            c.turn_cost_m_rad,
+            c.hug_m,
+            c.gain_m,
+            self._room.segments,
+            self._room.points,
+        )
+        if cell < 0:
+            return False
+        row, column = divmod(cell, self._grid.shape.columns)
+        stand_x, stand_y, depth, _ = self._stands[row, column]
+        self._goal = (row, column)
+        end = float(stand_x), float(stand_y)
+        way = self._room.way(parent, node, pose[:2], end)
+        self._doing = Doing.GO
+        self._driver.follow(way, t_s, slow_at_end=depth < DEEP_M)
+        return True
+
+    def _arrive(self, t_s: float) -> None:
+        """At the last waypoint."""
+        if self._doing is Doing.LOOK:
+            self._looked_s = t_s
+            self._solve()
+        elif self._goal is not None and not self._settled()[self._goal]:
+            self._tries[self._goal] += 1
+        self._decide(t_s)
+
+    def _fail(self, t_s: float, kind: str, text: str) -> None:
+        """Note that the way to the goal did not work out."""
+        if self._goal is not None:
+            self._tries[self._goal] += 1
+            text = f"{text}, on the way to column {self._goal[1]}, row {self._goal[0]}"
+        self._events.append(Event(t_s, kind, text))
+        self._driver.stop()
+
+    def _review(self, t_s: float) -> None:
+        """Nothing is left by what is known: smooth the whole run, look again, or end."""
+        self._solve(steps=3, anew=True)
+        self._senses.recent.forget()
+        self._refresh_room()
+        self._reviews += 1
+        x, y, _ = pose = self._smoother.keyframes.pose
+        cost, parent = self._room.costs(x, y)
+        if self._reviews <= self._config.reviews and self._choose(pose, cost, parent, t_s):
+            missed = int((~self._settled() & (self._stands_room() >= self._config.room_m)).sum())
+            self._events.append(Event(t_s, "review", f"the whole run smoothed; {missed} cells to see again"))
+            return
+        self._left = reasons(
+            ~self.visited,
+            obstacle_cells(self._smoother.map, self._grid.shape),
+            self._tries >= self._config.tries,
+            self._room,
+            cost,
+        )
+        self._doing, self._status = Doing.DONE, StackStatus.ARRIVED
+        self._driver.stop()
+        count = int(self.visited.sum())
+        self._reason = f"done: {count} cells visited, {len(self._left)} left ({summary(self._left)})"
+        self._events.append(Event(t_s, "arrived", self._reason))
+
+    def _stands_room(self) -> FloatArray:
+        assert self._stands is not None
+        return self._stands[:, :, 3]

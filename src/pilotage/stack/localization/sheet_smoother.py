@@ -1,0 +1,256 @@
+"""Pose by smoothing the whole run: every keyframe, every landmark, every systematic error at once.
+
+A filter cannot correct its past; exact cells need the past corrected too. All that encoders, gyroscope,
+beams and line sensors said is kept (a quarter of an hour on a small sheet is little), and every few seconds
+Gauss-Newton steps are taken over the whole graph (Lu and Milios 1997; Thrun, Burgard and Fox 2005, chapter
+11). Rests need no treatment of their own: encoders that do not count say that the heading stays, which
+shows the gyroscope's bias.
+"""
+
+from __future__ import annotations
+
+import math
+from itertools import count
+
+import numpy as np
+from pydantic import Field
+from scipy.stats import chi2
+
+from pilotage.core.angles import wrap_to_pi
+from pilotage.core.config import Config
+from pilotage.core.types import FloatArray, Pose2
+from pilotage.kernels import arrow_solve, sheet_graph
+from pilotage.stack.interface import Belief
+from pilotage.stack.localization.keyframes import GyroscopeErrors, Keyframes, OdometryErrorsConfig
+from pilotage.stack.localization.line_map import Kind, LineMap, LineMapConfig
+from pilotage.stack.localization.observations import Observations
+
+RELAXED, STRICT = 30.0, 3.0
+"""Standard deviations at which a residual weighs a quarter: just after landmarks were merged, and always."""
+
+JUMP_GATE = float(chi2.ppf(0.9999, 3))
+GROWN_M, GROWN_RAD = 0.012, math.radians(1.5)
+"""What a position and a heading may lose, at most, between two solutions (standard deviations)."""
+DISTRUST = 10.0
+"""Observations under suspicion are taken for so much less exact."""
+
+EDGE_ANGLE_STD_RAD, EDGE_OFFSET_STD_M = 3e-4, 5e-4
+
+
+class SmootherConfig(Config):
+    """What is known beforehand, and how landmarks are made."""
+
+    start_position_std_m: float = Field(default=0.001, gt=0.0)
+    start_heading_std_rad: float = Field(default=0.002, gt=0.0)
+    odometry: OdometryErrorsConfig = OdometryErrorsConfig()
+    landmarks: LineMapConfig = LineMapConfig()
+    range_std_factor: float = Field(default=1.25, gt=0.0)
+    """Beams are trusted less than their data sheet says: corners, and neighbours that share an error."""
+    range_std_m: float = Field(default=0.0015, gt=0.0)
+    crossing_std_m: float = Field(default=0.003, gt=0.0)
+    walls_along_axes_std_rad: float = Field(default=0.0, ge=0.0)
+    """Walls within 5 degrees of the sheet's axes are taken to lie along them, this surely; 0: not at all."""
+
+
+class SheetSmoother:
+    """The graph of a run so far.
+
+    Parameters
+    ----------
+    start
+        Pose at which the robot was put down.
+    separation_m
+        Of the wheels, by the data sheet.
+    edges_seen
+        Whether line sensors see the sheet's edge, whose place is known.
+    """
+
+    def __init__(
+        self,
+        config: SmootherConfig,
+        start: Pose2,
+        separation_m: float,
+        gyro: GyroscopeErrors,
+        size_m: tuple[float, float],
+        edges_seen: bool,
+        rng: np.random.Generator,
+    ) -> None:
+        self._config, self._gyro, self._separation = config, gyro, separation_m
+        self._start = np.array([start.x_m, start.y_m, start.theta_rad, 0.0])
+        self.keyframes = Keyframes(
+            (start.x_m, start.y_m, start.theta_rad), separation_m, config.odometry, gyro
+        )
+        self.map = LineMap(config.landmarks, size_m, edges_seen, rng)
+        self.beams, self.crossings = Observations(5), Observations(2)
+        self._fresh = 0
+        self.solved_s = 0.0
+        self.solves = self.rejected = 0
+        self._solved_beams = self._solved_crossings = 0
+        self.cov: FloatArray = np.diag(
+            np.array([config.start_position_std_m] * 2 + [config.start_heading_std_rad]) ** 2
+        )
+        self.position_std_m = config.start_position_std_m
+
+    @property
+    def belief(self) -> Belief:
+        """Pose now, with the covariance of the last solution."""
+        x, y, theta = self.keyframes.pose
+        return Belief(Pose2(x, y, wrap_to_pi(theta)), self.cov)
+
+    @property
+    def has_news(self) -> bool:
+        """Whether something was observed since the last solution."""
+        return self._fresh > 0
+
+    def add_beam(self, x: float, y: float, ux: float, uy: float, range_m: float, share: float) -> None:
+        """Add a beam that hit something: its origin and direction on the body, what it read, its noise."""
+        keyframes, config = self.keyframes, self._config
+        ox, oy = keyframes.in_frame(x, y)
+        c, s = math.cos(keyframes.turned_rad), math.sin(keyframes.turned_rad)
+        spread = config.range_std_factor * share * range_m + config.range_std_m
+        values = (ox, oy, c * ux - s * uy, s * ux + c * uy, range_m)
+        self.beams.add(keyframes.count - 1, values, spread, self.position_std_m)
+        self._fresh += 1
+
+    def add_crossing(self, at: tuple[float, float]) -> None:
+        """Add a point of the map where a line was crossed just now."""
+        values = self.keyframes.to_frame(*at)
+        self.crossings.add(self.keyframes.count - 1, values, self._config.crossing_std_m, self.position_std_m)
+        self._fresh += 1
+
+    def solve(self, steps: int = 1) -> None:
+        """Take Gauss-Newton steps over everything so far; more of them where landmarks were merged.
+
+        A pose that jumps farther than its covariance allows was drawn by a wrong association: then all is
+        set back, and what was observed since the last solution is left out of it and merged with nothing.
+        """
+        self.keyframes.close()
+        n, landmarks = self.keyframes.count, self.map
+        poses, systematic = self.keyframes.poses[:n].copy(), self.keyframes.systematic.copy()
+        lines, cov = landmarks.saved(), self.cov
+        self._iterate(steps, merge=True)
+        if not self._is_plausible(self.keyframes.poses[n - 1] - poses[n - 1], cov):
+            self.rejected += 1
+            self.keyframes.poses[:n] = poses
+            self.keyframes.systematic[:] = systematic
+            landmarks.restore(lines)
+            for seen, since in ((self.beams, self._solved_beams), (self.crossings, self._solved_crossings)):
+                seen.spread[since : seen.count] *= DISTRUST
+            self._iterate(1, merge=False)
+        self.keyframes.corrected()
+        self._solved_beams, self._solved_crossings = self.beams.count, self.crossings.count
+        self.solved_s = self.keyframes.t_s
+        self.solves += 1
+        self._fresh = 0
+
+    def _is_plausible(self, jump: FloatArray, cov: FloatArray) -> bool:
+        """Whether the newest pose moved no farther than it may, given how sure it was before."""
+        grown = cov + np.diag([GROWN_M**2, GROWN_M**2, GROWN_RAD**2])
+        return float(jump[:3] @ np.linalg.solve(grown, jump[:3])) < JUMP_GATE
+
+    def _iterate(self, steps: int, merge: bool) -> None:
+        relaxed = 0
+        for step in count():
+            if relaxed == 0:
+                if step >= steps:
+                    break
+                merged = self.map.update(self.keyframes.poses, self.beams, self.crossings, merge)
+                relaxed = 2 if merged else 0
+                self._step(RELAXED if merged else STRICT)
+            else:
+                relaxed -= 1
+                self._step(RELAXED if relaxed else STRICT)
+
+    def _step(self, robust: float) -> None:
+        keyframes, landmarks = self.keyframes, self.map
+        n, shared = keyframes.count, sheet_graph.SYSTEMATIC + 2 * landmarks.count
+        m = sheet_graph.STATES
+        diagonal, coupling = np.zeros((n, m, m)), np.zeros((n, m, m))
+        border, corner = np.zeros((n, m, shared)), np.zeros((shared, shared))
+        right, right_corner = np.zeros((n, m)), np.zeros(shared)
+        sheet_graph.add_odometry(
+            keyframes.poses,
+            keyframes.systematic,
+            keyframes.steps,
+            keyframes.spreads,
+            n,
+            diagonal,
+            coupling,
+            border,
+            corner,
+            right,
+            right_corner,
+        )
+        for seen, is_beam in ((self.beams, True), (self.crossings, False)):
+            sheet_graph.add_landmarks(
+                keyframes.poses,
+                landmarks.lines,
+                seen.frame,
+                seen.values,
+                seen.spread,
+                seen.landmark,
+                seen.count,
+                is_beam,
+                robust,
+                diagonal,
+                border,
+                corner,
+                right,
+                right_corner,
+            )
+        self._add_priors(diagonal[0], right[0], corner, right_corner)
+        status = arrow_solve.solve_arrow(diagonal, coupling, border, corner, right, right_corner, n, shared)
+        if status != arrow_solve.SOLVED:
+            return
+        keyframes.poses[:n] += right
+        keyframes.systematic += right_corner[: sheet_graph.SYSTEMATIC]
+        landmarks.lines[: landmarks.count, :2] += right_corner[sheet_graph.SYSTEMATIC :].reshape(-1, 2)
+        cov = arrow_solve.last_block_cov(diagonal[n - 1], border[n - 1], corner, shared)
+        self.cov = 0.5 * (cov + cov.T)[:3, :3]
+        half, skew = 0.5 * (self.cov[0, 0] + self.cov[1, 1]), 0.5 * (self.cov[0, 0] - self.cov[1, 1])
+        self.position_std_m = math.sqrt(half + math.hypot(skew, self.cov[0, 1]))
+
+    def _add_priors(
+        self, first: FloatArray, right: FloatArray, corner: FloatArray, right_corner: FloatArray
+    ) -> None:
+        """Add the start, the data sheets, and the places of the sheet's edges."""
+        config, errors, gyro = self._config, self._config.odometry, self._gyro
+        start = np.array(
+            [
+                config.start_position_std_m,
+                config.start_position_std_m,
+                config.start_heading_std_rad,
+                gyro.bias_std,
+            ]
+        )
+        weights = start**-2.0
+        first[np.diag_indices(4)] += weights
+        right -= weights * (self.keyframes.poses[0] - self._start)
+        turn_per_m = errors.radius_difference_std / self._separation
+        shared = np.array([gyro.scale_std, errors.turn_scale_std, turn_per_m, errors.distance_scale_std])
+        mean = np.array([0.0, 0.0, 0.0, -errors.slip_mean])
+        for k in range(sheet_graph.SYSTEMATIC):
+            _hold(corner, right_corner, k, self.keyframes.systematic[k] - mean[k], float(shared[k]))
+        for j in range(self.map.count):
+            at = sheet_graph.SYSTEMATIC + 2 * j
+            if j < self.map.edges:
+                # The edges' angles are 0, 90, 180 and -90 degrees, their offsets 0.
+                off = float(self.map.lines[j, 0])
+                off -= round(off / (0.5 * math.pi)) * 0.5 * math.pi
+                _hold(corner, right_corner, at, off, EDGE_ANGLE_STD_RAD)
+                _hold(corner, right_corner, at + 1, float(self.map.lines[j, 1]), EDGE_OFFSET_STD_M)
+                continue
+            # What is seen of a landmark fixes it; this only keeps the matrix regular.
+            corner[at, at] += 1e-6
+            corner[at + 1, at + 1] += 1e-6
+            if self.map.kinds[j] == Kind.WALL and config.walls_along_axes_std_rad > 0.0:
+                off = float(self.map.lines[j, 0])
+                off -= round(off / (0.5 * math.pi)) * 0.5 * math.pi
+                if abs(off) < math.radians(5.0):
+                    _hold(corner, right_corner, at, off, config.walls_along_axes_std_rad)
+
+
+def _hold(corner: FloatArray, right: FloatArray, k: int, off: float, std: float) -> None:
+    """Add a prior on a shared unknown that is ``off`` its mean."""
+    corner[k, k] += std**-2
+    right[k] -= off * std**-2
