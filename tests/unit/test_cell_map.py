@@ -33,6 +33,9 @@ def printed(rows: list[str]) -> CellMap:
 def test_what_is_written_is_read_back(states: np.ndarray) -> None:
     cells = CellMap(states)
     assert np.array_equal(parse_cell_map(format_cell_map(cells), "test", 5).states, states)
+    stamped = format_cell_map(cells, 36_061.25)
+    assert stamped.startswith("10:01:01.250 -> ")
+    assert np.array_equal(parse_cell_map(stamped, "test", 5).states, states)
 
 
 def test_the_first_row_is_the_largest_y_and_time_stamps_and_talk_are_skipped() -> None:

@@ -115,6 +115,8 @@ def test_a_broken_cell_file_is_one_line(tmp_path: Path, capsys: pytest.CaptureFi
     [
         ("world.sheet={size_m: [1.8, 1.8], cells: [0, 25]}", "cells"),
         ("world.sheet={size_m: [0, 1.8]}", "size_m"),
+        ("world.sheet={size_m: [1.8, 1.8], lines: [[[0, 0]]]}", "lines"),
+        ("world.sheet={size_m: [1.8, 1.8], obstacle: []}", "obstacles"),
         ("world.sheet=treasure-hnt", "treasure-hunt"),
         ("world.sheet=no/such.yaml", "none there"),
         ("world.start={x_m: 0.4, y_m: 0.5}", "with room for the body"),

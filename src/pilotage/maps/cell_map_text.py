@@ -74,10 +74,18 @@ def parse_cell_map(text: str, where: str, cells: int = 25) -> CellMap:
     return CellMap(np.array([_states(row, number, where, cells) for number, row in reversed(complete)]))
 
 
-def format_cell_map(cells: CellMap) -> str:
-    """Write a map in the robot's own format, the largest y first, without time stamps."""
+def format_cell_map(cells: CellMap, stamp_s: float | None = None) -> str:
+    """Write a map in the robot's own format, the largest y first.
+
+    ``stamp_s``, seconds of the day, puts the serial monitor's time stamp before each row.
+    """
     letters = [[_LETTER[CellState(int(state))] for state in row] for row in cells.states[::-1]]
-    return "".join(" ".join(row) + "\n" for row in letters)
+    stamp = ""
+    if stamp_s is not None:
+        minutes, milliseconds = divmod(round(1000.0 * stamp_s) % 86_400_000, 60_000)
+        seconds, milliseconds = divmod(milliseconds, 1000)
+        stamp = f"{minutes // 60:02d}:{minutes % 60:02d}:{seconds:02d}.{milliseconds:03d} -> "
+    return "".join(stamp + " ".join(row) + "\n" for row in letters)
 
 
 def features_only(cells: CellMap) -> CellMap:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Discriminator, Field, Tag, model_validator
 
 from pilotage.core.config import Config
 from pilotage.maps.true_cells import SheetFile
@@ -14,6 +14,13 @@ from pilotage.sensors.sensor import NonNegative, Positive
 Share = Annotated[float, Field(ge=0.0, lt=0.5)]
 
 
+SheetSource = Annotated[
+    Annotated[str, Tag("name")] | Annotated[SheetFile, Tag("inline")],
+    # Told apart beforehand, so that an error speaks of what was meant.
+    Discriminator(lambda value: "name" if isinstance(value, str) else "inline"),
+]
+
+
 class SheetWorldConfig(Config):
     """The sheet (a shipped name, a file, or the sheet itself) and where the robot is put down.
 
@@ -21,7 +28,7 @@ class SheetWorldConfig(Config):
     """
 
     kind: Literal["sheet"]
-    sheet: str | SheetFile
+    sheet: SheetSource
     start: PoseConfig | None = None
     tape_width_m: Positive = 0.015
     floor_is_dark: bool = True
