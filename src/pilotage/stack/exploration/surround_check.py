@@ -53,8 +53,8 @@ class SurroundCheck:
 
     Where none of the four is either, it hops to the nearest explored cell by straight distance, whatever
     stands between; a goal that takes too long is dropped and chosen anew. With ``avoid: always`` the
-    potential field also acts on the way to the next cell, and a goal that was dropped where something was
-    near is passed over until another one was reached, so that the field does not block the explorer.
+    potential field also acts on the way to the next cell, and a goal that was dropped after the field had
+    acted is passed over until another one was reached, so that the field does not block the explorer.
     Fails by its pose, and where the nearest explored cell is behind a box.
     """
 
@@ -72,6 +72,7 @@ class SurroundCheck:
         self._facing: float | None = None
         self._far = False
         self._slow_periods = 0
+        self._bent = False
         self._refused: set[tuple[int, int]] = set()
         self._looked: set[tuple[int, int]] = set()
         self._steps = 0
@@ -149,7 +150,7 @@ class SurroundCheck:
             elif self._marks.state(*self._goal) <= CellState.BORDER:
                 self._goal = None  # It has turned out to be no place to go to.
             elif self._slow_periods >= self._config.stuck_periods:
-                if self._always and self._field is not None and self._field.triggered:
+                if self._always and self._bent:
                     self._refused.add(self._goal)
                 self._goal = None
         if self._goal is None and self._facing is None:
@@ -186,7 +187,7 @@ class SurroundCheck:
         self._go(cell, far=min(away) > self._config.far_cells * min(self._marks.cell_m))
 
     def _go(self, cell: tuple[int, int], far: bool) -> None:
-        self._goal, self._far, self._slow_periods = cell, far, 0
+        self._goal, self._far, self._slow_periods, self._bent = cell, far, 0, False
 
     # --- driving ------------------------------------------------------------------------------------
 
@@ -198,6 +199,7 @@ class SurroundCheck:
         if self._field is not None and (self._far or self._always):
             command = self._field.command(pose, x, y)
             if command is not None:
+                self._bent = True
                 return command
         return pursue(pose, x, y, self._drive)
 
