@@ -10,15 +10,19 @@ import pytest
 from scipy.io import savemat
 
 from pilotage.core.errors import InputError
+from pilotage.core.types import FloatArray
 from pilotage.experiments.recordings.localize import localize_log
 from pilotage.kernels import slow_errors
 from pilotage.logs.aer1513 import read_aer1513
 
 
+def column(values: Any) -> FloatArray:
+    return np.asarray(values, dtype=np.float64).reshape(-1, 1)
+
+
 def laser_drive(seed: int = 0, rows: int = 3000) -> dict[str, Any]:
     """A drive with noise as the file says: 17 cylinders, a laser 0.22 m ahead of the axle, 10 Hz."""
     rng = np.random.default_rng(seed)
-    points = rng.uniform([0.0, -4.0], [10.0, 4.0], (17, 2))
     pose, poses = np.array([2.0, 0.0, 0.0]), []
     v = 0.2 + 0.1 * np.sin(0.01 * np.arange(rows))
     om = 0.12 + 0.15 * np.sin(0.03 * np.arange(rows))
@@ -28,12 +32,13 @@ def laser_drive(seed: int = 0, rows: int = 3000) -> dict[str, Any]:
             pose = pose + 0.1 * np.array([v[k] * np.cos(middle), v[k] * np.sin(middle), om[k]])
         poses.append(pose)
     truth = np.array(poses)
+    # Cylinders all over where it drives.
+    points = rng.uniform(truth[:, :2].min(axis=0) - 1.0, truth[:, :2].max(axis=0) + 1.0, (17, 2))
     laser = truth[:, :2] + 0.22 * np.column_stack([np.cos(truth[:, 2]), np.sin(truth[:, 2])])
     offset = points[None] - laser[:, None]
     r = np.hypot(offset[..., 0], offset[..., 1]) + rng.normal(0.0, 0.03, (rows, 17))
     b = np.arctan2(offset[..., 1], offset[..., 0]) - truth[:, 2:] + rng.normal(0.0, 0.026, (rows, 17))
     r[(r > 5.0) | (rng.random((rows, 17)) < 0.3)] = 0.0
-    column = lambda values: np.asarray(values).reshape(-1, 1)  # noqa: E731
     return {
         "t": column(0.1 * np.arange(rows)),
         "r": r,
