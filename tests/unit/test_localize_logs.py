@@ -38,7 +38,7 @@ def laser_drive(seed: int = 0, rows: int = 3000) -> dict[str, Any]:
     offset = points[None] - laser[:, None]
     r = np.hypot(offset[..., 0], offset[..., 1]) + rng.normal(0.0, 0.03, (rows, 17))
     b = np.arctan2(offset[..., 1], offset[..., 0]) - truth[:, 2:] + rng.normal(0.0, 0.026, (rows, 17))
-    r[(r > 5.0) | (rng.random((rows, 17)) < 0.3)] = 0.0
+    r[(r < 0.3) | (r > 5.0) | (rng.random((rows, 17)) < 0.3)] = 0.0
     return {
         "t": column(0.1 * np.arange(rows)),
         "r": r,
