@@ -287,6 +287,11 @@ EXAMPLES: dict[tuple[str, str], Example] = {
     ("localizer", "ekf-augmented"): Example(
         localizer_follows, {"systematic": {"distance_scale_var": 1e-3}}, FILTER_NUMBERS
     ),
+    ("localizer", "ekf-slow-errors"): Example(
+        localizer_follows,
+        {"gate": 0.999},
+        frozenset({"gate", "range_var_fraction", "range_scale", "depth_power", "recovery_factor"}),
+    ),
     ("localizer", "dead-reckoning"): Example(
         localizer_follows, pure_numbers=frozenset({"odometry_var_scale"})
     ),

@@ -11,6 +11,7 @@ from pilotage.cli.bench_scen import bench_scen
 from pilotage.cli.calibrate import calibrate
 from pilotage.cli.components import components
 from pilotage.cli.evaluate import evaluate
+from pilotage.cli.localize import localize
 from pilotage.cli.map_score import map_score
 from pilotage.cli.missions import missions
 from pilotage.cli.plan import plan
@@ -35,6 +36,7 @@ COMMANDS = (
     bench_scen,
     evaluate,
     calibrate,
+    localize,
     track,
     map_score,
     report,

@@ -43,7 +43,7 @@ def write_run_folder(out: Path, kind: Kind, record: Record, metrics: dict[str, o
         kind.write_files(record, draft)
         metrics = {**metrics, "run_dir": str(final)}
         (draft / "metrics.json").write_text(json.dumps(clean(metrics), indent=2) + "\n", encoding="utf-8")
-        _replace(draft, final)
+        replace_folder(draft, final)
     except BaseException:
         shutil.rmtree(draft, ignore_errors=True)
         raise
@@ -69,7 +69,7 @@ def _umask() -> int:
     return mask
 
 
-def _replace(draft: Path, final: Path) -> None:
+def replace_folder(draft: Path, final: Path) -> None:
     """Put ``draft`` in the place of ``final``, also where another process does the same at once."""
     for _ in range(100):
         if final.exists():

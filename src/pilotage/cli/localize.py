@@ -1,0 +1,61 @@
+"""``pilotage localize``: a localizer on a recorded log."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from pilotage.cli.options import Json, Out, Overrides
+from pilotage.cli.output import print_columns, print_json, stdout_for_json
+from pilotage.core.errors import InputError, unknown_name
+
+
+def localize(
+    log: Annotated[Path, typer.Argument(metavar="LOG", help="A MRCLAM folder or an AER1513 MATLAB file.")],
+    form: Annotated[str, typer.Option("--format", metavar="mrclam|aer1513", help="Format of the recording.")],
+    robot: Annotated[
+        int | None, typer.Option("--robot", metavar="N", help="mrclam: which robot, 1 to 5.")
+    ] = None,
+    localizer: Annotated[
+        str, typer.Option(metavar="NAME", help="A registered localizer that knows its landmarks.")
+    ] = "ekf-slow-errors",
+    max_range: Annotated[
+        float | None, typer.Option(metavar="M", help="aer1513: leave out readings beyond, in metres.")
+    ] = None,
+    overrides: Overrides = None,
+    out: Out = Path("runs"),
+    report: Annotated[bool, typer.Option(help="Write report.html into the run folder.")] = True,
+    json: Json = False,
+) -> int:
+    """Run a localizer over a recording and score it against its truth."""
+    from pilotage.experiments.recordings.localize import FORMATS, localize_log
+
+    if form not in FORMATS:
+        raise unknown_name("--format", form, FORMATS)
+    if max_range is not None and not (math.isfinite(max_range) and max_range > 0.0):
+        raise InputError(f"--max-range: expected metres above 0, found {max_range:g}")
+    with stdout_for_json(json):
+        result = localize_log(
+            log,
+            out,
+            form=form,
+            robot=robot,
+            localizer=localizer,
+            overrides=overrides or (),
+            max_range_m=max_range,
+        )
+        if report:
+            from pilotage.report import write_report
+
+            write_report(result.run_dir)
+    if json:
+        print_json(result.metrics)
+    else:
+        print_columns(
+            (key, f"{value:.4g}" if isinstance(value, float) else str(value))
+            for key, value in result.metrics.items()
+        )
+    return 0 if result.metrics["success"] else 1

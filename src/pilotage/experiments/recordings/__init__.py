@@ -1,0 +1,1 @@
+"""Recorded logs through the robot's plug: a log becomes readings, a localizer its beliefs."""

@@ -1,0 +1,176 @@
+"""A recording in one form, whatever file it came from: what was sensed, step by step, and the truth."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from pilotage.core.errors import InputError
+from pilotage.core.types import BoolArray, FloatArray, IntArray
+from pilotage.logs.aer1513 import read_aer1513
+from pilotage.logs.mrclam import TRUTH_GAP_S, read_mrclam
+from pilotage.maps.landmarks import Landmarks
+from pilotage.sensors.beacon import BeaconConfig
+from pilotage.sensors.readings import BeaconReadings, OdometryIncrement, Reading, Readings
+from pilotage.sensors.sensor import Mount, SensorConfig
+from pilotage.sensors.wheel_odometry import WheelOdometryConfig
+
+ODOMETRY, BEACONS = "odometry", "beacons"
+SCORE_HZ = 10.0
+HOLD_S = 0.5
+"""A command is held no longer than this where the next one is missing."""
+
+
+@dataclass(frozen=True, slots=True)
+class RecordedDrive:
+    """A recording as steps.
+
+    Attributes
+    ----------
+    t_s
+        (K,) ends of the steps since the begin; the first is the begin itself.
+    distance_m, angle_rad
+        (K,) as the odometry claims for the step that ends there.
+    first, ids, ranges_m, bearings_rad
+        Readings first[k] to first[k + 1] were taken at step k.
+    truth
+        (K, 3), nan where it is not known.
+    scored
+        (K,) the steps of the 10 Hz grid.
+    begin_s
+        The log's clock at the begin.
+    """
+
+    name: str
+    robot: int | None
+    begin_s: float
+    t_s: FloatArray
+    distance_m: FloatArray
+    angle_rad: FloatArray
+    first: IntArray
+    ids: IntArray
+    ranges_m: FloatArray
+    bearings_rad: FloatArray
+    truth: FloatArray
+    scored: BoolArray
+    landmarks: Landmarks
+    sensors: dict[str, SensorConfig]
+    truth_gaps: int
+    odometry_gaps: int
+    misread: tuple[str, ...]
+
+    def readings(self) -> Iterator[Readings]:
+        """The log through the robot's plug, from the first step after the begin."""
+        for k in range(1, self.t_s.shape[0]):
+            said: dict[str, Reading] = {
+                ODOMETRY: OdometryIncrement(float(self.distance_m[k]), float(self.angle_rad[k]))
+            }
+            rows = slice(int(self.first[k]), int(self.first[k + 1]))
+            if rows.stop > rows.start:
+                said[BEACONS] = BeaconReadings(self.ids[rows], self.ranges_m[rows], self.bearings_rad[rows])
+            yield Readings(float(self.t_s[k]), said)
+
+
+def mrclam_drive(folder: Path, robot: int) -> RecordedDrive:
+    """One robot of a MRCLAM data set; steps at 10 Hz and wherever a landmark was seen."""
+    log = read_mrclam(folder, robot)
+    known = log.of_landmarks
+    if min(log.odometry_t_s.shape[0], log.truth_t_s.shape[0]) < 2:
+        raise InputError(f"{folder}: expected two or more rows of odometry and truth, found fewer")
+    begin = float(max(log.truth_t_s[0], log.odometry_t_s[0]))
+    end = float(min(log.truth_t_s[-1], log.odometry_t_s[-1]))
+    if end - begin < 1.0:
+        raise InputError(
+            f"{folder}: expected odometry and truth of robot {robot} over the same time, "
+            f"found {max(end - begin, 0.0):.1f} s in common"
+        )
+    grid = begin + np.arange(int((end - begin) * SCORE_HZ) + 1) / SCORE_HZ
+    inside = (log.measurement_t_s[known] > begin) & (log.measurement_t_s[known] <= end)
+    known = known[inside]
+    clock = np.union1d(grid, log.measurement_t_s[known])
+    held = np.minimum(np.diff(log.odometry_t_s), HOLD_S)
+    gone = [np.concatenate([[0.0], np.cumsum(held * x[:-1])]) for x in (log.speed_m_s, log.turn_rate_rad_s)]
+    distance, angle = (np.diff(np.interp(clock, log.odometry_t_s, x), prepend=0.0) for x in gone)
+    heading = np.unwrap(log.truth[:, 2])
+    columns = (log.truth[:, 0], log.truth[:, 1], heading)
+    truth = np.column_stack([np.interp(clock, log.truth_t_s, column) for column in columns])
+    for left, right in log.truth_gaps_s:
+        truth[(clock > left) & (clock < right)] = np.nan
+    return RecordedDrive(
+        f"{folder.resolve().name}-robot{robot}",
+        robot,
+        begin,
+        clock - begin,
+        distance,
+        angle,
+        np.searchsorted(log.measurement_t_s[known], np.append(clock, np.inf)).astype(np.int64),
+        log.subjects[known],
+        log.ranges_m[known],
+        log.bearings_rad[known],
+        truth,
+        np.isin(clock, grid),
+        log.landmarks,
+        {
+            ODOMETRY: WheelOdometryConfig(
+                distance_var_m2_per_m=2e-3, angle_var_rad2_per_rad=0.01, angle_var_rad2_per_m=5e-3
+            ),
+            BEACONS: BeaconConfig(max_range_m=20.0, range_var_m2=0.15**2, bearing_var_rad2=0.03**2),
+        },
+        log.truth_gaps_s.shape[0],
+        int((np.diff(log.odometry_t_s) > TRUTH_GAP_S).sum()),
+        log.misread,
+    )
+
+
+def aer1513_drive(path: Path, max_range_m: float | None = None) -> RecordedDrive:
+    """A robot with a laser; one step a row, readings beyond ``max_range_m`` left out."""
+    log = read_aer1513(path)
+    seen = np.isfinite(log.ranges_m)
+    if max_range_m is not None:
+        seen &= np.nan_to_num(log.ranges_m, nan=np.inf) <= max_range_m
+    seen[0] = False
+    dt = np.diff(log.t_s, prepend=log.t_s[0])
+    held = np.minimum(dt, HOLD_S)
+    rows, columns = np.nonzero(seen)
+    # The file's noise is of the rates, drawn anew each step: per metre and radian, at the usual rates.
+    step = float(np.median(dt[1:]))
+    speed = max(float(np.mean(np.abs(log.speed_m_s))), 1e-2)
+    driving = WheelOdometryConfig(
+        distance_var_m2_per_m=log.speed_var_m2_s2 * step / speed,
+        angle_var_rad2_per_rad=0.0,
+        angle_var_rad2_per_m=log.turn_rate_var_rad2_s2 * step / speed,
+    )
+    truth = log.truth.copy()
+    truth[:, 2] = np.unwrap(truth[:, 2])
+    grid = np.concatenate([[True], np.diff(np.floor((log.t_s - log.t_s[0]) * SCORE_HZ + 1e-6)) > 0])
+    return RecordedDrive(
+        path.stem,
+        None,
+        float(log.t_s[0]),
+        log.t_s - log.t_s[0],
+        log.speed_m_s * held,
+        log.turn_rate_rad_s * held,
+        np.searchsorted(rows, np.arange(log.t_s.shape[0] + 1)).astype(np.int64),
+        columns.astype(np.int64) + 1,
+        log.ranges_m[seen],
+        log.bearings_rad[seen],
+        truth,
+        grid,
+        Landmarks(np.arange(1, log.points_xy_m.shape[0] + 1), log.points_xy_m),
+        {
+            ODOMETRY: driving,
+            BEACONS: BeaconConfig(
+                mount=Mount(x_m=log.laser_ahead_m),
+                field_of_view_rad=2.0 * np.pi,
+                max_range_m=100.0,
+                range_var_m2=log.range_var_m2,
+                bearing_var_rad2=log.bearing_var_rad2,
+            ),
+        },
+        int((dt > TRUTH_GAP_S).sum()),
+        int((dt > HOLD_S).sum()),
+        (),
+    )

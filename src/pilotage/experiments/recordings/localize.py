@@ -1,0 +1,242 @@
+"""A localizer run over a recording, judged against its truth, and written into a run folder."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+import shutil
+import tempfile
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import yaml
+
+from pilotage.core.errors import InputError
+from pilotage.core.random import RandomStreams
+from pilotage.core.types import Event, FloatArray, Pose2
+from pilotage.evaluation.log_metrics import log_metrics
+from pilotage.experiments.floor.recorder import BELIEF_COLUMNS, TRUTH_COLUMNS
+from pilotage.experiments.mission import apply_override, merge, read_parameters
+from pilotage.experiments.recordings.drive import RecordedDrive, aer1513_drive, mrclam_drive
+from pilotage.experiments.recordings.parameters import shipped_parameters
+from pilotage.experiments.run_folder import clean, replace_folder
+from pilotage.maps.segment_map import SegmentMap
+from pilotage.stack.interface import Belief
+from pilotage.stack.knowledge import Knowledge
+from pilotage.stack.localization.localizer import LOCALIZERS, Localizer
+
+FORMATS = ("mrclam", "aer1513")
+START_STDS = (0.05, 0.05, 0.03)
+"""Metres, metres and radians of the start, whose mean is the true pose."""
+DEFAULT = "ekf-slow-errors"
+SUMS = ("beacons_seen", "beacons_accepted", "nis", "nis_dof", "nis_expected")
+"""Telemetry that adds up between scored steps; of the rest the last value is kept."""
+
+
+@dataclass(frozen=True, slots=True)
+class LocalizedLog:
+    """Metrics by their JSON keys, and the run folder."""
+
+    metrics: dict[str, object]
+    run_dir: Path
+
+
+def read_drive(log: Path, form: str, robot: int | None, max_range_m: float | None = None) -> RecordedDrive:
+    """Read a recording.
+
+    Raises
+    ------
+    InputError
+        Where the options do not suit the format, or the recording is not what it should be.
+    """
+    if form == "mrclam":
+        if robot is None:
+            raise InputError("localize: expected --robot N for a MRCLAM data set, found none")
+        if max_range_m is not None:
+            raise InputError("localize: --max-range is for --format aer1513")
+        return mrclam_drive(log, robot)
+    if robot is not None:
+        raise InputError("localize: --robot is for --format mrclam; an AER1513 file holds one robot")
+    return aer1513_drive(log, max_range_m)
+
+
+def localize_log(
+    log: Path,
+    out: Path,
+    *,
+    form: str,
+    robot: int | None = None,
+    localizer: str = DEFAULT,
+    overrides: Sequence[str] = (),
+    max_range_m: float | None = None,
+) -> LocalizedLog:
+    """Run a localizer over a recording and write its run folder."""
+    drive = read_drive(log, form, robot, max_range_m)
+    shipped, learned_from = shipped_parameters(drive, localizer, form)
+    parameters = with_overrides(localizer, shipped, overrides)
+    knowledge = knowledge_of(drive)
+    config = LOCALIZERS.configure(localizer, parameters, "stack.localizer")
+    factory = LOCALIZERS.entry(localizer).factory
+    follow(drive, factory(config, knowledge), steps=50)  # compiles the kernels: not part of the speed
+    trace, events, loop_s = follow(drive, factory(config, knowledge))
+    steps = drive.t_s.shape[0] - 1
+    scores = log_metrics(trace)
+    success = bool(scores.get("scored_steps")) and not scores.get("lost", False)
+    metrics: dict[str, object] = {
+        "mission": f"localize-{drive.name}-{localizer}",
+        "success": success,
+        "reason": "" if success else "the localizer is lost at the end, or no truth is known to tell",
+        "format": form,
+        "robot": robot,
+        "localizer": localizer,
+        "learned_from": learned_from,
+        "duration_s": float(drive.t_s[-1]),
+        "steps": steps,
+        "wall_time_s": loop_s,
+        "steps_per_s": steps / loop_s,
+        **scores,
+        "recoveries": sum(event.kind == "recovery" for event in events),
+        "truth_gaps": drive.truth_gaps,
+        "odometry_gaps": drive.odometry_gaps,
+        "misread_barcodes": len(drive.misread),
+    }
+    return _write(out, drive, metrics, trace, events, {"name": localizer, **config.model_dump(mode="json")})
+
+
+def with_overrides(localizer: str, parameters: dict[str, Any], overrides: Sequence[str]) -> dict[str, Any]:
+    """Lay ``stack.localizer.key=value`` and ``@FILE`` over a localizer's parameters."""
+    values: dict[str, Any] = {"stack": {"localizer": {"name": localizer, **parameters}}}
+    for override in overrides:
+        if override.startswith("@"):
+            values = merge(values, read_parameters(override[1:]))
+        elif override.startswith("stack.localizer.") and not override.startswith("stack.localizer.name"):
+            apply_override(values, override)
+        else:
+            raise InputError(
+                f"--set {override}: expected stack.localizer.KEY=VALUE; the rest is the recording's, "
+                "the localizer's name comes by --localizer"
+            )
+    chosen = dict(values["stack"]["localizer"])
+    if chosen.pop("name") != localizer:
+        raise InputError(
+            f"--set: the parameters are of another localizer than '{localizer}'; use --localizer"
+        )
+    return chosen
+
+
+def knowledge_of(drive: RecordedDrive) -> Knowledge:
+    """What the recorded robot knew before it started."""
+    start = drive.truth[0]
+    if not np.isfinite(start).all():
+        raise InputError(f"{drive.name}: expected the truth at the begin, found a gap there")
+    initial = Belief(Pose2.from_array(start), np.diag(np.square(START_STDS)))
+    return Knowledge(
+        world_map=SegmentMap(np.zeros((0, 4)), np.zeros((0, 3)), _bounds(drive)),
+        landmarks=drive.landmarks,
+        sensors=drive.sensors,
+        body_radius_m=0.2,
+        max_speed_m_s=1.0,
+        max_turn_rate_rad_s=2.0,
+        dt_s=float(drive.t_s[1] - drive.t_s[0]),
+        initial=initial,
+        goal=None,
+        goal_tolerance_m=0.3,
+        streams=RandomStreams(0),
+    )
+
+
+def follow(
+    drive: RecordedDrive, localizer: Localizer, steps: int | None = None
+) -> tuple[dict[str, FloatArray], list[Event], float]:
+    """Step a localizer through a drive; returns the trace at the scored steps, events and wall time."""
+    names = tuple(localizer.telemetry())
+    sums = [name in SUMS for name in names]
+    rows: list[list[float]] = []
+    events: list[Event] = []
+    total = [math.nan] * len(names)
+    recoveries, loop_s = 0.0, 0.0
+    for k, readings in enumerate(drive.readings(), start=1):
+        begin = time.perf_counter()
+        belief = localizer.step(readings)
+        loop_s += time.perf_counter() - begin
+        said = localizer.telemetry()
+        for i, name in enumerate(names):
+            value = said[name]
+            if not sums[i] or math.isnan(total[i]):
+                total[i] = value
+            elif not math.isnan(value):
+                total[i] += value
+        if said.get("recoveries", 0.0) > recoveries:
+            recoveries = said["recoveries"]
+            events.append(
+                Event(
+                    readings.t_s,
+                    "recovery",
+                    "several readings in a row were rejected: the pose is trusted less",
+                )
+            )
+        if drive.scored[k]:
+            pose, cov = belief.pose, belief.cov
+            upper = (cov[0, 0], cov[0, 1], cov[1, 1], cov[0, 2], cov[1, 2], cov[2, 2])
+            x, y, theta = drive.truth[k]
+            heading = (theta + math.pi) % (2.0 * math.pi) - math.pi
+            rows.append([readings.t_s, x, y, heading, *pose.as_array(), *upper, *total])
+            total = [math.nan] * len(names)
+        if steps is not None and k >= steps:
+            break
+    columns = (*TRUTH_COLUMNS, *BELIEF_COLUMNS, *names)
+    table = np.array(rows, dtype=np.float64).reshape(-1, len(columns))
+    return {name: np.ascontiguousarray(table[:, i]) for i, name in enumerate(columns)}, events, loop_s
+
+
+def _bounds(drive: RecordedDrive) -> tuple[float, float, float, float]:
+    known = drive.truth[np.isfinite(drive.truth).all(axis=1), :2]
+    points = np.concatenate([drive.landmarks.points_xy_m, known])
+    (xmin, ymin), (xmax, ymax) = points.min(axis=0) - 0.5, points.max(axis=0) + 0.5
+    return float(xmin), float(ymin), float(xmax), float(ymax)
+
+
+def _write(
+    out: Path,
+    drive: RecordedDrive,
+    metrics: dict[str, object],
+    trace: dict[str, FloatArray],
+    events: list[Event],
+    localizer: dict[str, Any],
+) -> LocalizedLog:
+    """Write the run folder, complete or not at all."""
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    settings = yaml.safe_dump({"recording": drive.name, "stack": {"localizer": localizer}}, sort_keys=False)
+    digest = hashlib.sha256(settings.encode()).hexdigest()[:8]
+    out.mkdir(parents=True, exist_ok=True)
+    final = out / f"{metrics['mission']}-{digest}"
+    world = {
+        "bounds_m": list(_bounds(drive)),
+        "landmarks": [
+            {"id": int(i), "x_m": float(x), "y_m": float(y)}
+            for i, (x, y) in zip(drive.landmarks.ids, drive.landmarks.points_xy_m, strict=True)
+        ],
+        "start": drive.truth[0].tolist(),
+    }
+    metrics = {**metrics, "run_dir": str(final)}
+    draft = Path(tempfile.mkdtemp(prefix=f".{final.name}-", dir=out))
+    try:
+        draft.chmod(0o755)
+        (draft / "localizer.yaml").write_text(settings, encoding="utf-8")
+        pq.write_table(pa.table(trace), draft / "trace.parquet")
+        lines = [json.dumps({"t_s": e.t_s, "kind": e.kind, "text": e.text}) + "\n" for e in events]
+        (draft / "events.jsonl").write_text("".join(lines), encoding="utf-8")
+        (draft / "world.json").write_text(json.dumps(world), encoding="utf-8")
+        (draft / "metrics.json").write_text(json.dumps(clean(metrics), indent=2) + "\n", encoding="utf-8")
+        replace_folder(draft, final)
+    except BaseException:
+        shutil.rmtree(draft, ignore_errors=True)
+        raise
+    return LocalizedLog(metrics, final)

@@ -1,0 +1,243 @@
+"""The EKF for real drives and sensors: their slowly varying errors are part of its state."""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Mapping
+
+import numpy as np
+from pydantic import Field
+
+from pilotage.core.chi_square import chi_square_quantile, gated_mean
+from pilotage.core.config import Config
+from pilotage.core.errors import InputError
+from pilotage.core.types import FloatArray, Pose2
+from pilotage.kernels import slow_errors
+from pilotage.models.odometry import OdometryModel
+from pilotage.sensors.beacon import BeaconConfig
+from pilotage.sensors.readings import BeaconReadings, OdometryIncrement, Readings
+from pilotage.sensors.sensor import NonNegative, Positive
+from pilotage.sensors.wheel_odometry import WheelOdometryConfig
+from pilotage.stack.interface import Belief
+from pilotage.stack.knowledge import Knowledge
+from pilotage.stack.localization.landmark_filter import MEASUREMENT_DOF
+from pilotage.stack.localization.localizer import LOCALIZERS, require_initial_pose
+from pilotage.stack.localization.odometry_prediction import OdometryNoise, OdometryPrediction
+
+NAME = "ekf-slow-errors"
+
+
+class SlowError(Config):
+    """A first-order Gauss-Markov error: the standard deviation that it keeps, and its time constant."""
+
+    std: NonNegative
+    time_constant_s: Positive = 1.0e4
+
+
+class CommandMap(Config):
+    """From what the odometry says to the motion: gains, what an arc takes away, and a bend.
+
+    speed = (speed_gain - speed_loss_per_rad_s min(|w|, loss_up_to_rad_s)) v, turn rate = turn_gain w +
+    bend_rad_per_m speed; all ``delay_s`` late.
+    """
+
+    delay_s: NonNegative = 0.0
+    speed_gain: Positive = 1.0
+    speed_loss_per_rad_s: NonNegative = 0.0
+    loss_up_to_rad_s: NonNegative = 0.45
+    turn_gain: Positive = 1.0
+    bend_rad_per_m: float = 0.0
+
+
+class EkfSlowErrorsConfig(Config):
+    """Variances left out are taken from the sensors' data sheets; the errors' from the fields below."""
+
+    gate: float = Field(default=0.999, gt=0.0, lt=1.0)
+    commands: CommandMap = CommandMap()
+    odometry: OdometryNoise = OdometryNoise()
+    distance_var_m2_per_s: NonNegative = 0.0
+    angle_var_rad2_per_s: NonNegative = 0.0
+    range_var_m2: Positive | None = None
+    range_var_fraction: NonNegative = 0.0
+    """White variance of the range over its square."""
+    bearing_var_rad2: Positive | None = None
+    bearing_age_s: NonNegative = 0.0
+    range_scale: float = Field(default=1.0, gt=0.5, lt=2.0)
+    """Read over true range."""
+    depth_power: float = Field(default=0.0, ge=0.0, le=2.0)
+    """The reading is the range times cos(bearing) to this power: 0 a range, 1 the depth of a camera."""
+    speed_error: SlowError = SlowError(std=0.01, time_constant_s=30.0)
+    turn_error: SlowError = SlowError(std=0.01, time_constant_s=30.0)
+    course_rad: SlowError = SlowError(std=0.002)
+    bearing_rad: SlowError = SlowError(std=0.002)
+    sensor_range_error: SlowError = SlowError(std=0.002)
+    landmark_range_error: SlowError = SlowError(std=0.002, time_constant_s=30.0)
+    recovery_rejections: int = Field(default=5, ge=2)
+    """So many more rejections than acceptances say that the filter is wrong, not the sensor."""
+    recovery_factor: float = Field(default=2.0, gt=1.0)
+    recovery_position_std_m: NonNegative = 0.1
+    recovery_heading_std_rad: NonNegative = 0.1
+
+
+@LOCALIZERS.add(NAME, EkfSlowErrorsConfig)
+class EkfSlowErrorsLocalizer:
+    """Extended Kalman filter with the slowly varying errors of drive and sensor in its state.
+
+    State augmentation (Bar-Shalom et al. 2001, sect. 11.9): what stays the same from one reading to the
+    next does not average out, and a filter that takes it for white noise becomes overconfident. Known
+    correspondences, each landmark through a chi-square gate; after several rejections the pose is
+    trusted less until readings pass again.
+
+    Fails where landmarks are out of sight for minutes (it is dead reckoning then), or where most readings
+    carry a wrong identity.
+    """
+
+    def __init__(self, config: EkfSlowErrorsConfig, knowledge: Knowledge) -> None:
+        require_initial_pose(knowledge, NAME)
+        self._config = config
+        self._odometry, odometry = knowledge.one_sensor(WheelOdometryConfig, NAME)
+        self._beacons, beacons = knowledge.one_sensor(BeaconConfig, NAME)
+        if len(knowledge.landmarks) == 0:
+            raise InputError(f"{NAME}: expected a map with landmarks, found none")
+        self._noise = OdometryPrediction(odometry, config.odometry, 1.0, OdometryModel.EXACT_ARC)
+        order = np.argsort(knowledge.landmarks.ids)
+        self._ids = knowledge.landmarks.ids[order]
+        self._points = knowledge.landmarks.points_xy_m[order]
+        self._mount = np.array([beacons.mount.x_m, beacons.mount.y_m, beacons.mount.theta_rad])
+        self._range_var = beacons.range_var_m2 if config.range_var_m2 is None else config.range_var_m2
+        self._bearing_var = (
+            beacons.bearing_var_rad2 if config.bearing_var_rad2 is None else config.bearing_var_rad2
+        )
+        if self._range_var == 0.0 or self._bearing_var == 0.0:
+            raise InputError(
+                f"{NAME}: a beacon sensor without noise leaves the filter no measurement variance; "
+                "set stack.localizer.range_var_m2 and stack.localizer.bearing_var_rad2 above 0"
+            )
+        self._gate = chi_square_quantile(config.gate, MEASUREMENT_DOF)
+        self._expected_nis = gated_mean(self._gate, MEASUREMENT_DOF)
+        errors = [config.speed_error, config.turn_error, config.course_rad, config.bearing_rad]
+        errors += [config.sensor_range_error] + [config.landmark_range_error] * len(self._ids)
+        self._stationary = np.array([0.0, 0.0, 0.0, *(error.std**2 for error in errors)])
+        self._rates = np.array([0.0, 0.0, 0.0, *(1.0 / error.time_constant_s for error in errors)])
+        self._state = np.concatenate([knowledge.initial.pose.as_array(), np.zeros(len(errors))])
+        self._cov = np.diag(self._stationary)
+        self._cov[:3, :3] = knowledge.initial.cov
+        floor = [config.recovery_position_std_m] * 2 + [config.recovery_heading_std_rad]
+        self._floor: FloatArray = np.array(floor) ** 2
+        self._pending: deque[tuple[float, float, float, float]] = deque()
+        self._t_s: float | None = None
+        self._dt_s = knowledge.dt_s
+        self._turn_rate = 0.0
+        self._rejections = self.recoveries = 0
+        self.belief = knowledge.initial
+        self._count(0, 0, 0.0)
+
+    def step(self, readings: Readings) -> Belief:
+        """Move by what the odometry said ``delay_s`` ago, then update by every landmark seen."""
+        last = readings.t_s - self._dt_s if self._t_s is None else self._t_s
+        self._t_s = readings.t_s
+        odometry = readings.by_sensor.get(self._odometry)
+        if isinstance(odometry, OdometryIncrement) and readings.t_s > last:
+            self._pending.append((last, readings.t_s, odometry.distance_m, odometry.angle_rad))
+        self._move(last, readings.t_s)
+        seen = readings.by_sensor.get(self._beacons)
+        if isinstance(seen, BeaconReadings):
+            self._update(seen)
+        else:
+            self._count(0, 0, 0.0)
+        self.belief = Belief(Pose2.from_array(self._state), self._cov[:3, :3].copy())
+        return self.belief
+
+    def _move(self, begin_s: float, end_s: float) -> None:
+        """Predict from ``begin_s`` to ``end_s`` by the increments that act in between."""
+        delay = self._config.commands.delay_s
+        at = begin_s
+        while at < end_s:
+            while self._pending and self._pending[0][1] + delay <= at + 1e-9:
+                self._pending.popleft()
+            if not self._pending or self._pending[0][0] + delay >= end_s:
+                self._predict(0.0, 0.0, end_s - at)  # nothing is known to act
+                return
+            start, stop, distance, angle = self._pending[0]
+            if start + delay > at + 1e-9:
+                self._predict(0.0, 0.0, start + delay - at)
+                at = start + delay
+                continue
+            until = min(stop + delay, end_s)
+            share = (until - at) / (stop - start)
+            self._predict(share * distance, share * angle, until - at)
+            at = until
+
+    def _predict(self, distance: float, angle: float, dt_s: float) -> None:
+        if dt_s <= 0.0:
+            return
+        config, commands = self._config, self._config.commands
+        claimed_rate = min(abs(angle) / dt_s, commands.loss_up_to_rad_s)
+        gain = max(commands.speed_gain - commands.speed_loss_per_rad_s * claimed_rate, 0.0)
+        moved = gain * distance
+        turned = commands.turn_gain * angle + commands.bend_rad_per_m * moved
+        self._turn_rate = turned / dt_s
+        distance_var, angle_var = self._noise.variances(OdometryIncrement(moved, turned))
+        slow_errors.predict(
+            self._state,
+            self._cov,
+            moved,
+            turned,
+            dt_s,
+            distance_var + config.distance_var_m2_per_s * dt_s,
+            angle_var + config.angle_var_rad2_per_s * dt_s,
+            self._rates,
+            self._stationary,
+        )
+
+    def _update(self, seen: BeaconReadings) -> None:
+        config, count = self._config, seen.ids.shape[0]
+        nis, outcome = np.empty(count), np.empty(count, dtype=np.int64)
+        used = slow_errors.update_range_bearings(
+            self._state,
+            self._cov,
+            seen.ids,
+            seen.ranges_m / config.range_scale,
+            # An old picture was taken before the last bit of turn.
+            seen.bearings_rad - self._turn_rate * config.bearing_age_s,
+            self._ids,
+            self._points,
+            self._mount,
+            config.depth_power,
+            self._range_var,
+            config.range_var_fraction,
+            self._bearing_var,
+            self._gate,
+            nis,
+            outcome,
+        )
+        for result in outcome:
+            if result == slow_errors.OUTCOME_ACCEPTED:
+                self._rejections = max(0, self._rejections - 1)
+            elif result == slow_errors.OUTCOME_GATED:
+                self._rejections += 1
+        if self._rejections >= config.recovery_rejections:
+            slow_errors.inflate(self._cov, config.recovery_factor, self._floor)
+            self._rejections = 0
+            self.recoveries += 1
+        self._count(count, used, float(nis[outcome == slow_errors.OUTCOME_ACCEPTED].sum()))
+
+    def _count(self, seen: int, accepted: int, nis: float) -> None:
+        self._telemetry = {
+            "beacons_seen": float(seen),
+            "beacons_accepted": float(accepted),
+            "nis": nis if accepted else math.nan,
+            "nis_dof": float(MEASUREMENT_DOF * accepted),
+            "nis_expected": accepted * self._expected_nis if accepted else math.nan,
+            "recoveries": float(self.recoveries),
+            "speed_error": float(self._state[slow_errors.SPEED]),
+            "turn_error": float(self._state[slow_errors.TURN]),
+            "course_rad": float(self._state[slow_errors.COURSE]),
+            "bearing_offset_rad": float(self._state[slow_errors.BEARING]),
+            "range_error": float(self._state[slow_errors.SCALE]),
+        }
+
+    def telemetry(self) -> Mapping[str, float]:
+        """Beacons seen and accepted, their NIS, recoveries so far, and the errors as believed."""
+        return self._telemetry
