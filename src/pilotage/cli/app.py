@@ -7,6 +7,7 @@ from typing import Annotated
 import typer
 
 from pilotage import __version__
+from pilotage.cli.attribute import attribute
 from pilotage.cli.bench_scen import bench_scen
 from pilotage.cli.calibrate import calibrate
 from pilotage.cli.components import components
@@ -17,6 +18,7 @@ from pilotage.cli.plan import plan
 from pilotage.cli.report import report
 from pilotage.cli.run import run
 from pilotage.cli.schema import schema
+from pilotage.cli.study import study, sweep
 from pilotage.cli.track import track
 from pilotage.core.errors import InputError
 
@@ -35,6 +37,9 @@ COMMANDS = (
     bench_scen,
     evaluate,
     calibrate,
+    study,
+    sweep,
+    attribute,
     track,
     map_score,
     report,
