@@ -7,6 +7,7 @@ from typing import Annotated
 import typer
 
 from pilotage import __version__
+from pilotage.cli.attribute import attribute
 from pilotage.cli.bench_scen import bench_scen
 from pilotage.cli.calibrate import calibrate
 from pilotage.cli.components import components
@@ -18,6 +19,7 @@ from pilotage.cli.plan import plan
 from pilotage.cli.report import report
 from pilotage.cli.run import run
 from pilotage.cli.schema import schema
+from pilotage.cli.study import study, sweep
 from pilotage.cli.track import track
 from pilotage.core.errors import InputError
 
@@ -37,6 +39,9 @@ COMMANDS = (
     evaluate,
     calibrate,
     localize,
+    study,
+    sweep,
+    attribute,
     track,
     map_score,
     report,

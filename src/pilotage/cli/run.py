@@ -3,29 +3,38 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from pilotage.cli.options import Json, Out, Overrides, Seed
 from pilotage.cli.output import print_json, progress_line, stdout_for_json
+from pilotage.core.errors import InputError
+
+if TYPE_CHECKING:
+    from pilotage.missions.mission import Mission
 
 
 def run(
-    mission: Annotated[str, typer.Argument(metavar="MISSION|FILE", help="A shipped name or a YAML file.")],
+    mission: Annotated[
+        str | None, typer.Argument(metavar="MISSION|FILE", help="A shipped name or a YAML file.")
+    ] = None,
     seed: Seed = None,
     overrides: Overrides = None,
     out: Out = Path("runs"),
     json: Json = False,
     report: Annotated[bool, typer.Option(help="Write report.html into the run folder.")] = True,
     quiet: Annotated[bool, typer.Option("--quiet", help="Show neither progress nor summary.")] = False,
+    row: Annotated[
+        str | None, typer.Option("--from", metavar="STUDY:ROW", help="One trial of a study again.")
+    ] = None,
 ) -> int:
     """Run a mission and report on it."""
-    from pilotage.experiments.mission import load_mission
     from pilotage.experiments.run import run_mission
 
-    loaded = load_mission(mission, overrides or (), seed)
+    loaded = _mission(mission, overrides or (), seed, row)
     if not quiet and sys.stderr.isatty():
         _tell_if_cold()
     with stdout_for_json(json), progress_line(not quiet) as on_progress:
@@ -36,6 +45,25 @@ def run(
     elif not quiet:
         _print_summary(result.metrics, page or result.run_dir)
     return 0 if result.success else 1
+
+
+def _mission(name: str | None, overrides: Sequence[str], seed: int | None, row: str | None) -> Mission:
+    """The mission that is meant: a named one, or that of a study's row."""
+    if row is None:
+        if name is None:
+            raise InputError(
+                "run: expected a mission's name or file, or --from STUDY:ROW; see 'pilotage missions'"
+            )
+        from pilotage.experiments.mission import load_mission
+
+        return load_mission(name, overrides, seed)
+    if name is not None or overrides or seed is not None:
+        raise InputError(
+            "run --from: expected nothing beside it: the study's row says mission, settings and seed"
+        )
+    from pilotage.experiments.studies.replay import mission_from
+
+    return mission_from(row)
 
 
 def _tell_if_cold() -> None:

@@ -44,7 +44,18 @@ def load_mission(name_or_path: str, overrides: Sequence[str] = (), seed: int | N
     InputError
         One line: what was expected, what was found, the nearest right name.
     """
-    values = read_mission(name_or_path)
+    return mission_of(read_mission(name_or_path), overrides, seed)
+
+
+def mission_of(values: dict[str, Any], overrides: Sequence[str] = (), seed: int | None = None) -> Mission:
+    """Override and validate a mission that was read before; ``values`` stay as they are.
+
+    Raises
+    ------
+    InputError
+        As ``load_mission``.
+    """
+    values = copy.deepcopy(values)
     for override in overrides:
         if override.startswith("@"):
             values = merge(values, read_parameters(override[1:]))

@@ -14,6 +14,17 @@ from pilotage.missions.mission import Mission
 
 def resolved_yaml(mission: Mission, record: Record | None = None) -> str:
     """The mission in full, every component's defaults included; with a record, what came from files too."""
+    return yaml.safe_dump(resolved_values(mission, record), sort_keys=False, allow_unicode=True)
+
+
+def resolved_values(mission: Mission, record: Record | None = None) -> dict[str, Any]:
+    """The same as plain values.
+
+    Raises
+    ------
+    InputError
+        Where a component or one of its parameters is not what it should be.
+    """
     values = mission.model_dump(mode="json")
     for role, choice in values["stack"].items():
         if role in REGISTRIES and choice is not None:
@@ -22,7 +33,7 @@ def resolved_yaml(mission: Mission, record: Record | None = None) -> str:
         values["robot"]["sensors"][name] = _resolved("sensor", choice, f"robot.sensors.{name}")
     if record is not None:
         kind_of(mission).inline(record, values)
-    return yaml.safe_dump(values, sort_keys=False, allow_unicode=True)
+    return values
 
 
 def _resolved(role: str, choice: dict[str, Any], where: str) -> dict[str, Any]:

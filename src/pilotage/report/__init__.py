@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 def write_report(run_dir: Path) -> Path:
-    """Write ``report.html`` into a run or calibration folder: one self-contained page with vector figures.
+    """Write ``report.html`` into a run, calibration or study folder: self-contained, vector figures.
 
     Parameters
     ----------
@@ -36,6 +36,10 @@ def write_report(run_dir: Path) -> Path:
         from pilotage.report.calibration.page import write_calibration_report
 
         return write_calibration_report(run_dir)
+    if (run_dir / "trials.sqlite").is_file():
+        from pilotage.report.study.write import write_study_report
+
+        return write_study_report(run_dir)
     from pilotage.report.page import write_report as write
 
     return write(run_dir)

@@ -1,0 +1,49 @@
+"""``pilotage attribute``: which module costs success, time and accuracy."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from pilotage.cli.options import Json, Overrides
+from pilotage.cli.output import print_columns, print_json
+from pilotage.cli.study import Dask, Quiet, Report, Resume, Studies, WorkerCount, run_study_quietly
+
+
+def attribute(
+    mission: Annotated[str, typer.Argument(metavar="MISSION|FILE", help="A shipped name or a YAML file.")],
+    overrides: Overrides = None,
+    trials: Annotated[int, typer.Option("--trials", metavar="N", min=2, help="Seeds for every oracle.")] = 30,
+    workers: WorkerCount = None,
+    dask: Dask = None,
+    resume: Resume = False,
+    out: Studies = Path("studies"),
+    json: Json = False,
+    report: Report = True,
+    quiet: Quiet = False,
+) -> int:
+    """Swap one module at a time for one that knows the truth, and rank what the real ones cost."""
+    from pilotage.experiments.studies.attribution import attribution_of, attribution_study
+
+    made = attribution_study(mission, overrides or (), trials)
+    folder = out / made.name
+    code, page = run_study_quietly(made, folder, workers, dask, resume, json, report, quiet)
+    if code == 130:
+        return code
+    answer = attribution_of(folder)
+    if json:
+        print_json(answer | ({} if page is None else {"report": str(page)}))
+    elif not quiet:
+        _print(answer)
+        print(f"report: {page}" if page is not None else f"study: {folder}")
+    return code
+
+
+def _print(answer: dict[str, Any]) -> None:
+    rows = [("module", "what it costs, most first")]
+    for entry in answer["modules"]:
+        told = "; ".join(entry["told"]) or "nothing that these trials tell from chance"
+        rows.append((entry["module"], told))
+    print_columns(rows)

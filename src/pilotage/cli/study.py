@@ -1,0 +1,213 @@
+"""``pilotage study`` and ``pilotage sweep``: settings times seeds, with statistics and a page."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from pilotage.cli.options import Json, Overrides
+from pilotage.cli.output import print_json, stdout_for_json
+
+if TYPE_CHECKING:
+    from pilotage.experiments.studies.engine import StudyProgress
+    from pilotage.experiments.studies.study import Study
+
+Trials = Annotated[int | None, typer.Option("--trials", metavar="N", min=1, help="Trials in every cell.")]
+WorkerCount = Annotated[
+    int | None,
+    typer.Option("--workers", metavar="N", min=1, help="Processes on this machine; default: all cores."),
+]
+Dask = Annotated[
+    str | None, typer.Option("--dask", metavar="ADDRESS", help="A Dask scheduler to run on instead.")
+]
+Resume = Annotated[bool, typer.Option("--resume", help="Go on with a study that was begun before.")]
+Studies = Annotated[
+    Path, typer.Option("--out", metavar="DIR", help="Folder that the study's folder is made in.")
+]
+Report = Annotated[bool, typer.Option(help="Write report.html into the study's folder.")]
+Quiet = Annotated[bool, typer.Option("--quiet", help="Show neither progress nor summary.")]
+
+
+def study(
+    name: Annotated[
+        str, typer.Argument(metavar="NAME|FILE|DIR", help="A shipped study, a YAML file, a study's folder.")
+    ],
+    trials: Trials = None,
+    workers: WorkerCount = None,
+    dask: Dask = None,
+    resume: Resume = False,
+    out: Studies = Path("studies"),
+    json: Json = False,
+    report: Report = True,
+    quiet: Quiet = False,
+) -> int:
+    """Run a study: every setting times many seeds, finished trials never lost."""
+    from pilotage.experiments.studies.study import load_study
+
+    changes: dict[str, Any] = {} if trials is None else {"trials": trials}
+    loaded = load_study(name, changes)
+    folder = Path(name) if Path(name).is_dir() else out / loaded.name
+    return run_and_tell(loaded, folder, workers, dask, resume, json, report, quiet)
+
+
+def sweep(
+    mission: Annotated[str, typer.Argument(metavar="MISSION|FILE", help="A shipped name or a YAML file.")],
+    vary: Annotated[
+        list[str],
+        typer.Option("--vary", metavar="KEY=A:B:STEP|V1,V2", help="What is varied; again for more factors."),
+    ],
+    overrides: Overrides = None,
+    trials: Annotated[int, typer.Option("--trials", metavar="N", min=1, help="Trials in every cell.")] = 10,
+    metrics: Annotated[
+        str | None,
+        typer.Option("--metrics", metavar="M1,M2", help="What to report; the first answers the question."),
+    ] = None,
+    name: Annotated[str | None, typer.Option("--name", help="The study's name.")] = None,
+    workers: WorkerCount = None,
+    dask: Dask = None,
+    resume: Resume = False,
+    out: Studies = Path("studies"),
+    json: Json = False,
+    report: Report = True,
+    quiet: Quiet = False,
+) -> int:
+    """Write a study that varies a mission's parameters, and run it."""
+    from pilotage.experiments.studies.sweep import sweep_study
+
+    asked = tuple(part.strip() for part in metrics.split(",")) if metrics else ()
+    made = sweep_study(mission, vary, overrides or (), trials, asked, name)
+    return run_and_tell(made, out / made.name, workers, dask, resume, json, report, quiet)
+
+
+def run_and_tell(
+    loaded: Study,
+    folder: Path,
+    workers: int | None,
+    dask: str | None,
+    resume: bool,
+    json: bool,
+    report: bool,
+    quiet: bool,
+) -> int:
+    """Run a study, write its exports and its page, and say what came out."""
+    code, page = run_study_quietly(loaded, folder, workers, dask, resume, json, report, quiet)
+    if code == 130:
+        return code
+    from pilotage.experiments.studies.table import read_study, study_object
+
+    answer = study_object(read_study(folder))
+    if json:
+        print_json(answer | ({} if page is None else {"report": str(page)}))
+    elif not quiet:
+        _print_cells(answer)
+        print(f"report: {page}" if page is not None else f"study: {folder}")
+    return code
+
+
+def run_study_quietly(
+    loaded: Study,
+    folder: Path,
+    workers: int | None,
+    dask: str | None,
+    resume: bool,
+    json: bool,
+    report: bool,
+    quiet: bool,
+) -> tuple[int, Path | None]:
+    """Run a study, write its exports and its page; the exit code and the page's path."""
+    from pilotage.experiments.studies.engine import StudyStoppedError, run_study
+    from pilotage.experiments.studies.table import export
+
+    line = _Line(quiet)
+    try:
+        with stdout_for_json(json):
+            counts = run_study(loaded, folder, workers=workers, dask=dask, resume=resume, on_progress=line)
+    except KeyboardInterrupt:
+        line.close()
+        print(f"pilotage: stopped; go on with --resume, what is finished is in {folder}", file=sys.stderr)
+        return 130, None
+    except StudyStoppedError as error:
+        line.close()
+        print(f"pilotage: {error}", file=sys.stderr)
+        return 130, None
+    finally:
+        line.close()
+    with stdout_for_json(json):
+        export(folder)
+        page = _page(folder, quiet) if report else None
+    return (1 if counts.failed else 0), page
+
+
+def _page(folder: Path, quiet: bool) -> Path:
+    from pilotage.report.study.write import write_study_report
+
+    tell: Callable[[str], None] | None = None
+    if not quiet and sys.stderr.isatty():
+
+        def tell(text: str) -> None:
+            print(text, file=sys.stderr)
+
+    return write_study_report(folder, on_example=tell)
+
+
+def _print_cells(answer: dict[str, Any]) -> None:
+    from rich.console import Console
+    from rich.table import Table
+
+    from pilotage.report.metrics_table import metric_of
+
+    metrics = list(answer["cells"][0]["metrics"])[:5]
+    table = Table(title=f"{answer['study']}: {answer['trials']} trials, {answer['failed']} broken")
+    table.add_column("setting")
+    table.add_column("success", justify="right")
+    for name in metrics:
+        table.add_column(metric_of(name).name, justify="right")
+    for cell in answer["cells"]:
+        rate = cell["success"]
+        success = f"{round(rate['mean'] * rate['n'])}/{rate['n']}" if rate["n"] else "-"
+        texts = []
+        for name in metrics:
+            found, write = cell["metrics"][name], metric_of(name).write
+            texts.append(f"{write(found['mean'])} ({write(found['low'])} to {write(found['high'])})")
+        table.add_row(cell["name"], success, *texts)
+    Console(file=sys.stdout).print(table)
+
+
+class _Line:
+    """How far the study is, on standard error."""
+
+    def __init__(self, quiet: bool) -> None:
+        from time import monotonic
+
+        self._clock = monotonic
+        self._quiet = quiet
+        self._terminal = sys.stderr.isatty()
+        self._period_s = 0.2 if self._terminal else 10.0
+        self._next_s = monotonic()
+        self._drawn = False
+
+    def __call__(self, progress: StudyProgress) -> None:
+        now_s = self._clock()
+        if self._quiet or now_s < self._next_s:
+            return
+        self._next_s = now_s + self._period_s
+        counts = progress.counts
+        left = f"{progress.left_s:.0f} s left" if progress.left_s < 1e9 else "no rate yet"
+        failed = f", {counts.failed} broken" if counts.failed else ""
+        ended = counts.done + counts.failed
+        text = f"{ended} of {counts.total} trials{failed}, {progress.rate_per_s:.1f}/s, {left}"
+        print(
+            f"\r{text}\x1b[K" if self._terminal else text, end="" if self._terminal else "\n", file=sys.stderr
+        )
+        sys.stderr.flush()
+        self._drawn = self._terminal
+
+    def close(self) -> None:
+        """Wipe the line."""
+        if self._drawn:
+            print("\r\x1b[K", end="", file=sys.stderr)
+            self._drawn = False

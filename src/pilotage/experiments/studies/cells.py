@@ -1,0 +1,191 @@
+"""From factors to cells: one cell a setting, with the overrides that make it."""
+
+from __future__ import annotations
+
+import itertools
+import json
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from pilotage.core.errors import InputError, nearest
+from pilotage.experiments.studies.definition import CONFIGURATION, Configuration, StudyDefinition
+from pilotage.experiments.studies.factors import Factor
+
+Resolve = Callable[[Sequence[str]], Mapping[str, Any]]
+"""Overrides to the mission's values in full, every default written out."""
+
+MAX_CELLS = 1_000_000
+
+
+@dataclass(frozen=True, slots=True)
+class Cell:
+    """One setting of a study.
+
+    Attributes
+    ----------
+    name
+        Short and unique, such as ``turning_radius_m=0.3`` or ``baseline``.
+    values
+        By factor, the value that this cell has; one-at-a-time cells name their own factor only.
+    overrides
+        ``KEY=VALUE`` each, as ``--set`` takes them.
+    published
+        By metric, what others found for it.
+    """
+
+    index: int
+    name: str
+    values: Mapping[str, Any]
+    overrides: tuple[str, ...]
+    published: Mapping[str, float]
+
+
+def make_cells(definition: StudyDefinition, resolve: Resolve) -> tuple[Cell, ...]:
+    """Lay out all cells of a study.
+
+    Parameters
+    ----------
+    resolve
+        Gives the mission's values in full under some overrides; a key that none of them knows is refused
+        with the nearest right one, and factors that multiply take their bases from it.
+
+    Raises
+    ------
+    InputError
+        An unknown key, something that cannot be multiplied, or published values of no cell.
+    """
+    rows = _combinations(definition.factors, definition.combine)
+    count = len(rows) * max(1, len(definition.configurations))
+    if count > MAX_CELLS:
+        raise InputError(f"study '{definition.study}': expected at most {MAX_CELLS} cells, found {count}")
+    common = as_overrides(definition.set)
+    _check_keys(definition.set, resolve(()), "set")
+    cells: list[Cell] = []
+    for configuration in definition.configurations or (None,):
+        base = common if configuration is None else (*common, *as_overrides(configuration.set))
+        resolved = resolve(base)
+        if configuration is not None:
+            _check_keys(configuration.set, resolved, f"configuration '{configuration.name}'")
+        for row in rows:
+            cells.append(_cell(len(cells), configuration, row, base, resolved, resolve))
+    _unique(cells)
+    return tuple(_with_published(definition, cells))
+
+
+def as_overrides(settings: Mapping[str, Any]) -> tuple[str, ...]:
+    """Keys and values as ``--set`` takes them; JSON is YAML on one line."""
+    return tuple(f"{key}={json.dumps(value)}" for key, value in settings.items())
+
+
+def _combinations(factors: Sequence[Factor], combine: str) -> list[tuple[tuple[Factor, Any], ...]]:
+    """For each cell, the factors that it sets and their values."""
+    columns = [[(factor, value) for value in factor.settings()] for factor in factors]
+    if not columns:
+        return [()]
+    if combine == "one-at-a-time":
+        return [(pair,) for column in columns for pair in column]
+    if combine == "zip":
+        return list(zip(*columns, strict=True))
+    if math.prod(map(len, columns)) > MAX_CELLS:
+        raise InputError(f"factors: expected at most {MAX_CELLS} cells, found {math.prod(map(len, columns))}")
+    return list(itertools.product(*columns))
+
+
+def _cell(
+    index: int,
+    configuration: Configuration | None,
+    row: tuple[tuple[Factor, Any], ...],
+    base: tuple[str, ...],
+    resolved: Mapping[str, Any],
+    resolve: Resolve,
+) -> Cell:
+    values: dict[str, Any] = {} if configuration is None else {CONFIGURATION: configuration.name}
+    overrides = base
+    # Levels first: they may change a component whose parameter another factor varies.
+    for factor, value in sorted(row, key=lambda pair: pair[0].levels is None):
+        if factor.levels is not None:
+            overrides = (*overrides, *as_overrides(factor.levels[value]))
+            resolved = resolve(overrides)
+            _check_keys(factor.levels[value], resolved, f"level '{value}'")
+            continue
+        for key in factor.keys:
+            place = _check_key(key, resolved, "factor")
+            setting = _times(place, value, key) if factor.multiply else value
+            overrides = (*overrides, *as_overrides({key: setting}))
+    values |= {factor.title: value for factor, value in row}
+    words = [str(values[CONFIGURATION])] if configuration is not None else []
+    words += [
+        str(value) if factor.levels is not None else f"{factor.title}={show(value)}" for factor, value in row
+    ]
+    return Cell(index, ", ".join(words) or "mission", values, overrides, {})
+
+
+def show(value: Any) -> str:
+    """A value in a cell's name."""
+    return f"{value:.12g}" if isinstance(value, float) else value if isinstance(value, str) else f"{value}"
+
+
+def _times(base: Any, factor: float, key: str) -> Any:
+    if isinstance(base, bool) or not isinstance(base, int | float):
+        raise InputError(f"factor '{key}': expected a number in the mission to multiply, found {base}")
+    return base * factor
+
+
+def _check_keys(settings: Mapping[str, Any], resolved: Mapping[str, Any], where: str) -> None:
+    for key in settings:
+        _check_key(key, resolved, where)
+
+
+def _check_key(key: str, resolved: Mapping[str, Any], where: str) -> Any:
+    """What a key holds in the mission in full; InputError with the nearest name where there is no such."""
+    place: Any = resolved
+    parts = key.split(".")
+    for depth, part in enumerate(parts):
+        if isinstance(place, Mapping):
+            if part not in place:
+                known = [str(name) for name in place]
+                close = nearest(part, known)
+                hint = f"did you mean '{'.'.join([*parts[:depth], close])}'?" if close else f"known: {known}"
+                raise InputError(f"{where} '{key}': unknown key '{part}'; {hint}")
+            place = place[part]
+        elif isinstance(place, list | tuple):
+            if not part.isdigit() or int(part) >= len(place):
+                raise InputError(f"{where} '{key}': expected an index below {len(place)}, found '{part}'")
+            place = place[int(part)]
+        elif place is None:
+            return None  # an optional section that the mission does without: its model checks the rest
+        else:
+            raise InputError(f"{where} '{key}': '{'.'.join(parts[:depth])}' is a value, it has no keys")
+    return place
+
+
+def _unique(cells: list[Cell]) -> None:
+    seen: dict[str, int] = {}
+    for cell in cells:
+        if cell.name in seen:
+            raise InputError(f"study: two cells are called '{cell.name}'; give the factors other names")
+        seen[cell.name] = cell.index
+
+
+def _with_published(definition: StudyDefinition, cells: list[Cell]) -> list[Cell]:
+    found: dict[int, dict[str, float]] = {}
+    for number, entry in enumerate(definition.published):
+        picked = [cell for cell in cells if _is_meant(cell, entry.cell)]
+        if not picked:
+            what = entry.cell if isinstance(entry.cell, str) else dict(entry.cell)
+            close = nearest(str(what), [cell.name for cell in cells])
+            hint = f"; did you mean '{close}'?" if close else ""
+            raise InputError(f"published.{number}: expected a cell of the study, found {what}{hint}")
+        for cell in picked:
+            found.setdefault(cell.index, {}).update(entry.metrics)
+    return [
+        Cell(cell.index, cell.name, cell.values, cell.overrides, found.get(cell.index, {})) for cell in cells
+    ]
+
+
+def _is_meant(cell: Cell, wanted: str | Mapping[str, Any]) -> bool:
+    if isinstance(wanted, str):
+        return cell.name == wanted
+    return all(name in cell.values and cell.values[name] == value for name, value in wanted.items())

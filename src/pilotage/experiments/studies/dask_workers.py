@@ -1,0 +1,88 @@
+"""Workers of a Dask cluster, by its scheduler's address."""
+
+from __future__ import annotations
+
+import functools
+import json
+import time
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from pilotage.core.errors import InputError
+from pilotage.experiments.studies.local_workers import WAIT_S
+from pilotage.experiments.studies.trial import Outcome, Task, TrialRunner
+
+CONNECT_S = 10
+AHEAD = 2
+POLL_S = 0.005
+
+
+class DaskWorkers:
+    """Runs tasks on a cluster; the rows are those that local workers give.
+
+    Raises
+    ------
+    InputError
+        Where the extra is not installed or nobody answers at the address.
+    """
+
+    def __init__(self, base: Mapping[str, Any], address: str) -> None:
+        try:
+            import distributed
+        except ImportError:
+            raise InputError(
+                "--dask: expected the extra 'cluster'; pip install 'pilotage[cluster]'"
+            ) from None
+        try:
+            connect: Any = distributed.Client
+            self._client: Any = connect(address, timeout=CONNECT_S, set_as_default=False)
+        except (OSError, ValueError, TimeoutError) as error:
+            raise InputError(f"--dask {address}: expected a scheduler there, found: {error}") from None
+        self._base = json.dumps(dict(base))
+        self._futures: dict[Any, Task] = {}
+
+    @property
+    def room(self) -> int:
+        """Two tasks for each thread of the cluster."""
+        threads = int(sum(self._client.nthreads().values()))
+        return max(0, AHEAD * max(1, threads) - len(self._futures))
+
+    def give(self, task: Task) -> None:
+        """Submit one task; every submission is run, whatever was computed before."""
+        future = self._client.submit(run_on_cluster, self._base, task, pure=False, retries=0)
+        self._futures[future] = task
+
+    def outcomes(self) -> Iterator[Outcome]:
+        """Those that are ready; a task whose worker is gone is told."""
+        until = time.monotonic() + WAIT_S
+        while True:
+            ready = [future for future in self._futures if future.done()]
+            if ready or time.monotonic() > until or not self._futures:
+                break
+            time.sleep(POLL_S)
+        for future in ready:
+            task = self._futures.pop(future)
+            error = future.exception()
+            if error is None:
+                yield future.result()
+            else:
+                words = " ".join(str(error).split())
+                yield Outcome(
+                    task.row, {}, {}, f"its worker died ({type(error).__name__}: {words})", retry=True
+                )
+
+    def stop(self) -> None:
+        """Cancel what is left."""
+        self._client.cancel(list(self._futures))
+        self._futures.clear()
+        self._client.close()
+
+
+@functools.lru_cache(maxsize=4)
+def _runner(base: str) -> TrialRunner:
+    return TrialRunner(json.loads(base))
+
+
+def run_on_cluster(base: str, task: Task) -> Outcome:
+    """One task, wherever it comes to; the study's missions are validated once a process."""
+    return _runner(base).run(task)

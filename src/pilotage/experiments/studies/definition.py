@@ -1,0 +1,125 @@
+"""What a study is, as its YAML file says it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, Literal
+
+from pydantic import Field, model_validator
+
+from pilotage.core.config import Config
+from pilotage.experiments.studies.factors import Factor
+
+CONFIGURATION = "configuration"
+"""What the named configurations are called among the factors."""
+
+
+class Configuration(Config):
+    """A named set of overrides, such as one row of an ablation table; none is the mission as it is."""
+
+    name: str = Field(min_length=1)
+    set: Mapping[str, Any] = {}
+
+
+class Seeds(Config):
+    """Which seeds the trials take.
+
+    ``shared``: trial i has seed ``first + i`` in every cell, so that cells can be compared pairwise.
+    ``independent``: every row has a seed of its own.
+    """
+
+    first: int = Field(default=0, ge=0)
+    pairing: Literal["shared", "independent"] = "shared"
+
+
+class Published(Config):
+    """What others found for a cell: the cell's name or the factor values that pick it; metric to number."""
+
+    cell: str | Mapping[str, Any]
+    metrics: Mapping[str, float]
+
+
+class Reference(Config):
+    """A value that a metric is held against, such as a known optimum."""
+
+    value: float
+    name: str = "reference"
+
+
+class StudyDefinition(Config):
+    """A mission, what is varied, how often it is run, and what is asked.
+
+    Attributes
+    ----------
+    mission
+        A shipped mission's name or a file, relative to the study's file.
+    set
+        Overrides that hold in every cell.
+    combine
+        ``grid``: every value with every other; ``one-at-a-time``: each factor alone, the others as the
+        mission has them; ``zip``: the first values of all factors, then the second, and so on. Named
+        configurations are crossed with all of these.
+    metrics
+        The metrics to report; none given: every number that the trials give.
+    primary, lower_is_better, baseline
+        The metric that answers the question, and the cell that the others are held against.
+    published
+        Shown beside ours.
+    reference
+        By metric, a bound or an optimum.
+    """
+
+    study: str = Field(min_length=1, pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]*$")
+    question: str = ""
+    description: str = ""
+    mission: str = Field(min_length=1)
+    set: Mapping[str, Any] = {}
+    configurations: tuple[Configuration, ...] = ()
+    factors: tuple[Factor, ...] = ()
+    combine: Literal["grid", "one-at-a-time", "zip"] = "grid"
+    trials: int = Field(default=10, ge=1, le=10_000_000)
+    seeds: Seeds = Seeds()
+    metrics: tuple[str, ...] = ()
+    primary: str | None = None
+    lower_is_better: bool = True
+    baseline: str | None = None
+    published: tuple[Published, ...] = ()
+    reference: Mapping[str, Reference] = {}
+
+    @model_validator(mode="after")
+    def _sound(self) -> StudyDefinition:
+        titles = [factor.title for factor in self.factors]
+        _once(titles, "factors", "give one of them a name")
+        _once([c.name for c in self.configurations], "configurations", "names tell them apart")
+        _once(list(self.metrics), "metrics", "once is enough")
+        if self.configurations and CONFIGURATION in titles:
+            raise ValueError(f"a factor cannot be called '{CONFIGURATION}' beside configurations")
+        if self.combine == "zip" and len({len(factor.settings()) for factor in self.factors}) > 1:
+            lengths = ", ".join(f"{f.title} {len(f.settings())}" for f in self.factors)
+            raise ValueError(f"combine zip: expected factors of one length, found {lengths}")
+        for key in self.varied_keys():
+            if key == "run.seed":
+                raise ValueError("run.seed: the trials take their seeds by themselves; see 'seeds'")
+        return self
+
+    def varied_keys(self) -> list[str]:
+        """Every key of the mission that some cell changes."""
+        keys = [*self.set]
+        for configuration in self.configurations:
+            keys += configuration.set
+        for factor in self.factors:
+            keys += factor.keys
+            for level in (factor.levels or {}).values():
+                keys += level
+        return keys
+
+    @property
+    def factor_names(self) -> tuple[str, ...]:
+        """Names of what is varied, the configurations first."""
+        return (*((CONFIGURATION,) if self.configurations else ()), *(f.title for f in self.factors))
+
+
+def _once(names: list[str], what: str, remedy: str) -> None:
+    twice = next((name for i, name in enumerate(names) if name in names[:i]), None)
+    if twice is not None:
+        raise ValueError(f"{what}: '{twice}' stands twice; {remedy}")

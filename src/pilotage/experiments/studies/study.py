@@ -1,0 +1,215 @@
+"""A study made ready: its mission read, every cell validated, and a digest of all that decides its rows."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from pilotage.core.config import validate
+from pilotage.core.errors import InputError, unknown_name
+from pilotage.experiments.kinds import check_oracles, kind_of
+from pilotage.experiments.mission import mission_of, parse_yaml, read_mission, read_text, shipped_missions
+from pilotage.experiments.resolve import resolved_values
+from pilotage.experiments.studies.cells import Cell, make_cells
+from pilotage.experiments.studies.definition import StudyDefinition
+
+SHIPPED = resources.files("pilotage.missions") / "studies"
+STUDY_FILE, MISSION_FILE = "study.yaml", "mission.yaml"
+PRESENTATION = ("question", "description", "primary", "lower_is_better", "baseline", "published", "reference")
+"""What a definition says about its page only: it may change without touching a row."""
+
+
+@dataclass(frozen=True, slots=True)
+class Study:
+    """A definition with its mission and its cells.
+
+    Attributes
+    ----------
+    base
+        The mission's values before any cell's overrides.
+    files
+        Digests of the files that the mission names, such as its map.
+    """
+
+    definition: StudyDefinition
+    base: Mapping[str, Any]
+    cells: tuple[Cell, ...]
+    files: Mapping[str, str]
+
+    @property
+    def name(self) -> str:
+        """The study's name, and its folder's."""
+        return self.definition.study
+
+    @property
+    def rows(self) -> int:
+        """How many trials there are in all cells together."""
+        return len(self.cells) * self.definition.trials
+
+    def place(self, row: int) -> tuple[int, int]:
+        """Cell and trial of a row: the first trial of every cell, then the second, and so on."""
+        trial, cell = divmod(row, len(self.cells))
+        return cell, trial
+
+    def seed(self, row: int) -> int:
+        """The seed of a row's run."""
+        seeds = self.definition.seeds
+        return seeds.first + (self.place(row)[1] if seeds.pairing == "shared" else row)
+
+    def essence(self) -> dict[str, Any]:
+        """All that decides the rows, as plain values."""
+        definition = self.definition.model_dump(mode="json", exclude={*PRESENTATION, "study", "mission"})
+        return {**definition, "mission": dict(self.base), "files": dict(self.files)}
+
+    @property
+    def digest(self) -> str:
+        """A digest of ``essence``."""
+        text = json.dumps(self.essence(), sort_keys=True)
+        return hashlib.sha256(text.encode()).hexdigest()[:16]
+
+
+def shipped_studies() -> list[str]:
+    """Names of the studies that come with pilotage."""
+    if not SHIPPED.is_dir():
+        return []
+    return sorted(
+        entry.name.removesuffix(".yaml") for entry in SHIPPED.iterdir() if entry.name.endswith(".yaml")
+    )
+
+
+def load_study(name_or_path: str, changes: Mapping[str, Any] | None = None) -> Study:
+    """Read a study by its shipped name, its file or its folder, and make it ready.
+
+    Parameters
+    ----------
+    changes
+        Laid over the file's top keys, such as ``trials``.
+
+    Raises
+    ------
+    InputError
+        One line: what was expected, what was found, the nearest right name.
+    """
+    path = Path(name_or_path)
+    if path.is_dir() and (path / STUDY_FILE).is_file():
+        path = path / STUDY_FILE
+    folder = Path()
+    if path.suffix in {".yaml", ".yml"} or "/" in name_or_path:
+        if not path.is_file():
+            raise InputError(f"study '{name_or_path}': expected a YAML file or a study's folder, found none")
+        values, folder = parse_yaml(read_text(path), str(path)), path.parent
+    elif name_or_path in shipped_studies():
+        values = parse_yaml((SHIPPED / f"{name_or_path}.yaml").read_text(encoding="utf-8"), name_or_path)
+    else:
+        raise unknown_name("study", name_or_path, shipped_studies())
+    definition = validate(StudyDefinition, {**values, **(changes or {})}, "")
+    return make_study(definition, folder)
+
+
+def make_study(definition: StudyDefinition, folder: Path = Path()) -> Study:
+    """Read the mission and validate every cell of a study.
+
+    Parameters
+    ----------
+    folder
+        Where a mission's file is looked for.
+
+    Raises
+    ------
+    InputError
+        One line, with the cell's name where only that cell is wrong.
+    """
+    named = definition.mission
+    if named not in shipped_missions() and not Path(named).is_absolute() and (folder / named).is_file():
+        named = str(folder / named)
+    base = _anchored(read_mission(named))
+
+    def resolve(overrides: Sequence[str]) -> Mapping[str, Any]:
+        mission = mission_of(base, overrides)
+        check_oracles(kind_of(mission), mission)
+        return resolved_values(mission)
+
+    cells = make_cells(definition, resolve)
+    for cell in cells:
+        try:
+            resolve(cell.overrides)
+        except InputError as error:
+            raise InputError(f"cell '{cell.name}': {error}") from None
+    return Study(definition, base, cells, _digests(base))
+
+
+def study_yaml(study: Study) -> str:
+    """The definition in full; with ``mission.yaml`` beside it, it runs again from its folder alone."""
+    values = study.definition.model_dump(mode="json", exclude_none=True)
+    text = yaml.safe_dump({**values, "mission": MISSION_FILE}, sort_keys=False, allow_unicode=True)
+    return f"# mission: {study.definition.mission}; digest: {study.digest}\n{text}"
+
+
+def mission_yaml(study: Study) -> str:
+    """The mission before any cell's overrides."""
+    return yaml.safe_dump(dict(study.base), sort_keys=False, allow_unicode=True)
+
+
+def differences(old: Mapping[str, Any], new: Mapping[str, Any]) -> list[str]:
+    """What changed between two essences, ``key: old -> new`` each."""
+    before, after = _flat(old), _flat(new)
+    return [
+        f"{key}: {_short(before.get(key, 'nothing'))} -> {_short(after.get(key, 'nothing'))}"
+        for key in [*before, *(key for key in after if key not in before)]
+        if before.get(key, _Missing) != after.get(key, _Missing)
+    ]
+
+
+class _Missing:
+    """Stands for a key that is not there."""
+
+
+def _flat(values: Any, prefix: str = "") -> dict[str, Any]:
+    if isinstance(values, Mapping) and values:
+        items = [(str(key), value) for key, value in values.items()]
+    elif isinstance(values, list | tuple) and values:
+        items = [(str(i), value) for i, value in enumerate(values)]
+    else:
+        return {prefix: values}
+    found: dict[str, Any] = {}
+    for key, value in items:
+        found |= _flat(value, f"{prefix}.{key}" if prefix else key)
+    return found
+
+
+def _short(value: Any) -> str:
+    text = str(value)
+    return text if len(text) <= 60 else text[:57] + "..."
+
+
+def _is_file(value: Any) -> bool:
+    if not isinstance(value, str) or len(value) > 4096 or not ("/" in value or Path(value).suffix):
+        return False
+    try:
+        return Path(value).is_file()
+    except OSError:
+        return False
+
+
+def _anchored(values: Any) -> Any:
+    """The same values with the files that they name as absolute paths: workers may live elsewhere."""
+    if isinstance(values, dict):
+        return {key: _anchored(value) for key, value in values.items()}
+    if isinstance(values, list):
+        return [_anchored(value) for value in values]
+    return str(Path(values).resolve()) if _is_file(values) else values
+
+
+def _digests(base: Mapping[str, Any]) -> dict[str, str]:
+    return {
+        key: hashlib.sha256(Path(value).read_bytes()).hexdigest()[:16]
+        for key, value in _flat(base).items()
+        if _is_file(value)
+    }

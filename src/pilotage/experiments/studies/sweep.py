@@ -1,0 +1,109 @@
+"""A study from the command line: what is varied, as ``KEY=a:b:step`` or ``KEY=v1,v2``."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from pilotage.core.config import validate
+from pilotage.core.errors import InputError
+from pilotage.experiments.mission import parse_override
+from pilotage.experiments.studies.definition import StudyDefinition
+from pilotage.experiments.studies.study import Study, make_study
+
+
+def sweep_study(
+    mission: str,
+    vary: Sequence[str],
+    overrides: Sequence[str],
+    trials: int,
+    metrics: Sequence[str],
+    name: str | None = None,
+) -> Study:
+    """Make a study that varies a mission's parameters on a grid.
+
+    Raises
+    ------
+    InputError
+        A key that the mission does not have, an empty range, a step of zero, a value twice.
+    """
+    values: dict[str, Any] = {
+        "study": "sweep",
+        "mission": mission,
+        "set": settings_of(overrides),
+        "factors": [parse_vary(text) for text in vary],
+        "trials": trials,
+        "metrics": list(metrics),
+        "primary": metrics[0] if metrics else None,
+    }
+    digest = hashlib.sha256(json.dumps(values, sort_keys=True, default=str).encode()).hexdigest()[:6]
+    stem = Path(mission).stem
+    values["study"] = (
+        name or f"sweep-{''.join(c if c.isalnum() or c in '-_.' else '-' for c in stem)}-{digest}"
+    )
+    return make_study(validate(StudyDefinition, values, ""))
+
+
+def settings_of(overrides: Sequence[str]) -> dict[str, Any]:
+    """Overrides as a study's file has them.
+
+    Raises
+    ------
+    InputError
+        If one is not of the form KEY=VALUE.
+    """
+    settings: dict[str, Any] = {}
+    for override in overrides:
+        parts, value = parse_override(override)
+        settings[".".join(parts)] = value
+    return settings
+
+
+def parse_vary(text: str) -> dict[str, Any]:
+    """A factor from ``KEY=a:b:step``, ``KEY=a:b:step:log`` or ``KEY=v1,v2``.
+
+    Raises
+    ------
+    InputError
+        If the text is of neither form.
+    """
+    key, equals, right = text.partition("=")
+    key = key.strip()
+    if not equals or not key or not right.strip():
+        raise InputError(f"--vary '{text}': expected KEY=A:B:STEP or KEY=V1,V2")
+    parts = right.split(":")
+    if len(parts) == 3 and all(_is_number(part) for part in parts):
+        start, stop, step = (float(part) for part in parts)
+        if step == 0.0:
+            raise InputError(f"--vary '{text}': expected a step that is not zero")
+        if (stop - start) * step < 0.0:
+            raise InputError(f"--vary '{text}': an empty range: the step leads away from {stop:g}")
+        return {"key": key, "range": {"start": start, "stop": stop, "step": step}}
+    if ":" in right and all(_is_number(part) for part in parts):
+        raise InputError(f"--vary '{text}': expected a range as A:B:STEP")
+    try:
+        values = yaml.safe_load(f"[{right}]")
+    except yaml.YAMLError:
+        raise InputError(f"--vary '{text}': the values are not YAML") from None
+    numbers = [_number(value) for value in values]
+    return {"key": key, "values": numbers}
+
+
+def _number(value: Any) -> Any:
+    """YAML 1.1 reads 1e-3 as text; take such a text for the number it is."""
+    if isinstance(value, str) and _is_number(value):
+        return float(value)
+    return value
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True

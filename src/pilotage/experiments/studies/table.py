@@ -1,0 +1,213 @@
+"""A study's rows as columns, for judging, pages and other programs."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pilotage.core.errors import InputError
+from pilotage.core.types import FloatArray, IntArray
+from pilotage.evaluation.judge import SUCCESS, Judgement, judge
+from pilotage.experiments.studies.store import DATABASE, flat, read_rows
+from pilotage.experiments.studies.study import Study, load_study
+
+IDENTITY = frozenset({"seed"})
+"""Numbers of a trial that say which one it is."""
+
+
+@dataclass(frozen=True, slots=True)
+class StudyTable:
+    """The finished trials of a study as columns.
+
+    Attributes
+    ----------
+    row, cell, trial, seed
+        (n,) of the trials that are done.
+    values
+        By metric, (n,): nan where a trial does not give it.
+    broken
+        Rows that failed: (row, cell, seed, reason).
+    waiting
+        How many are still to run.
+    """
+
+    study: Study
+    folder: Path
+    row: IntArray
+    cell: IntArray
+    trial: IntArray
+    seed: IntArray
+    values: Mapping[str, FloatArray]
+    broken: tuple[tuple[int, int, int, str], ...]
+    waiting: int
+
+    @property
+    def metrics(self) -> tuple[str, ...]:
+        """What is reported: what the definition asks for, else every number that varies or matters."""
+        asked = self.study.definition.metrics
+        return asked or tuple(name for name in self.values if name not in {*IDENTITY, SUCCESS})
+
+    @property
+    def primary(self) -> str:
+        """The metric that answers the question."""
+        return self.study.definition.primary or next(iter(self.metrics), SUCCESS)
+
+    @property
+    def baseline(self) -> int | None:
+        """The cell that the others are held against.
+
+        Raises
+        ------
+        InputError
+            Where the definition names one that there is not.
+        """
+        named, cells = self.study.definition.baseline, self.study.cells
+        if named is None:
+            return 0 if len(cells) > 1 and self.study.definition.configurations else None
+        for cell in cells:
+            if cell.name == named:
+                return cell.index
+        raise InputError(f"baseline: expected the name of a cell, found '{named}'")
+
+    def judged(self) -> Judgement:
+        """Every cell's summary, and every cell against the baseline."""
+        names = dict.fromkeys([*self.metrics, self.primary, SUCCESS])
+        empty = np.full(self.row.shape, math.nan)
+        values = {name: self.values.get(name, empty) for name in names}
+        return judge(self.cell, self.trial, values, len(self.study.cells), self.baseline)
+
+
+def read_study(folder: Path) -> StudyTable:
+    """Read a study's folder; also while it runs.
+
+    Raises
+    ------
+    InputError
+        Where it is no study's folder, or its database is corrupt: what can be read of it is then beside
+        it, in ``trials-salvaged.csv``.
+    """
+    study = load_study(str(folder))
+    rows, trouble = read_rows(folder / DATABASE)
+    if trouble:
+        saved = folder / "trials-salvaged.csv"
+        write_csv(rows, study, saved)
+        raise InputError(
+            f"{folder / DATABASE}: corrupt database ({trouble}); "
+            f"{len(rows)} rows could be read and are in {saved}"
+        )
+    done = [row for row in rows if row["status"] == "done"]
+    numbers = [flat(row["metrics"]) | flat(row["timings"]) for row in done]
+    names = sorted({name for row in numbers for name in row})
+    values = {name: np.array([row.get(name, math.nan) for row in numbers]) for name in names}
+    broken = tuple(
+        (row["row"], row["cell"], row["seed"], row["reason"]) for row in rows if row["status"] == "failed"
+    )
+
+    def column(key: str) -> IntArray:
+        return np.array([row[key] for row in done], dtype=np.int64)
+
+    waiting = len(rows) - len(done) - len(broken)
+    return StudyTable(
+        study,
+        folder,
+        column("row"),
+        column("cell"),
+        column("trial"),
+        column("seed"),
+        values,
+        broken,
+        waiting,
+    )
+
+
+def study_object(table: StudyTable) -> dict[str, Any]:
+    """The study's JSON object: counts, and one object a cell."""
+    judgement = table.judged()
+    cells = []
+    for cell in table.study.cells:
+        rate = judgement.rates[cell.index]
+        metrics = {}
+        for name in table.metrics:
+            found = judgement.summaries[name][cell.index]
+            metrics[name] = {
+                "n": found.n,
+                "mean": found.mean,
+                "median": found.median,
+                "low": found.low,
+                "high": found.high,
+                "variance": found.variance,
+            }
+        cells.append(
+            {
+                "name": cell.name,
+                "values": dict(cell.values),
+                "success": {
+                    "n": rate.trials,
+                    "mean": rate.successes / rate.trials if rate.trials else None,
+                    "low": rate.low,
+                    "high": rate.high,
+                },
+                "metrics": metrics,
+                **({"published": dict(cell.published)} if cell.published else {}),
+            }
+        )
+    return {
+        "study": table.study.name,
+        "mission": table.study.definition.mission,
+        "trials": len(table.row) + len(table.broken),
+        "failed": len(table.broken),
+        "missing": table.waiting,
+        "cells": cells,
+        "study_dir": str(table.folder),
+    }
+
+
+def export(folder: Path) -> list[Path]:
+    """Write ``trials.csv`` and ``trials.parquet`` beside the database; return their paths."""
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    study = load_study(str(folder))
+    rows, _ = read_rows(folder / DATABASE)
+    csv_path, parquet_path = folder / "trials.csv", folder / "trials.parquet"
+    write_csv(rows, study, csv_path)
+    records = [_record(row, study) for row in rows]
+    names = list(dict.fromkeys(name for record in records for name in record))
+    columns = {name: [record.get(name) for record in records] for name in names}
+    mixed = {
+        name: [None if v is None else str(v) for v in values]
+        for name, values in columns.items()
+        if len({type(v) for v in values if v is not None}) > 1
+        and not all(isinstance(v, int | float) for v in values if v is not None)
+    }
+    pq.write_table(pa.table({**columns, **mixed}), parquet_path)
+    return [csv_path, parquet_path]
+
+
+def write_csv(rows: Sequence[Mapping[str, Any]], study: Study, path: Path) -> None:
+    """Write rows as CSV, one column a metric."""
+    import csv
+
+    records = [_record(row, study) for row in rows]
+    names = list(dict.fromkeys(name for record in records for name in record))
+    with path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.DictWriter(file, names)
+        writer.writeheader()
+        writer.writerows(records)
+
+
+def _record(row: Mapping[str, Any], study: Study) -> dict[str, Any]:
+    known = 0 <= row["cell"] < len(study.cells)
+    cell = study.cells[row["cell"]] if known else None
+    return {
+        **{key: row[key] for key in ("row", "cell", "trial", "seed", "status", "reason", "seconds")},
+        "setting": "" if cell is None else cell.name,
+        **({} if cell is None else {f"factor.{name}": value for name, value in cell.values.items()}),
+        **flat(row["metrics"]),
+        **flat(row["timings"]),
+    }

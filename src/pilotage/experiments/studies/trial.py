@@ -1,0 +1,116 @@
+"""One trial: a cell's mission with a seed, run and measured; the same wherever it runs."""
+
+from __future__ import annotations
+
+import errno
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from pilotage.core.errors import InputError
+from pilotage.experiments.mission import mission_of
+from pilotage.experiments.run import run_mission
+from pilotage.experiments.run_folder import clean
+from pilotage.missions.mission import Mission
+
+TIMINGS = frozenset(
+    {
+        "wall_time_s",
+        "steps_per_s",
+        "planning_time_s",
+        "preparation_time_s",
+        "first_solution_s",
+        "search_time_s",
+        "queries_per_s",
+        "real_time_factor",
+    }
+)
+"""Metrics of the clock on the wall: never the same twice, kept apart from those that are."""
+
+PLACES = frozenset({"run_dir"})
+
+
+@dataclass(frozen=True, slots=True)
+class Task:
+    """One row to run."""
+
+    row: int
+    cell: int
+    seed: int
+    overrides: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """What came of a task.
+
+    Attributes
+    ----------
+    reason
+        Why there are no metrics; empty where there are.
+    retry
+        Whether the reason lies with the machine, so that another try may do better.
+    seconds
+        Wall time of the trial itself.
+    """
+
+    row: int
+    metrics: Mapping[str, Any]
+    timings: Mapping[str, float | None]
+    reason: str = ""
+    retry: bool = False
+    seconds: float = math.nan
+
+
+class TrialRunner:
+    """Runs tasks of one study in one process.
+
+    Parameters
+    ----------
+    base
+        The mission's values before any cell's overrides.
+    """
+
+    _KEPT = 64
+
+    def __init__(self, base: Mapping[str, Any]) -> None:
+        self._base = dict(base)
+        self._missions: dict[tuple[str, ...], Mission] = {}
+
+    def run(self, task: Task) -> Outcome:
+        """Run one task; whatever goes wrong in it is its outcome."""
+        try:
+            return measured(task.row, self.mission(task.overrides, task.seed))
+        except InputError as error:
+            return Outcome(task.row, {}, {}, str(error))
+        except (OSError, MemoryError) as error:
+            return Outcome(task.row, {}, {}, _said(error), retry=True)
+        except Exception as error:  # a bug in one trial is that trial's, not the study's
+            return Outcome(task.row, {}, {}, _said(error))
+
+    def mission(self, overrides: Sequence[str], seed: int) -> Mission:
+        """The mission of a cell with a seed; validated once a cell."""
+        key = tuple(overrides)
+        mission = self._missions.get(key)
+        if mission is None:
+            if len(self._missions) >= self._KEPT:
+                self._missions.pop(next(iter(self._missions)))
+            mission = self._missions[key] = mission_of(self._base, key)
+        return mission.model_copy(update={"run": mission.run.model_copy(update={"seed": seed})})
+
+
+def measured(row: int, mission: Mission) -> Outcome:
+    """Run a mission without saving it, its metrics parted into those that repeat and those that do not."""
+    metrics = clean(dict(run_mission(mission, save=False).metrics))
+    timings = {key: value for key, value in metrics.items() if key in TIMINGS}
+    kept = {key: value for key, value in metrics.items() if key not in TIMINGS and key not in PLACES}
+    return Outcome(row, kept, timings, seconds=metrics["wall_time_s"])
+
+
+def _said(error: BaseException) -> str:
+    """The error in one line."""
+    if isinstance(error, OSError) and error.errno == errno.ENOSPC:
+        return f"disk full: {error.filename or error.strerror}"
+    words = " ".join(str(error).split())
+    return f"{type(error).__name__}: {words}" if words else type(error).__name__
