@@ -12,8 +12,6 @@ from pilotage.core.types import FloatArray, Pose2, Twist
 
 RELATIVE_TOLERANCE, ABSOLUTE_TOLERANCE = 1e-10, 1e-9
 """Of the integrator, in m and rad: a hundred thousand times finer than the millimetre that ends the drive."""
-PAST = 0.01
-"""Integrated until within this share of the tolerance, so that a sample falls before it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,36 +52,39 @@ def drive(
         Twist at x, y, theta; the bicycle's equation 1.1 with w = v tan(gamma) / L.
     distance_m
         Distance from the goal at x, y.
-    """
-    from scipy.integrate import solve_ivp
 
-    def flow(_t: float, state: FloatArray) -> list[float]:
+    Raises
+    ------
+    RuntimeError
+        Where the integrator's step falls below what floats can tell apart.
+    """
+    from scipy.integrate import DOP853
+
+    def flow(_t: float, state: FloatArray) -> FloatArray:
         x, y, theta = float(state[0]), float(state[1]), float(state[2])
         twist = command(x, y, theta)
-        return [twist.v_m_s * math.cos(theta), twist.v_m_s * math.sin(theta), twist.w_rad_s]
+        return np.array([twist.v_m_s * math.cos(theta), twist.v_m_s * math.sin(theta), twist.w_rad_s])
 
-    def past_it(_t: float, state: FloatArray) -> float:
-        return distance_m(float(state[0]), float(state[1])) - PAST * tolerance_m
-
-    # At the goal itself its direction is not defined: the integration ends a little before it.
-    past_it.terminal = True  # type: ignore[attr-defined]
-    if distance_m(start.x_m, start.y_m) <= tolerance_m:
-        return SampledDrive(np.zeros(1), start.as_array()[None, :], True)
-    times = sample_s * np.arange(math.floor(limit_s / sample_s) + 1, dtype=np.float64)
-    solution = solve_ivp(
-        flow,
-        (0.0, times[-1]),
-        start.as_array(),
-        method="DOP853",
-        t_eval=times,
-        events=past_it,
-        rtol=RELATIVE_TOLERANCE,
-        atol=ABSOLUTE_TOLERANCE,
+    last = max(1, math.floor(limit_s / sample_s))
+    poses, k = [start.as_array()[None, :]], 0
+    arrived = distance_m(start.x_m, start.y_m) <= tolerance_m
+    solver = DOP853(
+        flow, 0.0, start.as_array(), last * sample_s, rtol=RELATIVE_TOLERANCE, atol=ABSOLUTE_TOLERANCE
     )
-    poses = np.ascontiguousarray(solution.y.T)
-    away = np.array([distance_m(float(x), float(y)) for x, y, _ in poses])
-    near = np.flatnonzero(away <= tolerance_m)
-    arrived = bool(near.size)
-    if arrived:
-        poses = poses[: near[0] + 1]
-    return SampledDrive(times[: len(poses)], poses, arrived)
+    # Step by step: beyond the goal the bearing to it is rounding, and the integrator would chase that.
+    while not arrived and k < last:
+        failure = solver.step()
+        if solver.status == "failed":
+            raise RuntimeError(f"the integrator gave up at {solver.t:g} s: {failure}")
+        end = last if solver.status == "finished" else min(last, math.floor(solver.t / sample_s))
+        if end == k:
+            continue
+        new = solver.dense_output()(np.arange(k + 1, end + 1) * sample_s).T
+        near = np.flatnonzero([distance_m(x, y) <= tolerance_m for x, y, _ in new.tolist()])
+        if near.size:
+            arrived = True
+            new = new[: near[0] + 1]
+        poses.append(new)
+        k = end
+    table = np.concatenate(poses)
+    return SampledDrive(sample_s * np.arange(len(table), dtype=np.float64), table, arrived)
