@@ -297,8 +297,14 @@ class FrontierExplorer:
         """Set out to see where a tape ends; False where that is known of all."""
         self._solve()
         ends = tape_ends(self._smoother.map, self._senses.floor_samples(), self._tape_width_m)
-        ahead_m = self._senses.sensors_ahead_m
-        look = self._inspections.next_look(self._smoother.map, ends, self._room, cost, ahead_m)
+        look = self._inspections.next_look(
+            self._smoother.map,
+            ends,
+            self._senses.loose_crossings(),
+            self._room,
+            cost,
+            self._senses.sensors_ahead_m,
+        )
         if look is None:
             return False
         self._look(look, here, parent, t_s)

@@ -30,7 +30,10 @@ from pilotage.stack.planning.sheet_room import RecentPoints
 
 OVER_EDGE_WIDTHS = 1.8
 """All line sensors dark for so many widths of a tape: that is no tape."""
+STILL_MOST = 4
+"""At rest a beam is taken so often: the same spot again and again says nothing of the wall around it."""
 THIN_M = 0.009
+LOOSE_INSIDE_M = 0.06
 NEAR_M = 0.13
 """Beams this short are exact enough to steer clear by."""
 
@@ -83,6 +86,7 @@ class Senses:
         )
         self.grid = SheetGrid(SheetShape.of(knowledge.size_m, knowledge.cells, config.resolution_m))
         self._tape_width_m = knowledge.tape_width_m
+        self._still = 0
         self._dark_m, self._last_at = 0.0, (knowledge.start.x_m, knowledge.start.y_m)
         self.floor = Rows(4)
         self.recent = RecentPoints()
@@ -99,9 +103,12 @@ class Senses:
         if isinstance(counts, EncoderCounts):
             left, right = int(counts.left.sum()) * self._count_m, int(counts.right.sum()) * self._count_m
         self.smoother.keyframes.add(left, right, turned, self._dt_s)
+        if left != 0.0 or right != 0.0:
+            self._still = 0
         if len(by_sensor) <= 2:
             return False
         spoke = False
+        self._still += 1
         pose = self.smoother.keyframes.pose
         for name, sensor in self._infrared.items():
             reading = by_sensor.get(name)
@@ -129,7 +136,7 @@ class Senses:
         ux, uy = math.cos(mount.theta_rad), math.sin(mount.theta_rad)
         hit = not reading.saturated and reading.range_m < sensor.reliable_range_m
         length = min(reading.range_m, sensor.reliable_range_m)
-        if hit:
+        if hit and self._still <= STILL_MOST:
             smoother.add_beam(mount.x_m, mount.y_m, ux, uy, length, sensor.range_std_fraction)
             if length < NEAR_M:
                 c, s = math.cos(pose[2]), math.sin(pose[2])
@@ -169,6 +176,14 @@ class Senses:
         c, s = np.cos(poses[:, 2]), np.sin(poses[:, 2])
         x, y = rows[:, 1], rows[:, 2]
         return np.column_stack([poses[:, 0] + c * x - s * y, poses[:, 1] + s * x + c * y, rows[:, 3]])
+
+    def loose_crossings(self) -> FloatArray:
+        """(K, 2) where something was crossed that is no landmark yet, away from the sheet's edge."""
+        crossings = self.smoother.crossings
+        points: FloatArray = crossings.seen[crossings.owner < 0][:, :2]
+        size = np.array(self.grid.shape.size_m)
+        inside = np.minimum(points, size - points).min(axis=1, initial=np.inf)
+        return np.asarray(points[inside > LOOSE_INSIDE_M])
 
     def obstacles(self) -> tuple[FloatArray, FloatArray]:
         """(S, 4) walls and (P, 2) points that belong to none, confirmed by evidence or seen just now."""

@@ -22,6 +22,7 @@ from pilotage.stack.localization.observations import Observations
 
 SavedLines: TypeAlias = tuple[FloatArray, FloatArray, IntArray, int]
 
+MERGE_GAP_M = 0.05
 ROOM = 256
 """Landmarks at most."""
 
@@ -43,7 +44,8 @@ class LineMapConfig(Config):
     merge_angle_rad: float = Field(default=0.05, gt=0.0)
     wall_points: int = Field(default=12, ge=3)
     wall_length_m: float = Field(default=0.05, gt=0.0)
-    wall_gap_m: float = Field(default=0.05, gt=0.0)
+    wall_gap_m: float = Field(default=0.02, gt=0.0)
+    """Beams glide along a wall; two spots that they rest on make none, for they may lie on two faces."""
     tape_points: int = Field(default=4, ge=3)
     tape_length_m: float = Field(default=0.03, gt=0.0)
     tape_gap_m: float = Field(default=0.125, gt=0.0)
@@ -284,7 +286,7 @@ class LineMap:
             along = nx * dy - ny * dx
             apart = max(self.extents[i, 0] - (along + half), along - half - self.extents[i, 1])
             off = abs(nx * dx + ny * dy - self.lines[i, 1])
-            if apart <= maker.gap_m and off < nearest:
+            if apart <= max(maker.gap_m, MERGE_GAP_M) and off < nearest:
                 nearest, best = off, i
         return best
 
