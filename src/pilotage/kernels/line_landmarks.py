@@ -17,6 +17,9 @@ FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 BoolArray = NDArray[np.bool_]
 
+OUTLYING = 10
+"""Points at either end of a line that may be strays, of many hundreds."""
+
 
 @kernel
 def observed_points(
@@ -107,8 +110,8 @@ def associate(
 def measure_extents(
     points: FloatArray, landmark: IntArray, n: int, lines: FloatArray, n_lines: int, extents: FloatArray
 ) -> None:
-    """Set each line's extent to that of its points: of many the third outermost at either end."""
-    outer = np.empty((n_lines, 2, 3))
+    """Set each line's extent to that of its points: of many the third outermost, of more one farther in."""
+    outer = np.empty((n_lines, 2, OUTLYING))
     outer[:, 0, :] = np.inf
     outer[:, 1, :] = -np.inf
     count = np.zeros(n_lines, np.int64)
@@ -120,14 +123,14 @@ def measure_extents(
         along = nx * (points[k, 1] - lines[j, 3]) - ny * (points[k, 0] - lines[j, 2])
         count[j] += 1
         low, high = along, along
-        for r in range(3):
+        for r in range(OUTLYING):
             if low < outer[j, 0, r]:
                 low, outer[j, 0, r] = outer[j, 0, r], low
             if high > outer[j, 1, r]:
                 high, outer[j, 1, r] = outer[j, 1, r], high
     for j in range(n_lines):
         if count[j] > 0:
-            r = 2 if count[j] >= 12 else 0
+            r = min(2 + count[j] // 60, OUTLYING - 1) if count[j] >= 12 else 0
             extents[j, 0] = outer[j, 0, r]
             extents[j, 1] = outer[j, 1, r]
 

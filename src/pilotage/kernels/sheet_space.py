@@ -33,6 +33,15 @@ def clearance_at(x: float, y: float, segments: FloatArray, points: FloatArray) -
 
 
 @kernel
+def clearances(points: FloatArray, segments: FloatArray) -> FloatArray:
+    """(P,) distance of each of (P, 2) points to the nearest segment."""
+    out = np.empty(points.shape[0])
+    for k in range(points.shape[0]):
+        out[k] = clearance_at(points[k, 0], points[k, 1], segments, NO_POINTS)
+    return out
+
+
+@kernel
 def clearance_field(
     rows: int,
     columns: int,

@@ -370,12 +370,18 @@ class FrontierExplorer:
     def _review(self, t_s: float) -> None:
         """Nothing is left by what is known: smooth the whole run, look again, or end."""
         self._solve(steps=3, anew=True)
-        self._senses.recent.forget()
         self._refresh_room()
         self._reviews += 1
         x, y, _ = pose = self._smoother.keyframes.pose
         cost, parent = self._room.costs(x, y)
-        if self._reviews <= self._config.reviews and self._choose(pose, cost, parent, t_s):
+        found = self._reviews <= self._config.reviews and self._choose(pose, cost, parent, t_s)
+        if not found and not self._senses.doubts_strays:
+            # Strays beside a wall must not close a gap for good.
+            self._senses.doubts_strays = True
+            self._refresh_room()
+            cost, parent = self._room.costs(x, y)
+            found = self._choose(pose, cost, parent, t_s)
+        if found:
             missed = int((~self._settled() & (self._stands_room() >= self._config.room_m)).sum())
             self._events.append(Event(t_s, "review", f"the whole run smoothed; {missed} cells to see again"))
             return

@@ -9,6 +9,7 @@ import numpy as np
 from pilotage.core.errors import InputError
 from pilotage.core.rows import Rows
 from pilotage.core.types import FloatArray
+from pilotage.kernels import sheet_space
 from pilotage.sensors.gyroscope import GyroscopeConfig
 from pilotage.sensors.infrared import InfraredConfig
 from pilotage.sensors.line_sensor import LineSensorConfig
@@ -32,6 +33,10 @@ OVER_EDGE_WIDTHS = 1.8
 """All line sensors dark for so many widths of a tape: that is no tape."""
 STILL_MOST = 4
 """At rest a beam is taken so often: the same spot again and again says nothing of the wall around it."""
+LOOSE_SPREAD_M = 0.0115
+"""Points that belong to no wall are obstacles where they are this exact."""
+STRAY_M, EXACT_SPREAD_M = 0.025, 0.006
+"""Points so close to a wall and not exact may be strays of it, which would close a gap beside it."""
 THIN_M = 0.009
 LOOSE_INSIDE_M = 0.06
 NEAR_M = 0.13
@@ -87,6 +92,7 @@ class Senses:
         self.grid = SheetGrid(SheetShape.of(knowledge.size_m, knowledge.cells, config.resolution_m))
         self._tape_width_m = knowledge.tape_width_m
         self._still = 0
+        self.doubts_strays = False
         self._dark_m, self._last_at = 0.0, (knowledge.start.x_m, knowledge.start.y_m)
         self.floor = Rows(4)
         self.recent = RecentPoints()
@@ -190,7 +196,12 @@ class Senses:
         smoother = self.smoother
         walls = smoother.map.walls()
         beams = smoother.beams
-        loose = beams.seen[(beams.owner < 0) & (beams.spread[: beams.count] < 0.0115)][:, :2]
+        spread = beams.spread[: beams.count]
+        own = (beams.owner < 0) & (spread < LOOSE_SPREAD_M)
+        loose, exact = beams.seen[own][:, :2], spread[own] < EXACT_SPREAD_M
+        if self.doubts_strays and loose.shape[0] and walls.shape[0]:
+            off = sheet_space.clearances(loose, walls)
+            loose = loose[exact | (off > STRAY_M)]
         if loose.shape[0]:
             loose = loose[self.grid.is_occupied(loose)]
             loose = thinned(loose)

@@ -158,10 +158,6 @@ class RecentPoints:
         self.points[self._next] = x, y
         self._next = (self._next + 1) % self.points.shape[0]
 
-    def forget(self) -> None:
-        """Forget them all."""
-        self.points[:] = NEVER_M
-
     def shift(self, dx: float, dy: float) -> None:
         """Move them with a correction of the pose."""
         known = self.points[:, 0] < NEVER_M
