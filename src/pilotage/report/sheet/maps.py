@@ -24,6 +24,8 @@ _STATES = (
     (CellState.EXPLORED, "* explored", "#dcebf5", "explored"),
 )
 
+_REASON_COLOURS = (VERMILLION, BLUE, ORANGE, PURPLE, GREEN)
+
 
 def accuracy_figure(run: RunData) -> Illustration:
     """Visited cells and features: what is right, what was missed, what is wrong."""
@@ -84,11 +86,13 @@ def printed_figure(run: RunData) -> Illustration:
             keys.append(Key(name, colour, "band", layer=layer, opacity=1.0))
     draw_grid(axes, sheet)
     draw_things(axes, sheet, filled=False)
-    if len(sheet.left):
-        given_up = np.zeros(sheet.shape, dtype=np.bool_)
-        given_up[sheet.left[:, 0], sheet.left[:, 1]] = True
-        fill_cells(axes, sheet, given_up, VERMILLION, "given-up", 0.35, 0.6)
-        keys.append(Key("left unvisited, with a reason", VERMILLION, "band", "given-up", 0.35))
+    for k, reason in enumerate(dict.fromkeys(str(reason) for reason in sheet.left_reasons)):
+        where = np.asarray([str(other) == reason for other in sheet.left_reasons], dtype=np.bool_)
+        cells = np.zeros(sheet.shape, dtype=np.bool_)
+        cells[sheet.left[where, 0], sheet.left[where, 1]] = True
+        colour, layer = _REASON_COLOURS[k % len(_REASON_COLOURS)], f"left-{k}"
+        fill_cells(axes, sheet, cells, colour, layer, 0.35, 0.6)
+        keys.append(Key(f"left: {reason}", colour, "band", layer, 0.35))
     reasons = Counter(sheet.left_reasons)
     told = ", ".join(f"{count} {reason}" for reason, count in reasons.most_common())
     caption = (
