@@ -10,7 +10,7 @@ import numpy as np
 
 from pilotage.core.types import STANDSTILL, BoolArray, Event, FloatArray, IntArray, WheelSpeeds
 from pilotage.kernels import frontier_goal
-from pilotage.maps.cell_map import CellMap
+from pilotage.maps.cell_map import CellMap, CellState
 from pilotage.sensors.readings import Readings
 from pilotage.stack.control.waypoint_drive import WaypointDrive
 from pilotage.stack.control.wheel_pursuit import wheel_speeds
@@ -387,7 +387,7 @@ class FrontierExplorer:
             return
         self._left = reasons(
             ~self.visited,
-            obstacle_cells(self._smoother.map, self._grid.shape),
+            self.cells.holds(CellState.OBSTACLE),
             self._tries >= self._config.tries,
             self._room,
             cost,
