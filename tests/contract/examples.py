@@ -272,6 +272,20 @@ ROUTE = {"points_m": [[2.0, 2.0], [3.0, 4.0], [7.0, 4.0], [8.0, 6.0]], "turning_
 
 FILTER_NUMBERS = frozenset({"gate", "measurement_var_scale", "odometry_var_scale"})
 
+
+def navigator_plans(factory: Any, config: Any) -> None:
+    """A plan from start to goal, and nobody moves."""
+    knowledge = knowledge_of(start=START, goal=GOAL, variances=(1e-12, 1e-12, 1e-12))
+    planner = RrtStarDubinsPlanner(RrtStarDubinsConfig(stop="first"))
+    localizer = EkfLandmarkLocalizer(LandmarkFilterConfig(), knowledge)
+    parts = Parts(localizer, planner, None, None, None, None, None, None)
+    navigator = factory(config, knowledge, parts)
+    navigator.prepare()
+    assert navigator.status[0] is StackStatus.ARRIVED
+    assert len(navigator.plans) == 1
+    assert navigator.step(Readings(0.1)) == Twist(0.0, 0.0)
+
+
 SCALAR_FILTER_NUMBERS = frozenset({"process_var", "measurement_var", "initial_var"})
 
 EXAMPLES: dict[tuple[str, str], Example] = {
@@ -335,6 +349,7 @@ EXAMPLES: dict[tuple[str, str], Example] = {
     ("navigator", "open-loop"): Example(
         navigator_keeps_its_command, {"speed_m_s": 0.2, "turn_rate_rad_s": 0.1, "duration_s": 2.0}
     ),
+    ("navigator", "plan-only"): Example(navigator_plans),
     ("sensor", "wheel-encoders"): Example(sheet_sensor_reads),
     ("sensor", "gyroscope"): Example(sheet_sensor_reads, pure_numbers=frozenset({"scale_error"})),
     ("sensor", "magnetometer"): Example(sheet_sensor_reads),

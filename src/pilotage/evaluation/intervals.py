@@ -41,8 +41,14 @@ def bootstrap_mean(values: FloatArray) -> tuple[float, float]:
     """
     if values.size < 2:
         return math.nan, math.nan
+    scale = float(np.abs(values).max())
     if np.ptp(values) == 0.0:
         return float(values[0]), float(values[0])
+    low, high = _resampled(values / scale)  # squares of very small numbers would vanish
+    return scale * low, scale * high
+
+
+def _resampled(values: FloatArray) -> tuple[float, float]:
     found = stats.bootstrap(
         (values,),
         np.mean,

@@ -216,6 +216,13 @@ GROUPS: tuple[tuple[str, tuple[Metric, ...]], ...] = (
                 "Exact shortest path at the same clearance, from a visibility graph.",
             ),
             Metric("planned_over_shortest", "planned over shortest", _ratio, "1 cannot be beaten."),
+            Metric(
+                "planned_clearance_m",
+                "room along the plan",
+                quantities.length,
+                "Least distance of the body's edge from known walls, looked at every centimetre.",
+            ),
+            Metric("smoothness", "smoothness", _plain, "Of the planner's own states; 0 is a straight line."),
             Metric("planning_time_s", "planning time", quantities.duration, "Wall time of the first plan."),
             Metric(
                 "first_solution_s",

@@ -1,0 +1,267 @@
+"""Studies: definitions, the database, workers, kills, replays and pages."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import sqlite3
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from pilotage.cli.main import main
+from pilotage.core.config import validate
+from pilotage.core.errors import InputError
+from pilotage.experiments.run import run_mission
+from pilotage.experiments.run_folder import clean
+from pilotage.experiments.studies.attribution import attribution_of, attribution_study
+from pilotage.experiments.studies.definition import StudyDefinition
+from pilotage.experiments.studies.engine import run_study
+from pilotage.experiments.studies.replay import mission_from
+from pilotage.experiments.studies.store import DATABASE, Store, read_rows
+from pilotage.experiments.studies.study import Study, load_study, make_study, shipped_studies
+from pilotage.experiments.studies.sweep import parse_vary, sweep_study
+from pilotage.experiments.studies.table import read_study
+from pilotage.experiments.studies.trial import TIMINGS, Outcome
+from pilotage.report.study.write import write_study_report
+
+
+def small(**changes: Any) -> Study:
+    """A study of short missions: three radii, four seeds."""
+    values: dict[str, Any] = {
+        "study": "small",
+        "mission": "museum-plan",
+        "set": {"stack.planner.iterations": 300, "stack.planner.stop": "first"},
+        "factors": [{"key": "stack.planner.turning_radius_m", "values": [0.3, 0.5, 0.8]}],
+        "trials": 4,
+        "metrics": ["planned_length_m", "smoothness"],
+        "primary": "planned_length_m",
+    }
+    return make_study(validate(StudyDefinition, values | changes, ""))
+
+
+def numbers(folder: Path) -> list[tuple[int, int, int, str, str]]:
+    """What a study's rows are, clock times apart."""
+    rows, trouble = read_rows(folder / DATABASE)
+    assert not trouble
+    return [
+        (row["row"], row["cell"], row["seed"], row["status"], json.dumps(row["metrics"], sort_keys=True))
+        for row in rows
+    ]
+
+
+@pytest.fixture(scope="module")
+def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The small study, run by one worker."""
+    folder = tmp_path_factory.mktemp("studies") / "small"
+    counts = run_study(small(), folder, workers=1)
+    assert (counts.total, counts.done, counts.failed) == (12, 12, 0)
+    return folder
+
+
+def test_every_shipped_study_can_be_loaded() -> None:
+    names = shipped_studies()
+    assert {"museum-planner", "museum-noise", "museum-missions", "gale-estimation", "romi-ablation"} <= set(
+        names
+    )
+    assert len(load_study("museum-planner").cells) == 31
+    for name in names:
+        study = load_study(name)
+        assert study.rows == len(study.cells) * study.definition.trials
+
+
+def test_cells_share_their_seeds(undisturbed: Path) -> None:
+    table = read_study(undisturbed)
+    for cell in range(3):
+        assert sorted(table.seed[table.cell == cell].tolist()) == [0, 1, 2, 3]
+
+
+def test_two_workers_give_the_rows_of_one(undisturbed: Path, tmp_path: Path) -> None:
+    run_study(small(), tmp_path / "two", workers=2)
+    assert numbers(tmp_path / "two") == numbers(undisturbed)
+
+
+def test_a_cluster_gives_the_same_rows(undisturbed: Path, tmp_path: Path) -> None:
+    distributed = pytest.importorskip("distributed", reason="needs the extra cluster")
+    with distributed.LocalCluster(
+        n_workers=2, threads_per_worker=1, dashboard_address=None, processes=True
+    ) as cluster:
+        run_study(small(), tmp_path / "cluster", dask=cluster.scheduler_address)
+    assert numbers(tmp_path / "cluster") == numbers(undisturbed)
+
+
+def test_a_row_can_be_run_again_bit_equal(undisturbed: Path) -> None:
+    rows, _ = read_rows(undisturbed / DATABASE)
+    metrics = clean(dict(run_mission(mission_from(f"{undisturbed}:7"), save=False).metrics))
+    again = {key: value for key, value in metrics.items() if key not in TIMINGS}
+    assert again == rows[7]["metrics"]
+
+
+def test_killed_again_and_again_it_ends_as_if_nothing_had_been(undisturbed: Path, tmp_path: Path) -> None:
+    """SIGKILL at changing moments; the last process is left to finish."""
+    folder = tmp_path / "killed"
+    tests = Path(__file__).parents[1]
+    script = (
+        f"import sys; from pathlib import Path; sys.path.insert(0, {str(tests)!r})\n"
+        "from unit.test_studies import small\n"
+        "from pilotage.experiments.studies.engine import run_study\n"
+        f"if __name__ == '__main__': run_study(small(), Path({str(folder)!r}), workers=2, resume=True)\n"
+    )
+    for pause_s in (0.9, 2.1, 3.0):
+        process = subprocess.Popen([sys.executable, "-c", script], start_new_session=True)
+        time.sleep(pause_s)
+        os.killpg(process.pid, signal.SIGKILL)
+        process.wait()
+    run_study(small(), folder, workers=2, resume=True)
+    assert numbers(folder) == numbers(undisturbed)
+
+
+def test_two_processes_share_a_study(undisturbed: Path, tmp_path: Path) -> None:
+    folder = tmp_path / "shared"
+    first, second = Store(folder, small()), Store(folder, small())
+    rows = [task.row for store in (first, second, first) for task in store.claim(4)]
+    assert sorted(rows) == list(range(12))
+    assert first.claim(1) == []
+    second.close()  # gives back what it had
+    assert len(first.claim(12)) == 4
+    first.close()
+    run_study(small(), folder, workers=1, resume=True)
+    assert numbers(folder) == numbers(undisturbed)
+
+
+def test_a_trial_that_the_machine_broke_is_tried_once_more(tmp_path: Path) -> None:
+    store = Store(tmp_path / "study", small())
+    for attempt in range(2):
+        (task,) = store.claim(1)
+        assert task.row == 0
+        store.finish(Outcome(0, {}, {}, f"its worker died, try {attempt}", retry=True))
+    (next_task,) = store.claim(1)
+    assert next_task.row == 1
+    store.finish(Outcome(1, {}, {}, "ZeroDivisionError: a bug", retry=False))
+    counts = store.counts()
+    store.close()
+    assert (counts.done, counts.failed) == (0, 2)
+    rows, _ = read_rows(tmp_path / "study" / DATABASE)
+    assert rows[0]["reason"] == "its worker died, try 1"
+    assert rows[0]["attempts"] == 2
+
+
+def test_a_trial_that_crashes_does_not_take_the_study_with_it(tmp_path: Path) -> None:
+    study = small(factors=[{"key": "world.goal.x_m", "values": [20.0, -5.0]}], trials=2)
+    counts = run_study(study, tmp_path / "study", workers=1)
+    assert (counts.done, counts.failed) == (2, 2)
+    table = read_study(tmp_path / "study")
+    assert all("world.goal" in reason for _, _, _, reason in table.broken)
+
+
+def test_another_definition_is_refused_with_what_changed(undisturbed: Path) -> None:
+    with pytest.raises(InputError, match="trials: 4 -> 5"):
+        run_study(small(trials=5), undisturbed, resume=True)
+
+
+def test_a_begun_study_asks_for_resume(tmp_path: Path) -> None:
+    store = Store(tmp_path / "study", small())
+    (task,) = store.claim(1)
+    store.finish(Outcome(task.row, {"planned_length_m": 1.0}, {}))
+    store.close()
+    with pytest.raises(InputError, match="--resume"):
+        run_study(small(), tmp_path / "study", workers=1)
+
+
+def test_a_metric_that_no_trial_gives_is_refused_with_the_nearest(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="did you mean 'planned_length_m'"):
+        run_study(small(metrics=["planed_length_m"], primary=None, trials=1), tmp_path / "study", workers=1)
+
+
+def test_a_corrupt_database_is_said_and_salvaged(undisturbed: Path, tmp_path: Path) -> None:
+    import shutil
+
+    folder = tmp_path / "corrupt"
+    shutil.copytree(undisturbed, folder)
+    database = sqlite3.connect(folder / DATABASE)
+    database.execute("pragma wal_checkpoint(truncate)")
+    database.close()
+    content = bytearray((folder / DATABASE).read_bytes())
+    content[len(content) // 2 :] = b"\xff" * (len(content) - len(content) // 2)
+    (folder / DATABASE).write_bytes(bytes(content))
+    with pytest.raises(InputError, match="corrupt database"):
+        read_study(folder)
+    assert (folder / "trials-salvaged.csv").is_file()
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("stack.planner.turning_radius_m=0:1:0", "not zero"),
+        ("stack.planner.turning_radius_m=1:0:0.1", "empty range"),
+        ("stack.planner.turning_radius_m", "expected KEY"),
+        ("stack.planner.turning_radius_m=", "expected KEY"),
+        ("stack.planner.turning_radius_m=1:2", "A:B:STEP"),
+    ],
+)
+def test_what_cannot_be_varied_is_one_line(text: str, message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        parse_vary(text)
+
+
+def test_an_unknown_key_to_vary_is_answered_with_the_nearest() -> None:
+    with pytest.raises(InputError, match=r"did you mean 'stack\.planner\.turning_radius_m'"):
+        sweep_study("museum-plan", ["stack.planner.turning_radius=0.1,0.2"], (), 2, ())
+
+
+def test_ranges_hold_both_ends() -> None:
+    study = sweep_study("museum-plan", ["stack.planner.turning_radius_m=0.1:0.5:0.1"], (), 1, ())
+    assert [cell.values["turning_radius_m"] for cell in study.cells] == [0.1, 0.2, 0.3, 0.4, 0.5]
+
+
+def test_the_page_shows_cells_and_examples(undisturbed: Path) -> None:
+    page = write_study_report(undisturbed).read_text(encoding="utf-8")
+    assert "Over turning radius m" in page
+    assert "The worst trial" in page
+    assert "pilotage run --from" in page
+    assert (undisturbed / "trials").is_dir()
+
+
+def test_attribution_ranks_the_modules(tmp_path: Path) -> None:
+    made = attribution_study("museum-1", ["run.time_limit_s=4"], 3)
+    assert made.cells[0].name == "as it is"
+    run_study(made, tmp_path / "attribution", workers=1)
+    answer = attribution_of(tmp_path / "attribution")
+    assert {entry["module"] for entry in answer["modules"]} == {
+        "sensors",
+        "localizer",
+        "mapper",
+        "planner",
+        "controller",
+    }
+    by_name = {entry["module"]: entry["changes"] for entry in answer["modules"]}
+    assert by_name["localizer"]["position_rmse_m"]["mean"] < 0.0
+
+
+@pytest.fixture
+def in_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def test_the_commands_end_to_end(in_folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    arguments = ["sweep", "museum-plan", "--vary", "stack.planner.turning_radius_m=0.3,0.6", "--trials", "2"]
+    arguments += ["--metrics", "planned_length_m", "--set", "stack.planner.stop=first", "--workers", "1"]
+    assert main([*arguments, "--name", "mine", "--json"]) == 0
+    answer = json.loads(capsys.readouterr().out)
+    assert answer["trials"] == 4
+    assert answer["failed"] == 0
+    assert set(answer["cells"][0]["metrics"]["planned_length_m"]) >= {"n", "mean", "median", "low", "high"}
+    assert (in_folder / "studies" / "mine" / "trials.parquet").is_file()
+    assert main(["run", "--from", "mine:3", "--json", "--no-report"]) == 0
+    assert json.loads(capsys.readouterr().out)["seed"] == 1
+    assert main(["run", "--from", "mine:99", "--json"]) == 2
+    assert "from 0 to 3" in capsys.readouterr().err
+    assert main(["run"]) == 2
+    assert main(["study", "museum-planer"]) == 2
+    assert "did you mean 'museum-planner'" in capsys.readouterr().err
