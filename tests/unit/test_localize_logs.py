@@ -1,4 +1,4 @@
-"""A recorded log through the plug: the AER1513 form, simulated, and what is wrong with bad files."""
+"""A recorded log through the plug by ``ekf-slow-errors``: the AER1513 form, simulated, and bad files."""
 
 from __future__ import annotations
 

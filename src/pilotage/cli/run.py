@@ -52,7 +52,7 @@ def _mission(name: str | None, overrides: Sequence[str], seed: int | None, row: 
     if row is None:
         if name is None:
             raise InputError(
-                "run: expected a mission's name or file, or --from STUDY:ROW; see 'pilotage missions'"
+                "missing argument 'MISSION|FILE', or --from STUDY:ROW; see 'pilotage run --help'"
             )
         from pilotage.experiments.mission import load_mission
 
