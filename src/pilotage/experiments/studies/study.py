@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -136,7 +136,10 @@ def make_study(definition: StudyDefinition, folder: Path = Path()) -> Study:
         check_oracles(kind_of(mission), mission)
         return resolved_values(mission)
 
-    cells = make_cells(definition, resolve)
+    cells = tuple(
+        replace(cell, overrides=tuple(_anchored_override(text) for text in cell.overrides))
+        for cell in make_cells(definition, resolve)
+    )
     for cell in cells:
         try:
             resolve(cell.overrides)
@@ -205,6 +208,12 @@ def _anchored(values: Any) -> Any:
     if isinstance(values, list):
         return [_anchored(value) for value in values]
     return str(Path(values).resolve()) if _is_file(values) else values
+
+
+def _anchored_override(override: str) -> str:
+    key, _, text = override.partition("=")
+    value = json.loads(text)
+    return f"{key}={json.dumps(_anchored(value))}" if isinstance(value, str) else override
 
 
 def _digests(base: Mapping[str, Any]) -> dict[str, str]:
