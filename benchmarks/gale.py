@@ -81,9 +81,10 @@ def main() -> None:
         f"{np.median(reckoned['second-order'].final_m):.0f} m; "
         f"stretches over 1 km without landmarks: {found.stretches}"
     )
+    inside = 100 * ((mean > low) & (mean < high)).mean()
     print(
-        f"EKF, {few} runs: mean NEES {found.nees.mean():.3f}, {100 * ((mean > low) & (mean < high)).mean():.1f} % "
-        f"of the steps in the pointwise 99.9 % band {low:.2f} to {high:.2f}; "
+        f"EKF, {few} runs: mean NEES {found.nees.mean():.3f}, {inside:.1f} "
+        f"% of the steps in the pointwise 99.9 % band {low:.2f} to {high:.2f}; "
         f"NIS per degree of freedom {found.nis.mean():.4f}; "
         f"truth in its ellipse {100 * found.covered.mean():.1f} %"
     )

@@ -65,7 +65,8 @@ def killed(study: Study, folder: Path, undisturbed: Path, seconds: float) -> boo
     script = (
         "from pathlib import Path\nfrom benchmarks.studies import short_missions\n"
         "from pilotage.experiments.studies.engine import run_study\n"
-        f"if __name__ == '__main__': run_study(short_missions(), Path({str(folder)!r}), workers=2, resume=True)\n"
+        "if __name__ == '__main__':\n"
+        f"    run_study(short_missions(), Path({str(folder)!r}), workers=2, resume=True)\n"
     )
     rng = random.Random(0)
     for _ in range(KILLS):

@@ -14,9 +14,9 @@ from itertools import count
 
 import numpy as np
 from pydantic import Field
-from scipy.stats import chi2
 
 from pilotage.core.angles import wrap_to_pi
+from pilotage.core.chi_square import chi_square_quantile
 from pilotage.core.config import Config
 from pilotage.core.types import FloatArray, Pose2
 from pilotage.kernels import arrow_solve, sheet_graph
@@ -28,7 +28,7 @@ from pilotage.stack.localization.observations import Observations
 RELAXED, STRICT = 30.0, 3.0
 """Standard deviations at which a residual weighs a quarter: just after landmarks were merged, and always."""
 
-JUMP_GATE = float(chi2.ppf(0.9999, 3))
+JUMP_GATE = chi_square_quantile(0.9999, 3)
 GROWN_M, GROWN_RAD = 0.012, math.radians(1.5)
 """What a position and a heading may lose, at most, between two solutions (standard deviations)."""
 DISTRUST = 10.0
