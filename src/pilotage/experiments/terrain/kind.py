@@ -28,7 +28,7 @@ from pilotage.stack.localization.rover_estimators import ESTIMATORS
 from pilotage.stack.planning.grid_planner import GridRequest
 from pilotage.stack.planning.grid_space import GridSpace
 
-PICTURE_COLUMNS = 1125
+PICTURE_COLUMNS = 900
 """Ground and hazards are kept for the report no wider and no higher than this."""
 
 
@@ -40,11 +40,10 @@ class TerrainKind:
     def warm_up(self, mission: Mission) -> None:
         """Answer a small query with the mission's own planner, so that its times are not a compiler's."""
         assert isinstance(mission, TerrainMission)
-        if mission.stack.planner is None:
-            _warm_up_estimator()
-            return
         if mission.stack.estimator is not None:
-            _warm_up_estimator()
+            _warm_up_estimator(mission.stack.estimator.name)
+        if mission.stack.planner is None:
+            return
         weighted = mission.stack.cost_map.slope_that_doubles_deg is not None
         side = 24
         blocked = np.zeros((side, side), dtype=np.bool_)
@@ -109,7 +108,7 @@ class TerrainKind:
             places["route"] = record.route.path_xy_m
         if record.estimation is not None:
             places["landmarks"] = record.estimation.landmarks.points_xy_m
-        np.savez_compressed(folder / "terrain.npz", allow_pickle=False, **pictures, **places)
+        np.savez(folder / "terrain.npz", allow_pickle=False, **pictures, **places)
 
     def inline(self, record: TerrainRecord, values: dict[str, Any]) -> None:  # noqa: ARG002
         """Ground of millions of cells stays in its files; name them so that they are found from anywhere."""
@@ -138,15 +137,15 @@ def _move(mission: TerrainMission, ground: Ground, route: Route | None) -> Motio
     return None if spline is None else along_route(mission, spline, route, ground)
 
 
-def _warm_up_estimator() -> None:
-    """Run the estimators over a log of two steps."""
+def _warm_up_estimator(name: str) -> None:
+    """Run an estimator over a log of two steps."""
     truth = np.array([[0.0, 0.0, 0.0], [0.4, 0.0, 0.0], [0.8, 0.0, 0.0]])
     marks = Landmarks(np.array([0]), np.array([[5.0, 5.0]]))
     seer = ("seer", BeaconConfig(field_of_view_rad=6.28, max_range_m=100.0))
     log = landmark_log(truth, ("odometer", WheelOdometryConfig()), seer, marks, RandomStreams(0))
     initial = Belief(Pose2(0.0, 0.0, 0.0), np.eye(3))
-    for entry in ESTIMATORS:
-        entry.factory(entry.config()).estimate(initial, log, marks, seer[1])
+    entry = ESTIMATORS.entry(name)
+    entry.factory(entry.config()).estimate(initial, log, marks, seer[1])
 
 
 TERRAIN = TerrainKind()

@@ -16,7 +16,7 @@ from pilotage.evaluation.rover_metrics import ellipse_axes, estimation_metrics, 
 from pilotage.experiments.terrain.estimation import Estimation, seen_per_step
 from pilotage.experiments.terrain.ground import Ground
 from pilotage.experiments.terrain.motion import Motion, goal_errors, hazard_contacts, way_m
-from pilotage.experiments.terrain.route import Route
+from pilotage.experiments.terrain.route import CLEARANCE_REACH_CELLS, Route
 from pilotage.kernels.curve_clearance import distance_to_blocked
 from pilotage.maps.occupancy_grid import OccupancyGrid, squared_distances
 from pilotage.missions.terrain import TerrainMission
@@ -71,20 +71,25 @@ def motion_trace(motion: Motion, ground: Ground) -> dict[str, FloatArray]:
 def hazard_distance_m(points_xy_m: FloatArray, grid: OccupancyGrid) -> FloatArray:
     """(N,) distance of points on the grid from the nearest hazard's edge; exact where it is least.
 
-    Farther off by the distance of the cells' middles, less half a cell's diagonal: an eighth of a million
-    exact distances would take seconds.
+    Farther off by the distance of the cells' middles, less half a cell's diagonal: tens of thousands of exact
+    distances would take seconds. More than ``CLEARANCE_REACH_CELLS`` cells are not measured.
     """
-    blocked = grid.blocked()
+    blocked, reach = grid.blocked(), CLEARANCE_REACH_CELLS
     cells = grid.cells_at(points_xy_m)
     rows = np.clip(cells[:, 0], 0, grid.rows - 1)
     columns = np.clip(cells[:, 1], 0, grid.columns - 1)
-    if not blocked.any():
-        return np.full(len(points_xy_m), math.inf)
-    between = np.sqrt(squared_distances(blocked)[rows, columns].astype(np.float64))
-    away = np.maximum(between - math.sqrt(0.5), 0.0)
+    # No hazard farther than the reach counts: only the ground around the way is looked at.
+    top, left = max(int(rows.min()) - reach, 0), max(int(columns.min()) - reach, 0)
+    around = np.ascontiguousarray(
+        blocked[top : int(rows.max()) + reach + 1, left : int(columns.max()) + reach + 1]
+    )
+    if not around.any():
+        return np.full(len(points_xy_m), reach * grid.resolution_m)
+    between = np.sqrt(squared_distances(around)[rows - top, columns - left].astype(np.float64))
+    away = np.clip(between - math.sqrt(0.5), 0.0, float(reach))
     near = between <= between.min() + NEAR_CELLS
     places = grid.places_at(points_xy_m[near])
-    away[near] = distance_to_blocked(places, blocked, math.ceil(between[near].max()) + 1)
+    away[near] = distance_to_blocked(places, blocked, min(math.ceil(between[near].max()) + 1, reach))
     return away * grid.resolution_m
 
 

@@ -17,6 +17,7 @@ from pilotage.report.style import (
     MUTED,
     ORANGE,
     PURPLE,
+    SHADE,
     VERMILLION,
     YELLOW,
     Illustration,
@@ -25,6 +26,7 @@ from pilotage.report.style import (
     one_shape,
     render,
     series,
+    shade,
     stacked_axes,
 )
 
@@ -124,9 +126,9 @@ def uncertainty_figure(run: RunData) -> Illustration:
         logarithmic(axes, 0.7 * float(values.min()), 1.4 * float(values.max()))
         blind = trace["landmarks_seen"] == 0.0 if trace.has("landmarks_seen") else np.zeros(len(x), bool)
         if blind.any() and not blind.all():
-            axes.fill_between(
-                x, 0.0, 1.0, where=blind, transform=axes.get_xaxis_transform(), color="#e3e7ec", lw=0
-            )
+            edges = np.flatnonzero(np.diff(np.concatenate([[0], blind.astype(np.int8), [0]])))
+            ends = np.minimum(edges, len(x) - 1)
+            shade(axes, np.column_stack([x[ends[::2]], x[ends[1::2]]]), SHADE)
         axes.set_xlim(0.0, float(x[-1]))
         axes.set_xlabel(label, labelpad=3.0)
     alt = "Square root of the determinant of the position's covariance over time and over distance"
