@@ -76,7 +76,7 @@ def attribution_of(folder: Path) -> dict[str, Any]:
         ranked.append((_weight(changes), entry))
     ranked.sort(key=lambda pair: pair[0], reverse=True)
     return {
-        "attribution": table.study.definition.mission,
+        "attribution": table.study.base.get("mission", table.study.definition.mission),
         "trials": table.study.definition.trials,
         "modules": [entry for _, entry in ranked],
         "study_dir": str(folder),

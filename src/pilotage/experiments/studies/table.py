@@ -158,7 +158,7 @@ def study_object(table: StudyTable) -> dict[str, Any]:
         )
     return {
         "study": table.study.name,
-        "mission": table.study.definition.mission,
+        "mission": table.study.base.get("mission", table.study.definition.mission),
         "trials": len(table.row) + len(table.broken),
         "failed": len(table.broken),
         "missing": table.waiting,

@@ -51,7 +51,7 @@ def view_of(table: StudyTable) -> StudyView:
     return StudyView(
         name=study.name,
         question=definition.question or definition.description,
-        mission=definition.mission,
+        mission=str(study.base.get("mission", definition.mission)),
         cells=tuple(Cell(c.index, c.name, c.values, c.published) for c in study.cells),
         factors=definition.factor_names,
         metrics=table.metrics,
