@@ -1,9 +1,11 @@
 """The EKF whose state holds, after the pose, the slowly varying errors of drive and sensor.
 
-State (8 + L): x, y, theta; relative errors of speed and turn rate; course (direction of travel less
-heading); bearing offset; relative range error of the sensor and, beside it, of each landmark. Each
-error is a first-order Gauss-Markov process,
-e <- e exp(-dt / tau), which keeps its stationary variance (Bar-Shalom et al. 2001, sect. 8.2 and 11.9).
+State (14 + 2 L): x, y, theta; of the drive: relative errors of speed and turn rate, their offsets, and
+the course (direction of travel less heading); of the sensor: bearing offset, relative range error, range
+offset, how far its mount lies ahead and to the left of where it should be, and the age of its readings;
+then the error of each landmark's range, and of each landmark's bearing, in units of their standard
+deviations. Each error is a first-order Gauss-Markov process, e <- e exp(-dt / tau), which keeps its
+stationary variance (Bar-Shalom et al. 2001, sect. 8.2 and 11.9).
 """
 
 from __future__ import annotations
@@ -19,10 +21,15 @@ from pilotage.kernels.motion import wrap
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
-SPEED, TURN, COURSE, BEARING, SCALE, RANGES = 3, 4, 5, 6, 7, 8
+SPEED, TURN, SPEED_OFFSET, TURN_OFFSET, COURSE = 3, 4, 5, 6, 7
+BEARING, SCALE, OFFSET, AHEAD, LEFT, AGE, LANDMARKS = 8, 9, 10, 11, 12, 13, 14
 """Places in the state: the errors after the pose, and the first landmark's range error."""
+SLOPES = 11
+"""A reading depends on the pose, the sensor's six errors and its landmark's two."""
 MIN_COSINE = 0.2
 """A depth says nothing of what lies abeam: a bearing beyond 78 degrees counts as one of 78."""
+MIN_RANGE_M = 0.1
+"""An error across the line of sight counts as one at this range where the landmark is closer."""
 
 OUTCOME_ACCEPTED = 1
 OUTCOME_GATED = 0
@@ -38,49 +45,52 @@ def predict(
     dt: float,
     position_var: float,
     angle_var: float,
-    rates: FloatArray,
+    fading: FloatArray,
     stationary: FloatArray,
 ) -> None:
     """Move ``state`` (N,) and ``cov`` (N, N) in place by an increment of ``dt`` seconds.
 
-    The true increment is distance (1 + e_v), angle (1 + e_w) along the heading plus the course; the
-    distance's and angle's variances are those of the increment, white from step to step.
+    The true increment is distance (1 + e_v) + o_v dt, angle (1 + e_w) + o_w dt along the heading plus the
+    course; the distance's and angle's variances are those of the increment, white from step to step.
 
     Parameters
     ----------
-    rates
-        (N,) 1 / tau of each error, 0 for a constant one; the pose's are not looked at.
+    fading
+        (N, 3) 1 / tau of each error, and how fast it fades with the distance and the angle that the robot
+        moves (one over a length in m, over an angle in rad); 0 for a constant one; the pose's rows are not
+        looked at.
     stationary
         (N,) variances that the errors settle at.
     """
     n = state.shape[0]
-    d, a = distance * (1.0 + state[SPEED]), angle * (1.0 + state[TURN])
+    d = distance * (1.0 + state[SPEED]) + dt * state[SPEED_OFFSET]
+    a = angle * (1.0 + state[TURN]) + dt * state[TURN_OFFSET]
     middle = state[2] + state[COURSE] + 0.5 * a
     c, s = math.cos(middle), math.sin(middle)
     state[0] += d * c
     state[1] += d * s
     state[2] = wrap(state[2] + a)
-    # F differs from the identity in the pose's rows only: theta, speed, turn, course.
-    columns = (2, SPEED, TURN, COURSE)
-    fx = (-d * s, distance * c, -0.5 * d * s * angle, -d * s)
-    fy = (d * c, distance * s, 0.5 * d * c * angle, d * c)
+    # F differs from the identity in the pose's rows only.
+    columns = (2, SPEED, TURN, SPEED_OFFSET, TURN_OFFSET, COURSE)
+    fx = (-d * s, distance * c, -0.5 * d * s * angle, dt * c, -0.5 * d * s * dt, -d * s)
+    fy = (d * c, distance * s, 0.5 * d * c * angle, dt * s, 0.5 * d * c * dt, d * c)
     for j in range(n):  # F P
         px, py = 0.0, 0.0
-        for k in range(4):
+        for k in range(6):
             value = cov[columns[k], j]
             px += fx[k] * value
             py += fy[k] * value
-        turned = angle * cov[TURN, j]
+        turned = angle * cov[TURN, j] + dt * cov[TURN_OFFSET, j]
         cov[0, j] += px
         cov[1, j] += py
         cov[2, j] += turned
     for i in range(n):  # (F P) F'
         px, py = 0.0, 0.0
-        for k in range(4):
+        for k in range(6):
             value = cov[i, columns[k]]
             px += fx[k] * value
             py += fy[k] * value
-        turned = angle * cov[i, TURN]
+        turned = angle * cov[i, TURN] + dt * cov[i, TURN_OFFSET]
         cov[i, 0] += px
         cov[i, 1] += py
         cov[i, 2] += turned
@@ -93,18 +103,18 @@ def predict(
     cov[0, 2] += cx * angle_var
     cov[1, 2] += cy * angle_var
     cov[1, 0], cov[2, 0], cov[2, 1] = cov[0, 1], cov[0, 2], cov[1, 2]
+    kept = np.ones(n)
     for i in range(SPEED, n):
-        if rates[i] == 0.0:
-            continue
-        kept = math.exp(-dt * rates[i])
-        state[i] *= kept
-        for j in range(n):
-            cov[i, j] *= kept
-            cov[j, i] *= kept
-        cov[i, i] += stationary[i] * (1.0 - kept * kept)
+        past = fading[i - 1]
+        if fading[i, 0] == past[0] and fading[i, 1] == past[1] and fading[i, 2] == past[2]:
+            kept[i] = kept[i - 1]  # neighbours mostly fade alike: one exponential for all of them
+        else:
+            kept[i] = math.exp(-dt * fading[i, 0] - abs(d) * fading[i, 1] - abs(a) * fading[i, 2])
+        state[i] *= kept[i]
     for i in range(n):
+        cov[i, i] = kept[i] * kept[i] * cov[i, i] + stationary[i] * (1.0 - kept[i] * kept[i])
         for j in range(i + 1, n):
-            value = 0.5 * (cov[i, j] + cov[j, i])
+            value = 0.5 * kept[i] * kept[j] * (cov[i, j] + cov[j, i])
             cov[i, j] = value
             cov[j, i] = value
 
@@ -123,28 +133,67 @@ def range_of_depth(reading: float, bearing: float, depth: float) -> float:
 
 @kernel
 def measure(
-    state: FloatArray, mx: float, my: float, index: int, mount: FloatArray, z: FloatArray, H: FloatArray
+    state: FloatArray,
+    mx: float,
+    my: float,
+    places: IntArray,
+    mount: FloatArray,
+    motion: FloatArray,
+    scales: FloatArray,
+    z: FloatArray,
+    H: FloatArray,
 ) -> bool:
-    """Predict range and bearing (2,) of landmark ``index`` and the rows' six slopes H (2, 6).
+    """Predict range and bearing (2,) of a landmark at ``mx``, ``my`` and their slopes H (2, 11).
 
-    H's columns: x, y, theta, the bearing offset, the sensor's range error, the landmark's. False where
-    landmark and sensor coincide. Thrun et al. 2005, eq. 7.12-7.14, for a sensor off the axle whose range
-    reads r (1 + errors).
+    False where landmark and sensor coincide. Thrun et al. 2005, eq. 7.12-7.14, for a sensor off the axle,
+    from where it was when the reading was taken: r (1 + scale) + offset + the landmark's own error.
+
+    Parameters
+    ----------
+    places
+        (11,) of the slopes in the state; the last two are the landmark's errors.
+    mount
+        (4,) of the sensor: x, y, theta; and the age of its readings as known before, in s.
+    motion
+        (2,) speed and turn rate now.
+    scales
+        (4,) standard deviations of a landmark's error: fraction of the range, metres along; radians,
+        metres across.
     """
-    c, s = math.cos(state[2]), math.sin(state[2])
-    ox, oy = c * mount[0] - s * mount[1], s * mount[0] + c * mount[1]
-    dx, dy = mx - (state[0] + ox), my - (state[1] + oy)
+    v, w = motion[0], motion[1]
+    age = mount[3] + state[AGE]
+    course = state[2] + state[COURSE] - 0.5 * w * age
+    vx, vy = v * math.cos(course), v * math.sin(course)
+    x, y, theta = state[0] - age * vx, state[1] - age * vy, state[2] - age * w
+    c, s = math.cos(theta), math.sin(theta)
+    ahead, left = mount[0] + state[AHEAD], mount[1] + state[LEFT]
+    ox, oy = c * ahead - s * left, s * ahead + c * left
+    dx, dy = mx - (x + ox), my - (y + oy)
     q = dx * dx + dy * dy
     if q <= 1e-18:
         return False
     r = math.sqrt(q)
-    factor = 1.0 + state[SCALE] + state[RANGES + index]
-    z[0] = r * factor
-    z[1] = wrap(math.atan2(dy, dx) - state[2] - mount[2] + state[BEARING])
-    H[0, 0], H[0, 1], H[0, 2] = -dx / r * factor, -dy / r * factor, (dx * oy - dy * ox) / r * factor
-    H[0, 3], H[0, 4], H[0, 5] = 0.0, r, r
-    H[1, 0], H[1, 1], H[1, 2] = dy / q, -dx / q, -1.0 - (dx * ox + dy * oy) / q
-    H[1, 3], H[1, 4], H[1, 5] = 1.0, 0.0, 0.0
+    near = max(r, MIN_RANGE_M)
+    along = math.sqrt((scales[0] * r) ** 2 + scales[1] ** 2)
+    across = math.sqrt(scales[2] ** 2 + (scales[3] / near) ** 2)
+    factor = 1.0 + state[SCALE]
+    z[0] = r * factor + state[OFFSET] + along * state[places[9]]
+    z[1] = wrap(math.atan2(dy, dx) - theta - mount[2] + state[BEARING] + across * state[places[10]])
+    # By the place and heading that the reading was taken at ...
+    rx, ry, rt = -dx / r * factor, -dy / r * factor, (dx * oy - dy * ox) / r * factor
+    bx, by, bt = dy / q, -dx / q, -1.0 - (dx * ox + dy * oy) / q
+    # ... which the pose now leads to: x_then = x - age v cos(course), and turned by d theta alike.
+    H[0, 0], H[0, 1], H[0, 2] = rx, ry, rt + age * (rx * vy - ry * vx)
+    H[1, 0], H[1, 1], H[1, 2] = bx, by, bt + age * (bx * vy - by * vx)
+    H[0, 3], H[1, 3] = 0.0, 1.0
+    H[0, 4], H[1, 4] = r, 0.0
+    H[0, 5], H[1, 5] = 1.0, 0.0
+    H[0, 6], H[1, 6] = rx * c + ry * s, bx * c + by * s
+    H[0, 7], H[1, 7] = -rx * s + ry * c, -bx * s + by * c
+    # The half turn inside the course is of second order in the age and left out.
+    H[0, 8], H[1, 8] = -(rx * vx + ry * vy + rt * w), -(bx * vx + by * vy + bt * w)
+    H[0, 9], H[1, 9] = along, 0.0
+    H[0, 10], H[1, 10] = 0.0, across
     return True
 
 
@@ -158,7 +207,7 @@ def joseph_update(
     R: FloatArray,
     gate: float,
 ) -> float:
-    """Update in place by a pair of measurements that depend on ``places`` (6,) of the state only.
+    """Update in place by a pair of measurements that depend on ``places`` (11,) of the state only.
 
     Returns the squared Mahalanobis distance, beyond ``gate`` nothing is changed; nan where the innovation
     covariance is not positive. Joseph form, (I - K H) P (I - K H)' + K R K', multiplied out as
@@ -167,12 +216,12 @@ def joseph_update(
     n = state.shape[0]
     PH = np.zeros((n, 2))
     for i in range(n):
-        for k in range(6):
+        for k in range(SLOPES):
             value = cov[i, places[k]]
             PH[i, 0] += value * H[0, k]
             PH[i, 1] += value * H[1, k]
     s00, s01, s11 = R[0, 0], R[0, 1], R[1, 1]
-    for k in range(6):
+    for k in range(SLOPES):
         s00 += H[0, k] * PH[places[k], 0]
         s01 += H[0, k] * PH[places[k], 1]
         s11 += H[1, k] * PH[places[k], 1]
@@ -217,37 +266,39 @@ def update_range_bearings(
     known_ids: IntArray,
     known_points: FloatArray,
     mount: FloatArray,
+    motion: FloatArray,
+    scales: FloatArray,
     depth: float,
-    range_var: float,
-    range_var_per_m2: float,
-    bearing_var: float,
+    white: FloatArray,
     gate: float,
     nis: FloatArray,
     outcome: IntArray,
 ) -> int:
     """Update in place by any number of landmarks (K), one after the other; returns how many were used.
 
-    ``known_ids`` is sorted. ``nis`` (K,) and ``outcome`` (K,) are filled: accepted, gated, unknown id. The
-    range's white variance is range_var + range_var_per_m2 r^2.
+    ``known_ids`` is sorted. ``nis`` (K,) and ``outcome`` (K,) are filled: accepted, gated, unknown id.
+    ``white`` (4,) is the variance that is new with every reading, white[0] + white[1] r^2 of the range and
+    white[2] + white[3] / r^2 of the bearing; the rest as in `measure`.
     """
-    z, H, R = np.empty(2), np.empty((2, 6)), np.zeros((2, 2))
+    z, H, R = np.empty(2), np.empty((2, SLOPES)), np.zeros((2, 2))
     innovation = np.empty(2)
-    places = np.array([0, 1, 2, BEARING, SCALE, RANGES])
+    places = np.array([0, 1, 2, BEARING, SCALE, OFFSET, AHEAD, LEFT, AGE, 0, 0])
+    count = known_ids.shape[0]
     used = 0
     for k in range(ids.shape[0]):
         nis[k] = math.nan
         outcome[k] = OUTCOME_UNKNOWN
         i = np.searchsorted(known_ids, ids[k])
-        if i >= known_ids.shape[0] or known_ids[i] != ids[k]:
+        if i >= count or known_ids[i] != ids[k]:
             continue
-        if not measure(state, known_points[i, 0], known_points[i, 1], i, mount, z, H):
+        places[9], places[10] = LANDMARKS + i, LANDMARKS + count + i
+        if not measure(state, known_points[i, 0], known_points[i, 1], places, mount, motion, scales, z, H):
             continue
         reading = range_of_depth(ranges[k], bearings[k], depth)
         innovation[0] = reading - z[0]
         innovation[1] = wrap(bearings[k] - z[1])
-        R[0, 0] = range_var + range_var_per_m2 * reading * reading
-        R[1, 1] = bearing_var
-        places[5] = RANGES + i
+        R[0, 0] = white[0] + white[1] * reading * reading
+        R[1, 1] = white[2] + white[3] / max(reading, MIN_RANGE_M) ** 2
         nis[k] = joseph_update(state, cov, places, H, innovation, R, gate)
         outcome[k] = OUTCOME_ACCEPTED if nis[k] <= gate else OUTCOME_GATED
         used += outcome[k]

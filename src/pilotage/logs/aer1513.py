@@ -3,7 +3,8 @@
 Arrays: ``t`` (K,), ``r`` and ``b`` (K, L) range and bearing of every landmark from the laser, r = 0 where
 one was not seen; ``v`` and ``om`` (K,) measured speed and turn rate; ``l`` (L, 2) the landmarks;
 ``x_true``, ``y_true``, ``th_true`` (K,); ``d`` distance of the laser ahead of the axle; ``r_var``,
-``b_var``, ``v_var``, ``om_var``.
+``b_var``, ``v_var``, ``om_var``. ``true_valid`` (K,), where it is there, is 0 in rows whose truth is not
+known.
 """
 
 from __future__ import annotations
@@ -14,11 +15,12 @@ from pathlib import Path
 import numpy as np
 
 from pilotage.core.errors import InputError
-from pilotage.core.types import FloatArray
+from pilotage.core.types import BoolArray, FloatArray
 from pilotage.logs.mat import load_mat
 
 SERIES = ("t", "v", "om", "x_true", "y_true", "th_true")
 NUMBERS = ("d", "r_var", "b_var", "v_var", "om_var")
+KNOWN = "true_valid"
 MIN_ROWS = 10
 
 
@@ -30,6 +32,7 @@ class Aer1513Log:
     speed_m_s: FloatArray
     turn_rate_rad_s: FloatArray
     truth: FloatArray
+    truth_known: BoolArray
     ranges_m: FloatArray
     bearings_rad: FloatArray
     points_xy_m: FloatArray
@@ -48,7 +51,7 @@ def read_aer1513(path: Path) -> Aer1513Log:
     InputError
         The array, and its row, where something is missing, of the wrong shape, not finite or backward.
     """
-    content = load_mat(path, (*SERIES, *NUMBERS, "r", "b", "l"))
+    content = load_mat(path, (*SERIES, *NUMBERS, "r", "b", "l", KNOWN))
     missing = [name for name in (*SERIES, "r", "b", "l", *NUMBERS) if name not in content]
     if missing:
         raise InputError(
@@ -64,7 +67,13 @@ def read_aer1513(path: Path) -> Aer1513Log:
     points = _finite(path, "l", _array(path, content, "l"))
     if points.ndim != 2 or points.shape[1] != 2 or points.shape[0] == 0:
         raise InputError(f"{path}: l: expected (L, 2) landmarks, found shape {points.shape}")
-    series = {name: _finite(path, name, _shaped(path, content, name, (rows,))) for name in SERIES}
+    known = np.ones(rows, dtype=bool)
+    if KNOWN in content:
+        known = _finite(path, KNOWN, _shaped(path, content, KNOWN, (rows,)).reshape(-1)) != 0.0
+    series = {
+        name: _finite(path, name, _shaped(path, content, name, (rows,)), known if "true" in name else None)
+        for name in SERIES
+    }
     shape = (rows, points.shape[0])
     ranges = _finite(path, "r", _shaped(path, content, "r", shape)).copy()
     bearings = _finite(path, "b", _shaped(path, content, "b", shape), where=ranges != 0.0).copy()
@@ -78,7 +87,9 @@ def read_aer1513(path: Path) -> Aer1513Log:
         if not value > 0.0:
             raise InputError(f"{path}: {name}: expected a variance above 0, found {value:g}")
     truth = np.column_stack([series["x_true"], series["y_true"], series["th_true"]])
-    return Aer1513Log(t_s, series["v"], series["om"], truth, ranges, bearings, points, ahead, *variances)
+    return Aer1513Log(
+        t_s, series["v"], series["om"], truth, known, ranges, bearings, points, ahead, *variances
+    )
 
 
 def _array(path: Path, content: dict[str, object], name: str) -> FloatArray:

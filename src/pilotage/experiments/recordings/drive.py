@@ -42,6 +42,8 @@ class RecordedDrive:
         (K,) the steps of the 10 Hz grid.
     begin_s
         The log's clock at the begin.
+    rate_var
+        Variances per second of the odometry's distance (m^2) and angle (rad^2), where the log gives them.
     """
 
     name: str
@@ -61,6 +63,7 @@ class RecordedDrive:
     truth_gaps: int
     odometry_gaps: int
     misread: tuple[str, ...]
+    rate_var: tuple[float, float] | None = None
 
     def readings(self) -> Iterator[Readings]:
         """The log through the robot's plug, from the first step after the begin."""
@@ -145,14 +148,16 @@ def aer1513_drive(path: Path, max_range_m: float | None = None) -> RecordedDrive
     )
     truth = log.truth.copy()
     truth[:, 2] = np.unwrap(truth[:, 2])
+    truth[~log.truth_known] = np.nan
+    unknown_begins = np.flatnonzero(np.diff(log.truth_known.astype(np.int64), prepend=1) < 0)
     grid = np.concatenate([[True], np.diff(np.floor((log.t_s - log.t_s[0]) * SCORE_HZ + 1e-6)) > 0])
     return RecordedDrive(
         path.stem,
         None,
         float(log.t_s[0]),
         log.t_s - log.t_s[0],
-        log.speed_m_s * held,
-        log.turn_rate_rad_s * held,
+        _between(log.speed_m_s) * held,
+        _between(log.turn_rate_rad_s) * held,
         np.searchsorted(rows, np.arange(log.t_s.shape[0] + 1)).astype(np.int64),
         columns.astype(np.int64) + 1,
         log.ranges_m[seen],
@@ -170,7 +175,13 @@ def aer1513_drive(path: Path, max_range_m: float | None = None) -> RecordedDrive
                 bearing_var_rad2=log.bearing_var_rad2,
             ),
         },
-        int((dt > TRUTH_GAP_S).sum()),
+        int((dt > TRUTH_GAP_S).sum()) + unknown_begins.shape[0],
         int((dt > HOLD_S).sum()),
         (),
+        (log.speed_var_m2_s2 * step, log.turn_rate_var_rad2_s2 * step),
     )
+
+
+def _between(rates: FloatArray) -> FloatArray:
+    """(K,) mean rate of the step that ends at each sample: rates are taken as linear in between."""
+    return np.concatenate([rates[:1], 0.5 * (rates[1:] + rates[:-1])])

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import math
 from importlib import resources
 from typing import Any
 
 import yaml
 
 from pilotage.experiments.mission import merge
-from pilotage.experiments.recordings.drive import RecordedDrive
+from pilotage.experiments.recordings.drive import BEACONS, RecordedDrive
+from pilotage.sensors.beacon import BeaconConfig
 
 LEARNED = "ekf-slow-errors"
+SLOW_SHARE = 0.5
+"""Variance of a landmark's slow error over that of a single reading."""
 SAME_RECORDING_S = 600.0
 """Clocks that begin this close tell of the same drive, also where the log was cut."""
 
@@ -20,15 +24,31 @@ def shipped_parameters(drive: RecordedDrive, localizer: str, form: str) -> tuple
 
     Never learned from the recording itself: the first set wins that has not seen it.
     """
-    if localizer != LEARNED or form != "mrclam":
+    if localizer != LEARNED:
         return {}, []
-    text = (resources.files("pilotage.experiments.recordings") / "mrclam.yaml").read_text(encoding="utf-8")
+    text = (resources.files("pilotage.experiments.recordings") / f"{form}.yaml").read_text(encoding="utf-8")
     content = yaml.safe_load(text)
+    if form == "aer1513":
+        return _by_data_sheet(drive, content), []
     for chosen in content["sets"]:
         if not any(_same(drive, source) for source in chosen["learned_from"]):
             names = [f"{source['recording']} robot {source['robot']}" for source in chosen["learned_from"]]
             return merge(content["common"], chosen["parameters"]), names
     return dict(content["common"]), []
+
+
+def _by_data_sheet(drive: RecordedDrive, common: dict[str, Any]) -> dict[str, Any]:
+    """Noise of the rates per second, at rest as well; landmark errors in proportion to a reading's."""
+    beacons = drive.sensors[BEACONS]
+    assert isinstance(beacons, BeaconConfig)
+    along = {"std_m": math.sqrt(SLOW_SHARE * beacons.range_var_m2)}
+    own: dict[str, Any] = {"landmark_range_error": along, "landmark_bearing_error": along}
+    if drive.rate_var is not None:
+        distance, angle = drive.rate_var
+        nothing = ("distance_var_m2_per_m", "angle_var_rad2_per_m", "angle_var_rad2_per_rad")
+        own["odometry"] = dict.fromkeys(nothing, 0.0)
+        own |= {"distance_var_m2_per_s": distance, "angle_var_rad2_per_s": angle}
+    return merge(common, own)
 
 
 def _same(drive: RecordedDrive, source: dict[str, Any]) -> bool:

@@ -35,6 +35,19 @@ class SlowError(Config):
     time_constant_s: Positive = 1.0e4
 
 
+class LandmarkError(SlowError):
+    """Of one landmark's readings: ``std`` (fraction of the range, or radians) and metres, together.
+
+    The metres are along the line of sight for a range, and across it for a bearing. Such an error changes
+    as the robot sees the landmark from elsewhere: within ``length_m`` of way and ``angle_rad`` of turn, and
+    within the time constant at rest.
+    """
+
+    std_m: NonNegative = 0.0
+    length_m: Positive = 1.0e4
+    angle_rad: Positive = 1.0e4
+
+
 class CommandMap(Config):
     """From what the odometry says to the motion: gains, what an arc takes away, and a bend.
 
@@ -62,17 +75,27 @@ class EkfSlowErrorsConfig(Config):
     range_var_fraction: NonNegative = 0.0
     """White variance of the range over its square."""
     bearing_var_rad2: Positive | None = None
-    bearing_age_s: NonNegative = 0.0
+    across_var_m2: NonNegative = 0.0
+    """White variance of the bearing times the range squared."""
+    reading_age_s: NonNegative = 0.0
     range_scale: float = Field(default=1.0, gt=0.5, lt=2.0)
     """Read over true range."""
     depth_power: float = Field(default=0.0, ge=0.0, le=2.0)
     """The reading is the range times cos(bearing) to this power: 0 a range, 1 the depth of a camera."""
     speed_error: SlowError = SlowError(std=0.01, time_constant_s=30.0)
     turn_error: SlowError = SlowError(std=0.01, time_constant_s=30.0)
+    speed_offset_m_s: SlowError = SlowError(std=0.0)
+    turn_offset_rad_s: SlowError = SlowError(std=0.0)
     course_rad: SlowError = SlowError(std=0.002)
     bearing_rad: SlowError = SlowError(std=0.002)
-    sensor_range_error: SlowError = SlowError(std=0.002)
-    landmark_range_error: SlowError = SlowError(std=0.002, time_constant_s=30.0)
+    range_error: SlowError = SlowError(std=0.002)
+    """Of the sensor, a fraction of the range."""
+    range_offset_m: SlowError = SlowError(std=0.0)
+    mount_ahead_m: SlowError = SlowError(std=0.0)
+    mount_left_m: SlowError = SlowError(std=0.0)
+    age_error_s: SlowError = SlowError(std=0.0)
+    landmark_range_error: LandmarkError = LandmarkError(std=0.002, time_constant_s=30.0)
+    landmark_bearing_error: LandmarkError = LandmarkError(std=0.0, time_constant_s=30.0)
     recovery_rejections: int = Field(default=5, ge=2)
     """So many more rejections than acceptances say that the filter is wrong, not the sensor."""
     recovery_factor: float = Field(default=2.0, gt=1.0)
@@ -104,23 +127,41 @@ class EkfSlowErrorsLocalizer:
         order = np.argsort(knowledge.landmarks.ids)
         self._ids = knowledge.landmarks.ids[order]
         self._points = knowledge.landmarks.points_xy_m[order]
-        self._mount = np.array([beacons.mount.x_m, beacons.mount.y_m, beacons.mount.theta_rad])
-        self._range_var = beacons.range_var_m2 if config.range_var_m2 is None else config.range_var_m2
-        self._bearing_var = (
-            beacons.bearing_var_rad2 if config.bearing_var_rad2 is None else config.bearing_var_rad2
-        )
-        if self._range_var == 0.0 or self._bearing_var == 0.0:
+        mount = beacons.mount
+        self._mount = np.array([mount.x_m, mount.y_m, mount.theta_rad, config.reading_age_s])
+        range_var = beacons.range_var_m2 if config.range_var_m2 is None else config.range_var_m2
+        bearing_var = beacons.bearing_var_rad2 if config.bearing_var_rad2 is None else config.bearing_var_rad2
+        if range_var == 0.0 or bearing_var == 0.0:
             raise InputError(
                 f"{NAME}: a beacon sensor without noise leaves the filter no measurement variance; "
                 "set stack.localizer.range_var_m2 and stack.localizer.bearing_var_rad2 above 0"
             )
+        self._white = np.array([range_var, config.range_var_fraction, bearing_var, config.across_var_m2])
+        along, across = config.landmark_range_error, config.landmark_bearing_error
+        self._scales = np.array([along.std, along.std_m, across.std, across.std_m])
         self._gate = chi_square_quantile(config.gate, MEASUREMENT_DOF)
         self._expected_nis = gated_mean(self._gate, MEASUREMENT_DOF)
-        errors = [config.speed_error, config.turn_error, config.course_rad, config.bearing_rad]
-        errors += [config.sensor_range_error] + [config.landmark_range_error] * len(self._ids)
-        self._stationary = np.array([0.0, 0.0, 0.0, *(error.std**2 for error in errors)])
-        self._rates = np.array([0.0, 0.0, 0.0, *(1.0 / error.time_constant_s for error in errors)])
-        self._state = np.concatenate([knowledge.initial.pose.as_array(), np.zeros(len(errors))])
+        errors: list[SlowError] = [
+            config.speed_error,
+            config.turn_error,
+            config.speed_offset_m_s,
+            config.turn_offset_rad_s,
+            config.course_rad,
+            config.bearing_rad,
+            config.range_error,
+            config.range_offset_m,
+            config.mount_ahead_m,
+            config.mount_left_m,
+            config.age_error_s,
+        ]
+        count = len(self._ids)
+        # A landmark's errors are kept in units of their standard deviations.
+        self._stationary = np.array([0.0] * 3 + [error.std**2 for error in errors] + [1.0] * (2 * count))
+        constant = [[1.0 / error.time_constant_s, 0.0, 0.0] for error in errors]
+        self._fading = np.array(
+            [[0.0] * 3] * 3 + constant + [_fading(along)] * count + [_fading(across)] * count
+        )
+        self._state = np.concatenate([knowledge.initial.pose.as_array(), np.zeros(len(errors) + 2 * count)])
         self._cov = np.diag(self._stationary)
         self._cov[:3, :3] = knowledge.initial.cov
         floor = [config.recovery_position_std_m] * 2 + [config.recovery_heading_std_rad]
@@ -128,7 +169,7 @@ class EkfSlowErrorsLocalizer:
         self._pending: deque[tuple[float, float, float, float]] = deque()
         self._t_s: float | None = None
         self._dt_s = knowledge.dt_s
-        self._turn_rate = 0.0
+        self._motion = np.zeros(2)
         self._rejections = self.recoveries = 0
         self.belief = knowledge.initial
         self._count(0, 0, 0.0)
@@ -177,7 +218,6 @@ class EkfSlowErrorsLocalizer:
         gain = max(commands.speed_gain - commands.speed_loss_per_rad_s * claimed_rate, 0.0)
         moved = gain * distance
         turned = commands.turn_gain * angle + commands.bend_rad_per_m * moved
-        self._turn_rate = turned / dt_s
         distance_var, angle_var = self._noise.variances(OdometryIncrement(moved, turned))
         slow_errors.predict(
             self._state,
@@ -187,9 +227,12 @@ class EkfSlowErrorsLocalizer:
             dt_s,
             distance_var + config.distance_var_m2_per_s * dt_s,
             angle_var + config.angle_var_rad2_per_s * dt_s,
-            self._rates,
+            self._fading,
             self._stationary,
         )
+        state = self._state
+        self._motion[0] = moved / dt_s * (1.0 + state[slow_errors.SPEED]) + state[slow_errors.SPEED_OFFSET]
+        self._motion[1] = turned / dt_s * (1.0 + state[slow_errors.TURN]) + state[slow_errors.TURN_OFFSET]
 
     def _update(self, seen: BeaconReadings) -> None:
         config, count = self._config, seen.ids.shape[0]
@@ -199,15 +242,14 @@ class EkfSlowErrorsLocalizer:
             self._cov,
             seen.ids,
             seen.ranges_m / config.range_scale,
-            # An old picture was taken before the last bit of turn.
-            seen.bearings_rad - self._turn_rate * config.bearing_age_s,
+            seen.bearings_rad,
             self._ids,
             self._points,
             self._mount,
+            self._motion,
+            self._scales,
             config.depth_power,
-            self._range_var,
-            config.range_var_fraction,
-            self._bearing_var,
+            self._white,
             self._gate,
             nis,
             outcome,
@@ -233,11 +275,21 @@ class EkfSlowErrorsLocalizer:
             "recoveries": float(self.recoveries),
             "speed_error": float(self._state[slow_errors.SPEED]),
             "turn_error": float(self._state[slow_errors.TURN]),
+            "speed_offset_m_s": float(self._state[slow_errors.SPEED_OFFSET]),
+            "turn_offset_rad_s": float(self._state[slow_errors.TURN_OFFSET]),
             "course_rad": float(self._state[slow_errors.COURSE]),
             "bearing_offset_rad": float(self._state[slow_errors.BEARING]),
             "range_error": float(self._state[slow_errors.SCALE]),
+            "range_offset_m": float(self._state[slow_errors.OFFSET]),
+            "mount_ahead_m": float(self._state[slow_errors.AHEAD]),
+            "mount_left_m": float(self._state[slow_errors.LEFT]),
+            "age_error_s": float(self._state[slow_errors.AGE]),
         }
 
     def telemetry(self) -> Mapping[str, float]:
         """Beacons seen and accepted, their NIS, recoveries so far, and the errors as believed."""
         return self._telemetry
+
+
+def _fading(error: LandmarkError) -> list[float]:
+    return [1.0 / error.time_constant_s, 1.0 / error.length_m, 1.0 / error.angle_rad]
