@@ -14,6 +14,7 @@ from pilotage.core.types import FloatArray
 from pilotage.experiments.recordings.localize import localize_log
 from pilotage.kernels import slow_errors
 from pilotage.logs.aer1513 import read_aer1513
+from pilotage.report import write_report
 
 
 def column(values: Any) -> FloatArray:
@@ -154,6 +155,15 @@ def test_rows_whose_truth_is_not_valid_are_left_out(tmp_path: Path) -> None:
     assert found["scored_steps"] == 399 - 50
     assert found["truth_gaps"] == 2
     assert float(str(found["position_rmse_m"])) < 0.1
+
+
+def test_a_recording_s_page_shows_what_recordings_have(tmp_path: Path) -> None:
+    savemat(tmp_path / "d.mat", laser_drive(rows=400))
+    page = write_report(localize_log(tmp_path / "d.mat", tmp_path, form="aer1513").run_dir).read_text()
+    assert "What the filter found out about robot and sensor" in page
+    assert "Ultrasonic" not in page
+    assert "Clearance of the body" not in page
+    assert "values come from the recording" in page
 
 
 def test_what_the_data_sheet_does_not_say_is_found(tmp_path: Path) -> None:

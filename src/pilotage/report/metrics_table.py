@@ -62,7 +62,12 @@ GROUPS: tuple[tuple[str, tuple[Metric, ...]], ...] = (
     (
         "Run",
         (
-            Metric("duration_s", "duration", quantities.duration, "Simulated time from start to end."),
+            Metric(
+                "duration_s",
+                "duration",
+                quantities.duration,
+                "Time from start to end, simulated or recorded.",
+            ),
             Metric(
                 "travel_time_s", "travel time", quantities.duration, "Of the planned way at a constant speed."
             ),
@@ -171,6 +176,18 @@ GROUPS: tuple[tuple[str, tuple[Metric, ...]], ...] = (
                 quantities.share,
                 "Share of the sightings, beacons or walls, that the filter used.",
             ),
+            Metric("scored_steps", "steps scored", quantities.count, "Steps at 10 Hz whose truth is known."),
+            Metric("steps_without_truth", "steps without truth", quantities.count, "Left out of all errors."),
+            Metric("readings", "readings", quantities.count, "Of landmarks, over the whole recording."),
+            Metric(
+                "recoveries",
+                "recoveries",
+                quantities.count,
+                "How often several refused readings made the filter less sure.",
+            ),
+            Metric("truth_gaps", "gaps in the truth", quantities.count, "Stretches left out of all errors."),
+            Metric("odometry_gaps", "gaps in the odometry", quantities.count, "Longer than 0.5 s."),
+            Metric("misread_barcodes", "barcodes misread", quantities.count, "Of no landmark and no robot."),
             Metric("lost_s", "lost", quantities.duration, "Time in which the robot said that it was lost."),
             Metric(
                 "wrong_s",

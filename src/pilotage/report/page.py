@@ -15,6 +15,7 @@ from pilotage.report.figures.control import control_figure
 from pilotage.report.figures.covariance import covariance_figure
 from pilotage.report.figures.map import map_figure
 from pilotage.report.figures.pose_error import pose_error_figure
+from pilotage.report.figures.slow_errors import slow_errors_figure
 from pilotage.report.figures.terrain_estimate import drive_figure, rover_error_figure, uncertainty_figure
 from pilotage.report.figures.terrain_map import (
     close_up_figure,
@@ -80,10 +81,19 @@ SHEET_FIGURES: tuple[Draw, ...] = (
     printed_figure,
     pose_error_figure,
 )
+RECORDING_FIGURES: tuple[Draw, ...] = (
+    map_figure,
+    close_ups_figure,
+    pose_error_figure,
+    covariance_figure,
+    consistency_figure,
+    slow_errors_figure,
+)
 FIGURES: dict[str, tuple[Draw, ...]] = {
     "floor": FLOOR_FIGURES,
     "terrain": TERRAIN_FIGURES,
     "sheet": SHEET_FIGURES,
+    "recording": RECORDING_FIGURES,
 }
 """What is drawn of a run, by the kind of its mission."""
 SCENES: dict[str, Callable[[RunData], ReplayScene | None]] = {"floor": floor_scene, "sheet": sheet_scene}
@@ -109,8 +119,8 @@ def run_page(run: RunData) -> str:
     """Return the report of a run as HTML."""
     with drawing_style():
         figures = [draw(run) for draw in FIGURES.get(run.kind, FLOOR_FIGURES)]
-        if run.kind == "terrain":
-            # Its missions differ in what they do at all: what they do not do is not missing.
+        if run.kind in ("terrain", "recording"):
+            # They differ in what they do at all: what they do not do is not missing.
             figures = [figure for figure in figures if figure.svg or figure.slug == "hazards"]
         if run.updates:
             figures.append(updates_figure(run))
@@ -118,7 +128,7 @@ def run_page(run: RunData) -> str:
     entries: list[tuple[str, str]] = [(SLUG, TITLE)]
     drawn = 0
     slugs = [figure.slug for figure in figures]
-    explained = next((slug for slug in ("timeline", "coverage") if slug in slugs), slugs[0])
+    explained = next((slug for slug in ("timeline", "coverage") if slug in slugs), slugs[0] if slugs else "")
     for figure in figures:
         drawn += bool(figure.svg)
         sections.append(figure_section(drawn, figure))
@@ -131,6 +141,7 @@ def run_page(run: RunData) -> str:
         sections.append(_mission_section(run.mission_text))
         entries.append(("mission", "The mission as it ran"))
     description = str(run.mission.get("description") or "")
+    source = "recording" if run.kind == "recording" else "simulator"
     return document(
         title=escape(f"{run.name}: run report"),
         layers="".join(layer_rules(figure) for figure in figures) + style(),
@@ -144,8 +155,8 @@ def run_page(run: RunData) -> str:
         contents=contents(entries),
         body="\n".join(sections),
         footer=escape(
-            f"Made by pilotage from the run folder {run.run_dir.name}. Angles are counter-clockwise; "
-            "true values come from the simulator, the robot never sees them."
+            f"Made by pilotage from the run folder {run.run_dir.name}. Angles are counter-clockwise; true "
+            f"values come from the {source}, the robot never sees them."
         ),
     )
 

@@ -54,7 +54,7 @@ def duration(value_s: float) -> str:
 
 def share(value: float) -> str:
     """Write a share of one in percent."""
-    return f"{100.0 * value:.1f}\u00a0%" if math.isfinite(value) else NOTHING
+    return f"{100.0 * value:.1f}\u00a0%".replace("-", "−") if math.isfinite(value) else NOTHING
 
 
 def count(value: float) -> str:

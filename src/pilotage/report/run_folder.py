@@ -139,7 +139,9 @@ class RunData:
 
     @property
     def kind(self) -> str:
-        """The kind of world that the mission has."""
+        """The kind of world that the mission has; "recording" for a recorded log."""
+        if not self.mission and "localizer" in self.metrics:
+            return "recording"
         world = self.mission.get("world")
         return str(world.get("kind", "floor")) if isinstance(world, Mapping) else "floor"
 

@@ -33,6 +33,7 @@ from pilotage.report.style import (
 SLUG = "close-ups"
 TITLE = "Close-ups"
 MOST = 3
+WAY_S = 30.0
 _LEFT_PT, _RIGHT_PT, _TOP_PT, _BOTTOM_PT, _GAP_PT = 24.0, 4.0, 20.0, 22.0, 28.0
 # What went wrong is worth more than what went well.
 _TELLING = ("collision", "failed", "stuck", "escape", "avoid-start", "replan", "hall")
@@ -67,11 +68,11 @@ def close_ups_figure(run: RunData) -> Illustration:
         axes.tick_params(length=0.0)
         axes.set_title(moment.title, fontsize=9.0)
         axes.locator_params(nbins=5)
-        _draw(axes, _window(run, x, y, half_m), run, moment.step, radius)
+        _draw(axes, _window(run, x, y, half_m, moment.step), run, moment.step, radius)
     caption = (
-        f"Windows of {quantities.length(2.0 * half_m)}, in metres like the map. The disc is the robot at "
-        "that moment, the dashed ring is where it believed to be; the small black ellipses hold it with 95 % "
-        "probability and are to scale."
+        f"Windows of {quantities.length(2.0 * half_m)}, in metres like the map, with the way of "
+        f"{WAY_S:g} s before and after. The disc is the robot at that moment, the dashed ring is where it "
+        "believed to be; the small black ellipses hold it with 95 % probability and are to scale."
     )
     candidates = (
         (True, Key("true path", BLUE)),
@@ -163,8 +164,12 @@ def _draw(axes: Axes, inside: RunData, run: RunData, step: int, radius: float) -
     axes.plot(xs, ys, "D", markersize=5.5, color=GREEN, markeredgecolor="white", zorder=8.2)
 
 
-def _window(run: RunData, x: float, y: float, half_m: float) -> RunData:
-    """Return the run with only what lies in a window: lines are cut at its rim to keep the page small."""
+def _window(run: RunData, x: float, y: float, half_m: float, step: int) -> RunData:
+    """Return the run with only what lies in a window: lines are cut at its rim to keep the page small.
+
+    Of the ways only those of `WAY_S` around the moment: a robot that passes often would fill the window.
+    """
+    soon = np.abs(run.trace.t_s - run.trace.t_s[step]) <= WAY_S
 
     def near(points: FloatArray) -> BoolArray:
         # A little more than the window, so that lines leave it instead of ending at its rim.
@@ -180,7 +185,7 @@ def _window(run: RunData, x: float, y: float, half_m: float) -> RunData:
         if not all(name in columns for name in pair):
             return {}
         points = np.stack([columns[name] for name in pair], axis=1)
-        inside = near(points)
+        inside = near(points) & soon
         return {name: np.where(inside, columns[name], np.nan) for name in pair}
 
     columns = dict(run.trace.columns)

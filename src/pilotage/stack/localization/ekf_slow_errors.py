@@ -27,6 +27,21 @@ from pilotage.stack.localization.odometry_prediction import OdometryNoise, Odome
 
 NAME = "ekf-slow-errors"
 
+TELEMETRY = {
+    "speed_error": slow_errors.SPEED,
+    "turn_error": slow_errors.TURN,
+    "speed_offset_m_s": slow_errors.SPEED_OFFSET,
+    "turn_offset_rad_s": slow_errors.TURN_OFFSET,
+    "course_rad": slow_errors.COURSE,
+    "bearing_offset_rad": slow_errors.BEARING,
+    "range_error": slow_errors.SCALE,
+    "range_offset_m": slow_errors.OFFSET,
+    "mount_ahead_m": slow_errors.AHEAD,
+    "mount_left_m": slow_errors.LEFT,
+    "age_error_s": slow_errors.AGE,
+}
+"""Names of the errors in a trace; each has a standard deviation beside it."""
+
 
 class SlowError(Config):
     """A first-order Gauss-Markov error: the standard deviation that it keeps, and its time constant."""
@@ -273,18 +288,10 @@ class EkfSlowErrorsLocalizer:
             "nis_dof": float(MEASUREMENT_DOF * accepted),
             "nis_expected": accepted * self._expected_nis if accepted else math.nan,
             "recoveries": float(self.recoveries),
-            "speed_error": float(self._state[slow_errors.SPEED]),
-            "turn_error": float(self._state[slow_errors.TURN]),
-            "speed_offset_m_s": float(self._state[slow_errors.SPEED_OFFSET]),
-            "turn_offset_rad_s": float(self._state[slow_errors.TURN_OFFSET]),
-            "course_rad": float(self._state[slow_errors.COURSE]),
-            "bearing_offset_rad": float(self._state[slow_errors.BEARING]),
-            "range_error": float(self._state[slow_errors.SCALE]),
-            "range_offset_m": float(self._state[slow_errors.OFFSET]),
-            "mount_ahead_m": float(self._state[slow_errors.AHEAD]),
-            "mount_left_m": float(self._state[slow_errors.LEFT]),
-            "age_error_s": float(self._state[slow_errors.AGE]),
         }
+        for name, place in TELEMETRY.items():
+            self._telemetry[name] = float(self._state[place])
+            self._telemetry[f"{name}_std"] = math.sqrt(max(float(self._cov[place, place]), 0.0))
 
     def telemetry(self) -> Mapping[str, float]:
         """Beacons seen and accepted, their NIS, recoveries so far, and the errors as believed."""
