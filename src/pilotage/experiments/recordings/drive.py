@@ -11,7 +11,7 @@ import numpy as np
 from pilotage.core.errors import InputError
 from pilotage.core.types import BoolArray, FloatArray, IntArray
 from pilotage.logs.aer1513 import read_aer1513
-from pilotage.logs.mrclam import TRUTH_GAP_S, read_mrclam
+from pilotage.logs.mrclam import TRUTH_GAP_S, MrclamLog, read_mrclam
 from pilotage.maps.landmarks import Landmarks
 from pilotage.sensors.beacon import BeaconConfig
 from pilotage.sensors.readings import BeaconReadings, OdometryIncrement, Reading, Readings
@@ -33,7 +33,7 @@ class RecordedDrive:
     t_s
         (K,) ends of the steps since the begin; the first is the begin itself.
     distance_m, angle_rad
-        (K,) as the odometry claims for the step that ends there.
+        (K,) as the odometry claims for the step that ends there; nan where the log says nothing of it.
     first, ids, ranges_m, bearings_rad
         Readings first[k] to first[k + 1] were taken at step k.
     truth
@@ -68,9 +68,9 @@ class RecordedDrive:
     def readings(self) -> Iterator[Readings]:
         """The log through the robot's plug, from the first step after the begin."""
         for k in range(1, self.t_s.shape[0]):
-            said: dict[str, Reading] = {
-                ODOMETRY: OdometryIncrement(float(self.distance_m[k]), float(self.angle_rad[k]))
-            }
+            said: dict[str, Reading] = {}
+            if np.isfinite(self.distance_m[k]):
+                said[ODOMETRY] = OdometryIncrement(float(self.distance_m[k]), float(self.angle_rad[k]))
             rows = slice(int(self.first[k]), int(self.first[k + 1]))
             if rows.stop > rows.start:
                 said[BEACONS] = BeaconReadings(self.ids[rows], self.ranges_m[rows], self.bearings_rad[rows])
@@ -94,9 +94,7 @@ def mrclam_drive(folder: Path, robot: int) -> RecordedDrive:
     inside = (log.measurement_t_s[known] > begin) & (log.measurement_t_s[known] <= end)
     known = known[inside]
     clock = np.union1d(grid, log.measurement_t_s[known])
-    held = np.minimum(np.diff(log.odometry_t_s), HOLD_S)
-    gone = [np.concatenate([[0.0], np.cumsum(held * x[:-1])]) for x in (log.speed_m_s, log.turn_rate_rad_s)]
-    distance, angle = (np.diff(np.interp(clock, log.odometry_t_s, x), prepend=0.0) for x in gone)
+    distance, angle = _held(clock, log)
     heading = np.unwrap(log.truth[:, 2])
     columns = (log.truth[:, 0], log.truth[:, 1], heading)
     truth = np.column_stack([np.interp(clock, log.truth_t_s, column) for column in columns])
@@ -136,7 +134,7 @@ def aer1513_drive(path: Path, max_range_m: float | None = None) -> RecordedDrive
         seen &= np.nan_to_num(log.ranges_m, nan=np.inf) <= max_range_m
     seen[0] = False
     dt = np.diff(log.t_s, prepend=log.t_s[0])
-    held = np.minimum(dt, HOLD_S)
+    known = np.where(dt <= HOLD_S, dt, np.nan)
     rows, columns = np.nonzero(seen)
     # The file's noise is of the rates, drawn anew each step: per metre and radian, at the usual rates.
     step = float(np.median(dt[1:]))
@@ -156,8 +154,8 @@ def aer1513_drive(path: Path, max_range_m: float | None = None) -> RecordedDrive
         None,
         float(log.t_s[0]),
         log.t_s - log.t_s[0],
-        _between(log.speed_m_s) * held,
-        _between(log.turn_rate_rad_s) * held,
+        _between(log.speed_m_s) * known,
+        _between(log.turn_rate_rad_s) * known,
         np.searchsorted(rows, np.arange(log.t_s.shape[0] + 1)).astype(np.int64),
         columns.astype(np.int64) + 1,
         log.ranges_m[seen],
@@ -185,3 +183,20 @@ def aer1513_drive(path: Path, max_range_m: float | None = None) -> RecordedDrive
 def _between(rates: FloatArray) -> FloatArray:
     """(K,) mean rate of the step that ends at each sample: rates are taken as linear in between."""
     return np.concatenate([rates[:1], 0.5 * (rates[1:] + rates[:-1])])
+
+
+def _held(clock: FloatArray, log: MrclamLog) -> tuple[FloatArray, FloatArray]:
+    """Distance and angle of the steps that end at ``clock`` (K,): each command acts until the next one.
+
+    No longer than `HOLD_S`, though: a step of which the log covers less than half is not known (nan).
+    """
+    t = log.odometry_t_s
+    # The commands' times, and the ends of those after which the log falls silent.
+    silent = np.flatnonzero(np.diff(t) > HOLD_S)
+    knots = np.insert(t, silent + 1, t[silent] + HOLD_S)
+    acting = np.insert(np.ones(t.shape[0]), silent + 1, 0.0)[:-1] * np.diff(knots)
+    rates = [np.insert(rate, silent + 1, 0.0)[:-1] for rate in (log.speed_m_s, log.turn_rate_rad_s)]
+    gone = [np.concatenate([[0.0], np.cumsum(x)]) for x in (acting, *(acting * rate for rate in rates))]
+    covered, distance, angle = (np.diff(np.interp(clock, knots, x), prepend=0.0) for x in gone)
+    unknown = covered < 0.5 * np.diff(clock, prepend=clock[0])
+    return np.where(unknown, np.nan, distance), np.where(unknown, np.nan, angle)

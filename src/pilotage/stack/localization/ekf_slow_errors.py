@@ -111,6 +111,9 @@ class EkfSlowErrorsConfig(Config):
     age_error_s: SlowError = SlowError(std=0.0)
     landmark_range_error: LandmarkError = LandmarkError(std=0.002, time_constant_s=30.0)
     landmark_bearing_error: LandmarkError = LandmarkError(std=0.0, time_constant_s=30.0)
+    unlogged_speed_m_s: NonNegative = 0.05
+    unlogged_turn_rate_rad_s: NonNegative = 0.2
+    """Standard deviations of what the robot may do while its odometry says nothing."""
     recovery_rejections: int = Field(default=5, ge=2)
     """So many more rejections than acceptances say that the filter is wrong, not the sensor."""
     recovery_factor: float = Field(default=2.0, gt=1.0)
@@ -182,6 +185,7 @@ class EkfSlowErrorsLocalizer:
         floor = [config.recovery_position_std_m] * 2 + [config.recovery_heading_std_rad]
         self._floor: FloatArray = np.array(floor) ** 2
         self._pending: deque[tuple[float, float, float, float]] = deque()
+        self._unlogged_s = 0.0
         self._t_s: float | None = None
         self._dt_s = knowledge.dt_s
         self._motion = np.zeros(2)
@@ -213,17 +217,31 @@ class EkfSlowErrorsLocalizer:
             while self._pending and self._pending[0][1] + delay <= at + 1e-9:
                 self._pending.popleft()
             if not self._pending or self._pending[0][0] + delay >= end_s:
-                self._predict(0.0, 0.0, end_s - at)  # nothing is known to act
+                self._wonder(end_s - at)
                 return
             start, stop, distance, angle = self._pending[0]
             if start + delay > at + 1e-9:
-                self._predict(0.0, 0.0, start + delay - at)
+                self._wonder(start + delay - at)
                 at = start + delay
                 continue
+            self._unlogged_s = 0.0
             until = min(stop + delay, end_s)
             share = (until - at) / (stop - start)
             self._predict(share * distance, share * angle, until - at)
             at = until
+
+    def _wonder(self, dt_s: float) -> None:
+        """Nothing is known to act: the robot may stand, or go on at a speed that stays unknown.
+
+        Its place then has the variance (speed t)^2, which grows by speed^2 (2 t + dt) dt.
+        """
+        self._predict(0.0, 0.0, dt_s)
+        growth = (2.0 * self._unlogged_s + dt_s) * dt_s
+        self._unlogged_s += dt_s
+        place = self._config.unlogged_speed_m_s**2 * growth
+        slow_errors.inflate(
+            self._cov, 1.0, np.array([place, place, self._config.unlogged_turn_rate_rad_s**2 * growth])
+        )
 
     def _predict(self, distance: float, angle: float, dt_s: float) -> None:
         if dt_s <= 0.0:
