@@ -15,7 +15,7 @@ from pilotage.core.config import Config, validate
 from pilotage.core.errors import InputError
 from pilotage.core.types import FloatArray, Pose2
 from pilotage.evaluation.relief import relief
-from pilotage.experiments.mission import parse_override, parse_yaml, read_text
+from pilotage.experiments.values import parse_override, parse_yaml, read_text
 from pilotage.maps.elevation import ElevationModel
 from pilotage.maps.elevation_file import read_elevation
 from pilotage.maps.grid_file import GRID_SUFFIXES, read_grid

@@ -8,11 +8,10 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
-import yaml
-
 from pilotage.core.config import validate
 from pilotage.core.errors import InputError, nearest, unknown_name
 from pilotage.experiments.kinds import KINDS, kind_name
+from pilotage.experiments.values import apply_override, merge, parse_yaml, read_text
 from pilotage.missions.mission import TOP_KEYS, Mission
 
 SHIPPED = resources.files("pilotage.missions") / "files"
@@ -117,124 +116,3 @@ def _anchor_map(values: dict[str, Any], folder: Path) -> None:
         source = holder.get(key)
         if isinstance(source, str) and (folder / source).is_file():
             holder[key] = str(folder / source)
-
-
-def read_text(path: Path) -> str:
-    """Read a text file; InputError where it cannot be read."""
-    try:
-        return path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"'{path}': expected a readable text file, found: {error}") from None
-
-
-def parse_yaml(text: str, where: str) -> dict[str, Any]:
-    """Parse a YAML mapping; InputError with the line where it breaks."""
-    try:
-        values = yaml.safe_load(text)
-    except yaml.YAMLError as error:
-        mark = getattr(error, "problem_mark", None)
-        line = f" line {mark.line + 1}" if mark is not None else ""
-        problem = getattr(error, "problem", None) or "not YAML"
-        raise InputError(f"{where}{line}: expected YAML, found: {problem}") from None
-    if not isinstance(values, dict):
-        found = "an empty file" if values is None else f"a {type(values).__name__}"
-        raise InputError(f"{where}: expected a mapping of keys, found {found}")
-    return values
-
-
-def merge(base: dict[str, Any], changes: dict[str, Any]) -> dict[str, Any]:
-    """Lay ``changes`` over ``base``: mappings key by key, all else replaced.
-
-    A component whose ``name`` changes starts from nothing: its parameters are not the old one's.
-    """
-    merged = copy.deepcopy(base)
-    for key, value in changes.items():
-        old = merged.get(key)
-        if isinstance(value, dict) and isinstance(old, dict) and not _renames(old, value):
-            merged[key] = merge(old, value)
-        else:
-            merged[key] = copy.deepcopy(value)
-    return merged
-
-
-def _renames(old: dict[str, Any], new: dict[str, Any]) -> bool:
-    return "name" in new and new["name"] != old.get("name")
-
-
-def parse_override(override: str) -> tuple[list[str], Any]:
-    """Split ``dotted.key=value`` into the key's parts and the value, which is read as YAML.
-
-    Raises
-    ------
-    InputError
-        If the text is not of that form.
-    """
-    key, equals, text = override.partition("=")
-    parts = key.strip().split(".")
-    if not equals or not all(parts):
-        raise InputError(f"--set '{override}': expected KEY=VALUE such as stack.localizer.gate=0.99")
-    try:
-        value = yaml.safe_load(text)
-    except yaml.YAMLError:
-        raise InputError(f"--set '{override}': the value is not YAML") from None
-    if isinstance(value, str):
-        value = _number(value)
-    return parts, value
-
-
-def apply_override(values: dict[str, Any], override: str) -> None:
-    """Apply one ``dotted.key=value`` in place.
-
-    Raises
-    ------
-    InputError
-        If the text is not of that form or the key leads through something that has no keys.
-    """
-    parts, value = parse_override(override)
-    top = list(TOP_KEYS)
-    if parts[0] not in top:
-        close = nearest(parts[0], top)
-        hint = f"did you mean '{close}'?" if close else "known: " + ", ".join(top)
-        raise InputError(f"--set '{override}': unknown key '{parts[0]}'; {hint}")
-    place: Any = values
-    for depth, part in enumerate(parts[:-1]):
-        inner = _child(place, part, override)
-        if inner is None:
-            inner = {}
-            _put(place, part, inner, override)
-        if not isinstance(inner, dict | list):
-            raise InputError(
-                f"--set '{override}': '{'.'.join(parts[: depth + 1])}' is a value, it has no keys"
-            )
-        place = inner
-    last = parts[-1]
-    if last == "name" and isinstance(place, dict) and place.get("name") != value:
-        place.clear()
-    _put(place, last, value, override)
-
-
-def _number(text: str) -> Any:
-    """YAML 1.1 reads 1e-3 as text; take such a text for the number it is."""
-    try:
-        return float(text)
-    except ValueError:
-        return text
-
-
-def _child(place: Any, part: str, override: str) -> Any:
-    if isinstance(place, list):
-        return place[_index(place, part, override)]
-    return place.get(part)
-
-
-def _put(place: Any, part: str, value: Any, override: str) -> None:
-    if isinstance(place, list):
-        place[_index(place, part, override)] = value
-    else:
-        place[part] = value
-
-
-def _index(place: list[Any], part: str, override: str) -> int:
-    if not part.isdigit() or int(part) >= len(place):
-        raise InputError(f"--set '{override}': expected an index from 0 to {len(place) - 1}, found '{part}'")
-    return int(part)

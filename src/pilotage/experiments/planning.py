@@ -11,7 +11,7 @@ from pilotage.core.random import RandomStreams
 from pilotage.core.types import Goal, Pose2
 from pilotage.evaluation.shortest_path import shortest_path
 from pilotage.experiments.floor.world_map import load_map
-from pilotage.experiments.mission import parse_override
+from pilotage.experiments.values import parse_override
 from pilotage.maps.map_file import LandmarkMap
 from pilotage.stack.interface import PlannedPath
 from pilotage.stack.navigator.global_plan import GlobalPlan

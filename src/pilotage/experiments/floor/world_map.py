@@ -6,7 +6,7 @@ from importlib import resources
 from pathlib import Path
 
 from pilotage.core.errors import InputError, unknown_name
-from pilotage.experiments.mission import parse_yaml, read_text
+from pilotage.experiments.values import parse_yaml, read_text
 from pilotage.maps.map_file import LandmarkMap, MapFile, build_map, parse_map
 
 SHIPPED = resources.files("pilotage.missions") / "maps"

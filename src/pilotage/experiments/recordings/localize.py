@@ -21,10 +21,11 @@ from pilotage.core.random import RandomStreams
 from pilotage.core.types import Event, FloatArray, Pose2
 from pilotage.evaluation.log_metrics import log_metrics
 from pilotage.experiments.floor.recorder import BELIEF_COLUMNS, TRUTH_COLUMNS
-from pilotage.experiments.mission import apply_override, merge, read_parameters
+from pilotage.experiments.mission import read_parameters
 from pilotage.experiments.recordings.drive import RecordedDrive, aer1513_drive, mrclam_drive
 from pilotage.experiments.recordings.parameters import shipped_parameters
 from pilotage.experiments.run_folder import clean, replace_folder
+from pilotage.experiments.values import apply_override, merge
 from pilotage.maps.segment_map import SegmentMap
 from pilotage.stack.interface import Belief
 from pilotage.stack.knowledge import Knowledge

@@ -8,8 +8,8 @@ from typing import Any
 
 import yaml
 
-from pilotage.experiments.mission import merge
 from pilotage.experiments.recordings.drive import BEACONS, RecordedDrive
+from pilotage.experiments.values import merge
 from pilotage.sensors.beacon import BeaconConfig
 
 LEARNED = "ekf-slow-errors"

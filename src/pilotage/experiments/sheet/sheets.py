@@ -7,7 +7,7 @@ from pathlib import Path
 
 from pilotage.core.config import validate
 from pilotage.core.errors import InputError, unknown_name
-from pilotage.experiments.mission import parse_yaml, read_text
+from pilotage.experiments.values import parse_yaml, read_text
 from pilotage.maps.true_cells import SheetFile
 
 SHIPPED = resources.files("pilotage.missions") / "sheets"

@@ -15,10 +15,11 @@ import yaml
 from pilotage.core.config import validate
 from pilotage.core.errors import InputError, unknown_name
 from pilotage.experiments.kinds import check_oracles, kind_of
-from pilotage.experiments.mission import mission_of, parse_yaml, read_mission, read_text, shipped_missions
+from pilotage.experiments.mission import mission_of, read_mission, shipped_missions
 from pilotage.experiments.resolve import resolved_values
 from pilotage.experiments.studies.cells import Cell, make_cells
 from pilotage.experiments.studies.definition import StudyDefinition
+from pilotage.experiments.values import parse_yaml, read_text
 
 SHIPPED = resources.files("pilotage.missions") / "studies"
 STUDY_FILE, MISSION_FILE = "study.yaml", "mission.yaml"

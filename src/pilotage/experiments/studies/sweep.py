@@ -12,9 +12,9 @@ import yaml
 
 from pilotage.core.config import validate
 from pilotage.core.errors import InputError
-from pilotage.experiments.mission import parse_override
 from pilotage.experiments.studies.definition import StudyDefinition
 from pilotage.experiments.studies.study import Study, make_study
+from pilotage.experiments.values import parse_override
 
 
 def sweep_study(
