@@ -12,6 +12,7 @@ import numpy as np
 from pilotage.evaluation.sheet_metrics import sheet_metrics
 from pilotage.experiments.progress import OnProgress
 from pilotage.experiments.sheet.files import maps_of, world_of, write_map_files
+from pilotage.experiments.sheet.oracles import applicable
 from pilotage.experiments.sheet.sheets import shipped_sheets
 from pilotage.experiments.sheet.simulate import SheetRecord, simulate
 from pilotage.experiments.sheet.warm_up import warm_up
@@ -35,9 +36,9 @@ class SheetKind:
         return simulate(mission, on_progress)
 
     def oracles(self, mission: Mission) -> Mapping[str, str]:
-        """None yet."""
-        del mission
-        return {}
+        """Those that can stand in for something in this mission's robot."""
+        assert isinstance(mission, SheetMission)
+        return applicable(mission)
 
     def metrics(self, record: SheetRecord) -> dict[str, object]:
         """Outcome, coverage, mapping accuracy, pose errors."""
