@@ -250,7 +250,7 @@ def _nearest_first(away: FloatArray) -> list[int]:
 
 
 def _two_opt(order: list[int], away: FloatArray) -> list[int]:
-    """Turn parts of the order round, runs and all, as long as that is shorter; ways there and back are alike."""
+    """Turn parts of the order round, runs and all, while that is shorter; ways there and back are alike."""
     improved = True
     while improved:
         improved = False

@@ -15,6 +15,7 @@ from pilotage.experiments.progress import OnProgress
 from pilotage.experiments.terrain.estimation import estimate
 from pilotage.experiments.terrain.ground import Ground, load_ground, shares
 from pilotage.experiments.terrain.motion import Motion, along_route, drive_to_pose
+from pilotage.experiments.terrain.oracles import applicable
 from pilotage.experiments.terrain.record import TerrainRecord, estimation_trace, motion_metrics, motion_trace
 from pilotage.experiments.terrain.route import Route, ask, cost_map, planner_of, route_metrics, trace_of
 from pilotage.maps.landmarks import Landmarks
@@ -71,9 +72,10 @@ class TerrainKind:
         loop_s = max(time.perf_counter() - began, 1e-9)
         return TerrainRecord(mission, ground, route, motion, estimation, way, events, loop_s)
 
-    def oracles(self, mission: Mission) -> Mapping[str, str]:  # noqa: ARG002
-        """None: a planner on a known map has nothing that the truth could tell it."""
-        return {}
+    def oracles(self, mission: Mission) -> Mapping[str, str]:
+        """Those that can stand in for something that this mission does."""
+        assert isinstance(mission, TerrainMission)
+        return applicable(mission)
 
     def metrics(self, record: TerrainRecord) -> dict[str, object]:
         """Length, cost and effort of the plan, and the ground along it."""
