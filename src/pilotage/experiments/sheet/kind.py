@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from pilotage.evaluation.sheet_metrics import sheet_metrics
+from pilotage.experiments.kinds import ERROR, SHARE, TIME_COST, Aspect, Cost
 from pilotage.experiments.progress import OnProgress
 from pilotage.experiments.sheet.files import maps_of, world_of, write_map_files
 from pilotage.experiments.sheet.oracles import applicable
@@ -39,6 +40,17 @@ class SheetKind:
         """Those that can stand in for something in this mission's robot."""
         assert isinstance(mission, SheetMission)
         return applicable(mission)
+
+    def costs(self, mission: Mission) -> Mapping[str, Cost]:
+        """Coverage, map and pose errors, time, contacts."""
+        assert isinstance(mission, SheetMission)
+        return {
+            "coverage_reachable": SHARE,
+            "feature_precision": SHARE,
+            "position_rmse_m": ERROR,
+            "duration_s": TIME_COST,
+            "collisions": Cost(Aspect.SAFETY),
+        }
 
     def metrics(self, record: SheetRecord) -> dict[str, object]:
         """Outcome, coverage, mapping accuracy, pose errors."""
