@@ -234,6 +234,7 @@ def test_attribution_ranks_the_modules(tmp_path: Path) -> None:
     answer = attribution_of(tmp_path / "attribution")
     assert {entry["module"] for entry in answer["modules"]} == {
         "sensors",
+        "initial",
         "localizer",
         "mapper",
         "planner",

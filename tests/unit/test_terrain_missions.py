@@ -210,7 +210,7 @@ class TestReport:
         (["world.ground.obstacle=a.png"], "world.ground.images.obstacle: unknown key"),
         (["stack.planner.name=rrt-star-dubins"], "unknown grid planner"),
         (["stack.planner.corner_cuting=true"], "did you mean 'corner_cutting'"),
-        (["run.oracles=[localization]"], "run.oracles: expected none"),
+        (["run.oracles=[localization]"], "run.oracles: expected one of planner"),
     ],
 )
 def test_bad_input_is_one_line_and_writes_nothing(

@@ -6,6 +6,8 @@ A kind is loaded when a mission asks for it: the rover's terrain costs a museum 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from enum import StrEnum
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -34,6 +36,36 @@ class Record(Protocol):
         ...
 
 
+class Aspect(StrEnum):
+    """What a metric speaks of."""
+
+    ACCURACY = "accuracy"
+    TIME = "time"
+    SAFETY = "safety"
+
+
+@dataclass(frozen=True, slots=True)
+class Cost:
+    """A metric as a cost: of what, and whether less of it is better.
+
+    Attributes
+    ----------
+    whole_only
+        It compares only where both runs came to their end: a run that fails early is not fast.
+    """
+
+    aspect: Aspect
+    less_is_better: bool = True
+    whole_only: bool = False
+
+
+TIME_COST = Cost(Aspect.TIME, whole_only=True)
+ERROR = Cost(Aspect.ACCURACY)
+WAY = Cost(Aspect.TIME, whole_only=True)
+ROOM = Cost(Aspect.SAFETY, less_is_better=False)
+SHARE = Cost(Aspect.ACCURACY, less_is_better=False)
+
+
 class Kind(Protocol):
     """One kind of mission."""
 
@@ -58,6 +90,10 @@ class Kind(Protocol):
 
     def oracles(self, mission: Mission) -> Mapping[str, str]:
         """The oracles that ``run.oracles`` can name in this mission, and what each one does."""
+        ...
+
+    def costs(self, mission: Mission) -> Mapping[str, Cost]:
+        """The metrics that say what a module costs this mission, beside success; what matters most first."""
         ...
 
     def metrics(self, record: Any) -> dict[str, object]:
@@ -131,11 +167,12 @@ def check_oracles(kind: Kind, mission: Mission) -> None:
     Raises
     ------
     InputError
-        With the nearest right name, or that missions of this kind have none.
+        With those that it has.
     """
     known = kind.oracles(mission)
     for name in mission.run.oracles:
-        if not known:
-            raise InputError(f"run.oracles: expected none in the mission '{mission.mission}', found '{name}'")
         if name not in known:
-            raise unknown_name("run.oracles", name, known)
+            offered = f"one of {', '.join(known)}" if known else "none"
+            raise InputError(
+                f"run.oracles: expected {offered} in the mission '{mission.mission}', found '{name}'"
+            )

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import TypeVar
 
 from pilotage.core.errors import InputError
 from pilotage.core.random import RandomStreams
-from pilotage.core.types import Goal, Pose2
+from pilotage.core.types import FloatArray, Goal, Pose2
+from pilotage.maps.cell_map import CellMap
 from pilotage.maps.landmarks import Landmarks
 from pilotage.maps.segment_map import SegmentMap
 from pilotage.missions.sheet import FirmwareConfig, WheelDriveConfig
@@ -16,6 +17,40 @@ from pilotage.sensors.sensor import SensorConfig
 from pilotage.stack.interface import Belief
 
 S = TypeVar("S", bound=SensorConfig)
+
+
+@dataclass(frozen=True, slots=True)
+class FloorPlan:
+    """What stands on a sheet, drawn by somebody else.
+
+    Attributes
+    ----------
+    features
+        Obstacles and lines by cells, unknown where there is nothing.
+    walls_m
+        (S, 4) x0, y0, x1, y1 of the obstacles' faces.
+    """
+
+    features: CellMap
+    walls_m: FloatArray
+
+
+@dataclass(frozen=True, slots=True)
+class Given:
+    """What an exploring robot is given instead of finding it out by its own modules; nothing as a rule.
+
+    An explorer says in ``TAKES`` which of these it takes.
+
+    Attributes
+    ----------
+    pose
+        Where it is now, as a motion capture system over the sheet would tell.
+    plan
+        What stands on the sheet.
+    """
+
+    pose: Callable[[], Pose2] | None = None
+    plan: FloorPlan | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,6 +67,8 @@ class SheetKnowledge:
         The data sheet of its drive, not the truth.
     fusion, avoidance, firmware, magnetometer
         The mission's switches.
+    given
+        What it need not find out by itself.
     """
 
     size_m: tuple[float, float]
@@ -49,6 +86,7 @@ class SheetKnowledge:
     firmware: FirmwareConfig
     streams: RandomStreams
     magnetometer: bool = False
+    given: Given = Given()
 
     def sensors_of(self, kind: type[S]) -> dict[str, S]:
         """All sensors of one kind by name."""

@@ -13,9 +13,10 @@ from pilotage.core.random import RandomStreams
 from pilotage.core.types import Goal, Pose2
 from pilotage.experiments.components import build_component, optional_component
 from pilotage.experiments.floor.obstacles import Obstacles, place_obstacles
-from pilotage.experiments.floor.oracles import Truth, with_oracles, without_noise
+from pilotage.experiments.floor.oracles import Truth, exactly, with_oracles
 from pilotage.experiments.floor.places import settle_places
 from pilotage.experiments.floor.world_map import load_map
+from pilotage.experiments.ideal_sensors import ideal_sensors
 from pilotage.maps.map_file import LandmarkMap
 from pilotage.missions.floor import FloorMission
 from pilotage.sensors.sensor import SENSORS, SensorConfig
@@ -90,7 +91,7 @@ def build(mission: FloorMission) -> Experiment:
         world,
         mission.robot.body,
         mission.robot.motion,
-        without_noise(sensors) if "sensors" in oracles else sensors,
+        ideal_sensors(sensors) if "sensors" in oracles else sensors,
         start,
         mission.run.dt_s,
         streams,
@@ -167,7 +168,9 @@ def _build_stack(
 ) -> Stack:
     roles, robot = mission.stack, mission.robot
     initial = initial_belief(mission, start, streams)
-    if not roles.initial.known:
+    if "initial" in oracles:
+        initial = exactly(start)
+    elif not roles.initial.known:
         initial = Belief.anywhere(floor.walls.bounds_m)
     knowledge = Knowledge(
         world_map=floor.walls,

@@ -16,6 +16,7 @@ from pilotage.experiments.floor.recorder import RunRecord
 from pilotage.experiments.floor.simulate import simulate
 from pilotage.experiments.floor.warm_up import warm_up
 from pilotage.experiments.floor.world_map import shipped_maps
+from pilotage.experiments.kinds import ERROR, ROOM, TIME_COST, WAY, Cost
 from pilotage.experiments.progress import OnProgress
 from pilotage.missions.floor import FloorMission
 from pilotage.missions.mission import Mission
@@ -40,6 +41,19 @@ class FloorKind:
         """Those that can stand in for something in this stack."""
         assert isinstance(mission, FloorMission)
         return applicable(dict(mission.stack))
+
+    def costs(self, mission: Mission) -> Mapping[str, Cost]:
+        """Time, errors, way and room; of a plan alone its length, smoothness and room."""
+        assert isinstance(mission, FloorMission)
+        if mission.stack.controller is None:
+            return {"planned_length_m": WAY, "smoothness": WAY, "planned_clearance_m": ROOM}
+        return {
+            "duration_s": TIME_COST,
+            "position_rmse_m": ERROR,
+            "heading_rmse_rad": ERROR,
+            "path_length_m": WAY,
+            "min_clearance_m": ROOM,
+        }
 
     def metrics(self, record: RunRecord) -> dict[str, object]:
         """Position errors, consistency, path quality, clearance."""

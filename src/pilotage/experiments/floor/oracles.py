@@ -17,7 +17,6 @@ from pilotage.core.types import FloatArray, Pose2, Twist
 from pilotage.maps.distance_field import DistanceField
 from pilotage.maps.segment_map import SegmentMap
 from pilotage.sensors.readings import Readings
-from pilotage.sensors.sensor import SensorConfig
 from pilotage.sim.simulator import Simulator
 from pilotage.stack.control.controller import Control
 from pilotage.stack.interface import Belief
@@ -25,7 +24,8 @@ from pilotage.stack.navigator.navigator import Parts
 from pilotage.stack.planning.planner import Path, Planner, PlanRequest, PlanResult, Smoother
 
 ORACLES: Mapping[str, str] = {
-    "sensors": "sensors without noise; the filters still expect it",
+    "sensors": "sensors without noise, bias, scale error or offset; the filters expect them still",
+    "initial": "the start pose told exactly",
     "localizer": "the true pose instead of an estimate",
     "mapper": "every unexpected obstacle is on the robot's own map from the start",
     "planner": "the mission's planner on the world as it is, unexpected obstacles included",
@@ -79,13 +79,9 @@ def with_oracles(parts: Parts, names: frozenset[str], truth: Truth) -> Parts:
     return parts
 
 
-def without_noise(sensors: Mapping[str, SensorConfig]) -> dict[str, SensorConfig]:
-    """Sensors that read the truth: every variance of theirs is zero."""
-    silent: dict[str, SensorConfig] = {}
-    for name, config in sensors.items():
-        variances = {field: 0.0 for field in type(config).model_fields if "_var_" in field}
-        silent[name] = config.model_copy(update=variances)
-    return silent
+def exactly(pose: Pose2) -> Belief:
+    """The belief of who knows."""
+    return Belief(pose, SURE_VAR * np.eye(3))
 
 
 class TrueLocalizer:
@@ -97,7 +93,7 @@ class TrueLocalizer:
     @property
     def belief(self) -> Belief:
         """The true pose, almost certain."""
-        return Belief(self._truth.pose, SURE_VAR * np.eye(3))
+        return exactly(self._truth.pose)
 
     def step(self, readings: Readings) -> Belief:  # noqa: ARG002
         """The sensors say nothing that is not known."""

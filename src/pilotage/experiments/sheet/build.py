@@ -9,8 +9,12 @@ from pilotage.core.angles import wrap_to_pi
 from pilotage.core.errors import InputError
 from pilotage.core.random import RandomStreams
 from pilotage.core.types import Pose2
+from pilotage.evaluation.sheet_visits import reachable_cells
 from pilotage.experiments.components import build_component
+from pilotage.experiments.ideal_sensors import ideal_sensors
+from pilotage.experiments.sheet.oracles import Truth, faithful, floor_plan, given
 from pilotage.experiments.sheet.sheets import load_sheet
+from pilotage.experiments.sheet.tour import TourExplorer
 from pilotage.maps.true_cells import SheetFile
 from pilotage.missions.sheet import SheetMission
 from pilotage.sensors.sensor import SENSORS, SensorConfig
@@ -48,10 +52,13 @@ def build(mission: SheetMission) -> SheetExperiment:
         config = SENSORS.configure(choice.name, choice.parameters, f"robot.sensors.{name}")
         assert isinstance(config, SensorConfig)
         sensors[name] = config
-    robot = mission.robot
-    simulator = SheetSimulator(
-        world, robot.body, robot.motion, robot.errors, sensors, start, mission.run.dt_s, streams
-    )
+    robot, oracles = mission.robot, frozenset(mission.run.oracles)
+    motion, errors = robot.motion, robot.errors
+    if "drive" in oracles:
+        motion, errors = faithful(motion, errors)
+    carried = ideal_sensors(sensors) if "sensors" in oracles else sensors
+    simulator = SheetSimulator(world, robot.body, motion, errors, carried, start, mission.run.dt_s, streams)
+    truth = Truth(sheet, world, simulator)
     if not simulator.on_sheet or simulator.clearance_m < 0.0:
         raise InputError(
             f"world.start: expected a place on the sheet ({sheet.size_m[0]:g} x {sheet.size_m[1]:g} m) "
@@ -73,8 +80,12 @@ def build(mission: SheetMission) -> SheetExperiment:
         firmware=mission.stack.firmware,
         streams=streams,
         magnetometer=mission.stack.magnetometer,
+        given=given(oracles, truth),
     )
     explorer = build_component(EXPLORERS, mission.stack.explorer, "explorer", knowledge)
+    if "explorer" in oracles:
+        wanted = reachable_cells(sheet, robot.body.radius_m)
+        explorer = TourExplorer(knowledge, truth.pose, floor_plan(truth), wanted)
     return SheetExperiment(mission, sheet, world, simulator, explorer)
 
 

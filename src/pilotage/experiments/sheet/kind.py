@@ -10,8 +10,10 @@ from typing import Any
 import numpy as np
 
 from pilotage.evaluation.sheet_metrics import sheet_metrics
+from pilotage.experiments.kinds import ERROR, SHARE, TIME_COST, Aspect, Cost
 from pilotage.experiments.progress import OnProgress
 from pilotage.experiments.sheet.files import maps_of, world_of, write_map_files
+from pilotage.experiments.sheet.oracles import applicable
 from pilotage.experiments.sheet.sheets import shipped_sheets
 from pilotage.experiments.sheet.simulate import SheetRecord, simulate
 from pilotage.experiments.sheet.warm_up import warm_up
@@ -35,9 +37,20 @@ class SheetKind:
         return simulate(mission, on_progress)
 
     def oracles(self, mission: Mission) -> Mapping[str, str]:
-        """None yet."""
-        del mission
-        return {}
+        """Those that can stand in for something in this mission's robot."""
+        assert isinstance(mission, SheetMission)
+        return applicable(mission)
+
+    def costs(self, mission: Mission) -> Mapping[str, Cost]:
+        """Coverage, map and pose errors, time, contacts."""
+        assert isinstance(mission, SheetMission)
+        return {
+            "coverage_reachable": SHARE,
+            "feature_precision": SHARE,
+            "position_rmse_m": ERROR,
+            "duration_s": TIME_COST,
+            "collisions": Cost(Aspect.SAFETY),
+        }
 
     def metrics(self, record: SheetRecord) -> dict[str, object]:
         """Outcome, coverage, mapping accuracy, pose errors."""

@@ -2,26 +2,32 @@
 
 from __future__ import annotations
 
+import hashlib
+import json
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from pilotage.core.config import validate
 from pilotage.core.errors import InputError
-from pilotage.evaluation.judge import SUCCESS
+from pilotage.core.types import FloatArray
+from pilotage.evaluation.judge import SUCCESS, Judgement, judge
 from pilotage.evaluation.paired import Difference
-from pilotage.experiments.kinds import kind_of
-from pilotage.experiments.mission import load_mission
+from pilotage.experiments.kinds import SHARE, Aspect, Cost, kind_of
+from pilotage.experiments.mission import load_mission, mission_of
 from pilotage.experiments.studies.definition import StudyDefinition
 from pilotage.experiments.studies.study import Study, make_study
 from pilotage.experiments.studies.sweep import settings_of
-from pilotage.experiments.studies.table import read_study
+from pilotage.experiments.studies.table import StudyTable, read_study
 
 BASELINE = "as it is"
-ASKED = (SUCCESS, "duration_s", "position_rmse_m", "path_length_m", "min_clearance_m", "coverage_reachable")
-"""What is compared, as far as the mission gives it: success, time, accuracy."""
+ORACLE = "oracle "
 SURE = 0.05
+RANKED = (Aspect.ACCURACY, Aspect.SAFETY, Aspect.TIME)
+"""After success; what a gain speaks of."""
 
 
 def attribution_study(mission: str, overrides: Sequence[str], trials: int) -> Study:
@@ -30,25 +36,40 @@ def attribution_study(mission: str, overrides: Sequence[str], trials: int) -> St
     Raises
     ------
     InputError
-        Where missions of this kind have no oracles.
+        Where the mission has no module that an oracle can replace.
     """
     loaded = load_mission(mission, overrides)
-    oracles = kind_of(loaded).oracles(loaded)
+    kind = kind_of(loaded)
+    oracles, costs = kind.oracles(loaded), kind.costs(loaded)
     if not oracles:
         raise InputError(f"attribute '{mission}': expected a mission with modules that an oracle can replace")
+    told = "; ".join(f"{name}: {text}" for name, text in oracles.items())
     configurations: list[dict[str, Any]] = [{"name": BASELINE, "set": {"run.oracles": []}}]
-    configurations += [{"name": f"oracle {name}", "set": {"run.oracles": [name]}} for name in oracles]
+    configurations += [{"name": f"{ORACLE}{name}", "set": {"run.oracles": [name]}} for name in oracles]
+    primary = next(iter(costs))
     values: dict[str, Any] = {
-        "study": f"attribute-{Path(mission).stem}",
-        "question": f"What does each module of '{Path(mission).stem}' cost, beside one that knows all?",
+        "study": _name(mission, overrides),
+        "question": (
+            f"What does each module of '{Path(mission).stem}' cost, beside one that knows all? "
+            f"The oracles: {told}."
+        ),
         "mission": mission,
         "set": settings_of(overrides),
         "configurations": configurations,
         "trials": trials,
-        "primary": "duration_s",
+        "metrics": list(costs),
+        "primary": primary,
+        "lower_is_better": costs[primary].less_is_better,
         "baseline": BASELINE,
     }
     return make_study(validate(StudyDefinition, values, ""))
+
+
+def _name(mission: str, overrides: Sequence[str]) -> str:
+    """Another name for other overrides: their trials are not the same study's."""
+    stem = "".join(c if c.isalnum() or c in "-_." else "-" for c in Path(mission).stem)
+    digest = hashlib.sha256(json.dumps(list(overrides)).encode()).hexdigest()[:6]
+    return f"attribute-{stem}-{digest}" if overrides else f"attribute-{stem}"
 
 
 def attribution_of(folder: Path) -> dict[str, Any]:
@@ -57,55 +78,127 @@ def attribution_of(folder: Path) -> dict[str, Any]:
     Returns
     -------
     ``modules``, most costly first: for each the change of every metric with its interval, and sentences on
-    those that differ surely. Success counts before accuracy, accuracy before time; among them the effect.
+    those that differ surely, or else may differ. Success counts before accuracy (errors, coverage), that
+    before safety and time; among them the share that is gained. Times and ways are compared on the seeds
+    where both runs succeeded.
     """
     table = read_study(folder)
-    judgement = table.judged()
+    baseline = table.baseline or 0
+    base = mission_of(dict(table.study.base), table.study.cells[baseline].overrides)
+    costs = {SUCCESS: Cost(Aspect.ACCURACY, less_is_better=False), **kind_of(base).costs(base)}
+    values = {name: _comparable(table, name, cost) for name, cost in costs.items() if name in table.values}
+    judgement = judge(table.cell, table.trial, values, len(table.study.cells), baseline)
+    before = _baseline(judgement, baseline)
     ranked: list[tuple[tuple[float, ...], dict[str, Any]]] = []
     for cell in table.study.cells[1:]:
-        changes: dict[str, Difference] = {}
-        for name in ASKED:
-            found = judgement.differences[name][cell.index] if name in judgement.differences else None
-            if found is not None:
-                changes[name] = found
-        entry = {
-            "module": cell.name.removeprefix("oracle "),
-            "changes": {name: _plain(change) for name, change in changes.items() if change.n},
-            "told": [_told(name, change) for name, change in changes.items() if _sure(change)],
+        changes = {
+            name: found
+            for name in values
+            if (found := judgement.differences[name][cell.index]) is not None and found.n
         }
-        ranked.append((_weight(changes), entry))
+        sure = {name: _is_sure(table, values[name], cell.index, change) for name, change in changes.items()}
+        entry = {
+            "module": cell.name.removeprefix(ORACLE),
+            "changes": {name: _plain(change, sure[name]) for name, change in changes.items()},
+            "told": _told(changes, sure),
+        }
+        ranked.append((_weight(changes, costs, sure, before), entry))
     ranked.sort(key=lambda pair: pair[0], reverse=True)
     return {
         "attribution": table.study.base.get("mission", table.study.definition.mission),
         "trials": table.study.definition.trials,
+        "baseline": before,
         "modules": [entry for _, entry in ranked],
         "study_dir": str(folder),
     }
 
 
-def _sure(change: Difference) -> bool:
-    return change.n > 0 and math.isfinite(change.p_corrected) and change.p_corrected < SURE
+def _comparable(table: StudyTable, name: str, cost: Cost) -> FloatArray:
+    """(n,) a metric's values; nan where the run did not come to its end and that counts."""
+    values = table.values[name]
+    succeeded = table.values.get(SUCCESS)
+    if not cost.whole_only or succeeded is None:
+        return values
+    return np.where(succeeded > 0.0, values, math.nan)
 
 
-def _weight(changes: dict[str, Difference]) -> tuple[float, ...]:
-    """Sure gains in success, then in accuracy or coverage, then in time; then all effects together."""
+def _is_sure(table: StudyTable, values: FloatArray, cell: int, change: Difference) -> bool:
+    """Whether chance does not explain a change: by its test, or because there is no chance in either cell."""
+    if math.isfinite(change.p_corrected) and change.p_corrected < SURE:
+        return True
+    return (
+        change.n > 1
+        and change.mean != 0.0
+        and all(
+            np.ptp(column[np.isfinite(column)]) == 0.0 and len(set(table.seed[table.cell == index])) > 1
+            for index in (table.baseline or 0, cell)
+            if (column := values[table.cell == index]).size
+        )
+    )
 
-    def gain(name: str, sign: float) -> float:
-        change = changes.get(name)
-        return sign * change.effect if change is not None and _sure(change) else 0.0
+
+def _weight(
+    changes: Mapping[str, Difference],
+    costs: Mapping[str, Cost],
+    sure: Mapping[str, bool],
+    before: Mapping[str, float],
+) -> tuple[float, ...]:
+    """Sure gains in success, then by aspect the greatest share gained; then all effects together."""
+
+    def gain(aspect: Aspect) -> float:
+        gains = [
+            _share(change.mean, costs[name], before.get(name, math.nan))
+            for name, change in changes.items()
+            if costs[name].aspect is aspect and sure[name] and name != SUCCESS
+        ]
+        return max(gains, default=0.0)
 
     success = changes.get(SUCCESS)
-    won = success.mean if success is not None and _sure(success) else 0.0
-    accuracy = max(gain("position_rmse_m", -1.0), gain("coverage_reachable", 1.0))
+    won = success.mean if success is not None and sure[SUCCESS] else 0.0
     total = sum(abs(change.effect) for change in changes.values() if math.isfinite(change.effect))
-    return (won, accuracy, gain("duration_s", -1.0), total)
+    return (won, *(gain(aspect) for aspect in RANKED), total)
 
 
-def _told(name: str, change: Difference) -> str:
-    return f"{name} {change.mean:+.4g} ({change.low:+.4g} to {change.high:+.4g})"
+def _share(change: float, cost: Cost, before: float) -> float:
+    """What is gained, as a share of what there was; of a metric that is a share itself, in its own points."""
+    better = -change if cost.less_is_better else change
+    whole = 1.0 if cost == SHARE else abs(before)
+    return max(better / whole, 0.0) if whole > 0.0 else 0.0
 
 
-def _plain(change: Difference) -> dict[str, float]:
+def _told(changes: Mapping[str, Difference], sure: Mapping[str, bool]) -> list[str]:
+    """What differs surely; where nothing does, what may: its interval leaves zero out."""
+    certain = [f"{name} {_change(change)}" for name, change in changes.items() if sure[name]]
+    if certain:
+        return certain
+    return [
+        f"perhaps {name} {_change(change)}"
+        for name, change in changes.items()
+        if change.low > 0.0 or change.high < 0.0
+    ]
+
+
+def _change(change: Difference) -> str:
+    if change.low == change.high:
+        return f"{_signed(change.mean)} in every trial"
+    return f"{_signed(change.mean)} ({_signed(change.low)} to {_signed(change.high)})"
+
+
+def _signed(value: float) -> str:
+    """Four digits that count, without an exponent for what people measure."""
+    return f"{float(f'{value:.4g}'):+.10g}" if 1e-4 <= abs(value) < 1e10 else f"{value:+.3g}"
+
+
+def _baseline(judgement: Judgement, cell: int) -> dict[str, float]:
+    """Means of the mission as it is."""
+    return {
+        name: summaries[cell].mean
+        for name, summaries in judgement.summaries.items()
+        if math.isfinite(summaries[cell].mean)
+    }
+
+
+def _plain(change: Difference, sure: bool) -> dict[str, float | bool]:
     return {
         "n": change.n,
         "mean": change.mean,
@@ -114,4 +207,5 @@ def _plain(change: Difference) -> dict[str, float]:
         "median": change.median,
         "p": change.p_corrected,
         "effect": change.effect,
+        "sure": sure,
     }

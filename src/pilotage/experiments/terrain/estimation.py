@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TypeVar
 
@@ -16,7 +16,9 @@ from pilotage.core.errors import InputError
 from pilotage.core.random import RandomStreams
 from pilotage.core.types import FloatArray, IntArray, Pose2
 from pilotage.experiments.components import build_component
+from pilotage.experiments.ideal_sensors import ideal
 from pilotage.experiments.terrain.ground import Ground
+from pilotage.experiments.terrain.oracles import exactly, true_estimate
 from pilotage.maps.landmarks import Landmarks
 from pilotage.missions.terrain import TerrainMission
 from pilotage.sensors.beacon import BeaconConfig
@@ -58,15 +60,33 @@ def estimate(mission: TerrainMission, ground: Ground, truth: FloatArray) -> Esti
     seer = _one(sensors, BeaconConfig)
     landmarks = landmarks_of(mission, ground)
     streams = RandomStreams(mission.run.seed)
+    oracles = frozenset(mission.run.oracles)
     log = landmark_log(truth, odometer, seer, landmarks, streams)
+    if "sensors" in oracles:
+        log = _silent_log(truth, odometer, seer, landmarks, log.variances)
     initial = _initial(mission, truth[0], streams)
+    if oracles & {"initial", "estimator"}:
+        initial = exactly(truth[0])
     estimator = build_component(ESTIMATORS, choice, "estimator")
-    return Estimation(
-        log,
-        landmarks,
-        initial,
-        estimator.estimate(initial, log, landmarks, None if seer is None else seer[1]),
-    )
+    if "estimator" in oracles:
+        found = true_estimate(truth, log)
+    else:
+        found = estimator.estimate(initial, log, landmarks, None if seer is None else seer[1])
+    return Estimation(log, landmarks, initial, found)
+
+
+def _silent_log(
+    truth: FloatArray,
+    odometer: tuple[str, WheelOdometryConfig],
+    seer: tuple[str, BeaconConfig] | None,
+    landmarks: Landmarks,
+    expected: FloatArray,
+) -> LandmarkLog:
+    """What faultless sensors would log, with the (T, 2) variances that the data sheet expects."""
+    exact = None if seer is None else (seer[0], ideal(seer[1]))
+    # Nothing of the draws is left where all variances are zero.
+    log = landmark_log(truth, (odometer[0], ideal(odometer[1])), exact, landmarks, RandomStreams(0))
+    return replace(log, variances=expected)
 
 
 def landmarks_of(mission: TerrainMission, ground: Ground) -> Landmarks:

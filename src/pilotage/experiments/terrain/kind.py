@@ -11,10 +11,12 @@ import numpy as np
 
 from pilotage.core.random import RandomStreams
 from pilotage.core.types import Event, Pose2
+from pilotage.experiments.kinds import ERROR, ROOM, TIME_COST, WAY, Cost
 from pilotage.experiments.progress import OnProgress
 from pilotage.experiments.terrain.estimation import estimate
 from pilotage.experiments.terrain.ground import Ground, load_ground, shares
 from pilotage.experiments.terrain.motion import Motion, along_route, drive_to_pose
+from pilotage.experiments.terrain.oracles import applicable
 from pilotage.experiments.terrain.record import TerrainRecord, estimation_trace, motion_metrics, motion_trace
 from pilotage.experiments.terrain.route import Route, ask, cost_map, planner_of, route_metrics, trace_of
 from pilotage.maps.landmarks import Landmarks
@@ -71,9 +73,23 @@ class TerrainKind:
         loop_s = max(time.perf_counter() - began, 1e-9)
         return TerrainRecord(mission, ground, route, motion, estimation, way, events, loop_s)
 
-    def oracles(self, mission: Mission) -> Mapping[str, str]:  # noqa: ARG002
-        """None: a planner on a known map has nothing that the truth could tell it."""
-        return {}
+    def oracles(self, mission: Mission) -> Mapping[str, str]:
+        """Those that can stand in for something that this mission does."""
+        assert isinstance(mission, TerrainMission)
+        return applicable(mission)
+
+    def costs(self, mission: Mission) -> Mapping[str, Cost]:
+        """Errors of the estimate where there is one, time, way, room."""
+        assert isinstance(mission, TerrainMission)
+        stack = mission.stack
+        estimated = {"position_rmse_m": ERROR, "heading_rmse_rad": ERROR, "final_position_error_m": ERROR}
+        driven = stack.pose_controller is not None or stack.spline is not None
+        return {
+            **(estimated if stack.estimator is not None else {}),
+            **({"duration_s": TIME_COST, "path_length_m": WAY} if driven else {}),
+            **({} if driven else {"travel_time_s": TIME_COST, "planned_length_m": WAY}),
+            "min_clearance_m": ROOM,
+        }
 
     def metrics(self, record: TerrainRecord) -> dict[str, object]:
         """Length, cost and effort of the plan, and the ground along it."""

@@ -11,6 +11,7 @@ from pilotage.core.angles import wrap_to_pi
 from pilotage.core.errors import InputError
 from pilotage.core.types import FloatArray, Pose2
 from pilotage.experiments.terrain.ground import Ground
+from pilotage.experiments.terrain.oracles import shortest_curve
 from pilotage.experiments.terrain.route import Route
 from pilotage.missions.terrain import SplineConfig, TerrainMission
 from pilotage.sim.rover_drive import drive
@@ -57,6 +58,8 @@ def drive_to_pose(mission: TerrainMission, ground: Ground) -> Motion:
         raise InputError("world.goal.theta_rad: expected a heading, for the drive is to a pose, found none")
     for name, place in (("start", start), ("goal", goal)):
         _check_free(f"world.{name}", place.x_m, place.y_m, ground)
+    if "pose_controller" in mission.run.oracles:
+        return _shortest(mission, ground)
     controller = pose_controller(mission)
     driven = drive(
         lambda x, y, theta: controller.command(x, y, theta),
@@ -78,6 +81,26 @@ def drive_to_pose(mission: TerrainMission, ground: Ground) -> Motion:
     return Motion(driven.t_s, driven.poses, v, w, steering, driven.arrived, reason)
 
 
+def _shortest(mission: TerrainMission, ground: Ground) -> Motion:
+    """The shortest way to the goal pose at full speed, sampled about every ``run.dt_s``."""
+    start, goal, speed = mission.world.start, mission.world.goal, mission.robot.speed_m_s
+    assert goal.theta_rad is not None
+    ends = Pose2(start.x_m, start.y_m, start.theta_rad), Pose2(goal.x_m, goal.y_m, goal.theta_rad)
+    spline, reason = shortest_curve(*ends, ground)
+    if spline is None:
+        return _nowhere(mission, f"no clear way: {reason}")
+    count = max(2, math.ceil(spline.length_m / (speed * mission.run.dt_s)) + 1)
+    motion = _along(spline, count, mission, reason)
+    in_time = int(np.searchsorted(motion.t_s, mission.run.time_limit_s, side="right"))
+    if in_time == count:
+        return motion
+    t_s, poses, v, w, steering = (
+        column[:in_time]
+        for column in (motion.t_s, motion.poses, motion.v_m_s, motion.w_rad_s, motion.steering_rad)
+    )
+    return Motion(t_s, poses, v, w, steering, False, f"time limit of {mission.run.time_limit_s:g} s reached")
+
+
 def pose_controller(mission: TerrainMission) -> PolarPoseController:
     """The mission's pose controller; the rover's speed and wheelbase hold unless it names its own."""
     choice, goal = mission.stack.pose_controller, mission.world.goal
@@ -94,7 +117,6 @@ def along_route(mission: TerrainMission, config: SplineConfig, route: Route, gro
 
     Without a path, or a curve that keeps clear, the rover stays where it is.
     """
-    speed = mission.robot.speed_m_s
     if route.result.path is None:
         return _nowhere(mission, f"{route.result.status}: {route.result.reason}")
     cells = route.result.path.cells
@@ -107,7 +129,13 @@ def along_route(mission: TerrainMission, config: SplineConfig, route: Route, gro
         spline, reason = clear.spline, f"clear curve with {clear.knots} knots"
     else:
         spline, reason = QuinticSpline(ground.hazards.points_m(cells)), "curve through all cells, not checked"
-    curve = spline.sampled(config.samples)
+    return _along(spline, config.samples, mission, reason)
+
+
+def _along(spline: QuinticSpline, samples: int, mission: TerrainMission, reason: str) -> Motion:
+    """Follow a curve at the rover's speed (equations 5.1 to 5.6)."""
+    speed = mission.robot.speed_m_s
+    curve = spline.sampled(samples)
     poses = np.column_stack([curve.points_xy_m, curve.heading_rad])
     turn_rate = speed * curve.curvature_per_m
     steering = np.arctan(mission.robot.wheelbase_m * curve.curvature_per_m)

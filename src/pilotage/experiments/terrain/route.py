@@ -13,6 +13,7 @@ from pilotage.core.types import FloatArray
 from pilotage.evaluation.relief import relief
 from pilotage.experiments.grid_planning import free_cell
 from pilotage.experiments.terrain.ground import Ground
+from pilotage.experiments.terrain.oracles import KnowingPlanner
 from pilotage.kernels.curve_clearance import distance_to_blocked
 from pilotage.maps.memory import require_memory
 from pilotage.maps.occupancy_grid import near_blocked
@@ -50,7 +51,10 @@ def planner_of(mission: TerrainMission) -> GridPlanner:
     choice = mission.stack.planner
     assert choice is not None, "a mission that plans has a planner"
     config = GRID_PLANNERS.configure(choice.name, choice.parameters, "stack.planner")
-    return GRID_PLANNERS.entry(choice.name).factory(config)
+    planner = GRID_PLANNERS.entry(choice.name).factory(config)
+    if "planner" in mission.run.oracles:
+        return KnowingPlanner(planner, bool(getattr(config, "corner_cutting", False)))
+    return planner
 
 
 def cost_map(ground: Ground, config: CostMapConfig) -> GridSpace:

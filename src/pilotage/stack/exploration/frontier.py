@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from enum import StrEnum
+from typing import ClassVar
 
 import numpy as np
 
@@ -62,13 +63,16 @@ class FrontierExplorer:
     being taken for free. When the position becomes unsure it returns to a landmark. The pose comes from
     ``SheetSmoother``; at the end the whole run is smoothed once more, cells whose visit then proves
     doubtful are visited again, and only when none is left is it done.
-    Ignores the firmware switches: it counts encoders itself.
+    Ignores the firmware switches: it counts encoders itself. With a floor plan its ways are planned on that,
+    and it looks for no tape's end.
     """
+
+    TAKES: ClassVar = frozenset({"pose", "plan"})
 
     def __init__(self, config: FrontierConfig, knowledge: SheetKnowledge) -> None:
         self._config, self._avoidance = config, knowledge.avoidance
         self._hardware = knowledge.drive
-        self._tape_width_m = knowledge.tape_width_m
+        self._tape_width_m, self._plan = knowledge.tape_width_m, knowledge.given.plan
         self._senses = Senses(config, knowledge)
         self._smoother, self._grid = self._senses.smoother, self._senses.grid
         shape = self._grid.shape
@@ -105,6 +109,9 @@ class FrontierExplorer:
     def cells(self) -> CellMap:
         """The map as it would be printed now."""
         shape, landmarks = self._grid.shape, self._smoother.map
+        if self._plan is not None:
+            features = self._plan.features
+            return cell_map(self._grid, features.holds(CellState.OBSTACLE), features.holds(CellState.LINE))
         lines = line_cells(landmarks, self._senses.floor_samples(), self._tape_width_m, shape)
         return cell_map(self._grid, obstacle_cells(landmarks, shape), lines)
 
@@ -295,6 +302,8 @@ class FrontierExplorer:
 
     def _inspect(self, here: Point, cost: FloatArray, parent: IntArray, t_s: float) -> bool:
         """Set out to see where a tape ends; False where that is known of all."""
+        if self._plan is not None:
+            return False
         self._solve()
         ends = tape_ends(self._smoother.map, self._senses.floor_samples(), self._tape_width_m)
         look = self._inspections.next_look(

@@ -88,7 +88,9 @@ class Senses:
             knowledge.size_m,
             self.edges_seen,
             knowledge.streams.stream("explorer/landmarks"),
+            knowledge.given.pose,
         )
+        self._plan = knowledge.given.plan
         self.grid = SheetGrid(SheetShape.of(knowledge.size_m, knowledge.cells, config.resolution_m))
         self._tape_width_m = knowledge.tape_width_m
         self._still = 0
@@ -192,7 +194,12 @@ class Senses:
         return np.asarray(points[inside > LOOSE_INSIDE_M])
 
     def obstacles(self) -> tuple[FloatArray, FloatArray]:
-        """(S, 4) walls and (P, 2) points that belong to none, confirmed by evidence or seen just now."""
+        """(S, 4) walls and (P, 2) points that belong to none, confirmed by evidence or seen just now.
+
+        Those of the floor plan where there is one.
+        """
+        if self._plan is not None:
+            return self._plan.walls_m, self.recent.known
         smoother = self.smoother
         walls = smoother.map.walls()
         beams = smoother.beams

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import ClassVar
 
 from pilotage.core.config import Config
 from pilotage.core.types import STANDSTILL, BoolArray, Event, WheelSpeeds
@@ -35,6 +36,8 @@ class RandomWalk:
     It knows no sheet and no edge: what ends it is a box that the sensor's narrow beam passes by, or the
     edge. One front sensor and both line sensors are used, as in the report.
     """
+
+    TAKES: ClassVar = frozenset({"pose", "plan"})
 
     def __init__(self, config: RandomWalkConfig, knowledge: SheetKnowledge) -> None:
         self._config = config

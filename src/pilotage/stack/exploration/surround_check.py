@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 from pydantic import Field
@@ -57,6 +57,8 @@ class SurroundCheck:
     acted is passed over until another one was reached, so that the field does not block the explorer.
     Fails by its pose, and where the nearest explored cell is behind a box.
     """
+
+    TAKES: ClassVar = frozenset({"pose", "plan"})
 
     def __init__(self, config: SurroundCheckConfig, knowledge: SheetKnowledge) -> None:
         self._config = config

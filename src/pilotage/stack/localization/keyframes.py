@@ -113,6 +113,10 @@ class Keyframes:
         self._gyro_integral += gyro_rad
         self._time += dt_s
         self.t_s += dt_s
+        self._close_in_time()
+
+    def _close_in_time(self) -> None:
+        """Make a keyframe where the last one is far enough behind."""
         errors = self._errors
         if (
             self.ahead_m * self.ahead_m + self.aside_m * self.aside_m > errors.keyframe_distance_m**2

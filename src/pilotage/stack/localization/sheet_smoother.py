@@ -21,6 +21,7 @@ from pilotage.core.config import Config
 from pilotage.core.types import FloatArray, Pose2
 from pilotage.kernels import arrow_solve, sheet_graph
 from pilotage.stack.interface import Belief
+from pilotage.stack.localization.given_pose import SURE_M, GivenKeyframes, PoseSource
 from pilotage.stack.localization.keyframes import GyroscopeErrors, Keyframes, OdometryErrorsConfig
 from pilotage.stack.localization.line_map import Kind, LineMap, LineMapConfig
 from pilotage.stack.localization.observations import Observations
@@ -52,6 +53,16 @@ class SmootherConfig(Config):
     """Walls within 5 degrees of the sheet's axes are taken to lie along them, this surely; 0: not at all."""
 
 
+def surely(config: SmootherConfig) -> SmootherConfig:
+    """The same where odometry has no systematic error and the start is exact."""
+    exact = dict.fromkeys(
+        ("distance_scale_std", "turn_scale_std", "radius_difference_std", "slip_std_m_sqrt_m"), SURE_M
+    )
+    odometry = config.odometry.model_copy(update={**exact, "slip_mean": 0.0})
+    start = {"start_position_std_m": SURE_M, "start_heading_std_rad": SURE_M}
+    return config.model_copy(update={**start, "odometry": odometry})
+
+
 class SheetSmoother:
     """The graph of a run so far.
 
@@ -63,6 +74,8 @@ class SheetSmoother:
         Of the wheels, by the data sheet.
     edges_seen
         Whether line sensors see the sheet's edge, whose place is known.
+    given
+        A pose from outside: then only landmarks are found out.
     """
 
     def __init__(
@@ -74,11 +87,17 @@ class SheetSmoother:
         size_m: tuple[float, float],
         edges_seen: bool,
         rng: np.random.Generator,
+        given: PoseSource | None = None,
     ) -> None:
+        if given is not None:
+            config = surely(config)
         self._config, self._gyro, self._separation = config, gyro, separation_m
         self._start = np.array([start.x_m, start.y_m, start.theta_rad, 0.0])
-        self.keyframes = Keyframes(
-            (start.x_m, start.y_m, start.theta_rad), separation_m, config.odometry, gyro
+        first = (start.x_m, start.y_m, start.theta_rad)
+        self.keyframes = (
+            Keyframes(first, separation_m, config.odometry, gyro)
+            if given is None
+            else GivenKeyframes(given, first, separation_m, config.odometry, gyro)
         )
         self.map = LineMap(config.landmarks, size_m, edges_seen, rng)
         self.beams, self.crossings = Observations(5), Observations(2)

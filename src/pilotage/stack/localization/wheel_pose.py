@@ -54,7 +54,7 @@ class WheelPose:
         self._truncated = firmware.truncated_wheel_speed
         self._late_steps = max(1, round(firmware.pose_period_s / knowledge.dt_s))
         self._dt_s = knowledge.dt_s
-        self._pose = knowledge.start
+        self._pose, self._given = knowledge.start, knowledge.given.pose
         config = EncoderGyroConfig(errors=HeadingErrors())
         self._heading = EncoderGyroFilter(config, HeadingEstimate(knowledge.start.theta_rad, 1e-6))
         self._bias_sum, self._bias_count = 0.0, 0
@@ -68,17 +68,22 @@ class WheelPose:
 
     @property
     def belief(self) -> Belief:
-        """Pose and covariance."""
+        """Pose and covariance; of a pose from outside, next to none."""
+        if self._given is not None:
+            return Belief(self._given(), LEAST_VAR * np.eye(3))
         return Belief(self._pose, self._cov.matrix())
 
     @property
     def aligned(self) -> bool:
-        """Whether the robot may move: the gyroscope's bias has been taken."""
-        return self._gyro is None or self._steps * self._dt_s >= ALIGN_S
+        """Whether the robot may move: the gyroscope's bias has been taken, or is of no concern."""
+        return self._gyro is None or self._given is not None or self._steps * self._dt_s >= ALIGN_S
 
     def step(self, readings: Readings) -> Pose2:
         """Take in one control period."""
         self._steps += 1
+        if self._given is not None:
+            self._pose = self._given()
+            return self._pose
         if self._compass is not None:
             self._compass.look(readings)
         counts, rates = readings.by_sensor.get(self._encoders), None

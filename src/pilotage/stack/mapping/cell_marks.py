@@ -8,11 +8,11 @@ import numpy as np
 
 from pilotage.core.types import BoolArray, IntArray, Pose2
 from pilotage.kernels import cell_beam
-from pilotage.maps.cell_map import CellMap, CellState
+from pilotage.maps.cell_map import FEATURES, CellMap, CellState
 from pilotage.sensors.infrared import InfraredConfig
 from pilotage.sensors.line_sensor import LineSensorConfig
 from pilotage.sensors.readings import InfraredReading, LineReading, Readings
-from pilotage.stack.knowledge import SheetKnowledge
+from pilotage.stack.knowledge import FloorPlan, SheetKnowledge
 
 STEP_SHARE = 0.25
 """A beam is followed in steps of this share of a cell."""
@@ -24,7 +24,8 @@ class CellMarks:
     A return within a sensor's reliable range is an obstacle; what lies before it, and the reliable range
     of a sensor that sees nothing, is explored. Features are marked anywhere, everything else keeps
     ``margin_cells`` away from the map's edge. Wrong marks of high priority stay for good: this is what the
-    pose's drift does to the report's maps.
+    pose's drift does to the report's maps. With a floor plan there is nothing to find out: what it draws
+    stands from the start, the rest is explored, and only visits are marked.
     """
 
     def __init__(self, knowledge: SheetKnowledge, margin_cells: int = 0) -> None:
@@ -37,6 +38,8 @@ class CellMarks:
         self.visited_count = 0
         self._infrared = list(knowledge.sensors_of(InfraredConfig).items())
         self._lines = list(knowledge.sensors_of(LineSensorConfig).items())
+        if knowledge.given.plan is not None:
+            self._take(knowledge.given.plan)
 
     @property
     def cells(self) -> CellMap:
@@ -85,6 +88,17 @@ class CellMarks:
                 x = pose.x_m + c * mount.x_m - s * mount.y_m
                 y = pose.y_m + s * mount.x_m + c * mount.y_m
                 self._mark(here if self._line_at_centre else self.cell_of(x, y), CellState.LINE)
+
+    def _take(self, plan: FloorPlan) -> None:
+        """Draw a floor plan, and look at nothing any more."""
+        rows, columns = self._states.shape
+        inner = np.s_[self._margin : rows - self._margin, self._margin : columns - self._margin]
+        self._states[inner] = CellState.EXPLORED
+        known = plan.features.with_borders().states
+        self._states[inner] = np.minimum(self._states, known)[inner]
+        features = plan.features.holds(*FEATURES)
+        self._states[features] = plan.features.states[features]
+        self._infrared, self._lines = [], []
 
     def _beam(
         self, config: InfraredConfig, reading: InfraredReading, pose: Pose2, c: float, s: float
