@@ -18,6 +18,8 @@ from pilotage.experiments.studies.study import Study, make_study
 from pilotage.experiments.studies.sweep import settings_of
 from pilotage.experiments.studies.table import read_study
 
+DRIVER = "driver"
+"""An oracle that stands in for no module: it drives, and the localizer is only judged."""
 BASELINE = "as it is"
 ASKED = (SUCCESS, "duration_s", "position_rmse_m", "path_length_m", "min_clearance_m", "coverage_reachable")
 """What is compared, as far as the mission gives it: success, time, accuracy."""
@@ -37,7 +39,9 @@ def attribution_study(mission: str, overrides: Sequence[str], trials: int) -> St
     if not oracles:
         raise InputError(f"attribute '{mission}': expected a mission with modules that an oracle can replace")
     configurations: list[dict[str, Any]] = [{"name": BASELINE, "set": {"run.oracles": []}}]
-    configurations += [{"name": f"oracle {name}", "set": {"run.oracles": [name]}} for name in oracles]
+    configurations += [
+        {"name": f"oracle {name}", "set": {"run.oracles": [name]}} for name in oracles if name != DRIVER
+    ]
     values: dict[str, Any] = {
         "study": f"attribute-{Path(mission).stem}",
         "question": f"What does each module of '{Path(mission).stem}' cost, beside one that knows all?",

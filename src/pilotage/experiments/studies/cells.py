@@ -101,7 +101,9 @@ def _cell(
     resolved: Mapping[str, Any],
     resolve: Resolve,
 ) -> Cell:
-    values: dict[str, Any] = {} if configuration is None else {CONFIGURATION: configuration.name}
+    values: dict[str, Any] = (
+        {} if configuration is None else {CONFIGURATION: configuration.name, **configuration.values}
+    )
     overrides = base
     # Levels first: they may change a component whose parameter another factor varies.
     for factor, value in sorted(row, key=lambda pair: pair[0].levels is None):
