@@ -17,7 +17,9 @@ from pilotage.report.study.scales import Scale, key_and_unit, p_value, scale_of,
     ("metric", "values", "unit"),
     [
         ("position_rmse_m", [0.0065, 0.018], "mm"),
-        ("position_rmse_m", [0.0065, 1.8], "m"),
+        ("position_rmse_m", [0.0065, 0.002, 1.8], "mm"),
+        ("position_rmse_m", [0.0065, 0.9, 1.8], "m"),
+        ("position_rmse_m", [], "m"),
         ("path_length_m", [31_000.0], "km"),
         ("planning_time_s", [0.05], "ms"),
         ("duration_s", [86.0, math.nan], "s"),
@@ -29,7 +31,7 @@ from pilotage.report.study.scales import Scale, key_and_unit, p_value, scale_of,
         ("a_speed_m_s", [2.0], "m/s"),
     ],
 )
-def test_a_column_has_the_unit_of_its_largest_value(metric: str, values: list[float], unit: str) -> None:
+def test_a_column_has_the_unit_of_its_middle_value(metric: str, values: list[float], unit: str) -> None:
     assert scale_of(metric, values).unit == unit
 
 
@@ -37,6 +39,7 @@ def test_digits_end_where_the_interval_begins() -> None:
     assert told("planned_length_m", 24.5204, 24.5072, 24.5349) == "24.520\u00a0m (24.507 to 24.535)"
     assert told("final_position_error_m", 1100.2, 972.1, 1259.0) == "1\u00a0100\u00a0m (972 to 1\u00a0259)"
     assert told("position_rmse_m", 0.00641, 0.00630, 0.00651) == "6.41\u00a0mm (6.30 to 6.51)"
+    assert told("nees_mean", -1e-9, -0.02, 0.02, signed=True) == "+0.000 (−0.020 to +0.020)"
     assert told("nees_mean", math.nan, math.nan, math.nan) == "–"
 
 

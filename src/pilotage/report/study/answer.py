@@ -157,11 +157,11 @@ def _each_against_its_own(view: StudyView, judgement: Judgement, group: Group) -
             same = (
                 f"{_interval(view.primary, found)} with {view.cells[index].text}, in every trial the same as"
             )
-            parts.append(f"{same} with {view.cells[base].text}")
+            parts.append(f"{same} with {view.known_as(base, group)}")
             continue
         parts.append(
             f"{_interval(view.primary, found)} with {view.cells[index].text}, a change by "
-            f"{difference(view.primary, change)} against {view.cells[base].text}, {evidence(change)}"
+            f"{difference(view.primary, change)} against {view.known_as(base, group)}, {evidence(change)}"
         )
     return f"is {'; '.join(parts)}" if parts else "has no pairs to compare"
 

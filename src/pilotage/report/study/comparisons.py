@@ -60,7 +60,7 @@ def _rows(view: StudyView, judgement: Judgement, group: Group, metric: str) -> I
         found = judgement.differences[metric][index]
         if base is None or found is None or found.n == 0:
             continue
-        against = "" if group.baseline is not None else f" against {view.cells[base].text}"
+        against = "" if group.baseline is not None else f" against {view.known_as(base, group)}"
         yield f"{view.cells[index].text}{against}", found
 
 

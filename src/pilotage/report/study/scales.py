@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass
+from statistics import median
 
 from pilotage.report import quantities
 from pilotage.report.metrics_table import metric_of
@@ -45,7 +46,8 @@ class Scale:
         """Write a value with so many decimals, never in powers of ten, with thousands apart."""
         if not math.isfinite(value):
             return quantities.NOTHING
-        text = f"{value * self.times:{'+' if signed else ''},.{decimals}f}"
+        rounded = round(value * self.times, decimals) + 0.0  # no sign on a zero
+        text = f"{rounded:{'+' if signed else ''},.{decimals}f}"
         return text.replace(",", "\u00a0").replace("-", "−")
 
     def write_variance(self, variance: float) -> str:
@@ -54,8 +56,8 @@ class Scale:
 
 
 def scale_of(metric: str, values: Iterable[float]) -> Scale:
-    """The unit in which these values of a metric are told: that of the largest of them."""
-    size = max((abs(value) for value in values if math.isfinite(value)), default=0.0)
+    """The unit in which these values of a metric are told: that of the middle one."""
+    size = median([abs(value) for value in values if math.isfinite(value)] or [0.0])
     write = metric_of(metric).write
     if write is quantities.share or metric == "success":
         return Scale(100.0, "%")

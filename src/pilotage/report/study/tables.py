@@ -133,7 +133,7 @@ def consistency_table(view: StudyView) -> str:
         '<section id="consistency"><h2><a href="#consistency">Consistency</a></h2>'
         "<p>Means over the runs with their 95 % bands; runs are independent, the steps within one are not. "
         "A filter is overconfident where the whole band lies above the ideal value. NIS is told per degree "
-        f"of freedom, as the gate lets it through.</p>{''.join(tables)}</section>"
+        f"of freedom, corrected for what the gate cuts off.</p>{''.join(tables)}</section>"
     )
 
 

@@ -130,6 +130,10 @@ class StudyView:
                 out[index] = base
         return out
 
+    def known_as(self, index: int, group: Group) -> str:
+        """What a cell is called beside the cells of a group: its own name where it is none of them."""
+        return self.cells[index].text if index in group.cells else self.cells[index].name
+
     def members(self, group: Group) -> list[Cell]:
         """The cells of a group."""
         return [self.cells[index] for index in group.cells]
