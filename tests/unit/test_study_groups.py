@@ -10,6 +10,7 @@ import pytest
 from pilotage.core.config import validate
 from pilotage.core.errors import InputError
 from pilotage.evaluation.judge import judge
+from pilotage.experiments.mission import load_mission
 from pilotage.experiments.studies.definition import StudyDefinition
 from pilotage.experiments.studies.groups import baselines, cell_groups
 from pilotage.experiments.studies.study import Study, load_study, make_study, shipped_studies
@@ -105,6 +106,22 @@ def test_factors_varied_one_at_a_time_are_groups_of_their_own() -> None:
         ("gate", (0, 1)),
         ("odometry_var_scale", (2, 3, 4)),
     ]
+
+
+def test_a_components_name_is_set_before_its_parameters_whatever_comes_first() -> None:
+    scale = "stack.localizer.odometry_var_scale"
+    factors = [
+        {"key": scale, "values": [0.1, 10.0]},
+        {"key": "stack.localizer.name", "values": ["ekf-walls"]},
+    ]
+    cells = study(configurations=[], factors=factors).cells
+    for cell, value in zip(cells, (0.1, 10.0), strict=True):
+        localizer = load_mission("museum-route", cell.overrides).model_dump()["stack"]["localizer"]
+        assert (localizer["name"], localizer["odometry_var_scale"]) == ("ekf-walls", value)
+    (mixed,) = study(
+        configurations=[{"name": "mixed", "set": {scale: 10.0, "stack.localizer.name": "ekf-walls"}}]
+    ).cells
+    assert [text.partition("=")[0] for text in mixed.overrides] == ["stack.localizer.name", scale]
 
 
 def test_what_is_said_about_cells_changes_no_row_and_so_no_digest() -> None:

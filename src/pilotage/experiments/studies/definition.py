@@ -86,7 +86,8 @@ class StudyDefinition(Config):
     metrics
         The metrics to report; none given: every number that the trials give.
     primary, lower_is_better, baseline
-        The metric that answers the question, and the cell that the others are held against.
+        The metric that answers the question, which way it is better (by default as its name says), and the
+        cell that the others are held against.
     groups
         Cells that are judged apart from the others, each group with a baseline of its own.
     contrasts
@@ -109,7 +110,7 @@ class StudyDefinition(Config):
     seeds: Seeds = Seeds()
     metrics: tuple[str, ...] = ()
     primary: str | None = None
-    lower_is_better: bool = True
+    lower_is_better: bool | None = None
     baseline: str | None = None
     groups: tuple[Group, ...] = ()
     contrasts: tuple[Contrast, ...] = ()

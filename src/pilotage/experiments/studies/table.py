@@ -19,6 +19,16 @@ from pilotage.experiments.studies.study import Study, load_study
 
 IDENTITY = frozenset({"seed"})
 """Numbers of a trial that say which one it is."""
+TELLING = (
+    "coverage_reachable",
+    "position_rmse_m",
+    "planned_length_m",
+    "duration_s",
+    "path_length_m",
+    "nees_mean",
+    "nis_mean",
+)
+"""Where nothing is asked for, these stand before others, and the first that the trials give answers."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,7 +61,8 @@ class StudyTable:
     def metrics(self) -> tuple[str, ...]:
         """What is reported: what the definition asks for, else every number that varies or matters."""
         asked = self.study.definition.metrics
-        return asked or tuple(name for name in self.values if name not in {*IDENTITY, SUCCESS})
+        given = [name for name in self.values if name not in {*IDENTITY, SUCCESS}]
+        return asked or (*(m for m in TELLING if m in given), *(m for m in given if m not in TELLING))
 
     @property
     def primary(self) -> str:

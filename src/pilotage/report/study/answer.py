@@ -30,11 +30,7 @@ def answer(view: StudyView, judgement: Judgement) -> str:
     metric = metric_of(view.primary)
     if not any(math.isfinite(summary.mean) for summary in judgement.summaries[view.primary]):
         return f"No trial gave {metric.name}."
-    if (
-        len(view.groups) == 1
-        and all(base is None for base in view.groups[0].baselines)
-        and 1 < len(view.cells) <= FEW
-    ):
+    if _is_few_alone(view):
         return f"{'; '.join(_each(view, judgement, cell) for cell in view.cells)}."
     if len(view.groups) == 1:
         return f"{_sentence(metric.name)} {_group(view, judgement, view.groups[0])}."
@@ -68,6 +64,13 @@ def evidence(change: Difference) -> str:
     if change.p_corrected < SURE:
         return f"{p_value(change.p_corrected, 'p ')} after correction"
     return "not told from chance"
+
+
+def _is_few_alone(view: StudyView) -> bool:
+    """Whether the study is a few settings by name, held against nothing."""
+    names_alone = all(isinstance(value, str) for cell in view.cells for value in cell.values.values())
+    alone = all(base is None for group in view.groups for base in group.baselines)
+    return names_alone and alone and len(view.groups) == 1 and 1 < len(view.cells) <= FEW
 
 
 def _each(view: StudyView, judgement: Judgement, cell: Cell) -> str:
@@ -118,8 +121,8 @@ def _group(view: StudyView, judgement: Judgement, group: Group) -> str:
             return f"is {_interval(view.primary, summaries[best])} at every setting, mean {over} each"
         return (
             f"is {first} with {view.cells[best].text}, {_interval(view.primary, summaries[best])}, and "
-            f"{last} with {view.cells[worst].text}, {_interval(view.primary, summaries[worst])}: means with "
-            f"their 95 % intervals {over} each"
+            f"{last} with {view.cells[worst].text}, {_interval(view.primary, summaries[worst])}: "
+            f"{'means with their 95 % intervals ' if summaries[best].n > 1 else ''}{over} each"
         )
     start = f"is {_interval(view.primary, summaries[base])} with {view.cells[base].text}"
     found = [judgement.differences[view.primary][index] for index in group.cells if index != base]

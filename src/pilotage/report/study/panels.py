@@ -6,7 +6,6 @@ import math
 from collections.abc import Iterable, Sequence
 from typing import Literal
 
-import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
@@ -25,10 +24,10 @@ WIDE = 30.0
 
 
 def drawable(view: StudyView, cells: Iterable[Cell]) -> list[str]:
-    """Metrics of which at least one trial of these cells gave a value."""
-    inside = np.isin(view.cell, [cell.index for cell in cells])
+    """Metrics that trials of these cells gave a value of."""
+    chosen = list(cells)
     names = dict.fromkeys([view.primary, *view.metrics])
-    return [m for m in names if bool(np.isfinite(view.column(m)[inside]).any())][:MOST]
+    return [metric for metric in names if view.worth_showing(metric, chosen)][:MOST]
 
 
 def scale_for(judgement: Judgement, metric: str, cells: Iterable[Cell]) -> Scale:

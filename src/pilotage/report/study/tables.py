@@ -34,7 +34,8 @@ def cells_table(view: StudyView, judgement: Judgement, lower: dict[str, bool]) -
 
 
 def _group_table(view: StudyView, judgement: Judgement, lower: dict[str, bool], group: Group) -> str:
-    metrics = [m for m in view.metrics if any(judgement.summaries[m][i].n for i in group.cells)]
+    given = [m for m in view.metrics if any(judgement.summaries[m][i].n for i in group.cells)]
+    metrics = [m for m in given if view.worth_showing(m, view.members(group))]
     scales = {m: _scale(judgement, m, view.members(group)) for m in metrics}
     best = {
         m: best_cell(judgement, m, lower[m], group.cells)
@@ -63,7 +64,7 @@ def _group_table(view: StudyView, judgement: Judgement, lower: dict[str, bool], 
     return (
         f'{caption}<div class="wide" tabindex="0"><table class="cells"><thead><tr>'
         f'<th scope="col">setting</th><th scope="col" class="value">success</th>{head}</tr></thead>'
-        f"<tbody>{''.join(rows)}</tbody></table></div>{_all_numbers(view, judgement, group, metrics)}"
+        f"<tbody>{''.join(rows)}</tbody></table></div>{_all_numbers(view, judgement, group, given)}"
     )
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -75,6 +75,8 @@ class StudyView:
         Pairs of metrics that are held against each other within every trial.
     units
         By factor, the unit of its values.
+    asked
+        Whether somebody chose the metrics; of all that the trials give, those that never vary are left out.
     reference
         By metric, a value that bounds it or that it is held against, such as a known optimum, with its name.
     row, cell, trial, seed
@@ -106,6 +108,7 @@ class StudyView:
     note: str = ""
     contrasts: tuple[tuple[str, str], ...] = ()
     units: Mapping[str, str] = field(default_factory=dict)
+    asked: bool = True
     versions: str = ""
 
     def column(self, metric: str) -> FloatArray:
@@ -133,6 +136,15 @@ class StudyView:
     def known_as(self, index: int, group: Group) -> str:
         """What a cell is called beside the cells of a group: its own name where it is none of them."""
         return self.cells[index].text if index in group.cells else self.cells[index].name
+
+    def worth_showing(self, metric: str, cells: Iterable[Cell]) -> bool:
+        """Whether the trials of some cells give a metric, and it varies or was asked for."""
+        inside = np.isin(self.cell, [cell.index for cell in cells])
+        found = self.column(metric)[inside]
+        found = found[np.isfinite(found)]
+        if not found.size:
+            return False
+        return self.asked or metric == self.primary or found.size == 1 or bool(np.ptp(found) > 0.0)
 
     def members(self, group: Group) -> list[Cell]:
         """The cells of a group."""

@@ -21,6 +21,7 @@ from pilotage.report.run_folder import read_run
 from pilotage.report.study.examples import Example, describe, rows_to_show
 from pilotage.report.study.page import write_page
 from pilotage.report.study.scales import key_and_unit
+from pilotage.report.study.tables import lower_is_better
 from pilotage.report.study.view import Cell, Failure, Group, StudyView
 from pilotage.report.style import drawing_style
 
@@ -67,7 +68,10 @@ def view_of(table: StudyTable) -> StudyView:
         factors=definition.factor_names,
         metrics=table.metrics,
         primary=table.primary,
-        lower_is_better=definition.lower_is_better,
+        lower_is_better=lower_is_better((table.primary,))[table.primary]
+        if definition.lower_is_better is None
+        else definition.lower_is_better,
+        asked=bool(definition.metrics),
         groups=tuple(Group(group.name, group.cells, group.baselines) for group in table.groups),
         contrasts=table.contrasts,
         units={factor.title: unit_of(factor) for factor in definition.factors},
@@ -107,7 +111,7 @@ def labels(table: StudyTable) -> list[str]:
                 continue
             unit = unit_of(factors[title])
             after = f"\u00a0{unit}" if unit else ""
-            named = factors[title].levels is not None
+            named = factors[title].levels is not None or isinstance(value, str)
             words.append(str(value) if named else f"{key_and_unit(title)[0]} {show(value)}{after}")
         out.append(", ".join(words) or cell.name)
     for group in table.groups:
