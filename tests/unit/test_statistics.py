@@ -50,6 +50,13 @@ def test_a_summary_holds_its_mean_and_its_median(values: np.ndarray) -> None:
     assert summary.smallest <= summary.median <= summary.largest
 
 
+def test_values_that_differ_by_rounding_alone_give_a_point_and_no_warning() -> None:
+    shifted = (np.arange(8) * 0.1 + 3.0) - (np.arange(8) * 0.1 + 1.0)  # all 2, but for the last bits
+    assert np.ptp(shifted) > 0.0
+    assert bootstrap_mean(shifted) == pytest.approx((2.0, 2.0))
+    assert bootstrap_mean(np.full(5, 1e-300)) == (1e-300, 1e-300)
+
+
 def test_what_is_not_finite_is_not_counted() -> None:
     summary = summarize(np.array([1.0, math.nan, 3.0, math.inf]))
     assert (summary.n, summary.mean) == (2, 2.0)
@@ -81,6 +88,13 @@ def test_nothing_changed_is_no_evidence() -> None:
     assert math.isnan(same.p_value)
     assert (same.mean, same.low, same.high, same.effect) == (0.0, 0.0, 0.0, 0.0)
     assert difference(np.array([math.nan]), np.array([1.0])).n == 0
+
+
+def test_a_difference_of_rounding_alone_is_none() -> None:
+    values = np.linspace(1.0, 2.0, 10)
+    found = difference(values, values / 3.0 * 3.0 * (1.0 + 1e-15))
+    assert (found.low, found.high, found.effect) == (0.0, 0.0, 0.0)
+    assert math.isnan(found.p_value)
 
 
 def test_success_is_compared_on_the_pairs_that_differ() -> None:

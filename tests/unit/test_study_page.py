@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+import re
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -13,9 +14,15 @@ from pilotage.evaluation.judge import judge, paired_columns
 from pilotage.report.study.answer import answer
 from pilotage.report.study.examples import Example, describe, rows_to_show
 from pilotage.report.study.page import judge_view, study_page
-from pilotage.report.study.view import Cell, Failure, StudyView
+from pilotage.report.study.view import Cell, Failure, Group, StudyView
 
 TRIALS = 20
+
+
+def all_of(cells: Sequence[Cell], baseline: int | None, name: str = "") -> Group:
+    """A group of these cells, held against one of them."""
+    held = tuple(None if cell.index == baseline else baseline for cell in cells)
+    return Group(name, tuple(cell.index for cell in cells), held)
 
 
 def made_up(
@@ -38,7 +45,7 @@ def made_up(
         metrics=metrics,
         primary=metrics[0],
         lower_is_better=True,
-        baseline=baseline,
+        groups=(all_of(cells, baseline),),
         reference={},
         trials_per_cell=TRIALS,
         first_seed=0,
@@ -66,15 +73,17 @@ def two_settings(shift_m: float) -> StudyView:
 
 def test_a_better_setting_is_named_with_its_gain() -> None:
     view = two_settings(-0.5)
-    text = answer(view, judge_view(view))
-    assert text.startswith("Way driven is lowest with new")
-    assert "against plain it changes by −0.5" in text
-    assert "after correction" in text
+    text = answer(view, judge_view(view)).replace("\u00a0", " ")
+    assert re.match(
+        r"Way driven is 10\.\d+ m \([\d.]+ to [\d.]+\) with plain; lowest with new, 9\.\d+ m, ", text
+    )
+    assert re.search(r"a change by −0\.49\d* m \(−0\.50\d* to −0\.48\d*\) on the same 20 seeds", text)
+    assert text.endswith("p < 0.001 after correction.")
 
 
 def test_a_difference_that_is_none_is_called_chance() -> None:
     view = two_settings(-0.008)
-    assert "do not tell from chance" in answer(view, judge_view(view))
+    assert "not told from chance" in answer(view, judge_view(view))
 
 
 def test_pairs_are_matched_by_their_trial_not_by_their_place() -> None:
@@ -91,7 +100,9 @@ def test_all_comparisons_of_a_study_are_corrected_together() -> None:
     cell = np.repeat(np.arange(11), TRIALS)
     trial = np.tile(np.arange(TRIALS), 11)
     values: Mapping[str, np.ndarray] = {"path_length_m": rng.normal(size=cell.size)}
-    found = [entry for entry in judge(cell, trial, values, 11, 0).differences["path_length_m"] if entry]
+    found = [
+        entry for entry in judge(cell, trial, values, [None, *[0] * 10]).differences["path_length_m"] if entry
+    ]
     assert len(found) == 10
     assert all(entry.p_corrected >= entry.p_value for entry in found)
 
@@ -129,8 +140,9 @@ def test_numbers_over_a_factor_are_drawn_and_the_best_is_bold(metric: str) -> No
 
     page = study_page(made_up(cells, (metric,), value, baseline=None))
     assert 'id="factor-stack-planner-turning-radius-m"' in page
+    assert "turning radius [m]" in page
     assert "published" in page
-    assert "<b>20.2" in page.replace("\u00a0", " ")
+    assert "<b>20.195</b>" in page
     assert "http://" not in page.replace("http://www.w3.org", "")
 
 

@@ -1,4 +1,4 @@
-"""Judging a study: every cell's summary, and every cell against the baseline on the same seeds."""
+"""Judging a study: every cell's summary, and every cell against its baseline on the same seeds."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from pilotage.evaluation.intervals import Summary, summarize, wilson
 from pilotage.evaluation.paired import Difference, corrected, difference
 
 SUCCESS = "success"
+Pair = tuple[str, str]
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,17 +36,25 @@ class Judgement:
     rates
         One success rate a cell.
     differences
-        By metric, one a cell against the baseline; None for the baseline itself, and all of them where
-        there is no baseline. Their ``p_corrected`` counts all comparisons of all metrics here.
+        By metric, one a cell against its baseline; None for a baseline itself and where there is none.
+    contrasts
+        By (metric, other metric), one a cell: the first less the second in the same trials.
+
+    ``p_corrected`` counts all comparisons made here: of all metrics, cells and contrasts.
     """
 
     summaries: Mapping[str, Sequence[Summary]]
     rates: Sequence[Rate]
     differences: Mapping[str, Sequence[Difference | None]]
+    contrasts: Mapping[Pair, Sequence[Difference]]
 
 
 def judge(
-    cell: IntArray, trial: IntArray, values: Mapping[str, FloatArray], cells: int, baseline: int | None
+    cell: IntArray,
+    trial: IntArray,
+    values: Mapping[str, FloatArray],
+    baselines: Sequence[int | None],
+    contrasts: Sequence[Pair] = (),
 ) -> Judgement:
     """Judge the finished trials of a study.
 
@@ -55,11 +64,12 @@ def judge(
         (n,) which cell a row belongs to, and its number there; rows with the same number share a seed.
     values
         By metric, (n,) its values; nan where a trial does not give it. ``success`` is 0 or 1.
-    cells
-        How many cells there are, those without a finished trial included.
-    baseline
-        The cell that the others are held against.
+    baselines
+        One a cell, those without a finished trial included: the cell that it is held against, or None.
+    contrasts
+        Pairs of metrics that are held against each other within every trial.
     """
+    cells = len(baselines)
     summaries = {
         metric: [summarize(column[cell == index]) for index in range(cells)]
         for metric, column in values.items()
@@ -67,17 +77,27 @@ def judge(
     rates = [
         _rate(values[SUCCESS][cell == i]) if SUCCESS in values else _rate(np.zeros(0)) for i in range(cells)
     ]
-    if baseline is None:
-        nothing: list[Difference | None] = [None] * cells
-        return Judgement(summaries, rates, dict.fromkeys(values, nothing))
-    found = {
-        metric: [
-            None if index == baseline else _paired(cell, trial, column, baseline, index, metric == SUCCESS)
-            for index in range(cells)
-        ]
+    across = {
+        (metric, index): _paired(cell, trial, column, base, index, metric == SUCCESS)
         for metric, column in values.items()
+        for index, base in enumerate(baselines)
+        if base is not None and base != index
     }
-    return Judgement(summaries, rates, _correct(found))
+    empty = np.full(cell.shape, np.nan)
+    within = {
+        ((first, other), index): difference(
+            values.get(other, empty)[cell == index], values.get(first, empty)[cell == index]
+        )
+        for first, other in contrasts
+        for index in range(cells)
+    }
+    across, within = _correct(across, within)
+    return Judgement(
+        summaries,
+        rates,
+        {metric: [across.get((metric, index)) for index in range(cells)] for metric in values},
+        {pair: [within[pair, index] for index in range(cells)] for pair in contrasts},
+    )
 
 
 def paired_columns(
@@ -96,18 +116,16 @@ def _paired(
     return difference(*paired_columns(cell, trial, column, first, other), binary=binary)
 
 
-def _correct(found: dict[str, list[Difference | None]]) -> dict[str, list[Difference | None]]:
+def _correct(
+    across: Mapping[tuple[str, int], Difference], within: Mapping[tuple[Pair, int], Difference]
+) -> tuple[dict[tuple[str, int], Difference], dict[tuple[Pair, int], Difference]]:
     """Correct all p-values at once."""
-    places = [
-        (metric, i) for metric, row in found.items() for i, entry in enumerate(row) if entry is not None
-    ]
-    p_values = [entry.p_value for row in found.values() for entry in row if entry is not None]
-    out = {metric: list(row) for metric, row in found.items()}
-    for (metric, index), p_value in zip(places, corrected(p_values), strict=True):
-        entry = out[metric][index]
-        assert entry is not None
-        out[metric][index] = replace(entry, p_corrected=p_value)
-    return out
+    p_values = corrected([entry.p_value for entry in (*across.values(), *within.values())])
+    one, other = p_values[: len(across)], p_values[len(across) :]
+    return (
+        {key: replace(across[key], p_corrected=p) for key, p in zip(across, one, strict=True)},
+        {key: replace(within[key], p_corrected=p) for key, p in zip(within, other, strict=True)},
+    )
 
 
 def _rate(success: FloatArray) -> Rate:

@@ -10,7 +10,7 @@ import numpy as np
 from scipy import stats
 
 from pilotage.core.types import FloatArray
-from pilotage.evaluation.intervals import bootstrap_mean
+from pilotage.evaluation.intervals import ROUNDING, bootstrap_mean
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,7 +50,8 @@ def difference(first: FloatArray, other: FloatArray, *, binary: bool = False) ->
     Parameters
     ----------
     first, other
-        (n,) the metric of trial i in either; nan where a trial does not give it.
+        (n,) the metric of trial i in either; nan where a trial does not give it. A difference of rounding
+        alone is none.
     binary
         The metric is yes or no (a success): the test is then McNemar's exact one on the pairs that
         differ, otherwise Wilcoxon's signed-rank test (pairs without a difference are split evenly, Pratt).
@@ -63,6 +64,7 @@ def difference(first: FloatArray, other: FloatArray, *, binary: bool = False) ->
     if first.shape != other.shape or first.ndim != 1:
         raise ValueError(f"expected two arrays of the same length, found {first.shape} and {other.shape}")
     change = other - first
+    change[np.abs(change) <= ROUNDING * np.maximum(np.abs(first), np.abs(other))] = 0.0
     change = change[np.isfinite(change)]
     if change.size == 0:
         return NOTHING

@@ -12,6 +12,8 @@ from pilotage.evaluation.intervals import bootstrap_mean
 
 NEES_IDEAL = 3.0
 NIS_IDEAL = 1.0
+IDEALS = {"nees_mean": NEES_IDEAL, "nis_mean": NIS_IDEAL}
+"""By metric, what a consistent filter gives."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,6 +12,7 @@ from pilotage.core.errors import InputError
 from pilotage.core.random import RandomStreams
 from pilotage.core.types import Goal, Pose2
 from pilotage.experiments.components import build_component, optional_component
+from pilotage.experiments.floor.driver import WatchedLocalizer, WatchedStack
 from pilotage.experiments.floor.obstacles import Obstacles, place_obstacles
 from pilotage.experiments.floor.oracles import Truth, exactly, with_oracles
 from pilotage.experiments.floor.places import settle_places
@@ -197,4 +198,6 @@ def _build_stack(
     )
     if truth is not None:
         parts = with_oracles(parts, oracles, truth)
-    return build_component(NAVIGATORS, roles.navigator, "navigator", knowledge, parts)
+    stack = build_component(NAVIGATORS, roles.navigator, "navigator", knowledge, parts)
+    localizer = parts.localizer
+    return WatchedStack(stack, localizer.watched) if isinstance(localizer, WatchedLocalizer) else stack

@@ -14,6 +14,7 @@ import numpy as np
 
 from pilotage.core.angles import wrap_to_pi
 from pilotage.core.types import FloatArray, Pose2, Twist
+from pilotage.experiments.floor.driver import WatchedLocalizer
 from pilotage.maps.distance_field import DistanceField
 from pilotage.maps.segment_map import SegmentMap
 from pilotage.sensors.readings import Readings
@@ -30,6 +31,7 @@ ORACLES: Mapping[str, str] = {
     "mapper": "every unexpected obstacle is on the robot's own map from the start",
     "planner": "the mission's planner on the world as it is, unexpected obstacles included",
     "controller": "the reference followed from the true pose, whatever the robot believes",
+    "driver": "everything drives on the true pose; the localizer runs along and is judged",
 }
 """What stands in for each module."""
 
@@ -61,13 +63,16 @@ class Truth:
 
 def applicable(roles: Mapping[str, object]) -> dict[str, str]:
     """The oracles that can stand in for something in a stack of these roles."""
-    return {name: text for name, text in ORACLES.items() if name == "sensors" or roles.get(name) is not None}
+    always = ("sensors", "driver")
+    return {name: text for name, text in ORACLES.items() if name in always or roles.get(name) is not None}
 
 
 def with_oracles(parts: Parts, names: frozenset[str], truth: Truth) -> Parts:
     """The parts with those named replaced."""
     if "localizer" in names:
         parts = replace(parts, localizer=TrueLocalizer(truth))
+    if "driver" in names:
+        parts = replace(parts, localizer=WatchedLocalizer(parts.localizer, TrueLocalizer(truth)))
     if "mapper" in names:
         parts = replace(parts, mapper=KnowingMapper(truth))
     if "planner" in names and parts.planner is not None:

@@ -23,6 +23,8 @@ from pilotage.experiments.studies.study import Study, make_study
 from pilotage.experiments.studies.sweep import settings_of
 from pilotage.experiments.studies.table import StudyTable, read_study
 
+DRIVER = "driver"
+"""An oracle that stands in for no module: it drives, and the localizer is only judged."""
 BASELINE = "as it is"
 ORACLE = "oracle "
 SURE = 0.05
@@ -45,8 +47,14 @@ def attribution_study(mission: str, overrides: Sequence[str], trials: int) -> St
         raise InputError(f"attribute '{mission}': expected a mission with modules that an oracle can replace")
     told = "; ".join(f"{name}: {text}" for name, text in oracles.items())
     configurations: list[dict[str, Any]] = [{"name": BASELINE, "set": {"run.oracles": []}}]
+<<<<<<< HEAD
     configurations += [{"name": f"{ORACLE}{name}", "set": {"run.oracles": [name]}} for name in oracles]
     primary = next(iter(costs))
+=======
+    configurations += [
+        {"name": f"oracle {name}", "set": {"run.oracles": [name]}} for name in oracles if name != DRIVER
+    ]
+>>>>>>> h4
     values: dict[str, Any] = {
         "study": _name(mission, overrides),
         "question": (

@@ -75,8 +75,16 @@ def make_cells(definition: StudyDefinition, resolve: Resolve) -> tuple[Cell, ...
 
 
 def as_overrides(settings: Mapping[str, Any]) -> tuple[str, ...]:
-    """Keys and values as ``--set`` takes them; JSON is YAML on one line."""
-    return tuple(f"{key}={json.dumps(value)}" for key, value in settings.items())
+    """Keys and values as ``--set`` takes them; JSON is YAML on one line.
+
+    Names of components come first: another name takes the parameters that were set before with it.
+    """
+    ordered = sorted(settings.items(), key=lambda item: not _names_component((item[0],)))
+    return tuple(f"{key}={json.dumps(value)}" for key, value in ordered)
+
+
+def _names_component(keys: Sequence[str]) -> bool:
+    return any(key == "name" or key.endswith(".name") for key in keys)
 
 
 def _combinations(factors: Sequence[Factor], combine: str) -> list[tuple[tuple[Factor, Any], ...]]:
@@ -101,10 +109,14 @@ def _cell(
     resolved: Mapping[str, Any],
     resolve: Resolve,
 ) -> Cell:
-    values: dict[str, Any] = {} if configuration is None else {CONFIGURATION: configuration.name}
+    values: dict[str, Any] = (
+        {} if configuration is None else {CONFIGURATION: configuration.name, **configuration.values}
+    )
     overrides = base
-    # Levels first: they may change a component whose parameter another factor varies.
-    for factor, value in sorted(row, key=lambda pair: pair[0].levels is None):
+    # Levels and names first: they may change a component whose parameter another factor varies.
+    for factor, value in sorted(
+        row, key=lambda pair: pair[0].levels is None and not _names_component(pair[0].keys)
+    ):
         if factor.levels is not None:
             overrides = (*overrides, *as_overrides(factor.levels[value]))
             resolved = resolve(overrides)

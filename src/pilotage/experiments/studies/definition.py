@@ -15,10 +15,15 @@ CONFIGURATION = "configuration"
 
 
 class Configuration(Config):
-    """A named set of overrides, such as one row of an ablation table; none is the mission as it is."""
+    """A named set of overrides, such as one row of an ablation table; none is the mission as it is.
+
+    ``values`` says what its settings amount to, by factor: figures over those factors are then drawn of
+    named configurations too. They change nothing in the trials.
+    """
 
     name: str = Field(min_length=1)
     set: Mapping[str, Any] = {}
+    values: Mapping[str, float | int] = {}
 
 
 class Seeds(Config):
@@ -46,6 +51,25 @@ class Reference(Config):
     name: str = "reference"
 
 
+class Group(Config):
+    """Cells that are judged together: one answer, one figure, one table.
+
+    ``cells`` are names of cells, or how names begin: ``walls*``. ``baseline`` is the one of them that the
+    others are held against, or by cell the one that it is held against, of whichever group.
+    """
+
+    name: str = Field(min_length=1)
+    cells: tuple[str, ...] = Field(min_length=1)
+    baseline: str | Mapping[str, str] | None = None
+
+
+class Contrast(Config):
+    """Two metrics of the same trials that are held against each other."""
+
+    metric: str
+    against: str
+
+
 class StudyDefinition(Config):
     """A mission, what is varied, how often it is run, and what is asked.
 
@@ -62,7 +86,12 @@ class StudyDefinition(Config):
     metrics
         The metrics to report; none given: every number that the trials give.
     primary, lower_is_better, baseline
-        The metric that answers the question, and the cell that the others are held against.
+        The metric that answers the question, which way it is better (by default as its name says), and the
+        cell that the others are held against.
+    groups
+        Cells that are judged apart from the others, each group with a baseline of its own.
+    contrasts
+        Pairs of metrics that are held against each other within every trial.
     published
         Shown beside ours.
     reference
@@ -81,8 +110,10 @@ class StudyDefinition(Config):
     seeds: Seeds = Seeds()
     metrics: tuple[str, ...] = ()
     primary: str | None = None
-    lower_is_better: bool = True
+    lower_is_better: bool | None = None
     baseline: str | None = None
+    groups: tuple[Group, ...] = ()
+    contrasts: tuple[Contrast, ...] = ()
     published: tuple[Published, ...] = ()
     reference: Mapping[str, Reference] = {}
 
@@ -92,6 +123,15 @@ class StudyDefinition(Config):
         _once(titles, "factors", "give one of them a name")
         _once([c.name for c in self.configurations], "configurations", "names tell them apart")
         _once(list(self.metrics), "metrics", "once is enough")
+        _once([group.name for group in self.groups], "groups", "names tell them apart")
+        for name in (name for entry in self.contrasts for name in (entry.metric, entry.against)):
+            if self.metrics and name not in self.metrics:
+                raise ValueError(f"contrasts: expected metrics of the study, found '{name}'")
+        if self.groups and self.baseline is not None:
+            raise ValueError("baseline: expected one in each of the groups, found one beside them")
+        clash = next((name for name in self.value_names if name in {CONFIGURATION, *titles}), None)
+        if clash is not None:
+            raise ValueError(f"configurations: '{clash}' among their values is a factor's name already")
         if self.configurations and CONFIGURATION in titles:
             raise ValueError(f"a factor cannot be called '{CONFIGURATION}' beside configurations")
         if self.combine == "zip" and len({len(factor.settings()) for factor in self.factors}) > 1:
@@ -116,7 +156,13 @@ class StudyDefinition(Config):
     @property
     def factor_names(self) -> tuple[str, ...]:
         """Names of what is varied, the configurations first."""
-        return (*((CONFIGURATION,) if self.configurations else ()), *(f.title for f in self.factors))
+        named = (CONFIGURATION,) if self.configurations else ()
+        return (*named, *self.value_names, *(f.title for f in self.factors))
+
+    @property
+    def value_names(self) -> tuple[str, ...]:
+        """Names of what the configurations say that their settings amount to."""
+        return tuple(dict.fromkeys(name for c in self.configurations for name in c.values))
 
 
 def _once(names: list[str], what: str, remedy: str) -> None:

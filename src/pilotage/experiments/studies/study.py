@@ -19,11 +19,22 @@ from pilotage.experiments.mission import mission_of, read_mission, shipped_missi
 from pilotage.experiments.resolve import resolved_values
 from pilotage.experiments.studies.cells import Cell, make_cells
 from pilotage.experiments.studies.definition import StudyDefinition
+from pilotage.experiments.studies.groups import cell_groups
 from pilotage.experiments.values import parse_yaml, read_text
 
 SHIPPED = resources.files("pilotage.missions") / "studies"
 STUDY_FILE, MISSION_FILE = "study.yaml", "mission.yaml"
-PRESENTATION = ("question", "description", "primary", "lower_is_better", "baseline", "published", "reference")
+PRESENTATION = (
+    "question",
+    "description",
+    "primary",
+    "lower_is_better",
+    "baseline",
+    "groups",
+    "contrasts",
+    "published",
+    "reference",
+)
 """What a definition says about its page only: it may change without touching a row."""
 
 
@@ -67,6 +78,8 @@ class Study:
     def essence(self) -> dict[str, Any]:
         """All that decides the rows, as plain values."""
         definition = self.definition.model_dump(mode="json", exclude={*PRESENTATION, "study", "mission"})
+        for configuration in definition["configurations"]:
+            del configuration["values"]
         return {**definition, "mission": dict(self.base), "files": dict(self.files)}
 
     @property
@@ -146,6 +159,7 @@ def make_study(definition: StudyDefinition, folder: Path = Path()) -> Study:
             resolve(cell.overrides)
         except InputError as error:
             raise InputError(f"cell '{cell.name}': {error}") from None
+    cell_groups(definition, cells)
     return Study(definition, base, cells, _digests(base))
 
 

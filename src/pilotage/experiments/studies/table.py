@@ -13,11 +13,22 @@ import numpy as np
 from pilotage.core.errors import InputError
 from pilotage.core.types import FloatArray, IntArray
 from pilotage.evaluation.judge import SUCCESS, Judgement, judge
+from pilotage.experiments.studies.groups import CellGroup, baselines, cell_groups
 from pilotage.experiments.studies.store import DATABASE, flat, read_rows
 from pilotage.experiments.studies.study import Study, load_study
 
 IDENTITY = frozenset({"seed"})
 """Numbers of a trial that say which one it is."""
+TELLING = (
+    "coverage_reachable",
+    "position_rmse_m",
+    "planned_length_m",
+    "duration_s",
+    "path_length_m",
+    "nees_mean",
+    "nis_mean",
+)
+"""Where nothing is asked for, these stand before others, and the first that the trials give answers."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,7 +61,8 @@ class StudyTable:
     def metrics(self) -> tuple[str, ...]:
         """What is reported: what the definition asks for, else every number that varies or matters."""
         asked = self.study.definition.metrics
-        return asked or tuple(name for name in self.values if name not in {*IDENTITY, SUCCESS})
+        given = [name for name in self.values if name not in {*IDENTITY, SUCCESS}]
+        return asked or (*(m for m in TELLING if m in given), *(m for m in given if m not in TELLING))
 
     @property
     def primary(self) -> str:
@@ -58,28 +70,22 @@ class StudyTable:
         return self.study.definition.primary or next(iter(self.metrics), SUCCESS)
 
     @property
-    def baseline(self) -> int | None:
-        """The cell that the others are held against.
+    def groups(self) -> tuple[CellGroup, ...]:
+        """Cells that are judged together, with the one that the others are held against."""
+        return cell_groups(self.study.definition, self.study.cells)
 
-        Raises
-        ------
-        InputError
-            Where the definition names one that there is not.
-        """
-        named, cells = self.study.definition.baseline, self.study.cells
-        if named is None:
-            return 0 if len(cells) > 1 and self.study.definition.configurations else None
-        for cell in cells:
-            if cell.name == named:
-                return cell.index
-        raise InputError(f"baseline: expected the name of a cell, found '{named}'")
+    @property
+    def contrasts(self) -> tuple[tuple[str, str], ...]:
+        """Pairs of metrics that are held against each other within every trial."""
+        return tuple((entry.metric, entry.against) for entry in self.study.definition.contrasts)
 
     def judged(self) -> Judgement:
-        """Every cell's summary, and every cell against the baseline."""
+        """Every cell's summary, and every cell against its baseline."""
         names = dict.fromkeys([*self.metrics, self.primary, SUCCESS])
         empty = np.full(self.row.shape, math.nan)
         values = {name: self.values.get(name, empty) for name in names}
-        return judge(self.cell, self.trial, values, len(self.study.cells), self.baseline)
+        held_against = baselines(self.groups, len(self.study.cells))
+        return judge(self.cell, self.trial, values, held_against, self.contrasts)
 
 
 def read_study(folder: Path) -> StudyTable:

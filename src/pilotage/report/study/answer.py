@@ -1,62 +1,182 @@
-"""The answer in one sentence, with its interval."""
+"""The answer in one sentence, with its interval, and what else each group of settings says."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 
 from pilotage.evaluation.intervals import Summary
 from pilotage.evaluation.judge import Judgement
-from pilotage.report import quantities
+from pilotage.evaluation.paired import Difference
 from pilotage.report.metrics_table import Metric, metric_of
-from pilotage.report.study.view import StudyView
+from pilotage.report.study.findings import FEW, facts, rate_text
+from pilotage.report.study.scales import p_value, told
+from pilotage.report.study.view import Cell, Group, StudyView
 
 SURE = 0.05
 
 
-def best_cell(judgement: Judgement, metric: str, lower: bool) -> int | None:
-    """The cell with the best mean; None where no cell has one."""
-    means = [summary.mean for summary in judgement.summaries.get(metric, ())]
-    known = [(mean, index) for index, mean in enumerate(means) if math.isfinite(mean)]
+def best_cell(judgement: Judgement, metric: str, lower: bool, cells: Iterable[int]) -> int | None:
+    """The one of some cells with the best mean; None where none of them has one."""
+    known = [(judgement.summaries[metric][index].mean, index) for index in cells]
+    known = [entry for entry in known if math.isfinite(entry[0])]
     if not known:
         return None
     return (min(known) if lower else max(known, key=lambda entry: (entry[0], -entry[1])))[1]
 
 
-def interval(metric: Metric, summary: Summary) -> str:
-    """Mean and interval in the metric's own words."""
-    if not math.isfinite(summary.mean):
-        return quantities.NOTHING
-    if not math.isfinite(summary.low):
-        return metric.write(summary.mean)
-    return f"{metric.write(summary.mean)} ({metric.write(summary.low)} to {metric.write(summary.high)})"
-
-
 def answer(view: StudyView, judgement: Judgement) -> str:
-    """One sentence: which setting is best, by how much against the baseline, and how surely."""
+    """One sentence: what the settings of each group give, with intervals."""
     metric = metric_of(view.primary)
-    best = best_cell(judgement, view.primary, view.lower_is_better)
-    if best is None:
+    if not any(math.isfinite(summary.mean) for summary in judgement.summaries[view.primary]):
         return f"No trial gave {metric.name}."
-    summary = judgement.summaries[view.primary][best]
-    found = interval(metric, summary)
-    if len(view.cells) == 1:
-        return f"{_sentence(metric.name)} is {found} over {summary.n} trials (mean with its 95 % interval)."
-    lead = "lowest" if view.lower_is_better else "highest"
-    text = f"{_sentence(metric.name)} is {lead} with {view.cells[best].name}: {found}"
-    change = None if view.baseline is None else judgement.differences[view.primary][best]
+    if _is_few_alone(view):
+        return f"{'; '.join(_each(view, judgement, cell) for cell in view.cells)}."
+    if len(view.groups) == 1:
+        return f"{_sentence(metric.name)} {_group(view, judgement, view.groups[0])}."
+    parts = [
+        f"{group.name}: {_in_short(view, judgement, group)}"
+        for group in view.groups
+        if best_cell(judgement, view.primary, view.lower_is_better, group.cells) is not None
+    ]
+    return f"{_sentence(metric.name)}, mean with its 95 % interval. {_sentence('; '.join(parts))}."
+
+
+def answers(view: StudyView, judgement: Judgement) -> list[tuple[str, list[str]]]:
+    """What each group of settings says: its name, and sentences."""
+    metric, several = metric_of(view.primary), len(view.groups) > 1
+    out = []
+    for group in view.groups:
+        found = best_cell(judgement, view.primary, view.lower_is_better, group.cells)
+        own = (
+            [f"{_sentence(metric.name)} {_group(view, judgement, group)}."]
+            if several and found is not None
+            else []
+        )
+        out.append((group.name, [*own, *facts(view, judgement, group)]))
+    return [entry for entry in out if entry[1]]
+
+
+def evidence(change: Difference) -> str:
+    """How surely a difference is one."""
+    if not math.isfinite(change.p_value):
+        return "no trial differs" if change.n > 1 else "one pair tells nothing"
+    if change.p_corrected < SURE:
+        return f"{p_value(change.p_corrected, 'p ')} after correction"
+    return "not told from chance"
+
+
+def _is_few_alone(view: StudyView) -> bool:
+    """Whether the study is a few settings by name, held against nothing."""
+    names_alone = all(isinstance(value, str) for cell in view.cells for value in cell.values.values())
+    alone = all(base is None for group in view.groups for base in group.baselines)
+    return names_alone and alone and len(view.groups) == 1 and 1 < len(view.cells) <= FEW
+
+
+def _each(view: StudyView, judgement: Judgement, cell: Cell) -> str:
+    """One of a few settings that are held against nothing: how often it succeeds, and its metric."""
+    rate = judgement.rates[cell.index]
+    summary = judgement.summaries[view.primary][cell.index]
+    succeeds = f"{rate_text(rate)} trials succeed, " if rate.trials else ""
+    name = metric_of(view.primary).name
+    return f"{cell.text}: {succeeds}{name} {_interval(view.primary, summary)} in the mean"
+
+
+def _in_short(view: StudyView, judgement: Judgement, group: Group) -> str:
+    """The baseline, the best and the worst of a group."""
+    summaries = judgement.summaries[view.primary]
+    best = best_cell(judgement, view.primary, view.lower_is_better, group.cells)
+    worst = best_cell(judgement, view.primary, not view.lower_is_better, group.cells)
+    assert best is not None
+    assert worst is not None
+    base = group.baseline if group.baseline is not None else best
+    if len(group.cells) == 1:
+        return _interval(view.primary, summaries[best])
+    if summaries[best].mean == summaries[worst].mean:
+        return f"{_interval(view.primary, summaries[base])} at every setting"
+    told_of = dict.fromkeys((base, best, worst))
+    parts = [
+        f"{_interval(view.primary, summaries[index])} with {view.cells[index].text}" for index in told_of
+    ]
+    return f"{', '.join(parts[:-1])} and {parts[-1]}"
+
+
+def _group(view: StudyView, judgement: Judgement, group: Group) -> str:
+    """A group's settings: where the metric is lowest and highest, and against what."""
+    metric, summaries = metric_of(view.primary), judgement.summaries[view.primary]
+    lower = view.lower_is_better
+    best = best_cell(judgement, view.primary, lower, group.cells)
+    worst = best_cell(judgement, view.primary, not lower, group.cells)
+    assert best is not None
+    assert worst is not None
+    over = f"over {summaries[best].n} trial{'s' if summaries[best].n > 1 else ''}"
+    if len(group.cells) == 1 and group.baselines[0] is None:
+        return f"is {_interval(view.primary, summaries[best])}, mean with its 95 % interval {over}"
+    base = group.baseline
+    if base is None and any(entry is not None for entry in group.baselines):
+        return _each_against_its_own(view, judgement, group)
+    first, last = ("lowest", "highest") if lower else ("highest", "lowest")
+    if base is None:
+        if all(summaries[index].mean == summaries[best].mean for index in group.cells):
+            return f"is {_interval(view.primary, summaries[best])} at every setting, mean {over} each"
+        return (
+            f"is {first} with {view.cells[best].text}, {_interval(view.primary, summaries[best])}, and "
+            f"{last} with {view.cells[worst].text}, {_interval(view.primary, summaries[worst])}: "
+            f"{'means with their 95 % intervals ' if summaries[best].n > 1 else ''}{over} each"
+        )
+    start = f"is {_interval(view.primary, summaries[base])} with {view.cells[base].text}"
+    found = [judgement.differences[view.primary][index] for index in group.cells if index != base]
+    changes = [change for change in found if change is not None and change.n]
+    if changes and all(change.low == change.high == 0.0 for change in changes):
+        return f"{start}, and no other setting changes a single one of {changes[0].n} trials"
+    parts = [
+        _change(view, judgement, metric, index, word)
+        for index, word in ((best, first), (worst, last))
+        if index != base
+    ]
+    none = f"no setting is {'lower' if lower else 'higher'}" if best == base else ""
+    return "; ".join([start, *([none] if none else []), *parts])
+
+
+def _change(view: StudyView, judgement: Judgement, metric: Metric, index: int, word: str) -> str:
+    change = judgement.differences[view.primary][index]
+    text = (
+        f"{word} with {view.cells[index].text}, {metric.write(judgement.summaries[view.primary][index].mean)}"
+    )
     if change is None or change.n == 0:
-        return f"{text}, mean with its 95 % interval over {summary.n} trials."
-    assert view.baseline is not None
-    evidence = (
-        f"p = {change.p_corrected:.2g} after correction"
-        if math.isfinite(change.p_corrected) and change.p_corrected < SURE
-        else "which these trials do not tell from chance"
-    )
-    return (
-        f"{text}; against {view.cells[view.baseline].name} it changes by {metric.write(change.mean)} "
-        f"({metric.write(change.low)} to {metric.write(change.high)}) on the same {change.n} seeds, "
-        f"{evidence}."
-    )
+        return text
+    by = difference(view.primary, change)
+    return f"{text}, a change by {by} on the same {change.n} seeds, {evidence(change)}"
+
+
+def _each_against_its_own(view: StudyView, judgement: Judgement, group: Group) -> str:
+    parts = []
+    for index, base in zip(group.cells, group.baselines, strict=True):
+        change = judgement.differences[view.primary][index]
+        if base is None or change is None or change.n == 0:
+            continue
+        found = judgement.summaries[view.primary][index]
+        if change.low == change.high == 0.0:
+            same = (
+                f"{_interval(view.primary, found)} with {view.cells[index].text}, in every trial the same as"
+            )
+            parts.append(f"{same} with {view.known_as(base, group)}")
+            continue
+        parts.append(
+            f"{_interval(view.primary, found)} with {view.cells[index].text}, a change by "
+            f"{difference(view.primary, change)} against {view.known_as(base, group)}, {evidence(change)}"
+        )
+    return f"is {'; '.join(parts)}" if parts else "has no pairs to compare"
+
+
+def difference(metric: str, change: Difference) -> str:
+    """A difference with its interval; those of shares in percentage points."""
+    text = told(metric, change.mean, change.low, change.high, signed=True)
+    return text.replace("\u00a0%", "\u00a0percentage points")
+
+
+def _interval(metric: str, summary: Summary) -> str:
+    return told(metric, summary.mean, summary.low, summary.high)
 
 
 def _sentence(text: str) -> str:

@@ -50,7 +50,9 @@ def describe(view: StudyView, row: int) -> str:
     metric = metric_of(view.primary)
     value = metric.write(float(view.column(view.primary)[at]))
     ended = "" if view.column("success")[at] != 0.0 else "; it failed"
-    return f"{view.cells[int(view.cell[at])].name}, seed {int(view.seed[at])}: {metric.name} {value}{ended}."
+    cell = view.cells[int(view.cell[at])]
+    setting = cell.text if len(view.groups) == 1 else cell.name
+    return f"{setting}, seed {int(view.seed[at])}: {metric.name} {value}{ended}."
 
 
 def examples_section(examples: Sequence[Example]) -> str:

@@ -5,15 +5,18 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
+import numpy as np
+
 from pilotage.evaluation.judge import Judgement, judge
 from pilotage.report.markup import contents, document, escape, figure_section, layer_rules, tiles
 from pilotage.report.quantities import count
-from pilotage.report.study.answer import answer
+from pilotage.report.study.answer import answer, answers
+from pilotage.report.study.comparisons import comparisons_table
 from pilotage.report.study.examples import Example, examples_section
-from pilotage.report.study.figures import factor_figures, settings_figure
+from pilotage.report.study.factor_figures import factor_figures
+from pilotage.report.study.settings_figures import settings_figures
 from pilotage.report.study.tables import (
     cells_table,
-    comparisons_table,
     consistency_table,
     failures_table,
     lower_is_better,
@@ -29,9 +32,9 @@ def study_page(view: StudyView, examples: tuple[Example, ...] = ()) -> str:
     judgement = judge_view(view)
     lower = lower_is_better(view.metrics) | {view.primary: view.lower_is_better}
     with drawing_style():
-        side_by_side = settings_figure(view, judgement)
-        figures = [*([side_by_side] if side_by_side is not None else []), *factor_figures(view, judgement)]
+        figures = [*settings_figures(view, judgement), *factor_figures(view, judgement)]
     sections = [
+        ("findings", "What it says", _findings(view, judgement)),
         *((f.slug, f.title, figure_section(number, f)) for number, f in enumerate(figures, start=1)),
         ("cells", "Every setting", cells_table(view, judgement, lower)),
         ("comparisons", "Comparisons", comparisons_table(view, judgement)),
@@ -76,14 +79,30 @@ def judge_view(view: StudyView) -> Judgement:
     names = dict.fromkeys([*view.metrics, view.primary, "success"])
     values = {name: view.column(name) for name in names if name in view.values or name in view.metrics}
     values.setdefault(view.primary, view.column(view.primary))
-    return judge(view.cell, view.trial, values, len(view.cells), view.baseline)
+    return judge(view.cell, view.trial, values, view.baselines, view.contrasts)
+
+
+def _findings(view: StudyView, judgement: Judgement) -> str:
+    """What each group of settings says beyond the headline, and what one must know to read it."""
+    parts = [
+        f"{f'<h3>{escape(name)}</h3>' if len(view.groups) > 1 else ''}"
+        f"<ul>{''.join(f'<li>{escape(text)}</li>' for text in texts)}</ul>"
+        for name, texts in answers(view, judgement)
+    ]
+    note = f'<p class="note">{escape(view.note)}</p>' if view.note else ""
+    if not parts and not note:
+        return ""
+    head = '<section id="findings"><h2><a href="#findings">What it says</a></h2>'
+    return f"{head}{''.join(parts)}{note}</section>"
 
 
 def _tiles(view: StudyView) -> list[tuple[str, str]]:
+    success = view.column("success")
+    rated = int(np.isfinite(success).sum())
     entries = [
         ("trials", count(view.row.size)),
-        ("settings", count(len(view.cells))),
-        ("trials each", count(view.trials_per_cell)),
+        ("settings × trials each", f"{count(len(view.cells))} × {count(view.trials_per_cell)}"),
+        *([("succeeded", f"{count(float(np.nansum(success)))} of {count(rated)}")] if rated else []),
         ("broken trials", count(len(view.failures))),
     ]
     return [*entries, ("still to run", count(view.waiting))] if view.waiting else entries
@@ -96,7 +115,8 @@ def _again(view: StudyView) -> str:
         f"<p>Seeds {view.first_seed} to {last}, the same in every setting. The folder&#x27;s "
         "<code>study.yaml</code> holds everything that is needed: "
         "<code>pilotage study study.yaml</code>. Any single trial: "
-        "<code>pilotage run --from STUDY:ROW</code>.</p>"
+        "<code>pilotage run --from STUDY:ROW</code>, in the folder that holds the study&#x27;s. "
+        f"{escape(f'Made with {view.versions}.') if view.versions else ''}</p>"
         f"<details><summary>Show the definition</summary><pre>{escape(view.definition)}</pre></details>"
         "</section>"
     )

@@ -1,17 +1,20 @@
-"""The study's tables: one row a cell, one row a comparison, one row a failure."""
+"""The study's tables: every setting with its intervals, its consistency, and the trials that broke."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
 
+from pilotage.evaluation.intervals import Summary
 from pilotage.evaluation.judge import Judgement, Rate
-from pilotage.evaluation.pooled import NEES_IDEAL, NIS_IDEAL, pool
+from pilotage.evaluation.pooled import IDEALS, Pooled, pool
 from pilotage.report import quantities
 from pilotage.report.markup import escape
 from pilotage.report.metrics_table import metric_of
-from pilotage.report.study.answer import SURE, best_cell
-from pilotage.report.study.view import StudyView
+from pilotage.report.study.answer import best_cell
+from pilotage.report.study.findings import NAMES
+from pilotage.report.study.scales import Scale, scale_of
+from pilotage.report.study.view import Cell, Group, StudyView
 
 LOWER_IS_BETTER = ("_m", "_rad", "_s", "smoothness", "collisions", "replans", "attempts", "escapes")
 IDEAL = ("nees", "nis")
@@ -19,103 +22,130 @@ IDEAL = ("nees", "nis")
 
 
 def cells_table(view: StudyView, judgement: Judgement, lower: dict[str, bool]) -> str:
-    """Mean, interval and variance of each metric in each cell, beside what was published."""
-    best = {m: best_cell(judgement, m, lower[m]) for m in view.metrics if not m.startswith(IDEAL)}
-    head = "".join(f'<th scope="col" class="value">{escape(metric_of(m).name)}</th>' for m in view.metrics)
-    rows = []
-    for cell in view.cells:
-        rate = judgement.rates[cell.index]
-        parts = [f'<th scope="row">{escape(cell.name)}</th><td class="value">{_rate(rate)}</td>']
-        for name in view.metrics:
-            summary = judgement.summaries[name][cell.index]
-            text = _mean(name, summary.mean, best.get(name) == cell.index and len(view.cells) > 1)
-            small = []
-            if math.isfinite(summary.low):
-                write = metric_of(name).write
-                small.append(f"{write(summary.low)} to {write(summary.high)}")
-                small.append(f"median {write(summary.median)}, variance {_scientific(summary.variance)}")
-            if name in cell.published:
-                small.append(f"published {metric_of(name).write(cell.published[name])}")
-            inner = "".join(f"<br><span class='range'>{escape(line)}</span>" for line in small)
-            parts.append(f'<td class="value plain">{text}{inner}</td>')
-        rows.append(f"<tr>{''.join(parts)}</tr>")
+    """Mean and interval of each metric in each setting, beside what was published; all numbers folded."""
+    parts = [_group_table(view, judgement, lower, group) for group in view.groups]
+    published = any(cell.published for cell in view.cells)
     return (
         '<section id="cells"><h2><a href="#cells">Every setting</a></h2>'
-        "<p>Mean over the trials; below it the 95 % bootstrap interval of the mean, the median and the "
-        "variance. The best mean of a column is bold. Success with its 95 % Wilson interval.</p>"
-        '<div class="wide"><table class="cells"><thead><tr><th scope="col">setting</th>'
-        f'<th scope="col" class="value">success</th>{head}</tr></thead>'
-        f"<tbody>{''.join(rows)}</tbody></table></div>"
-        "</section>"
+        "<p>Means over the trials; below each its 95 % bootstrap interval"
+        f"{', and what was published' if published else ''}. The best mean of a column is bold. Success with "
+        f"its 95 % Wilson interval.</p>{''.join(parts)}</section>"
     )
 
 
-def comparisons_table(view: StudyView, judgement: Judgement) -> str:
-    """Every cell against the baseline; empty where there is none."""
-    if view.baseline is None or len(view.cells) < 2:
-        return ""
+def _group_table(view: StudyView, judgement: Judgement, lower: dict[str, bool], group: Group) -> str:
+    given = [m for m in view.metrics if any(judgement.summaries[m][i].n for i in group.cells)]
+    metrics = [m for m in given if view.worth_showing(m, view.members(group))]
+    scales = {m: _scale(judgement, m, view.members(group)) for m in metrics}
+    best = {
+        m: best_cell(judgement, m, lower[m], group.cells)
+        for m in metrics
+        if not m.startswith(IDEAL) and _differ(judgement, m, group)
+    }
+    head = "".join(
+        f'<th scope="col" class="value">{escape(metric_of(m).name)}{scales[m].label}</th>' for m in metrics
+    )
     rows = []
-    for name in view.metrics:
-        metric = metric_of(name)
-        rows.append(f'<tr class="group"><th colspan="6" scope="rowgroup">{escape(metric.name)}</th></tr>')
-        for cell in view.cells:
-            found = judgement.differences[name][cell.index]
-            if found is None or found.n == 0:
-                continue
-            sure = math.isfinite(found.p_corrected) and found.p_corrected < SURE
-            band = f"{metric.write(found.low)} to {metric.write(found.high)}"
-            p_text = f"{found.p_corrected:.2g}" if math.isfinite(found.p_corrected) else quantities.NOTHING
-            rows.append(
-                f'<tr><th scope="row">{escape(cell.name)}</th>'
-                f'<td class="value">{escape(metric.write(found.mean))}</td>'
-                f'<td class="value plain">{escape(band)}</td>'
-                f'<td class="value plain">{p_text}</td><td class="value plain">{found.effect:+.2f}</td>'
-                f"<td>{'differs' if sure else 'not told from chance'}</td></tr>"
+    for cell in view.members(group):
+        parts = [
+            f'<th scope="row">{escape(cell.text)}</th><td class="value">{_rate(judgement.rates[cell.index])}'
+        ]
+        parts += [
+            _entry(
+                judgement.summaries[m][cell.index],
+                scales[m],
+                best.get(m) == cell.index,
+                cell.published.get(m),
             )
-    base = escape(view.cells[view.baseline].name)
+            for m in metrics
+        ]
+        rows.append(f"<tr>{'</td>'.join(parts)}</td></tr>")
+    caption = f"<h3>{escape(group.name)}</h3>" if len(view.groups) > 1 else ""
     return (
-        f'<section id="comparisons"><h2><a href="#comparisons">Against {base}</a></h2>'
-        "<p>Differences between trials with the same seed: their mean with its 95 % bootstrap interval; p "
-        "from Wilcoxon&#x27;s signed-rank test (for success from McNemar&#x27;s exact test), corrected for "
-        "all comparisons on this page (Benjamini and Yekutieli); effect: matched-pairs rank-biserial "
-        "correlation, 1 where every pair grows.</p>"
-        '<div class="wide"><table class="comparisons"><thead><tr><th scope="col">setting</th>'
-        '<th scope="col" class="value">difference</th><th scope="col" class="value">95 % interval</th>'
-        '<th scope="col" class="value">p, corrected</th><th scope="col" class="value">effect</th>'
-        f'<th scope="col">verdict</th></tr></thead><tbody>{"".join(rows)}</tbody></table></div></section>'
+        f'{caption}<div class="wide" tabindex="0"><table class="cells"><thead><tr>'
+        f'<th scope="col">setting</th><th scope="col" class="value">success</th>{head}</tr></thead>'
+        f"<tbody>{''.join(rows)}</tbody></table></div>{_all_numbers(view, judgement, group, given)}"
+    )
+
+
+def _entry(summary: Summary, scale: Scale, best: bool, published: float | None) -> str:
+    digits = scale.decimals(summary.mean, summary.low, summary.high)
+    mean = scale.write(summary.mean, digits)
+    lines = []
+    if math.isfinite(summary.low):
+        lines.append(f"{scale.write(summary.low, digits)} to {scale.write(summary.high, digits)}")
+    if published is not None:
+        lines.append(f"published {quantities.significant(published * scale.times, 4)}")
+    small = "".join(f"<br><span class='range'>{escape(line)}</span>" for line in lines)
+    return f'<td class="value plain">{f"<b>{mean}</b>" if best else mean}{small}'
+
+
+def _all_numbers(view: StudyView, judgement: Judgement, group: Group, metrics: Sequence[str]) -> str:
+    """Per metric the count, median, variance and extremes as well, folded away."""
+    rows = []
+    for metric in metrics:
+        scale = _scale(judgement, metric, view.members(group))
+        head = f"{metric_of(metric).name}{scale.label}, variance in its square"
+        rows.append(f'<tr class="group"><th colspan="8" scope="rowgroup">{escape(head)}</th></tr>')
+        for cell in view.members(group):
+            found = judgement.summaries[metric][cell.index]
+            digits = scale.decimals(found.mean, found.low, found.high)
+            numbers = (found.mean, found.low, found.high, found.median, found.smallest, found.largest)
+            texts = [scale.write(number, digits) for number in numbers]
+            texts.insert(4, scale.write_variance(found.variance))
+            values = "".join(f'<td class="value plain">{text}</td>' for text in (str(found.n), *texts))
+            rows.append(f'<tr><th scope="row">{escape(cell.text)}</th>{values}</tr>')
+    names = ("n", "mean", "from", "to", "median", "variance", "smallest", "largest")
+    heads = "".join(f'<th scope="col" class="value">{name}</th>' for name in names)
+    what = f" of {group.name}" if len(view.groups) > 1 else ""
+    return (
+        f"<details><summary>All numbers{escape(what)}: count, median, variance, extremes</summary>"
+        f'<div class="wide" tabindex="0"><table class="cells"><thead><tr><th scope="col">setting</th>{heads}'
+        f"</tr></thead><tbody>{''.join(rows)}</tbody></table></div></details>"
     )
 
 
 def consistency_table(view: StudyView) -> str:
-    """NEES and NIS pooled over the runs of each cell; empty where the study has neither."""
-    rows = []
-    for key, title, ideal in (
-        ("nees_mean", "NEES", NEES_IDEAL),
-        ("nis_mean", "NIS per degree of freedom", NIS_IDEAL),
-    ):
-        if key not in view.values:
-            continue
-        for cell in view.cells:
-            pooled = pool(view.column(key)[view.cell == cell.index], ideal)
-            if pooled.n:
-                low, high = quantities.significant(pooled.low), quantities.significant(pooled.high)
+    """NEES and NIS pooled over the runs of each setting; empty where the study reports neither."""
+    shown = [metric for metric in IDEALS if metric in view.metrics]
+    tables = []
+    for group in view.groups:
+        rows = []
+        for cell in view.members(group):
+            pooled = [pool(view.column(m)[view.cell == cell.index], IDEALS[m]) for m in shown]
+            if any(entry.n for entry in pooled):
                 rows.append(
-                    f'<tr><th scope="row">{escape(cell.name)}</th><td>{title}</td>'
-                    f'<td class="value">{quantities.significant(pooled.mean)}</td>'
-                    f'<td class="value plain">{low} to {high}</td><td class="value plain">{ideal:g}</td>'
-                    f"<td>{pooled.verdict}</td></tr>"
+                    f'<tr><th scope="row">{escape(cell.text)}</th>{"".join(map(_pooled, pooled))}</tr>'
                 )
-    if not rows:
+        if rows:
+            head = "".join(
+                f'<th scope="col" class="value">{NAMES[m]}, ideal {IDEALS[m]:g}</th>'
+                '<th scope="col">verdict</th>'
+                for m in shown
+            )
+            caption = f"<h3>{escape(group.name)}</h3>" if len(view.groups) > 1 else ""
+            tables.append(
+                f'{caption}<div class="wide" tabindex="0"><table class="cells"><thead><tr>'
+                f'<th scope="col">setting</th>{head}</tr></thead><tbody>{"".join(rows)}</tbody></table></div>'
+            )
+    if not tables:
         return ""
     return (
         '<section id="consistency"><h2><a href="#consistency">Consistency</a></h2>'
         "<p>Means over the runs with their 95 % bands; runs are independent, the steps within one are not. "
-        "A filter is overconfident where the whole band lies above the ideal value.</p>"
-        '<div class="wide"><table><thead><tr><th scope="col">setting</th><th scope="col">statistic</th>'
-        '<th scope="col" class="value">mean</th><th scope="col" class="value">95 % band</th>'
-        '<th scope="col" class="value">ideal</th><th scope="col">verdict</th></tr></thead>'
-        f"<tbody>{''.join(rows)}</tbody></table></div></section>"
+        "A filter is overconfident where the whole band lies above the ideal value. NIS is told per degree "
+        f"of freedom, corrected for what the gate cuts off.</p>{''.join(tables)}</section>"
     )
+
+
+def _pooled(entry: Pooled) -> str:
+    if not entry.n:
+        return f'<td class="value plain">{quantities.NOTHING}</td><td></td>'
+    scale = Scale()
+    digits = scale.decimals(entry.mean, entry.low, entry.high)
+    band = f"{scale.write(entry.low, digits)} to {scale.write(entry.high, digits)}"
+    below = f"<br><span class='range'>{band}</span>" if math.isfinite(entry.low) else ""
+    return f'<td class="value plain">{scale.write(entry.mean, digits)}{below}</td><td>{entry.verdict}</td>'
 
 
 def failures_table(view: StudyView) -> str:
@@ -136,9 +166,15 @@ def failures_table(view: StudyView) -> str:
     )
 
 
-def _mean(name: str, value: float, best: bool) -> str:
-    text = escape(metric_of(name).write(value))
-    return f"<b>{text}</b>" if best else text
+def _scale(judgement: Judgement, metric: str, cells: Sequence[Cell]) -> Scale:
+    """The unit of a metric's column: that of its means, so that one stray trial does not set it."""
+    return scale_of(metric, [judgement.summaries[metric][cell.index].mean for cell in cells])
+
+
+def _differ(judgement: Judgement, metric: str, group: Group) -> bool:
+    means = [judgement.summaries[metric][index].mean for index in group.cells]
+    finite = [mean for mean in means if math.isfinite(mean)]
+    return len(finite) > 1 and min(finite) < max(finite)
 
 
 def _rate(rate: Rate) -> str:
@@ -148,10 +184,6 @@ def _rate(rate: Rate) -> str:
         f"{rate.successes}/{rate.trials}<br><span class='range'>{100.0 * rate.low:.0f} to "
         f"{100.0 * rate.high:.0f}&nbsp;%</span>"
     )
-
-
-def _scientific(value: float) -> str:
-    return f"{value:.3g}" if math.isfinite(value) else quantities.NOTHING
 
 
 def lower_is_better(metrics: Sequence[str]) -> dict[str, bool]:

@@ -2,10 +2,16 @@
 
 from __future__ import annotations
 
+import platform
 from collections.abc import Callable
+from importlib import metadata
 from pathlib import Path
 
+from pilotage import __version__
 from pilotage.experiments.run import run_mission
+from pilotage.experiments.studies.cells import show
+from pilotage.experiments.studies.definition import CONFIGURATION
+from pilotage.experiments.studies.factors import Factor
 from pilotage.experiments.studies.replay import mission_of_row
 from pilotage.experiments.studies.study import study_yaml
 from pilotage.experiments.studies.table import StudyTable, read_study
@@ -14,7 +20,9 @@ from pilotage.report.page import write_report as write_run_report
 from pilotage.report.run_folder import read_run
 from pilotage.report.study.examples import Example, describe, rows_to_show
 from pilotage.report.study.page import write_page
-from pilotage.report.study.view import Cell, Failure, StudyView
+from pilotage.report.study.scales import key_and_unit
+from pilotage.report.study.tables import lower_is_better
+from pilotage.report.study.view import Cell, Failure, Group, StudyView
 from pilotage.report.style import drawing_style
 
 TRIALS = "trials"
@@ -51,13 +59,23 @@ def view_of(table: StudyTable) -> StudyView:
     return StudyView(
         name=study.name,
         question=definition.question or definition.description,
+        note=definition.description if definition.question else "",
         mission=str(study.base.get("mission", definition.mission)),
-        cells=tuple(Cell(c.index, c.name, c.values, c.published) for c in study.cells),
+        cells=tuple(
+            Cell(c.index, c.name, c.values, c.published, label)
+            for c, label in zip(study.cells, labels(table), strict=True)
+        ),
         factors=definition.factor_names,
         metrics=table.metrics,
         primary=table.primary,
-        lower_is_better=definition.lower_is_better,
-        baseline=table.baseline,
+        lower_is_better=lower_is_better((table.primary,))[table.primary]
+        if definition.lower_is_better is None
+        else definition.lower_is_better,
+        asked=bool(definition.metrics),
+        groups=tuple(Group(group.name, group.cells, group.baselines) for group in table.groups),
+        contrasts=table.contrasts,
+        units={factor.title: unit_of(factor) for factor in definition.factors},
+        versions=versions(),
         reference={
             key: (f"{entry.name}, {entry.value:g}", entry.value)
             for key, entry in definition.reference.items()
@@ -75,6 +93,47 @@ def view_of(table: StudyTable) -> StudyView:
     )
 
 
+def unit_of(factor: Factor) -> str:
+    """The unit of a factor's values; none where they multiply, or are of several kinds."""
+    found = {key_and_unit(key)[1] for key in factor.keys}
+    return found.pop() if len(found) == 1 and not factor.multiply else ""
+
+
+def labels(table: StudyTable) -> list[str]:
+    """How each cell is called on the page: values with their units, what a whole group shares left out."""
+    study = table.study
+    factors = {factor.title: factor for factor in study.definition.factors}
+    out = []
+    for cell in study.cells:
+        words = [str(cell.values[CONFIGURATION])] if CONFIGURATION in cell.values else []
+        for title, value in cell.values.items():
+            if title not in factors:
+                continue
+            unit = unit_of(factors[title])
+            after = f"\u00a0{unit}" if unit else ""
+            named = factors[title].levels is not None or isinstance(value, str)
+            words.append(str(value) if named else f"{key_and_unit(title)[0]} {show(value)}{after}")
+        out.append(", ".join(words) or cell.name)
+    for group in table.groups:
+        parts = [out[index].split(", ") for index in group.cells]
+        while min(map(len, parts)) >= 1 and max(map(len, parts)) > 1 and len({p[0] for p in parts}) == 1:
+            if min(map(len, parts)) == 1:
+                # The one that is nothing but what all share keeps its name.
+                parts = [p if len(p) == 1 else p[1:] for p in parts]
+                break
+            parts = [p[1:] for p in parts]
+        for index, part in zip(group.cells, parts, strict=True):
+            out[index] = ", ".join(part)
+    return out
+
+
+def versions() -> str:
+    """What made the rows and the page: releases of pilotage and of what its numbers come from."""
+    names = ("numpy", "scipy", "numba")
+    parts = [f"pilotage {__version__}", f"Python {platform.python_version()}"]
+    return ", ".join([*parts, *(f"{name} {metadata.version(name)}" for name in names)])
+
+
 def _example(table: StudyTable, view: StudyView, title: str, row: int) -> Example:
     result = run_mission(mission_of_row(table.study, row), out=table.folder / TRIALS)
     assert result.run_dir is not None
@@ -87,7 +146,7 @@ def _example(table: StudyTable, view: StudyView, title: str, row: int) -> Exampl
         row,
         describe(view, row),
         page.relative_to(table.folder).as_posix(),
-        f"pilotage run --from {table.folder}:{row}",
+        f"pilotage run --from {table.folder.resolve().name}:{row}",
         # Identifiers of two pictures of the same kind must not meet on one page.
         picture.svg.replace(f'"{picture.slug}-', f'"row{row}-{picture.slug}-').replace(
             f"#{picture.slug}-", f"#row{row}-{picture.slug}-"

@@ -1,0 +1,106 @@
+"""Every setting against its baseline, and one metric against another, on the same trials."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+
+from pilotage.evaluation.judge import Judgement
+from pilotage.evaluation.paired import Difference
+from pilotage.report.markup import escape
+from pilotage.report.metrics_table import metric_of
+from pilotage.report.study.answer import SURE
+from pilotage.report.study.scales import Scale, p_value, scale_of
+from pilotage.report.study.view import Group, StudyView
+
+Row = tuple[str, Difference]
+HEADS = ("difference", "95 % interval", "median", "p, corrected", "effect")
+
+
+def comparisons_table(view: StudyView, judgement: Judgement) -> str:
+    """Differences on the same seeds, one folding table a metric; empty where nothing is compared."""
+    parts = []
+    success = view.column("success")
+    told_apart = (*view.metrics, "success") if bool(np.any(success == 0.0)) else view.metrics
+    for group in view.groups:
+        tables = [
+            table
+            for metric in told_apart
+            if (table := _table(metric, list(_rows(view, judgement, group, metric)), metric == view.primary))
+        ]
+        if tables:
+            base = group.baseline
+            against = "" if base is None else f" against {view.cells[base].text}"
+            title = f"{group.name}{',' if against else ''}" if len(view.groups) > 1 else "Every setting"
+            parts.append(f"<h3>{escape(f'{title}{against}')}</h3>{''.join(tables)}")
+    for pair, found in judgement.contrasts.items():
+        rows = [(cell.text, found[cell.index]) for cell in view.cells if found[cell.index].n]
+        if rows:
+            names = [metric_of(name).name for name in pair]
+            parts.append(
+                f"<h3>{escape(f'{names[0]} less {names[1]}, within each trial')}</h3>"
+                f"{_table(pair[0], rows, True)}"
+            )
+    if not parts:
+        return ""
+    return (
+        '<section id="comparisons"><h2><a href="#comparisons">Comparisons</a></h2>'
+        "<p>Differences between trials with the same seed: their mean with its 95 % bootstrap interval, and "
+        "their median; p from Wilcoxon&#x27;s signed-rank test (for success from McNemar&#x27;s "
+        "exact test), corrected for all comparisons on this page "
+        "(Benjamini and Yekutieli); effect: matched-pairs rank-biserial correlation, 1 where every pair "
+        f"grows, −1 where every pair shrinks.</p>{''.join(parts)}</section>"
+    )
+
+
+def _rows(view: StudyView, judgement: Judgement, group: Group, metric: str) -> Iterator[Row]:
+    for index, base in zip(group.cells, group.baselines, strict=True):
+        found = judgement.differences[metric][index]
+        if base is None or found is None or found.n == 0:
+            continue
+        against = "" if group.baseline is not None else f" against {view.known_as(base, group)}"
+        yield f"{view.cells[index].text}{against}", found
+
+
+def _table(metric: str, rows: list[Row], shown: bool) -> str:
+    if not rows or (not shown and all(found.low == found.high == 0.0 for _, found in rows)):
+        return ""
+    scale = scale_of(metric, [found.mean for _, found in rows])
+    unit = " [percentage points]" if scale.unit == "%" else scale.label
+    heads = "".join(f'<th scope="col" class="value">{name}</th>' for name in HEADS)
+    body = "".join(_row(name, found, scale) for name, found in rows)
+    return (
+        f"<details{' open' if shown else ''}><summary>{escape(metric_of(metric).name + unit)}</summary>"
+        f'<div class="wide" tabindex="0"><table class="cells"><thead><tr><th scope="col">setting</th>{heads}'
+        f'<th scope="col">verdict</th></tr></thead><tbody>{body}</tbody></table></div></details>'
+    )
+
+
+def _row(name: str, found: Difference, scale: Scale) -> str:
+    digits = scale.decimals(found.mean, found.low, found.high)
+    mean, low, high, median = (
+        scale.write(value, digits, signed=True) for value in (found.mean, found.low, found.high, found.median)
+    )
+    effect = f"{found.effect:+.2f}".replace("-", "−")
+    band = f"{low} to {high}" if math.isfinite(found.low) else "–"
+    texts = (band, median, p_value(found.p_corrected), effect)
+    values = "".join(f'<td class="value plain">{escape(text)}</td>' for text in texts)
+    return (
+        f'<tr><th scope="row">{escape(name)}</th><td class="value">{mean}</td>'
+        f"{values}<td>{verdict(found)}</td></tr>"
+    )
+
+
+def verdict(found: Difference) -> str:
+    """What the test and the interval say together: they look at ranks and at the mean."""
+    if found.low == found.high == 0.0:
+        return "no trial differs"
+    if not math.isfinite(found.p_corrected) or found.p_corrected >= SURE:
+        return "not told from chance"
+    if found.low > 0.0 and found.effect > 0.0:
+        return "higher"
+    if found.high < 0.0 and found.effect < 0.0:
+        return "lower"
+    return f"{'higher' if found.effect > 0.0 else 'lower'} in most trials, not surely in the mean"

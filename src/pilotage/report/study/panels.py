@@ -1,0 +1,70 @@
+"""What the study's figures share: which metrics are drawn, in which unit, on which kind of axis."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from typing import Literal
+
+from matplotlib.axes import Axes
+from matplotlib.axis import Axis
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+
+from pilotage.evaluation.judge import Judgement
+from pilotage.report import quantities
+from pilotage.report.metrics_table import metric_of
+from pilotage.report.study.scales import Scale, scale_of
+from pilotage.report.study.view import Cell, StudyView
+from pilotage.report.style import MUTED
+
+MOST = 12
+"""So many metrics are drawn, the one that answers the question first; the tables have all."""
+WIDE = 30.0
+"""Means that reach over more than this ratio are drawn on a logarithmic axis."""
+
+
+def drawable(view: StudyView, cells: Iterable[Cell]) -> list[str]:
+    """Metrics that trials of these cells gave a value of."""
+    chosen = list(cells)
+    names = dict.fromkeys([view.primary, *view.metrics])
+    return [metric for metric in names if view.worth_showing(metric, chosen)][:MOST]
+
+
+def scale_for(judgement: Judgement, metric: str, cells: Iterable[Cell]) -> Scale:
+    """The unit of a panel: that of its means."""
+    return scale_of(metric, [judgement.summaries[metric][cell.index].mean for cell in cells])
+
+
+def title(axes: Axes, metric: str, scale: Scale) -> None:
+    """Write the metric and its unit above a panel."""
+    axes.set_title(metric_of(metric).name + scale.label)
+
+
+def is_wide(values: Sequence[float], lows: Sequence[float]) -> bool:
+    """Whether means belong on a logarithmic axis; what would lie at or below zero keeps it straight."""
+    finite = [value for value in values if math.isfinite(value)]
+    positive = all(value > 0.0 for value in [*finite, *(low for low in lows if math.isfinite(low))])
+    return len(finite) > 1 and positive and max(finite) / min(finite) >= WIDE
+
+
+def set_log(axes: Axes, which: Literal["x", "y"]) -> None:
+    """Turn an axis logarithmic, its ticks written as plain numbers."""
+    axis: Axis
+    if which == "x":
+        axes.set_xscale("log")
+        axis = axes.xaxis
+    else:
+        axes.set_yscale("log")
+        axis = axes.yaxis
+    axis.set_major_locator(LogLocator(base=10.0, numticks=6))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: quantities.significant(value, 1)))
+    axis.set_minor_formatter(NullFormatter())
+
+
+def reference_line(axes: Axes, view: StudyView, metric: str, scale: Scale, *, upright: bool) -> None:
+    """Draw what the metric is held against, where there is such."""
+    if metric not in view.reference:
+        return
+    at = view.reference[metric][1] * scale.times
+    draw = axes.axvline if upright else axes.axhline
+    draw(at, color=MUTED, linestyle=(0, (5, 3)), linewidth=1.0, zorder=2.0)

@@ -1,0 +1,120 @@
+"""One unit for a whole column or axis, and as many digits as its intervals are worth."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+from statistics import median
+
+from pilotage.report import quantities
+from pilotage.report.metrics_table import metric_of
+
+MAX_DECIMALS = 6
+LEAST_P = 0.001
+"""Smaller p-values are not told apart."""
+
+
+@dataclass(frozen=True, slots=True)
+class Scale:
+    """What a value is multiplied by to be written, and the unit that it then has; empty for plain numbers."""
+
+    times: float = 1.0
+    unit: str = ""
+
+    @property
+    def label(self) -> str:
+        """The unit in brackets, with the space before it."""
+        return f" [{self.unit}]" if self.unit else ""
+
+    @property
+    def square(self) -> str:
+        """The unit of a variance, likewise."""
+        return f" [({self.unit})²]" if self.unit == "%" else f" [{self.unit}²]" if self.unit else ""
+
+    def decimals(self, value: float, low: float, high: float) -> int:
+        """Decimals that leave two digits of an interval's half; four digits of the value without one."""
+        half = 0.5 * (high - low) * self.times
+        if math.isfinite(half) and half > 0.0:
+            return min(max(1 - math.floor(math.log10(half)), 0), MAX_DECIMALS)
+        size = abs(value * self.times)
+        if not math.isfinite(size) or size == 0.0:
+            return 0
+        return min(max(3 - math.floor(math.log10(size)), 0), MAX_DECIMALS)
+
+    def write(self, value: float, decimals: int, *, signed: bool = False) -> str:
+        """Write a value with so many decimals, never in powers of ten, with thousands apart."""
+        if not math.isfinite(value):
+            return quantities.NOTHING
+        rounded = round(value * self.times, decimals) + 0.0  # no sign on a zero
+        text = f"{rounded:{'+' if signed else ''},.{decimals}f}"
+        return text.replace(",", "\u00a0").replace("-", "−")
+
+    def write_variance(self, variance: float) -> str:
+        """Write a variance in the square of the unit."""
+        return quantities.significant(variance * self.times**2)
+
+
+def scale_of(metric: str, values: Iterable[float]) -> Scale:
+    """The unit in which these values of a metric are told: that of the middle one."""
+    size = median([abs(value) for value in values if math.isfinite(value)] or [0.0])
+    write = metric_of(metric).write
+    if write is quantities.share or metric == "success":
+        return Scale(100.0, "%")
+    if write is quantities.angle or metric.endswith("_rad"):
+        return Scale(math.degrees(1.0), "°")
+    if write is quantities.length or metric.endswith("_m"):
+        if 0.0 < size < 0.1:
+            return Scale(1000.0, "mm")
+        return Scale(0.001, "km") if size >= 10_000.0 else Scale(1.0, "m")
+    if write is quantities.duration or (metric.endswith("_s") and not metric.endswith(("_per_s", "_m_s"))):
+        if 0.0 < size < 0.1:
+            return Scale(1000.0, "ms")
+        return Scale(1.0 / 3600.0, "h") if size >= 3.0 * 3600.0 else Scale(1.0, "s")
+    return Scale(1.0, next((u for e, u in (("_m_s", "m/s"), ("_per_s", "1/s")) if metric.endswith(e)), ""))
+
+
+def told(metric: str, value: float, low: float, high: float, *, signed: bool = False) -> str:
+    """A value with its interval in one unit: ``24.52 m (24.51 to 24.54)``."""
+    if not math.isfinite(value):
+        return quantities.NOTHING
+    scale = scale_of(metric, (value, low, high))
+    digits = scale.decimals(value, low, high)
+    unit = {"": "", "°": "°"}.get(scale.unit, f"\u00a0{scale.unit}")
+    text = f"{scale.write(value, digits, signed=signed)}{unit}"
+    if not math.isfinite(low):
+        return text
+    return f"{text} ({scale.write(low, digits, signed=signed)} to {scale.write(high, digits, signed=signed)})"
+
+
+def p_value(value: float, letter: str = "") -> str:
+    """A p-value as one says it; with its letter before it, as ``p = 0.012``."""
+    if not math.isfinite(value):
+        return quantities.NOTHING
+    if value < LEAST_P:
+        return f"{letter}< {LEAST_P:g}"
+    return f"{letter}{'= ' if letter else ''}{value:.3f}"
+
+
+_UNITS = (
+    ("_m_s2", "m/s²"),
+    ("_rad_s2", "rad/s²"),
+    ("_rad_s", "rad/s"),
+    ("_m_s", "m/s"),
+    ("_m2", "m²"),
+    ("_rad2", "rad²"),
+    ("_hz", "Hz"),
+    ("_deg", "°"),
+    ("_rad", "rad"),
+    ("_m", "m"),
+    ("_s", "s"),
+)
+
+
+def key_and_unit(key: str) -> tuple[str, str]:
+    """A parameter's key as words, and its unit by its ending: ``turning radius``, ``m``."""
+    last = key.rsplit(".", 1)[-1]
+    for ending, unit in _UNITS:
+        if last.endswith(ending) and len(last) > len(ending):
+            return last[: -len(ending)].replace("_", " "), unit
+    return last.replace("_", " "), ""

@@ -1,0 +1,70 @@
+"""Numbers on a study's page: one unit a column, digits worth their interval, never powers of ten."""
+
+from __future__ import annotations
+
+import math
+import re
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from pilotage.report.study.scales import Scale, key_and_unit, p_value, scale_of, told
+
+
+@pytest.mark.parametrize(
+    ("metric", "values", "unit"),
+    [
+        ("position_rmse_m", [0.0065, 0.018], "mm"),
+        ("position_rmse_m", [0.0065, 0.002, 1.8], "mm"),
+        ("position_rmse_m", [0.0065, 0.9, 1.8], "m"),
+        ("position_rmse_m", [], "m"),
+        ("path_length_m", [31_000.0], "km"),
+        ("planning_time_s", [0.05], "ms"),
+        ("duration_s", [86.0, math.nan], "s"),
+        ("duration_s", [338_190.0], "h"),
+        ("heading_rmse_rad", [0.001], "°"),
+        ("coverage_visited", [0.3], "%"),
+        ("success", [1.0], "%"),
+        ("nees_mean", [3.0], ""),
+        ("a_speed_m_s", [2.0], "m/s"),
+    ],
+)
+def test_a_column_has_the_unit_of_its_middle_value(metric: str, values: list[float], unit: str) -> None:
+    assert scale_of(metric, values).unit == unit
+
+
+def test_digits_end_where_the_interval_begins() -> None:
+    assert told("planned_length_m", 24.5204, 24.5072, 24.5349) == "24.520\u00a0m (24.507 to 24.535)"
+    assert told("final_position_error_m", 1100.2, 972.1, 1259.0) == "1\u00a0100\u00a0m (972 to 1\u00a0259)"
+    assert told("position_rmse_m", 0.00641, 0.00630, 0.00651) == "6.41\u00a0mm (6.30 to 6.51)"
+    assert told("nees_mean", -1e-9, -0.02, 0.02, signed=True) == "+0.000 (−0.020 to +0.020)"
+    assert told("nees_mean", math.nan, math.nan, math.nan) == "–"
+
+
+@given(st.floats(-1e9, 1e9), st.floats(1e-12, 1e6))
+def test_no_number_is_written_in_powers_of_ten(value: float, half: float) -> None:
+    for metric in ("position_rmse_m", "nees_mean", "planning_time_s"):
+        text = told(metric, value, value - half, value + half, signed=True)
+        assert not re.search(r"\d[eE][+-]?\d", text)
+    assert "e" not in Scale(1000.0, "ms").write_variance(half)
+
+
+def test_a_variance_is_in_the_square_of_its_columns_unit() -> None:
+    times_s = np.array([0.050, 0.052, 0.054])
+    scale = scale_of("planning_time_s", times_s)
+    assert scale.square == " [ms²]"
+    assert scale.write_variance(float(times_s.var(ddof=1))) == "4.00"
+
+
+def test_small_p_values_are_not_told_apart() -> None:
+    assert p_value(3e-17) == "< 0.001"
+    assert p_value(0.0123, "p ") == "p = 0.012"
+    assert p_value(3e-17, "p ") == "p < 0.001"
+
+
+def test_a_keys_unit_is_its_ending() -> None:
+    assert key_and_unit("stack.planner.turning_radius_m") == ("turning radius", "m")
+    assert key_and_unit("stack.local_planner.speed_m_s") == ("speed", "m/s")
+    assert key_and_unit("stack.localizer.gate") == ("gate", "")
