@@ -233,7 +233,7 @@ class _Line:
         self._quiet = quiet
         self._terminal = sys.stderr.isatty()
         self._period_s = 0.2 if self._terminal else 10.0
-        self._next_s = monotonic()
+        self._next_s = monotonic() + (0.0 if self._terminal else self._period_s)
         self._drawn = False
 
     def __call__(self, progress: StudyProgress) -> None:

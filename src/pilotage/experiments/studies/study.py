@@ -168,6 +168,9 @@ def make_study(definition: StudyDefinition, folder: Path = Path()) -> Study:
             resolve(cell.overrides)
         except InputError as error:
             raise InputError(f"cell '{cell.name}': {error}") from None
+    names = [cell.name for cell in cells]
+    if definition.baseline is not None and definition.baseline not in names:
+        raise unknown_name("baseline", definition.baseline, names)
     named_in_cells = [json.loads(text.partition("=")[2]) for cell in cells for text in cell.overrides]
     return Study(definition, base, cells, digests([base, named_in_cells]))
 
