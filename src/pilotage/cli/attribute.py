@@ -29,16 +29,16 @@ def attribute(
 
     made = attribution_study(mission, overrides or (), trials)
     folder = out / made.name
-    code, page = run_study_quietly(made, folder, workers, dask, resume, json, report, quiet)
-    if code == 130:
-        return code
+    ran = run_study_quietly(made, folder, workers, dask, resume, json, report, quiet)
+    if not ran.whole:
+        return ran.code
     answer = attribution_of(folder)
     if json:
-        print_json(answer | ({} if page is None else {"report": str(page)}))
+        print_json(answer | ({} if ran.page is None else {"report": str(ran.page)}))
     elif not quiet:
         _print(answer)
-        print(f"report: {page}" if page is not None else f"study: {folder}")
-    return code
+        print(f"report: {ran.page}" if ran.page is not None else f"study: {folder}")
+    return ran.code
 
 
 def _print(answer: dict[str, Any]) -> None:

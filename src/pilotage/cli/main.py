@@ -17,15 +17,11 @@ from pathlib import Path
 from types import FrameType
 from typing import NoReturn
 
+from pilotage.cli.stopped import INTERRUPTED, TERMINATED, Terminated
+
 BAD_INPUT = 2
 BUG = 70
-INTERRUPTED = 130
 BROKEN_PIPE = 141
-TERMINATED = 143
-
-
-class _Terminated(KeyboardInterrupt):
-    """SIGTERM, raised where Ctrl-C would be, so that what is half-written is cleared away."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -41,7 +37,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         _steady_streams()
         with _ended_by_sigterm():
             return _run(sys.argv[1:] if arguments is None else list(arguments))
-    except _Terminated:
+    except Terminated:
         return _say("ended by SIGTERM", TERMINATED)
     except KeyboardInterrupt:
         return _say("interrupted", INTERRUPTED)
@@ -61,7 +57,7 @@ def _ended_by_sigterm() -> Iterator[None]:
     def end(signum: int, frame: FrameType | None) -> NoReturn:  # noqa: ARG001 - as signal calls it
         # Once is enough: a second one must not cut the clearing away short.
         signal.signal(signal.SIGTERM, signal.SIG_IGN)
-        raise _Terminated
+        raise Terminated
 
     before = signal.signal(signal.SIGTERM, end)
     try:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -11,11 +12,14 @@ import typer
 
 from pilotage.cli.options import Json, Overrides
 from pilotage.cli.output import print_json, stdout_for_json
+from pilotage.cli.stopped import INTERRUPTED, TERMINATED, Terminated
+from pilotage.core.errors import InputError
 
 if TYPE_CHECKING:
     from pilotage.experiments.studies.engine import StudyProgress
     from pilotage.experiments.studies.study import Study
 
+FAILED = 1
 Trials = Annotated[int | None, typer.Option("--trials", metavar="N", min=1, help="Trials in every cell.")]
 WorkerCount = Annotated[
     int | None,
@@ -46,11 +50,11 @@ def study(
     quiet: Quiet = False,
 ) -> int:
     """Run a study: every setting times many seeds, finished trials never lost."""
-    from pilotage.experiments.studies.study import load_study
+    from pilotage.experiments.studies.study import is_study_folder, load_study
 
     changes: dict[str, Any] = {} if trials is None else {"trials": trials}
     loaded = load_study(name, changes)
-    folder = Path(name) if Path(name).is_dir() else out / loaded.name
+    folder = Path(name) if is_study_folder(name) else out / loaded.name
     return run_and_tell(loaded, folder, workers, dask, resume, json, report, quiet)
 
 
@@ -78,7 +82,9 @@ def sweep(
     """Write a study that varies a mission's parameters, and run it."""
     from pilotage.experiments.studies.sweep import sweep_study
 
-    asked = tuple(part.strip() for part in metrics.split(",")) if metrics else ()
+    asked = () if metrics is None else tuple(part.strip() for part in metrics.split(","))
+    if not all(asked):
+        raise InputError(f"--metrics '{metrics}': expected names with commas between, M1,M2")
     made = sweep_study(mission, vary, overrides or (), trials, asked, name)
     return run_and_tell(made, out / made.name, workers, dask, resume, json, report, quiet)
 
@@ -94,18 +100,27 @@ def run_and_tell(
     quiet: bool,
 ) -> int:
     """Run a study, write its exports and its page, and say what came out."""
-    code, page = run_study_quietly(loaded, folder, workers, dask, resume, json, report, quiet)
-    if code == 130:
-        return code
+    ran = run_study_quietly(loaded, folder, workers, dask, resume, json, report, quiet)
+    if not ran.whole:
+        return ran.code
     from pilotage.experiments.studies.table import read_study, study_object
 
     answer = study_object(read_study(folder))
     if json:
-        print_json(answer | ({} if page is None else {"report": str(page)}))
+        print_json(answer | ({} if ran.page is None else {"report": str(ran.page)}))
     elif not quiet:
         _print_cells(answer)
-        print(f"report: {page}" if page is not None else f"study: {folder}")
-    return code
+        print(f"report: {ran.page}" if ran.page is not None else f"study: {folder}")
+    return ran.code
+
+
+@dataclass(frozen=True, slots=True)
+class Ran:
+    """How a study's run ended: its exit code, its page, and whether it came to its end."""
+
+    code: int
+    page: Path | None = None
+    whole: bool = False
 
 
 def run_study_quietly(
@@ -117,29 +132,60 @@ def run_study_quietly(
     json: bool,
     report: bool,
     quiet: bool,
-) -> tuple[int, Path | None]:
-    """Run a study, write its exports and its page; the exit code and the page's path."""
-    from pilotage.experiments.studies.engine import StudyStoppedError, run_study
-    from pilotage.experiments.studies.table import export
+) -> Ran:
+    """Run a study, write its exports and its page, and say on standard error what went wrong."""
+    from pilotage.experiments.studies.database import StudyStoppedError
+    from pilotage.experiments.studies.engine import run_study
 
     line = _Line(quiet)
+    go_on = f"go on with --resume, what is finished is in {folder}"
     try:
         with stdout_for_json(json):
-            counts = run_study(loaded, folder, workers=workers, dask=dask, resume=resume, on_progress=line)
+            counts = run_study(
+                loaded,
+                folder,
+                workers=workers,
+                dask=dask,
+                resume=resume,
+                on_progress=line,
+                on_trouble=None if quiet else line.tell,
+            )
+            line.close()
+            page = _write_files(folder, report, quiet)
+    except Terminated:
+        return _stopped(line, f"ended by SIGTERM; {go_on}", TERMINATED)
     except KeyboardInterrupt:
-        line.close()
-        print(f"pilotage: stopped; go on with --resume, what is finished is in {folder}", file=sys.stderr)
-        return 130, None
+        return _stopped(line, f"stopped; {go_on}", INTERRUPTED)
     except StudyStoppedError as error:
-        line.close()
-        print(f"pilotage: {error}", file=sys.stderr)
-        return 130, None
+        return _stopped(line, str(error), FAILED)
     finally:
         line.close()
-    with stdout_for_json(json):
+    if counts.failed:
+        line.tell(
+            f"{counts.failed} of {counts.total} trials failed; their reasons are in {folder}/trials.csv"
+        )
+    return Ran(FAILED if counts.failed else 0, page, whole=True)
+
+
+def _stopped(line: _Line, text: str, code: int) -> Ran:
+    line.close()
+    line.tell(text)
+    return Ran(code)
+
+
+def _write_files(folder: Path, report: bool, quiet: bool) -> Path | None:
+    """Write exports and page; the rows are safe, whatever becomes of these."""
+    from pilotage.experiments.studies.database import StudyStoppedError
+    from pilotage.experiments.studies.export import export
+
+    try:
         export(folder)
-        page = _page(folder, quiet) if report else None
-    return (1 if counts.failed else 0), page
+        return _page(folder, quiet) if report else None
+    except OSError as error:
+        raise StudyStoppedError(
+            f"{folder}: all trials are finished, but their exports cannot be written "
+            f"({error.strerror or error}); mend that and go on with --resume"
+        ) from None
 
 
 def _page(folder: Path, quiet: bool) -> Path:
@@ -161,7 +207,7 @@ def _print_cells(answer: dict[str, Any]) -> None:
     from pilotage.report.metrics_table import metric_of
 
     metrics = list(answer["cells"][0]["metrics"])[:5]
-    table = Table(title=f"{answer['study']}: {answer['trials']} trials, {answer['failed']} broken")
+    table = Table(title=f"{answer['study']}: {answer['trials']} trials, {answer['failed']} failed")
     table.add_column("setting")
     table.add_column("success", justify="right")
     for name in metrics:
@@ -187,7 +233,7 @@ class _Line:
         self._quiet = quiet
         self._terminal = sys.stderr.isatty()
         self._period_s = 0.2 if self._terminal else 10.0
-        self._next_s = monotonic()
+        self._next_s = monotonic() + (0.0 if self._terminal else self._period_s)
         self._drawn = False
 
     def __call__(self, progress: StudyProgress) -> None:
@@ -197,7 +243,7 @@ class _Line:
         self._next_s = now_s + self._period_s
         counts = progress.counts
         left = f"{progress.left_s:.0f} s left" if progress.left_s < 1e9 else "no rate yet"
-        failed = f", {counts.failed} broken" if counts.failed else ""
+        failed = f", {counts.failed} failed" if counts.failed else ""
         ended = counts.done + counts.failed
         text = f"{ended} of {counts.total} trials{failed}, {progress.rate_per_s:.1f}/s, {left}"
         print(
@@ -205,6 +251,11 @@ class _Line:
         )
         sys.stderr.flush()
         self._drawn = self._terminal
+
+    def tell(self, text: str) -> None:
+        """Say one line that stays."""
+        self.close()
+        print(f"pilotage: {text}", file=sys.stderr)
 
     def close(self) -> None:
         """Wipe the line."""

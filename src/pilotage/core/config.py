@@ -58,7 +58,10 @@ def describe(error: ValidationError, model: type[BaseModel], where: str) -> str:
         return f"{place}: missing; it has to be given"
     message = first["msg"].removeprefix("Value error, ")
     message = message[:1].lower() + message[1:]
-    return f"{place}: {message}, found {_show(first['input'])}"
+    # A rule that says itself what it found, or is about the whole file: the dump would only bury it.
+    if place and ", found " not in message:
+        message += f", found {_show(first['input'])}"
+    return f"{place}: {message}" if place else message
 
 
 def _fields_at(model: type[BaseModel], path: list[str]) -> list[str]:

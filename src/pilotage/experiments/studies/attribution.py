@@ -23,6 +23,8 @@ from pilotage.experiments.studies.study import Study, make_study
 from pilotage.experiments.studies.sweep import settings_of
 from pilotage.experiments.studies.table import StudyTable, read_study
 
+FIRST = 0
+"""The cell of the mission as it is."""
 DRIVER = "driver"
 """An oracle that stands in for no module: it drives, and the localizer is only judged."""
 BASELINE = "as it is"
@@ -42,19 +44,14 @@ def attribution_study(mission: str, overrides: Sequence[str], trials: int) -> St
     """
     loaded = load_mission(mission, overrides)
     kind = kind_of(loaded)
-    oracles, costs = kind.oracles(loaded), kind.costs(loaded)
+    oracles = {name: text for name, text in kind.oracles(loaded).items() if name != DRIVER}
+    costs = kind.costs(loaded)
     if not oracles:
         raise InputError(f"attribute '{mission}': expected a mission with modules that an oracle can replace")
     told = "; ".join(f"{name}: {text}" for name, text in oracles.items())
     configurations: list[dict[str, Any]] = [{"name": BASELINE, "set": {"run.oracles": []}}]
-<<<<<<< HEAD
     configurations += [{"name": f"{ORACLE}{name}", "set": {"run.oracles": [name]}} for name in oracles]
     primary = next(iter(costs))
-=======
-    configurations += [
-        {"name": f"oracle {name}", "set": {"run.oracles": [name]}} for name in oracles if name != DRIVER
-    ]
->>>>>>> h4
     values: dict[str, Any] = {
         "study": _name(mission, overrides),
         "question": (
@@ -91,12 +88,11 @@ def attribution_of(folder: Path) -> dict[str, Any]:
     where both runs succeeded.
     """
     table = read_study(folder)
-    baseline = table.baseline or 0
-    base = mission_of(dict(table.study.base), table.study.cells[baseline].overrides)
+    base = mission_of(dict(table.study.base), table.study.cells[FIRST].overrides)
     costs = {SUCCESS: Cost(Aspect.ACCURACY, less_is_better=False), **kind_of(base).costs(base)}
     values = {name: _comparable(table, name, cost) for name, cost in costs.items() if name in table.values}
-    judgement = judge(table.cell, table.trial, values, len(table.study.cells), baseline)
-    before = _baseline(judgement, baseline)
+    judgement = judge(table.cell, table.trial, values, [FIRST] * len(table.study.cells))
+    before = _baseline(judgement, FIRST)
     ranked: list[tuple[tuple[float, ...], dict[str, Any]]] = []
     for cell in table.study.cells[1:]:
         changes = {
@@ -139,7 +135,7 @@ def _is_sure(table: StudyTable, values: FloatArray, cell: int, change: Differenc
         and change.mean != 0.0
         and all(
             np.ptp(column[np.isfinite(column)]) == 0.0 and len(set(table.seed[table.cell == index])) > 1
-            for index in (table.baseline or 0, cell)
+            for index in (FIRST, cell)
             if (column := values[table.cell == index]).size
         )
     )

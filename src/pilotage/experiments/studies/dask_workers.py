@@ -5,15 +5,15 @@ from __future__ import annotations
 import functools
 import json
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from typing import Any
 
 from pilotage.core.errors import InputError
-from pilotage.experiments.studies.local_workers import WAIT_S
 from pilotage.experiments.studies.trial import Outcome, Task, TrialRunner
+from pilotage.experiments.studies.workers import AHEAD, WAIT_S, Running
 
 CONNECT_S = 10
-AHEAD = 2
 POLL_S = 0.005
 
 
@@ -71,11 +71,17 @@ class DaskWorkers:
                     task.row, {}, {}, f"its worker died ({type(error).__name__}: {words})", retry=True
                 )
 
+    def running(self) -> Sequence[Running]:
+        """Not known from here: the cluster's own pages tell."""
+        return ()
+
     def stop(self) -> None:
-        """Cancel what is left."""
-        self._client.cancel(list(self._futures))
+        """Cancel what is left; a scheduler that is gone has nothing to cancel."""
+        with suppress(Exception):
+            self._client.cancel(list(self._futures))
         self._futures.clear()
-        self._client.close()
+        with suppress(Exception):
+            self._client.close()
 
 
 @functools.lru_cache(maxsize=4)

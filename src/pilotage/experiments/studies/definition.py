@@ -8,7 +8,7 @@ from typing import Any, Literal
 from pydantic import Field, model_validator
 
 from pilotage.core.config import Config
-from pilotage.experiments.studies.factors import Factor
+from pilotage.experiments.studies.factors import Factor, check_plain
 
 CONFIGURATION = "configuration"
 """What the named configurations are called among the factors."""
@@ -33,7 +33,7 @@ class Seeds(Config):
     ``independent``: every row has a seed of its own.
     """
 
-    first: int = Field(default=0, ge=0)
+    first: int = Field(default=0, ge=0, le=2**62)
     pairing: Literal["shared", "independent"] = "shared"
 
 
@@ -119,6 +119,8 @@ class StudyDefinition(Config):
 
     @model_validator(mode="after")
     def _sound(self) -> StudyDefinition:
+        for where, values in (("set", self.set), *((c.name, c.set) for c in self.configurations)):
+            check_plain(values, where)
         titles = [factor.title for factor in self.factors]
         _once(titles, "factors", "give one of them a name")
         _once([c.name for c in self.configurations], "configurations", "names tell them apart")
@@ -134,6 +136,9 @@ class StudyDefinition(Config):
             raise ValueError(f"configurations: '{clash}' among their values is a factor's name already")
         if self.configurations and CONFIGURATION in titles:
             raise ValueError(f"a factor cannot be called '{CONFIGURATION}' beside configurations")
+        if self.combine != "one-at-a-time":
+            keys = [key for f in self.factors for key in f.keys]
+            _once(keys, "factors: the key", "one of them would have no effect")
         if self.combine == "zip" and len({len(factor.settings()) for factor in self.factors}) > 1:
             lengths = ", ".join(f"{f.title} {len(f.settings())}" for f in self.factors)
             raise ValueError(f"combine zip: expected factors of one length, found {lengths}")

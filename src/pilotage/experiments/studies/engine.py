@@ -3,17 +3,22 @@
 from __future__ import annotations
 
 import contextlib
+import errno
 import os
-import sqlite3
+import signal
+import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from pilotage.core.errors import InputError, PilotageError, nearest
+from pilotage.core.errors import InputError, nearest
 from pilotage.experiments.studies.dask_workers import DaskWorkers
-from pilotage.experiments.studies.local_workers import LocalWorkers, Workers
-from pilotage.experiments.studies.store import DATABASE, Counts, Store, flat, read_rows
+from pilotage.experiments.studies.database import DATABASE, CorruptDatabaseError, StudyStoppedError
+from pilotage.experiments.studies.export import save_what_is_left
+from pilotage.experiments.studies.local_workers import LocalWorkers
+from pilotage.experiments.studies.rows import flat, read_rows
+from pilotage.experiments.studies.store import Counts, Store
 from pilotage.experiments.studies.study import (
     MISSION_FILE,
     STUDY_FILE,
@@ -21,8 +26,13 @@ from pilotage.experiments.studies.study import (
     mission_yaml,
     study_yaml,
 )
+from pilotage.experiments.studies.workers import Workers
 
 HEAR_EVERY_S = 5.0
+TELL_EVERY_S = 0.1
+LONG_S = 120.0
+LONG_TIMES = 20.0
+"""A trial that takes both more than LONG_S and so many times the longest one so far may hang."""
 ENOUGH_TO_TELL = 20
 """A metric that none of so many trials gives is given by none."""
 
@@ -36,10 +46,6 @@ class StudyProgress:
     left_s: float
 
 
-class StudyStoppedError(PilotageError):
-    """The study cannot go on now; what is finished is kept, and the message says how to go on."""
-
-
 def run_study(
     study: Study,
     folder: Path,
@@ -48,6 +54,7 @@ def run_study(
     dask: str | None = None,
     resume: bool = False,
     on_progress: Callable[[StudyProgress], None] | None = None,
+    on_trouble: Callable[[str], None] | None = None,
 ) -> Counts:
     """Run what is missing of a study in ``folder``.
 
@@ -59,46 +66,65 @@ def run_study(
         A scheduler's address instead.
     resume
         Whether to go on with a folder that was begun before; a complete one is left as it is.
+    on_trouble
+        Told, a line each, of a worker that died, a trial that broke or takes very long, a disk that is full.
 
     Raises
     ------
     InputError
         The folder holds another definition, or was begun and ``resume`` is not said; a metric that no
-        trial gives.
+        trial gives; a corrupt database, after what can be read of it was saved.
     StudyStoppedError
-        The disk is full.
+        The disk is full and stays so, the cluster is gone, or no worker can begin.
     KeyboardInterrupt
         Passed on, with all finished rows written and the claims given back.
     """
+    tell = on_trouble or (lambda _: None)
+    try:
+        counts = _run(study, folder, workers, dask, resume, on_progress, tell)
+        check_metrics(study, folder)
+    except CorruptDatabaseError as error:
+        raise save_what_is_left(folder, study, error.trouble) from None
+    except OSError as error:
+        if error.errno != errno.ENOSPC:
+            raise
+        raise StudyStoppedError(f"{folder}: the disk is full; make room and go on with --resume") from None
+    return counts
+
+
+def _run(
+    study: Study,
+    folder: Path,
+    workers: int | None,
+    dask: str | None,
+    resume: bool,
+    on_progress: Callable[[StudyProgress], None] | None,
+    tell: Callable[[str], None],
+) -> Counts:
     begun = (folder / DATABASE).is_file()
-    store = Store(folder, study)
+    store = Store(folder, study, tell)
     try:
         counts = store.counts()
         if begun and not resume and counts.missing and counts.missing < counts.total:
-            raise InputError(
-                f"{folder}: {counts.done + counts.failed} of {counts.total} trials are finished; "
-                "go on with --resume"
-            )
+            ended = f"{counts.done + counts.failed} of {counts.total} trials are finished"
+            if store.others():
+                raise InputError(f"{folder}: {ended}, another process is at work; join it with --resume")
+            raise InputError(f"{folder}: {ended}; go on with --resume")
         _write(folder / STUDY_FILE, study_yaml(study))
         _write(folder / MISSION_FILE, mission_yaml(study))
         if counts.missing:
-            wanted = min(workers or os.cpu_count() or 1, counts.missing)
+            wanted = min(workers or _cores(), counts.missing)
             crew: Workers = DaskWorkers(study.base, dask) if dask else LocalWorkers(study.base, wanted)
             try:
-                _loop(study, store, crew, folder, on_progress)
+                _loop(study, store, crew, folder, on_progress, tell)
             finally:
-                crew.stop()
-        counts = store.counts()
-    except sqlite3.OperationalError as error:
-        raise StudyStoppedError(
-            f"{folder}: the database cannot be written ({error}); go on with --resume"
-        ) from None
+                with _undisturbed():
+                    crew.stop()
+        return store.counts()
     finally:
-        # On a full disk the claims are free again once this process is gone.
-        with contextlib.suppress(sqlite3.OperationalError):
+        # Where this fails, as on a full disk, the claims are free again once this process is gone.
+        with _undisturbed(), contextlib.suppress(StudyStoppedError, CorruptDatabaseError):
             store.close()
-    check_metrics(study, folder)
-    return counts
 
 
 def _loop(
@@ -107,9 +133,12 @@ def _loop(
     crew: Workers,
     folder: Path,
     on_progress: Callable[[StudyProgress], None] | None,
+    tell: Callable[[str], None],
 ) -> None:
-    began, finished, heard = time.monotonic(), 0, time.monotonic()
+    began = heard = time.monotonic()
+    shown, finished, longest_s = 0.0, 0, 0.0
     held: set[int] = set()
+    told: set[int] = set()
     checked = False
     while True:
         for task in store.claim(crew.room) if crew.room else ():
@@ -124,19 +153,52 @@ def _loop(
             continue
         for outcome in crew.outcomes():
             held.discard(outcome.row)
-            store.finish(outcome)
-            finished += not outcome.reason
-        if time.monotonic() - heard > HEAR_EVERY_S:
+            again = store.finish(outcome)
+            if outcome.reason:
+                tell(f"row {outcome.row}: {outcome.reason}; {'tried once more' if again else 'given up'}")
+            else:
+                finished += 1
+                longest_s = max(longest_s, outcome.seconds)
+        now = time.monotonic()
+        if now - heard > HEAR_EVERY_S:
             store.hear()
-            heard = time.monotonic()
+            heard = now
+            for trial in crew.running():
+                if trial.seconds > max(LONG_S, LONG_TIMES * longest_s) and trial.row not in told:
+                    told.add(trial.row)
+                    tell(
+                        f"row {trial.row} has run for {trial.seconds:.0f} s; where it hangs, "
+                        f"'kill -9 {trial.pid}' gives it up"
+                    )
         if not checked and finished >= ENOUGH_TO_TELL:
             check_metrics(study, folder)
             checked = True
-        if on_progress is not None:
+        if on_progress is not None and now - shown > TELL_EVERY_S:
             counts = store.counts()
-            rate = finished / max(time.monotonic() - began, 1e-9)
+            rate = finished / max(now - began, 1e-9)
             left = counts.missing / rate if rate > 0.0 else float("inf")
             on_progress(StudyProgress(counts, rate, left))
+            shown = now
+
+
+@contextlib.contextmanager
+def _undisturbed() -> Iterator[None]:
+    """Let a second Ctrl-C wait until what the first one stopped is put away."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+def _cores() -> int:
+    """How many cores this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
 
 
 def check_metrics(study: Study, folder: Path) -> None:
@@ -148,7 +210,9 @@ def check_metrics(study: Study, folder: Path) -> None:
         With the nearest one that they do give.
     """
     asked = [*study.definition.metrics, *([study.definition.primary] if study.definition.primary else [])]
-    rows, _ = read_rows(folder / DATABASE)
+    rows, trouble = read_rows(folder / DATABASE)
+    if trouble:
+        raise CorruptDatabaseError(folder / DATABASE, trouble)
     given: set[str] = set()
     for row in rows:
         given |= flat(row["metrics"]).keys() | flat(row["timings"]).keys()

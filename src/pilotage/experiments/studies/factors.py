@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from decimal import Decimal
 from typing import Any
 
@@ -124,9 +125,13 @@ class Factor(Config):
             raise ValueError("expected the key that is varied")
         if self.levels is not None and (self.keys or self.multiply or not self.name):
             raise ValueError("levels set keys of their own: expected a name beside them, no key, no multiply")
+        twice_key = next((key for i, key in enumerate(self.keys) if key in self.keys[:i]), None)
+        if twice_key is not None:
+            raise ValueError(f"the key '{twice_key}' stands twice")
         found = self.settings()
         if not found:
             raise ValueError("an empty list of values")
+        check_plain(self.levels if self.levels is not None else list(found), "values")
         texts = [repr(value) for value in found]
         twice = next((text for i, text in enumerate(texts) if text in texts[:i]), None)
         if twice is not None:
@@ -154,6 +159,26 @@ class Factor(Config):
         source = self.range or self.log_range or self.random_range
         assert source is not None
         return source.values()
+
+
+def check_plain(value: Any, where: str) -> None:
+    """Refuse what a mission cannot hold, such as a date or a number that is none.
+
+    Raises
+    ------
+    ValueError
+        With the place of the first such value.
+    """
+    if isinstance(value, Mapping):
+        for key, inner in value.items():
+            check_plain(inner, f"{where}.{key}")
+    elif isinstance(value, list | tuple):
+        for i, inner in enumerate(value):
+            check_plain(inner, f"{where}.{i}")
+    elif isinstance(value, float) and not math.isfinite(value):
+        raise ValueError(f"{where}: expected a finite number, found {value}")
+    elif not isinstance(value, bool | int | float | str | None):
+        raise ValueError(f"{where}: expected a number or text, found the {type(value).__name__} {value}")
 
 
 def _is_number(value: Any) -> bool:

@@ -5,41 +5,25 @@ from __future__ import annotations
 import contextlib
 import multiprocessing
 import os
+import pickle
 import signal
-from collections.abc import Iterator, Mapping
+import threading
+import time
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from multiprocessing import resource_tracker
 from multiprocessing.connection import Connection, wait
 from multiprocessing.context import SpawnProcess
-from typing import Any, Protocol
+from typing import Any
 
+from pilotage.experiments.studies.database import StudyStoppedError
 from pilotage.experiments.studies.trial import Outcome, Task, TrialRunner
+from pilotage.experiments.studies.workers import AHEAD, WAIT_S, Running
 from pilotage.kernels.jit import cache_is_cold
 
-AHEAD = 2
-"""Tasks that a worker holds: the one it runs and the next."""
 ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
-WAIT_S = 1.0
-
-
-class Workers(Protocol):
-    """Whoever runs tasks."""
-
-    @property
-    def room(self) -> int:
-        """How many more tasks it takes now."""
-        ...
-
-    def give(self, task: Task) -> None:
-        """Hand one task over."""
-        ...
-
-    def outcomes(self) -> Iterator[Outcome]:
-        """What has ended since the last call; waits a moment where nothing has."""
-        ...
-
-    def stop(self) -> None:
-        """Stop at once; what runs is lost."""
-        ...
+STILLBORN = 4
+"""So many workers in a row that die before they can begin: the fault is not a trial's."""
 
 
 @dataclass(slots=True)
@@ -47,16 +31,25 @@ class _Worker:
     process: SpawnProcess
     pipe: Connection
     tasks: list[Task] = field(default_factory=list)
+    ready: bool = False
+    since_s: float = 0.0
 
 
 class LocalWorkers:
-    """Spawned processes, each with a pipe of its own."""
+    """Spawned processes, each with a pipe of its own.
+
+    Raises
+    ------
+    StudyStoppedError
+        From ``outcomes``, where one worker after another dies before it can begin.
+    """
 
     def __init__(self, base: Mapping[str, Any], count: int) -> None:
         self._base = dict(base)
         self._context = multiprocessing.get_context("spawn")
         # Where nothing is compiled yet, one of them does it for all.
         self._count = count
+        self._stillborn = 0
         self._workers = [self._start() for _ in range(1 if cache_is_cold() else count)]
 
     @property
@@ -67,6 +60,8 @@ class LocalWorkers:
     def give(self, task: Task) -> None:
         """To the worker that has least to do."""
         worker = min(self._workers, key=lambda w: len(w.tasks))
+        if not worker.tasks:
+            worker.since_s = time.monotonic()
         worker.tasks.append(task)
         # One that has just died is seen to at the next look at the outcomes.
         with contextlib.suppress(OSError):
@@ -75,18 +70,36 @@ class LocalWorkers:
     def outcomes(self) -> Iterator[Outcome]:
         """What came through the pipes; a worker that died is replaced and its task told."""
         ready = wait([w.pipe for w in self._workers] + [w.process.sentinel for w in self._workers], WAIT_S)
-        for number, worker in enumerate(self._workers):
-            if worker.pipe in ready:
-                try:
-                    while worker.pipe.poll():
-                        outcome: Outcome = worker.pipe.recv()
-                        worker.tasks = [task for task in worker.tasks if task.row != outcome.row]
-                        yield outcome
-                        self._fill_up()
-                except (EOFError, OSError):
-                    pass
+        for number, worker in enumerate(list(self._workers)):
+            # Read first, also what a worker left behind that has died since.
+            if worker.pipe in ready or worker.process.sentinel in ready:
+                for outcome in self._received(worker):
+                    yield outcome
+                    self._fill_up()
             if worker.process.sentinel in ready and not worker.process.is_alive():
                 yield from self._replace(number)
+
+    def running(self) -> Sequence[Running]:
+        """The first task of every worker."""
+        now_s = time.monotonic()
+        return tuple(
+            Running(w.tasks[0].row, w.process.pid or 0, now_s - w.since_s)
+            for w in self._workers
+            if w.tasks and w.ready
+        )
+
+    def _received(self, worker: _Worker) -> Iterator[Outcome]:
+        try:
+            while worker.pipe.poll():
+                message: Outcome | None = worker.pipe.recv()
+                worker.since_s = time.monotonic()
+                if message is None:
+                    worker.ready, self._stillborn = True, 0
+                    continue
+                worker.tasks = [task for task in worker.tasks if task.row != message.row]
+                yield message
+        except (EOFError, OSError, pickle.UnpicklingError):  # it died in the middle of a word
+            pass
 
     def _fill_up(self) -> None:
         while len(self._workers) < self._count:
@@ -107,7 +120,8 @@ class LocalWorkers:
         kept = {name: os.environ.get(name) for name in ONE_THREAD}
         os.environ.update(dict.fromkeys(ONE_THREAD, "1"))
         try:
-            process.start()
+            with _interrupts_held():
+                process.start()
         finally:
             for name, value in kept.items():
                 if value is None:
@@ -123,22 +137,58 @@ class LocalWorkers:
         dead.process.join()
         code = dead.process.exitcode
         dead.pipe.close()
+        how = f"signal {-code}" if code is not None and code < 0 else f"exit code {code}"
+        if not dead.ready:
+            # No trial is to blame: it had not begun one.
+            self._stillborn += 1
+            if self._stillborn >= STILLBORN:
+                raise StudyStoppedError(
+                    f"{self._stillborn} workers died one after another before they could begin ({how}); "
+                    "mend that and go on with --resume"
+                )
         fresh = self._workers[number] = self._start()
-        for task in dead.tasks[1:]:
+        for task in dead.tasks[1:] if dead.ready else dead.tasks:
             fresh.tasks.append(task)
-            fresh.pipe.send(task)
-        if dead.tasks:
-            how = f"signal {-code}" if code is not None and code < 0 else f"exit code {code}"
+            with contextlib.suppress(OSError):
+                fresh.pipe.send(task)
+        fresh.since_s = time.monotonic()
+        if dead.tasks and dead.ready:
             yield Outcome(dead.tasks[0].row, {}, {}, f"its worker died ({how})", retry=True)
+
+
+@contextlib.contextmanager
+def _interrupts_held() -> Iterator[None]:
+    """Keep Ctrl-C waiting while a worker starts, which inherits that and so never sees one."""
+    if not hasattr(signal, "pthread_sigmask"):  # pragma: no cover - Windows
+        yield
+        return
+    resource_tracker.ensure_running()  # a process of its own, which undoes the hold when it starts
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def _work(pipe: Connection, base: Mapping[str, Any]) -> None:
     """A worker's life: run what comes, until the pipe closes."""
     # Ctrl-C goes to the whole group: the parent decides.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    if hasattr(signal, "pthread_sigmask"):
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
+    threading.Thread(target=_end_with_parent, daemon=True).start()
     runner = TrialRunner(base)
     try:
+        pipe.send(None)  # ready
         while True:
             pipe.send(runner.run(pipe.recv()))
     except (EOFError, OSError):
         return
+
+
+def _end_with_parent() -> None:
+    """End at once when the parent is gone, however it went: nobody wants what this one still computes."""
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        wait([parent.sentinel])
+        os._exit(1)

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 from pilotage.core.errors import InputError
-from pilotage.experiments.studies.study import Study, load_study
+from pilotage.experiments.studies.database import DATABASE
+from pilotage.experiments.studies.rows import read_essence
+from pilotage.experiments.studies.study import Study, changes_told, differences, load_study
 from pilotage.experiments.studies.trial import TrialRunner
 from pilotage.missions.mission import Mission
 
@@ -44,6 +47,19 @@ def mission_of_row(study: Study, row: int) -> Mission:
 
 
 def mission_from(text: str) -> Mission:
-    """The mission of ``STUDY:ROW``."""
+    """The mission of ``STUDY:ROW``, as the study that is there ran it.
+
+    Raises
+    ------
+    InputError
+        If there is no such study or row, or its files are not those that its rows were made from.
+    """
     folder, row = parse_row(text)
-    return mission_of_row(load_study(str(folder)), row)
+    study = load_study(str(folder.resolve()))
+    made_from = read_essence(folder / DATABASE)
+    if made_from is not None and differences(made_from, json.loads(json.dumps(study.essence()))):
+        raise InputError(
+            f"--from '{text}': expected the files that the study was made from, found them changed "
+            f"({changes_told(made_from, study)}); no row can be run again as it was"
+        )
+    return mission_of_row(study, row)

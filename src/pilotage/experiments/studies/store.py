@@ -1,55 +1,46 @@
-"""A study's database: one row a trial, written as each ends, shared by any number of processes.
+"""A study's database at work: one row a trial, written as each ends, shared by any number of processes.
 
-SQLite in WAL mode: a process killed at any moment leaves every finished row; it can be read while it is
-written. A row is claimed in one transaction, so that two processes never run the same one, and a claim
-whose owner is gone is free again.
+SQLite with a write-ahead log: a process killed at any moment leaves every finished row; it can be read
+while it is written. A row is claimed in one transaction, so that two processes never run the same one, and
+a claim whose owner is gone is free again.
 """
 
 from __future__ import annotations
 
 import json
-import os
-import socket
 import sqlite3
 import time
 import uuid
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TypeVar
 
 from pilotage.core.errors import InputError
-from pilotage.experiments.studies.study import Study, differences
+from pilotage.experiments.studies.database import (
+    DATABASE,
+    SCHEMA,
+    CorruptDatabaseError,
+    check_sound,
+    checksum,
+    connect,
+    is_full,
+    telling,
+)
+from pilotage.experiments.studies.owners import hear, others
+from pilotage.experiments.studies.rows import flat, read_rows
+from pilotage.experiments.studies.study import STUDY_FILE, Study, changes_told
 from pilotage.experiments.studies.trial import Outcome, Task
 
-DATABASE = "trials.sqlite"
-MAX_ATTEMPTS = 2
-"""A trial that the machine, not the mission, broke is tried once more."""
-STALE_S = 30.0
-"""An owner that has not been heard of for so long is gone; one on this machine as soon as its process is."""
-BUSY_S = 60.0
+__all__ = ["DATABASE", "Counts", "Store", "flat", "read_rows"]
 
-SCHEMA = """
-create table meta (key text primary key, value text not null);
-create table owners (
-    owner text primary key, host text not null, pid integer not null, heard_s real not null
-);
-create table trials (
-    row integer primary key,
-    cell integer not null,
-    trial integer not null,
-    seed integer not null,
-    status text not null default 'pending',
-    attempts integer not null default 0,
-    owner text,
-    reason text not null default '',
-    metrics text,
-    timings text,
-    seconds real
-);
-create index trials_status on trials (status, row);
-"""
+MAX_ATTEMPTS = 2
+"""A trial that broke, and not by its mission's fault, is tried once more."""
+FULL_PAUSE_S = 2.0
+"""How long a full disk is given before it is tried once more."""
+
+T = TypeVar("T")
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,28 +60,45 @@ class Counts:
 class Store:
     """The database of one study.
 
+    Parameters
+    ----------
+    on_trouble
+        Told of a disk that is full, before it is tried once more.
+
     Raises
     ------
     InputError
-        Where the folder holds another study, or a file that is no such database.
+        Where the folder holds another study, a file that is no such database or a broken one, or cannot
+        be written.
+    StudyStoppedError
+        Where the disk is full; from every method that writes.
     """
 
-    def __init__(self, folder: Path, study: Study) -> None:
+    def __init__(self, folder: Path, study: Study, on_trouble: Callable[[str], None] | None = None) -> None:
         self.path = folder / DATABASE
         self._owner = uuid.uuid4().hex
+        self._on_trouble = on_trouble
         folder.mkdir(parents=True, exist_ok=True)
+        if self.path.is_file():
+            if self.path.stat().st_size == 0 and (folder / STUDY_FILE).is_file():
+                raise CorruptDatabaseError(self.path, "the file is empty")
+            check_sound(self.path)
         self._db = connect(self.path)
-        with reading(self.path), self._transaction():
-            found = self._db.execute("select name from sqlite_master where name = 'meta'").fetchone()
-            if found is None:
-                self._fill(study)
-            else:
-                self._check(study)
+        try:
+            with telling(self.path), self._transaction():
+                tables = {name for (name,) in self._db.execute("select name from sqlite_master")}
+                if not tables:
+                    self._fill(study)
+                else:
+                    self._check(study, tables)
+        except BaseException:
+            self._db.close()
+            raise
 
     def close(self) -> None:
         """Give back what this process has claimed."""
         try:
-            with self._transaction():
+            with telling(self.path), self._transaction():
                 self._db.execute(
                     "update trials set status = 'pending', owner = null, attempts = attempts - 1 "
                     "where status = 'running' and owner = ?",
@@ -102,7 +110,8 @@ class Store:
 
     def claim(self, count: int) -> list[Task]:
         """Claim up to ``count`` rows that nobody runs, the first ones first."""
-        with self._transaction():
+
+        def claimed() -> list[tuple[int, int, int]]:
             self._hear()
             rows = self._db.execute(
                 "select row, cell, seed from trials where status = 'pending' order by row limit ?", (count,)
@@ -111,62 +120,90 @@ class Store:
                 "update trials set status = 'running', owner = ?, attempts = attempts + 1 where row = ?",
                 [(self._owner, row) for row, _, _ in rows],
             )
-        return [Task(row, cell, seed, ()) for row, cell, seed in rows]
+            return rows
 
-    def finish(self, outcome: Outcome) -> None:
-        """Write what came of a trial, in one transaction; only the first word on a row counts."""
-        ok = not outcome.reason
-        with self._transaction():
-            (attempts,) = self._db.execute(
-                "select attempts from trials where row = ?", (outcome.row,)
+        return [Task(row, cell, seed, ()) for row, cell, seed in self._written(claimed, "a claim")]
+
+    def finish(self, outcome: Outcome) -> bool:
+        """Write what came of a trial, in one transaction; only the first word on a row counts.
+
+        Returns
+        -------
+        Whether the trial is to be tried once more.
+        """
+
+        def finished() -> bool:
+            attempts, cell, seed = self._db.execute(
+                "select attempts, cell, seed from trials where row = ?", (outcome.row,)
             ).fetchone()
+            ok = not outcome.reason
             again = not ok and outcome.retry and attempts < MAX_ATTEMPTS
-            status = "done" if ok else "pending" if again else "failed"
+            metrics = json.dumps(dict(outcome.metrics), sort_keys=True) if ok else None
+            timings = json.dumps(dict(outcome.timings), sort_keys=True) if ok else None
             self._db.execute(
-                "update trials set status = ?, reason = ?, metrics = ?, timings = ?, seconds = ?, "
+                "update trials set status = ?, reason = ?, metrics = ?, timings = ?, seconds = ?, crc = ?, "
                 "owner = null where row = ? and status = 'running' and owner = ?",
                 (
-                    status,
+                    "done" if ok else "pending" if again else "failed",
                     outcome.reason,
-                    json.dumps(dict(outcome.metrics), sort_keys=True) if ok else None,
-                    json.dumps(dict(outcome.timings), sort_keys=True) if ok else None,
+                    metrics,
+                    timings,
                     outcome.seconds if ok else None,
+                    checksum(outcome.row, cell, seed, metrics, timings) if ok else None,
                     outcome.row,
                     self._owner,
                 ),
             )
             self._hear()
+            return again
 
-    def release(self, rows: list[int]) -> None:
-        """Put rows back that were claimed and not begun."""
-        with self._transaction():
-            self._db.executemany(
-                "update trials set status = 'pending', owner = null, attempts = attempts - 1 "
-                "where row = ? and status = 'running' and owner = ?",
-                [(row, self._owner) for row in rows],
-            )
+        return self._written(finished, f"row {outcome.row}")
 
     def hear(self) -> None:
         """Say that this process lives, and free the claims of those that do not."""
-        with self._transaction():
-            self._hear()
+        self._written(self._hear, "a sign of life")
 
     def counts(self) -> Counts:
         """How many trials stand where."""
-        by_status = dict(self._db.execute("select status, count(*) from trials group by status").fetchall())
+        with telling(self.path):
+            found = self._db.execute("select status, count(*) from trials group by status").fetchall()
+        by_status = dict(found)
         return Counts(sum(by_status.values()), by_status.get("done", 0), by_status.get("failed", 0))
 
+    def others(self) -> int:
+        """How many other processes are at work on the study."""
+        with telling(self.path):
+            return others(self._db, self._owner)
+
     # --- inside -------------------------------------------------------------------------------------
+
+    def _written(self, write: Callable[[], T], what: str) -> T:
+        """Do ``write`` in one transaction; where the disk is full, once more after a moment."""
+        with telling(self.path):
+            try:
+                with self._transaction():
+                    return write()
+            except sqlite3.OperationalError as error:
+                if not is_full(error):
+                    raise
+                if self._on_trouble is not None:
+                    self._on_trouble(f"{what} cannot be written ({error}); trying once more")
+            with suppress(sqlite3.OperationalError):  # what moves into the database leaves room in the log
+                self._db.execute("pragma wal_checkpoint(restart)")
+            time.sleep(FULL_PAUSE_S)
+            with self._transaction():
+                return write()
 
     @contextmanager
     def _transaction(self) -> Iterator[None]:
         self._db.execute("begin immediate")
         try:
             yield
+            self._db.execute("commit")
         except BaseException:
-            self._db.execute("rollback")
+            if self._db.in_transaction:  # SQLite itself rolls back on some errors
+                self._db.execute("rollback")
             raise
-        self._db.execute("commit")
 
     def _fill(self, study: Study) -> None:
         for statement in SCHEMA.split(";"):
@@ -177,101 +214,21 @@ class Store:
         essence = json.dumps(study.essence(), sort_keys=True)
         self._db.execute("insert into meta values ('digest', ?), ('essence', ?)", (study.digest, essence))
 
-    def _check(self, study: Study) -> None:
+    def _check(self, study: Study, tables: set[str]) -> None:
+        if not {"meta", "owners", "trials"} <= tables:
+            raise InputError(
+                f"{self.path}: expected a study's database, found one with other tables; "
+                "give the study another folder"
+            )
+        columns = {name for _, name, *_ in self._db.execute("pragma table_info(trials)")}
         found = dict(self._db.execute("select key, value from meta").fetchall())
-        if found.get("digest") == study.digest:
+        if found.get("digest") == study.digest and "crc" in columns:
             return
-        changed = differences(json.loads(found.get("essence", "{}")), json.loads(json.dumps(study.essence())))
-        told = "; ".join(changed[:3]) + (f" and {len(changed) - 3} more" if len(changed) > 3 else "")
         raise InputError(
             f"{self.path.parent}: expected the study that it was made for, found another definition "
-            f"({told or 'of another version'}); give it another name or folder"
+            f"({changes_told(json.loads(found.get('essence', '{}')), study)}); "
+            "give it another name or folder"
         )
 
     def _hear(self) -> None:
-        now, host = time.time(), socket.gethostname()
-        self._db.execute(
-            "insert into owners values (?, ?, ?, ?) "
-            "on conflict (owner) do update set heard_s = excluded.heard_s",
-            (self._owner, host, os.getpid(), now),
-        )
-        for owner, where, pid, heard_s in self._db.execute("select * from owners").fetchall():
-            gone = now - heard_s > STALE_S or (where == host and not _alive(pid))
-            if owner != self._owner and gone:
-                # Killed with its process says nothing against a trial: it does not count as a try.
-                self._db.execute(
-                    "update trials set status = 'pending', owner = null, attempts = max(attempts - 1, 0) "
-                    "where status = 'running' and owner = ?",
-                    (owner,),
-                )
-                self._db.execute("delete from owners where owner = ?", (owner,))
-
-
-def connect(path: Path) -> sqlite3.Connection:
-    """Open a database for writing."""
-    try:
-        database = sqlite3.connect(path, timeout=BUSY_S, isolation_level=None)
-        with reading(path):
-            database.execute("pragma journal_mode = wal")
-            database.execute("pragma synchronous = normal")
-    except sqlite3.OperationalError as error:
-        raise InputError(f"{path}: expected a database that can be written, found: {error}") from None
-    return database
-
-
-@contextmanager
-def reading(path: Path) -> Iterator[None]:
-    """Say in one line that a database is broken."""
-    try:
-        yield
-    except sqlite3.OperationalError:
-        raise
-    except sqlite3.DatabaseError as error:
-        raise InputError(f"{path}: corrupt database ({error})") from None
-
-
-def read_rows(path: Path) -> tuple[list[dict[str, Any]], str]:
-    """All rows that can be read, and what stood in the way of more (empty where nothing did).
-
-    Raises
-    ------
-    InputError
-        Where there is no such file.
-    """
-    if not path.is_file():
-        raise InputError(f"{path}: expected a study's database, found none")
-    database = sqlite3.connect(f"file:{path}?mode=ro", uri=True, timeout=BUSY_S)
-    database.row_factory = sqlite3.Row
-    rows: list[dict[str, Any]] = []
-    try:
-        for found in database.execute("select * from trials order by row"):
-            row = dict(found)
-            for key in ("metrics", "timings"):
-                row[key] = json.loads(row[key]) if row[key] else {}
-            rows.append(row)
-    except (sqlite3.DatabaseError, ValueError) as error:
-        return rows, str(error)
-    finally:
-        database.close()
-    return rows, ""
-
-
-def flat(metrics: Mapping[str, Any]) -> dict[str, float]:
-    """A trial's numbers by one level of names; yes and no are 1 and 0, what is no number is left out."""
-    out: dict[str, float] = {}
-    for key, value in metrics.items():
-        if isinstance(value, Mapping):
-            out |= {f"{key}_{inner}": number for inner, number in flat(value).items()}
-        elif isinstance(value, bool | int | float):
-            out[key] = float(value)
-    return out
-
-
-def _alive(pid: int) -> bool:
-    try:
-        os.kill(pid, 0)
-    except ProcessLookupError:
-        return False
-    except PermissionError:
-        return True
-    return True
+        hear(self._db, self._owner)

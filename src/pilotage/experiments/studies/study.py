@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -19,6 +19,7 @@ from pilotage.experiments.mission import mission_of, read_mission, shipped_missi
 from pilotage.experiments.resolve import resolved_values
 from pilotage.experiments.studies.cells import Cell, make_cells
 from pilotage.experiments.studies.definition import StudyDefinition
+from pilotage.experiments.studies.files import anchored, digests
 from pilotage.experiments.studies.groups import cell_groups
 from pilotage.experiments.values import parse_yaml, read_text
 
@@ -27,6 +28,7 @@ STUDY_FILE, MISSION_FILE = "study.yaml", "mission.yaml"
 PRESENTATION = (
     "question",
     "description",
+    "metrics",
     "primary",
     "lower_is_better",
     "baseline",
@@ -36,6 +38,7 @@ PRESENTATION = (
     "reference",
 )
 """What a definition says about its page only: it may change without touching a row."""
+MAX_ROWS = 10_000_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,7 +50,7 @@ class Study:
     base
         The mission's values before any cell's overrides.
     files
-        Digests of the files that the mission names, such as its map.
+        By path, digests of the files that mission and cells name, such as a map.
     """
 
     definition: StudyDefinition
@@ -98,6 +101,11 @@ def shipped_studies() -> list[str]:
     )
 
 
+def is_study_folder(name_or_path: str) -> bool:
+    """Whether that is the folder of a study that was begun."""
+    return (Path(name_or_path) / STUDY_FILE).is_file()
+
+
 def load_study(name_or_path: str, changes: Mapping[str, Any] | None = None) -> Study:
     """Read a study by its shipped name, its file or its folder, and make it ready.
 
@@ -112,8 +120,11 @@ def load_study(name_or_path: str, changes: Mapping[str, Any] | None = None) -> S
         One line: what was expected, what was found, the nearest right name.
     """
     path = Path(name_or_path)
-    if path.is_dir() and (path / STUDY_FILE).is_file():
+    if is_study_folder(name_or_path):
         path = path / STUDY_FILE
+        name_or_path = str(path)
+    elif path.is_dir() and name_or_path not in shipped_studies():
+        raise InputError(f"'{name_or_path}': expected a study's folder, found no {STUDY_FILE} in it")
     folder = Path()
     if path.suffix in {".yaml", ".yml"} or "/" in name_or_path:
         if not path.is_file():
@@ -123,8 +134,11 @@ def load_study(name_or_path: str, changes: Mapping[str, Any] | None = None) -> S
         values = parse_yaml((SHIPPED / f"{name_or_path}.yaml").read_text(encoding="utf-8"), name_or_path)
     else:
         raise unknown_name("study", name_or_path, shipped_studies())
-    definition = validate(StudyDefinition, {**values, **(changes or {})}, "")
-    return make_study(definition, folder)
+    try:
+        definition = validate(StudyDefinition, {**values, **(changes or {})}, "")
+        return make_study(definition, folder)
+    except InputError as error:
+        raise InputError(f"study '{name_or_path}': {error}") from None
 
 
 def make_study(definition: StudyDefinition, folder: Path = Path()) -> Study:
@@ -143,29 +157,42 @@ def make_study(definition: StudyDefinition, folder: Path = Path()) -> Study:
     named = definition.mission
     if named not in shipped_missions() and not Path(named).is_absolute() and (folder / named).is_file():
         named = str(folder / named)
-    base = _anchored(read_mission(named))
+    places = (folder, Path())
+    base = anchored(read_mission(named), places)
+    definition = _at_their_places(definition, places)
 
     def resolve(overrides: Sequence[str]) -> Mapping[str, Any]:
         mission = mission_of(base, overrides)
         check_oracles(kind_of(mission), mission)
         return resolved_values(mission)
 
-    cells = tuple(
-        replace(cell, overrides=tuple(_anchored_override(text) for text in cell.overrides))
-        for cell in make_cells(definition, resolve)
-    )
+    cells = make_cells(definition, resolve)
+    if len(cells) * definition.trials > MAX_ROWS:
+        raise InputError(f"expected at most {MAX_ROWS} rows, found {len(cells)} cells of {definition.trials}")
     for cell in cells:
         try:
             resolve(cell.overrides)
         except InputError as error:
             raise InputError(f"cell '{cell.name}': {error}") from None
+    names = [cell.name for cell in cells]
+    if definition.baseline is not None and definition.baseline not in names:
+        raise unknown_name("baseline", definition.baseline, names)
     cell_groups(definition, cells)
-    return Study(definition, base, cells, _digests(base))
+    named_in_cells = [json.loads(text.partition("=")[2]) for cell in cells for text in cell.overrides]
+    return Study(definition, base, cells, digests([base, named_in_cells]))
+
+
+def _at_their_places(definition: StudyDefinition, places: Sequence[Path]) -> StudyDefinition:
+    """The definition with the files that it sets as absolute paths, so that its folder runs anywhere."""
+    values = definition.model_dump(mode="json")
+    varied = {key: anchored(values[key], places) for key in ("set", "configurations", "factors")}
+    return validate(StudyDefinition, {**values, **varied}, "")
 
 
 def study_yaml(study: Study) -> str:
     """The definition in full; with ``mission.yaml`` beside it, it runs again from its folder alone."""
-    values = study.definition.model_dump(mode="json", exclude_none=True)
+    # None is a value among the overrides: a module that is left out.
+    values = study.definition.model_dump(mode="json")
     text = yaml.safe_dump({**values, "mission": MISSION_FILE}, sort_keys=False, allow_unicode=True)
     return f"# mission: {study.definition.mission}; digest: {study.digest}\n{text}"
 
@@ -173,6 +200,13 @@ def study_yaml(study: Study) -> str:
 def mission_yaml(study: Study) -> str:
     """The mission before any cell's overrides."""
     return yaml.safe_dump(dict(study.base), sort_keys=False, allow_unicode=True)
+
+
+def changes_told(old: Mapping[str, Any], study: Study) -> str:
+    """What changed from an essence to a study's, ``key: old -> new``; the first three and how many more."""
+    changed = differences(old, json.loads(json.dumps(study.essence())))
+    more = f" and {len(changed) - 3} more" if len(changed) > 3 else ""
+    return "; ".join(changed[:3]) + more or "of another version"
 
 
 def differences(old: Mapping[str, Any], new: Mapping[str, Any]) -> list[str]:
@@ -205,35 +239,3 @@ def _flat(values: Any, prefix: str = "") -> dict[str, Any]:
 def _short(value: Any) -> str:
     text = str(value)
     return text if len(text) <= 60 else text[:57] + "..."
-
-
-def _is_file(value: Any) -> bool:
-    if not isinstance(value, str) or len(value) > 4096 or not ("/" in value or Path(value).suffix):
-        return False
-    try:
-        return Path(value).is_file()
-    except OSError:
-        return False
-
-
-def _anchored(values: Any) -> Any:
-    """The same values with the files that they name as absolute paths: workers may live elsewhere."""
-    if isinstance(values, dict):
-        return {key: _anchored(value) for key, value in values.items()}
-    if isinstance(values, list):
-        return [_anchored(value) for value in values]
-    return str(Path(values).resolve()) if _is_file(values) else values
-
-
-def _anchored_override(override: str) -> str:
-    key, _, text = override.partition("=")
-    value = json.loads(text)
-    return f"{key}={json.dumps(_anchored(value))}" if isinstance(value, str) else override
-
-
-def _digests(base: Mapping[str, Any]) -> dict[str, str]:
-    return {
-        key: hashlib.sha256(Path(value).read_bytes()).hexdigest()[:16]
-        for key, value in _flat(base).items()
-        if _is_file(value)
-    }

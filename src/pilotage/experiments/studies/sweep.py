@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Sequence
+import math
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,7 @@ import yaml
 
 from pilotage.core.config import validate
 from pilotage.core.errors import InputError
+from pilotage.experiments.mission import read_parameters
 from pilotage.experiments.studies.definition import StudyDefinition
 from pilotage.experiments.studies.study import Study, make_study
 from pilotage.experiments.values import parse_override
@@ -44,7 +46,9 @@ def sweep_study(
     digest = hashlib.sha256(json.dumps(values, sort_keys=True, default=str).encode()).hexdigest()[:6]
     stem = Path(mission).stem
     values["study"] = (
-        name or f"sweep-{''.join(c if c.isalnum() or c in '-_.' else '-' for c in stem)}-{digest}"
+        name
+        if name is not None
+        else f"sweep-{''.join(c if c.isalnum() or c in '-_.' else '-' for c in stem)}-{digest}"
     )
     return make_study(validate(StudyDefinition, values, ""))
 
@@ -59,9 +63,23 @@ def settings_of(overrides: Sequence[str]) -> dict[str, Any]:
     """
     settings: dict[str, Any] = {}
     for override in overrides:
-        parts, value = parse_override(override)
-        settings[".".join(parts)] = value
+        if override.startswith("@"):
+            settings |= _dotted(read_parameters(override[1:]))
+        else:
+            parts, value = parse_override(override)
+            settings[".".join(parts)] = value
     return settings
+
+
+def _dotted(values: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
+    """Nested keys as dotted ones; a component's name first, for it drops the parameters of another."""
+    found: dict[str, Any] = {}
+    for key, value in sorted(values.items(), key=lambda item: item[0] != "name"):
+        if isinstance(value, Mapping) and value:
+            found |= _dotted(value, f"{prefix}{key}.")
+        else:
+            found[f"{prefix}{key}"] = value
+    return found
 
 
 def parse_vary(text: str) -> dict[str, Any]:
@@ -81,6 +99,8 @@ def parse_vary(text: str) -> dict[str, Any]:
         start, stop, step = (float(part) for part in parts)
         if step == 0.0:
             raise InputError(f"--vary '{text}': expected a step that is not zero")
+        if not all(math.isfinite(number) for number in (start, stop, step)):
+            raise InputError(f"--vary '{text}': expected finite numbers")
         if (stop - start) * step < 0.0:
             raise InputError(f"--vary '{text}': an empty range: the step leads away from {stop:g}")
         return {"key": key, "range": {"start": start, "stop": stop, "step": step}}

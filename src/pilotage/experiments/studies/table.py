@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from pilotage.core.errors import InputError
 from pilotage.core.types import FloatArray, IntArray
 from pilotage.evaluation.judge import SUCCESS, Judgement, judge
+from pilotage.experiments.studies.database import DATABASE
+from pilotage.experiments.studies.export import save_what_is_left
 from pilotage.experiments.studies.groups import CellGroup, baselines, cell_groups
-from pilotage.experiments.studies.store import DATABASE, flat, read_rows
+from pilotage.experiments.studies.rows import flat, read_rows
 from pilotage.experiments.studies.study import Study, load_study
 
 IDENTITY = frozenset({"seed"})
@@ -100,12 +101,7 @@ def read_study(folder: Path) -> StudyTable:
     study = load_study(str(folder))
     rows, trouble = read_rows(folder / DATABASE)
     if trouble:
-        saved = folder / "trials-salvaged.csv"
-        write_csv(rows, study, saved)
-        raise InputError(
-            f"{folder / DATABASE}: corrupt database ({trouble}); "
-            f"{len(rows)} rows could be read and are in {saved}"
-        )
+        raise save_what_is_left(folder, study, trouble)
     done = [row for row in rows if row["status"] == "done"]
     numbers = [flat(row["metrics"]) | flat(row["timings"]) for row in done]
     names = sorted({name for row in numbers for name in row})
@@ -170,50 +166,4 @@ def study_object(table: StudyTable) -> dict[str, Any]:
         "missing": table.waiting,
         "cells": cells,
         "study_dir": str(table.folder),
-    }
-
-
-def export(folder: Path) -> list[Path]:
-    """Write ``trials.csv`` and ``trials.parquet`` beside the database; return their paths."""
-    import pyarrow as pa
-    import pyarrow.parquet as pq
-
-    study = load_study(str(folder))
-    rows, _ = read_rows(folder / DATABASE)
-    csv_path, parquet_path = folder / "trials.csv", folder / "trials.parquet"
-    write_csv(rows, study, csv_path)
-    records = [_record(row, study) for row in rows]
-    names = list(dict.fromkeys(name for record in records for name in record))
-    columns = {name: [record.get(name) for record in records] for name in names}
-    mixed = {
-        name: [None if v is None else str(v) for v in values]
-        for name, values in columns.items()
-        if len({type(v) for v in values if v is not None}) > 1
-        and not all(isinstance(v, int | float) for v in values if v is not None)
-    }
-    pq.write_table(pa.table({**columns, **mixed}), parquet_path)
-    return [csv_path, parquet_path]
-
-
-def write_csv(rows: Sequence[Mapping[str, Any]], study: Study, path: Path) -> None:
-    """Write rows as CSV, one column a metric."""
-    import csv
-
-    records = [_record(row, study) for row in rows]
-    names = list(dict.fromkeys(name for record in records for name in record))
-    with path.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.DictWriter(file, names)
-        writer.writeheader()
-        writer.writerows(records)
-
-
-def _record(row: Mapping[str, Any], study: Study) -> dict[str, Any]:
-    known = 0 <= row["cell"] < len(study.cells)
-    cell = study.cells[row["cell"]] if known else None
-    return {
-        **{key: row[key] for key in ("row", "cell", "trial", "seed", "status", "reason", "seconds")},
-        "setting": "" if cell is None else cell.name,
-        **({} if cell is None else {f"factor.{name}": value for name, value in cell.values.items()}),
-        **flat(row["metrics"]),
-        **flat(row["timings"]),
     }

@@ -28,6 +28,7 @@ TIMINGS = frozenset(
 )
 """Metrics of the clock on the wall: never the same twice, kept apart from those that are."""
 
+REASON_LENGTH = 500
 PLACES = frozenset({"run_dir"})
 
 
@@ -50,7 +51,7 @@ class Outcome:
     reason
         Why there are no metrics; empty where there are.
     retry
-        Whether the reason lies with the machine, so that another try may do better.
+        Whether another try may do better: anything but a mission that cannot be built.
     seconds
         Wall time of the trial itself.
     """
@@ -84,10 +85,8 @@ class TrialRunner:
             return measured(task.row, self.mission(task.overrides, task.seed))
         except InputError as error:
             return Outcome(task.row, {}, {}, str(error))
-        except (OSError, MemoryError) as error:
+        except Exception as error:  # what goes wrong in one trial is that trial's, not the study's
             return Outcome(task.row, {}, {}, _said(error), retry=True)
-        except Exception as error:  # a bug in one trial is that trial's, not the study's
-            return Outcome(task.row, {}, {}, _said(error))
 
     def mission(self, overrides: Sequence[str], seed: int) -> Mission:
         """The mission of a cell with a seed; validated once a cell."""
@@ -112,5 +111,5 @@ def _said(error: BaseException) -> str:
     """The error in one line."""
     if isinstance(error, OSError) and error.errno == errno.ENOSPC:
         return f"disk full: {error.filename or error.strerror}"
-    words = " ".join(str(error).split())
+    words = " ".join(str(error).split())[:REASON_LENGTH]
     return f"{type(error).__name__}: {words}" if words else type(error).__name__

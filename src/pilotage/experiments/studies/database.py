@@ -1,0 +1,157 @@
+"""A study's SQLite file: its tables, how it is opened, and what its errors mean to a person."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import sqlite3
+import time
+import zlib
+from collections.abc import Iterator
+from contextlib import closing, contextmanager
+from pathlib import Path
+
+from pilotage.core.errors import InputError, PilotageError
+
+DATABASE = "trials.sqlite"
+BUSY_S = 60.0
+"""How long one process waits for another's transaction; each takes milliseconds."""
+RETRY_S = 0.05
+LEAST_FREE = 16 * 1024
+"""A disk with fewer bytes free is full: SQLite cannot even open its log there."""
+
+SCHEMA = """
+create table meta (key text primary key, value text not null);
+create table owners (
+    owner text primary key, host text not null, pid integer not null, heard_s real not null
+);
+create table trials (
+    row integer primary key,
+    cell integer not null,
+    trial integer not null,
+    seed integer not null,
+    status text not null default 'pending',
+    attempts integer not null default 0,
+    owner text,
+    reason text not null default '',
+    metrics text,
+    timings text,
+    seconds real,
+    crc integer
+);
+create index trials_status on trials (status, row);
+"""
+
+_FULL = {sqlite3.SQLITE_FULL, sqlite3.SQLITE_IOERR, sqlite3.SQLITE_NOMEM}
+_SHUT = {sqlite3.SQLITE_READONLY, sqlite3.SQLITE_CANTOPEN, sqlite3.SQLITE_PERM, sqlite3.SQLITE_AUTH}
+_BUSY = {sqlite3.SQLITE_BUSY, sqlite3.SQLITE_LOCKED}
+
+
+class StudyStoppedError(PilotageError):
+    """The study cannot go on now; what is finished is kept, and the message says how to go on."""
+
+
+class CorruptDatabaseError(InputError):
+    """The database is broken; what can be read of it is to be saved.
+
+    Attributes
+    ----------
+    trouble
+        What SQLite, or a row's checksum, says.
+    """
+
+    def __init__(self, path: Path, trouble: str, remedy: str = "") -> None:
+        super().__init__(f"{path}: corrupt database ({trouble}){remedy}")
+        self.trouble = trouble
+
+
+def connect(path: Path) -> sqlite3.Connection:
+    """Open a database for writing, in the mode that lets others read meanwhile.
+
+    Raises
+    ------
+    InputError
+        Where it cannot be written, or is broken.
+    StudyStoppedError
+        Where the disk is full.
+    """
+    with telling(path):
+        database = sqlite3.connect(path, timeout=BUSY_S, isolation_level=None)
+        try:
+            _set_mode(database)
+        except BaseException:
+            database.close()
+            raise
+    return database
+
+
+def check_sound(path: Path) -> None:
+    """Refuse a database that is broken somewhere, before anything is written to it.
+
+    Raises
+    ------
+    CorruptDatabaseError
+        With what SQLite finds.
+    """
+    with telling(path), closing(sqlite3.connect(path, timeout=BUSY_S)) as database:
+        (found,) = database.execute("pragma quick_check(1)").fetchone()
+    if found != "ok":
+        raise CorruptDatabaseError(path, " ".join(str(found).split()))
+
+
+@contextmanager
+def telling(path: Path) -> Iterator[None]:
+    """Turn a database's errors into what they mean: broken, not ours to write, or no room."""
+    try:
+        yield
+    except sqlite3.DatabaseError as error:
+        raise told(path, error) from None
+    except (json.JSONDecodeError, UnicodeDecodeError) as error:
+        raise CorruptDatabaseError(path, str(error)) from None
+
+
+def told(path: Path, error: sqlite3.DatabaseError) -> PilotageError:
+    """What an error means: CorruptDatabaseError, InputError or StudyStoppedError."""
+    code = getattr(error, "sqlite_errorcode", sqlite3.SQLITE_CORRUPT) & 0xFF
+    if is_full(error) or (code in _SHUT and _no_room(path.parent)):
+        return StudyStoppedError(
+            f"{path}: cannot be written ({error}); its rows are whole: make room and go on with --resume"
+        )
+    if code in _BUSY:
+        return StudyStoppedError(f"{path}: held by another program ({error}); go on with --resume")
+    if code in _SHUT:
+        return InputError(f"{path}: expected a database that can be written, found: {error}")
+    return CorruptDatabaseError(path, str(error))
+
+
+def is_full(error: sqlite3.DatabaseError) -> bool:
+    """Whether there is no room for what was to be written."""
+    return getattr(error, "sqlite_errorcode", sqlite3.SQLITE_CORRUPT) & 0xFF in _FULL
+
+
+def checksum(row: int, cell: int, seed: int, metrics: str | None, timings: str | None) -> int:
+    """CRC-32 over what a finished row says: SQLite itself does not notice a changed digit."""
+    return zlib.crc32(f"{row}|{cell}|{seed}|{metrics}|{timings}".encode())
+
+
+def _set_mode(database: sqlite3.Connection) -> None:
+    """Switch to the write-ahead log; two that do so at once must not trip over each other."""
+    until = time.monotonic() + BUSY_S
+    while True:
+        try:
+            database.execute("pragma journal_mode = wal")
+            database.execute("pragma synchronous = normal")
+            return
+        except sqlite3.OperationalError as error:
+            busy = getattr(error, "sqlite_errorcode", 0) & 0xFF in _BUSY
+            if not busy or time.monotonic() > until:
+                raise
+        time.sleep(RETRY_S)
+
+
+def _no_room(folder: Path) -> bool:
+    try:
+        return os.access(folder, os.W_OK) and shutil.disk_usage(folder).free < LEAST_FREE
+    except OSError:
+        return False
