@@ -221,7 +221,7 @@ def test_ranges_hold_both_ends() -> None:
 
 def test_the_page_shows_cells_and_examples(undisturbed: Path) -> None:
     page = write_study_report(undisturbed).read_text(encoding="utf-8")
-    assert "Over turning radius m" in page
+    assert "Over turning radius" in page
     assert "The worst trial" in page
     assert "pilotage run --from" in page
     assert (undisturbed / "trials").is_dir()
