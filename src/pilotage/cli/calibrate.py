@@ -13,15 +13,17 @@ from pilotage.cli.options import Json, Overrides, Seed
 from pilotage.cli.output import print_columns, print_json, stdout_for_json
 from pilotage.core.errors import InputError, unknown_name
 
-KINDS = ("odometry", "range", "heading")
+KINDS = ("odometry", "range", "heading", "commands")
 
 
 def calibrate(
-    what: Annotated[str, typer.Argument(metavar="odometry|range|heading", help="What to calibrate.")],
+    what: Annotated[
+        str, typer.Argument(metavar="odometry|range|heading|commands", help="What to calibrate.")
+    ],
     logs: Annotated[
         list[Path] | None,
         typer.Argument(
-            metavar="[LOG...]", help="Recordings; without any the calibration runs are simulated."
+            metavar="[LOG...]", help="Recordings; without any, runs are simulated (odometry, range)."
         ),
     ] = None,
     seed: Seed = None,
@@ -38,12 +40,27 @@ def calibrate(
     axis: Annotated[
         str, typer.Option(metavar="x|y|z", help="heading: the axis that the robot turns about.")
     ] = "z",
+    form: Annotated[
+        str | None, typer.Option("--format", metavar="mrclam", help="commands: format of the recordings.")
+    ] = None,
+    robots: Annotated[
+        list[int] | None,
+        typer.Option("--robot", metavar="N", help="commands: from this robot; repeatable; default all."),
+    ] = None,
+    leave_one_out: Annotated[
+        bool,
+        typer.Option("--leave-one-out", help="commands: also write a set without each recording in turn."),
+    ] = False,
     report: Annotated[bool, typer.Option(help="Write report.html into the calibration's folder.")] = True,
     json: Json = False,
 ) -> int:
-    """Estimate noise and systematic errors of a sensor, each with a 95 % interval."""
+    """Estimate noise and systematic errors of a sensor or a drive, each with a 95 % interval."""
     if what not in KINDS:
         raise unknown_name("calibration", what, KINDS)
+    if what == "commands":
+        _check_commands(logs, form, overrides is not None or seed is not None)
+    elif form is not None or robots or leave_one_out:
+        raise InputError("calibrate: --format, --robot and --leave-one-out are for 'calibrate commands'")
     if logs and (overrides or seed is not None):
         raise InputError(
             "calibrate: --set and --seed are for simulated runs; leave them out where logs are given"
@@ -60,8 +77,12 @@ def calibrate(
             )
         elif what == "range":
             result = lab.range_from(places, out, overrides=overrides or (), seed=seed or 0)
-        else:
+        elif what == "heading":
             result = lab.heading_from(places, out, axis=axis)
+        else:
+            from pilotage.experiments.calibrate_commands import commands_from
+
+            result = commands_from(places, out, robots=robots or (), leave_one_out=leave_one_out)
         answer: dict[str, Any] = dict(result.answer)
         if report:
             from pilotage.report import write_report
@@ -72,6 +93,17 @@ def calibrate(
     else:
         _print(answer)
     return 0
+
+
+def _check_commands(logs: list[Path] | None, form: str | None, simulated: bool) -> None:
+    if not logs:
+        raise InputError("calibrate commands: expected folders of recordings with truth, found none")
+    if form is None:
+        raise InputError("calibrate commands: expected --format mrclam, found none")
+    if form != "mrclam":
+        raise unknown_name("--format", form, ("mrclam",))
+    if simulated:
+        raise InputError("calibrate commands: --set and --seed are for simulated runs; leave them out")
 
 
 def _print(answer: Mapping[str, Any]) -> None:

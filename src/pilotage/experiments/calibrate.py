@@ -29,6 +29,7 @@ from pilotage.logs.steady_csv import read_steady_csv
 from pilotage.sensors.wheel_odometry import WheelOdometryConfig
 
 CALIBRATION_FILE, DATA_FILE, PARAMETER_FILE = "calibration.json", "data.npz", "parameters.yaml"
+SETS_FILE = "sets.yaml"
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,7 +61,7 @@ def odometry_from(
     if given is not None:
         answer["given"] = _held(found, given)
     data = {f"{i}/{key}": value for i, log in enumerate(found.logs) for key, value in _arrays(log).items()}
-    return _write(out, answer, data, {PARAMETER_FILE: parameter_yaml(found, sensor)})
+    return write_calibration(out, answer, data, {PARAMETER_FILE: parameter_yaml(found, sensor)})
 
 
 def range_from(
@@ -84,7 +85,7 @@ def range_from(
         answer[f"{r.sensor}_{quantity}_mean_{r.unit}"] = result.mean.as_dict()
     answer["sensors"] = [result.as_dict() for result in found]
     data = {str(i): result.readings.values for i, result in enumerate(found)}
-    return _write(out, answer, data, {})
+    return write_calibration(out, answer, data, {})
 
 
 def heading_from(places: Sequence[Path], out: Path, *, axis: str = "z") -> CalibrationResult:
@@ -104,7 +105,7 @@ def heading_from(places: Sequence[Path], out: Path, *, axis: str = "z") -> Calib
         data |= {f"{i}/{log.sensor}/t_s": log.t_s, f"{i}/{log.sensor}/values": log.values}
     for i, drive in enumerate(found.drives):
         data |= {f"drive-{i}/t_s": drive.log.t_s, f"drive-{i}/drift_rad": drive.drift_rad}
-    return _write(out, answer, data, {})
+    return write_calibration(out, answer, data, {})
 
 
 def _odometry_logs(place: Path) -> list[OdometrySteps]:
@@ -148,7 +149,7 @@ def _arrays(log: LogErrors) -> dict[str, FloatArray]:
     }
 
 
-def _write(
+def write_calibration(
     out: Path, answer: dict[str, object], data: Mapping[str, FloatArray], texts: Mapping[str, str]
 ) -> CalibrationResult:
     """Write ``calibrate-<what>-<hash>``; the same data and answer have the same name."""
@@ -162,6 +163,8 @@ def _write(
     named: dict[str, Any] = {**answer, "calibration_dir": str(folder)}
     if PARAMETER_FILE in texts:
         named["parameter_file"] = str(folder / PARAMETER_FILE)
+    if SETS_FILE in texts:
+        named["sets_file"] = str(folder / SETS_FILE)
     np.savez_compressed(folder / DATA_FILE, allow_pickle=False, **dict(data))
     # Last: a folder with this file is whole.
     (folder / CALIBRATION_FILE).write_text(json.dumps(clean(named), indent=2) + "\n", encoding="utf-8")

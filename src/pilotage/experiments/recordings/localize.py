@@ -96,6 +96,7 @@ def localize_log(
         "robot": robot,
         "localizer": localizer,
         "learned_from": learned_from,
+        "overrides": list(overrides),
         "duration_s": float(drive.t_s[-1]),
         "steps": steps,
         "wall_time_s": loop_s,

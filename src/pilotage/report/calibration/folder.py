@@ -14,6 +14,7 @@ import numpy as np
 from pilotage.core.errors import InputError
 from pilotage.core.types import FloatArray
 
+KINDS = ("odometry", "range", "heading", "commands")
 CALIBRATION_FILE, DATA_FILE, PARAMETER_FILE = "calibration.json", "data.npz", "parameters.yaml"
 
 
@@ -28,7 +29,7 @@ class CalibrationData:
 
     @property
     def kind(self) -> str:
-        """``odometry``, ``range`` or ``heading``."""
+        """One of ``KINDS``."""
         return str(self.answer.get("calibration", ""))
 
 
@@ -46,7 +47,7 @@ def read_calibration(folder: Path) -> CalibrationData:
             arrays = {name: np.asarray(file[name], dtype=np.float64) for name in file.files}
     except (OSError, ValueError, zipfile.BadZipFile) as error:
         raise InputError(f"{folder}: expected a calibration folder, found: {error}") from None
-    if not isinstance(answer, dict) or answer.get("calibration") not in {"odometry", "range", "heading"}:
+    if not isinstance(answer, dict) or answer.get("calibration") not in KINDS:
         raise InputError(f"{folder / CALIBRATION_FILE}: expected a calibration, found something else")
     parameters = folder / PARAMETER_FILE
     text = parameters.read_text(encoding="utf-8") if parameters.is_file() else ""

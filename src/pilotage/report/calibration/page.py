@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from pilotage.report.calibration.drive_figures import drive_figures
 from pilotage.report.calibration.folder import CalibrationData, read_calibration
 from pilotage.report.calibration.heading_figures import heading_figures
 from pilotage.report.calibration.odometry_figures import odometry_figures
@@ -16,15 +17,22 @@ from pilotage.report.markup import contents, document, escape, figure_section, l
 from pilotage.report.style import drawing_style
 
 REPORT_FILE = "report.html"
-_FIGURES = {"odometry": odometry_figures, "range": range_figures, "heading": heading_figures}
+_FIGURES = {
+    "odometry": odometry_figures,
+    "range": range_figures,
+    "heading": heading_figures,
+    "commands": drive_figures,
+}
 _TITLES = {
     "odometry": "Odometry calibration",
     "range": "Calibration of the range sensors",
     "heading": "Calibration of gyroscope and magnetometer",
+    "commands": "Calibration of drive commands and camera",
 }
 _UNITS = (
     ("_rad_sqrt_s", "rad/√s"),
     ("_m2_per_m", "m²/m"),
+    ("_per_rad_s", "s/rad"),
     ("_m2_per_rad", "m²/rad"),
     ("_rad2_per_rad", "rad²/rad"),
     ("_rad2_per_m", "rad²/m"),
@@ -40,6 +48,7 @@ _UNITS = (
     ("_rad2", "rad²"),
     ("_rad", "rad"),
     ("_m", "m"),
+    ("_s", "s"),
 )
 _MEANINGS = {
     "distance_var_per_step_m2": "Variance of the distance error of one step of the logs.",
@@ -60,6 +69,13 @@ _MEANINGS = {
     "gyro_bias_rad_s": "What the gyroscope reads at rest about the turning axis.",
     "gyro_angle_random_walk_rad_sqrt_s": "White noise: how the integrated angle's error grows.",
     "gyro_angle_var_rad2_per_s": "The same as a variance per second.",
+    "delay_s": "How late a command acts.",
+    "speed_gain": "True over commanded speed on a straight.",
+    "speed_loss_per_rad_s": "What that gain loses with each rad/s of commanded turn, up to 0.45 rad/s.",
+    "turn_gain": "True over commanded turn rate.",
+    "bend_rad_per_m": "Turn that comes with every metre.",
+    "range_scale": "Reading over true range, straight ahead.",
+    "depth_power": "The reading falls with cos(bearing) to this power: 0 a range, 1 the depth of a camera.",
     "gyro_bias_instability_rad_s": "How far the bias wanders; an upper bound in short logs.",
 }
 
@@ -87,7 +103,7 @@ def calibration_page(data: CalibrationData) -> str:
     entries += [("offset", "The shape of the offset")] if sections[1] else []
     entries += [(figure.slug, figure.title) for figure in figures]
     if data.parameters:
-        sections.append(_parameters(data.parameters))
+        sections.append(_parameters(data))
         entries.append(("parameters", "Parameter file"))
     title = _TITLES[data.kind]
     source = "simulated calibration runs" if data.answer.get("simulated") else "recorded logs"
@@ -183,11 +199,16 @@ def _offset(data: CalibrationData) -> str:
     )
 
 
-def _parameters(text: str) -> str:
+def _parameters(data: CalibrationData) -> str:
+    use = (
+        "Lay it over another recording: <code>pilotage localize LOG --format mrclam --robot N"
+        if data.kind == "commands"
+        else "Lay it over any mission: <code>pilotage run MISSION"
+    )
     return (
         '<section id="parameters"><h2><a href="#parameters">Parameter file</a></h2>'
-        f"<p>Lay it over any mission: <code>pilotage run MISSION --set @parameters.yaml</code>.</p>"
-        f"<pre>{escape(text)}</pre></section>"
+        f"<p>{use} --set @parameters.yaml</code>.</p>"
+        f"<pre>{escape(data.parameters)}</pre></section>"
     )
 
 
@@ -198,6 +219,10 @@ def _headline(answer: Mapping[str, Any]) -> str:
         used = sum(bool(log["used"]) for log in logs)
         shape = (answer.get("offset") or {}).get("shape", "none")
         return f"{len(logs)} logs, {used} of them used; offset: {shape}."
+    if kind == "commands":
+        return (
+            f"{len(answer['logs'])} recordings, {answer['windows']} windows, {answer['readings']} readings."
+        )
     if kind == "range":
         return f"{len(answer['sensors'])} quantities of sensors that look at the same thing all the time."
     return f"{len(answer['gyroscope'])} gyroscope axes, {len(answer['magnetometer'])} magnetometers turned."
