@@ -63,6 +63,8 @@ class Events:
     robots_seen: float = 0.05
     blind_s: tuple[tuple[float, float], ...] = ()
     standing_s: tuple[tuple[float, float], ...] = ()
+    odometry_gaps_s: tuple[tuple[float, float], ...] = ()
+    """The robot drives on, its commands were not logged."""
     truth_gaps_s: tuple[tuple[float, float], ...] = ()
     pushes: tuple[tuple[float, float, float], ...] = ()
     """Time, distance in metres (in a random direction), turn in radians."""
@@ -140,8 +142,9 @@ def drive(seed: int, robot: Robot, events: Events, places: FloatArray) -> _World
             off = _wrap(math.atan2(to_goal[1], to_goal[0]) - pose[2])
             w = float(np.clip(0.8 * off, -0.45, 0.45))
             command = (0.086 if abs(off) < 0.3 else 0.067, w if abs(off) > 0.05 else 0.0)
-        world.odometry.append((t, round(command[0], 3), round(command[1], 3)))
-        late.append(world.odometry[-1][1:])
+        if not _in(events.odometry_gaps_s, t):
+            world.odometry.append((t, round(command[0], 3), round(command[1], 3)))
+        late.append(command)
         v_c, w_c = late.pop(0)
         v = (robot.speed_gain - robot.speed_loss * min(abs(w_c), 0.45)) * v_c * (1.0 + errors[0])
         w = robot.turn_gain * w_c * (1.0 + errors[1]) + robot.bend_rad_per_m * v
