@@ -116,7 +116,7 @@ def calibrate_at_rest(log: HeadingLog, axis: int) -> GyroscopeCalibration:
         Where the log is shorter than a few seconds.
     """
     if log.t_s.shape[0] < 200 or log.t_s[-1] - log.t_s[0] < 5.0:
-        raise InputError(f"{log.name}: expected at least 200 readings over 5 s at rest, found fewer")
+        raise InputError(f"{log.place}: expected at least 200 readings over 5 s at rest, found fewer")
     rate = log.values[:, axis]
     batches = np.array([batch.mean() for batch in np.array_split(rate, BATCHES)])
     return GyroscopeCalibration(

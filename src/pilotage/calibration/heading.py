@@ -9,6 +9,7 @@ from pilotage.calibration.gyro_reference import GyroReferenceCalibration, calibr
 from pilotage.calibration.gyroscope import GyroscopeCalibration, calibrate_at_rest, is_moving, turns_of
 from pilotage.calibration.intervals import Estimate
 from pilotage.calibration.magnetometer import (
+    BLOCKS,
     MagnetometerCalibration,
     calibrate_turned,
     noise_at_rest,
@@ -85,6 +86,9 @@ def calibrate_heading(
         raise InputError("calibrate heading: expected at least one log, found none")
     gyro = [log for log in logs if log.sensor is HeadingSensor.GYROSCOPE]
     compass = [log for log in logs if log.sensor is HeadingSensor.MAGNETOMETER]
+    for log in compass:
+        if log.t_s.shape[0] < BLOCKS:
+            raise InputError(f"{log.place}: expected {BLOCKS} or more readings, found {log.t_s.shape[0]}")
     moving = {id(log): is_moving(log) for log in gyro}
     at_rest = [calibrate_at_rest(log, i) for log in gyro if not moving[id(log)] for i in range(3)]
     yaw = AXES.index(axis)

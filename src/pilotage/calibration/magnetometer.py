@@ -89,7 +89,7 @@ def calibrate_turned(log: HeadingLog) -> MagnetometerCalibration:
     counts = np.bincount(sector, minlength=SECTORS)
     if np.count_nonzero(counts) < LEAST_SPAN * SECTORS:
         raise InputError(
-            f"{log.name}: expected the magnetometer to be turned all around, "
+            f"{log.place}: expected the magnetometer to be turned all around, "
             f"found readings in {np.count_nonzero(counts)} of {SECTORS} directions"
         )
     # Every direction counts the same, however long the sensor rested in it.

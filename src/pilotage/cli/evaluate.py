@@ -34,14 +34,19 @@ def evaluate(
         formats = [guess_format(path) for path in (estimate, reference)]
         if formats[0] is not formats[1]:
             raise InputError(
-                "evaluate: expected both files in one format, "
-                f"found by their columns {formats[0]} and {formats[1]}"
+                "evaluate: expected both files in one format, found by their columns "
+                f"{estimate} as {formats[0]} and {reference} as {formats[1]}"
             )
         form = formats[0]
     judged = TrajectoryFormat(form)
-    errors = trajectory_errors(
-        read_trajectory(estimate, judged), read_trajectory(reference, judged), align=align, scale=scale
-    )
+    found, true = read_trajectory(estimate, judged), read_trajectory(reference, judged)
+    if found.t_s is None and len(found) != len(true):
+        short, full = (estimate, reference) if len(found) < len(true) else (reference, estimate)
+        raise InputError(
+            f"{short}: without times expected as many poses as in {full} ({max(len(found), len(true))}), "
+            f"found {min(len(found), len(true))}; is the file cut short?"
+        )
+    errors = trajectory_errors(found, true, align=align, scale=scale)
     answer = {**errors.summary(), "format": form, "align": align, "scale_corrected": scale}
     if json:
         print_json(answer)

@@ -22,6 +22,8 @@ SERIES = ("t", "v", "om", "x_true", "y_true", "th_true")
 NUMBERS = ("d", "r_var", "b_var", "v_var", "om_var")
 KNOWN = "true_valid"
 MIN_ROWS = 10
+LARGEST, LARGEST_TIME = 1e6, 1e12
+"""Metres, radians and seconds beyond which a file is damaged."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,6 +61,8 @@ def read_aer1513(path: Path) -> Aer1513Log:
         )
     t_s = _finite(path, "t", _array(path, content, "t").reshape(-1))
     rows = t_s.shape[0]
+    if _array(path, content, "t").ndim > 2:
+        raise InputError(f"{path}: t: expected a column, found shape {_array(path, content, 't').shape}")
     if rows < MIN_ROWS:
         raise InputError(f"{path}: t: expected {MIN_ROWS} or more rows, found {rows}")
     backward = np.flatnonzero(np.diff(t_s) <= 0.0)
@@ -108,10 +112,10 @@ def _shaped(path: Path, content: dict[str, object], name: str, shape: tuple[int,
 
 
 def _finite(path: Path, name: str, values: FloatArray, where: object = None) -> FloatArray:
-    wrong = ~np.isfinite(values)
+    wrong = ~np.isfinite(values) | (np.abs(values) > (LARGEST_TIME if name == "t" else LARGEST))
     if where is not None:
         wrong &= np.asarray(where)
     bad = np.flatnonzero(wrong.any(axis=tuple(range(1, wrong.ndim))))
     if bad.size:
-        raise InputError(f"{path}: {name} row {int(bad[0]) + 1}: expected a finite number")
+        raise InputError(f"{path}: {name} row {int(bad[0]) + 1}: expected a finite number within {LARGEST:g}")
     return values

@@ -24,6 +24,9 @@ from pilotage.core.errors import InputError
 from pilotage.core.types import FloatArray
 from pilotage.logs.text import read_lines
 
+LARGEST = 1e12
+"""Beyond any metre, radian or second of a log."""
+
 
 @dataclass(frozen=True, slots=True)
 class CarmenLog:
@@ -76,6 +79,7 @@ def read_carmen(path: Path) -> CarmenLog:
     """
     scans: list[_Scan] = []
     odometry: list[list[float]] = []
+    number = 0
     for number, line in enumerate(read_lines(path), start=1):
         words = line.split()
         if not words:
@@ -92,7 +96,9 @@ def read_carmen(path: Path) -> CarmenLog:
             _expect(words, 10, where)
             odometry.append([*_floats(words[1:4], where), *_floats(words[7:8], where)])
     if not scans:
-        raise InputError(f"{path}: expected FLASER or ROBOTLASER1 lines, found none")
+        raise InputError(
+            f"{path} line {number + 1}: expected FLASER or ROBOTLASER1 lines, found the end of the file"
+        )
     beams = len(scans[0].ranges_m)
     t_s = np.array([scan.t_s for scan in scans])
     poses = np.array(odometry).reshape(-1, 4)
@@ -155,4 +161,6 @@ def _floats(words: list[str], where: str) -> list[float]:
         raise InputError(f"{where}: expected numbers, {error}") from None
     if not all(math.isfinite(value) for value in values):
         raise InputError(f"{where}: expected finite numbers, found NaN or infinity")
+    if max(map(abs, values), default=0.0) > LARGEST:
+        raise InputError(f"{where}: expected numbers within {LARGEST:g}, found {max(values, key=abs):g}")
     return values

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from pilotage.core.errors import InputError
 from pilotage.core.types import FloatArray
-from pilotage.logs.text import check_times, read_table
+from pilotage.logs.text import check_size, check_times, read_table
 
 DRIVE_SUFFIX = ".mat"
 COLUMNS = ("t", "x", "y", "z")
@@ -40,12 +40,15 @@ class HeadingLog:
         (N,) increasing, in general not evenly spaced.
     values
         (N, 3): rad/s about the axes (gyroscope) or gauss along them (magnetometer).
+    place
+        The file, for complaints.
     """
 
     name: str
     sensor: HeadingSensor
     t_s: FloatArray
     values: FloatArray
+    place: str
 
 
 def read_heading_log(path: Path) -> HeadingLog:
@@ -63,10 +66,11 @@ def read_heading_log(path: Path) -> HeadingLog:
     table = read_table(path, COLUMNS, separator=",", header=True)
     t_s = table.values[:, 0].copy()
     check_times(table, t_s)
+    check_size(table, COLUMNS)
     values = table.values[:, 1:].copy()
     if sensor is HeadingSensor.GYROSCOPE:
         values *= math.pi / 180.0
-    return HeadingLog(path.resolve().parent.name, sensor, t_s, values)
+    return HeadingLog(path.resolve().parent.name, sensor, t_s, values, str(path))
 
 
 def sensor_of(path: Path) -> HeadingSensor | None:

@@ -18,9 +18,10 @@ import numpy as np
 
 from pilotage.core.errors import InputError
 from pilotage.core.types import FloatArray, IntArray
-from pilotage.logs.text import Table, check_times, read_table
+from pilotage.logs.text import Table, check_size, check_times, read_table
 from pilotage.maps.landmarks import Landmarks
 
+LANDMARKS = "Landmark_Groundtruth.dat"
 ROBOTS = range(1, 6)
 """Subjects that move; the others are landmarks."""
 TRUTH_GAP_S = 0.5
@@ -83,12 +84,14 @@ def read_mrclam(folder: Path, robot: int) -> MrclamLog:
         raise InputError(f"{folder}: expected a robot from {ROBOTS[0]} to {ROBOTS[-1]}, found {robot}")
     if not folder.is_dir():
         raise InputError(f"{folder}: expected the folder of a MRCLAM data set, found none there")
-    odometry = _timed(folder / f"Robot{robot}_Odometry.dat", ("t_s", "v_m_s", "w_rad_s"), repeats=True)
+    odometry = _timed(
+        folder / f"Robot{robot}_Odometry.dat", ("t_s", "v_m_s", "w_rad_s"), repeats=True, least=2
+    )
     # One camera picture shows several barcodes at the same time.
     seen = _timed(
         folder / f"Robot{robot}_Measurement.dat", ("t_s", "barcode", "range_m", "bearing_rad"), repeats=True
     )
-    truth = _timed(folder / f"Robot{robot}_Groundtruth.dat", ("t_s", "x_m", "y_m", "theta_rad"))
+    truth = _timed(folder / f"Robot{robot}_Groundtruth.dat", ("t_s", "x_m", "y_m", "theta_rad"), least=2)
     t_s = truth.values[:, 0].copy()
     wide = np.flatnonzero(np.diff(t_s) > TRUTH_GAP_S)
     negative = np.flatnonzero(seen.values[:, 2] < 0.0)
@@ -96,7 +99,8 @@ def read_mrclam(folder: Path, robot: int) -> MrclamLog:
         raise InputError(
             f"{seen.place(int(negative[0]))}: range_m: expected a range >= 0, found a negative one"
         )
-    subjects, misread = _subjects(seen, read_barcodes(folder / "Barcodes.dat"))
+    barcodes, landmarks = read_barcodes(folder / "Barcodes.dat"), read_landmarks(folder / LANDMARKS)
+    subjects, misread = _subjects(seen, barcodes, {*ROBOTS, *landmarks.ids.tolist()})
     known = subjects >= 0
     return MrclamLog(
         robot,
@@ -110,7 +114,7 @@ def read_mrclam(folder: Path, robot: int) -> MrclamLog:
         t_s,
         truth.values[:, 1:].copy(),
         np.column_stack([t_s[wide], t_s[wide + 1]]),
-        read_landmarks(folder / "Landmark_Groundtruth.dat"),
+        landmarks,
         misread,
     )
 
@@ -129,7 +133,9 @@ def read_barcodes(path: Path) -> dict[int, int]:
 
 def read_landmarks(path: Path) -> Landmarks:
     """Read the landmarks' places, by subject."""
-    table = read_table(path, ("subject", "x_m", "y_m", "x_std_m", "y_std_m"))
+    columns = ("subject", "x_m", "y_m", "x_std_m", "y_std_m")
+    table = read_table(path, columns)
+    check_size(table, columns)
     ids = [_whole(table, row, 0, "subject") for row in range(table.values.shape[0])]
     for row, subject in enumerate(ids):
         if subject in ids[:row]:
@@ -137,26 +143,32 @@ def read_landmarks(path: Path) -> Landmarks:
     return Landmarks(np.array(ids, dtype=np.int64), table.values[:, 1:3])
 
 
-def _timed(path: Path, columns: tuple[str, ...], *, repeats: bool = False) -> Table:
+def _timed(path: Path, columns: tuple[str, ...], *, repeats: bool = False, least: int = 1) -> Table:
     table = read_table(path, columns)
+    if table.values.shape[0] < least:
+        raise InputError(f"{table.place(-1)}: expected {least} or more rows, found the end of the file")
     check_times(table, table.values[:, 0], repeats=repeats)
+    check_size(table, columns)
     return table
 
 
-def _subjects(seen: Table, barcodes: dict[int, int]) -> tuple[IntArray, tuple[str, ...]]:
-    """Subjects (M,) of the readings, -1 where the barcode is unknown, and where those stand."""
+def _subjects(seen: Table, barcodes: dict[int, int], placed: set[int]) -> tuple[IntArray, tuple[str, ...]]:
+    """Subjects (M,) of the readings, -1 where nobody known wears the barcode, and where those stand."""
     subjects = np.full(seen.values.shape[0], -1, dtype=np.int64)
     unknown: list[str] = []
     for row in range(subjects.shape[0]):
         barcode = _whole(seen, row, 1, "barcode")
-        subjects[row] = barcodes.get(barcode, -1)
-        if subjects[row] >= 0:
+        subject = barcodes.get(barcode, -1)
+        if subject in placed:
+            subjects[row] = subject
             continue
         unknown.append(seen.place(row))
         if barcode not in BARCODES or len(unknown) > MISREAD_SHARE * subjects.shape[0]:
+            what = f"a subject of {LANDMARKS}" if barcode in barcodes else "a barcode of Barcodes.dat"
+            found = f"{subject} (barcode {barcode})" if barcode in barcodes else str(barcode)
             raise InputError(
-                f"{seen.place(row)}: expected a barcode of Barcodes.dat, found {barcode}"
-                + (f" ({len(unknown)} unknown ones so far)" if len(unknown) > 1 else "")
+                f"{seen.place(row)}: expected {what}, found {found}"
+                + (f"; {len(unknown)} unknown ones so far" if len(unknown) > 1 else "")
             )
     return subjects, tuple(unknown)
 

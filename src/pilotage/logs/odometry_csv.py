@@ -13,7 +13,7 @@ from pilotage.core.angles import wrap_array_to_pi
 from pilotage.core.errors import InputError
 from pilotage.core.types import FloatArray
 from pilotage.logs.odometry_steps import OdometryForm, OdometrySteps, carried_over
-from pilotage.logs.text import check_gaps, check_times, read_table
+from pilotage.logs.text import check_gaps, check_size, check_times, read_table
 
 COLUMNS = (
     "t_s",
@@ -47,6 +47,7 @@ def read_odometry_csv(path: Path) -> OdometrySteps:
             f"found {t_s.shape[0]}"
         )
     check_times(table, t_s)
+    check_size(table, COLUMNS)
     check_gaps(table, t_s)
     odometry, truth = table.values[:, 1:4], table.values[:, 4:7]
     if _errors_add_up(odometry, truth):

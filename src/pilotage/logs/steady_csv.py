@@ -7,9 +7,10 @@ from pathlib import Path
 
 from pilotage.core.errors import InputError
 from pilotage.core.types import FloatArray
-from pilotage.logs.text import check_times, read_lines, read_table
+from pilotage.logs.text import check_size, check_times, read_lines, read_table
 
 UNITS = ("m", "rad")
+LEAST_ROWS = 10
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,16 +30,24 @@ def read_steady_csv(path: Path) -> list[Column]:
     InputError
         File and line of what is wrong.
     """
-    lines = read_lines(path)
-    names = [name.strip() for name in lines[0].split(",")] if lines else []
+    lines = [line.partition("#")[0].strip() for line in read_lines(path)]
+    number, header = next(((n, text) for n, text in enumerate(lines, start=1) if text), (1, ""))
+    names = [name.strip().strip('"') for name in header.split(",")] if header else []
     wanted = [name for name in names if name.rpartition("_")[2] in UNITS and name.rpartition("_")[0]]
     if not wanted:
         found = ", ".join(names) or "nothing"
-        raise InputError(f"{path} line 1: expected columns such as range_m or bearing_rad, found {found}")
+        raise InputError(
+            f"{path} line {number}: expected columns such as range_m or bearing_rad, found {found}"
+        )
     timed = ["t_s"] if "t_s" in names else []
     table = read_table(path, [*timed, *wanted], separator=",", header=True)
     if timed:
         check_times(table, table.values[:, 0])
+    check_size(table, [*timed, *wanted], first=len(timed))
+    if table.values.shape[0] < LEAST_ROWS:
+        raise InputError(
+            f"{table.place(-1)}: expected {LEAST_ROWS} or more readings, found {table.values.shape[0]}"
+        )
     return [
         Column(name.rpartition("_")[0], name.rpartition("_")[2], table.values[:, len(timed) + i].copy())
         for i, name in enumerate(wanted)

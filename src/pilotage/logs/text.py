@@ -17,6 +17,8 @@ from pilotage.core.errors import InputError
 from pilotage.core.types import FloatArray, IntArray
 
 _GZIP_MAGIC = b"\x1f\x8b"
+SAME_FORM = 3
+"""So many lines in one form tell how the next one should look."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,7 +45,12 @@ class Table:
 
 
 def read_lines(path: Path) -> list[str]:
-    """Read a text file, gzipped or not, into its lines.
+    """Read a text file, gzipped or not, into its lines; fails as ``read_text`` does."""
+    return read_text(path).splitlines()
+
+
+def read_text(path: Path) -> str:
+    """Read a text file, gzipped or not.
 
     Raises
     ------
@@ -54,7 +61,7 @@ def read_lines(path: Path) -> list[str]:
         data = path.read_bytes()
         if data[:2] == _GZIP_MAGIC:
             data = gzip.decompress(data)
-        return data.decode("utf-8-sig").splitlines()
+        text = data.decode("utf-8-sig")
     except (EOFError, zlib.error, gzip.BadGzipFile):
         raise InputError(f"{path} line {_whole_lines(path) + 1}: the compressed file is cut short") from None
     except UnicodeDecodeError as error:
@@ -62,6 +69,10 @@ def read_lines(path: Path) -> list[str]:
         raise InputError(f"{path} line {line}: expected text, found bytes that are not UTF-8") from None
     except OSError as error:
         raise InputError(f"{path}: expected a readable file, found: {error.strerror or error}") from None
+    if "\0" in text:
+        line = text[: text.index("\0")].count("\n") + 1
+        raise InputError(f"{path} line {line}: expected text, found zero bytes")
+    return text
 
 
 def _whole_lines(path: Path) -> int:
@@ -97,10 +108,11 @@ def read_table(
     width = len(columns)
     rows: list[list[float]] = []
     places: list[int] = []
-    lines = read_lines(path)
+    whole = read_text(path)
+    lines = whole.splitlines()
     for number, line in enumerate(lines, start=1):
-        text = line.strip()
-        if not text or text.startswith("#"):
+        text = line.partition("#")[0].strip()
+        if not text:
             continue
         words = text.split(separator)
         if header and picked is None:
@@ -117,11 +129,23 @@ def read_table(
         places.append(number)
     if not rows:
         raise InputError(f"{path} line {len(lines) + 1}: expected rows of numbers, found the end of the file")
+    if not whole.endswith(("\n", "\r")):
+        _refuse_cut_number(path, [lines[number - 1] for number in places], places[-1])
     return Table(path, np.array(rows), np.array(places, dtype=np.int64))
 
 
+def _refuse_cut_number(path: Path, lines: Sequence[str], number: int) -> None:
+    """A file that ends within a line, with fewer digits than all lines before have there, was cut."""
+    *before, last = [len(line.partition("#")[0].rstrip().rpartition(".")[2]) for line in lines]
+    if len(before) >= SAME_FORM and len(set(before)) == 1 and last < before[0]:
+        raise InputError(
+            f"{path} line {number}: expected as many digits as in the lines before, and the line's end; "
+            "the file seems to be cut short"
+        )
+
+
 def _pick(path: Path, number: int, names: Sequence[str], columns: Sequence[str]) -> list[int]:
-    found = [name.strip() for name in names]
+    found = [name.strip().strip('"') for name in names]
     missing = [name for name in columns if name not in found]
     if missing:
         raise InputError(
@@ -137,7 +161,8 @@ def _last(number: int, total: int, short: bool) -> str:
 
 def _numbers(path: Path, number: int, words: Sequence[str], columns: Sequence[str]) -> list[float]:
     try:
-        values = [float(word) for word in words]
+        # Python reads 1_000 as a number; a log that holds such a word is damaged.
+        values = [float(word.replace("_", "?")) for word in words]
     except ValueError:
         bad = next(i for i, word in enumerate(words) if not _is_number(word))
         raise InputError(
@@ -151,7 +176,7 @@ def _numbers(path: Path, number: int, words: Sequence[str], columns: Sequence[st
 
 def _is_number(word: str) -> bool:
     try:
-        float(word)
+        float(word.replace("_", "?"))
     except ValueError:
         return False
     return True
@@ -172,6 +197,23 @@ def check_times(table: Table, t_s: FloatArray, *, repeats: bool = False) -> None
         what = "the same time again" if steps[row - 1] == 0.0 else "a time before it"
         raise InputError(
             f"{table.place(row)}: expected a time after {t_s[row - 1]:.6f} s, found {what} ({t_s[row]:.6f} s)"
+        )
+
+
+def check_size(table: Table, columns: Sequence[str], first: int = 1, most: float = 1e6) -> None:
+    """Refuse metres, radians and their rates beyond ``most``, in the columns from ``first`` on.
+
+    Raises
+    ------
+    InputError
+        File and line of the first such number: no robot was there, the file is damaged.
+    """
+    rows, places = np.nonzero(np.abs(table.values[:, first:]) > most)
+    if rows.size:
+        row, column = int(rows[0]), first + int(places[0])
+        raise InputError(
+            f"{table.place(row)}: {columns[column]}: expected a number within {most:g}, "
+            f"found {table.values[row, column]:g}"
         )
 
 

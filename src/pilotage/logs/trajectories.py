@@ -15,10 +15,12 @@ from scipy.spatial.transform import Rotation
 
 from pilotage.core.errors import InputError
 from pilotage.core.types import FloatArray
-from pilotage.logs.text import check_times, read_lines, read_table
+from pilotage.logs.text import check_size, check_times, read_lines, read_table
 
 TUM_COLUMNS = ("t", "x", "y", "z", "qx", "qy", "qz", "qw")
 KITTI_COLUMNS = tuple(f"{'rt'[c == 3]}{r + 1}{c + 1 if c < 3 else ''}" for r in range(3) for c in range(4))
+LARGEST_M = 1e9
+"""Farther than any coordinates on earth."""
 ROTATION_TOLERANCE = 1e-2
 """A pose matrix whose rotation is farther from orthonormal than this is refused."""
 
@@ -28,6 +30,9 @@ class TrajectoryFormat(StrEnum):
 
     TUM = "tum"
     KITTI = "kitti"
+
+
+FORM_OF = {len(TUM_COLUMNS): TrajectoryFormat.TUM, len(KITTI_COLUMNS): TrajectoryFormat.KITTI}
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,11 +58,21 @@ class Trajectory3:
 
 
 def guess_format(path: Path) -> TrajectoryFormat:
-    """Tell the format by the first line's columns: 12 are KITTI's, else the TUM reader judges them."""
-    for line in read_lines(path):
-        if line.strip() and not line.lstrip().startswith("#"):
-            return TrajectoryFormat.KITTI if len(line.split()) == len(KITTI_COLUMNS) else TrajectoryFormat.TUM
-    return TrajectoryFormat.TUM
+    """Tell the format by the columns of the first line that has any.
+
+    Raises
+    ------
+    InputError
+        File and line where they are of neither.
+    """
+    lines = read_lines(path)
+    for number, line in enumerate(lines, start=1):
+        columns = len(line.partition("#")[0].split())
+        if columns in FORM_OF:
+            return FORM_OF[columns]
+        if columns:
+            raise InputError(f"{path} line {number}: expected 8 columns (TUM) or 12 (KITTI), found {columns}")
+    raise InputError(f"{path} line {len(lines) + 1}: expected poses, found the end of the file")
 
 
 def read_trajectory(path: Path, form: TrajectoryFormat) -> Trajectory3:
@@ -74,6 +89,7 @@ def read_tum(path: Path) -> Trajectory3:
         File and line of what is missing, not finite, or out of the order of time.
     """
     table = read_table(path, TUM_COLUMNS)
+    check_size(table, TUM_COLUMNS, most=LARGEST_M)
     t_s = table.values[:, 0].copy()
     check_times(table, t_s)
     norms = np.linalg.norm(table.values[:, 4:], axis=1)
@@ -93,6 +109,7 @@ def read_kitti(path: Path) -> Trajectory3:
         File and line of what is missing, not finite, or no rotation.
     """
     table = read_table(path, KITTI_COLUMNS)
+    check_size(table, KITTI_COLUMNS, first=0, most=LARGEST_M)
     poses = table.values.reshape(-1, 3, 4)
     rotations = np.ascontiguousarray(poses[:, :, :3])
     off = np.abs(rotations @ rotations.transpose(0, 2, 1) - np.eye(3)).max(axis=(1, 2))

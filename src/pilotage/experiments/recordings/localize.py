@@ -115,7 +115,7 @@ def with_overrides(localizer: str, parameters: dict[str, Any], overrides: Sequen
     values: dict[str, Any] = {"stack": {"localizer": {"name": localizer, **parameters}}}
     for override in overrides:
         if override.startswith("@"):
-            values = merge(values, read_parameters(override[1:]))
+            values = merge(values, _only_the_localizer(override[1:], read_parameters(override[1:])))
         elif override.startswith("stack.localizer.") and not override.startswith("stack.localizer.name"):
             apply_override(values, override)
         else:
@@ -129,6 +129,19 @@ def with_overrides(localizer: str, parameters: dict[str, Any], overrides: Sequen
             f"--set: the parameters are of another localizer than '{localizer}'; use --localizer"
         )
     return chosen
+
+
+def _only_the_localizer(file: str, values: dict[str, Any]) -> dict[str, Any]:
+    """Refuse parameters that a recording has no use for, and what is no mapping."""
+    at: Any = values
+    for key in ("stack", "localizer"):
+        found = [str(name) for name in at] if isinstance(at, dict) else type(at).__name__
+        if not isinstance(at, dict) or list(at) != [key]:
+            raise InputError(f"{file}: expected parameters of stack.localizer and no others, found {found}")
+        at = at[key]
+    if not isinstance(at, dict):
+        raise InputError(f"{file}: stack.localizer: expected a mapping of keys, found {at!r}")
+    return values
 
 
 def knowledge_of(drive: RecordedDrive) -> Knowledge:
