@@ -6,6 +6,7 @@ Every complaint names the file and the line, so that the user can look at the pl
 from __future__ import annotations
 
 import gzip
+import re
 import zlib
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -136,7 +137,8 @@ def read_table(
 
 def _refuse_cut_number(path: Path, lines: Sequence[str], number: int) -> None:
     """A file that ends within a line, with fewer digits than all lines before have there, was cut."""
-    *before, last = [len(line.partition("#")[0].rstrip().rpartition(".")[2]) for line in lines]
+    words = [re.split(r"[\s,]+", line.partition("#")[0].strip())[-1] for line in lines]
+    *before, last = [len(word.partition(".")[2]) for word in words]
     if len(before) >= SAME_FORM and len(set(before)) == 1 and last < before[0]:
         raise InputError(
             f"{path} line {number}: expected as many digits as in the lines before, and the line's end; "
