@@ -60,7 +60,8 @@ def laser_drive(seed: int = 0, rows: int = 3000, events: LaserEvents = QUIET) ->
     unseen = (r < 0.3) | (r > 5.0) | (rng.random((rows, CYLINDERS)) < 0.3)
     if events.range_error_std_m > 0.0:
         r += slow(rng, rows, events.range_error_std_m)
-    for row in np.flatnonzero(rng.random(rows) < events.wrong_cylinders * CYLINDERS):
+    wrong = rng.random(rows) if events.wrong_cylinders > 0.0 else np.ones(rows)
+    for row in np.flatnonzero(wrong < events.wrong_cylinders * CYLINDERS):
         one, other = rng.choice(CYLINDERS, 2, replace=False)
         r[row, one], b[row, one] = r[row, other], b[row, other]
     r[unseen | within(events.blind_s, t)[:, None] | (r <= 0.05)] = 0.0

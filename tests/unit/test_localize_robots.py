@@ -122,10 +122,6 @@ def test_all_of_it_at_once(tmp_path: Path) -> None:
         assert np.nanmedian(one.nees) <= 6.0
 
 
-@pytest.mark.xfail(
-    strict=True,
-    reason="commands that were not logged count as standing still, and nothing is added to the covariance",
-)
 def test_commands_that_were_not_logged_are_motion_that_is_not_known(tmp_path: Path) -> None:
     """Ten seconds of driving without a command in the log, landmarks in view or not."""
     gap = ((150.0, 160.0),)
