@@ -17,11 +17,7 @@ def test_the_shipped_sets_are_learned_again_to_their_digits(tmp_path: Path) -> N
     sets = yaml.safe_load(Path(str(answer["sets_file"])).read_text(encoding="utf-8"))["sets"]
     shipped = resources.files("pilotage.experiments.recordings") / "mrclam.yaml"
     assert sets == yaml.safe_load(shipped.read_text(encoding="utf-8"))["sets"]
-
-
-def test_cameras_differ_more_than_their_intervals(tmp_path: Path) -> None:
-    """What the warning is for: robot 2 reads 1.052 of the range, robot 3 1.025."""
-    answer = commands_from([recording("mrclam/MRCLAM_Dataset6")], tmp_path).answer
+    # The cameras differ by more than their intervals: robot 2 reads 1.052 of the range, robot 3 1.025.
     said = str(answer["warnings"])
     assert "range_scale" in said
     assert "speed_gain" not in said
