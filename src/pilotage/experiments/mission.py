@@ -104,12 +104,12 @@ def read_mission(name_or_path: str) -> dict[str, Any]:
 
 
 def _anchor_map(values: dict[str, Any], folder: Path) -> None:
-    """Let the relative paths of a map's files start from the mission file's folder."""
+    """Let the relative paths of the world's files start from the mission file's folder."""
     world = values.get("world")
     if not isinstance(world, dict):
         return
     ground = world.get("ground")
-    places = [(world, "map")]
+    places = [(world, key) for key in ("map", "sheet", "landmarks")]
     if isinstance(ground, dict):
         places += [(ground, key) for key in ("file", "obstacles", "environment", "landmarks")]
     for holder, key in places:

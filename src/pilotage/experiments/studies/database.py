@@ -7,9 +7,10 @@ import os
 import shutil
 import sqlite3
 import time
+import uuid
 import zlib
-from collections.abc import Iterator
-from contextlib import closing, contextmanager
+from collections.abc import Callable, Iterator
+from contextlib import closing, contextmanager, suppress
 from pathlib import Path
 
 from pilotage.core.errors import InputError, PilotageError
@@ -86,6 +87,36 @@ def connect(path: Path) -> sqlite3.Connection:
     return database
 
 
+def put_in_place(path: Path, fill: Callable[[sqlite3.Connection], None]) -> None:
+    """Make a database beside ``path`` and move it there whole: nobody ever sees half of one.
+
+    Where another process was quicker, its database stays.
+
+    Raises
+    ------
+    InputError
+        Where the folder cannot be written.
+    StudyStoppedError
+        Where the disk is full.
+    """
+    draft = path.with_name(f".{path.name}.{uuid.uuid4().hex}")
+    try:
+        with closing(connect(draft)) as database, telling(path):
+            database.execute("begin")
+            fill(database)
+            database.execute("commit")
+        try:
+            os.link(draft, path)
+        except FileExistsError:
+            return
+        except OSError:  # a file system without links
+            if not path.exists():
+                draft.rename(path)
+    finally:
+        for suffix in ("", "-wal", "-shm"):
+            draft.with_name(draft.name + suffix).unlink(missing_ok=True)
+
+
 def check_sound(path: Path) -> None:
     """Refuse a database that is broken somewhere, before anything is written to it.
 
@@ -94,10 +125,25 @@ def check_sound(path: Path) -> None:
     CorruptDatabaseError
         With what SQLite finds.
     """
-    with telling(path), closing(sqlite3.connect(path, timeout=BUSY_S)) as database:
+    # For reading only: closing another kind of connection would hold off other readers for a moment.
+    with telling(path), closing(_reading_only(path)) as database:
         (found,) = database.execute("pragma quick_check(1)").fetchone()
     if found != "ok":
         raise CorruptDatabaseError(path, " ".join(str(found).split()))
+
+
+def close_gently(database: sqlite3.Connection, path: Path) -> None:
+    """Close without holding off those who read.
+
+    The last connection that may write moves the log into the database and deletes it, which locks all
+    others out meanwhile. So it is moved before, beside any readers, and another connection outlasts this.
+    """
+    with suppress(sqlite3.DatabaseError):
+        database.execute("pragma wal_checkpoint(passive)")
+    with suppress(sqlite3.DatabaseError), closing(_reading_only(path)) as keeper:
+        keeper.execute("select count(*) from meta").fetchone()
+        database.close()
+    database.close()
 
 
 @contextmanager
@@ -133,6 +179,10 @@ def is_full(error: sqlite3.DatabaseError) -> bool:
 def checksum(row: int, cell: int, seed: int, metrics: str | None, timings: str | None) -> int:
     """CRC-32 over what a finished row says: SQLite itself does not notice a changed digit."""
     return zlib.crc32(f"{row}|{cell}|{seed}|{metrics}|{timings}".encode())
+
+
+def _reading_only(path: Path) -> sqlite3.Connection:
+    return sqlite3.connect(f"{path.resolve().as_uri()}?mode=ro", uri=True, timeout=BUSY_S)
 
 
 def _set_mode(database: sqlite3.Connection) -> None:

@@ -8,7 +8,7 @@ from decimal import Decimal
 from typing import Any
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import Field, field_validator, model_validator
 
 from pilotage.core.config import Config
 
@@ -115,6 +115,14 @@ class Factor(Config):
     random_range: RandomRange | None = None
     levels: dict[str, dict[str, Any]] | None = None
     multiply: bool = False
+
+    @field_validator("levels", mode="before")
+    @classmethod
+    def _named(cls, levels: Any) -> Any:
+        for name in levels if isinstance(levels, Mapping) else ():
+            if not isinstance(name, str):
+                raise ValueError(f"expected names in quotes, for YAML reads on, off, 1 as no text, found {name}")
+        return levels
 
     @model_validator(mode="after")
     def _whole(self) -> Factor:

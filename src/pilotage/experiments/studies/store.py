@@ -24,8 +24,10 @@ from pilotage.experiments.studies.database import (
     CorruptDatabaseError,
     check_sound,
     checksum,
+    close_gently,
     connect,
     is_full,
+    put_in_place,
     telling,
 )
 from pilotage.experiments.studies.owners import hear, others
@@ -83,12 +85,14 @@ class Store:
             if self.path.stat().st_size == 0 and (folder / STUDY_FILE).is_file():
                 raise CorruptDatabaseError(self.path, "the file is empty")
             check_sound(self.path)
+        else:
+            put_in_place(self.path, lambda database: _fill(database, study))
         self._db = connect(self.path)
         try:
             with telling(self.path), self._transaction():
                 tables = {name for (name,) in self._db.execute("select name from sqlite_master")}
                 if not tables:
-                    self._fill(study)
+                    _fill(self._db, study)
                 else:
                     self._check(study, tables)
         except BaseException:
@@ -106,7 +110,7 @@ class Store:
                 )
                 self._db.execute("delete from owners where owner = ?", (self._owner,))
         finally:
-            self._db.close()
+            close_gently(self._db, self.path)
 
     def claim(self, count: int) -> list[Task]:
         """Claim up to ``count`` rows that nobody runs, the first ones first."""
@@ -205,15 +209,6 @@ class Store:
                 self._db.execute("rollback")
             raise
 
-    def _fill(self, study: Study) -> None:
-        for statement in SCHEMA.split(";"):
-            if statement.strip():
-                self._db.execute(statement)
-        rows = ((row, *study.place(row), study.seed(row)) for row in range(study.rows))
-        self._db.executemany("insert into trials (row, cell, trial, seed) values (?, ?, ?, ?)", rows)
-        essence = json.dumps(study.essence(), sort_keys=True)
-        self._db.execute("insert into meta values ('digest', ?), ('essence', ?)", (study.digest, essence))
-
     def _check(self, study: Study, tables: set[str]) -> None:
         if not {"meta", "owners", "trials"} <= tables:
             raise InputError(
@@ -232,3 +227,14 @@ class Store:
 
     def _hear(self) -> None:
         hear(self._db, self._owner)
+
+
+def _fill(database: sqlite3.Connection, study: Study) -> None:
+    """Make the tables, with every row waiting."""
+    for statement in SCHEMA.split(";"):
+        if statement.strip():
+            database.execute(statement)
+    rows = ((row, *study.place(row), study.seed(row)) for row in range(study.rows))
+    database.executemany("insert into trials (row, cell, trial, seed) values (?, ?, ?, ?)", rows)
+    essence = json.dumps(study.essence(), sort_keys=True)
+    database.execute("insert into meta values ('digest', ?), ('essence', ?)", (study.digest, essence))
