@@ -147,20 +147,29 @@ def _weight(
     sure: Mapping[str, bool],
     before: Mapping[str, float],
 ) -> tuple[float, ...]:
-    """Sure gains in success, then by aspect the greatest share gained; then all effects together."""
+    """Gains in success and, by aspect, the greatest share gained: the sure ones first, then what may be."""
 
-    def gain(aspect: Aspect) -> float:
-        gains = [
-            _share(change.mean, costs[name], before.get(name, math.nan))
-            for name, change in changes.items()
-            if costs[name].aspect is aspect and sure[name] and name != SUCCESS
-        ]
-        return max(gains, default=0.0)
+    def gains(counted: Mapping[str, bool]) -> tuple[float, ...]:
+        won = changes[SUCCESS].mean if counted.get(SUCCESS, False) else 0.0
+        by_aspect = (
+            max(
+                (
+                    _share(change.mean, costs[name], before.get(name, math.nan))
+                    for name, change in changes.items()
+                    if costs[name].aspect is aspect and counted[name] and name != SUCCESS
+                ),
+                default=0.0,
+            )
+            for aspect in RANKED
+        )
+        return (won, *by_aspect)
 
-    success = changes.get(SUCCESS)
-    won = success.mean if success is not None and sure[SUCCESS] else 0.0
-    total = sum(abs(change.effect) for change in changes.values() if math.isfinite(change.effect))
-    return (won, *(gain(aspect) for aspect in RANKED), total)
+    return (*gains(sure), *gains({name: _may_differ(change) for name, change in changes.items()}))
+
+
+def _may_differ(change: Difference) -> bool:
+    """Whether the interval of the change leaves zero out."""
+    return change.low > 0.0 or change.high < 0.0
 
 
 def _share(change: float, cost: Cost, before: float) -> float:
@@ -175,11 +184,7 @@ def _told(changes: Mapping[str, Difference], sure: Mapping[str, bool]) -> list[s
     certain = [f"{name} {_change(change)}" for name, change in changes.items() if sure[name]]
     if certain:
         return certain
-    return [
-        f"perhaps {name} {_change(change)}"
-        for name, change in changes.items()
-        if change.low > 0.0 or change.high < 0.0
-    ]
+    return [f"perhaps {name} {_change(change)}" for name, change in changes.items() if _may_differ(change)]
 
 
 def _change(change: Difference) -> str:
