@@ -312,7 +312,7 @@ class TestTerrain:
         ("gale-astar-ekf", [], {"sensors", "initial", "estimator", "planner"}),
         ("romi-explore", [], {"sensors", "drive", "localizer", "mapper", "explorer"}),
         ("romi-baseline", [], {"sensors", "drive", "localizer", "mapper", "explorer"}),
-        ("museum-plan", [], {"sensors", "initial", "localizer", "planner"}),
+        ("museum-plan", [], {"sensors", "initial", "localizer", "planner", "driver"}),
     ],
 )
 def test_what_a_mission_offers(mission: str, more: list[str], offered: set[str]) -> None:

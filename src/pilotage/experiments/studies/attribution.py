@@ -48,16 +48,12 @@ def attribution_study(mission: str, overrides: Sequence[str], trials: int) -> St
     costs = kind.costs(loaded)
     if not oracles:
         raise InputError(f"attribute '{mission}': expected a mission with modules that an oracle can replace")
-    told = "; ".join(f"{name}: {text}" for name, text in oracles.items())
     configurations: list[dict[str, Any]] = [{"name": BASELINE, "set": {"run.oracles": []}}]
     configurations += [{"name": f"{ORACLE}{name}", "set": {"run.oracles": [name]}} for name in oracles]
     primary = next(iter(costs))
     values: dict[str, Any] = {
         "study": _name(mission, overrides),
-        "question": (
-            f"What does each module of '{Path(mission).stem}' cost, beside one that knows all? "
-            f"The oracles: {told}."
-        ),
+        "question": f"What does each module of '{Path(mission).stem}' cost, beside one that knows all?",
         "mission": mission,
         "set": settings_of(overrides),
         "configurations": configurations,
@@ -77,18 +73,25 @@ def _name(mission: str, overrides: Sequence[str]) -> str:
     return f"attribute-{stem}-{digest}" if overrides else f"attribute-{stem}"
 
 
+def is_attribution(study: Study) -> bool:
+    """Whether a study holds a mission as it is beside oracles, one at a time."""
+    first, *others = (cell.name for cell in study.cells)
+    return first == BASELINE and bool(others) and all(name.startswith(ORACLE) for name in others)
+
+
 def attribution_of(folder: Path) -> dict[str, Any]:
     """Rank the modules by what their oracles gain.
 
     Returns
     -------
-    ``modules``, most costly first: for each the change of every metric with its interval, and sentences on
-    those that differ surely, or else may differ. Success counts before accuracy (errors, coverage), that
-    before safety and time; among them the share that is gained. Times and ways are compared on the seeds
-    where both runs succeeded.
+    ``modules``, most costly first: for each what its oracle does, the change of every metric with its
+    interval, and sentences on those that differ surely, or else may differ. Success counts before accuracy
+    (errors, coverage), that before safety and time; among them the share that is gained. Times and ways are
+    compared on the seeds where both runs succeeded.
     """
     table = read_study(folder)
     base = mission_of(dict(table.study.base), table.study.cells[FIRST].overrides)
+    texts = kind_of(base).oracles(base)
     costs = {SUCCESS: Cost(Aspect.ACCURACY, less_is_better=False), **kind_of(base).costs(base)}
     values = {name: _comparable(table, name, cost) for name, cost in costs.items() if name in table.values}
     judgement = judge(table.cell, table.trial, values, [FIRST] * len(table.study.cells))
@@ -103,6 +106,7 @@ def attribution_of(folder: Path) -> dict[str, Any]:
         sure = {name: _is_sure(table, values[name], cell.index, change) for name, change in changes.items()}
         entry = {
             "module": cell.name.removeprefix(ORACLE),
+            "oracle": texts.get(cell.name.removeprefix(ORACLE), ""),
             "changes": {name: _plain(change, sure[name]) for name, change in changes.items()},
             "told": _told(changes, sure),
         }
