@@ -28,7 +28,7 @@ def ranking_table(modules: Sequence[Module]) -> str:
     rows = []
     for module in modules:
         text = module["oracle"]
-        small = f"<br><span class='range'>{escape(text)}</span>" if text else ""
+        small = f'<span class="what">{escape(text)}</span>' if text else ""
         cells = "".join(_entry(module["changes"].get(name), scales[name]) for name in metrics)
         rows.append(f'<tr><th scope="row">{escape(module["module"])}{small}</th>{cells}</tr>')
     return (
