@@ -9,7 +9,7 @@ from typing import Any
 from pilotage.report import quantities
 from pilotage.report.markup import escape
 from pilotage.report.metrics_table import metric_of
-from pilotage.report.study.scales import Scale, scale_of
+from pilotage.report.study.scales import Scale, scale_of, told
 
 Module = Mapping[str, Any]
 """One entry of ``experiments.studies.attribution.attribution_of``'s ``modules``."""
@@ -46,8 +46,8 @@ def ranking_answer(modules: Sequence[Module]) -> str:
     for module in modules:
         sure = [(name, change) for name, change in module["changes"].items() if change["sure"]]
         if sure:
-            told = "; ".join(_said(name, change) for name, change in sure[:3])
-            return f"What costs most is '{module['module']}': with an oracle for it {told}."
+            words = "; ".join(_said(name, change) for name, change in sure[:3])
+            return f"What costs most is '{module['module']}': with an oracle for it {words}."
     for module in modules:
         likely = [
             (name, change)
@@ -55,20 +55,20 @@ def ranking_answer(modules: Sequence[Module]) -> str:
             if change["low"] > 0.0 or change["high"] < 0.0
         ]
         if likely:
-            told = "; ".join(_said(name, change) for name, change in likely[:3])
+            words = "; ".join(_said(name, change) for name, change in likely[:3])
             return (
                 "These trials are too few to tell any module's cost from chance; what costs most is likely "
-                f"'{module['module']}': with an oracle for it {told}."
+                f"'{module['module']}': with an oracle for it {words}."
             )
     return "These trials tell no module's cost from chance."
 
 
 def _said(name: str, change: Mapping[str, Any]) -> str:
-    metric = metric_of(name)
-    by = f"{metric.name} changes by {metric.write(change['mean'])}"
-    if change["low"] == change["high"]:
-        return f"{by} in every trial"
-    return f"{by} ({metric.write(change['low'])} to {metric.write(change['high'])})"
+    mean, low, high = (float(change[key]) for key in ("mean", "low", "high"))
+    name_of = metric_of(name).name
+    if low == high:
+        return f"{name_of} changes by {told(name, mean, math.nan, math.nan, signed=True)} in every trial"
+    return f"{name_of} changes by {told(name, mean, low, high, signed=True)}"
 
 
 def _metrics(modules: Sequence[Module]) -> list[str]:
