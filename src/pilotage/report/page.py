@@ -42,6 +42,7 @@ from pilotage.report.metrics_table import metric_rows
 from pilotage.report.replay.floor import floor_scene
 from pilotage.report.replay.scene import ReplayScene
 from pilotage.report.replay.section import SLUG, TITLE, replay_section, script_source, style
+from pilotage.report.replay.terrain import terrain_scene
 from pilotage.report.run_folder import RunData, number, read_run
 from pilotage.report.sheet.maps import accuracy_figure, printed_figure
 from pilotage.report.sheet.path import coverage_figure, path_figure
@@ -96,7 +97,11 @@ FIGURES: dict[str, tuple[Draw, ...]] = {
     "recording": RECORDING_FIGURES,
 }
 """What is drawn of a run, by the kind of its mission."""
-SCENES: dict[str, Callable[[RunData], ReplayScene | None]] = {"floor": floor_scene, "sheet": sheet_scene}
+SCENES: dict[str, Callable[[RunData], ReplayScene | None]] = {
+    "floor": floor_scene,
+    "terrain": terrain_scene,
+    "sheet": sheet_scene,
+}
 """How a run of each kind becomes a scene to replay."""
 _LONGEST_MISSION = 100_000
 

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import zipfile
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pilotage.core.errors import InputError
-from pilotage.core.types import FloatArray
+from pilotage.core.types import FloatArray, IntArray
 
 PICTURES_FILE = "terrain.npz"
 
@@ -36,6 +38,10 @@ class TerrainPictures:
         NaN where hazards were given as such.
     landmarks
         (M, 2) known points; none where the mission has no estimator.
+    route
+        (R, 2) the planned path's corners; none where there is no plan.
+    seen_counts, seen
+        (N,) how many landmarks were in sight at each row of the trace, and which (rows of ``landmarks``).
     """
 
     ground: Picture | None
@@ -47,6 +53,9 @@ class TerrainPictures:
     goal: FloatArray
     slope_limit_deg: float
     landmarks: FloatArray
+    route: FloatArray
+    seen_counts: IntArray
+    seen: IntArray
 
 
 def read_pictures(run_dir: Path) -> TerrainPictures | None:
@@ -73,6 +82,8 @@ def read_pictures(run_dir: Path) -> TerrainPictures | None:
             np.asarray(arrays["goal"], dtype=np.float64),
             float(arrays["slope_limit_deg"]),
             np.asarray(arrays.get("landmarks", np.zeros((0, 2))), dtype=np.float64).reshape(-1, 2),
+            np.asarray(arrays.get("route", np.zeros((0, 2))), dtype=np.float64).reshape(-1, 2),
+            *_seen(arrays),
         )
     except (OSError, ValueError, EOFError, KeyError, TypeError, zipfile.BadZipFile) as error:
         raise InputError(f"{path}: cannot be read, {error}; run the mission again") from None
@@ -84,6 +95,16 @@ def _picture(array: NDArray[np.generic] | None) -> Picture | None:
     if array.ndim != 2 or array.size == 0:
         raise ValueError(f"expected a picture, found shape {array.shape}")
     return np.asarray(array, dtype=np.uint8)
+
+
+def _seen(arrays: Mapping[str, NDArray[Any]]) -> tuple[IntArray, IntArray]:
+    """Counts and landmarks; nothing where they do not fit each other."""
+    nothing = np.zeros(0, dtype=np.int64)
+    counts = np.asarray(arrays.get("seen_counts", nothing), dtype=np.int64)
+    seen = np.asarray(arrays.get("seen", nothing), dtype=np.int64)
+    known = len(arrays.get("landmarks", nothing))
+    sound = bool((counts >= 0).all() and (seen >= 0).all() and (seen < known).all())
+    return (counts, seen) if sound and counts.sum() == len(seen) else (nothing, nothing)
 
 
 def _must(picture: Picture | None) -> Picture:

@@ -48,16 +48,12 @@ def attribution_study(mission: str, overrides: Sequence[str], trials: int) -> St
     costs = kind.costs(loaded)
     if not oracles:
         raise InputError(f"attribute '{mission}': expected a mission with modules that an oracle can replace")
-    told = "; ".join(f"{name}: {text}" for name, text in oracles.items())
     configurations: list[dict[str, Any]] = [{"name": BASELINE, "set": {"run.oracles": []}}]
     configurations += [{"name": f"{ORACLE}{name}", "set": {"run.oracles": [name]}} for name in oracles]
     primary = next(iter(costs))
     values: dict[str, Any] = {
         "study": _name(mission, overrides),
-        "question": (
-            f"What does each module of '{Path(mission).stem}' cost, beside one that knows all? "
-            f"The oracles: {told}."
-        ),
+        "question": f"What does each module of '{Path(mission).stem}' cost, beside one that knows all?",
         "mission": mission,
         "set": settings_of(overrides),
         "configurations": configurations,
@@ -77,18 +73,25 @@ def _name(mission: str, overrides: Sequence[str]) -> str:
     return f"attribute-{stem}-{digest}" if overrides else f"attribute-{stem}"
 
 
+def is_attribution(study: Study) -> bool:
+    """Whether a study holds a mission as it is beside oracles, one at a time."""
+    first, *others = (cell.name for cell in study.cells)
+    return first == BASELINE and bool(others) and all(name.startswith(ORACLE) for name in others)
+
+
 def attribution_of(folder: Path) -> dict[str, Any]:
     """Rank the modules by what their oracles gain.
 
     Returns
     -------
-    ``modules``, most costly first: for each the change of every metric with its interval, and sentences on
-    those that differ surely, or else may differ. Success counts before accuracy (errors, coverage), that
-    before safety and time; among them the share that is gained. Times and ways are compared on the seeds
-    where both runs succeeded.
+    ``modules``, most costly first: for each what its oracle does, the change of every metric with its
+    interval, and sentences on those that differ surely, or else may differ. Success counts before accuracy
+    (errors, coverage), that before safety and time; among them the share that is gained. Times and ways are
+    compared on the seeds where both runs succeeded.
     """
     table = read_study(folder)
     base = mission_of(dict(table.study.base), table.study.cells[FIRST].overrides)
+    texts = kind_of(base).oracles(base)
     costs = {SUCCESS: Cost(Aspect.ACCURACY, less_is_better=False), **kind_of(base).costs(base)}
     values = {name: _comparable(table, name, cost) for name, cost in costs.items() if name in table.values}
     judgement = judge(table.cell, table.trial, values, [FIRST] * len(table.study.cells))
@@ -103,6 +106,7 @@ def attribution_of(folder: Path) -> dict[str, Any]:
         sure = {name: _is_sure(table, values[name], cell.index, change) for name, change in changes.items()}
         entry = {
             "module": cell.name.removeprefix(ORACLE),
+            "oracle": texts.get(cell.name.removeprefix(ORACLE), ""),
             "changes": {name: _plain(change, sure[name]) for name, change in changes.items()},
             "told": _told(changes, sure),
         }
@@ -147,20 +151,29 @@ def _weight(
     sure: Mapping[str, bool],
     before: Mapping[str, float],
 ) -> tuple[float, ...]:
-    """Sure gains in success, then by aspect the greatest share gained; then all effects together."""
+    """Gains in success and, by aspect, the greatest share gained: the sure ones first, then what may be."""
 
-    def gain(aspect: Aspect) -> float:
-        gains = [
-            _share(change.mean, costs[name], before.get(name, math.nan))
-            for name, change in changes.items()
-            if costs[name].aspect is aspect and sure[name] and name != SUCCESS
-        ]
-        return max(gains, default=0.0)
+    def gains(counted: Mapping[str, bool]) -> tuple[float, ...]:
+        won = changes[SUCCESS].mean if counted.get(SUCCESS, False) else 0.0
+        by_aspect = (
+            max(
+                (
+                    _share(change.mean, costs[name], before.get(name, math.nan))
+                    for name, change in changes.items()
+                    if costs[name].aspect is aspect and counted[name] and name != SUCCESS
+                ),
+                default=0.0,
+            )
+            for aspect in RANKED
+        )
+        return (won, *by_aspect)
 
-    success = changes.get(SUCCESS)
-    won = success.mean if success is not None and sure[SUCCESS] else 0.0
-    total = sum(abs(change.effect) for change in changes.values() if math.isfinite(change.effect))
-    return (won, *(gain(aspect) for aspect in RANKED), total)
+    return (*gains(sure), *gains({name: _may_differ(change) for name, change in changes.items()}))
+
+
+def _may_differ(change: Difference) -> bool:
+    """Whether the interval of the change leaves zero out."""
+    return change.low > 0.0 or change.high < 0.0
 
 
 def _share(change: float, cost: Cost, before: float) -> float:
@@ -175,11 +188,7 @@ def _told(changes: Mapping[str, Difference], sure: Mapping[str, bool]) -> list[s
     certain = [f"{name} {_change(change)}" for name, change in changes.items() if sure[name]]
     if certain:
         return certain
-    return [
-        f"perhaps {name} {_change(change)}"
-        for name, change in changes.items()
-        if change.low > 0.0 or change.high < 0.0
-    ]
+    return [f"perhaps {name} {_change(change)}" for name, change in changes.items() if _may_differ(change)]
 
 
 def _change(change: Difference) -> str:

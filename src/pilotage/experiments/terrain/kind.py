@@ -13,7 +13,7 @@ from pilotage.core.random import RandomStreams
 from pilotage.core.types import Event, Pose2
 from pilotage.experiments.kinds import ERROR, ROOM, TIME_COST, WAY, Cost
 from pilotage.experiments.progress import OnProgress
-from pilotage.experiments.terrain.estimation import estimate
+from pilotage.experiments.terrain.estimation import estimate, seen_per_step
 from pilotage.experiments.terrain.ground import Ground, load_ground, shares
 from pilotage.experiments.terrain.motion import Motion, along_route, drive_to_pose
 from pilotage.experiments.terrain.oracles import applicable
@@ -123,7 +123,12 @@ class TerrainKind:
         if record.route is not None:
             places["route"] = record.route.path_xy_m
         if record.estimation is not None:
-            places["landmarks"] = record.estimation.landmarks.points_xy_m
+            marks, log = record.estimation.landmarks, record.estimation.log
+            order = np.argsort(marks.ids)
+            places["landmarks"] = marks.points_xy_m
+            # Which landmarks were in sight at each step, as rows of the table; none at the start.
+            places["seen_counts"] = np.concatenate([[0], seen_per_step(log)]).astype(np.int32)
+            places["seen"] = order[np.searchsorted(marks.ids[order], log.ids)].astype(np.int32)
         np.savez(folder / "terrain.npz", allow_pickle=False, **pictures, **places)
 
     def inline(self, record: TerrainRecord, values: dict[str, Any]) -> None:  # noqa: ARG002

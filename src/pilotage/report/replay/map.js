@@ -14,7 +14,7 @@ class ReplayMap {
       return starts;
     });
     this.ways = scene.poses.map((track) => (track.trail ? this.way(track) : null));
-    this.typicalAxis = scene.poses.map((track) => this.medianAxis(track));
+    this.axes = scene.poses.map((track) => this.axesOf(track));
     this.rasters = scene.rasters.map((raster) => this.startRaster(raster));
   }
 
@@ -34,8 +34,9 @@ class ReplayMap {
     return path;
   }
 
-  medianAxis(track) {
-    if (!track.cov_m2) return 0;
+  // A typical long half axis, and one that few exceed.
+  axesOf(track) {
+    if (!track.cov_m2) return [0, 0];
     const axes = [];
     const stride = Math.max(1, Math.floor(track.x_m.length / 500));
     for (let i = 0; i < track.x_m.length; i += stride) {
@@ -43,7 +44,7 @@ class ReplayMap {
       if (axis) axes.push(axis.a);
     }
     axes.sort((p, q) => p - q);
-    return axes.length ? axes[axes.length >> 1] : 0;
+    return axes.length ? [axes[axes.length >> 1], axes[Math.floor(0.95 * (axes.length - 1))]] : [0, 0];
   }
 
   // Half axes and direction of the 95 % ellipse, from the eigenvalues of the position's covariance.
@@ -61,8 +62,10 @@ class ReplayMap {
   // How many times too large ellipses are drawn: chosen so that a typical one can be seen at this zoom.
   factor() {
     if (this.exaggeration !== "auto") return Number(this.exaggeration);
-    const axis = Math.max(0, ...this.typicalAxis);
-    const wanted = axis > 0 ? 13 / (axis * this.scale) : 1;
+    const axis = Math.max(0, ...this.axes.map((pair) => pair[0])), large = Math.max(0, ...this.axes.map((pair) => pair[1]));
+    if (!(axis > 0)) return 1;
+    // The large ones stay within a quarter of the view, end to end.
+    const wanted = Math.min(13 / axis, 0.125 * Math.min(this.width, this.height) / large) / this.scale;
     for (const step of [1, 2, 5, 10, 20, 50, 100, 200, 500, 1000]) if (wanted <= step * 1.3) return step;
     return 1000;
   }
@@ -235,7 +238,9 @@ class ReplayMap {
   }
 
   drawWays(pen, i, poses) {
-    this.scene.poses.forEach((track, k) => {
+    // The first way lies on top: where an estimate is right it is hidden.
+    [...this.scene.poses.keys()].reverse().forEach((k) => {
+      const track = this.scene.poses[k];
       if (!track.trail || !this.shows(track)) return;
       this.inMetres(pen, (pixel) => {
         pen.strokeStyle = this.colour(track.colour);
@@ -319,6 +324,15 @@ class ReplayMap {
       if (!this.shows(layer)) continue;
       pen.fillStyle = pen.strokeStyle = this.colour(layer.colour);
       pen.lineWidth = 1.8;
+      if (layer.look === "dot") {
+        const size = Math.min(Math.max(this.scale * 30, 1.6), 5);
+        for (let k = 0; k + 1 < layer.points_m.length; k += 2) {
+          pen.beginPath();
+          pen.arc(this.px(layer.points_m[k]), this.py(layer.points_m[k + 1]), size, 0, 2 * Math.PI);
+          pen.fill();
+        }
+        continue;
+      }
       layer.labels.forEach((label, k) => {
         const x = this.px(layer.points_m[2 * k]), y = this.py(layer.points_m[2 * k + 1]);
         pen.beginPath();

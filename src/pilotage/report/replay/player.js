@@ -1,3 +1,12 @@
+// Times as people say them: tenths of a second, or of long runs days, hours and minutes.
+const LONG_S = 7200;
+function saidTime(t, span) {
+  if (span <= LONG_S) return `${t.toFixed(1)} s`;
+  const minutes = Math.floor(t / 60 + 1e-6), two = (n) => String(n).padStart(2, "0");
+  const hours = Math.floor(minutes / 60), clock = `${two(hours % 24)} h ${two(minutes % 60)} min`;
+  return span < 86400 ? clock : `${Math.floor(hours / 24)} d ${clock}`;
+}
+
 // The player: clock, controls, keyboard, pointer and touch. It never starts by itself.
 class ReplayPlayer {
   constructor(root, scene) {
@@ -7,10 +16,12 @@ class ReplayPlayer {
     this.end = scene.t_s[scene.t_s.length - 1];
     this.t = this.start;
     this.playing = false;
-    this.speed = 4;
+    this.span = this.end - this.start;
+    this.long = this.span > LONG_S;
     this.follow = false;
     this.frames = 0;
     this.find = (name) => root.querySelector(`[data-replay-${name}]`);
+    this.speed = Number(this.find("speed").value);
     const style = getComputedStyle(document.documentElement);
     const colours = { paper: getComputedStyle(document.body).backgroundColor };
     for (const name of ["ink", "muted", "line", "soft", "bad"]) colours[name] = style.getPropertyValue(`--${name}`).trim() || "#444";
@@ -28,7 +39,8 @@ class ReplayPlayer {
   resize(first) {
     const width = this.map.width;
     this.map.resize();
-    if (first || Math.abs(width - this.map.width) > 1) this.map.fit();
+    // Who has chosen a view keeps it.
+    if (first || (Math.abs(width - this.map.width) > 1 && !this.zoomed && !this.follow)) this.map.fit();
     if (this.scene.series.length) this.series.resize();
     this.draw();
   }
@@ -77,10 +89,10 @@ class ReplayPlayer {
 
   say(i, state, colour) {
     const put = (name, text) => { const at = this.find(name); if (at.textContent !== text) at.textContent = text; };
-    put("clock", `${this.t.toFixed(1)} / ${this.end.toFixed(1)} s`);
+    put("clock", this.long ? `${saidTime(this.t, this.span)} of ${saidTime(this.end, this.span)}` : `${this.t.toFixed(1)} / ${this.end.toFixed(1)} s`);
     const scrub = this.find("scrub");
     scrub.value = String(this.t);
-    scrub.setAttribute("aria-valuetext", `${this.t.toFixed(1)} seconds of ${this.end.toFixed(1)}`);
+    scrub.setAttribute("aria-valuetext", this.long ? `${saidTime(this.t, this.span)} of ${saidTime(this.end, this.span)}` : `${this.t.toFixed(1)} seconds of ${this.end.toFixed(1)}`);
     put("state", state);
     this.find("state").style.borderColor = colour || "transparent";
     const absent = this.scene.poses.filter((track) => track.absent && track.x_m[i] !== track.x_m[i]);
@@ -89,7 +101,7 @@ class ReplayPlayer {
     const factor = ellipses ? this.map.factor() : 1;
     put("factor", ellipses && !absent.length && factor !== 1 ? `ellipse × ${factor}` : "");
     const event = this.eventAt(this.t);
-    put("event", event ? `${event.t_s.toFixed(1)} s · ${event.kind}: ${event.text}` : "");
+    put("event", event ? `${saidTime(event.t_s, this.span)} · ${event.kind}: ${event.text}` : "");
     this.find("event").style.borderColor = event ? event.colour : "transparent";
   }
 
@@ -104,7 +116,7 @@ class ReplayPlayer {
     for (const group of [s.rasters, s.lines, s.circles, s.marks, s.paths, s.sights, s.scans, s.poses]) {
       for (const layer of group) {
         const size = layer.lines_m || layer.circles_m;
-        if (!size || size.length) seen.set(layer.name, layer.colour || (layer.palette || ["muted"])[0]);
+        if (!size || size.length) seen.set(layer.name, layer.colour || (layer.palette || ["muted"]).at(-1));
       }
     }
     for (const [name, colour] of seen) {
@@ -129,7 +141,7 @@ class ReplayPlayer {
       const tick = document.createElement("i");
       tick.style.left = `${100 * Math.min(Math.max((event.t_s - this.start) / span, 0), 1)}%`;
       tick.style.background = event.colour;
-      tick.title = `${event.t_s.toFixed(1)} s · ${event.kind}: ${event.text}`;
+      tick.title = `${saidTime(event.t_s, this.span)} · ${event.kind}: ${event.text}`;
       ticks.append(tick);
     }
     const scrub = this.find("scrub");
@@ -152,7 +164,11 @@ class ReplayPlayer {
   setFollow(on) {
     this.follow = on;
     this.find("follow").checked = on;
-    if (on && this.map.scale * 12 < this.map.width / 2 && !this.zoomed) this.map.zoom(2.5);
+    if (on && !this.zoomed) {
+      const width = this.scene.follow_m;
+      if (width > 0) this.map.zoom(this.map.width / (width * this.map.scale));
+      else if (this.map.scale * 12 < this.map.width / 2) this.map.zoom(2.5);
+    }
     this.draw();
   }
 
@@ -182,7 +198,7 @@ class ReplayPlayer {
     // Lists keep their own keys; a button or a box keeps space, which presses it.
     if (event.ctrlKey || event.metaKey || event.altKey || event.target.tagName === "SELECT") return;
     const pressable = event.target.tagName === "BUTTON" || event.target.type === "checkbox";
-    const step = event.shiftKey ? 10 : 1;
+    const step = (event.shiftKey ? 10 : 1) * (this.long ? 600 : 1);
     const actions = {
       " ": () => this.play(!this.playing),
       ArrowLeft: () => this.seek(this.t - step),

@@ -38,7 +38,7 @@ class Circles:
 
 @dataclass(frozen=True, slots=True)
 class Marks:
-    """Fixed points (n, 2) with a label each; ``look`` is ``diamond``, ``ring`` or ``cross``."""
+    """Fixed points (n, 2) with a label each; ``look`` is ``diamond``, ``dot``, ``ring`` or ``cross``."""
 
     name: str
     points_m: FloatArray
@@ -156,7 +156,11 @@ class SceneEvent:
 
 @dataclass(frozen=True, slots=True)
 class ReplayScene:
-    """All that the player shows; ``breaks`` are frames before which the tracks jump (no line is drawn)."""
+    """All that the player shows.
+
+    ``breaks`` are frames before which the tracks jump (no line is drawn); ``follow_m`` is the width of the
+    view when it follows the robot, 0 to leave that to the player.
+    """
 
     t_s: FloatArray
     bounds_m: tuple[float, float, float, float]
@@ -173,3 +177,4 @@ class ReplayScene:
     events: tuple[SceneEvent, ...] = ()
     breaks: IntArray = field(default_factory=lambda: np.empty(0, dtype=np.int64))
     note: str = ""
+    follow_m: float = 0.0

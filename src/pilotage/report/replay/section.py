@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import hashlib
+import math
 from functools import cache
 from html import escape
 from importlib import resources
@@ -15,6 +16,21 @@ SCRIPTS = ("unpack.js", "map.js", "series.js", "player.js")
 TITLE = "Replay"
 SLUG = "replay"
 SPEEDS = (0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0)
+SPEED = 4.0
+LONG_SPEEDS = {
+    60.0: "1 min/s",
+    300.0: "5 min/s",
+    900.0: "15 min/s",
+    1800.0: "30 min/s",
+    3600.0: "1 h/s",
+    10800.0: "3 h/s",
+    21600.0: "6 h/s",
+    43200.0: "12 h/s",
+    86400.0: "1 day/s",
+    604800.0: "7 days/s",
+}
+LONG_S, PLAY_S = 7200.0, 75.0
+"""A longer run is told in hours and days, as ``player.js`` does, and plays in about so much time."""
 
 
 @cache
@@ -41,20 +57,33 @@ def replay_section(scene: ReplayScene | None) -> str:
     head = f'<section id="{SLUG}"><h2><a href="#{SLUG}">{TITLE}</a></h2>'
     if scene is None:
         return f'{head}<p class="absent">The run left no poses over time to replay.</p></section>'
-    speeds = "".join(
-        f'<option value="{s:g}"{" selected" if s == 4.0 else ""}>{s:g} ×</option>' for s in SPEEDS
-    )
+    long = float(scene.t_s[-1] - scene.t_s[0]) > LONG_S
+    step = "ten minutes (with shift ten times that)" if long else "a second (with shift ten)"
     note = f" {escape(scene.note)}" if scene.note else ""
     return (
-        f"{head}{_PLAYER.replace('{speeds}', speeds)}"
+        f"{head}{_PLAYER.replace('{speeds}', _speeds(scene))}"
         '<noscript><p class="absent">The replay needs JavaScript; the rest of the page does not.</p>'
         "</noscript>"
         '<p class="absent" id="replay-trouble" role="alert" hidden></p>'
-        '<p class="replay-help">Space plays, ← → move by a second (with shift ten), ↑ ↓ change the speed, '
+        f'<p class="replay-help">Space plays, ← → move by {step}, ↑ ↓ change the speed, '
         "+ − zoom, f follows, 0 shows all. Drag or pinch the map; the wheel zooms once the map is clicked. "
         f"A click on a curve goes to that moment.{note}</p>"
         f'<script type="text/plain" id="replay-scene">{pack(scene)}</script>'
         f"<script>{script()}</script></section>"
+    )
+
+
+def _speeds(scene: ReplayScene) -> str:
+    """The choice of speeds: times real time, or for a long run its time in a second."""
+    span_s = float(scene.t_s[-1] - scene.t_s[0])
+    names, chosen = {s: f"{s:g} ×" for s in SPEEDS}, SPEED
+    if span_s > LONG_S:
+        names, chosen = LONG_SPEEDS, min(LONG_SPEEDS, key=lambda s: abs(math.log(s * PLAY_S / span_s)))
+    return "".join(
+        f'<option value="{s:.0f}"{" selected" if s == chosen else ""}>{name}</option>'
+        if s >= 1.0
+        else f'<option value="{s:g}">{name}</option>'
+        for s, name in names.items()
     )
 
 

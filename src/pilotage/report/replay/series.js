@@ -65,7 +65,7 @@ class ReplaySeries {
       pen.textAlign = "left";
       pen.textBaseline = "alphabetic";
       pen.fillStyle = this.colours.ink;
-      pen.fillText(`${series.title} [${series.unit}]`, 4, top - 7);
+      pen.fillText(this.title(series), 4, top - 7);
       pen.strokeStyle = this.colours.line;
       pen.lineWidth = 1;
       pen.font = "11px system-ui, sans-serif";
@@ -143,15 +143,18 @@ class ReplaySeries {
     pen.textBaseline = "alphabetic";
     pen.fillStyle = this.colours.ink;
     this.scene.series.forEach((series, k) => {
-      const said = [this.number(series.values[i])];
+      const value = series.values[i];
+      const said = [!series.unit && Number.isInteger(value) ? String(value) : this.number(value)];
       if (series.band) said.push(`${series.band_name} ${this.number(series.band[i])}`);
       if (series.other) said.push(`${series.other_name} ${this.number(series.other[i])}`);
       // Beside the title there may be room for the value only.
-      const title = pen.measureText(`${series.title} [${series.unit}]`).width * 1.15 + 16;
+      const title = pen.measureText(this.title(series)).width * 1.15 + 16;
       while (said.length > 1 && title + pen.measureText(said.join(" · ")).width > this.width - this.right) said.pop();
       pen.fillText(said.join(" · "), this.width - this.right, this.panel(k).top - 7);
     });
   }
+
+  title(series) { return series.unit ? `${series.title} [${series.unit}]` : series.title; }
 
   number(v) { return v === v ? v.toFixed(Math.abs(v) < 0.1 ? 4 : 2) : "–"; }
 }

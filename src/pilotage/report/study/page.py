@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +15,7 @@ from pilotage.report.study.answer import answer, answers
 from pilotage.report.study.comparisons import comparisons_table
 from pilotage.report.study.examples import Example, examples_section
 from pilotage.report.study.factor_figures import factor_figures
+from pilotage.report.study.ranking import Module, ranking_answer, ranking_table
 from pilotage.report.study.settings_figures import settings_figures
 from pilotage.report.study.tables import (
     cells_table,
@@ -27,13 +29,16 @@ from pilotage.report.style import drawing_style
 REPORT_FILE = "report.html"
 
 
-def study_page(view: StudyView, examples: tuple[Example, ...] = ()) -> str:
-    """Return the page of a study as HTML."""
+def study_page(
+    view: StudyView, examples: tuple[Example, ...] = (), ranking: Sequence[Module] | None = None
+) -> str:
+    """Return the page of a study as HTML; ``ranking`` is an attribution's, with the oracles' texts."""
     judgement = judge_view(view)
     lower = lower_is_better(view.metrics) | {view.primary: view.lower_is_better}
     with drawing_style():
         figures = [*settings_figures(view, judgement), *factor_figures(view, judgement)]
     sections = [
+        ("ranking", "What each module costs", "" if ranking is None else ranking_table(ranking)),
         ("findings", "What it says", _findings(view, judgement)),
         *((f.slug, f.title, figure_section(number, f)) for number, f in enumerate(figures, start=1)),
         ("cells", "Every setting", cells_table(view, judgement, lower)),
@@ -51,7 +56,7 @@ def study_page(view: StudyView, examples: tuple[Example, ...] = ()) -> str:
         heading=escape(view.name),
         description=f'<p class="description">{escape(view.question)}</p>' if view.question else "",
         outcome="",
-        headline=escape(answer(view, judgement)),
+        headline=escape(answer(view, judgement) if ranking is None else ranking_answer(ranking)),
         tiles=tiles(_tiles(view)),
         contents=contents([(slug, title) for slug, title, _ in present]),
         body="\n".join(section for _, _, section in present),
@@ -62,12 +67,17 @@ def study_page(view: StudyView, examples: tuple[Example, ...] = ()) -> str:
     )
 
 
-def write_page(view: StudyView, folder: Path, examples: tuple[Example, ...] = ()) -> Path:
+def write_page(
+    view: StudyView,
+    folder: Path,
+    examples: tuple[Example, ...] = (),
+    ranking: Sequence[Module] | None = None,
+) -> Path:
     """Write ``report.html`` into the study's folder in one go and return its path."""
     path = folder / REPORT_FILE
     beside = path.with_name(f".{path.name}.{os.getpid()}")
     try:
-        beside.write_text(study_page(view, examples), encoding="utf-8")
+        beside.write_text(study_page(view, examples, ranking), encoding="utf-8")
         beside.replace(path)
     finally:
         beside.unlink(missing_ok=True)

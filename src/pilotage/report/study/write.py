@@ -9,6 +9,7 @@ from pathlib import Path
 
 from pilotage import __version__
 from pilotage.experiments.run import run_mission
+from pilotage.experiments.studies.attribution import attribution_of, is_attribution
 from pilotage.experiments.studies.cells import show
 from pilotage.experiments.studies.definition import CONFIGURATION
 from pilotage.experiments.studies.factors import Factor
@@ -50,7 +51,8 @@ def write_study_report(
         if on_example is not None:
             on_example(f"{title.lower()}: row {row}, again for its picture")
         shown.append(_example(table, view, title, row))
-    return write_page(view, folder, tuple(shown))
+    ranking = attribution_of(folder)["modules"] if is_attribution(table.study) else None
+    return write_page(view, folder, tuple(shown), ranking)
 
 
 def view_of(table: StudyTable) -> StudyView:

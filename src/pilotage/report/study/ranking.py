@@ -1,0 +1,100 @@
+"""The modules of a mission by what they cost: the first section of an attribution's page."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from pilotage.report import quantities
+from pilotage.report.markup import escape
+from pilotage.report.metrics_table import metric_of
+from pilotage.report.study.scales import Scale, scale_of, told
+
+Module = Mapping[str, Any]
+"""One entry of ``experiments.studies.attribution.attribution_of``'s ``modules``."""
+
+
+def ranking_table(modules: Sequence[Module]) -> str:
+    """One row a module, most costly first: how each metric changes where an oracle stands in for it."""
+    metrics = [name for name in _metrics(modules) if any(_moves(m["changes"].get(name)) for m in modules)]
+    if not metrics:
+        return ""
+    scales = {name: _scale(name, modules) for name in metrics}
+    head = "".join(
+        f'<th scope="col" class="value">{escape(metric_of(name).name)}{scales[name].label}</th>'
+        for name in metrics
+    )
+    rows = []
+    for module in modules:
+        text = module["oracle"]
+        small = f'<span class="what">{escape(text)}</span>' if text else ""
+        cells = "".join(_entry(module["changes"].get(name), scales[name]) for name in metrics)
+        rows.append(f'<tr><th scope="row">{escape(module["module"])}{small}</th>{cells}</tr>')
+    return (
+        '<section id="ranking"><h2><a href="#ranking">What each module costs</a></h2>'
+        "<p>How the mission changes where an oracle replaces one module, on the same seeds; below it the "
+        "95 % interval. Bold is what the trials tell from chance. Success counts before accuracy, accuracy "
+        "before safety and time; times and ways are compared where both runs succeeded.</p>"
+        '<div class="wide" tabindex="0"><table class="cells"><thead><tr><th scope="col">oracle for</th>'
+        f"{head}</tr></thead><tbody>{''.join(rows)}</tbody></table></div></section>"
+    )
+
+
+def ranking_answer(modules: Sequence[Module]) -> str:
+    """One sentence: which module costs most, and how surely."""
+    for module in modules:
+        sure = [(name, change) for name, change in module["changes"].items() if change["sure"]]
+        if sure:
+            words = "; ".join(_said(name, change) for name, change in sure[:3])
+            return f"What costs most is '{module['module']}': with an oracle for it {words}."
+    for module in modules:
+        likely = [
+            (name, change)
+            for name, change in module["changes"].items()
+            if change["low"] > 0.0 or change["high"] < 0.0
+        ]
+        if likely:
+            words = "; ".join(_said(name, change) for name, change in likely[:3])
+            return (
+                "These trials are too few to tell any module's cost from chance; what costs most is likely "
+                f"'{module['module']}': with an oracle for it {words}."
+            )
+    return "These trials tell no module's cost from chance."
+
+
+def _said(name: str, change: Mapping[str, Any]) -> str:
+    mean, low, high = (float(change[key]) for key in ("mean", "low", "high"))
+    name_of = metric_of(name).name
+    if low == high:
+        return f"{name_of} changes by {told(name, mean, math.nan, math.nan, signed=True)} in every trial"
+    return f"{name_of} changes by {told(name, mean, low, high, signed=True)}"
+
+
+def _metrics(modules: Sequence[Module]) -> list[str]:
+    return list(dict.fromkeys(name for module in modules for name in module["changes"]))
+
+
+def _moves(change: Mapping[str, Any] | None) -> bool:
+    return change is not None and math.isfinite(change["mean"]) and change["mean"] != 0.0
+
+
+def _scale(name: str, modules: Sequence[Module]) -> Scale:
+    found = (module["changes"].get(name) for module in modules)
+    return scale_of(name, [change["mean"] for change in found if change is not None and _moves(change)])
+
+
+def _entry(change: Mapping[str, Any] | None, scale: Scale) -> str:
+    if change is None or not math.isfinite(change["mean"]):
+        return f'<td class="value plain">{quantities.NOTHING}</td>'
+    if change["mean"] == change["low"] == change["high"] == 0.0:
+        return '<td class="value plain">0</td>'
+    digits = scale.decimals(change["mean"], change["low"], change["high"])
+    mean = scale.write(change["mean"], digits, signed=True)
+    if change["low"] == change["high"]:
+        band = "in every trial"
+    else:
+        low, high = (scale.write(change[end], digits, signed=True) for end in ("low", "high"))
+        band = f"{low} to {high}"
+    shown = f"<b>{mean}</b>" if change["sure"] else mean
+    return f'<td class="value plain">{shown}<br><span class="range">{band}</span></td>'

@@ -1,0 +1,148 @@
+"""``pilotage attribute`` for missions of every kind: what is compared, how it is ranked, what is said."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from pilotage.cli.main import main
+from pilotage.experiments.kinds import kind_of
+from pilotage.experiments.mission import load_mission, shipped_missions
+from pilotage.experiments.run import run_mission
+from pilotage.experiments.studies.attribution import attribution_of, attribution_study, is_attribution
+from pilotage.experiments.studies.engine import run_study
+from pilotage.experiments.studies.sweep import sweep_study
+from pilotage.report.study.ranking import ranking_answer, ranking_table
+from pilotage.report.study.write import write_study_report
+
+SMALL = """
+size_m: [1.0, 0.8]
+cells: [10, 8]
+start_pose: [0.3, 0.3, 0.0]
+obstacles: [[0.62, 0.45, 0.8, 0.6]]
+lines: [[[0.2, 0.6], [0.45, 0.6]]]
+"""
+
+
+@pytest.fixture
+def planned(tmp_path: Path) -> Path:
+    """A mission that plans round a wall of pixels with a gap on top."""
+    pixels = np.zeros((40, 60), np.uint8)
+    pixels[3:, 30] = 255
+    Image.fromarray(pixels).save(tmp_path / "obstacles.png")
+    path = tmp_path / "round-a-wall.yaml"
+    path.write_text(
+        "mission: round-a-wall\n"
+        "world:\n"
+        "  kind: terrain\n"
+        f"  ground: {{name: images, obstacles: {tmp_path / 'obstacles.png'}}}\n"
+        "  start: {x_m: 55, y_m: 45}\n"
+        "  goal: {x_m: 545, y_m: 45}\n"
+        "stack: {planner: {name: astar}}\n"
+    )
+    return path
+
+
+@pytest.mark.parametrize("name", shipped_missions())
+def test_every_shipped_mission_can_be_attributed(name: str) -> None:
+    """Or has modules, at least, that an oracle can replace."""
+    made = attribution_study(name, (), 2)
+    assert is_attribution(made)
+    assert len(made.cells) > 1
+    mission = load_mission(name)
+    assert made.definition.metrics == tuple(kind_of(mission).costs(mission))
+
+
+@pytest.mark.parametrize("name", ["gale-astar", "gale-pose", "romi-baseline", "museum-plan", "museum-1"])
+def test_what_is_compared_is_what_the_mission_gives(name: str) -> None:
+    mission = load_mission(name, ["run.time_limit_s=20"])
+    metrics = run_mission(mission, save=False).metrics
+    assert set(kind_of(mission).costs(mission)) <= set(metrics)
+
+
+def test_a_sheet(tmp_path: Path) -> None:
+    """The random walk falls off the sheet: what a knowing explorer gains in success and coverage leads."""
+    (tmp_path / "small.yaml").write_text(SMALL)
+    made = attribution_study("romi-baseline", [f"world.sheet={tmp_path / 'small.yaml'}"], 8)
+    run_study(made, tmp_path / "study", workers=1)
+    answer = attribution_of(tmp_path / "study")
+    first = answer["modules"][0]
+    assert first["module"] == "explorer"
+    assert first["changes"]["coverage_reachable"]["mean"] > 0.3
+    assert answer["baseline"]["success"] == 0.0
+    # No run of the baseline came to its end: its time is not held against that of one that did.
+    assert "duration_s" not in first["changes"]
+    by_name = {entry["module"]: entry["changes"] for entry in answer["modules"]}
+    assert by_name["localizer"]["position_rmse_m"]["mean"] == pytest.approx(
+        -answer["baseline"]["position_rmse_m"], abs=1e-6
+    )
+    page = write_study_report(tmp_path / "study", examples=False).read_text(encoding="utf-8")
+    assert '<section id="ranking">' in page
+    assert page.index("What each module costs") < page.index("Settings side by side")
+
+
+def test_terrain_from_the_command_line(
+    planned: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Nothing is drawn where a path is planned on a known map: two trials are as good as a hundred."""
+    monkeypatch.chdir(tmp_path)
+    assert main(["attribute", str(planned), "--trials", "2", "--workers", "1", "--json"]) == 0
+    (only,) = json.loads(capsys.readouterr().out)["modules"]
+    assert only["module"] == "planner"
+    assert "any angle" in only["oracle"]
+    change = only["changes"]["planned_length_m"]
+    assert change["sure"]
+    assert change["mean"] == change["low"] == change["high"] < 0.0
+    assert any(text.startswith("planned_length_m -") and "every trial" in text for text in only["told"])
+
+
+def test_another_study_has_no_ranking(planned: Path) -> None:
+    vary = ["stack.planner.name=astar,theta-star"]
+    made = sweep_study(str(planned), vary, (), 1, ["planned_length_m"])
+    assert not is_attribution(made)
+
+
+def entry(module: str, **changes: tuple[float, float, float, bool]) -> dict[str, Any]:
+    return {
+        "module": module,
+        "oracle": "knows <all>",
+        "changes": {
+            name: {"n": 9, "mean": mean, "low": low, "high": high, "sure": sure}
+            for name, (mean, low, high, sure) in changes.items()
+        },
+    }
+
+
+class TestWords:
+    def test_the_first_sure_cost_answers(self) -> None:
+        modules = [
+            entry("mapper", duration_s=(-9.0, -12.0, 2.0, False)),
+            entry("planner", duration_s=(-5.0, -6.0, -4.0, True), path_length_m=(0.0, 0.0, 0.0, False)),
+        ]
+        assert "'planner'" in ranking_answer(modules)
+        assert "way" not in ranking_answer(modules)
+
+    def test_few_trials_say_so(self) -> None:
+        likely = [entry("planner", duration_s=(-5.0, -6.0, -4.0, False))]
+        assert "too few" in ranking_answer(likely)
+        assert ranking_answer([entry("planner", duration_s=(-5.0, -9.0, 4.0, False))]).endswith(
+            "from chance."
+        )
+
+    def test_the_table(self) -> None:
+        table = ranking_table(
+            [
+                entry("planner", duration_s=(-5.0, -6.0, -4.0, True), collisions=(0.0, 0.0, 0.0, False)),
+                entry("mapper", duration_s=(-5.0, -5.0, -5.0, False)),
+            ]
+        )
+        assert "<b>−5.0</b>" in table
+        assert "in every trial" in table
+        assert "knows &lt;all&gt;" in table
+        assert "collisions" not in table  # nobody changes them
+        assert ranking_table([entry("mapper", duration_s=(0.0, 0.0, 0.0, False))]) == ""

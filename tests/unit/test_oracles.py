@@ -1,0 +1,351 @@
+"""Oracles: each makes its module's error go away, leaves the world as it is, and is offered where it fits."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from pilotage.cli.main import main
+from pilotage.core.angles import wrap_array_to_pi
+from pilotage.experiments.floor.kind import FLOOR
+from pilotage.experiments.ideal_sensors import FAULTS, ideal
+from pilotage.experiments.kinds import kind_of
+from pilotage.experiments.mission import load_mission
+from pilotage.experiments.run import simulate
+from pilotage.experiments.sheet.kind import SHEET
+from pilotage.experiments.sheet.simulate import SheetRecord
+from pilotage.experiments.terrain.kind import TERRAIN
+from pilotage.experiments.terrain.record import TerrainRecord
+from pilotage.sensors.sensor import SENSORS, Mount, SensorConfig
+
+PROPERTIES = {
+    "rate_hz",
+    "mount",
+    "field_of_view_rad",
+    "max_range_m",
+    "min_range_m",
+    "reliable_range_m",
+    "beams",
+    "cone_rad",
+    "counts_per_turn",
+    "field_ut",
+    "disturbance_length_m",
+}
+"""What a sensor is, as opposed to what it does wrong."""
+
+
+class TestIdealSensors:
+    def test_every_field_of_every_sensor_is_either_a_property_or_a_fault(self) -> None:
+        for entry in SENSORS:
+            faults = set(FAULTS[entry.config])  # type: ignore[index]
+            assert set(entry.config.model_fields) - PROPERTIES == faults, entry.name
+
+    def test_properties_stay_and_faults_go(self) -> None:
+        odometer = SENSORS.configure(
+            "wheel-odometry", {"rate_hz": 5.0, "angle_scale": 1.3, "angle_bias_rad_s": 0.1}, ""
+        )
+        assert isinstance(odometer, SensorConfig)
+        silent = ideal(odometer).model_dump()
+        assert silent["rate_hz"] == 5.0
+        assert (silent["angle_scale"], silent["angle_bias_rad_s"]) == (1.0, 0.0)
+        assert silent["angle_var_rad2_per_rad"] == 0.0
+
+    def test_of_a_foreign_sensor_the_variances_go(self) -> None:
+        class Sonar(SensorConfig):
+            echo_var_m2: float = 0.5
+            gain: float = 2.0
+
+        assert ideal(Sonar(mount=Mount(x_m=1.0))) == Sonar(mount=Mount(x_m=1.0), echo_var_m2=0.0, gain=2.0)
+
+
+class TestFloor:
+    def test_silent_sensors_have_no_systematic_error_either(self) -> None:
+        """Odometry that turns 20 % too far and a crooked beacon sensor, by dead reckoning."""
+        wrong = [
+            "stack.localizer=dead-reckoning",
+            "robot.sensors.odometry.angle_scale=1.2",
+            "robot.sensors.odometry.angle_bias_rad_s=0.01",
+            "run.time_limit_s=20",
+            "run.oracles=[sensors, initial]",
+        ]
+        mission = load_mission("museum-1", wrong)
+        metrics = FLOOR.metrics(simulate(mission))  # type: ignore[arg-type]
+        assert metrics["position_rmse_m"] == pytest.approx(0.0, abs=1e-3)
+        mission = load_mission("museum-1", [*wrong[:-1], "run.oracles=[initial]"])
+        assert FLOOR.metrics(simulate(mission))["position_rmse_m"] > 0.1  # type: ignore[arg-type, operator]
+
+    def test_the_start_is_told(self) -> None:
+        first = []
+        for oracle in ("", "initial"):
+            settings = ["stack.initial.x_var_m2=100", "run.time_limit_s=1", f"run.oracles=[{oracle}]"]
+            trace: Any = simulate(
+                load_mission("museum-1", ["stack.localizer=dead-reckoning", *settings])
+            ).trace
+            off = np.hypot(trace["est_x_m"] - trace["true_x_m"], trace["est_y_m"] - trace["true_y_m"])
+            first.append(off[0])
+        assert first[1] < 0.01 < 0.1 < first[0]
+
+
+# --- sheets ------------------------------------------------------------------------------------------
+
+SMALL = """
+size_m: [1.0, 0.8]
+cells: [10, 8]
+start_pose: [0.3, 0.3, 0.0]
+obstacles: [[0.62, 0.45, 0.8, 0.6]]
+lines: [[[0.2, 0.6], [0.45, 0.6]]]
+"""
+
+
+@pytest.fixture(scope="module")
+def small(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("sheet") / "small.yaml"
+    path.write_text(SMALL)
+    return path
+
+
+def explored(small: Path, oracle: str, *more: str, seed: int = 3) -> tuple[SheetRecord, dict[str, Any]]:
+    settings = [f"world.sheet={small}", f"run.oracles=[{oracle}]", f"run.seed={seed}", *more]
+    record: Any = simulate(load_mission("romi-explore", settings))
+    return record, SHEET.metrics(record)
+
+
+REPORTS = ("stack.explorer.name=surround-check", "stack.explorer.margin_cells=0")
+WANDERS = ("stack.explorer.name=random-walk", "stack.fusion=false", "stack.avoidance=false")
+
+
+class TestSheets:
+    @pytest.mark.parametrize("explorer", [(), REPORTS, WANDERS])
+    def test_the_true_pose(self, small: Path, explorer: tuple[str, ...]) -> None:
+        _, found = explored(small, "", *explorer)
+        _, known = explored(small, "localizer", *explorer)
+        assert found["position_rmse_m"] > 1e-3
+        assert known["position_rmse_m"] < 1e-9
+        assert known["heading_rmse_rad"] < 1e-9
+        assert known["nees_mean"] < 1e-3
+        if not explorer:
+            # The others mark a visit 20 times a second, and miss a cell that was left sooner.
+            assert known["visited_accuracy"] == 1.0
+
+    @pytest.mark.parametrize("explorer", [(), REPORTS, WANDERS])
+    def test_the_map_that_is_there(self, small: Path, explorer: tuple[str, ...]) -> None:
+        _, known = explored(small, "mapper", *explorer)
+        assert known["feature_precision"] == 1.0
+        assert known["feature_recall_all"] == 1.0
+        _, found = explored(small, "", *explorer)
+        assert min(found["feature_precision"] or 0.0, found["feature_recall_all"]) < 1.0
+
+    def test_a_drive_as_on_its_data_sheet(self, small: Path) -> None:
+        """Wheels and encoders then say exactly where the robot is; not so with the drive's errors."""
+        worst = []
+        for oracle in ("", "drive"):
+            trace = explored(small, oracle, *WANDERS)[0].trace
+            # A box that stops the body while the wheels spin on is no fault of the drive.
+            free = trace["contacts"] == 0.0
+            off = np.hypot(trace["est_x_m"] - trace["true_x_m"], trace["est_y_m"] - trace["true_y_m"])
+            worst.append(off[free].max())
+        assert worst[0] > 3e-3
+        # A count of an encoder is 0.15 mm.
+        assert worst[1] < 5e-4
+
+    def test_sensors_without_faults(self, small: Path) -> None:
+        """A gyroscope with a large scale error misleads the fused heading of the report's robot."""
+        bad = ("robot.sensors.gyroscope.scale_error=0.2", "robot.sensors.gyroscope.rate_std_rad_s=0.05")
+        drive = explored(small, "drive", *REPORTS, *bad)[1]["heading_rmse_rad"]
+        both = explored(small, "drive, sensors", *REPORTS, *bad)[1]["heading_rmse_rad"]
+        assert both < 0.5 * drive
+
+    @pytest.mark.parametrize("explorer", [(), REPORTS, WANDERS])
+    def test_who_knows_covers_all_and_is_the_fastest(self, small: Path, explorer: tuple[str, ...]) -> None:
+        record, knows = explored(small, "explorer", *explorer)
+        assert knows["success"]
+        assert knows["coverage_reachable"] == 1.0
+        assert knows["position_rmse_m"] == 0.0
+        assert knows["overhang_max_m"] < 1e-3
+        assert record.experiment.explorer.left == ()
+        if not explorer:
+            assert knows["duration_s"] < 0.7 * explored(small, "")[1]["duration_s"]
+        # A cell a step of its side at full speed, and no less.
+        cells = knows["reachable_cells"]
+        assert knows["duration_s"] > (cells - 1) * 0.1 / (3.0 * 0.035)
+
+    def test_ground_that_no_way_leads_to_is_left(self, tmp_path: Path) -> None:
+        sheet = tmp_path / "parted.yaml"
+        sheet.write_text("size_m: [1.0, 0.5]\nstart_pose: [0.2, 0.25, 1]\ncells: [10, 5]\n"
+                         "obstacles: [[0.5, 0.0, 0.55, 0.5]]\n")  # fmt: skip
+        record, knows = explored(sheet, "explorer")
+        assert record.outcome.done
+        assert 0.3 < knows["coverage_reachable"] < 0.7
+        assert len(record.experiment.explorer.left) == knows["cells_left"] > 0
+
+    def test_the_same_seed_has_the_same_robot(self, small: Path) -> None:
+        """What an oracle replaces changes; the drive's errors and everybody's noise do not."""
+        plain, _ = explored(small, "", *WANDERS)
+        knows, _ = explored(small, "localizer", *WANDERS)
+        again, _ = explored(small, "localizer", *WANDERS)
+        # The wanderer drives by chance and one beam: where it goes does not depend on its pose at all.
+        for name in ("true_x_m", "true_y_m", "true_theta_rad"):
+            np.testing.assert_array_equal(plain.trace[name], knows.trace[name])
+        for name, column in knows.trace.items():
+            np.testing.assert_array_equal(column, again.trace[name])
+
+
+# --- terrain -----------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def ground(tmp_path_factory: pytest.TempPathFactory) -> list[str]:
+    """Ground of 60 x 40 pixels with a wall across it, a gap on top, and landmarks."""
+    folder = tmp_path_factory.mktemp("ground")
+    pixels = np.zeros((40, 60), np.uint8)
+    pixels[3:, 30] = 255
+    Image.fromarray(pixels).save(folder / "obstacles.png")
+    return [
+        "world.ground.name=images",
+        f"world.ground.obstacles={folder / 'obstacles.png'}",
+        "world.start.x_m=55",
+        "world.start.y_m=45",
+        "world.goal.x_m=545",
+        "world.goal.y_m=45",
+        "world.landmarks=[{id: 7, x_m: 100, y_m: 200}, {id: 3, x_m: 400, y_m: 300}]",
+    ]
+
+
+def driven(
+    mission: str, ground: list[str], oracle: str, *more: str, seed: int = 5
+) -> tuple[TerrainRecord, dict[str, Any]]:
+    settings = [*ground, f"run.oracles=[{oracle}]", f"run.seed={seed}", *more]
+    record: Any = simulate(load_mission(mission, settings))
+    return record, TERRAIN.metrics(record)
+
+
+FREE = ("world.start.y_m=372", "world.goal.y_m=372", "world.start.theta_rad=0", "world.goal.theta_rad=0")
+
+
+class TestTerrain:
+    def test_the_true_pose(self, ground: list[str]) -> None:
+        assert driven("gale-astar-ekf", ground, "")[1]["position_rmse_m"] > 0.01
+        record, knows = driven("gale-astar-ekf", ground, "estimator")
+        assert knows["position_rmse_m"] == 0.0
+        assert knows["final_position_error_m"] == 0.0
+        assert record.estimation is not None
+        assert (
+            np.abs(wrap_array_to_pi(record.trace["est_theta_rad"] - record.trace["true_theta_rad"])).max()
+            < 1e-9
+        )
+
+    def test_silent_sensors_and_a_known_start_leave_no_error(self, ground: list[str]) -> None:
+        wrong = "robot.sensors.odometer.angle_scale=1.05"
+        plain = driven("gale-astar-ekf", ground, "initial", wrong)[1]["position_rmse_m"]
+        record, silent = driven("gale-astar-ekf", ground, "initial, sensors", wrong)
+        assert silent["position_rmse_m"] < 1e-3 < plain
+        # The filter expects noise still: its covariance grows as it would.
+        assert record.estimation is not None
+        assert (record.estimation.log.variances[:, 0] > 0.0).all()
+
+    def test_one_oracle_leaves_what_the_others_draw(self, ground: list[str]) -> None:
+        plain, _ = driven("gale-astar-ekf", ground, "")
+        told, _ = driven("gale-astar-ekf", ground, "initial")
+        silent, _ = driven("gale-astar-ekf", ground, "sensors")
+        assert plain.estimation is not None
+        assert told.estimation is not None
+        assert silent.estimation is not None
+        np.testing.assert_array_equal(plain.estimation.log.steps, told.estimation.log.steps)
+        np.testing.assert_array_equal(plain.estimation.log.ranges_m, told.estimation.log.ranges_m)
+        np.testing.assert_array_equal(plain.estimation.log.ids, silent.estimation.log.ids)
+        assert plain.estimation.initial.pose == silent.estimation.initial.pose
+        assert plain.estimation.initial.pose != told.estimation.initial.pose
+
+    def test_any_angle_is_no_longer(self, ground: list[str]) -> None:
+        own = driven("gale-astar", ground, "")[1]
+        knows = driven("gale-astar", ground, "planner")[1]
+        assert knows["planned_length_m"] < 0.99 * own["planned_length_m"]
+        # From either end over the wall's top, two straight lines: no any-angle path is shorter.
+        top = 45.0 + 32 * 10.0
+        assert knows["planned_length_m"] >= 2.0 * math.hypot(245.0, top - 45.0) * 0.99
+
+    def test_the_shortest_way_to_a_pose(self, ground: list[str]) -> None:
+        """Round the wall, where the pose controller runs into it; between free poses no longer than it."""
+        into = driven("gale-pose", ground, "", "world.goal.theta_rad=0")[1]
+        around, metrics = driven("gale-pose", ground, "pose_controller", "world.goal.theta_rad=0")
+        assert not into["success"]
+        assert metrics["success"], metrics["reason"]
+        assert metrics["goal_error_m"] < 1e-6
+        assert metrics["goal_error_rad"] < 0.05
+        speeds = np.hypot(*np.diff(around.motion.poses[:, :2], axis=0).T) / np.diff(around.motion.t_s)  # type: ignore[union-attr]
+        assert speeds.max() <= 0.04 + 1e-6
+        own, best = (driven("gale-pose", ground, oracle, *FREE)[1] for oracle in ("", "pose_controller"))
+        assert own["success"]
+        assert best["success"]
+        assert best["path_length_m"] <= 1.001 * own["path_length_m"]
+        assert best["duration_s"] < own["duration_s"]
+
+    def test_no_way_and_no_time(self, ground: list[str], tmp_path: Path) -> None:
+        pixels = np.zeros((40, 60), np.uint8)
+        pixels[:, 30] = 255
+        Image.fromarray(pixels).save(tmp_path / "closed.png")
+        closed = f"world.ground.obstacles={tmp_path / 'closed.png'}"
+        metrics = driven("gale-pose", ground, "pose_controller", "world.goal.theta_rad=0", closed)[1]
+        assert not metrics["success"]
+        assert "not connected" in metrics["reason"]
+        late = driven("gale-pose", ground, "pose_controller", "run.time_limit_s=100", *FREE)[1]
+        assert not late["success"]
+        assert late["duration_s"] <= 100.0
+
+
+# --- what is offered ---------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("mission", "more", "offered"),
+    [
+        ("gale-pose", [], {"pose_controller"}),
+        ("gale-astar", [], {"planner"}),
+        ("gale-astar", ["stack.planner.name=theta-star"], set()),
+        ("gale-astar", ["stack.cost_map.slope_that_doubles_deg=10"], set()),
+        ("gale-ekf", [], {"sensors", "initial", "estimator", "pose_controller"}),
+        ("gale-astar-ekf", [], {"sensors", "initial", "estimator", "planner"}),
+        ("romi-explore", [], {"sensors", "drive", "localizer", "mapper", "explorer"}),
+        ("romi-baseline", [], {"sensors", "drive", "localizer", "mapper", "explorer"}),
+        ("museum-plan", [], {"sensors", "initial", "localizer", "planner", "driver"}),
+    ],
+)
+def test_what_a_mission_offers(mission: str, more: list[str], offered: set[str]) -> None:
+    loaded = load_mission(mission, more)
+    assert set(kind_of(loaded).oracles(loaded)) == offered
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        (["run", "gale-astar", "--set", "run.oracles=[localizer]"], "expected one of planner in the mission"),
+        (
+            ["run", "romi-explore", "--set", "run.oracles=[planner]"],
+            "expected one of sensors, drive, localizer",
+        ),
+        (
+            ["run", "gale-astar", "--set", "stack.planner.name=theta-star", "--set", "run.oracles=[planner]"],
+            "expected none",
+        ),
+        (["attribute", "gale-astar", "--set", "stack.planner.name=theta-star"], "that an oracle can replace"),
+    ],
+)
+def test_others_are_refused_in_one_line(
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    arguments: list[str],
+    told: str,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(arguments) == 2
+    answer = capsys.readouterr()
+    assert answer.out == ""
+    assert answer.err.count("\n") == 1
+    assert told in answer.err
+    assert list(tmp_path.iterdir()) == []
