@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 from pilotage.evaluation.intervals import Summary
 from pilotage.evaluation.judge import Judgement
@@ -109,7 +109,7 @@ def _group(view: StudyView, judgement: Judgement, group: Group) -> str:
     worst = best_cell(judgement, view.primary, not lower, group.cells)
     assert best is not None
     assert worst is not None
-    over = f"over {summaries[best].n} trial{'s' if summaries[best].n > 1 else ''}"
+    over = _over([summaries[index].n for index in group.cells])
     if len(group.cells) == 1 and group.baselines[0] is None:
         return f"is {_interval(view.primary, summaries[best])}, mean with its 95 % interval {over}"
     base = group.baseline
@@ -117,6 +117,9 @@ def _group(view: StudyView, judgement: Judgement, group: Group) -> str:
         return _each_against_its_own(view, judgement, group)
     first, last = ("lowest", "highest") if lower else ("highest", "lowest")
     if base is None:
+        if sum(math.isfinite(summaries[index].mean) for index in group.cells) == 1:
+            only = _interval(view.primary, summaries[best])
+            return f"is {only} with {view.cells[best].text}, the only setting that gave it, mean {over}"
         if all(summaries[index].mean == summaries[best].mean for index in group.cells):
             return f"is {_interval(view.primary, summaries[best])} at every setting, mean {over} each"
         return (
@@ -136,6 +139,12 @@ def _group(view: StudyView, judgement: Judgement, group: Group) -> str:
     ]
     none = f"no setting is {'lower' if lower else 'higher'}" if best == base else ""
     return "; ".join([start, *([none] if none else []), *parts])
+
+
+def _over(counts: Sequence[int]) -> str:
+    """Over how many trials means are taken; settings without any are left out."""
+    few, many = min(count for count in counts if count), max(counts)
+    return f"over {f'{few} to ' if few < many else ''}{many} trial{'s' if many > 1 else ''}"
 
 
 def _change(view: StudyView, judgement: Judgement, metric: Metric, index: int, word: str) -> str:
