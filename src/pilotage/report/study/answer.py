@@ -8,7 +8,7 @@ from collections.abc import Iterable, Sequence
 from pilotage.evaluation.intervals import Summary
 from pilotage.evaluation.judge import Judgement
 from pilotage.evaluation.paired import Difference
-from pilotage.report.metrics_table import Metric, metric_of
+from pilotage.report.metrics_table import metric_of
 from pilotage.report.study.findings import FEW, facts, rate_text
 from pilotage.report.study.scales import p_value, told
 from pilotage.report.study.view import Cell, Group, StudyView
@@ -103,7 +103,7 @@ def _in_short(view: StudyView, judgement: Judgement, group: Group) -> str:
 
 def _group(view: StudyView, judgement: Judgement, group: Group) -> str:
     """A group's settings: where the metric is lowest and highest, and against what."""
-    metric, summaries = metric_of(view.primary), judgement.summaries[view.primary]
+    summaries = judgement.summaries[view.primary]
     lower = view.lower_is_better
     best = best_cell(judgement, view.primary, lower, group.cells)
     worst = best_cell(judgement, view.primary, not lower, group.cells)
@@ -133,7 +133,7 @@ def _group(view: StudyView, judgement: Judgement, group: Group) -> str:
     if changes and all(change.low == change.high == 0.0 for change in changes):
         return f"{start}, and no other setting changes a single one of {changes[0].n} trials"
     parts = [
-        _change(view, judgement, metric, index, word)
+        _change(view, judgement, index, word)
         for index, word in ((best, first), (worst, last))
         if index != base
     ]
@@ -147,10 +147,10 @@ def _over(counts: Sequence[int]) -> str:
     return f"over {f'{few} to ' if few < many else ''}{many} trial{'s' if many > 1 else ''}"
 
 
-def _change(view: StudyView, judgement: Judgement, metric: Metric, index: int, word: str) -> str:
+def _change(view: StudyView, judgement: Judgement, index: int, word: str) -> str:
     change = judgement.differences[view.primary][index]
     text = (
-        f"{word} with {view.cells[index].text}, {metric.write(judgement.summaries[view.primary][index].mean)}"
+        f"{word} with {view.cells[index].text}, {_plain(view, judgement.summaries[view.primary][index].mean)}"
     )
     if change is None or change.n == 0:
         return text
@@ -186,6 +186,10 @@ def difference(metric: str, change: Difference) -> str:
 
 def _interval(metric: str, summary: Summary) -> str:
     return told(metric, summary.mean, summary.low, summary.high)
+
+
+def _plain(view: StudyView, value: float) -> str:
+    return told(view.primary, value, math.nan, math.nan)
 
 
 def _sentence(text: str) -> str:
