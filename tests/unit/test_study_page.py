@@ -200,7 +200,8 @@ def test_every_group_answers_for_itself_against_its_own_baseline() -> None:
     judged = judge_view(view)
     headline = answer(view, judged).replace("\u00a0", " ")
     assert re.search(
-        r"On beacons: 9\.\d+ mm \(.*\) with plain and 1[12]\.\d+ mm \(.*\) with gate; on walls: ", headline
+        r"On beacons: least 9\.\d+ mm \(.*\) with plain, most 1[12]\.\d+ mm \(.*\) with gate; on walls: ",
+        headline,
     )
     said = {name: " ".join(texts) for name, texts in answers(view, judged)}
     assert re.search(r"a change by \+(1\.9|2\.0)\d+\smm", said["on beacons"])

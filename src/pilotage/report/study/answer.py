@@ -77,7 +77,7 @@ def _each(view: StudyView, judgement: Judgement, cell: Cell) -> str:
     """One of a few settings that are held against nothing: how often it succeeds, and its metric."""
     rate = judgement.rates[cell.index]
     summary = judgement.summaries[view.primary][cell.index]
-    succeeds = f"{rate_text(rate)} trials succeed, " if rate.trials else ""
+    succeeds = f"success {rate_text(rate)}, " if rate.trials else ""
     name = metric_of(view.primary).name
     return f"{cell.text}: {succeeds}{name} {_interval(view.primary, summary)} in the mean"
 
@@ -94,11 +94,16 @@ def _in_short(view: StudyView, judgement: Judgement, group: Group) -> str:
         return _interval(view.primary, summaries[best])
     if summaries[best].mean == summaries[worst].mean:
         return f"{_interval(view.primary, summaries[base])} at every setting"
-    told_of = dict.fromkeys((base, best, worst))
-    parts = [
-        f"{_interval(view.primary, summaries[index])} with {view.cells[index].text}" for index in told_of
+    low, high = (best, worst) if view.lower_is_better else (worst, best)
+    parts = (
+        [f"{_interval(view.primary, summaries[base])} with {view.cells[base].text}"] if base != best else []
+    )
+    parts += [
+        f"{word} {_interval(view.primary, summaries[index])} with {view.cells[index].text}"
+        for word, index in (("least", low), ("most", high))
+        if index != base or base == best
     ]
-    return f"{', '.join(parts[:-1])} and {parts[-1]}"
+    return ", ".join(parts)
 
 
 def _group(view: StudyView, judgement: Judgement, group: Group) -> str:

@@ -24,9 +24,9 @@ def cells_table(view: StudyView, judgement: Judgement) -> str:
     published = any(cell.published for cell in view.cells)
     return (
         '<section id="cells"><h2><a href="#cells">Every setting</a></h2>'
-        "<p>Means over the trials; below each its 95 % bootstrap interval"
-        f"{', and what was published' if published else ''}. The best mean of a column is bold. Success with "
-        f"its 95 % Wilson interval.</p>{''.join(parts)}</section>"
+        "<p>Means over the trials; below each its 95 % bootstrap interval, the variance in the square of the "
+        f"column&#x27;s unit{', and what was published' if published else ''}. The best mean of a column is "
+        f"bold. Success with its 95 % Wilson interval.</p>{''.join(parts)}</section>"
     )
 
 
@@ -71,6 +71,7 @@ def _entry(summary: Summary, scale: Scale, best: bool, published: float | None) 
     lines = []
     if math.isfinite(summary.low):
         lines.append(f"{scale.write(summary.low, digits)} to {scale.write(summary.high, digits)}")
+        lines.append(f"variance {scale.write_variance(summary.variance)}")
     if published is not None:
         lines.append(f"published {quantities.significant(published * scale.times, 4)}")
     small = "".join(f"<br><span class='range'>{escape(line)}</span>" for line in lines)
