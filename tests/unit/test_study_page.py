@@ -169,7 +169,10 @@ def test_examples_link_to_their_replay() -> None:
         "The worst trial", 5, "plain, seed 5", "trials/5/report.html", "pilotage run --from x:5", "<svg/>"
     )
     page = study_page(two_settings(-0.5), (shown,))
-    assert 'href="trials/5/report.html"' in page
+    assert 'href="trials/5/report.html#replay">Replay it</a>' in page
+    assert 'href="trials/5/report.html">Its report</a>' in page
+    still = study_page(two_settings(-0.5), (replace(shown, replay=False),))
+    assert "Replay it" not in still
     assert "pilotage run --from x:5" in page
 
 

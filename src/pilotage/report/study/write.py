@@ -151,4 +151,5 @@ def _example(table: StudyTable, view: StudyView, title: str, row: int) -> Exampl
         picture.svg.replace(f'"{picture.slug}-', f'"row{row}-{picture.slug}-').replace(
             f"#{picture.slug}-", f"#row{row}-{picture.slug}-"
         ),
+        "replay-player" in page.read_text("utf-8"),
     )
