@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import csv
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,6 +14,7 @@ from pilotage.core.errors import InputError
 from pilotage.evaluation.judge import judge
 from pilotage.experiments.mission import load_mission
 from pilotage.experiments.studies.definition import StudyDefinition
+from pilotage.experiments.studies.export import write_csv
 from pilotage.experiments.studies.groups import baselines, cell_groups
 from pilotage.experiments.studies.study import Study, load_study, make_study, shipped_studies
 
@@ -143,6 +146,16 @@ def test_every_cell_is_judged_against_its_own_baseline_and_pairs_within_trials()
     assert [round(entry.mean, 9) for entry in within] == [0.535] * 4
     across = [entry for row in judged.differences.values() for entry in row if entry is not None]
     assert all(entry.p_corrected > entry.p_value for entry in (*across, *within))
+
+
+def test_exported_seeds_are_whole_numbers_and_values_stand_beside_settings(tmp_path: Path) -> None:
+    told = [{**entry, "values": {"gate": 0.5 + i}} for i, entry in enumerate(FILTERS)]
+    made = study(configurations=told)
+    row = {"row": 1, "cell": 1, "trial": 0, "seed": 20, "status": "done", "reason": "", "seconds": 0.1}
+    rows = [{**row, "metrics": {"seed": 20, "nees_mean": 3.0}, "timings": {}}]
+    write_csv(rows, made, tmp_path / "trials.csv")
+    (found,) = csv.DictReader((tmp_path / "trials.csv").read_text().splitlines())
+    assert (found["seed"], found["factor.gate"], found["nees_mean"]) == ("20", "1.5", "3.0")
 
 
 def test_every_shipped_study_stands_and_its_settings_are_in_groups() -> None:

@@ -11,8 +11,12 @@ import numpy as np
 import pytest
 
 from pilotage.evaluation.judge import judge, paired_columns
-from pilotage.report.study.answer import answer
+from pilotage.evaluation.paired import difference
+from pilotage.report.study.answer import answer, answers
+from pilotage.report.study.better import lower_is_better
+from pilotage.report.study.comparisons import verdict
 from pilotage.report.study.examples import Example, describe, rows_to_show
+from pilotage.report.study.factor_figures import lines_over
 from pilotage.report.study.page import judge_view, study_page
 from pilotage.report.study.view import Cell, Failure, Group, StudyView
 
@@ -165,8 +169,165 @@ def test_examples_link_to_their_replay() -> None:
         "The worst trial", 5, "plain, seed 5", "trials/5/report.html", "pilotage run --from x:5", "<svg/>"
     )
     page = study_page(two_settings(-0.5), (shown,))
-    assert 'href="trials/5/report.html"' in page
+    assert 'href="trials/5/report.html#replay">Replay it</a>' in page
+    assert 'href="trials/5/report.html">Its report</a>' in page
+    still = study_page(two_settings(-0.5), (replace(shown, replay=False),))
+    assert "Replay it" not in still
     assert "pilotage run --from x:5" in page
+
+
+def with_groups(view: StudyView, *groups: Group, contrasts: tuple[tuple[str, str], ...] = ()) -> StudyView:
+    return replace(view, groups=groups, contrasts=contrasts)
+
+
+def four_settings(metrics: tuple[str, ...] = ("position_rmse_m", "nees_mean")) -> StudyView:
+    """Two filters, each plain and with a gate: 10 and 12 mm, 1 and 40 mm; NEES 3, 6, 3, 1."""
+    rng = np.random.default_rng(4)
+    centre = {"position_rmse_m": (0.010, 0.012, 0.001, 0.040), "nees_mean": (3.0, 6.0, 3.0, 1.0)}
+    names = ("beacons, plain", "beacons, gate", "walls, plain", "walls, gate")
+    cells = [
+        Cell(i, name, {"configuration": name}, {}, name.partition(", ")[2]) for i, name in enumerate(names)
+    ]
+
+    def value(cell: Cell, trial: int, metric: str) -> float:  # noqa: ARG001
+        middle = centre.get(metric, centre["position_rmse_m"])[cell.index]
+        return float(middle * (1.0 + 0.01 * rng.normal()))
+
+    view = made_up(cells, metrics, value, baseline=None)
+    beacons, walls = all_of(cells[:2], 0, "on beacons"), all_of(cells[2:], 2, "on walls")
+    return with_groups(view, beacons, walls)
+
+
+def test_every_group_answers_for_itself_against_its_own_baseline() -> None:
+    view = four_settings()
+    judged = judge_view(view)
+    headline = answer(view, judged).replace("\u00a0", " ")
+    assert re.search(
+        r"On beacons: least 9\.\d+ mm \(.*\) with plain, most 1[12]\.\d+ mm \(.*\) with gate; on walls: ",
+        headline,
+    )
+    said = {name: " ".join(texts) for name, texts in answers(view, judged)}
+    assert re.search(r"a change by \+(1\.9|2\.0)\d+\smm", said["on beacons"])
+    assert re.search(r"a change by \+39\.\d+\smm", said["on walls"])
+    assert "by NEES, plain: consistent, gate: overconfident" in said["on beacons"]
+    assert "by NEES, plain: consistent, gate: underconfident" in said["on walls"]
+    page = study_page(view)
+    assert "on walls, against plain" in page
+    assert page.count('<table class="cells">') >= 6
+    assert not re.search(r"<td[^>]*>[^<]*\d[eE][+-]?\d", page)
+
+
+def test_settings_of_another_group_are_called_by_their_own_name() -> None:
+    view = four_settings()
+    held = Group("on walls", (2, 3), (0, 1))
+    text = answers(
+        with_groups(view, view.groups[0], held), judge_view(with_groups(view, view.groups[0], held))
+    )
+    assert "against beacons, plain" in dict(text)["on walls"][0]
+    assert "against beacons, gate" in dict(text)["on walls"][0]
+
+
+def test_metrics_of_the_same_trials_are_held_against_each_other() -> None:
+    view = four_settings(("position_rmse_m", "other_m"))
+    other = view.values["position_rmse_m"] + 0.002
+    view = replace(
+        view, values={**view.values, "other_m": other}, contrasts=(("other_m", "position_rmse_m"),)
+    )
+    judged = judge_view(view)
+    found = judged.contrasts["other_m", "position_rmse_m"]
+    assert [round(entry.mean, 9) for entry in found] == [0.002] * 4
+    assert "within each trial" in study_page(view)
+    assert "+2.000\u00a0mm" in " ".join(answers(view, judged)[0][1])
+
+
+def test_a_test_that_is_sure_of_ranks_alone_says_so() -> None:
+    # Most pairs shrink a little, a few grow a lot: the mean is not told from zero.
+    change = np.array([-1.0] * 27 + [9.0] * 3)
+    found = difference(np.zeros(30), change + 1e-3 * np.arange(30))
+    assert found.p_value < 0.05
+    assert found.low < 0.0 < found.high
+    assert verdict(found) == "lower in most trials, not surely in the mean"
+    assert verdict(difference(np.zeros(30), np.full(30, 2.0) + 0.01 * np.arange(30))) == "higher"
+    assert verdict(difference(np.ones(30), np.ones(30))) == "no trial differs"
+
+
+def test_what_ended_early_is_not_called_quick() -> None:
+    cells = [Cell(i, name, {"configuration": name}, {}) for i, name in enumerate(("falls", "arrives"))]
+    view = made_up(cells, ("coverage_visited", "duration_s"), lambda c, t, _: 10.0 + 5 * c.index + 0.1 * t, 0)
+    view = replace(view, lower_is_better=False)
+    assert "<b>10.95" in study_page(view)  # all succeed: the shorter duration is the better one
+    failing = replace(view, values={**view.values, "success": np.where(view.cell == 0, 0.0, 1.0)})
+    page = study_page(failing)
+    assert "<b>10.95" not in page
+    assert "<summary>success [percentage points]" in page
+
+
+@pytest.mark.parametrize(
+    ("metric", "lower"),
+    [
+        ("position_rmse_narrow_m", True),
+        ("min_clearance_m", False),
+        ("planned_clearance_m", False),
+        ("visited_accuracy", False),
+        ("final_error_x_m", None),
+        ("nees_mean", None),
+        ("a_metric_that_nobody_knows", None),
+    ],
+)
+def test_which_way_a_metric_is_better_is_known_by_its_name(metric: str, lower: bool | None) -> None:
+    assert lower_is_better(metric) is lower
+
+
+def test_consistency_is_judged_only_where_it_is_reported() -> None:
+    view = four_settings()
+    assert 'id="consistency"' in study_page(view)
+    assert 'id="consistency"' not in study_page(replace(view, metrics=("position_rmse_m",)))
+
+
+def test_metrics_that_never_vary_are_left_out_unless_asked_for() -> None:
+    view = four_settings()
+    calm = {**view.values, "collisions": np.zeros(view.row.size)}
+    with_it = replace(view, metrics=(*view.metrics, "collisions"), values=calm)
+    assert view.worth_showing("nees_mean", view.cells)
+    assert with_it.worth_showing("collisions", view.cells)
+    assert not replace(with_it, asked=False).worth_showing("collisions", view.cells)
+
+
+def test_one_setting_that_gave_something_is_not_the_lowest_and_the_highest() -> None:
+    view = two_settings(-0.5)
+    keep = view.cell == 0
+    values = {name: column[keep] for name, column in view.values.items()}
+    alone = replace(
+        view,
+        row=view.row[keep],
+        cell=view.cell[keep],
+        trial=view.trial[keep],
+        seed=view.seed[keep],
+        values=values,
+    )
+    alone = with_groups(alone, Group("", (0, 1), (None, None)))
+    assert "the only setting that gave it" in answer_over_a_factor(alone)
+
+
+def answer_over_a_factor(view: StudyView) -> str:
+    cells = tuple(replace(cell, values={"gate": 0.5 + cell.index}) for cell in view.cells)
+    view = replace(view, cells=cells, factors=("gate",))
+    return answer(view, judge_view(view))
+
+
+def test_configurations_are_drawn_over_what_their_settings_amount_to() -> None:
+    pairs = [(m, o) for m in (0.1, 1.0, 10.0) for o in (0.1, 1.0, 10.0)]
+    cells = [
+        Cell(i, f"m {m}, o {o}", {"configuration": f"m {m}, o {o}", "measurement": m, "odometry": o}, {})
+        for i, (m, o) in enumerate(pairs)
+    ]
+    view = made_up(cells, ("position_rmse_m",), lambda c, t, _: 1.0 + c.index + 0.1 * t, 4)
+    lines = lines_over(view, view.cells, "measurement")
+    assert [name for name, _ in lines] == ["odometry 0.1", "odometry 1", "odometry 10"]
+    assert all(len(line) == 3 for _, line in lines)
+    page = study_page(view)
+    assert 'id="factor-measurement"' in page
+    assert 'id="settings"' not in page
 
 
 def test_nothing_finished_yet_is_said() -> None:

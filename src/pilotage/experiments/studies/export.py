@@ -99,4 +99,5 @@ def _record(row: Mapping[str, Any], study: Study) -> dict[str, Any]:
         **({} if cell is None else {f"factor.{name}": value for name, value in cell.values.items()}),
         **flat(row["metrics"]),
         **flat(row["timings"]),
+        "seed": row["seed"],  # a whole number, also where the run's own metrics tell it as another
     }

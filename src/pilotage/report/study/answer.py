@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 from pilotage.evaluation.intervals import Summary
 from pilotage.evaluation.judge import Judgement
 from pilotage.evaluation.paired import Difference
-from pilotage.report.metrics_table import Metric, metric_of
+from pilotage.report.metrics_table import metric_of
 from pilotage.report.study.findings import FEW, facts, rate_text
 from pilotage.report.study.scales import p_value, told
 from pilotage.report.study.view import Cell, Group, StudyView
@@ -77,7 +77,7 @@ def _each(view: StudyView, judgement: Judgement, cell: Cell) -> str:
     """One of a few settings that are held against nothing: how often it succeeds, and its metric."""
     rate = judgement.rates[cell.index]
     summary = judgement.summaries[view.primary][cell.index]
-    succeeds = f"{rate_text(rate)} trials succeed, " if rate.trials else ""
+    succeeds = f"success {rate_text(rate)}, " if rate.trials else ""
     name = metric_of(view.primary).name
     return f"{cell.text}: {succeeds}{name} {_interval(view.primary, summary)} in the mean"
 
@@ -94,22 +94,27 @@ def _in_short(view: StudyView, judgement: Judgement, group: Group) -> str:
         return _interval(view.primary, summaries[best])
     if summaries[best].mean == summaries[worst].mean:
         return f"{_interval(view.primary, summaries[base])} at every setting"
-    told_of = dict.fromkeys((base, best, worst))
-    parts = [
-        f"{_interval(view.primary, summaries[index])} with {view.cells[index].text}" for index in told_of
+    low, high = (best, worst) if view.lower_is_better else (worst, best)
+    parts = (
+        [f"{_interval(view.primary, summaries[base])} with {view.cells[base].text}"] if base != best else []
+    )
+    parts += [
+        f"{word} {_interval(view.primary, summaries[index])} with {view.cells[index].text}"
+        for word, index in (("least", low), ("most", high))
+        if index != base or base == best
     ]
-    return f"{', '.join(parts[:-1])} and {parts[-1]}"
+    return ", ".join(parts)
 
 
 def _group(view: StudyView, judgement: Judgement, group: Group) -> str:
     """A group's settings: where the metric is lowest and highest, and against what."""
-    metric, summaries = metric_of(view.primary), judgement.summaries[view.primary]
+    summaries = judgement.summaries[view.primary]
     lower = view.lower_is_better
     best = best_cell(judgement, view.primary, lower, group.cells)
     worst = best_cell(judgement, view.primary, not lower, group.cells)
     assert best is not None
     assert worst is not None
-    over = f"over {summaries[best].n} trial{'s' if summaries[best].n > 1 else ''}"
+    over = _over([summaries[index].n for index in group.cells])
     if len(group.cells) == 1 and group.baselines[0] is None:
         return f"is {_interval(view.primary, summaries[best])}, mean with its 95 % interval {over}"
     base = group.baseline
@@ -117,6 +122,9 @@ def _group(view: StudyView, judgement: Judgement, group: Group) -> str:
         return _each_against_its_own(view, judgement, group)
     first, last = ("lowest", "highest") if lower else ("highest", "lowest")
     if base is None:
+        if sum(math.isfinite(summaries[index].mean) for index in group.cells) == 1:
+            only = _interval(view.primary, summaries[best])
+            return f"is {only} with {view.cells[best].text}, the only setting that gave it, mean {over}"
         if all(summaries[index].mean == summaries[best].mean for index in group.cells):
             return f"is {_interval(view.primary, summaries[best])} at every setting, mean {over} each"
         return (
@@ -130,7 +138,7 @@ def _group(view: StudyView, judgement: Judgement, group: Group) -> str:
     if changes and all(change.low == change.high == 0.0 for change in changes):
         return f"{start}, and no other setting changes a single one of {changes[0].n} trials"
     parts = [
-        _change(view, judgement, metric, index, word)
+        _change(view, judgement, index, word)
         for index, word in ((best, first), (worst, last))
         if index != base
     ]
@@ -138,10 +146,16 @@ def _group(view: StudyView, judgement: Judgement, group: Group) -> str:
     return "; ".join([start, *([none] if none else []), *parts])
 
 
-def _change(view: StudyView, judgement: Judgement, metric: Metric, index: int, word: str) -> str:
+def _over(counts: Sequence[int]) -> str:
+    """Over how many trials means are taken; settings without any are left out."""
+    few, many = min(count for count in counts if count), max(counts)
+    return f"over {f'{few} to ' if few < many else ''}{many} trial{'s' if many > 1 else ''}"
+
+
+def _change(view: StudyView, judgement: Judgement, index: int, word: str) -> str:
     change = judgement.differences[view.primary][index]
     text = (
-        f"{word} with {view.cells[index].text}, {metric.write(judgement.summaries[view.primary][index].mean)}"
+        f"{word} with {view.cells[index].text}, {_plain(view, judgement.summaries[view.primary][index].mean)}"
     )
     if change is None or change.n == 0:
         return text
@@ -177,6 +191,10 @@ def difference(metric: str, change: Difference) -> str:
 
 def _interval(metric: str, summary: Summary) -> str:
     return told(metric, summary.mean, summary.low, summary.high)
+
+
+def _plain(view: StudyView, value: float) -> str:
+    return told(view.primary, value, math.nan, math.nan)
 
 
 def _sentence(text: str) -> str:

@@ -9,6 +9,7 @@ import numpy as np
 
 from pilotage.report.markup import escape
 from pilotage.report.metrics_table import metric_of
+from pilotage.report.replay.section import SLUG
 from pilotage.report.study.view import StudyView
 
 
@@ -16,7 +17,8 @@ from pilotage.report.study.view import StudyView
 class Example:
     """A trial that was run again for its picture.
 
-    ``link`` is the page of that run, relative to the study's folder; ``svg`` its map.
+    ``link`` is the page of that run, relative to the study's folder, ``replay`` whether it has one; ``svg``
+    its map.
     """
 
     title: str
@@ -25,6 +27,7 @@ class Example:
     link: str
     command: str
     svg: str
+    replay: bool = True
 
 
 def rows_to_show(view: StudyView) -> list[tuple[str, int]]:
@@ -61,8 +64,9 @@ def examples_section(examples: Sequence[Example]) -> str:
         return ""
     parts = []
     for example in examples:
+        replay = f'<a href="{escape(example.link)}#{SLUG}">Replay it</a> · ' if example.replay else ""
         link = (
-            f'<p><a href="{escape(example.link)}">Its report, with a replay</a> · '
+            f'<p>{replay}<a href="{escape(example.link)}">Its report</a> · '
             f"<code>{escape(example.command)}</code></p>"
         )
         parts.append(

@@ -181,9 +181,10 @@ class _Places:
         self._step = 1.0 if self._even else span / (len(self._values) - 1)
 
     def prepare(self, axes: Axes) -> None:
-        """Give the axis its scale and its ticks."""
+        """Give the axis its scale, its ends and its ticks; settings without a trial keep their place."""
         if self._log:
             set_log(axes, "x")
+        axes.set_xlim(self.of(self._values[0], -0.4), self.of(self._values[-1], 0.4))
         if self._even or (self._log and len(self._values) <= MOST_TICKS):
             at = [self.of(value, 0.0) for value in self._values]
             axes.set_xticks(at, [f"{value:g}" for value in self._values])

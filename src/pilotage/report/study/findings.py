@@ -33,7 +33,7 @@ def _success(view: StudyView, judgement: Judgement, group: Group) -> str:
     if not rated:
         return ""
     if len(rated) <= FEW:
-        return f"Success: {'; '.join(f'{cell.text} {rate_text(rate)}' for cell, rate in rated)}."
+        return f"Success: {'; '.join(f'{cell.text}: {rate_text(rate)}' for cell, rate in rated)}."
     good, all_of_them = sum(rate.successes for _, rate in rated), sum(rate.trials for _, rate in rated)
     if good in (0, all_of_them):
         return f"Success: {'all' if good else 'none'} of the {all_of_them} trials."
@@ -61,7 +61,7 @@ def _contrasts(view: StudyView, judgement: Judgement, group: Group) -> list[str]
                 for name in (first, other)
             ]
             by = told(first, change.mean, change.low, change.high, signed=True)
-            parts.append(f"{cell.text} {means[0]} against {means[1]}, {by}, {how}, {change.n} trials")
+            parts.append(f"{cell.text}: {means[0]} against {means[1]}, {by}, {how}, {change.n} trials")
         if parts:
             out.append(
                 f"{metric_of(first).name} against {metric_of(other).name}, in the same trials: "
@@ -83,12 +83,12 @@ def _consistency(view: StudyView, group: Group) -> str:
         if not known:
             continue
         if len(known) <= FEW:
-            text = ", ".join(f"{name} {verdict}" for name, verdict in known.items())
+            text = ", ".join(f"{name}: {verdict}" for name, verdict in known.items())
         else:
             text = ", ".join(
                 f"{number} {verdict}" for verdict, number in Counter(known.values()).most_common()
             )
-        parts.append(f"by {NAMES[metric]} {text}")
+        parts.append(f"by {NAMES[metric]}, {text}")
     return f"Consistency of the settings: {'; '.join(parts)}." if parts else ""
 
 

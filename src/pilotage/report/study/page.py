@@ -21,7 +21,6 @@ from pilotage.report.study.tables import (
     cells_table,
     consistency_table,
     failures_table,
-    lower_is_better,
 )
 from pilotage.report.study.view import StudyView
 from pilotage.report.style import drawing_style
@@ -34,14 +33,13 @@ def study_page(
 ) -> str:
     """Return the page of a study as HTML; ``ranking`` is an attribution's, with the oracles' texts."""
     judgement = judge_view(view)
-    lower = lower_is_better(view.metrics) | {view.primary: view.lower_is_better}
     with drawing_style():
         figures = [*settings_figures(view, judgement), *factor_figures(view, judgement)]
     sections = [
         ("ranking", "What each module costs", "" if ranking is None else ranking_table(ranking)),
         ("findings", "What it says", _findings(view, judgement)),
         *((f.slug, f.title, figure_section(number, f)) for number, f in enumerate(figures, start=1)),
-        ("cells", "Every setting", cells_table(view, judgement, lower)),
+        ("cells", "Every setting", cells_table(view, judgement)),
         ("comparisons", "Comparisons", comparisons_table(view, judgement)),
         ("consistency", "Consistency", consistency_table(view)),
         ("trials", "The median and the worst trial", examples_section(examples)),

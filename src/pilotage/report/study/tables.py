@@ -12,35 +12,32 @@ from pilotage.report import quantities
 from pilotage.report.markup import escape
 from pilotage.report.metrics_table import metric_of
 from pilotage.report.study.answer import best_cell
+from pilotage.report.study.better import UNTIL_THE_END, lower_is_better
 from pilotage.report.study.findings import NAMES
 from pilotage.report.study.scales import Scale, scale_of
 from pilotage.report.study.view import Cell, Group, StudyView
 
-LOWER_IS_BETTER = ("_m", "_rad", "_s", "smoothness", "collisions", "replans", "attempts", "escapes")
-IDEAL = ("nees", "nis")
-"""Best where they are near their ideal value, which a mean alone does not tell."""
 
-
-def cells_table(view: StudyView, judgement: Judgement, lower: dict[str, bool]) -> str:
+def cells_table(view: StudyView, judgement: Judgement) -> str:
     """Mean and interval of each metric in each setting, beside what was published; all numbers folded."""
-    parts = [_group_table(view, judgement, lower, group) for group in view.groups]
+    parts = [_group_table(view, judgement, group) for group in view.groups]
     published = any(cell.published for cell in view.cells)
     return (
         '<section id="cells"><h2><a href="#cells">Every setting</a></h2>'
-        "<p>Means over the trials; below each its 95 % bootstrap interval"
-        f"{', and what was published' if published else ''}. The best mean of a column is bold. Success with "
-        f"its 95 % Wilson interval.</p>{''.join(parts)}</section>"
+        "<p>Means over the trials; below each its 95 % bootstrap interval, the variance in the square of the "
+        f"column&#x27;s unit{', and what was published' if published else ''}. The best mean of a column is "
+        f"bold. Success with its 95 % Wilson interval.</p>{''.join(parts)}</section>"
     )
 
 
-def _group_table(view: StudyView, judgement: Judgement, lower: dict[str, bool], group: Group) -> str:
+def _group_table(view: StudyView, judgement: Judgement, group: Group) -> str:
     given = [m for m in view.metrics if any(judgement.summaries[m][i].n for i in group.cells)]
     metrics = [m for m in given if view.worth_showing(m, view.members(group))]
     scales = {m: _scale(judgement, m, view.members(group)) for m in metrics}
     best = {
-        m: best_cell(judgement, m, lower[m], group.cells)
+        m: best_cell(judgement, m, lower, group.cells)
         for m in metrics
-        if not m.startswith(IDEAL) and _differ(judgement, m, group)
+        if (lower := _lower(view, judgement, m, group)) is not None and _differ(judgement, m, group)
     }
     head = "".join(
         f'<th scope="col" class="value">{escape(metric_of(m).name)}{scales[m].label}</th>' for m in metrics
@@ -74,6 +71,7 @@ def _entry(summary: Summary, scale: Scale, best: bool, published: float | None) 
     lines = []
     if math.isfinite(summary.low):
         lines.append(f"{scale.write(summary.low, digits)} to {scale.write(summary.high, digits)}")
+        lines.append(f"variance {scale.write_variance(summary.variance)}")
     if published is not None:
         lines.append(f"published {quantities.significant(published * scale.times, 4)}")
     small = "".join(f"<br><span class='range'>{escape(line)}</span>" for line in lines)
@@ -171,6 +169,16 @@ def _scale(judgement: Judgement, metric: str, cells: Sequence[Cell]) -> Scale:
     return scale_of(metric, [judgement.summaries[metric][cell.index].mean for cell in cells])
 
 
+def _lower(view: StudyView, judgement: Judgement, metric: str, group: Group) -> bool | None:
+    """Whether less of a metric is better in a group; None where neither is."""
+    if metric == view.primary:
+        return view.lower_is_better
+    rates = [judgement.rates[index] for index in group.cells]
+    if metric in UNTIL_THE_END and any(rate.successes < rate.trials for rate in rates):
+        return None  # a trial that broke off early was not quick
+    return lower_is_better(metric)
+
+
 def _differ(judgement: Judgement, metric: str, group: Group) -> bool:
     means = [judgement.summaries[metric][index].mean for index in group.cells]
     finite = [mean for mean in means if math.isfinite(mean)]
@@ -184,8 +192,3 @@ def _rate(rate: Rate) -> str:
         f"{rate.successes}/{rate.trials}<br><span class='range'>{100.0 * rate.low:.0f} to "
         f"{100.0 * rate.high:.0f}&nbsp;%</span>"
     )
-
-
-def lower_is_better(metrics: Sequence[str]) -> dict[str, bool]:
-    """Which way is better, by the metric's name: errors, lengths and times down, all else up."""
-    return {name: name.endswith(LOWER_IS_BETTER) for name in metrics}

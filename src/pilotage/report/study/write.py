@@ -19,10 +19,10 @@ from pilotage.experiments.studies.table import StudyTable, read_study
 from pilotage.report.page import FIGURES, FLOOR_FIGURES
 from pilotage.report.page import write_report as write_run_report
 from pilotage.report.run_folder import read_run
+from pilotage.report.study.better import lower_is_better
 from pilotage.report.study.examples import Example, describe, rows_to_show
 from pilotage.report.study.page import write_page
 from pilotage.report.study.scales import key_and_unit
-from pilotage.report.study.tables import lower_is_better
 from pilotage.report.study.view import Cell, Failure, Group, StudyView
 from pilotage.report.style import drawing_style
 
@@ -70,7 +70,7 @@ def view_of(table: StudyTable) -> StudyView:
         factors=definition.factor_names,
         metrics=table.metrics,
         primary=table.primary,
-        lower_is_better=lower_is_better((table.primary,))[table.primary]
+        lower_is_better=lower_is_better(table.primary) is not False
         if definition.lower_is_better is None
         else definition.lower_is_better,
         asked=bool(definition.metrics),
@@ -153,4 +153,5 @@ def _example(table: StudyTable, view: StudyView, title: str, row: int) -> Exampl
         picture.svg.replace(f'"{picture.slug}-', f'"row{row}-{picture.slug}-').replace(
             f"#{picture.slug}-", f"#row{row}-{picture.slug}-"
         ),
+        "replay-player" in page.read_text("utf-8"),
     )
