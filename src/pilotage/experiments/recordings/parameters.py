@@ -6,6 +6,7 @@ import math
 from importlib import resources
 from typing import Any
 
+import numpy as np
 import yaml
 
 from pilotage.experiments.recordings.drive import BEACONS, RecordedDrive
@@ -48,6 +49,10 @@ def _by_data_sheet(drive: RecordedDrive, common: dict[str, Any]) -> dict[str, An
         nothing = ("distance_var_m2_per_m", "angle_var_rad2_per_m", "angle_var_rad2_per_rad")
         own["odometry"] = dict.fromkeys(nothing, 0.0)
         own |= {"distance_var_m2_per_s": distance, "angle_var_rad2_per_s": angle}
+    # What is not logged is motion of the usual kind.
+    moved, turned, dt = (x[1:] for x in (drive.distance_m, drive.angle_rad, np.diff(drive.t_s, prepend=0.0)))
+    own["unlogged_speed_m_s"] = float(np.sqrt(np.nanmean((moved / dt) ** 2)))
+    own["unlogged_turn_rate_rad_s"] = float(np.sqrt(np.nanmean((turned / dt) ** 2)))
     return merge(common, own)
 
 

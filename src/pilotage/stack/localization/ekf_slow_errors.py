@@ -5,9 +5,10 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from pilotage.core.chi_square import chi_square_quantile, gated_mean
 from pilotage.core.config import Config
@@ -114,11 +115,24 @@ class EkfSlowErrorsConfig(Config):
     unlogged_speed_m_s: NonNegative = 0.05
     unlogged_turn_rate_rad_s: NonNegative = 0.2
     """Standard deviations of what the robot may do while its odometry says nothing."""
-    recovery_rejections: int = Field(default=5, ge=2)
+    recovery_rejections: int = Field(default=3, ge=2)
     """So many more rejections than acceptances say that the filter is wrong, not the sensor."""
     recovery_factor: float = Field(default=2.0, gt=1.0)
     recovery_position_std_m: NonNegative = 0.1
     recovery_heading_std_rad: NonNegative = 0.1
+
+    @model_validator(mode="before")
+    @classmethod
+    def _only_what_is_said_changes(cls, values: Any) -> Any:
+        """An error of which only some fields are given keeps the others of its own default."""
+        if not isinstance(values, Mapping):
+            return values
+        filled = dict(values)
+        for name, field in cls.model_fields.items():
+            given = filled.get(name)
+            if isinstance(field.default, SlowError) and isinstance(given, Mapping):
+                filled[name] = {**field.default.model_dump(), **given}
+        return filled
 
 
 @LOCALIZERS.add(NAME, EkfSlowErrorsConfig)
