@@ -130,3 +130,14 @@ def test_commands_that_were_not_logged_are_motion_that_is_not_known(tmp_path: Pa
         for one in localized(tmp_path / f"{len(blind)}", events, 6):
             assert one.metrics["odometry_gaps"] == 1
             assert one.number("nees_mean") <= 6.0
+
+
+def test_a_minute_of_unlogged_motion_ends_with_a_pose_found_anew(tmp_path: Path) -> None:
+    """The heading is as good as unknown then: the next landmarks are laid over the map instead."""
+    gap = ((150.0, 210.0),)
+    events = Events(duration_s=400.0, odometry_gaps_s=gap, blind_s=gap)
+    for one in localized(tmp_path, events, 7):
+        assert one.number("nees_mean") <= 6.0
+        later = one.error_m[one.t_s > 300.0]
+        assert np.mean(later <= BACK_M) >= 0.75
+        assert later.max() <= 0.6

@@ -25,9 +25,13 @@ from pilotage.stack.knowledge import Knowledge
 from pilotage.stack.localization.landmark_filter import MEASUREMENT_DOF
 from pilotage.stack.localization.localizer import LOCALIZERS, require_initial_pose
 from pilotage.stack.localization.odometry_prediction import OdometryNoise, OdometryPrediction
+from pilotage.stack.localization.recent_sightings import RecentSightings
 
 NAME = "ekf-slow-errors"
 
+TYPICAL_RANGE_M = 3.0
+NO_HEADING_VAR = math.pi**2 / 3.0
+"""Of a heading of which nothing is known."""
 TELEMETRY = {
     "speed_error": slow_errors.SPEED,
     "turn_error": slow_errors.TURN,
@@ -115,6 +119,8 @@ class EkfSlowErrorsConfig(Config):
     unlogged_speed_m_s: NonNegative = 0.05
     unlogged_turn_rate_rad_s: NonNegative = 0.2
     """Standard deviations of what the robot may do while its odometry says nothing."""
+    fix_heading_std_rad: float = Field(default=0.8, gt=0.0)
+    """Beyond this the slopes mean nothing: the pose is fitted anew to the landmarks of the last seconds."""
     recovery_rejections: int = Field(default=3, ge=2)
     """So many more rejections than acceptances say that the filter is wrong, not the sensor."""
     recovery_factor: float = Field(default=2.0, gt=1.0)
@@ -200,6 +206,7 @@ class EkfSlowErrorsLocalizer:
         self._floor: FloatArray = np.array(floor) ** 2
         self._pending: deque[tuple[float, float, float, float]] = deque()
         self._unlogged_s = 0.0
+        self._recent = RecentSightings()
         self._t_s: float | None = None
         self._dt_s = knowledge.dt_s
         self._motion = np.zeros(2)
@@ -250,12 +257,13 @@ class EkfSlowErrorsLocalizer:
         Its place then has the variance (speed t)^2, which grows by speed^2 (2 t + dt) dt.
         """
         self._predict(0.0, 0.0, dt_s)
+        self._recent.forget()
         growth = (2.0 * self._unlogged_s + dt_s) * dt_s
         self._unlogged_s += dt_s
         place = self._config.unlogged_speed_m_s**2 * growth
-        slow_errors.inflate(
-            self._cov, 1.0, np.array([place, place, self._config.unlogged_turn_rate_rad_s**2 * growth])
-        )
+        heading = self._config.unlogged_turn_rate_rad_s**2 * growth
+        heading = min(heading, max(NO_HEADING_VAR - self._cov[2, 2], 0.0))
+        slow_errors.inflate(self._cov, 1.0, np.array([place, place, heading]))
 
     def _predict(self, distance: float, angle: float, dt_s: float) -> None:
         if dt_s <= 0.0:
@@ -278,11 +286,17 @@ class EkfSlowErrorsLocalizer:
             self._stationary,
         )
         state = self._state
+        self._recent.move(moved, turned, self._t_s or 0.0)
         self._motion[0] = moved / dt_s * (1.0 + state[slow_errors.SPEED]) + state[slow_errors.SPEED_OFFSET]
         self._motion[1] = turned / dt_s * (1.0 + state[slow_errors.TURN]) + state[slow_errors.TURN_OFFSET]
 
     def _update(self, seen: BeaconReadings) -> None:
         config, count = self._config, seen.ids.shape[0]
+        self._remember(seen)
+        if self._cov[2, 2] > config.fix_heading_std_rad**2:
+            self._begin_anew(least_landmarks=2)
+            self._count(count, 0, 0.0)
+            return
         nis, outcome = np.empty(count), np.empty(count, dtype=np.int64)
         used = slow_errors.update_range_bearings(
             self._state,
@@ -310,7 +324,39 @@ class EkfSlowErrorsLocalizer:
             slow_errors.inflate(self._cov, config.recovery_factor, self._floor)
             self._rejections = 0
             self.recoveries += 1
+            # Three landmarks that agree on a place have a word against the filter; two may be mistaken.
+            self._begin_anew(least_landmarks=3)
         self._count(count, used, float(nis[outcome == slow_errors.OUTCOME_ACCEPTED].sum()))
+
+    def _remember(self, seen: BeaconReadings) -> None:
+        config = self._config
+        for landmark, range_m, bearing in zip(seen.ids, seen.ranges_m, seen.bearings_rad, strict=True):
+            row = int(np.searchsorted(self._ids, landmark))
+            if row < self._ids.shape[0] and self._ids[row] == landmark:
+                reading = slow_errors.range_of_depth(
+                    range_m / config.range_scale, bearing, config.depth_power
+                )
+                self._recent.add(self._t_s or 0.0, row, reading, bearing, self._mount)
+
+    def _begin_anew(self, least_landmarks: int) -> None:
+        """Take the pose that the last seconds' landmarks agree on; the slow errors stay as believed."""
+        fix = self._recent.fix(self._points, self._reading_cov(), least_landmarks)
+        if fix is None or fix.chi2 > chi_square_quantile(self._config.gate, fix.dof):
+            return
+        self._state[:3] = fix.pose
+        self._cov[:3, :], self._cov[:, :3] = 0.0, 0.0
+        self._cov[:3, :3] = fix.cov
+        self._rejections = 0
+        self._recent.forget()
+
+    def _reading_cov(self) -> FloatArray:
+        """(2, 2) of range and bearing at `TYPICAL_RANGE_M`, white and slow together."""
+        r2 = TYPICAL_RANGE_M**2
+        white, scales, slow = self._white, self._scales**2, self._stationary
+        along = white[0] + scales[1] + slow[slow_errors.OFFSET]
+        along += (white[1] + scales[0] + slow[slow_errors.SCALE]) * r2
+        across = white[2] + scales[2] + slow[slow_errors.BEARING] + (white[3] + scales[3]) / r2
+        return np.diag([along, across])
 
     def _count(self, seen: int, accepted: int, nis: float) -> None:
         self._telemetry = {
