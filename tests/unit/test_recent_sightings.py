@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from pilotage.core.angles import wrap_to_pi
-from pilotage.stack.localization.ekf_slow_errors import EkfSlowErrorsConfig
 from pilotage.stack.localization.recent_sightings import WINDOW_S, RecentSightings
+from pilotage.stack.localization.slow_errors_config import EkfSlowErrorsConfig
 
 POINTS = np.array([[3.0, 1.0], [1.0, 4.0], [-2.0, 2.0], [4.0, -3.0]])
 MOUNT = np.array([0.2, -0.1, 0.3])
