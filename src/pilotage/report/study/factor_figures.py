@@ -65,6 +65,7 @@ def lines_over(view: StudyView, cells: Sequence[Cell], factor: str) -> list[Line
     for cell in numeric:
         groups[tuple(cell.values.get(f) for f in others)].append(cell)
     kept = {key: line for key, line in groups.items() if len({c.values[factor] for c in line}) > 1}
+    kept = dict(sorted(kept.items(), key=lambda entry: [v if _is_number(v) else 0.0 for v in entry[0]]))
     differing = [i for i in range(len(others)) if len({key[i] for key in kept}) > 1]
     if len(kept) == 1:
         return [("mean with its 95 % interval", next(iter(kept.values())))]
