@@ -19,6 +19,7 @@ from pilotage.stack.exploration.explorer import EXPLORERS, LeftCell
 from pilotage.stack.exploration.frontier_config import FrontierConfig
 from pilotage.stack.exploration.frontier_inspections import Inspections
 from pilotage.stack.exploration.frontier_reasons import reasons, summary
+from pilotage.stack.exploration.frontier_retreat import is_walled_in, trail_back
 from pilotage.stack.exploration.frontier_returns import Look, best_look
 from pilotage.stack.exploration.frontier_senses import Senses
 from pilotage.stack.exploration.sheet_features import cell_map, line_cells, obstacle_cells, tape_ends
@@ -40,6 +41,8 @@ CAUTION_ROOM_M = 0.022
 REVIEW_DEPTH_M = 0.008
 SHALLOW_M = 0.004
 BACK_SPEED_M_S, BACK_S, BACK_ROOM_M = 0.035, 0.5, 0.006
+RETREATS = 5
+"""How often, at most, it leaves a place that its map has closed."""
 PENALTY_M = 0.5
 """What one failed try makes a goal dearer."""
 
@@ -87,7 +90,7 @@ class FrontierExplorer:
         self._stands: FloatArray | None = None
         self._map_is_old = True
         self._reviews = 0
-        self._looks = self._stops = 0
+        self._looks = self._stops = self._retreats = 0
         self._inspections = Inspections(config.tape_end_m, config.inspections)
         self._left: tuple[LeftCell, ...] = ()
         self._status, self._reason = StackStatus.RUNNING, ""
@@ -390,6 +393,8 @@ class FrontierExplorer:
             self._refresh_room()
             cost, parent = self._room.costs(x, y)
             found = self._choose(pose, cost, parent, t_s)
+        if not found and self._retreat(cost, t_s):
+            return
         if found:
             missed = int((~self._settled() & (self._stands_room() >= self._config.room_m)).sum())
             self._events.append(Event(t_s, "review", f"the whole run smoothed; {missed} cells to see again"))
@@ -406,6 +411,18 @@ class FrontierExplorer:
         count = int(self.visited.sum())
         self._reason = f"done: {count} cells visited, {len(self._left)} left ({summary(self._left)})"
         self._events.append(Event(t_s, "arrived", self._reason))
+
+    def _retreat(self, cost: FloatArray, t_s: float) -> bool:
+        """Set out back along the trail where the map closes the robot in; False where it does not."""
+        way = trail_back(self._smoother.keyframes.poses[: self._smoother.keyframes.count])
+        if self._retreats >= RETREATS or not way or not is_walled_in(self._room, cost, self.visited):
+            return False
+        self._retreats += 1
+        self._events.append(Event(t_s, "retreat", "the map leaves no way out: back along its own trail"))
+        self._doing = Doing.LOOK
+        self._driver.follow(way, t_s, slow_at_end=True)
+        self._driver.is_careful = True
+        return True
 
     def _stands_room(self) -> FloatArray:
         assert self._stands is not None
