@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
 import os
 import shutil
@@ -160,6 +161,34 @@ def test_every_trial_failed_is_still_a_study_with_a_page(
     sweep = ["sweep", "museum-plan", "--vary", "stack.planner.turning_radius_m=0.3,0.5", "--trials", "1"]
     assert main([*sweep, "--name", "x", "--workers", "1"]) == 1
     assert "ZeroDivisionError: a bug" in (tmp_path / "studies/x/report.html").read_text(encoding="utf-8")
+
+
+class LostClient:
+    """A Dask client whose scheduler is gone: it raises what the real one does, not even an Exception."""
+
+    def nthreads(self) -> dict[str, int]:
+        raise asyncio.CancelledError("scheduler-connection-lost")
+
+    def submit(self, *_: Any, **__: Any) -> None:
+        raise RuntimeError("Cannot schedule new futures after shutdown")
+
+    def cancel(self, *_: Any) -> None:
+        raise AssertionError("there is nobody to cancel anything")
+
+    def close(self) -> None:
+        raise OSError("closed")
+
+
+def test_a_cluster_that_is_lost_stops_the_study(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    distributed = pytest.importorskip("distributed", reason="needs the extra cluster")
+    monkeypatch.setattr(distributed, "Client", lambda *_, **__: LostClient())
+    sweep = ["sweep", "museum-plan", "--vary", "stack.planner.turning_radius_m=0.3", "--trials", "1"]
+    assert main([*sweep, "--name", "x", "--out", str(tmp_path), "--dask", "tcp://host:1", "--quiet"]) == 1
+    (line,) = capsys.readouterr().err.splitlines()
+    assert "--dask tcp://host:1: the cluster is lost (scheduler-connection-lost); go on with --resume" in line
+    assert rows_of(tmp_path / "x")[0]["status"] == "pending"
 
 
 # --- signals ----------------------------------------------------------------------------------------
