@@ -24,7 +24,7 @@ def work(pipe: Connection, base: Mapping[str, Any]) -> None:
     """In the place of a worker's life: the same, with trials that obey the orders."""
     if "unborn" in os.environ[ORDERS]:
         os._exit(7)
-    trial.measured = instead  # type: ignore[assignment]
+    trial.measured = instead
     local_workers._work(pipe, base)
 
 
@@ -47,8 +47,6 @@ def misbehave(how: str) -> None:
         os.kill(os.getpid(), signal.SIGKILL)
     elif how == "segv":
         ctypes.string_at(0)
-    elif how == "exit":
-        os._exit(3)
     elif how == "sysexit":
         sys.exit(4)
     elif how == "memory":

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import asyncio
 import functools
 import json
+import logging
 import time
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from typing import Any
 
 from pilotage.core.errors import InputError
+from pilotage.experiments.studies.database import StudyStoppedError
 from pilotage.experiments.studies.trial import Outcome, Task, TrialRunner
 from pilotage.experiments.studies.workers import AHEAD, WAIT_S, Running
 
@@ -24,6 +27,8 @@ class DaskWorkers:
     ------
     InputError
         Where the extra is not installed or nobody answers at the address.
+    StudyStoppedError
+        From the methods, where the cluster is lost.
     """
 
     def __init__(self, base: Mapping[str, Any], address: str) -> None:
@@ -33,23 +38,28 @@ class DaskWorkers:
             raise InputError(
                 "--dask: expected the extra 'cluster'; pip install 'pilotage[cluster]'"
             ) from None
+        # A cluster that is lost is told in one line, not at length.
+        logging.getLogger("distributed.client").setLevel(logging.CRITICAL)
         try:
             connect: Any = distributed.Client
             self._client: Any = connect(address, timeout=CONNECT_S, set_as_default=False)
         except (OSError, ValueError, TimeoutError) as error:
             raise InputError(f"--dask {address}: expected a scheduler there, found: {error}") from None
+        self._address, self._is_lost = address, False
         self._base = json.dumps(dict(base))
         self._futures: dict[Any, Task] = {}
 
     @property
     def room(self) -> int:
         """Two tasks for each thread of the cluster."""
-        threads = int(sum(self._client.nthreads().values()))
+        with self._in_touch():
+            threads = int(sum(self._client.nthreads().values()))
         return max(0, AHEAD * max(1, threads) - len(self._futures))
 
     def give(self, task: Task) -> None:
         """Submit one task; every submission is run, whatever was computed before."""
-        future = self._client.submit(run_on_cluster, self._base, task, pure=False, retries=0)
+        with self._in_touch():
+            future = self._client.submit(run_on_cluster, self._base, task, pure=False, retries=0)
         self._futures[future] = task
 
     def outcomes(self) -> Iterator[Outcome]:
@@ -62,14 +72,29 @@ class DaskWorkers:
             time.sleep(POLL_S)
         for future in ready:
             task = self._futures.pop(future)
-            error = future.exception()
-            if error is None:
-                yield future.result()
+            if future.cancelled():  # by nobody here: its scheduler does not answer any more
+                raise self._lost("it does not answer")
+            with self._in_touch():
+                error = future.exception()
+                outcome: Outcome | None = future.result() if error is None else None
+            if outcome is not None:
+                yield outcome
             else:
                 words = " ".join(str(error).split())
                 yield Outcome(
                     task.row, {}, {}, f"its worker died ({type(error).__name__}: {words})", retry=True
                 )
+
+    @contextmanager
+    def _in_touch(self) -> Iterator[None]:
+        try:
+            yield
+        except (Exception, asyncio.CancelledError) as error:
+            raise self._lost(" ".join(str(error).split()) or type(error).__name__) from None
+
+    def _lost(self, why: str) -> StudyStoppedError:
+        self._is_lost = True
+        return StudyStoppedError(f"--dask {self._address}: the cluster is lost ({why}); go on with --resume")
 
     def running(self) -> Sequence[Running]:
         """Not known from here: the cluster's own pages tell."""
@@ -77,8 +102,9 @@ class DaskWorkers:
 
     def stop(self) -> None:
         """Cancel what is left; a scheduler that is gone has nothing to cancel."""
-        with suppress(Exception):
-            self._client.cancel(list(self._futures))
+        if not self._is_lost:
+            with suppress(Exception):
+                self._client.cancel(list(self._futures))
         self._futures.clear()
         with suppress(Exception):
             self._client.close()

@@ -138,7 +138,7 @@ def _loop(
     began = heard = time.monotonic()
     shown, finished, longest_s = 0.0, 0, 0.0
     held: set[int] = set()
-    told: set[int] = set()
+    told: set[tuple[int, int]] = set()
     checked = False
     while True:
         for task in store.claim(crew.room) if crew.room else ():
@@ -164,8 +164,8 @@ def _loop(
             store.hear()
             heard = now
             for trial in crew.running():
-                if trial.seconds > max(LONG_S, LONG_TIMES * longest_s) and trial.row not in told:
-                    told.add(trial.row)
+                if trial.seconds > max(LONG_S, LONG_TIMES * longest_s) and (trial.row, trial.pid) not in told:
+                    told.add((trial.row, trial.pid))
                     tell(
                         f"row {trial.row} has run for {trial.seconds:.0f} s; where it hangs, "
                         f"'kill -9 {trial.pid}' gives it up"

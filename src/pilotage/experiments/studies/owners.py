@@ -10,6 +10,9 @@ import time
 STALE_S = 30.0
 """An owner that has not been heard of for so long is gone; one on this machine as soon as its process is."""
 
+ENDED: set[str] = set()
+"""Owners in this very process that could not say good-bye, as on a full disk."""
+
 
 def hear(database: sqlite3.Connection, owner: str) -> None:
     """Say that ``owner`` lives, and free what those that are gone had claimed."""
@@ -18,7 +21,7 @@ def hear(database: sqlite3.Connection, owner: str) -> None:
         (owner, socket.gethostname(), os.getpid(), time.time()),
     )
     for other, host, pid, heard_s in database.execute("select * from owners").fetchall():
-        if other != owner and is_gone(host, pid, heard_s):
+        if other in ENDED or (other != owner and is_gone(host, pid, heard_s)):
             # Killed with its process says nothing against a trial: it does not count as a try.
             database.execute(
                 "update trials set status = 'pending', owner = null, attempts = max(attempts - 1, 0) "

@@ -30,7 +30,7 @@ from pilotage.experiments.studies.database import (
     put_in_place,
     telling,
 )
-from pilotage.experiments.studies.owners import hear, others
+from pilotage.experiments.studies.owners import ENDED, hear, others
 from pilotage.experiments.studies.rows import flat, read_rows
 from pilotage.experiments.studies.study import STUDY_FILE, Study, changes_told
 from pilotage.experiments.studies.trial import Outcome, Task
@@ -101,6 +101,7 @@ class Store:
 
     def close(self) -> None:
         """Give back what this process has claimed."""
+        ENDED.add(self._owner)
         try:
             with telling(self.path), self._transaction():
                 self._db.execute(
