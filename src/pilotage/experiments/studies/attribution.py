@@ -51,9 +51,10 @@ def attribution_study(mission: str, overrides: Sequence[str], trials: int) -> St
     configurations: list[dict[str, Any]] = [{"name": BASELINE, "set": {"run.oracles": []}}]
     configurations += [{"name": f"{ORACLE}{name}", "set": {"run.oracles": [name]}} for name in oracles]
     primary = next(iter(costs))
+    changed = f" (with {', '.join(overrides)})" if overrides else ""
     values: dict[str, Any] = {
         "study": _name(mission, overrides),
-        "question": f"What does each module of '{Path(mission).stem}' cost, beside one that knows all?",
+        "question": f"What does each module of '{Path(mission).stem}'{changed} cost, beside one that knows all?",
         "mission": mission,
         "set": settings_of(overrides),
         "configurations": configurations,
