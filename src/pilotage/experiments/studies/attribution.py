@@ -50,11 +50,11 @@ def attribution_study(mission: str, overrides: Sequence[str], trials: int) -> St
         raise InputError(f"attribute '{mission}': expected a mission with modules that an oracle can replace")
     configurations: list[dict[str, Any]] = [{"name": BASELINE, "set": {"run.oracles": []}}]
     configurations += [{"name": f"{ORACLE}{name}", "set": {"run.oracles": [name]}} for name in oracles]
-    primary = next(iter(costs))
+    primary, named = next(iter(costs)), Path(mission).stem
     changed = f" (with {', '.join(overrides)})" if overrides else ""
     values: dict[str, Any] = {
         "study": _name(mission, overrides),
-        "question": f"What does each module of '{Path(mission).stem}'{changed} cost, beside one that knows all?",
+        "question": f"What does each module of '{named}'{changed} cost, beside one that knows all?",
         "mission": mission,
         "set": settings_of(overrides),
         "configurations": configurations,
