@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from pilotage.cli.options import Json, Overrides
+from pilotage.cli.options import Json, Overrides, parse_out
 from pilotage.cli.output import print_json, stdout_for_json
 from pilotage.cli.stopped import INTERRUPTED, TERMINATED, Terminated
 from pilotage.core.errors import InputError
@@ -30,7 +30,8 @@ Dask = Annotated[
 ]
 Resume = Annotated[bool, typer.Option("--resume", help="Go on with a study that was begun before.")]
 Studies = Annotated[
-    Path, typer.Option("--out", metavar="DIR", help="Folder that the study's folder is made in.")
+    Path,
+    typer.Option("--out", metavar="DIR", parser=parse_out, help="Folder that the study's folder is made in."),
 ]
 Report = Annotated[bool, typer.Option(help="Write report.html into the study's folder.")]
 Quiet = Annotated[bool, typer.Option("--quiet", help="Show neither progress nor summary.")]
