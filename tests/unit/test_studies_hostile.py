@@ -160,7 +160,11 @@ def test_every_trial_failed_is_still_a_study_with_a_page(
     monkeypatch.chdir(tmp_path)
     sweep = ["sweep", "museum-plan", "--vary", "stack.planner.turning_radius_m=0.3,0.5", "--trials", "1"]
     assert main([*sweep, "--name", "x", "--workers", "1"]) == 1
-    assert "ZeroDivisionError: a bug" in (tmp_path / "studies/x/report.html").read_text(encoding="utf-8")
+    page = tmp_path / "studies/x/report.html"
+    assert "ZeroDivisionError: a bug" in page.read_text(encoding="utf-8")
+    page.unlink()
+    assert main(["report", "studies/x"]) == 0
+    assert page.is_file()
 
 
 class LostClient:
