@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import random
 import signal
 import sqlite3
 import subprocess
@@ -103,8 +104,8 @@ def test_a_row_can_be_run_again_bit_equal(undisturbed: Path) -> None:
 
 
 def test_killed_again_and_again_it_ends_as_if_nothing_had_been(undisturbed: Path, tmp_path: Path) -> None:
-    """SIGKILL at changing moments; the last process is left to finish."""
-    folder = tmp_path / "killed"
+    """SIGKILL to parent and workers while rows come in; the last process is left to finish."""
+    folder, rng = tmp_path / "killed", random.Random(6)
     tests = Path(__file__).parents[1]
     script = (
         f"import sys; from pathlib import Path; sys.path.insert(0, {str(tests)!r})\n"
@@ -112,13 +113,29 @@ def test_killed_again_and_again_it_ends_as_if_nothing_had_been(undisturbed: Path
         "from pilotage.experiments.studies.engine import run_study\n"
         f"if __name__ == '__main__': run_study(small(), Path({str(folder)!r}), workers=2, resume=True)\n"
     )
-    for pause_s in (0.9, 2.1, 3.0):
+
+    def done() -> int:
+        if not (folder / DATABASE).is_file():
+            return 0
+        return sum(row[3] == "done" for row in numbers(folder))
+
+    before = 0
+    for kill in range(2):
         process = subprocess.Popen([sys.executable, "-c", script], start_new_session=True)
-        time.sleep(pause_s)
-        os.killpg(process.pid, signal.SIGKILL)
+        until = time.monotonic() + 60.0
+        while done() < before + 2 and time.monotonic() < until:
+            time.sleep(0.005)
+        time.sleep(rng.uniform(0.0, 0.1))
+        if kill == 1:
+            os.kill(process.pid, signal.SIGKILL)  # the parent alone: its workers follow
+        else:
+            os.killpg(process.pid, signal.SIGKILL)
         process.wait()
+        assert done() > before
+        before = done()
     run_study(small(), folder, workers=2, resume=True)
     assert numbers(folder) == numbers(undisturbed)
+    assert {row["attempts"] for row in read_rows(folder / DATABASE)[0]} == {1}
 
 
 def test_two_processes_share_a_study(undisturbed: Path, tmp_path: Path) -> None:

@@ -153,6 +153,17 @@ def test_the_command_says_how_many_failed(
     assert "ZeroDivisionError: a bug" in (tmp_path / "studies/x/trials.csv").read_text(encoding="utf-8")
 
 
+def test_a_thousand_troubles_are_not_a_thousand_lines(
+    order: Callable[..., None], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    order(*(f"{row}:bug" for row in range(40)))
+    sweep = ["sweep", "museum-plan", "--vary", "stack.planner.turning_radius_m=0.3", "--trials", "40"]
+    assert main([*sweep, "--name", "x", "--workers", "1", "--no-report", "--out", str(tmp_path)]) == 1
+    lines = capsys.readouterr().err.splitlines()
+    assert len(lines) == 22
+    assert lines[-1].startswith("pilotage: 40 of 40 trials failed")
+
+
 def test_every_trial_failed_is_still_a_study_with_a_page(
     order: Callable[..., None], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -160,7 +171,11 @@ def test_every_trial_failed_is_still_a_study_with_a_page(
     monkeypatch.chdir(tmp_path)
     sweep = ["sweep", "museum-plan", "--vary", "stack.planner.turning_radius_m=0.3,0.5", "--trials", "1"]
     assert main([*sweep, "--name", "x", "--workers", "1"]) == 1
-    assert "ZeroDivisionError: a bug" in (tmp_path / "studies/x/report.html").read_text(encoding="utf-8")
+    page = tmp_path / "studies/x/report.html"
+    assert "ZeroDivisionError: a bug" in page.read_text(encoding="utf-8")
+    page.unlink()
+    assert main(["report", "studies/x"]) == 0
+    assert page.is_file()
 
 
 class LostClient:

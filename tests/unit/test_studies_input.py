@@ -116,7 +116,6 @@ def test_a_wrong_factor_is_one_line(
         ("study empty-folder", "found no study.yaml in it"),
         ("study museum-planner --out file", "file"),
         ("attribute nope", "unknown mission 'nope'"),
-        ("attribute romi-explore", "modules that an oracle can replace"),
         (f"sweep museum-plan --vary {RADIUS}=nan", "expected a finite number"),
         (f"sweep museum-plan --vary {RADIUS}=0:inf:1", "expected finite numbers"),
         (f"sweep museum-plan --vary {RADIUS}=0.3 --metrics a,,b", "--metrics 'a,,b'"),

@@ -1,4 +1,4 @@
-"""``pilotage report``: write a saved run's page again."""
+"""``pilotage report``: write a saved run's or study's page again."""
 
 from __future__ import annotations
 
@@ -9,9 +9,19 @@ import typer
 
 
 def report(
-    run: Annotated[Path, typer.Argument(metavar="RUN", help="A run folder, such as runs/museum-1-0-1a2b3c.")],
+    run: Annotated[
+        Path,
+        typer.Argument(metavar="RUN", help="The folder of a run or a study, such as runs/museum-1-0-1a2b3c."),
+    ],
 ) -> None:
-    """Write report.html into a run folder and print its path."""
+    """Write report.html into a run's or a study's folder and print its path."""
+    from pilotage.experiments.studies.study import is_study_folder
+
+    if is_study_folder(str(run)):
+        from pilotage.report.study.write import write_study_report
+
+        print(write_study_report(run))
+        return
     from pilotage.report import write_report
 
     print(write_report(run))

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from pilotage.cli.options import Json, Overrides
+from pilotage.cli.options import Json, Overrides, parse_out
 from pilotage.cli.output import print_json, stdout_for_json
 from pilotage.cli.stopped import INTERRUPTED, TERMINATED, Terminated
 from pilotage.core.errors import InputError
@@ -20,6 +20,8 @@ if TYPE_CHECKING:
     from pilotage.experiments.studies.study import Study
 
 FAILED = 1
+TROUBLES = 20
+"""So many lines are read; a thousand are not."""
 Trials = Annotated[int | None, typer.Option("--trials", metavar="N", min=1, help="Trials in every cell.")]
 WorkerCount = Annotated[
     int | None,
@@ -30,7 +32,8 @@ Dask = Annotated[
 ]
 Resume = Annotated[bool, typer.Option("--resume", help="Go on with a study that was begun before.")]
 Studies = Annotated[
-    Path, typer.Option("--out", metavar="DIR", help="Folder that the study's folder is made in.")
+    Path,
+    typer.Option("--out", metavar="DIR", parser=parse_out, help="Folder that the study's folder is made in."),
 ]
 Report = Annotated[bool, typer.Option(help="Write report.html into the study's folder.")]
 Quiet = Annotated[bool, typer.Option("--quiet", help="Show neither progress nor summary.")]
@@ -148,7 +151,7 @@ def run_study_quietly(
                 dask=dask,
                 resume=resume,
                 on_progress=line,
-                on_trouble=None if quiet else line.tell,
+                on_trouble=None if quiet else line.trouble,
             )
             line.close()
             page = _write_files(folder, report, quiet)
@@ -235,6 +238,7 @@ class _Line:
         self._period_s = 0.2 if self._terminal else 10.0
         self._next_s = monotonic() + (0.0 if self._terminal else self._period_s)
         self._drawn = False
+        self._troubles = 0
 
     def __call__(self, progress: StudyProgress) -> None:
         now_s = self._clock()
@@ -251,6 +255,14 @@ class _Line:
         )
         sys.stderr.flush()
         self._drawn = self._terminal
+
+    def trouble(self, text: str) -> None:
+        """Say what went wrong on the way, as long as it is worth reading."""
+        self._troubles += 1
+        if self._troubles <= TROUBLES:
+            self.tell(text)
+        elif self._troubles == TROUBLES + 1:
+            self.tell("more of that kind: see the reasons in trials.csv")
 
     def tell(self, text: str) -> None:
         """Say one line that stays."""
