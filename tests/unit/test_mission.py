@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -18,6 +19,7 @@ from pilotage.experiments.floor.simulate import simulate
 from pilotage.experiments.floor.world_map import load_map
 from pilotage.experiments.mission import load_mission, shipped_missions
 from pilotage.experiments.resolve import resolved_yaml
+from pilotage.experiments.values import apply_override
 from pilotage.kernels import geometry
 from pilotage.maps.map_file import MapFile
 from pilotage.missions.floor import AcrossPathObstacle, BoxObstacle, FloorMission, TrapObstacle
@@ -243,3 +245,9 @@ def test_an_obstacle_without_room_is_refused() -> None:
             [trap], ROOM, Pose2(1.0, 4.0, 0.0), Goal(9.0, 4.0), path, 0.3, np.random.default_rng(0)
         )
     assert math.isfinite(path.sum())
+
+
+def test_a_component_s_short_form_can_be_overridden() -> None:
+    values: dict[str, Any] = {"world": {"map": "museum"}, "stack": {"planner": "astar"}}
+    apply_override(values, "stack.planner.name=theta-star")
+    assert values["stack"] == {"planner": {"name": "theta-star"}}

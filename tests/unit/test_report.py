@@ -514,6 +514,7 @@ def test_quantities_are_humane() -> None:
     assert quantities.duration(0.0123) == "12.3\u00a0ms"
     assert quantities.duration(119.99) == "120.0\u00a0s"
     assert quantities.duration(135.4) == "2\u00a0min 15\u00a0s"
+    assert quantities.duration(-594.5) == "−9\u00a0min 54\u00a0s"
     assert quantities.share(0.5) == "50.0\u00a0%"
     assert quantities.significant(0.99996) == "1.00"
     for write in (quantities.length, quantities.angle, quantities.duration, quantities.count):

@@ -95,6 +95,9 @@ def apply_override(values: dict[str, Any], override: str) -> None:
         if inner is None:
             inner = {}
             _put(place, part, inner, override)
+        if isinstance(inner, str) and parts[0] == "stack":
+            inner = {"name": inner}  # the short form of a component
+            _put(place, part, inner, override)
         if not isinstance(inner, dict | list):
             raise InputError(
                 f"--set '{override}': '{'.'.join(parts[: depth + 1])}' is a value, it has no keys"

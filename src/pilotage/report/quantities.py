@@ -39,6 +39,8 @@ def duration(value_s: float) -> str:
     """Write a duration in ms, s, minutes and seconds (from 2 min), hours (from 3 h), days (from 2 days)."""
     if not math.isfinite(value_s):
         return NOTHING
+    if value_s < 0.0:
+        return f"−{duration(-value_s)}"
     if 0.0 < abs(value_s) < 0.1:
         return f"{significant(1000.0 * value_s)}\u00a0ms"
     if abs(value_s) < 120.0:
