@@ -13,15 +13,13 @@ import typer
 from pilotage.cli.options import Json, Overrides, parse_out
 from pilotage.cli.output import print_json, stdout_for_json
 from pilotage.cli.stopped import INTERRUPTED, TERMINATED, Terminated
+from pilotage.cli.study_line import StudyLine
 from pilotage.core.errors import InputError
 
 if TYPE_CHECKING:
-    from pilotage.experiments.studies.engine import StudyProgress
     from pilotage.experiments.studies.study import Study
 
 FAILED = 1
-TROUBLES = 20
-"""So many lines are read; a thousand are not."""
 Trials = Annotated[int | None, typer.Option("--trials", metavar="N", min=1, help="Trials in every cell.")]
 WorkerCount = Annotated[
     int | None,
@@ -140,7 +138,7 @@ def run_study_quietly(
     from pilotage.experiments.studies.database import StudyStoppedError
     from pilotage.experiments.studies.engine import run_study
 
-    line = _Line(quiet)
+    line = StudyLine(quiet)
     go_on = f"go on with --resume, what is finished is in {folder}"
     try:
         with stdout_for_json(json):
@@ -170,7 +168,7 @@ def run_study_quietly(
     return Ran(FAILED if counts.failed else 0, page, whole=True)
 
 
-def _stopped(line: _Line, text: str, code: int) -> Ran:
+def _stopped(line: StudyLine, text: str, code: int) -> Ran:
     line.close()
     line.tell(text)
     return Ran(code)
@@ -224,53 +222,3 @@ def _print_cells(answer: dict[str, Any]) -> None:
             texts.append(f"{write(found['mean'])} ({write(found['low'])} to {write(found['high'])})")
         table.add_row(cell["name"], success, *texts)
     Console(file=sys.stdout).print(table)
-
-
-class _Line:
-    """How far the study is, on standard error."""
-
-    def __init__(self, quiet: bool) -> None:
-        from time import monotonic
-
-        self._clock = monotonic
-        self._quiet = quiet
-        self._terminal = sys.stderr.isatty()
-        self._period_s = 0.2 if self._terminal else 10.0
-        self._next_s = monotonic() + (0.0 if self._terminal else self._period_s)
-        self._drawn = False
-        self._troubles = 0
-
-    def __call__(self, progress: StudyProgress) -> None:
-        now_s = self._clock()
-        if self._quiet or now_s < self._next_s:
-            return
-        self._next_s = now_s + self._period_s
-        counts = progress.counts
-        left = f"{progress.left_s:.0f} s left" if progress.left_s < 1e9 else "no rate yet"
-        failed = f", {counts.failed} failed" if counts.failed else ""
-        ended = counts.done + counts.failed
-        text = f"{ended} of {counts.total} trials{failed}, {progress.rate_per_s:.1f}/s, {left}"
-        print(
-            f"\r{text}\x1b[K" if self._terminal else text, end="" if self._terminal else "\n", file=sys.stderr
-        )
-        sys.stderr.flush()
-        self._drawn = self._terminal
-
-    def trouble(self, text: str) -> None:
-        """Say what went wrong on the way, as long as it is worth reading."""
-        self._troubles += 1
-        if self._troubles <= TROUBLES:
-            self.tell(text)
-        elif self._troubles == TROUBLES + 1:
-            self.tell("more of that kind: see the reasons in trials.csv")
-
-    def tell(self, text: str) -> None:
-        """Say one line that stays."""
-        self.close()
-        print(f"pilotage: {text}", file=sys.stderr)
-
-    def close(self) -> None:
-        """Wipe the line."""
-        if self._drawn:
-            print("\r\x1b[K", end="", file=sys.stderr)
-            self._drawn = False
