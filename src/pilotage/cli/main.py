@@ -35,7 +35,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     # Everything is imported inside, so that Ctrl-C during an import is one line as well.
     try:
         _steady_streams()
-        with _ended_by_sigterm():
+        with _ended_once(for_good=arguments is None):
             return _run(sys.argv[1:] if arguments is None else list(arguments))
     except Terminated:
         return _say("ended by SIGTERM", TERMINATED)
@@ -48,22 +48,32 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 @contextmanager
-def _ended_by_sigterm() -> Iterator[None]:
-    """Let SIGTERM unwind as Ctrl-C does; only a process's main thread can ask for that."""
+def _ended_once(for_good: bool) -> Iterator[None]:
+    """Let SIGTERM unwind as Ctrl-C does, and neither of them twice.
+
+    A second one must not cut the clearing away short, nor the interpreter's own end where the process ends
+    with the command (``for_good``). Only a process's main thread can ask for that.
+    """
     if threading.current_thread() is not threading.main_thread():
         yield
         return
 
     def end(signum: int, frame: FrameType | None) -> NoReturn:  # noqa: ARG001 - as signal calls it
-        # Once is enough: a second one must not cut the clearing away short.
-        signal.signal(signal.SIGTERM, signal.SIG_IGN)
-        raise Terminated
+        for number in before:
+            signal.signal(number, signal.SIG_IGN)
+        raise Terminated if signum == signal.SIGTERM else KeyboardInterrupt
 
-    before = signal.signal(signal.SIGTERM, end)
+    before = {number: signal.getsignal(number) for number in (signal.SIGTERM, signal.SIGINT)}
+    # Where Ctrl-C is ignored from the start (a shell's background job), it stays so.
+    caught = [number for number in before if before[number] is not signal.SIG_IGN]
+    for number in caught:
+        signal.signal(number, end)
     try:
         yield
     finally:
-        signal.signal(signal.SIGTERM, before)
+        if not for_good:
+            for number in caught:
+                signal.signal(number, before[number])
 
 
 def _steady_streams() -> None:
