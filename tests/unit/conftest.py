@@ -1,0 +1,55 @@
+"""Fixtures that several of the unit tests share."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+import tempfile
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+from pilotage.experiments.studies import local_workers
+from support import hostile_trials
+
+
+@pytest.fixture
+def order(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
+    """Give rows their orders."""
+    marks = tmp_path / "marks"
+    marks.mkdir()
+    monkeypatch.setenv(hostile_trials.MARKS, str(marks))
+    monkeypatch.setattr(local_workers, "_work", hostile_trials.work)
+
+    def give(*orders: str) -> None:
+        monkeypatch.setenv(hostile_trials.ORDERS, ",".join(orders))
+
+    give()
+    return give
+
+
+@pytest.fixture
+def small_disk() -> Iterator[Callable[[str], Path]]:
+    """Disks of their own, of some kilobytes."""
+    made: list[Path] = []
+
+    def mount(size: str) -> Path:
+        place = Path(tempfile.mkdtemp(prefix="pilotage-disk-"))
+        ran = subprocess.run(
+            ["mount", "-t", "tmpfs", "-o", f"size={size}", "tmpfs", str(place)],
+            capture_output=True,
+            check=False,
+        )
+        if ran.returncode != 0:
+            place.rmdir()
+            pytest.skip("cannot mount a small disk here")
+        made.append(place)
+        return place
+
+    if shutil.which("mount") is None:
+        pytest.skip("no mount here")
+    yield mount
+    for place in made:
+        subprocess.run(["umount", "-l", str(place)], check=True)
+        place.rmdir()

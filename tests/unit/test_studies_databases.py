@@ -1,0 +1,163 @@
+"""Studies whose databases are broken, shared or asked while they run."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import sqlite3
+import subprocess
+import sys
+import threading
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from pilotage.cli.main import main
+from pilotage.core.errors import InputError
+from pilotage.experiments.studies.database import DATABASE
+from pilotage.experiments.studies.engine import run_study
+from pilotage.experiments.studies.store import Store
+from pilotage.experiments.studies.trial import Outcome
+from support.hostile_studies import TESTS, expected, rows_of, study_of
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A study with every row written, without a run."""
+    folder = tmp_path_factory.mktemp("finished") / "x"
+    study = study_of(trials=100)
+    made = Store(folder, study)
+    for task in made.claim(300):
+        made.finish(Outcome(task.row, expected(task.row) | {"words": "x" * 60}, {"wall_time_s": 0.1}))
+    made.close()
+    run_study(study, folder)
+    return folder
+
+
+def spoil(how: str, content: bytearray) -> bytes:
+    """Break a database's bytes."""
+    middle = len(content) // 2
+    if how == "truncated":
+        return bytes(content[:middle])
+    if how == "page":
+        return bytes(content[: middle + 1] + os.urandom(4096) + content[middle + 4097 :])
+    if how == "header":
+        return os.urandom(100) + bytes(content[100:])
+    if how == "first page":
+        return bytes(4096) + bytes(content[4096:])
+    if how == "digit":
+        place = content.rindex(b"planned_length_m") + 19
+        content[place] = ord("7") if content[place] != ord("7") else ord("8")
+        return bytes(content)
+    return b"" if how == "empty" else os.urandom(len(content))
+
+
+@pytest.mark.parametrize(
+    ("how", "at_least"),
+    [
+        ("truncated", 40),
+        ("page", 200),
+        ("header", 300),
+        ("first page", 300),
+        ("digit", 299),
+        ("empty", 0),
+        ("noise", 0),
+    ],
+)
+def test_a_broken_database_is_told_in_one_line_and_what_is_left_is_exported(
+    finished: Path, tmp_path: Path, how: str, at_least: int, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = tmp_path / "x"
+    shutil.copytree(finished, folder)
+    database = folder / DATABASE
+    with sqlite3.connect(database) as connection:
+        connection.execute("pragma wal_checkpoint(truncate)")
+    connection.close()
+    for suffix in ("-wal", "-shm"):
+        database.with_name(DATABASE + suffix).unlink(missing_ok=True)
+    database.write_bytes(spoil(how, bytearray(database.read_bytes())))
+    broken = database.read_bytes()
+    for _ in range(2):
+        assert main(["study", str(folder), "--resume", "--no-report", "--workers", "1"]) == 2
+        (line,) = capsys.readouterr().err.splitlines()
+        assert f"{DATABASE}: corrupt database (" in line
+        assert "trials-salvaged.csv" in line
+        saved = (folder / "trials-salvaged.csv").read_text(encoding="utf-8").splitlines()
+        assert f"; {max(len(saved) - 1, 0)} of 300 finished trials could be read" in line
+        assert at_least <= max(len(saved) - 1, 0) <= 300 - (how in {"truncated", "page", "digit"})
+    assert database.read_bytes() == broken  # nothing was made worse
+    if at_least:
+        header = saved[0].split(",")
+        for entry in saved[1:]:
+            row = dict(zip(header, entry.split(","), strict=True))
+            assert float(row["planned_length_m"]) == expected(int(row["row"]))["planned_length_m"]
+
+
+def test_the_database_of_something_else_is_left_alone(tmp_path: Path) -> None:
+    with sqlite3.connect(tmp_path / DATABASE) as other:
+        other.execute("create table recipes (name text)")
+    other.close()
+    with pytest.raises(InputError, match="other tables"):
+        run_study(study_of(), tmp_path)
+
+
+def test_many_processes_that_begin_at_once_share_every_row_once(tmp_path: Path) -> None:
+    script = f"""
+import sys
+sys.path.insert(0, {str(TESTS)!r})
+from pathlib import Path
+from support.hostile_studies import study_of
+from pilotage.experiments.studies.store import Store
+from pilotage.experiments.studies.trial import Outcome
+study = study_of()
+sys.stdin.readline()
+store = Store(Path({str(tmp_path)!r}) / "x", study)
+while tasks := store.claim(1):
+    print(tasks[0].row)
+    store.finish(Outcome(tasks[0].row, {{"n": 1.0}}, {{}}))
+store.close()
+"""
+    crew = [
+        subprocess.Popen(
+            [sys.executable, "-c", script], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+        )
+        for _ in range(3)
+    ]
+    for process in crew:
+        assert process.stdin is not None
+        process.stdin.write("go\n")
+        process.stdin.flush()
+    claimed = [int(line) for process in crew for line in process.communicate(timeout=60)[0].split()]
+    assert [process.returncode for process in crew] == [0] * 3
+    assert sorted(claimed) == list(range(18))
+    assert [row["status"] for row in rows_of(tmp_path / "x")] == ["done"] * 18
+
+
+def test_it_can_be_queried_while_it_runs(order: Callable[..., None], tmp_path: Path) -> None:
+    order()
+    database, errors, counted, done = tmp_path / "x" / DATABASE, [], [], threading.Event()
+
+    def ask() -> None:
+        while not done.is_set():
+            if database.exists():
+                try:
+                    with sqlite3.connect(database) as connection:
+                        counted.append(connection.execute("select count(*) from trials").fetchone()[0])
+                    connection.close()
+                except sqlite3.Error as error:
+                    errors.append(error)
+
+    asking = [threading.Thread(target=ask) for _ in range(2)]
+    for thread in asking:
+        thread.start()
+    try:
+        counts = run_study(study_of(trials=100), tmp_path / "x", workers=2)
+    finally:
+        done.set()
+        for thread in asking:
+            thread.join()
+    assert counts.done == 300
+    assert not errors
+    assert set(counted) == {300}  # never half a database
+    assert len(counted) > 50

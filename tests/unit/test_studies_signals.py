@@ -1,0 +1,108 @@
+"""Studies that are ended from outside."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from pilotage.cli.main import main
+from support.hostile_studies import TESTS, expected, rows_of
+
+SLOW = f"""
+import sys
+sys.path.insert(0, {str(TESTS)!r})
+from support import hostile_trials
+from pilotage.experiments.studies import local_workers
+from pilotage.cli.main import main
+if __name__ == "__main__":
+    local_workers._work = hostile_trials.work
+    sys.argv[1:] = ["sweep", "museum-plan", "--vary", "stack.planner.turning_radius_m=0.3,0.5,0.8",
+                    "--trials", "6", "--name", "x", "--no-report", *sys.argv[1:]]
+    sys.exit(main())
+"""
+
+
+def descendants(pid: int) -> set[int]:
+    """All processes of a session but its leader that still run."""
+    found = set()
+    for entry in Path("/proc").iterdir():
+        if entry.name.isdigit():
+            try:
+                fields = (entry / "stat").read_text().rsplit(")", 1)[1].split()
+            except OSError:
+                continue
+            if int(fields[3]) == pid and fields[0] != "Z" and int(entry.name) != pid:
+                found.add(int(entry.name))
+    return found
+
+
+@pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="needs /proc to see what still runs")
+@pytest.mark.parametrize(
+    ("sent", "group", "code", "told"),
+    [
+        ((signal.SIGINT,), True, 130, "pilotage: stopped; go on with --resume, what is finished is in "),
+        ((signal.SIGINT,), False, 130, "pilotage: stopped; go on with --resume, what is finished is in "),
+        ((signal.SIGINT, signal.SIGINT), True, 130, "pilotage: stopped; go on with --resume, what is"),
+        ((signal.SIGTERM,), True, 143, "pilotage: ended by SIGTERM; go on with --resume, what is finished"),
+        ((signal.SIGKILL,), False, -9, ""),
+    ],
+)
+def test_a_signal_ends_it_within_seconds_without_orphans(
+    order: Callable[..., None], tmp_path: Path, sent: tuple[int, ...], group: bool, code: int, told: str
+) -> None:
+    order("4:slow")
+    process = subprocess.Popen(
+        [
+            sys.executable,
+            "-c",
+            SLOW,
+            "--out",
+            str(tmp_path),
+            "--workers",
+            "2" if sent[0] == signal.SIGINT else "1",
+        ],
+        start_new_session=True,
+        stderr=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+    marks = tmp_path / "marks"
+    until = time.monotonic() + 60.0
+    while not list(marks.glob("4-*")):
+        assert time.monotonic() < until
+        assert process.poll() is None, process.communicate()
+        time.sleep(0.01)
+    began = time.monotonic()
+    for number in sent:
+        if group:
+            os.killpg(process.pid, number)
+        else:
+            os.kill(process.pid, number)
+        time.sleep(0.01)
+    _, err = process.communicate(timeout=30)
+    assert process.returncode == code
+    assert err.splitlines()[-1:] == ([] if not told else err.splitlines()[:1])  # one line, no traceback
+    assert err.startswith(told)
+    while descendants(process.pid) and time.monotonic() < began + 5.0:
+        time.sleep(0.01)
+    assert not descendants(process.pid)
+    assert time.monotonic() < began + 5.0
+    rows = rows_of(tmp_path / "x")
+    assert rows[4]["status"] == ("running" if code == -9 else "pending")
+    if code != -9:
+        assert {(row["status"], row["attempts"]) for row in rows} <= {("done", 1), ("pending", 0)}
+    if len(sent) > 1 or sent[0] == signal.SIGTERM:
+        return
+    order()
+    sweep = ["sweep", "museum-plan", "--vary", "stack.planner.turning_radius_m=0.3,0.5,0.8", "--trials", "6"]
+    sweep += ["--name", "x", "--workers", "1", "--no-report", "--out", str(tmp_path), "--resume"]
+    assert main([*sweep, "--quiet"]) == 0
+    assert [row["metrics"] for row in rows_of(tmp_path / "x")] == [expected(row) for row in range(18)]
+    assert {row["attempts"] for row in rows_of(tmp_path / "x")} == {1}
