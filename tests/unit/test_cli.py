@@ -87,6 +87,7 @@ def lab(monkeypatch: pytest.MonkeyPatch) -> Lab:
         components=lambda name: [("gate", "float", "0.99")] if name else [("planner", "a-star", "a grid")],
         mission_schema=lambda: {"title": "Mission"},
     )
+    module("pilotage.experiments.studies.study", is_study_folder=lambda _place: False)
     module("pilotage.report", write_report=lab.write_report, summary_table=lambda metrics: str(metrics))
     return lab
 

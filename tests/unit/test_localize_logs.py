@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from scipy.io import savemat
 
+from pilotage.cli.localize import localize
 from pilotage.core.errors import InputError
 from pilotage.core.types import FloatArray
 from pilotage.experiments.recordings.localize import localize_log
@@ -105,6 +106,17 @@ def test_rows_whose_truth_is_not_valid_are_left_out(tmp_path: Path) -> None:
     assert found["scored_steps"] == 399 - 50
     assert found["truth_gaps"] == 2
     assert float(str(found["position_rmse_m"])) < 0.1
+
+
+def test_the_command_prints_plain_numbers_and_names_its_page(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    savemat(tmp_path / "d.mat", laser_drive(rows=400))
+    localize(tmp_path / "d.mat", "aer1513", out=tmp_path)
+    printed = capsys.readouterr().out
+    assert not set("[]{}") & set(printed)
+    assert printed.splitlines()[-1].startswith("report ")
+    assert Path(printed.split()[-1]).is_file()
 
 
 def test_a_recording_s_page_shows_what_recordings_have(tmp_path: Path) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated
 
@@ -47,15 +48,23 @@ def localize(
             overrides=overrides or (),
             max_range_m=max_range,
         )
+        page: Path | None = None
         if report:
             from pilotage.report import write_report
 
-            write_report(result.run_dir)
+            page = write_report(result.run_dir)
     if json:
         print_json(result.metrics)
     else:
-        print_columns(
-            (key, f"{value:.4g}" if isinstance(value, float) else str(value))
-            for key, value in result.metrics.items()
-        )
+        rows = [(key, _text(value)) for key, value in result.metrics.items()]
+        print_columns([*rows, ("report", str(page))] if page is not None else rows)
     return 0 if result.metrics["success"] else 1
+
+
+def _text(value: object) -> str:
+    """Return a metric for reading: numbers by four digits, lists and mappings without brackets."""
+    if isinstance(value, Mapping):
+        return ", ".join(f"{key} {_text(item)}" for key, item in value.items())
+    if isinstance(value, list | tuple):
+        return ", ".join(_text(item) for item in value)
+    return f"{value:.4g}" if isinstance(value, float) else str(value)

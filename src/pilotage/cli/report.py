@@ -1,4 +1,4 @@
-"""``pilotage report``: write a saved run's or study's page again."""
+"""``pilotage report``: write a saved run's, study's or calibration's page again."""
 
 from __future__ import annotations
 
@@ -11,10 +11,13 @@ import typer
 def report(
     run: Annotated[
         Path,
-        typer.Argument(metavar="RUN", help="The folder of a run or a study, such as runs/museum-1-0-1a2b3c."),
+        typer.Argument(
+            metavar="RUN|STUDY",
+            help="The folder of a run, a study or a calibration, such as runs/museum-1-0-1a2b3c.",
+        ),
     ],
 ) -> None:
-    """Write report.html into a run's or a study's folder and print its path."""
+    """Write report.html into the folder of a run, a study or a calibration and print its path."""
     from pilotage.experiments.studies.study import is_study_folder
 
     if is_study_folder(str(run)):

@@ -209,7 +209,7 @@ def _print_cells(answer: dict[str, Any]) -> None:
 
     metrics = list(answer["cells"][0]["metrics"])[:5]
     table = Table(title=f"{answer['study']}: {answer['trials']} trials, {answer['failed']} failed")
-    table.add_column("setting")
+    table.add_column("setting", overflow="fold")  # names are cut by nothing: settings differ at their ends
     table.add_column("success", justify="right")
     for name in metrics:
         table.add_column(metric_of(name).name, justify="right")
