@@ -203,3 +203,18 @@ def test_what_cannot_be_calibrated_is_refused_in_one_line(tmp_path: Path, capsys
     broken.write_text(Path(log).read_text()[:-20])
     assert "line 301: expected 7 columns" in refused(capsys, "odometry", str(broken))
     assert not (tmp_path / "runs").exists()
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (("range", "--sensor", "odometry"), "--sensor and --wheel-base are for 'calibrate odometry'"),
+        (("heading", "--wheel-base", "0.2"), "--sensor and --wheel-base are for 'calibrate odometry'"),
+        (("odometry", "--axis", "z"), "--axis is for 'calibrate heading'"),
+        (("heading", "--axis", "q"), "unknown --axis 'q'; known: x, y, z"),
+    ],
+)
+def test_options_of_another_calibration_are_refused(
+    words: tuple[str, ...], told: str, capsys: Capture
+) -> None:
+    assert told in refused(capsys, *words)

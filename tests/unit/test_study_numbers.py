@@ -68,3 +68,11 @@ def test_a_keys_unit_is_its_ending() -> None:
     assert key_and_unit("stack.planner.turning_radius_m") == ("turning radius", "m")
     assert key_and_unit("stack.local_planner.speed_m_s") == ("speed", "m/s")
     assert key_and_unit("stack.localizer.gate") == ("gate", "")
+
+
+def test_small_variances_are_short_and_rounding_is_none() -> None:
+    scale = Scale()
+    assert scale.write_variance(1.234e-11, 1e-3) == "1.23 · 10⁻¹¹"
+    assert scale.write_variance(4.7e-5, 0.08) == "4.70 · 10⁻⁵"
+    assert scale.write_variance(1.08e-23, 1.0) == "0"
+    assert scale.write_variance(0.0, 0.0) == "0"

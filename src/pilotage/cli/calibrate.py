@@ -13,6 +13,7 @@ from pilotage.cli.options import Json, Overrides, Seed
 from pilotage.cli.output import print_columns, print_json, stdout_for_json
 from pilotage.core.errors import InputError, unknown_name
 
+AXES = ("x", "y", "z")
 KINDS = ("odometry", "range", "heading", "commands")
 
 
@@ -32,14 +33,18 @@ def calibrate(
         "runs"
     ),
     sensor: Annotated[
-        str, typer.Option(help="odometry: the sensor's name in the mission, for the parameter file.")
-    ] = "odometry",
+        str | None,
+        typer.Option(
+            metavar="NAME", help="odometry: the sensor's name in the mission, for the parameter file."
+        ),
+    ] = None,
     wheel_base: Annotated[
         float | None, typer.Option(metavar="M", help="odometry: the wheel base that it was told, in metres.")
     ] = None,
     axis: Annotated[
-        str, typer.Option(metavar="x|y|z", help="heading: the axis that the robot turns about.")
-    ] = "z",
+        str | None,
+        typer.Option(metavar="x|y|z", help="heading: the axis that the robot turns about; default z."),
+    ] = None,
     form: Annotated[
         str | None, typer.Option("--format", metavar="mrclam", help="commands: format of the recordings.")
     ] = None,
@@ -65,6 +70,12 @@ def calibrate(
         raise InputError(
             "calibrate: --set and --seed are for simulated runs; leave them out where logs are given"
         )
+    if what != "odometry" and (sensor is not None or wheel_base is not None):
+        raise InputError("calibrate: --sensor and --wheel-base are for 'calibrate odometry'")
+    if axis is not None and what != "heading":
+        raise InputError("calibrate: --axis is for 'calibrate heading'")
+    if axis is not None and axis not in AXES:
+        raise unknown_name("--axis", axis, AXES)
     if wheel_base is not None and not (math.isfinite(wheel_base) and wheel_base > 0.0):
         raise InputError(f"--wheel-base: expected metres above 0, found {wheel_base:g}")
     from pilotage.experiments import calibrate as lab
@@ -73,12 +84,17 @@ def calibrate(
     with stdout_for_json(json):
         if what == "odometry":
             result = lab.odometry_from(
-                places, out, overrides=overrides or (), seed=seed or 0, wheel_base_m=wheel_base, sensor=sensor
+                places,
+                out,
+                overrides=overrides or (),
+                seed=seed or 0,
+                wheel_base_m=wheel_base,
+                sensor=sensor or "odometry",
             )
         elif what == "range":
             result = lab.range_from(places, out, overrides=overrides or (), seed=seed or 0)
         elif what == "heading":
-            result = lab.heading_from(places, out, axis=axis)
+            result = lab.heading_from(places, out, axis=axis or "z")
         else:
             from pilotage.experiments.calibrate_commands import commands_from
 

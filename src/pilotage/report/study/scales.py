@@ -11,6 +11,11 @@ from pilotage.report import quantities
 from pilotage.report.metrics_table import metric_of
 
 MAX_DECIMALS = 6
+ROUNDING = 1e-9
+"""Standard deviations below this share of the mean are rounding."""
+LEAST_PLAIN = 1e-4
+"""Variances below this are written in powers of ten."""
+SUPERSCRIPTS = str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹")
 LEAST_P = 0.001
 """Smaller p-values are not told apart."""
 
@@ -50,9 +55,20 @@ class Scale:
         text = f"{rounded:{'+' if signed else ''},.{decimals}f}"
         return text.replace(",", "\u00a0").replace("-", "−")
 
-    def write_variance(self, variance: float) -> str:
-        """Write a variance in the square of the unit."""
-        return quantities.significant(variance * self.times**2)
+    def write_variance(self, variance: float, mean: float = 0.0) -> str:
+        """Write a variance in the square of the unit; what rounding leaves of equal values is none.
+
+        A small one is written in powers of ten, the only number here that is.
+        """
+        value = variance * self.times**2
+        if not math.isfinite(value):
+            return quantities.NOTHING
+        if variance <= (ROUNDING * abs(mean)) ** 2:
+            return "0"
+        if value >= LEAST_PLAIN:
+            return quantities.significant(value)
+        digits, power = f"{value:.2e}".split("e")
+        return f"{digits} · 10{power.lstrip('-0').translate(SUPERSCRIPTS).join(('⁻', ''))}"
 
 
 def scale_of(metric: str, values: Iterable[float]) -> Scale:

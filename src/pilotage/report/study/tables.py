@@ -71,7 +71,7 @@ def _entry(summary: Summary, scale: Scale, best: bool, published: float | None) 
     lines = []
     if math.isfinite(summary.low):
         lines.append(f"{scale.write(summary.low, digits)} to {scale.write(summary.high, digits)}")
-        lines.append(f"variance {scale.write_variance(summary.variance)}")
+        lines.append(f"variance {scale.write_variance(summary.variance, summary.mean)}")
     if published is not None:
         lines.append(f"published {quantities.significant(published * scale.times, 4)}")
     small = "".join(f"<br><span class='range'>{escape(line)}</span>" for line in lines)
@@ -90,7 +90,7 @@ def _all_numbers(view: StudyView, judgement: Judgement, group: Group, metrics: S
             digits = scale.decimals(found.mean, found.low, found.high)
             numbers = (found.mean, found.low, found.high, found.median, found.smallest, found.largest)
             texts = [scale.write(number, digits) for number in numbers]
-            texts.insert(4, scale.write_variance(found.variance))
+            texts.insert(4, scale.write_variance(found.variance, found.mean))
             values = "".join(f'<td class="value plain">{text}</td>' for text in (str(found.n), *texts))
             rows.append(f'<tr><th scope="row">{escape(cell.text)}</th>{values}</tr>')
     names = ("n", "mean", "from", "to", "median", "variance", "smallest", "largest")
