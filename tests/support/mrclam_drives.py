@@ -2,8 +2,9 @@
 
 Motion (world at 20 Hz):  v = (g - loss min(|w_c|, 0.45)) v_c (1 + e_v),  w = turn w_c (1 + e_w) + bend v,
 commands late, travel a little aside of the heading, wheels that jerk; e_v, e_w first-order Gauss-Markov.
-Camera: range r scale cos(bearing)^power (1 + e_landmark) + white, bearings of a moment ago with an error of
-each landmark. The scatter and correlation of windows and readings are those of the five recorded robots.
+Camera: (r scale + offset) cos(bearing)^power (1 + axis tan(bearing) + e_landmark) + white, bearings of a
+moment ago with an error of each landmark. The scatter and correlation of windows and readings are those of
+the recorded robots.
 """
 
 from __future__ import annotations
@@ -42,7 +43,10 @@ class Robot:
     speed_jerk_std: float = 0.018
     turn_jerk_std: float = 0.07
     """In arcs twice that."""
-    landmark_range_std: float = 0.009
+    range_offset_m: float = 0.0
+    axis_rad: float = 0.0
+    """Of the optical axis, along which depth is measured."""
+    landmark_range_std: float = 0.007
     landmark_bearing_std_rad: float = 0.007
     landmark_error_s: float = 15.0
     range_std: float = 0.006
@@ -85,8 +89,10 @@ def one_of_a_kind(rng: np.random.Generator) -> Robot:
         turn_gain=rng.normal(0.944, 0.015),
         bend_rad_per_m=rng.normal(-0.043, 0.015),
         course_rad=rng.normal(0.0, 0.02),
-        range_scale=rng.normal(1.034, 0.011),
+        range_scale=rng.normal(1.018, 0.018),
         depth_power=rng.normal(0.905, 0.05),
+        range_offset_m=rng.normal(0.05, 0.035),
+        axis_rad=rng.normal(0.0, 0.025),
         bearing_offset_rad=rng.normal(0.0, 0.007),
     )
 
@@ -181,8 +187,8 @@ def _picture(
         b = _wrap(math.atan2(old[1], old[0]) - seen_from[2])
         if abs(b) > 0.58 or not 0.8 < r < 7.0 or rng.random() > 0.25:
             continue
-        reading = r * robot.range_scale * math.cos(b) ** robot.depth_power
-        reading *= 1.0 + landmark_errors[i] + rng.normal(0.0, robot.range_std)
+        reading = (r * robot.range_scale + robot.range_offset_m) * math.cos(b) ** robot.depth_power
+        reading *= 1.0 + robot.axis_rad * math.tan(b) + landmark_errors[i] + rng.normal(0.0, robot.range_std)
         barcode = BARCODES[6 + i]
         luck = rng.random()
         if luck < events.wrong_barcodes:

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from scipy.io import savemat
 
 from pilotage.cli.localize import localize
@@ -36,7 +39,7 @@ def test_bad_arrays_are_named(tmp_path: Path, name: str, value: Any, said: str) 
 
 def error_state(landmarks: int = 2) -> FloatArray:
     """A state with every error in it."""
-    errors = [0.05, -0.03, 0.02, 0.01, 0.08, -0.02, 0.01, -0.03, 0.02, -0.01, 0.07]
+    errors = [0.05, -0.03, 0.02, 0.01, 0.08, -0.02, 0.01, -0.03, 0.02, -0.01, 0.07, 0.04]
     return np.array([1.0, 2.0, 0.4, *errors, *np.linspace(-1.0, 1.0, 2 * landmarks)])
 
 
@@ -44,21 +47,31 @@ def test_the_slopes_are_those_of_central_differences() -> None:
     state = error_state()
     # A landmark's error grows with its range: a slope of second order that is left out, as the half turn is
     # that lies between the reading and now.
-    state[14:] = 0.0
-    places = np.array([0, 1, 2, 8, 9, 10, 11, 12, 13, 15, 17])
+    state[15:] = 0.0
+    places = np.array([0, 1, 2, 8, 9, 10, 11, 12, 13, 14, 16, 18])
     mount, motion = np.array([0.2, 0.05, 0.1, 0.05]), np.array([0.4, 0.3])
     scales = np.array([0.01, 0.03, 0.02, 0.05])
-    z, H, scratch = np.empty(2), np.empty((2, 11)), np.empty((2, 11))
-    assert slow_errors.measure(state, 4.0, 3.0, places, mount, motion, scales, z, H)
+    slant = slow_errors.slant_of_depth(0.3, 0.9)
+    z, H, scratch = np.empty(2), np.empty((2, 12)), np.empty((2, 12))
+    assert slow_errors.measure(state, 4.0, 3.0, places, mount, motion, scales, slant, z, H)
     for column, place in enumerate(places):
         ends = []
         for sign in (1.0, -1.0):
             moved, there = state.copy(), np.empty(2)
             moved[place] += sign * 1e-6
-            slow_errors.measure(moved, 4.0, 3.0, places, mount, motion, scales, there, scratch)
+            slow_errors.measure(moved, 4.0, 3.0, places, mount, motion, scales, slant, there, scratch)
             ends.append(there)
         slope = (ends[0] - ends[1]) / 2e-6
         np.testing.assert_allclose(slope, H[:, column], atol=1e-2 if place == slow_errors.AGE else 1e-6)
+
+
+@given(range_m=st.floats(0.3, 8.0), bearing=st.floats(-0.6, 0.6), axis=st.floats(-0.05, 0.05))
+def test_a_camera_s_depth_is_measured_along_its_own_axis(range_m: float, bearing: float, axis: float) -> None:
+    depth = range_m * math.cos(bearing - axis)
+    made = slow_errors.range_of_depth(depth / math.cos(bearing), bearing, 0.0)
+    predicted = range_m * (1.0 + slow_errors.slant_of_depth(bearing, 1.0) * axis)
+    assert made == pytest.approx(predicted, rel=axis**2)
+    assert slow_errors.slant_of_depth(bearing, 0.0) == 0.0
 
 
 def test_the_motion_s_slopes_are_those_of_central_differences() -> None:
@@ -86,14 +99,14 @@ def test_the_motion_s_slopes_are_those_of_central_differences() -> None:
 def test_errors_keep_their_variance_and_fade_by_time_way_and_turn() -> None:
     size = error_state().shape[0]
     fading = np.zeros((size, 3))
-    fading[14], fading[15], fading[16] = (0.1, 0.0, 0.0), (0.0, 2.0, 0.0), (0.0, 0.0, 3.0)
+    fading[15], fading[16], fading[17] = (0.1, 0.0, 0.0), (0.0, 2.0, 0.0), (0.0, 0.0, 3.0)
     stationary = np.zeros(size)
-    stationary[14:17] = 1.0
+    stationary[15:18] = 1.0
     state, cov = np.zeros(size), np.diag(stationary)
-    state[14:17] = 1.0
+    state[15:18] = 1.0
     slow_errors.predict(state, cov, 0.3, -0.2, 0.5, 0.0, 0.0, fading, stationary)
-    np.testing.assert_allclose(state[14:17], np.exp([-0.05, -0.6, -0.6]))
-    np.testing.assert_allclose(np.diag(cov)[14:17], 1.0)
+    np.testing.assert_allclose(state[15:18], np.exp([-0.05, -0.6, -0.6]))
+    np.testing.assert_allclose(np.diag(cov)[15:18], 1.0)
 
 
 def test_rows_whose_truth_is_not_valid_are_left_out(tmp_path: Path) -> None:

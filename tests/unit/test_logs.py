@@ -178,9 +178,19 @@ def test_a_rare_misread_barcode_is_left_out_and_named(tmp_path: Path) -> None:
     assert log.misread == (f"{tmp_path / 'Robot1_Measurement.dat'} line 78",)
 
 
+def test_a_first_row_that_is_older_than_it_says_is_left_out_and_named(tmp_path: Path) -> None:
+    rows = ["0.1 0.294 0\n", "0 0 0\n", "0.12 0 0\n", "3 0.1 0\n"]
+    log = read_mrclam(mrclam(tmp_path, Robot1_Odometry__dat="".join(rows)), 1)
+    np.testing.assert_allclose(log.odometry_t_s, [0.0, 0.12, 3.0])
+    np.testing.assert_allclose(log.speed_m_s, [0.0, 0.0, 0.1])
+    assert log.stale == (f"{tmp_path / 'Robot1_Odometry.dat'} line 1",)
+
+
 @pytest.mark.parametrize(
     ("name", "text", "message"),
     [
+        ("Robot1_Odometry__dat", "0 0 0\n0.1 0 0\n0.05 0 0\n1 0 0\n", "line 3: .* a time before it"),
+        ("Robot1_Odometry__dat", "1 0 0\n0.1 0 0\n0.2 0 0\n", "line 2: .* a time before it"),
         ("Robot1_Measurement__dat", "1 63 3 0\n2 99 3 0\n", "Measurement.dat line 2: .* found 99"),
         ("Robot1_Measurement__dat", "1 63 -3 0\n", "line 1: range_m: expected a range >= 0"),
         ("Robot1_Odometry__dat", "2 0 0\n1 0 0\n", "Odometry.dat line 2: .* a time before it"),

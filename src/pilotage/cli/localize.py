@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import sys
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated
@@ -12,6 +13,9 @@ import typer
 from pilotage.cli.options import Json, Out, Overrides
 from pilotage.cli.output import print_columns, print_json, stdout_for_json
 from pilotage.core.errors import InputError, unknown_name
+
+NAMED = 5
+"""Rows of a log that were left out and are named; the others are counted."""
 
 
 def localize(
@@ -53,6 +57,10 @@ def localize(
             from pilotage.report import write_report
 
             page = write_report(result.run_dir)
+    for line in result.left_out[:NAMED]:
+        print(line, file=sys.stderr)
+    if len(result.left_out) > NAMED:
+        print(f"and {len(result.left_out) - NAMED} more", file=sys.stderr)
     if json:
         print_json(result.metrics)
     else:

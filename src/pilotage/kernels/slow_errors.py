@@ -1,11 +1,11 @@
 """The EKF whose state holds, after the pose, the slowly varying errors of drive and sensor.
 
-State (14 + 2 L): x, y, theta; of the drive: relative errors of speed and turn rate, their offsets, and
+State (15 + 2 L): x, y, theta; of the drive: relative errors of speed and turn rate, their offsets, and
 the course (direction of travel less heading); of the sensor: bearing offset, relative range error, range
-offset, how far its mount lies ahead and to the left of where it should be, and the age of its readings;
-then the error of each landmark's range, and of each landmark's bearing, in units of their standard
-deviations. Each error is a first-order Gauss-Markov process, e <- e exp(-dt / tau), which keeps its
-stationary variance (Bar-Shalom et al. 2001, sect. 8.2 and 11.9).
+offset, how far its mount lies ahead and to the left of where it should be, the age of its readings, and
+the angle of a camera's optical axis; then the error of each landmark's range, and of each landmark's
+bearing, in units of their standard deviations. Each error is a first-order Gauss-Markov process,
+e <- e exp(-dt / tau), which keeps its stationary variance (Bar-Shalom et al. 2001, sect. 8.2 and 11.9).
 """
 
 from __future__ import annotations
@@ -22,10 +22,10 @@ FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
 SPEED, TURN, SPEED_OFFSET, TURN_OFFSET, COURSE = 3, 4, 5, 6, 7
-BEARING, SCALE, OFFSET, AHEAD, LEFT, AGE, LANDMARKS = 8, 9, 10, 11, 12, 13, 14
+BEARING, SCALE, OFFSET, AHEAD, LEFT, AGE, AXIS, LANDMARKS = 8, 9, 10, 11, 12, 13, 14, 15
 """Places in the state: the errors after the pose, and the first landmark's range error."""
-SLOPES = 11
-"""A reading depends on the pose, the sensor's six errors and its landmark's two."""
+SLOPES = 12
+"""A reading depends on the pose, the sensor's seven errors and its landmark's two."""
 MIN_COSINE = 0.2
 """A depth says nothing of what lies abeam: a bearing beyond 78 degrees counts as one of 78."""
 MIN_RANGE_M = 0.1
@@ -132,6 +132,17 @@ def range_of_depth(reading: float, bearing: float, depth: float) -> float:
 
 
 @kernel
+def slant_of_depth(bearing: float, depth: float) -> float:
+    """How a range made of a depth grows with the angle of the optical axis, as a fraction of the range.
+
+    Along an axis at the angle e the depth is r cos(bearing - e), so that the range made of it is
+    r (cos(bearing - e) / cos(bearing))^depth, to first order r (1 + depth tan(bearing) e).
+    """
+    c = max(math.cos(bearing), MIN_COSINE)
+    return float(depth * math.copysign(math.sqrt(1.0 - c * c), bearing) / c)
+
+
+@kernel
 def measure(
     state: FloatArray,
     mx: float,
@@ -140,18 +151,20 @@ def measure(
     mount: FloatArray,
     motion: FloatArray,
     scales: FloatArray,
+    slant: float,
     z: FloatArray,
     H: FloatArray,
 ) -> bool:
-    """Predict range and bearing (2,) of a landmark at ``mx``, ``my`` and their slopes H (2, 11).
+    """Predict range and bearing (2,) of a landmark at ``mx``, ``my`` and their slopes H (2, 12).
 
     False where landmark and sensor coincide. Thrun et al. 2005, eq. 7.12-7.14, for a sensor off the axle,
-    from where it was when the reading was taken: r (1 + scale) + offset + the landmark's own error.
+    from where it was when the reading was taken: r (1 + scale + slant axis) + offset + the landmark's own
+    error.
 
     Parameters
     ----------
     places
-        (11,) of the slopes in the state; the last two are the landmark's errors.
+        (12,) of the slopes in the state; the last two are the landmark's errors.
     mount
         (4,) of the sensor: x, y, theta; and the age of its readings as known before, in s.
     motion
@@ -159,6 +172,8 @@ def measure(
     scales
         (4,) standard deviations of a landmark's error: fraction of the range, metres along; radians,
         metres across.
+    slant
+        Of this reading, by `slant_of_depth`; 0 where ranges are measured as such.
     """
     v, w = motion[0], motion[1]
     age = mount[3] + state[AGE]
@@ -176,9 +191,9 @@ def measure(
     near = max(r, MIN_RANGE_M)
     along = math.sqrt((scales[0] * r) ** 2 + scales[1] ** 2)
     across = math.sqrt(scales[2] ** 2 + (scales[3] / near) ** 2)
-    factor = 1.0 + state[SCALE]
-    z[0] = r * factor + state[OFFSET] + along * state[places[9]]
-    z[1] = wrap(math.atan2(dy, dx) - theta - mount[2] + state[BEARING] + across * state[places[10]])
+    factor = 1.0 + state[SCALE] + slant * state[AXIS]
+    z[0] = r * factor + state[OFFSET] + along * state[places[10]]
+    z[1] = wrap(math.atan2(dy, dx) - theta - mount[2] + state[BEARING] + across * state[places[11]])
     # By the place and heading that the reading was taken at ...
     rx, ry, rt = -dx / r * factor, -dy / r * factor, (dx * oy - dy * ox) / r * factor
     bx, by, bt = dy / q, -dx / q, -1.0 - (dx * ox + dy * oy) / q
@@ -192,8 +207,9 @@ def measure(
     H[0, 7], H[1, 7] = -rx * s + ry * c, -bx * s + by * c
     # The half turn inside the course is of second order in the age and left out.
     H[0, 8], H[1, 8] = -(rx * vx + ry * vy + rt * w), -(bx * vx + by * vy + bt * w)
-    H[0, 9], H[1, 9] = along, 0.0
-    H[0, 10], H[1, 10] = 0.0, across
+    H[0, 9], H[1, 9] = slant * r, 0.0
+    H[0, 10], H[1, 10] = along, 0.0
+    H[0, 11], H[1, 11] = 0.0, across
     return True
 
 
@@ -207,7 +223,7 @@ def joseph_update(
     R: FloatArray,
     gate: float,
 ) -> float:
-    """Update in place by a pair of measurements that depend on ``places`` (11,) of the state only.
+    """Update in place by a pair of measurements that depend on ``places`` (12,) of the state only.
 
     Returns the squared Mahalanobis distance, beyond ``gate`` nothing is changed; nan where the innovation
     covariance is not positive. Joseph form, (I - K H) P (I - K H)' + K R K', multiplied out as
@@ -282,7 +298,7 @@ def update_range_bearings(
     """
     z, H, R = np.empty(2), np.empty((2, SLOPES)), np.zeros((2, 2))
     innovation = np.empty(2)
-    places = np.array([0, 1, 2, BEARING, SCALE, OFFSET, AHEAD, LEFT, AGE, 0, 0])
+    places = np.array([0, 1, 2, BEARING, SCALE, OFFSET, AHEAD, LEFT, AGE, AXIS, 0, 0])
     count = known_ids.shape[0]
     used = 0
     for k in range(ids.shape[0]):
@@ -291,8 +307,10 @@ def update_range_bearings(
         i = np.searchsorted(known_ids, ids[k])
         if i >= count or known_ids[i] != ids[k]:
             continue
-        places[9], places[10] = LANDMARKS + i, LANDMARKS + count + i
-        if not measure(state, known_points[i, 0], known_points[i, 1], places, mount, motion, scales, z, H):
+        places[10], places[11] = LANDMARKS + i, LANDMARKS + count + i
+        x, y = known_points[i, 0], known_points[i, 1]
+        slant = slant_of_depth(bearings[k], depth)
+        if not measure(state, x, y, places, mount, motion, scales, slant, z, H):
             continue
         reading = range_of_depth(ranges[k], bearings[k], depth)
         innovation[0] = reading - z[0]

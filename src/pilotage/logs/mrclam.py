@@ -28,6 +28,8 @@ TRUTH_GAP_S = 0.5
 """Longer than this without truth is a gap: nothing can be scored in it."""
 MISREAD_SHARE = 0.01
 """More unknown barcodes than this share of the readings are no misreadings."""
+STALE_S = 0.2
+"""A first row of odometry that is stamped so little after the second one is a rest from before the log."""
 BARCODES = range(1, 100)
 """Barcodes have two digits; what is outside comes from a damaged file."""
 
@@ -50,6 +52,8 @@ class MrclamLog:
         The known points, by subject.
     misread
         File and line of the readings that were left out because nobody wears their barcode.
+    stale
+        File and line of a first row of the odometry that was left out because it is older than it says.
     """
 
     robot: int
@@ -65,6 +69,7 @@ class MrclamLog:
     truth_gaps_s: FloatArray
     landmarks: Landmarks
     misread: tuple[str, ...] = ()
+    stale: tuple[str, ...] = ()
 
     @property
     def of_landmarks(self) -> IntArray:
@@ -84,9 +89,9 @@ def read_mrclam(folder: Path, robot: int) -> MrclamLog:
         raise InputError(f"{folder}: expected a robot from {ROBOTS[0]} to {ROBOTS[-1]}, found {robot}")
     if not folder.is_dir():
         raise InputError(f"{folder}: expected the folder of a MRCLAM data set, found none there")
-    odometry = _timed(
-        folder / f"Robot{robot}_Odometry.dat", ("t_s", "v_m_s", "w_rad_s"), repeats=True, least=2
-    )
+    path, columns = folder / f"Robot{robot}_Odometry.dat", ("t_s", "v_m_s", "w_rad_s")
+    odometry, stale = _without_stale_row(read_table(path, columns))
+    _check_timed(odometry, columns, repeats=True, least=2)
     # One camera picture shows several barcodes at the same time.
     seen = _timed(
         folder / f"Robot{robot}_Measurement.dat", ("t_s", "barcode", "range_m", "bearing_rad"), repeats=True
@@ -116,6 +121,7 @@ def read_mrclam(folder: Path, robot: int) -> MrclamLog:
         np.column_stack([t_s[wide], t_s[wide + 1]]),
         landmarks,
         misread,
+        stale,
     )
 
 
@@ -145,11 +151,27 @@ def read_landmarks(path: Path) -> Landmarks:
 
 def _timed(path: Path, columns: tuple[str, ...], *, repeats: bool = False, least: int = 1) -> Table:
     table = read_table(path, columns)
+    _check_timed(table, columns, repeats=repeats, least=least)
+    return table
+
+
+def _check_timed(table: Table, columns: tuple[str, ...], *, repeats: bool, least: int) -> None:
     if table.values.shape[0] < least:
         raise InputError(f"{table.place(-1)}: expected {least} or more rows, found the end of the file")
     check_times(table, table.values[:, 0], repeats=repeats)
     check_size(table, columns)
-    return table
+
+
+def _without_stale_row(table: Table) -> tuple[Table, tuple[str, ...]]:
+    """Leave out a first row that is stamped shortly after the second: the drive's buffer from before.
+
+    Four of the five robots of set 9 begin with such a row, at a speed that they do not have. Times that go
+    back anywhere else stay an error.
+    """
+    t_s = table.values[:, 0]
+    if t_s.shape[0] < 3 or not 0.0 < t_s[0] - t_s[1] <= STALE_S or np.any(np.diff(t_s[1:]) < 0.0):
+        return table, ()
+    return Table(table.path, table.values[1:], table.lines[1:]), (table.place(0),)
 
 
 def _subjects(seen: Table, barcodes: dict[int, int], placed: set[int]) -> tuple[IntArray, tuple[str, ...]]:

@@ -188,6 +188,9 @@ GROUPS: tuple[tuple[str, tuple[Metric, ...]], ...] = (
             Metric("truth_gaps", "gaps in the truth", quantities.count, "Stretches left out of all errors."),
             Metric("odometry_gaps", "gaps in the odometry", quantities.count, "Longer than 0.5 s."),
             Metric("misread_barcodes", "barcodes misread", quantities.count, "Of no landmark and no robot."),
+            Metric(
+                "stale_odometry_rows", "stale odometry", quantities.count, "A first row older than it says."
+            ),
             Metric("lost_s", "lost", quantities.duration, "Time in which the robot said that it was lost."),
             Metric(
                 "wrong_s",

@@ -42,6 +42,8 @@ class RecordedDrive:
         (K,) the steps of the 10 Hz grid.
     begin_s
         The log's clock at the begin.
+    misread, stale
+        File and line of readings of unknown barcodes, and of an outdated first row of odometry: left out.
     rate_var
         Variances per second of the odometry's distance (m^2) and angle (rad^2), where the log gives them.
     """
@@ -64,6 +66,7 @@ class RecordedDrive:
     odometry_gaps: int
     misread: tuple[str, ...]
     rate_var: tuple[float, float] | None = None
+    stale: tuple[str, ...] = ()
 
     def readings(self) -> Iterator[Readings]:
         """The log through the robot's plug, from the first step after the begin."""
@@ -123,6 +126,7 @@ def mrclam_drive(folder: Path, robot: int) -> RecordedDrive:
         log.truth_gaps_s.shape[0],
         int((np.diff(log.odometry_t_s) > TRUTH_GAP_S).sum()),
         log.misread,
+        stale=log.stale,
     )
 
 

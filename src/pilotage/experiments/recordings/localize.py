@@ -41,10 +41,11 @@ SUMS = ("beacons_seen", "beacons_accepted", "nis", "nis_dof", "nis_expected")
 
 @dataclass(frozen=True, slots=True)
 class LocalizedLog:
-    """Metrics by their JSON keys, and the run folder."""
+    """Metrics by their JSON keys, the run folder, and a line for each row of the log that was left out."""
 
     metrics: dict[str, object]
     run_dir: Path
+    left_out: list[str]
 
 
 def read_drive(log: Path, form: str, robot: int | None, max_range_m: float | None = None) -> RecordedDrive:
@@ -106,6 +107,7 @@ def localize_log(
         "truth_gaps": drive.truth_gaps,
         "odometry_gaps": drive.odometry_gaps,
         "misread_barcodes": len(drive.misread),
+        "stale_odometry_rows": len(drive.stale),
     }
     return _write(out, drive, metrics, trace, events, {"name": localizer, **config.model_dump(mode="json")})
 
@@ -254,4 +256,6 @@ def _write(
     except BaseException:
         shutil.rmtree(draft, ignore_errors=True)
         raise
-    return LocalizedLog(metrics, final)
+    left_out = [f"{place}: left out, its time lies after the next row's" for place in drive.stale]
+    left_out += [f"{place}: left out, nobody wears this barcode" for place in drive.misread]
+    return LocalizedLog(metrics, final, left_out)

@@ -28,6 +28,7 @@ _ERRORS: tuple[tuple[str, str, str, float, Callable[[float], str]], ...] = (
     ("mount_ahead_m", "Sensor farther ahead by", "mm", 1e3, quantities.length),
     ("mount_left_m", "Sensor farther left by", "mm", 1e3, quantities.length),
     ("age_error_s", "Readings older by", "ms", 1e3, quantities.duration),
+    ("axis_rad", "Optical axis, to the left", "mrad", 1e3, quantities.angle),
 )
 """Column, name, unit and its factor, and how the last value is written."""
 

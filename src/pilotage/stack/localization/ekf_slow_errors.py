@@ -41,8 +41,11 @@ TELEMETRY = {
     "mount_ahead_m": slow_errors.AHEAD,
     "mount_left_m": slow_errors.LEFT,
     "age_error_s": slow_errors.AGE,
+    "axis_rad": slow_errors.AXIS,
 }
 """Names of the errors in a trace; each has a standard deviation beside it."""
+DOUBTED = (slow_errors.SPEED, slow_errors.TURN, slow_errors.AGE)
+"""What another drive than the expected one has otherwise."""
 
 
 @LOCALIZERS.add(NAME, EkfSlowErrorsConfig)
@@ -95,6 +98,7 @@ class EkfSlowErrorsLocalizer:
             config.mount_ahead_m,
             config.mount_left_m,
             config.age_error_s,
+            config.axis_rad,
         ]
         count = len(self._ids)
         # A landmark's errors are kept in units of their standard deviations.
@@ -115,6 +119,7 @@ class EkfSlowErrorsLocalizer:
         self._dt_s = knowledge.dt_s
         self._motion = np.zeros(2)
         self._rejections = self.recoveries = 0
+        self._recovered_s, self._doubt = -math.inf, 1.0
         self.belief = knowledge.initial
         self._count(0, 0, 0.0)
 
@@ -228,9 +233,28 @@ class EkfSlowErrorsLocalizer:
             slow_errors.inflate(self._cov, config.recovery_factor, self._floor)
             self._rejections = 0
             self.recoveries += 1
+            self._doubt_the_drive()
             # Three landmarks that agree on a place have a word against the filter; two may be mistaken.
             self._begin_anew(least_landmarks=3)
         self._count(count, used, float(nis[outcome == slow_errors.OUTCOME_ACCEPTED].sum()))
+
+    def _doubt_the_drive(self) -> None:
+        """Recovery after recovery: the drive is another than expected, so its errors may be larger.
+
+        The stationary variance grows by f^2, the time constant alike: what drives a Gauss-Markov process,
+        2 variance / time constant, stays the same.
+        """
+        config, now = self._config, self._t_s or 0.0
+        again, self._recovered_s = now - self._recovered_s <= config.doubt_within_s, now
+        factor = min(config.doubt_factor, config.doubt_limit / self._doubt)
+        if not again or factor <= 1.0:
+            return
+        self._doubt *= factor
+        for place in DOUBTED:
+            wider = factor**2 * self._stationary[place]
+            self._cov[place, place] += wider - self._stationary[place]
+            self._stationary[place] = wider
+            self._fading[place] /= factor**2
 
     def _remember(self, seen: BeaconReadings) -> None:
         config = self._config

@@ -78,6 +78,8 @@ class EkfSlowErrorsConfig(Config):
     mount_ahead_m: SlowError = SlowError(std=0.0)
     mount_left_m: SlowError = SlowError(std=0.0)
     age_error_s: SlowError = SlowError(std=0.0)
+    axis_rad: SlowError = SlowError(std=0.0)
+    """Of a camera that measures depth, beside where its bearings say it looks."""
     landmark_range_error: LandmarkError = LandmarkError(std=0.002, time_constant_s=30.0)
     landmark_bearing_error: LandmarkError = LandmarkError(std=0.0, time_constant_s=30.0)
     unlogged_speed_m_s: NonNegative = 0.05
@@ -88,6 +90,11 @@ class EkfSlowErrorsConfig(Config):
     recovery_rejections: int = Field(default=3, ge=2)
     """So many more rejections than acceptances say that the filter is wrong, not the sensor."""
     recovery_factor: float = Field(default=2.0, gt=1.0)
+    doubt_within_s: NonNegative = 120.0
+    """Recoveries that follow each other so closely speak against what is believed of the drive as well."""
+    doubt_factor: float = Field(default=2.0, ge=1.0)
+    """Then the drive's errors and the readings' age may be so much larger, and change as slowly as before."""
+    doubt_limit: float = Field(default=8.0, ge=1.0)
     recovery_position_std_m: NonNegative = 0.1
     recovery_heading_std_rad: NonNegative = 0.1
 
