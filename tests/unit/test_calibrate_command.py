@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import re
+from html import unescape
 from pathlib import Path
 from typing import Any
 
@@ -149,8 +150,19 @@ def test_ranges_may_come_from_a_file(tmp_path: Path, capsys: Capture) -> None:
     answer = calibrate(capsys, "range", str(path), "--out", str(tmp_path))
     assert answer["scanner_range_var_m2"]["low"] < 1e-4 < answer["scanner_range_var_m2"]["high"]
     assert answer["scanner_bearing_var_rad2"]["low"] < 4e-4 < answer["scanner_bearing_var_rad2"]["high"]
+    assert answer["warnings"] == []
     path.write_text("t_s,range\n0,1\n")
     assert "line 1: expected columns such as range_m" in refused(capsys, "range", str(path))
+
+
+def test_readings_that_are_all_the_same_come_with_a_word(tmp_path: Path, capsys: Capture) -> None:
+    path = tmp_path / "coarse.csv"
+    path.write_text("range_m\n" + "1.5\n" * 20)
+    answer = calibrate(capsys, "range", str(path), "--out", str(tmp_path))
+    assert answer["coarse_range_var_m2"]["value"] == 0.0
+    (warning,) = answer["warnings"]
+    assert "all 20 readings are the same" in warning
+    assert warning in unescape(Path(answer["report"]).read_text())
 
 
 def heading_logs(folder: Path) -> Path:

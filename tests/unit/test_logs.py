@@ -254,16 +254,23 @@ def test_a_spoilt_carmen_log_is_named(tmp_path: Path, text: str, message: str) -
 
 
 def test_heading_logs_are_told_by_their_names(tmp_path: Path) -> None:
-    folder = tmp_path / "turn"
-    folder.mkdir()
+    folder = tmp_path / "robot" / "turn"
+    folder.mkdir(parents=True)
     write_csv(
         folder / "a_gyroscope.csv", ("t", "x", "y", "z"), [[0.0, 0.0, 0.0, 180.0], [0.1, 0.0, 0.0, 0.0]]
     )
     write_csv(folder / "a_compass.csv", ("t", "x", "y", "z"), [[0.0, 0.1, 0.2, 0.3], [0.1, 0.1, 0.2, 0.3]])
     write_csv(folder / "other.csv", ("t", "x", "y", "z"), [[0.0, 0.0, 0.0, 0.0]])
-    compass, gyro = (read_heading_log(path) for path in find_heading_logs(tmp_path))
+    compass, gyro = (read_heading_log(path) for path in find_heading_logs(tmp_path / "robot"))
     assert (compass.sensor, gyro.sensor) == (HeadingSensor.MAGNETOMETER, HeadingSensor.GYROSCOPE)
     assert gyro.name == "turn"
+    # A folder too far up holds no log: what lies deep in it is seldom one robot's.
+    with pytest.raises(InputError, match="found none"):
+        find_heading_logs(tmp_path)
+    with pytest.raises(
+        InputError, match=r"gone\.csv: expected a log or a folder of logs, found nothing there"
+    ):
+        find_heading_logs(tmp_path / "gone.csv")
     assert gyro.values[0, 2] == pytest.approx(math.pi)
     with pytest.raises(InputError, match="to know the sensor"):
         read_heading_log(folder / "other.csv")

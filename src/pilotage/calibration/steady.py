@@ -54,6 +54,18 @@ class SteadyCalibration:
     normality: Normality | None
     lag_one_correlation: float
 
+    @property
+    def warning(self) -> str:
+        """What a user of the variance has to know; empty where it can be used as it is."""
+        if self.var.value > 0.0:
+            return ""
+        r = self.readings
+        return (
+            f"{r.sensor} {r.quantity}: all {r.values.shape[0]} readings are the same, so their noise is "
+            "below the sensor's resolution and not told; a filter needs a variance above 0, with a "
+            "resolution d at least d^2 / 12"
+        )
+
     def as_dict(self) -> dict[str, object]:
         """Return the result as JSON knows it."""
         r = self.readings

@@ -84,6 +84,7 @@ def range_from(
         answer[f"{r.sensor}_{quantity}_var_{r.unit}2"] = result.var.as_dict()
         answer[f"{r.sensor}_{quantity}_mean_{r.unit}"] = result.mean.as_dict()
     answer["sensors"] = [result.as_dict() for result in found]
+    answer["warnings"] = [result.warning for result in found if result.warning]
     data = {str(i): result.readings.values for i, result in enumerate(found)}
     return write_calibration(out, answer, data, {})
 

@@ -80,13 +80,25 @@ def sensor_of(path: Path) -> HeadingSensor | None:
 
 
 def find_heading_logs(place: Path) -> list[Path]:
-    """Return the logs in a folder and the folders in it (drives with a reference too), or the file itself."""
+    """Return the logs in a folder and the folders right in it (drives with a reference too), or the file.
+
+    No deeper: what lies further down is seldom one robot's, and all logs are calibrated as one.
+
+    Raises
+    ------
+    InputError
+        Where nothing is there, or no log in the folder.
+    """
+    if not place.exists():
+        raise InputError(f"{place}: expected a log or a folder of logs, found nothing there")
     if not place.is_dir():
         return [place]
-    found = sorted(path for path in place.rglob("*.csv") if sensor_of(path) is not None)
-    found += sorted(place.rglob(f"*{DRIVE_SUFFIX}"))
+    near = sorted([*place.glob("*"), *place.glob("*/*")])
+    found = [path for path in near if path.suffix == ".csv" and sensor_of(path) is not None]
+    found += [path for path in near if path.suffix == DRIVE_SUFFIX]
     if not found:
         raise InputError(
-            f"{place}: expected gyroscope or magnetometer logs (*.csv, or *.mat of a drive) in it, found none"
+            f"{place}: expected gyroscope or magnetometer logs (*.csv, or *.mat of a drive) in it "
+            "or in the folders right in it, found none"
         )
     return found
