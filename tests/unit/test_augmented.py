@@ -14,7 +14,7 @@ from pilotage.core.types import FloatArray
 from pilotage.evaluation.run_metrics import poses
 from pilotage.experiments.floor.mission import load_floor_mission
 from pilotage.experiments.floor.simulate import simulate
-from pilotage.kernels import augmented, ekf
+from pilotage.kernels import augmented, sighting
 
 NONE = np.zeros(4)
 MOUNT = np.array([0.1, -0.05, 0.3])
@@ -80,7 +80,7 @@ def test_an_offset_reading_is_explained_by_pose_or_offset() -> None:
     z, H = np.empty(2), np.empty((2, 3))
     ranges, bearings = [], []
     for x, y in landmarks:
-        ekf.range_bearing(state[:3], x, y, MOUNT, z, H)
+        sighting.range_bearing(state[:3], x, y, MOUNT, z, H)
         ranges.append(z[0])
         bearings.append(z[1] + 0.02)
     nis, outcome = np.empty(3), np.empty(3, dtype=np.int64)

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from pilotage.core.angles import wrap_to_pi
 from pilotage.core.chi_square import chi_square_cdf, chi_square_quantile, gated_mean
 from pilotage.core.types import FloatArray, Pose2
-from pilotage.kernels import ekf
+from pilotage.kernels import ekf, sighting
 from pilotage.models.odometry import OdometryModel, move_jacobians
 from pilotage.models.range_bearing import range_bearing
 
@@ -96,10 +96,10 @@ def test_gate_refuses_the_impossible_and_unknown_ids_are_left_out() -> None:
     pose, cov = np.zeros(3), np.diag([1e-4, 1e-4, 1e-4])
     before = pose.copy()
     used, outcome = update(pose, cov, [3, 5], [[4.5, 0.0], [1.0, 0.0]], gate)
-    assert (used, outcome) == (0, [ekf.OUTCOME_GATED, ekf.OUTCOME_UNKNOWN])
+    assert (used, outcome) == (0, [sighting.OUTCOME_GATED, sighting.OUTCOME_UNKNOWN])
     assert (pose == before).all()
     used, outcome = update(pose, cov, [8], [[5.0, math.pi / 2]], gate)
-    assert (used, outcome) == (1, [ekf.OUTCOME_ACCEPTED])
+    assert (used, outcome) == (1, [sighting.OUTCOME_ACCEPTED])
 
 
 def test_innovations_do_not_break_at_pi() -> None:

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from scipy.optimize import least_squares
 
 from pilotage.core.types import FloatArray
-from pilotage.kernels import ekf, ukf
+from pilotage.kernels import ekf, iekf, sighting, ukf
 from pilotage.kernels.motion import exact_arc
 from unit.test_ekf import MOUNT, R, spd
 
@@ -77,7 +77,7 @@ def test_with_an_unsure_heading_only_the_unscented_mean_and_covariance_are_right
 
 
 @pytest.mark.parametrize(
-    "update", [ukf.update_range_bearings, ekf.update_range_bearings_iterated], ids=["ukf", "iekf"]
+    "update", [ukf.update_range_bearings, iekf.update_range_bearings], ids=["ukf", "iekf"]
 )
 @given(seed=st.integers(0, 3000))
 @settings(max_examples=60)
@@ -88,7 +88,7 @@ def test_small_updates_equal_the_ekfs(update: object, seed: int) -> None:
     if np.hypot(*(landmark[0] - pose[:2])) < 2.0:
         return
     z, H = np.empty(2), np.empty((2, 3))
-    ekf.range_bearing(pose, landmark[0, 0], landmark[0, 1], MOUNT, z, H)
+    sighting.range_bearing(pose, landmark[0, 0], landmark[0, 1], MOUNT, z, H)
     measured = z + rng.normal(size=2) * np.sqrt(np.diag(R))
     results = []
     for kernel in (ekf.update_range_bearings, update):
@@ -109,7 +109,7 @@ def test_the_iterated_filter_finds_the_posteriors_maximum() -> None:
 
     def residuals(x: FloatArray) -> FloatArray:
         z, H = np.empty(2), np.empty((2, 3))
-        ekf.range_bearing(np.asarray(x), landmark[0, 0], landmark[0, 1], MOUNT, z, H)
+        sighting.range_bearing(np.asarray(x), landmark[0, 0], landmark[0, 1], MOUNT, z, H)
         return np.concatenate([root.T @ (x - prior), (measured - z) / np.sqrt(np.diag(R))])
 
     best = least_squares(residuals, prior, xtol=1e-12, ftol=1e-12, gtol=1e-12).x
@@ -117,13 +117,13 @@ def test_the_iterated_filter_finds_the_posteriors_maximum() -> None:
     plain, plain_cov = pose.copy(), cov.copy()
     arguments = (IDS, measured[:1], measured[1:], IDS, landmark, MOUNT, R, math.inf, nis, outcome)
     ekf.update_range_bearings(plain, plain_cov, *arguments)
-    ekf.update_range_bearings_iterated(pose, cov, *arguments)
+    iekf.update_range_bearings(pose, cov, *arguments)
     assert pose == pytest.approx(best, abs=1e-5)
     assert np.abs(plain - best).max() > 1e-3
 
 
 def test_an_update_far_off_is_gated_and_changes_nothing() -> None:
-    for update in (ukf.update_range_bearings, ekf.update_range_bearings_iterated):
+    for update in (ukf.update_range_bearings, iekf.update_range_bearings):
         pose, cov = np.zeros(3), np.diag([1e-4, 1e-4, 1e-4])
         nis, outcome = np.empty(2), np.empty(2, dtype=np.int64)
         used = update(
@@ -141,6 +141,6 @@ def test_an_update_far_off_is_gated_and_changes_nothing() -> None:
             outcome,
         )
         assert used == 0
-        assert outcome.tolist() == [ekf.OUTCOME_GATED, ekf.OUTCOME_UNKNOWN]
+        assert outcome.tolist() == [sighting.OUTCOME_GATED, sighting.OUTCOME_UNKNOWN]
         assert (pose == 0.0).all()
         assert (cov == np.diag([1e-4, 1e-4, 1e-4])).all()

@@ -7,9 +7,15 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from pilotage.kernels.ekf import OUTCOME_ACCEPTED, OUTCOME_GATED, OUTCOME_UNKNOWN, range_bearing
 from pilotage.kernels.jit import kernel
 from pilotage.kernels.motion import arc_jacobians, exact_arc, mid_angle, wrap
+from pilotage.kernels.sighting import (
+    OUTCOME_ACCEPTED,
+    OUTCOME_GATED,
+    OUTCOME_UNKNOWN,
+    landmark_index,
+    range_bearing,
+)
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -76,8 +82,7 @@ def predict(
 def joseph_update(
     state: FloatArray, cov: FloatArray, H: FloatArray, innovation: FloatArray, R: FloatArray, gate: float
 ) -> float:
-    """Update in place by a measurement of two numbers, H (2, 7), unless its squared Mahalanobis distance
-    exceeds ``gate``; returns that distance (nan where the innovation covariance is not positive)."""
+    """As ``ekf.joseph_update2``, of the whole state: H (2, 7)."""
     PHt = cov @ H.T
     S = H @ PHt + R
     determinant = S[0, 0] * S[1, 1] - S[0, 1] * S[1, 0]
@@ -127,8 +132,8 @@ def update_range_bearings(
     for k in range(ids.shape[0]):
         nis[k] = math.nan
         outcome[k] = OUTCOME_UNKNOWN
-        i = np.searchsorted(known_ids, ids[k])
-        if i >= known_ids.shape[0] or known_ids[i] != ids[k]:
+        i = landmark_index(known_ids, ids[k])
+        if i < 0:
             continue
         if not range_bearing(state[:POSE], known_points[i, 0], known_points[i, 1], mount, z, pose_row):
             continue

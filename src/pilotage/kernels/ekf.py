@@ -9,13 +9,16 @@ from numpy.typing import NDArray
 
 from pilotage.kernels.jit import kernel
 from pilotage.kernels.motion import arc_jacobians, exact_arc, mid_angle, wrap
+from pilotage.kernels.sighting import (
+    OUTCOME_ACCEPTED,
+    OUTCOME_GATED,
+    OUTCOME_UNKNOWN,
+    landmark_index,
+    range_bearing,
+)
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
-
-OUTCOME_ACCEPTED = 1
-OUTCOME_GATED = 0
-OUTCOME_UNKNOWN = -1
 
 
 @kernel
@@ -117,35 +120,6 @@ def joseph_update2(
 
 
 @kernel
-def range_bearing(
-    pose: FloatArray, mx: float, my: float, mount: FloatArray, z: FloatArray, H: FloatArray
-) -> bool:
-    """Predict range and bearing of a landmark from a sensor mounted at ``mount`` (x, y, theta).
-
-    Fills z (2,) and its Jacobian H (2, 3) in the robot's pose; False where the landmark coincides with
-    the sensor. The night-watch report's h with its slips mended: the bearing is atan2(dy, dx), and the
-    bearing's row divides by the squared distance (Thrun et al. 2005, eq. 7.12-7.14).
-    """
-    c, s = math.cos(pose[2]), math.sin(pose[2])
-    # The sensor's lever arm turned into the map frame.
-    ox, oy = c * mount[0] - s * mount[1], s * mount[0] + c * mount[1]
-    dx, dy = mx - (pose[0] + ox), my - (pose[1] + oy)
-    q = dx * dx + dy * dy
-    if q <= 1e-18:
-        return False
-    r = math.sqrt(q)
-    z[0] = r
-    z[1] = wrap(math.atan2(dy, dx) - pose[2] - mount[2])
-    H[0, 0] = -dx / r
-    H[0, 1] = -dy / r
-    H[0, 2] = (dx * oy - dy * ox) / r
-    H[1, 0] = dy / q
-    H[1, 1] = -dx / q
-    H[1, 2] = -1.0 - (dx * ox + dy * oy) / q
-    return True
-
-
-@kernel
 def update_range_bearings(
     pose: FloatArray,
     cov: FloatArray,
@@ -165,86 +139,21 @@ def update_range_bearings(
     ``known_ids`` is sorted. ``nis`` (K,) and ``outcome`` (K,) are filled: accepted, gated, unknown id.
     One after the other equals jointly for a linear measurement, and re-linearizes in between otherwise.
     """
-    z = np.empty(2)
-    H = np.empty((2, 3))
-    innovation = np.empty(2)
+    z, innovation, H = np.empty(2), np.empty(2), np.empty((2, 3))
     used = 0
     for k in range(ids.shape[0]):
         nis[k] = math.nan
         outcome[k] = OUTCOME_UNKNOWN
-        i = np.searchsorted(known_ids, ids[k])
-        if i >= known_ids.shape[0] or known_ids[i] != ids[k]:
-            continue
-        if not range_bearing(pose, known_points[i, 0], known_points[i, 1], mount, z, H):
-            continue
-        innovation[0] = ranges[k] - z[0]
-        innovation[1] = wrap(bearings[k] - z[1])
-        nis[k] = joseph_update2(pose, cov, H, innovation, R, gate)
-        outcome[k] = OUTCOME_ACCEPTED if nis[k] <= gate else OUTCOME_GATED
-        used += outcome[k]
-    return used
-
-
-MAX_ITERATIONS = 8
-CONVERGED = 1e-9
-
-
-@kernel
-def update_range_bearings_iterated(
-    pose: FloatArray,
-    cov: FloatArray,
-    ids: IntArray,
-    ranges: FloatArray,
-    bearings: FloatArray,
-    known_ids: IntArray,
-    known_points: FloatArray,
-    mount: FloatArray,
-    R: FloatArray,
-    gate: float,
-    nis: FloatArray,
-    outcome: IntArray,
-) -> int:
-    """As ``update_range_bearings``, each landmark linearized anew at its own outcome until it settles.
-
-    The iterated EKF is Gauss-Newton on the posterior (Bell and Cathey 1993). The gate looks at the first
-    linearization; the covariance is that of the last.
-    """
-    z = np.empty(2)
-    H = np.empty((2, 3))
-    innovation = np.empty(2)
-    used = 0
-    for k in range(ids.shape[0]):
-        nis[k] = math.nan
-        outcome[k] = OUTCOME_UNKNOWN
-        i = np.searchsorted(known_ids, ids[k])
-        if i >= known_ids.shape[0] or known_ids[i] != ids[k]:
+        i = landmark_index(known_ids, ids[k])
+        if i < 0:
             continue
         mx, my = known_points[i, 0], known_points[i, 1]
         if not range_bearing(pose, mx, my, mount, z, H):
             continue
-        innovation[0] = ranges[k] - z[0]
-        innovation[1] = wrap(bearings[k] - z[1])
-        prior, prior_cov = pose.copy(), cov.copy()
+        innovation[0], innovation[1] = ranges[k] - z[0], wrap(bearings[k] - z[1])
         nis[k] = joseph_update2(pose, cov, H, innovation, R, gate)
-        if not nis[k] <= gate:
-            outcome[k] = OUTCOME_GATED
-            continue
-        for _ in range(MAX_ITERATIONS):
-            last = pose.copy()
-            if not range_bearing(last, mx, my, mount, z, H):
-                break
-            # The innovation seen from the prior: z less the prediction, less the slope times the way back.
-            d0, d1, d2 = prior[0] - last[0], prior[1] - last[1], wrap(prior[2] - last[2])
-            innovation[0] = ranges[k] - z[0] - (H[0, 0] * d0 + H[0, 1] * d1 + H[0, 2] * d2)
-            innovation[1] = wrap(bearings[k] - z[1] - (H[1, 0] * d0 + H[1, 1] * d1 + H[1, 2] * d2))
-            pose[:] = prior
-            cov[:, :] = prior_cov
-            joseph_update2(pose, cov, H, innovation, R, math.inf)
-            moved = abs(pose[0] - last[0]) + abs(pose[1] - last[1]) + abs(wrap(pose[2] - last[2]))
-            if moved < CONVERGED:
-                break
-        outcome[k] = OUTCOME_ACCEPTED
-        used += 1
+        outcome[k] = OUTCOME_ACCEPTED if nis[k] <= gate else OUTCOME_GATED
+        used += outcome[k]
     return used
 
 
@@ -281,9 +190,7 @@ def filter_log(
         (T, 3), (T, 3, 3) and (T, M) are filled; ``nis`` is nan where nothing was measured.
     """
     Q = np.zeros((2, 2))
-    z = np.empty(2)
-    H = np.empty((2, 3))
-    innovation = np.empty(2)
+    z, innovation, H = np.empty(2), np.empty(2), np.empty((2, 3))
     used = 0
     for t in range(increments.shape[0]):
         distance, angle = increments[t, 0], increments[t, 1]
@@ -294,10 +201,10 @@ def filter_log(
             nis[t, m] = math.nan
             if math.isnan(ranges[t, m]) or math.isnan(bearings[t, m]):
                 continue
-            if not range_bearing(pose, landmarks[m, 0], landmarks[m, 1], mount, z, H):
+            mx, my = landmarks[m, 0], landmarks[m, 1]
+            if not range_bearing(pose, mx, my, mount, z, H):
                 continue
-            innovation[0] = ranges[t, m] - z[0]
-            innovation[1] = wrap(bearings[t, m] - z[1])
+            innovation[0], innovation[1] = ranges[t, m] - z[0], wrap(bearings[t, m] - z[1])
             nis[t, m] = joseph_update2(pose, cov, H, innovation, R, gate)
             if nis[t, m] <= gate:
                 used += 1

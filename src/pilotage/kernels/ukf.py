@@ -11,9 +11,15 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from pilotage.kernels.ekf import OUTCOME_ACCEPTED, OUTCOME_GATED, OUTCOME_UNKNOWN, range_bearing
 from pilotage.kernels.jit import kernel
 from pilotage.kernels.motion import exact_arc, mid_angle, wrap
+from pilotage.kernels.sighting import (
+    OUTCOME_ACCEPTED,
+    OUTCOME_GATED,
+    OUTCOME_UNKNOWN,
+    landmark_index,
+    range_bearing,
+)
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -125,10 +131,8 @@ def update_range_bearings(
     for k in range(ids.shape[0]):
         nis[k] = math.nan
         outcome[k] = OUTCOME_UNKNOWN
-        index = np.searchsorted(known_ids, ids[k])
-        if index >= known_ids.shape[0] or known_ids[index] != ids[k]:
-            continue
-        if not sigma_points(pose, cov, points, wm, wc):
+        index = landmark_index(known_ids, ids[k])
+        if index < 0 or not sigma_points(pose, cov, points, wm, wc):
             continue
         seen = True
         for i in range(7):

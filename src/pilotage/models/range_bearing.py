@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from pilotage.core.types import FloatArray, Pose2
-from pilotage.kernels import ekf
+from pilotage.kernels import sighting
 
 
 def range_bearing(pose: Pose2, landmark_xy_m: FloatArray, mount: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -26,6 +26,6 @@ def range_bearing(pose: Pose2, landmark_xy_m: FloatArray, mount: FloatArray) -> 
     z, H = np.empty(2), np.empty((2, 3))
     point = np.asarray(landmark_xy_m, dtype=np.float64)
     arm = np.asarray(mount, dtype=np.float64)
-    if not ekf.range_bearing(pose.as_array(), point[0], point[1], arm, z, H):
+    if not sighting.range_bearing(pose.as_array(), point[0], point[1], arm, z, H):
         raise ValueError("range_bearing: the landmark coincides with the sensor, its bearing is undefined")
     return z, H

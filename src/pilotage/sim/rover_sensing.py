@@ -9,7 +9,7 @@ import numpy as np
 from pilotage.core.angles import wrap_array_to_pi
 from pilotage.core.random import RandomStreams
 from pilotage.core.types import FloatArray
-from pilotage.kernels import rover_filter
+from pilotage.kernels import landmarks_in_reach
 from pilotage.maps.landmarks import Landmarks
 from pilotage.sensors.beacon import BeaconConfig
 from pilotage.sensors.landmark_log import LandmarkLog
@@ -85,7 +85,7 @@ def _within(
     size = 4 * len(places) + 16
     while True:
         step, index = np.empty(size, dtype=np.int64), np.empty(size, dtype=np.int64)
-        count = int(rover_filter.sightings_within(places, marks, reach_m, step, index))
+        count = int(landmarks_in_reach.sightings_within(places, marks, reach_m, step, index))
         if count < size:
             return step[:count], index[:count]
         size *= 4

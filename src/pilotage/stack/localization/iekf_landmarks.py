@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pilotage.kernels import ekf
+from pilotage.kernels import ekf, iekf
 from pilotage.stack.knowledge import Knowledge
 from pilotage.stack.localization.landmark_filter import LandmarkFilter, LandmarkFilterConfig
 from pilotage.stack.localization.localizer import LOCALIZERS
@@ -17,4 +17,4 @@ class IteratedEkfLandmarkLocalizer(LandmarkFilter):
     """
 
     def __init__(self, config: LandmarkFilterConfig, knowledge: Knowledge) -> None:
-        super().__init__("iekf-landmarks", ekf.predict, ekf.update_range_bearings_iterated, config, knowledge)
+        super().__init__("iekf-landmarks", ekf.predict, iekf.update_range_bearings, config, knowledge)

@@ -12,7 +12,7 @@ from pilotage.core.chi_square import chi_square_quantile, gated_mean
 from pilotage.core.config import Config
 from pilotage.core.errors import InputError
 from pilotage.core.types import BoolArray, Pose2
-from pilotage.kernels import ekf
+from pilotage.kernels import sighting
 from pilotage.models.odometry import OdometryModel
 from pilotage.sensors.beacon import BeaconConfig
 from pilotage.sensors.readings import BeaconReadings, OdometryIncrement, Readings
@@ -136,9 +136,9 @@ class LandmarkFilter:
             nis,
             outcome,
         )
-        total = float(nis[outcome == ekf.OUTCOME_ACCEPTED].sum()) if used else 0.0
+        total = float(nis[outcome == sighting.OUTCOME_ACCEPTED].sum()) if used else 0.0
         self._telemetry = _telemetry(count, used, total, used * self._expected_nis)
-        known = outcome != ekf.OUTCOME_UNKNOWN
+        known = outcome != sighting.OUTCOME_UNKNOWN
         self._rejected = 0 if used else self._rejected + int(known.any())
         if self._doubt_after is not None and known.any() and self._rejected >= self._doubt_after:
             self._doubt(seen, known)

@@ -12,7 +12,7 @@ from pilotage.core.chi_square import chi_square_quantile
 from pilotage.core.config import Config
 from pilotage.core.registry import Registry
 from pilotage.core.types import FloatArray, IntArray
-from pilotage.kernels import rover_filter
+from pilotage.kernels import rover_filter, rover_odometry
 from pilotage.maps.landmarks import Landmarks
 from pilotage.sensors.beacon import BeaconConfig
 from pilotage.sensors.landmark_log import LandmarkLog
@@ -90,7 +90,7 @@ class DeadReckoningLog:
         """Sum the steps; sightings are not looked at."""
         poses, covs = np.empty((len(log.steps), 3)), np.empty((len(log.steps), 3, 3))
         pose, cov = initial.pose.as_array(), initial.cov.copy()
-        rover_filter.dead_reckon(pose, cov, log.steps, log.variances, self._second, poses, covs)
+        rover_odometry.dead_reckon(pose, cov, log.steps, log.variances, self._second, poses, covs)
         unused = np.full(log.ids.shape, np.nan), np.full(log.ids.shape, -1, dtype=np.int64)
         return LogEstimate(poses, covs, *unused, gate=1.0)
 
