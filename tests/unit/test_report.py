@@ -29,7 +29,7 @@ from pilotage.core.types import Event
 from pilotage.report import quantities, summary_table, write_report
 from pilotage.report.figures.consistency import chi_square_band
 from pilotage.report.figures.layers import ellipse_outlines
-from pilotage.report.figures.map import view_limits
+from pilotage.report.figures.map_view import view_limits
 from pilotage.report.figures.placing import LabelPlacer, along
 from pilotage.report.run_folder import read_run
 from pilotage.report.series import band, decimate, merge_spans, running_mean, spans

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from pilotage.report import quantities
-from pilotage.report.run_folder import number
+from pilotage.report.run_data import number
 
 
 def outcome(metrics: Mapping[str, Any]) -> bool | None:

@@ -12,7 +12,7 @@ from typing import Any
 
 from pilotage.report import quantities
 from pilotage.report.metric_catalogue import GROUPS, Metric, plain
-from pilotage.report.run_folder import number
+from pilotage.report.run_data import number
 
 NOT_MEASURES = frozenset(
     {"mission", "seed", "success", "reason", "run_dir", "name", "rows", "columns", "resolution_m"}

@@ -43,7 +43,8 @@ from pilotage.report.replay.floor import floor_scene
 from pilotage.report.replay.scene import ReplayScene
 from pilotage.report.replay.section import SLUG, TITLE, replay_section, script_source, style
 from pilotage.report.replay.terrain import terrain_scene
-from pilotage.report.run_folder import RunData, number, read_run
+from pilotage.report.run_data import RunData, number
+from pilotage.report.run_folder import read_run
 from pilotage.report.sheet.maps import accuracy_figure, printed_figure
 from pilotage.report.sheet.path import coverage_figure, path_figure
 from pilotage.report.sheet.replay import sheet_scene

@@ -9,19 +9,21 @@ from __future__ import annotations
 import json
 import math
 import zipfile
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 import yaml
 
 from pilotage.core.errors import InputError
-from pilotage.core.types import BoolArray, Event, FloatArray
-from pilotage.report.scan_updates import RecordedUpdate, read_updates
-from pilotage.report.sheet_data import SheetData, read_sheet
+from pilotage.core.types import Event, FloatArray
+from pilotage.report.run_data import Landmark, Plan, RunData, Trace, World, number
+from pilotage.report.scan_updates import read_updates
+from pilotage.report.sheet_data import read_sheet
 from pilotage.report.sightings import Sightings, read_sightings
+
+T = TypeVar("T")
 
 METRICS_FILE = "metrics.json"
 TRACE_FILE = "trace.parquet"
@@ -31,131 +33,6 @@ WORLD_FILE = "world.json"
 PLANS_FILE = "plans.npz"
 UPDATES_FILE = "updates.npz"
 SCANS_FILE = "scans.npz"
-
-
-@dataclass(frozen=True, slots=True)
-class Trace:
-    """The columns of the trace, one value a step.
-
-    Parameters
-    ----------
-    columns
-        Name to (N,) values; a column that the run did not record is simply not there.
-    steps
-        N, the number of rows.
-    """
-
-    columns: Mapping[str, FloatArray]
-    steps: int
-
-    def __getitem__(self, name: str) -> FloatArray:
-        """Return the (N,) column, all NaN where the run did not record it."""
-        values = self.columns.get(name)
-        return np.full(self.steps, np.nan) if values is None else values
-
-    def has(self, *names: str) -> bool:
-        """Say whether every named column holds at least one finite value."""
-        return all(name in self.columns and bool(np.isfinite(self.columns[name]).any()) for name in names)
-
-    @property
-    def t_s(self) -> FloatArray:
-        """(N,) times; the row's number where there is no clock."""
-        return self["t_s"] if self.has("t_s") else np.arange(self.steps, dtype=np.float64)
-
-    def ultrasonics(self) -> dict[str, FloatArray]:
-        """Return the ranges of every ultrasonic sensor by the sensor's name, NaN where saturated."""
-        return {
-            name.removeprefix("us_").removesuffix("_m"): values
-            for name, values in self.columns.items()
-            if name.startswith("us_") and name.endswith("_m")
-        }
-
-
-@dataclass(frozen=True, slots=True)
-class Landmark:
-    """A beacon on the map."""
-
-    id: str
-    x_m: float
-    y_m: float
-
-
-@dataclass(frozen=True, slots=True)
-class World:
-    """What stood in the world: the known map first, then what the robot was not told about."""
-
-    segments_m: FloatArray = field(default_factory=lambda: np.empty((0, 4)))
-    circles_m: FloatArray = field(default_factory=lambda: np.empty((0, 3)))
-    landmarks: tuple[Landmark, ...] = ()
-    obstacle_segments_m: FloatArray = field(default_factory=lambda: np.empty((0, 4)))
-    obstacle_circles_m: FloatArray = field(default_factory=lambda: np.empty((0, 3)))
-    obstacle_polygons_m: tuple[FloatArray, ...] = ()
-    bounds_m: tuple[float, float, float, float] | None = None
-    robot_radius_m: float | None = None
-    start: tuple[float, float, float | None] | None = None
-    goal: tuple[float, float, float | None] | None = None
-
-    @property
-    def has_obstacles(self) -> bool:
-        """Whether there was anything that the robot was not told about."""
-        unexpected = (self.obstacle_segments_m, self.obstacle_circles_m, self.obstacle_polygons_m)
-        return any(len(things) > 0 for things in unexpected)
-
-
-@dataclass(frozen=True, slots=True)
-class Plan:
-    """One answer of the planner: the path (N, 3), its waypoints (W, 3) and the search tree (E, 4)."""
-
-    path: FloatArray
-    waypoints: FloatArray
-    tree: FloatArray
-    t_s: float
-    length_m: float
-    planning_time_s: float
-
-
-@dataclass(frozen=True, slots=True)
-class RunData:
-    """Everything a run folder tells."""
-
-    run_dir: Path
-    mission: Mapping[str, Any]
-    mission_text: str
-    metrics: Mapping[str, Any]
-    events: tuple[Event, ...]
-    world: World
-    plans: tuple[Plan, ...]
-    mapped_points_m: FloatArray
-    shortest_path_m: FloatArray
-    trace: Trace
-    updates: tuple[RecordedUpdate, ...] = ()
-    sightings: Sightings = field(default_factory=Sightings)
-    sheet: SheetData | None = None
-
-    @property
-    def name(self) -> str:
-        """The mission's name, or the folder's."""
-        return str(self.metrics.get("mission") or self.mission.get("mission") or self.run_dir.name)
-
-    @property
-    def kind(self) -> str:
-        """The kind of world that the mission has; "recording" for a recorded log."""
-        if not self.mission and "localizer" in self.metrics:
-            return "recording"
-        world = self.mission.get("world")
-        return str(world.get("kind", "floor")) if isinstance(world, Mapping) else "floor"
-
-    @property
-    def settle_s(self) -> float:
-        """Errors count after this long (the start error is drawn, not earned)."""
-        run = self.mission.get("run")
-        value = number(run.get("settle_s")) if isinstance(run, Mapping) else math.nan
-        return value if math.isfinite(value) else 1.0
-
-    def settled(self) -> BoolArray:
-        """(N,) steps that count for the errors; all of them in a run that ended before settling."""
-        after = self.trace.t_s > self.settle_s
-        return after if bool(after.any()) else np.ones(self.trace.steps, dtype=np.bool_)
 
 
 def read_run(run_dir: Path) -> RunData:
@@ -191,17 +68,10 @@ def read_run(run_dir: Path) -> RunData:
         mapped_points_m=mapped_points,
         shortest_path_m=shortest_path,
         trace=_read_trace(run_dir / TRACE_FILE),
-        updates=_read_updates(run_dir / UPDATES_FILE),
-        sightings=_read_sightings(run_dir / SCANS_FILE),
+        updates=_archive(run_dir / UPDATES_FILE, read_updates, ()),
+        sightings=_archive(run_dir / SCANS_FILE, read_sightings, Sightings()),
         sheet=read_sheet(run_dir),
     )
-
-
-def number(value: object) -> float:
-    """Return a float; NaN for None and for what is no number (null stands for NaN in JSON)."""
-    if isinstance(value, bool) or not isinstance(value, (int, float, np.integer, np.floating)):
-        return math.nan
-    return float(value)
 
 
 def _broken(path: Path, error: Exception) -> InputError:
@@ -347,20 +217,12 @@ def _read_plans(path: Path) -> tuple[tuple[Plan, ...], FloatArray, FloatArray]:
     return tuple(plans), rows("mapped_points", 2), rows("shortest_path", 2)
 
 
-def _read_sightings(path: Path) -> Sightings:
+def _archive(path: Path, read: Callable[[Path], T], empty: T) -> T:
+    """Read an archive of arrays, or hand out ``empty`` where the run has none."""
     if not path.is_file():
-        return Sightings()
+        return empty
     try:
-        return read_sightings(path)
-    except (OSError, ValueError, EOFError, KeyError, IndexError, zipfile.BadZipFile) as error:
-        raise _broken(path, error) from None
-
-
-def _read_updates(path: Path) -> tuple[RecordedUpdate, ...]:
-    if not path.is_file():
-        return ()
-    try:
-        return read_updates(path)
+        return read(path)
     except (OSError, ValueError, EOFError, KeyError, IndexError, zipfile.BadZipFile) as error:
         raise _broken(path, error) from None
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from pilotage.report import quantities
-from pilotage.report.run_folder import RunData
+from pilotage.report.run_data import RunData
 from pilotage.report.style import (
     BLUE,
     VERMILLION,

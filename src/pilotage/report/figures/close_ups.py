@@ -14,7 +14,7 @@ from pilotage.core.types import BoolArray, FloatArray
 from pilotage.report import quantities
 from pilotage.report.event_kinds import event_kind
 from pilotage.report.figures import layers
-from pilotage.report.run_folder import Plan, RunData, Trace, World
+from pilotage.report.run_data import Plan, RunData, Trace, World
 from pilotage.report.style import (
     BLACK,
     BLUE,

@@ -9,7 +9,7 @@ from scipy.special import gammaincinv
 
 from pilotage.core.types import FloatArray
 from pilotage.report import quantities
-from pilotage.report.run_folder import RunData
+from pilotage.report.run_data import RunData
 from pilotage.report.series import running_mean
 from pilotage.report.style import (
     BLUE,

@@ -14,7 +14,7 @@ from matplotlib.axes import Axes
 from matplotlib.path import Path as Outline
 
 from pilotage.core.types import FloatArray
-from pilotage.report.run_folder import RunData, World
+from pilotage.report.run_data import RunData, World
 from pilotage.report.style import (
     BLACK,
     BLUE,

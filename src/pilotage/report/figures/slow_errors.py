@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 
 from pilotage.core.types import FloatArray
 from pilotage.report import quantities
-from pilotage.report.run_folder import RunData
+from pilotage.report.run_data import RunData
 from pilotage.report.series import band
 from pilotage.report.style import BLUE, SKY, Illustration, Key, render, series, stacked_axes, time_limits
 

@@ -10,7 +10,7 @@ from matplotlib.path import Path as Outline
 
 from pilotage.core.types import FloatArray
 from pilotage.report import quantities
-from pilotage.report.run_folder import RunData, number
+from pilotage.report.run_data import RunData, number
 from pilotage.report.style import (
     BLUE,
     GREEN,

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from pilotage.core.types import FloatArray
 from pilotage.report import quantities
 from pilotage.report.figures.terrain_estimate import ellipses_told, estimate_layers, thinned
-from pilotage.report.run_folder import RunData
+from pilotage.report.run_data import RunData
 from pilotage.report.style import BLUE, GREEN, ORANGE, SKY, VERMILLION, WIDTH_PT, Illustration, Key, render
 from pilotage.report.terrain_pictures import Picture, TerrainPictures, read_pictures
 

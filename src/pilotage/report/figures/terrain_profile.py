@@ -8,7 +8,7 @@ import numpy as np
 
 from pilotage.core.types import FloatArray
 from pilotage.report import quantities
-from pilotage.report.run_folder import RunData
+from pilotage.report.run_data import RunData
 from pilotage.report.style import (
     BLUE,
     GREEN,

@@ -10,7 +10,7 @@ from pilotage.core.types import FloatArray
 from pilotage.report.event_kinds import event_kind
 from pilotage.report.figures.badge import RADIUS_PT, badge
 from pilotage.report.modes import MODES, Mode, mode_spans
-from pilotage.report.run_folder import RunData
+from pilotage.report.run_data import RunData
 from pilotage.report.style import (
     BLUE,
     GRID,

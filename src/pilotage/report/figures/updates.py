@@ -13,7 +13,7 @@ from pilotage.core.types import FloatArray
 from pilotage.report.figures import layers
 from pilotage.report.figures.badge import badge
 from pilotage.report.figures.placing import LabelPlacer, along
-from pilotage.report.run_folder import RunData
+from pilotage.report.run_data import RunData
 from pilotage.report.scan_updates import RecordedUpdate
 from pilotage.report.style import (
     BLACK,

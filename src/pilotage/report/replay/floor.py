@@ -24,7 +24,7 @@ from pilotage.report.replay.scene import (
     SightTrack,
     States,
 )
-from pilotage.report.run_folder import RunData
+from pilotage.report.run_data import RunData
 from pilotage.report.style import BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILLION
 
 Column = Callable[[str], FloatArray]

@@ -20,7 +20,7 @@ from pilotage.report.replay.scene import (
     Series,
     SightTrack,
 )
-from pilotage.report.run_folder import RunData
+from pilotage.report.run_data import RunData
 from pilotage.report.style import BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILLION
 from pilotage.report.terrain_pictures import TerrainPictures, read_pictures
 

@@ -9,7 +9,7 @@ import numpy as np
 from pilotage.core.types import FloatArray
 from pilotage.report.replay.floor import floor_scene
 from pilotage.report.replay.scene import Lines, Raster, ReplayScene
-from pilotage.report.run_folder import RunData
+from pilotage.report.run_data import RunData
 from pilotage.report.sheet_data import SheetData
 
 NOT_YET, VISITED = 0, 1
