@@ -7,16 +7,15 @@ from collections.abc import Mapping
 from enum import StrEnum
 from typing import ClassVar
 
-import numpy as np
-
 from pilotage.core.types import STANDSTILL, BoolArray, Event, FloatArray, IntArray, WheelSpeeds
-from pilotage.kernels import frontier_goal
 from pilotage.maps.cell_map import CellMap, CellState
 from pilotage.sensors.readings import Readings
 from pilotage.stack.control.waypoint_drive import WaypointDrive
 from pilotage.stack.control.wheel_pursuit import wheel_speeds
 from pilotage.stack.exploration.explorer import EXPLORERS, LeftCell
 from pilotage.stack.exploration.frontier_config import FrontierConfig
+from pilotage.stack.exploration.frontier_goals import DEEP_M, Cell, Goals
+from pilotage.stack.exploration.frontier_ground import Ground
 from pilotage.stack.exploration.frontier_inspections import Inspections
 from pilotage.stack.exploration.frontier_reasons import reasons, summary
 from pilotage.stack.exploration.frontier_retreat import is_walled_in, trail_back
@@ -27,24 +26,9 @@ from pilotage.stack.interface import Belief, StackStatus
 from pilotage.stack.knowledge import SheetKnowledge
 from pilotage.stack.planning.sheet_room import Point, SheetRoom
 
-Cell = tuple[int, int]
-
-OVERHANG_M = 0.004
-"""The body may reach over the sheet's edge by this much."""
-KEEP_OFF_M = 0.004
-DEEP_M = 0.020
-"""A goal counts as visited this deep inside it, on the way to the next."""
-GUARD_AHEAD_M, GUARD_ROOM_M = 0.05, 0.011
-"""It stops for what would come this near within so much way: a few millimetres are driven while it brakes."""
-CAUTION_ROOM_M = 0.022
-"""With less room ahead it drives more slowly."""
-REVIEW_DEPTH_M = 0.008
-SHALLOW_M = 0.004
 BACK_SPEED_M_S, BACK_S, BACK_ROOM_M = 0.035, 0.5, 0.006
 RETREATS = 5
 """How often, at most, it leaves a place that its map has closed."""
-PENALTY_M = 0.5
-"""What one failed try makes a goal dearer."""
 
 
 class Doing(StrEnum):
@@ -79,18 +63,16 @@ class FrontierExplorer:
         self._senses = Senses(config, knowledge)
         self._smoother, self._grid = self._senses.smoother, self._senses.grid
         shape = self._grid.shape
-        self._room = SheetRoom(shape, knowledge.body_radius_m, config.room_m, config.wide_m)
+        room = SheetRoom(shape, knowledge.body_radius_m, config.room_m, config.wide_m)
+        self._ground = Ground(self._senses, room)
+        self._goals = Goals(config, self._grid, self._ground)
         self._driver = WaypointDrive(
             knowledge.drive, config.speed_share, config.turn_rate_rad_s, config.stuck_s
         )
         self._doing, self._until_s = Doing.REST, config.first_rest_s
         self._rested_s = self._looked_s = 0.0
         self._goal: Cell | None = None
-        self._tries = np.zeros((shape.rows, shape.columns), np.int64)
-        self._stands: FloatArray | None = None
-        self._map_is_old = True
-        self._reviews = 0
-        self._looks = self._stops = self._retreats = 0
+        self._reviews = self._retreats = 0
         self._inspections = Inspections(config.tape_end_m, config.inspections)
         self._left: tuple[LeftCell, ...] = ()
         self._status, self._reason = StackStatus.RUNNING, ""
@@ -186,9 +168,8 @@ class FrontierExplorer:
             if self._driver.waypoints and not self._way_is_free():
                 self._decide(t_s)
         if self._avoidance and self._driver.moves_ahead and self._in_the_way():
-            self._stops += 1
             self._solve()
-            self._refresh_room()
+            self._ground.refresh()
             self._fail(t_s, "stopped", "something stands in the way")
             self._decide(t_s)
 
@@ -203,13 +184,12 @@ class FrontierExplorer:
 
     def _back_off(self, t_s: float) -> None:
         """Drive back a little, where there is room behind."""
-        if self._map_is_old:
-            self._refresh_room()
+        self._ground.refresh()
         x, y, theta = self._smoother.keyframes.pose
         back_m = BACK_SPEED_M_S * BACK_S
         behind = x - back_m * math.cos(theta), y - back_m * math.sin(theta)
         self._doing = Doing.BACK
-        self._until_s = t_s + (BACK_S if self._room.clear((x, y), behind) > BACK_ROOM_M else 0.0)
+        self._until_s = t_s + (BACK_S if self._ground.room.clear((x, y), behind) > BACK_ROOM_M else 0.0)
 
     def _solve(self, steps: int = 1, anew: bool = False) -> None:
         """Smooth, and bring the map up to date."""
@@ -222,48 +202,21 @@ class FrontierExplorer:
             self._grid.gather_anew(poses)
         else:
             self._grid.gather(poses)
-        self._map_is_old = True
-
-    def _refresh_room(self) -> None:
-        self._room.update(*self._senses.obstacles())
-        self._stands = None
-        self._map_is_old = False
+        self._ground.age()
 
     def _way_is_free(self) -> bool:
         """Whether the next pieces of the way keep their room, by the map as it is now."""
-        if self._map_is_old:
-            self._refresh_room()
+        self._ground.refresh()
         x, y, _ = self._smoother.keyframes.pose
-        here, least = (x, y), min(self._config.room_m - 0.003, self._room.at(x, y) - 0.002)
-        for waypoint in self._driver.waypoints[:2]:
-            if self._room.clear(here, waypoint) < least:
-                return False
-            here = waypoint
-        return True
+        return self._ground.way_is_free((x, y), self._driver.waypoints)
 
     def _in_the_way(self) -> bool:
-        """Whether what beams hit lately stands close before the body."""
+        """Whether something stands close before the body; where little room is left it drives carefully."""
         x, y, _ = self._smoother.keyframes.pose
-        to_x, to_y = self._driver.waypoints[0]
-        away = math.hypot(to_x - x, to_y - y)
-        share = min(1.0, GUARD_AHEAD_M / max(away, 1e-6))
-        ahead = x + share * (to_x - x), y + share * (to_y - y)
-        near = self._senses.recent
-        room = near.room_along((x, y), ahead, self._room.body_m)
-        self._driver.is_careful = room < CAUTION_ROOM_M
-        return room < GUARD_ROOM_M and room < near.room_along((x, y), (x, y), self._room.body_m) - 0.0015
+        in_the_way, self._driver.is_careful = self._ground.look_ahead((x, y), self._driver.waypoints[0])
+        return in_the_way
 
     # --- deciding -----------------------------------------------------------------------------------
-
-    def _settled(self) -> BoolArray:
-        """Cells whose visit is sure, by how deep inside them the path led."""
-        c = self._config
-        wanted = c.depth_m + min(c.depth_std * self._smoother.position_std_m, DEEP_M - 0.004)
-        deep = np.full_like(self._grid.depth_m, REVIEW_DEPTH_M if self._reviews else wanted)
-        if self._stands is not None:
-            # Of some cells only a sliver can be entered.
-            deep = np.minimum(deep, np.maximum(self._stands[:, :, 2] - 0.004, SHALLOW_M))
-        return np.asarray(self._grid.depth_m >= deep)
 
     def _decide(self, t_s: float) -> None:
         """Rest, return to a landmark, visit a cell, or end."""
@@ -273,17 +226,16 @@ class FrontierExplorer:
         if t_s - self._rested_s > c.rest_every_s and c.rest_s > 0.0:
             self._doing, self._until_s, self._rested_s = Doing.REST, t_s + c.rest_s, t_s
             return
-        if self._map_is_old:
-            self._refresh_room()
+        self._ground.refresh()
         x, y, _ = pose = self._smoother.keyframes.pose
-        cost, parent = self._room.costs(x, y)
+        cost, parent = self._ground.room.costs(x, y)
         unsure = self._smoother.position_std_m > c.return_std_m
         if unsure and t_s - self._looked_s > c.return_pause_s:
             self._looked_s = t_s
             look = best_look(
                 self._smoother.map,
                 self._smoother.cov[:2, :2],
-                self._room,
+                self._ground.room,
                 cost,
                 (x, y),
                 self._senses.sensors_ahead_m,
@@ -296,10 +248,9 @@ class FrontierExplorer:
 
     def _look(self, look: Look, here: Point, parent: IntArray, t_s: float) -> None:
         """Set out to see a landmark."""
-        way = [*self._room.way(parent, look.node, here, look.begin), look.end]
+        way = [*self._ground.room.way(parent, look.node, here, look.begin), look.end]
         if look.back:
             way.append(look.begin)
-        self._looks += 1
         self._doing = Doing.LOOK
         self._driver.follow(way, t_s, slow_at_end=True, back=look.back)
 
@@ -313,7 +264,7 @@ class FrontierExplorer:
             self._smoother.map,
             ends,
             self._senses.loose_crossings(),
-            self._room,
+            self._ground.room,
             cost,
             self._senses.sensors_ahead_m,
         )
@@ -326,40 +277,12 @@ class FrontierExplorer:
         self, pose: tuple[float, float, float], cost: FloatArray, parent: IntArray, t_s: float
     ) -> bool:
         """Set out for the best goal; False where none can be reached."""
-        c = self._config
-        if self._stands is None:
-            self._stands = self._room.stands(self._grid.depth_m < DEEP_M, OVERHANG_M, KEEP_OFF_M)
-        settled = self._settled()
-        wanted = ~settled & (self._tries < c.tries)
-        no_room = self._stands[:, :, 3] < c.room_m
-        cell, node = frontier_goal.choose_goal(
-            wanted,
-            settled | no_room,
-            self._stands,
-            self._grid.unknown_share(),
-            np.asarray(PENALTY_M * self._tries, dtype=np.float64),
-            cost,
-            self._room.rows,
-            self._room.columns,
-            *self._grid.shape.fine_size_m,
-            pose,
-            c.room_m,
-            self._room.body_m,
-            c.turn_cost_m_rad,
-            c.hug_m,
-            c.gain_m,
-            self._room.segments,
-            self._room.points,
-        )
-        if cell < 0:
+        goal = self._goals.choose(pose, cost, parent, self._smoother.position_std_m)
+        if goal is None:
             return False
-        row, column = divmod(cell, self._grid.shape.columns)
-        stand_x, stand_y, depth, _ = self._stands[row, column]
-        self._goal = (row, column)
-        end = float(stand_x), float(stand_y)
-        way = self._room.way(parent, node, pose[:2], end)
+        self._goal = goal.cell
         self._doing = Doing.GO
-        self._driver.follow(way, t_s, slow_at_end=depth < DEEP_M)
+        self._driver.follow(goal.way, t_s, slow_at_end=goal.is_shallow)
         return True
 
     def _arrive(self, t_s: float) -> None:
@@ -367,14 +290,14 @@ class FrontierExplorer:
         if self._doing is Doing.LOOK:
             self._looked_s = t_s
             self._solve()
-        elif self._goal is not None and not self._settled()[self._goal]:
-            self._tries[self._goal] += 1
+        elif self._goal is not None and not self._goals.settled(self._smoother.position_std_m)[self._goal]:
+            self._goals.tries[self._goal] += 1
         self._decide(t_s)
 
     def _fail(self, t_s: float, kind: str, text: str) -> None:
         """Note that the way to the goal did not work out."""
         if self._goal is not None:
-            self._tries[self._goal] += 1
+            self._goals.tries[self._goal] += 1
             text = f"{text}, on the way to column {self._goal[1]}, row {self._goal[0]}"
         self._events.append(Event(t_s, kind, text))
         self._driver.stop()
@@ -382,28 +305,30 @@ class FrontierExplorer:
     def _review(self, t_s: float) -> None:
         """Nothing is left by what is known: smooth the whole run, look again, or end."""
         self._solve(steps=3, anew=True)
-        self._refresh_room()
+        self._ground.refresh()
         self._reviews += 1
+        self._goals.is_review = True
         x, y, _ = pose = self._smoother.keyframes.pose
-        cost, parent = self._room.costs(x, y)
+        cost, parent = self._ground.room.costs(x, y)
         found = self._reviews <= self._config.reviews and self._choose(pose, cost, parent, t_s)
         if not found and not self._senses.doubts_strays:
             # Strays beside a wall must not close a gap for good.
             self._senses.doubts_strays = True
-            self._refresh_room()
-            cost, parent = self._room.costs(x, y)
+            self._ground.age()
+            self._ground.refresh()
+            cost, parent = self._ground.room.costs(x, y)
             found = self._choose(pose, cost, parent, t_s)
         if not found and self._retreat(cost, t_s):
             return
         if found:
-            missed = int((~self._settled() & (self._stands_room() >= self._config.room_m)).sum())
+            missed = self._goals.missed(self._smoother.position_std_m)
             self._events.append(Event(t_s, "review", f"the whole run smoothed; {missed} cells to see again"))
             return
         self._left = reasons(
             ~self.visited,
             self.cells.holds(CellState.OBSTACLE),
-            self._tries >= self._config.tries,
-            self._room,
+            self._goals.given_up(),
+            self._ground.room,
             cost,
         )
         self._doing, self._status = Doing.DONE, StackStatus.ARRIVED
@@ -415,7 +340,7 @@ class FrontierExplorer:
     def _retreat(self, cost: FloatArray, t_s: float) -> bool:
         """Set out back along the trail where the map closes the robot in; False where it does not."""
         way = trail_back(self._smoother.keyframes.poses[: self._smoother.keyframes.count])
-        if self._retreats >= RETREATS or not way or not is_walled_in(self._room, cost, self.visited):
+        if self._retreats >= RETREATS or not way or not is_walled_in(self._ground.room, cost, self.visited):
             return False
         self._retreats += 1
         self._events.append(Event(t_s, "retreat", "the map leaves no way out: back along its own trail"))
@@ -423,7 +348,3 @@ class FrontierExplorer:
         self._driver.follow(way, t_s, slow_at_end=True)
         self._driver.is_careful = True
         return True
-
-    def _stands_room(self) -> FloatArray:
-        assert self._stands is not None
-        return self._stands[:, :, 3]
