@@ -14,16 +14,13 @@ import pytest
 from pilotage.core.angles import wrap_to_pi
 from pilotage.core.types import FloatArray
 from pilotage.evaluation.consistency import fraction_in_band
-from pilotage.stack.localization.heading_filters import (
+from pilotage.stack.localization.gyro_bias import GyroBiasConfig, GyroBiasFilter
+from pilotage.stack.localization.heading_filter import HeadingErrors, HeadingEstimate, HeadingFilter
+from pilotage.stack.localization.heading_report import (
     EncoderGyroConfig,
     EncoderGyroFilter,
     EncoderMagnetometerConfig,
     EncoderMagnetometerFilter,
-    GyroBiasConfig,
-    GyroBiasFilter,
-    HeadingErrors,
-    HeadingEstimate,
-    HeadingFilter,
 )
 
 RUNS, STEPS, DT = 400, 300, 0.05

@@ -18,7 +18,7 @@ from pilotage.evaluation.consistency import fraction_in_band, nees
 from pilotage.evaluation.run_metrics import covariances, poses
 from pilotage.experiments.floor.mission import load_floor_mission
 from pilotage.experiments.floor.simulate import simulate
-from pilotage.stack.localization.heading_filters import HEADING_FILTERS
+from pilotage.stack.localization.heading_filter import HEADING_FILTERS
 from pilotage.stack.localization.localizer import LOCALIZERS
 
 RUNS, SETTLE = 24, 10

@@ -25,7 +25,7 @@ from pilotage.sim.world import World
 from pilotage.stack.control.pi_follower import PiFollower, PiFollowerConfig
 from pilotage.stack.interface import StackStatus
 from pilotage.stack.localization.ekf_landmarks import EkfLandmarkLocalizer
-from pilotage.stack.localization.heading_filters import HeadingEstimate
+from pilotage.stack.localization.heading_filter import HeadingEstimate
 from pilotage.stack.localization.landmark_filter import LandmarkFilterConfig
 from pilotage.stack.navigator.navigator import Parts
 from pilotage.stack.planning.dubins_local import DubinsLocalConfig, DubinsLocalPlanner

@@ -13,15 +13,13 @@ from pilotage.core.angles import wrap_to_pi
 from pilotage.core.errors import InputError
 from pilotage.core.types import FloatArray
 from pilotage.kernels import heading
-from pilotage.stack.localization.heading_filters import (
+from pilotage.stack.localization.gyro_bias import GyroBiasConfig, GyroBiasFilter
+from pilotage.stack.localization.heading_filter import HeadingErrors, HeadingEstimate
+from pilotage.stack.localization.heading_report import (
     EncoderGyroConfig,
     EncoderGyroFilter,
     EncoderMagnetometerConfig,
     EncoderMagnetometerFilter,
-    GyroBiasConfig,
-    GyroBiasFilter,
-    HeadingErrors,
-    HeadingEstimate,
 )
 
 START = HeadingEstimate(0.0, 1e-4)

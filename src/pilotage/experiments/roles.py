@@ -11,7 +11,7 @@ from pilotage.stack.control.escape import ESCAPES
 from pilotage.stack.control.polar_pose import POSE_CONTROLLERS
 from pilotage.stack.control.reactive import REACTIVES
 from pilotage.stack.exploration.explorer import EXPLORERS
-from pilotage.stack.localization.heading_filters import HEADING_FILTERS
+from pilotage.stack.localization.heading_filter import HEADING_FILTERS
 from pilotage.stack.localization.localizer import LOCALIZERS
 from pilotage.stack.localization.rover_estimators import ESTIMATORS
 from pilotage.stack.mapping.mapper import MAPPERS

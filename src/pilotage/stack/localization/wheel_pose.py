@@ -15,13 +15,12 @@ from pilotage.sensors.readings import EncoderCounts, GyroscopeRates, MagneticFie
 from pilotage.sensors.wheel_encoders import WheelEncodersConfig
 from pilotage.stack.interface import Belief
 from pilotage.stack.knowledge import SheetKnowledge
-from pilotage.stack.localization.heading_filters import (
+from pilotage.stack.localization.heading_filter import HeadingErrors, HeadingEstimate
+from pilotage.stack.localization.heading_report import (
     EncoderGyroConfig,
     EncoderGyroFilter,
     EncoderMagnetometerConfig,
     EncoderMagnetometerFilter,
-    HeadingErrors,
-    HeadingEstimate,
 )
 
 ALIGN_S = 1.0
