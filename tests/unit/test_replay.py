@@ -25,7 +25,7 @@ from pilotage.sensors.beacon import BeaconConfig
 from pilotage.sensors.lidar import LidarConfig
 from pilotage.sensors.readings import BeaconReadings, LidarScan, Readings
 from support.browser import Browser, find_browser
-from unit.test_report import fabricate_run
+from support.fabricated_run import fabricate_run
 
 PLAYER = 'document.getElementById("replay-player").player'
 READY = 'document.getElementById("replay-player")?.player'

@@ -1,0 +1,138 @@
+"""What a report is made of: words for numbers, thinned series, bands, ellipses, labels, the map's view."""
+
+from __future__ import annotations
+
+import io
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+from rich.console import Console
+from scipy.stats import chi2
+
+from pilotage.core.types import FloatArray
+from pilotage.report import quantities, summary_table
+from pilotage.report.figures.consistency import chi_square_band
+from pilotage.report.figures.layers import ellipse_outlines
+from pilotage.report.figures.map_view import view_limits
+from pilotage.report.figures.placing import LabelPlacer, along
+from pilotage.report.run_folder import read_run
+from pilotage.report.series import band, decimate, merge_spans, running_mean, spans
+from support.fabricated_run import fabricate_metrics, fabricate_run, fabricate_world
+from support.pages import page_of
+
+
+def _printed(metrics: dict[str, Any]) -> str:
+    console = Console(width=100, record=True, file=io.StringIO())
+    console.print(summary_table(metrics))
+    return console.export_text()
+
+
+def test_summary_table() -> None:
+    text = _printed(fabricate_metrics(600))
+    for part in ("two-rooms", "seed 3", "success", "5.60\u00a0mm", "0.120°", "1.017", "2.70 to 3.20"):
+        assert part in text
+    failed = _printed({"success": False, "reason": "stuck [bold]here[/bold]", "position_rmse_m": math.nan})
+    assert "failed: stuck [bold]here[/bold]" in failed
+    assert "nan" not in failed
+    assert "outcome not said" in _printed({})
+
+
+def test_quantities_are_humane() -> None:
+    assert quantities.length(0.00512) == "5.12\u00a0mm"
+    assert quantities.length(66.3) == "66.30\u00a0m"
+    assert quantities.angle(math.pi / 180.0) == "1.00°"
+    assert quantities.duration(0.0123) == "12.3\u00a0ms"
+    assert quantities.duration(119.99) == "120.0\u00a0s"
+    assert quantities.duration(135.4) == "2\u00a0min 15\u00a0s"
+    assert quantities.duration(-594.5) == "−9\u00a0min 54\u00a0s"
+    assert quantities.share(0.5) == "50.0\u00a0%"
+    assert quantities.significant(0.99996) == "1.00"
+    for write in (quantities.length, quantities.angle, quantities.duration, quantities.count):
+        assert write(math.nan) == quantities.NOTHING
+
+
+@given(
+    values=arrays(np.float64, st.integers(1, 400), elements=st.floats(-1e6, 1e6) | st.just(math.nan)),
+    buckets=st.integers(1, 50),
+)
+def test_decimation_keeps_the_extremes_in_order(values: FloatArray, buckets: int) -> None:
+    t_s = np.arange(len(values), dtype=np.float64)
+    times, kept = decimate(t_s, values, buckets)
+    assert len(kept) <= max(2 * buckets + 2, 2)
+    assert bool((np.diff(times) > 0.0).all())
+    assert times[0] == t_s[0]
+    assert times[-1] == t_s[-1]
+    np.testing.assert_array_equal(kept, values[times.astype(int)])
+    if bool(np.isfinite(values).any()):
+        assert np.nanmax(kept) == np.nanmax(values)
+        assert np.nanmin(kept) == np.nanmin(values)
+
+
+@given(values=arrays(np.float64, st.integers(1, 300), elements=st.floats(0.0, 1e6) | st.just(math.nan)))
+def test_bands_never_shrink(values: FloatArray) -> None:
+    times, widths = band(np.arange(len(values), dtype=np.float64), values, 20)
+    assert len(times) == len(widths)
+    if bool(np.isfinite(values).any()):
+        assert np.nanmax(widths) == np.nanmax(values)
+
+
+def test_spans_and_running_mean() -> None:
+    t_s = np.arange(6.0)
+    stretches = spans(t_s, np.array([True, False, True, True, False, True]))
+    np.testing.assert_allclose(stretches, [[0, 1], [2, 4], [5, 6]])
+    np.testing.assert_allclose(merge_spans(stretches, 1.5), [[0, 6]])
+    assert spans(t_s, np.zeros(6, dtype=np.bool_)).shape == (0, 2)
+    mean = running_mean(np.array([1.0, np.nan, 3.0, 5.0]), 2)
+    np.testing.assert_allclose(mean, [1.0, 1.0, 3.0, 4.0])
+
+
+def test_chi_square_band_holds_its_probability() -> None:
+    for dof in (1.0, 3.0, 8.0):
+        low, high = chi_square_band(dof, 0.95)
+        assert chi2.cdf(high, dof) - chi2.cdf(low, dof) == pytest.approx(0.95)
+        assert chi2.cdf(low, dof) == pytest.approx(0.025)
+
+
+def test_ellipse_holds_its_probability(tmp_path: Path) -> None:
+    run = read_run(fabricate_run(tmp_path / "run", steps=5))
+    (outline,) = ellipse_outlines(run, [4])
+    trace = run.trace
+    centre = np.array([trace["est_x_m"][4], trace["est_y_m"][4]])
+    xx, xy, yy = (float(trace[name][4]) for name in ("cov_xx_m2", "cov_xy_m2", "cov_yy_m2"))
+    inverse = np.linalg.inv(np.array([[xx, xy], [xy, yy]]))
+    away = np.asarray(outline.vertices)[:-1] - centre
+    squared = np.einsum("ni,ij,nj->n", away, inverse, away)
+    np.testing.assert_allclose(squared, chi2.ppf(0.95, 2), rtol=1e-6)
+
+
+def test_labels_keep_off_lines_and_each_other() -> None:
+    line = along(np.array([[0.0, 50.0], [100.0, 50.0]]), 2.0, 1.0)
+    placer = LabelPlacer(line, (0.0, 0.0, 100.0, 100.0))
+    places = [placer.place(50.0, 50.0, 6.0, 6.0, np.array([5.0, 12.0, 25.0])) for _ in range(4)]
+    for i, (x, y) in enumerate(places):
+        assert abs(y - 50.0) > 6.0
+        for other_x, other_y in places[:i]:
+            assert max(abs(x - other_x), abs(y - other_y)) > 6.0
+
+
+def test_map_shows_the_whole_floor_or_the_part_that_matters(tmp_path: Path) -> None:
+    whole = view_limits(read_run(fabricate_run(tmp_path / "whole", steps=50)))
+    assert whole is not None
+    assert whole[0] < 0.0
+    assert whole[2] > 12.0
+    floor = fabricate_world() | {
+        "bounds_m": [-60, -60, 60, 60],
+        "segments_m": [[-60, -60, 60, -60], [60, -60, 60, 60]],
+    }
+    run = fabricate_run(tmp_path / "part", steps=50, world=floor)
+    part = view_limits(read_run(run))
+    assert part is not None
+    assert part[0] > -20.0
+    assert part[3] < 30.0
+    assert "Only the part of the floor around the run is shown." in page_of(run)
