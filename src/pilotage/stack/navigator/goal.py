@@ -5,11 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
-import numpy as np
-
 from pilotage.core.errors import InputError
 from pilotage.core.types import STOP, Event, FloatArray, Pose2, Twist
-from pilotage.kernels import geometry
 from pilotage.sensors.readings import Readings
 from pilotage.stack.control.guard import ArcGuard
 from pilotage.stack.control.reactive import Reaction, ReactionKind
@@ -27,6 +24,8 @@ from pilotage.stack.navigator.global_plan import GlobalPlan
 from pilotage.stack.navigator.goal_config import GoalNavigatorConfig, Mode
 from pilotage.stack.navigator.lost import LostDriving
 from pilotage.stack.navigator.navigator import NAVIGATORS, Parts
+from pilotage.stack.navigator.own_map import OwnMap
+from pilotage.stack.navigator.progress import StallWatch
 
 HERE_TOLERANCE_M = 0.005
 """Slack between what a plan keeps and what is checked while driving it."""
@@ -62,13 +61,10 @@ class GoalNavigator:
         self._goal = knowledge.goal
         self._tolerance_m = knowledge.goal_tolerance_m
         self._radius_m = knowledge.body_radius_m
-        self._segments = knowledge.world_map.segments_m
-        self._known_circles = knowledge.world_map.circles_m
-        self._nothing = self._known_circles[:0]
-        self._circles = self._last_mapped = self._known_circles
         self._localizer = parts.localizer
         self._reactive = parts.reactive
         self._mapper = parts.mapper
+        self._map = OwnMap(knowledge.world_map, parts.mapper)
         self._escape = parts.escape
         self._plan = GlobalPlan(
             parts.planner,
@@ -85,7 +81,7 @@ class GoalNavigator:
         self._status, self._reason = StackStatus.RUNNING, ""
         self._mode = Mode.FOLLOW
         self._to_go_m = math.nan
-        self._best_m, self._best_t_s = math.inf, 0.0
+        self._stall = StallWatch(config.stall_progress_m, config.stall_s)
         self._trail: list[Pose2] = []
         self._avoiding = self._escaping = self._in_hall = False
         self._reaction = NO_REACTION
@@ -122,7 +118,7 @@ class GoalNavigator:
     @property
     def mapped_circles_m(self) -> FloatArray:
         """(M, 3) what the robot put on its own map."""
-        return self._nothing if self._mapper is None else self._mapper.circles_m
+        return self._map.found_circles_m
 
     def prepare(self) -> None:
         """Plan from the initial belief; without a path the task has failed before it starts.
@@ -131,7 +127,7 @@ class GoalNavigator:
         """
         if self.belief.status is BeliefStatus.LOST:
             return
-        result = self._plan.make(0.0, self.belief.pose, self.mapped_circles_m, (self._plan.clearance_m,))
+        result = self._plan.make(0.0, self.belief.pose, self._map.found_circles_m, (self._plan.clearance_m,))
         if result.path is None:
             self._fail(f"{result.status}: {result.reason}")
         else:
@@ -153,8 +149,8 @@ class GoalNavigator:
             return self._find_the_way_again(readings, belief.pose)
         command = self._drive(readings, belief.pose)
         # Its own trail it has driven before: there only the known walls are asked.
-        circles = self._known_circles if self._mode is Mode.ESCAPE else self._all_circles()
-        if self._guard.allows(command, belief.pose, self._segments, circles, self._room_asked_m()):
+        circles = self._map.known_circles_m if self._mode is Mode.ESCAPE else self._map.circles_m
+        if self._guard.allows(command, belief.pose, self._map.segments_m, circles, self._room_asked_m()):
             return command
         return self._refuse(command, belief.pose)
 
@@ -190,12 +186,12 @@ class GoalNavigator:
         self._trail.append(pose)
         if self._reactive is not None:
             self._reaction = self._reactive.step(
-                readings, pose, self._segments, self._plan.circles_m, self._goes_straight()
+                readings, pose, self._map.segments_m, self._plan.circles_m, self._goes_straight()
             )
         kind = self._reaction.kind
         if kind is ReactionKind.TRAPPED:
             return self._begin_escape("turning found no way out")
-        if self._stalled():
+        if self._stall.stalled(self._to_go_m, self._t_s):
             return self._begin_escape(f"no progress for {self._config.stall_s:g} s")
         if kind is ReactionKind.AVOID:
             return self._avoid()
@@ -225,7 +221,7 @@ class GoalNavigator:
         self._mode = Mode.WANDER
         if self._t_s < self._lost.plan_at_s:
             return self._lost.step(readings)
-        result = self._plan.make(self._t_s, pose, self.mapped_circles_m, self._clearances(pose))
+        result = self._plan.make(self._t_s, pose, self._map.found_circles_m, self._clearances(pose))
         self.counts["replans"] += 1
         if result.path is None:
             if self.counts["replans"] >= self._config.max_replans:
@@ -304,7 +300,7 @@ class GoalNavigator:
     def _replan_locally(self, pose: Pose2) -> bool:
         assert self._plan.progress is not None
         route = self._plan.progress.route_ahead(self._config.waypoint_ahead_m)
-        return self._follower.replan(pose, route, self._segments, self._all_circles())
+        return self._follower.replan(pose, route, self._map.segments_m, self._map.circles_m)
 
     def _replan_globally(self, pose: Pose2, why: str) -> Twist:
         """Plan anew on the robot's own map; back out where even that finds no way."""
@@ -313,7 +309,7 @@ class GoalNavigator:
         if self.counts["replans"] >= self._config.max_replans:
             return self._fail(f"stuck: gave up after {self.counts['replans']} replans")
         self.counts["replans"] += 1
-        result = self._plan.make(self._t_s, pose, self.mapped_circles_m, self._clearances(pose))
+        result = self._plan.make(self._t_s, pose, self._map.found_circles_m, self._clearances(pose))
         if result.path is None:
             return self._begin_escape(f"replanning found {result.status} ({result.reason})")
         self._took_plan("replan", why)
@@ -321,7 +317,7 @@ class GoalNavigator:
 
     def _took_plan(self, kind: str, why: str = "") -> None:
         plan = self._plan.history[-1]
-        self._best_m, self._best_t_s = math.inf, self._t_s
+        self._stall.restart(self._t_s)
         self._to_go_m = plan.length_m
         because = f"{why}: " if why else ""
         self._say(
@@ -342,7 +338,7 @@ class GoalNavigator:
     def _clearances(self, pose: Pose2) -> list[float]:
         """Clearances to try in turn: the planner's own, the fallbacks, and what there is where it stands."""
         config = self._config
-        here = geometry.distance_to_nearest(pose.x_m, pose.y_m, self._segments, self._all_circles())
+        here = self._map.distance_m(pose)
         asked = [self._plan.clearance_m, *(self._radius_m + margin for margin in config.fallback_margins_m)]
         squeezed = max(here - HERE_TOLERANCE_M, self._radius_m - MAPPED_TOLERANCE_M)
         return [c for c in asked if c <= self._plan.clearance_m] + (
@@ -354,14 +350,6 @@ class GoalNavigator:
         if self._mode is Mode.ESCAPE:
             return self._radius_m + HERE_TOLERANCE_M
         return self._plan.history[-1].clearance_m - HERE_TOLERANCE_M
-
-    def _all_circles(self) -> FloatArray:
-        """Everything round on the robot's own map: what it was told of and what it found."""
-        mapped = self.mapped_circles_m
-        if mapped is not self._last_mapped:
-            self._last_mapped = mapped
-            self._circles = np.concatenate([self._known_circles, mapped])
-        return self._circles
 
     def _goes_straight(self) -> bool:
         assert self._plan.progress is not None
@@ -381,15 +369,6 @@ class GoalNavigator:
         if self._to_go_m > away + self._tolerance_m:
             return False
         return away <= self._config.arrival_m or (away <= self._tolerance_m and self._to_go_m < 0.02)
-
-    def _stalled(self) -> bool:
-        """Whether the distance to go has not shrunk for too long."""
-        if self._to_go_m < self._best_m - self._config.stall_progress_m:
-            self._best_m, self._best_t_s = self._to_go_m, self._t_s
-        stalled = self._t_s - self._best_t_s > self._config.stall_s
-        if stalled:
-            self._best_t_s = self._t_s
-        return stalled
 
     # --- ends ---------------------------------------------------------------------------------------
 

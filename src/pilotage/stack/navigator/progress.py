@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from pilotage.core.types import FloatArray, Pose2
@@ -84,3 +86,24 @@ class PathProgress:
             return 0.0
         turns = np.mod(headings - headings[0] + np.pi, 2.0 * np.pi) - np.pi
         return float(np.max(np.abs(turns)))
+
+
+class StallWatch:
+    """Says when the distance to go has not shrunk by ``progress_m`` for longer than ``patience_s``."""
+
+    def __init__(self, progress_m: float, patience_s: float) -> None:
+        self._progress_m, self._patience_s = progress_m, patience_s
+        self._best_m, self._best_t_s = math.inf, 0.0
+
+    def restart(self, t_s: float) -> None:
+        """A new plan: any distance is progress."""
+        self._best_m, self._best_t_s = math.inf, t_s
+
+    def stalled(self, to_go_m: float, t_s: float) -> bool:
+        """Whether it has stalled; having said so it waits as long again."""
+        if to_go_m < self._best_m - self._progress_m:
+            self._best_m, self._best_t_s = to_go_m, t_s
+        stalled = t_s - self._best_t_s > self._patience_s
+        if stalled:
+            self._best_t_s = t_s
+        return stalled
