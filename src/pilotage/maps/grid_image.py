@@ -6,11 +6,11 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from PIL import Image, UnidentifiedImageError
+from PIL import Image
 
 from pilotage.core.errors import InputError
 from pilotage.core.types import Pose2
-from pilotage.maps.memory import require_memory
+from pilotage.maps.image_file import opened_image
 from pilotage.maps.occupancy_grid import CORNER, FREE, OCCUPIED, OccupancyGrid
 
 ByteArray = NDArray[np.uint8]
@@ -36,27 +36,8 @@ def read_grey(path: Path, size: tuple[int, int] | None = None) -> tuple[ByteArra
     InputError
         Where the image is missing, unreadable, coloured, of another depth or size, or too large.
     """
-    if not path.is_file():
-        raise InputError(f"image '{path}': expected an image there, found none")
-    # Pillow guards against large images; here the memory that there is decides.
-    limit, Image.MAX_IMAGE_PIXELS = Image.MAX_IMAGE_PIXELS, None
-    try:
-        with Image.open(path) as image:
-            columns, rows = image.size
-            if size is not None and (rows, columns) != size:
-                raise InputError(
-                    f"image '{path}': expected {size[1]} x {size[0]} pixels, found {columns} x {rows}"
-                )
-            require_memory(rows * columns * (len(image.getbands()) + 2), f"image '{path}'")
-            return _grey(image, path)
-    except UnidentifiedImageError:
-        raise InputError(
-            f"image '{path}': expected a PNG, PGM or other image, found another format"
-        ) from None
-    except (OSError, SyntaxError, ValueError) as error:
-        raise InputError(f"image '{path}': cannot be read ({error}); it may be cut short") from None
-    finally:
-        Image.MAX_IMAGE_PIXELS = limit
+    with opened_image(path, size, lambda image: len(image.getbands()) + 2) as image:
+        return _grey(image, path)
 
 
 def _grey(image: Image.Image, path: Path) -> tuple[ByteArray, ByteArray | None]:

@@ -11,8 +11,8 @@ from scipy import ndimage
 
 from pilotage.core.errors import InputError
 from pilotage.core.types import Pose2
+from pilotage.maps.image_file import opened_image
 from pilotage.maps.landmarks import Landmarks
-from pilotage.maps.memory import require_memory
 from pilotage.maps.occupancy_grid import CORNER, OccupancyGrid
 
 YELLOW = (255, 220, 0)
@@ -38,22 +38,8 @@ def read_landmark_image(
     InputError
         Where the image is missing, unreadable or of another size, or has no coloured spot.
     """
-    if not path.is_file():
-        raise InputError(f"image '{path}': expected an image there, found none")
-    limit, Image.MAX_IMAGE_PIXELS = Image.MAX_IMAGE_PIXELS, None
-    try:
-        with Image.open(path) as image:
-            columns, rows = image.size
-            if size is not None and (rows, columns) != size:
-                raise InputError(
-                    f"image '{path}': expected {size[1]} x {size[0]} pixels, found {columns} x {rows}"
-                )
-            require_memory(12 * rows * columns, f"image '{path}'")
-            pixels = np.asarray(image.convert("RGB"))
-    except (OSError, SyntaxError, ValueError) as error:
-        raise InputError(f"image '{path}': cannot be read ({error}); it may be cut short") from None
-    finally:
-        Image.MAX_IMAGE_PIXELS = limit
+    with opened_image(path, size, lambda _: 12) as image:
+        pixels = np.asarray(image.convert("RGB"))
     coloured = pixels.max(axis=2) - pixels.min(axis=2) >= COLOURED_FROM
     labels, count = ndimage.label(coloured, np.ones((3, 3), dtype=np.int64))
     if count == 0:
