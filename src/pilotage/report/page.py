@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
-import os
 from collections.abc import Callable
 from pathlib import Path
 
+from pilotage.core.whole_file import write_whole
 from pilotage.report import quantities
 from pilotage.report.figures.clearance import clearance_figure
 from pilotage.report.figures.close_ups import close_ups_figure
@@ -109,15 +109,8 @@ _LONGEST_MISSION = 100_000
 
 def write_report(run_dir: Path) -> Path:
     """Write ``report.html`` into a run folder and return its path; see ``pilotage.report``."""
-    page = run_page(read_run(run_dir))
     path = run_dir / REPORT_FILE
-    # Written beside and renamed: a reader never sees half a page.
-    beside = path.with_name(f".{path.name}.{os.getpid()}")
-    try:
-        beside.write_text(page, encoding="utf-8")
-        beside.replace(path)
-    finally:
-        beside.unlink(missing_ok=True)
+    write_whole(path, run_page(read_run(run_dir)))
     return path
 
 

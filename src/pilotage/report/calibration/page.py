@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-import os
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from pilotage.core.whole_file import write_whole
 from pilotage.report.calibration.drive_figures import drive_figures
 from pilotage.report.calibration.folder import CalibrationData, read_calibration
 from pilotage.report.calibration.heading_figures import heading_figures
@@ -82,15 +82,8 @@ _MEANINGS = {
 
 def write_calibration_report(folder: Path) -> Path:
     """Write ``report.html`` into a calibration folder and return its path."""
-    page = calibration_page(read_calibration(folder))
     path = folder / REPORT_FILE
-    # Written beside and renamed: a reader never sees half a page.
-    beside = path.with_name(f".{path.name}.{os.getpid()}")
-    try:
-        beside.write_text(page, encoding="utf-8")
-        beside.replace(path)
-    finally:
-        beside.unlink(missing_ok=True)
+    write_whole(path, calibration_page(read_calibration(folder)))
     return path
 
 
