@@ -68,9 +68,6 @@ def test_a_false_sighting_shows() -> None:
     assert found.chi2 > 100.0
 
 
-WRONG_START = ["stack.initial.theta_var_rad2=0.01", "run.time_limit_s=5"]
-
-
 def last_error_m(mission: str, overrides: list[str], seed: int) -> float:
     """Position error at the end."""
     trace = simulate(load_floor_mission(mission, overrides, seed)).trace

@@ -204,8 +204,6 @@ class SimulatedUltrasonic:
         return UltrasonicReading(max(float(distance), c.min_range_m), saturated=False)
 
 
-SensorFactory = Callable[[SensorConfig, World, np.random.Generator], SimulatedSensor]
-
 SIMULATED: dict[type[SensorConfig], Callable[..., SimulatedSensor]] = {
     WheelOdometryConfig: SimulatedWheelOdometry,
     LidarConfig: SimulatedLidar,

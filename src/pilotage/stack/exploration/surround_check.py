@@ -34,7 +34,6 @@ class SurroundCheckConfig(Config):
 
     goal_tolerance_m: Positive = 0.020
     planning_period_s: Positive = 0.1
-    sensing_period_s: Positive = 0.05
     stuck_periods: int = Field(default=200, ge=1)
     """A goal is dropped after so many control periods with less than 10 mm of progress each: after 2 s."""
     far_cells: Positive = 1.5

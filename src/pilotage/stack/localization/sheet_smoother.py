@@ -103,7 +103,7 @@ class SheetSmoother:
         self.beams, self.crossings = Observations(5), Observations(2)
         self._fresh = 0
         self.solved_s = 0.0
-        self.solves = self.rejected = 0
+        self.solves = 0
         self._solved_beams = self._solved_crossings = 0
         self.cov: FloatArray = np.diag(
             np.array([config.start_position_std_m] * 2 + [config.start_heading_std_rad]) ** 2
@@ -149,7 +149,6 @@ class SheetSmoother:
         lines, cov = landmarks.saved(), self.cov
         self._iterate(steps, merge=True)
         if not self._is_plausible(self.keyframes.poses[n - 1] - poses[n - 1], cov):
-            self.rejected += 1
             self.keyframes.poses[:n] = poses
             self.keyframes.systematic[:] = systematic
             landmarks.restore(lines)

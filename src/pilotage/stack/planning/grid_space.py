@@ -69,11 +69,6 @@ class GridSpace:
         self._factors = cost_factors
         self._weights, self._lightest, self._heaviest = _weights(blocked, cost_factors)
 
-    @property
-    def has_costs(self) -> bool:
-        """Whether cells differ in cost."""
-        return self._weights is not None
-
     def contains(self, cell: Cell) -> bool:
         """Whether there is such a cell."""
         return 0 <= cell[0] < self.rows and 0 <= cell[1] < self.columns
