@@ -1,0 +1,56 @@
+"""The docs hold: links lead somewhere, and every registered name and every metric is told of."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+from pilotage.experiments.roles import REGISTRIES
+from pilotage.report.metric_catalogue import GROUPS
+
+ROOT = Path(__file__).parents[2]
+PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", ROOT / "CHANGELOG.md", *(ROOT / "docs").rglob("*.md")]
+DERIVED = frozenset({"planned_over_shortest", "final_error_x_m", "final_error_y_m", "final_error_theta_rad"})
+"""Rows of the table that are made from other metrics."""
+
+
+def anchors(page: Path) -> set[str]:
+    """The places in a page that a link can name, as forges make them from headings."""
+    headings = re.findall(r"^#+ (.*)$", page.read_text(), re.MULTILINE)
+    return {re.sub(r"[^\w\- ]", "", heading.lower()).strip().replace(" ", "-") for heading in headings}
+
+
+def broken_links(page: Path) -> Iterator[str]:
+    for target, anchor in re.findall(r"\]\(([^)#\s]*)(?:#([^)\s]*))?\)", page.read_text()):
+        if "://" in target:
+            continue
+        place = page.parent / target if target else page
+        if not place.exists() or (anchor and anchor not in anchors(place)):
+            yield f"{page.name}: {target}#{anchor}"
+
+
+def test_links_lead_somewhere() -> None:
+    assert [link for page in PAGES for link in broken_links(page)] == []
+
+
+def test_files_that_are_named_are_there() -> None:
+    rooms = "|".join(sorted(path.name for path in (ROOT / "src/pilotage").iterdir() if path.is_dir()))
+    named = re.compile(rf"`((?:src|tests|benchmarks|examples|docs|{rooms})/[\w/.-]+\.\w+)`")
+    missing = [
+        f"{page.name}: {path}"
+        for page in PAGES
+        for path in named.findall(page.read_text())
+        if not ((ROOT / path).exists() or (ROOT / "src/pilotage" / path).exists())
+    ]
+    assert missing == []
+
+
+def test_every_component_and_every_metric_is_told_of() -> None:
+    told = "".join(page.read_text() for page in (ROOT / "docs").glob("*.md"))
+    changes = (ROOT / "CHANGELOG.md").read_text()
+    names = {entry.name for registry in REGISTRIES.values() for entry in registry}
+    assert sorted(name for name in names if f"`{name}`" not in told) == []
+    assert sorted(name for name in names if f"`{name}`" not in changes) == []
+    keys = {metric.key for _, metrics in GROUPS for metric in metrics}
+    assert sorted(key for key in keys - DERIVED if f"`{key}`" not in told) == []
