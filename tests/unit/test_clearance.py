@@ -8,7 +8,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pilotage.kernels import dubins, guide
+from pilotage.kernels import dubins, guide, guide_moves
 from pilotage.kernels.clearance import curve_is_free, exact_distance, least_step, skin, slack_at
 from pilotage.kernels.geometry import distances_to_nearest
 from pilotage.maps.distance_field import DistanceField
@@ -75,7 +75,7 @@ def way_exists(world: SegmentMap, clearance_m: float) -> bool:
     """Whether the guide finds a way from the first to the last room."""
     space = space_for(DistanceField.from_map(world), clearance_m)
     stride = max(1, int(clearance_m / (2.0 * space.resolution)))
-    classes = guide.classify(space, stride, clearance_m)
+    classes = guide_moves.classify(space, stride, clearance_m)
     start = guide.nearest_node(2.5, 2.5, classes, space, stride)
     goal = guide.nearest_node(12.5, 12.5, classes, space, stride)
     cost, _ = guide.cost_to_go(classes, space, stride, clearance_m, guide.TIGHT_FACTOR, *goal, *start)
@@ -92,7 +92,7 @@ def test_doors_are_told_apart_to_about_a_centimetre() -> None:
 def test_guide_costs_lie_close_above_the_straight_way() -> None:
     empty = SegmentMap(np.array([[0.0, 0, 0, 20.0]]), np.zeros((0, 3)), (0.0, 0.0, 20.0, 20.0))
     space = space_for(DistanceField.from_map(empty), 0.4)
-    classes = guide.classify(space, 2, 0.4)
+    classes = guide_moves.classify(space, 2, 0.4)
     cost, move = guide.cost_to_go(classes, space, 2, 0.4, 1, 50, 50, -1, -1)
     for row, col in ((5, 20), (90, 60), (50, 97), (20, 80), (99, 99)):
         straight_m = 0.2 * math.hypot(row - 50, col - 50)

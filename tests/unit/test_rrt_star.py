@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from pilotage.core.errors import InputError
-from pilotage.kernels import dubins, rrt_star, rrt_tree
+from pilotage.kernels import dubins, rrt_samples, rrt_star, rrt_tree
 from pilotage.kernels.clearance import least_step
 from pilotage.maps.distance_field import DistanceField
 from pilotage.stack.planning.driving_space import space_for
@@ -79,12 +79,12 @@ def test_chunks_leave_no_trace() -> None:
     assert np.array_equal(trees[0].cost, trees[1].cost)
 
 
-NO_BOUND = rrt_star.Bound(np.zeros((1, 1)), 0.0, 0.0, 1.0)
+NO_BOUND = rrt_samples.Bound(np.zeros((1, 1)), 0.0, 0.0, 1.0)
 
 
-def bare_search(query: PlanRequest) -> tuple[rrt_tree.Tree, Any, rrt_star.Search]:
+def bare_search(query: PlanRequest) -> tuple[rrt_tree.Tree, Any, rrt_samples.Search]:
     space = space_for(query.field, CLEARANCE_M)
-    search = rrt_star.Search(
+    search = rrt_samples.Search(
         0.5, 1.5, CLEARANCE_M, least_step(0.5, CLEARANCE_M, 0.5), 0.05, 0.0, 0.8, 0.6, 3.7, False
     )
     goal = np.array([query.goal.x_m, query.goal.y_m, query.goal.theta_rad or 0.0])

@@ -13,7 +13,7 @@ from pilotage.core.angles import wrap_array_to_pi
 from pilotage.core.config import Config
 from pilotage.core.errors import InputError
 from pilotage.core.types import FloatArray
-from pilotage.kernels import dubins, guide, rrt_star, rrt_tree
+from pilotage.kernels import dubins, guide, guide_moves, rrt_samples, rrt_star, rrt_tree
 from pilotage.kernels.clearance import Space, first_blocked, least_step, skin, slack_at
 from pilotage.kernels.field import sample_distance
 from pilotage.stack.planning.driving_space import (
@@ -35,7 +35,7 @@ MAX_TREE_NODES = 500_000
 CHUNK = 256
 """Iterations between looks at the clock and at the incumbent."""
 
-NO_BOUND = rrt_star.Bound(np.zeros((1, 1)), 0.0, 0.0, 1.0)
+NO_BOUND = rrt_samples.Bound(np.zeros((1, 1)), 0.0, 0.0, 1.0)
 NO_GUIDE = np.zeros((0, 3))
 
 
@@ -145,7 +145,7 @@ class RrtStarDubinsPlanner:
         reason = f"{best.length_m:.2f} m after {done} iterations"
         return PlanResult(PlanStatus.FOUND, reason, best, first_s, elapsed, done, edges)
 
-    def _search(self, request: PlanRequest, space: Space, clearance_m: float) -> rrt_star.Search:
+    def _search(self, request: PlanRequest, space: Space, clearance_m: float) -> rrt_samples.Search:
         """Settings for the kernel; edges keep a little more clearance for what checks may step over."""
         config = self._config
         step = least_step(config.validation_distance_m, clearance_m, config.turning_radius_m)
@@ -153,7 +153,7 @@ class RrtStarDubinsPlanner:
         for x, y in ((request.start.x_m, request.start.y_m), (request.goal.x_m, request.goal.y_m)):
             # Where an end touches the clearance's edge there is no room for more.
             extra = min(extra, max(0.0, float(slack_at(x, y, space, clearance_m))))
-        return rrt_star.Search(
+        return rrt_samples.Search(
             radius=config.turning_radius_m,
             connection=config.max_connection_distance_m,
             clearance=clearance_m + extra,
@@ -169,14 +169,14 @@ class RrtStarDubinsPlanner:
 
 def _look_around(
     request: PlanRequest, space: Space, clearance_m: float, config: RrtStarDubinsConfig
-) -> tuple[FloatArray, rrt_star.Bound, str | None]:
+) -> tuple[FloatArray, rrt_samples.Bound, str | None]:
     """Rough way to the goal, lower bound of the cost-to-go, and the proof where there is no way at all."""
     space = _fine_enough(space, clearance_m)
     stride = max(1, int(clearance_m / (2.0 * space.resolution)))
     cell = stride * space.resolution
     if min(space.distance.shape) < 3 * stride:
         return NO_GUIDE, NO_BOUND, None
-    classes = guide.classify(space, stride, clearance_m)
+    classes = guide_moves.classify(space, stride, clearance_m)
     start = guide.nearest_node(request.start.x_m, request.start.y_m, classes, space, stride)
     goal = guide.nearest_node(request.goal.x_m, request.goal.y_m, classes, space, stride)
     cost, move = guide.cost_to_go(classes, space, stride, clearance_m, guide.TIGHT_FACTOR, *goal, *start)
@@ -201,7 +201,7 @@ def _look_around(
         return way, NO_BOUND, None
     loose, _ = guide.cost_to_go(classes, space, stride, clearance_m, 1, *goal, -1, -1)
     metres = np.where(loose == guide.UNREACHED, np.inf, loose * (cell / guide.UNIT / 1.03) - cell)
-    return way, rrt_star.Bound(metres, space.x0, space.y0, cell), None
+    return way, rrt_samples.Bound(metres, space.x0, space.y0, cell), None
 
 
 def _fine_enough(space: Space, clearance_m: float) -> Space:
