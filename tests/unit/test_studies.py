@@ -193,6 +193,12 @@ def test_a_begun_study_asks_for_resume(tmp_path: Path) -> None:
 def test_a_metric_that_no_trial_gives_is_refused_with_the_nearest(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="did you mean 'planned_length_m'"):
         run_study(small(metrics=["planed_length_m"], primary=None, trials=1), tmp_path / "study", workers=1)
+    assert not (tmp_path / "study").exists()
+
+
+def test_a_metric_of_other_missions_is_noticed_once_trials_ran(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="metric 'lost_s': no trial of the study"):
+        run_study(small(metrics=["lost_s"], primary=None, trials=1), tmp_path / "study", workers=1)
 
 
 def test_a_corrupt_database_is_said_and_salvaged(undisturbed: Path, tmp_path: Path) -> None:
@@ -234,6 +240,8 @@ def test_an_unknown_key_to_vary_is_answered_with_the_nearest() -> None:
 def test_ranges_hold_both_ends() -> None:
     study = sweep_study("museum-plan", ["stack.planner.turning_radius_m=0.1:0.5:0.1"], (), 1, ())
     assert [cell.values["turning_radius_m"] for cell in study.cells] == [0.1, 0.2, 0.3, 0.4, 0.5]
+    study = sweep_study("museum-plan", ["stack.planner.turning_radius_m=0.1:0.4:3:log"], (), 1, ())
+    assert [cell.values["turning_radius_m"] for cell in study.cells] == [0.1, 0.2, 0.4]
 
 
 def test_the_page_shows_cells_and_examples(undisturbed: Path) -> None:

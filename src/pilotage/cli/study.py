@@ -63,7 +63,11 @@ def sweep(
     mission: Annotated[str, typer.Argument(metavar="MISSION|FILE", help="A shipped name or a YAML file.")],
     vary: Annotated[
         list[str],
-        typer.Option("--vary", metavar="KEY=A:B:STEP|V1,V2", help="What is varied; again for more factors."),
+        typer.Option(
+            "--vary",
+            metavar="KEY=A:B:STEP|V1,V2",
+            help="What is varied, A:B:COUNT:log in equal ratios; again for more factors.",
+        ),
     ],
     overrides: Overrides = None,
     trials: Annotated[int, typer.Option("--trials", metavar="N", min=1, help="Trials in every cell.")] = 10,
