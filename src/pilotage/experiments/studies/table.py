@@ -79,6 +79,11 @@ class StudyTable:
         return self.study.definition.primary or next(iter(self.metrics), SUCCESS)
 
     @property
+    def same_seeds(self) -> bool:
+        """Whether trials with the same number in two cells share a seed."""
+        return self.study.definition.seeds.pairing == "shared"
+
+    @property
     def groups(self) -> tuple[CellGroup, ...]:
         """Cells that are judged together, with the one that the others are held against."""
         return cell_groups(self.study.definition, self.study.cells)
@@ -94,7 +99,7 @@ class StudyTable:
         empty = np.full(self.row.shape, math.nan)
         values = {name: self.values.get(name, empty) for name in names}
         held_against = baselines(self.groups, len(self.study.cells))
-        return judge(self.cell, self.trial, values, held_against, self.contrasts)
+        return judge(self.cell, self.trial, values, held_against, self.contrasts, same_seeds=self.same_seeds)
 
 
 def read_study(folder: Path) -> StudyTable:
