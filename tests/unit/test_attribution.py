@@ -16,8 +16,9 @@ from pilotage.experiments.mission import load_mission, shipped_missions
 from pilotage.experiments.run import run_mission
 from pilotage.experiments.studies.attribution import attribution_of, attribution_study, is_attribution
 from pilotage.experiments.studies.engine import run_study
+from pilotage.experiments.studies.rows import flat
 from pilotage.experiments.studies.sweep import sweep_study
-from pilotage.report.study.ranking import ranking_answer, ranking_table
+from pilotage.report.study.ranking import module_words, ranking_answer, ranking_table
 from pilotage.report.study.write import write_study_report
 
 SMALL = """
@@ -63,6 +64,18 @@ def test_what_is_compared_is_what_the_mission_gives(name: str) -> None:
     mission = load_mission(name, ["run.time_limit_s=20"])
     metrics = run_mission(mission, save=False).metrics
     assert set(kind_of(mission).costs(mission)) <= set(metrics)
+    assert flat(metrics).keys() <= kind_of(mission).metric_names
+
+
+@pytest.mark.parametrize(
+    ("name", "limit_s"),
+    [("museum-lost", 20), ("museum-route", 5), ("gale-astar-ekf", 20000), ("romi-explore", 9)],
+)
+def test_every_number_of_a_run_can_be_asked_for(name: str, limit_s: float) -> None:
+    """A study refuses names that its kind does not know, so the kind has to know all that it gives."""
+    mission = load_mission(name, [f"run.time_limit_s={limit_s}"])
+    metrics = run_mission(mission, save=False).metrics
+    assert flat(metrics).keys() <= kind_of(mission).metric_names
 
 
 def test_a_sheet(tmp_path: Path) -> None:
@@ -99,6 +112,11 @@ def test_terrain_from_the_command_line(
     assert change["sure"]
     assert change["mean"] == change["low"] == change["high"] < 0.0
     assert any(text.startswith("planned_length_m -") and "every trial" in text for text in only["told"])
+    # People read names and units, and which module it is.
+    assert main(["attribute", str(planned), "--trials", "2", "--workers", "1"]) == 0
+    text = capsys.readouterr().out
+    assert "planned_length_m" not in text
+    assert "What costs most is 'planner': with an oracle for it" in text
 
 
 def test_another_study_has_no_ranking(planned: Path) -> None:
@@ -108,11 +126,13 @@ def test_another_study_has_no_ranking(planned: Path) -> None:
 
 
 def entry(module: str, **changes: tuple[float, float, float, bool]) -> dict[str, Any]:
+    """A module as ``attribution_of`` gives it; less of everything but success is better."""
     return {
         "module": module,
         "oracle": "knows <all>",
         "changes": {
             name: {"n": 9, "mean": mean, "low": low, "high": high, "sure": sure}
+            | {"better": mean > 0.0 if name == "success" else mean < 0.0}
             for name, (mean, low, high, sure) in changes.items()
         },
     }
@@ -133,6 +153,32 @@ class TestWords:
         assert ranking_answer([entry("planner", duration_s=(-5.0, -9.0, 4.0, False))]).endswith(
             "from chance."
         )
+
+    def test_what_an_oracle_makes_worse_is_no_cost_of_its_module(self) -> None:
+        worse = entry("localizer", position_rmse_m=(0.002, 0.001, 0.003, True))
+        likely = entry("planner", duration_s=(-5.0, -6.0, -4.0, False))
+        sure = entry("mapper", duration_s=(-5.0, -6.0, -4.0, True))
+        assert "is 'mapper'" in ranking_answer([worse, likely, sure])
+        assert "is likely 'planner'" in ranking_answer([worse, likely])
+        alone = ranking_answer([worse])
+        assert "costs most" not in alone
+        assert "worse: with one for 'localizer'" in alone
+
+    def test_a_cost_is_told_with_what_its_oracle_makes_worse(self) -> None:
+        both = entry(
+            "mapper", position_rmse_m=(0.002, 0.001, 0.003, True), duration_s=(-5.0, -6.0, -4.0, True)
+        )
+        assert (
+            "duration changes by −5.0\u00a0s (−6.0 to −4.0); for the worse, position error"
+            in ranking_answer([both])
+        )
+        first, second = module_words(both)
+        assert first.startswith("duration −5.0")
+        assert second.startswith("worse: position error")
+
+    def test_nothing_is_gained_where_success_falls(self) -> None:
+        falls = entry("explorer", success=(-0.5, -0.8, -0.2, True), duration_s=(-9.0, -9.0, -9.0, True))
+        assert "costs most" not in ranking_answer([falls])
 
     def test_the_table(self) -> None:
         table = ranking_table(

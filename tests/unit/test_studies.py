@@ -10,12 +10,14 @@ import sqlite3
 import subprocess
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from pilotage.cli.main import main
+from pilotage.cli.study import _print_cells
 from pilotage.core.config import validate
 from pilotage.core.errors import InputError
 from pilotage.experiments.run import run_mission
@@ -27,7 +29,7 @@ from pilotage.experiments.studies.replay import mission_from
 from pilotage.experiments.studies.store import DATABASE, Store, read_rows
 from pilotage.experiments.studies.study import Study, load_study, make_study, shipped_studies
 from pilotage.experiments.studies.sweep import parse_vary, sweep_study
-from pilotage.experiments.studies.table import read_study
+from pilotage.experiments.studies.table import read_study, study_object
 from pilotage.experiments.studies.trial import TIMINGS, Outcome
 from pilotage.report.study.write import write_study_report
 
@@ -193,6 +195,12 @@ def test_a_begun_study_asks_for_resume(tmp_path: Path) -> None:
 def test_a_metric_that_no_trial_gives_is_refused_with_the_nearest(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="did you mean 'planned_length_m'"):
         run_study(small(metrics=["planed_length_m"], primary=None, trials=1), tmp_path / "study", workers=1)
+    assert not (tmp_path / "study").exists()
+
+
+def test_a_metric_of_other_missions_is_noticed_once_trials_ran(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="metric 'lost_s': no trial of the study"):
+        run_study(small(metrics=["lost_s"], primary=None, trials=1), tmp_path / "study", workers=1)
 
 
 def test_a_corrupt_database_is_said_and_salvaged(undisturbed: Path, tmp_path: Path) -> None:
@@ -234,6 +242,8 @@ def test_an_unknown_key_to_vary_is_answered_with_the_nearest() -> None:
 def test_ranges_hold_both_ends() -> None:
     study = sweep_study("museum-plan", ["stack.planner.turning_radius_m=0.1:0.5:0.1"], (), 1, ())
     assert [cell.values["turning_radius_m"] for cell in study.cells] == [0.1, 0.2, 0.3, 0.4, 0.5]
+    study = sweep_study("museum-plan", ["stack.planner.turning_radius_m=0.1:0.4:3:log"], (), 1, ())
+    assert [cell.values["turning_radius_m"] for cell in study.cells] == [0.1, 0.2, 0.4]
 
 
 def test_the_page_shows_cells_and_examples(undisturbed: Path) -> None:
@@ -261,6 +271,24 @@ def test_attribution_ranks_the_modules(tmp_path: Path) -> None:
     assert by_name["localizer"]["position_rmse_m"]["mean"] < 0.0
 
 
+def test_the_terminal_cuts_no_number(
+    undisturbed: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What has no room is left out, and said; without a choice, what counts in such a mission leads."""
+    monkeypatch.setenv("COLUMNS", "80")
+    table = replace(read_study(undisturbed), study=small(metrics=[], primary=None))
+    answer = study_object(table)
+    assert answer["primary"] == "planned_length_m"
+    _print_cells(answer)
+    text = capsys.readouterr().out
+    assert "…" not in text
+    assert "planned path" in text
+    assert "position error" not in text  # of a plan that nobody drove
+    assert all(cell["name"] in text for cell in answer["cells"])
+    assert "more metrics" in text
+    assert max(map(len, text.splitlines())) <= 80
+
+
 @pytest.fixture
 def in_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.chdir(tmp_path)
@@ -281,5 +309,6 @@ def test_the_commands_end_to_end(in_folder: Path, capsys: pytest.CaptureFixture[
     assert main(["run", "--from", "mine:99", "--json"]) == 2
     assert "from 0 to 3" in capsys.readouterr().err
     assert main(["run"]) == 2
+    capsys.readouterr()
     assert main(["study", "museum-planer"]) == 2
     assert "did you mean 'museum-planner'" in capsys.readouterr().err

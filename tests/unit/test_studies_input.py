@@ -11,7 +11,9 @@ import pytest
 import yaml
 
 from pilotage.cli.main import main
+from pilotage.core.errors import InputError
 from pilotage.experiments.studies.database import DATABASE
+from pilotage.experiments.studies.definition import StudyDefinition
 from pilotage.experiments.studies.engine import _write
 from pilotage.experiments.studies.rows import read_rows
 from pilotage.experiments.studies.store import Store
@@ -20,6 +22,7 @@ from pilotage.experiments.studies.study import (
     STUDY_FILE,
     Study,
     load_study,
+    make_study,
     mission_yaml,
     study_yaml,
 )
@@ -118,7 +121,18 @@ def test_a_wrong_factor_is_one_line(
         ("attribute nope", "unknown mission 'nope'"),
         (f"sweep museum-plan --vary {RADIUS}=nan", "expected a finite number"),
         (f"sweep museum-plan --vary {RADIUS}=0:inf:1", "expected finite numbers"),
+        (f"sweep museum-plan --vary {RADIUS}=0:1:3:log", "expected finite numbers above 0"),
+        (f"sweep museum-plan --vary {RADIUS}=0.1:1:0.3:log", "as COUNT, found '0.3'"),
+        (f"sweep museum-plan --vary {RADIUS}=0.1:1:1:log", "an empty range"),
         (f"sweep museum-plan --vary {RADIUS}=0.3 --metrics a,,b", "--metrics 'a,,b'"),
+        (
+            f"sweep museum-plan --vary {RADIUS}=0.3 --metrics planned_lenght_m",
+            "did you mean 'planned_length_m'?",
+        ),
+        (
+            f"sweep museum-plan --vary {RADIUS}=0.3 --metrics coverage_visited",
+            "no mission of the kind 'floor'",
+        ),
         (f"sweep museum-plan --vary {RADIUS}=0.3 --name ../up", "study"),
         (f"sweep museum-plan --vary {RADIUS}=0.3 --set @nope.yaml", "a YAML file of parameters"),
         ("run --from nope:3", "found neither"),
@@ -137,6 +151,7 @@ def test_a_wrong_command_is_one_line(
     (tmp_path / "empty-folder").mkdir()
     (tmp_path / "file").touch()
     assert told in refused(capsys, *arguments.split())
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["empty-folder", "file"]
 
 
 # --- one row again ----------------------------------------------------------------------------------
@@ -198,6 +213,24 @@ KINDS: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
         },
     ),
 }
+
+
+def test_another_ground_is_set_with_its_own_keys(tmp_path: Path) -> None:
+    """As ``run --set`` takes them."""
+    (tmp_path / "obstacles.png").touch()
+    changes = {
+        "world.ground.obstacles": str(tmp_path / "obstacles.png"),
+        "world.ground.resolution_m": 5.0,
+        "world.ground.name": "images",
+    }
+    study = make_study(
+        StudyDefinition(study="x", mission="gale-astar", set=changes, factors=()),
+    )
+    assert len(study.cells) == 1
+    with pytest.raises(InputError, match="columns"):  # that was the crater's
+        make_study(
+            StudyDefinition(study="x", mission="gale-astar", set={**changes, "world.ground.columns": 9})
+        )
 
 
 def made(folder: Path, study: Study) -> Path:

@@ -42,8 +42,11 @@ def attribute(
 
 
 def _print(answer: dict[str, Any]) -> None:
-    rows = [("module", "what it costs, most first")]
+    from pilotage.report.study.ranking import module_words, ranking_answer
+
+    rows = [("module", "what an oracle for it changes, most costly module first")]
     for entry in answer["modules"]:
-        told = "; ".join(entry["told"]) or "nothing that these trials tell from chance"
-        rows.append((entry["module"], told))
+        first, *others = module_words(entry) or ["nothing that these trials tell from chance"]
+        rows += [(entry["module"], first), *(("", text) for text in others)]
     print_columns(rows)
+    print(ranking_answer(answer["modules"]))

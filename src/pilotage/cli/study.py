@@ -63,7 +63,11 @@ def sweep(
     mission: Annotated[str, typer.Argument(metavar="MISSION|FILE", help="A shipped name or a YAML file.")],
     vary: Annotated[
         list[str],
-        typer.Option("--vary", metavar="KEY=A:B:STEP|V1,V2", help="What is varied; again for more factors."),
+        typer.Option(
+            "--vary",
+            metavar="KEY=A:B:STEP|V1,V2",
+            help="What is varied, A:B:COUNT:log in equal ratios; again for more factors.",
+        ),
     ],
     overrides: Overrides = None,
     trials: Annotated[int, typer.Option("--trials", metavar="N", min=1, help="Trials in every cell.")] = 10,
@@ -202,23 +206,40 @@ def _page(folder: Path, quiet: bool) -> Path:
 
 
 def _print_cells(answer: dict[str, Any]) -> None:
+    """One row a setting; as many metrics beside it as the terminal has room for, none of them cut."""
     from rich.console import Console
     from rich.table import Table
 
     from pilotage.report.metrics_table import metric_of
+    from pilotage.report.study.scales import told
 
-    metrics = list(answer["cells"][0]["metrics"])[:5]
+    console, cells = Console(file=sys.stdout), answer["cells"]
     table = Table(title=f"{answer['study']}: {answer['trials']} trials, {answer['failed']} failed")
     table.add_column("setting", overflow="fold")  # names are cut by nothing: settings differ at their ends
-    table.add_column("success", justify="right")
-    for name in metrics:
-        table.add_column(metric_of(name).name, justify="right")
-    for cell in answer["cells"]:
-        rate = cell["success"]
-        success = f"{round(rate['mean'] * rate['n'])}/{rate['n']}" if rate["n"] else "-"
-        texts = []
-        for name in metrics:
-            found, write = cell["metrics"][name], metric_of(name).write
-            texts.append(f"{write(found['mean'])} ({write(found['low'])} to {write(found['high'])})")
-        table.add_row(cell["name"], success, *texts)
-    Console(file=sys.stdout).print(table)
+    table.add_column("success", justify="right", no_wrap=True)
+    rates = [cell["success"] for cell in cells]
+    columns = [[f"{round(r['mean'] * r['n'])}/{r['n']}" if r["n"] else "-" for r in rates]]
+    longest = max(len("setting"), *(len(cell["name"]) for cell in cells))
+    # A name may be folded to a third of the width where that makes room; three signs divide two columns.
+    left = console.width - len("| setting | success |") + len("setting") - min(longest, console.width // 3)
+    # What answers the question has room before others.
+    metrics = sorted(cells[0]["metrics"], key=lambda name: name != answer["primary"])
+    for shown, name in enumerate(metrics):
+        found = [cell["metrics"][name] for cell in cells]
+        texts = [told(name, *(_number(entry[key]) for key in ("mean", "low", "high"))) for entry in found]
+        left -= max(map(len, (metric_of(name).name, *texts))) + 3
+        if shown and left < 0:
+            metrics = metrics[:shown]
+            break
+        table.add_column(metric_of(name).name, justify="right", no_wrap=True)
+        columns.append(texts)
+    for cell, row in zip(cells, zip(*columns, strict=True), strict=True):
+        table.add_row(cell["name"], *row)
+    console.print(table)
+    more = len(cells[0]["metrics"]) - len(metrics)
+    if more:
+        print(f"{more} more metric{'s' if more > 1 else ''} on the page, and with --json")
+
+
+def _number(value: float | None) -> float:
+    return float("nan") if value is None else value

@@ -74,6 +74,30 @@ def _resampled(values: FloatArray) -> tuple[float, float]:
     return float(found.low), float(found.high)
 
 
+def bootstrap_difference(first: FloatArray, other: FloatArray) -> tuple[float, float]:
+    """95 % bootstrap interval of mean(other) - mean(first), both (n,) and (m,) drawn apart; as above."""
+    if min(first.size, other.size) < 2:
+        return math.nan, math.nan
+    scale = float(max(np.abs(first).max(), np.abs(other).max()))
+    if max(np.ptp(first), np.ptp(other)) <= ROUNDING * scale:
+        change = float(other.mean() - first.mean())
+        change = 0.0 if abs(change) <= ROUNDING * scale else change
+        return change, change
+    for method in ("BCa", "percentile"):  # BCa has no acceleration where almost all values are equal
+        found = stats.bootstrap(
+            (first / scale, other / scale),
+            lambda one, two, axis: np.mean(two, axis=axis) - np.mean(one, axis=axis),
+            vectorized=True,
+            confidence_level=LEVEL,
+            n_resamples=RESAMPLES,
+            method=method,
+            rng=np.random.default_rng(0),
+        ).confidence_interval
+        if math.isfinite(found.low) and math.isfinite(found.high):
+            break
+    return scale * float(found.low), scale * float(found.high)
+
+
 def summarize(values: FloatArray) -> Summary:
     """Summarize a metric over trials; what is not finite is left out and not counted."""
     finite = values[np.isfinite(values)]

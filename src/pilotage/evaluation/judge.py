@@ -1,4 +1,4 @@
-"""Judging a study: every cell's summary, and every cell against its baseline on the same seeds."""
+"""Judging a study: every cell's summary, and every cell against its baseline, on the same seeds or apart."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 
 from pilotage.core.types import FloatArray, IntArray
 from pilotage.evaluation.intervals import Summary, summarize, wilson
-from pilotage.evaluation.paired import Difference, corrected, difference
+from pilotage.evaluation.paired import Difference, corrected, difference, difference_apart
 
 SUCCESS = "success"
 Pair = tuple[str, str]
@@ -55,19 +55,23 @@ def judge(
     values: Mapping[str, FloatArray],
     baselines: Sequence[int | None],
     contrasts: Sequence[Pair] = (),
+    *,
+    same_seeds: bool = True,
 ) -> Judgement:
     """Judge the finished trials of a study.
 
     Parameters
     ----------
     cell, trial
-        (n,) which cell a row belongs to, and its number there; rows with the same number share a seed.
+        (n,) which cell a row belongs to, and its number there.
     values
         By metric, (n,) its values; nan where a trial does not give it. ``success`` is 0 or 1.
     baselines
         One a cell, those without a finished trial included: the cell that it is held against, or None.
     contrasts
         Pairs of metrics that are held against each other within every trial.
+    same_seeds
+        Whether rows with the same number share a seed: cells are then compared pair by pair.
     """
     cells = len(baselines)
     summaries = {
@@ -79,6 +83,8 @@ def judge(
     ]
     across = {
         (metric, index): _paired(cell, trial, column, base, index, metric == SUCCESS)
+        if same_seeds
+        else difference_apart(column[cell == base], column[cell == index], binary=metric == SUCCESS)
         for metric, column in values.items()
         for index, base in enumerate(baselines)
         if base is not None and base != index

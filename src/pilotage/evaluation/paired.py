@@ -1,4 +1,4 @@
-"""Two configurations on the same seeds: what changed, how surely, and how much."""
+"""Two configurations, on the same seeds or apart: what changed, how surely, and how much."""
 
 from __future__ import annotations
 
@@ -10,17 +10,18 @@ import numpy as np
 from scipy import stats
 
 from pilotage.core.types import FloatArray
-from pilotage.evaluation.intervals import ROUNDING, bootstrap_mean
+from pilotage.evaluation.intervals import ROUNDING, bootstrap_difference, bootstrap_mean
 
 
 @dataclass(frozen=True, slots=True)
 class Difference:
-    """A metric's change from one configuration to another over pairs of trials with the same seed.
+    """A metric's change from one configuration to another.
 
     Attributes
     ----------
     n
-        Pairs in which both trials give the metric.
+        Pairs of trials with the same seed in which both give the metric; of trials that are no pairs, those
+        of the smaller side.
     mean, low, high, median
         Of the differences, other minus first, with the mean's 95 % bootstrap interval.
     p_value
@@ -28,7 +29,8 @@ class Difference:
     p_corrected
         The same, corrected for the number of comparisons made at once (see ``corrected``).
     effect
-        Matched-pairs rank-biserial correlation in [-1, 1]: +1 where every pair grows.
+        Rank-biserial correlation in [-1, 1]: +1 where every pair grows; of trials that are no pairs, where
+        every one of the other side is larger than every one of the first.
     """
 
     n: int
@@ -82,6 +84,40 @@ def difference(first: FloatArray, other: FloatArray, *, binary: bool = False) ->
     )
 
 
+def difference_apart(first: FloatArray, other: FloatArray, *, binary: bool = False) -> Difference:
+    """Compare two configurations whose trials are no pairs: each has seeds of its own.
+
+    The median is that of all differences between a trial of one and a trial of the other (Hodges and
+    Lehmann), the test Mann and Whitney's, of a success Fisher's exact one, the effect the rank-biserial
+    correlation 2 U / (n m) - 1 (Wendt 1972).
+
+    Parameters
+    ----------
+    first, other
+        (n,) and (m,) the metric of every trial; nan where a trial does not give it.
+    """
+    first, other = (column[np.isfinite(column)] for column in (first, other))
+    if not (first.size and other.size):
+        return NOTHING
+    scale = float(max(np.abs(first).max(), np.abs(other).max()))
+    change = np.subtract.outer(other, first)
+    change[np.abs(change) <= ROUNDING * scale] = 0.0
+    low, high = bootstrap_difference(first, other)
+    p_value = math.nan
+    if np.any(change):
+        p_value = _fisher(first, other) if binary else float(stats.mannwhitneyu(other, first).pvalue)
+    return Difference(
+        n=int(min(first.size, other.size)),
+        mean=float(change.mean()),
+        low=low,
+        high=high,
+        median=float(np.median(change)),
+        p_value=p_value,
+        p_corrected=p_value,
+        effect=float(np.sign(change).mean()),
+    )
+
+
 def corrected(p_values: Sequence[float]) -> list[float]:
     """P-values corrected for being many: Benjamini and Yekutieli's false discovery rate.
 
@@ -105,6 +141,11 @@ def _wilcoxon(change: FloatArray) -> float:
 def _mcnemar(change: FloatArray) -> float:
     grew, differ = int((change > 0.0).sum()), int((change != 0.0).sum())
     return float(stats.binomtest(grew, differ).pvalue) if differ else math.nan
+
+
+def _fisher(first: FloatArray, other: FloatArray) -> float:
+    table = [[int(side.sum()), int(side.size - side.sum())] for side in (first, other)]
+    return float(stats.fisher_exact(table).pvalue)
 
 
 def _rank_biserial(change: FloatArray) -> float:

@@ -74,6 +74,11 @@ class Kind(Protocol):
         """The model that validates its files."""
         ...
 
+    @property
+    def metric_names(self) -> frozenset[str]:
+        """Every number that its runs can give, nested ones by one level of names."""
+        ...
+
     def warm_up(self, mission: Mission) -> None:
         """Compile or load what a run of the mission needs, so that its times are not a compiler's."""
         ...

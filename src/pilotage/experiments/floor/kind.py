@@ -17,6 +17,7 @@ from pilotage.experiments.floor.simulate import simulate
 from pilotage.experiments.floor.warm_up import warm_up
 from pilotage.experiments.floor.world_map import shipped_maps
 from pilotage.experiments.kinds import ERROR, ROOM, TIME_COST, WAY, Cost
+from pilotage.experiments.metric_names import FLOOR_METRICS
 from pilotage.experiments.progress import OnProgress
 from pilotage.missions.floor import FloorMission
 from pilotage.missions.mission import Mission
@@ -26,6 +27,7 @@ class FloorKind:
     """Missions with ``world.kind: floor``; see ``pilotage.experiments.kinds.Kind``."""
 
     schema: type[Mission] = FloorMission
+    metric_names = FLOOR_METRICS
 
     def warm_up(self, mission: Mission) -> None:
         """Take the first steps once."""

@@ -11,6 +11,7 @@ import numpy as np
 
 from pilotage.evaluation.sheet_metrics import sheet_metrics
 from pilotage.experiments.kinds import ERROR, SHARE, TIME_COST, Aspect, Cost
+from pilotage.experiments.metric_names import SHEET_METRICS
 from pilotage.experiments.progress import OnProgress
 from pilotage.experiments.sheet.files import maps_of, world_of, write_map_files
 from pilotage.experiments.sheet.oracles import applicable
@@ -25,6 +26,7 @@ class SheetKind:
     """Missions with ``world.kind: sheet``; see ``pilotage.experiments.kinds.Kind``."""
 
     schema: type[Mission] = SheetMission
+    metric_names = SHEET_METRICS
 
     def warm_up(self, mission: Mission) -> None:
         """Take the first moments once."""

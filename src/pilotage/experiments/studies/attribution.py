@@ -86,14 +86,15 @@ def attribution_of(folder: Path) -> dict[str, Any]:
     Returns
     -------
     ``modules``, most costly first: for each what its oracle does, the change of every metric with its
-    interval, and sentences on those that differ surely, or else may differ. Success counts before accuracy
-    (errors, coverage), that before safety and time; among them the share that is gained. Times and ways are
-    compared on the seeds where both runs succeeded.
+    interval and whether it is for the better, and sentences on those that differ surely, or else may differ.
+    Success counts before accuracy (errors, coverage), that before safety and time; among them the share that
+    is gained. What an oracle makes worse is no cost of its module: it is told, and counts nothing, but for
+    success. Times and ways are compared on the seeds where both runs succeeded.
     """
     table = read_study(folder)
     base = mission_of(dict(table.study.base), table.study.cells[FIRST].overrides)
     texts = kind_of(base).oracles(base)
-    costs = {SUCCESS: Cost(Aspect.ACCURACY, less_is_better=False), **kind_of(base).costs(base)}
+    costs = {SUCCESS: Cost(Aspect.ACCURACY, less_is_better=False), **_ranked(kind_of(base).costs(base))}
     values = {name: _comparable(table, name, cost) for name, cost in costs.items() if name in table.values}
     judgement = judge(table.cell, table.trial, values, [FIRST] * len(table.study.cells))
     before = _baseline(judgement, FIRST)
@@ -108,8 +109,8 @@ def attribution_of(folder: Path) -> dict[str, Any]:
         entry = {
             "module": cell.name.removeprefix(ORACLE),
             "oracle": texts.get(cell.name.removeprefix(ORACLE), ""),
-            "changes": {name: _plain(change, sure[name]) for name, change in changes.items()},
-            "told": _told(changes, sure),
+            "changes": {name: _plain(change, costs[name], sure[name]) for name, change in changes.items()},
+            "told": _told(changes, costs, sure),
         }
         ranked.append((_weight(changes, costs, sure, before), entry))
     ranked.sort(key=lambda pair: pair[0], reverse=True)
@@ -120,6 +121,11 @@ def attribution_of(folder: Path) -> dict[str, Any]:
         "modules": [entry for _, entry in ranked],
         "study_dir": str(folder),
     }
+
+
+def _ranked(costs: Mapping[str, Cost]) -> dict[str, Cost]:
+    """Costs in the order in which they count."""
+    return dict(sorted(costs.items(), key=lambda item: RANKED.index(item[1].aspect)))
 
 
 def _comparable(table: StudyTable, name: str, cost: Cost) -> FloatArray:
@@ -179,17 +185,27 @@ def _may_differ(change: Difference) -> bool:
 
 def _share(change: float, cost: Cost, before: float) -> float:
     """What is gained, as a share of what there was; of a metric that is a share itself, in its own points."""
-    better = -change if cost.less_is_better else change
     whole = 1.0 if cost == SHARE else abs(before)
-    return max(better / whole, 0.0) if whole > 0.0 else 0.0
+    return max(_gain(change, cost) / whole, 0.0) if whole > 0.0 else 0.0
 
 
-def _told(changes: Mapping[str, Difference], sure: Mapping[str, bool]) -> list[str]:
-    """What differs surely; where nothing does, what may: its interval leaves zero out."""
-    certain = [f"{name} {_change(change)}" for name, change in changes.items() if sure[name]]
-    if certain:
-        return certain
-    return [f"perhaps {name} {_change(change)}" for name, change in changes.items() if _may_differ(change)]
+def _gain(change: float, cost: Cost) -> float:
+    return -change if cost.less_is_better else change
+
+
+def _told(
+    changes: Mapping[str, Difference], costs: Mapping[str, Cost], sure: Mapping[str, bool]
+) -> list[str]:
+    """What differs surely; where nothing does, what may: its interval leaves zero out. Gains first."""
+    known = [name for name in changes if sure[name]]
+    word = "" if known else "perhaps "
+    known = known or [name for name, change in changes.items() if _may_differ(change)]
+    gains = [name for name in known if _gain(changes[name].mean, costs[name]) > 0.0]
+    losses = [name for name in known if name not in gains]
+    return [
+        *(f"{word}{name} {_change(changes[name])}" for name in gains),
+        *(f"{word}worse: {name} {_change(changes[name])}" for name in losses),
+    ]
 
 
 def _change(change: Difference) -> str:
@@ -212,7 +228,7 @@ def _baseline(judgement: Judgement, cell: int) -> dict[str, float]:
     }
 
 
-def _plain(change: Difference, sure: bool) -> dict[str, float | bool]:
+def _plain(change: Difference, cost: Cost, sure: bool) -> dict[str, float | bool]:
     return {
         "n": change.n,
         "mean": change.mean,
@@ -221,5 +237,6 @@ def _plain(change: Difference, sure: bool) -> dict[str, float | bool]:
         "median": change.median,
         "p": change.p_corrected,
         "effect": change.effect,
+        "better": _gain(change.mean, cost) > 0.0,
         "sure": sure,
     }

@@ -61,7 +61,8 @@ def make_cells(definition: StudyDefinition, resolve: Resolve) -> tuple[Cell, ...
     if count > MAX_CELLS:
         raise InputError(f"study '{definition.study}': expected at most {MAX_CELLS} cells, found {count}")
     common = as_overrides(definition.set)
-    _check_keys(definition.set, resolve(()), "set")
+    # With the names that it sets: another ground or localizer has keys of its own.
+    _check_keys(definition.set, resolve(common), "set")
     cells: list[Cell] = []
     for configuration in definition.configurations or (None,):
         base = common if configuration is None else (*common, *as_overrides(configuration.set))

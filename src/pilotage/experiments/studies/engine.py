@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from pilotage.core.errors import InputError, nearest
+from pilotage.experiments.kinds import KINDS, kind_name
 from pilotage.experiments.studies.dask_workers import DaskWorkers
 from pilotage.experiments.studies.database import DATABASE, CorruptDatabaseError, StudyStoppedError
 from pilotage.experiments.studies.export import save_what_is_left
@@ -72,14 +73,16 @@ def run_study(
     Raises
     ------
     InputError
-        The folder holds another definition, or was begun and ``resume`` is not said; a metric that no
-        trial gives; a corrupt database, after what can be read of it was saved.
+        A metric that no mission of the kind gives (nothing is run or written then), or that no trial gives;
+        the folder holds another definition, or was begun and ``resume`` is not said; a corrupt database,
+        after what can be read of it was saved.
     StudyStoppedError
         The disk is full and stays so, the cluster is gone, or no worker can begin.
     KeyboardInterrupt
         Passed on, with all finished rows written and the claims given back.
     """
     tell = on_trouble or (lambda _: None)
+    check_metric_names(study)
     try:
         counts = _run(study, folder, workers, dask, resume, on_progress, tell)
         check_metrics(study, folder)
@@ -201,6 +204,32 @@ def _cores() -> int:
     return os.cpu_count() or 1
 
 
+def check_metric_names(study: Study) -> None:
+    """Refuse a metric that no mission of the study's kind can give.
+
+    Raises
+    ------
+    InputError
+        With the nearest one that they can give.
+    """
+    kind = kind_name(study.base)
+    known = KINDS[kind]().metric_names
+    definition = study.definition
+    told = [*(name for entry in definition.published for name in entry.metrics), *definition.reference]
+    for metric in [*_asked(study), *told]:
+        if metric not in known:
+            close = nearest(metric, sorted(known))
+            hint = f"; did you mean '{close}'?" if close else ""
+            raise InputError(f"metric '{metric}': no mission of the kind '{kind}' gives it{hint}")
+
+
+def _asked(study: Study) -> list[str]:
+    """The metrics that a study is to report."""
+    definition = study.definition
+    primary = [] if definition.primary is None else [definition.primary]
+    return [*definition.metrics, *primary, *(m for e in definition.contrasts for m in (e.metric, e.against))]
+
+
 def check_metrics(study: Study, folder: Path) -> None:
     """Refuse a metric that none of the finished trials gives.
 
@@ -209,7 +238,6 @@ def check_metrics(study: Study, folder: Path) -> None:
     InputError
         With the nearest one that they do give.
     """
-    asked = [*study.definition.metrics, *([study.definition.primary] if study.definition.primary else [])]
     rows, trouble = read_rows(folder / DATABASE)
     if trouble:
         raise CorruptDatabaseError(folder / DATABASE, trouble)
@@ -218,7 +246,7 @@ def check_metrics(study: Study, folder: Path) -> None:
         given |= flat(row["metrics"]).keys() | flat(row["timings"]).keys()
     if not given:
         return
-    for metric in asked:
+    for metric in _asked(study):
         if metric not in given:
             close = nearest(metric, given)
             hint = f"; did you mean '{close}'?" if close else ""

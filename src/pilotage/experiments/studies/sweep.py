@@ -83,12 +83,12 @@ def _dotted(values: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
 
 
 def parse_vary(text: str) -> dict[str, Any]:
-    """A factor from ``KEY=a:b:step``, ``KEY=a:b:step:log`` or ``KEY=v1,v2``.
+    """A factor from ``KEY=a:b:step``, ``KEY=a:b:count:log`` or ``KEY=v1,v2``.
 
     Raises
     ------
     InputError
-        If the text is of neither form.
+        If the text is of none of these forms.
     """
     key, equals, right = text.partition("=")
     key = key.strip()
@@ -104,6 +104,8 @@ def parse_vary(text: str) -> dict[str, Any]:
         if (stop - start) * step < 0.0:
             raise InputError(f"--vary '{text}': an empty range: the step leads away from {stop:g}")
         return {"key": key, "range": {"start": start, "stop": stop, "step": step}}
+    if len(parts) == 4 and parts[3].strip() == "log" and all(_is_number(part) for part in parts[:3]):
+        return {"key": key, "log_range": _log_range(text, *parts[:3])}
     if ":" in right and all(_is_number(part) for part in parts):
         raise InputError(f"--vary '{text}': expected a range as A:B:STEP")
     try:
@@ -112,6 +114,15 @@ def parse_vary(text: str) -> dict[str, Any]:
         raise InputError(f"--vary '{text}': the values are not YAML") from None
     numbers = [_number(value) for value in values]
     return {"key": key, "values": numbers}
+
+
+def _log_range(text: str, start: str, stop: str, count: str) -> dict[str, float | int]:
+    if not count.strip().isdigit():
+        raise InputError(f"--vary '{text}': expected a whole number of values as COUNT, found '{count}'")
+    first, last = float(start), float(stop)
+    if not (0.0 < first < math.inf and 0.0 < last < math.inf):
+        raise InputError(f"--vary '{text}': expected finite numbers above 0")
+    return {"start": first, "stop": last, "count": int(count)}
 
 
 def _number(value: Any) -> Any:

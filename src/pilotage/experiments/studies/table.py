@@ -12,6 +12,8 @@ import numpy as np
 
 from pilotage.core.types import FloatArray, IntArray
 from pilotage.evaluation.judge import SUCCESS, Judgement, judge
+from pilotage.experiments.kinds import kind_of
+from pilotage.experiments.mission import mission_of
 from pilotage.experiments.studies.database import DATABASE
 from pilotage.experiments.studies.export import save_what_is_left
 from pilotage.experiments.studies.groups import CellGroup, baselines, cell_groups
@@ -29,7 +31,8 @@ TELLING = (
     "nees_mean",
     "nis_mean",
 )
-"""Where nothing is asked for, these stand before others, and the first that the trials give answers."""
+"""Where nothing is asked for, these stand before others, and the first that the trials give answers; before
+them all, what counts in a mission of that kind: the pose error of a plan that nobody drives tells nothing."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,12 +66,22 @@ class StudyTable:
         """What is reported: what the definition asks for, else every number that varies or matters."""
         asked = self.study.definition.metrics
         given = [name for name in self.values if name not in {*IDENTITY, SUCCESS}]
-        return asked or (*(m for m in TELLING if m in given), *(m for m in given if m not in TELLING))
+        if asked:
+            return asked
+        mission = mission_of(dict(self.study.base), self.study.cells[0].overrides)
+        costs = kind_of(mission).costs(mission)
+        first = dict.fromkeys([*(m for m in TELLING if m in costs), *costs, *TELLING])
+        return (*(m for m in first if m in given), *(m for m in given if m not in first))
 
     @property
     def primary(self) -> str:
         """The metric that answers the question."""
         return self.study.definition.primary or next(iter(self.metrics), SUCCESS)
+
+    @property
+    def same_seeds(self) -> bool:
+        """Whether trials with the same number in two cells share a seed."""
+        return self.study.definition.seeds.pairing == "shared"
 
     @property
     def groups(self) -> tuple[CellGroup, ...]:
@@ -86,7 +99,7 @@ class StudyTable:
         empty = np.full(self.row.shape, math.nan)
         values = {name: self.values.get(name, empty) for name in names}
         held_against = baselines(self.groups, len(self.study.cells))
-        return judge(self.cell, self.trial, values, held_against, self.contrasts)
+        return judge(self.cell, self.trial, values, held_against, self.contrasts, same_seeds=self.same_seeds)
 
 
 def read_study(folder: Path) -> StudyTable:
@@ -164,6 +177,7 @@ def study_object(table: StudyTable) -> dict[str, Any]:
         "trials": len(table.row) + len(table.broken),
         "failed": len(table.broken),
         "missing": table.waiting,
+        "primary": table.primary,
         "cells": cells,
         "study_dir": str(table.folder),
     }

@@ -12,6 +12,7 @@ import numpy as np
 from pilotage.core.random import RandomStreams
 from pilotage.core.types import Event, Pose2
 from pilotage.experiments.kinds import ERROR, ROOM, TIME_COST, WAY, Cost
+from pilotage.experiments.metric_names import TERRAIN_METRICS
 from pilotage.experiments.progress import OnProgress
 from pilotage.experiments.terrain.estimation import estimate, seen_per_step
 from pilotage.experiments.terrain.ground import Ground, load_ground, shares
@@ -38,6 +39,7 @@ class TerrainKind:
     """Missions with ``world.kind: terrain``; see ``pilotage.experiments.kinds.Kind``."""
 
     schema: type[Mission] = TerrainMission
+    metric_names = TERRAIN_METRICS
 
     def warm_up(self, mission: Mission) -> None:
         """Answer a small query with the mission's own planner, so that its times are not a compiler's."""

@@ -160,7 +160,8 @@ def _change(view: StudyView, judgement: Judgement, index: int, word: str) -> str
     if change is None or change.n == 0:
         return text
     by = difference(view.primary, change)
-    return f"{text}, a change by {by} on the same {change.n} seeds, {evidence(change)}"
+    seeds = f"on the same {change.n} seeds" if view.same_seeds else "on seeds of their own"
+    return f"{text}, a change by {by} {seeds}, {evidence(change)}"
 
 
 def _each_against_its_own(view: StudyView, judgement: Judgement, group: Group) -> str:

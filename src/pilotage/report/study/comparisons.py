@@ -16,6 +16,20 @@ from pilotage.report.study.scales import Scale, p_value, scale_of
 from pilotage.report.study.view import Group, StudyView
 
 Row = tuple[str, Difference]
+PAIRED = (
+    "Differences between trials with the same seed: their mean with its 95 % bootstrap interval, and "
+    "their median; p from Wilcoxon&#x27;s signed-rank test (for success from McNemar&#x27;s "
+    "exact test), corrected for all comparisons on this page "
+    "(Benjamini and Yekutieli); effect: matched-pairs rank-biserial correlation, 1 where every pair "
+    "grows, −1 where every pair shrinks."
+)
+APART = (
+    "Every setting has seeds of its own: the difference of the means with its 95 % bootstrap interval, and "
+    "the median of all differences (Hodges and Lehmann); p from Mann and Whitney&#x27;s test (for success "
+    "from Fisher&#x27;s exact test), corrected for all comparisons on this page (Benjamini and Yekutieli); "
+    "effect: rank-biserial correlation, 1 where every trial is above every one of the other setting&#x27;s, "
+    "−1 where below. The same seeds would tell smaller differences."
+)
 HEADS = ("difference", "95 % interval", "median", "p, corrected", "effect")
 
 
@@ -47,11 +61,7 @@ def comparisons_table(view: StudyView, judgement: Judgement) -> str:
         return ""
     return (
         '<section id="comparisons"><h2><a href="#comparisons">Comparisons</a></h2>'
-        "<p>Differences between trials with the same seed: their mean with its 95 % bootstrap interval, and "
-        "their median; p from Wilcoxon&#x27;s signed-rank test (for success from McNemar&#x27;s "
-        "exact test), corrected for all comparisons on this page "
-        "(Benjamini and Yekutieli); effect: matched-pairs rank-biserial correlation, 1 where every pair "
-        f"grows, −1 where every pair shrinks.</p>{''.join(parts)}</section>"
+        f"<p>{PAIRED if view.same_seeds else APART}</p>{''.join(parts)}</section>"
     )
 
 

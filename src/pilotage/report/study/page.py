@@ -59,8 +59,8 @@ def study_page(
         contents=contents([(slug, title) for slug, title, _ in present]),
         body="\n".join(section for _, _, section in present),
         footer=escape(
-            "Made by pilotage from the study's database. Settings are compared on the same seeds; intervals "
-            "are 95 %."
+            "Made by pilotage from the study's database. Settings are compared on "
+            f"{'the same seeds' if view.same_seeds else 'seeds of their own'}; intervals are 95 %."
         ),
     )
 
@@ -87,7 +87,7 @@ def judge_view(view: StudyView) -> Judgement:
     names = dict.fromkeys([*view.metrics, view.primary, "success"])
     values = {name: view.column(name) for name in names if name in view.values or name in view.metrics}
     values.setdefault(view.primary, view.column(view.primary))
-    return judge(view.cell, view.trial, values, view.baselines, view.contrasts)
+    return judge(view.cell, view.trial, values, view.baselines, view.contrasts, same_seeds=view.same_seeds)
 
 
 def _findings(view: StudyView, judgement: Judgement) -> str:

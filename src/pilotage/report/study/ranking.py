@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from pilotage.report import quantities
@@ -13,6 +13,8 @@ from pilotage.report.study.scales import Scale, scale_of, told
 
 Module = Mapping[str, Any]
 """One entry of ``experiments.studies.attribution.attribution_of``'s ``modules``."""
+Named = tuple[str, Mapping[str, Any]]
+"""A metric and its change."""
 
 
 def ranking_table(modules: Sequence[Module]) -> str:
@@ -42,33 +44,76 @@ def ranking_table(modules: Sequence[Module]) -> str:
 
 
 def ranking_answer(modules: Sequence[Module]) -> str:
-    """One sentence: which module costs most, and how surely."""
+    """One sentence: which module costs most, and how surely.
+
+    A module costs what its oracle makes better; one whose oracle only makes things worse costs nothing.
+    """
     for module in modules:
-        sure = [(name, change) for name, change in module["changes"].items() if change["sure"]]
-        if sure:
-            words = "; ".join(_said(name, change) for name, change in sure[:3])
-            return f"What costs most is '{module['module']}': with an oracle for it {words}."
+        gains, losses = _gains_and_losses(module, _surely)
+        if gains:
+            return f"What costs most is '{module['module']}': with an oracle for it {_words(gains, losses)}."
     for module in modules:
-        likely = [
-            (name, change)
-            for name, change in module["changes"].items()
-            if change["low"] > 0.0 or change["high"] < 0.0
-        ]
-        if likely:
-            words = "; ".join(_said(name, change) for name, change in likely[:3])
+        gains, losses = _gains_and_losses(module, _likely)
+        if gains:
             return (
                 "These trials are too few to tell any module's cost from chance; what costs most is likely "
-                f"'{module['module']}': with an oracle for it {words}."
+                f"'{module['module']}': with an oracle for it {_words(gains, losses)}."
+            )
+    for module in modules:
+        _, losses = _gains_and_losses(module, _surely)
+        if losses:
+            return (
+                "These trials tell no module's cost from chance; an oracle even makes things worse: with one "
+                f"for '{module['module']}' {_words([], losses)}."
             )
     return "These trials tell no module's cost from chance."
 
 
-def _said(name: str, change: Mapping[str, Any]) -> str:
+def module_words(module: Module) -> list[str]:
+    """What an oracle changes surely, or else what it may, one change each; gains first."""
+    for know, word in ((_surely, ""), (_likely, "perhaps ")):
+        gains, losses = _gains_and_losses(module, know)
+        if gains or losses:
+            return [
+                *(f"{word}{_said(*entry)}" for entry in gains),
+                *(f"{word}worse: {_said(*entry)}" for entry in losses),
+            ]
+    return []
+
+
+def _surely(change: Mapping[str, Any]) -> bool:
+    return bool(change["sure"])
+
+
+def _likely(change: Mapping[str, Any]) -> bool:
+    return bool(change["low"] > 0.0 or change["high"] < 0.0)
+
+
+def _gains_and_losses(
+    module: Module, know: Callable[[Mapping[str, Any]], bool]
+) -> tuple[list[Named], list[Named]]:
+    """What is known to become better with the oracle, and what worse; nothing better where success falls."""
+    known = [(name, change) for name, change in module["changes"].items() if know(change)]
+    gains = [entry for entry in known if entry[1]["better"]]
+    losses = [entry for entry in known if not entry[1]["better"]]
+    if any(name == "success" for name, _ in losses):
+        return [], losses
+    return gains, losses
+
+
+def _words(gains: Sequence[Named], losses: Sequence[Named]) -> str:
+    better, worse = (
+        "; ".join(_said(*entry, verb=" changes by") for entry in entries[:3]) for entries in (gains, losses)
+    )
+    return f"{better}; for the worse, {worse}" if better and worse else better or worse
+
+
+def _said(name: str, change: Mapping[str, Any], verb: str = "") -> str:
     mean, low, high = (float(change[key]) for key in ("mean", "low", "high"))
-    name_of = metric_of(name).name
+    start = f"{metric_of(name).name}{verb}"
     if low == high:
-        return f"{name_of} changes by {told(name, mean, math.nan, math.nan, signed=True)} in every trial"
-    return f"{name_of} changes by {told(name, mean, low, high, signed=True)}"
+        return f"{start} {told(name, mean, math.nan, math.nan, signed=True)} in every trial"
+    return f"{start} {told(name, mean, low, high, signed=True)}"
 
 
 def _metrics(modules: Sequence[Module]) -> list[str]:

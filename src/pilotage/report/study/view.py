@@ -77,6 +77,8 @@ class StudyView:
         By factor, the unit of its values.
     asked
         Whether somebody chose the metrics; of all that the trials give, those that never vary are left out.
+    same_seeds
+        Whether the settings took the same seeds, so that trials are pairs.
     reference
         By metric, a value that bounds it or that it is held against, such as a known optimum, with its name.
     row, cell, trial, seed
@@ -109,6 +111,7 @@ class StudyView:
     contrasts: tuple[tuple[str, str], ...] = ()
     units: Mapping[str, str] = field(default_factory=dict)
     asked: bool = True
+    same_seeds: bool = True
     versions: str = ""
 
     def column(self, metric: str) -> FloatArray:

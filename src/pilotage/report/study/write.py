@@ -74,6 +74,7 @@ def view_of(table: StudyTable) -> StudyView:
         if definition.lower_is_better is None
         else definition.lower_is_better,
         asked=bool(definition.metrics),
+        same_seeds=table.same_seeds,
         groups=tuple(Group(group.name, group.cells, group.baselines) for group in table.groups),
         contrasts=table.contrasts,
         units={factor.title: unit_of(factor) for factor in definition.factors},
