@@ -70,6 +70,26 @@ def lost_in(world: SegmentMap, start: Pose2) -> tuple[Simulator, EkfWallsLocaliz
     return sim, EkfWallsLocalizer(EkfWallsConfig(), knowledge)
 
 
+@pytest.mark.parametrize("off", [(0.0, 0.0, 0.5), (4.0, 3.0, 1.0), (11.0, 2.0, -2.0)])
+def test_a_wrong_and_vague_start_is_noticed(off: tuple[float, float, float]) -> None:
+    # A tenth of a metre and of a radian: too unsure to expect a scan, too far off to match a wall.
+    truth = Pose2(3.5, 16.0, 0.4)
+    told = Pose2(truth.x_m + off[0], truth.y_m + off[1], truth.theta_rad + off[2])
+    knowledge = knowledge_of(world=MUSEUM, start=told, initial=Belief(told, 0.01 * np.eye(3)))
+    sim = Simulator(
+        World(MUSEUM, MUSEUM, BEACONS), BodyConfig(), MotionConfig(), sensors(), truth, 0.1, RandomStreams(1)
+    )
+    localizer = EkfWallsLocalizer(EkfWallsConfig(), knowledge)
+    lost_at = -1
+    for step in range(80):
+        belief = localizer.step(sim.step(Twist(0.2, 0.5)))
+        if lost_at < 0 and belief.status is BeliefStatus.LOST:
+            lost_at = step
+    assert 0 <= lost_at <= 20
+    assert belief.status is BeliefStatus.LOCALIZED
+    assert is_near(belief.pose.as_array(), sim.truth)
+
+
 def test_the_true_pose_is_among_the_hypotheses_of_one_scan() -> None:
     rng = np.random.default_rng(1)
     for seed in range(40):

@@ -53,6 +53,26 @@ def test_the_museums_doubled_wall_is_one() -> None:
     assert np.unique(walls.line_of).shape[0] < 31  # doorways leave walls on one line
 
 
+def test_each_wall_lies_where_its_own_pieces_do_in_a_map_of_whole_millimetres() -> None:
+    # A wall with a door, turned by 0.3 rad and rounded: its halves are on one line only to half a millimetre.
+    c, s = math.cos(0.3), math.sin(0.3)
+    along = np.array([[0.0, 7.0], [9.0, 10.5], [10.5, 12.0]])
+    ends = np.column_stack([along[:, 0] * c, along[:, 0] * s, along[:, 1] * c, along[:, 1] * s])
+    pieces = np.asarray(np.round(ends, 3), dtype=np.float64)
+    walls = WallLines.of(SegmentMap.of(pieces))
+    assert len(walls) == 2
+    assert np.unique(walls.line_of).shape[0] == 1
+    lengths = np.hypot(*(walls.segments_m[:, 2:] - walls.segments_m[:, :2]).T)
+    alone, chain = int(np.argmax(lengths)), int(np.argmin(lengths))
+    assert tuple(walls.normals[alone]) == pytest.approx(normal_form(pieces[0]), abs=1e-12)
+    # The two that touch are one wall, between them: nearer to both than either is to the other's line.
+    rho, alpha = walls.normals[chain]
+    touching = pieces[1:].reshape(-1, 2)
+    assert np.abs(touching @ np.array([math.cos(alpha), math.sin(alpha)]) - rho).max() < 5e-4
+    for (rho, alpha), segment in zip(walls.normals, walls.segments_m, strict=True):
+        assert segment.reshape(2, 2) @ np.array([math.cos(alpha), math.sin(alpha)]) == pytest.approx(rho)
+
+
 @settings(max_examples=100)
 @given(st.tuples(*[st.floats(-20, 20)] * 4))
 def test_both_ends_obey_the_normal_form(segment: tuple[float, float, float, float]) -> None:

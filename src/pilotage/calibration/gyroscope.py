@@ -137,13 +137,16 @@ def allan_deviation(t_s: FloatArray, rate_rad_s: FloatArray) -> AllanDeviation:
     """Overlapping Allan deviation from the integrated angle.
 
     Readings need not be evenly spaced: the angle is integrated over the times that the log gives and
-    looked up on an even grid, no finer than the log's longer steps. Intervals are chi-square with the
+    looked up on an even grid, no finer than the log's longer steps. A reading stands for the time that is
+    nearer to it than to its neighbours: integrals from reading to reading would share each between two
+    steps and halve the deviation at the shortest time. Intervals are chi-square with the
     degrees of freedom of white rate noise (Riley, NIST SP 1065, table 5).
     """
-    angle = _angle(t_s, rate_rad_s)
+    edges = 0.5 * (t_s[1:] + t_s[:-1])
+    angle = np.concatenate([[0.0], np.cumsum(rate_rad_s[1:-1] * np.diff(edges))])
     step = max(float(np.quantile(np.diff(t_s), 0.99)), float(np.mean(np.diff(t_s))))
-    grid = np.arange(t_s[0], t_s[-1], step)
-    theta = np.interp(grid, t_s, angle)
+    grid = np.arange(edges[0], edges[-1], step)
+    theta = np.interp(grid, edges, angle)
     n = grid.shape[0]
     sizes = np.unique(np.round(np.geomspace(1, max(n // 5, 1), 40)).astype(np.int64))
     deviations, lows, highs = [], [], []

@@ -150,11 +150,12 @@ def _recovery(
     if "localized" not in trace:
         return {}
     claimed, dt_s = trace["localized"] > 0.5, mission.run.dt_s
-    if claimed.all() and mission.stack.initial.known:
-        return {}
     error = estimate - truth
     wrong = np.hypot(error[:, 0], error[:, 1]) > WRONG_M
     wrong |= np.abs(wrap_array_to_pi(error[:, 2])) > WRONG_RAD
+    # One that never says so although it is wrong is the worst case of all.
+    if claimed.all() and mission.stack.initial.known and not wrong.any():
+        return {}
     metrics: dict[str, object] = {
         "lost_s": float(dt_s * (~claimed).sum()),
         "wrong_s": float(dt_s * (claimed & wrong).sum()),

@@ -132,7 +132,7 @@ class EkfWallsLocalizer:
         used = matches.count
         self._telemetry = _telemetry(len(lines), used, total, self._expected_nis[used])
         if self._recovery is not None:
-            self._lost = self._recovery.gives_up(self._pose, self._cov, ranges_m, len(lines), used)
+            self._lost = self._recovery.gives_up(self._pose, self._cov, ranges_m, matches)
 
     def _find(self, lines: DetectedLines, ranges_m: FloatArray) -> None:
         assert self._recovery is not None, "never lost without it"

@@ -17,7 +17,7 @@ from pilotage.stack.localization.global_search import GlobalSearch, GlobalSearch
 from pilotage.stack.localization.odometry_prediction import OdometryPrediction
 from pilotage.stack.localization.scan_fit import ScanFit
 from pilotage.stack.localization.viewpoint import Viewpoint, ViewpointConfig
-from pilotage.stack.localization.wall_matching import WallMatcher
+from pilotage.stack.localization.wall_matching import UNMATCHED, Matches, WallMatcher
 from pilotage.stack.perception.lines import DetectedLines
 
 LINES_AT_LEAST = 2
@@ -44,7 +44,9 @@ class RecoveryConfig(Config):
     blatant_share: float = Field(default=0.35, ge=0.0, lt=1.0)
     """A scan that explains less than this and shows walls of which none is where it should be: at once."""
     sure_m: Positive = 0.3
-    """A belief less certain than this is not put to the question."""
+    """A belief less certain than this expects no scan; it is judged by the lines that it can place,"""
+    unplaced_scans: int = Field(default=5, ge=1)
+    """and given up where it can place fewer than half of them, in so many scans that show two or more."""
 
 
 class Recovery:
@@ -72,35 +74,51 @@ class Recovery:
             knowledge.body_radius_m,
         )
         self._viewpoint = Viewpoint(config.viewpoint, knowledge.world_map, lidar, knowledge.body_radius_m)
-        self._contradicted = self._unexplained = 0
+        self._contradicted = self._unexplained = self._unplaced = 0
 
     @property
     def hypotheses(self) -> int:
         """How many poses are being followed."""
         return len(self._search.hypotheses)
 
-    def gives_up(
-        self, pose: FloatArray, cov: FloatArray, ranges_m: FloatArray, seen: int, matched: int
-    ) -> bool:
-        """Whether a scan, of whose lines some were matched, shows a belief to be wrong."""
+    def gives_up(self, pose: FloatArray, cov: FloatArray, ranges_m: FloatArray, matches: Matches) -> bool:
+        """Whether a scan, whose lines were matched as far as they could be, shows a belief to be wrong."""
+        # What a heading that is not known moves, it moves at the distance of the walls.
+        far_m = float(np.median(ranges_m))
+        spread_m = 3.0 * math.sqrt(cov[0, 0] + cov[1, 1] + far_m**2 * cov[2, 2])
+        if spread_m > self._config.sure_m:
+            wrong = self._places_too_few(matches)
+        else:
+            self._unplaced = 0
+            wrong = self._contradicts(pose, ranges_m, spread_m, matches)
+        if wrong:
+            self._contradicted = self._unexplained = self._unplaced = 0
+            self._search.reset()
+        return wrong
+
+    def _places_too_few(self, matches: Matches) -> bool:
+        """The question to an unsure belief: where it is right, most walls in sight fit it together, were it
+        in more ways than one; where it is wrong, too few do, and it may stay unsure for ever."""
+        seen = matches.walls.shape[0]
+        if seen >= LINES_AT_LEAST:
+            placed = int((matches.walls != UNMATCHED).sum())
+            self._unplaced = self._unplaced + 1 if 2 * placed < seen else 0
+        return self._unplaced >= self._config.unplaced_scans
+
+    def _contradicts(self, pose: FloatArray, ranges_m: FloatArray, spread_m: float, matches: Matches) -> bool:
+        """The question to a belief that is sure of what it should see."""
         config = self._config
-        spread_m = 3.0 * math.sqrt(cov[0, 0] + cov[1, 1])
-        if spread_m > config.sure_m:
-            return False
         fit = self._fit.of(pose, ranges_m, spread_m)
         contradicted = fit.contradicted > config.contradicted_share
         self._contradicted = self._contradicted + 1 if contradicted else 0
         unexplained = fit.explained < config.explained_share
         self._unexplained = self._unexplained + 1 if unexplained else 0
-        wrong = (
+        none = matches.walls.shape[0] >= LINES_AT_LEAST and matches.count == 0
+        return (
             self._contradicted >= config.contradicted_scans
             or self._unexplained >= config.explained_scans
-            or (seen >= LINES_AT_LEAST and matched == 0 and fit.explained < config.blatant_share)
+            or (none and fit.explained < config.blatant_share)
         )
-        if wrong:
-            self._contradicted = self._unexplained = 0
-            self._search.reset()
-        return wrong
 
     @property
     def look_bearing_rad(self) -> float | None:
