@@ -131,7 +131,7 @@ def solve_arrow(
 
 @kernel
 def substitute(factor: FloatArray, right: FloatArray, n: int) -> None:
-    """Solve L L^T x = right in place, ``factor`` holding L in its lower triangle."""
+    """Solve L L^T x = right (n,) in place, ``factor`` (n, n) holding L in its lower triangle."""
     for r in range(n):
         value = right[r]
         for c in range(r):

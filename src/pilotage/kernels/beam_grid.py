@@ -80,7 +80,7 @@ def mark_depth(depth: FloatArray, x: float, y: float, width_m: float, height_m: 
 
 @kernel
 def mark_path(depth: FloatArray, poses: FloatArray, width_m: float, height_m: float, spacing: float) -> None:
-    """Note the depth of every point of a path of straight pieces, looked at every ``spacing``."""
+    """Note in ``depth`` (rows, columns) how deep a path (N, 3) leads into each cell, every ``spacing``."""
     for i in range(poses.shape[0] - 1):
         dx, dy = poses[i + 1, 0] - poses[i, 0], poses[i + 1, 1] - poses[i, 1]
         pieces = int(math.hypot(dx, dy) / spacing) + 1

@@ -81,7 +81,10 @@ def bucket_geometry(
     cells_y: int,
     reach: float,
 ) -> tuple[IntArray, IntArray]:
-    """List for each cell the geometry within ``reach`` of any of its points; returns starts and items."""
+    """List for each cell the (S, 4) segments and (C, 3) discs within ``reach`` of any of its points.
+
+    Returns starts (cells + 1,) and items, S + i for disc i.
+    """
     n, m = segments.shape[0], circles.shape[0]
     count = np.zeros(cells_x * cells_y + 1, np.int64)
     items = np.empty(0, np.int64)
@@ -128,7 +131,9 @@ def make_space(
     circles: FloatArray,
     clearance: float,
 ) -> Space:
-    """Bucket the geometry for questions about ``clearance`` metres; arrays are copied, never changed."""
+    """Bucket (S, 4) segments and (C, 3) discs for questions about ``clearance`` metres, beside their distance
+    field ``distance`` (rows, columns); arrays are copied, never changed.
+    """
     distance = np.array(distance, dtype=np.float64)
     segments = np.array(segments, dtype=np.float64).reshape(-1, 4)
     circles = np.array(circles, dtype=np.float64).reshape(-1, 3)

@@ -53,8 +53,9 @@ def predict(
 def joseph_update2(
     pose: FloatArray, cov: FloatArray, H: FloatArray, innovation: FloatArray, R: FloatArray, gate: float
 ) -> float:
-    """Update in place by one two-dimensional measurement unless its squared Mahalanobis distance
-    exceeds ``gate``; returns that distance (nan where the innovation covariance is not positive).
+    """Update ``pose`` (3,) and ``cov`` (3, 3) in place by one two-dimensional measurement, H (2, 3), unless
+    its squared Mahalanobis distance exceeds ``gate``; returns that distance (nan where the innovation
+    covariance S = H P H' + R is not positive).
 
     Joseph form, P <- (I - K H) P (I - K H)' + K R K', which keeps P symmetric and positive.
     """

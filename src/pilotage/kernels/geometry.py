@@ -71,7 +71,7 @@ def segments_cross(
 
 @kernel
 def sees(ax: float, ay: float, bx: float, by: float, segments: FloatArray, circles: FloatArray) -> bool:
-    """Whether the straight line from A to B meets no segment and no circle."""
+    """Whether the straight line from A to B meets none of (S, 4) segments and (C, 3) circles."""
     for i in range(segments.shape[0]):
         if segments_cross(ax, ay, bx, by, segments[i, 0], segments[i, 1], segments[i, 2], segments[i, 3]):
             return False

@@ -79,6 +79,7 @@ def word(bits: WordArray, line: int, position: int) -> np.uint64:
 
 @kernel
 def is_set(bits: WordArray, line: int, position: int) -> bool:
+    """Whether a cell's bit is set."""
     word = bits[np.uint64(line), np.uint64(position >> 6)]
     return bool(word >> np.uint64(position & 63) & np.uint64(1))
 

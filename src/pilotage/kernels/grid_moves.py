@@ -73,7 +73,7 @@ def is_blocked(states: ByteArray, cell: int) -> bool:
 
 @kernel
 def may_step(states: ByteArray, cell: int, direction: int, offset: IntArray, cut_corners: bool) -> bool:
-    """Whether a step from a free cell is allowed."""
+    """Whether a step from a free cell of the flat padded grid in one of the 8 directions is allowed."""
     if is_blocked(states, cell + offset[direction]):
         return False
     if cut_corners or direction % 2 == 0:

@@ -98,7 +98,7 @@ def correct_by_heading(
 
 @kernel
 def squared_distance_of_heading(state: FloatArray, P: FloatArray, measured: float, var: float) -> float:
-    """Squared Mahalanobis distance of a measured heading: chi-square with one degree of freedom."""
+    """Squared Mahalanobis distance of a heading at state (2,), P (2, 2): chi-square of one degree."""
     innovation = wrap(measured - state[0])
     S = P[0, 0] + var
     return float(innovation * innovation / S) if S > 0.0 else math.nan

@@ -60,6 +60,7 @@ def posterior_cost(
 ) -> float:
     """J = xi' P^-1 xi + (z - h)' R^-1 (z - h): squared misfit to the prediction and to the sighting.
 
+    xi (3,), P^-1 ``inverse`` (3, 3), the pose ``at`` (3,) that xi leads to, R (2, 2) diagonal.
     At its least it is the sighting's squared Mahalanobis distance, for a linear one exactly the innovation's.
     """
     cost = 0.0

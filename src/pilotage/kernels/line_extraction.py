@@ -28,7 +28,7 @@ CONFIDENCE_LOG = math.log(0.001)
 def near_line(
     points: FloatArray, rest: IntArray, count: int, rho: float, alpha: float, threshold: float, out: IntArray
 ) -> int:
-    """Collect the points of ``rest[:count]`` within ``threshold`` of a line; returns their number."""
+    """Collect of ``rest[:count]`` the indices of points (N, 2) nearer a line than ``threshold``; how many."""
     c, s = math.cos(alpha), math.sin(alpha)
     found = 0
     for k in range(count):
@@ -70,7 +70,7 @@ def sample_line(
     uniforms: FloatArray,
     drawn: int,
 ) -> tuple[float, float, int]:
-    """RANSAC (Fischler & Bolles 1981): the line through two points that has most points near it.
+    """RANSAC (Fischler & Bolles 1981): the line through two of points (N, 2) that has most of them near it.
 
     Returns rho, alpha and how many uniforms have been drawn in all.
     """

@@ -18,7 +18,7 @@ IntArray = NDArray[np.int64]
 def fit_line(points: FloatArray, index: IntArray, count: int) -> tuple[float, float]:
     """Distance and angle of the line x cos(alpha) + y sin(alpha) = rho that fits points best.
 
-    The points are ``points[index[:count]]``. Total least squares: least sum of squared perpendicular
+    The points (N, 2) are ``points[index[:count]]``. Total least squares: least sum of squared perpendicular
     distances, rho >= 0 (Arras & Siegwart 1997, eq. 5-6). Undefined for points in one place.
     """
     mx = my = 0.0
@@ -55,6 +55,7 @@ def line_covariance(
     Beam angles are exact and ranges independent, so cov = var sum J_k J_k' with J_k the derivative of
     (rho, alpha) in range k (first order; Arras & Siegwart 1997, sec. 2.2, for range noise alone).
     """
+    # The moments of ``fit_line`` once more: for the few points of a line a call costs more than they do.
     mx = my = 0.0
     for k in range(count):
         mx += points[index[k], 0]
@@ -98,7 +99,7 @@ def is_straight(
     range_var: float,
     z: float,
 ) -> bool:
-    """Whether the residuals of a fit are no larger than range noise explains.
+    """Whether the residuals of a fit to points (N, 2) seen along ``directions`` (N,) are range noise alone.
 
     A residual's variance is range_var cos^2 of the angle between beam and normal, so their summed squares
     are a weighted sum of chi-squares: matched to one chi-square by mean and variance (Satterthwaite

@@ -79,7 +79,7 @@ def resampled(states: FloatArray, step: float, longest: float) -> FloatArray:
 
 @kernel
 def fits(states: FloatArray, clearance: float, segments: FloatArray, circles: FloatArray) -> bool:
-    """Whether every state keeps ``clearance``; a start that is nearer may only move away.
+    """Whether every state (N, 3) keeps ``clearance``; a start that is nearer may only move away.
 
     The states are a control step apart, a few centimetres; the distance is 1-Lipschitz in between.
     """

@@ -71,7 +71,7 @@ def distance_by_node(
     resolution: float,
     items: FloatArray,
 ) -> float:
-    """Distance from a point to the edge of the item that is nearest to the point's node.
+    """Distance from a point to that of the items (N, 5) which is nearest to its node, ``nearest`` (ny, nx).
 
     Off the grid the node at its edge counts: a noisy reading of an outer wall ends behind it.
     """

@@ -34,7 +34,7 @@ def predict_first_order(
     q_distance: float,
     q_turn: float,
 ) -> None:
-    """One step in place, linearized: equations 4.5 to 4.8."""
+    """One step of ``pose`` (3,) and ``cov`` (3, 3) in place, linearized: equations 4.5 to 4.8."""
     direction = pose[2] + aside
     c, s = math.cos(direction), math.sin(direction)
     f0, f1 = -distance * s, distance * c  # F = [1 0 f0; 0 1 f1; 0 0 1]

@@ -118,7 +118,7 @@ def table_fan_ranges(
 
 @kernel
 def add_range_noise(ranges: FloatArray, normals: FloatArray, std: float, max_range: float) -> FloatArray:
-    """Ranges with additive noise, kept in [0, max_range]; a beam without a hit stays at ``max_range``."""
+    """Ranges (N,) + std * normals (N,), kept in [0, max_range]; one without a hit stays at ``max_range``."""
     out = np.empty_like(ranges)
     for k in range(ranges.shape[0]):
         if ranges[k] >= max_range:
@@ -132,7 +132,7 @@ def add_range_noise(ranges: FloatArray, normals: FloatArray, std: float, max_ran
 def cone_range(
     x: float, y: float, theta: float, half_width: float, segments: FloatArray, circles: FloatArray
 ) -> float:
-    """Distance from the apex to the nearest point of any obstacle inside the cone; inf where none.
+    """Distance from the apex to the nearest of (S, 4) segments and (C, 3) circles in the cone; inf for none.
 
     The cone spans theta +- half_width, half_width below pi/2.
     """

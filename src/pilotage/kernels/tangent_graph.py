@@ -27,7 +27,7 @@ TOLERANCE_M = 1e-9
 def straight_is_free(
     ax: float, ay: float, bx: float, by: float, segments: FloatArray, circles: FloatArray, clearance: float
 ) -> bool:
-    """Whether all points between A and B are at least ``clearance`` from every segment and disc."""
+    """Whether all points between A and B keep ``clearance`` from (S, 4) segments and (C, 3) discs."""
     low = clearance - TOLERANCE_M
     min_x, max_x, min_y, max_y = min(ax, bx) - low, max(ax, bx) + low, min(ay, by) - low, max(ay, by) + low
     for i in range(circles.shape[0]):

@@ -29,7 +29,7 @@ def overlap_share(
     slack: float,
     sigmas: float,
 ) -> float:
-    """Share of a detected line, given by its ends in the sensor's frame, that lies beside a wall.
+    """Share of a detected line that lies beside a wall; ``end`` (4,) in the sensor's frame, ``segment`` (4,).
 
     The wall is lengthened at both ends by ``slack`` and by ``sigmas`` standard deviations of where the
     line's end would come to lie along it.

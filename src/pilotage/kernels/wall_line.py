@@ -59,7 +59,7 @@ def wall_innovation(
 
 @kernel
 def innovation_distance(cov: FloatArray, H: FloatArray, innovation: FloatArray, R: FloatArray) -> float:
-    """Squared Mahalanobis distance of a two-dimensional innovation; nan where S is not positive."""
+    """Squared Mahalanobis distance v' S^-1 v of v (2,), S = H P H' + R, H (2, 3); nan for no positive S."""
     S = np.empty((2, 2))
     for a in range(2):
         for b in range(2):

@@ -10,6 +10,7 @@ from pilotage.experiments.floor.recorder import RunRecord
 
 
 def world_of(record: RunRecord) -> dict[str, Any]:
+    """What ``world.json`` holds: walls, landmarks, what the robot was not told of, start and goal."""
     experiment = record.experiment
     mission, world = experiment.mission, experiment.world
     start, goal = mission.world.start, mission.world.goal
@@ -31,6 +32,7 @@ def world_of(record: RunRecord) -> dict[str, Any]:
 
 
 def plans_of(record: RunRecord) -> dict[str, Any]:
+    """What ``plans.npz`` holds: every plan adopted, the obstacle points mapped, the exact shortest path."""
     experiment = record.experiment
     arrays: dict[str, Any] = {"mapped_points": experiment.stack.mapped_circles_m[:, :2]}
     for i, plan in enumerate(experiment.stack.plans):
