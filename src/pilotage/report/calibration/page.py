@@ -217,7 +217,9 @@ def _headline(answer: Mapping[str, Any]) -> str:
             f"{len(answer['logs'])} recordings, {answer['windows']} windows, {answer['readings']} readings."
         )
     if kind == "range":
-        return f"{len(answer['sensors'])} quantities of sensors that look at the same thing all the time."
+        count = len(answer["sensors"])
+        quantities = "1 quantity" if count == 1 else f"{count} quantities"
+        return f"{quantities} of sensors that look at the same thing all the time."
     return f"{len(answer['gyroscope'])} gyroscope axes, {len(answer['magnetometer'])} magnetometers turned."
 
 

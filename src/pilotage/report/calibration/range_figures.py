@@ -34,12 +34,14 @@ def _figure(data: CalibrationData, index: int, entry: Mapping[str, Any]) -> Illu
     histogram(spread, values, expected)
     slug = f"sensor-{index + 1}"
     alt = f"{len(values)} readings of {name} and their histogram with the fitted normal"
-    keys = (
-        Key("readings", BLUE),
-        Key("expected", BLUE, "dash"),
-        Key("share of the readings", SKY, "band", opacity=1.0),
-        Key("fitted normal", VERMILLION),
+    has_spread = entry[f"var_{unit}2"]["value"] > 0.0
+    candidates = (
+        (True, Key("readings", BLUE)),
+        (expected is not None, Key("expected", BLUE, "dash")),
+        (has_spread, Key("share of the readings", SKY, "band", opacity=1.0)),
+        (has_spread, Key("fitted normal", VERMILLION)),
     )
+    keys = tuple(key for there, key in candidates if there)
     return Illustration(slug, name, alt, _caption(entry, unit), render(figure, slug, alt), keys)
 
 
