@@ -1,4 +1,4 @@
-"""The kinds of missions: what turns a mission of each kind into a run, its numbers and its files.
+"""The kinds of missions there are, by name; what each of them offers stands in ``mission_kind``.
 
 A kind is loaded when a mission asks for it: the rover's terrain costs a museum run nothing.
 """
@@ -6,112 +6,14 @@ A kind is loaded when a mission asks for it: the rover's terrain costs a museum 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
-from enum import StrEnum
-from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 from pilotage.core.errors import InputError, unknown_name
-from pilotage.core.types import Event, FloatArray
-from pilotage.experiments.progress import OnProgress
+from pilotage.experiments.mission_kind import SHARE, Aspect, Cost, Kind
 from pilotage.missions.mission import DEFAULT_KIND, Mission
 
-
-class Record(Protocol):
-    """A finished run in memory."""
-
-    @property
-    def mission(self) -> Mission:
-        """The mission with its random places drawn: run again, it gives the same run."""
-        ...
-
-    @property
-    def trace(self) -> Mapping[str, FloatArray]:
-        """Columns by name, one row a step."""
-        ...
-
-    @property
-    def events(self) -> list[Event]:
-        """What happened, in order."""
-        ...
-
-
-class Aspect(StrEnum):
-    """What a metric speaks of."""
-
-    ACCURACY = "accuracy"
-    TIME = "time"
-    SAFETY = "safety"
-
-
-@dataclass(frozen=True, slots=True)
-class Cost:
-    """A metric as a cost: of what, and whether less of it is better.
-
-    Attributes
-    ----------
-    whole_only
-        It compares only where both runs came to their end: a run that fails early is not fast.
-    """
-
-    aspect: Aspect
-    less_is_better: bool = True
-    whole_only: bool = False
-
-
-TIME_COST = Cost(Aspect.TIME, whole_only=True)
-ERROR = Cost(Aspect.ACCURACY)
-WAY = Cost(Aspect.TIME, whole_only=True)
-ROOM = Cost(Aspect.SAFETY, less_is_better=False)
-SHARE = Cost(Aspect.ACCURACY, less_is_better=False)
-
-
-class Kind(Protocol):
-    """One kind of mission."""
-
-    @property
-    def schema(self) -> type[Mission]:
-        """The model that validates its files."""
-        ...
-
-    @property
-    def metric_names(self) -> frozenset[str]:
-        """Every number that its runs can give, nested ones by one level of names."""
-        ...
-
-    def warm_up(self, mission: Mission) -> None:
-        """Compile or load what a run of the mission needs, so that its times are not a compiler's."""
-        ...
-
-    def simulate(self, mission: Mission, on_progress: OnProgress | None = None) -> Record:
-        """Build a mission and step it to its end.
-
-        Raises
-        ------
-        InputError
-            Where the mission asks for something that does not exist or cannot be.
-        """
-        ...
-
-    def oracles(self, mission: Mission) -> Mapping[str, str]:
-        """The oracles that ``run.oracles`` can name in this mission, and what each one does."""
-        ...
-
-    def costs(self, mission: Mission) -> Mapping[str, Cost]:
-        """The metrics that say what a module costs this mission, beside success; what matters most first."""
-        ...
-
-    def metrics(self, record: Any) -> dict[str, object]:
-        """The numbers of a run by their JSON keys; ``success`` among them."""
-        ...
-
-    def write_files(self, record: Any, folder: Path) -> None:
-        """Write what this kind keeps beside mission, trace, events and metrics into ``folder``."""
-        ...
-
-    def inline(self, record: Any, values: dict[str, Any]) -> None:
-        """Put what the mission took from files into its values, so that they alone run it again."""
-        ...
+# Costs are handed on: who asks a kind what its metrics cost needs the words for the answer.
+__all__ = ["KINDS", "SHARE", "Aspect", "Cost", "check_oracles", "kind_name", "kind_of"]
 
 
 def _floor() -> Kind:

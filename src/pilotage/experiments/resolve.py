@@ -7,7 +7,8 @@ from typing import Any
 
 import yaml
 
-from pilotage.experiments.kinds import Record, kind_of
+from pilotage.experiments.kinds import kind_of
+from pilotage.experiments.mission_kind import Record
 from pilotage.experiments.roles import REGISTRIES
 from pilotage.missions.mission import Mission
 

@@ -6,7 +6,8 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
-from pilotage.experiments.kinds import Record, check_oracles, kind_of
+from pilotage.experiments.kinds import check_oracles, kind_of
+from pilotage.experiments.mission_kind import Record
 from pilotage.experiments.progress import OnProgress
 from pilotage.experiments.run_folder import write_run_folder
 from pilotage.missions.mission import Mission

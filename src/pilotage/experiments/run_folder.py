@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from pilotage.experiments.kinds import Kind, Record
+from pilotage.experiments.mission_kind import Kind, Record
 from pilotage.experiments.resolve import resolved_yaml, run_name
 
 

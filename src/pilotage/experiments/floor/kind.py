@@ -16,15 +16,15 @@ from pilotage.experiments.floor.recorder import RunRecord
 from pilotage.experiments.floor.simulate import simulate
 from pilotage.experiments.floor.warm_up import warm_up
 from pilotage.experiments.floor.world_map import shipped_maps
-from pilotage.experiments.kinds import ERROR, ROOM, TIME_COST, WAY, Cost
 from pilotage.experiments.metric_names import FLOOR_METRICS
+from pilotage.experiments.mission_kind import ERROR, ROOM, TIME_COST, WAY, Cost
 from pilotage.experiments.progress import OnProgress
 from pilotage.missions.floor import FloorMission
 from pilotage.missions.mission import Mission
 
 
 class FloorKind:
-    """Missions with ``world.kind: floor``; see ``pilotage.experiments.kinds.Kind``."""
+    """Missions with ``world.kind: floor``; see ``pilotage.experiments.mission_kind.Kind``."""
 
     schema: type[Mission] = FloorMission
     metric_names = FLOOR_METRICS

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from pilotage.evaluation.sheet_metrics import sheet_metrics
-from pilotage.experiments.kinds import ERROR, SHARE, TIME_COST, Aspect, Cost
 from pilotage.experiments.metric_names import SHEET_METRICS
+from pilotage.experiments.mission_kind import ERROR, SHARE, TIME_COST, Aspect, Cost
 from pilotage.experiments.progress import OnProgress
 from pilotage.experiments.sheet.files import maps_of, world_of, write_map_files
 from pilotage.experiments.sheet.oracles import applicable
@@ -23,7 +23,7 @@ from pilotage.missions.sheet import SheetMission
 
 
 class SheetKind:
-    """Missions with ``world.kind: sheet``; see ``pilotage.experiments.kinds.Kind``."""
+    """Missions with ``world.kind: sheet``; see ``pilotage.experiments.mission_kind.Kind``."""
 
     schema: type[Mission] = SheetMission
     metric_names = SHEET_METRICS

@@ -11,8 +11,8 @@ import numpy as np
 
 from pilotage.core.random import RandomStreams
 from pilotage.core.types import Event, Pose2
-from pilotage.experiments.kinds import ERROR, ROOM, TIME_COST, WAY, Cost
 from pilotage.experiments.metric_names import TERRAIN_METRICS
+from pilotage.experiments.mission_kind import ERROR, ROOM, TIME_COST, WAY, Cost
 from pilotage.experiments.progress import OnProgress
 from pilotage.experiments.terrain.estimation import estimate, seen_per_step
 from pilotage.experiments.terrain.ground import Ground, load_ground, shares
@@ -36,7 +36,7 @@ PICTURE_COLUMNS = 900
 
 
 class TerrainKind:
-    """Missions with ``world.kind: terrain``; see ``pilotage.experiments.kinds.Kind``."""
+    """Missions with ``world.kind: terrain``; see ``pilotage.experiments.mission_kind.Kind``."""
 
     schema: type[Mission] = TerrainMission
     metric_names = TERRAIN_METRICS

@@ -27,7 +27,7 @@ NEAR_CELLS = 3.0
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TerrainRecord:
-    """A finished run; see ``pilotage.experiments.kinds.Record``.
+    """A finished run; see ``pilotage.experiments.mission_kind.Record``.
 
     Attributes
     ----------
