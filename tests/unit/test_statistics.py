@@ -14,7 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from pilotage.evaluation.intervals import bootstrap_mean, summarize, wilson
+from pilotage.evaluation.intervals import COVERAGE, bootstrap_mean, summarize, wilson
 from pilotage.evaluation.paired import corrected, difference
 from pilotage.evaluation.pooled import NEES_IDEAL, pool
 
@@ -130,3 +130,15 @@ def test_pooled_consistency_names_a_filter_that_is_off_by_two(factor: float, ver
     pooled = pool(runs, NEES_IDEAL)
     assert pooled.verdict == verdict
     assert pool(runs[:1], NEES_IDEAL).verdict == "too few runs to say"
+    assert pool(runs[:9], NEES_IDEAL).verdict == "too few runs to say"
+
+
+def test_intervals_of_a_handful_hold_the_mean_as_often_as_the_pages_say() -> None:
+    """200 studies each: four standard deviations of a count that is right are at most 0.15."""
+    rng = np.random.default_rng(8)
+    for trials in (2, 4, 6):
+        held = 0
+        for _ in range(200):
+            low, high = bootstrap_mean(rng.gamma(4.0, 0.75, trials))
+            held += low <= 3.0 <= high
+        assert held / 200 == pytest.approx(COVERAGE[trials], abs=0.15)

@@ -12,6 +12,9 @@ from pilotage.core.types import FloatArray
 
 LEVEL = 0.95
 RESAMPLES = 2000
+COVERAGE = {2: 0.5, 3: 0.7, 4: 0.8, 5: 0.85, 6: 0.85, 7: 0.85}
+"""How often the 95 % bootstrap interval of so few trials holds the mean (measured: normal and gamma values);
+from 8 on it is about nine times in ten and more."""
 ROUNDING = 1e-12
 """Values that differ by less than this share of their size differ by rounding, not by chance."""
 

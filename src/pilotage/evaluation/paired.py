@@ -144,7 +144,7 @@ def _mcnemar(change: FloatArray) -> float:
 
 
 def _fisher(first: FloatArray, other: FloatArray) -> float:
-    table = [[int(side.sum()), int(side.size - side.sum())] for side in (first, other)]
+    table = np.array([[int(side.sum()), int(side.size - side.sum())] for side in (first, other)])
     return float(stats.fisher_exact(table).pvalue)
 
 

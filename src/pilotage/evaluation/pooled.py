@@ -12,6 +12,8 @@ from pilotage.evaluation.intervals import bootstrap_mean
 
 NEES_IDEAL = 3.0
 NIS_IDEAL = 1.0
+FEWEST_RUNS = 10
+"""Of fewer runs the band is too short for a verdict (see ``intervals.COVERAGE``)."""
 IDEALS = {"nees_mean": NEES_IDEAL, "nis_mean": NIS_IDEAL}
 """By metric, what a consistent filter gives."""
 
@@ -29,7 +31,7 @@ class Pooled:
     @property
     def verdict(self) -> str:
         """Consistent, too sure of itself, or too cautious."""
-        if self.n < 2 or not math.isfinite(self.low):
+        if self.n < FEWEST_RUNS or not math.isfinite(self.low):
             return "too few runs to say"
         if self.low > self.ideal:
             return "overconfident"

@@ -10,7 +10,7 @@ from pilotage.evaluation.judge import Judgement
 from pilotage.evaluation.paired import Difference
 from pilotage.report.metrics_table import metric_of
 from pilotage.report.study.findings import FEW, facts, rate_text
-from pilotage.report.study.scales import p_value, told
+from pilotage.report.study.scales import p_value, points, told
 from pilotage.report.study.view import Cell, Group, StudyView
 
 SURE = 0.05
@@ -186,8 +186,7 @@ def _each_against_its_own(view: StudyView, judgement: Judgement, group: Group) -
 
 def difference(metric: str, change: Difference) -> str:
     """A difference with its interval; those of shares in percentage points."""
-    text = told(metric, change.mean, change.low, change.high, signed=True)
-    return text.replace("\u00a0%", "\u00a0percentage points")
+    return points(told(metric, change.mean, change.low, change.high, signed=True))
 
 
 def _interval(metric: str, summary: Summary) -> str:

@@ -14,7 +14,7 @@ from matplotlib.ticker import NullLocator
 from pilotage.core.types import FloatArray
 from pilotage.evaluation.intervals import Summary
 from pilotage.evaluation.judge import Judgement
-from pilotage.report.study.panels import drawable, is_wide, reference_line, scale_for, set_log, title
+from pilotage.report.study.panels import dots_of, drawable, is_wide, reference_line, scale_for, set_log, title
 from pilotage.report.study.view import Cell, Group, StudyView
 from pilotage.report.style import (
     BLUE,
@@ -146,11 +146,9 @@ def _factor_panel(
             axes.plot(
                 np.full(dots.shape, x),
                 dots,
-                ".",
                 color=colour,
-                alpha=0.3,
-                markersize=3.0,
-                markeredgewidth=0.0,
+                alpha=0.45,
+                **dots_of(dots.size),
             )
         _with_intervals(
             axes, at, [judgement.summaries[metric][c.index] for c in ordered], colour, scale.times

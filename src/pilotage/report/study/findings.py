@@ -6,9 +6,9 @@ import math
 from collections import Counter
 
 from pilotage.evaluation.judge import Judgement, Rate
-from pilotage.evaluation.pooled import IDEALS, pool
+from pilotage.evaluation.pooled import FEWEST_RUNS, IDEALS, pool
 from pilotage.report.metrics_table import metric_of
-from pilotage.report.study.scales import p_value, told
+from pilotage.report.study.scales import p_value, points, told
 from pilotage.report.study.view import Cell, Group, StudyView
 
 FEW = 3
@@ -60,7 +60,7 @@ def _contrasts(view: StudyView, judgement: Judgement, group: Group) -> list[str]
                 told(name, judgement.summaries[name][cell.index].mean, math.nan, math.nan)
                 for name in (first, other)
             ]
-            by = told(first, change.mean, change.low, change.high, signed=True)
+            by = points(told(first, change.mean, change.low, change.high, signed=True))
             parts.append(f"{cell.text}: {means[0]} against {means[1]}, {by}, {how}, {change.n} trials")
         if parts:
             out.append(
@@ -79,7 +79,7 @@ def _consistency(view: StudyView, group: Group) -> str:
             cell.text: pool(view.column(metric)[view.cell == cell.index], IDEALS[metric])
             for cell in view.members(group)
         }
-        known = {name: entry.verdict for name, entry in verdicts.items() if entry.n > 1}
+        known = {name: entry.verdict for name, entry in verdicts.items() if entry.n >= FEWEST_RUNS}
         if not known:
             continue
         if len(known) <= FEW:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from typing import Literal
+from typing import Any, Literal
 
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
@@ -19,8 +19,15 @@ from pilotage.report.style import MUTED
 
 MOST = 12
 """So many metrics are drawn, the one that answers the question first; the tables have all."""
+FEW_TRIALS = 12
 WIDE = 30.0
 """Means that reach over more than this ratio are drawn on a logarithmic axis."""
+
+
+def dots_of(trials: int) -> dict[str, Any]:
+    """How single trials are drawn: a handful to be seen one by one, many as a cloud."""
+    few = trials <= FEW_TRIALS
+    return {"marker": "o", "markersize": 2.6 if few else 1.5, "markeredgewidth": 0.0, "linestyle": "none"}
 
 
 def drawable(view: StudyView, cells: Iterable[Cell]) -> list[str]:

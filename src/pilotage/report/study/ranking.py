@@ -9,7 +9,7 @@ from typing import Any
 from pilotage.report import quantities
 from pilotage.report.markup import escape
 from pilotage.report.metrics_table import metric_of
-from pilotage.report.study.scales import Scale, scale_of, told
+from pilotage.report.study.scales import Scale, points, scale_of, told
 
 Module = Mapping[str, Any]
 """One entry of ``experiments.studies.attribution.attribution_of``'s ``modules``."""
@@ -110,10 +110,11 @@ def _words(gains: Sequence[Named], losses: Sequence[Named]) -> str:
 
 def _said(name: str, change: Mapping[str, Any], verb: str = "") -> str:
     mean, low, high = (float(change[key]) for key in ("mean", "low", "high"))
-    start = f"{metric_of(name).name}{verb}"
     if low == high:
-        return f"{start} {told(name, mean, math.nan, math.nan, signed=True)} in every trial"
-    return f"{start} {told(name, mean, low, high, signed=True)}"
+        text = f"{told(name, mean, math.nan, math.nan, signed=True)} in every trial"
+    else:
+        text = told(name, mean, low, high, signed=True)
+    return f"{metric_of(name).name}{verb} {points(text)}"
 
 
 def _metrics(modules: Sequence[Module]) -> list[str]:

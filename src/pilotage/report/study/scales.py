@@ -103,6 +103,11 @@ def told(metric: str, value: float, low: float, high: float, *, signed: bool = F
     return f"{text} ({scale.write(low, digits, signed=signed)} to {scale.write(high, digits, signed=signed)})"
 
 
+def points(text: str) -> str:
+    """A difference of shares, as it is said."""
+    return text.replace("\u00a0%", "\u00a0percentage points")
+
+
 def p_value(value: float, letter: str = "") -> str:
     """A p-value as one says it; with its letter before it, as ``p = 0.012``."""
     if not math.isfinite(value):

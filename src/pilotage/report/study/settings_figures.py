@@ -11,7 +11,7 @@ from matplotlib.ticker import MaxNLocator
 
 from pilotage.evaluation.judge import Judgement
 from pilotage.report.study.factor_figures import lines_over
-from pilotage.report.study.panels import drawable, is_wide, reference_line, scale_for, set_log, title
+from pilotage.report.study.panels import dots_of, drawable, is_wide, reference_line, scale_for, set_log, title
 from pilotage.report.study.view import Cell, Group, StudyView
 from pilotage.report.style import BLUE, FAINT, MUTED, ORANGE, WIDTH_PT, Illustration, Key, render
 
@@ -58,10 +58,9 @@ def _figure(view: StudyView, judgement: Judgement, group: Group, slug: str, name
         keys.append(Key("published", ORANGE, "spot"))
     keys += [Key(text, MUTED, "dash") for metric, (text, _) in view.reference.items() if metric in metrics]
     alt = f"The settings of the study {view.name}, {len(cells)} of them, with their trials and their means."
-    caption = (
-        "Each setting's trials and their mean with its 95 % bootstrap interval. Settings share their seeds, "
-        "so comparisons of pairs are sharper than overlapping intervals look."
-    )
+    caption = "Each setting's trials and their mean with its 95 % bootstrap interval."
+    if view.same_seeds:
+        caption += " Settings share their seeds: comparisons of pairs are sharper than overlapping intervals."
     return Illustration(slug, name, alt, caption, render(figure, slug, alt), tuple(keys))
 
 
@@ -81,7 +80,7 @@ def _panel(
         y = count - 1 - row
         trials = column[view.cell == cell.index]
         spread = np.linspace(-0.22, 0.22, trials.size) if trials.size > 1 else np.zeros(trials.size)
-        axes.plot(trials, y + spread, ".", color=FAINT, markersize=3.0, markeredgewidth=0.0, alpha=0.7)
+        axes.plot(trials, y + spread, color=FAINT, alpha=0.8, **dots_of(trials.size))
         if math.isfinite(summary.mean):
             mean = summary.mean * scale.times
             low = summary.low * scale.times if math.isfinite(summary.low) else mean

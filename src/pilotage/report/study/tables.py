@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from pilotage.evaluation.intervals import Summary
+from pilotage.evaluation.intervals import COVERAGE, Summary
 from pilotage.evaluation.judge import Judgement, Rate
 from pilotage.evaluation.pooled import IDEALS, Pooled, pool
 from pilotage.report import quantities
@@ -26,7 +26,18 @@ def cells_table(view: StudyView, judgement: Judgement) -> str:
         '<section id="cells"><h2><a href="#cells">Every setting</a></h2>'
         "<p>Means over the trials; below each its 95 % bootstrap interval, the variance in the square of the "
         f"column&#x27;s unit{', and what was published' if published else ''}. The best mean of a column is "
-        f"bold. Success with its 95 % Wilson interval.</p>{''.join(parts)}</section>"
+        f"bold. Success with its 95 % Wilson interval.{_of_few(view)}</p>{''.join(parts)}</section>"
+    )
+
+
+def _of_few(view: StudyView) -> str:
+    """What the intervals of a handful of trials are worth."""
+    held = COVERAGE.get(view.trials_per_cell)
+    if held is None:
+        return ""
+    return (
+        f" Of {view.trials_per_cell} trials a bootstrap interval is too short: it holds the true mean in "
+        f"about {100.0 * held:.0f} % of such studies."
     )
 
 
