@@ -94,6 +94,8 @@ def test_what_a_log_does_not_show_is_not_told() -> None:
     assert found.angle_scale is None
     assert found.distance_offset_m_per_step is None
     assert any("at once" in warning for warning in found.warnings)
+    assert any("one size" in warning for warning in found.warnings)
+    assert not any("one size" in warning for warning in mixed_drive(0).warnings)
 
 
 def test_correlated_errors_are_found_and_warned_of() -> None:

@@ -136,6 +136,7 @@ def calibrate_odometry(logs: Sequence[OdometrySteps]) -> OdometryCalibration:
     warnings += _noise_warnings(errors)
     if not any(log.distance_m.std() > NO_NOISE and log.angle_rad.std() > NO_NOISE for log in used):
         warnings.append("no log shows distance and angle errors at once: their covariance is zero in each")
+    warnings += _offset_warnings(distance, angle)
     moving = np.concatenate([np.abs(log.steps.way_m[_moves(log.steps)]) for log in used])
     turning = np.concatenate([np.abs(log.steps.turn_rad[_turns(log.steps)]) for log in used])
     return OdometryCalibration(
@@ -279,6 +280,21 @@ def _cross_cov(used: Sequence[LogErrors]) -> Estimate | None:
         return None
     value = products / dof
     return normal_estimate(value, float(np.sqrt(variance + dof * value**2)) / dof, dof)
+
+
+def _offset_warnings(distance: ErrorModel | None, angle: ErrorModel | None) -> list[str]:
+    """Say where steps of one size hide an offset: its column is a combination of the motions then."""
+    hidden = [
+        name
+        for name, model, where in (("distance", distance, 1), ("angle", angle, 2))
+        if model is not None and model.mean[0] is not None and model.mean[where] is None
+    ]
+    if not hidden:
+        return []
+    return [
+        f"{' and '.join(hidden)}: all steps are of one size, so an offset per step would pass for a scale; "
+        "logs at several speeds tell them apart"
+    ]
 
 
 def _noise_warnings(errors: Sequence[LogErrors]) -> list[str]:
