@@ -142,7 +142,7 @@ def test_a_new_name_drops_the_old_ones_parameters() -> None:
         ("wrold.map=museum", "did you mean 'world'"),
         ("stack.localizer", "KEY=VALUE"),
         ("run.seed=-1", "greater than or equal to 0"),
-        ("run.dt_s=0", "greater than 0"),
+        ("run.dt_s=0", "greater than or equal to 0.0001"),
         ("world.obstacles.9.thickness_m=1", "index from 0 to 1"),
         ("stack.localizer.gate=1.5", "less than 1"),
         ("stack.local_planner.speed_m_s=5", "max_speed_m_s"),
@@ -251,3 +251,60 @@ def test_a_component_s_short_form_can_be_overridden() -> None:
     values: dict[str, Any] = {"world": {"map": "museum"}, "stack": {"planner": "astar"}}
     apply_override(values, "stack.planner.name=theta-star")
     assert values["stack"] == {"planner": {"name": "theta-star"}}
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (
+            "extends: museum-1\nrun: {seed: 1}\nrun: {seed: 2}\n",
+            "line 3: expected YAML, found: the key 'run'",
+        ),
+        ("extends: museum-1\nworld:\n  goal: {x_m: 2, x_m: 3, y_m: 27}\n", "line 3: .* the key 'x_m' twice"),
+        ("extends: museum-1\nrun: {dt_s: 1.0e-9}\n", "run.dt_s: .*0.0001"),
+        ("extends: museum-1\nworld: {map: {map: bare, walls_m: []}}\n", "walls_m: .*at least 1 item"),
+    ],
+)
+def test_broken_missions_are_refused(tmp_path: Path, text: str, message: str) -> None:
+    path = tmp_path / "broken.yaml"
+    path.write_text(text)
+    with pytest.raises(InputError, match=message):
+        load_mission(str(path))
+
+
+def test_a_yaml_merge_key_may_repeat_what_it_merges(tmp_path: Path) -> None:
+    path = tmp_path / "merged.yaml"
+    path.write_text(
+        "extends: museum-1\nworld:\n  start: &place {x_m: 1.0, y_m: 2.0}\n  goal: {<<: *place, x_m: 9.0}\n"
+    )
+    goal = load_floor_mission(str(path)).world.goal
+    assert goal is not None
+    assert (goal.x_m, goal.y_m) == (9.0, 2.0)
+
+
+@pytest.mark.parametrize(
+    ("wall_y_m", "start_var_m2", "seed"),
+    [
+        pytest.param(0.9, 1e-4, 0, id="the corridor is narrower than plans like it"),
+        # This seed's start error is 0.25 m towards the wall: the belief is too near it, the robot is not.
+        pytest.param(2.0, 0.01, 701, id="the start is not where it is believed"),
+    ],
+)
+def test_who_seems_to_start_too_near_a_wall_looks_around_first(
+    wall_y_m: float, start_var_m2: float, seed: int
+) -> None:
+    values = load_floor_mission("museum-1").model_dump()
+    corners = [(0, 0), (6, 0), (6, wall_y_m), (0, wall_y_m)]
+    walls = [(*a, *b) for a, b in zip(corners, corners[1:] + corners[:1], strict=True)]
+    marks = [{"id": i, "x_m": x, "y_m": y} for i, (x, y) in enumerate([(0.0, 0.1), (3.0, 0.0), (6.0, 0.5)])]
+    values["world"] |= {
+        "map": {"map": "corridor", "walls_m": walls, "landmarks": marks},
+        "start": {"x_m": 0.6, "y_m": 0.5 * wall_y_m},
+        "goal": {"x_m": 5.0, "y_m": 0.5 * wall_y_m},
+        "obstacles": [],
+    }
+    values["stack"]["initial"] = {"x_var_m2": start_var_m2, "y_var_m2": start_var_m2, "theta_var_rad2": 0.01}
+    values["run"] |= {"seed": seed, "time_limit_s": 60.0}
+    record = simulate(FloorMission.model_validate(values))
+    assert [event.kind for event in record.events][:2] == ["look-around", "plan"]
+    assert record.outcome.arrived

@@ -102,6 +102,14 @@ class TestPlanning:
         assert main([*arguments[:-2], "3.5,2.5"]) == 1
         assert "not connected" in capsys.readouterr().out
 
+    def test_the_edge_belongs_to_the_map(self, world: Path) -> None:
+        rows, columns = (plan_on_grid(world, (0.5, 2.5), (0.5, 2.5))[key] for key in ("rows", "columns"))
+        answer = plan_on_grid(world, (0.0, 2.5), (0.5, float(rows)))
+        assert answer["start_cell"] == [rows - 3, 0]
+        assert answer["goal_cell"] == [0, 0]
+        with pytest.raises(InputError, match="on the map"):
+            plan_on_grid(world, (0.0, 2.5), (columns + 0.01, 0.5))
+
     @pytest.mark.parametrize("planner", ["astar", "dijkstra", "theta-star"])
     def test_every_planner(self, world: Path, planner: str) -> None:
         answer = plan_on_grid(world, (0.5, 2.5), (1.5, 0.5), planner, ["corner_cutting=true"])
@@ -170,7 +178,7 @@ class TestPlanOnElevation:
         [
             (("--start", "145,55", "--goal", "255,55"), "--start: expected free ground, found (145, 55)"),
             (("--start", "55,55", "--goal", "145,55"), "which is steeper than 20 deg"),
-            (("--start", "55,55", "--goal", "300,55"), "--goal: expected a place on the map, 300 x 200 m"),
+            (("--start", "55,55", "--goal", "301,55"), "--goal: expected a place on the map, 300 x 200 m"),
             (("--start", "55,55", "--goal", "9,9", "--set", "map.resolution_m=0"), "greater than 0, found 0"),
             (("--start", "55,55", "--goal", "9,9", "--set", "map.slope_that_doubles_deg=2", "--planner",
               "theta-star"), "theta-star"),

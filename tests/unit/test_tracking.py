@@ -13,9 +13,12 @@ from pilotage.cli.main import main
 from pilotage.core.errors import InputError
 from pilotage.maps.cell_map import CellState
 from pilotage.tracking.opencv import opencv
+from pilotage.tracking.path import build_path
 from pilotage.tracking.robot_colour import parse_hsv
+from pilotage.tracking.robot_finder import Sighting
 from pilotage.tracking.scene import TrackOptions, learn_scene
 from pilotage.tracking.sheet import Sheet, in_map_order, parse_corners, project
+from pilotage.tracking.sheet_finder import find_corners
 from pilotage.tracking.track import Track, follow
 from support.films import (
     FROM_ABOVE,
@@ -64,6 +67,14 @@ def test_the_robot_is_found_where_it_is(script: FilmScript, tmp_path: Path) -> N
     assert np.median(off_m) < 0.004
     # Stated uncertainty is for each axis; the median of the distance is 1.18 of it.
     assert 0.3 < np.median(off_m) / (1.18 * np.median(track.path.std_m)) < 3.0
+
+
+def test_a_small_quick_robot_is_followed_from_near_to_far(tmp_path: Path) -> None:
+    # Three radii from frame to frame, and several times as many pixels near the camera as far from it.
+    script = FilmScript(frames=20, radius_m=0.035)
+    track = tracked(tmp_path, script)
+    assert len(track.path.frames) == script.frames
+    assert errors_px(track, script).max() < 2.0
 
 
 def test_marks_and_visited_cells_fall_into_their_cells(tmp_path: Path) -> None:
@@ -249,3 +260,59 @@ def test_the_camera_is_found_from_the_view_of_the_square() -> None:
         ]
     ).T / (2 * step)
     assert sheet.metres_per_px(seen(point)[0]) == pytest.approx(numeric, rel=1e-4)
+
+
+def photograph(corners: np.ndarray, bow_px: float = 0.0, hand: bool = False) -> np.ndarray:
+    """A sheet on a rough floor, its sides bent outwards by a lens, a hand on its upper right corner."""
+    rng = np.random.default_rng(5)
+    floor = rng.integers(40, 90, (120, 214, 1)).astype(np.uint8)
+    picture = cv2.resize(floor, (640, 360), interpolation=cv2.INTER_CUBIC)[..., None].repeat(3, axis=2)
+    share = np.linspace(0.0, 1.0, 60, endpoint=False)[:, None]
+    outline = []
+    for start, end in zip(corners, np.roll(corners, -1, axis=0), strict=True):
+        outward = np.array([-(end - start)[1], (end - start)[0]]) / np.hypot(*(end - start))
+        outward = outward if outward @ (0.5 * (start + end) - corners.mean(axis=0)) > 0.0 else -outward
+        outline.append(start + share * (end - start) + 4.0 * share * (1.0 - share) * bow_px * outward)
+    cv2.fillPoly(picture, [np.rint(16.0 * np.concatenate(outline)).astype(np.int32)], (205, 210, 212), 0, 4)
+    if hand:
+        cv2.circle(picture, tuple(int(value) for value in corners[2]), 30, (120, 150, 190), -1)
+    blurred: np.ndarray = cv2.GaussianBlur(picture, (0, 0), 0.7)
+    return blurred
+
+
+TURNED = np.array([[395.0, 338.0], [147.0, 202.0], [274.0, 82.0], [427.0, 166.0]])
+
+
+def test_a_rough_floor_is_not_taken_for_the_sheet() -> None:
+    found = find_corners([photograph(TURNED)] * 9)
+    assert found is not None
+    assert np.abs(found[0] - in_map_order(TURNED)).max() < 1.5
+
+
+def test_a_hand_on_a_corner_most_of_the_time_does_not_move_it() -> None:
+    corners = np.array([[102.0, 338.0], [538.0, 338.0], [454.0, 82.0], [185.0, 82.0]])
+    found = find_corners([photograph(corners, hand=i % 3 < 2) for i in range(9)])
+    assert found is not None
+    assert np.abs(found[0] - corners).max() < 1.5
+
+
+def test_bent_sides_make_corners_less_sure() -> None:
+    corners = np.array([[102.0, 338.0], [538.0, 338.0], [454.0, 82.0], [185.0, 82.0]])
+    straight, bent = find_corners([photograph(corners)] * 9), find_corners([photograph(corners, 4.0)] * 9)
+    assert straight is not None
+    assert bent is not None
+    assert straight[1] < 0.6
+    # The root mean square over corners and axes, against what it says.
+    off = np.sqrt(np.mean((bent[0] - corners) ** 2))
+    assert 0.5 < off / bent[1] < 2.0
+
+
+def test_a_body_that_is_no_disc_is_placed_less_surely() -> None:
+    sheet = Sheet(np.array(FROM_ABOVE), SIZE_M, 0.3)
+    centres = [np.array([0.5 + 0.01 * i, 0.9]) for i in range(20)]
+    stated = [
+        build_path([(i, Sighting(c, 0.1, 0.0, 0.03, bare)) for i, c in enumerate(centres)], sheet).std_m
+        for bare in (0.0, 0.2)
+    ]
+    assert stated[0].max() < 0.005
+    assert stated[1] == pytest.approx(np.sqrt(stated[0] ** 2 + 0.02**2))

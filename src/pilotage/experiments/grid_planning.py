@@ -26,6 +26,9 @@ from pilotage.stack.planning.grid_space import Cell, GridSpace
 
 DEFAULT_PLANNER = "astar"
 
+EDGE_CELLS = 1e-6
+"""Rounding moves a place on the map's edge by far less than this."""
+
 
 class GridMapConfig(Config):
     """How a map file is taken: what it does not say itself, and what counts as blocked.
@@ -195,6 +198,13 @@ def free_cell(
         What a blocked cell is, in words.
     """
     cell = grid.cell_at(place[0], place[1])
+    if not grid.contains(*cell):
+        # A place on the very edge, as the map's own corner is, belongs to the outermost cell.
+        at = grid.places_at(np.array([[place[0], place[1]]]))[0]
+        size = np.array([grid.rows, grid.columns])
+        if np.all((at >= -EDGE_CELLS) & (at <= size + EDGE_CELLS)):
+            row, column = np.clip(np.floor(at), 0, size - 1)
+            cell = int(row), int(column)
     if not grid.contains(*cell):
         width_m, height_m = grid.size_m
         corners = grid.centres_m(np.array([[grid.rows - 0.5, -0.5], [-0.5, grid.columns - 0.5]]))

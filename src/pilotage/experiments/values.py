@@ -9,6 +9,7 @@ from typing import Any
 import yaml
 
 from pilotage.core.errors import InputError, nearest
+from pilotage.core.yaml_text import load_yaml
 from pilotage.missions.mission import TOP_KEYS
 
 
@@ -21,14 +22,8 @@ def read_text(path: Path) -> str:
 
 
 def parse_yaml(text: str, where: str) -> dict[str, Any]:
-    """Parse a YAML mapping; InputError with the line where it breaks."""
-    try:
-        values = yaml.safe_load(text)
-    except yaml.YAMLError as error:
-        mark = getattr(error, "problem_mark", None)
-        line = f" line {mark.line + 1}" if mark is not None else ""
-        problem = getattr(error, "problem", None) or "not YAML"
-        raise InputError(f"{where}{line}: expected YAML, found: {problem}") from None
+    """Parse a YAML mapping; InputError with the line where it breaks or gives a key twice."""
+    values = load_yaml(text, where)
     if not isinstance(values, dict):
         found = "an empty file" if values is None else f"a {type(values).__name__}"
         raise InputError(f"{where}: expected a mapping of keys, found {found}")

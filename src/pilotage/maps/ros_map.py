@@ -19,6 +19,7 @@ from pydantic import Field, field_validator, model_validator
 from pilotage.core.config import Config, validate
 from pilotage.core.errors import InputError
 from pilotage.core.types import Pose2
+from pilotage.core.yaml_text import load_yaml
 from pilotage.maps.grid_image import ByteArray, read_grey, write_grey
 from pilotage.maps.occupancy_grid import FREE, OCCUPIED, UNKNOWN, OccupancyArray, OccupancyGrid
 
@@ -155,6 +156,7 @@ def _load_yaml(path: Path) -> Any:
     if not path.is_file():
         raise InputError(f"map '{path}': expected a map file, found none there")
     try:
-        return yaml.safe_load(path.read_text(encoding="utf-8"))
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
+        text = path.read_text(encoding="utf-8")
+    except UnicodeDecodeError as error:
         raise InputError(f"{path}: expected YAML, found something else ({error})") from None
+    return load_yaml(text, str(path))

@@ -5,12 +5,18 @@ from __future__ import annotations
 import math
 from typing import Annotated, Literal
 
-from pydantic import Field
+from pydantic import Discriminator, Field, Tag
 
 from pilotage.core.config import Config
 from pilotage.maps.map_file import MapFile
 from pilotage.missions.mission import ComponentChoice, InitialConfig, Mission, Point, PoseConfig
 from pilotage.sensors.sensor import NonNegative, Positive
+
+MapSource = Annotated[
+    Annotated[str, Tag("name")] | Annotated[MapFile, Tag("inline")],
+    # Told apart beforehand, so that an error speaks of what was meant.
+    Discriminator(lambda value: "name" if isinstance(value, str) else "inline"),
+]
 
 
 class GoalConfig(Config):
@@ -84,7 +90,7 @@ class WorldConfig(Config):
     """
 
     kind: Literal["floor"] = "floor"
-    map: str | MapFile
+    map: MapSource
     start: PoseConfig
     goal: GoalConfig | None = None
     obstacles: tuple[Obstacle, ...] = ()

@@ -60,7 +60,7 @@ class InitialConfig(Config):
 class RunConfig(Config):
     """Time step, time limit and seed."""
 
-    dt_s: float = Field(default=0.1, gt=0.0, le=10.0)
+    dt_s: float = Field(default=0.1, ge=1e-4, le=10.0)
     time_limit_s: Positive = 600.0
     seed: int = Field(default=0, ge=0)
     settle_s: NonNegative = 1.0

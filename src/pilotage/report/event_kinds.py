@@ -28,6 +28,7 @@ _KINDS = {
     "stuck": EventKind("stuck", VERMILLION, True),
     "failed": EventKind("failed", VERMILLION, True),
     "kidnap": EventKind("carried elsewhere", VERMILLION, True),
+    "look-around": EventKind("looks around first", ORANGE, False),
     "lost": EventKind("lost, wandering", ORANGE, True),
     "found": EventKind("found itself", GREEN, True),
     "obstacle-mapped": EventKind("obstacle mapped", MUTED, False),

@@ -31,8 +31,8 @@ class Path:
         The point of the floor under it, shape (N, 2).
     std_m
         Standard deviation of each coordinate on the floor, shape (N,): jitter of the centre, how well the
-        corners are known, and how much of the disc was hidden. Not in it: a wrong size of the sheet, and a
-        height of the disc that was not told.
+        corners are known, how much of the disc was hidden, and how unlike a disc the body looks. Not in it: a
+        wrong size of the sheet, and a height of the disc that was not told.
     jitter_px
         Standard deviation of the centre from frame to frame.
     """
@@ -67,13 +67,15 @@ def build_path(
     seen_m = np.array([one.centre_m for _, one in sightings]).reshape(-1, 2)
     points_px = project(sheet.to_image, seen_m)
     hidden_m = np.array([one.spread_m for _, one in sightings])
+    # A tall body seen aslant is no disc: the same in all frames, so it does not show as jitter.
+    unlike_m = float(np.median([one.bare * one.radius_m for _, one in sightings])) if sightings else 0.0
     points_m = seen_m
     if camera_m is not None and height_m > 0.0:
         points_m = seen_m + (camera_m[:2] - seen_m) * height_m / camera_m[2]
     jitter_px = _jitter(numbers, points_px)
     metres_per_px = np.array([np.linalg.norm(sheet.metres_per_px(point)) / 2**0.5 for point in points_px])
     from_pixels = np.hypot(jitter_px, sheet.corner_std_px) * metres_per_px
-    return Path(numbers, points_px, points_m, np.hypot(from_pixels, hidden_m), jitter_px)
+    return Path(numbers, points_px, points_m, np.sqrt(from_pixels**2 + hidden_m**2 + unlike_m**2), jitter_px)
 
 
 def visited_cells(path: Path, size_m: float, grid: int) -> NDArray[np.bool_]:

@@ -34,11 +34,11 @@ _JUMP = 1.5
 """In radii: how far the robot may be from where it was, for each frame since."""
 _MOST_JUMP = 8.0
 _ALIKE = 0.4
-"""Numbers of pixels whose logarithms differ by less are alike."""
+"""Areas whose logarithms differ by less are alike."""
 _PATCH_RADIUS = 18
 """Pixels of the disc's radius on the patch of floor where it is fitted."""
 _LEAST_SHARE = 0.2
-"""Of the learned number of pixels; less is not the robot."""
+"""Of the learned area; less is not the robot."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,23 +53,26 @@ class Sighting:
         Radius of the circle around the coloured pixels.
     spread_m
         Standard deviation of the places that would fit about as well.
-    pixels
-        Coloured pixels.
+    area_m2
+        What the coloured pixels take on the floor: near and far the same.
+    bare
+        Share of the disc, as it was laid, that shows no body. Much of it: the body is no disc.
     """
 
     centre_m: Floats
     radius_m: float
     spread_m: float
-    pixels: int
+    area_m2: float
+    bare: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
 class RobotLook:
-    """What is known of the robot: its colour (None: told by difference alone), radius, number of pixels."""
+    """What is known of the robot: its colour (None: told by difference alone), radius, coloured area."""
 
     colour: HsvRange | None
     radius_m: float
-    pixels: float
+    area_m2: float
 
 
 class RobotFinder:
@@ -96,7 +99,7 @@ class RobotFinder:
     def find(self, reduced_frame: Image) -> Sighting | None:
         """Return the robot in this frame, or None."""
         candidates = self._view.candidates(reduced_frame, self._look.colour, self._look.radius_m)
-        large = [one for one in candidates if one[0].pixels >= _LEAST_SHARE * self._look.pixels]
+        large = [one for one in candidates if one[0].area_m2 >= _LEAST_SHARE * self._look.area_m2]
         best = self._choose(large)
         if best is None:
             self._missed += 1
@@ -122,8 +125,8 @@ class RobotFinder:
         return ranked[-1][0] if ranked else None
 
     def _likeness(self, one: Sighting) -> float:
-        """The number of pixels is as learned: 0; twice or half as many: the same amount below."""
-        return -abs(math.log(one.pixels / self._look.pixels))
+        """The area is as learned: 0; twice or half as large: the same amount below."""
+        return -abs(math.log(one.area_m2 / self._look.area_m2))
 
 
 def learn_look(
@@ -134,7 +137,7 @@ def learn_look(
     colour: HsvRange | None,
     radius_m: float | None = None,
 ) -> RobotLook:
-    """Learn the robot's radius (unless given) and its number of pixels from the samples.
+    """Learn the robot's radius (unless given) and its coloured area from the samples.
 
     Raises
     ------
@@ -146,12 +149,12 @@ def learn_look(
     for sample in samples:
         candidates = [one for one, inside in view.candidates(sample, colour, radius_m) if inside]
         if candidates:
-            seen.append(max(candidates, key=lambda one: one.pixels))
+            seen.append(max(candidates, key=lambda one: one.area_m2))
     if not seen:
         raise InputError("no robot of this colour is on the map in this video; give its colour by --hsv")
     # Half covered discs look smaller, reflections larger: a quantile above the median is the disc.
     radius = radius_m if radius_m is not None else float(np.quantile([one.radius_m for one in seen], 0.7))
-    return RobotLook(colour, radius, float(np.median([one.pixels for one in seen])))
+    return RobotLook(colour, radius, float(np.median([one.area_m2 for one in seen])))
 
 
 class _View:
@@ -160,6 +163,7 @@ class _View:
     def __init__(self, background: Background, sheet: Sheet, reduction: int) -> None:
         self._background = background
         self._reduction = reduction
+        self._sheet = sheet
         self._to_floor = sheet.to_floor
         self._to_image = sheet.to_image
         x, y = background.region.offset
@@ -230,7 +234,12 @@ class _View:
         middle = np.average(places, axis=0, weights=weights)
         variance = np.average(((places - middle) ** 2).mean(axis=1), weights=weights)
         spread_m = float(np.sqrt(variance)) * step_m
-        return Sighting(origin_m + middle * step_m, first.radius_m, spread_m, first.pixels)
+        row, column = np.clip(
+            np.rint(middle[::-1]).astype(int) - _PATCH_RADIUS, 0, 2 * (half - _PATCH_RADIUS)
+        )
+        under = body[row : row + len(self._disc), column : column + len(self._disc)]
+        bare = 1.0 - float(np.average(under, weights=self._disc)) / 255.0
+        return Sighting(origin_m + middle * step_m, first.radius_m, spread_m, first.area_m2, bare)
 
     def _circle(self, mask: Image, corner: tuple[int, int], radius_m: float | None) -> Sighting | None:
         cv2 = opencv()
@@ -246,7 +255,9 @@ class _View:
         # The middle of a reduced pixel in pixels of the film.
         full = points * self._reduction + 0.5 * (self._reduction - 1)
         centre, radius = enclosing_circle(project(self._to_floor, full), radius_m)
-        return Sighting(centre, radius, 0.0, int(areas[kept].sum()))
+        at_px = project(self._to_image, centre[None])[0]
+        pixel_m2 = abs(float(np.linalg.det(self._sheet.metres_per_px(at_px)))) * self._reduction**2
+        return Sighting(centre, radius, 0.0, float(areas[kept].sum()) * pixel_m2)
 
 
 def enclosing_circle(points: Floats, most_radius: float | None = None) -> tuple[Floats, float]:

@@ -51,9 +51,7 @@ def find_corners(samples: Sequence[Image]) -> tuple[Floats, float] | None:
         and their standard deviation in pixels; None where no sheet is seen.
     """
     chosen = [samples[i] for i in np.unique(np.linspace(0, len(samples) - 1, _FRAMES).astype(int))]
-    quads = [(image, _best_quadrilateral(image)) for image in chosen]
-    fitted = [refine_corners(image, quad) for image, quad in quads if quad is not None]
-    refined = [(quad, deviation) for quad, deviation, support in fitted if support >= _LEAST_SUPPORT]
+    refined = [found for found in map(_best_quadrilateral, chosen) if found is not None]
     if not refined:
         return None
     side = max(chosen[0].shape[:2])
@@ -75,9 +73,10 @@ def refine_corners(image: Image, corners: Floats) -> tuple[Floats, float, float]
     Returns
     -------
     tuple[Floats, float, float]
-        Corners, shape (4, 2); the standard deviation of a corner in pixels; and the share of the worst side
-        that shows an edge where the line was laid. Corners that would move further than the searched band
-        stay where they were.
+        Corners, shape (4, 2); the standard deviation of a corner in pixels, by the scatter of the edges and
+        by how much they are bent; and the share of the worst side that shows an edge where the line was
+        laid, beyond what would by chance. Corners that would move further than the searched band stay where
+        they were.
     """
     grey = opencv().GaussianBlur(image.min(axis=2), (0, 0), 1.0).astype(np.float32)
     centre = corners.mean(axis=0)
@@ -85,25 +84,47 @@ def refine_corners(image: Image, corners: Floats) -> tuple[Floats, float, float]
     for band in (0.03, 0.012):
         lines, deviations, supports = [], [], []
         for start, end in zip(current, np.roll(current, -1, axis=0), strict=True):
-            points = _edge_points(grey, start, end, centre, max(4.0, band * float(np.hypot(*(end - start)))))
+            length = float(np.hypot(*(end - start)))
+            reach, near = max(4.0, band * length), max(1.5, 0.004 * length)
+            points = _edge_points(grey, start, end, centre, reach)
             line, spread = _robust_line(points)
             lines.append(line)
-            off = np.abs(points @ line[:2] - line[2])
-            near = max(1.5, 0.004 * float(np.hypot(*(end - start))))
-            supports.append(np.count_nonzero(off < near) / _PLACES)
-            deviations.append(spread / np.sqrt(max(len(points) / 4.0, 1.0)))
+            off = points @ line[:2] - line[2]
+            on_line = np.abs(off) < near
+            by_chance = near / reach
+            share = np.count_nonzero(on_line) / _PLACES
+            supports.append(max(0.0, (share - by_chance) / (1.0 - by_chance)))
+            seen = np.abs(off) < max(near, 3.0 * spread)
+            scatter = spread / np.sqrt(max(len(points) / 4.0, 1.0))
+            deviations.append(float(np.hypot(scatter, _bend(points[seen], off[seen], line))))
         moved = np.array([_meet(lines[i - 1], lines[i]) for i in range(4)])
-        reach = 2.0 * band * float(np.max(np.hypot(*(current - np.roll(current, 1, axis=0)).T)))
-        if not np.all(np.isfinite(moved)) or np.hypot(*(moved - current).T).max() > reach:
+        furthest = 2.0 * band * float(np.max(np.hypot(*(current - np.roll(current, 1, axis=0)).T)))
+        if not np.all(np.isfinite(moved)) or np.hypot(*(moved - current).T).max() > furthest:
             break
         current, deviation, support = moved, float(np.mean(deviations)), min(supports)
     return current, deviation, support
 
 
-def _best_quadrilateral(image: Image) -> Floats | None:
-    """Return the most sheet-like quadrilateral of one frame."""
-    cv2 = opencv()
+def _best_quadrilateral(image: Image) -> tuple[Floats, float] | None:
+    """Return the corners of the most sheet-like quadrilateral of one frame, and their standard deviation.
+
+    A rough floor may look like a sheet of its own, and a hand on a corner like paper: what counts besides
+    size and shape is how much of each side shows an edge where it should be.
+    """
     best, best_score = None, 0.0
+    for quad, score in sorted(_quadrilaterals(image), key=lambda pair: -pair[1]):
+        if score <= best_score:
+            break
+        corners, deviation, support = refine_corners(image, in_map_order(quad))
+        if support >= _LEAST_SUPPORT and score * support > best_score:
+            best, best_score = (corners, deviation), score * support
+    return best
+
+
+def _quadrilaterals(image: Image) -> list[tuple[Floats, float]]:
+    """Even quadrilaterals of one frame with a score of size and shape; those that are alike only once."""
+    cv2 = opencv()
+    found: list[tuple[Floats, float]] = []
     light = cv2.GaussianBlur(image.min(axis=2), (5, 5), 0)
     dark = cv2.GaussianBlur(255 - image.max(axis=2), (5, 5), 0)
     for channel in (light, dark):
@@ -115,9 +136,17 @@ def _best_quadrilateral(image: Image) -> Floats | None:
             outlines, _ = cv2.findContours(mask, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE)
             for outline in outlines:
                 quad, score = _as_quadrilateral(outline, image.shape[:2])
-                if quad is not None and score > best_score and _even(image, quad):
-                    best, best_score = quad, score
-    return None if best is None else in_map_order(best)
+                if quad is None or any(score <= other and _alike(quad, one) for one, other in found):
+                    continue
+                if _even(image, quad):
+                    found.append((quad, score))
+    return found
+
+
+def _alike(first: Floats, second: Floats) -> bool:
+    """Whether two quadrilaterals have each corner within what the fit of the sides makes good."""
+    near = 0.005 * float(np.ptp(first, axis=0).max())
+    return bool(np.abs(first[:, None] - second[None]).max(axis=2).min(axis=1).max() < near)
 
 
 def _as_quadrilateral(outline: NDArray[np.int32], shape: tuple[int, int]) -> tuple[Floats | None, float]:
@@ -204,6 +233,18 @@ def _robust_line(points: Floats) -> tuple[Floats, float]:
         weight = 1.0 / (1.0 + (residual / (2.0 * spread)) ** 2) ** 2
         line = np.array([normal[0], normal[1], normal @ middle])
     return line, spread
+
+
+def _bend(points: Floats, off: Floats, line: Floats) -> float:
+    """How far the ends of a bent edge are from the straight line that was fitted to it.
+
+    A parabola of sagitta s is 2/3 s beyond its best line at the ends, where the corners are.
+    """
+    if len(points) < 20:
+        return 0.0
+    along = points @ np.array([-line[1], line[0]])
+    share = 2.0 * (along - along.min()) / max(float(np.ptp(along)), 1e-9) - 1.0
+    return 2.0 / 3.0 * abs(float(np.polyfit(share, off, 2)[0]))
 
 
 def _meet(first: Floats, second: Floats) -> Floats:

@@ -26,6 +26,7 @@ from pilotage.stack.navigator.lost import LostDriving
 from pilotage.stack.navigator.navigator import NAVIGATORS, Parts
 from pilotage.stack.navigator.own_map import OwnMap
 from pilotage.stack.navigator.progress import StallWatch
+from pilotage.stack.planning.planner import PlanStatus
 
 HERE_TOLERANCE_M = 0.005
 """Slack between what a plan keeps and what is checked while driving it."""
@@ -83,7 +84,7 @@ class GoalNavigator:
         self._to_go_m = math.nan
         self._stall = StallWatch(config.stall_progress_m, config.stall_s)
         self._trail: list[Pose2] = []
-        self._avoiding = self._escaping = self._in_hall = False
+        self._avoiding = self._escaping = self._in_hall = self._looks_around = False
         self._reaction = NO_REACTION
         self._events: list[Event] = []
         self.counts = {"attempts": 0, "replans": 0, "escapes": 0}
@@ -123,12 +124,16 @@ class GoalNavigator:
     def prepare(self) -> None:
         """Plan from the initial belief; without a path the task has failed before it starts.
 
-        A robot that is lost plans once it knows where it is.
+        A robot that is lost plans once it knows where it is. One that believes to stand where there is no
+        room for a plan first looks around: the belief may be as far off as its covariance says.
         """
         if self.belief.status is BeliefStatus.LOST:
             return
         result = self._plan.make(0.0, self.belief.pose, self._map.found_circles_m, (self._plan.clearance_m,))
-        if result.path is None:
+        if result.status is PlanStatus.START_BLOCKED:
+            self._looks_around = True
+            self._say("look-around", f"{result.reason}: looking around before planning")
+        elif result.path is None:
             self._fail(f"{result.status}: {result.reason}")
         else:
             self._took_plan("plan")
@@ -143,6 +148,8 @@ class GoalNavigator:
             return STOP
         if belief.status is BeliefStatus.LOST:
             return self._wander_about(readings)
+        if self._looks_around:
+            return self._look_around(belief.pose)
         if self._mapper is not None:
             self._mapper.step(readings, belief)
         if self._lost.active:
@@ -205,6 +212,18 @@ class GoalNavigator:
             self._in_hall = False
             self._follower.drop()
         return self._follow(pose)
+
+    def _look_around(self, pose: Pose2) -> Twist:
+        """Stand still while the sensors correct the start pose, then plan from where the robot truly is."""
+        self._mode = Mode.REPLAN
+        if self._t_s < self._config.look_around_s:
+            return STOP
+        self._looks_around = False
+        result = self._plan.make(self._t_s, pose, self.mapped_circles_m, self._clearances(pose))
+        if result.path is None:
+            return self._fail(f"{result.status}: {result.reason}")
+        self._took_plan("plan", "looked around")
+        return STOP
 
     def _wander_about(self, readings: Readings) -> Twist:
         """Lost: keep clear of everything and look around until the localizer knows more."""

@@ -40,6 +40,8 @@ class GoalNavigatorConfig(Config):
     """A plan that turns less than this over the next stretch goes straight on: a hall may be centred."""
     fallback_margins_m: tuple[Positive, ...] = (0.10, 0.06)
     """Replans that fail at the planner's clearance try the body's radius plus these."""
+    look_around_s: NonNegative = 1.0
+    """How long it stands still first where its start pose seems too near an obstacle to plan from."""
     cruise_speed_m_s: Positive = 0.5
     max_replans: int = Field(default=30, ge=0)
     guard: GuardConfig = GuardConfig()

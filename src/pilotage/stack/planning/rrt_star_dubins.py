@@ -190,11 +190,12 @@ def _look_around(
             for k, n in zip(ij, space.distance.shape, strict=True)
         ]
         widest_m = guide.widest_way(space.distance, *ends) + space.resolution * math.sqrt(0.5)
+        at_most_m = min(math.ceil(widest_m * 1000.0) / 1000.0, clearance_m)
         return (
             NO_GUIDE,
             NO_BOUND,
-            f"no way from start to goal keeps {clearance_m:g} m from the obstacles: "
-            f"the widest way needs a clearance of at most {math.ceil(widest_m * 1000.0) / 1000.0:g} m",
+            f"no way from start to goal keeps {clearance_m:g} m from the obstacles: the widest way needs a "
+            f"clearance of at most {at_most_m:g} m (clearance_m; a narrow body can do with less)",
         )
     way = guide.trace(move, space, stride, *start, 3) if config.guide_bias > 0.0 else NO_GUIDE
     if config.stop == "first" or config.guide_bias == 0.0:
