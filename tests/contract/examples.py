@@ -304,7 +304,17 @@ EXAMPLES: dict[tuple[str, str], Example] = {
     ("localizer", "ekf-slow-errors"): Example(
         localizer_follows,
         {"gate": 0.999},
-        frozenset({"gate", "range_var_fraction", "range_scale", "depth_power", "recovery_factor"}),
+        frozenset(
+            {
+                "gate",
+                "range_var_fraction",
+                "range_scale",
+                "depth_power",
+                "recovery_factor",
+                "doubt_factor",
+                "doubt_limit",
+            }
+        ),
     ),
     ("localizer", "dead-reckoning"): Example(
         localizer_follows, pure_numbers=frozenset({"odometry_var_scale"})
