@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from pilotage.kernels.jit import kernel
 from pilotage.kernels.motion import wrap
+from pilotage.kernels.sighting import OUTCOME_ACCEPTED, OUTCOME_GATED, OUTCOME_UNKNOWN, landmark_index
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -30,10 +31,6 @@ MIN_COSINE = 0.2
 """A depth says nothing of what lies abeam: a bearing beyond 78 degrees counts as one of 78."""
 MIN_RANGE_M = 0.1
 """An error across the line of sight counts as one at this range where the landmark is closer."""
-
-OUTCOME_ACCEPTED = 1
-OUTCOME_GATED = 0
-OUTCOME_UNKNOWN = -1
 
 
 @kernel
@@ -304,8 +301,8 @@ def update_range_bearings(
     for k in range(ids.shape[0]):
         nis[k] = math.nan
         outcome[k] = OUTCOME_UNKNOWN
-        i = np.searchsorted(known_ids, ids[k])
-        if i >= count or known_ids[i] != ids[k]:
+        i = landmark_index(known_ids, ids[k])
+        if i < 0:
             continue
         places[10], places[11] = LANDMARKS + i, LANDMARKS + count + i
         x, y = known_points[i, 0], known_points[i, 1]

@@ -15,7 +15,7 @@ from pilotage.report.metric_catalogue import GROUPS, Metric, plain
 from pilotage.report.run_data import number
 
 NOT_MEASURES = frozenset(
-    {"mission", "seed", "success", "reason", "run_dir", "name", "rows", "columns", "resolution_m"}
+    {"mission", "seed", "success", "reason", "run_dir", "name", "robot", "rows", "columns", "resolution_m"}
 )
 """Keys that identify a run or tell its outcome, or repeat its settings; they are not in the table."""
 

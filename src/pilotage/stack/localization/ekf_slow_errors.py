@@ -12,6 +12,7 @@ from pilotage.core.chi_square import chi_square_quantile, gated_mean
 from pilotage.core.errors import InputError
 from pilotage.core.types import FloatArray, Pose2
 from pilotage.kernels import slow_errors
+from pilotage.kernels.sighting import OUTCOME_ACCEPTED, OUTCOME_GATED
 from pilotage.models.odometry import OdometryModel
 from pilotage.sensors.beacon import BeaconConfig
 from pilotage.sensors.readings import BeaconReadings, OdometryIncrement, Readings
@@ -225,9 +226,9 @@ class EkfSlowErrorsLocalizer:
             outcome,
         )
         for result in outcome:
-            if result == slow_errors.OUTCOME_ACCEPTED:
+            if result == OUTCOME_ACCEPTED:
                 self._rejections = max(0, self._rejections - 1)
-            elif result == slow_errors.OUTCOME_GATED:
+            elif result == OUTCOME_GATED:
                 self._rejections += 1
         if self._rejections >= config.recovery_rejections:
             slow_errors.inflate(self._cov, config.recovery_factor, self._floor)
@@ -236,7 +237,7 @@ class EkfSlowErrorsLocalizer:
             self._doubt_the_drive()
             # Three landmarks that agree on a place have a word against the filter; two may be mistaken.
             self._begin_anew(least_landmarks=3)
-        self._count(count, used, float(nis[outcome == slow_errors.OUTCOME_ACCEPTED].sum()))
+        self._count(count, used, float(nis[outcome == OUTCOME_ACCEPTED].sum()))
 
     def _doubt_the_drive(self) -> None:
         """Recovery after recovery: the drive is another than expected, so its errors may be larger.
