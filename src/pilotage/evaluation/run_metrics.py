@@ -154,7 +154,8 @@ def _recovery(
     wrong = np.hypot(error[:, 0], error[:, 1]) > WRONG_M
     wrong |= np.abs(wrap_array_to_pi(error[:, 2])) > WRONG_RAD
     # One that never says so although it is wrong is the worst case of all.
-    if claimed.all() and mission.stack.initial.known and not wrong.any():
+    wrong_for_good = wrong & (trace["t_s"] > mission.run.settle_s)
+    if claimed.all() and mission.stack.initial.known and not wrong_for_good.any():
         return {}
     metrics: dict[str, object] = {
         "lost_s": float(dt_s * (~claimed).sum()),

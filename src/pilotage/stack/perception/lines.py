@@ -37,7 +37,8 @@ class LineExtractionConfig(Config):
     gap_m: Positive = 0.5
     """A line ends where the next of its points is farther than this along it."""
     end_margin_m: NonNegative = 0.05
-    """Points this near the ends of a line are not fitted: at a corner they may be the next wall's."""
+    """Points this near the ends of a line are not fitted: at a corner they may be the next wall's. At least
+    as much as an inlier may lie off the line, because so far into it does the next wall pass for its own."""
     straight: float = Field(default=0.9999, gt=0.5, lt=1.0)
     """Share of true walls whose residuals pass for straight."""
     iterations: int = Field(default=60, ge=1, le=10_000)
@@ -94,6 +95,7 @@ class LineExtractor:
         self._config = config
         self._var = range_var_m2
         self._threshold = config.inlier_sigmas * float(np.sqrt(range_var_m2))
+        self._end_margin = max(config.end_margin_m, self._threshold)
         self._max_range = min(config.max_range_m, np.nextafter(lidar.max_range_m, 0.0))
         self._step = lidar.beam_step_rad
         self._directions = clustering.beam_directions(
@@ -119,7 +121,7 @@ class LineExtractor:
             self._var,
             self._threshold,
             config.gap_m,
-            config.end_margin_m,
+            self._end_margin,
             config.line_points,
             config.line_length_m,
             self._straight_z,
