@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import gc
 import json
 import os
 import signal
@@ -143,7 +144,27 @@ def test_a_cluster_that_is_lost_stops_the_study(
     distributed = pytest.importorskip("distributed", reason="needs the extra cluster")
     monkeypatch.setattr(distributed, "Client", lambda *_, **__: LostClient())
     sweep = ["sweep", "museum-plan", "--vary", "stack.planner.turning_radius_m=0.3", "--trials", "1"]
-    assert main([*sweep, "--name", "x", "--out", str(tmp_path), "--dask", "tcp://host:1", "--quiet"]) == 1
+    assert (
+        main([*sweep, "--name", "x", "--out", str(tmp_path), "--dask", "tcp://127.0.0.1:1", "--quiet"]) == 1
+    )
     (line,) = capsys.readouterr().err.splitlines()
-    assert "--dask tcp://host:1: the cluster is lost (scheduler-connection-lost); go on with --resume" in line
+    assert (
+        "--dask tcp://127.0.0.1:1: the cluster is lost (scheduler-connection-lost); go on with --resume"
+        in line
+    )
     assert rows_of(tmp_path / "x")[0]["status"] == "pending"
+
+
+@pytest.mark.parametrize("address", ["nonsense", "tcp://127.0.0.1", "foo://x:1", "tcp://a:b"])
+def test_an_address_that_is_none_leaves_nothing_behind(
+    address: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """One line, from a client that was never made, and no folder."""
+    pytest.importorskip("distributed")
+    monkeypatch.chdir(tmp_path)
+    sweep = ["sweep", "museum-plan", "--vary", "stack.planner.turning_radius_m=0.3", "--dask", address]
+    assert main(sweep) == 2
+    gc.collect()
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith(f"pilotage: --dask {address}: expected a scheduler there, found: ")
+    assert not list(tmp_path.iterdir())

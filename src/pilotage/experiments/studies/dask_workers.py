@@ -34,6 +34,7 @@ class DaskWorkers:
     def __init__(self, base: Mapping[str, Any], address: str) -> None:
         try:
             import distributed
+            from distributed.comm.addressing import resolve_address
         except ImportError:
             raise InputError(
                 "--dask: expected the extra 'cluster'; pip install 'pilotage[cluster]'"
@@ -41,6 +42,8 @@ class DaskWorkers:
         # A cluster that is lost is told in one line, not at length.
         logging.getLogger("distributed.client").setLevel(logging.CRITICAL)
         try:
+            # A client that could not be made complains at length when it is thrown away.
+            resolve_address(address)
             connect: Any = distributed.Client
             self._client: Any = connect(address, timeout=CONNECT_S, set_as_default=False)
         except (OSError, ValueError, TimeoutError) as error:

@@ -104,6 +104,26 @@ def _run(
     on_progress: Callable[[StudyProgress], None] | None,
     tell: Callable[[str], None],
 ) -> Counts:
+    # Before a folder is made: nothing is left behind where nobody answers.
+    cluster = DaskWorkers(study.base, dask) if dask else None
+    try:
+        return _run_on(cluster, study, folder, workers, resume, on_progress, tell)
+    finally:
+        if cluster is not None:
+            with _undisturbed():
+                cluster.stop()
+
+
+def _run_on(
+    cluster: Workers | None,
+    study: Study,
+    folder: Path,
+    workers: int | None,
+    resume: bool,
+    on_progress: Callable[[StudyProgress], None] | None,
+    tell: Callable[[str], None],
+) -> Counts:
+    """Run what is missing on a cluster, or on processes here."""
     begun = (folder / DATABASE).is_file()
     store = Store(folder, study, tell)
     try:
@@ -117,7 +137,7 @@ def _run(
         _write(folder / MISSION_FILE, mission_yaml(study))
         if counts.missing:
             wanted = min(workers or _cores(), counts.missing)
-            crew: Workers = DaskWorkers(study.base, dask) if dask else LocalWorkers(study.base, wanted)
+            crew: Workers = cluster or LocalWorkers(study.base, wanted)
             try:
                 _loop(study, store, crew, folder, on_progress, tell)
             finally:

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from pilotage.core.errors import InputError
+from pilotage.experiments.studies.carve import records
 from pilotage.experiments.studies.database import BUSY_S, SCHEMA, checksum
 
 HEADER = 100
@@ -44,7 +45,7 @@ def salvage(path: Path) -> list[dict[str, Any]]:
     """Every row that can still be read from a broken database, one by one, whole ones only.
 
     A first page that is lost is put back: it only says where the tables begin, which is the same in every
-    study's database.
+    study's database. Rows to which the tables' own pages do not lead any more are looked for page by page.
     """
     with tempfile.TemporaryDirectory() as place:
         copy = Path(place) / path.name
@@ -56,7 +57,9 @@ def salvage(path: Path) -> list[dict[str, Any]]:
         if not found:
             _put_first_page_back(copy)
             found = _row_by_row(copy)
-        return found
+        known = {row["row"] for row in found}
+        unreached = {row["row"]: row for row in _by_pages(copy) if row["row"] not in known}
+        return sorted([*found, *unreached.values()], key=lambda row: int(row["row"]))
 
 
 def read_essence(path: Path) -> dict[str, Any] | None:
@@ -101,7 +104,7 @@ def _reader(path: Path) -> Iterator[sqlite3.Connection]:
         yield database
 
 
-def _row(found: sqlite3.Row) -> dict[str, Any]:
+def _row(found: sqlite3.Row | Mapping[str, Any]) -> dict[str, Any]:
     row = dict(found)
     row["whole"] = row.get("crc") is None or row["crc"] == checksum(
         row["row"], row["cell"], row["seed"], row["metrics"], row["timings"]
@@ -128,6 +131,26 @@ def _row_by_row(path: Path) -> list[dict[str, Any]]:
             if row is not None and _is_whole(row):
                 found.append(row)
     return found
+
+
+COLUMNS = (
+    *("row", "cell", "trial", "seed", "status", "attempts", "owner", "reason"),
+    *("metrics", "timings", "seconds", "crc"),
+)
+
+
+def _by_pages(path: Path) -> Iterator[dict[str, Any]]:
+    """Finished rows that are found on any page and whose checksum holds."""
+    for number, values in records(path.read_bytes(), PAGE, len(COLUMNS)):
+        row = dict(zip(COLUMNS, values, strict=True), row=number)
+        if row["status"] not in ("done", "failed") or row["crc"] is None:
+            continue
+        try:
+            row = _row(row)
+        except (ValueError, TypeError):
+            continue
+        if _is_whole(row):
+            yield row
 
 
 def _last_row(database: sqlite3.Connection, path: Path) -> int:
