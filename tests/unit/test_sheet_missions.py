@@ -15,11 +15,12 @@ from pilotage.evaluation.sheet_visits import VisitedCells, reachable_cells
 from pilotage.experiments.mission import load_mission
 from pilotage.experiments.run import run_mission
 from pilotage.experiments.sheet.sheets import load_sheet
-from pilotage.experiments.sheet.simulate import simulate
+from pilotage.experiments.sheet.simulate import _reason, simulate
 from pilotage.maps.cell_map_text import read_cell_map
 from pilotage.maps.ros_map import read_ros_map
 from pilotage.maps.true_cells import SheetFile
 from pilotage.missions.sheet import SheetMission
+from pilotage.stack.interface import StackStatus
 
 REPORT = "stack.explorer.name=surround-check"
 
@@ -44,6 +45,14 @@ def test_every_configuration_ends_with_a_reason(name: str, overrides: tuple[str,
     assert found["reason"]
     assert isinstance(found["coverage_visited"], float)
     assert 0.0 < found["coverage_visited"] < 1.0
+
+
+def test_one_that_is_done_but_touched_a_box_says_why_it_is_no_success() -> None:
+    mission = load_mission("romi-explore")
+    assert isinstance(mission, SheetMission)
+    assert _reason(StackStatus.ARRIVED, "done: all", mission, 0) == "done: all"
+    assert _reason(StackStatus.ARRIVED, "done: all", mission, 1) == "done: all; touched a box once"
+    assert _reason(StackStatus.FAILED, "left the sheet", mission, 2) == "left the sheet"
 
 
 def test_the_same_seed_gives_the_same_run_and_another_one_another() -> None:

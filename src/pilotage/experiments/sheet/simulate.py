@@ -143,7 +143,7 @@ def simulate(mission: SheetMission, on_progress: OnProgress | None = None) -> Sh
             on_progress(_progress(simulator.t_s, visits.count, experiment, rows))
     outcome = SheetOutcome(
         done=status is StackStatus.ARRIVED,
-        reason=_reason(status, reason, mission),
+        reason=_reason(status, reason, mission, contacts),
         loop_s=max(time.perf_counter() - begin, 1e-9),
         visited=visits.visited,
         first_visit_s=visits.first_s,
@@ -155,9 +155,13 @@ def simulate(mission: SheetMission, on_progress: OnProgress | None = None) -> Sh
     return SheetRecord(experiment, trace, outcome, events)
 
 
-def _reason(status: StackStatus, reason: str, mission: SheetMission) -> str:
+def _reason(status: StackStatus, reason: str, mission: SheetMission, contacts: int) -> str:
     if status is StackStatus.RUNNING:
         return f"time limit of {mission.run.time_limit_s:g} s reached"
+    if status is StackStatus.ARRIVED and contacts > 0:
+        # Done, and yet no success: it says why.
+        times = "once" if contacts == 1 else f"{contacts} times"
+        return f"{reason}; touched a box {times}"
     return reason or str(status)
 
 
