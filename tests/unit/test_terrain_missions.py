@@ -201,7 +201,7 @@ class TestReport:
     ("words", "told"),
     [
         (["world.start.x_m=305"], "world.start: expected free ground, found (305, 45)"),
-        (["world.goal.x_m=600"], "world.goal: expected a place on the map, 600 x 400 m"),
+        (["world.goal.x_m=600.1"], "world.goal: expected a place on the map, 600 x 400 m"),
         (["world.goal.x_m=300", "world.goal.y_m=45"], "which is a hazard"),
         (["stack.cost_map.inflation_m=60", "world.start.x_m=275"], "too near to an obstacle"),
         (["world.ground.resolution_m=0"], "greater than 0, found 0"),
