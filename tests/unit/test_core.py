@@ -186,6 +186,8 @@ class Outer(Config):
     inner: Inner = Inner()
     maybe: Inner | None = None
     steps: int = 3
+    often: bool = False
+    limit: float | None = None
     start: float = Field(default=0.0, ge=-10.0)
     size_m: float
 
@@ -226,6 +228,9 @@ def test_a_wrong_config_is_one_line(values: object, message: str) -> None:
         ({"size_m": "wide"}, "world.size_m: input should be a valid number", "found 'wide'"),
         ({"size_m": None}, "world.size_m: input should be a valid number", "found nothing"),
         ({"size_m": 1, "steps": 1.5}, "world.steps: input should be a valid integer", "found 1.5"),
+        ({"size_m": True}, "world.size_m: input should be a valid number", "found 'true'"),
+        ({"size_m": 1, "steps": False}, "world.steps: input should be a valid integer", "found 'false'"),
+        ({"size_m": 1, "limit": True}, "world.limit: input should be a valid number", "found 'true'"),
         ({"size_m": 1, "inner": 3}, "world.inner: input should be a valid dictionary", "found 3"),
         ({"size_m": 1, "steps": "x" * 500}, "world.steps: input should be a valid integer", "..."),
     ],
@@ -243,6 +248,10 @@ def test_without_a_place_the_key_stands_alone() -> None:
         validate(Outer, {}, "")
     with pytest.raises(InputError, match=r"^file: expected a mapping"):
         validate(Outer, "text", "")
+
+
+def test_a_truth_value_stays_one_where_it_is_asked_for() -> None:
+    assert validate(Outer, {"size_m": 1, "often": True}, "world").often
 
 
 def test_configs_are_frozen() -> None:

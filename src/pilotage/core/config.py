@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any, TypeVar
 
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import BaseModel, ConfigDict, ValidationError, model_validator
 
 from pilotage.core.errors import InputError, nearest
 
@@ -15,6 +16,28 @@ class Config(BaseModel):
     model_config = ConfigDict(
         extra="forbid", frozen=True, allow_inf_nan=False, validate_default=True, strict=False
     )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _true_is_no_number(cls, values: Any) -> Any:
+        """Refuse a truth value where it would pass for 0 or 1: as a word it fails at its own key."""
+        if not isinstance(values, Mapping):
+            return values
+        words = {}
+        for name, value in values.items():
+            field = cls.model_fields.get(name) if isinstance(value, bool) else None
+            if (
+                field is not None
+                and _takes(field.annotation, float, int)
+                and not _takes(field.annotation, bool)
+            ):
+                words[name] = str(value).lower()
+        return {**values, **words} if words else values
+
+
+def _takes(annotation: Any, *kinds: type) -> bool:
+    """Whether an annotation such as ``float | None`` names one of the types itself."""
+    return annotation in kinds or any(_takes(part, *kinds) for part in getattr(annotation, "__args__", ()))
 
 
 ConfigT = TypeVar("ConfigT", bound=BaseModel)
