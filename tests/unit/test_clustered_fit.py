@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from pilotage.calibration.clustered import clustered_least_squares, jackknife_std
+from pilotage.core.errors import InputError
 
 
 def test_intervals_hold_where_errors_are_common_to_a_cluster() -> None:
@@ -34,6 +35,11 @@ def test_with_every_row_its_own_cluster_it_is_whites_estimator() -> None:
     white = bread @ (design * residual[:, None] ** 2).T @ design @ bread * 50 / 49 * 49 / 48
     np.testing.assert_allclose(found.stds, np.sqrt(np.diag(white)), rtol=1e-12)
     assert found.dof == 49.0
+
+
+def test_one_cluster_tells_nothing() -> None:
+    with pytest.raises(InputError, match="two minutes or more"):
+        clustered_least_squares(np.ones((9, 1)), np.ones(9), np.zeros(9, dtype=np.int64))
 
 
 def test_the_jackknife_of_a_mean_is_its_standard_error() -> None:

@@ -114,11 +114,13 @@ def test_rows_whose_truth_is_not_valid_are_left_out(tmp_path: Path) -> None:
     valid = np.ones((400, 1))
     valid[100:140], valid[300:310] = 0.0, 0.0
     drive["x_true"][100:140], drive["x_true"][300:310] = np.nan, 1e3
+    drive["th_true"][100:140], drive["th_true"][300:310] = np.nan, 50.0
     savemat(tmp_path / "d.mat", drive | {"true_valid": valid})
     found = localize_log(tmp_path / "d.mat", tmp_path, form="aer1513").metrics
     assert found["scored_steps"] == 399 - 50
     assert found["truth_gaps"] == 2
     assert float(str(found["position_rmse_m"])) < 0.1
+    assert float(str(found["heading_rmse_rad"])) < 0.1
 
 
 def test_the_command_prints_plain_numbers_and_names_its_page(

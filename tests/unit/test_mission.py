@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import math
 from pathlib import Path
 from typing import Any
@@ -12,6 +13,7 @@ import yaml
 
 from pilotage.core.errors import InputError
 from pilotage.core.types import Goal, Pose2
+from pilotage.core.yaml_text import load_yaml
 from pilotage.experiments.floor.build import build, initial_belief
 from pilotage.experiments.floor.mission import load_floor_mission
 from pilotage.experiments.floor.obstacles import place_obstacles
@@ -19,7 +21,7 @@ from pilotage.experiments.floor.simulate import simulate
 from pilotage.experiments.floor.world_map import load_map
 from pilotage.experiments.mission import load_mission, shipped_missions
 from pilotage.experiments.resolve import resolved_yaml
-from pilotage.experiments.values import apply_override
+from pilotage.experiments.values import apply_override, merge, parse_override
 from pilotage.kernels import geometry
 from pilotage.maps.map_file import MapFile
 from pilotage.missions.floor import AcrossPathObstacle, BoxObstacle, FloorMission, TrapObstacle
@@ -251,6 +253,30 @@ def test_a_component_s_short_form_can_be_overridden() -> None:
     values: dict[str, Any] = {"world": {"map": "museum"}, "stack": {"planner": "astar"}}
     apply_override(values, "stack.planner.name=theta-star")
     assert values["stack"] == {"planner": {"name": "theta-star"}}
+
+
+def test_a_component_s_short_form_keeps_its_name_under_new_parameters() -> None:
+    short: dict[str, Any] = {"robot": {"sensors": {"eye": "lidar"}}, "stack": {"planner": "astar"}}
+    values = copy.deepcopy(short)
+    apply_override(values, "robot.sensors.eye.max_range_m=3")
+    assert values["robot"] == {"sensors": {"eye": {"name": "lidar", "max_range_m": 3}}}
+    laid = merge(short, {"stack": {"planner": {"weight": 2}}, "robot": {"sensors": {"eye": {"beams": 9}}}})
+    assert laid["stack"] == {"planner": {"name": "astar", "weight": 2}}
+    assert laid["robot"] == {"sensors": {"eye": {"name": "lidar", "beams": 9}}}
+
+
+@pytest.mark.parametrize("text", ["a: 2024-13-45", "a: 0x_", "a: [1, 2", "a: 1\na: 2"])
+def test_text_that_is_no_yaml_is_one_line(text: str) -> None:
+    with pytest.raises(InputError, match=r"^here.*expected YAML, found: "):
+        load_yaml(text, "here")
+    if "\n" not in text:
+        with pytest.raises(InputError, match="the value is not YAML"):
+            parse_override(f"run.{text.replace(': ', '=', 1)}")
+
+
+def test_a_mapping_laid_under_another_gives_no_key_twice() -> None:
+    text = "b: &b {a: 1}\nx: {y: &m {<<: *b, a: 2}}\nz: {<<: *m}\n"
+    assert load_yaml(text, "here")["z"] == {"a": 2}
 
 
 @pytest.mark.parametrize(

@@ -339,3 +339,25 @@ def test_a_definition_edited_in_its_folder_is_refused_with_what_changed(
     # What only the page says may change.
     _write(folder / STUDY_FILE, study_yaml(study).replace("metrics: []", "metrics: [smoothness]"))
     Store(folder, load_study(str(folder))).close()
+
+
+def test_a_cell_of_a_file_is_named_as_the_study_names_it(world: Path) -> None:
+    """Also from the study's folder, where the file is told by its absolute place."""
+    definition = {
+        "study": "maps",
+        "mission": "museum-1",
+        "trials": 1,
+        "factors": [
+            {"key": "world.map", "values": ["museum", "my map.yaml"]},
+            {"key": "stack.localizer.gate", "values": [0.9, 0.99]},
+        ],
+        "baseline": "map=my map.yaml, gate=0.99",
+        "published": [{"cell": {"map": "my map.yaml", "gate": 0.9}, "metrics": {}}],
+    }
+    (world / "s.yaml").write_text(yaml.safe_dump(definition), encoding="utf-8")
+    study = load_study(str(world / "s.yaml"))
+    assert study.definition.baseline in [cell.name for cell in study.cells]
+    assert str(world / "my map.yaml") in str(study.definition.published[0].cell)
+    (world / STUDY_FILE).write_text(study_yaml(study), encoding="utf-8")
+    (world / MISSION_FILE).write_text(mission_yaml(study), encoding="utf-8")
+    assert load_study(str(world)).definition.baseline == study.definition.baseline

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pilotage.calibration.intervals import Estimate, normal_estimate
+from pilotage.core.errors import InputError
 from pilotage.core.types import FloatArray, IntArray
 
 
@@ -36,12 +37,19 @@ def clustered_least_squares(design: FloatArray, target: FloatArray, clusters: In
     ----------
     design, target, clusters
         (N, P), (N,) and (N,); rows with the same number in ``clusters`` are of one cluster; two or more.
+
+    Raises
+    ------
+    InputError
+        For a single cluster: nothing tells how far clusters differ.
     """
     rows, columns = design.shape
     values, *_ = np.linalg.lstsq(design, target, rcond=None)
     residual = target - design @ values
     _, member = np.unique(clusters, return_inverse=True)
     groups = int(member.max()) + 1
+    if groups < 2:
+        raise InputError("expected what was measured to span two minutes or more, found less")
     scores = np.zeros((groups, columns))
     np.add.at(scores, member, design * residual[:, None])
     bread = np.linalg.pinv(design.T @ design)

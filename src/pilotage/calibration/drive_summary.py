@@ -10,6 +10,8 @@ from pilotage.calibration.drive_commands import DriveCommands
 from pilotage.calibration.intervals import Estimate
 
 DISAGREE_P = 0.001
+LEAST_WIDTH = 1e-12
+"""What was found without any scatter weighs much, not infinitely."""
 _HALVES = 2.0 * 1.959964
 """Width of a 95 % interval in standard deviations."""
 
@@ -54,7 +56,7 @@ def _disagree(estimates: Sequence[Estimate]) -> bool:
     """Cochran's test (Biometrics 1954): the spread of the values against their own intervals."""
     if len(estimates) < 2:
         return False
-    weights = [(_HALVES / (one.high - one.low)) ** 2 for one in estimates]
+    weights = [(_HALVES / max(one.high - one.low, LEAST_WIDTH)) ** 2 for one in estimates]
     mean = sum(w * one.value for w, one in zip(weights, estimates, strict=True)) / sum(weights)
     q = sum(w * (one.value - mean) ** 2 for w, one in zip(weights, estimates, strict=True))
     return float(stats.chi2.sf(q, len(estimates) - 1)) < DISAGREE_P

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable
 from typing import Any
 
 import yaml
@@ -25,17 +24,19 @@ def load_yaml(text: str, where: str) -> Any:
     """
     try:
         return yaml.load(text, Loader=_StrictLoader)
-    except yaml.YAMLError as error:
+    except (yaml.YAMLError, ValueError) as error:  # a date that is none is a ValueError
         mark = getattr(error, "problem_mark", None)
         line = f" line {mark.line + 1}" if mark is not None else ""
-        problem = getattr(error, "problem", None) or "not YAML"
+        problem = getattr(error, "problem", None) or str(error) or "not YAML"
         raise InputError(f"{where}{line}: expected YAML, found: {problem}") from None
 
 
 class _StrictLoader(yaml.SafeLoader):
     """Plain values only, and every key once."""
 
-    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Hashable, Any]:
+    def compose_mapping_node(self, anchor: Any) -> yaml.MappingNode:
+        """Look at the keys as they are written, before `<<` lays other mappings under them."""
+        node = super().compose_mapping_node(anchor)
         seen: set[tuple[str, Any]] = set()
         for key, _ in node.value:
             if isinstance(key, yaml.ScalarNode) and key.tag != "tag:yaml.org,2002:merge":
@@ -44,4 +45,4 @@ class _StrictLoader(yaml.SafeLoader):
                         None, None, f"the key '{key.value}' twice in one mapping", key.start_mark
                     )
                 seen.add((key.tag, key.value))
-        return super().construct_mapping(node, deep=deep)
+        return node

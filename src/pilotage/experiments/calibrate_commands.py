@@ -16,7 +16,6 @@ from pilotage.core.types import FloatArray
 from pilotage.experiments.calibrate import PARAMETER_FILE, SETS_FILE, CalibrationResult, write_calibration
 from pilotage.logs.mrclam import ROBOTS, MrclamLog, read_mrclam
 
-FORMATS = ("mrclam",)
 LOCALIZER = "ekf-slow-errors"
 
 

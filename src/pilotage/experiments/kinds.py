@@ -9,11 +9,8 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from pilotage.core.errors import InputError, unknown_name
-from pilotage.experiments.mission_kind import SHARE, Aspect, Cost, Kind
+from pilotage.experiments.mission_kind import Kind
 from pilotage.missions.mission import DEFAULT_KIND, Mission
-
-# Costs are handed on: who asks a kind what its metrics cost needs the words for the answer.
-__all__ = ["KINDS", "SHARE", "Aspect", "Cost", "check_oracles", "kind_name", "kind_of"]
 
 
 def _floor() -> Kind:

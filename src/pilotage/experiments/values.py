@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -30,19 +31,31 @@ def parse_yaml(text: str, where: str) -> dict[str, Any]:
     return values
 
 
-def merge(base: dict[str, Any], changes: dict[str, Any]) -> dict[str, Any]:
+def merge(base: dict[str, Any], changes: dict[str, Any], place: Sequence[str] = ()) -> dict[str, Any]:
     """Lay ``changes`` over ``base``: mappings key by key, all else replaced.
 
     A component whose ``name`` changes starts from nothing: its parameters are not the old one's.
+
+    Parameters
+    ----------
+    place
+        Keys that lead to both; what stands at the components' places may be a name alone.
     """
     merged = copy.deepcopy(base)
     for key, value in changes.items():
         old = merged.get(key)
+        if isinstance(old, str) and isinstance(value, dict) and _holds_components(place):
+            old = {"name": old}
         if isinstance(value, dict) and isinstance(old, dict) and not _renames(old, value):
-            merged[key] = merge(old, value)
+            merged[key] = merge(old, value, [*place, key])
         else:
             merged[key] = copy.deepcopy(value)
     return merged
+
+
+def _holds_components(place: Sequence[str]) -> bool:
+    """Whether the values there are components, of which a name alone is the short form."""
+    return list(place) in (["stack"], ["robot", "sensors"])
 
 
 def _renames(old: dict[str, Any], new: dict[str, Any]) -> bool:
@@ -63,7 +76,7 @@ def parse_override(override: str) -> tuple[list[str], Any]:
         raise InputError(f"--set '{override}': expected KEY=VALUE such as stack.localizer.gate=0.99")
     try:
         value = yaml.safe_load(text)
-    except yaml.YAMLError:
+    except (yaml.YAMLError, ValueError):
         raise InputError(f"--set '{override}': the value is not YAML") from None
     if isinstance(value, str):
         value = _number(value)
@@ -90,8 +103,8 @@ def apply_override(values: dict[str, Any], override: str) -> None:
         if inner is None:
             inner = {}
             _put(place, part, inner, override)
-        if isinstance(inner, str) and parts[0] == "stack":
-            inner = {"name": inner}  # the short form of a component
+        if isinstance(inner, str) and _holds_components(parts[:depth]):
+            inner = {"name": inner}
             _put(place, part, inner, override)
         if not isinstance(inner, dict | list):
             raise InputError(

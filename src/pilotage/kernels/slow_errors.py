@@ -54,8 +54,7 @@ def predict(
     ----------
     fading
         (N, 3) 1 / tau of each error, and how fast it fades with the distance and the angle that the robot
-        moves (one over a length in m, over an angle in rad); 0 for a constant one; the pose's rows are not
-        looked at.
+        moves (one over a length in m, over an angle in rad); 0 for a constant one, and in the pose's rows.
     stationary
         (N,) variances that the errors settle at.
     """

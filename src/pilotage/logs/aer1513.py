@@ -112,10 +112,11 @@ def _shaped(path: Path, content: dict[str, object], name: str, shape: tuple[int,
 
 
 def _finite(path: Path, name: str, values: FloatArray, where: object = None) -> FloatArray:
-    wrong = ~np.isfinite(values) | (np.abs(values) > (LARGEST_TIME if name == "t" else LARGEST))
+    limit = LARGEST_TIME if name == "t" else LARGEST
+    wrong = ~np.isfinite(values) | (np.abs(values) > limit)
     if where is not None:
         wrong &= np.asarray(where)
     bad = np.flatnonzero(wrong.any(axis=tuple(range(1, wrong.ndim))))
     if bad.size:
-        raise InputError(f"{path}: {name} row {int(bad[0]) + 1}: expected a finite number within {LARGEST:g}")
+        raise InputError(f"{path}: {name} row {int(bad[0]) + 1}: expected a finite number within {limit:g}")
     return values

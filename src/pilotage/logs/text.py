@@ -142,7 +142,7 @@ def _refuse_cut_number(path: Path, lines: Sequence[str], number: int) -> None:
     if len(before) >= SAME_FORM and len(set(before)) == 1 and last < before[0]:
         raise InputError(
             f"{path} line {number}: expected as many digits as in the lines before, and the line's end; "
-            "the file seems to be cut short"
+            "the file seems to be cut short; where it is whole, end its last line"
         )
 
 

@@ -149,7 +149,7 @@ def aer1513_drive(path: Path, max_range_m: float | None = None) -> RecordedDrive
         angle_var_rad2_per_m=log.turn_rate_var_rad2_s2 * step / speed,
     )
     truth = log.truth.copy()
-    truth[:, 2] = np.unwrap(truth[:, 2])
+    truth[log.truth_known, 2] = np.unwrap(truth[log.truth_known, 2])  # what is unknown may be anything
     truth[~log.truth_known] = np.nan
     unknown_begins = np.flatnonzero(np.diff(log.truth_known.astype(np.int64), prepend=1) < 0)
     grid = np.concatenate([[True], np.diff(np.floor((log.t_s - log.t_s[0]) * SCORE_HZ + 1e-6)) > 0])

@@ -16,8 +16,9 @@ from pilotage.core.errors import InputError
 from pilotage.core.types import FloatArray
 from pilotage.evaluation.judge import SUCCESS, Judgement, judge
 from pilotage.evaluation.paired import Difference
-from pilotage.experiments.kinds import SHARE, Aspect, Cost, kind_of
+from pilotage.experiments.kinds import kind_of
 from pilotage.experiments.mission import load_mission, mission_of
+from pilotage.experiments.mission_kind import SHARE, Aspect, Cost
 from pilotage.experiments.studies.definition import StudyDefinition
 from pilotage.experiments.studies.study import Study, make_study
 from pilotage.experiments.studies.sweep import settings_of

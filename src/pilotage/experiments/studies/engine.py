@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from pilotage.core.errors import InputError, nearest
+from pilotage.core.whole_file import write_whole
 from pilotage.experiments.kinds import KINDS, kind_name
 from pilotage.experiments.studies.dask_workers import DaskWorkers
 from pilotage.experiments.studies.database import DATABASE, CorruptDatabaseError, StudyStoppedError
@@ -141,8 +142,9 @@ def _run_on(
             try:
                 _loop(study, store, crew, folder, on_progress, tell)
             finally:
-                with _undisturbed():
-                    crew.stop()
+                if cluster is None:
+                    with _undisturbed():
+                        crew.stop()
         return store.counts()
     finally:
         # Where this fails, as on a full disk, the claims are free again once this process is gone.
@@ -164,7 +166,8 @@ def _loop(
     told: set[tuple[int, int]] = set()
     checked = False
     while True:
-        for task in store.claim(crew.room) if crew.room else ():
+        room = crew.room
+        for task in store.claim(room) if room else ():
             held.add(task.row)
             crew.give(replace(task, overrides=study.cells[task.cell].overrides))
         if not held:
@@ -276,6 +279,4 @@ def check_metrics(study: Study, folder: Path) -> None:
 def _write(path: Path, text: str) -> None:
     if path.is_file() and path.read_text(encoding="utf-8") == text:
         return
-    beside = path.with_name(f".{path.name}.{os.getpid()}")
-    beside.write_text(text, encoding="utf-8")
-    beside.replace(path)
+    write_whole(path, text)

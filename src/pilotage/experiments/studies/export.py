@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import csv
-import os
 import tempfile
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from pilotage.core.whole_file import draft_of
 from pilotage.experiments.studies.database import DATABASE, CorruptDatabaseError
 from pilotage.experiments.studies.rows import flat, read_rows, salvage
 from pilotage.experiments.studies.study import Study, load_study
@@ -43,7 +42,7 @@ def export(folder: Path) -> list[Path]:
         if len({type(v) for v in values if v is not None}) > 1
         and not all(isinstance(v, int | float) for v in values if v is not None)
     }
-    with _beside(parquet_path) as draft:
+    with draft_of(parquet_path) as draft:
         pq.write_table(pa.table({**columns, **mixed}), draft)
     return [csv_path, parquet_path]
 
@@ -52,7 +51,7 @@ def write_csv(rows: Sequence[Mapping[str, Any]], study: Study, path: Path) -> No
     """Write rows as CSV, one column a metric."""
     records = [_record(row, study) for row in rows]
     names = list(dict.fromkeys(name for record in records for name in record))
-    with _beside(path) as draft, draft.open("w", newline="", encoding="utf-8") as file:
+    with draft_of(path) as draft, draft.open("w", newline="", encoding="utf-8") as file:
         writer = csv.DictWriter(file, names)
         writer.writeheader()
         writer.writerows(records)
@@ -77,17 +76,6 @@ def save_what_is_left(folder: Path, study: Study, trouble: str) -> CorruptDataba
         f"; {finished} of {study.rows} finished trials could be read and are in {saved}; "
         f"move {DATABASE} away to run the study anew",
     )
-
-
-@contextmanager
-def _beside(path: Path) -> Iterator[Path]:
-    """A draft that takes the place of ``path`` when it is whole: two processes may write at once."""
-    draft = path.with_name(f".{path.name}.{os.getpid()}")
-    try:
-        yield draft
-        draft.replace(path)
-    finally:
-        draft.unlink(missing_ok=True)
 
 
 def _record(row: Mapping[str, Any], study: Study) -> dict[str, Any]:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Mapping, Sequence
+import re
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
@@ -186,7 +187,37 @@ def _at_their_places(definition: StudyDefinition, places: Sequence[Path]) -> Stu
     """The definition with the files that it sets as absolute paths, so that its folder runs anywhere."""
     values = definition.model_dump(mode="json")
     varied = {key: anchored(values[key], places) for key in ("set", "configurations", "factors")}
-    return validate(StudyDefinition, {**values, **varied}, "")
+    moved = dict(_moved(values["factors"], varied["factors"]))
+    # Cells are named by their values: what names cells is told alike.
+    told = {key: _told(values[key], moved) for key in ("baseline", "groups", "published")}
+    return validate(StudyDefinition, {**values, **varied, **told}, "")
+
+
+def _moved(before: Any, after: Any) -> Iterator[tuple[str, str]]:
+    """The texts that differ between two trees of the same shape."""
+    if isinstance(before, Mapping):
+        for key in before:
+            yield from _moved(before[key], after[key])
+    elif isinstance(before, list):
+        for one, other in zip(before, after, strict=True):
+            yield from _moved(one, other)
+    elif isinstance(before, str) and before != after:
+        yield before, after
+
+
+def _told(value: Any, moved: Mapping[str, str]) -> Any:
+    """What names cells, ``map=a.yaml, gate=0.9``, or their values, with those values as they are now."""
+    if isinstance(value, Mapping):
+        return {_told(key, moved): _told(inner, moved) for key, inner in value.items()}
+    if isinstance(value, list):
+        return [_told(inner, moved) for inner in value]
+    if not isinstance(value, str):
+        return value
+    for before, after in moved.items():
+        if value == before:
+            return after
+        value = re.sub(f"(?<==){re.escape(before)}(?=, |$)", after.replace("\\", r"\\"), value)
+    return value
 
 
 def study_yaml(study: Study) -> str:

@@ -110,7 +110,7 @@ def parse_vary(text: str) -> dict[str, Any]:
         raise InputError(f"--vary '{text}': expected a range as A:B:STEP")
     try:
         values = yaml.safe_load(f"[{right}]")
-    except yaml.YAMLError:
+    except (yaml.YAMLError, ValueError):
         raise InputError(f"--vary '{text}': the values are not YAML") from None
     numbers = [_number(value) for value in values]
     return {"key": key, "values": numbers}

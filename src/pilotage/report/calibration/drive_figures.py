@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 
+from pilotage.calibration.drive_windows import LOSS_UP_TO_RAD_S
 from pilotage.core.types import FloatArray
 from pilotage.report.calibration.folder import CalibrationData
 from pilotage.report.calibration.plots import histogram, panels_in_a_row
@@ -16,7 +17,6 @@ from pilotage.report.style import BLUE, MUTED, SKY, VERMILLION, Illustration, Ke
 MOST_POINTS = 1500
 SLOWEST_M_S = 0.03
 """A ratio of speeds says nothing where hardly any was commanded."""
-LOSS_UP_TO_RAD_S = 0.45
 _DRIVE = ("speed_gain", "speed_loss_per_rad_s", "turn_gain")
 _REST = ("bend_rad_per_m", "range_scale", "depth_power")
 _LABELS = {

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 
+from pilotage.core.whole_file import write_whole
 from pilotage.evaluation.judge import Judgement, judge
 from pilotage.report.markup import contents, document, escape, figure_section, layer_rules, tiles
 from pilotage.report.quantities import count
@@ -73,12 +73,7 @@ def write_page(
 ) -> Path:
     """Write ``report.html`` into the study's folder in one go and return its path."""
     path = folder / REPORT_FILE
-    beside = path.with_name(f".{path.name}.{os.getpid()}")
-    try:
-        beside.write_text(study_page(view, examples, ranking), encoding="utf-8")
-        beside.replace(path)
-    finally:
-        beside.unlink(missing_ok=True)
+    write_whole(path, study_page(view, examples, ranking))
     return path
 
 

@@ -12,14 +12,14 @@ from pilotage.core.chi_square import chi_square_quantile, gated_mean
 from pilotage.core.errors import InputError
 from pilotage.core.types import FloatArray, Pose2
 from pilotage.kernels import slow_errors
-from pilotage.kernels.sighting import OUTCOME_ACCEPTED, OUTCOME_GATED
+from pilotage.kernels.sighting import OUTCOME_ACCEPTED, OUTCOME_GATED, landmark_index
 from pilotage.models.odometry import OdometryModel
 from pilotage.sensors.beacon import BeaconConfig
 from pilotage.sensors.readings import BeaconReadings, OdometryIncrement, Readings
 from pilotage.sensors.wheel_odometry import WheelOdometryConfig
 from pilotage.stack.interface import Belief
 from pilotage.stack.knowledge import Knowledge
-from pilotage.stack.localization.landmark_filter import MEASUREMENT_DOF
+from pilotage.stack.localization.landmark_filter import MEASUREMENT_DOF, MOST_HEADING_VAR
 from pilotage.stack.localization.localizer import LOCALIZERS, require_initial_pose
 from pilotage.stack.localization.odometry_prediction import OdometryPrediction
 from pilotage.stack.localization.recent_sightings import RecentSightings
@@ -28,8 +28,6 @@ from pilotage.stack.localization.slow_errors_config import EkfSlowErrorsConfig, 
 NAME = "ekf-slow-errors"
 
 TYPICAL_RANGE_M = 3.0
-NO_HEADING_VAR = math.pi**2 / 3.0
-"""Of a heading of which nothing is known."""
 TELEMETRY = {
     "speed_error": slow_errors.SPEED,
     "turn_error": slow_errors.TURN,
@@ -172,7 +170,7 @@ class EkfSlowErrorsLocalizer:
         self._unlogged_s += dt_s
         place = self._config.unlogged_speed_m_s**2 * growth
         heading = self._config.unlogged_turn_rate_rad_s**2 * growth
-        heading = min(heading, max(NO_HEADING_VAR - self._cov[2, 2], 0.0))
+        heading = min(heading, max(MOST_HEADING_VAR - self._cov[2, 2], 0.0))
         slow_errors.inflate(self._cov, 1.0, np.array([place, place, heading]))
 
     def _predict(self, distance: float, angle: float, dt_s: float) -> None:
@@ -260,8 +258,8 @@ class EkfSlowErrorsLocalizer:
     def _remember(self, seen: BeaconReadings) -> None:
         config = self._config
         for landmark, range_m, bearing in zip(seen.ids, seen.ranges_m, seen.bearings_rad, strict=True):
-            row = int(np.searchsorted(self._ids, landmark))
-            if row < self._ids.shape[0] and self._ids[row] == landmark:
+            row = landmark_index(self._ids, landmark)
+            if row >= 0:
                 reading = slow_errors.range_of_depth(
                     range_m / config.range_scale, bearing, config.depth_power
                 )

@@ -8,14 +8,17 @@ import numpy as np
 
 from pilotage.core.angles import wrap_to_pi
 from pilotage.core.types import Pose2
-from pilotage.stack.localization.keyframes import GyroscopeErrors, Keyframes, OdometryErrorsConfig
+from pilotage.stack.localization.keyframes import (
+    NO_GYROSCOPE,
+    GyroscopeErrors,
+    Keyframes,
+    OdometryErrorsConfig,
+)
 
 PoseSource = Callable[[], Pose2]
 
 SURE_M = 1e-5
 """Standard deviation (m, rad) of what is given: small, and the graph's equations stay regular."""
-GYRO_STD_RAD = 1e3
-"""A turn known to within a thousand radians says nothing: the gyroscope is not asked."""
 
 
 class GivenKeyframes(Keyframes):
@@ -55,8 +58,7 @@ class GivenKeyframes(Keyframes):
             return
         self._exact.append(self._now)
         super().close()
-        self.spreads[self.count - 2] = (SURE_M, SURE_M, SURE_M, GYRO_STD_RAD, SURE_M)
-        self.poses[self.count - 1, :3] = self._now
+        self.spreads[self.count - 2] = (SURE_M, SURE_M, SURE_M, NO_GYROSCOPE.walk, SURE_M)
 
     def corrected(self) -> None:
         """Put all back where it was: only the landmarks were to be solved for."""

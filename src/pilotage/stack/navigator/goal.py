@@ -229,7 +229,7 @@ class GoalNavigator:
         """Lost: keep clear of everything and look around until the localizer knows more."""
         if not self._lost.active:
             self._lost.active = True
-            self._avoiding = self._escaping = self._in_hall = False
+            self._avoiding = self._escaping = self._in_hall = self._looks_around = False
             self._follower.drop()
             self._say("lost", "the robot does not know where it is: wandering until it does")
         self._mode = Mode.WANDER
