@@ -346,5 +346,7 @@ class FrontierExplorer:
         self._events.append(Event(t_s, "retreat", "the map leaves no way out: back along its own trail"))
         self._doing = Doing.LOOK
         self._driver.follow(way, t_s, slow_at_end=True)
-        self._driver.is_careful = True
+        # Nothing was looked at again: that review is still to come.
+        self._reviews -= 1
+        self._goals.is_review = self._reviews > 0
         return True

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -73,4 +73,6 @@ class RecentSightings:
             return None
         at = np.array([(sighting.x_m, sighting.y_m) for sighting in self._seen])
         ranges, bearings = np.hypot(at[:, 0], at[:, 1]), np.arctan2(at[:, 1], at[:, 0])
-        return fix_from_beacons(points_xy_m[rows], ranges, bearings, _NO_MOUNT, R)
+        fix = fix_from_beacons(points_xy_m[rows], ranges, bearings, _NO_MOUNT, R)
+        # What a landmark's readings are off by within seconds is mostly the same: they count as one.
+        return None if fix is None else replace(fix, cov=fix.cov * rows.size / np.unique(rows).size)
