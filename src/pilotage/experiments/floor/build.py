@@ -11,10 +11,11 @@ from pilotage.core.angles import wrap_to_pi
 from pilotage.core.errors import InputError
 from pilotage.core.random import RandomStreams
 from pilotage.core.types import Goal, Pose2
+from pilotage.experiments.certain import exactly
 from pilotage.experiments.components import build_component, optional_component
 from pilotage.experiments.floor.driver import WatchedLocalizer, WatchedStack
 from pilotage.experiments.floor.obstacles import Obstacles, place_obstacles
-from pilotage.experiments.floor.oracles import Truth, exactly, with_oracles
+from pilotage.experiments.floor.oracles import Truth, with_oracles
 from pilotage.experiments.floor.places import settle_places
 from pilotage.experiments.floor.world_map import load_map
 from pilotage.experiments.ideal_sensors import ideal_sensors

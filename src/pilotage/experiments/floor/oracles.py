@@ -14,6 +14,7 @@ import numpy as np
 
 from pilotage.core.angles import wrap_to_pi
 from pilotage.core.types import FloatArray, Pose2, Twist
+from pilotage.experiments.certain import exactly
 from pilotage.experiments.floor.driver import WatchedLocalizer
 from pilotage.maps.distance_field import DistanceField
 from pilotage.maps.segment_map import SegmentMap
@@ -35,8 +36,6 @@ ORACLES: Mapping[str, str] = {
 }
 """What stands in for each module."""
 
-SURE_VAR = 1e-8
-"""Variance (m^2, rad^2) of a belief that is the truth: small, and still one that can be inverted."""
 SIDE_SPACING_M = 0.05
 SIDE_DISC_M = 0.03
 """Discs along an obstacle's sides, as the obstacle layer would put them there."""
@@ -82,11 +81,6 @@ def with_oracles(parts: Parts, names: frozenset[str], truth: Truth) -> Parts:
     if "controller" in names:
         parts = replace(parts, controller=TrueTracking(truth))
     return parts
-
-
-def exactly(pose: Pose2) -> Belief:
-    """The belief of who knows."""
-    return Belief(pose, SURE_VAR * np.eye(3))
 
 
 class TrueLocalizer:

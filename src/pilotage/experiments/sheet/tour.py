@@ -15,6 +15,7 @@ import numpy as np
 
 from pilotage.core.types import STANDSTILL, BoolArray, Event, FloatArray, IntArray, Pose2, WheelSpeeds
 from pilotage.evaluation.sheet_visits import VisitedCells
+from pilotage.experiments.certain import exactly
 from pilotage.maps.cell_map import CellMap, CellState
 from pilotage.sensors.readings import Readings
 from pilotage.stack.control.waypoint_drive import WaypointDrive
@@ -24,7 +25,6 @@ from pilotage.stack.knowledge import FloorPlan, SheetKnowledge
 from pilotage.stack.mapping.sheet_grid import SheetShape
 from pilotage.stack.planning.sheet_room import Point, SheetRoom
 
-SURE_VAR = 1e-8
 RESOLUTION_M = 0.018
 ROOM_M, WIDE_M = 0.006, 0.02
 OVERHANG_M, KEEP_OFF_M = 0.0, 0.006
@@ -70,7 +70,7 @@ class TourExplorer:
     @property
     def belief(self) -> Belief:
         """The true pose, almost certain."""
-        return Belief(self._pose(), SURE_VAR * np.eye(3))
+        return exactly(self._pose())
 
     @property
     def status(self) -> tuple[StackStatus, str]:

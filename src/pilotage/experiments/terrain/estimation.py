@@ -15,10 +15,11 @@ from pilotage.core.angles import wrap_to_pi
 from pilotage.core.errors import InputError
 from pilotage.core.random import RandomStreams
 from pilotage.core.types import FloatArray, IntArray, Pose2
+from pilotage.experiments.certain import exactly
 from pilotage.experiments.components import build_component
 from pilotage.experiments.ideal_sensors import ideal
 from pilotage.experiments.terrain.ground import Ground
-from pilotage.experiments.terrain.oracles import exactly, true_estimate
+from pilotage.experiments.terrain.oracles import true_estimate
 from pilotage.maps.landmarks import Landmarks
 from pilotage.missions.terrain import TerrainMission
 from pilotage.sensors.beacon import BeaconConfig
@@ -66,7 +67,8 @@ def estimate(mission: TerrainMission, ground: Ground, truth: FloatArray) -> Esti
         log = _silent_log(truth, odometer, seer, landmarks, log.variances)
     initial = _initial(mission, truth[0], streams)
     if oracles & {"initial", "estimator"}:
-        initial = exactly(truth[0])
+        x, y, theta = truth[0].tolist()
+        initial = exactly(Pose2(x, y, wrap_to_pi(theta)))
     estimator = build_component(ESTIMATORS, choice, "estimator")
     if "estimator" in oracles:
         found = true_estimate(truth, log)

@@ -16,11 +16,11 @@ import numpy as np
 
 from pilotage.core.angles import wrap_array_to_pi
 from pilotage.core.types import FloatArray, Pose2
+from pilotage.experiments.certain import SURE_VAR
 from pilotage.experiments.terrain.ground import Ground
 from pilotage.maps.occupancy_grid import near_blocked
 from pilotage.missions.terrain import TerrainMission
 from pilotage.sensors.landmark_log import LandmarkLog
-from pilotage.stack.interface import Belief
 from pilotage.stack.localization.rover_estimators import LogEstimate
 from pilotage.stack.planning.clear_spline import clear_spline
 from pilotage.stack.planning.grid_planner import GRID_PLANNERS, GridPlanner, GridRequest, GridResult
@@ -37,8 +37,6 @@ ORACLES: Mapping[str, str] = {
 """What stands in for each module."""
 
 ANY_ANGLE = "theta-star"
-SURE_VAR = 1e-8
-"""Variance (m^2, rad^2) of what is known: small, and still one that can be inverted."""
 HEADING_CELLS, KNOT_CELLS = 2.0, 10.0
 """How far the shortest way runs along the heading at either end, and how far its curve's knots are apart."""
 
@@ -73,12 +71,6 @@ class KnowingPlanner:
             return replace(own, planning_time_s=took)
         shorter = other.path.length_cells < own.path.length_cells
         return replace(other if shorter else own, planning_time_s=took)
-
-
-def exactly(pose: FloatArray) -> Belief:
-    """The belief of who knows a pose (3,)."""
-    x, y, theta = pose.tolist()
-    return Belief(Pose2(x, y, float(wrap_array_to_pi(np.array([theta]))[0])), SURE_VAR * np.eye(3))
 
 
 def true_estimate(truth: FloatArray, log: LandmarkLog) -> LogEstimate:

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 
 import numpy as np
 
-from pilotage.core.chi_square import chi_square_quantile
 from pilotage.core.types import FloatArray, IntArray
-from pilotage.report.event_kinds import event_kind
 from pilotage.report.modes import MODES
+from pilotage.report.replay.common import Column, position_error, scene_events
 from pilotage.report.replay.scene import (
     Circles,
     Lines,
@@ -19,15 +17,12 @@ from pilotage.report.replay.scene import (
     PoseTrack,
     ReplayScene,
     ScanTrack,
-    SceneEvent,
     Series,
     SightTrack,
     States,
 )
 from pilotage.report.run_data import RunData
 from pilotage.report.style import BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILLION
-
-Column = Callable[[str], FloatArray]
 
 MOST_FRAMES = 20_000
 """A longer run is thinned; a page must stay one that can be sent by mail."""
@@ -75,11 +70,7 @@ def floor_scene(run: RunData) -> ReplayScene | None:
         sights=_sights(run, frames, 0),
         states=_states(column),
         series=_series(column),
-        events=tuple(
-            SceneEvent(e.t_s, event_kind(e.kind).name, e.text, event_kind(e.kind).colour)
-            for e in run.events
-            if math.isfinite(e.t_s)
-        ),
+        events=scene_events(run),
         breaks=_breaks(run, t_s[frames]),
         note=" ".join(part for part in note if part),
     )
@@ -204,13 +195,8 @@ def _states(column: Column) -> States | None:
 
 
 def _series(column: Column) -> tuple[Series, ...]:
-    error = np.hypot(column("est_x_m") - column("true_x_m"), column("est_y_m") - column("true_y_m"))
-    xx, xy, yy = column("cov_xx_m2"), column("cov_xy_m2"), column("cov_yy_m2")
-    # Larger eigenvalue of the position's covariance: the long half axis of the ellipse on the map.
-    largest = 0.5 * (xx + yy) + np.sqrt(0.25 * (xx - yy) ** 2 + xy**2)
-    half_axis = np.sqrt(np.maximum(largest, 0.0) * chi_square_quantile(0.95, 2))
     series = [
-        Series("position error", "m", error, BLUE, band=half_axis, band_name="95 % half axis"),
+        position_error(column),
         Series(
             "speed",
             "m/s",

@@ -7,16 +7,14 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from pilotage.core.chi_square import chi_square_quantile
 from pilotage.core.types import FloatArray, IntArray
-from pilotage.report.event_kinds import event_kind
+from pilotage.report.replay.common import position_error, scene_events
 from pilotage.report.replay.scene import (
     Marks,
     PathTrack,
     PoseTrack,
     Raster,
     ReplayScene,
-    SceneEvent,
     Series,
     SightTrack,
 )
@@ -60,11 +58,7 @@ def terrain_scene(run: RunData) -> ReplayScene | None:
         poses=_poses(run, frames),
         sights=() if pictures is None else _sights(pictures, frames, trace.steps),
         series=_series(run, frames),
-        events=tuple(
-            SceneEvent(e.t_s, event_kind(e.kind).name, e.text, event_kind(e.kind).colour)
-            for e in run.events
-            if math.isfinite(e.t_s)
-        ),
+        events=scene_events(run),
         note=f"{note} One step in {stride} is shown.".strip() if stride > 1 else note,
         follow_m=max(FOLLOW_SHARE * width_m, FOLLOW_LEAST_M),
     )
@@ -226,13 +220,8 @@ def _series(run: RunData, frames: IntArray) -> tuple[Series, ...]:
     def column(name: str) -> FloatArray:
         return trace[name][frames]
 
-    error = np.hypot(column("est_x_m") - column("true_x_m"), column("est_y_m") - column("true_y_m"))
-    xx, xy, yy = column("cov_xx_m2"), column("cov_xy_m2"), column("cov_yy_m2")
-    # Larger eigenvalue of the position's covariance: the long half axis of the ellipse on the map.
-    largest = 0.5 * (xx + yy) + np.sqrt(0.25 * (xx - yy) ** 2 + xy**2)
-    half_axis = np.sqrt(np.maximum(largest, 0.0) * chi_square_quantile(0.95, 2))
     estimated = trace.has("est_x_m", "est_y_m")
-    series = [Series("position error", "m", error, BLUE, band=half_axis, band_name="95 % half axis")]
+    series = [position_error(column)]
     if estimated:
         series.append(Series("landmarks in sight", "", column("landmarks_seen"), GREEN))
     else:
