@@ -18,7 +18,7 @@ import numpy as np
 
 from pilotage.core.angles import wrap_to_pi
 from pilotage.core.types import FloatArray
-from pilotage.kernels import ekf
+from pilotage.kernels.filters import ekf
 
 LANDMARKS = np.array([[8.0, 0.0], [0.0, 9.0], [-7.0, -2.0], [3.0, -8.0], [10.0, 10.0]])
 R = np.diag([3.4665e-4, 1.1771e-4])

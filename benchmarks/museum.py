@@ -16,7 +16,7 @@ from pilotage.core.types import STOP, FloatArray, Goal, Pose2
 from pilotage.experiments.floor.build import build
 from pilotage.experiments.floor.mission import load_floor_mission
 from pilotage.experiments.floor.world_map import load_map
-from pilotage.kernels import geometry
+from pilotage.kernels.geometry import plane
 from pilotage.maps.distance_field import DistanceField
 from pilotage.maps.map_file import LandmarkMap
 from pilotage.missions.floor import FloorMission
@@ -136,7 +136,7 @@ class Museum:
         at = np.linspace(0.0, s[-1], int(np.ceil(s[-1] / CHECK_STEP_M)) + 1)
         points = np.column_stack([np.interp(at, s, points_xy_m[:, k]) for k in range(2)])
         walls = self.floor.walls
-        return float(geometry.least_distance(points, walls.segments_m, walls.circles_m))
+        return float(plane.least_distance(points, walls.segments_m, walls.circles_m))
 
     # Planning
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from pilotage.core.types import FloatArray, Pose2
 from pilotage.experiments.floor.world_map import load_map
-from pilotage.kernels import scan
+from pilotage.kernels.scans import rays
 from pilotage.sensors.lidar import LidarConfig
 from pilotage.stack.localization.wall_matching import WallMatcher, WallMatchingConfig
 from pilotage.stack.perception.clusters import linkage_clusters, window_clusters
@@ -35,7 +35,7 @@ def scans() -> list[tuple[Pose2, FloatArray]]:
         x, y, theta = (float(value) for value in rng.uniform([0.5, 0.5, -3.1], [39.5, 24.5, 3.1]))
         if world.distance_m(x, y) < 0.45:
             continue
-        exact = scan.fan_ranges(
+        exact = rays.fan_ranges(
             x,
             y,
             theta + first,
@@ -45,7 +45,7 @@ def scans() -> list[tuple[Pose2, FloatArray]]:
             world.segments_m,
             world.circles_m,
         )
-        noisy = scan.add_range_noise(exact, rng.standard_normal(LIDAR.beams), std, LIDAR.max_range_m)
+        noisy = rays.add_range_noise(exact, rng.standard_normal(LIDAR.beams), std, LIDAR.max_range_m)
         made.append((Pose2(x, y, theta), noisy))
     return made
 

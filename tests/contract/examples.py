@@ -15,7 +15,7 @@ from pilotage.core.angles import wrap_to_pi
 from pilotage.core.errors import InputError
 from pilotage.core.random import RandomStreams
 from pilotage.core.types import Goal, Pose2, Twist
-from pilotage.kernels import geometry
+from pilotage.kernels.geometry import plane
 from pilotage.maps.distance_field import DistanceField
 from pilotage.missions.floor import BodyConfig, MotionConfig
 from pilotage.sensors.readings import Readings, UltrasonicReading
@@ -121,7 +121,7 @@ def assert_valid(path: Path, goal: Goal) -> None:
     """Starts at the start, ends at the goal, keeps its clearance, has its waypoints on it."""
     assert np.allclose(path.states[0, :2], [START.x_m, START.y_m], atol=1e-6)
     assert np.allclose(path.states[-1, :2], [goal.x_m, goal.y_m], atol=1e-6)
-    assert geometry.least_distance(np.ascontiguousarray(path.states[:, :2]), ROOM.segments_m, NO_CIRCLES) >= (
+    assert plane.least_distance(np.ascontiguousarray(path.states[:, :2]), ROOM.segments_m, NO_CIRCLES) >= (
         0.4 - 1e-6
     )
     assert np.hypot(*np.diff(path.states[:, :2], axis=0).T).max() <= 0.05 + 1e-9

@@ -8,8 +8,8 @@ import math
 import numpy as np
 
 from pilotage.core.types import FloatArray, Goal, Pose2
-from pilotage.kernels import dubins
-from pilotage.kernels.geometry import distances_to_nearest
+from pilotage.kernels.geometry.plane import distances_to_nearest
+from pilotage.kernels.rrt import dubins
 from pilotage.maps.distance_field import DistanceField
 from pilotage.maps.segment_map import SegmentMap
 from pilotage.stack.planning.planner import Path, PlanRequest

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from pilotage.core.types import FloatArray, Pose2
-from pilotage.kernels import scan
+from pilotage.kernels.scans import rays
 from pilotage.maps.segment_map import SegmentMap
 from pilotage.sensors.lidar import LidarConfig
 from pilotage.stack.perception.lines import LineExtractionConfig, LineExtractor
@@ -21,7 +21,7 @@ def scan_of(
 ) -> FloatArray:
     """Ranges seen from ``pose``; without a generator, without noise."""
     first = pose.theta_rad + float(lidar.beam_angles_rad()[0])
-    ranges = scan.fan_ranges(
+    ranges = rays.fan_ranges(
         pose.x_m,
         pose.y_m,
         first,
@@ -34,7 +34,7 @@ def scan_of(
     if rng is None:
         return ranges
     normals = rng.standard_normal(lidar.beams)
-    return scan.add_range_noise(ranges, normals, math.sqrt(lidar.range_var_m2), lidar.max_range_m)
+    return rays.add_range_noise(ranges, normals, math.sqrt(lidar.range_var_m2), lidar.max_range_m)
 
 
 def extractor(seed: int = 0, lidar: LidarConfig = LIDAR, **changes: float) -> LineExtractor:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pilotage.kernels import arrow_solve
+from pilotage.kernels.filters import arrow_solve
 
 
 def _arrow(blocks: int, shared: int, seed: int) -> tuple[np.ndarray, ...]:

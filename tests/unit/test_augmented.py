@@ -14,7 +14,7 @@ from pilotage.core.types import FloatArray
 from pilotage.evaluation.run_metrics import poses
 from pilotage.experiments.floor.mission import load_floor_mission
 from pilotage.experiments.floor.simulate import simulate
-from pilotage.kernels import augmented, sighting
+from pilotage.kernels.filters import augmented, sighting
 
 NONE = np.zeros(4)
 MOUNT = np.array([0.1, -0.05, 0.3])

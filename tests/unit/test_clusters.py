@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from pilotage.core.types import Pose2
 from pilotage.experiments.floor.world_map import load_map
-from pilotage.kernels.clustering import beam_directions
+from pilotage.kernels.lines.clustering import beam_directions
 from pilotage.sensors.lidar import LidarConfig
 from pilotage.stack.perception.clusters import DROPPED, linkage_clusters, window_clusters
 from support.walls import scan_of

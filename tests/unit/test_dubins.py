@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pilotage.kernels import dubins
+from pilotage.kernels.rrt import dubins
 
 coordinate = st.floats(-8.0, 8.0)
 angle = st.floats(-7.0, 7.0)

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from pilotage.core.angles import wrap_to_pi
 from pilotage.core.chi_square import chi_square_cdf, chi_square_quantile, gated_mean
 from pilotage.core.types import FloatArray, Pose2
-from pilotage.kernels import ekf, sighting
+from pilotage.kernels.filters import ekf, sighting
 from pilotage.models.odometry import OdometryModel, move_jacobians
 from pilotage.models.range_bearing import range_bearing
 

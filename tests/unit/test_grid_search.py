@@ -17,7 +17,10 @@ from scipy import ndimage
 
 from pilotage.core.errors import InputError
 from pilotage.core.types import BoolArray, FloatArray
-from pilotage.kernels import grid_components, grid_distance, grid_moves, grid_search
+from pilotage.kernels.grids import components as grid_components
+from pilotage.kernels.grids import distance as grid_distance
+from pilotage.kernels.grids import moves as grid_moves
+from pilotage.kernels.grids import search as grid_search
 from pilotage.stack.planning.grid_space import Cell, GridPath, GridSpace, Search
 
 SHAPES = array_shapes(min_dims=2, max_dims=2, min_side=1, max_side=14)

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from pilotage.core.angles import wrap_to_pi
 from pilotage.core.errors import InputError
 from pilotage.core.types import FloatArray
-from pilotage.kernels import heading
+from pilotage.kernels.filters import heading
 from pilotage.stack.localization.gyro_bias import GyroBiasConfig, GyroBiasFilter
 from pilotage.stack.localization.heading_filter import HeadingErrors, HeadingEstimate
 from pilotage.stack.localization.heading_report import (

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from pilotage.kernels import line_landmarks
+from pilotage.kernels.lines import landmarks as line_landmarks
 from pilotage.maps.cell_map import CellMap, CellState
 from pilotage.stack.exploration.sheet_features import enclosed
 from pilotage.stack.localization.line_crossings import CrossingDetector

@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 
 from pilotage.core.angles import wrap_array_to_pi, wrap_to_pi
 from pilotage.core.types import FloatArray, Pose2
-from pilotage.kernels.clustering import beam_directions
-from pilotage.kernels.line_fit import fit_line, is_straight, line_covariance
+from pilotage.kernels.lines.clustering import beam_directions
+from pilotage.kernels.lines.fit import fit_line, is_straight, line_covariance
 from pilotage.maps.segment_map import SegmentMap, box_segments
 from support.walls import RANGE_VAR_M2, extractor, scan_of
 

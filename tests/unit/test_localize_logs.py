@@ -16,7 +16,7 @@ from pilotage.cli.localize import localize
 from pilotage.core.errors import InputError
 from pilotage.core.types import FloatArray
 from pilotage.experiments.recordings.localize import localize_log
-from pilotage.kernels import slow_errors
+from pilotage.kernels.filters import slow_errors
 from pilotage.logs.aer1513 import read_aer1513
 from pilotage.report import write_report
 from support.laser_drives import laser_drive

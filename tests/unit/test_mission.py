@@ -22,7 +22,7 @@ from pilotage.experiments.floor.world_map import load_map
 from pilotage.experiments.mission import load_mission, shipped_missions
 from pilotage.experiments.resolve import resolved_yaml
 from pilotage.experiments.values import apply_override, merge, parse_override
-from pilotage.kernels import geometry
+from pilotage.kernels.geometry import plane
 from pilotage.maps.map_file import MapFile
 from pilotage.missions.floor import AcrossPathObstacle, BoxObstacle, FloorMission, TrapObstacle
 from support.robots import ROOM
@@ -222,10 +222,10 @@ def test_drawn_obstacles_stand_on_the_path_free_of_walls_with_a_way_around(seed:
     start, goal = Pose2(12.0, 20.0, 0.0), Goal(37.0, 20.0)
     path = PATH[120:380]
     placed = place_obstacles([obstacle], walls, start, goal, path, 0.3, np.random.default_rng(seed))
-    on_path = [geometry.distance_to_nearest(x, y, placed.segments_m, geometry.NO_CIRCLES) for x, y, _ in path]
+    on_path = [plane.distance_to_nearest(x, y, placed.segments_m, plane.NO_CIRCLES) for x, y, _ in path]
     assert min(on_path) < 0.1
     for polygon in placed.polygons_m:
-        assert geometry.least_distance(polygon, walls.segments_m, walls.circles_m) > 0.0
+        assert plane.least_distance(polygon, walls.segments_m, walls.circles_m) > 0.0
     if kind == "trap":
         assert len(placed.polygons_m) == 3
         corners = np.concatenate(placed.polygons_m)

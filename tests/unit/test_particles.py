@@ -17,7 +17,7 @@ from pilotage.evaluation.run_metrics import poses
 from pilotage.experiments.floor.mission import load_floor_mission
 from pilotage.experiments.floor.simulate import simulate
 from pilotage.experiments.floor.world_map import load_map
-from pilotage.kernels import particles
+from pilotage.kernels.filters import particles
 from pilotage.maps.rasterize import rasterized
 from pilotage.maps.ros_map import RosMap, write_ros_map
 from pilotage.sensors.readings import LidarScan, Readings

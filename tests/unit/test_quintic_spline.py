@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from pilotage.core.errors import InputError
 from pilotage.core.types import BoolArray, FloatArray, Pose2
-from pilotage.kernels.curve_clearance import distance_to_blocked
+from pilotage.kernels.grids.blocked_distance import distance_to_blocked
 from pilotage.maps.occupancy_grid import OccupancyGrid
 from pilotage.stack.planning.clear_spline import clear_spline, curve_clearance_m, path_knots
 from pilotage.stack.planning.grid_space import GridSpace

@@ -16,7 +16,9 @@ from pilotage.experiments.floor.mission import load_floor_mission
 from pilotage.experiments.floor.places import random_pose
 from pilotage.experiments.floor.world_map import load_map
 from pilotage.experiments.resolve import resolved_yaml
-from pilotage.kernels import geometry, viewpoints, wander
+from pilotage.kernels.geometry import plane
+from pilotage.kernels.lines import viewpoints
+from pilotage.kernels.scans import wander
 from pilotage.maps.distance_field import DistanceField
 from pilotage.maps.segment_map import SegmentMap, box_segments
 from pilotage.missions.floor import BodyConfig, MotionConfig
@@ -231,8 +233,6 @@ def test_random_places_are_connected_to_the_start() -> None:
     for _ in range(50):
         pose = random_pose(walled_off, PoseConfig(x_m=1.0, y_m=1.0), 0.5, rng)
         assert pose.x_m <= 4.5 + 1e-9
-        assert (
-            geometry.distance_to_nearest(pose.x_m, pose.y_m, walled_off.segments_m, np.zeros((0, 3))) >= 0.5
-        )
+        assert plane.distance_to_nearest(pose.x_m, pose.y_m, walled_off.segments_m, np.zeros((0, 3))) >= 0.5
     with pytest.raises(InputError, match="nearest wall"):
         random_pose(walled_off, PoseConfig(x_m=0.1, y_m=1.0), 0.5, rng)

@@ -9,8 +9,11 @@ import numpy as np
 import pytest
 
 from pilotage.core.errors import InputError
-from pilotage.kernels import dubins, rrt_samples, rrt_star, rrt_tree
-from pilotage.kernels.clearance import least_step
+from pilotage.kernels.rrt import dubins
+from pilotage.kernels.rrt import samples as rrt_samples
+from pilotage.kernels.rrt import star as rrt_star
+from pilotage.kernels.rrt import tree as rrt_tree
+from pilotage.kernels.rrt.clearance import least_step
 from pilotage.maps.distance_field import DistanceField
 from pilotage.stack.planning.driving_space import space_for
 from pilotage.stack.planning.planner import PlanRequest, PlanResult, PlanStatus

@@ -10,7 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from pilotage.core.types import FloatArray
-from pilotage.kernels import geometry, scan
+from pilotage.kernels.geometry import plane
+from pilotage.kernels.scans import rays
 
 NO_CIRCLES = np.zeros((0, 3))
 coordinate = st.floats(-9.0, 9.0).map(lambda v: round(v, 3))
@@ -23,7 +24,7 @@ def scenes(draw: st.DrawFn) -> tuple[FloatArray, FloatArray]:
     circles = draw(st.lists(st.tuples(coordinate, coordinate, st.floats(0.1, 1.5)), max_size=4))
     walls = np.array(segments, dtype=float).reshape(-1, 4)
     discs = np.array(circles, dtype=float).reshape(-1, 3)
-    away = [geometry.point_segment_distance(0.0, 0.0, *wall) > 0.05 for wall in walls]
+    away = [plane.point_segment_distance(0.0, 0.0, *wall) > 0.05 for wall in walls]
     return walls[np.array(away, dtype=bool)], discs[np.hypot(discs[:, 0], discs[:, 1]) > discs[:, 2] + 0.3]
 
 
@@ -57,7 +58,7 @@ def test_fan_equals_brute_force(
 ) -> None:
     walls, discs = scene
     beams, step = fan
-    ranges = scan.fan_ranges(0.0, 0.0, first, step, beams, 12.0, walls, discs)
+    ranges = rays.fan_ranges(0.0, 0.0, first, step, beams, 12.0, walls, discs)
     for k in range(0, beams, max(1, beams // 60)):
         expected = brute_force(first + k * step, 12.0, walls, discs)
         # A beam within rounding of a wall's end may see it or not: both neighbours then tell.
@@ -68,15 +69,15 @@ def test_fan_equals_brute_force(
 
 def test_fan_of_a_full_circle_sees_all_four_walls() -> None:
     room = np.array([[-2, -3, 2, -3], [2, -3, 2, 3], [2, 3, -2, 3], [-2, 3, -2, -3]], dtype=float)
-    ranges = scan.fan_ranges(0.0, 0.0, 0.0, math.pi / 2, 4, 20.0, room, NO_CIRCLES)
+    ranges = rays.fan_ranges(0.0, 0.0, 0.0, math.pi / 2, 4, 20.0, room, NO_CIRCLES)
     assert ranges == pytest.approx([2.0, 3.0, 2.0, 3.0])
 
 
 def test_fan_beyond_reach_reads_the_reach() -> None:
     wall = np.array([[5.0, -1.0, 5.0, 1.0]])
-    ranges = scan.fan_ranges(0.0, 0.0, -0.1, 0.1, 3, 4.0, wall, NO_CIRCLES)
+    ranges = rays.fan_ranges(0.0, 0.0, -0.1, 0.1, 3, 4.0, wall, NO_CIRCLES)
     assert (ranges == 4.0).all()
-    noisy = scan.add_range_noise(ranges, np.ones(3), 0.5, 4.0)
+    noisy = rays.add_range_noise(ranges, np.ones(3), 0.5, 4.0)
     assert (noisy == 4.0).all()
 
 
@@ -86,7 +87,7 @@ def test_cone_reads_the_nearest_point_inside_it(
     scene: tuple[FloatArray, FloatArray], theta: float, half: float
 ) -> None:
     walls, discs = scene
-    nearest = min(scan.cone_range(0.0, 0.0, theta, half, walls, discs), 100.0)
+    nearest = min(rays.cone_range(0.0, 0.0, theta, half, walls, discs), 100.0)
     beams = [brute_force(theta + half * u, 100.0, walls, discs) for u in np.linspace(-1, 1, 801)]
     least = min(beams)
     # The reference samples the cone: it can only miss what lies between two of its beams or edge-on.
@@ -98,9 +99,9 @@ def test_cone_reads_the_nearest_point_inside_it(
 def test_cone_sees_a_wall_end_inside_and_not_outside() -> None:
     wall = np.array([[2.0, 0.3, 2.0, 5.0]])
     half = math.radians(5.0)
-    assert scan.cone_range(0.0, 0.0, 0.0, half, wall, NO_CIRCLES) == math.inf
+    assert rays.cone_range(0.0, 0.0, 0.0, half, wall, NO_CIRCLES) == math.inf
     looking_up = math.atan2(0.3, 2.0)
-    assert scan.cone_range(0.0, 0.0, looking_up, half, wall, NO_CIRCLES) == pytest.approx(
+    assert rays.cone_range(0.0, 0.0, looking_up, half, wall, NO_CIRCLES) == pytest.approx(
         math.hypot(2.0, 0.3), abs=1e-9
     )
 
@@ -110,7 +111,7 @@ def test_walls_hide_beacons_but_not_those_on_them() -> None:
     points = np.array([[2.0, 0.0], [1.0, 0.5], [0.95, 0.0], [-1.0, 0.0]])
     ranges, bearings = np.empty(4), np.empty(4)
     index = np.empty(4, dtype=np.int64)
-    seen = scan.visible_points(
+    seen = rays.visible_points(
         0.0, 0.0, 0.0, 0.75 * math.pi, 20.0, points, wall, NO_CIRCLES, ranges, bearings, index
     )
     assert index[:seen].tolist() == [1, 2]  # behind the wall hidden, behind the robot out of view
@@ -124,9 +125,7 @@ def test_distance_is_one_lipschitz(scene: tuple[FloatArray, FloatArray], x: floa
     walls, discs = scene
     if walls.shape[0] + discs.shape[0] == 0:
         return
-    here = geometry.distance_to_nearest(x, y, walls, discs)
+    here = plane.distance_to_nearest(x, y, walls, discs)
     for angle in np.linspace(0.0, 2 * math.pi, 9):
-        there = geometry.distance_to_nearest(
-            x + 0.1 * math.cos(angle), y + 0.1 * math.sin(angle), walls, discs
-        )
+        there = plane.distance_to_nearest(x + 0.1 * math.cos(angle), y + 0.1 * math.sin(angle), walls, discs)
         assert abs(there - here) <= 0.1 + 1e-12

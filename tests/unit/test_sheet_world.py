@@ -13,7 +13,8 @@ from hypothesis import strategies as st
 from pilotage.core.errors import InputError
 from pilotage.core.random import RandomStreams
 from pilotage.core.types import Pose2, WheelSpeeds
-from pilotage.kernels import boxes, wheel_drive
+from pilotage.kernels.bodies import wheel_drive
+from pilotage.kernels.geometry import boxes
 from pilotage.maps.true_cells import SheetFile
 from pilotage.missions.sheet import DriveErrorsConfig, WheelDriveConfig
 from pilotage.sensors.gyroscope import GyroscopeConfig

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from pilotage.core.types import FloatArray
 from pilotage.evaluation.shortest_path import shortest_path
-from pilotage.kernels import dubins
+from pilotage.kernels.rrt import dubins
 from pilotage.maps.segment_map import SegmentMap
 from pilotage.stack.planning.planner import Path, PlanRequest
 from pilotage.stack.planning.rrt_star_dubins import RrtStarDubinsConfig, RrtStarDubinsPlanner

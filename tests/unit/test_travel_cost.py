@@ -8,7 +8,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from pilotage.kernels.travel_cost import travel_costs
+from pilotage.kernels.grids.travel_cost import travel_costs
 from pilotage.stack.planning.grid_space import GridSpace
 
 

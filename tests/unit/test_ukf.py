@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 from scipy.optimize import least_squares
 
 from pilotage.core.types import FloatArray
-from pilotage.kernels import ekf, iekf, sighting, ukf
-from pilotage.kernels.motion import exact_arc
+from pilotage.kernels.filters import ekf, iekf, sighting, ukf
+from pilotage.kernels.geometry.motion import exact_arc
 from unit.test_ekf import MOUNT, R, spd
 
 IDS = np.array([3])

@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from pilotage.core.angles import wrap_to_pi
 from pilotage.core.types import FloatArray, Pose2
 from pilotage.experiments.floor.world_map import load_map
-from pilotage.kernels import joint_association
-from pilotage.kernels.wall_line import innovation_distance
+from pilotage.kernels.filters.wall_line import innovation_distance
+from pilotage.kernels.lines import joint_association
 from pilotage.maps.segment_map import SegmentMap, box_segments
 from pilotage.maps.wall_lines import WallLines, normal_form
 from pilotage.models.wall_line import wall_line

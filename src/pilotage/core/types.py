@@ -3,14 +3,23 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
-FloatArray: TypeAlias = NDArray[np.float64]
-IntArray: TypeAlias = NDArray[np.int64]
-BoolArray: TypeAlias = NDArray[np.bool_]
+from pilotage.kernels.arrays import BoolArray, FloatArray, IntArray
+
+__all__ = [
+    "STANDSTILL",
+    "STOP",
+    "BoolArray",
+    "Event",
+    "FloatArray",
+    "Goal",
+    "IntArray",
+    "Pose2",
+    "Twist",
+    "WheelSpeeds",
+]
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from pilotage.core.types import FloatArray
-from pilotage.kernels import scan
+from pilotage.kernels.scans import rays
 from pilotage.maps.segment_map import SegmentMap
 
 HALL_WIDTH_M = 2.0
@@ -31,7 +31,7 @@ def hall_offset_m(truth: FloatArray, walls: SegmentMap) -> float | None:
     for x, y, theta in truth[::-1]:
         sides: list[tuple[float, float]] = []
         for spread in (-SPREAD_RAD, 0.0, SPREAD_RAD):
-            right, left = scan.fan_ranges(
+            right, left = rays.fan_ranges(
                 x,
                 y,
                 theta + spread - math.pi / 2,

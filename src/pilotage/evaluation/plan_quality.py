@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from pilotage.core.types import FloatArray
-from pilotage.kernels import geometry
+from pilotage.kernels.geometry import plane
 from pilotage.maps.segment_map import SegmentMap
 
 CHECK_M = 0.01
@@ -40,4 +40,4 @@ def clearance_m(states: FloatArray, walls: SegmentMap, body_radius_m: float) -> 
     at = np.linspace(0.0, float(s[-1]), count)
     fine = np.column_stack([np.interp(at, s, points[:, 0]), np.interp(at, s, points[:, 1])])
     both = np.ascontiguousarray(np.vstack([fine, points]))
-    return float(geometry.least_distance(both, walls.segments_m, walls.circles_m)) - body_radius_m
+    return float(plane.least_distance(both, walls.segments_m, walls.circles_m)) - body_radius_m

@@ -12,8 +12,8 @@ from scipy.sparse.csgraph import dijkstra
 
 from pilotage.core.errors import InputError
 from pilotage.core.types import FloatArray, IntArray
-from pilotage.kernels import tangent_graph
-from pilotage.kernels.geometry import distance_to_nearest
+from pilotage.kernels.geometry.plane import distance_to_nearest
+from pilotage.kernels.rrt import tangent_graph
 from pilotage.maps.segment_map import SegmentMap
 
 ARC_SPACING_M = 0.02

@@ -1,15 +1,17 @@
 """The ``kernel`` decorator: compiled on first call, cached on disk, safe against stale callees.
 
-numba's own cache does not notice an edited callee in another module, so the cache folder is keyed to
-a digest of all kernel sources and of the numba and numpy versions.
+numba's own cache does not notice an edited callee in another module, so each kernel module's cache folder is
+keyed to a digest of its source, of all kernel modules that it imports, and of the numba and numpy versions.
 """
 
 from __future__ import annotations
 
 import hashlib
 import os
+import re
 import tempfile
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
@@ -27,12 +29,33 @@ trailing_zeros = cast(Callable[[np.uint64], int], _bits.trailing_zeros)
 """How many bits of a word, not 0, are 0 before the highest and after the lowest one set: one instruction."""
 
 
-def _digest() -> str:
-    """Digest of every kernel source and of the versions that compile them."""
+_ROOT = Path(__file__).parent
+_IMPORTS = re.compile(r"^from pilotage\.kernels(?:\.([\w.]+))? import ([^\n(]+|\([^)]*\))", re.MULTILINE)
+
+
+def _imported(path: Path) -> set[Path]:
+    """The kernel modules that a kernel module names in its imports."""
+    found: set[Path] = set()
+    for package, names in _IMPORTS.findall(path.read_text(encoding="utf-8")):
+        place = _ROOT.joinpath(*package.split(".")) if package else _ROOT
+        modules = [place.with_suffix(".py")]
+        modules += [place / f"{name.split(' as ')[0].strip()}.py" for name in names.strip("()").split(",")]
+        found.update(module for module in modules if module.is_file())
+    return found
+
+
+@cache
+def _digest(path: Path) -> str:
+    """Digest of a kernel module with all that it calls, and of the versions that compile them."""
+    sources, open_paths = {path}, [path]
+    while open_paths:
+        new = _imported(open_paths.pop()) - sources
+        sources |= new
+        open_paths += new
     sha = hashlib.sha256(f"{numba.__version__} {np.__version__}".encode())
-    for path in sorted(Path(__file__).parent.glob("*.py")):
-        sha.update(path.name.encode())
-        sha.update(path.read_bytes())
+    for source in sorted(sources):
+        sha.update(source.name.encode())
+        sha.update(source.read_bytes())
     return sha.hexdigest()[:16]
 
 
@@ -48,7 +71,7 @@ def _cache_folder() -> Path:
     candidates += [Path(folder) / "pilotage" for folder in (xdg, home) if folder]
     candidates.append(Path(tempfile.gettempdir()) / f"pilotage-{os.getuid() if hasattr(os, 'getuid') else 0}")
     for base in candidates:
-        folder = base / f"kernels-{_digest()}"
+        folder = base / "kernels"
         try:
             folder.mkdir(parents=True, exist_ok=True)
             if os.access(folder, os.W_OK):
@@ -59,15 +82,24 @@ def _cache_folder() -> Path:
 
 
 _CACHE = _cache_folder()
-# numba takes the folder when a function is decorated, so this has to come first.
-setattr(numba.config, "CACHE_DIR", str(_CACHE))  # noqa: B010 - numba's stub lacks the name
+
+
+def _folder_of(path: Path) -> Path:
+    """Where the compiled code of one kernel module is kept."""
+    return _CACHE / f"{path.stem}-{_digest(path)}"
 
 
 def cache_is_cold() -> bool:
-    """Whether no kernel has been compiled yet: the first run will take its time."""
-    return next(_CACHE.rglob("*.nbi"), None) is None
+    """Whether nothing has been compiled yet: the first run will take its time.
+
+    Told by the plane geometry, which every run needs.
+    """
+    return next(_folder_of(_ROOT / "geometry" / "plane.py").rglob("*.nbi"), None) is None
 
 
 def kernel(function: F) -> F:
     """Compile ``function`` with numba: cached, no fast-math, no parallel threads, errors as in numpy."""
+    # numba takes the cache's folder when a function is decorated.
+    folder = _folder_of(Path(function.__code__.co_filename))
+    setattr(numba.config, "CACHE_DIR", str(folder))  # noqa: B010 - numba's stub lacks the name
     return cast(F, numba.njit(cache=True, error_model="numpy")(function))

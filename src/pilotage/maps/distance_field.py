@@ -9,7 +9,7 @@ import numpy as np
 
 from pilotage.core.errors import InputError
 from pilotage.core.types import FloatArray
-from pilotage.kernels import field
+from pilotage.kernels.geometry import field
 from pilotage.maps.memory import require_memory
 from pilotage.maps.occupancy_grid import OccupancyGrid, squared_distances
 from pilotage.maps.segment_map import SegmentMap

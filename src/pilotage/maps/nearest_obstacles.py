@@ -11,7 +11,7 @@ from scipy.ndimage import distance_transform_edt
 
 from pilotage.core.errors import InputError
 from pilotage.core.types import FloatArray
-from pilotage.kernels import nearest
+from pilotage.kernels.geometry import nearest
 from pilotage.maps.memory import require_memory
 from pilotage.maps.occupancy_grid import OccupancyGrid
 from pilotage.maps.segment_map import SegmentMap

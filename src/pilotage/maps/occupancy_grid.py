@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from pilotage.core.errors import InputError
 from pilotage.core.types import BoolArray, FloatArray, IntArray, Pose2
-from pilotage.kernels import grid_distance
+from pilotage.kernels.grids import distance as grid_distance
 from pilotage.maps.memory import require_memory
 
 OccupancyArray = NDArray[np.int8]

@@ -8,7 +8,7 @@ import numpy as np
 
 from pilotage.core.errors import InputError
 from pilotage.core.types import Pose2
-from pilotage.kernels import field
+from pilotage.kernels.geometry import field
 from pilotage.maps.memory import require_memory
 from pilotage.maps.occupancy_grid import OccupancyGrid
 from pilotage.maps.segment_map import SegmentMap

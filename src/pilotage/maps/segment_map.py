@@ -8,7 +8,7 @@ import numpy as np
 
 from pilotage.core.errors import InputError
 from pilotage.core.types import FloatArray
-from pilotage.kernels import geometry
+from pilotage.kernels.geometry import plane
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,7 +67,7 @@ class SegmentMap:
 
     def distance_m(self, x_m: float, y_m: float) -> float:
         """Exact distance from a point to the nearest wall or disc edge (negative inside a disc)."""
-        return float(geometry.distance_to_nearest(x_m, y_m, self.segments_m, self.circles_m))
+        return float(plane.distance_to_nearest(x_m, y_m, self.segments_m, self.circles_m))
 
     def contains(self, x_m: float, y_m: float) -> bool:
         """Whether a point lies within the bounds."""

@@ -7,7 +7,7 @@ from enum import StrEnum
 import numpy as np
 
 from pilotage.core.types import FloatArray, Pose2
-from pilotage.kernels import motion
+from pilotage.kernels.geometry import motion
 
 
 class OdometryModel(StrEnum):

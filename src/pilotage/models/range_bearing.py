@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from pilotage.core.types import FloatArray, Pose2
-from pilotage.kernels import sighting
+from pilotage.kernels.filters import sighting
 
 
 def range_bearing(pose: Pose2, landmark_xy_m: FloatArray, mount: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from pilotage.core.types import FloatArray, Pose2
-from pilotage.kernels import wall_line as kernels
+from pilotage.kernels.filters import wall_line as kernels
 
 
 def wall_line(

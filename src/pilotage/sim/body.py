@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from pilotage.core.types import Pose2, Twist
-from pilotage.kernels import disc, geometry
+from pilotage.kernels.bodies import disc
+from pilotage.kernels.geometry import plane
 from pilotage.maps.segment_map import SegmentMap
 from pilotage.missions.floor import BodyConfig, MotionConfig
 
@@ -25,7 +26,7 @@ class DifferentialDriveBody:
         self._circles = geometry_m.circles_m
         self._x, self._y, self._theta = start.x_m, start.y_m, start.theta_rad
         self.twist = Twist(0.0, 0.0)
-        distance = geometry.distance_to_nearest(self._x, self._y, self._segments, self._circles)
+        distance = plane.distance_to_nearest(self._x, self._y, self._segments, self._circles)
         self.clearance_m = float(distance) - self._radius_m
         self.collisions = 0
         self._touching = False
@@ -39,7 +40,7 @@ class DifferentialDriveBody:
         """Set the body down elsewhere, standing still; its wheels do not turn meanwhile."""
         self._x, self._y, self._theta = pose.x_m, pose.y_m, pose.theta_rad
         self.twist = Twist(0.0, 0.0)
-        distance = geometry.distance_to_nearest(self._x, self._y, self._segments, self._circles)
+        distance = plane.distance_to_nearest(self._x, self._y, self._segments, self._circles)
         self.clearance_m = float(distance) - self._radius_m
         self._touching = False
 

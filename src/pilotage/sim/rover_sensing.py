@@ -9,7 +9,7 @@ import numpy as np
 from pilotage.core.angles import wrap_array_to_pi
 from pilotage.core.random import RandomStreams
 from pilotage.core.types import FloatArray
-from pilotage.kernels import landmarks_in_reach
+from pilotage.kernels.scans import landmarks_in_reach
 from pilotage.maps.landmarks import Landmarks
 from pilotage.sensors.beacon import BeaconConfig
 from pilotage.sensors.landmark_log import LandmarkLog

@@ -10,7 +10,7 @@ from typing import Protocol
 import numpy as np
 
 from pilotage.core.types import FloatArray, Pose2
-from pilotage.kernels import scan
+from pilotage.kernels.scans import rays
 from pilotage.models.odometry import increment_variances
 from pilotage.sensors.beacon import BeaconConfig
 from pilotage.sensors.lidar import LidarConfig
@@ -118,7 +118,7 @@ class SimulatedLidar:
         """Scan from where the sensor is now."""
         c = self._config
         x, y, theta = _mounted(motion.pose, c.mount)
-        exact = scan.table_fan_ranges(
+        exact = rays.table_fan_ranges(
             x,
             y,
             theta + self._first,
@@ -130,7 +130,7 @@ class SimulatedLidar:
             self._circles,
         )
         normals = self._rng.standard_normal(c.beams)
-        return LidarScan(scan.add_range_noise(exact, normals, self._std, c.max_range_m))
+        return LidarScan(rays.add_range_noise(exact, normals, self._std, c.max_range_m))
 
 
 class SimulatedBeacons:
@@ -153,7 +153,7 @@ class SimulatedBeacons:
         """Measure every landmark in sight; draws do not depend on which are."""
         c = self._config
         x, y, theta = _mounted(motion.pose, c.mount)
-        count = scan.visible_points(
+        count = rays.visible_points(
             x,
             y,
             theta,
@@ -196,7 +196,7 @@ class SimulatedUltrasonic:
         """Measure; out of reach is flagged, below the least range reads as the least range."""
         c = self._config
         x, y, theta = _mounted(motion.pose, c.mount)
-        distance = scan.cone_range(x, y, theta, 0.5 * c.cone_rad, self._segments, self._circles)
+        distance = rays.cone_range(x, y, theta, 0.5 * c.cone_rad, self._segments, self._circles)
         if self._std > 0.0:
             distance += self._std * float(self._rng.standard_normal())
         if distance >= c.max_range_m:

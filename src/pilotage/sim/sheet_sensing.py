@@ -9,7 +9,7 @@ from typing import Protocol
 import numpy as np
 
 from pilotage.core.types import Pose2
-from pilotage.kernels import boxes
+from pilotage.kernels.geometry import boxes
 from pilotage.sensors.infrared import InfraredConfig
 from pilotage.sensors.line_sensor import LineSensorConfig
 from pilotage.sensors.magnetometer import MagnetometerConfig

@@ -12,7 +12,8 @@ from pilotage.core.angles import wrap_to_pi
 from pilotage.core.errors import InputError
 from pilotage.core.random import RandomStreams
 from pilotage.core.types import FloatArray, Pose2, WheelSpeeds
-from pilotage.kernels import boxes, wheel_drive
+from pilotage.kernels.bodies import wheel_drive
+from pilotage.kernels.geometry import boxes
 from pilotage.missions.sheet import DriveErrorsConfig, SheetBodyConfig, WheelDriveConfig
 from pilotage.sensors.gyroscope import GyroscopeConfig
 from pilotage.sensors.readings import EncoderCounts, GyroscopeRates, Reading, Readings

@@ -11,7 +11,7 @@ from scipy import ndimage
 
 from pilotage.core.errors import InputError
 from pilotage.core.types import FloatArray, Goal, Pose2
-from pilotage.kernels import geometry
+from pilotage.kernels.geometry import plane
 from pilotage.maps.distance_field import DistanceField
 from pilotage.maps.segment_map import SegmentMap, box_segments
 from pilotage.missions.floor import (
@@ -78,7 +78,7 @@ def place_obstacles(
         elif planned is not None and planned.shape[0] > 1:
             boxes = _draw_across(obstacle, world, placed, start, goal, planned, rng, where)
             placed = _with(placed, boxes, None)
-        clear = geometry.distance_to_nearest(start.x_m, start.y_m, placed.segments_m, placed.circles_m)
+        clear = plane.distance_to_nearest(start.x_m, start.y_m, placed.segments_m, placed.circles_m)
         if clear < body_radius_m:
             raise InputError(f"{where}: expected the start to be free, found the obstacle standing on it")
     return placed
@@ -167,7 +167,7 @@ def _trap(
 
 def _distance_to_hull(x: float, y: float, sides: FloatArray) -> float:
     """Distance to the nearest corner or side of an obstacle (its inside counts by its sides)."""
-    return float(geometry.distance_to_nearest(x, y, sides, geometry.NO_CIRCLES))
+    return float(plane.distance_to_nearest(x, y, sides, plane.NO_CIRCLES))
 
 
 def _free_of_walls(sides: FloatArray, world: SegmentMap) -> bool:
@@ -187,7 +187,7 @@ def _free_of_walls(sides: FloatArray, world: SegmentMap) -> bool:
     grid = np.stack(
         np.meshgrid(np.linspace(low[0], high[0], steps[0]), np.linspace(low[1], high[1], steps[1])), axis=-1
     ).reshape(-1, 2)
-    least = geometry.least_distance(np.ascontiguousarray(grid @ frame.T), world.segments_m, world.circles_m)
+    least = plane.least_distance(np.ascontiguousarray(grid @ frame.T), world.segments_m, world.circles_m)
     return bool(inside and least > 0.1)
 
 

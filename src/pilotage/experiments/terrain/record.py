@@ -17,7 +17,7 @@ from pilotage.experiments.terrain.estimation import Estimation, seen_per_step
 from pilotage.experiments.terrain.ground import Ground
 from pilotage.experiments.terrain.motion import Motion, goal_errors, hazard_contacts, way_m
 from pilotage.experiments.terrain.route import CLEARANCE_REACH_CELLS, Route
-from pilotage.kernels.curve_clearance import distance_to_blocked
+from pilotage.kernels.grids.blocked_distance import distance_to_blocked
 from pilotage.maps.occupancy_grid import OccupancyGrid, squared_distances
 from pilotage.missions.terrain import TerrainMission
 

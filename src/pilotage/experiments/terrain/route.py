@@ -14,7 +14,7 @@ from pilotage.evaluation.relief import relief
 from pilotage.experiments.grid_planning import free_cell
 from pilotage.experiments.terrain.ground import Ground
 from pilotage.experiments.terrain.oracles import KnowingPlanner
-from pilotage.kernels.curve_clearance import distance_to_blocked
+from pilotage.kernels.grids.blocked_distance import distance_to_blocked
 from pilotage.maps.memory import require_memory
 from pilotage.maps.occupancy_grid import near_blocked
 from pilotage.missions.terrain import CostMapConfig, TerrainMission

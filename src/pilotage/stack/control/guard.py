@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pilotage.core.config import Config
 from pilotage.core.types import FloatArray, Pose2, Twist
-from pilotage.kernels import local_path
+from pilotage.kernels.rrt import local_path
 from pilotage.sensors.sensor import NonNegative, Positive
 
 PIECES = 4

@@ -10,7 +10,8 @@ from pydantic import Field
 from pilotage.core.angles import wrap_array_to_pi
 from pilotage.core.config import Config
 from pilotage.core.types import STOP, FloatArray, Twist
-from pilotage.kernels import clustering, wander
+from pilotage.kernels.lines import clustering
+from pilotage.kernels.scans import wander
 from pilotage.sensors.lidar import LidarConfig
 from pilotage.sensors.readings import LidarScan, Readings
 from pilotage.sensors.sensor import NonNegative, Positive

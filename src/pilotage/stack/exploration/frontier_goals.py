@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pilotage.core.types import BoolArray, FloatArray, IntArray
-from pilotage.kernels import frontier_goal
+from pilotage.kernels.sheet import frontier_goal
 from pilotage.stack.exploration.frontier_config import FrontierConfig
 from pilotage.stack.exploration.frontier_ground import Ground
 from pilotage.stack.mapping.sheet_grid import SheetGrid

@@ -9,7 +9,7 @@ import numpy as np
 from pilotage.core.errors import InputError
 from pilotage.core.rows import Rows
 from pilotage.core.types import FloatArray
-from pilotage.kernels import sheet_space
+from pilotage.kernels.sheet import space as sheet_space
 from pilotage.sensors.gyroscope import GyroscopeConfig
 from pilotage.sensors.infrared import InfraredConfig
 from pilotage.sensors.line_sensor import LineSensorConfig

@@ -10,7 +10,7 @@ from pydantic import Field
 
 from pilotage.core.config import Config
 from pilotage.core.types import FloatArray
-from pilotage.kernels import augmented
+from pilotage.kernels.filters import augmented
 from pilotage.sensors.readings import Readings
 from pilotage.sensors.sensor import NonNegative
 from pilotage.sensors.wheel_odometry import WheelOdometryConfig

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pilotage.kernels import ekf
+from pilotage.kernels.filters import ekf
 from pilotage.stack.knowledge import Knowledge
 from pilotage.stack.localization.landmark_filter import LandmarkFilter, LandmarkFilterConfig
 from pilotage.stack.localization.localizer import LOCALIZERS

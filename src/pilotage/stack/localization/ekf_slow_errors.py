@@ -11,8 +11,8 @@ import numpy as np
 from pilotage.core.chi_square import chi_square_quantile, gated_mean
 from pilotage.core.errors import InputError
 from pilotage.core.types import FloatArray, Pose2
-from pilotage.kernels import slow_errors
-from pilotage.kernels.sighting import OUTCOME_ACCEPTED, OUTCOME_GATED, landmark_index
+from pilotage.kernels.filters import slow_errors
+from pilotage.kernels.filters.sighting import OUTCOME_ACCEPTED, OUTCOME_GATED, landmark_index
 from pilotage.models.odometry import OdometryModel
 from pilotage.sensors.beacon import BeaconConfig
 from pilotage.sensors.readings import BeaconReadings, OdometryIncrement, Readings

@@ -11,7 +11,9 @@ from pilotage.core.angles import wrap_to_pi
 from pilotage.core.chi_square import gated_mean
 from pilotage.core.config import Config
 from pilotage.core.types import FloatArray, Pose2
-from pilotage.kernels import clustering, ekf, infinite_lines
+from pilotage.kernels.filters import ekf
+from pilotage.kernels.lines import clustering
+from pilotage.kernels.lines import infinite as infinite_lines
 from pilotage.sensors.lidar import LidarConfig
 from pilotage.sensors.readings import LidarScan, OdometryIncrement, Readings
 from pilotage.sensors.sensor import NonNegative, Positive

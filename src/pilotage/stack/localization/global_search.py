@@ -11,7 +11,7 @@ from pydantic import Field
 from pilotage.core.angles import wrap_to_pi
 from pilotage.core.config import Config
 from pilotage.core.types import FloatArray
-from pilotage.kernels import pose_hypotheses
+from pilotage.kernels.lines import pose_hypotheses
 from pilotage.maps.segment_map import SegmentMap
 from pilotage.sensors.readings import OdometryIncrement
 from pilotage.sensors.sensor import NonNegative, Positive

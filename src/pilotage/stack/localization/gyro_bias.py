@@ -6,7 +6,7 @@ from pydantic import Field
 
 from pilotage.core.chi_square import chi_square_quantile
 from pilotage.core.config import Config
-from pilotage.kernels import heading
+from pilotage.kernels.filters import heading
 from pilotage.stack.localization.heading_account import ENCODERS_ALONE, GYRO_ALONE, HeadingAccount
 from pilotage.stack.localization.heading_filter import HEADING_FILTERS, HeadingErrors, HeadingEstimate
 

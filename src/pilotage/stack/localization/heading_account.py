@@ -11,7 +11,7 @@ import numpy as np
 
 from pilotage.core.angles import wrap_to_pi
 from pilotage.core.errors import InputError
-from pilotage.kernels import heading
+from pilotage.kernels.filters import heading
 from pilotage.stack.localization.heading_filter import HeadingErrors, HeadingEstimate
 
 GYRO_ALONE = (1.0, 0.0)

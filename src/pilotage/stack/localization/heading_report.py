@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pilotage.core.config import Config
-from pilotage.kernels import heading
+from pilotage.kernels.filters import heading
 from pilotage.sensors.sensor import NonNegative, Positive
 from pilotage.stack.localization.heading_account import ENCODERS_ALONE, GYRO_ALONE, HeadingAccount
 from pilotage.stack.localization.heading_filter import HEADING_FILTERS, HeadingErrors, HeadingEstimate

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pilotage.kernels import ekf, iekf
+from pilotage.kernels.filters import ekf, iekf
 from pilotage.stack.knowledge import Knowledge
 from pilotage.stack.localization.landmark_filter import LandmarkFilter, LandmarkFilterConfig
 from pilotage.stack.localization.localizer import LOCALIZERS

@@ -10,7 +10,7 @@ from pydantic import Field
 from pilotage.core.config import Config
 from pilotage.core.rows import doubled
 from pilotage.core.types import FloatArray
-from pilotage.kernels import sheet_graph
+from pilotage.kernels.sheet import graph as sheet_graph
 
 Positive = Field(gt=0.0)
 

@@ -12,7 +12,7 @@ from pilotage.core.chi_square import chi_square_quantile, gated_mean
 from pilotage.core.config import Config
 from pilotage.core.errors import InputError
 from pilotage.core.types import BoolArray, Pose2
-from pilotage.kernels import sighting
+from pilotage.kernels.filters import sighting
 from pilotage.models.odometry import OdometryModel
 from pilotage.sensors.beacon import BeaconConfig
 from pilotage.sensors.readings import BeaconReadings, OdometryIncrement, Readings

@@ -17,7 +17,7 @@ from pydantic import Field
 
 from pilotage.core.config import Config
 from pilotage.core.types import FloatArray, IntArray
-from pilotage.kernels import line_landmarks
+from pilotage.kernels.lines import landmarks as line_landmarks
 from pilotage.stack.localization.observations import Observations
 
 SavedLines: TypeAlias = tuple[FloatArray, FloatArray, IntArray, int]

@@ -13,7 +13,7 @@ from scipy.special import ndtri
 from pilotage.core.config import Config
 from pilotage.core.errors import InputError
 from pilotage.core.types import FloatArray, Pose2
-from pilotage.kernels import particles
+from pilotage.kernels.filters import particles
 from pilotage.maps.nearest_obstacles import NearestObstacles
 from pilotage.maps.ros_map import read_ros_map
 from pilotage.models.odometry import OdometryModel

@@ -8,7 +8,7 @@ import numpy as np
 
 from pilotage.core.config import Config
 from pilotage.core.types import FloatArray
-from pilotage.kernels import ekf
+from pilotage.kernels.filters import ekf
 from pilotage.models.odometry import OdometryModel, increment_variances
 from pilotage.sensors.readings import OdometryIncrement
 from pilotage.sensors.sensor import NonNegative, Positive

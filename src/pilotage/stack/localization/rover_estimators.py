@@ -12,7 +12,7 @@ from pilotage.core.chi_square import chi_square_quantile
 from pilotage.core.config import Config
 from pilotage.core.registry import Registry
 from pilotage.core.types import FloatArray, IntArray
-from pilotage.kernels import rover_filter, rover_odometry
+from pilotage.kernels.filters import rover_filter, rover_odometry
 from pilotage.maps.landmarks import Landmarks
 from pilotage.sensors.beacon import BeaconConfig
 from pilotage.sensors.landmark_log import LandmarkLog

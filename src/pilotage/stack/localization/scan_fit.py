@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pilotage.core.types import FloatArray
-from pilotage.kernels import pose_hypotheses
+from pilotage.kernels.lines import pose_hypotheses
 from pilotage.maps.segment_map import SegmentMap
 from pilotage.sensors.lidar import LidarConfig
 

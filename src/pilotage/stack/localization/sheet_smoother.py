@@ -19,7 +19,8 @@ from pilotage.core.angles import wrap_to_pi
 from pilotage.core.chi_square import chi_square_quantile
 from pilotage.core.config import Config
 from pilotage.core.types import FloatArray, Pose2
-from pilotage.kernels import arrow_solve, sheet_graph
+from pilotage.kernels.filters import arrow_solve
+from pilotage.kernels.sheet import graph as sheet_graph
 from pilotage.stack.interface import Belief
 from pilotage.stack.localization.given_pose import SURE_M, GivenKeyframes, PoseSource
 from pilotage.stack.localization.keyframes import GyroscopeErrors, Keyframes, OdometryErrorsConfig

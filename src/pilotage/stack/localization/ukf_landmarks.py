@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pilotage.kernels import ukf
+from pilotage.kernels.filters import ukf
 from pilotage.stack.knowledge import Knowledge
 from pilotage.stack.localization.landmark_filter import LandmarkFilter, LandmarkFilterConfig
 from pilotage.stack.localization.localizer import LOCALIZERS

@@ -10,7 +10,7 @@ from pydantic import Field
 from pilotage.core.angles import wrap_to_pi
 from pilotage.core.config import Config
 from pilotage.core.types import FloatArray
-from pilotage.kernels import viewpoints
+from pilotage.kernels.lines import viewpoints
 from pilotage.maps.distance_field import DistanceField
 from pilotage.maps.segment_map import SegmentMap
 from pilotage.sensors.lidar import LidarConfig

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from pilotage.core.types import FloatArray
-from pilotage.kernels import joint_association
+from pilotage.kernels.lines import joint_association
 from pilotage.stack.localization.wall_matching import Matches, WallMatcher
 from pilotage.stack.perception.lines import DetectedLines
 

@@ -10,7 +10,7 @@ from pydantic import Field
 from pilotage.core.chi_square import chi_square_quantile
 from pilotage.core.config import Config
 from pilotage.core.types import FloatArray, IntArray
-from pilotage.kernels import joint_association, wall_candidates
+from pilotage.kernels.lines import joint_association, wall_candidates
 from pilotage.maps.segment_map import SegmentMap
 from pilotage.maps.wall_lines import WallLines
 from pilotage.sensors.sensor import NonNegative

@@ -9,7 +9,7 @@ import numpy as np
 
 from pilotage.core.angles import wrap_to_pi
 from pilotage.core.types import FloatArray
-from pilotage.kernels import joint_association
+from pilotage.kernels.lines import joint_association
 from pilotage.stack.interface import LineVerdict, ScanUpdate
 from pilotage.stack.localization.wall_matching import AMBIGUOUS, Matches, WallMatcher
 from pilotage.stack.perception.lines import DetectedLines

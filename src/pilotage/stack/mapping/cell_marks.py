@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from pilotage.core.types import BoolArray, IntArray, Pose2
-from pilotage.kernels import cell_beam
+from pilotage.kernels.sheet import cell_beam
 from pilotage.maps.cell_map import FEATURES, CellMap, CellState
 from pilotage.sensors.infrared import InfraredConfig
 from pilotage.sensors.line_sensor import LineSensorConfig

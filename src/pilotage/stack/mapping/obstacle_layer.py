@@ -9,7 +9,7 @@ from pydantic import Field
 
 from pilotage.core.config import Config
 from pilotage.core.types import FloatArray
-from pilotage.kernels import unexpected
+from pilotage.kernels.scans import unexpected
 from pilotage.maps.distance_field import DistanceField
 from pilotage.sensors.lidar import LidarConfig
 from pilotage.sensors.readings import LidarScan, Readings

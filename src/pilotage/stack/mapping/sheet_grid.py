@@ -8,7 +8,7 @@ import numpy as np
 
 from pilotage.core.rows import Rows
 from pilotage.core.types import BoolArray, FloatArray
-from pilotage.kernels import beam_grid
+from pilotage.kernels.grids import beam_grid
 
 HIT_ODDS, FREE_ODDS, LIMIT_ODDS = 1.5, -0.25, 8.0
 """A hit outweighs six beams that pass: those are many and correlated, and must not wear walls away."""

@@ -6,7 +6,7 @@ import math
 
 from pilotage.core.angles import wrap_to_pi
 from pilotage.core.types import STOP, FloatArray, Pose2, Twist
-from pilotage.kernels import geometry
+from pilotage.kernels.geometry import plane
 from pilotage.stack.control.controller import Control, Controller
 from pilotage.stack.planning.local_planner import LocalPath, LocalPlanner, RouteAhead
 
@@ -56,7 +56,7 @@ class WaypointFollower:
         points = local.states[self._index : self._index + count, :2]
         if points.shape[0] == 0:
             return math.inf
-        return float(geometry.least_distance(points, geometry.NO_SEGMENTS, circles_m))
+        return float(plane.least_distance(points, plane.NO_SEGMENTS, circles_m))
 
     def step(self, pose: Pose2) -> Twist:
         """Advance the reference by one point and give the command for it."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from pilotage.core.types import FloatArray, Pose2
-from pilotage.kernels import geometry
+from pilotage.kernels.geometry import plane
 from pilotage.maps.segment_map import SegmentMap
 from pilotage.stack.mapping.mapper import Mapper
 
@@ -41,4 +41,4 @@ class OwnMap:
 
     def distance_m(self, pose: Pose2) -> float:
         """Distance from the pose's point to the nearest thing on the map."""
-        return geometry.distance_to_nearest(pose.x_m, pose.y_m, self.segments_m, self.circles_m)
+        return plane.distance_to_nearest(pose.x_m, pose.y_m, self.segments_m, self.circles_m)

@@ -6,7 +6,7 @@ import numpy as np
 from scipy.cluster.hierarchy import fcluster, linkage
 
 from pilotage.core.types import FloatArray, IntArray
-from pilotage.kernels import clustering
+from pilotage.kernels.lines import clustering
 
 DROPPED = clustering.DROPPED
 """Label of a reading that is no return, or whose cluster is too small."""

@@ -10,7 +10,8 @@ from scipy.special import ndtri
 
 from pilotage.core.config import Config
 from pilotage.core.types import FloatArray, IntArray
-from pilotage.kernels import clustering, line_extraction
+from pilotage.kernels.lines import clustering
+from pilotage.kernels.lines import extraction as line_extraction
 from pilotage.sensors.lidar import LidarConfig
 from pilotage.sensors.sensor import NonNegative, Positive
 

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 
 from pilotage.core.types import FloatArray, Pose2
-from pilotage.kernels import scan
+from pilotage.kernels.scans import rays
 from pilotage.sensors.readings import Readings, UltrasonicReading
 from pilotage.sensors.ultrasonic import UltrasonicConfig
 
@@ -93,7 +93,7 @@ class SonarRing:
         c, s = math.cos(pose.theta_rad), math.sin(pose.theta_rad)
         mount = config.mount
         return float(
-            scan.cone_range(
+            rays.cone_range(
                 pose.x_m + c * mount.x_m - s * mount.y_m,
                 pose.y_m + s * mount.x_m + c * mount.y_m,
                 pose.theta_rad + mount.theta_rad,

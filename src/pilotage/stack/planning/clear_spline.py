@@ -15,7 +15,7 @@ import numpy as np
 
 from pilotage.core.errors import InputError
 from pilotage.core.types import BoolArray, FloatArray, IntArray
-from pilotage.kernels.curve_clearance import distance_to_blocked
+from pilotage.kernels.grids.blocked_distance import distance_to_blocked
 from pilotage.maps.occupancy_grid import OccupancyGrid
 from pilotage.stack.planning.quintic_spline import QuinticSpline
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from pilotage.core.errors import InputError
 from pilotage.core.types import FloatArray
-from pilotage.kernels.clearance import Space, first_blocked, make_space, slack_at
+from pilotage.kernels.rrt.clearance import Space, first_blocked, make_space, slack_at
 from pilotage.maps.distance_field import DistanceField
 from pilotage.stack.planning.planner import Path, PlanRequest, PlanResult, PlanStatus
 

@@ -10,7 +10,7 @@ from pilotage.core.angles import wrap_to_pi
 from pilotage.core.config import Config
 from pilotage.core.errors import InputError
 from pilotage.core.types import FloatArray, Pose2
-from pilotage.kernels import local_path
+from pilotage.kernels.rrt import local_path
 from pilotage.sensors.sensor import NonNegative, Positive
 from pilotage.stack.knowledge import Knowledge
 from pilotage.stack.planning.local_planner import LOCAL_PLANNERS, LocalPath, RouteAhead

@@ -11,7 +11,7 @@ import numpy as np
 from pilotage.core.angles import wrap_to_pi
 from pilotage.core.errors import InputError
 from pilotage.core.types import FloatArray
-from pilotage.kernels.clearance import Space
+from pilotage.kernels.rrt.clearance import Space
 from pilotage.stack.planning.driving_space import (
     CHECK_SPACING_M,
     STATE_SPACING_M,

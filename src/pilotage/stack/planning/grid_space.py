@@ -11,7 +11,12 @@ from numpy.typing import NDArray
 
 from pilotage.core.errors import InputError
 from pilotage.core.types import BoolArray, FloatArray, IntArray
-from pilotage.kernels import grid_bits, grid_components, grid_jump, grid_moves, grid_search, grid_theta
+from pilotage.kernels.grids import bits as grid_bits
+from pilotage.kernels.grids import components as grid_components
+from pilotage.kernels.grids import jump as grid_jump
+from pilotage.kernels.grids import moves as grid_moves
+from pilotage.kernels.grids import search as grid_search
+from pilotage.kernels.grids import theta as grid_theta
 from pilotage.maps.memory import require_memory
 from pilotage.stack.planning.grid_path import Cell, GridPath, Search
 

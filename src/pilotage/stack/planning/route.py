@@ -14,8 +14,8 @@ from pilotage.core.angles import wrap_array_to_pi, wrap_to_pi
 from pilotage.core.config import Config
 from pilotage.core.errors import InputError
 from pilotage.core.types import FloatArray, Goal, Pose2
-from pilotage.kernels import dubins
-from pilotage.kernels.clearance import first_blocked
+from pilotage.kernels.rrt import dubins
+from pilotage.kernels.rrt.clearance import first_blocked
 from pilotage.maps.distance_field import DistanceField
 from pilotage.stack.planning.driving_space import (
     CHECK_SPACING_M,

@@ -13,9 +13,12 @@ from pilotage.core.angles import wrap_array_to_pi
 from pilotage.core.config import Config
 from pilotage.core.errors import InputError
 from pilotage.core.types import FloatArray
-from pilotage.kernels import dubins, guide, guide_moves, rrt_samples, rrt_star, rrt_tree
-from pilotage.kernels.clearance import Space, first_blocked, least_step, skin, slack_at
-from pilotage.kernels.field import sample_distance
+from pilotage.kernels.geometry.field import sample_distance
+from pilotage.kernels.rrt import dubins, guide, guide_moves
+from pilotage.kernels.rrt import samples as rrt_samples
+from pilotage.kernels.rrt import star as rrt_star
+from pilotage.kernels.rrt import tree as rrt_tree
+from pilotage.kernels.rrt.clearance import Space, first_blocked, least_step, skin, slack_at
 from pilotage.stack.planning.driving_space import (
     CHECK_SPACING_M,
     STATE_SPACING_M,

@@ -7,7 +7,9 @@ import math
 import numpy as np
 
 from pilotage.core.types import BoolArray, FloatArray, IntArray
-from pilotage.kernels import frontier_goal, sheet_space, travel_cost
+from pilotage.kernels.grids import travel_cost
+from pilotage.kernels.sheet import frontier_goal
+from pilotage.kernels.sheet import space as sheet_space
 from pilotage.stack.mapping.sheet_grid import SheetShape
 
 Point = tuple[float, float]

@@ -10,8 +10,8 @@ from pydantic import Field
 from pilotage.core.angles import wrap_array_to_pi
 from pilotage.core.config import Config
 from pilotage.core.types import BoolArray, FloatArray, IntArray
-from pilotage.kernels import dubins, shortcut
-from pilotage.kernels.clearance import Space, least_step, skin, slack_at
+from pilotage.kernels.rrt import dubins, shortcut
+from pilotage.kernels.rrt.clearance import Space, least_step, skin, slack_at
 from pilotage.stack.planning.driving_space import (
     CHECK_SPACING_M,
     STATE_SPACING_M,

@@ -1,0 +1,15 @@
+"""The array types that every kernel and every room speaks of."""
+
+from __future__ import annotations
+
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray: TypeAlias = NDArray[np.float64]
+IntArray: TypeAlias = NDArray[np.int64]
+BoolArray: TypeAlias = NDArray[np.bool_]
+ByteArray: TypeAlias = NDArray[np.uint8]
+UintArray: TypeAlias = NDArray[np.uint32]
+WordArray: TypeAlias = NDArray[np.uint64]

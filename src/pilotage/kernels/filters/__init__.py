@@ -1,0 +1,1 @@
+"""Recursive estimation: prediction, measurement models, updates."""

@@ -1,0 +1,211 @@
+"""The extended Kalman filter on a planar pose: odometry prediction, range-bearing update."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from pilotage.kernels.arrays import FloatArray, IntArray
+from pilotage.kernels.filters.sighting import (
+    OUTCOME_ACCEPTED,
+    OUTCOME_GATED,
+    OUTCOME_UNKNOWN,
+    landmark_index,
+    range_bearing,
+)
+from pilotage.kernels.geometry.motion import arc_jacobians, exact_arc, mid_angle, wrap
+from pilotage.kernels.jit import kernel
+
+
+@kernel
+def predict(
+    pose: FloatArray, cov: FloatArray, distance: float, angle: float, Q: FloatArray, exact: bool
+) -> None:
+    """Move ``pose`` (3,) and ``cov`` (3, 3) in place by one odometry increment.
+
+    Q (2, 2) is the covariance of (distance, angle). P <- F P F' + G Q G' (Thrun et al. 2005, table 7.2).
+    """
+    scratch = np.empty((3, 8))  # one allocation for all three: they would cost more than the arithmetic
+    F, G, FP = scratch[:, 0:3], scratch[:, 3:5], scratch[:, 5:8]
+    arc_jacobians(pose[2], distance, angle, exact, F, G)
+    if exact:
+        pose[0], pose[1], pose[2] = exact_arc(pose[0], pose[1], pose[2], distance, angle)
+    else:
+        pose[0], pose[1], pose[2] = mid_angle(pose[0], pose[1], pose[2], distance, angle)
+    for i in range(3):
+        for j in range(3):
+            FP[i, j] = F[i, 0] * cov[0, j] + F[i, 1] * cov[1, j] + F[i, 2] * cov[2, j]
+    for i in range(3):
+        for j in range(i, 3):
+            value = FP[i, 0] * F[j, 0] + FP[i, 1] * F[j, 1] + FP[i, 2] * F[j, 2]
+            for a in range(2):
+                for b in range(2):
+                    value += G[i, a] * Q[a, b] * G[j, b]
+            cov[i, j] = value
+            cov[j, i] = value
+
+
+@kernel
+def joseph_update2(
+    pose: FloatArray, cov: FloatArray, H: FloatArray, innovation: FloatArray, R: FloatArray, gate: float
+) -> float:
+    """Update ``pose`` (3,) and ``cov`` (3, 3) in place by one two-dimensional measurement, H (2, 3), unless
+    its squared Mahalanobis distance exceeds ``gate``; returns that distance (nan where the innovation
+    covariance S = H P H' + R is not positive).
+
+    Joseph form, P <- (I - K H) P (I - K H)' + K R K', which keeps P symmetric and positive.
+    """
+    # Written out in scalars: arrays this small cost more to make than to fill.
+    p00, p01, p02 = cov[0, 0], cov[0, 1], cov[0, 2]
+    p11, p12, p22 = cov[1, 1], cov[1, 2], cov[2, 2]
+    h00, h01, h02 = H[0, 0], H[0, 1], H[0, 2]
+    h10, h11, h12 = H[1, 0], H[1, 1], H[1, 2]
+    r00, r01, r11 = R[0, 0], R[0, 1], R[1, 1]
+    # P H', then S = H P H' + R
+    a0, b0 = p00 * h00 + p01 * h01 + p02 * h02, p00 * h10 + p01 * h11 + p02 * h12
+    a1, b1 = p01 * h00 + p11 * h01 + p12 * h02, p01 * h10 + p11 * h11 + p12 * h12
+    a2, b2 = p02 * h00 + p12 * h01 + p22 * h02, p02 * h10 + p12 * h11 + p22 * h12
+    s00 = h00 * a0 + h01 * a1 + h02 * a2 + r00
+    s01 = h00 * b0 + h01 * b1 + h02 * b2 + r01
+    s11 = h10 * b0 + h11 * b1 + h12 * b2 + r11
+    determinant = s00 * s11 - s01 * s01
+    if not determinant > 0.0:
+        return math.nan
+    i00, i01, i11 = s11 / determinant, -s01 / determinant, s00 / determinant
+    v0, v1 = innovation[0], innovation[1]
+    nis = v0 * (i00 * v0 + i01 * v1) + v1 * (i01 * v0 + i11 * v1)
+    if nis > gate:
+        return float(nis)
+    # K = P H' S^-1
+    k00, k01 = a0 * i00 + b0 * i01, a0 * i01 + b0 * i11
+    k10, k11 = a1 * i00 + b1 * i01, a1 * i01 + b1 * i11
+    k20, k21 = a2 * i00 + b2 * i01, a2 * i01 + b2 * i11
+    pose[0] += k00 * v0 + k01 * v1
+    pose[1] += k10 * v0 + k11 * v1
+    pose[2] = wrap(pose[2] + k20 * v0 + k21 * v1)
+    # A = I - K H
+    m00, m01, m02 = 1.0 - k00 * h00 - k01 * h10, -k00 * h01 - k01 * h11, -k00 * h02 - k01 * h12
+    m10, m11, m12 = -k10 * h00 - k11 * h10, 1.0 - k10 * h01 - k11 * h11, -k10 * h02 - k11 * h12
+    m20, m21, m22 = -k20 * h00 - k21 * h10, -k20 * h01 - k21 * h11, 1.0 - k20 * h02 - k21 * h12
+    # A P
+    n00, n01, n02 = (
+        m00 * p00 + m01 * p01 + m02 * p02,
+        m00 * p01 + m01 * p11 + m02 * p12,
+        m00 * p02 + m01 * p12 + m02 * p22,
+    )
+    n10, n11, n12 = (
+        m10 * p00 + m11 * p01 + m12 * p02,
+        m10 * p01 + m11 * p11 + m12 * p12,
+        m10 * p02 + m11 * p12 + m12 * p22,
+    )
+    n20, n21, n22 = (
+        m20 * p00 + m21 * p01 + m22 * p02,
+        m20 * p01 + m21 * p11 + m22 * p12,
+        m20 * p02 + m21 * p12 + m22 * p22,
+    )
+    # K R, then A P A' + K R K'
+    w00, w01 = k00 * r00 + k01 * r01, k00 * r01 + k01 * r11
+    w10, w11 = k10 * r00 + k11 * r01, k10 * r01 + k11 * r11
+    w20, w21 = k20 * r00 + k21 * r01, k20 * r01 + k21 * r11
+    cov[0, 0] = n00 * m00 + n01 * m01 + n02 * m02 + w00 * k00 + w01 * k01
+    cov[1, 1] = n10 * m10 + n11 * m11 + n12 * m12 + w10 * k10 + w11 * k11
+    cov[2, 2] = n20 * m20 + n21 * m21 + n22 * m22 + w20 * k20 + w21 * k21
+    cov[0, 1] = cov[1, 0] = n00 * m10 + n01 * m11 + n02 * m12 + w00 * k10 + w01 * k11
+    cov[0, 2] = cov[2, 0] = n00 * m20 + n01 * m21 + n02 * m22 + w00 * k20 + w01 * k21
+    cov[1, 2] = cov[2, 1] = n10 * m20 + n11 * m21 + n12 * m22 + w10 * k20 + w11 * k21
+    return float(nis)
+
+
+@kernel
+def update_range_bearings(
+    pose: FloatArray,
+    cov: FloatArray,
+    ids: IntArray,
+    ranges: FloatArray,
+    bearings: FloatArray,
+    known_ids: IntArray,
+    known_points: FloatArray,
+    mount: FloatArray,
+    R: FloatArray,
+    gate: float,
+    nis: FloatArray,
+    outcome: IntArray,
+) -> int:
+    """Update in place by any number of landmarks (K), one after the other; returns how many were used.
+
+    ``known_ids`` is sorted. ``nis`` (K,) and ``outcome`` (K,) are filled: accepted, gated, unknown id.
+    One after the other equals jointly for a linear measurement, and re-linearizes in between otherwise.
+    """
+    z, innovation, H = np.empty(2), np.empty(2), np.empty((2, 3))
+    used = 0
+    for k in range(ids.shape[0]):
+        nis[k] = math.nan
+        outcome[k] = OUTCOME_UNKNOWN
+        i = landmark_index(known_ids, ids[k])
+        if i < 0:
+            continue
+        mx, my = known_points[i, 0], known_points[i, 1]
+        if not range_bearing(pose, mx, my, mount, z, H):
+            continue
+        innovation[0], innovation[1] = ranges[k] - z[0], wrap(bearings[k] - z[1])
+        nis[k] = joseph_update2(pose, cov, H, innovation, R, gate)
+        outcome[k] = OUTCOME_ACCEPTED if nis[k] <= gate else OUTCOME_GATED
+        used += outcome[k]
+    return used
+
+
+@kernel
+def filter_log(
+    pose: FloatArray,
+    cov: FloatArray,
+    increments: FloatArray,
+    densities: FloatArray,
+    ranges: FloatArray,
+    bearings: FloatArray,
+    landmarks: FloatArray,
+    mount: FloatArray,
+    R: FloatArray,
+    gate: float,
+    exact: bool,
+    poses: FloatArray,
+    covs: FloatArray,
+    nis: FloatArray,
+) -> int:
+    """Run the whole filter over a log; returns the number of measurements used.
+
+    Parameters
+    ----------
+    pose, cov
+        (3,) and (3, 3) the initial belief; moved in place to the final one.
+    increments
+        (T, 2) distance and angle of each step.
+    densities
+        (4,) variances of the distance per metre and per radian, of the angle per radian and per metre.
+    ranges, bearings
+        (T, M) measurements of the M landmarks; nan where one was not seen.
+    poses, covs, nis
+        (T, 3), (T, 3, 3) and (T, M) are filled; ``nis`` is nan where nothing was measured.
+    """
+    Q = np.zeros((2, 2))
+    z, innovation, H = np.empty(2), np.empty(2), np.empty((2, 3))
+    used = 0
+    for t in range(increments.shape[0]):
+        distance, angle = increments[t, 0], increments[t, 1]
+        Q[0, 0] = densities[0] * abs(distance) + densities[1] * abs(angle)
+        Q[1, 1] = densities[2] * abs(angle) + densities[3] * abs(distance)
+        predict(pose, cov, distance, angle, Q, exact)
+        for m in range(landmarks.shape[0]):
+            nis[t, m] = math.nan
+            if math.isnan(ranges[t, m]) or math.isnan(bearings[t, m]):
+                continue
+            mx, my = landmarks[m, 0], landmarks[m, 1]
+            if not range_bearing(pose, mx, my, mount, z, H):
+                continue
+            innovation[0], innovation[1] = ranges[t, m] - z[0], wrap(bearings[t, m] - z[1])
+            nis[t, m] = joseph_update2(pose, cov, H, innovation, R, gate)
+            if nis[t, m] <= gate:
+                used += 1
+        poses[t] = pose
+        covs[t] = cov
+    return used

@@ -1,0 +1,200 @@
+"""Monte-Carlo localization: motion, likelihood field, tempering, low-variance resampling, KLD bound."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pilotage.kernels.arrays import FloatArray, IntArray
+from pilotage.kernels.geometry.motion import exact_arc, mid_angle, wrap
+from pilotage.kernels.geometry.nearest import distance_by_node
+from pilotage.kernels.jit import kernel
+
+BISECTIONS = 40
+
+
+@kernel
+def sample_motion(
+    poses: FloatArray,
+    distance: float,
+    angle: float,
+    distance_std: float,
+    angle_std: float,
+    normals: FloatArray,
+    exact: bool,
+) -> None:
+    """Move every particle (N, 3) in place by an increment drawn with its ``normals`` (N, 2)."""
+    for i in range(poses.shape[0]):
+        d = distance + distance_std * normals[i, 0]
+        a = angle + angle_std * normals[i, 1]
+        if exact:
+            poses[i, 0], poses[i, 1], poses[i, 2] = exact_arc(poses[i, 0], poses[i, 1], poses[i, 2], d, a)
+        else:
+            poses[i, 0], poses[i, 1], poses[i, 2] = mid_angle(poses[i, 0], poses[i, 1], poses[i, 2], d, a)
+
+
+@kernel
+def log_likelihoods(
+    poses: FloatArray,
+    points: FloatArray,
+    nearest: NDArray[np.int32],
+    x0: float,
+    y0: float,
+    resolution: float,
+    items: FloatArray,
+    table: FloatArray,
+    table_step: float,
+    out: FloatArray,
+) -> None:
+    """Log-likelihood (N,) of a scan's end points (B, 2), in the base frame, at particles (N, 3).
+
+    The likelihood field of Thrun et al. 2005, table 6.3: the distance from each end point to the nearest
+    obstacle. ``table`` holds the logarithm of a beam's density at multiples of ``table_step``; its last
+    entry stands for all beyond and for what is off the map.
+    """
+    last = table.shape[0] - 1
+    beyond = last * table_step
+    for i in range(poses.shape[0]):
+        x, y = poses[i, 0], poses[i, 1]
+        c, s = math.cos(poses[i, 2]), math.sin(poses[i, 2])
+        total = 0.0
+        for k in range(points.shape[0]):
+            px, py = x + c * points[k, 0] - s * points[k, 1], y + s * points[k, 0] + c * points[k, 1]
+            away = distance_by_node(px, py, nearest, x0, y0, resolution, items)
+            total += table[int(away / table_step + 0.5)] if away < beyond else table[last]
+        out[i] = total
+
+
+@kernel
+def effective_count(log_weights: FloatArray, exponent: float) -> float:
+    """Effective number of particles, (sum w)^2 / sum w^2, for weights w^exponent."""
+    top = log_weights.max()
+    total = squares = 0.0
+    for i in range(log_weights.shape[0]):
+        w = math.exp(exponent * (log_weights[i] - top))
+        total += w
+        squares += w * w
+    return total * total / squares
+
+
+@kernel
+def largest_exponent(log_weights: FloatArray, most: float, least_effective: float) -> float:
+    """Largest exponent up to ``most`` that leaves at least so many effective particles (bisection).
+
+    Tempering: a likelihood much sharper than the cloud is let in by parts (Del Moral, Doucet and Jasra
+    2006, sect. 3; the exponent by effective size as in Jasra et al. 2011).
+    """
+    if effective_count(log_weights, most) >= least_effective:
+        return most
+    low, high = 0.0, most
+    for _ in range(BISECTIONS):
+        middle = 0.5 * (low + high)
+        if effective_count(log_weights, middle) >= least_effective:
+            low = middle
+        else:
+            high = middle
+    return low
+
+
+@kernel
+def normalized(log_weights: FloatArray, exponent: float) -> FloatArray:
+    """Weights (N,) that sum to one."""
+    top = log_weights.max()
+    out = np.empty(log_weights.shape[0])
+    total = 0.0
+    for i in range(out.shape[0]):
+        out[i] = math.exp(exponent * (log_weights[i] - top))
+        total += out[i]
+    for i in range(out.shape[0]):
+        out[i] /= total
+    return out
+
+
+@kernel
+def low_variance_indices(weights: FloatArray, count: int, start: float) -> IntArray:
+    """Indices (count,) drawn by one comb of evenly spaced teeth (Thrun et al. 2005, table 4.4).
+
+    ``start`` in [0, 1) is the comb's offset in teeth; particle i is drawn floor or ceil of count * w_i times.
+    """
+    out = np.empty(count, dtype=np.int64)
+    i, reached = 0, weights[0]
+    for k in range(count):
+        tooth = (k + start) / count
+        while tooth > reached and i < weights.shape[0] - 1:
+            i += 1
+            reached += weights[i]
+        out[k] = i
+    return out
+
+
+@kernel
+def moments(poses: FloatArray, weights: FloatArray, mean: FloatArray, cov: FloatArray) -> None:
+    """Fill mean (3,) and covariance (3, 3) of weighted poses (N, 3); the heading's mean is circular."""
+    x = y = c = s = 0.0
+    for i in range(poses.shape[0]):
+        w = weights[i]
+        x += w * poses[i, 0]
+        y += w * poses[i, 1]
+        c += w * math.cos(poses[i, 2])
+        s += w * math.sin(poses[i, 2])
+    mean[0], mean[1], mean[2] = x, y, wrap(math.atan2(s, c))
+    cov[:, :] = 0.0
+    for i in range(poses.shape[0]):
+        w = weights[i]
+        dx, dy, dt = poses[i, 0] - x, poses[i, 1] - y, wrap(poses[i, 2] - mean[2])
+        cov[0, 0] += w * dx * dx
+        cov[0, 1] += w * dx * dy
+        cov[0, 2] += w * dx * dt
+        cov[1, 1] += w * dy * dy
+        cov[1, 2] += w * dy * dt
+        cov[2, 2] += w * dt * dt
+    cov[1, 0], cov[2, 0], cov[2, 1] = cov[0, 1], cov[0, 2], cov[1, 2]
+
+
+@kernel
+def spread_out(poses: FloatArray, mean: FloatArray, root: FloatArray, h: float, normals: FloatArray) -> None:
+    """Move resampled particles (N, 3) apart in place by a kernel that leaves mean and covariance as they are.
+
+    Each is drawn towards the mean by a = sqrt(1 - h^2) and moved by h times a normal variable with the
+    cloud's covariance, whose square root is ``root`` (3, 3) (Liu and West 2001, sect. 10.3.3).
+    """
+    a = math.sqrt(1.0 - h * h)
+    for i in range(poses.shape[0]):
+        n0, n1, n2 = h * normals[i, 0], h * normals[i, 1], h * normals[i, 2]
+        dt = wrap(poses[i, 2] - mean[2])
+        poses[i, 0] = mean[0] + a * (poses[i, 0] - mean[0]) + root[0, 0] * n0
+        poses[i, 1] = mean[1] + a * (poses[i, 1] - mean[1]) + root[1, 0] * n0 + root[1, 1] * n1
+        poses[i, 2] = wrap(mean[2] + a * dt + root[2, 0] * n0 + root[2, 1] * n1 + root[2, 2] * n2)
+
+
+@kernel
+def occupied_bins(poses: FloatArray, side: float, angle: float) -> int:
+    """Number of bins of ``side`` x ``side`` x ``angle`` that hold at least one particle (N, 3)."""
+    keys = np.empty(poses.shape[0], dtype=np.int64)
+    turns = math.ceil(2.0 * math.pi / angle)
+    for i in range(poses.shape[0]):
+        column = math.floor(poses[i, 0] / side) + (1 << 20)
+        row = math.floor(poses[i, 1] / side) + (1 << 20)
+        turn = math.floor((poses[i, 2] + math.pi) / angle)
+        keys[i] = (row * (1 << 21) + column) * turns + turn
+    keys.sort()
+    count = 1
+    for i in range(1, keys.shape[0]):
+        if keys[i] != keys[i - 1]:
+            count += 1
+    return count
+
+
+@kernel
+def kld_count(bins: int, error: float, quantile: float) -> float:
+    """Particles that keep the KL distance to the true posterior below ``error`` (Fox 2003, eq. 7).
+
+    ``quantile`` is the standard normal's at the probability wanted.
+    """
+    if bins < 2:
+        return 1.0
+    k = bins - 1.0
+    a = 2.0 / (9.0 * k)
+    return k / (2.0 * error) * (1.0 - a + math.sqrt(a) * quantile) ** 3

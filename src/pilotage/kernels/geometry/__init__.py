@@ -1,0 +1,1 @@
+"""Plane geometry: distances, fields of distance, motion of a pose."""

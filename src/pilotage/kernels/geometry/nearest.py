@@ -1,0 +1,97 @@
+"""Which obstacle is nearest to each node of a grid, and exact distances by it."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pilotage.kernels.arrays import FloatArray
+from pilotage.kernels.geometry.field import BLOCK
+from pilotage.kernels.geometry.plane import point_segment_distance
+from pilotage.kernels.jit import kernel
+
+IndexArray = NDArray[np.int32]
+
+
+@kernel
+def item_distance(x: float, y: float, items: FloatArray, i: int) -> float:
+    """Distance to item i of (N, 5): a segment x0, y0, x1, y1 thickened by a radius; negative inside it."""
+    return float(
+        point_segment_distance(x, y, items[i, 0], items[i, 1], items[i, 2], items[i, 3]) - items[i, 4]
+    )
+
+
+@kernel
+def nearest_items(x0: float, y0: float, resolution: float, nx: int, ny: int, items: FloatArray) -> IndexArray:
+    """Index (ny, nx) of the item (N, 5) nearest to each node.
+
+    As in ``field.sample_distance``, items too far from a block of nodes are passed over for all of it.
+    """
+    out = np.empty((ny, nx), np.int32)
+    away = np.empty(items.shape[0])
+    near = np.empty(items.shape[0], np.int32)
+    for row0 in range(0, ny, BLOCK):
+        row1 = min(ny, row0 + BLOCK)
+        for col0 in range(0, nx, BLOCK):
+            col1 = min(nx, col0 + BLOCK)
+            mx = x0 + 0.5 * (col0 + col1 - 1) * resolution
+            my = y0 + 0.5 * (row0 + row1 - 1) * resolution
+            spread = math.hypot(col1 - col0, row1 - row0) * resolution * (1.0 + 1e-9)
+            least = math.inf
+            for i in range(items.shape[0]):
+                away[i] = item_distance(mx, my, items, i)
+                least = min(least, away[i])
+            count = 0
+            for i in range(items.shape[0]):
+                if away[i] <= least + spread:
+                    near[count] = i
+                    count += 1
+            for row in range(row0, row1):
+                y = y0 + row * resolution
+                for col in range(col0, col1):
+                    x = x0 + col * resolution
+                    best, which = math.inf, 0
+                    for n in range(count):
+                        d = item_distance(x, y, items, near[n])
+                        if d < best:
+                            best, which = d, near[n]
+                    out[row, col] = which
+    return out
+
+
+@kernel
+def distance_by_node(
+    x: float,
+    y: float,
+    nearest: IndexArray,
+    x0: float,
+    y0: float,
+    resolution: float,
+    items: FloatArray,
+) -> float:
+    """Distance from a point to that of the items (N, 5) which is nearest to its node, ``nearest`` (ny, nx).
+
+    Off the grid the node at its edge counts: a noisy reading of an outer wall ends behind it.
+    """
+    ny, nx = nearest.shape
+    col = int(min(max((x - x0) / resolution + 0.5, 0.0), nx - 0.5))
+    row = int(min(max((y - y0) / resolution + 0.5, 0.0), ny - 0.5))
+    return abs(item_distance(x, y, items, nearest[row, col]))
+
+
+@kernel
+def distances_by_node(
+    points: FloatArray,
+    nearest: IndexArray,
+    x0: float,
+    y0: float,
+    resolution: float,
+    items: FloatArray,
+) -> FloatArray:
+    """``distance_by_node`` for points (K, 2); returns (K,)."""
+    out = np.empty(points.shape[0])
+    for k in range(points.shape[0]):
+        out[k] = distance_by_node(points[k, 0], points[k, 1], nearest, x0, y0, resolution, items)
+    return out

@@ -1,0 +1,1 @@
+"""Searches and distances on grids."""

@@ -1,0 +1,1 @@
+"""Straight lines in scans and their association with walls."""

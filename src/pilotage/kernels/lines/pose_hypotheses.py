@@ -1,0 +1,141 @@
+"""Poses that a scan allows without any prior: two lines that cross fix a pose once each is a wall."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from pilotage.kernels.arrays import FloatArray
+from pilotage.kernels.geometry.motion import wrap
+from pilotage.kernels.geometry.plane import distance_to_nearest
+from pilotage.kernels.jit import kernel
+from pilotage.kernels.lines.wall_candidates import overlap_share
+from pilotage.kernels.scans.rays import fan_ranges
+
+
+@kernel
+def pair_poses(
+    lines: FloatArray,
+    ends: FloatArray,
+    walls: FloatArray,
+    segments: FloatArray,
+    circles: FloatArray,
+    bounds: FloatArray,
+    angle_tolerance: float,
+    slack: float,
+    least_overlap: float,
+    least_clearance: float,
+    out: FloatArray,
+) -> int:
+    """Fill ``out`` (H, 3) with sensor poses from which two lines (2, 2) may be two of the walls.
+
+    Each line may be each wall from either side; the angle between the lines must be that between the
+    walls. The heading then follows from the normals, the position from the two distances. Kept are poses
+    inside ``bounds`` that leave room for the body and where both lines overlap their walls. Returns how many,
+    at most H.
+    """
+    count = 0
+    pose, nothing = np.empty(3), np.zeros(3)
+    certain = np.zeros((3, 3))
+    between = wrap(lines[1, 1] - lines[0, 1])
+    for a in range(2 * walls.shape[0]):
+        first, flip_a = a // 2, a % 2
+        angle_a = walls[first, 1] + flip_a * math.pi
+        rho_a = walls[first, 0] * (1.0 - 2.0 * flip_a)
+        for b in range(2 * walls.shape[0]):
+            second, flip_b = b // 2, b % 2
+            angle_b = walls[second, 1] + flip_b * math.pi
+            error = wrap(angle_b - angle_a - between)
+            if abs(error) > angle_tolerance:
+                continue
+            rho_b = walls[second, 0] * (1.0 - 2.0 * flip_b)
+            ax, ay = math.cos(angle_a), math.sin(angle_a)
+            bx, by = math.cos(angle_b), math.sin(angle_b)
+            determinant = ax * by - ay * bx
+            if abs(determinant) < 1e-6:
+                continue
+            u, v = rho_a - lines[0, 0], rho_b - lines[1, 0]
+            pose[0] = (u * by - v * ay) / determinant
+            pose[1] = (v * ax - u * bx) / determinant
+            pose[2] = wrap(angle_a - lines[0, 1] + 0.5 * error)
+            if not (bounds[0] <= pose[0] <= bounds[2] and bounds[1] <= pose[1] <= bounds[3]):
+                continue
+            if (
+                overlap_share(pose, certain, nothing, ends[0], walls[first, 1], segments[first], slack, 0.0)
+                < least_overlap
+            ):
+                continue
+            if (
+                overlap_share(pose, certain, nothing, ends[1], walls[second, 1], segments[second], slack, 0.0)
+                < least_overlap
+            ):
+                continue
+            if distance_to_nearest(pose[0], pose[1], segments, circles) < least_clearance:
+                continue
+            if count == out.shape[0]:
+                return count
+            out[count] = pose
+            count += 1
+    return count
+
+
+@kernel
+def scan_fit(
+    x: float,
+    y: float,
+    first: float,
+    step: float,
+    ranges: FloatArray,
+    max_range: float,
+    stride: int,
+    near: float,
+    beyond: float,
+    segments: FloatArray,
+    circles: FloatArray,
+) -> tuple[float, float]:
+    """Shares of every ``stride``-th beam that the map explains, and that it contradicts, from a pose.
+
+    Explained: within ``near`` of the map's range. Contradicted: longer than the map's by more than
+    ``beyond``, through what the map says is a wall; a shorter one may be something unexpected.
+    """
+    beams = (ranges.shape[0] + stride - 1) // stride
+    expected = fan_ranges(x, y, first, step * stride, beams, max_range, segments, circles)
+    explained = contradicted = 0
+    for k in range(beams):
+        measured = min(ranges[k * stride], max_range)
+        if abs(measured - expected[k]) <= near:
+            explained += 1
+        elif measured > expected[k] + beyond:
+            contradicted += 1
+    return explained / beams, contradicted / beams
+
+
+@kernel
+def fitting_poses(
+    poses: FloatArray,
+    first: float,
+    step: float,
+    ranges: FloatArray,
+    max_range: float,
+    stride: int,
+    near: float,
+    beyond: float,
+    least_explained: float,
+    most_contradicted: float,
+    segments: FloatArray,
+    circles: FloatArray,
+) -> FloatArray:
+    """Indices and explained shares (K, 2) of the sensor poses (H, 3) that fit the scan, best first."""
+    kept = np.empty((poses.shape[0], 2))
+    count = 0
+    for h in range(poses.shape[0]):
+        explained, contradicted = scan_fit(
+            poses[h, 0], poses[h, 1], poses[h, 2] + first, step, ranges, max_range, stride, near, beyond,
+            segments, circles,
+        )  # fmt: skip
+        if explained >= least_explained and contradicted <= most_contradicted:
+            kept[count, 0] = h
+            kept[count, 1] = explained
+            count += 1
+    return kept[:count][np.argsort(-kept[:count, 1], kind="mergesort")]

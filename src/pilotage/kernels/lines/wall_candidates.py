@@ -1,0 +1,141 @@
+"""Which walls of the map a detected line may be: near enough, overlapping, and in sight."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from pilotage.kernels.arrays import FloatArray, IntArray
+from pilotage.kernels.filters.wall_line import innovation_distance, wall_innovation
+from pilotage.kernels.geometry.plane import point_segment_distance, segments_cross
+from pilotage.kernels.jit import kernel
+
+SIGHT_MARGIN_M = 0.1
+"""A line of sight ends this far before the wall that it leads to."""
+
+
+@kernel
+def overlap_share(
+    pose: FloatArray,
+    cov: FloatArray,
+    mount: FloatArray,
+    end: FloatArray,
+    alpha: float,
+    segment: FloatArray,
+    slack: float,
+    sigmas: float,
+) -> float:
+    """Share of a detected line that lies beside a wall; ``end`` (4,) in the sensor's frame, ``segment`` (4,).
+
+    The wall is lengthened at both ends by ``slack`` and by ``sigmas`` standard deviations of where the
+    line's end would come to lie along it.
+    """
+    theta = pose[2] + mount[2]
+    c, s = math.cos(theta), math.sin(theta)
+    x = pose[0] + math.cos(pose[2]) * mount[0] - math.sin(pose[2]) * mount[1]
+    y = pose[1] + math.sin(pose[2]) * mount[0] + math.cos(pose[2]) * mount[1]
+    tx, ty = -math.sin(alpha), math.cos(alpha)
+    w0 = segment[0] * tx + segment[1] * ty
+    w1 = segment[2] * tx + segment[3] * ty
+    if w0 > w1:
+        w0, w1 = w1, w0
+    a = x * tx + y * ty + (c * end[0] - s * end[1]) * tx + (s * end[0] + c * end[1]) * ty
+    b = x * tx + y * ty + (c * end[2] - s * end[3]) * tx + (s * end[2] + c * end[3]) * ty
+    if a > b:
+        a, b = b, a
+    reach2 = max(end[0] * end[0] + end[1] * end[1], end[2] * end[2] + end[3] * end[3])
+    spread = math.sqrt(cov[0, 0] + cov[1, 1] + reach2 * cov[2, 2])
+    tolerance = slack + sigmas * spread
+    inside = min(b, w1 + tolerance) - max(a, w0 - tolerance)
+    return float(max(inside, 0.0) / max(b - a, 1e-9))
+
+
+@kernel
+def in_sight(
+    pose: FloatArray,
+    mount: FloatArray,
+    end: FloatArray,
+    wall: int,
+    segments: FloatArray,
+    circles: FloatArray,
+) -> bool:
+    """Whether any of three points of a detected line could be seen with no other wall in the way."""
+    theta = pose[2] + mount[2]
+    c, s = math.cos(theta), math.sin(theta)
+    x = pose[0] + math.cos(pose[2]) * mount[0] - math.sin(pose[2]) * mount[1]
+    y = pose[1] + math.sin(pose[2]) * mount[0] + math.cos(pose[2]) * mount[1]
+    for k in range(3):
+        share = 0.25 * (k + 1)
+        px = (1.0 - share) * end[0] + share * end[2]
+        py = (1.0 - share) * end[1] + share * end[3]
+        keep = max(0.0, 1.0 - SIGHT_MARGIN_M / max(math.hypot(px, py), 1e-9))
+        bx, by = x + keep * (c * px - s * py), y + keep * (s * px + c * py)
+        free = True
+        for i in range(segments.shape[0]):
+            if i != wall and segments_cross(
+                x, y, bx, by, segments[i, 0], segments[i, 1], segments[i, 2], segments[i, 3]
+            ):
+                free = False
+                break
+        for i in range(circles.shape[0]):
+            near = point_segment_distance(circles[i, 0], circles[i, 1], x, y, bx, by)
+            free = free and near > circles[i, 2]
+        if free:
+            return True
+    return False
+
+
+@kernel
+def candidates(
+    pose: FloatArray,
+    cov: FloatArray,
+    mount: FloatArray,
+    lines: FloatArray,
+    covs: FloatArray,
+    ends: FloatArray,
+    walls: FloatArray,
+    line_of: IntArray,
+    segments: FloatArray,
+    gate: float,
+    slack: float,
+    sigmas: float,
+    least_overlap: float,
+    out: IntArray,
+    distance: FloatArray,
+) -> IntArray:
+    """Individually compatible walls of each line: fills out (L, C) and returns how many (L,).
+
+    ``distance`` (L,) is filled with the least squared Mahalanobis distance to a wall that the line
+    overlaps (inf where it overlaps none). Of walls on one infinite line, which a measurement cannot tell
+    apart, the one with the greatest overlap stands for all.
+    """
+    count = np.zeros(lines.shape[0], dtype=np.int64)
+    z, H, v = np.empty(2), np.empty((2, 3)), np.empty(2)
+    shares = np.empty(out.shape[1])
+    for i in range(lines.shape[0]):
+        distance[i] = math.inf
+        for w in range(walls.shape[0]):
+            wall_innovation(pose, mount, walls[w], lines[i], z, H, v)
+            nis = innovation_distance(cov, H, v, covs[i])
+            if not nis <= max(gate, distance[i]):
+                continue
+            share = overlap_share(pose, cov, mount, ends[i], walls[w, 1], segments[w], slack, sigmas)
+            if share < least_overlap:
+                continue
+            distance[i] = min(distance[i], nis)
+            if nis > gate:
+                continue
+            place = count[i]
+            for k in range(count[i]):
+                if line_of[out[i, k]] == line_of[w]:
+                    place = k
+            if place == count[i]:
+                if count[i] == out.shape[1]:
+                    continue
+                count[i] += 1
+            elif share <= shares[place]:
+                continue
+            out[i, place] = w
+            shares[place] = share
+    return count

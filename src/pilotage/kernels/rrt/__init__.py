@@ -1,0 +1,1 @@
+"""Sampling-based planning of drivable curves, and exact shortest paths."""

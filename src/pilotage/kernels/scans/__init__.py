@@ -1,0 +1,1 @@
+"""What range sensors read, and what a scan says."""

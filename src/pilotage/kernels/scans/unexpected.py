@@ -1,0 +1,79 @@
+"""Scan points that the known map does not explain, gathered in cells until they are believed."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from pilotage.kernels.arrays import FloatArray, IntArray
+from pilotage.kernels.geometry.field import interpolate_at
+from pilotage.kernels.jit import kernel
+
+
+@kernel
+def unexplained_points(
+    ranges: FloatArray,
+    x: float,
+    y: float,
+    first: float,
+    step: float,
+    reach: float,
+    tolerance: float,
+    tolerance_per_m: float,
+    distance: FloatArray,
+    x0: float,
+    y0: float,
+    resolution: float,
+) -> FloatArray:
+    """Endpoints (K, 2) of the beams shorter than ``reach`` that end farther from every known wall than
+    ``tolerance + tolerance_per_m * range``.
+
+    Beam k looks along ``first + k * step`` in the map frame from (x, y); ``distance`` is the distance
+    field of the known map. A point outside the field counts as explained.
+    """
+    points = np.empty((ranges.shape[0], 2))
+    count = 0
+    for k in range(ranges.shape[0]):
+        r = ranges[k]
+        if r >= reach:
+            continue
+        angle = first + k * step
+        px, py = x + r * math.cos(angle), y + r * math.sin(angle)
+        if interpolate_at(px, py, distance, x0, y0, resolution) > tolerance + tolerance_per_m * r:
+            points[count, 0] = px
+            points[count, 1] = py
+            count += 1
+    return points[:count].copy()
+
+
+@kernel
+def confirm_cells(
+    points: FloatArray,
+    hits: IntArray,
+    sums: FloatArray,
+    x0: float,
+    y0: float,
+    cell: float,
+    threshold: int,
+) -> FloatArray:
+    """Count points (K, 2) into ``hits`` (ny, nx) and add them to ``sums`` (ny, nx, 2), both in place.
+
+    Returns the mean points (C, 2) of the cells whose count reaches ``threshold`` by this call.
+    """
+    ny, nx = hits.shape
+    means = np.empty((points.shape[0], 2))
+    count = 0
+    for k in range(points.shape[0]):
+        col = math.floor((points[k, 0] - x0) / cell)
+        row = math.floor((points[k, 1] - y0) / cell)
+        if not (0 <= row < ny and 0 <= col < nx) or hits[row, col] >= threshold:
+            continue
+        hits[row, col] += 1
+        sums[row, col, 0] += points[k, 0]
+        sums[row, col, 1] += points[k, 1]
+        if hits[row, col] == threshold:
+            means[count, 0] = sums[row, col, 0] / threshold
+            means[count, 1] = sums[row, col, 1] / threshold
+            count += 1
+    return means[:count].copy()

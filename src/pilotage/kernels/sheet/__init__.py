@@ -1,0 +1,1 @@
+"""The small robot on its sheet: factors of its smoother, room, cells."""
