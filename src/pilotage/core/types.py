@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
 
@@ -12,6 +14,7 @@ __all__ = [
     "STANDSTILL",
     "STOP",
     "BoolArray",
+    "Command",
     "Event",
     "FloatArray",
     "Goal",
@@ -39,13 +42,37 @@ class Pose2:
         """Build from (3,) x, y, theta."""
         return Pose2(float(values[0]), float(values[1]), float(values[2]))
 
+    def compose(self, inner: Pose2) -> Pose2:
+        """The pose, in this one's parent frame, of what ``inner`` says in this one's own: self (+) inner.
+
+        The only place where frames are joined (Smith, Self and Cheeseman 1990, eq. 17).
+        """
+        c, s = math.cos(self.theta_rad), math.sin(self.theta_rad)
+        return Pose2(
+            self.x_m + c * inner.x_m - s * inner.y_m,
+            self.y_m + s * inner.x_m + c * inner.y_m,
+            _wrapped(self.theta_rad + inner.theta_rad),
+        )
+
+    def inverse(self) -> Pose2:
+        """The parent's pose in this one's frame: ``p.compose(p.inverse())`` is the origin."""
+        c, s = math.cos(self.theta_rad), math.sin(self.theta_rad)
+        return Pose2(-c * self.x_m - s * self.y_m, s * self.x_m - c * self.y_m, _wrapped(-self.theta_rad))
+
+
+def _wrapped(angle_rad: float) -> float:
+    """To [-pi, pi)."""
+    wrapped = (angle_rad + math.pi) % (2.0 * math.pi) - math.pi
+    return -math.pi if wrapped >= math.pi else wrapped
+
 
 @dataclass(frozen=True, slots=True)
 class Twist:
-    """A planar velocity in the body frame: forward speed and turn rate."""
+    """A planar velocity in the body frame: forward speed, turn rate, speed to the left."""
 
     v_m_s: float
     w_rad_s: float
+    lateral_m_s: float = 0.0
 
 
 STOP = Twist(0.0, 0.0)
@@ -60,6 +87,9 @@ class WheelSpeeds:
 
 
 STANDSTILL = WheelSpeeds(0.0, 0.0)
+
+Command: TypeAlias = Twist | WheelSpeeds
+"""What a stack may ask of a motion; every motion follows a twist, a wheel drive wheel speeds too."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,7 +1,11 @@
-"""What the robot is told before it starts: its map, its landmarks, its own data sheet."""
+"""What the robot is told before it starts, apart by subject: its own data sheet, its map, its task.
+
+The map is a ``maps.world_map.WorldMap``; there is no truth in any of the three.
+"""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import TypeVar
@@ -13,10 +17,91 @@ from pilotage.maps.cell_map import CellMap
 from pilotage.maps.landmarks import Landmarks
 from pilotage.maps.segment_map import SegmentMap
 from pilotage.missions.sheet import FirmwareConfig, WheelDriveConfig
+from pilotage.models.footprint import Footprint
+from pilotage.models.motion.motion import MotionConfig
 from pilotage.sensors.sensor import SensorConfig
 from pilotage.stack.interface import Belief
 
 S = TypeVar("S", bound=SensorConfig)
+
+
+@dataclass(frozen=True, slots=True)
+class RobotKnowledge:
+    """The robot's own data sheet.
+
+    Attributes
+    ----------
+    name
+        As the mission calls it.
+    footprint, motion, sensors
+        Its outline, how it moves, and what it carries, by name.
+    dt_s
+        The period of a step.
+    streams
+        Random streams of this robot alone.
+    """
+
+    footprint: Footprint
+    motion: MotionConfig
+    sensors: Mapping[str, SensorConfig]
+    dt_s: float
+    streams: RandomStreams
+    name: str = "robot"
+
+    @property
+    def radius_m(self) -> float:
+        """Of the disc around the axle that holds the whole robot."""
+        return self.footprint.radius_m
+
+    def sensors_of(self, kind: type[S]) -> dict[str, S]:
+        """All sensors of one kind by name."""
+        return {name: config for name, config in self.sensors.items() if isinstance(config, kind)}
+
+    def one_sensor(self, kind: type[S], needed_by: str) -> tuple[str, S]:
+        """Return the only sensor of one kind.
+
+        Raises
+        ------
+        InputError
+            If the robot has none of them or more than one.
+        """
+        found = list(self.sensors_of(kind).items())
+        if len(found) != 1:
+            raise InputError(
+                f"{needed_by}: expected one {kind.__name__.removesuffix('Config')} among robot.sensors, "
+                f"found {len(found)}; the robot has: {', '.join(self.sensors) or 'none'}"
+            )
+        return found[0]
+
+
+@dataclass(frozen=True, slots=True)
+class TaskKnowledge:
+    """What the robot is to do, and where it believes to begin.
+
+    Attributes
+    ----------
+    initial
+        Belief at the start; its status is LOST where the robot is told nothing.
+    goals
+        Places to go to, in order; none where the task has none.
+    goal_tolerance_m
+        A goal is reached this near to it.
+    time_limit_s
+        When the run ends at the latest.
+    pose_given
+        Tells the true pose, as a motion capture system would, to a robot that is given it; None as a rule.
+    """
+
+    initial: Belief
+    goals: tuple[Goal, ...] = ()
+    goal_tolerance_m: float = math.inf
+    time_limit_s: float = math.inf
+    pose_given: Callable[[], Pose2] | None = None
+
+    @property
+    def goal(self) -> Goal | None:
+        """The first goal."""
+        return self.goals[0] if self.goals else None
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,0 +1,53 @@
+"""What is painted or taped on a floor: a sheet with an edge, tapes, and the cells it is counted in."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pilotage.core.types import FloatArray
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FloorMarkings:
+    """Markings of a sheet whose lower left corner is the origin.
+
+    Attributes
+    ----------
+    size_m
+        Width and height of the sheet.
+    cells
+        Columns and rows of its cell map.
+    tapes_m
+        (M, 4) pieces of the tapes' centre lines; empty where nobody says.
+    tape_width_m
+        Of every tape.
+    edge_is_dark
+        Whether the floor beyond the edge reads dark.
+    """
+
+    size_m: tuple[float, float]
+    cells: tuple[int, int]
+    tapes_m: FloatArray
+    tape_width_m: float
+    edge_is_dark: bool
+
+    def without_tapes(self) -> FloorMarkings:
+        """What somebody knows who was told of the sheet but not of what is on it."""
+        return FloorMarkings(self.size_m, self.cells, np.zeros((0, 4)), self.tape_width_m, self.edge_is_dark)
+
+    @property
+    def cell_m(self) -> tuple[float, float]:
+        """Width and height of a cell."""
+        return self.size_m[0] / self.cells[0], self.size_m[1] / self.cells[1]
+
+    def holds(self, x_m: float, y_m: float) -> bool:
+        """Whether a point is on the sheet."""
+        return 0.0 <= x_m <= self.size_m[0] and 0.0 <= y_m <= self.size_m[1]
+
+    def overhang_m(self, x_m: float, y_m: float, radius_m: float) -> float:
+        """How far a disc reaches over the sheet's edge; 0 where it is on the sheet."""
+        width, height = self.size_m
+        inside = min(x_m, width - x_m, y_m, height - y_m)
+        return max(radius_m - inside, 0.0)

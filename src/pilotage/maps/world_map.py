@@ -1,0 +1,82 @@
+"""A map of any format, as layers: what a file says of a world, and what a robot may be told of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pilotage.core.types import FloatArray
+from pilotage.maps.distance_field import DistanceField
+from pilotage.maps.elevation import ElevationModel
+from pilotage.maps.landmarks import Landmarks
+from pilotage.maps.markings import FloorMarkings
+from pilotage.maps.occupancy_grid import OccupancyGrid
+from pilotage.maps.outlines import outlines
+from pilotage.maps.segment_map import SegmentMap
+
+NO_LANDMARKS = Landmarks(np.zeros(0, dtype=np.int64), np.zeros((0, 2)))
+
+
+@dataclass(frozen=True, eq=False)
+class WorldMap:
+    """Layers of a map; None where it has none of a kind.
+
+    Attributes
+    ----------
+    bounds_m
+        xmin, ymin, xmax, ymax.
+    geometry
+        Walls and discs, exactly.
+    grid
+        Cells that are free, occupied or unknown; of terrain, its hazards.
+    elevation, slope_limit_deg
+        Heights, and the slope beyond which a cell of ``grid`` is a hazard.
+    markings
+        What is painted or taped on the floor.
+    landmarks
+        Points with identities.
+    picture
+        (rows, columns) a grey picture that came with the map.
+    """
+
+    name: str
+    bounds_m: tuple[float, float, float, float]
+    geometry: SegmentMap | None = None
+    grid: OccupancyGrid | None = None
+    elevation: ElevationModel | None = None
+    slope_limit_deg: float | None = None
+    markings: FloorMarkings | None = None
+    landmarks: Landmarks = NO_LANDMARKS
+    picture: NDArray[np.uint8] | None = None
+
+    @cached_property
+    def walls(self) -> SegmentMap:
+        """Everything solid as segments and discs: of a grid the outlines of its occupied cells, exactly."""
+        if self.geometry is not None:
+            return self.geometry
+        segments: FloatArray = np.zeros((0, 4)) if self.grid is None else outlines(self.grid)
+        return SegmentMap(segments, np.zeros((0, 3)), self.bounds_m)
+
+    @cached_property
+    def field(self) -> DistanceField:
+        """Distance to the nearest wall, sampled; unknown cells of a grid are not driven on."""
+        if self.geometry is None and self.grid is not None:
+            return DistanceField.from_grid(self.grid)
+        return DistanceField.from_map(self.walls)
+
+    def contains(self, x_m: float, y_m: float) -> bool:
+        """Whether a point lies within the bounds."""
+        xmin, ymin, xmax, ymax = self.bounds_m
+        return xmin <= x_m <= xmax and ymin <= y_m <= ymax
+
+    def extent_only(self) -> WorldMap:
+        """What somebody knows who was told how large the place is and nothing of what stands in it."""
+        markings = None if self.markings is None else self.markings.without_tapes()
+        return WorldMap(self.name, self.bounds_m, markings=markings)
+
+    def with_landmarks(self, landmarks: Landmarks) -> WorldMap:
+        """The same map with other landmarks."""
+        return replace(self, landmarks=landmarks)

@@ -1,0 +1,1 @@
+"""How robots move: the data sheets of the registered motions. What they truly do is simulated in ``sim``."""

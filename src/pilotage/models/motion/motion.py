@@ -1,0 +1,45 @@
+"""The role: a motion's data sheet, which the robot knows; and the registry of motions."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated
+
+from pydantic import Field
+
+from pilotage.core.config import Config
+from pilotage.core.registry import Registry
+
+Positive = Annotated[float, Field(gt=0.0)]
+
+
+class MotionConfig(Config):
+    """What every motion's data sheet says, whatever moves: its limits as a twist.
+
+    A motion's config derives from this one; those whose limits follow from other numbers (a wheel drive's
+    from its wheels) override the three properties.
+    """
+
+    @property
+    def top_speed_m_s(self) -> float:
+        """Fastest forward speed."""
+        raise NotImplementedError
+
+    @property
+    def top_turn_rate_rad_s(self) -> float:
+        """Fastest turn."""
+        raise NotImplementedError
+
+    @property
+    def least_turning_radius_m(self) -> float:
+        """Radius of the tightest arc; 0 for who turns on the spot."""
+        return 0.0
+
+    @property
+    def braking_m_s2(self) -> float:
+        """Deceleration that it can be relied on for; inf for who stops at once."""
+        return math.inf
+
+
+MOTIONS: Registry[MotionConfig] = Registry("motion", "pilotage.models.motion")
+"""Motion names to their data sheets; ``sim`` says for each what it truly does."""

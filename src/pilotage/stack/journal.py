@@ -1,0 +1,94 @@
+"""What a stack has to tell besides its command: events, plans, counts, maps and telemetry."""
+
+from __future__ import annotations
+
+from array import array
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+
+from pilotage.core.types import Event
+from pilotage.stack.interface import ExplainableUpdate, PlannedPath
+
+
+class Channel:
+    """A component's columns of the telemetry: declared once, told at each step.
+
+    What was told last stands until it is told anew.
+    """
+
+    __slots__ = ("_begin", "_end", "_row")
+
+    def __init__(self, row: array[float], begin: int, end: int) -> None:
+        self._row, self._begin, self._end = row, begin, end
+
+    def tell(self, *values: float) -> None:
+        """Say the numbers of this step, in the order in which they were declared."""
+        told = array("d", values)
+        if len(told) != self._end - self._begin:
+            raise ValueError(f"telemetry: expected {self._end - self._begin} numbers, found {len(told)}")
+        self._row[self._begin : self._end] = told
+
+
+@dataclass(slots=True)
+class Journal:
+    """One robot's journal. The stack writes; whoever runs it reads.
+
+    Attributes
+    ----------
+    events
+        What happened, in order.
+    plans
+        Every plan adopted, in order.
+    counts
+        What was counted, by name: attempts, replans, escapes.
+    planning_time_s
+        Wall time spent planning globally, queries without a path included.
+    units
+        Telemetry columns by name with their units, in the order of ``row``.
+    row
+        The last numbers told.
+    update
+        The last step's sensor update where it can be explained; whoever reads it sets it back to None.
+    """
+
+    events: list[Event] = field(default_factory=list)
+    plans: list[PlannedPath] = field(default_factory=list)
+    counts: dict[str, int] = field(default_factory=dict)
+    planning_time_s: float = 0.0
+    units: dict[str, str] = field(default_factory=dict)
+    row: array[float] = field(default_factory=lambda: array("d"))
+    update: ExplainableUpdate | None = None
+    _results: dict[str, Callable[[], object]] = field(default_factory=dict)
+
+    def say(self, t_s: float, kind: str, text: str) -> None:
+        """Tell that something happened."""
+        self.events.append(Event(t_s, kind, text))
+
+    def count(self, name: str) -> int:
+        """Count one more of ``name``; returns how many there are now."""
+        self.counts[name] = self.counts.get(name, 0) + 1
+        return self.counts[name]
+
+    def channel(self, columns: Mapping[str, str]) -> Channel:
+        """Declare telemetry: column names with their units; to be done at construction.
+
+        Raises
+        ------
+        ValueError
+            If a name is declared twice.
+        """
+        for name in columns:
+            if name in self.units:
+                raise ValueError(f"telemetry: the column '{name}' is declared twice")
+        begin = len(self.row)
+        self.units.update(columns)
+        self.row.extend([float("nan")] * len(columns))
+        return Channel(self.row, begin, len(self.row))
+
+    def result(self, name: str, make: Callable[[], object]) -> None:
+        """Offer something that is wanted once, at the end of the run: a map, what was found."""
+        self._results[name] = make
+
+    def results(self) -> dict[str, object]:
+        """Everything offered, made now."""
+        return {name: make() for name, make in self._results.items()}
