@@ -35,13 +35,13 @@ class Registry(Generic[T]):
     ----------
     role
         What the entries are, as it is called in messages and mission files ("planner").
-    package
-        The package whose modules register themselves here; imported at the first look-up.
+    packages
+        Those whose modules register themselves here; imported at the first look-up.
     """
 
-    def __init__(self, role: str, package: str) -> None:
+    def __init__(self, role: str, *packages: str) -> None:
         self.role = role
-        self._package = package
+        self._packages = packages
         self._entries: dict[str, Entry[T]] = {}
         self._loaded = False
 
@@ -86,8 +86,9 @@ class Registry(Generic[T]):
 
     def _load(self) -> None:
         if not self._loaded:
-            load_modules(self._package)
-            self._loaded = True
+            self._loaded = True  # first: a module that is loaded may look another name up
+            for package in self._packages:
+                load_modules(package)
 
 
 def load_modules(package: str) -> None:

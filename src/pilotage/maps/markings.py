@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pilotage.core.types import FloatArray
+from pilotage.maps.true_cells import SheetFile
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -25,6 +26,8 @@ class FloorMarkings:
         Of every tape.
     edge_is_dark
         Whether the floor beyond the edge reads dark.
+    source
+        The file that says all of it; None where nobody was told.
     """
 
     size_m: tuple[float, float]
@@ -32,6 +35,7 @@ class FloorMarkings:
     tapes_m: FloatArray
     tape_width_m: float
     edge_is_dark: bool
+    source: SheetFile | None = None
 
     def without_tapes(self) -> FloorMarkings:
         """What somebody knows who was told of the sheet but not of what is on it."""

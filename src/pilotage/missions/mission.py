@@ -1,86 +1,95 @@
-"""What every mission file holds, whatever its world: a name, a world of some kind, robot, stack, run.
-
-Components of the stack are named here but configured where they live: a mission holds each
-component's ``name`` and its parameters, and the room that registers the name validates them.
-"""
+"""A mission file: world, robot or robots, task, stack, run."""
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
-from pydantic import ConfigDict, Field, model_validator
+from pydantic import Field, model_validator
 
 from pilotage.core.config import Config
+from pilotage.missions.choice import ComponentChoice, laid_over
+from pilotage.missions.places import GoalConfig, PoseConfig
+from pilotage.missions.robot import RobotConfig
+from pilotage.missions.stack import StackConfig
+from pilotage.missions.world import WorldConfig
 from pilotage.sensors.sensor import NonNegative, Positive
 
-TOP_KEYS = ("mission", "description", "world", "robot", "stack", "run")
-DEFAULT_KIND = "floor"
-
-Point = tuple[float, float]
-
-
-class ComponentChoice(Config):
-    """A registered name and, beside it, the parameters of that component."""
-
-    model_config = ConfigDict(extra="allow", frozen=True)
-
-    name: str
-
-    @model_validator(mode="before")
-    @classmethod
-    def _bare_name(cls, data: Any) -> Any:
-        """A bare name stands for the component with its defaults."""
-        return {"name": data} if isinstance(data, str) else data
-
-    @property
-    def parameters(self) -> dict[str, Any]:
-        """All keys but the name."""
-        return dict(self.model_extra or {})
-
-
-class PoseConfig(Config):
-    """A start pose."""
-
-    x_m: float
-    y_m: float
-    theta_rad: float = Field(default=0.0, ge=-2 * math.pi, le=2 * math.pi)
-
-
-class InitialConfig(Config):
-    """What the robot believes at the start: the start pose with an error drawn from this covariance."""
-
-    x_var_m2: NonNegative = 0.01
-    y_var_m2: NonNegative = 0.01
-    theta_var_rad2: NonNegative = 0.01
-    known: bool = True
-    """False: the robot is told nothing, and the variances do not count."""
+TOP_KEYS = ("mission", "description", "world", "robot", "robots", "task", "stack", "run")
 
 
 class RunConfig(Config):
     """Time step, time limit and seed."""
 
-    dt_s: float = Field(default=0.1, ge=1e-4, le=10.0)
+    dt_s: float = Field(default=0.1, ge=1e-4, le=1000.0)
     time_limit_s: Positive = 600.0
     seed: int = Field(default=0, ge=0)
     settle_s: NonNegative = 1.0
     """Errors count after this long: the start error is drawn, not earned."""
+    record_every_s: NonNegative = 0.0
+    """A row of the trace so often; 0: at every step."""
+    ellipse_probability: float = Field(default=0.95, gt=0.0, lt=1.0)
+    """Of the ellipses drawn and counted."""
     oracles: tuple[str, ...] = ()
     """Modules that know the truth in this run, to find out what the real ones cost."""
 
 
 class Mission(Config):
-    """What missions of all kinds have in common; ``world.kind`` says which kind it is.
+    """A mission, whatever its world, its robots and its task.
 
-    Each kind is a subclass in a module of its own that adds ``world``, ``robot`` and ``stack``.
+    ``robots`` makes it one of several: each entry is laid over ``robot``.
     """
 
     mission: str = Field(min_length=1)
     description: str = ""
+    world: WorldConfig
+    robot: RobotConfig = RobotConfig()
+    robots: tuple[RobotConfig, ...] = ()
+    task: ComponentChoice = ComponentChoice(name="reach")
+    stack: StackConfig
     run: RunConfig = RunConfig()
 
+    @model_validator(mode="before")
+    @classmethod
+    def _each_over_the_common_one(cls, values: Any) -> Any:
+        """Lay each entry of ``robots`` over ``robot``; without names they are numbered."""
+        if not isinstance(values, dict) or not isinstance(values.get("robots"), list | tuple):
+            return values
+        common = values.get("robot") if isinstance(values.get("robot"), dict) else {}
+        entries = []
+        for number, entry in enumerate(values["robots"]):
+            if isinstance(entry, dict):
+                entry = {"name": f"robot-{number}", **laid_over(common, entry)}
+                if isinstance(entry.get("stack"), dict) and isinstance(values.get("stack"), dict):
+                    entry["stack"] = laid_over(values["stack"], entry["stack"])
+            entries.append(entry)
+        return {**values, "robots": entries}
+
     @model_validator(mode="after")
-    def _steps(self) -> Mission:
+    def _consistent(self) -> Mission:
         if self.run.time_limit_s < self.run.dt_s:
             raise ValueError("run.time_limit_s must be at least run.dt_s")
+        names = [robot.name for robot in self.robots]
+        if len(set(names)) < len(names):
+            twice = next(name for name in names if names.count(name) > 1)
+            raise ValueError(f"robots: expected every name once, found '{twice}' twice")
+        for kidnap in self.world.kidnaps:
+            if kidnap.robot >= len(self.team):
+                raise ValueError(f"world.kidnaps: there is no robot {kidnap.robot} of {len(self.team)}")
         return self
+
+    @property
+    def team(self) -> tuple[RobotConfig, ...]:
+        """All robots: the one, or the several."""
+        return self.robots or (self.robot,)
+
+    def stack_of(self, robot: RobotConfig) -> StackConfig:
+        """What runs on a robot: its own stack, else the common one."""
+        return robot.stack or self.stack
+
+    def start_of(self, robot: RobotConfig) -> PoseConfig | None:
+        """Where a robot begins: its own start, else the world's."""
+        return robot.start or self.world.start
+
+    def goal_of(self, robot: RobotConfig) -> GoalConfig | None:
+        """Where a robot is to go: its own goal, else the world's."""
+        return robot.goal or self.world.goal

@@ -10,6 +10,7 @@ from typing import Protocol, runtime_checkable
 
 import numpy as np
 
+from pilotage.core.registry import Registry
 from pilotage.core.types import Event, FloatArray, IntArray, Pose2, Twist
 from pilotage.sensors.readings import Readings
 
@@ -181,3 +182,8 @@ class Stack(Protocol):
     def plans(self) -> list[PlannedPath]:
         """All plans adopted so far."""
         ...
+
+
+NAVIGATORS: Registry[Stack] = Registry("navigator", "pilotage.stack.navigator", "pilotage.stack.exploration")
+"""Whole stacks; built as ``cls(config, robot, chart, task, parts, journal)``: a ``RobotKnowledge``, a
+``WorldMap``, a ``TaskKnowledge``, the ``Parts`` that the mission names, and the ``Journal`` to write into."""

@@ -16,9 +16,12 @@ from pilotage.core.types import FloatArray, Goal, Pose2
 from pilotage.maps.cell_map import CellMap
 from pilotage.maps.landmarks import Landmarks
 from pilotage.maps.segment_map import SegmentMap
-from pilotage.missions.sheet import FirmwareConfig, WheelDriveConfig
+from pilotage.maps.true_cells import true_map
+from pilotage.maps.world_map import WorldMap
+from pilotage.missions.explorer import ExplorerConfig, FirmwareConfig
 from pilotage.models.footprint import Footprint
 from pilotage.models.motion.motion import MotionConfig
+from pilotage.models.motion.wheel_drive import WheelDriveConfig
 from pilotage.sensors.sensor import SensorConfig
 from pilotage.stack.interface import Belief
 
@@ -176,6 +179,46 @@ class SheetKnowledge:
     def sensors_of(self, kind: type[S]) -> dict[str, S]:
         """All sensors of one kind by name."""
         return {name: config for name, config in self.sensors.items() if isinstance(config, kind)}
+
+    @staticmethod
+    def of(
+        robot: RobotKnowledge, chart: WorldMap, task: TaskKnowledge, switches: ExplorerConfig, needed_by: str
+    ) -> SheetKnowledge:
+        """What an explorer is told, from what every robot is told.
+
+        A chart on which walls or tapes are drawn is taken as a floor plan by somebody else.
+
+        Raises
+        ------
+        InputError
+            Where the world is no sheet or the robot does not drive by its wheels' speeds.
+        """
+        markings, motion = chart.markings, robot.motion
+        if markings is None:
+            raise InputError(f"{needed_by}: expected a sheet with cells as world.map, found '{chart.name}'")
+        if not isinstance(motion, WheelDriveConfig):
+            raise InputError(f"{needed_by}: expected robot.motion.name: wheel-drive, found another motion")
+        plan = None
+        if markings.source is not None:
+            plan = FloorPlan(true_map(markings.source).cells, chart.walls.segments_m)
+        return SheetKnowledge(
+            size_m=markings.size_m,
+            cells=markings.cells,
+            edge_is_dark=markings.edge_is_dark,
+            tape_width_m=markings.tape_width_m,
+            start=task.initial.pose,
+            body_radius_m=robot.radius_m,
+            drive=motion,
+            sensors=robot.sensors,
+            dt_s=robot.dt_s,
+            time_limit_s=task.time_limit_s,
+            fusion=switches.fusion,
+            avoidance=switches.avoidance,
+            firmware=switches.firmware,
+            streams=robot.streams,
+            magnetometer=switches.magnetometer,
+            given=Given(task.pose_given, plan),
+        )
 
     @property
     def cell_m(self) -> tuple[float, float]:

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 
 from pilotage.core.angles import wrap_to_pi
 from pilotage.core.types import Pose2, WheelSpeeds
-from pilotage.missions.sheet import WheelDriveConfig
+from pilotage.models.motion.wheel_drive import WheelDriveConfig
 from pilotage.sensors.infrared import InfraredConfig
 from pilotage.sensors.readings import InfraredReading, Readings
 from pilotage.stack.control.wheel_pursuit import TURN_FIRST_RAD, turn, wheel_speeds

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from pilotage.core.types import STANDSTILL, WheelSpeeds
-from pilotage.missions.sheet import WheelDriveConfig
+from pilotage.models.motion.wheel_drive import WheelDriveConfig
 from pilotage.stack.control.wheel_pursuit import wheel_speeds
 
 Point = tuple[float, float]

@@ -6,7 +6,7 @@ import math
 
 from pilotage.core.angles import wrap_to_pi
 from pilotage.core.types import Pose2, WheelSpeeds
-from pilotage.missions.sheet import WheelDriveConfig
+from pilotage.models.motion.wheel_drive import WheelDriveConfig
 
 TURN_FIRST_RAD = 0.35
 """Headings farther off than this are mended on the spot."""

@@ -1,16 +1,13 @@
-"""The role: an exploring robot's whole stack, readings in and wheel speeds out; and its registry."""
+"""What an exploring stack has to offer at the end: its map, where it was, and what it left."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Protocol
 
-from pilotage.core.registry import Registry
-from pilotage.core.types import BoolArray, Event, WheelSpeeds
+from pilotage.core.types import BoolArray
 from pilotage.maps.cell_map import CellMap
-from pilotage.sensors.readings import Readings
-from pilotage.stack.interface import Belief, StackStatus
+from pilotage.stack.journal import Journal
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,17 +20,7 @@ class LeftCell:
 
 
 class Explorer(Protocol):
-    """Explores a sheet and maps it. Built as ``cls(config, knowledge)``, a ``SheetKnowledge``."""
-
-    @property
-    def belief(self) -> Belief:
-        """Where it believes to be."""
-        ...
-
-    @property
-    def status(self) -> tuple[StackStatus, str]:
-        """Running; arrived: it is done; failed: it gave up; and why."""
-        ...
+    """A stack that explores a sheet of cells and maps it."""
 
     @property
     def cells(self) -> CellMap:
@@ -50,17 +37,9 @@ class Explorer(Protocol):
         """Cells that it gave up, once it is done."""
         ...
 
-    def step(self, readings: Readings) -> WheelSpeeds:
-        """Take in what the sensors said in one control period, give the next command."""
-        ...
 
-    def telemetry(self) -> Mapping[str, float]:
-        """Numbers of the last step worth recording; the same keys at every step."""
-        ...
-
-    def drain_events(self) -> list[Event]:
-        """Events since the last call."""
-        ...
-
-
-EXPLORERS: Registry[Explorer] = Registry("explorer", "pilotage.stack.exploration")
+def offer(journal: Journal, explorer: Explorer) -> None:
+    """Offer an explorer's map to whoever reads its journal at the end."""
+    journal.result("cells", lambda: explorer.cells)
+    journal.result("visited", lambda: explorer.visited)
+    journal.result("left", lambda: explorer.left)

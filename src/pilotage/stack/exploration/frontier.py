@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from enum import StrEnum
 from typing import ClassVar
 
-from pilotage.core.types import STANDSTILL, BoolArray, Event, FloatArray, IntArray, WheelSpeeds
+from pilotage.core.types import STANDSTILL, BoolArray, FloatArray, IntArray, WheelSpeeds
 from pilotage.maps.cell_map import CellMap, CellState
+from pilotage.maps.world_map import WorldMap
 from pilotage.sensors.readings import Readings
 from pilotage.stack.control.waypoint_drive import WaypointDrive
 from pilotage.stack.control.wheel_pursuit import wheel_speeds
-from pilotage.stack.exploration.explorer import EXPLORERS, LeftCell
+from pilotage.stack.exploration.explorer import LeftCell, offer
 from pilotage.stack.exploration.frontier_config import FrontierConfig
 from pilotage.stack.exploration.frontier_goals import DEEP_M, Cell, Goals
 from pilotage.stack.exploration.frontier_ground import Ground
@@ -22,8 +22,9 @@ from pilotage.stack.exploration.frontier_retreat import is_walled_in, trail_back
 from pilotage.stack.exploration.frontier_returns import Look, best_look
 from pilotage.stack.exploration.frontier_senses import Senses
 from pilotage.stack.exploration.sheet_features import cell_map, line_cells, obstacle_cells, tape_ends
-from pilotage.stack.interface import Belief, StackStatus
-from pilotage.stack.knowledge import SheetKnowledge
+from pilotage.stack.interface import NAVIGATORS, Belief, StackStatus
+from pilotage.stack.journal import Journal
+from pilotage.stack.knowledge import RobotKnowledge, SheetKnowledge, TaskKnowledge
 from pilotage.stack.planning.sheet_room import Point, SheetRoom
 
 BACK_SPEED_M_S, BACK_S, BACK_ROOM_M = 0.035, 0.5, 0.006
@@ -41,7 +42,7 @@ class Doing(StrEnum):
     DONE = "done"
 
 
-@EXPLORERS.add("frontier", FrontierConfig)
+@NAVIGATORS.add("frontier", FrontierConfig)
 class FrontierExplorer:
     """Visits every cell it can, nearest and most telling first, on a map and a pose that correct each other.
 
@@ -56,7 +57,22 @@ class FrontierExplorer:
 
     TAKES: ClassVar = frozenset({"pose", "plan"})
 
-    def __init__(self, config: FrontierConfig, knowledge: SheetKnowledge) -> None:
+    def __init__(
+        self,
+        config: FrontierConfig,
+        robot: RobotKnowledge,
+        chart: WorldMap,
+        task: TaskKnowledge,
+        parts: object,
+        journal: Journal,
+    ) -> None:
+        del parts  # it brings its own
+        knowledge = SheetKnowledge.of(robot, chart, task, config, "frontier")
+        self._journal = journal
+        offer(journal, self)
+        self._channel = journal.channel(
+            {"goal_x_m": "m", "goal_y_m": "m", "position_std_m": "m", "landmarks": "1"}
+        )
         self._config, self._avoidance = config, knowledge.avoidance
         self._hardware = knowledge.drive
         self._tape_width_m, self._plan = knowledge.tape_width_m, knowledge.given.plan
@@ -76,7 +92,6 @@ class FrontierExplorer:
         self._inspections = Inspections(config.tape_end_m, config.inspections)
         self._left: tuple[LeftCell, ...] = ()
         self._status, self._reason = StackStatus.RUNNING, ""
-        self._events: list[Event] = []
 
     # --- what others ask ----------------------------------------------------------------------------
 
@@ -110,25 +125,17 @@ class FrontierExplorer:
         """Cells not visited, with reasons, once it is done."""
         return self._left
 
-    def telemetry(self) -> Mapping[str, float]:
-        """How sure of the position, where it is going, and what it has put on the map."""
-        x, y = self._driver.waypoints[-1] if self._driver.waypoints else (math.nan, math.nan)
-        return {
-            "goal_x_m": x,
-            "goal_y_m": y,
-            "position_std_m": self._smoother.position_std_m,
-            "landmarks": float(self._smoother.map.count),
-        }
-
-    def drain_events(self) -> list[Event]:
-        """Events since the last call."""
-        events, self._events = self._events, []
-        return events
-
     # --- one control period -------------------------------------------------------------------------
 
     def step(self, readings: Readings) -> WheelSpeeds:
         """Sense, decide where nothing is under way, drive."""
+        command = self._step(readings)
+        # How sure of the position, where it is going, and what it has put on the map.
+        x, y = self._driver.waypoints[-1] if self._driver.waypoints else (math.nan, math.nan)
+        self._channel.tell(x, y, self._smoother.position_std_m, float(self._smoother.map.count))
+        return command
+
+    def _step(self, readings: Readings) -> WheelSpeeds:
         if self._doing is Doing.DONE:
             return STANDSTILL
         t_s = readings.t_s
@@ -299,7 +306,7 @@ class FrontierExplorer:
         if self._goal is not None:
             self._goals.tries[self._goal] += 1
             text = f"{text}, on the way to column {self._goal[1]}, row {self._goal[0]}"
-        self._events.append(Event(t_s, kind, text))
+        self._journal.say(t_s, kind, text)
         self._driver.stop()
 
     def _review(self, t_s: float) -> None:
@@ -322,7 +329,7 @@ class FrontierExplorer:
             return
         if found:
             missed = self._goals.missed(self._smoother.position_std_m)
-            self._events.append(Event(t_s, "review", f"the whole run smoothed; {missed} cells to see again"))
+            self._journal.say(t_s, "review", f"the whole run smoothed; {missed} cells to see again")
             return
         self._left = reasons(
             ~self.visited,
@@ -335,7 +342,7 @@ class FrontierExplorer:
         self._driver.stop()
         count = int(self.visited.sum())
         self._reason = f"done: {count} cells visited, {len(self._left)} left ({summary(self._left)})"
-        self._events.append(Event(t_s, "arrived", self._reason))
+        self._journal.say(t_s, "arrived", self._reason)
 
     def _retreat(self, cost: FloatArray, t_s: float) -> bool:
         """Set out back along the trail where the map closes the robot in; False where it does not."""
@@ -343,7 +350,7 @@ class FrontierExplorer:
         if self._retreats >= RETREATS or not way or not is_walled_in(self._ground.room, cost, self.visited):
             return False
         self._retreats += 1
-        self._events.append(Event(t_s, "retreat", "the map leaves no way out: back along its own trail"))
+        self._journal.say(t_s, "retreat", "the map leaves no way out: back along its own trail")
         self._doing = Doing.LOOK
         self._driver.follow(way, t_s, slow_at_end=True)
         # Nothing was looked at again: that review is still to come.

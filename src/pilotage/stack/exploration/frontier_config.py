@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from pydantic import Field
 
-from pilotage.core.config import Config
+from pilotage.missions.explorer import ExplorerConfig
 from pilotage.stack.localization.sheet_smoother import SmootherConfig
 
 
-class FrontierConfig(Config):
+class FrontierConfig(ExplorerConfig):
     """How it drives, chooses, returns to what it knows, and when it gives a cell up."""
 
     pose: SmootherConfig = SmootherConfig()

@@ -2,24 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import ClassVar
 
-from pilotage.core.config import Config
-from pilotage.core.types import STANDSTILL, BoolArray, Event, WheelSpeeds
+from pilotage.core.types import STANDSTILL, BoolArray, WheelSpeeds
 from pilotage.maps.cell_map import CellMap
+from pilotage.maps.world_map import WorldMap
+from pilotage.missions.explorer import ExplorerConfig
 from pilotage.sensors.infrared import InfraredConfig
 from pilotage.sensors.line_sensor import LineSensorConfig
 from pilotage.sensors.readings import InfraredReading, Readings
 from pilotage.sensors.sensor import Positive
-from pilotage.stack.exploration.explorer import EXPLORERS, LeftCell
-from pilotage.stack.interface import Belief, StackStatus
-from pilotage.stack.knowledge import SheetKnowledge
+from pilotage.stack.exploration.explorer import LeftCell, offer
+from pilotage.stack.interface import NAVIGATORS, Belief, StackStatus
+from pilotage.stack.journal import Journal
+from pilotage.stack.knowledge import RobotKnowledge, SheetKnowledge, TaskKnowledge
 from pilotage.stack.localization.wheel_pose import WheelPose
 from pilotage.stack.mapping.cell_marks import CellMarks
 
 
-class RandomWalkConfig(Config):
+class RandomWalkConfig(ExplorerConfig):
     """How near something in front must be, and how the robot turns."""
 
     trigger_m: Positive = 0.10
@@ -29,7 +30,7 @@ class RandomWalkConfig(Config):
     now and then it makes a big turn."""
 
 
-@EXPLORERS.add("random-walk", RandomWalkConfig)
+@NAVIGATORS.add("random-walk", RandomWalkConfig)
 class RandomWalk:
     """Drives on with turns by chance, only turns before what its one front sensor sees; maps as it goes.
 
@@ -39,7 +40,20 @@ class RandomWalk:
 
     TAKES: ClassVar = frozenset({"pose", "plan"})
 
-    def __init__(self, config: RandomWalkConfig, knowledge: SheetKnowledge) -> None:
+    def __init__(
+        self,
+        config: RandomWalkConfig,
+        robot: RobotKnowledge,
+        chart: WorldMap,
+        task: TaskKnowledge,
+        parts: object,
+        journal: Journal,
+    ) -> None:
+        del parts  # it brings its own
+        knowledge = SheetKnowledge.of(robot, chart, task, config, "random-walk")
+        self._journal = journal
+        offer(journal, self)
+        self._channel = journal.channel({"turn_rad_s": "rad/s"})
         self._config = config
         self._drive = knowledge.drive
         infrared = knowledge.sensors_of(InfraredConfig)
@@ -53,7 +67,6 @@ class RandomWalk:
         self._steps = 0
         self._turn = 0.0
         self._blocked = False
-        self._events: list[Event] = []
 
     @property
     def belief(self) -> Belief:
@@ -92,6 +105,7 @@ class RandomWalk:
             return STANDSTILL
         if self._steps % self._turn_every == 0:
             self._turn = float(self._rng.normal(0.0, self._config.turn_std_rad_s))
+        self._channel.tell(self._turn)
         self._steps += 1
         self._look(seen)
         most = self._drive.max_wheel_speed_rad_s
@@ -99,15 +113,6 @@ class RandomWalk:
         return WheelSpeeds(
             min(max(forward - self._turn, -most), most), min(max(forward + self._turn, -most), most)
         )
-
-    def telemetry(self) -> Mapping[str, float]:
-        """By how much the wheels' speeds differ from straight on."""
-        return {"turn_rad_s": self._turn}
-
-    def drain_events(self) -> list[Event]:
-        """Nothing happens that would be worth a word."""
-        events, self._events = self._events, []
-        return events
 
     def _look(self, readings: Readings) -> None:
         """Something near in front? Lines are mapped and driven over."""

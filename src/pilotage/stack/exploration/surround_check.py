@@ -3,24 +3,25 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from typing import ClassVar, Literal
 
 import numpy as np
 from pydantic import Field
 
 from pilotage.core.angles import wrap_to_pi
-from pilotage.core.config import Config
-from pilotage.core.types import STANDSTILL, BoolArray, Event, WheelSpeeds
+from pilotage.core.types import STANDSTILL, BoolArray, WheelSpeeds
 from pilotage.maps.cell_map import CellMap, CellState
+from pilotage.maps.world_map import WorldMap
+from pilotage.missions.explorer import ExplorerConfig
 from pilotage.sensors.infrared import InfraredConfig
 from pilotage.sensors.readings import Readings
 from pilotage.sensors.sensor import Positive
 from pilotage.stack.control.potential_field import PotentialField
 from pilotage.stack.control.wheel_pursuit import pursue, turn
-from pilotage.stack.exploration.explorer import EXPLORERS, LeftCell
-from pilotage.stack.interface import Belief, StackStatus
-from pilotage.stack.knowledge import SheetKnowledge
+from pilotage.stack.exploration.explorer import LeftCell, offer
+from pilotage.stack.interface import NAVIGATORS, Belief, StackStatus
+from pilotage.stack.journal import Journal
+from pilotage.stack.knowledge import RobotKnowledge, SheetKnowledge, TaskKnowledge
 from pilotage.stack.localization.wheel_pose import WheelPose
 from pilotage.stack.mapping.cell_marks import CellMarks
 
@@ -29,7 +30,7 @@ AROUND = ((1, 0), (-1, 0), (0, 1), (0, -1))
 FACING_RAD = 0.1
 
 
-class SurroundCheckConfig(Config):
+class SurroundCheckConfig(ExplorerConfig):
     """The report's numbers; ``avoid`` says when the potential field acts where the mission switches it on."""
 
     goal_tolerance_m: Positive = 0.020
@@ -46,7 +47,7 @@ class SurroundCheckConfig(Config):
     """Stuck where no cell was new for so long."""
 
 
-@EXPLORERS.add("surround-check", SurroundCheckConfig)
+@NAVIGATORS.add("surround-check", SurroundCheckConfig)
 class SurroundCheck:
     """Next cell by the states around (exploration report, ch. 2.1): explored first, unknown as a heading.
 
@@ -59,7 +60,20 @@ class SurroundCheck:
 
     TAKES: ClassVar = frozenset({"pose", "plan"})
 
-    def __init__(self, config: SurroundCheckConfig, knowledge: SheetKnowledge) -> None:
+    def __init__(
+        self,
+        config: SurroundCheckConfig,
+        robot: RobotKnowledge,
+        chart: WorldMap,
+        task: TaskKnowledge,
+        parts: object,
+        journal: Journal,
+    ) -> None:
+        del parts  # it brings its own
+        knowledge = SheetKnowledge.of(robot, chart, task, config, "surround-check")
+        self._journal = journal
+        offer(journal, self)
+        self._channel = journal.channel({"goal_x_m": "m", "goal_y_m": "m", "far_hop": "1"})
         self._config = config
         self._drive = knowledge.drive
         self._dt_s = knowledge.dt_s
@@ -79,7 +93,6 @@ class SurroundCheck:
         self._steps = 0
         self._new_at_s, self._new_count = 0.0, 0
         self._status, self._reason = StackStatus.RUNNING, ""
-        self._events: list[Event] = []
 
     @property
     def belief(self) -> Belief:
@@ -108,6 +121,12 @@ class SurroundCheck:
 
     def step(self, readings: Readings) -> WheelSpeeds:
         """Localize, map, choose, drive."""
+        command = self._step(readings)
+        x, y = (math.nan, math.nan) if self._goal is None else self._marks.centre_of(*self._goal)
+        self._channel.tell(x, y, float(self._far))
+        return command
+
+    def _step(self, readings: Readings) -> WheelSpeeds:
         self._steps += 1
         pose = self._pose.step(readings)
         if len(readings.by_sensor) > 2:
@@ -127,16 +146,6 @@ class SurroundCheck:
                 return turn(off, self._drive)
             self._facing = None
         return STANDSTILL
-
-    def telemetry(self) -> Mapping[str, float]:
-        """The goal and whether it is a far one."""
-        x, y = (math.nan, math.nan) if self._goal is None else self._marks.centre_of(*self._goal)
-        return {"goal_x_m": x, "goal_y_m": y, "far_hop": float(self._far)}
-
-    def drain_events(self) -> list[Event]:
-        """Events since the last call."""
-        events, self._events = self._events, []
-        return events
 
     # --- choosing -----------------------------------------------------------------------------------
 
@@ -215,4 +224,4 @@ class SurroundCheck:
         self._status, self._reason = status, reason
         self._goal = None
         kind = "arrived" if status is StackStatus.ARRIVED else "failed"
-        self._events.append(Event(t_s, kind, reason))
+        self._journal.say(t_s, kind, reason)

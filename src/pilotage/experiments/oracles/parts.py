@@ -1,69 +1,29 @@
-"""Oracles: what a module would do if it knew the truth, to find out what the real one costs.
-
-They live outside the stack, because truth must not cross the robot's plug; they fill its roles because the
-modules meet at those seams. A mission asks for them by ``run.oracles``.
-"""
+"""Parts of a stack that know the truth: localizer, mapper, planner, smoother, controller."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from pilotage.core.angles import wrap_to_pi
 from pilotage.core.types import FloatArray, Pose2, Twist
-from pilotage.experiments.certain import exactly
-from pilotage.experiments.floor.driver import WatchedLocalizer
+from pilotage.experiments.oracles.certain import exactly
+from pilotage.experiments.oracles.driver import WatchedLocalizer
+from pilotage.experiments.oracles.truth import Truth
 from pilotage.maps.distance_field import DistanceField
-from pilotage.maps.segment_map import SegmentMap
 from pilotage.sensors.readings import Readings
-from pilotage.sim.simulator import Simulator
 from pilotage.stack.control.controller import Control
 from pilotage.stack.interface import Belief
 from pilotage.stack.navigator.navigator import Parts
 from pilotage.stack.planning.planner import Path, Planner, PlanRequest, PlanResult, Smoother
-
-ORACLES: Mapping[str, str] = {
-    "sensors": "sensors without noise, bias, scale error or offset; the filters expect them still",
-    "initial": "the start pose told exactly",
-    "localizer": "the true pose instead of an estimate",
-    "mapper": "every unexpected obstacle is on the robot's own map from the start",
-    "planner": "the mission's planner on the world as it is, unexpected obstacles included",
-    "controller": "the reference followed from the true pose, whatever the robot believes",
-    "driver": "everything drives on the true pose; the localizer runs along and is judged",
-}
-"""What stands in for each module."""
 
 SIDE_SPACING_M = 0.05
 SIDE_DISC_M = 0.03
 """Discs along an obstacle's sides, as the obstacle layer would put them there."""
 ALONG_PER_S, ACROSS_PER_M2, HEADING_PER_M = 2.0, 8.0, 4.0
 """Gains of the tracking law; across and heading are damped alike at all speeds."""
-
-
-@dataclass(slots=True)
-class Truth:
-    """What the oracles know; the simulator comes into being after the stack."""
-
-    geometry: SegmentMap
-    obstacle_segments_m: FloatArray
-    obstacle_circles_m: FloatArray
-    start: Pose2
-    dt_s: float
-    simulator: Simulator | None = None
-
-    @property
-    def pose(self) -> Pose2:
-        """Where the robot is."""
-        return self.start if self.simulator is None else self.simulator.truth
-
-
-def applicable(roles: Mapping[str, object]) -> dict[str, str]:
-    """The oracles that can stand in for something in a stack of these roles."""
-    always = ("sensors", "driver")
-    return {name: text for name, text in ORACLES.items() if name in always or roles.get(name) is not None}
 
 
 def with_oracles(parts: Parts, names: frozenset[str], truth: Truth) -> Parts:
@@ -97,10 +57,6 @@ class TrueLocalizer:
     def step(self, readings: Readings) -> Belief:  # noqa: ARG002
         """The sensors say nothing that is not known."""
         return self.belief
-
-    def telemetry(self) -> Mapping[str, float]:
-        """Nothing beyond the belief."""
-        return {}
 
 
 class KnowingMapper:

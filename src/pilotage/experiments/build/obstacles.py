@@ -14,7 +14,7 @@ from pilotage.core.types import FloatArray, Goal, Pose2
 from pilotage.kernels.geometry import plane
 from pilotage.maps.distance_field import DistanceField
 from pilotage.maps.segment_map import SegmentMap, box_segments
-from pilotage.missions.floor import (
+from pilotage.missions.world import (
     AcrossPathObstacle,
     BoxObstacle,
     CircleObstacle,

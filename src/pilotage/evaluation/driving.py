@@ -1,0 +1,150 @@
+"""How well one robot drove: errors, consistency, plan, clearance, recovery."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from pilotage.core.angles import wrap_array_to_pi
+from pilotage.core.types import BoolArray, FloatArray
+from pilotage.evaluation.consistency import nees, nees_metrics, nis_metrics
+from pilotage.evaluation.finished import FinishedRun, RobotRun
+from pilotage.evaluation.plan_quality import clearance_m, smoothness
+from pilotage.evaluation.pose_errors import pose_errors
+from pilotage.evaluation.shortest_path import ShortestPath, shortest_path
+from pilotage.evaluation.split_errors import split_errors
+
+WRONG_M, WRONG_RAD = 0.5, 0.1
+"""A pose farther from the truth than this is wrong."""
+MOST_SEGMENTS = 400
+"""Beyond so many walls the exact shortest path is not worked out: its tangent graph grows with their square."""
+
+
+def poses(trace: Mapping[str, FloatArray], prefix: str) -> FloatArray:
+    """(N, 3) x, y, theta of the columns that begin with ``prefix``."""
+    return np.column_stack([trace[f"{prefix}_x_m"], trace[f"{prefix}_y_m"], trace[f"{prefix}_theta_rad"]])
+
+
+def covariances(trace: Mapping[str, FloatArray]) -> FloatArray:
+    """(N, 3, 3) covariances of the belief."""
+    xx, xy, yy = trace["cov_xx_m2"], trace["cov_xy_m2"], trace["cov_yy_m2"]
+    xt, yt, tt = trace["cov_xt_m_rad"], trace["cov_yt_m_rad"], trace["cov_tt_rad2"]
+    return np.array([[xx, xy, xt], [xy, yy, yt], [xt, yt, tt]]).transpose(2, 0, 1)
+
+
+def header(run: FinishedRun, robot: RobotRun) -> dict[str, object]:
+    """What every run's object begins with."""
+    return {
+        "mission": run.mission.mission,
+        "seed": run.mission.run.seed,
+        "success": False,
+        "reason": run.ending or robot.reason or str(robot.status),
+        "duration_s": run.duration_s,
+        "steps": run.steps,
+        "steps_per_s": run.steps / run.loop_s,
+        **dict(robot.counts),
+    }
+
+
+def driving_metrics(run: FinishedRun, robot: RobotRun) -> tuple[dict[str, object], FloatArray]:
+    """A robot's metrics whatever its task, and its (N,) NEES.
+
+    Errors count after ``run.settle_s``, because the start error is drawn from the initial covariance, and
+    while the robot holds itself for localized: an honest "lost" claims no pose.
+    """
+    trace, config = robot.trace, run.mission.run
+    if trace["t_s"].shape[0] == 0:
+        return {}, np.zeros(0)
+    truth, estimate = poses(trace, "true"), poses(trace, "est")
+    values = nees(truth, estimate, covariances(trace))
+    counted = _counted(config.settle_s, trace)
+    metrics: dict[str, object] = {
+        "collisions": robot.collisions,
+        "min_clearance_m": float(trace["clearance_m"].min()),
+        "path_length_m": robot.driven_m,
+    }
+    metrics |= pose_errors(truth, estimate, counted).metrics()
+    if counted.any():
+        metrics |= split_errors(trace, pose_errors(truth, estimate).distance_m, counted)
+    metrics |= _consistency(trace, values, counted)
+    return metrics | _recovery(run, robot, truth, estimate), values
+
+
+def shortest_for(run: FinishedRun, robot: RobotRun) -> ShortestPath | None:
+    """Exact shortest path to hold against the first plan; None where there is nothing to compare."""
+    goal, plans = robot.goal, robot.plans
+    if goal is None or not plans or plans[0].given or not robot.stack.initial.known:
+        return None
+    if run.chart.walls.segments_m.shape[0] > MOST_SEGMENTS:
+        return None
+    return shortest_path(
+        run.chart.walls, (robot.start.x_m, robot.start.y_m), (goal.x_m, goal.y_m), plans[0].clearance_m
+    )
+
+
+def planning_metrics(run: FinishedRun, robot: RobotRun, shortest: ShortestPath | None) -> dict[str, object]:
+    """Length, quality and times of the first plan, beside the shortest path at the same clearance."""
+    if not robot.plans:
+        return {}
+    plan = robot.plans[0]
+    metrics: dict[str, object] = {
+        "planned_length_m": plan.length_m,
+        "planning_time_s": plan.planning_time_s,
+        "first_solution_s": plan.first_solution_s,
+        "planned_clearance_m": clearance_m(plan.states, run.chart.walls, robot.footprint.radius_m),
+        "smoothness": smoothness(plan.waypoints[:, :2]),
+    }
+    if shortest is not None:
+        metrics["shortest_length_m"] = shortest.length_m
+    return metrics
+
+
+def _counted(settle_s: float, trace: Mapping[str, FloatArray]) -> BoolArray:
+    """(N,) at which steps errors count."""
+    counted = trace["t_s"] > settle_s
+    if "localized" in trace:
+        counted &= trace["localized"] > 0.5
+    return np.asarray(counted, dtype=np.bool_)
+
+
+def _consistency(
+    trace: Mapping[str, FloatArray], values: FloatArray, counted: BoolArray
+) -> dict[str, object]:
+    """NEES, NIS and the share of readings that the filter accepted, over the steps that count."""
+    metrics = nees_metrics(values[counted])
+    if "nis" not in trace:
+        return metrics
+    metrics |= nis_metrics(trace["nis"][counted], trace["nis_expected"][counted])
+    for what in ("beacons", "lines"):
+        seen = trace[f"{what}_seen"][counted].sum() if f"{what}_seen" in trace else 0.0
+        if seen > 0.0:
+            metrics["accepted_fraction"] = float(trace[f"{what}_accepted"][counted].sum() / seen)
+    return metrics
+
+
+def _recovery(
+    run: FinishedRun, robot: RobotRun, truth: FloatArray, estimate: FloatArray
+) -> dict[str, object]:
+    """How long a robot that can be lost was lost, and how long it was wrong without knowing."""
+    trace, known = robot.trace, robot.stack.initial.known
+    if "localized" not in trace:
+        return {}
+    claimed, dt_s = trace["localized"] > 0.5, run.mission.run.dt_s
+    error = estimate - truth
+    wrong = np.hypot(error[:, 0], error[:, 1]) > WRONG_M
+    wrong |= np.abs(wrap_array_to_pi(error[:, 2])) > WRONG_RAD
+    # One that never says so although it is wrong is the worst case of all.
+    wrong_for_good = wrong & (trace["t_s"] > run.mission.run.settle_s)
+    if claimed.all() and known and not wrong_for_good.any():
+        return {}
+    metrics: dict[str, object] = {
+        "lost_s": float(dt_s * (~claimed).sum()),
+        "wrong_s": float(dt_s * (claimed & wrong).sum()),
+    }
+    found = np.flatnonzero(claimed & ~np.concatenate([[known], claimed[:-1]]))
+    if found.size:
+        since = np.flatnonzero(claimed[: found[-1]])
+        begin = float(trace["t_s"][since[-1]]) if since.size else 0.0
+        metrics["found_after_s"] = float(trace["t_s"][found[-1]]) - begin
+    return metrics

@@ -1,0 +1,92 @@
+"""The task of reaching a goal, or several in order."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import ClassVar
+
+from pilotage.core.angles import wrap_to_pi
+from pilotage.core.config import Config
+from pilotage.core.errors import InputError
+from pilotage.core.types import Event
+from pilotage.evaluation.driving import driving_metrics, header, planning_metrics, poses, shortest_for
+from pilotage.evaluation.finished import FinishedRun, RobotRun, Verdict
+from pilotage.evaluation.halls import hall_offset_m
+from pilotage.evaluation.tasks.collisions import CollisionWatch
+from pilotage.evaluation.tasks.task import TASKS, Attempt, TaskSetting, all_ended
+from pilotage.evaluation.tasks.team import verdict
+from pilotage.missions.places import GoalConfig
+
+
+class ReachConfig(Config):
+    """Further goals after ``world.goal``, to be reached in this order."""
+
+    goals: tuple[GoalConfig, ...] = ()
+
+
+@TASKS.add("reach", ReachConfig)
+class ReachTask:
+    """Done when every robot says that it has arrived; a success if it truly has, and nothing was touched."""
+
+    columns: Mapping[str, str]
+    goals: tuple[GoalConfig, ...]
+    drives: ClassVar[bool] = True
+
+    def __init__(self, config: ReachConfig, setting: TaskSetting) -> None:
+        mission = setting.mission
+        for robot in mission.team:
+            if mission.goal_of(robot) is None and not config.goals:
+                raise InputError("task 'reach': expected world.goal, found none")
+        self.columns, self.goals = {}, config.goals
+        self.events: list[Event] = []
+        self._watch = CollisionWatch(self.events)
+
+    def step(self, t_s: float, attempts: Sequence[Attempt]) -> str | None:
+        """Over at the first collision, or when nobody is under way any more."""
+        collision = self._watch.step(t_s, attempts)
+        if collision is not None:
+            return collision
+        return "" if all_ended(attempts) else None
+
+    def row(self, index: int) -> tuple[float, ...]:  # noqa: ARG002
+        """Nothing beyond what every trace has."""
+        return ()
+
+    def progress(self, attempts: Sequence[Attempt]) -> tuple[tuple[str, str], ...]:  # noqa: ARG002
+        """Nothing beyond what every progress line has."""
+        return ()
+
+    def judge(self, run: FinishedRun) -> Verdict:
+        """Position errors, consistency, path quality, clearance, and whether the goal was reached."""
+        return verdict([self._judged(run, robot) for robot in run.robots], run)
+
+    def _judged(self, run: FinishedRun, robot: RobotRun) -> Verdict:
+        shortest = shortest_for(run, robot)
+        metrics = header(run, robot) | planning_metrics(run, robot, shortest)
+        driven, nees = driving_metrics(run, robot)
+        extras = {} if shortest is None else {"shortest_path": shortest.points_xy_m}
+        metrics |= driven
+        if robot.trace["t_s"].shape[0]:
+            metrics |= self._arrival(run, robot)
+        return Verdict(metrics, ({"nees": nees},), extras)
+
+    def _arrival(self, run: FinishedRun, robot: RobotRun) -> dict[str, object]:
+        """Where it stands at the end, and whether that is where it should."""
+        metrics: dict[str, object] = {}
+        truth = poses(robot.trace, "true")
+        if run.chart.geometry is not None:
+            metrics["hall_offset_m"] = hall_offset_m(truth, run.chart.walls)
+        last = self.goals[-1] if self.goals else robot.goal
+        assert last is not None, "refused at the build"
+        away_m = math.hypot(truth[-1, 0] - last.x_m, truth[-1, 1] - last.y_m)
+        metrics["goal_error_m"] = away_m
+        reached = away_m <= last.tolerance_m
+        if last.theta_rad is not None:
+            turned = wrap_to_pi(truth[-1, 2] - last.theta_rad)
+            metrics["goal_error_rad"] = turned
+            reached = reached and abs(turned) <= last.tolerance_rad
+        metrics["success"] = robot.arrived and robot.collisions == 0 and reached
+        if robot.arrived and not reached:
+            metrics["reason"] = f"the robot says it arrived, but stands {away_m:.2f} m from its goal"
+        return metrics

@@ -1,0 +1,81 @@
+"""The role: watches a run, says when it is over, and judges it; and the registry of tasks."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import ClassVar, Protocol
+
+from pilotage.core.registry import Registry
+from pilotage.core.types import Event
+from pilotage.evaluation.finished import FinishedRun, Verdict
+from pilotage.maps.world_map import WorldMap
+from pilotage.missions.mission import Mission
+from pilotage.missions.places import GoalConfig
+from pilotage.models.footprint import Footprint
+from pilotage.sim.bodies.body import Body
+from pilotage.stack.interface import Stack, StackStatus
+from pilotage.stack.journal import Journal
+
+
+@dataclass(frozen=True, slots=True)
+class TaskSetting:
+    """What a task is built in.
+
+    Attributes
+    ----------
+    mission, chart
+        The mission, its places drawn, and the world's map.
+    footprints
+        One a robot.
+    """
+
+    mission: Mission
+    chart: WorldMap
+    footprints: Sequence[Footprint]
+
+
+@dataclass(frozen=True, slots=True)
+class Attempt:
+    """One robot at its task: its true body, what runs on it, what it tells."""
+
+    body: Body
+    stack: Stack
+    journal: Journal
+
+
+class Task(Protocol):
+    """Built as ``cls(config, setting)``; refuses a mission that lacks what it needs."""
+
+    columns: Mapping[str, str]
+    """The task's own columns of the trace with their units, one set a robot."""
+    events: list[Event]
+    """What happened, as seen from outside; whoever runs the task takes them out."""
+    goals: tuple[GoalConfig, ...]
+    """Further goals after a robot's own, in order."""
+    drives: ClassVar[bool]
+    """Whether anybody drives at all."""
+
+    def step(self, t_s: float, attempts: Sequence[Attempt]) -> str | None:
+        """Look at every robot after a step; why the run is over, or None. Empty: the robots ended it."""
+        ...
+
+    def row(self, index: int) -> tuple[float, ...]:
+        """The task's numbers of the last step for one robot, in the order of ``columns``."""
+        ...
+
+    def progress(self, attempts: Sequence[Attempt]) -> tuple[tuple[str, str], ...]:
+        """The numbers that tell most while the run goes on: (label, text) each."""
+        ...
+
+    def judge(self, run: FinishedRun) -> Verdict:
+        """The metrics by their JSON keys, ``success`` and ``reason`` among them, and what else came to light."""
+        ...
+
+
+TASKS: Registry[Task] = Registry("task", "pilotage.evaluation.tasks")
+
+
+def all_ended(attempts: Sequence[Attempt]) -> bool:
+    """Whether no robot is at it any more."""
+    return all(attempt.stack.status[0] is not StackStatus.RUNNING for attempt in attempts)

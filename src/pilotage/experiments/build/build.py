@@ -1,0 +1,226 @@
+"""From a mission to objects: the robots' stacks first, then the world that they meet."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from pilotage.core.errors import InputError
+from pilotage.core.random import RandomStreams
+from pilotage.core.types import FloatArray
+from pilotage.evaluation.tasks.task import TASKS, Task, TaskSetting
+from pilotage.experiments.build.charts import chart_of
+from pilotage.experiments.build.obstacles import Obstacles, place_obstacles
+from pilotage.experiments.build.places import check_place, pose_of, settle_places
+from pilotage.experiments.build.robots import footprint_of, motion_of, sensors_of
+from pilotage.experiments.build.stacks import build_stack, first_belief, goal_of, told
+from pilotage.experiments.oracles.drive import faithful
+from pilotage.experiments.oracles.ideal_sensors import ideal_sensors
+from pilotage.experiments.oracles.truth import Truth
+from pilotage.maps.world_map import WorldMap
+from pilotage.missions.mission import Mission
+from pilotage.missions.places import GoalConfig
+from pilotage.missions.robot import RobotConfig
+from pilotage.missions.stack import StackConfig
+from pilotage.sim.source import RobotSpec, Simulator
+from pilotage.sim.worlds.world import World
+from pilotage.stack.interface import Stack
+from pilotage.stack.journal import Journal
+from pilotage.stack.knowledge import RobotKnowledge, TaskKnowledge
+
+
+@dataclass(frozen=True, slots=True)
+class Member:
+    """One robot, ready to step.
+
+    Attributes
+    ----------
+    config, stack_config
+        As the mission has them.
+    known
+        Its own data sheet.
+    """
+
+    config: RobotConfig
+    stack_config: StackConfig
+    known: RobotKnowledge
+    stack: Stack
+    journal: Journal
+
+
+@dataclass(frozen=True, slots=True)
+class Experiment:
+    """Everything that one run needs, ready to step."""
+
+    mission: Mission
+    chart: WorldMap
+    obstacles: Obstacles
+    simulator: Simulator
+    team: tuple[Member, ...]
+    task: Task
+
+
+def build(mission: Mission) -> Experiment:
+    """Build a mission.
+
+    The stacks plan before the world is finished, because some obstacles are put across the planned path.
+
+    Raises
+    ------
+    InputError
+        Where the mission asks for something that does not exist or cannot be.
+    """
+    chart = chart_of(mission.world)
+    mission = settle_places(mission, chart)
+    streams = RandomStreams(mission.run.seed)
+    sheets = [_data_sheet(mission, index, streams) for index in range(len(mission.team))]
+    _check_places(mission, chart, sheets)
+    task = _task(mission, chart, sheets)
+    oracles = frozenset(mission.run.oracles)
+    nothing = np.zeros((0, 4)), np.zeros((0, 3))
+    truths = [_truth(mission, index, chart, *nothing) for index in range(len(sheets))]
+    blind = oracles - {"mapper", "planner", "explorer"}
+    team = [
+        _member(mission, index, chart, sheet, truths[index], blind, task.goals)
+        for index, sheet in enumerate(sheets)
+    ]
+    obstacles = _obstacles(mission, chart, sheets, team, streams)
+    if oracles:
+        # The obstacles stay where the robot without oracles meets them: only the modules differ.
+        placed = obstacles.segments_m, obstacles.circles_m
+        truths = [_truth(mission, index, chart, *placed) for index in range(len(sheets))]
+        team = [
+            _member(mission, index, chart, sheet, truths[index], oracles, task.goals)
+            for index, sheet in enumerate(sheets)
+        ]
+    simulator = Simulator(
+        World.of(chart, obstacles.segments_m, obstacles.circles_m),
+        [_spec(mission, index, sheet, oracles) for index, sheet in enumerate(sheets)],
+        mission.run.dt_s,
+    )
+    for truth, body in zip(truths, simulator.bodies, strict=True):
+        truth.body = body
+    return Experiment(mission, chart, obstacles, simulator, tuple(team), task)
+
+
+def _data_sheet(mission: Mission, index: int, streams: RandomStreams) -> RobotKnowledge:
+    """What a robot knows of itself; one of several has random streams of its own."""
+    robot = mission.team[index]
+    where = f"robots.{index}" if mission.robots else "robot"
+    return RobotKnowledge(
+        footprint_of(robot, where),
+        motion_of(robot, where),
+        sensors_of(robot, where),
+        mission.run.dt_s,
+        streams.within(robot.name) if mission.robots else streams,
+        robot.name,
+    )
+
+
+def _check_places(mission: Mission, chart: WorldMap, sheets: Sequence[RobotKnowledge]) -> None:
+    """Starts, goals and where robots are carried to must be on the map and leave room; no two starts meet."""
+    starts: list[FloatArray] = []
+    for index, (robot, sheet) in enumerate(zip(mission.team, sheets, strict=True)):
+        start, goal = mission.start_of(robot), mission.goal_of(robot)
+        assert start is not None, "settled above"
+        own = f"robots.{index}" if mission.robots else "world"
+        check_place(f"{own}.start", start.x_m, start.y_m, sheet.footprint, chart)
+        if goal is not None:
+            check_place(f"{own}.goal", goal.x_m, goal.y_m, sheet.footprint, chart)
+        here = np.array([start.x_m, start.y_m])
+        for other, place in enumerate(starts):
+            apart = float(np.hypot(*(here - place)))
+            if apart < sheet.footprint.inner_radius_m + sheets[other].footprint.inner_radius_m:
+                raise InputError(
+                    f"robots.{index}.start: expected robots apart, found '{sheet.name}' inside "
+                    f"'{sheets[other].name}' ({apart:.2f} m between their middles); move one of them"
+                )
+        starts.append(here)
+    for number, kidnap in enumerate(mission.world.kidnaps):
+        assert kidnap.to is not None, "settled above"
+        footprint = sheets[kidnap.robot].footprint
+        check_place(f"world.kidnaps.{number}.to", kidnap.to.x_m, kidnap.to.y_m, footprint, chart)
+
+
+def _task(mission: Mission, chart: WorldMap, sheets: Sequence[RobotKnowledge]) -> Task:
+    choice = mission.task
+    config = TASKS.configure(choice.name, choice.parameters, "task")
+    setting = TaskSetting(mission, chart, tuple(sheet.footprint for sheet in sheets))
+    return TASKS.entry(choice.name).factory(config, setting)
+
+
+def _truth(
+    mission: Mission, index: int, chart: WorldMap, segments_m: FloatArray, circles_m: FloatArray
+) -> Truth:
+    start = mission.start_of(mission.team[index])
+    assert start is not None, "settled above"
+    return Truth(chart, segments_m, circles_m, pose_of(start), mission.run.dt_s)
+
+
+def _member(
+    mission: Mission,
+    index: int,
+    chart: WorldMap,
+    sheet: RobotKnowledge,
+    truth: Truth,
+    oracles: frozenset[str],
+    further: tuple[GoalConfig, ...],
+) -> Member:
+    robot = mission.team[index]
+    config = mission.stack_of(robot)
+    goal = mission.goal_of(robot)
+    own = told(config, chart)
+    knowing = bool(oracles & {"initial", "explorer"})
+    task = TaskKnowledge(
+        initial=first_belief(config.initial, truth.start, own, sheet.streams, knowing),
+        goals=tuple(goal_of(place) for place in (goal, *further) if place is not None),
+        goal_tolerance_m=np.inf if goal is None else goal.tolerance_m,
+        time_limit_s=mission.run.time_limit_s,
+        pose_given=truth.tell_pose if "localizer" in oracles else None,
+    )
+    if "mapper" in oracles and config.map == "none":
+        own = chart
+    journal = Journal()
+    stack = build_stack(config, sheet, own, task, journal, truth, oracles)
+    return Member(robot, config, sheet, stack, journal)
+
+
+def _obstacles(
+    mission: Mission,
+    chart: WorldMap,
+    sheets: Sequence[RobotKnowledge],
+    team: Sequence[Member],
+    streams: RandomStreams,
+) -> Obstacles:
+    """What is on no map; what lies across a path lies across the first robot's."""
+    if not mission.world.obstacles:
+        return Obstacles(np.zeros((0, 4)), np.zeros((0, 3)), [])
+    robot = mission.team[0]
+    start, goal = mission.start_of(robot), mission.goal_of(robot)
+    assert start is not None, "settled above"
+    plans = team[0].journal.plans
+    return place_obstacles(
+        mission.world.obstacles,
+        chart.walls,
+        pose_of(start),
+        None if goal is None else goal_of(goal),
+        plans[0].states if plans else None,
+        sheets[0].radius_m,
+        streams.stream("world"),
+    )
+
+
+def _spec(mission: Mission, index: int, sheet: RobotKnowledge, oracles: frozenset[str]) -> RobotSpec:
+    """The robot as it truly is: with the faults that it has, or without those that an oracle takes away."""
+    start = mission.start_of(mission.team[index])
+    assert start is not None, "settled above"
+    return RobotSpec(
+        sheet.name,
+        sheet.footprint,
+        faithful(sheet.motion) if "drive" in oracles else sheet.motion,
+        ideal_sensors(sheet.sensors) if "sensors" in oracles else sheet.sensors,
+        pose_of(start),
+        sheet.streams,
+    )

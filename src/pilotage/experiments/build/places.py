@@ -1,0 +1,160 @@
+"""The places of a mission: checked, and those that the seed draws."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.ndimage import label
+
+from pilotage.core.angles import wrap_to_pi
+from pilotage.core.errors import InputError
+from pilotage.core.random import RandomStreams
+from pilotage.core.types import Pose2
+from pilotage.kernels.grids.blocked_distance import distance_to_blocked
+from pilotage.maps.distance_field import DistanceField
+from pilotage.maps.world_map import WorldMap
+from pilotage.missions.mission import Mission
+from pilotage.missions.places import Kidnap, PoseConfig
+from pilotage.models.footprint import Footprint
+
+GRID_M = 0.1
+MAX_DRAWS = 100_000
+
+
+def start_pose(mission: Mission, index: int, chart: WorldMap) -> PoseConfig:
+    """Where a robot is put down: the mission's start, else the sheet's, else the middle of a sheet.
+
+    Raises
+    ------
+    InputError
+        Where neither the mission nor its map says.
+    """
+    start = mission.start_of(mission.team[index])
+    if start is not None:
+        return start
+    sheet = None if chart.markings is None else chart.markings.source
+    if sheet is None:
+        raise InputError("world.start: expected a start pose, found none")
+    if sheet.start_pose is None:
+        return PoseConfig(x_m=0.5 * sheet.size_m[0], y_m=0.5 * sheet.size_m[1])
+    x, y, theta = sheet.start_pose
+    if not all(map(math.isfinite, sheet.start_pose)):
+        raise InputError(f"sheet: start_pose: expected finite numbers, found {sheet.start_pose}")
+    return PoseConfig(x_m=x, y_m=y, theta_rad=wrap_to_pi(theta))
+
+
+def settle_places(mission: Mission, chart: WorldMap) -> Mission:
+    """Return the mission with all its places known, so that it can be recorded and run again as it is."""
+    world = mission.world
+    given = [start_pose(mission, index, chart) for index in range(len(mission.team))]
+    if world.random_start is None and all(kidnap.to is not None for kidnap in world.kidnaps):
+        return mission if mission.robots or world.start is not None else _started(mission, given)
+    streams = RandomStreams(mission.run.seed)
+    starts = given
+    if world.random_start is not None:
+        rng, clearance_m = streams.stream("start"), world.random_start.clearance_m
+        starts = [_random_pose(chart, start, clearance_m, rng) for start in given]
+    rng = streams.stream("kidnap")
+    kidnaps = tuple(
+        kidnap if kidnap.to is not None else _carried(kidnap, chart, given[kidnap.robot], rng)
+        for kidnap in world.kidnaps
+    )
+    settled = world.model_copy(update={"random_start": None, "kidnaps": kidnaps})
+    return _started(mission.model_copy(update={"world": settled}), starts)
+
+
+def _started(mission: Mission, starts: Sequence[PoseConfig]) -> Mission:
+    """The mission with its starts where they belong: the one robot's in the world, else each robot's own."""
+    if not mission.robots and mission.robot.start is None:
+        return mission.model_copy(update={"world": mission.world.model_copy(update={"start": starts[0]})})
+    if not mission.robots:
+        return mission.model_copy(update={"robot": mission.robot.model_copy(update={"start": starts[0]})})
+    robots = tuple(
+        robot.model_copy(update={"start": start}) for robot, start in zip(mission.robots, starts, strict=True)
+    )
+    return mission.model_copy(update={"robots": robots})
+
+
+def check_place(where: str, x_m: float, y_m: float, footprint: Footprint, chart: WorldMap) -> None:
+    """Refuse a place beside the map, or one that leaves no room for the body.
+
+    A polygon needs the room of the largest disc inside it: how it stands is another question.
+
+    Raises
+    ------
+    InputError
+        With what was found there.
+    """
+    xmin, ymin, xmax, ymax = chart.bounds_m
+    if not chart.contains(x_m, y_m):
+        raise InputError(
+            f"{where}: expected a place on the map '{chart.name}' ({xmin:g} to {xmax:g}, "
+            f"{ymin:g} to {ymax:g} m), found ({x_m:g}, {y_m:g})"
+        )
+    needed = footprint.inner_radius_m
+    clear = room_m(chart, x_m, y_m, needed)
+    if clear < needed:
+        what = "the body's radius" if footprint.is_disc else "the body's inner radius"
+        raise InputError(
+            f"{where}: expected at least {what} of {needed:g} m to the nearest wall, "
+            f"found {clear:.3f} m at ({x_m:g}, {y_m:g}); move it or make the body smaller"
+        )
+
+
+def room_m(chart: WorldMap, x_m: float, y_m: float, asked_m: float) -> float:
+    """Distance from a point to the nearest wall or blocked cell; beyond ``asked_m`` it may be told short."""
+    if chart.geometry is not None:
+        return chart.geometry.distance_m(x_m, y_m)
+    if chart.grid is None:
+        return math.inf
+    grid = chart.grid
+    reach = math.ceil(asked_m / grid.resolution_m) + 2
+    places = grid.places_at(np.array([[x_m, y_m]]))
+    return float(distance_to_blocked(places, grid.blocked(), reach)[0]) * grid.resolution_m
+
+
+def pose_of(place: PoseConfig) -> Pose2:
+    """The pose that a mission file says."""
+    return Pose2(place.x_m, place.y_m, wrap_to_pi(place.theta_rad))
+
+
+def _carried(kidnap: Kidnap, chart: WorldMap, near: PoseConfig, rng: np.random.Generator) -> Kidnap:
+    return kidnap.model_copy(update={"to": _random_pose(chart, near, kidnap.clearance_m, rng)})
+
+
+def _random_pose(
+    chart: WorldMap, reachable_from: PoseConfig, clearance_m: float, rng: np.random.Generator
+) -> PoseConfig:
+    """Draw a pose, uniform over the floor that is connected to a place at a clearance.
+
+    Raises
+    ------
+    InputError
+        Where the place itself has less clearance, or nothing is found.
+    """
+    field = chart.field if chart.geometry is None else DistanceField.from_map(chart.walls, GRID_M)
+    regions, _ = label(field.distance_m >= clearance_m)
+    x0, y0 = field.origin_xy_m
+    step = field.resolution_m
+
+    def region(x: float, y: float) -> int:
+        row, col = round((y - y0) / step), round((x - x0) / step)
+        inside = 0 <= row < regions.shape[0] and 0 <= col < regions.shape[1]
+        return int(regions[row, col]) if inside else 0
+
+    home = region(reachable_from.x_m, reachable_from.y_m)
+    if home == 0:
+        raise InputError(
+            f"world.start: expected {clearance_m:g} m to the nearest wall, from where random places are "
+            f"reached, found less at ({reachable_from.x_m:g}, {reachable_from.y_m:g})"
+        )
+    xmin, ymin, xmax, ymax = chart.bounds_m
+    for _ in range(MAX_DRAWS):
+        x, y, theta = rng.uniform([xmin, ymin, -math.pi], [xmax, ymax, math.pi])
+        if region(x, y) != home:
+            continue
+        if room_m(chart, float(x), float(y), clearance_m) >= clearance_m:
+            return PoseConfig(x_m=float(x), y_m=float(y), theta_rad=float(theta))
+    raise InputError(f"random place: found none with {clearance_m:g} m of clearance; ask for less")

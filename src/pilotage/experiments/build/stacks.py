@@ -1,0 +1,139 @@
+"""One robot's stack from a mission: what it is told, then its components."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pilotage.core.angles import wrap_to_pi
+from pilotage.core.errors import InputError
+from pilotage.core.random import RandomStreams
+from pilotage.core.types import Goal, Pose2
+from pilotage.experiments.build.charts import load_chart
+from pilotage.experiments.components import build_component, optional_component
+from pilotage.experiments.oracles.certain import exactly
+from pilotage.experiments.oracles.driver import WatchedLocalizer, WatchedStack
+from pilotage.experiments.oracles.explorer import knowing_explorer
+from pilotage.experiments.oracles.parts import TrueLocalizer, with_oracles
+from pilotage.experiments.oracles.truth import Truth
+from pilotage.maps.world_map import WorldMap
+from pilotage.missions.places import GoalConfig
+from pilotage.missions.stack import InitialConfig, StackConfig
+from pilotage.stack.control.controller import CONTROLLERS
+from pilotage.stack.control.escape import ESCAPES
+from pilotage.stack.control.reactive import REACTIVES
+from pilotage.stack.interface import Belief, Stack
+from pilotage.stack.journal import Journal
+from pilotage.stack.knowledge import RobotKnowledge, TaskKnowledge
+from pilotage.stack.localization.localizer import LOCALIZERS, Localizer
+from pilotage.stack.mapping.mapper import MAPPERS
+from pilotage.stack.navigator.navigator import NAVIGATORS, Parts
+from pilotage.stack.planning.local_planner import LOCAL_PLANNERS
+from pilotage.stack.planning.planner import PLANNERS, SMOOTHERS
+
+
+def told(stack: StackConfig, chart: WorldMap) -> WorldMap:
+    """The robot's own map at the start: the world's as it was drawn, its extent alone, or another file's.
+
+    Raises
+    ------
+    InputError
+        Where the file cannot be read.
+    """
+    if stack.map == "given":
+        return chart
+    if stack.map == "none":
+        return chart.extent_only()
+    return load_chart(stack.map)
+
+
+def initial_belief(initial: InitialConfig, start: Pose2, streams: RandomStreams) -> Belief:
+    """What the robot believes at first: the start with an error drawn from the initial covariance."""
+    variances = np.array([initial.x_var_m2, initial.y_var_m2, initial.theta_var_rad2])
+    error = np.sqrt(variances) * streams.stream("initial").standard_normal(3)
+    pose = Pose2(
+        start.x_m + float(error[0]),
+        start.y_m + float(error[1]),
+        wrap_to_pi(start.theta_rad + float(error[2])),
+    )
+    return Belief(pose, np.diag(variances))
+
+
+def goal_of(goal: GoalConfig) -> Goal:
+    """The goal that a mission file says."""
+    theta = None if goal.theta_rad is None else wrap_to_pi(goal.theta_rad)
+    return Goal(goal.x_m, goal.y_m, theta)
+
+
+def build_stack(
+    config: StackConfig,
+    robot: RobotKnowledge,
+    chart: WorldMap,
+    task: TaskKnowledge,
+    journal: Journal,
+    truth: Truth | None = None,
+    oracles: frozenset[str] = frozenset(),
+) -> Stack:
+    """Build what runs on a robot; it plans while it is built.
+
+    Parameters
+    ----------
+    chart
+        The robot's own map.
+    truth, oracles
+        Which of its modules know the truth, and the truth; none as a rule.
+
+    Raises
+    ------
+    InputError
+        Where a component is unknown, or lacks what it needs.
+    """
+    if "explorer" in oracles and truth is not None:
+        return knowing_explorer(robot, chart, task, truth, journal)
+    localizer = _localizer(config, robot, chart, task, journal, truth, oracles)
+    parts = Parts(
+        localizer=localizer,
+        planner=optional_component(PLANNERS, config.planner, "planner"),
+        smoother=optional_component(SMOOTHERS, config.smoother, "smoother"),
+        local_planner=optional_component(LOCAL_PLANNERS, config.local_planner, "local_planner", robot),
+        controller=optional_component(CONTROLLERS, config.controller, "controller", robot),
+        reactive=optional_component(REACTIVES, config.reactive, "reactive", robot),
+        mapper=optional_component(MAPPERS, config.mapper, "mapper", robot, chart),
+        escape=optional_component(ESCAPES, config.escape, "escape", robot),
+    )
+    if truth is not None:
+        parts = with_oracles(parts, oracles, truth)
+    stack = build_component(NAVIGATORS, config.navigator, "navigator", robot, chart, task, parts, journal)
+    watched = parts.localizer
+    return WatchedStack(stack, watched.watched) if isinstance(watched, WatchedLocalizer) else stack
+
+
+def _localizer(
+    config: StackConfig,
+    robot: RobotKnowledge,
+    chart: WorldMap,
+    task: TaskKnowledge,
+    journal: Journal,
+    truth: Truth | None,
+    oracles: frozenset[str],
+) -> Localizer | None:
+    """The mission's localizer; a navigator may bring its own, or the truth may stand in for it."""
+    if config.localizer is None:
+        return TrueLocalizer(truth) if truth is not None and "localizer" in oracles else None
+    return build_component(LOCALIZERS, config.localizer, "localizer", robot, chart, task.initial, journal)
+
+
+def first_belief(
+    initial: InitialConfig, start: Pose2, chart: WorldMap, streams: RandomStreams, told_exactly: bool
+) -> Belief:
+    """What a robot believes before anything was measured."""
+    belief = initial_belief(initial, start, streams)
+    if told_exactly:
+        return exactly(start)
+    return belief if initial.known else Belief.anywhere(chart.bounds_m)
+
+
+def require_goal(goal: GoalConfig | None, needed_by: str) -> GoalConfig:
+    """The goal; InputError where there is none."""
+    if goal is None:
+        raise InputError(f"{needed_by}: expected world.goal, found none")
+    return goal

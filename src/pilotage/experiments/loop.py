@@ -1,0 +1,157 @@
+"""The one loop: the source gives readings, each robot's stack gives a command, the task says when it is over."""
+
+from __future__ import annotations
+
+import math
+import time
+from dataclasses import dataclass
+
+import numpy as np
+
+from pilotage.core.angles import wrap_to_pi
+from pilotage.core.types import STOP, Command, Event, Pose2
+from pilotage.evaluation.finished import FinishedRun, RobotRun
+from pilotage.evaluation.tasks.task import Attempt, all_ended
+from pilotage.experiments.build.build import Experiment, build
+from pilotage.experiments.progress import EVERY_S, OnProgress, Progress, metres
+from pilotage.experiments.recorder import Recorder
+from pilotage.experiments.sightings import Sightings
+from pilotage.experiments.update_album import UpdateAlbum
+from pilotage.missions.mission import Mission
+from pilotage.missions.places import Kidnap
+
+
+@dataclass(frozen=True, slots=True)
+class Run:
+    """A finished run, and of every robot what its sensors saw and which updates are worth a picture."""
+
+    finished: FinishedRun
+    sightings: tuple[Sightings, ...]
+    albums: tuple[UpdateAlbum, ...]
+
+
+def simulate(mission: Mission, on_progress: OnProgress | None = None) -> Run:
+    """Build a mission and step it to its end.
+
+    Raises
+    ------
+    InputError
+        Where the mission cannot be built.
+    """
+    return run_loop(build(mission), on_progress)
+
+
+def run_loop(experiment: Experiment, on_progress: OnProgress | None = None) -> Run:
+    """Step source and stacks until the task says that it is over, or time is up."""
+    mission, source, task = experiment.mission, experiment.simulator, experiment.task
+    team = experiment.team
+    attempts = tuple(
+        Attempt(body, member.stack, member.journal) for body, member in zip(source.bodies, team, strict=True)
+    )
+    recorders = tuple(
+        Recorder(member, body, task, index)
+        for index, (member, body) in enumerate(zip(team, source.bodies, strict=True))
+    )
+    sightings = tuple(Sightings(dict(member.known.sensors)) for member in team)
+    albums = tuple(UpdateAlbum() for _ in team)
+    events: list[Event] = []
+    planned_s = sum(member.journal.planning_time_s for member in team)
+    every = max(1, round(mission.run.record_every_s / mission.run.dt_s))
+    limit = math.ceil(mission.run.time_limit_s / mission.run.dt_s) if task.drives else 0
+    kidnaps = sorted(mission.world.kidnaps, key=lambda kidnap: kidnap.at_s)
+    commands: list[Command] = [STOP] * len(team)
+    ending = "" if not task.drives or all_ended(attempts) else None
+    begin = last_told = time.perf_counter()
+    step = 0
+    while ending is None and step < limit:
+        while kidnaps and source.t_s >= kidnaps[0].at_s:
+            events.append(_carry(experiment, kidnaps.pop(0)))
+        readings = source.step(commands)
+        step += 1
+        for index, member in enumerate(team):
+            commands[index] = member.stack.step(readings[index])
+        ending = task.step(source.t_s, attempts)
+        for index, member in enumerate(team):
+            if step % every == 0 or ending is not None:
+                recorders[index].record(readings[index], commands[index])
+            sightings[index].record(readings[index])
+            update = member.journal.update
+            if update is not None:
+                albums[index].offer(source.t_s, update)
+                member.journal.update = None
+        if on_progress is not None and time.perf_counter() - last_told > EVERY_S:
+            last_told = time.perf_counter()
+            on_progress(_progress(experiment, attempts))
+    loop_s = time.perf_counter() - begin
+    planning_s = sum(member.journal.planning_time_s for member in team) - planned_s
+    if ending is None:
+        ending = f"time limit of {mission.run.time_limit_s:g} s reached"
+    events += [event for member in team for event in member.journal.events] + task.events
+    placed = experiment.obstacles
+    finished = FinishedRun(
+        mission,
+        experiment.chart,
+        placed.segments_m,
+        placed.circles_m,
+        placed.polygons_m,
+        tuple(_robot_run(experiment, index, recorder) for index, recorder in enumerate(recorders)),
+        sorted(events, key=lambda event: event.t_s),
+        step,
+        source.t_s,
+        max(loop_s - planning_s, 1e-9),
+        ending,
+    )
+    return Run(finished, sightings, albums)
+
+
+def _robot_run(experiment: Experiment, index: int, recorder: Recorder) -> RobotRun:
+    member, body = experiment.team[index], experiment.simulator.bodies[index]
+    mission, journal = experiment.mission, member.journal
+    start = mission.start_of(member.config)
+    assert start is not None, "settled by the build"
+    status, reason = member.stack.status
+    return RobotRun(
+        member.known.name,
+        member.known.footprint,
+        member.known.motion,
+        Pose2(start.x_m, start.y_m, wrap_to_pi(start.theta_rad)),
+        mission.goal_of(member.config),
+        member.stack_config,
+        recorder.trace(),
+        journal.units,
+        journal.plans,
+        journal.counts,
+        journal.results(),
+        journal.planning_time_s,
+        status,
+        reason,
+        body.collisions,
+        body.driven_m,
+    )
+
+
+def _carry(experiment: Experiment, kidnap: Kidnap) -> Event:
+    """Carry a robot elsewhere; nobody tells it."""
+    assert kidnap.to is not None, "settled by the build"
+    to = Pose2(kidnap.to.x_m, kidnap.to.y_m, wrap_to_pi(kidnap.to.theta_rad))
+    experiment.simulator.bodies[kidnap.robot].carry_to(to)
+    return Event(
+        experiment.simulator.t_s,
+        "kidnap",
+        f"the robot is carried to ({to.x_m:.2f}, {to.y_m:.2f}) and not told",
+    )
+
+
+def _progress(experiment: Experiment, attempts: tuple[Attempt, ...]) -> Progress:
+    """Where the worst located robot stands, and what the task has to tell."""
+    worst_m, sigma_m = 0.0, 0.0
+    for attempt in attempts:
+        truth, belief = attempt.body.pose, attempt.stack.belief
+        worst_m = max(worst_m, math.hypot(truth.x_m - belief.pose.x_m, truth.y_m - belief.pose.y_m))
+        sigma_m = max(sigma_m, float(np.sqrt(max(np.linalg.eigvalsh(belief.cov[:2, :2])[-1], 0.0))))
+    numbers = (
+        *experiment.task.progress(attempts),
+        ("error", metres(worst_m, 3)),
+        ("sigma", metres(sigma_m, 3)),
+    )
+    return Progress(experiment.simulator.t_s, numbers)

@@ -1,0 +1,56 @@
+"""Which oracles there are, and which of them a mission has a place for."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from pilotage.core.errors import InputError
+from pilotage.missions.mission import Mission
+from pilotage.stack.navigator.navigator import NAVIGATORS
+
+ORACLES: Mapping[str, str] = {
+    "sensors": "sensors without noise, bias, scale error or offset; the filters expect them still",
+    "initial": "the start pose told exactly",
+    "localizer": "the true pose instead of an estimate",
+    "mapper": "every unexpected obstacle is on the robot's own map from the start",
+    "planner": "the mission's planner on the world as it is, unexpected obstacles included",
+    "controller": "the reference followed from the true pose, whatever the robot believes",
+    "driver": "everything drives on the true pose; the localizer runs along and is judged",
+    "drive": "wheels that do what the data sheet says, at once: alike, without slip, without lag",
+    "explorer": "the whole robot knows: a short path through every reachable cell, driven from the true pose",
+}
+"""What stands in for each module."""
+TAKEN = {"localizer": "pose", "mapper": "plan"}
+"""What an exploring robot has to take for an oracle to reach it; it says so in ``TAKES``."""
+
+
+def applicable(mission: Mission) -> dict[str, str]:
+    """The oracles that can stand in for something in a mission."""
+    stack = mission.stack
+    taken: frozenset[str] = getattr(NAVIGATORS.entry(stack.navigator.name).factory, "TAKES", frozenset())
+    there = {"sensors"} if mission.robot.sensors or mission.robots else set()
+    there |= {name for name in ("localizer", "mapper", "planner", "controller") if getattr(stack, name)}
+    there |= {"initial", "driver"} if stack.localizer is not None else set()
+    there |= {name for name, what in TAKEN.items() if what in taken}
+    there |= {"drive"} if all(robot.motion.name == "wheel-drive" for robot in mission.team) else set()
+    there |= {"explorer"} if mission.task.name == "explore" and taken else set()
+    return {name: text for name, text in ORACLES.items() if name in there}
+
+
+def check_oracles(mission: Mission) -> None:
+    """Refuse an oracle that the mission has no place for, or names twice.
+
+    Raises
+    ------
+    InputError
+        With those that it has.
+    """
+    known = applicable(mission)
+    for name in mission.run.oracles:
+        if name not in known:
+            offered = f"one of {', '.join(known)}" if known else "none"
+            raise InputError(
+                f"run.oracles: expected {offered} in the mission '{mission.mission}', found '{name}'"
+            )
+    if len(set(mission.run.oracles)) < len(mission.run.oracles):
+        raise InputError("run.oracles: expected every oracle once, found one twice")

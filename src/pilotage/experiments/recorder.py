@@ -1,0 +1,121 @@
+"""One row a step and robot: truth, belief, command and telemetry, side by side for the first time."""
+
+from __future__ import annotations
+
+import math
+from array import array
+
+import numpy as np
+
+from pilotage.core.types import Command, FloatArray, Twist, WheelSpeeds
+from pilotage.evaluation.tasks.task import Task
+from pilotage.experiments.build.build import Member
+from pilotage.models.motion.wheel_drive import WheelDriveConfig
+from pilotage.sensors.readings import OdometryIncrement, Readings, UltrasonicReading
+from pilotage.sensors.ultrasonic import UltrasonicConfig
+from pilotage.sensors.wheel_odometry import WheelOdometryConfig
+from pilotage.sim.bodies.body import Body
+
+TRUTH_COLUMNS = ("t_s", "true_x_m", "true_y_m", "true_theta_rad")
+BELIEF_COLUMNS = (
+    "est_x_m",
+    "est_y_m",
+    "est_theta_rad",
+    "cov_xx_m2",
+    "cov_xy_m2",
+    "cov_yy_m2",
+    "cov_xt_m_rad",
+    "cov_yt_m_rad",
+    "cov_tt_rad2",
+)
+TWIST_COLUMNS = ("v_cmd_m_s", "w_cmd_rad_s")
+WHEEL_COLUMNS = ("left_cmd_rad_s", "right_cmd_rad_s")
+BODY_COLUMNS = ("v_true_m_s", "w_true_rad_s", "clearance_m", "collisions")
+ODOMETRY_COLUMNS = ("odom_distance_m", "odom_angle_rad")
+"""The wheel odometry's reading of the step; nan where there was none."""
+
+
+class Recorder:
+    """Collects one robot's rows as plain numbers; columns are made once at the end."""
+
+    def __init__(self, member: Member, body: Body, task: Task, index: int) -> None:
+        self._stack, self._journal, self._body = member.stack, member.journal, body
+        self._task, self._index = task, index
+        sensors = member.known.sensors
+        self._sonars = [name for name, config in sensors.items() if isinstance(config, UltrasonicConfig)]
+        wheels = [name for name, config in sensors.items() if isinstance(config, WheelOdometryConfig)]
+        self._odometer = wheels[0] if wheels else None
+        self._by_wheels = isinstance(member.known.motion, WheelDriveConfig)
+        self._rows = array("d")
+        self.names = (
+            *TRUTH_COLUMNS,
+            *BELIEF_COLUMNS,
+            *(WHEEL_COLUMNS if self._by_wheels else TWIST_COLUMNS),
+            *BODY_COLUMNS,
+            *ODOMETRY_COLUMNS,
+            *(f"us_{name}_m" for name in self._sonars),
+            *task.columns,
+            *member.journal.units,
+        )
+
+    def record(self, readings: Readings, command: Command) -> None:
+        """Record the step that has just been taken."""
+        body, belief = self._body, self._stack.belief
+        truth, pose, cov, twist = body.pose, belief.pose, belief.cov, body.twist
+        self._rows.extend(
+            (
+                readings.t_s,
+                truth.x_m,
+                truth.y_m,
+                truth.theta_rad,
+                pose.x_m,
+                pose.y_m,
+                pose.theta_rad,
+                cov[0, 0],
+                cov[0, 1],
+                cov[1, 1],
+                cov[0, 2],
+                cov[1, 2],
+                cov[2, 2],
+                *self._commanded(command),
+                twist.v_m_s,
+                twist.w_rad_s,
+                body.clearance_m,
+                body.collisions,
+                *_odometry(readings, self._odometer),
+                *[_sonar_m(readings, name) for name in self._sonars],
+                *self._task.row(self._index),
+            )
+        )
+        self._rows.extend(self._journal.row)
+
+    def _commanded(self, command: Command) -> tuple[float, float]:
+        """The two numbers of a command; nan where it is not of the recorded form."""
+        if self._by_wheels:
+            if isinstance(command, WheelSpeeds):
+                return command.left_rad_s, command.right_rad_s
+            return math.nan, math.nan
+        if isinstance(command, Twist):
+            return command.v_m_s, command.w_rad_s
+        return math.nan, math.nan
+
+    def trace(self) -> dict[str, FloatArray]:
+        """Columns by name, each (rows,)."""
+        table = np.frombuffer(self._rows, dtype=np.float64).reshape(-1, len(self.names))
+        return {name: np.ascontiguousarray(table[:, i]) for i, name in enumerate(self.names)}
+
+
+def _odometry(readings: Readings, name: str | None) -> tuple[float, float]:
+    """Distance and angle of the odometry increment; nan where there is none."""
+    reading = None if name is None else readings.by_sensor.get(name)
+    if isinstance(reading, OdometryIncrement):
+        return reading.distance_m, reading.angle_rad
+    return math.nan, math.nan
+
+
+def _sonar_m(readings: Readings, name: str) -> float:
+    """An ultrasonic distance; nan where there is none or it is saturated."""
+    reading = readings.by_sensor.get(name)
+    if isinstance(reading, UltrasonicReading) and not reading.saturated:
+        return reading.range_m
+    return math.nan

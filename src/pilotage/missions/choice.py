@@ -1,0 +1,50 @@
+"""A component by its registered name, with its parameters beside it."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Mapping
+from typing import Any
+
+from pydantic import ConfigDict, model_validator
+
+from pilotage.core.config import Config
+
+
+class ComponentChoice(Config):
+    """A registered name and, beside it, the parameters of that component.
+
+    A bare name stands for the component with its defaults. The room that registers the name validates the
+    parameters.
+    """
+
+    model_config = ConfigDict(extra="allow", frozen=True)
+
+    name: str
+
+    @model_validator(mode="before")
+    @classmethod
+    def _bare_name(cls, data: Any) -> Any:
+        """A bare name stands for the component with its defaults."""
+        return {"name": data} if isinstance(data, str) else data
+
+    @property
+    def parameters(self) -> dict[str, Any]:
+        """All keys but the name."""
+        return dict(self.model_extra or {})
+
+
+def laid_over(base: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
+    """``changes`` over ``base``, mappings key by key; a component whose ``name`` changes starts from nothing."""
+    merged = copy.deepcopy(dict(base))
+    for key, value in changes.items():
+        old = merged.get(key)
+        if (
+            isinstance(value, Mapping)
+            and isinstance(old, Mapping)
+            and value.get("name", old.get("name")) == old.get("name")
+        ):
+            merged[key] = laid_over(old, value)
+        else:
+            merged[key] = copy.deepcopy(value)
+    return merged

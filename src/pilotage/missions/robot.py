@@ -1,0 +1,58 @@
+"""The robot of a mission: its outline, how it moves, what it carries."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Annotated, Any, Literal
+
+from pydantic import Discriminator, Field, Tag
+
+from pilotage.core.config import Config
+from pilotage.missions.choice import ComponentChoice
+from pilotage.missions.places import GoalConfig, Point, PoseConfig
+from pilotage.missions.stack import StackConfig
+from pilotage.sensors.sensor import Positive
+
+
+class DiscFootprint(Config):
+    """A disc around the axle's middle."""
+
+    name: Literal["disc"] = "disc"
+    radius_m: Positive = 0.30
+
+
+class PolygonFootprint(Config):
+    """Corners in the base frame: x forward, y left, the axle's middle at (0, 0)."""
+
+    name: Literal["polygon"] = "polygon"
+    points_m: tuple[Point, ...]
+
+
+def _outline(value: Any) -> str:
+    """Tell the two apart by their name, or by what is given."""
+    given = value if isinstance(value, Mapping) else getattr(value, "__dict__", {})
+    name = given.get("name")
+    if name in ("disc", "polygon"):
+        return str(name)
+    return "polygon" if "points_m" in given else "disc"
+
+
+FootprintChoice = Annotated[
+    Annotated[DiscFootprint, Tag("disc")] | Annotated[PolygonFootprint, Tag("polygon")],
+    Discriminator(_outline),
+]
+
+
+class RobotConfig(Config):
+    """One robot. Motion and sensors are registered names with their parameters.
+
+    In ``robots`` each entry is laid over ``robot``, and may say its own start, goal and stack.
+    """
+
+    name: str = "robot"
+    footprint: FootprintChoice = DiscFootprint()
+    motion: ComponentChoice = ComponentChoice(name="differential-drive")
+    sensors: dict[str, ComponentChoice] = Field(default_factory=dict)
+    start: PoseConfig | None = None
+    goal: GoalConfig | None = None
+    stack: StackConfig | None = None

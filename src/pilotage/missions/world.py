@@ -1,0 +1,80 @@
+"""The world of a mission: its map, what is not on it, and where the robot begins."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from pilotage.core.config import Config
+from pilotage.maps.map_file import LandmarkEntry
+from pilotage.missions.map_choice import MapChoice
+from pilotage.missions.places import GoalConfig, Kidnap, Point, PoseConfig, RandomPlace
+from pilotage.sensors.sensor import NonNegative, Positive
+
+
+class BoxObstacle(Config):
+    """A box along the line from one point to another."""
+
+    kind: Literal["box"]
+    from_m: Point
+    to_m: Point
+    thickness_m: Positive = 0.3
+
+
+class CircleObstacle(Config):
+    """A round obstacle."""
+
+    kind: Literal["circle"]
+    centre_m: Point
+    radius_m: Positive
+
+
+class AcrossPathObstacle(Config):
+    """A box put across the planned path; place and size drawn from the run's seed."""
+
+    kind: Literal["across-path"]
+    length_m: tuple[Positive, Positive] = (1.5, 3.0)
+    thickness_m: Positive = 0.3
+    along: tuple[NonNegative, NonNegative] = (0.2, 0.8)
+
+
+class TrapObstacle(Config):
+    """A U-shaped trap open towards the robot, across the planned path; place and size from the seed."""
+
+    kind: Literal["u-trap"]
+    width_m: tuple[Positive, Positive] = (3.0, 3.6)
+    depth_m: tuple[Positive, Positive] = (2.0, 2.5)
+    thickness_m: Positive = 0.2
+    along: tuple[NonNegative, NonNegative] = (0.15, 0.85)
+
+
+Obstacle = Annotated[
+    BoxObstacle | CircleObstacle | AcrossPathObstacle | TrapObstacle, Field(discriminator="kind")
+]
+
+
+class MarkingsConfig(Config):
+    """What a sheet's file leaves out."""
+
+    tape_width_m: Positive = 0.015
+    edge_is_dark: bool = True
+    """Whether line sensors read dark beyond the sheet's edge, as on the film's grey carpet."""
+
+
+class WorldConfig(Config):
+    """The map, start and goal, and what should not be there.
+
+    With ``random_start`` the run begins elsewhere than at ``start``. Without ``start`` it begins where the
+    sheet says, or in its middle. Landmarks in a table take the place of those that the map has.
+    """
+
+    map: MapChoice
+    landmarks: str | tuple[LandmarkEntry, ...] | None = None
+    """The table itself, or a CSV file with the columns id, x_m, y_m."""
+    markings: MarkingsConfig = MarkingsConfig()
+    start: PoseConfig | None = None
+    goal: GoalConfig | None = None
+    obstacles: tuple[Obstacle, ...] = ()
+    random_start: RandomPlace | None = None
+    kidnaps: tuple[Kidnap, ...] = ()
