@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-import hashlib
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -19,17 +16,15 @@ from pilotage.calibration.steady import SteadyReadings, calibrate_steady
 from pilotage.core.errors import InputError
 from pilotage.core.types import FloatArray
 from pilotage.experiments.calibration_runs import drive_odometry_runs, listen_in_the_room
-from pilotage.experiments.run_folder import clean
 from pilotage.logs.heading_csv import DRIVE_SUFFIX, find_heading_logs, read_heading_log
 from pilotage.logs.odometry_csv import read_odometry_csv
 from pilotage.logs.odometry_steps import OdometrySteps
 from pilotage.logs.reckoning_mat import read_reckoning_mat
 from pilotage.logs.run_trace import TRACE, read_run_odometry
 from pilotage.logs.steady_csv import read_steady_csv
+from pilotage.records import calibration as records
+from pilotage.records.calibration import PARAMETER_FILE
 from pilotage.sensors.wheel_odometry import WheelOdometryConfig
-
-CALIBRATION_FILE, DATA_FILE, PARAMETER_FILE = "calibration.json", "data.npz", "parameters.yaml"
-SETS_FILE = "sets.yaml"
 
 
 @dataclass(frozen=True, slots=True)
@@ -154,19 +149,4 @@ def write_calibration(
     out: Path, answer: dict[str, object], data: Mapping[str, FloatArray], texts: Mapping[str, str]
 ) -> CalibrationResult:
     """Write ``calibrate-<what>-<hash>``; the same data and answer have the same name."""
-    digest = hashlib.sha256(json.dumps(clean(answer), sort_keys=True).encode())
-    for key in sorted(data):
-        digest.update(np.ascontiguousarray(data[key]).tobytes())
-    folder = out / f"calibrate-{answer['calibration']}-{digest.hexdigest()[:8]}"
-    folder.mkdir(parents=True, exist_ok=True)
-    for name, text in texts.items():
-        (folder / name).write_text(text, encoding="utf-8")
-    named: dict[str, Any] = {**answer, "calibration_dir": str(folder)}
-    if PARAMETER_FILE in texts:
-        named["parameter_file"] = str(folder / PARAMETER_FILE)
-    if SETS_FILE in texts:
-        named["sets_file"] = str(folder / SETS_FILE)
-    np.savez_compressed(folder / DATA_FILE, allow_pickle=False, **dict(data))
-    # Last: a folder with this file is whole.
-    (folder / CALIBRATION_FILE).write_text(json.dumps(clean(named), indent=2) + "\n", encoding="utf-8")
-    return CalibrationResult(named, folder)
+    return CalibrationResult(*records.write_calibration(out, answer, data, texts))

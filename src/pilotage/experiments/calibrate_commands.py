@@ -13,8 +13,9 @@ from pilotage.calibration.drive_commands import DELAYS_S, DriveCommands, calibra
 from pilotage.calibration.drive_summary import drive_summary
 from pilotage.core.errors import InputError
 from pilotage.core.types import FloatArray
-from pilotage.experiments.calibrate import PARAMETER_FILE, SETS_FILE, CalibrationResult, write_calibration
+from pilotage.experiments.calibrate import CalibrationResult, write_calibration
 from pilotage.logs.mrclam import ROBOTS, MrclamLog, read_mrclam
+from pilotage.records.calibration import PARAMETER_FILE, SETS_FILE
 
 LOCALIZER = "ekf-slow-errors"
 

@@ -2,88 +2,27 @@
 
 from __future__ import annotations
 
-import json
-import math
-import os
-import shutil
-import tempfile
 from pathlib import Path
-from typing import Any
-
-import numpy as np
 
 from pilotage.experiments.mission_kind import Kind, Record
 from pilotage.experiments.resolve import resolved_yaml, run_name
+from pilotage.records.events import write_events
+from pilotage.records.metrics import clean, write_metrics
+from pilotage.records.mission import write_mission
+from pilotage.records.run_folder import draft_folder, replace_folder
+from pilotage.records.trace import trace_of, write_trace
+
+__all__ = ["clean", "replace_folder", "write_run_folder"]
 
 
 def write_run_folder(out: Path, kind: Kind, record: Record, metrics: dict[str, object]) -> Path:
-    """Write a run folder under ``out`` and return its path.
-
-    Everything is written beside it first and moved into place at the end, so that two runs at once do
-    not mix and an interrupted one leaves nothing half-written.
-    """
-    import pyarrow as pa
-    import pyarrow.parquet as pq
-
+    """Write a run folder under ``out`` and return its path; see ``pilotage.records.run_folder``."""
     mission = record.mission
-    out.mkdir(parents=True, exist_ok=True)
     final = out / run_name(mission)
-    draft = Path(tempfile.mkdtemp(prefix=f".{final.name}-", dir=out))
-    try:
-        draft.chmod(0o777 & ~_umask())
-        (draft / "mission.yaml").write_text(resolved_yaml(mission, record), encoding="utf-8")
-        pq.write_table(pa.table(dict(record.trace)), draft / "trace.parquet")
-        (draft / "events.jsonl").write_text(
-            "".join(
-                json.dumps({"t_s": event.t_s, "kind": event.kind, "text": event.text}) + "\n"
-                for event in record.events
-            ),
-            encoding="utf-8",
-        )
+    with draft_folder(final) as draft:
+        write_mission(draft, resolved_yaml(mission, record))
+        write_trace(draft, trace_of(record.trace))
+        write_events(draft, record.events)
         kind.write_files(record, draft)
-        metrics = {**metrics, "run_dir": str(final)}
-        (draft / "metrics.json").write_text(json.dumps(clean(metrics), indent=2) + "\n", encoding="utf-8")
-        replace_folder(draft, final)
-    except BaseException:
-        shutil.rmtree(draft, ignore_errors=True)
-        raise
+        write_metrics(draft, {**metrics, "run_dir": str(final)})
     return final
-
-
-def clean(value: Any) -> Any:
-    """Make a value fit for JSON: nan and infinities become null, numpy numbers plain ones."""
-    if isinstance(value, dict):
-        return {key: clean(inner) for key, inner in value.items()}
-    if isinstance(value, list | tuple):
-        return [clean(inner) for inner in value]
-    if isinstance(value, np.generic):
-        value = value.item()
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    return value
-
-
-def _umask() -> int:
-    mask = os.umask(0)
-    os.umask(mask)
-    return mask
-
-
-def replace_folder(draft: Path, final: Path) -> None:
-    """Put ``draft`` in the place of ``final``, also where another process does the same at once."""
-    for _ in range(100):
-        if final.exists():
-            old = Path(tempfile.mkdtemp(prefix=f".{final.name}-old-", dir=final.parent))
-            try:
-                final.rename(old / "run")
-            except FileNotFoundError:  # another process was quicker
-                pass
-            finally:
-                shutil.rmtree(old, ignore_errors=True)
-        try:
-            draft.rename(final)
-            return
-        except OSError:
-            if not final.exists():
-                raise
-    raise OSError(f"could not put the run folder into place: {final}")

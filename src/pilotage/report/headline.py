@@ -6,8 +6,8 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
+from pilotage.records.numbers import number
 from pilotage.report import quantities
-from pilotage.report.run_data import number
 
 
 def outcome(metrics: Mapping[str, Any]) -> bool | None:

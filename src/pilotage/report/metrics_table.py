@@ -10,9 +10,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from pilotage.records.numbers import number
 from pilotage.report import quantities
 from pilotage.report.metric_catalogue import GROUPS, Metric, plain
-from pilotage.report.run_data import number
 
 NOT_MEASURES = frozenset(
     {"mission", "seed", "success", "reason", "run_dir", "name", "robot", "rows", "columns", "resolution_m"}

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pilotage.core.types import FloatArray
-from pilotage.report.run_data import Trace
+from pilotage.records.trace import Trace
 from pilotage.report.series import merge_spans, spans
 from pilotage.report.style import BLUE, FAINT, GREEN, INK, ORANGE, PURPLE, VERMILLION
 

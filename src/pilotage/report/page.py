@@ -7,6 +7,8 @@ from collections.abc import Callable
 from pathlib import Path
 
 from pilotage.core.whole_file import write_whole
+from pilotage.records.numbers import number
+from pilotage.records.run_data import RunData, read_run
 from pilotage.report import quantities
 from pilotage.report.figures.clearance import clearance_figure
 from pilotage.report.figures.close_ups import close_ups_figure
@@ -43,8 +45,6 @@ from pilotage.report.replay.floor import floor_scene
 from pilotage.report.replay.scene import ReplayScene
 from pilotage.report.replay.section import SLUG, TITLE, replay_section, script_source, style
 from pilotage.report.replay.terrain import terrain_scene
-from pilotage.report.run_data import RunData, number
-from pilotage.report.run_folder import read_run
 from pilotage.report.sheet.maps import accuracy_figure, printed_figure
 from pilotage.report.sheet.path import coverage_figure, path_figure
 from pilotage.report.sheet.replay import sheet_scene

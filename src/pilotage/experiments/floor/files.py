@@ -2,46 +2,43 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from pilotage.experiments.floor.recorder import RunRecord
+from pilotage.records.plans import Plan, Plans
+from pilotage.records.world import RobotOutline, World, landmarks_of
 
 
-def world_of(record: RunRecord) -> dict[str, Any]:
-    """What ``world.json`` holds: walls, landmarks, what the robot was not told of, start and goal."""
+def world_of(record: RunRecord) -> World:
+    """Walls, landmarks, what the robot was not told of, start and goal."""
     experiment = record.experiment
     mission, world = experiment.mission, experiment.world
     start, goal = mission.world.start, mission.world.goal
-    return {
-        "segments_m": world.known.segments_m.tolist(),
-        "circles_m": world.known.circles_m.tolist(),
-        "bounds_m": list(world.known.bounds_m),
-        "landmarks": [
-            {"id": int(i), "x_m": float(x), "y_m": float(y)}
-            for i, (x, y) in zip(world.landmarks.ids, world.landmarks.points_xy_m, strict=True)
-        ],
-        "obstacle_segments_m": world.obstacle_segments_m.tolist(),
-        "obstacle_circles_m": world.obstacle_circles_m.tolist(),
-        "obstacle_polygons_m": [polygon.tolist() for polygon in experiment.obstacles.polygons_m],
-        "robot_radius_m": mission.robot.body.radius_m,
-        "start": [start.x_m, start.y_m, start.theta_rad],
-        "goal": None if goal is None else [goal.x_m, goal.y_m, goal.theta_rad],
-    }
+    robot = RobotOutline(
+        radius_m=mission.robot.body.radius_m,
+        start=(start.x_m, start.y_m, start.theta_rad),
+        goals=() if goal is None else ((goal.x_m, goal.y_m, goal.theta_rad),),
+    )
+    return World(
+        segments_m=world.known.segments_m,
+        circles_m=world.known.circles_m,
+        bounds_m=world.known.bounds_m,
+        landmarks=landmarks_of(world.landmarks.ids, world.landmarks.points_xy_m),
+        obstacle_segments_m=world.obstacle_segments_m,
+        obstacle_circles_m=world.obstacle_circles_m,
+        obstacle_polygons_m=tuple(experiment.obstacles.polygons_m),
+        robots=(robot,),
+    )
 
 
-def plans_of(record: RunRecord) -> dict[str, Any]:
-    """What ``plans.npz`` holds: every plan adopted, the obstacle points mapped, the exact shortest path."""
-    experiment = record.experiment
-    arrays: dict[str, Any] = {"mapped_points": experiment.stack.mapped_circles_m[:, :2]}
-    for i, plan in enumerate(experiment.stack.plans):
-        arrays[f"path_{i}"] = plan.states
-        arrays[f"waypoints_{i}"] = plan.waypoints
-        arrays[f"tree_{i}"] = plan.tree_edges_m
-        arrays[f"t_{i}"] = np.array(plan.t_s)
-        arrays[f"length_{i}"] = np.array(plan.length_m)
-        arrays[f"planning_time_{i}"] = np.array(plan.planning_time_s)
-    shortest = record.outcome.shortest
-    arrays["shortest_path"] = np.zeros((0, 2)) if shortest is None else shortest.points_xy_m
-    return arrays
+def plans_of(record: RunRecord) -> Plans:
+    """Every plan adopted, the obstacle points mapped, the exact shortest path."""
+    stack, shortest = record.experiment.stack, record.outcome.shortest
+    return Plans(
+        tuple(
+            Plan(p.states, p.waypoints, p.tree_edges_m, p.t_s, p.length_m, p.planning_time_s)
+            for p in stack.plans
+        ),
+        stack.mapped_circles_m[:, :2],
+        np.zeros((0, 2)) if shortest is None else shortest.points_xy_m,
+    )

@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
-
-import numpy as np
 
 from pilotage.evaluation.run_metrics import run_metrics
 from pilotage.experiments.floor.files import plans_of, world_of
@@ -21,6 +18,10 @@ from pilotage.experiments.mission_kind import ERROR, ROOM, TIME_COST, WAY, Cost
 from pilotage.experiments.progress import OnProgress
 from pilotage.missions.floor import FloorMission
 from pilotage.missions.mission import Mission
+from pilotage.records.plans import write_plans
+from pilotage.records.scans import write_sightings
+from pilotage.records.updates import write_updates
+from pilotage.records.world import write_world
 
 
 class FloorKind:
@@ -63,14 +64,10 @@ class FloorKind:
 
     def write_files(self, record: RunRecord, folder: Path) -> None:
         """``world.json``, ``plans.npz``, ``scans.npz``; ``updates.npz`` where updates are explained."""
-        (folder / "world.json").write_text(json.dumps(world_of(record)), encoding="utf-8")
-        np.savez_compressed(folder / "plans.npz", allow_pickle=False, **plans_of(record))
-        updates = record.album.arrays()
-        if updates:
-            np.savez_compressed(folder / "updates.npz", allow_pickle=False, **updates)
-        sightings = record.sightings.arrays()
-        if sightings:
-            np.savez_compressed(folder / "scans.npz", allow_pickle=False, **sightings)
+        write_world(folder, world_of(record))
+        write_plans(folder, plans_of(record))
+        write_updates(folder, record.album.pictures())
+        write_sightings(folder, record.sightings.seen())
 
     def inline(self, record: RunRecord, values: dict[str, Any]) -> None:
         """Write a map that came from a file into the mission."""

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from pilotage.core.types import FloatArray, IntArray
+from pilotage.records import scans as records
 from pilotage.sensors.beacon import BeaconConfig
 from pilotage.sensors.lidar import LidarConfig
 from pilotage.sensors.readings import BeaconReadings, LidarScan, Readings
@@ -17,9 +20,6 @@ APART_S = 0.2
 MOST_BEAMS = 108
 MOST_SCANS = 4000
 """Beyond that every other scan goes and the rest come half as often: the file does not grow with the run."""
-LEVELS = 65534
-"""A range is a whole number of ``max_range_m / LEVELS``; 65535 says that nothing was in reach."""
-NOTHING = 65535
 
 
 class Sightings:
@@ -55,28 +55,26 @@ class Sightings:
                 self._scans, self._scan_t_s = self._scans[::2], self._scan_t_s[::2]
                 self._apart_s *= 2.0
 
-    def arrays(self) -> dict[str, Any]:
-        """The sightings as arrays for one file; empty where the robot has no such sensor."""
-        arrays: dict[str, Any] = {}
+    def seen(self) -> records.Sightings:
+        """What was seen, as the file keeps it."""
+        out = records.Sightings()
         if self._config is not None and self._scans:
             mount = self._config.mount
-            resolution_m = self._config.max_range_m / LEVELS
-            ranges = np.stack(self._scans).astype(np.float64)
-            hit = np.isfinite(ranges) & (ranges >= 0.0) & (ranges < self._config.max_range_m)
-            arrays |= {
-                "scan_t_s": np.array(self._scan_t_s),
-                "scan_ranges": np.where(
-                    hit, np.rint(np.where(hit, ranges, 0.0) / resolution_m), NOTHING
-                ).astype(np.uint16),
-                "scan_resolution_m": np.array(resolution_m),
-                "scan_angles_rad": self._config.beam_angles_rad()[:: self._stride],
-                "scan_mount": np.array([mount.x_m, mount.y_m, mount.theta_rad]),
-            }
+            out = records.Sightings(
+                scan_t_s=np.array(self._scan_t_s),
+                ranges_m=np.stack(self._scans).astype(np.float64),
+                angles_rad=self._config.beam_angles_rad()[:: self._stride],
+                mount=np.array([mount.x_m, mount.y_m, mount.theta_rad]),
+                max_range_m=self._config.max_range_m,
+            )
         if self._beacons is not None:
             counts = np.array([len(ids) for ids in self._seen], dtype=np.int64)
-            ids = np.concatenate([self._nothing, *self._seen]).astype(np.int32)
-            arrays |= {"beacon_counts": counts.astype(np.uint16), "beacon_ids": ids}
-        return arrays
+            out = replace(out, beacon_counts=counts, beacon_ids=np.concatenate([self._nothing, *self._seen]))
+        return out
+
+    def arrays(self) -> Mapping[str, Any]:
+        """The sightings as arrays for one file; empty where the robot has no such sensor."""
+        return records.sighting_arrays(self.seen())
 
 
 def _first(sensors: dict[str, object], config: type[Any]) -> tuple[str | None, Any]:

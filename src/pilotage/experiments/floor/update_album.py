@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from pilotage.stack.interface import ExplainableUpdate, LineVerdict, ScanUpdate
+from pilotage.core.scan_update import ScanUpdate
+from pilotage.records.updates import KeptUpdate, update_arrays
+from pilotage.stack.interface import ExplainableUpdate
 
 APART_S = 3.0
 """Two pictures of the same kind are at least so far apart: the next scan looks like the last."""
 MOST_LEFT_OUT = 2
 EVENLY = 2
-
-VERDICTS = tuple(LineVerdict)
-"""In the order in which they are numbered in the file."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,32 +64,16 @@ class UpdateAlbum:
         kept[:] = [picture for k, picture in enumerate(kept) if k not in rivals]
         kept.append(Picture(t_s, why, score, update.explained()))
 
-    def pictures(self) -> list[Picture]:
+    def pictures(self) -> list[KeptUpdate]:
         """The chosen ones in their order, each update once."""
         inner = np.linspace(0, len(self._evenly) - 1, EVENLY + 2)[1:-1] if self._evenly else np.empty(0)
         evenly = [self._evenly[round(float(k))] for k in inner]
         by_time: dict[float, Picture] = {}
         for picture in (*self._first, *self._left_out, *self._farthest, *evenly):
             by_time.setdefault(picture.t_s, picture)
-        return [by_time[t_s] for t_s in sorted(by_time)]
+        chosen = [by_time[t_s] for t_s in sorted(by_time)]
+        return [KeptUpdate(picture.t_s, picture.why, picture.update) for picture in chosen]
 
-    def arrays(self) -> dict[str, Any]:
+    def arrays(self) -> Mapping[str, Any]:
         """The pictures as arrays for one file; empty without any."""
-        arrays: dict[str, Any] = {}
-        for k, picture in enumerate(self.pictures()):
-            update = picture.update
-            arrays |= {
-                f"t_s_{k}": np.array(picture.t_s),
-                f"why_{k}": np.array(picture.why),
-                f"sensor_pose_{k}": update.sensor_pose,
-                f"sensor_pose_after_{k}": update.sensor_pose_after,
-                f"points_m_{k}": update.points_m.astype(np.float32),
-                f"clusters_{k}": update.clusters.astype(np.int16),
-                f"members_{k}": update.members.astype(np.int16),
-                f"ends_m_{k}": update.ends_m,
-                f"walls_m_{k}": update.walls_m,
-                f"distances_{k}": update.distances,
-                f"gate_{k}": np.array(update.gate),
-                f"verdicts_{k}": np.array([VERDICTS.index(v) for v in update.verdicts], dtype=np.int16),
-            }
-        return arrays
+        return update_arrays(self.pictures())

@@ -3,10 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-import json
 import math
-import shutil
-import tempfile
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -24,9 +21,11 @@ from pilotage.experiments.floor.recorder import BELIEF_COLUMNS, TRUTH_COLUMNS
 from pilotage.experiments.mission import read_parameters
 from pilotage.experiments.recordings.drive import RecordedDrive, aer1513_drive, mrclam_drive
 from pilotage.experiments.recordings.parameters import shipped_parameters
-from pilotage.experiments.run_folder import clean, replace_folder
 from pilotage.experiments.values import apply_override, merge
 from pilotage.maps.segment_map import SegmentMap
+from pilotage.records.run_folder import RunFiles, write_run
+from pilotage.records.trace import trace_of
+from pilotage.records.world import RobotOutline, World, landmarks_of
 from pilotage.stack.interface import Belief
 from pilotage.stack.knowledge import Knowledge
 from pilotage.stack.localization.localizer import LOCALIZERS, Localizer
@@ -227,35 +226,17 @@ def _write(
     localizer: dict[str, Any],
 ) -> LocalizedLog:
     """Write the run folder, complete or not at all."""
-    import pyarrow as pa
-    import pyarrow.parquet as pq
-
     settings = yaml.safe_dump({"recording": drive.name, "stack": {"localizer": localizer}}, sort_keys=False)
     digest = hashlib.sha256(settings.encode()).hexdigest()[:8]
-    out.mkdir(parents=True, exist_ok=True)
-    final = out / f"{metrics['mission']}-{digest}"
-    world = {
-        "bounds_m": list(_bounds(drive)),
-        "landmarks": [
-            {"id": int(i), "x_m": float(x), "y_m": float(y)}
-            for i, (x, y) in zip(drive.landmarks.ids, drive.landmarks.points_xy_m, strict=True)
-        ],
-        "start": drive.truth[0].tolist(),
-    }
+    x, y, theta = (float(value) for value in drive.truth[0])
+    world = World(
+        bounds_m=_bounds(drive),
+        landmarks=landmarks_of(drive.landmarks.ids, drive.landmarks.points_xy_m),
+        robots=(RobotOutline(start=(x, y, theta)),),
+    )
+    files = RunFiles(trace_of(trace), metrics, tuple(events), localizer_text=settings, world=world)
+    final = write_run(out, f"{metrics['mission']}-{digest}", files)
     metrics = {**metrics, "run_dir": str(final)}
-    draft = Path(tempfile.mkdtemp(prefix=f".{final.name}-", dir=out))
-    try:
-        draft.chmod(0o755)
-        (draft / "localizer.yaml").write_text(settings, encoding="utf-8")
-        pq.write_table(pa.table(trace), draft / "trace.parquet")
-        lines = [json.dumps({"t_s": e.t_s, "kind": e.kind, "text": e.text}) + "\n" for e in events]
-        (draft / "events.jsonl").write_text("".join(lines), encoding="utf-8")
-        (draft / "world.json").write_text(json.dumps(world), encoding="utf-8")
-        (draft / "metrics.json").write_text(json.dumps(clean(metrics), indent=2) + "\n", encoding="utf-8")
-        replace_folder(draft, final)
-    except BaseException:
-        shutil.rmtree(draft, ignore_errors=True)
-        raise
     left_out = [f"{place}: left out, its time lies after the next row's" for place in drive.stale]
     left_out += [f"{place}: left out, nobody wears this barcode" for place in drive.misread]
     return LocalizedLog(metrics, final, left_out)

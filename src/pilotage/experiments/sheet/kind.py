@@ -2,24 +2,23 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
-
-import numpy as np
 
 from pilotage.evaluation.sheet_metrics import sheet_metrics
 from pilotage.experiments.metric_names import SHEET_METRICS
 from pilotage.experiments.mission_kind import ERROR, SHARE, TIME_COST, Aspect, Cost
 from pilotage.experiments.progress import OnProgress
-from pilotage.experiments.sheet.files import maps_of, world_of, write_map_files
+from pilotage.experiments.sheet.files import cells_of, world_of
 from pilotage.experiments.sheet.oracles import applicable
 from pilotage.experiments.sheet.sheets import shipped_sheets
 from pilotage.experiments.sheet.simulate import SheetRecord, simulate
 from pilotage.experiments.sheet.warm_up import warm_up
 from pilotage.missions.mission import Mission
 from pilotage.missions.sheet import SheetMission
+from pilotage.records.cells import write_cells
+from pilotage.records.world import write_world
 
 
 class SheetKind:
@@ -84,9 +83,9 @@ class SheetKind:
 
     def write_files(self, record: SheetRecord, folder: Path) -> None:
         """``world.json``, ``cells.npz``, and the robot's map as text, image and ROS map."""
-        (folder / "world.json").write_text(json.dumps(world_of(record)), encoding="utf-8")
-        np.savez_compressed(folder / "cells.npz", allow_pickle=False, **maps_of(record))
-        write_map_files(record, folder)
+        world = world_of(record)
+        write_world(folder, world)
+        write_cells(folder, cells_of(record, world))
 
     def inline(self, record: SheetRecord, values: dict[str, Any]) -> None:
         """Write a sheet that came from a file into the mission."""

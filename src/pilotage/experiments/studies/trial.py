@@ -11,8 +11,8 @@ from typing import Any
 from pilotage.core.errors import InputError
 from pilotage.experiments.mission import mission_of
 from pilotage.experiments.run import run_mission
-from pilotage.experiments.run_folder import clean
 from pilotage.missions.mission import Mission
+from pilotage.records.metrics import clean
 
 TIMINGS = frozenset(
     {

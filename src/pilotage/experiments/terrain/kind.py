@@ -23,6 +23,7 @@ from pilotage.experiments.terrain.route import Route, ask, cost_map, planner_of,
 from pilotage.maps.landmarks import Landmarks
 from pilotage.missions.mission import Mission
 from pilotage.missions.terrain import TerrainMission
+from pilotage.records.terrain import TerrainPictures, write_terrain
 from pilotage.sensors.beacon import BeaconConfig
 from pilotage.sensors.wheel_odometry import WheelOdometryConfig
 from pilotage.sim.rover_sensing import landmark_log
@@ -103,35 +104,7 @@ class TerrainKind:
 
     def write_files(self, record: TerrainRecord, folder: Path) -> None:
         """``terrain.npz``: small pictures of ground, hazards and what the search looked at."""
-        grid = record.ground.hazards
-        seen, hazards = record.ground.picture(PICTURE_COLUMNS)
-        pictures: dict[str, Any] = {"hazards": hazards}
-        if seen is not None:
-            pictures["ground"] = seen
-        path = None if record.route is None else record.route.result.path
-        if path is not None and len(path.looked_at):
-            looked_at = np.zeros(grid.rows * grid.columns, dtype=np.bool_)
-            looked_at[path.looked_at] = True
-            step = -(-grid.rows // hazards.shape[0])
-            pictures["looked_at"] = shares(looked_at.reshape(grid.rows, grid.columns), step)
-        world, limit = record.mission.world, record.ground.slope_limit_deg
-        places = {
-            "size_m": np.array(grid.size_m),
-            "origin": grid.origin.as_array(),
-            "start": np.array([world.start.x_m, world.start.y_m]),
-            "goal": np.array([world.goal.x_m, world.goal.y_m]),
-            "slope_limit_deg": np.array(np.nan if limit is None else limit),
-        }
-        if record.route is not None:
-            places["route"] = record.route.path_xy_m
-        if record.estimation is not None:
-            marks, log = record.estimation.landmarks, record.estimation.log
-            order = np.argsort(marks.ids)
-            places["landmarks"] = marks.points_xy_m
-            # Which landmarks were in sight at each step, as rows of the table; none at the start.
-            places["seen_counts"] = np.concatenate([[0], seen_per_step(log)]).astype(np.int32)
-            places["seen"] = order[np.searchsorted(marks.ids[order], log.ids)].astype(np.int32)
-        np.savez(folder / "terrain.npz", allow_pickle=False, **pictures, **places)
+        write_terrain(folder, _pictures(record))
 
     def inline(self, record: TerrainRecord, values: dict[str, Any]) -> None:  # noqa: ARG002
         """Ground of millions of cells stays in its files; name them so that they are found from anywhere."""
@@ -139,6 +112,40 @@ class TerrainKind:
         for key in ("file", "obstacles", "environment", "landmarks"):
             if isinstance(ground.get(key), str):
                 ground[key] = str(Path(ground[key]).absolute())
+
+
+def _pictures(record: TerrainRecord) -> TerrainPictures:
+    """Ground and hazards, no wider than a report shows them, and the places on them."""
+    grid, world, limit = record.ground.hazards, record.mission.world, record.ground.slope_limit_deg
+    seen_ground, hazards = record.ground.picture(PICTURE_COLUMNS)
+    path = None if record.route is None else record.route.result.path
+    looked_at = None
+    if path is not None and len(path.looked_at):
+        cells = np.zeros(grid.rows * grid.columns, dtype=np.bool_)
+        cells[path.looked_at] = True
+        looked_at = shares(cells.reshape(grid.rows, grid.columns), -(-grid.rows // hazards.shape[0]))
+    landmarks, counts, seen = np.zeros((0, 2)), np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64)
+    if record.estimation is not None:
+        marks, log = record.estimation.landmarks, record.estimation.log
+        order = np.argsort(marks.ids)
+        landmarks = marks.points_xy_m
+        # Which landmarks were in sight at each step, as rows of the table; none at the start.
+        counts = np.concatenate([[0], seen_per_step(log)])
+        seen = order[np.searchsorted(marks.ids[order], log.ids)]
+    return TerrainPictures(
+        ground=seen_ground,
+        hazards=hazards,
+        looked_at=looked_at,
+        size_m=np.array(grid.size_m),
+        origin=grid.origin.as_array(),
+        start=np.array([world.start.x_m, world.start.y_m]),
+        goal=np.array([world.goal.x_m, world.goal.y_m]),
+        slope_limit_deg=np.nan if limit is None else limit,
+        landmarks=landmarks,
+        route=np.zeros((0, 2)) if record.route is None else record.route.path_xy_m,
+        seen_counts=counts,
+        seen=seen,
+    )
 
 
 def _plan(mission: TerrainMission, ground: Ground) -> tuple[Route | None, list[Event]]:

@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 
 from pilotage.calibration.drive_windows import LOSS_UP_TO_RAD_S
 from pilotage.core.types import FloatArray
-from pilotage.report.calibration.folder import CalibrationData
+from pilotage.records.calibration import CalibrationData
 from pilotage.report.calibration.plots import histogram, panels_in_a_row
 from pilotage.report.style import BLUE, MUTED, SKY, VERMILLION, Illustration, Key, nice_limit, render
 

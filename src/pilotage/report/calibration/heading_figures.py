@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from pilotage.core.types import FloatArray
-from pilotage.report.calibration.folder import CalibrationData
+from pilotage.records.calibration import CalibrationData
 from pilotage.report.calibration.plots import panels_in_a_row
 from pilotage.report.style import (
     BLUE,

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from pilotage.report.calibration.folder import CalibrationData
+from pilotage.records.calibration import CalibrationData
 from pilotage.report.calibration.plots import histogram, panels_in_a_row
 from pilotage.report.style import (
     BLUE,

@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from pilotage.core.whole_file import write_whole
+from pilotage.records.calibration import CalibrationData, read_calibration
 from pilotage.report.calibration.drive_figures import drive_figures
-from pilotage.report.calibration.folder import CalibrationData, read_calibration
 from pilotage.report.calibration.heading_figures import heading_figures
 from pilotage.report.calibration.odometry_figures import odometry_figures
 from pilotage.report.calibration.range_figures import range_figures

@@ -11,10 +11,13 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from pilotage.core.types import BoolArray, FloatArray
+from pilotage.records.plans import Plan
+from pilotage.records.run_data import RunData
+from pilotage.records.trace import Trace
+from pilotage.records.world import World
 from pilotage.report import quantities
 from pilotage.report.event_kinds import event_kind
 from pilotage.report.figures import layers
-from pilotage.report.run_data import Plan, RunData, Trace, World
 from pilotage.report.style import (
     BLACK,
     BLUE,

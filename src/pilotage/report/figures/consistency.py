@@ -8,8 +8,8 @@ from matplotlib.ticker import MaxNLocator
 from scipy.special import gammaincinv
 
 from pilotage.core.types import FloatArray
+from pilotage.records.run_data import RunData
 from pilotage.report import quantities
-from pilotage.report.run_data import RunData
 from pilotage.report.series import running_mean
 from pilotage.report.style import (
     BLUE,

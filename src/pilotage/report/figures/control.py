@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pilotage.report.run_data import RunData
+from pilotage.records.run_data import RunData
 from pilotage.report.style import (
     BLACK,
     BLUE,

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from pilotage.records.run_data import RunData
 from pilotage.report import quantities
-from pilotage.report.run_data import RunData
 from pilotage.report.series import merge_spans, spans
 from pilotage.report.style import (
     BLUE,

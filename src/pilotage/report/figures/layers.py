@@ -14,7 +14,8 @@ from matplotlib.axes import Axes
 from matplotlib.path import Path as Outline
 
 from pilotage.core.types import FloatArray
-from pilotage.report.run_data import RunData, World
+from pilotage.records.run_data import RunData
+from pilotage.records.world import World
 from pilotage.report.style import (
     BLACK,
     BLUE,

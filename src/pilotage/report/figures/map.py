@@ -8,10 +8,10 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from pilotage.core.types import FloatArray
+from pilotage.records.run_data import RunData
 from pilotage.report import quantities
 from pilotage.report.figures import layers, map_marks
 from pilotage.report.figures.map_view import Limits, map_axes, view_limits
-from pilotage.report.run_data import RunData
 from pilotage.report.style import (
     BLACK,
     BLUE,

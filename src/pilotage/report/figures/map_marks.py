@@ -7,11 +7,11 @@ import math
 import numpy as np
 from matplotlib.axes import Axes
 
+from pilotage.records.run_data import RunData
 from pilotage.report.event_kinds import event_kind
 from pilotage.report.figures import layers
 from pilotage.report.figures.badge import RADIUS_PT, badge
 from pilotage.report.figures.placing import LabelPlacer, along
-from pilotage.report.run_data import RunData
 from pilotage.report.style import BLUE, GREEN, MUTED
 
 _MOST_BEACON_LABELS = 150

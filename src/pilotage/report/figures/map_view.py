@@ -9,8 +9,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from pilotage.core.types import FloatArray
+from pilotage.records.run_data import RunData
 from pilotage.report.figures import layers
-from pilotage.report.run_data import RunData
 from pilotage.report.style import WIDTH_PT
 
 Limits: TypeAlias = tuple[float, float, float, float]

@@ -9,8 +9,8 @@ from matplotlib.axes import Axes
 
 from pilotage.core.angles import wrap_array_to_pi
 from pilotage.core.types import FloatArray
+from pilotage.records.run_data import RunData
 from pilotage.report import quantities
-from pilotage.report.run_data import RunData
 from pilotage.report.series import band
 from pilotage.report.style import (
     BLUE,

@@ -8,8 +8,8 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from pilotage.core.types import FloatArray
+from pilotage.records.run_data import RunData
 from pilotage.report import quantities
-from pilotage.report.run_data import RunData
 from pilotage.report.series import band
 from pilotage.report.style import BLUE, SKY, Illustration, Key, render, series, stacked_axes, time_limits
 

@@ -9,8 +9,9 @@ from matplotlib.axes import Axes
 from matplotlib.path import Path as Outline
 
 from pilotage.core.types import FloatArray
+from pilotage.records.numbers import number
+from pilotage.records.run_data import RunData
 from pilotage.report import quantities
-from pilotage.report.run_data import RunData, number
 from pilotage.report.style import (
     BLUE,
     GREEN,

@@ -12,11 +12,11 @@ from matplotlib.transforms import Affine2D
 from numpy.typing import NDArray
 
 from pilotage.core.types import FloatArray
+from pilotage.records.run_data import RunData
+from pilotage.records.terrain import Picture, TerrainPictures
 from pilotage.report import quantities
 from pilotage.report.figures.terrain_estimate import ellipses_told, estimate_layers, thinned
-from pilotage.report.run_data import RunData
 from pilotage.report.style import BLUE, GREEN, ORANGE, SKY, VERMILLION, WIDTH_PT, Illustration, Key, render
-from pilotage.report.terrain_pictures import Picture, TerrainPictures, read_pictures
 
 _LEFT_PT, _RIGHT_PT, _TOP_PT, _BOTTOM_PT = 44.0, 8.0, 8.0, 32.0
 _MOST_HEIGHT_PT = 900.0
@@ -30,7 +30,7 @@ Rgb = NDArray[np.uint8]
 def terrain_map_figure(run: RunData) -> Illustration:
     """Draw the way over the shaded ground, hazards tinted."""
     slug, title = "terrain", "The way over the ground"
-    pictures = read_pictures(run.run_dir)
+    pictures = run.terrain
     if pictures is None:
         return Illustration(slug, title, "", _NOTHING)
     if pictures.ground is None:
@@ -49,7 +49,7 @@ def terrain_map_figure(run: RunData) -> Illustration:
 def close_up_figure(run: RunData) -> Illustration:
     """Draw the way and its estimate, hazards tinted, as large as the page allows."""
     slug, title = "close-up", "The way from near"
-    pictures = read_pictures(run.run_dir)
+    pictures = run.terrain
     if pictures is None or not run.trace.has("true_x_m", "est_x_m"):
         return Illustration(slug, title, "", "The mission has no estimator.")
     unit = _unit(pictures)
@@ -70,7 +70,7 @@ def close_up_figure(run: RunData) -> Illustration:
 def hazard_map_figure(run: RunData) -> Illustration:
     """Draw the way over the hazards, white on black as obstacle maps are."""
     slug, title = "hazards", "The way between the hazards"
-    pictures = read_pictures(run.run_dir)
+    pictures = run.terrain
     if pictures is None:
         return Illustration(slug, title, "", _NOTHING)
     figure, axes = _ground_axes(pictures)
@@ -85,7 +85,7 @@ def hazard_map_figure(run: RunData) -> Illustration:
 def looked_at_figure(run: RunData) -> Illustration:
     """Draw where the search went."""
     slug, title = "looked-at", "What the search looked at"
-    pictures = read_pictures(run.run_dir)
+    pictures = run.terrain
     if pictures is None or pictures.looked_at is None:
         return Illustration(slug, title, "", "The planner does not tell what it looked at.")
     figure, axes = _ground_axes(pictures)

@@ -7,8 +7,8 @@ import math
 import numpy as np
 
 from pilotage.core.types import FloatArray
+from pilotage.records.run_data import RunData
 from pilotage.report import quantities
-from pilotage.report.run_data import RunData
 from pilotage.report.style import (
     BLUE,
     GREEN,
@@ -22,7 +22,6 @@ from pilotage.report.style import (
     series,
     stacked_axes,
 )
-from pilotage.report.terrain_pictures import read_pictures
 
 
 def terrain_profile_figure(run: RunData) -> Illustration:
@@ -36,7 +35,7 @@ def terrain_profile_figure(run: RunData) -> Illustration:
     series(height, s, trace["elevation_m"], BLUE, linewidth=1.3)
     degrees = np.rad2deg(trace["slope_rad"])
     series(slope, s, degrees, ORANGE)
-    pictures = read_pictures(run.run_dir)
+    pictures = run.terrain
     limit = math.nan if pictures is None else pictures.slope_limit_deg
     keys = [Key("height", BLUE), Key("slope", ORANGE)]
     if math.isfinite(limit):

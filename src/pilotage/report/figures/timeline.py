@@ -7,10 +7,10 @@ from matplotlib.axes import Axes
 from matplotlib.path import Path as Outline
 
 from pilotage.core.types import FloatArray
+from pilotage.records.run_data import RunData
 from pilotage.report.event_kinds import event_kind
 from pilotage.report.figures.badge import RADIUS_PT, badge
 from pilotage.report.modes import MODES, Mode, mode_spans
-from pilotage.report.run_data import RunData
 from pilotage.report.style import (
     BLUE,
     GRID,

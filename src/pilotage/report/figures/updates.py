@@ -9,12 +9,13 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.path import Path as Outline
 
+from pilotage.core.scan_update import LineVerdict
 from pilotage.core.types import FloatArray
+from pilotage.records.run_data import RunData
+from pilotage.records.updates import RecordedUpdate
 from pilotage.report.figures import layers
 from pilotage.report.figures.badge import badge
 from pilotage.report.figures.placing import LabelPlacer, along
-from pilotage.report.run_data import RunData
-from pilotage.report.scan_updates import RecordedUpdate
 from pilotage.report.style import (
     BLACK,
     BLUE,
@@ -32,7 +33,6 @@ from pilotage.report.style import (
     one_shape,
     render,
 )
-from pilotage.stack.interface import LineVerdict
 
 SLUG = "updates"
 TITLE = "Updates explained"

@@ -9,9 +9,9 @@ import numpy as np
 
 from pilotage.core.chi_square import chi_square_quantile
 from pilotage.core.types import FloatArray
+from pilotage.records.run_data import RunData
 from pilotage.report.event_kinds import event_kind
 from pilotage.report.replay.scene import SceneEvent, Series
-from pilotage.report.run_data import RunData
 from pilotage.report.style import BLUE
 
 Column = Callable[[str], FloatArray]

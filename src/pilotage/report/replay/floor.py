@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from pilotage.core.types import FloatArray, IntArray
+from pilotage.records.run_data import RunData
 from pilotage.report.modes import MODES
 from pilotage.report.replay.common import Column, position_error, scene_events
 from pilotage.report.replay.scene import (
@@ -21,7 +22,6 @@ from pilotage.report.replay.scene import (
     SightTrack,
     States,
 )
-from pilotage.report.run_data import RunData
 from pilotage.report.style import BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILLION
 
 MOST_FRAMES = 20_000

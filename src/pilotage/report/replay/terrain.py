@@ -8,6 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pilotage.core.types import FloatArray, IntArray
+from pilotage.records.run_data import RunData
+from pilotage.records.terrain import TerrainPictures
 from pilotage.report.replay.common import position_error, scene_events
 from pilotage.report.replay.scene import (
     Marks,
@@ -18,9 +20,7 @@ from pilotage.report.replay.scene import (
     Series,
     SightTrack,
 )
-from pilotage.report.run_data import RunData
 from pilotage.report.style import BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILLION
-from pilotage.report.terrain_pictures import TerrainPictures, read_pictures
 
 MOST_FRAMES = 6000
 """Drives of a hundred thousand seconds change little from one step to the next."""
@@ -45,7 +45,7 @@ def terrain_scene(run: RunData) -> ReplayScene | None:
         return None
     stride = math.ceil(trace.steps / MOST_FRAMES)
     frames = np.unique(np.append(np.arange(0, trace.steps, stride), trace.steps - 1))
-    pictures = read_pictures(run.run_dir)
+    pictures = run.terrain
     bounds = _bounds(run, pictures)
     width_m = max(bounds[2] - bounds[0], bounds[3] - bounds[1])
     note = "" if driven else "Nothing was driven: the rover is shown along the planned way at its speed."

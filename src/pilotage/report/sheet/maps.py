@@ -8,8 +8,9 @@ import numpy as np
 
 from pilotage.core.types import BoolArray
 from pilotage.maps.cell_map import FEATURES, CellState
+from pilotage.records.numbers import number
+from pilotage.records.run_data import RunData
 from pilotage.report import quantities
-from pilotage.report.run_data import RunData, number
 from pilotage.report.sheet.panels import draw_grid, draw_things, fill_cells, sheet_panels
 from pilotage.report.style import BLUE, GREEN, INK, ORANGE, PURPLE, SKY, VERMILLION, Illustration, Key, render
 

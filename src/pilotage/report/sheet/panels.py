@@ -11,8 +11,8 @@ from matplotlib.figure import Figure
 from matplotlib.path import Path as Outline
 
 from pilotage.core.types import BoolArray
+from pilotage.records.cells import SheetData
 from pilotage.report.figures.layers import line
-from pilotage.report.sheet_data import SheetData
 from pilotage.report.style import FAINT, GRID, INK, WIDTH_PT, one_shape
 
 _LEFT_PT, _RIGHT_PT, _TOP_PT, _BOTTOM_PT, _GAP_PT = 40.0, 8.0, 24.0, 32.0, 44.0

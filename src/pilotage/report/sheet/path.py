@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 
+from pilotage.records.run_data import RunData
 from pilotage.report import quantities
 from pilotage.report.event_kinds import event_kind
 from pilotage.report.figures import layers
 from pilotage.report.figures.badge import badge
 from pilotage.report.figures.map_marks import place_at
-from pilotage.report.run_data import RunData
 from pilotage.report.sheet.panels import draw_grid, draw_things, fill_cells, sheet_panels
 from pilotage.report.style import (
     BLUE,

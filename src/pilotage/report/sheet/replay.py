@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 
 from pilotage.core.types import FloatArray
+from pilotage.records.cells import SheetData
+from pilotage.records.run_data import RunData
 from pilotage.report.replay.floor import floor_scene
 from pilotage.report.replay.scene import Lines, Raster, ReplayScene
-from pilotage.report.run_data import RunData
-from pilotage.report.sheet_data import SheetData
 
 NOT_YET, VISITED = 0, 1
 PALETTE = ("transparent", "rgba(86, 180, 233, 0.35)")

@@ -16,9 +16,9 @@ from pilotage.experiments.studies.factors import Factor
 from pilotage.experiments.studies.replay import mission_of_row
 from pilotage.experiments.studies.study import study_yaml
 from pilotage.experiments.studies.table import StudyTable, read_study
+from pilotage.records.run_data import read_run
 from pilotage.report.page import FIGURES, FLOOR_FIGURES
 from pilotage.report.page import write_report as write_run_report
-from pilotage.report.run_folder import read_run
 from pilotage.report.study.better import lower_is_better
 from pilotage.report.study.examples import Example, describe, rows_to_show
 from pilotage.report.study.page import write_page

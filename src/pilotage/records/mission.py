@@ -1,0 +1,35 @@
+"""``mission.yaml``: the mission in full, so that the run is run again from it alone."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from pilotage.records.reading import broken, parse_yaml, read_text
+
+MISSION_FILE = "mission.yaml"
+
+
+def write_mission(folder: Path, text: str) -> None:
+    """Write the mission's YAML text."""
+    (folder / MISSION_FILE).write_text(text, encoding="utf-8")
+
+
+def read_mission(folder: Path) -> tuple[Mapping[str, Any], str]:
+    """Read the mission's values and its text; both empty where there is no such file.
+
+    The values are plain and not validated: a report of an old run must not depend on today's schema.
+
+    Raises
+    ------
+    InputError
+        One line, where the file is no YAML.
+    """
+    path = folder / MISSION_FILE
+    text = read_text(path)
+    try:
+        values = parse_yaml(text)
+    except ValueError as error:
+        raise broken(path, error) from None
+    return (values if isinstance(values, dict) else {}), text

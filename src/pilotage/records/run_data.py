@@ -1,0 +1,173 @@
+"""A run folder read: what every figure, table and replay is made from."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numpy as np
+
+from pilotage.core.errors import InputError
+from pilotage.core.types import BoolArray, Event, FloatArray
+from pilotage.maps.occupancy_grid import OccupancyGrid
+from pilotage.records.cells import SheetData, read_cells
+from pilotage.records.events import read_events
+from pilotage.records.grid import read_grid_layer
+from pilotage.records.localizer import read_localizer
+from pilotage.records.metrics import METRICS_FILE, read_metrics
+from pilotage.records.mission import read_mission
+from pilotage.records.numbers import number
+from pilotage.records.plans import Plan, Plans, read_plans
+from pilotage.records.run_folder import robot_folder
+from pilotage.records.scans import Sightings, read_sightings
+from pilotage.records.terrain import TerrainPictures, read_terrain
+from pilotage.records.trace import TRACE_FILE, Trace, read_trace
+from pilotage.records.updates import RecordedUpdate, read_updates
+from pilotage.records.world import World, read_world
+
+T = TypeVar("T")
+
+
+@dataclass(frozen=True, slots=True)
+class RunData:
+    """Everything a run folder tells, of one of its robots.
+
+    Attributes
+    ----------
+    trace
+        That robot's rows; a lost robot claims no pose, so none is in ``est_*``, ``cov_*`` and ``nees``.
+    robot, robots
+        Which robot it is, and the names of all; none where the run has one only.
+    """
+
+    run_dir: Path
+    mission: Mapping[str, Any]
+    mission_text: str
+    metrics: Mapping[str, Any]
+    events: tuple[Event, ...]
+    world: World
+    plans: tuple[Plan, ...]
+    mapped_points_m: FloatArray
+    shortest_path_m: FloatArray
+    trace: Trace
+    updates: tuple[RecordedUpdate, ...] = ()
+    sightings: Sightings = field(default_factory=Sightings)
+    sheet: SheetData | None = None
+    terrain: TerrainPictures | None = None
+    grid: OccupancyGrid | None = None
+    localizer_text: str = ""
+    robot: int = 0
+    robots: tuple[str, ...] = ()
+
+    @property
+    def name(self) -> str:
+        """The mission's name, or the folder's."""
+        return str(self.metrics.get("mission") or self.mission.get("mission") or self.run_dir.name)
+
+    @property
+    def kind(self) -> str:
+        """What is drawn of it: "terrain", "sheet" or "floor", "recording" for a recorded log."""
+        if not self.mission and "localizer" in self.metrics:
+            return "recording"
+        world = self.mission.get("world")
+        told = world.get("kind") if isinstance(world, Mapping) else None
+        if told is not None:
+            return str(told)
+        if self.terrain is not None:
+            return "terrain"
+        return "floor" if self.sheet is None else "sheet"
+
+    @property
+    def settle_s(self) -> float:
+        """Errors count after this long (the start error is drawn, not earned)."""
+        run = self.mission.get("run")
+        value = number(run.get("settle_s")) if isinstance(run, Mapping) else math.nan
+        return value if math.isfinite(value) else 1.0
+
+    def settled(self) -> BoolArray:
+        """(N,) steps that count for the errors; all of them in a run that ended before settling."""
+        after = self.trace.t_s > self.settle_s
+        return after if bool(after.any()) else np.ones(self.trace.steps, dtype=np.bool_)
+
+
+OnDamage = Callable[[str], None]
+"""Told one line for each file that cannot be read; the run is then read without it."""
+
+
+def read_run(folder: Path, *, robot: int = 0, on_damage: OnDamage | None = None) -> RunData:
+    """Read a run folder; what is missing stays empty.
+
+    Parameters
+    ----------
+    folder
+        Folder written by a run: at least ``metrics.json`` and ``trace.parquet``.
+    robot
+        Whose rows and files, where there are several.
+    on_damage
+        Where given, a damaged file other than those two is told to it and left out; else it is an error.
+
+    Raises
+    ------
+    InputError
+        One line, where the folder is not a run folder or one of its files cannot be read.
+    """
+    if not folder.is_dir():
+        raise InputError(
+            f"{folder}: expected a run folder, found {'a file' if folder.exists() else 'nothing'}"
+        )
+    missing = [name for name in (METRICS_FILE, TRACE_FILE) if not (folder / name).exists()]
+    if missing:
+        raise InputError(f"{folder}: not a run folder; expected {' and '.join(missing)} in it")
+
+    def part(read: Callable[[Path], T], empty: T, place: Path = folder) -> T:
+        try:
+            return read(place)
+        except InputError as error:
+            if on_damage is None:
+                raise
+            on_damage(str(error))
+            return empty
+
+    metrics, trace = read_metrics(folder), read_trace(folder)
+    nothing: tuple[Mapping[str, Any], str] = ({}, "")
+    mission, mission_text = part(read_mission, nothing)
+    world = part(read_world, World())
+    own = robot_folder(folder, robot)
+    plans = part(read_plans, Plans(), own)
+    return RunData(
+        run_dir=folder,
+        mission=mission,
+        mission_text=mission_text,
+        metrics=metrics,
+        events=part(read_events, ()),
+        world=world,
+        plans=plans.plans,
+        mapped_points_m=plans.mapped_points_m,
+        shortest_path_m=plans.shortest_path_m,
+        trace=_without_lost_poses(trace.of(robot)),
+        updates=part(read_updates, (), own),
+        sightings=part(read_sightings, Sightings(), own),
+        sheet=part(lambda place: read_cells(place, world), None, own),
+        terrain=part(read_terrain, None),
+        grid=part(read_grid_layer, None),
+        localizer_text=part(read_localizer, ""),
+        robot=robot,
+        robots=trace.robots,
+    )
+
+
+def _without_lost_poses(trace: Trace) -> Trace:
+    """Leave out what a lost robot's belief holds in place of a pose: it claims none, so none is drawn."""
+    localized = trace.columns.get("localized")
+    if localized is None or not bool((localized < 0.5).any()):
+        return trace
+    columns = {
+        name: np.where(localized < 0.5, np.nan, values)
+        if name.startswith(("est_", "cov_", "nees"))
+        else values
+        for name, values in trace.columns.items()
+    }
+    return Trace(columns, trace.steps)

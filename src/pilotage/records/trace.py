@@ -1,0 +1,184 @@
+"""``trace.parquet``: one row a step, or a step and robot; columns by name, float64."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pilotage.core.errors import InputError
+from pilotage.core.types import FloatArray, IntArray
+from pilotage.records.numbers import LARGEST
+from pilotage.records.reading import broken, clean_text, is_there
+
+TRACE_FILE = "trace.parquet"
+ROBOT_COLUMN = "robot"
+ROBOTS_KEY = b"pilotage.robots"
+"""Key of the file's metadata: the robots' names as a JSON list, in the order of their numbers."""
+MOST_COLUMNS = 2000
+MOST_VALUES = 64_000_000
+"""Half a gigabyte as float64: a day of ten steps a second in seventy columns."""
+MOST_FILE_BYTES = 1 << 30
+
+
+@dataclass(frozen=True, slots=True)
+class Trace:
+    """The columns of the trace, one value a step and robot.
+
+    Parameters
+    ----------
+    columns
+        Name to (N,) values; a column that the run did not record is simply not there.
+    steps
+        N, the number of rows.
+    robots, robot
+        The robots' names, and (N,) whose row it is as an index into them; none and None where there is one
+        robot only.
+    """
+
+    columns: Mapping[str, FloatArray]
+    steps: int
+    robots: tuple[str, ...] = ()
+    robot: IntArray | None = None
+
+    def __getitem__(self, name: str) -> FloatArray:
+        """Return the (N,) column, all NaN where the run did not record it."""
+        values = self.columns.get(name)
+        return np.full(self.steps, np.nan) if values is None else values
+
+    def has(self, *names: str) -> bool:
+        """Say whether every named column holds at least one finite value."""
+        return all(name in self.columns and bool(np.isfinite(self.columns[name]).any()) for name in names)
+
+    @property
+    def t_s(self) -> FloatArray:
+        """(N,) times; the row's number where there is no clock."""
+        return self["t_s"] if self.has("t_s") else np.arange(self.steps, dtype=np.float64)
+
+    def of(self, robot: int) -> Trace:
+        """Return the rows of one robot only, in their order."""
+        if self.robot is None:
+            return self
+        rows = np.flatnonzero(self.robot == robot)
+        return Trace({name: values[rows] for name, values in self.columns.items()}, len(rows))
+
+    def ultrasonics(self) -> dict[str, FloatArray]:
+        """Return the ranges of every ultrasonic sensor by the sensor's name, NaN where saturated."""
+        return {
+            name.removeprefix("us_").removesuffix("_m"): values
+            for name, values in self.columns.items()
+            if name.startswith("us_") and name.endswith("_m")
+        }
+
+
+def trace_of(columns: Mapping[str, FloatArray]) -> Trace:
+    """The trace of one robot, from its columns."""
+    return Trace(columns, len(next(iter(columns.values()))) if columns else 0)
+
+
+def merged(traces: Mapping[str, Mapping[str, FloatArray]]) -> Trace:
+    """The trace of several robots, from each one's columns by its name.
+
+    Rows of the same time stand together, robots in their order; what a robot did not record is NaN.
+    """
+    lengths = [len(next(iter(columns.values()))) if columns else 0 for columns in traces.values()]
+    robot = np.repeat(np.arange(len(traces), dtype=np.int64), lengths)
+    names = list(dict.fromkeys(name for columns in traces.values() for name in columns))
+    joined = {
+        name: np.concatenate(
+            [
+                columns.get(name, np.full(n, np.nan))
+                for columns, n in zip(traces.values(), lengths, strict=True)
+            ]
+            or [np.empty(0)]
+        )
+        for name in names
+    }
+    order = np.lexsort((robot, joined["t_s"])) if "t_s" in joined else np.arange(len(robot))
+    columns = {name: np.ascontiguousarray(values[order]) for name, values in joined.items()}
+    return Trace(columns, len(robot), tuple(traces), robot[order])
+
+
+def write_trace(folder: Path, trace: Trace) -> None:
+    """Write the trace; with several robots also the column ``robot`` and their names in the metadata."""
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    columns: dict[str, Any] = dict(trace.columns)
+    metadata = None
+    if trace.robot is not None:
+        columns = {ROBOT_COLUMN: trace.robot.astype(np.int32), **columns}
+        metadata = {ROBOTS_KEY: json.dumps(list(trace.robots)).encode()}
+    pq.write_table(pa.table(columns, metadata=metadata), folder / TRACE_FILE)
+
+
+def read_trace(folder: Path, columns: Sequence[str] | None = None) -> Trace:
+    """Read the trace.
+
+    Parameters
+    ----------
+    columns
+        Only these, of those that are there; None reads every column of numbers. A column of words (a
+        sensor's state, say) is no series and left out; a value beyond ``numbers.LARGEST`` is NaN, as
+        nothing that was measured is that large.
+
+    Raises
+    ------
+    InputError
+        One line, where the file is missing, is no parquet file, or larger than any run's.
+    """
+    # Imported here: a report needs it, the summary in the terminal does not.
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    path = folder / TRACE_FILE
+    if not is_there(path, MOST_FILE_BYTES):
+        raise InputError(f"{path}: expected a run folder's trace, found none there")
+    try:
+        with pq.ParquetFile(path) as file:
+            schema, rows = file.schema_arrow, file.metadata.num_rows
+            wanted = [
+                field.name
+                for field in schema
+                if (pa.types.is_floating(field.type) or pa.types.is_integer(field.type))
+                and (columns is None or field.name in (*columns, ROBOT_COLUMN))
+            ]
+            if len(schema) > MOST_COLUMNS or rows * max(len(wanted), 1) > MOST_VALUES:
+                raise broken(path, f"{rows} rows in {len(schema)} columns are more than any run writes")
+            # One file of a few hundred kilobytes: starting a pool of threads costs more than it gains.
+            table = file.read(columns=wanted, use_threads=False)
+    except (pa.ArrowException, OSError, ValueError, KeyError, MemoryError, OverflowError) as error:
+        raise broken(path, str(error).partition("\n")[0]) from None
+    if table.num_rows != rows or len(table.column_names) != len(wanted):
+        raise broken(path, "its columns are not of one length or not of one name each")
+    found = {name: _numbers(table[name]) for name in wanted}
+    robots, robot = _robots(path, schema.metadata, found.pop(ROBOT_COLUMN, None))
+    return Trace({clean_text(name): values for name, values in found.items()}, rows, robots, robot)
+
+
+def _numbers(column: Any) -> FloatArray:
+    """A column as (N,) float64."""
+    values = np.array(column.to_numpy(), dtype=np.float64)
+    # Infinities are left: a clearance is infinite where there is nothing.
+    values[np.isfinite(values) & (np.abs(values) > LARGEST)] = np.nan
+    return values
+
+
+def _robots(path: Path, metadata: Any, robot: FloatArray | None) -> tuple[tuple[str, ...], IntArray | None]:
+    """The robots' names and whose row it is."""
+    if robot is None:
+        return (), None
+    if not np.isfinite(robot).all() or (robot.size and not (robot.min() >= 0.0 and robot.max() < 10_000.0)):
+        raise broken(path, "column robot: expected whole numbers from 0")
+    whose = robot.astype(np.int64)
+    count = int(whose.max()) + 1 if whose.size else 0
+    try:
+        names = json.loads((metadata or {}).get(ROBOTS_KEY, b"[]"))
+    except (ValueError, RecursionError):
+        names = []
+    told = [clean_text(str(name)) for name in names] if isinstance(names, list) else []
+    return (*told, *(f"robot {k}" for k in range(len(told), count))), whose

@@ -1,0 +1,148 @@
+"""``updates.npz``: updates by scans explained: what was seen, matched, accepted, and why not."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pilotage.core.scan_update import LineVerdict, ScanUpdate
+from pilotage.core.types import FloatArray, IntArray
+from pilotage.records.arrays import Arrays, read_arrays, write_arrays
+from pilotage.records.plans import places
+from pilotage.records.reading import broken, clean_text
+
+UPDATES_FILE = "updates.npz"
+VERDICTS = tuple(LineVerdict)
+"""In the order in which the file numbers them."""
+
+
+@dataclass(frozen=True, slots=True)
+class KeptUpdate:
+    """An update worth a picture: when it was, why it was kept, and what it was, in the sensor's frame."""
+
+    t_s: float
+    why: str
+    update: ScanUpdate
+
+
+@dataclass(frozen=True, slots=True)
+class RecordedUpdate:
+    """One update as it is drawn, all in the map frame as it was believed before the update.
+
+    Attributes
+    ----------
+    t_s, why
+        When it was, and why it was kept.
+    sensor_pose, sensor_pose_after
+        (3,) of the scanner before and after.
+    points_m, clusters, members
+        (N, 2) the scan, and per point its cluster and its line, -1 for none.
+    ends_m, walls_m
+        (L, 4) the lines, and the walls that they were matched to (nan for none).
+    distances, gate, verdicts
+        Squared Mahalanobis distances (L,), the gate's chi-square value, and what became of each line.
+    """
+
+    t_s: float
+    why: str
+    sensor_pose: FloatArray
+    sensor_pose_after: FloatArray
+    points_m: FloatArray
+    clusters: IntArray
+    members: IntArray
+    ends_m: FloatArray
+    walls_m: FloatArray
+    distances: FloatArray
+    gate: float
+    verdicts: tuple[LineVerdict, ...]
+
+
+def update_arrays(updates: Iterable[KeptUpdate]) -> Mapping[str, Any]:
+    """The file's arrays; empty without any update."""
+    arrays: dict[str, Any] = {}
+    for k, kept in enumerate(updates):
+        update = kept.update
+        arrays |= {
+            f"t_s_{k}": np.array(kept.t_s),
+            f"why_{k}": np.array(kept.why),
+            f"sensor_pose_{k}": update.sensor_pose,
+            f"sensor_pose_after_{k}": update.sensor_pose_after,
+            f"points_m_{k}": update.points_m.astype(np.float32),
+            f"clusters_{k}": update.clusters.astype(np.int16),
+            f"members_{k}": update.members.astype(np.int16),
+            f"ends_m_{k}": update.ends_m,
+            f"walls_m_{k}": update.walls_m,
+            f"distances_{k}": update.distances,
+            f"gate_{k}": np.array(update.gate),
+            f"verdicts_{k}": np.array([VERDICTS.index(v) for v in update.verdicts], dtype=np.int16),
+        }
+    return arrays
+
+
+def write_updates(folder: Path, updates: Iterable[KeptUpdate]) -> None:
+    """Write the updates; no file where there are none."""
+    arrays = update_arrays(updates)
+    if arrays:
+        write_arrays(folder / UPDATES_FILE, arrays)
+
+
+def read_updates(folder: Path) -> tuple[RecordedUpdate, ...]:
+    """Read the updates; none where there is no such file.
+
+    Raises
+    ------
+    InputError
+        One line, where the file is no archive or an array is not what it should be.
+    """
+    path = folder / UPDATES_FILE
+    arrays = read_arrays(path)
+    if arrays is None:
+        return ()
+    try:
+        updates: list[RecordedUpdate] = []
+        while f"t_s_{len(updates)}" in arrays:
+            updates.append(_update(arrays, len(updates)))
+        return tuple(updates)
+    except ValueError as error:
+        raise broken(path, error) from None
+
+
+def _update(arrays: Arrays, k: int) -> RecordedUpdate:
+    before, after = arrays.floats(f"sensor_pose_{k}", 3), arrays.floats(f"sensor_pose_after_{k}", 3)
+    ends, points = places(arrays, f"ends_m_{k}", (4,)), places(arrays, f"points_m_{k}", (2,))
+    lines, count = len(ends), len(points)
+    verdicts = arrays.ints(f"verdicts_{k}", lines)
+    clusters, members = arrays.ints(f"clusters_{k}", count), arrays.ints(f"members_{k}", count)
+    if not (np.isfinite(before).all() and np.isfinite(after).all()):
+        raise ValueError(f"sensor_pose_{k}: expected finite numbers")
+    if bool(((verdicts < 0) | (verdicts >= len(VERDICTS))).any()):
+        raise ValueError(f"verdicts_{k}: expected numbers below {len(VERDICTS)}")
+    if bool(((members < -1) | (members >= lines)).any()) or bool((clusters < -1).any()):
+        raise ValueError(f"members_{k}: expected numbers of lines, or -1")
+    walls = places(arrays, f"walls_m_{k}", (4,))
+    if len(walls) != lines:
+        raise ValueError(f"walls_m_{k}: expected {lines} rows, found {len(walls)}")
+    return RecordedUpdate(
+        t_s=arrays.scalar(f"t_s_{k}"),
+        why=clean_text(arrays.word(f"why_{k}")),
+        sensor_pose=before,
+        sensor_pose_after=after,
+        points_m=_placed(before, points),
+        clusters=clusters,
+        members=members,
+        ends_m=_placed(before, ends.reshape(-1, 2)).reshape(-1, 4),
+        walls_m=walls,
+        distances=arrays.floats(f"distances_{k}", lines),
+        gate=arrays.scalar(f"gate_{k}"),
+        verdicts=tuple(VERDICTS[v] for v in verdicts),
+    )
+
+
+def _placed(pose: FloatArray, points: FloatArray) -> FloatArray:
+    """Points (N, 2) of the sensor's frame in the map frame."""
+    c, s = np.cos(pose[2]), np.sin(pose[2])
+    return np.asarray(points @ np.array([[c, s], [-s, c]]) + pose[:2])
