@@ -5,6 +5,8 @@ from __future__ import annotations
 import difflib
 from collections.abc import Iterable
 
+from pilotage.core.shown import shown
+
 
 class PilotageError(Exception):
     """Base of what pilotage raises on purpose."""
@@ -14,7 +16,7 @@ class InputError(PilotageError):
     """What the user handed in cannot be used; the message is one line: expected, found, remedy."""
 
     def __init__(self, message: str) -> None:
-        super().__init__(" ".join(message.split()))
+        super().__init__(shown(message))
 
 
 def nearest(name: str, known: Iterable[str]) -> str | None:

@@ -1,0 +1,145 @@
+"""NumPy arrays from files: nothing in them is run, and no more is taken than the file can hold."""
+
+from __future__ import annotations
+
+import math
+import zipfile
+import zlib
+from pathlib import Path
+from typing import IO, Any
+
+import numpy as np
+
+from pilotage.core.errors import InputError
+from pilotage.core.files.plain import opened, require_file
+from pilotage.core.limits import DATA_BYTES, limit, too_large
+
+Array = np.ndarray[tuple[int, ...], np.dtype[Any]]
+
+_KINDS = frozenset("biufcSU")
+"""Kinds of dtype that are plain values: numbers, truth values and text."""
+_MOST_DIMENSIONS = 8
+_MOST_MEMBERS = 1000
+_DAMAGED = (zipfile.BadZipFile, zlib.error, EOFError, ValueError, KeyError, RuntimeError, OSError)
+
+
+def map_npy(path: Path, what: str = "a .npy file") -> Array:
+    """Map a NumPy file into memory, read-only.
+
+    Raises
+    ------
+    InputError
+        Where it is no such file, holds objects, or less than its header says.
+    """
+    with opened(path, what, DATA_BYTES) as file:
+        shape, dtype, fortran = _header(file, str(path))
+        at = file.tell()
+    held = require_file(path) - at
+    if math.prod(shape) * dtype.itemsize > held:
+        raise _cut(str(path), shape, dtype)
+    if 0 in shape:
+        return np.empty(shape, dtype)
+    try:
+        return np.memmap(path, dtype, "r", at, shape, "F" if fortran else "C")
+    except (OSError, ValueError) as error:
+        raise InputError(f"{path}: expected a NumPy array, found: {error}") from None
+
+
+def read_npz(path: Path, what: str = "an .npz file") -> dict[str, Array]:
+    """Read all arrays of an archive.
+
+    Raises
+    ------
+    InputError
+        Where it is no such archive, an array is damaged, or they unpack to more than the limit.
+    """
+    with opened(path, what, DATA_BYTES) as file:
+        try:
+            with zipfile.ZipFile(file) as archive:
+                return _arrays(archive, str(path))
+        except InputError:
+            raise
+        except _DAMAGED as error:
+            raise InputError(f"{path}: expected {what}, found: {error or 'damaged data'}") from None
+
+
+def _arrays(archive: zipfile.ZipFile, where: str) -> dict[str, Array]:
+    members = archive.infolist()
+    if len(members) > _MOST_MEMBERS:
+        raise too_large(where, _MOST_MEMBERS, len(members), "arrays")
+    total, most = sum(member.file_size for member in members), limit(DATA_BYTES)
+    if total > most:
+        raise too_large(f"{where} (unpacked)", most, total)
+    found: dict[str, Array] = {}
+    for member in members:
+        name = member.filename.removesuffix(".npy")
+        if name in found:
+            raise InputError(f"{where}: {name}: expected every array once, found it twice")
+        with archive.open(member) as file:
+            found[name] = _array(file, member.file_size, f"{where}: {name}")
+    return found
+
+
+def _array(file: IO[bytes], size: int, where: str) -> Array:
+    shape, dtype, fortran = _header(file, where)
+    count = math.prod(shape)
+    # Compared before anything is taken: the header may promise what no memory holds.
+    if count * dtype.itemsize > size:
+        raise _cut(where, shape, dtype)
+    data = file.read(count * dtype.itemsize)
+    if len(data) < count * dtype.itemsize:
+        raise _cut(where, shape, dtype)
+    file.read()  # to the member's end, where its checksum is compared
+    return np.frombuffer(data, dtype).reshape(shape, order="F" if fortran else "C")
+
+
+def _header(file: Any, where: str) -> tuple[tuple[int, ...], np.dtype[Any], bool]:
+    try:
+        version = np.lib.format.read_magic(file)
+        if version == (1, 0):
+            shape, fortran, dtype = np.lib.format.read_array_header_1_0(file)
+        elif version == (2, 0):
+            shape, fortran, dtype = np.lib.format.read_array_header_2_0(file)
+        else:
+            raise ValueError(f"version {version}")
+    except (
+        ValueError,
+        TypeError,
+        SyntaxError,
+        EOFError,
+        OverflowError,
+        RecursionError,
+        MemoryError,
+    ) as error:
+        raise InputError(f"{where}: expected a NumPy array, found: {error or 'a damaged header'}") from None
+    if dtype.kind not in _KINDS or dtype.itemsize == 0:
+        raise InputError(f"{where}: expected an array of numbers or text, found {dtype}")
+    if len(shape) > _MOST_DIMENSIONS or any(type(n) is not int or n < 0 for n in shape):
+        raise InputError(f"{where}: expected up to {_MOST_DIMENSIONS} sizes of 0 or more, found {shape}")
+    return shape, dtype, bool(fortran)
+
+
+def _cut(where: str, shape: tuple[int, ...], dtype: np.dtype[Any]) -> InputError:
+    return InputError(
+        f"{where}: expected {dtype} of shape {shape}, found less; the file seems to be cut short"
+    )
+
+
+def require_numbers(values: Array, most: float, where: str) -> Array:
+    """Refuse numbers that are not finite or beyond ``most``; other kinds of values are refused as well.
+
+    Raises
+    ------
+    InputError
+        Says which is the first one.
+    """
+    if values.dtype.kind not in "biuf":
+        raise InputError(f"{where}: expected numbers, found {values.dtype}")
+    if values.dtype.kind == "b":
+        return values
+    with np.errstate(all="ignore"):
+        wrong = ~(np.abs(values) <= most)
+    if wrong.any():
+        first = values.reshape(-1)[int(np.argmax(wrong.reshape(-1)))]
+        raise InputError(f"{where}: expected finite numbers within {most:g}, found {first:g}")
+    return values

@@ -1,0 +1,51 @@
+"""Images: their header is looked at before a pixel is unpacked."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from pilotage.core.errors import InputError
+from pilotage.core.files.plain import opened
+from pilotage.core.limits import DATA_BYTES, limit, too_large
+
+if TYPE_CHECKING:
+    from PIL import Image
+
+FORMATS = ("PNG", "PPM", "BMP", "TIFF", "JPEG")
+"""Pillow knows more, some of which start other programs."""
+_DAMAGED = (OSError, SyntaxError, ValueError, TypeError, LookupError, OverflowError, EOFError, MemoryError)
+
+
+@contextmanager
+def opened_image(path: Path, what: str = "an image") -> Iterator[Image.Image]:
+    """Open an image whose pixels are within the limit; what fails while it is read is told as input, too.
+
+    Raises
+    ------
+    InputError
+        Where there is none, it is of another format, damaged, or too large.
+    """
+    from PIL import Image, UnidentifiedImageError
+
+    where = f"image '{path}'"
+    with opened(path, what, DATA_BYTES) as file, warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # Pillow warns of damaged metadata; the pixels are what counts
+        # Pillow guards against large images by their pixels; here it is by their bytes, and told.
+        guard, Image.MAX_IMAGE_PIXELS = Image.MAX_IMAGE_PIXELS, None
+        try:
+            with Image.open(file, formats=FORMATS) as image:
+                columns, rows = image.size
+                size, most = columns * rows * len(image.getbands()), limit(DATA_BYTES)
+                if size > most:
+                    raise too_large(f"{where} ({columns} x {rows} pixels)", most, size)
+                yield image
+        except UnidentifiedImageError:
+            raise InputError(f"{where}: expected a PNG, PGM or other image, found another format") from None
+        except (*_DAMAGED, Image.DecompressionBombError) as error:
+            raise InputError(f"{where}: cannot be read ({error}); it may be cut short") from None
+        finally:
+            Image.MAX_IMAGE_PIXELS = guard
