@@ -56,8 +56,9 @@ def sample(mission: str, seeds: int) -> Sample:
     for seed in range(seeds):
         config = load_floor_mission(mission, seed=seed)
         record = simulate(config)
-        metrics.append(run_metrics(config, record.trace, record.outcome, record.experiment.floor.walls))
-        series.append(record.trace["nees"])
+        found, nees = run_metrics(config, record.trace, record.outcome, record.experiment.floor.walls)
+        metrics.append(found)
+        series.append(nees)
     return Sample(metrics, series)
 
 

@@ -13,7 +13,7 @@ def numbers(name: str, seed: int, limit_s: float) -> dict[str, object]:
     """Metrics of one run."""
     record = simulate(load_floor_mission(name, [f"run.time_limit_s={limit_s}"], seed))
     floor = record.experiment.floor.walls
-    return run_metrics(record.experiment.mission, record.trace, record.outcome, floor)
+    return run_metrics(record.experiment.mission, record.trace, record.outcome, floor)[0]
 
 
 def test_lost_robots_find_themselves_and_are_never_wrong() -> None:

@@ -16,7 +16,7 @@ from hypothesis.extra.numpy import arrays
 
 from pilotage.evaluation.intervals import COVERAGE, bootstrap_mean, summarize, wilson
 from pilotage.evaluation.paired import corrected, difference
-from pilotage.evaluation.pooled import NEES_IDEAL, pool
+from pilotage.evaluation.pooled import IDEALS, pool
 
 NUMBERS = st.floats(-1e6, 1e6)
 
@@ -127,10 +127,10 @@ def test_pooled_consistency_names_a_filter_that_is_off_by_two(factor: float, ver
     rng = np.random.default_rng(5)
     # Means of runs with about 60 independent poses each.
     runs = factor * rng.chisquare(3 * 60, 100) / 60
-    pooled = pool(runs, NEES_IDEAL)
+    pooled = pool(runs, IDEALS["nees_mean"])
     assert pooled.verdict == verdict
-    assert pool(runs[:1], NEES_IDEAL).verdict == "too few runs to say"
-    assert pool(runs[:9], NEES_IDEAL).verdict == "too few runs to say"
+    assert pool(runs[:1], IDEALS["nees_mean"]).verdict == "too few runs to say"
+    assert pool(runs[:9], IDEALS["nees_mean"]).verdict == "too few runs to say"
 
 
 def test_intervals_of_a_handful_hold_the_mean_as_often_as_the_pages_say() -> None:

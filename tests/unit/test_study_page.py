@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 from pilotage.evaluation.judge import judge, paired_columns
+from pilotage.evaluation.metrics import METRICS
 from pilotage.evaluation.paired import difference
 from pilotage.report.study.answer import answer, answers
-from pilotage.report.study.better import lower_is_better
 from pilotage.report.study.comparisons import verdict
 from pilotage.report.study.examples import Example, describe, rows_to_show
 from pilotage.report.study.factor_figures import lines_over
@@ -79,7 +79,7 @@ def test_a_better_setting_is_named_with_its_gain() -> None:
     view = two_settings(-0.5)
     text = answer(view, judge_view(view)).replace("\u00a0", " ")
     assert re.match(
-        r"Way driven is 10\.\d+ m \([\d.]+ to [\d.]+\) with plain; lowest with new, 9\.\d+ m, ", text
+        r"Path driven is 10\.\d+ m \([\d.]+ to [\d.]+\) with plain; lowest with new, 9\.\d+ m, ", text
     )
     assert re.search(r"a change by −0\.49\d* m \(−0\.50\d* to −0\.48\d*\) on the same 20 seeds", text)
     assert text.endswith("p < 0.001 after correction.")
@@ -274,8 +274,8 @@ def test_what_ended_early_is_not_called_quick() -> None:
         ("a_metric_that_nobody_knows", None),
     ],
 )
-def test_which_way_a_metric_is_better_is_known_by_its_name(metric: str, lower: bool | None) -> None:
-    assert lower_is_better(metric) is lower
+def test_which_way_a_metric_is_better_is_declared_with_it(metric: str, lower: bool | None) -> None:
+    assert METRICS.find(metric).less_is_better is lower
 
 
 def test_consistency_is_judged_only_where_it_is_reported() -> None:
@@ -341,5 +341,5 @@ def test_nothing_finished_yet_is_said() -> None:
         values={},
         waiting=2 * TRIALS,
     )
-    assert "No trial gave way driven" in study_page(empty)
+    assert "No trial gave path driven" in study_page(empty)
     assert math.isnan(judge_view(empty).rates[0].low)

@@ -210,7 +210,7 @@ def _print_cells(answer: dict[str, Any]) -> None:
     from rich.console import Console
     from rich.table import Table
 
-    from pilotage.report.metrics_table import metric_of
+    from pilotage.evaluation.metrics import METRICS
     from pilotage.report.study.scales import told
 
     console, cells = Console(file=sys.stdout), answer["cells"]
@@ -227,11 +227,11 @@ def _print_cells(answer: dict[str, Any]) -> None:
     for shown, name in enumerate(metrics):
         found = [cell["metrics"][name] for cell in cells]
         texts = [told(name, *(_number(entry[key]) for key in ("mean", "low", "high"))) for entry in found]
-        left -= max(map(len, (metric_of(name).name, *texts))) + 3
+        left -= max(map(len, (METRICS.find(name).name, *texts))) + 3
         if shown and left < 0:
             metrics = metrics[:shown]
             break
-        table.add_column(metric_of(name).name, justify="right", no_wrap=True)
+        table.add_column(METRICS.find(name).name, justify="right", no_wrap=True)
         columns.append(texts)
     for cell, row in zip(cells, zip(*columns, strict=True), strict=True):
         table.add_row(cell["name"], *row)

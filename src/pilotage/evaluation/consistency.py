@@ -1,4 +1,4 @@
-"""NEES and NIS: whether a filter is as good as it says."""
+"""NEES and NIS: whether a filter is as good as it says; their means over a run under their JSON keys."""
 
 from __future__ import annotations
 
@@ -46,6 +46,39 @@ def nees(truth: FloatArray, estimate: FloatArray, cov: FloatArray) -> FloatArray
         solved = np.linalg.solve(cov[regular], error[regular][:, :, None])[:, :, 0]
         out[regular] = np.einsum("ni,ni->n", error[regular], solved)
     return out
+
+
+def nees_metrics(values: FloatArray) -> dict[str, object]:
+    """Mean and band of a run's NEES (N,), nan left out; 3 is ideal for a pose."""
+    return _banded("nees", correlated_mean(values))
+
+
+def nis_metrics(nis: FloatArray, expected: FloatArray | float) -> dict[str, object]:
+    """Mean and band of NIS per degree of freedom, corrected for what the gate cuts off; 1 is ideal.
+
+    Parameters
+    ----------
+    nis
+        (N,) of each step's accepted readings together, or of each reading; nan where there is none.
+    expected
+        What a consistent filter gives behind its gate: (N,) by step, or one number for readings that all
+        have it. Steps of which nothing is expected are left out. Where none is left there are no metrics.
+    """
+    if isinstance(expected, float):
+        ratios = nis[np.isfinite(nis)] / expected
+        return _banded("nis", correlated_mean(ratios)) if ratios.size else {}
+    measured = np.isfinite(nis) & (expected > 0.0)
+    if not measured.any():
+        return {}
+    nis, expected = nis[measured], expected[measured]
+    # A ratio of sums r = sum(nis) / sum(expected); its band is that of the linearized terms, in which a
+    # changing number of readings cancels.
+    ratio = nis.sum() / expected.sum()
+    return _banded("nis", correlated_mean(ratio + (nis - ratio * expected) / expected.mean()))
+
+
+def _banded(name: str, band: Band) -> dict[str, object]:
+    return {f"{name}_mean": band.mean, f"{name}_low": band.low, f"{name}_high": band.high}
 
 
 def fraction_in_band(values: FloatArray, dof: int, probability: float = 0.999) -> float:

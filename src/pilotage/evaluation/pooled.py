@@ -9,12 +9,11 @@ import numpy as np
 
 from pilotage.core.types import FloatArray
 from pilotage.evaluation.intervals import bootstrap_mean
+from pilotage.evaluation.metrics import METRICS
 
-NEES_IDEAL = 3.0
-NIS_IDEAL = 1.0
 FEWEST_RUNS = 10
 """Of fewer runs the band is too short for a verdict (see ``intervals.COVERAGE``)."""
-IDEALS = {"nees_mean": NEES_IDEAL, "nis_mean": NIS_IDEAL}
+IDEALS = {metric.key: metric.ideal for metric in METRICS if math.isfinite(metric.ideal)}
 """By metric, what a consistent filter gives."""
 
 

@@ -6,10 +6,10 @@ import math
 
 import numpy as np
 
-from pilotage.core.angles import wrap_array_to_pi
 from pilotage.core.chi_square import chi_square_quantile, gated_mean
 from pilotage.core.types import BoolArray, FloatArray, IntArray
-from pilotage.evaluation.consistency import correlated_mean, nees
+from pilotage.evaluation.consistency import nees, nees_metrics, nis_metrics
+from pilotage.evaluation.pose_errors import pose_errors
 
 STRETCH_M = 1000.0
 """A way of this length without a landmark is a stretch to get over."""
@@ -56,33 +56,18 @@ def estimation_metrics(
     nis, outcome
         (S,) of the sightings; accepted where the outcome is 1.
     """
-    error = poses - truth
-    distance = np.hypot(error[:, 0], error[:, 1])
-    heading = wrap_array_to_pi(error[:, 2])
+    errors = pose_errors(truth, poses)
     step_m = np.concatenate([[0.0], np.hypot(*np.diff(truth[:, :2], axis=0).T)])
-    band = correlated_mean(nees(truth.copy(), poses, covs))
     metrics: dict[str, object] = {
-        "position_rmse_m": float(np.sqrt(np.mean(distance**2))),
-        "position_max_m": float(distance.max()),
-        "heading_rmse_rad": float(np.sqrt(np.mean(heading**2))),
-        "final_error": {
-            "x_m": float(error[-1, 0]),
-            "y_m": float(error[-1, 1]),
-            "theta_rad": float(heading[-1]),
-        },
-        "final_position_error_m": float(distance[-1]),
+        **errors.metrics(),
+        "final_position_error_m": float(errors.distance_m[-1]),
         "ellipse_coverage": float(in_ellipse(truth, poses, covs, probability).mean()),
-        "nees_mean": band.mean,
-        "nees_low": band.low,
-        "nees_high": band.high,
+        **nees_metrics(nees(truth, poses, covs)),
         "blind_stretches": len(stretches_without(seen, step_m)),
     }
     accepted = outcome == 1
     if accepted.any():
-        # Per degree of freedom, corrected for what the gate cuts off.
-        ratio = nis[accepted] / gated_mean(chi_square_quantile(gate, 2), 2)
-        nis_band = correlated_mean(ratio)
-        metrics |= {"nis_mean": nis_band.mean, "nis_low": nis_band.low, "nis_high": nis_band.high}
+        metrics |= nis_metrics(nis[accepted], gated_mean(chi_square_quantile(gate, 2), 2))
         metrics["accepted_fraction"] = float(accepted.sum() / (outcome >= 0).sum())
         metrics["sightings"] = len(outcome)
     return metrics

@@ -8,11 +8,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pilotage.core.angles import wrap_array_to_pi, wrap_to_pi
+from pilotage.core.angles import wrap_array_to_pi
 from pilotage.core.types import BoolArray, FloatArray
-from pilotage.evaluation.consistency import correlated_mean, nees
+from pilotage.evaluation.consistency import nees, nees_metrics, nis_metrics
 from pilotage.evaluation.halls import hall_offset_m
 from pilotage.evaluation.plan_quality import clearance_m, smoothness
+from pilotage.evaluation.pose_errors import pose_errors
 from pilotage.evaluation.shortest_path import ShortestPath, shortest_path
 from pilotage.evaluation.split_errors import split_errors
 from pilotage.maps.segment_map import SegmentMap
@@ -68,9 +69,9 @@ def covariances(trace: Mapping[str, FloatArray]) -> FloatArray:
 
 
 def run_metrics(
-    mission: FloorMission, trace: dict[str, FloatArray], outcome: Outcome, floor: SegmentMap
-) -> dict[str, object]:
-    """Compute a run's metrics; adds the column ``nees`` to the trace.
+    mission: FloorMission, trace: Mapping[str, FloatArray], outcome: Outcome, floor: SegmentMap
+) -> tuple[dict[str, object], FloatArray]:
+    """Compute a run's metrics, and its (N,) NEES.
 
     Errors count after ``run.settle_s``, because the start error is drawn from the initial covariance, and
     while the robot holds itself for localized: an honest "lost" claims no pose.
@@ -87,11 +88,10 @@ def run_metrics(
         **dict(outcome.counts),
     }
     metrics |= _planning(outcome, floor, mission.robot.body.radius_m)
-    trace["nees"] = np.zeros(0)
     if steps == 0:
-        return metrics
+        return metrics, np.zeros(0)
     truth, estimate = poses(trace, "true"), poses(trace, "est")
-    trace["nees"] = nees(truth.copy(), estimate, covariances(trace))
+    values = nees(truth, estimate, covariances(trace))
     collisions = int(trace["collisions"][-1])
     metrics["collisions"] = collisions
     metrics["min_clearance_m"] = float(trace["clearance_m"].min())
@@ -100,13 +100,13 @@ def run_metrics(
     carried = driven > 2.0 * mission.robot.motion.max_speed_m_s * mission.run.dt_s
     metrics["path_length_m"] = float(driven[~carried].sum())
     metrics |= _errors(mission, trace, truth, estimate)
-    metrics |= _consistency(mission, trace)
+    metrics |= _consistency(mission, trace, values)
     metrics |= _recovery(mission, trace, truth, estimate)
     metrics["hall_offset_m"] = hall_offset_m(truth, floor)
     goal = mission.world.goal
     if goal is None:
         metrics["success"] = outcome.arrived and collisions == 0
-        return metrics
+        return metrics, values
     goal_error = math.hypot(truth[-1, 0] - goal.x_m, truth[-1, 1] - goal.y_m)
     metrics["goal_error_m"] = goal_error
     reached = goal_error <= goal.tolerance_m
@@ -115,7 +115,7 @@ def run_metrics(
     metrics["success"] = outcome.arrived and collisions == 0 and (reached or not drives)
     if drives and outcome.arrived and not reached:
         metrics["reason"] = f"the robot says it arrived, but stands {goal_error:.2f} m from its goal"
-    return metrics
+    return metrics, values
 
 
 def _planning(outcome: Outcome, floor: SegmentMap, body_radius_m: float) -> dict[str, object]:
@@ -173,42 +173,21 @@ def _errors(
     mission: FloorMission, trace: Mapping[str, FloatArray], truth: FloatArray, estimate: FloatArray
 ) -> dict[str, object]:
     counted = _counted(mission, trace)
-    final = estimate[-1] - truth[-1]
-    metrics: dict[str, object] = {
-        "final_error": {
-            "x_m": float(final[0]),
-            "y_m": float(final[1]),
-            "theta_rad": wrap_to_pi(float(final[2])),
-        }
-    }
+    metrics = pose_errors(truth, estimate, counted).metrics()
     if not counted.any():
         return metrics
-    error = estimate[counted] - truth[counted]
-    distance = np.hypot(error[:, 0], error[:, 1])
-    heading = wrap_array_to_pi(error[:, 2])
-    metrics["position_rmse_m"] = float(np.sqrt(np.mean(distance**2)))
-    metrics["position_max_m"] = float(distance.max())
-    metrics["heading_rmse_rad"] = float(np.sqrt(np.mean(heading**2)))
-    everywhere = np.hypot(estimate[:, 0] - truth[:, 0], estimate[:, 1] - truth[:, 1])
-    return metrics | split_errors(trace, everywhere, counted)
+    return metrics | split_errors(trace, pose_errors(truth, estimate).distance_m, counted)
 
 
-def _consistency(mission: FloorMission, trace: Mapping[str, FloatArray]) -> dict[str, object]:
-    """NEES (3 is ideal) and NIS per degree of freedom (1 is ideal), corrected for what the gate cuts off."""
+def _consistency(
+    mission: FloorMission, trace: Mapping[str, FloatArray], values: FloatArray
+) -> dict[str, object]:
+    """NEES, NIS and the share of readings that the filter accepted, over the steps that count."""
     counted = _counted(mission, trace)
-    band = correlated_mean(trace["nees"][counted])
-    metrics: dict[str, object] = {"nees_mean": band.mean, "nees_low": band.low, "nees_high": band.high}
+    metrics = nees_metrics(values[counted])
     if "nis" not in trace:
         return metrics
-    nis, expected = trace["nis"][counted], trace["nis_expected"][counted]
-    measured = np.isfinite(nis)
-    if measured.any():
-        # A ratio of sums r = sum(nis) / sum(expected); its band is that of the linearized terms, in which
-        # a changing number of beacons cancels.
-        ratio = nis[measured].sum() / expected[measured].sum()
-        terms = ratio + (nis[measured] - ratio * expected[measured]) / expected[measured].mean()
-        band = correlated_mean(terms)
-        metrics |= {"nis_mean": band.mean, "nis_low": band.low, "nis_high": band.high}
+    metrics |= nis_metrics(trace["nis"][counted], trace["nis_expected"][counted])
     for what in ("beacons", "lines"):
         seen = trace[f"{what}_seen"][counted].sum() if f"{what}_seen" in trace else 0.0
         if seen > 0.0:

@@ -7,10 +7,11 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from pilotage.core.angles import wrap_array_to_pi
 from pilotage.core.types import BoolArray, FloatArray
 from pilotage.evaluation.cell_map_score import CellMapScore, score_cell_map
-from pilotage.evaluation.consistency import correlated_mean, nees
+from pilotage.evaluation.consistency import nees, nees_metrics
+from pilotage.evaluation.pose_errors import pose_errors
+from pilotage.evaluation.run_metrics import covariances, poses
 from pilotage.evaluation.sheet_visits import reachable_cells
 from pilotage.maps.cell_map import CellMap
 from pilotage.maps.true_cells import SheetFile, true_map
@@ -85,31 +86,13 @@ def _errors(trace: Mapping[str, FloatArray]) -> dict[str, object]:
     """Errors of the pose over the run, and their consistency with the covariance."""
     if trace["t_s"].size == 0:
         return {}
-    truth = np.column_stack([trace[f"true_{axis}"] for axis in ("x_m", "y_m", "theta_rad")])
-    estimate = np.column_stack([trace[f"est_{axis}"] for axis in ("x_m", "y_m", "theta_rad")])
-    distance = np.hypot(*(estimate - truth)[:, :2].T)
-    heading = wrap_array_to_pi(estimate[:, 2] - truth[:, 2])
-    metrics: dict[str, object] = {
-        "position_rmse_m": float(np.sqrt(np.mean(distance**2))),
-        "position_max_m": float(distance.max()),
-        "heading_rmse_rad": float(np.sqrt(np.mean(heading**2))),
+    truth, estimate = poses(trace, "true"), poses(trace, "est")
+    metrics = pose_errors(truth, estimate).metrics() | {
         "min_clearance_m": float(trace["clearance_m"].min()),
         "overhang_max_m": float(trace["overhang_m"].max()),
-        "final_error": {
-            "x_m": float(estimate[-1, 0] - truth[-1, 0]),
-            "y_m": float(estimate[-1, 1] - truth[-1, 1]),
-            "theta_rad": float(heading[-1]),
-        },
     }
-    rows = (
-        ("xx_m2", "xy_m2", "xt_m_rad"),
-        ("xy_m2", "yy_m2", "yt_m_rad"),
-        ("xt_m_rad", "yt_m_rad", "tt_rad2"),
-    )
-    cov = np.array([[trace[f"cov_{name}"] for name in row] for row in rows]).transpose(2, 0, 1)
+    cov = covariances(trace)
     known = np.linalg.eigvalsh(cov)[:, 0] > 0.0
     if known.sum() > 1:
-        values = nees(truth[known], estimate[known], cov[known])
-        band = correlated_mean(values)
-        metrics |= {"nees_mean": band.mean, "nees_low": band.low, "nees_high": band.high}
+        metrics |= nees_metrics(nees(truth[known], estimate[known], cov[known]))
     return metrics

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from pilotage.core.types import BoolArray, FloatArray
+from pilotage.evaluation.pose_errors import rms
 from pilotage.stack.navigator.goal_config import Mode
 
 NARROW_M = 0.5
@@ -41,5 +42,5 @@ def split_errors(
     for name, part in parts.items():
         chosen = distance_m[counted & part]
         if chosen.size:
-            out[f"position_rmse_{name}_m"] = float(np.sqrt(np.mean(chosen**2)))
+            out[f"position_rmse_{name}_m"] = rms(chosen)
     return out

@@ -15,6 +15,7 @@ import numpy as np
 
 from pilotage.core.errors import InputError
 from pilotage.core.types import FloatArray, IntArray
+from pilotage.evaluation.pose_errors import rms
 from pilotage.logs.trajectories import Trajectory3
 
 MAX_TIME_DIFFERENCE_S = 0.01
@@ -42,7 +43,7 @@ class TrajectoryErrors:
         """Root mean square, mean, median and maximum of both errors, under their JSON keys."""
         out: dict[str, float | int] = {}
         for name, values in (("ate", self.ate_m), ("rpe", self.rpe_m)):
-            out[f"{name}_rmse_m"] = float(np.sqrt(np.mean(values**2)))
+            out[f"{name}_rmse_m"] = rms(values)
             out[f"{name}_mean_m"] = float(values.mean())
             out[f"{name}_median_m"] = float(np.median(values))
             out[f"{name}_max_m"] = float(values.max())

@@ -6,10 +6,12 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
+from pilotage.evaluation.metrics import METRICS
 from pilotage.experiments.kinds import check_oracles, kind_of
 from pilotage.experiments.mission_kind import Record
 from pilotage.experiments.progress import OnProgress
 from pilotage.experiments.run_folder import write_run_folder
+from pilotage.experiments.task_of import task_of
 from pilotage.missions.mission import Mission
 
 
@@ -51,6 +53,7 @@ def run_mission(
     begin = time.perf_counter()
     record = kind.simulate(mission, on_progress)
     metrics = kind.metrics(record)
+    metrics |= METRICS.computed(task_of(mission), record.trace, metrics)
     metrics["wall_time_s"] = time.perf_counter() - begin
     run_dir = None
     if save:

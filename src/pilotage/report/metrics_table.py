@@ -10,14 +10,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from pilotage.evaluation.metrics import METRICS
 from pilotage.records.numbers import number
 from pilotage.report import quantities
-from pilotage.report.metric_catalogue import GROUPS, Metric, plain
 
-NOT_MEASURES = frozenset(
-    {"mission", "seed", "success", "reason", "run_dir", "name", "robot", "rows", "columns", "resolution_m"}
-)
-"""Keys that identify a run or tell its outcome, or repeat its settings; they are not in the table."""
+FURTHER = "Further"
+NOT_MEASURES = frozenset({"mission", "reason", "run_dir", "name", "robot"})
+"""Keys that identify a run or tell its outcome; they are not in the table."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,10 +30,6 @@ class Row:
     band: str = ""
 
 
-_BANDED = {"nees_mean": ("nees_low", "nees_high"), "nis_mean": ("nis_low", "nis_high")}
-_FOLDED = frozenset({"final_error"} | {key for pair in _BANDED.values() for key in pair})
-
-
 def metric_rows(metrics: Mapping[str, Any]) -> list[tuple[str, list[Row]]]:
     """Return the metrics of a run by group, without what the run does not have.
 
@@ -44,40 +39,18 @@ def metric_rows(metrics: Mapping[str, Any]) -> list[tuple[str, list[Row]]]:
         The run's object; None and NaN are left out, keys that are not in the catalogue come last.
     """
     values = _flatten(metrics)
-    groups = []
-    known = set()
-    for title, catalogue in GROUPS:
-        rows = []
-        for metric in catalogue:
-            known.add(metric.key)
-            value = values.get(metric.key, math.nan)
-            if math.isfinite(value):
-                rows.append(
-                    Row(
-                        metric.key,
-                        metric.name,
-                        metric.write(value),
-                        metric.meaning,
-                        _band(metric.key, values),
-                    )
-                )
-        if rows:
-            groups.append((title, rows))
-    others = [
-        Row(key, key.replace("_", " "), quantities.significant(value, 4), "")
-        for key, value in values.items()
-        if key not in known | _FOLDED | NOT_MEASURES and math.isfinite(value)
-    ]
-    return [*groups, ("Further", others)] if others else groups
-
-
-def metric_of(key: str) -> Metric:
-    """The catalogue's entry for a key; one made from the key where there is none."""
-    for _, catalogue in GROUPS:
-        for metric in catalogue:
-            if metric.key == key:
-                return metric
-    return Metric(key, key.replace("_", " "), lambda value: quantities.significant(value, 4), "")
+    groups: dict[str, list[Row]] = {}
+    for metric in METRICS:
+        value = values.get(metric.key, math.nan)
+        if metric.group and math.isfinite(value):
+            text = quantities.measured(value, metric.unit)
+            row = Row(metric.key, metric.name, text, metric.meaning, _band(metric.key, values))
+            groups.setdefault(metric.group, []).append(row)
+    for key, value in values.items():
+        if key not in METRICS and key not in NOT_MEASURES and math.isfinite(value):
+            row = Row(key, key.replace("_", " "), quantities.significant(value, 4), "")
+            groups.setdefault(FURTHER, []).append(row)
+    return list(groups.items())
 
 
 def _flatten(metrics: Mapping[str, Any]) -> dict[str, float]:
@@ -95,8 +68,9 @@ def _flatten(metrics: Mapping[str, Any]) -> dict[str, float]:
 
 
 def _band(key: str, values: Mapping[str, float]) -> str:
-    low_key, high_key = _BANDED.get(key, ("", ""))
-    low, high = values.get(low_key, math.nan), values.get(high_key, math.nan)
+    if not key.endswith("_mean"):
+        return ""
+    low, high = (values.get(f"{key.removesuffix('_mean')}_{end}", math.nan) for end in ("low", "high"))
     if not (math.isfinite(low) and math.isfinite(high)):
         return ""
-    return f"{plain(low)} to {plain(high)}"
+    return f"{quantities.significant(low)} to {quantities.significant(high)}"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Mapping
 
 NOTHING = "–"
 
@@ -62,3 +63,33 @@ def share(value: float) -> str:
 def count(value: float) -> str:
     """Write a whole number."""
     return f"{round(value):,}".replace(",", "\u00a0") if math.isfinite(value) else NOTHING
+
+
+def _degrees(value: float) -> str:
+    return f"{significant(value)}°" if math.isfinite(value) else NOTHING
+
+
+def _rate(value: float) -> str:
+    return f"{count(value)} / s" if math.isfinite(value) else NOTHING
+
+
+BY_UNIT: Mapping[str, Callable[[float], str]] = {
+    "m": length,
+    "s": duration,
+    "rad": angle,
+    "deg": _degrees,
+    "share": share,
+    "count": count,
+    "1/s": _rate,
+    "ratio": lambda value: f"{value:.3f}",
+    "×": lambda value: f"{value:.0f} ×",
+}
+"""How a metric of some unit is written; all others as plain numbers."""
+
+
+def measured(value: float, unit: str) -> str:
+    """Write a value of a unit as one says it."""
+    write = BY_UNIT.get(unit)
+    if write is not None:
+        return write(value)
+    return f"{significant(value)} {unit}" if unit and math.isfinite(value) else significant(value)

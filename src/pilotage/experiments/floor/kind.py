@@ -60,7 +60,9 @@ class FloorKind:
 
     def metrics(self, record: RunRecord) -> dict[str, object]:
         """Position errors, consistency, path quality, clearance."""
-        return run_metrics(record.mission, record.trace, record.outcome, record.experiment.floor.walls)
+        walls = record.experiment.floor.walls
+        metrics, record.trace["nees"] = run_metrics(record.mission, record.trace, record.outcome, walls)
+        return metrics
 
     def write_files(self, record: RunRecord, folder: Path) -> None:
         """``world.json``, ``plans.npz``, ``scans.npz``; ``updates.npz`` where updates are explained."""

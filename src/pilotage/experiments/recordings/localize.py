@@ -86,7 +86,7 @@ def localize_log(
     follow(drive, factory(config, knowledge), steps=50)  # compiles the kernels: not part of the speed
     trace, events, loop_s = follow(drive, factory(config, knowledge))
     steps = drive.t_s.shape[0] - 1
-    scores = log_metrics(trace)
+    scores, trace["nees"] = log_metrics(trace)
     success = bool(scores.get("scored_steps")) and not scores.get("lost", False)
     metrics: dict[str, object] = {
         "mission": f"localize-{drive.name}-{localizer}",

@@ -15,14 +15,16 @@ from pilotage.core.config import validate
 from pilotage.core.errors import InputError
 from pilotage.core.types import FloatArray
 from pilotage.evaluation.judge import SUCCESS, Judgement, judge
+from pilotage.evaluation.metric import Aspect, Metric
+from pilotage.evaluation.metrics import METRICS
 from pilotage.evaluation.paired import Difference
 from pilotage.experiments.kinds import kind_of
 from pilotage.experiments.mission import load_mission, mission_of
-from pilotage.experiments.mission_kind import SHARE, Aspect, Cost
 from pilotage.experiments.studies.definition import StudyDefinition
 from pilotage.experiments.studies.study import Study, make_study
 from pilotage.experiments.studies.sweep import settings_of
 from pilotage.experiments.studies.table import StudyTable, read_study
+from pilotage.experiments.task_of import has, task_of
 
 FIRST = 0
 """The cell of the mission as it is."""
@@ -31,7 +33,7 @@ DRIVER = "driver"
 BASELINE = "as it is"
 ORACLE = "oracle "
 SURE = 0.05
-RANKED = (Aspect.ACCURACY, Aspect.SAFETY, Aspect.TIME)
+RANKED = ({Aspect.ACCURACY}, {Aspect.SAFETY}, {Aspect.TIME, Aspect.EFFORT})
 """After success; what a gain speaks of."""
 
 
@@ -46,12 +48,12 @@ def attribution_study(mission: str, overrides: Sequence[str], trials: int) -> St
     loaded = load_mission(mission, overrides)
     kind = kind_of(loaded)
     oracles = {name: text for name, text in kind.oracles(loaded).items() if name != DRIVER}
-    costs = kind.costs(loaded)
+    costs = METRICS.costs_of(task_of(loaded), METRICS.given_by(task_of(loaded), has(loaded)))
     if not oracles:
         raise InputError(f"attribute '{mission}': expected a mission with modules that an oracle can replace")
     configurations: list[dict[str, Any]] = [{"name": BASELINE, "set": {"run.oracles": []}}]
     configurations += [{"name": f"{ORACLE}{name}", "set": {"run.oracles": [name]}} for name in oracles]
-    primary, named = next(iter(costs)), Path(mission).stem
+    primary, named = costs[0], Path(mission).stem
     changed = f" (with {', '.join(overrides)})" if overrides else ""
     values: dict[str, Any] = {
         "study": _name(mission, overrides),
@@ -60,9 +62,9 @@ def attribution_study(mission: str, overrides: Sequence[str], trials: int) -> St
         "set": settings_of(overrides),
         "configurations": configurations,
         "trials": trials,
-        "metrics": list(costs),
-        "primary": primary,
-        "lower_is_better": costs[primary].less_is_better,
+        "metrics": [metric.key for metric in costs],
+        "primary": primary.key,
+        "lower_is_better": primary.less_is_better,
         "baseline": BASELINE,
     }
     return make_study(validate(StudyDefinition, values, ""))
@@ -95,7 +97,8 @@ def attribution_of(folder: Path) -> dict[str, Any]:
     table = read_study(folder)
     base = mission_of(dict(table.study.base), table.study.cells[FIRST].overrides)
     texts = kind_of(base).oracles(base)
-    costs = {SUCCESS: Cost(Aspect.ACCURACY, less_is_better=False), **_ranked(kind_of(base).costs(base))}
+    judging = METRICS.costs_of(task_of(base), METRICS.given_by(task_of(base), has(base)))
+    costs = {metric.key: metric for metric in (METRICS.find(SUCCESS), *_ranked(judging))}
     values = {name: _comparable(table, name, cost) for name, cost in costs.items() if name in table.values}
     judgement = judge(table.cell, table.trial, values, [FIRST] * len(table.study.cells))
     before = _baseline(judgement, FIRST)
@@ -124,16 +127,17 @@ def attribution_of(folder: Path) -> dict[str, Any]:
     }
 
 
-def _ranked(costs: Mapping[str, Cost]) -> dict[str, Cost]:
+def _ranked(costs: Sequence[Metric]) -> list[Metric]:
     """Costs in the order in which they count."""
-    return dict(sorted(costs.items(), key=lambda item: RANKED.index(item[1].aspect)))
+    rank = {aspect: place for place, aspects in enumerate(RANKED) for aspect in aspects}
+    return sorted(costs, key=lambda cost: rank.get(cost.aspect, len(RANKED)))
 
 
-def _comparable(table: StudyTable, name: str, cost: Cost) -> FloatArray:
+def _comparable(table: StudyTable, name: str, cost: Metric) -> FloatArray:
     """(n,) a metric's values; nan where the run did not come to its end and that counts."""
     values = table.values[name]
     succeeded = table.values.get(SUCCESS)
-    if not cost.whole_only or succeeded is None:
+    if not cost.whole_runs or succeeded is None:
         return values
     return np.where(succeeded > 0.0, values, math.nan)
 
@@ -155,7 +159,7 @@ def _is_sure(table: StudyTable, values: FloatArray, cell: int, change: Differenc
 
 def _weight(
     changes: Mapping[str, Difference],
-    costs: Mapping[str, Cost],
+    costs: Mapping[str, Metric],
     sure: Mapping[str, bool],
     before: Mapping[str, float],
 ) -> tuple[float, ...]:
@@ -168,11 +172,11 @@ def _weight(
                 (
                     _share(change.mean, costs[name], before.get(name, math.nan))
                     for name, change in changes.items()
-                    if costs[name].aspect is aspect and counted[name] and name != SUCCESS
+                    if costs[name].aspect in aspects and counted[name] and name != SUCCESS
                 ),
                 default=0.0,
             )
-            for aspect in RANKED
+            for aspects in RANKED
         )
         return (won, *by_aspect)
 
@@ -184,18 +188,18 @@ def _may_differ(change: Difference) -> bool:
     return change.low > 0.0 or change.high < 0.0
 
 
-def _share(change: float, cost: Cost, before: float) -> float:
+def _share(change: float, cost: Metric, before: float) -> float:
     """What is gained, as a share of what there was; of a metric that is a share itself, in its own points."""
-    whole = 1.0 if cost == SHARE else abs(before)
+    whole = 1.0 if cost.unit == "share" else abs(before)
     return max(_gain(change, cost) / whole, 0.0) if whole > 0.0 else 0.0
 
 
-def _gain(change: float, cost: Cost) -> float:
+def _gain(change: float, cost: Metric) -> float:
     return -change if cost.less_is_better else change
 
 
 def _told(
-    changes: Mapping[str, Difference], costs: Mapping[str, Cost], sure: Mapping[str, bool]
+    changes: Mapping[str, Difference], costs: Mapping[str, Metric], sure: Mapping[str, bool]
 ) -> list[str]:
     """What differs surely; where nothing does, what may: its interval leaves zero out. Gains first."""
     known = [name for name in changes if sure[name]]
@@ -229,7 +233,7 @@ def _baseline(judgement: Judgement, cell: int) -> dict[str, float]:
     }
 
 
-def _plain(change: Difference, cost: Cost, sure: bool) -> dict[str, float | bool]:
+def _plain(change: Difference, cost: Metric, sure: bool) -> dict[str, float | bool]:
     return {
         "n": change.n,
         "mean": change.mean,

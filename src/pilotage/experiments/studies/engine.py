@@ -14,7 +14,8 @@ from pathlib import Path
 
 from pilotage.core.errors import InputError, nearest
 from pilotage.core.whole_file import write_whole
-from pilotage.experiments.kinds import KINDS, kind_name
+from pilotage.evaluation.metrics import METRICS
+from pilotage.experiments.mission import mission_of
 from pilotage.experiments.studies.dask_workers import DaskWorkers
 from pilotage.experiments.studies.database import DATABASE, CorruptDatabaseError, StudyStoppedError
 from pilotage.experiments.studies.export import save_what_is_left
@@ -29,6 +30,7 @@ from pilotage.experiments.studies.study import (
     study_yaml,
 )
 from pilotage.experiments.studies.workers import Workers
+from pilotage.experiments.task_of import has, task_of
 
 HEAR_EVERY_S = 5.0
 TELL_EVERY_S = 0.1
@@ -228,22 +230,29 @@ def _cores() -> int:
 
 
 def check_metric_names(study: Study) -> None:
-    """Refuse a metric that no mission of the study's kind can give.
+    """Refuse a metric that no trial of the study can give.
 
     Raises
     ------
     InputError
         With the nearest one that they can give.
     """
-    kind = kind_name(study.base)
-    known = KINDS[kind]().metric_names
     definition = study.definition
     told = [*(name for entry in definition.published for name in entry.metrics), *definition.reference]
-    for metric in [*_asked(study), *told]:
-        if metric not in known:
-            close = nearest(metric, sorted(known))
-            hint = f"; did you mean '{close}'?" if close else ""
-            raise InputError(f"metric '{metric}': no mission of the kind '{kind}' gives it{hint}")
+    asked = {*_asked(study), *told}
+    known: set[str] = set()
+    tasks: set[str] = set()
+    for cell in study.cells:
+        if asked <= known:
+            return
+        mission = mission_of(dict(study.base), cell.overrides)
+        tasks.add(task_of(mission))
+        known |= METRICS.given_by(task_of(mission), has(mission))
+    for metric in sorted(asked - known):
+        close = nearest(metric, sorted(known))
+        hint = f"; did you mean '{close}'?" if close else ""
+        named = " or ".join(f"'{task}'" for task in sorted(tasks))
+        raise InputError(f"metric '{metric}': no trial of this study gives it (its task: {named}){hint}")
 
 
 def _asked(study: Study) -> list[str]:

@@ -12,27 +12,19 @@ import numpy as np
 
 from pilotage.core.types import FloatArray, IntArray
 from pilotage.evaluation.judge import SUCCESS, Judgement, judge
-from pilotage.experiments.kinds import kind_of
+from pilotage.evaluation.metric import Aspect
+from pilotage.evaluation.metrics import METRICS
+from pilotage.evaluation.pooled import IDEALS
 from pilotage.experiments.mission import mission_of
 from pilotage.experiments.studies.database import DATABASE
 from pilotage.experiments.studies.export import save_what_is_left
 from pilotage.experiments.studies.groups import CellGroup, baselines, cell_groups
 from pilotage.experiments.studies.rows import flat, read_rows
 from pilotage.experiments.studies.study import Study, load_study
+from pilotage.experiments.task_of import task_of
 
 IDENTITY = frozenset({"seed"})
 """Numbers of a trial that say which one it is."""
-TELLING = (
-    "coverage_reachable",
-    "position_rmse_m",
-    "planned_length_m",
-    "duration_s",
-    "path_length_m",
-    "nees_mean",
-    "nis_mean",
-)
-"""Where nothing is asked for, these stand before others, and the first that the trials give answers; before
-them all, what counts in a mission of that kind: the pose error of a plan that nobody drives tells nothing."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,9 +61,11 @@ class StudyTable:
         if asked:
             return asked
         mission = mission_of(dict(self.study.base), self.study.cells[0].overrides)
-        costs = kind_of(mission).costs(mission)
-        first = dict.fromkeys([*(m for m in TELLING if m in costs), *costs, *TELLING])
-        return (*(m for m in first if m in given), *(m for m in given if m not in first))
+        costs = METRICS.costs_of(task_of(mission), given)
+        # Where nothing is asked for, accuracy answers before time does.
+        judging = sorted(costs, key=lambda metric: metric.aspect is not Aspect.ACCURACY)
+        first = dict.fromkeys([*(metric.key for metric in judging), *(m for m in IDEALS if m in given)])
+        return (*first, *(m for m in given if m not in first))
 
     @property
     def primary(self) -> str:

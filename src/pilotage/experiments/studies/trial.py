@@ -9,24 +9,11 @@ from dataclasses import dataclass
 from typing import Any
 
 from pilotage.core.errors import InputError
+from pilotage.evaluation.metrics import METRICS
 from pilotage.experiments.mission import mission_of
 from pilotage.experiments.run import run_mission
 from pilotage.missions.mission import Mission
 from pilotage.records.metrics import clean
-
-TIMINGS = frozenset(
-    {
-        "wall_time_s",
-        "steps_per_s",
-        "planning_time_s",
-        "preparation_time_s",
-        "first_solution_s",
-        "search_time_s",
-        "queries_per_s",
-        "real_time_factor",
-    }
-)
-"""Metrics of the clock on the wall: never the same twice, kept apart from those that are."""
 
 REASON_LENGTH = 500
 PLACES = frozenset({"run_dir"})
@@ -102,8 +89,8 @@ class TrialRunner:
 def measured(row: int, mission: Mission) -> Outcome:
     """Run a mission without saving it, its metrics parted into those that repeat and those that do not."""
     metrics = clean(dict(run_mission(mission, save=False).metrics))
-    timings = {key: value for key, value in metrics.items() if key in TIMINGS}
-    kept = {key: value for key, value in metrics.items() if key not in TIMINGS and key not in PLACES}
+    timings = {key: value for key, value in metrics.items() if METRICS.is_wall_clock(key)}
+    kept = {key: value for key, value in metrics.items() if key not in timings and key not in PLACES}
     return Outcome(row, kept, timings, seconds=metrics["wall_time_s"])
 
 

@@ -7,8 +7,8 @@ from collections.abc import Iterable, Sequence
 
 from pilotage.evaluation.intervals import Summary
 from pilotage.evaluation.judge import Judgement
+from pilotage.evaluation.metrics import METRICS
 from pilotage.evaluation.paired import Difference
-from pilotage.report.metrics_table import metric_of
 from pilotage.report.study.findings import FEW, facts, rate_text
 from pilotage.report.study.scales import p_value, points, told
 from pilotage.report.study.view import Cell, Group, StudyView
@@ -27,7 +27,7 @@ def best_cell(judgement: Judgement, metric: str, lower: bool, cells: Iterable[in
 
 def answer(view: StudyView, judgement: Judgement) -> str:
     """One sentence: what the settings of each group give, with intervals."""
-    metric = metric_of(view.primary)
+    metric = METRICS.find(view.primary)
     if not any(math.isfinite(summary.mean) for summary in judgement.summaries[view.primary]):
         return f"No trial gave {metric.name}."
     if _is_few_alone(view):
@@ -44,7 +44,7 @@ def answer(view: StudyView, judgement: Judgement) -> str:
 
 def answers(view: StudyView, judgement: Judgement) -> list[tuple[str, list[str]]]:
     """What each group of settings says: its name, and sentences."""
-    metric, several = metric_of(view.primary), len(view.groups) > 1
+    metric, several = METRICS.find(view.primary), len(view.groups) > 1
     out = []
     for group in view.groups:
         found = best_cell(judgement, view.primary, view.lower_is_better, group.cells)
@@ -78,7 +78,7 @@ def _each(view: StudyView, judgement: Judgement, cell: Cell) -> str:
     rate = judgement.rates[cell.index]
     summary = judgement.summaries[view.primary][cell.index]
     succeeds = f"success {rate_text(rate)}, " if rate.trials else ""
-    name = metric_of(view.primary).name
+    name = METRICS.find(view.primary).name
     return f"{cell.text}: {succeeds}{name} {_interval(view.primary, summary)} in the mean"
 
 

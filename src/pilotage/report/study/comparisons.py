@@ -8,9 +8,9 @@ from collections.abc import Iterator
 import numpy as np
 
 from pilotage.evaluation.judge import Judgement
+from pilotage.evaluation.metrics import METRICS
 from pilotage.evaluation.paired import Difference
 from pilotage.report.markup import escape
-from pilotage.report.metrics_table import metric_of
 from pilotage.report.study.answer import SURE
 from pilotage.report.study.scales import Scale, p_value, scale_of
 from pilotage.report.study.view import Group, StudyView
@@ -52,7 +52,7 @@ def comparisons_table(view: StudyView, judgement: Judgement) -> str:
     for pair, found in judgement.contrasts.items():
         rows = [(cell.text, found[cell.index]) for cell in view.cells if found[cell.index].n]
         if rows:
-            names = [metric_of(name).name for name in pair]
+            names = [METRICS.find(name).name for name in pair]
             parts.append(
                 f"<h3>{escape(f'{names[0]} less {names[1]}, within each trial')}</h3>"
                 f"{_table(pair[0], rows, True)}"
@@ -82,7 +82,7 @@ def _table(metric: str, rows: list[Row], shown: bool) -> str:
     heads = "".join(f'<th scope="col" class="value">{name}</th>' for name in HEADS)
     body = "".join(_row(name, found, scale) for name, found in rows)
     return (
-        f"<details{' open' if shown else ''}><summary>{escape(metric_of(metric).name + unit)}</summary>"
+        f"<details{' open' if shown else ''}><summary>{escape(METRICS.find(metric).name + unit)}</summary>"
         f'<div class="wide" tabindex="0"><table class="cells"><thead><tr><th scope="col">setting</th>{heads}'
         f'<th scope="col">verdict</th></tr></thead><tbody>{body}</tbody></table></div></details>'
     )

@@ -7,8 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pilotage.evaluation.metrics import METRICS
+from pilotage.report import quantities
 from pilotage.report.markup import escape
-from pilotage.report.metrics_table import metric_of
 from pilotage.report.replay.section import SLUG
 from pilotage.report.study.view import StudyView
 
@@ -50,8 +51,8 @@ def rows_to_show(view: StudyView) -> list[tuple[str, int]]:
 def describe(view: StudyView, row: int) -> str:
     """Which setting, which seed, what it gave."""
     at = int(np.flatnonzero(view.row == row)[0])
-    metric = metric_of(view.primary)
-    value = metric.write(float(view.column(view.primary)[at]))
+    metric = METRICS.find(view.primary)
+    value = quantities.measured(float(view.column(view.primary)[at]), metric.unit)
     ended = "" if view.column("success")[at] != 0.0 else "; it failed"
     cell = view.cells[int(view.cell[at])]
     setting = cell.text if len(view.groups) == 1 else cell.name

@@ -6,14 +6,13 @@ import math
 from collections import Counter
 
 from pilotage.evaluation.judge import Judgement, Rate
+from pilotage.evaluation.metrics import METRICS
 from pilotage.evaluation.pooled import FEWEST_RUNS, IDEALS, pool
-from pilotage.report.metrics_table import metric_of
 from pilotage.report.study.scales import p_value, points, told
 from pilotage.report.study.view import Cell, Group, StudyView
 
 FEW = 3
 """So many settings are named one by one; of more, their number."""
-NAMES = {"nees_mean": "NEES", "nis_mean": "NIS"}
 
 
 def facts(view: StudyView, judgement: Judgement, group: Group) -> list[str]:
@@ -64,7 +63,7 @@ def _contrasts(view: StudyView, judgement: Judgement, group: Group) -> list[str]
             parts.append(f"{cell.text}: {means[0]} against {means[1]}, {by}, {how}, {change.n} trials")
         if parts:
             out.append(
-                f"{metric_of(first).name} against {metric_of(other).name}, in the same trials: "
+                f"{METRICS.find(first).name} against {METRICS.find(other).name}, in the same trials: "
                 f"{'; '.join(parts)}."
             )
     return [text[:1].upper() + text[1:] for text in out]
@@ -88,7 +87,7 @@ def _consistency(view: StudyView, group: Group) -> str:
             text = ", ".join(
                 f"{number} {verdict}" for verdict, number in Counter(known.values()).most_common()
             )
-        parts.append(f"by {NAMES[metric]}, {text}")
+        parts.append(f"by {METRICS.find(metric).name}, {text}")
     return f"Consistency of the settings: {'; '.join(parts)}." if parts else ""
 
 
@@ -103,6 +102,6 @@ def _published(view: StudyView, judgement: Judgement, group: Group) -> str:
     above = sum((summary.low if math.isfinite(summary.low) else summary.mean) > v for v, summary in known)
     inside = len(known) - below - above
     return (
-        f"Against the published {metric_of(metric).name}, our interval lies below it at {below} of "
+        f"Against the published {METRICS.find(metric).name}, our interval lies below it at {below} of "
         f"{len(known)} settings, above it at {above}, and holds it at {inside}."
     )

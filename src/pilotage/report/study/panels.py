@@ -11,8 +11,8 @@ from matplotlib.axis import Axis
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from pilotage.evaluation.judge import Judgement
+from pilotage.evaluation.metrics import METRICS
 from pilotage.report import quantities
-from pilotage.report.metrics_table import metric_of
 from pilotage.report.study.scales import Scale, scale_of
 from pilotage.report.study.view import Cell, StudyView
 from pilotage.report.style import MUTED
@@ -44,7 +44,7 @@ def scale_for(judgement: Judgement, metric: str, cells: Iterable[Cell]) -> Scale
 
 def title(axes: Axes, metric: str, scale: Scale) -> None:
     """Write the metric and its unit above a panel."""
-    axes.set_title(metric_of(metric).name + scale.label)
+    axes.set_title(METRICS.find(metric).name + scale.label)
 
 
 def is_wide(values: Sequence[float], lows: Sequence[float]) -> bool:

@@ -6,9 +6,9 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
+from pilotage.evaluation.metrics import METRICS
 from pilotage.report import quantities
 from pilotage.report.markup import escape
-from pilotage.report.metrics_table import metric_of
 from pilotage.report.study.scales import Scale, points, scale_of, told
 
 Module = Mapping[str, Any]
@@ -24,7 +24,7 @@ def ranking_table(modules: Sequence[Module]) -> str:
         return ""
     scales = {name: _scale(name, modules) for name in metrics}
     head = "".join(
-        f'<th scope="col" class="value">{escape(metric_of(name).name)}{scales[name].label}</th>'
+        f'<th scope="col" class="value">{escape(METRICS.find(name).name)}{scales[name].label}</th>'
         for name in metrics
     )
     rows = []
@@ -114,7 +114,7 @@ def _said(name: str, change: Mapping[str, Any], verb: str = "") -> str:
         text = f"{told(name, mean, math.nan, math.nan, signed=True)} in every trial"
     else:
         text = told(name, mean, low, high, signed=True)
-    return f"{metric_of(name).name}{verb} {points(text)}"
+    return f"{METRICS.find(name).name}{verb} {points(text)}"
 
 
 def _metrics(modules: Sequence[Module]) -> list[str]:

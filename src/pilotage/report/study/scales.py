@@ -7,8 +7,9 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from statistics import median
 
+from pilotage.evaluation.metric import words_and_unit
+from pilotage.evaluation.metrics import METRICS
 from pilotage.report import quantities
-from pilotage.report.metrics_table import metric_of
 
 MAX_DECIMALS = 6
 ROUNDING = 1e-9
@@ -74,20 +75,20 @@ class Scale:
 def scale_of(metric: str, values: Iterable[float]) -> Scale:
     """The unit in which these values of a metric are told: that of the middle one."""
     size = median([abs(value) for value in values if math.isfinite(value)] or [0.0])
-    write = metric_of(metric).write
-    if write is quantities.share or metric == "success":
+    unit = METRICS.find(metric).unit
+    if unit == "share":
         return Scale(100.0, "%")
-    if write is quantities.angle or metric.endswith("_rad"):
+    if unit == "rad":
         return Scale(math.degrees(1.0), "°")
-    if write is quantities.length or metric.endswith("_m"):
+    if unit == "m":
         if 0.0 < size < 0.1:
             return Scale(1000.0, "mm")
         return Scale(0.001, "km") if size >= 10_000.0 else Scale(1.0, "m")
-    if write is quantities.duration or (metric.endswith("_s") and not metric.endswith(("_per_s", "_m_s"))):
+    if unit == "s":
         if 0.0 < size < 0.1:
             return Scale(1000.0, "ms")
         return Scale(1.0 / 3600.0, "h") if size >= 3.0 * 3600.0 else Scale(1.0, "s")
-    return Scale(1.0, next((u for e, u in (("_m_s", "m/s"), ("_per_s", "1/s")) if metric.endswith(e)), ""))
+    return Scale(1.0, _UNWRITTEN.get(unit, unit))
 
 
 def told(metric: str, value: float, low: float, high: float, *, signed: bool = False) -> str:
@@ -117,25 +118,11 @@ def p_value(value: float, letter: str = "") -> str:
     return f"{letter}{'= ' if letter else ''}{value:.3f}"
 
 
-_UNITS = (
-    ("_m_s2", "m/s²"),
-    ("_rad_s2", "rad/s²"),
-    ("_rad_s", "rad/s"),
-    ("_m_s", "m/s"),
-    ("_m2", "m²"),
-    ("_rad2", "rad²"),
-    ("_hz", "Hz"),
-    ("_deg", "°"),
-    ("_rad", "rad"),
-    ("_m", "m"),
-    ("_s", "s"),
-)
+_UNWRITTEN = {"count": "", "ratio": "", "deg": "°"}
+"""Units of metrics that are written otherwise, or not at all."""
 
 
 def key_and_unit(key: str) -> tuple[str, str]:
     """A parameter's key as words, and its unit by its ending: ``turning radius``, ``m``."""
-    last = key.rsplit(".", 1)[-1]
-    for ending, unit in _UNITS:
-        if last.endswith(ending) and len(last) > len(ending):
-            return last[: -len(ending)].replace("_", " "), unit
-    return last.replace("_", " "), ""
+    words, unit = words_and_unit(key)
+    return words, _UNWRITTEN.get(unit, unit)

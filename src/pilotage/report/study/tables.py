@@ -7,13 +7,11 @@ from collections.abc import Sequence
 
 from pilotage.evaluation.intervals import COVERAGE, Summary
 from pilotage.evaluation.judge import Judgement, Rate
+from pilotage.evaluation.metrics import METRICS
 from pilotage.evaluation.pooled import IDEALS, Pooled, pool
 from pilotage.report import quantities
 from pilotage.report.markup import escape
-from pilotage.report.metrics_table import metric_of
 from pilotage.report.study.answer import best_cell
-from pilotage.report.study.better import UNTIL_THE_END, lower_is_better
-from pilotage.report.study.findings import NAMES
 from pilotage.report.study.scales import Scale, scale_of
 from pilotage.report.study.view import Cell, Group, StudyView
 
@@ -51,7 +49,7 @@ def _group_table(view: StudyView, judgement: Judgement, group: Group) -> str:
         if (lower := _lower(view, judgement, m, group)) is not None and _differ(judgement, m, group)
     }
     head = "".join(
-        f'<th scope="col" class="value">{escape(metric_of(m).name)}{scales[m].label}</th>' for m in metrics
+        f'<th scope="col" class="value">{escape(METRICS.find(m).name)}{scales[m].label}</th>' for m in metrics
     )
     rows = []
     for cell in view.members(group):
@@ -94,7 +92,7 @@ def _all_numbers(view: StudyView, judgement: Judgement, group: Group, metrics: S
     rows = []
     for metric in metrics:
         scale = _scale(judgement, metric, view.members(group))
-        head = f"{metric_of(metric).name}{scale.label}, variance in its square"
+        head = f"{METRICS.find(metric).name}{scale.label}, variance in its square"
         rows.append(f'<tr class="group"><th colspan="8" scope="rowgroup">{escape(head)}</th></tr>')
         for cell in view.members(group):
             found = judgement.summaries[metric][cell.index]
@@ -128,7 +126,7 @@ def consistency_table(view: StudyView) -> str:
                 )
         if rows:
             head = "".join(
-                f'<th scope="col" class="value">{NAMES[m]}, ideal {IDEALS[m]:g}</th>'
+                f'<th scope="col" class="value">{METRICS.find(m).name}, ideal {IDEALS[m]:g}</th>'
                 '<th scope="col">verdict</th>'
                 for m in shown
             )
@@ -185,9 +183,9 @@ def _lower(view: StudyView, judgement: Judgement, metric: str, group: Group) -> 
     if metric == view.primary:
         return view.lower_is_better
     rates = [judgement.rates[index] for index in group.cells]
-    if metric in UNTIL_THE_END and any(rate.successes < rate.trials for rate in rates):
+    if METRICS.find(metric).whole_runs and any(rate.successes < rate.trials for rate in rates):
         return None  # a trial that broke off early was not quick
-    return lower_is_better(metric)
+    return METRICS.find(metric).less_is_better
 
 
 def _differ(judgement: Judgement, metric: str, group: Group) -> bool:

@@ -8,6 +8,7 @@ from importlib import metadata
 from pathlib import Path
 
 from pilotage import __version__
+from pilotage.evaluation.metrics import METRICS
 from pilotage.experiments.run import run_mission
 from pilotage.experiments.studies.attribution import attribution_of, is_attribution
 from pilotage.experiments.studies.cells import show
@@ -19,7 +20,6 @@ from pilotage.experiments.studies.table import StudyTable, read_study
 from pilotage.records.run_data import read_run
 from pilotage.report.page import FIGURES, FLOOR_FIGURES
 from pilotage.report.page import write_report as write_run_report
-from pilotage.report.study.better import lower_is_better
 from pilotage.report.study.examples import Example, describe, rows_to_show
 from pilotage.report.study.page import write_page
 from pilotage.report.study.scales import key_and_unit
@@ -70,7 +70,7 @@ def view_of(table: StudyTable) -> StudyView:
         factors=definition.factor_names,
         metrics=table.metrics,
         primary=table.primary,
-        lower_is_better=lower_is_better(table.primary) is not False
+        lower_is_better=METRICS.find(table.primary).less_is_better is not False
         if definition.lower_is_better is None
         else definition.lower_is_better,
         asked=bool(definition.metrics),
