@@ -3,22 +3,26 @@
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Mapping
 from typing import Any
 
 import yaml
 
-from pilotage.experiments.kinds import kind_of
-from pilotage.experiments.mission_kind import Record
-from pilotage.experiments.roles import REGISTRIES
+from pilotage.experiments.build.charts import inlined
+from pilotage.experiments.roles import ROLES
+from pilotage.maps.world_map import WorldMap
 from pilotage.missions.mission import Mission
 
-
-def resolved_yaml(mission: Mission, record: Record | None = None) -> str:
-    """The mission in full, every component's defaults included; with a record, what came from files too."""
-    return yaml.safe_dump(resolved_values(mission, record), sort_keys=False, allow_unicode=True)
+LONGEST_NAME = 80
+"""Of a mission, in the name of its run's folder."""
 
 
-def resolved_values(mission: Mission, record: Record | None = None) -> dict[str, Any]:
+def resolved_yaml(mission: Mission, chart: WorldMap | None = None) -> str:
+    """The mission in full, every component's defaults included; with its chart, what came from files too."""
+    return yaml.safe_dump(resolved_values(mission, chart), sort_keys=False, allow_unicode=True)
+
+
+def resolved_values(mission: Mission, chart: WorldMap | None = None) -> dict[str, Any]:
     """The same as plain values.
 
     Raises
@@ -27,27 +31,52 @@ def resolved_values(mission: Mission, record: Record | None = None) -> dict[str,
         Where a component or one of its parameters is not what it should be.
     """
     values = mission.model_dump(mode="json")
-    for role, choice in values["stack"].items():
-        if role in REGISTRIES and choice is not None:
-            values["stack"][role] = _resolved(role, choice, f"stack.{role}")
-    for name, choice in values["robot"].get("sensors", {}).items():
-        values["robot"]["sensors"][name] = _resolved("sensor", choice, f"robot.sensors.{name}")
-    if record is not None:
-        kind_of(mission).inline(record, values)
+    values["task"] = _resolved("task", values["task"], "task")
+    _resolve_stack(values["stack"], "stack")
+    _resolve_robot(values["robot"], "robot")
+    for index, robot in enumerate(values["robots"]):
+        _resolve_robot(robot, f"robots.{index}")
+    if chart is not None:
+        values["world"]["map"] = inlined(mission.world.map, chart)
     return values
 
 
-def _resolved(role: str, choice: dict[str, Any], where: str) -> dict[str, Any]:
+def check_components(mission: Mission) -> None:
+    """Refuse a mission that names a component or gives a parameter which does not exist.
+
+    Raises
+    ------
+    InputError
+        With the nearest right name.
+    """
+    resolved_values(mission)
+
+
+def _resolve_stack(stack: dict[str, Any], where: str) -> None:
+    for role, choice in stack.items():
+        if role in ROLES and choice is not None:
+            stack[role] = _resolved(role, choice, f"{where}.{role}")
+
+
+def _resolve_robot(robot: dict[str, Any], where: str) -> None:
+    robot["motion"] = _resolved("motion", robot["motion"], f"{where}.motion")
+    for name, choice in robot["sensors"].items():
+        robot["sensors"][name] = _resolved("sensor", choice, f"{where}.sensors.{name}")
+    if robot["stack"] is not None:
+        _resolve_stack(robot["stack"], f"{where}.stack")
+
+
+def _resolved(role: str, choice: Mapping[str, Any], where: str) -> dict[str, Any]:
     """A component's name with all its parameters, those left to their defaults too."""
     parameters = {key: value for key, value in choice.items() if key != "name"}
-    config = REGISTRIES[role].configure(choice["name"], parameters, where)
+    config = ROLES[role].configure(choice["name"], parameters, where)
     return {"name": choice["name"], **config.model_dump(mode="json")}
 
 
 def run_name(mission: Mission) -> str:
     """``<mission>-<seed>-<hash>``: the same mission and seed have the same name."""
     digest = hashlib.sha256(resolved_yaml(mission).encode()).hexdigest()[:8]
-    return f"{_slug(mission.mission)}-{mission.run.seed}-{digest}"
+    return f"{_slug(mission.mission)[:LONGEST_NAME]}-{mission.run.seed}-{digest}"
 
 
 def _slug(text: str) -> str:

@@ -1,4 +1,4 @@
-"""One run of one mission, whatever its kind: step it to its end, evaluate, write the run folder."""
+"""One run of one mission: step it to its end, judge it, write the run folder."""
 
 from __future__ import annotations
 
@@ -6,13 +6,18 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
+from pilotage.core.types import FloatArray
+from pilotage.evaluation.finished import Verdict
 from pilotage.evaluation.metrics import METRICS
-from pilotage.experiments.kinds import check_oracles, kind_of
-from pilotage.experiments.mission_kind import Record
+from pilotage.experiments.leavings import files_of
+from pilotage.experiments.loop import Run, run_loop
+from pilotage.experiments.build.build import Experiment, build
+from pilotage.experiments.oracles.applicable import check_oracles
 from pilotage.experiments.progress import OnProgress
-from pilotage.experiments.run_folder import write_run_folder
-from pilotage.experiments.task_of import task_of
+from pilotage.experiments.resolve import run_name
+from pilotage.experiments.warm_up import warm_up
 from pilotage.missions.mission import Mission
+from pilotage.records.run_folder import write_run
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,23 +52,26 @@ def run_mission(
     InputError
         Where the mission cannot be built; nothing has been written then.
     """
-    kind = kind_of(mission)
-    check_oracles(kind, mission)
-    kind.warm_up(mission)
+    check_oracles(mission)
+    warm_up(mission)
     begin = time.perf_counter()
-    record = kind.simulate(mission, on_progress)
-    metrics = kind.metrics(record)
-    metrics |= METRICS.computed(task_of(mission), record.trace, metrics)
+    experiment = build(mission)
+    run = run_loop(experiment, on_progress)
+    verdict = judge(experiment, run)
+    metrics = verdict.metrics
     metrics["wall_time_s"] = time.perf_counter() - begin
     run_dir = None
     if save:
-        run_dir = write_run_folder(Path("runs") if out is None else out, kind, record, metrics)
+        folder = Path("runs") if out is None else out
+        run_dir = write_run(folder, run_name(run.finished.mission), files_of(run, verdict, metrics))
         metrics["run_dir"] = str(run_dir)
     return RunResult(metrics, bool(metrics["success"]), run_dir)
 
 
-def simulate(mission: Mission, on_progress: OnProgress | None = None) -> Record:
-    """Build a mission and step it to its end, without judging it."""
-    kind = kind_of(mission)
-    check_oracles(kind, mission)
-    return kind.simulate(mission, on_progress)
+def judge(experiment: Experiment, run: Run) -> Verdict:
+    """The task's verdict, with the metrics that were registered from outside."""
+    verdict = experiment.task.judge(run.finished)
+    trace: dict[str, FloatArray] = run.finished.robots[0].trace
+    name = run.finished.mission.task.name
+    verdict.metrics.update(METRICS.computed(name, trace, verdict.metrics))
+    return verdict
