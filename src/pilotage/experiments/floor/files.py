@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
+from pilotage.core.types import FloatArray
 from pilotage.experiments.floor.recorder import RunRecord
 
 
@@ -34,8 +35,9 @@ def world_of(record: RunRecord) -> dict[str, Any]:
 def plans_of(record: RunRecord) -> dict[str, Any]:
     """What ``plans.npz`` holds: every plan adopted, the obstacle points mapped, the exact shortest path."""
     experiment = record.experiment
-    arrays: dict[str, Any] = {"mapped_points": experiment.stack.mapped_circles_m[:, :2]}
-    for i, plan in enumerate(experiment.stack.plans):
+    mapped = cast("FloatArray", experiment.journal.results().get("mapped_circles_m", np.zeros((0, 3))))
+    arrays: dict[str, Any] = {"mapped_points": mapped[:, :2]}
+    for i, plan in enumerate(experiment.journal.plans):
         arrays[f"path_{i}"] = plan.states
         arrays[f"waypoints_{i}"] = plan.waypoints
         arrays[f"tree_{i}"] = plan.tree_edges_m

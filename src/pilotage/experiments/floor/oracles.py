@@ -98,10 +98,6 @@ class TrueLocalizer:
         """The sensors say nothing that is not known."""
         return self.belief
 
-    def telemetry(self) -> Mapping[str, float]:
-        """Nothing beyond the belief."""
-        return {}
-
 
 class KnowingMapper:
     """Has every unexpected obstacle on its map before it is seen, as discs along the sides."""
