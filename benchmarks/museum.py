@@ -124,7 +124,7 @@ class Museum:
     @cached_property
     def poses(self) -> list[Pose2]:
         """Poses about a metre apart along the route, for scans."""
-        states = build(self.mission).stack.plans[0].states
+        states = build(self.mission).journal.plans[0].states
         step = np.hypot(*np.diff(states[:, :2], axis=0).T)
         marks = np.searchsorted(np.cumsum(step), np.arange(0.0, step.sum(), POSE_SPACING_M))
         return [Pose2.from_array(state) for state in states[marks]]

@@ -38,7 +38,8 @@ class Listener:
     def note(self) -> None:
         """Keep what it believes now."""
         stack = self.experiment.stack
-        telemetry = stack.telemetry()
+        journal = self.experiment.journal
+        telemetry = dict(zip(journal.units, journal.row, strict=True))
         self.poses.append(stack.belief.pose.as_array())
         self.heading_vars.append(float(stack.belief.cov[2, 2]))
         self.seen.append(telemetry["lines_seen"])

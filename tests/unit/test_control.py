@@ -10,6 +10,7 @@ import pytest
 from pilotage.core.angles import wrap_to_pi
 from pilotage.core.errors import InputError
 from pilotage.core.types import FloatArray, Pose2, Twist
+from pilotage.maps.near_walls import NearWalls
 from pilotage.models.odometry import OdometryModel, move
 from pilotage.sensors.readings import Readings, UltrasonicReading
 from pilotage.stack.control.back_out import BackOut, BackOutConfig
@@ -17,9 +18,9 @@ from pilotage.stack.control.guard import ArcGuard, GuardConfig
 from pilotage.stack.control.pi_follower import PiFollower, PiFollowerConfig
 from pilotage.stack.control.reactive import Reaction, ReactionKind
 from pilotage.stack.control.ultrasonic_reaction import UltrasonicReaction, UltrasonicReactionConfig
-from support.robots import knowledge_of
+from support.robots import told_of
 
-NOTHING: FloatArray = np.zeros((0, 4))
+NOTHING = NearWalls(np.zeros((0, 4)))
 NO_CIRCLES: FloatArray = np.zeros((0, 3))
 
 
@@ -33,7 +34,7 @@ def sonar(front: float | None, left: float | None, right: float | None) -> Readi
 
 def react(config: UltrasonicReactionConfig, *readings: Readings, straight: bool = True) -> Reaction:
     """The reaction to the last of some readings."""
-    reaction = UltrasonicReaction(config, knowledge_of())
+    reaction = UltrasonicReaction(config, told_of().robot)
     out = None
     for reading in readings:
         out = reaction.step(reading, Pose2(5.0, 5.0, 0.0), NOTHING, NO_CIRCLES, straight)
@@ -43,7 +44,7 @@ def react(config: UltrasonicReactionConfig, *readings: Readings, straight: bool 
 
 @pytest.mark.parametrize("side", [1.0, -1.0])
 def test_pi_follower_turns_towards_the_reference(side: float) -> None:
-    follower = PiFollower(PiFollowerConfig(), knowledge_of())
+    follower = PiFollower(PiFollowerConfig(), told_of().robot)
     follower.step(Pose2(0.0, 0.0, 0.0), Pose2(0.1, 0.0, 0.0), Twist(0.5, 0.0))
     control = follower.step(Pose2(0.05, 0.0, 0.0), Pose2(0.5, side * 0.2, 0.0), Twist(0.5, 0.0))
     assert control.error_m == pytest.approx(side * 0.2)
@@ -54,7 +55,7 @@ def test_pi_follower_turns_towards_the_reference(side: float) -> None:
 
 def test_pi_follower_distance_is_that_of_the_report() -> None:
     # Eq. 15-16 in numbers: line through (0, 0) and (1, 1), point (1, 0).
-    follower = PiFollower(PiFollowerConfig(), knowledge_of())
+    follower = PiFollower(PiFollowerConfig(), told_of().robot)
     follower.step(Pose2(0.0, 0.0, 0.7), Pose2(0.0, 0.0, 0.0), Twist(0.5, 0.0))
     control = follower.step(Pose2(1.0, 1.0, 0.7), Pose2(1.0, 0.0, 0.0), Twist(0.5, 0.0))
     assert control.error_m == pytest.approx(-math.sqrt(0.5))
@@ -62,7 +63,7 @@ def test_pi_follower_distance_is_that_of_the_report() -> None:
 
 def test_pi_follower_integral_is_bounded() -> None:
     config = PiFollowerConfig(integral_limit_rad_s=0.05)
-    follower = PiFollower(config, knowledge_of())
+    follower = PiFollower(config, told_of().robot)
     for _ in range(2000):
         control = follower.step(Pose2(0.0, 0.0, 0.0), Pose2(1.0, 5.0, 0.0), Twist(0.5, 0.0))
     assert control.integral_rad_s == pytest.approx(0.05)
@@ -113,24 +114,24 @@ def test_turning_without_a_way_out_is_a_trap() -> None:
 
 
 def test_mapped_walls_need_no_avoidance_unless_asked() -> None:
-    wall = np.array([[6.0, 0.0, 6.0, 10.0]])
+    wall = NearWalls(np.array([[6.0, 0.0, 6.0, 10.0]]))
     reading = sonar(0.8, None, None)
     pose = Pose2(5.0, 5.0, 0.0)
-    wise = UltrasonicReaction(UltrasonicReactionConfig(), knowledge_of())
+    wise = UltrasonicReaction(UltrasonicReactionConfig(), told_of().robot)
     assert wise.step(reading, pose, wall, NO_CIRCLES, False).kind is ReactionKind.NONE
-    reports = UltrasonicReaction(UltrasonicReactionConfig(ignore_mapped=False), knowledge_of())
+    reports = UltrasonicReaction(UltrasonicReactionConfig(ignore_mapped=False), told_of().robot)
     assert reports.step(reading, pose, wall, NO_CIRCLES, False).kind is ReactionKind.AVOID
 
 
 def test_release_below_the_trigger_is_refused() -> None:
     config = UltrasonicReactionConfig(frontal_below_m=1.0, release_above_m=0.5)
     with pytest.raises(InputError, match="release_above_m"):
-        UltrasonicReaction(config, knowledge_of())
+        UltrasonicReaction(config, told_of().robot)
 
 
 def test_backing_out_follows_the_trail_in_reverse() -> None:
     trail = [Pose2(0.05 * i, 0.1 * math.sin(0.1 * i), 0.0) for i in range(100)]
-    escape = BackOut(BackOutConfig(distance_m=2.0), knowledge_of())
+    escape = BackOut(BackOutConfig(distance_m=2.0), told_of().robot)
     last, before = trail[-1], trail[-2]
     pose = Pose2(last.x_m, last.y_m, math.atan2(last.y_m - before.y_m, last.x_m - before.x_m))
     escape.begin(list(trail))
@@ -148,7 +149,7 @@ def test_backing_out_follows_the_trail_in_reverse() -> None:
 
 
 def test_backing_out_without_a_trail_turns_on_the_spot() -> None:
-    escape = BackOut(BackOutConfig(turn_rad=1.2, turn_limit_rad_s=0.6), knowledge_of())
+    escape = BackOut(BackOutConfig(turn_rad=1.2, turn_limit_rad_s=0.6), told_of().robot)
     escape.begin([])
     commands = [escape.step(Pose2(0, 0, 0)) for _ in range(21)]
     assert commands[-1] is None
@@ -159,7 +160,7 @@ def test_backing_out_without_a_trail_turns_on_the_spot() -> None:
 
 def test_a_second_escape_starts_where_the_first_one_ended() -> None:
     trail = [Pose2(0.05 * i, 0.0, 0.0) for i in range(200)]
-    escape = BackOut(BackOutConfig(distance_m=2.0), knowledge_of())
+    escape = BackOut(BackOutConfig(distance_m=2.0), told_of().robot)
     pose = trail[-1]
     for _ in range(2):
         escape.begin(trail)
@@ -170,7 +171,7 @@ def test_a_second_escape_starts_where_the_first_one_ended() -> None:
 
 def test_the_guard_refuses_driving_into_the_map_but_not_away_from_it() -> None:
     guard = ArcGuard(GuardConfig(horizon_s=0.5, margin_m=0.03), 0.3)
-    wall = np.array([[1.0, -5.0, 1.0, 5.0]])
+    wall = NearWalls(np.array([[1.0, -5.0, 1.0, 5.0]]))
     here = Pose2(0.6, 0.0, 0.0)
     assert not guard.allows(Twist(0.5, 0.0), here, wall, NO_CIRCLES, 1.0)
     assert guard.allows(Twist(0.0, 1.0), here, wall, NO_CIRCLES, 1.0)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,17 +12,21 @@ from hypothesis import strategies as st
 from scipy.stats import chi2, norm
 
 from pilotage.core.errors import InputError
-from pilotage.core.types import FloatArray
+from pilotage.core.random import RandomStreams
+from pilotage.core.types import FloatArray, Pose2, Twist
 from pilotage.evaluation.run_metrics import poses
 from pilotage.experiments.floor.mission import load_floor_mission
 from pilotage.experiments.floor.simulate import simulate
-from pilotage.experiments.floor.world_map import load_map
 from pilotage.kernels.filters import particles
 from pilotage.maps.rasterize import rasterized
-from pilotage.maps.ros_map import RosMap, write_ros_map
+from pilotage.maps.world_map import WorldMap
+from pilotage.missions.floor import BodyConfig, MotionConfig
 from pilotage.sensors.readings import LidarScan, Readings
+from pilotage.sim.simulator import Simulator
+from pilotage.sim.world import World
+from pilotage.stack.localization.localizer import LOCALIZERS
 from pilotage.stack.localization.mcl_likelihood_field import MclConfig, MclLikelihoodFieldLocalizer
-from support.robots import ROOM, knowledge_of
+from support.robots import BEACONS, ROOM, sensors, told_of
 
 MCL = "stack.localizer.name=mcl-likelihood-field"
 
@@ -123,21 +127,27 @@ def test_it_tracks_the_route(seed: int) -> None:
     assert np.sqrt(np.mean(error[20:] ** 2)) < 0.005
 
 
-def test_it_tracks_on_an_occupancy_grid(tmp_path: Path) -> None:
-    grid = rasterized(load_map("museum").walls, 0.05)
-    write_ros_map(tmp_path / "museum.yaml", RosMap.of(grid, "museum.pgm"))
-    file = f"stack.localizer.grid_file={tmp_path / 'museum.yaml'}"
-    # A cell is 5 cm wide, and thin walls are drawn two cells thick.
-    overrides = [MCL, file, "stack.localizer.field_std_m=0.05", "run.time_limit_s=60"]
-    trace = simulate(load_floor_mission("museum-walls", overrides, 0)).trace
-    error = np.hypot(*(poses(trace, "est") - poses(trace, "true"))[:, :2].T)
-    assert error[20:].max() < 0.1
+def test_it_tracks_on_an_occupancy_grid() -> None:
+    """Where the exact walls are unknown: cells are 5 cm wide, and thin walls are drawn two cells thick."""
+    start = Pose2(2.0, 2.0, 0.0)
+    told = told_of(start=start, variances=(1e-4, 1e-4, 1e-4))
+    chart = WorldMap("room", ROOM.bounds_m, grid=rasterized(ROOM, 0.05))
+    told = replace(told, chart=chart)
+    localizer = told.localizer(MclLikelihoodFieldLocalizer, MclConfig(field_std_m=0.05))
+    sim = Simulator(
+        World(ROOM, ROOM, BEACONS), BodyConfig(), MotionConfig(), sensors(), start, 0.1, RandomStreams(0)
+    )
+    for step in range(100):
+        belief = localizer.step(sim.step(Twist(0.3, 0.4 if step % 60 < 30 else -0.4)))
+        if step > 20:
+            assert math.hypot(belief.pose.x_m - sim.truth.x_m, belief.pose.y_m - sim.truth.y_m) < 0.1
 
 
 def test_a_scan_without_returns_leaves_the_belief_and_strange_ranges_do_no_harm() -> None:
-    localizer = MclLikelihoodFieldLocalizer(MclConfig(), knowledge_of(ROOM))
+    told = told_of(ROOM)
+    localizer = told.localizer(MclLikelihoodFieldLocalizer, MclConfig())
     before = localizer.step(Readings(0.1, {"lidar": LidarScan(np.full(539, 20.0))}))
-    assert localizer.telemetry()["scan_parts"] == 0
+    assert told.said["scan_parts"] == 0
     for ranges in (np.full(539, np.nan), np.full(539, np.inf), np.zeros(539)):
         after = localizer.step(Readings(0.2, {"lidar": LidarScan(ranges)}))
         assert np.isfinite(after.cov).all()
@@ -148,6 +158,6 @@ def test_a_scan_without_returns_leaves_the_belief_and_strange_ranges_do_no_harm(
 
 def test_misuse_is_told() -> None:
     with pytest.raises(InputError, match="at least least_particles"):
-        MclLikelihoodFieldLocalizer(MclConfig(least_particles=500, most_particles=100), knowledge_of())
-    with pytest.raises(InputError, match="expected a map file"):
-        MclLikelihoodFieldLocalizer(MclConfig(grid_file="no-such.yaml"), knowledge_of())
+        told_of().localizer(MclLikelihoodFieldLocalizer, MclConfig(least_particles=500, most_particles=100))
+    with pytest.raises(InputError, match=r"world\.map"):
+        LOCALIZERS.configure("mcl-likelihood-field", {"grid_file": "office.yaml"}, "stack.localizer")

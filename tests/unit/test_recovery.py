@@ -35,7 +35,7 @@ from pilotage.stack.localization.localizer import LOCALIZERS
 from pilotage.stack.localization.odometry_prediction import OdometryNoise, OdometryPrediction
 from pilotage.stack.localization.scan_fit import ScanFit
 from pilotage.stack.localization.wall_matching import WallMatcher, WallMatchingConfig
-from support.robots import BEACONS, ROOM, knowledge_of, sensors
+from support.robots import BEACONS, ROOM, Told, sensors, told_of
 from support.walls import LIDAR, extractor, scan_of
 
 MUSEUM = load_map("museum").walls
@@ -63,25 +63,25 @@ def is_near(pose: FloatArray, truth: Pose2) -> bool:
     return away < 0.1 and abs(wrap_to_pi(float(pose[2]) - truth.theta_rad)) < 0.035
 
 
-def lost_in(world: SegmentMap, start: Pose2) -> tuple[Simulator, EkfWallsLocalizer]:
+def lost_in(world: SegmentMap, start: Pose2) -> tuple[Simulator, EkfWallsLocalizer, Told]:
     """A robot at ``start`` that is told nothing."""
-    knowledge = knowledge_of(world=world, start=start, initial=Belief.anywhere(world.bounds_m))
+    told = told_of(world=world, start=start, initial=Belief.anywhere(world.bounds_m))
     sim = Simulator(
         World(world, world, BEACONS), BodyConfig(), MotionConfig(), sensors(), start, 0.1, RandomStreams(1)
     )
-    return sim, EkfWallsLocalizer(EkfWallsConfig(), knowledge)
+    return sim, told.localizer(EkfWallsLocalizer, EkfWallsConfig()), told
 
 
 @pytest.mark.parametrize("off", [(0.0, 0.0, 0.5), (4.0, 3.0, 1.0), (11.0, 2.0, -2.0)])
 def test_a_wrong_and_vague_start_is_noticed(off: tuple[float, float, float]) -> None:
     # A tenth of a metre and of a radian: too unsure to expect a scan, too far off to match a wall.
     truth = Pose2(3.5, 16.0, 0.4)
-    told = Pose2(truth.x_m + off[0], truth.y_m + off[1], truth.theta_rad + off[2])
-    knowledge = knowledge_of(world=MUSEUM, start=told, initial=Belief(told, 0.01 * np.eye(3)))
+    believed = Pose2(truth.x_m + off[0], truth.y_m + off[1], truth.theta_rad + off[2])
+    told = told_of(world=MUSEUM, start=believed, initial=Belief(believed, 0.01 * np.eye(3)))
     sim = Simulator(
         World(MUSEUM, MUSEUM, BEACONS), BodyConfig(), MotionConfig(), sensors(), truth, 0.1, RandomStreams(1)
     )
-    localizer = EkfWallsLocalizer(EkfWallsConfig(), knowledge)
+    localizer = told.localizer(EkfWallsLocalizer, EkfWallsConfig())
     lost_at = -1
     for step in range(80):
         belief = localizer.step(sim.step(Twist(0.2, 0.5)))
@@ -104,18 +104,18 @@ def test_the_true_pose_is_among_the_hypotheses_of_one_scan() -> None:
 
 
 def test_a_room_that_looks_the_same_from_both_ends_keeps_two_hypotheses() -> None:
-    sim, localizer = lost_in(BOX, Pose2(3.0, 3.0, 0.4))
+    sim, localizer, told = lost_in(BOX, Pose2(3.0, 3.0, 0.4))
     for step in range(150):
         belief = localizer.step(sim.step(Twist(0.4, 0.5 if step % 100 < 50 else -0.5)))
         assert belief.status is BeliefStatus.LOST
-        assert localizer.telemetry()["localized"] == 0.0
-    assert localizer.telemetry()["hypotheses"] == 2.0
-    assert localizer.look_bearing_rad is None, "nowhere in this room would they differ"
+        assert told.said["localized"] == 0.0
+    assert told.said["hypotheses"] == 2.0
+    assert localizer.look_bearing_rad() is None, "nowhere in this room would they differ"
 
 
 def test_in_a_room_with_a_mark_it_finds_itself_and_says_so_only_then() -> None:
     marked = BOX.with_obstacles(np.array([[7.0, 0.0, 7.0, 3.0]]), np.zeros((0, 3)))
-    sim, localizer = lost_in(marked, Pose2(2.0, 2.0, 0.4))
+    sim, localizer, _ = lost_in(marked, Pose2(2.0, 2.0, 0.4))
     statuses = []
     for step in range(120):
         belief = localizer.step(sim.step(Twist(0.3, 0.5 if step % 80 < 40 else -0.5)))
@@ -129,7 +129,7 @@ def test_in_a_room_with_a_mark_it_finds_itself_and_says_so_only_then() -> None:
 
 
 def test_a_robot_carried_elsewhere_notices_at_once() -> None:
-    knowledge = knowledge_of(start=Pose2(2.0, 2.0, 0.0), variances=(1e-4, 1e-4, 1e-4))
+    told = told_of(start=Pose2(2.0, 2.0, 0.0), variances=(1e-4, 1e-4, 1e-4))
     sim = Simulator(
         World(ROOM, ROOM, BEACONS),
         BodyConfig(),
@@ -139,7 +139,7 @@ def test_a_robot_carried_elsewhere_notices_at_once() -> None:
         0.1,
         RandomStreams(0),
     )
-    localizer = EkfWallsLocalizer(EkfWallsConfig(), knowledge)
+    localizer = told.localizer(EkfWallsLocalizer, EkfWallsConfig())
     for _ in range(10):
         assert localizer.step(sim.step(Twist(0.2, 0.3))).status is BeliefStatus.LOCALIZED
     sim.body.carry_to(Pose2(8.0, 6.5, 2.0))
@@ -148,15 +148,15 @@ def test_a_robot_carried_elsewhere_notices_at_once() -> None:
 
 
 def test_only_localizers_that_search_start_without_a_pose() -> None:
-    nowhere = knowledge_of(initial=Belief.anywhere(ROOM.bounds_m))
     for entry in LOCALIZERS:
+        nowhere = told_of(initial=Belief.anywhere(ROOM.bounds_m))
         if entry.name == "ekf-walls":
-            assert entry.factory(EkfWallsConfig(), nowhere).belief.status is BeliefStatus.LOST
+            assert nowhere.localizer(entry.factory, EkfWallsConfig()).belief.status is BeliefStatus.LOST
             with pytest.raises(InputError, match="known"):
-                entry.factory(EkfWallsConfig(recovery=None), nowhere)
+                nowhere.localizer(entry.factory, EkfWallsConfig(recovery=None))
         else:
             with pytest.raises(InputError, match="ekf-walls"):
-                entry.factory(entry.config(), nowhere)
+                nowhere.localizer(entry.factory, entry.config())
 
 
 def test_the_telling_place_is_where_the_views_differ() -> None:
@@ -192,7 +192,7 @@ def test_wandering_touches_nothing(bearing: float | None) -> None:
         rng = np.random.default_rng(seed)
         drawn = random_pose(ROOM, PoseConfig(x_m=2.0, y_m=2.0), 0.5, rng)
         start = Pose2(drawn.x_m, drawn.y_m, drawn.theta_rad)
-        knowledge = knowledge_of(start=start)
+        told = told_of(start=start)
         sim = Simulator(
             World(ROOM, ROOM, BEACONS),
             BodyConfig(),
@@ -202,7 +202,7 @@ def test_wandering_touches_nothing(bearing: float | None) -> None:
             0.1,
             RandomStreams(seed),
         )
-        wanderer = Wanderer.of(WanderConfig(), knowledge)
+        wanderer = Wanderer.of(WanderConfig(), told.robot)
         assert wanderer is not None
         command, way = Twist(0.0, 0.0), 0.0
         for _ in range(400):

@@ -20,7 +20,7 @@ from pilotage.report.run_folder import read_run
 from pilotage.sensors.readings import LidarScan, Readings
 from pilotage.stack.interface import ExplainableUpdate, LineVerdict, ScanUpdate
 from pilotage.stack.localization.ekf_walls import EkfWallsConfig, EkfWallsLocalizer
-from support.robots import ROOM, knowledge_of
+from support.robots import ROOM, told_of
 from support.walls import scan_of
 
 TRUE = Pose2(3.0, 4.2, 0.3)
@@ -28,15 +28,16 @@ TRUE = Pose2(3.0, 4.2, 0.3)
 
 def explained(belief: Pose2, world: object = ROOM) -> ScanUpdate:
     """One scan of the room seen from ``TRUE`` by a robot that believes otherwise."""
-    knowledge = knowledge_of(start=belief, variances=(1e-4, 1e-4, 1e-4))
-    localizer = EkfWallsLocalizer(EkfWallsConfig(recovery=None), knowledge)
+    told = told_of(start=belief, variances=(1e-4, 1e-4, 1e-4))
+    localizer = told.localizer(EkfWallsLocalizer, EkfWallsConfig(recovery=None))
     ranges = scan_of(world, TRUE, np.random.default_rng(0))  # type: ignore[arg-type]
     localizer.step(Readings(0.1, {"lidar": LidarScan(ranges)}))
-    assert localizer.last_update is not None
-    update = localizer.last_update.explained()
-    assert localizer.last_update.left_out == sum(v is not LineVerdict.ACCEPTED for v in update.verdicts)
+    assert told.journal.update is not None
+    update = told.journal.update.explained()
+    assert told.journal.update.left_out == sum(v is not LineVerdict.ACCEPTED for v in update.verdicts)
+    told.journal.update = None
     localizer.step(Readings(0.2, {}))
-    assert localizer.last_update is None, "a step without a scan has no update"
+    assert told.journal.update is None, "a step without a scan has no update"
     return update
 
 

@@ -13,7 +13,9 @@ from pilotage.evaluation.shortest_path import shortest_path
 from pilotage.experiments.floor.world_map import load_map
 from pilotage.experiments.values import parse_override
 from pilotage.maps.map_file import LandmarkMap
+from pilotage.maps.world_map import WorldMap
 from pilotage.stack.interface import PlannedPath
+from pilotage.stack.journal import Journal
 from pilotage.stack.navigator.global_plan import GlobalPlan
 from pilotage.stack.planning.planner import PLANNERS, SMOOTHERS, PlanResult
 
@@ -53,18 +55,19 @@ def plan_on_map(
     config = PLANNERS.configure(planner, own, f"planner '{planner}'")
     smoother_config = SMOOTHERS.configure(smoother_name, smoothing, f"smoother '{smoother_name}'")
     to = Goal(goal[0], goal[1], wrap_to_pi(goal[2]) if len(goal) > 2 else None)
+    journal = Journal()
     plan = GlobalPlan(
         PLANNERS.entry(planner).factory(config),
         SMOOTHERS.entry(smoother_name).factory(smoother_config),
-        floor.walls,
-        to,
+        WorldMap(floor.name, floor.walls.bounds_m, floor.walls),
         RandomStreams(seed).stream("planner"),
+        journal,
     )
     pose = Pose2(start[0], start[1], wrap_to_pi(start[2]) if len(start) > 2 else 0.0)
-    result = plan.make(0.0, pose, floor.walls.circles_m[:0], (plan.clearance_m,))
+    result = plan.make(0.0, pose, to, floor.walls.circles_m[:0], (plan.clearance_m,))
     answer: dict[str, Any] = {
         "success": result.path is not None,
-        "reason": _reason(result, plan.history[-1] if plan.history else None),
+        "reason": _reason(result, journal.plans[-1] if journal.plans else None),
         "planner": planner,
         "seed": seed,
         "clearance_m": plan.clearance_m,
@@ -72,7 +75,7 @@ def plan_on_map(
     }
     if plan.path is None:
         return answer
-    adopted = plan.history[-1]
+    adopted = journal.plans[-1]
     shortest = shortest_path(floor.walls, (start[0], start[1]), (goal[0], goal[1]), plan.clearance_m)
     answer |= {
         "planned_length_m": adopted.length_m,

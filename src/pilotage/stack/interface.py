@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import Protocol, runtime_checkable
+from typing import Protocol
 
 import numpy as np
 
 from pilotage.core.registry import Registry
 from pilotage.core.scan_update import LineVerdict as LineVerdict
 from pilotage.core.scan_update import ScanUpdate as ScanUpdate
-from pilotage.core.types import Event, FloatArray, Pose2, Twist
+from pilotage.core.types import Command, FloatArray, Pose2
 from pilotage.sensors.readings import Readings
 
 
@@ -59,16 +58,6 @@ class ExplainableUpdate(Protocol):
         ...
 
 
-@runtime_checkable
-class Explaining(Protocol):
-    """A stack or a localizer that can say why its last update came out as it did."""
-
-    @property
-    def last_update(self) -> ExplainableUpdate | None:
-        """The update of the last step; None where there was none."""
-        ...
-
-
 class StackStatus(StrEnum):
     """How far the task has come, as the robot itself sees it."""
 
@@ -94,7 +83,10 @@ class PlannedPath:
 
 
 class Stack(Protocol):
-    """What runs on the robot."""
+    """What runs on the robot. All else that it has to tell goes into the ``Journal`` that it was handed.
+
+    What is planned off line, before the start, is planned at construction.
+    """
 
     @property
     def belief(self) -> Belief:
@@ -106,40 +98,8 @@ class Stack(Protocol):
         """The task's status and, where it failed, why."""
         ...
 
-    def prepare(self) -> None:
-        """Plan before the start (the off-line part)."""
-        ...
-
-    def step(self, readings: Readings) -> Twist:
+    def step(self, readings: Readings) -> Command:
         """Take in what the sensors said, give the next command."""
-        ...
-
-    def telemetry(self) -> Mapping[str, float]:
-        """Numbers of the last step worth recording; the same keys at every step."""
-        ...
-
-    def drain_events(self) -> list[Event]:
-        """Events since the last call."""
-        ...
-
-    @property
-    def mapped_circles_m(self) -> FloatArray:
-        """(M, 3) x, y, radius of what the robot put on its own map."""
-        ...
-
-    @property
-    def counts(self) -> Mapping[str, int]:
-        """What the stack counted: attempts, replans, escapes."""
-        ...
-
-    @property
-    def planning_time_s(self) -> float:
-        """Wall time spent planning globally, queries without a path included."""
-        ...
-
-    @property
-    def plans(self) -> list[PlannedPath]:
-        """All plans adopted so far."""
         ...
 
 

@@ -28,6 +28,10 @@ class Channel:
             raise ValueError(f"telemetry: expected {self._end - self._begin} numbers, found {len(told)}")
         self._row[self._begin : self._end] = told
 
+    def shift(self, columns: int) -> None:
+        """Make room for columns declared before these; for the journal."""
+        self._begin, self._end = self._begin + columns, self._end + columns
+
 
 @dataclass(slots=True)
 class Journal:
@@ -59,6 +63,7 @@ class Journal:
     row: array[float] = field(default_factory=lambda: array("d"))
     update: ExplainableUpdate | None = None
     _results: dict[str, Callable[[], object]] = field(default_factory=dict)
+    _channels: list[Channel] = field(default_factory=list)
 
     def say(self, t_s: float, kind: str, text: str) -> None:
         """Tell that something happened."""
@@ -69,8 +74,14 @@ class Journal:
         self.counts[name] = self.counts.get(name, 0) + 1
         return self.counts[name]
 
-    def channel(self, columns: Mapping[str, str]) -> Channel:
+    def channel(self, columns: Mapping[str, str], *, first: bool = False) -> Channel:
         """Declare telemetry: column names with their units; to be done at construction.
+
+        Parameters
+        ----------
+        first
+            Before all columns declared so far: a stack's own stand before those of its parts, which are
+            made before it.
 
         Raises
         ------
@@ -80,10 +91,18 @@ class Journal:
         for name in columns:
             if name in self.units:
                 raise ValueError(f"telemetry: the column '{name}' is declared twice")
-        begin = len(self.row)
-        self.units.update(columns)
-        self.row.extend([float("nan")] * len(columns))
-        return Channel(self.row, begin, len(self.row))
+        untold = array("d", [float("nan")] * len(columns))
+        if first:
+            for channel in self._channels:
+                channel.shift(len(columns))
+            self.row[:0] = untold
+            self.units = {**columns, **self.units}
+        else:
+            self.row.extend(untold)
+            self.units.update(columns)
+        begin = 0 if first else len(self.row) - len(columns)
+        self._channels.append(Channel(self.row, begin, begin + len(columns)))
+        return self._channels[-1]
 
     def result(self, name: str, make: Callable[[], object]) -> None:
         """Offer something that is wanted once, at the end of the run: a map, what was found."""

@@ -14,8 +14,6 @@ from pilotage.core.errors import InputError
 from pilotage.core.random import RandomStreams
 from pilotage.core.types import FloatArray, Goal, Pose2
 from pilotage.maps.cell_map import CellMap
-from pilotage.maps.landmarks import Landmarks
-from pilotage.maps.segment_map import SegmentMap
 from pilotage.maps.true_cells import true_map
 from pilotage.maps.world_map import WorldMap
 from pilotage.missions.explorer import ExplorerConfig, FirmwareConfig
@@ -224,40 +222,3 @@ class SheetKnowledge:
     def cell_m(self) -> tuple[float, float]:
         """Width and height of a cell."""
         return self.size_m[0] / self.cells[0], self.size_m[1] / self.cells[1]
-
-
-@dataclass(frozen=True, slots=True)
-class Knowledge:
-    """Everything a component of the stack may know at its construction; no truth in it."""
-
-    world_map: SegmentMap
-    landmarks: Landmarks
-    sensors: Mapping[str, SensorConfig]
-    body_radius_m: float
-    max_speed_m_s: float
-    max_turn_rate_rad_s: float
-    dt_s: float
-    initial: Belief
-    goal: Goal | None
-    goal_tolerance_m: float
-    streams: RandomStreams
-
-    def sensors_of(self, kind: type[S]) -> dict[str, S]:
-        """All sensors of one kind by name."""
-        return {name: config for name, config in self.sensors.items() if isinstance(config, kind)}
-
-    def one_sensor(self, kind: type[S], needed_by: str) -> tuple[str, S]:
-        """Return the only sensor of one kind.
-
-        Raises
-        ------
-        InputError
-            If the robot has none of them or more than one.
-        """
-        found = list(self.sensors_of(kind).items())
-        if len(found) != 1:
-            raise InputError(
-                f"{needed_by}: expected one {kind.__name__.removesuffix('Config')} among robot.sensors, "
-                f"found {len(found)}; the robot has: {', '.join(self.sensors) or 'none'}"
-            )
-        return found[0]

@@ -20,7 +20,10 @@ from pilotage.experiments.floor.places import settle_places
 from pilotage.experiments.floor.world_map import load_map
 from pilotage.experiments.ideal_sensors import ideal_sensors
 from pilotage.maps.map_file import LandmarkMap
+from pilotage.maps.world_map import WorldMap
 from pilotage.missions.floor import FloorMission
+from pilotage.models.footprint import Footprint
+from pilotage.models.motion.differential_drive import DifferentialDriveConfig
 from pilotage.sensors.sensor import SENSORS, SensorConfig
 from pilotage.sim.simulator import Simulator
 from pilotage.sim.world import World
@@ -28,7 +31,8 @@ from pilotage.stack.control.controller import CONTROLLERS
 from pilotage.stack.control.escape import ESCAPES
 from pilotage.stack.control.reactive import REACTIVES
 from pilotage.stack.interface import Belief, Stack
-from pilotage.stack.knowledge import Knowledge
+from pilotage.stack.journal import Journal
+from pilotage.stack.knowledge import RobotKnowledge, TaskKnowledge
 from pilotage.stack.localization.localizer import LOCALIZERS
 from pilotage.stack.mapping.mapper import MAPPERS
 from pilotage.stack.navigator.navigator import NAVIGATORS, Parts
@@ -46,6 +50,7 @@ class Experiment:
     obstacles: Obstacles
     simulator: Simulator
     stack: Stack
+    journal: Journal
 
 
 def build(mission: FloorMission) -> Experiment:
@@ -68,9 +73,9 @@ def build(mission: FloorMission) -> Experiment:
         _check_place(f"world.kidnaps.{number}.to", kidnap.to.x_m, kidnap.to.y_m, radius, floor)
     streams = RandomStreams(mission.run.seed)
     sensors = build_sensors(mission)
-    stack = _build_stack(mission, floor, start, goal, sensors, streams)
-    stack.prepare()
-    planned = stack.plans[0].states if stack.plans else None
+    journal = Journal()
+    stack = _build_stack(mission, floor, start, goal, sensors, streams, journal)
+    planned = journal.plans[0].states if journal.plans else None
     obstacles = place_obstacles(
         mission.world.obstacles,
         floor.walls,
@@ -87,8 +92,8 @@ def build(mission: FloorMission) -> Experiment:
     if oracles:
         # The obstacles stay where the robot without oracles meets them: only the modules differ.
         truth = Truth(geometry, world.obstacle_segments_m, world.obstacle_circles_m, start, mission.run.dt_s)
-        stack = _build_stack(mission, floor, start, goal, sensors, streams, oracles, truth)
-        stack.prepare()
+        journal = Journal()
+        stack = _build_stack(mission, floor, start, goal, sensors, streams, journal, oracles, truth)
     simulator = Simulator(
         world,
         mission.robot.body,
@@ -100,7 +105,7 @@ def build(mission: FloorMission) -> Experiment:
     )
     if truth is not None:
         truth.simulator = simulator
-    return Experiment(mission, floor, world, obstacles, simulator, stack)
+    return Experiment(mission, floor, world, obstacles, simulator, stack, journal)
 
 
 def build_sensors(mission: FloorMission) -> dict[str, SensorConfig]:
@@ -165,6 +170,7 @@ def _build_stack(
     goal: Goal | None,
     sensors: dict[str, SensorConfig],
     streams: RandomStreams,
+    journal: Journal,
     oracles: frozenset[str] = frozenset(),
     truth: Truth | None = None,
 ) -> Stack:
@@ -174,31 +180,33 @@ def _build_stack(
         initial = exactly(start)
     elif not roles.initial.known:
         initial = Belief.anywhere(floor.walls.bounds_m)
-    knowledge = Knowledge(
-        world_map=floor.walls,
-        landmarks=floor.landmarks,
-        sensors=sensors,
-        body_radius_m=robot.body.radius_m,
-        max_speed_m_s=robot.motion.max_speed_m_s,
-        max_turn_rate_rad_s=robot.motion.max_turn_rate_rad_s,
-        dt_s=mission.run.dt_s,
-        initial=initial,
-        goal=goal,
-        goal_tolerance_m=math.inf if mission.world.goal is None else mission.world.goal.tolerance_m,
-        streams=streams,
+    chart = WorldMap(floor.name, floor.walls.bounds_m, floor.walls, landmarks=floor.landmarks)
+    told = RobotKnowledge(
+        Footprint.disc(robot.body.radius_m),
+        DifferentialDriveConfig(**robot.motion.model_dump(exclude={"name"})),
+        sensors,
+        mission.run.dt_s,
+        streams,
     )
+    task = TaskKnowledge(
+        initial,
+        () if goal is None else (goal,),
+        math.inf if mission.world.goal is None else mission.world.goal.tolerance_m,
+    )
+    # A localizer that an oracle stands in for has nothing to tell.
+    heard = Journal() if "localizer" in oracles else journal
     parts = Parts(
-        localizer=build_component(LOCALIZERS, roles.localizer, "localizer", knowledge),
+        localizer=build_component(LOCALIZERS, roles.localizer, "localizer", told, chart, initial, heard),
         planner=optional_component(PLANNERS, roles.planner, "planner"),
         smoother=optional_component(SMOOTHERS, roles.smoother, "smoother"),
-        local_planner=optional_component(LOCAL_PLANNERS, roles.local_planner, "local_planner", knowledge),
-        controller=optional_component(CONTROLLERS, roles.controller, "controller", knowledge),
-        reactive=optional_component(REACTIVES, roles.reactive, "reactive", knowledge),
-        mapper=optional_component(MAPPERS, roles.mapper, "mapper", knowledge),
-        escape=optional_component(ESCAPES, roles.escape, "escape", knowledge),
+        local_planner=optional_component(LOCAL_PLANNERS, roles.local_planner, "local_planner", told),
+        controller=optional_component(CONTROLLERS, roles.controller, "controller", told),
+        reactive=optional_component(REACTIVES, roles.reactive, "reactive", told),
+        mapper=optional_component(MAPPERS, roles.mapper, "mapper", told, chart),
+        escape=optional_component(ESCAPES, roles.escape, "escape", told),
     )
     if truth is not None:
         parts = with_oracles(parts, oracles, truth)
-    stack = build_component(NAVIGATORS, roles.navigator, "navigator", knowledge, parts)
+    stack = build_component(NAVIGATORS, roles.navigator, "navigator", told, chart, task, parts, journal)
     localizer = parts.localizer
     return WatchedStack(stack, localizer.watched) if isinstance(localizer, WatchedLocalizer) else stack

@@ -17,7 +17,8 @@ from pilotage.sensors.readings import OdometryIncrement, Readings, UltrasonicRea
 from pilotage.sensors.ultrasonic import UltrasonicConfig
 from pilotage.sensors.wheel_odometry import WheelOdometryConfig
 from pilotage.sim.simulator import Simulator
-from pilotage.stack.interface import Explaining, Stack
+from pilotage.stack.interface import Stack
+from pilotage.stack.journal import Journal
 
 TRUTH_COLUMNS = ("t_s", "true_x_m", "true_y_m", "true_theta_rad")
 BELIEF_COLUMNS = (
@@ -56,15 +57,18 @@ class RunRecord:
 class Recorder:
     """Collects rows as plain numbers; columns are made once at the end."""
 
-    def __init__(self, simulator: Simulator, stack: Stack, sensors: dict[str, object]) -> None:
+    def __init__(
+        self, simulator: Simulator, stack: Stack, journal: Journal, sensors: dict[str, object]
+    ) -> None:
         self._simulator = simulator
-        self._stack = stack
+        self._stack, self._journal = stack, journal
         self._sonars = [name for name, config in sensors.items() if isinstance(config, UltrasonicConfig)]
         wheels = [name for name, config in sensors.items() if isinstance(config, WheelOdometryConfig)]
         self._wheels = wheels[0] if wheels else None
-        self._telemetry_columns = tuple(stack.telemetry())
+        self._telemetry_columns = tuple(journal.units)
         self._rows: list[tuple[float, ...]] = []
-        self.events: list[Event] = []
+        self.events: list[Event] = list(journal.events)
+        self._heard = len(journal.events)
         self.album = UpdateAlbum()
         self.sightings = Sightings(sensors)
 
@@ -98,12 +102,14 @@ class Recorder:
                 body.collisions,
                 *_odometry(readings, self._wheels),
                 *[_sonar_m(readings, name) for name in self._sonars],
-                *self._stack.telemetry().values(),
+                *self._journal.row,
             )
         )
         self.sightings.record(readings)
-        self.events += self._stack.drain_events()
-        update = self._stack.last_update if isinstance(self._stack, Explaining) else None
+        if len(self._journal.events) > self._heard:
+            self.events += self._journal.events[self._heard :]
+            self._heard = len(self._journal.events)
+        update, self._journal.update = self._journal.update, None
         if update is not None:
             self.album.offer(readings.t_s, update)
 

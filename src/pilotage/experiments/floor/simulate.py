@@ -8,7 +8,7 @@ import time
 import numpy as np
 
 from pilotage.core.angles import wrap_to_pi
-from pilotage.core.types import STOP, Pose2
+from pilotage.core.types import STOP, Command, Pose2, Twist
 from pilotage.evaluation.run_metrics import Outcome, shortest_for
 from pilotage.experiments.floor.build import Experiment, build, build_sensors
 from pilotage.experiments.floor.recorder import Recorder, RunRecord
@@ -21,22 +21,22 @@ def simulate(mission: FloorMission, on_progress: OnProgress | None = None) -> Ru
     """Build a mission and step it to its end."""
     experiment = build(mission)
     mission = experiment.mission
-    simulator, stack = experiment.simulator, experiment.stack
-    recorder = Recorder(simulator, stack, dict(build_sensors(mission)))
-    recorder.events += stack.drain_events()
+    simulator, stack, journal = experiment.simulator, experiment.stack, experiment.journal
+    recorder = Recorder(simulator, stack, journal, dict(build_sensors(mission)))
     limit = math.ceil(mission.run.time_limit_s / mission.run.dt_s)
-    planned_s = stack.planning_time_s
+    planned_s = journal.planning_time_s
     begin = last_told = time.perf_counter()
-    command, status, reason = STOP, *stack.status
+    command: Command = STOP
+    status, reason = stack.status
     kidnaps = sorted(mission.world.kidnaps, key=lambda kidnap: kidnap.at_s)
     for _ in range(limit):
         if status is StackStatus.FAILED:
             break
         while kidnaps and simulator.t_s >= kidnaps[0].at_s:
             _carry(experiment, recorder, kidnaps.pop(0))
-        readings = simulator.step(command)
+        readings = simulator.step(_twist(command))
         command = stack.step(readings)
-        recorder.record(readings, command)
+        recorder.record(readings, _twist(command))
         status, reason = stack.status
         if simulator.body.collisions:
             recorder.note("collision", "the body touched something")
@@ -50,14 +50,19 @@ def simulate(mission: FloorMission, on_progress: OnProgress | None = None) -> Ru
     outcome = Outcome(
         arrived=status is StackStatus.ARRIVED,
         reason=_reason(experiment, status, reason),
-        loop_s=max(loop_s - (stack.planning_time_s - planned_s), 1e-9),
-        plans=stack.plans,
-        shortest=shortest_for(mission, stack.plans, experiment.floor.walls),
-        counts=dict(stack.counts),
+        loop_s=max(loop_s - (journal.planning_time_s - planned_s), 1e-9),
+        plans=journal.plans,
+        shortest=shortest_for(mission, journal.plans, experiment.floor.walls),
+        counts=dict(journal.counts),
     )
     return RunRecord(
         experiment, recorder.trace(), outcome, recorder.events, recorder.album, recorder.sightings
     )
+
+
+def _twist(command: Command) -> Twist:
+    assert isinstance(command, Twist), "what moves on a floor follows twists"
+    return command
 
 
 def _carry(experiment: Experiment, recorder: Recorder, kidnap: Kidnap) -> None:
@@ -82,7 +87,8 @@ def _reason(experiment: Experiment, status: StackStatus, reason: str) -> str:
 
 def _progress(experiment: Experiment) -> Progress:
     truth, belief = experiment.simulator.truth, experiment.stack.belief
-    to_go = experiment.stack.telemetry().get("distance_to_go_m", math.nan)
+    told = dict(zip(experiment.journal.units, experiment.journal.row, strict=True))
+    to_go = told.get("distance_to_go_m", math.nan)
     error_m = math.hypot(truth.x_m - belief.pose.x_m, truth.y_m - belief.pose.y_m)
     sigma_m = float(np.sqrt(max(np.linalg.eigvalsh(belief.cov[:2, :2])[-1], 0.0)))
     numbers = (

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import yaml
 
+from pilotage.core.config import Config
 from pilotage.core.errors import InputError
 from pilotage.core.random import RandomStreams
 from pilotage.core.types import Event, FloatArray, Pose2
@@ -23,11 +24,15 @@ from pilotage.experiments.recordings.drive import RecordedDrive, aer1513_drive, 
 from pilotage.experiments.recordings.parameters import shipped_parameters
 from pilotage.experiments.values import apply_override, merge
 from pilotage.maps.segment_map import SegmentMap
+from pilotage.maps.world_map import WorldMap
+from pilotage.models.footprint import Footprint
+from pilotage.models.motion.differential_drive import DifferentialDriveConfig
 from pilotage.records.run_folder import RunFiles, write_run
 from pilotage.records.trace import trace_of
 from pilotage.records.world import RobotOutline, World, landmarks_of
 from pilotage.stack.interface import Belief
-from pilotage.stack.knowledge import Knowledge
+from pilotage.stack.journal import Journal
+from pilotage.stack.knowledge import RobotKnowledge
 from pilotage.stack.localization.localizer import LOCALIZERS, Localizer
 
 FORMATS = ("mrclam", "aer1513")
@@ -80,11 +85,9 @@ def localize_log(
     drive = read_drive(log, form, robot, max_range_m)
     shipped, learned_from = shipped_parameters(drive, localizer, form)
     parameters = with_overrides(localizer, shipped, overrides)
-    knowledge = knowledge_of(drive)
     config = LOCALIZERS.configure(localizer, parameters, "stack.localizer")
-    factory = LOCALIZERS.entry(localizer).factory
-    follow(drive, factory(config, knowledge), steps=50)  # compiles the kernels: not part of the speed
-    trace, events, loop_s = follow(drive, factory(config, knowledge))
+    follow(drive, *build_localizer(drive, localizer, config), steps=50)  # compiles: not part of the speed
+    trace, events, loop_s = follow(drive, *build_localizer(drive, localizer, config))
     steps = drive.t_s.shape[0] - 1
     scores, trace["nees"] = log_metrics(trace)
     success = bool(scores.get("scored_steps")) and not scores.get("lost", False)
@@ -145,32 +148,29 @@ def _only_the_localizer(file: str, values: dict[str, Any]) -> dict[str, Any]:
     return values
 
 
-def knowledge_of(drive: RecordedDrive) -> Knowledge:
-    """What the recorded robot knew before it started."""
+def build_localizer(drive: RecordedDrive, name: str, config: Config) -> tuple[Localizer, Journal]:
+    """The localizer with what the recorded robot knew before it started, and the journal that it writes."""
     start = drive.truth[0]
     if not np.isfinite(start).all():
         raise InputError(f"{drive.name}: expected the truth at the begin, found a gap there")
     initial = Belief(Pose2.from_array(start), np.diag(np.square(START_STDS)))
-    return Knowledge(
-        world_map=SegmentMap(np.zeros((0, 4)), np.zeros((0, 3)), _bounds(drive)),
-        landmarks=drive.landmarks,
-        sensors=drive.sensors,
-        body_radius_m=0.2,
-        max_speed_m_s=1.0,
-        max_turn_rate_rad_s=2.0,
-        dt_s=float(drive.t_s[1] - drive.t_s[0]),
-        initial=initial,
-        goal=None,
-        goal_tolerance_m=0.3,
-        streams=RandomStreams(0),
+    dt_s = float(drive.t_s[1] - drive.t_s[0])
+    robot = RobotKnowledge(
+        Footprint.disc(0.2), DifferentialDriveConfig(), drive.sensors, dt_s, RandomStreams(0)
     )
+    bounds_m = _bounds(drive)
+    floor = SegmentMap(np.zeros((0, 4)), np.zeros((0, 3)), bounds_m)
+    chart = WorldMap(drive.name, bounds_m, floor, landmarks=drive.landmarks)
+    journal = Journal()
+    return LOCALIZERS.entry(name).factory(config, robot, chart, initial, journal), journal
 
 
 def follow(
-    drive: RecordedDrive, localizer: Localizer, steps: int | None = None
+    drive: RecordedDrive, localizer: Localizer, journal: Journal, steps: int | None = None
 ) -> tuple[dict[str, FloatArray], list[Event], float]:
     """Step a localizer through a drive; returns the trace at the scored steps, events and wall time."""
-    names = tuple(localizer.telemetry())
+    names = tuple(journal.units)
+    told_recoveries = names.index("recoveries") if "recoveries" in names else None
     sums = [name in SUMS for name in names]
     rows: list[list[float]] = []
     events: list[Event] = []
@@ -180,15 +180,13 @@ def follow(
         begin = time.perf_counter()
         belief = localizer.step(readings)
         loop_s += time.perf_counter() - begin
-        said = localizer.telemetry()
-        for i, name in enumerate(names):
-            value = said[name]
+        for i, value in enumerate(journal.row):
             if not sums[i] or math.isnan(total[i]):
                 total[i] = value
             elif not math.isnan(value):
                 total[i] += value
-        if said.get("recoveries", 0.0) > recoveries:
-            recoveries = said["recoveries"]
+        if told_recoveries is not None and journal.row[told_recoveries] > recoveries:
+            recoveries = journal.row[told_recoveries]
             events.append(
                 Event(
                     readings.t_s,

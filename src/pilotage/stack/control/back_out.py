@@ -9,7 +9,7 @@ from pilotage.core.config import Config
 from pilotage.core.types import Pose2, Twist
 from pilotage.sensors.sensor import Positive
 from pilotage.stack.control.escape import ESCAPES
-from pilotage.stack.knowledge import Knowledge
+from pilotage.stack.knowledge import RobotKnowledge
 
 
 class BackOutConfig(Config):
@@ -33,9 +33,9 @@ class BackOut:
     that moved in behind is not seen.
     """
 
-    def __init__(self, config: BackOutConfig, knowledge: Knowledge) -> None:
+    def __init__(self, config: BackOutConfig, robot: RobotKnowledge) -> None:
         self._config = config
-        self._dt_s = knowledge.dt_s
+        self._dt_s = robot.dt_s
         self._trail: list[Pose2] = []
         self._left_m = 0.0
         self._turn_left_rad = 0.0

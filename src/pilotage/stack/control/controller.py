@@ -20,7 +20,7 @@ class Control:
 
 
 class Controller(Protocol):
-    """Follows a moving reference. Built as ``cls(config, knowledge)``."""
+    """Follows a moving reference. Built as ``cls(config, robot: RobotKnowledge)``."""
 
     def reset(self) -> None:
         """Forget the past: the robot was moved by something else meanwhile."""

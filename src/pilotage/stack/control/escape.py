@@ -9,7 +9,7 @@ from pilotage.core.types import Pose2, Twist
 
 
 class Escape(Protocol):
-    """Gets the robot out of a trap. Built as ``cls(config, knowledge)``."""
+    """Gets the robot out of a trap. Built as ``cls(config, robot: RobotKnowledge)``."""
 
     def begin(self, trail: list[Pose2]) -> None:
         """Start an escape; ``trail`` is the way the robot came by, oldest first, for the escape to use up."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pilotage.core.config import Config
 from pilotage.core.types import FloatArray, Pose2, Twist
 from pilotage.kernels.rrt import local_path
+from pilotage.maps.near_walls import NearWalls
 from pilotage.sensors.sensor import NonNegative, Positive
 
 PIECES = 4
@@ -20,8 +21,9 @@ class GuardConfig(Config):
 class ArcGuard:
     """Checks the arc that a command would drive against everything on the robot's own map.
 
-    A disc turns on the spot without touching anything, so a refused command keeps its turn rate and
-    loses its speed. The braking distance, v^2 / (2 a), has to lie within the horizon.
+    A robot of any shape is taken for the disc around it. A disc turns on the spot without touching anything,
+    so a refused command keeps its turn rate and loses its speed. The braking distance, v^2 / (2 a), has to
+    lie within the horizon.
     """
 
     def __init__(self, config: GuardConfig, body_radius_m: float) -> None:
@@ -29,11 +31,13 @@ class ArcGuard:
         self._clearance_m = body_radius_m + config.margin_m
 
     def allows(
-        self, command: Twist, pose: Pose2, segments_m: FloatArray, circles_m: FloatArray, most_m: float
+        self, command: Twist, pose: Pose2, walls: NearWalls, circles_m: FloatArray, most_m: float
     ) -> bool:
         """Whether the command can be driven for the horizon, keeping its clearance but at most ``most_m``."""
         if command.v_m_s == 0.0:
             return True
+        clearance_m = min(self._clearance_m, most_m)
+        reach_m = abs(command.v_m_s) * self._horizon_s + clearance_m
         return bool(
             local_path.arc_fits(
                 pose.x_m,
@@ -43,8 +47,8 @@ class ArcGuard:
                 command.w_rad_s,
                 self._horizon_s,
                 PIECES,
-                min(self._clearance_m, most_m),
-                segments_m,
+                clearance_m,
+                walls.near(pose.x_m, pose.y_m, reach_m),
                 circles_m,
             )
         )

@@ -8,7 +8,7 @@ from pilotage.core.config import Config
 from pilotage.core.types import Pose2, Twist
 from pilotage.sensors.sensor import NonNegative, Positive
 from pilotage.stack.control.controller import CONTROLLERS, Control
-from pilotage.stack.knowledge import Knowledge
+from pilotage.stack.knowledge import RobotKnowledge
 
 BASELINE_M = 0.005
 """Two estimates nearer than this give no direction; the estimated heading does then."""
@@ -32,9 +32,9 @@ class PiFollower:
     that starts at the estimate.
     """
 
-    def __init__(self, config: PiFollowerConfig, knowledge: Knowledge) -> None:
+    def __init__(self, config: PiFollowerConfig, robot: RobotKnowledge) -> None:
         self._config = config
-        self._max_turn = knowledge.max_turn_rate_rad_s
+        self._max_turn = robot.motion.top_turn_rate_rad_s
         self._last: Pose2 | None = None
         self._sum_m = 0.0
 

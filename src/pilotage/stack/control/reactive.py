@@ -8,6 +8,7 @@ from typing import Protocol
 
 from pilotage.core.registry import Registry
 from pilotage.core.types import FloatArray, Pose2
+from pilotage.maps.near_walls import NearWalls
 from pilotage.sensors.readings import Readings
 
 
@@ -36,20 +37,20 @@ class Reaction:
 
 
 class Reactive(Protocol):
-    """Reacts to what is near. Built as ``cls(config, knowledge)``."""
+    """Reacts to what is near. Built as ``cls(config, robot: RobotKnowledge)``."""
 
     def reset(self) -> None:
         """Forget an avoidance in progress."""
         ...
 
     def step(
-        self, readings: Readings, pose: Pose2, segments_m: FloatArray, circles_m: FloatArray, straight: bool
+        self, readings: Readings, pose: Pose2, walls: NearWalls, circles_m: FloatArray, straight: bool
     ) -> Reaction:
         """React to one step's readings.
 
         Parameters
         ----------
-        segments_m, circles_m
+        walls, circles_m
             What the current plan already takes into account; returns it explains need no avoidance.
         straight
             Whether the plan goes straight on for the next metre or so.

@@ -9,11 +9,12 @@ from pydantic import Field
 from pilotage.core.config import Config
 from pilotage.core.errors import InputError
 from pilotage.core.types import FloatArray, Pose2
+from pilotage.maps.near_walls import NearWalls
 from pilotage.sensors.readings import Readings
 from pilotage.sensors.sensor import NonNegative, Positive
 from pilotage.sensors.ultrasonic import UltrasonicConfig
 from pilotage.stack.control.reactive import REACTIVES, Reaction, ReactionKind
-from pilotage.stack.knowledge import Knowledge
+from pilotage.stack.knowledge import RobotKnowledge
 from pilotage.stack.perception.sonar import SonarRing, SonarView
 
 
@@ -52,8 +53,8 @@ class UltrasonicReaction:
     Obstacles thinner than the gap between the cones are seen late or not at all.
     """
 
-    def __init__(self, config: UltrasonicReactionConfig, knowledge: Knowledge) -> None:
-        sensors = knowledge.sensors_of(UltrasonicConfig)
+    def __init__(self, config: UltrasonicReactionConfig, robot: RobotKnowledge) -> None:
+        sensors = robot.sensors_of(UltrasonicConfig)
         if not sensors:
             raise InputError(
                 "reactive 'ultrasonic': expected ultrasonic sensors among robot.sensors, found none"
@@ -65,7 +66,7 @@ class UltrasonicReaction:
             )
         self._config = config
         self._ring = SonarRing(sensors, config.mapped_tolerance_m, config.mapped_widening_rad)
-        self._dt_s = knowledge.dt_s
+        self._dt_s = robot.dt_s
         self._side = 0.0
         self._turned_rad = 0.0
         self._hall_seen_at: Pose2 | None = None
@@ -76,12 +77,12 @@ class UltrasonicReaction:
         self._turned_rad = 0.0
 
     def step(
-        self, readings: Readings, pose: Pose2, segments_m: FloatArray, circles_m: FloatArray, straight: bool
+        self, readings: Readings, pose: Pose2, walls: NearWalls, circles_m: FloatArray, straight: bool
     ) -> Reaction:
         """Frontal objects first, then halls, then lateral objects."""
         config = self._config
         watch = max(config.frontal_below_m, config.release_above_m)
-        view = self._ring.look(readings, pose, segments_m, circles_m, watch)
+        view = self._ring.look(readings, pose, walls, circles_m, watch)
         front = view.front_unexpected_m if config.ignore_mapped else view.front_m
         threshold = config.release_above_m if self._side else config.frontal_below_m
         if front < threshold:

@@ -15,7 +15,7 @@ from pilotage.kernels.scans import wander
 from pilotage.sensors.lidar import LidarConfig
 from pilotage.sensors.readings import LidarScan, Readings
 from pilotage.sensors.sensor import NonNegative, Positive
-from pilotage.stack.knowledge import Knowledge
+from pilotage.stack.knowledge import RobotKnowledge
 
 
 class WanderConfig(Config):
@@ -49,11 +49,11 @@ class Wanderer:
     """
 
     def __init__(
-        self, config: WanderConfig, knowledge: Knowledge, lidar_name: str, lidar: LidarConfig
+        self, config: WanderConfig, robot: RobotKnowledge, lidar_name: str, lidar: LidarConfig
     ) -> None:
         self._config = config
         self._name = lidar_name
-        self._half_width = knowledge.body_radius_m + config.margin_m
+        self._half_width = robot.radius_m + config.margin_m
         self._directions = clustering.beam_directions(
             float(lidar.beam_angles_rad()[0]) + lidar.mount.theta_rad, lidar.beam_step_rad, lidar.beams
         )
@@ -61,14 +61,14 @@ class Wanderer:
         half_view = min(0.5 * lidar.field_of_view_rad, math.pi) - 0.2
         self._headings = np.linspace(-half_view, half_view, config.directions)
         self._turning = self._turned_rad = 0.0
-        self._dt_s = knowledge.dt_s
+        self._dt_s = robot.dt_s
         self._command = STOP
 
     @staticmethod
-    def of(config: WanderConfig, knowledge: Knowledge) -> Wanderer | None:
+    def of(config: WanderConfig, robot: RobotKnowledge) -> Wanderer | None:
         """A wanderer for a robot with a scanner; None for one without."""
-        scanners = list(knowledge.sensors_of(LidarConfig).items())
-        return Wanderer(config, knowledge, *scanners[0]) if scanners else None
+        scanners = list(robot.sensors_of(LidarConfig).items())
+        return Wanderer(config, robot, *scanners[0]) if scanners else None
 
     def step(self, readings: Readings, bearing_rad: float | None = None) -> Twist:
         """Choose a command from the scan; without a new scan, go on as before.

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,15 +10,20 @@ from pydantic import Field
 from pilotage.core.config import Config
 from pilotage.core.types import FloatArray
 from pilotage.kernels.filters import augmented
+from pilotage.maps.world_map import WorldMap
 from pilotage.sensors.readings import Readings
 from pilotage.sensors.sensor import NonNegative
 from pilotage.sensors.wheel_odometry import WheelOdometryConfig
 from pilotage.stack.interface import Belief
-from pilotage.stack.knowledge import Knowledge
+from pilotage.stack.journal import Journal
+from pilotage.stack.knowledge import RobotKnowledge
 from pilotage.stack.localization.landmark_filter import LandmarkFilter, LandmarkFilterConfig
 from pilotage.stack.localization.localizer import LOCALIZERS
 
 NAME = "ekf-augmented"
+ERRORS = {"distance_scale": "1", "angle_scale": "1", "angle_bias_rad_s": "rad/s", "bearing_offset_rad": "rad"}
+ERROR_COLUMNS = {column: unit for name, unit in ERRORS.items() for column in (name, f"{name}_std")}
+"""Of the trace: each error as believed, and its standard deviation."""
 
 
 class SystematicErrors(Config):
@@ -72,8 +76,17 @@ class EkfAugmentedLocalizer(LandmarkFilter):
     only, angle scale and bias are one. The covariance says so.
     """
 
-    def __init__(self, config: EkfAugmentedConfig, knowledge: Knowledge) -> None:
-        super().__init__(NAME, self._predict, augmented.update_range_bearings, config, knowledge)
+    def __init__(
+        self,
+        config: EkfAugmentedConfig,
+        robot: RobotKnowledge,
+        chart: WorldMap,
+        initial: Belief,
+        journal: Journal,
+    ) -> None:
+        super().__init__(
+            NAME, self._predict, augmented.update_range_bearings, config, robot, chart, initial, journal
+        )
         believed = config.systematic
         self._walk = np.array(
             [
@@ -101,17 +114,20 @@ class EkfAugmentedLocalizer(LandmarkFilter):
         )
         cov[: augmented.POSE, : augmented.POSE] = self._cov
         self._cov = cov
-        _, odometry = knowledge.one_sensor(WheelOdometryConfig, NAME)
+        _, odometry = robot.one_sensor(WheelOdometryConfig, NAME)
         self._period_s = 1.0 / odometry.rate_hz
         self._odometry_s: float | None = None
         self._since_s = self._period_s
+        self._errors = journal.channel(ERROR_COLUMNS)
 
     def step(self, readings: Readings) -> Belief:
         """Predict by the odometry reading less its errors, then update by every beacon seen."""
         if self._odometry in readings.by_sensor:
             last = readings.t_s - self._period_s if self._odometry_s is None else self._odometry_s
             self._since_s, self._odometry_s = readings.t_s - last, readings.t_s
-        return super().step(readings)
+        belief = super().step(readings)
+        self._tell_errors()
+        return belief
 
     @property
     def systematic(self) -> SystematicEstimate:
@@ -119,15 +135,11 @@ class EkfAugmentedLocalizer(LandmarkFilter):
         n = augmented.POSE
         return SystematicEstimate(self._pose[n:].copy(), self._cov[n:, n:].copy())
 
-    def telemetry(self) -> Mapping[str, float]:
-        """The landmark filter's numbers, and the systematic errors with their standard deviations."""
-        values = self._pose[augmented.POSE :]
-        stds = np.sqrt(np.diagonal(self._cov)[augmented.POSE :])
-        names = ("distance_scale", "angle_scale", "angle_bias_rad_s", "bearing_offset_rad")
-        found: dict[str, float] = dict(super().telemetry())
-        for name, value, std in zip(names, values, stds, strict=True):
-            found[name], found[f"{name}_std"] = float(value), float(std)
-        return found
+    def _tell_errors(self) -> None:
+        """The systematic errors with their standard deviations, one after the other."""
+        values = self._pose[augmented.POSE :].tolist()
+        stds = np.sqrt(np.diagonal(self._cov)[augmented.POSE :]).tolist()
+        self._errors.tell(*(number for pair in zip(values, stds, strict=True) for number in pair))
 
     @property
     def _bearing_offset_rad(self) -> float:

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 from pilotage.kernels.filters import ekf
-from pilotage.stack.knowledge import Knowledge
+from pilotage.maps.world_map import WorldMap
+from pilotage.stack.interface import Belief
+from pilotage.stack.journal import Journal
+from pilotage.stack.knowledge import RobotKnowledge
 from pilotage.stack.localization.landmark_filter import LandmarkFilter, LandmarkFilterConfig
 from pilotage.stack.localization.localizer import LOCALIZERS
 
@@ -18,5 +21,14 @@ class EkfLandmarkLocalizer(LandmarkFilter):
     pose far outside its covariance gates away what could mend it.
     """
 
-    def __init__(self, config: LandmarkFilterConfig, knowledge: Knowledge) -> None:
-        super().__init__("ekf-landmarks", ekf.predict, ekf.update_range_bearings, config, knowledge)
+    def __init__(
+        self,
+        config: LandmarkFilterConfig,
+        robot: RobotKnowledge,
+        chart: WorldMap,
+        initial: Belief,
+        journal: Journal,
+    ) -> None:
+        super().__init__(
+            "ekf-landmarks", ekf.predict, ekf.update_range_bearings, config, robot, chart, initial, journal
+        )

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Mapping
 
 import numpy as np
 
@@ -13,13 +12,15 @@ from pilotage.core.errors import InputError
 from pilotage.core.types import FloatArray, Pose2
 from pilotage.kernels.filters import slow_errors
 from pilotage.kernels.filters.sighting import OUTCOME_ACCEPTED, OUTCOME_GATED, landmark_index
+from pilotage.maps.world_map import WorldMap
 from pilotage.models.odometry import OdometryModel
 from pilotage.sensors.beacon import BeaconConfig
 from pilotage.sensors.readings import BeaconReadings, OdometryIncrement, Readings
 from pilotage.sensors.wheel_odometry import WheelOdometryConfig
 from pilotage.stack.interface import Belief
-from pilotage.stack.knowledge import Knowledge
-from pilotage.stack.localization.landmark_filter import MEASUREMENT_DOF, MOST_HEADING_VAR
+from pilotage.stack.journal import Journal
+from pilotage.stack.knowledge import RobotKnowledge
+from pilotage.stack.localization.landmark_filter import MEASUREMENT_DOF, MOST_HEADING_VAR, SIGHTING_COLUMNS
 from pilotage.stack.localization.localizer import LOCALIZERS, require_initial_pose
 from pilotage.stack.localization.odometry_prediction import OdometryPrediction
 from pilotage.stack.localization.recent_sightings import RecentSightings
@@ -43,6 +44,17 @@ TELEMETRY = {
     "axis_rad": slow_errors.AXIS,
 }
 """Names of the errors in a trace; each has a standard deviation beside it."""
+UNITS = {"_m_s": "m/s", "_rad_s": "rad/s", "_rad": "rad", "_m": "m", "_s": "s"}
+COLUMNS = {
+    **SIGHTING_COLUMNS,
+    "recoveries": "1",
+    **{
+        column: next((unit for ending, unit in UNITS.items() if name.endswith(ending)), "1")
+        for name in TELEMETRY
+        for column in (name, f"{name}_std")
+    },
+}
+"""Beacons seen and accepted, their NIS, recoveries so far, and the errors as believed."""
 DOUBTED = (slow_errors.SPEED, slow_errors.TURN, slow_errors.AGE)
 """What another drive than the expected one has otherwise."""
 
@@ -60,17 +72,24 @@ class EkfSlowErrorsLocalizer:
     carry a wrong identity.
     """
 
-    def __init__(self, config: EkfSlowErrorsConfig, knowledge: Knowledge) -> None:
-        require_initial_pose(knowledge, NAME)
+    def __init__(
+        self,
+        config: EkfSlowErrorsConfig,
+        robot: RobotKnowledge,
+        chart: WorldMap,
+        initial: Belief,
+        journal: Journal,
+    ) -> None:
+        require_initial_pose(initial, NAME)
         self._config = config
-        self._odometry, odometry = knowledge.one_sensor(WheelOdometryConfig, NAME)
-        self._beacons, beacons = knowledge.one_sensor(BeaconConfig, NAME)
-        if len(knowledge.landmarks) == 0:
+        self._odometry, odometry = robot.one_sensor(WheelOdometryConfig, NAME)
+        self._beacons, beacons = robot.one_sensor(BeaconConfig, NAME)
+        if len(chart.landmarks) == 0:
             raise InputError(f"{NAME}: expected a map with landmarks, found none")
         self._noise = OdometryPrediction(odometry, config.odometry, 1.0, OdometryModel.EXACT_ARC)
-        order = np.argsort(knowledge.landmarks.ids)
-        self._ids = knowledge.landmarks.ids[order]
-        self._points = knowledge.landmarks.points_xy_m[order]
+        order = np.argsort(chart.landmarks.ids)
+        self._ids = chart.landmarks.ids[order]
+        self._points = chart.landmarks.points_xy_m[order]
         mount = beacons.mount
         self._mount = np.array([mount.x_m, mount.y_m, mount.theta_rad, config.reading_age_s])
         range_var = beacons.range_var_m2 if config.range_var_m2 is None else config.range_var_m2
@@ -106,21 +125,21 @@ class EkfSlowErrorsLocalizer:
         self._fading = np.array(
             [[0.0] * 3] * 3 + constant + [_fading(along)] * count + [_fading(across)] * count
         )
-        self._state = np.concatenate([knowledge.initial.pose.as_array(), np.zeros(len(errors) + 2 * count)])
+        self._state = np.concatenate([initial.pose.as_array(), np.zeros(len(errors) + 2 * count)])
         self._cov = np.diag(self._stationary)
-        self._cov[:3, :3] = knowledge.initial.cov
+        self._cov[:3, :3] = initial.cov
         floor = [config.recovery_position_std_m] * 2 + [config.recovery_heading_std_rad]
         self._floor: FloatArray = np.array(floor) ** 2
         self._pending: deque[tuple[float, float, float, float]] = deque()
         self._unlogged_s = 0.0
         self._recent = RecentSightings()
         self._t_s: float | None = None
-        self._dt_s = knowledge.dt_s
+        self._dt_s = robot.dt_s
         self._motion = np.zeros(2)
         self._rejections = self.recoveries = 0
         self._recovered_s, self._doubt = -math.inf, 1.0
-        self.belief = knowledge.initial
-        self._count(0, 0, 0.0)
+        self.belief = initial
+        self._telemetry = journal.channel(COLUMNS)
 
     def step(self, readings: Readings) -> Belief:
         """Move by what the odometry said ``delay_s`` ago, then update by every landmark seen."""
@@ -134,7 +153,7 @@ class EkfSlowErrorsLocalizer:
         if isinstance(seen, BeaconReadings):
             self._update(seen)
         else:
-            self._count(0, 0, 0.0)
+            self._tell(0, 0, 0.0)
         self.belief = Belief(Pose2.from_array(self._state), self._cov[:3, :3].copy())
         return self.belief
 
@@ -203,7 +222,7 @@ class EkfSlowErrorsLocalizer:
         self._remember(seen)
         if self._cov[2, 2] > config.fix_heading_std_rad**2:
             self._begin_anew(least_landmarks=2)
-            self._count(count, 0, 0.0)
+            self._tell(count, 0, 0.0)
             return
         nis, outcome = np.empty(count), np.empty(count, dtype=np.int64)
         used = slow_errors.update_range_bearings(
@@ -235,7 +254,7 @@ class EkfSlowErrorsLocalizer:
             self._doubt_the_drive()
             # Three landmarks that agree on a place have a word against the filter; two may be mistaken.
             self._begin_anew(least_landmarks=3)
-        self._count(count, used, float(nis[outcome == OUTCOME_ACCEPTED].sum()))
+        self._tell(count, used, float(nis[outcome == OUTCOME_ACCEPTED].sum()))
 
     def _doubt_the_drive(self) -> None:
         """Recovery after recovery: the drive is another than expected, so its errors may be larger.
@@ -285,22 +304,20 @@ class EkfSlowErrorsLocalizer:
         across = white[2] + scales[2] + slow[slow_errors.BEARING] + (white[3] + scales[3]) / r2
         return np.diag([along, across])
 
-    def _count(self, seen: int, accepted: int, nis: float) -> None:
-        self._telemetry = {
-            "beacons_seen": float(seen),
-            "beacons_accepted": float(accepted),
-            "nis": nis if accepted else math.nan,
-            "nis_dof": float(MEASUREMENT_DOF * accepted),
-            "nis_expected": accepted * self._expected_nis if accepted else math.nan,
-            "recoveries": float(self.recoveries),
-        }
-        for name, place in TELEMETRY.items():
-            self._telemetry[name] = float(self._state[place])
-            self._telemetry[f"{name}_std"] = math.sqrt(max(float(self._cov[place, place]), 0.0))
-
-    def telemetry(self) -> Mapping[str, float]:
-        """Beacons seen and accepted, their NIS, recoveries so far, and the errors as believed."""
-        return self._telemetry
+    def _tell(self, seen: int, accepted: int, nis: float) -> None:
+        state, cov = self._state, self._cov
+        errors: list[float] = []
+        for place in TELEMETRY.values():
+            errors += (float(state[place]), math.sqrt(max(float(cov[place, place]), 0.0)))
+        self._telemetry.tell(
+            seen,
+            accepted,
+            nis if accepted else math.nan,
+            MEASUREMENT_DOF * accepted,
+            accepted * self._expected_nis if accepted else math.nan,
+            self.recoveries,
+            *errors,
+        )
 
 
 def _fading(error: LandmarkError) -> list[float]:

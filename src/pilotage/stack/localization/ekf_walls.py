@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 
 import numpy as np
 from pydantic import Field
@@ -12,13 +11,15 @@ from pilotage.core.chi_square import gated_mean
 from pilotage.core.config import Config
 from pilotage.core.errors import InputError
 from pilotage.core.types import FloatArray, Pose2
+from pilotage.maps.world_map import WorldMap
 from pilotage.models.odometry import OdometryModel
 from pilotage.sensors.lidar import LidarConfig
 from pilotage.sensors.readings import LidarScan, OdometryIncrement, Readings
 from pilotage.sensors.sensor import Positive
 from pilotage.sensors.wheel_odometry import WheelOdometryConfig
 from pilotage.stack.interface import Belief, BeliefStatus
-from pilotage.stack.knowledge import Knowledge
+from pilotage.stack.journal import Journal
+from pilotage.stack.knowledge import RobotKnowledge
 from pilotage.stack.localization.localizer import LOCALIZERS, require_initial_pose
 from pilotage.stack.localization.odometry_prediction import OdometryNoise, OdometryPrediction
 from pilotage.stack.localization.recovery import Recovery, RecoveryConfig
@@ -26,6 +27,18 @@ from pilotage.stack.localization.wall_correction import correct
 from pilotage.stack.localization.wall_matching import LINE_DOF, WallMatcher, WallMatchingConfig
 from pilotage.stack.localization.wall_update import WallUpdate
 from pilotage.stack.perception.lines import DetectedLines, LineExtractionConfig, LineExtractor
+
+COLUMNS = {
+    "lines_seen": "1",
+    "lines_accepted": "1",
+    "nis": "1",
+    "nis_dof": "1",
+    "nis_expected": "1",
+    "localized": "1",
+    "hypotheses": "1",
+}
+"""Lines seen and matched; NIS of the accepted together, its degrees of freedom and its mean; whether the
+robot knows where it is, and how many poses it may have."""
 
 
 class EkfWallsConfig(Config):
@@ -61,9 +74,16 @@ class EkfWallsLocalizer:
     that repeats itself farther than the robot sees.
     """
 
-    def __init__(self, config: EkfWallsConfig, knowledge: Knowledge) -> None:
-        self._odometry, odometry = knowledge.one_sensor(WheelOdometryConfig, "ekf-walls")
-        self._lidar, lidar = knowledge.one_sensor(LidarConfig, "ekf-walls")
+    def __init__(
+        self,
+        config: EkfWallsConfig,
+        robot: RobotKnowledge,
+        chart: WorldMap,
+        initial: Belief,
+        journal: Journal,
+    ) -> None:
+        self._odometry, odometry = robot.one_sensor(WheelOdometryConfig, "ekf-walls")
+        self._lidar, lidar = robot.one_sensor(LidarConfig, "ekf-walls")
         range_var = lidar.range_var_m2 if config.range_var_m2 is None else config.range_var_m2
         if range_var == 0.0:
             raise InputError(
@@ -73,18 +93,19 @@ class EkfWallsLocalizer:
         self._prediction = OdometryPrediction(
             odometry, config.odometry, config.odometry_var_scale, config.odometry_model
         )
-        self._extractor = LineExtractor(config.lines, lidar, range_var, knowledge.streams.stream("ekf-walls"))
+        self._extractor = LineExtractor(config.lines, lidar, range_var, robot.streams.stream("ekf-walls"))
         # Only the covariances are scaled: which points make a line is no matter of belief.
         self._var_scale = config.measurement_var_scale
         self._mount = np.array([lidar.mount.x_m, lidar.mount.y_m, lidar.mount.theta_rad])
-        self._matcher = WallMatcher(config.matching, config.gate, knowledge.world_map, self._mount)
+        self._matcher = WallMatcher(config.matching, config.gate, chart.walls, self._mount)
         if config.recovery is None:
-            require_initial_pose(knowledge, "ekf-walls without recovery")
+            require_initial_pose(initial, "ekf-walls without recovery")
             self._recovery = None
         else:
             self._recovery = Recovery(
                 config.recovery,
-                knowledge,
+                robot,
+                chart,
                 lidar,
                 config.lines.max_range_m,
                 self._matcher,
@@ -93,21 +114,20 @@ class EkfWallsLocalizer:
             )
         gates = self._matcher.joint_gates
         self._expected_nis = [0.0, *(gated_mean(gates[k], LINE_DOF * k) for k in range(1, len(gates)))]
-        self._pose = knowledge.initial.pose.as_array()
-        self._cov = knowledge.initial.cov.copy()
-        self.belief = knowledge.initial
-        self._unknown = Belief.anywhere(knowledge.world_map.bounds_m)
-        self._lost = knowledge.initial.status is BeliefStatus.LOST
-        self.last_update: WallUpdate | None = None
-        self._telemetry = _telemetry(0, 0, 0.0, 0.0)
+        self._pose = initial.pose.as_array()
+        self._cov = initial.cov.copy()
+        self.belief = initial
+        self._unknown = Belief.anywhere(chart.bounds_m)
+        self._lost = initial.status is BeliefStatus.LOST
+        self._journal = journal
+        self._telemetry = journal.channel(COLUMNS)
 
     def step(self, readings: Readings) -> Belief:
         """Predict by the odometry increment, then update by the lines of the scan."""
         odometry = readings.by_sensor.get(self._odometry)
         if isinstance(odometry, OdometryIncrement):
             self._move(odometry)
-        self._telemetry = _telemetry(0, 0, 0.0, 0.0)
-        self.last_update = None
+        seen, used, nis = 0, 0, 0.0
         scan = readings.by_sensor.get(self._lidar)
         if isinstance(scan, LidarScan):
             lines = self._extractor.extract(scan.ranges_m)
@@ -115,7 +135,9 @@ class EkfWallsLocalizer:
             if self._lost:
                 self._find(lines, scan.ranges_m)
             else:
-                self._update(lines, scan.ranges_m)
+                used, nis = self._update(lines, scan.ranges_m)
+            seen = len(lines)
+        self._tell(seen, used, nis)
         self.belief = self._unknown if self._lost else Belief(Pose2.from_array(self._pose), self._cov.copy())
         return self.belief
 
@@ -125,46 +147,38 @@ class EkfWallsLocalizer:
         elif self._recovery is not None:
             self._recovery.move(odometry)
 
-    def _update(self, lines: DetectedLines, ranges_m: FloatArray) -> None:
+    def _update(self, lines: DetectedLines, ranges_m: FloatArray) -> tuple[int, float]:
+        """Correct the pose; returns how many lines were used, and their joint NIS."""
         pose, cov = self._pose.copy(), self._cov.copy()
         matches, total = correct(self._pose, self._cov, self._mount, lines, self._matcher)
-        self.last_update = WallUpdate(pose, cov, self._pose.copy(), lines, matches, self._matcher)
-        used = matches.count
-        self._telemetry = _telemetry(len(lines), used, total, self._expected_nis[used])
+        self._journal.update = WallUpdate(pose, cov, self._pose.copy(), lines, matches, self._matcher)
         if self._recovery is not None:
             self._lost = self._recovery.gives_up(self._pose, self._cov, ranges_m, matches)
+        return matches.count, total
 
     def _find(self, lines: DetectedLines, ranges_m: FloatArray) -> None:
         assert self._recovery is not None, "never lost without it"
-        self._telemetry = _telemetry(len(lines), 0, 0.0, 0.0)
         found = self._recovery.find(lines, ranges_m)
         if found is not None:
             self._pose, self._cov, self._lost = found.pose, found.cov, False
 
-    @property
     def look_bearing_rad(self) -> float | None:
         """Direction, in the robot's frame, worth driving in to find out where it is; None where any is."""
         if not self._lost or self._recovery is None:
             return None
         return self._recovery.look_bearing_rad
 
-    def telemetry(self) -> Mapping[str, float]:
-        """Lines seen and matched; NIS of the accepted together, its degrees of freedom and its mean."""
-        return {
-            **self._telemetry,
-            "localized": 0.0 if self._lost else 1.0,
-            "hypotheses": 0.0 if self._recovery is None else float(self._recovery.hypotheses),
-        }
-
-
-def _telemetry(seen: int, accepted: int, nis: float, expected: float) -> dict[str, float]:
-    """One step's numbers; without a measurement there is no NIS."""
-    if accepted == 0:
-        nis = expected = math.nan
-    return {
-        "lines_seen": float(seen),
-        "lines_accepted": float(accepted),
-        "nis": nis,
-        "nis_dof": float(LINE_DOF * accepted),
-        "nis_expected": expected,
-    }
+    def _tell(self, seen: int, accepted: int, nis: float) -> None:
+        """One step's numbers; without a measurement there is no NIS."""
+        expected = self._expected_nis[accepted]
+        if accepted == 0:
+            nis = expected = math.nan
+        self._telemetry.tell(
+            seen,
+            accepted,
+            nis,
+            LINE_DOF * accepted,
+            expected,
+            0.0 if self._lost else 1.0,
+            0.0 if self._recovery is None else self._recovery.hypotheses,
+        )

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 
 import numpy as np
 
@@ -14,12 +13,14 @@ from pilotage.core.types import FloatArray, Pose2
 from pilotage.kernels.filters import ekf
 from pilotage.kernels.lines import clustering
 from pilotage.kernels.lines import infinite as infinite_lines
+from pilotage.maps.world_map import WorldMap
 from pilotage.sensors.lidar import LidarConfig
 from pilotage.sensors.readings import LidarScan, OdometryIncrement, Readings
 from pilotage.sensors.sensor import NonNegative, Positive
 from pilotage.sensors.wheel_odometry import WheelOdometryConfig
 from pilotage.stack.interface import Belief
-from pilotage.stack.knowledge import Knowledge
+from pilotage.stack.journal import Journal
+from pilotage.stack.knowledge import RobotKnowledge
 from pilotage.stack.localization.localizer import LOCALIZERS, require_initial_pose
 
 CUTOFF_M = 0.5
@@ -28,6 +29,8 @@ MAX_RANGE_M = 19.9
 INLIER_M = 0.05
 ITERATIONS = 60
 UNIFORMS = 512
+COLUMNS = {"lines_seen": "1", "lines_accepted": "1", "nis": "1", "nis_dof": "1", "nis_expected": "1"}
+"""Lines seen and accepted; NIS summed over the accepted, its degrees of freedom and its mean."""
 
 
 class EkfWallsReportConfig(Config):
@@ -53,35 +56,43 @@ class EkfWallsReportLocalizer:
     threshold lets through next to nothing or next to everything. Use ``ekf-walls``.
     """
 
-    def __init__(self, config: EkfWallsReportConfig, knowledge: Knowledge) -> None:
-        require_initial_pose(knowledge, "ekf-walls-report")
-        self._odometry, _ = knowledge.one_sensor(WheelOdometryConfig, "ekf-walls-report")
-        self._lidar, lidar = knowledge.one_sensor(LidarConfig, "ekf-walls-report")
+    def __init__(
+        self,
+        config: EkfWallsReportConfig,
+        robot: RobotKnowledge,
+        chart: WorldMap,
+        initial: Belief,
+        journal: Journal,
+    ) -> None:
+        require_initial_pose(initial, "ekf-walls-report")
+        self._odometry, _ = robot.one_sensor(WheelOdometryConfig, "ekf-walls-report")
+        self._lidar, lidar = robot.one_sensor(LidarConfig, "ekf-walls-report")
         self._step = lidar.beam_step_rad
         self._directions = clustering.beam_directions(
             float(lidar.beam_angles_rad()[0]), lidar.beam_step_rad, lidar.beams
         )
         self._max_range = min(MAX_RANGE_M, float(np.nextafter(lidar.max_range_m, 0.0)))
-        self._lines = _general_equations(knowledge.world_map.segments_m)
+        self._lines = _general_equations(chart.walls.segments_m)
         self._Q = np.diag([config.odometry_distance_var_m2, config.odometry_angle_var_rad2])
         self._R = config.distance_var_m2
         self._threshold = config.threshold_chi2
         self._expected_nis = gated_mean(config.threshold_chi2, 1)
-        self._rng = knowledge.streams.stream("ekf-walls-report")
-        self._pose = knowledge.initial.pose.as_array()
-        self._cov = knowledge.initial.cov.copy()
-        self.belief = knowledge.initial
-        self._telemetry = _telemetry(0, 0, 0.0, 0.0)
+        self._rng = robot.streams.stream("ekf-walls-report")
+        self._pose = initial.pose.as_array()
+        self._cov = initial.cov.copy()
+        self.belief = initial
+        self._telemetry = journal.channel(COLUMNS)
 
     def step(self, readings: Readings) -> Belief:
         """Predict by the report's odometry model, then update by every distance that passes."""
         odometry = readings.by_sensor.get(self._odometry)
         if isinstance(odometry, OdometryIncrement):
             ekf.predict(self._pose, self._cov, odometry.distance_m, odometry.angle_rad, self._Q, False)
-        self._telemetry = _telemetry(0, 0, 0.0, 0.0)
         scan = readings.by_sensor.get(self._lidar)
         if isinstance(scan, LidarScan):
             self._update(scan.ranges_m)
+        else:
+            self._tell(0, 0, 0.0)
         self.belief = Belief(Pose2.from_array(self._pose), self._cov.copy())
         return self.belief
 
@@ -103,9 +114,7 @@ class EkfWallsReportLocalizer:
         passed = np.flatnonzero((matched >= 0) & (nis <= self._threshold))
         if passed.size:
             self._correct(innovation[passed], H[passed])
-        self._telemetry = _telemetry(
-            feet.shape[0], passed.size, float(nis[passed].sum()), passed.size * self._expected_nis
-        )
+        self._tell(feet.shape[0], passed.size, float(nis[passed].sum()))
 
     def _correct(self, innovation: FloatArray, H: FloatArray) -> None:
         """All distances at once, in Joseph form."""
@@ -117,9 +126,12 @@ class EkfWallsReportLocalizer:
         cov = A @ self._cov @ A.T + K @ R @ K.T
         self._cov = 0.5 * (cov + cov.T)
 
-    def telemetry(self) -> Mapping[str, float]:
-        """Lines seen and accepted; NIS summed over the accepted, its degrees of freedom and its mean."""
-        return self._telemetry
+    def _tell(self, seen: int, accepted: int, nis: float) -> None:
+        """One step's numbers; without a measurement there is no NIS."""
+        expected = accepted * self._expected_nis
+        if accepted == 0:
+            nis = expected = math.nan
+        self._telemetry.tell(seen, accepted, nis, accepted, expected)
 
 
 def _general_equations(segments_m: FloatArray) -> FloatArray:
@@ -128,16 +140,3 @@ def _general_equations(segments_m: FloatArray) -> FloatArray:
     lines = np.column_stack([y1 - y0, x0 - x1, x1 * y0 - x0 * y1])
     length = np.hypot(lines[:, 0], lines[:, 1])
     return np.ascontiguousarray(lines[length > 0.0] / length[length > 0.0, None])
-
-
-def _telemetry(seen: int, accepted: int, nis: float, expected: float) -> dict[str, float]:
-    """One step's numbers; without a measurement there is no NIS."""
-    if accepted == 0:
-        nis = expected = math.nan
-    return {
-        "lines_seen": float(seen),
-        "lines_accepted": float(accepted),
-        "nis": nis,
-        "nis_dof": float(accepted),
-        "nis_expected": expected,
-    }

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 
 import numpy as np
 from pydantic import Field
@@ -13,19 +13,29 @@ from pilotage.core.config import Config
 from pilotage.core.errors import InputError
 from pilotage.core.types import BoolArray, Pose2
 from pilotage.kernels.filters import sighting
+from pilotage.maps.world_map import WorldMap
 from pilotage.models.odometry import OdometryModel
 from pilotage.sensors.beacon import BeaconConfig
 from pilotage.sensors.readings import BeaconReadings, OdometryIncrement, Readings
 from pilotage.sensors.sensor import Positive
 from pilotage.sensors.wheel_odometry import WheelOdometryConfig
 from pilotage.stack.interface import Belief
-from pilotage.stack.knowledge import Knowledge
+from pilotage.stack.journal import Journal
+from pilotage.stack.knowledge import RobotKnowledge
 from pilotage.stack.localization.beacon_fix import fix_from_beacons
 from pilotage.stack.localization.localizer import require_initial_pose
 from pilotage.stack.localization.odometry_prediction import OdometryNoise, OdometryPrediction, Predict
 
 MEASUREMENT_DOF = 2
 """Range and bearing."""
+SIGHTING_COLUMNS = {
+    "beacons_seen": "1",
+    "beacons_accepted": "1",
+    "nis": "1",
+    "nis_dof": "1",
+    "nis_expected": "1",
+}
+"""Beacons seen and accepted; NIS summed over the accepted, its degrees of freedom and its mean."""
 WIDENING = 2.0
 """A filter in doubt multiplies the pose's standard deviations by this at every sighting until one passes."""
 MOST_HEADING_VAR = math.pi**2 / 3.0
@@ -72,20 +82,23 @@ class LandmarkFilter:
         predict: Predict,
         update: Update,
         config: LandmarkFilterConfig,
-        knowledge: Knowledge,
+        robot: RobotKnowledge,
+        chart: WorldMap,
+        initial: Belief,
+        journal: Journal,
     ) -> None:
-        require_initial_pose(knowledge, name)
+        require_initial_pose(initial, name)
         self._update_kernel = update
-        self._odometry, odometry = knowledge.one_sensor(WheelOdometryConfig, name)
-        self._beacons, beacons = knowledge.one_sensor(BeaconConfig, name)
-        if len(knowledge.landmarks) == 0:
+        self._odometry, odometry = robot.one_sensor(WheelOdometryConfig, name)
+        self._beacons, beacons = robot.one_sensor(BeaconConfig, name)
+        if len(chart.landmarks) == 0:
             raise InputError(f"{name}: expected a map with landmarks, found none")
         self._prediction = OdometryPrediction(
             odometry, config.odometry, config.odometry_var_scale, config.odometry_model, predict
         )
-        order = np.argsort(knowledge.landmarks.ids)
-        self._ids = knowledge.landmarks.ids[order]
-        self._points = knowledge.landmarks.points_xy_m[order]
+        order = np.argsort(chart.landmarks.ids)
+        self._ids = chart.landmarks.ids[order]
+        self._points = chart.landmarks.points_xy_m[order]
         self._mount = np.array([beacons.mount.x_m, beacons.mount.y_m, beacons.mount.theta_rad])
         range_var = beacons.range_var_m2 if config.range_var_m2 is None else config.range_var_m2
         bearing_var = beacons.bearing_var_rad2 if config.bearing_var_rad2 is None else config.bearing_var_rad2
@@ -99,10 +112,10 @@ class LandmarkFilter:
         self._gate = chi_square_quantile(config.gate, MEASUREMENT_DOF)
         self._expected_nis = gated_mean(self._gate, MEASUREMENT_DOF)
         self._doubt_after, self._rejected = config.doubt_after, 0
-        self._pose = knowledge.initial.pose.as_array()
-        self._cov = knowledge.initial.cov.copy()
-        self.belief = knowledge.initial
-        self._telemetry = _telemetry(0, 0, 0.0, 0.0)
+        self._pose = initial.pose.as_array()
+        self._cov = initial.cov.copy()
+        self.belief = initial
+        self._telemetry = journal.channel(SIGHTING_COLUMNS)
 
     def step(self, readings: Readings) -> Belief:
         """Predict by the odometry increment, then update by every beacon seen."""
@@ -113,7 +126,7 @@ class LandmarkFilter:
         if isinstance(seen, BeaconReadings):
             self._update(seen)
         else:
-            self._telemetry = _telemetry(0, 0, 0.0, 0.0)
+            self._tell(0, 0, 0.0)
         # A filter may estimate more than the pose, which comes first.
         self.belief = Belief(Pose2.from_array(self._pose), self._cov[:3, :3].copy())
         return self.belief
@@ -137,7 +150,7 @@ class LandmarkFilter:
             outcome,
         )
         total = float(nis[outcome == sighting.OUTCOME_ACCEPTED].sum()) if used else 0.0
-        self._telemetry = _telemetry(count, used, total, used * self._expected_nis)
+        self._tell(count, used, total)
         known = outcome != sighting.OUTCOME_UNKNOWN
         self._rejected = 0 if used else self._rejected + int(known.any())
         if self._doubt_after is not None and known.any() and self._rejected >= self._doubt_after:
@@ -164,19 +177,9 @@ class LandmarkFilter:
         """By how much bearings are believed to read too large."""
         return 0.0
 
-    def telemetry(self) -> Mapping[str, float]:
-        """Beacons seen and accepted; NIS summed over the accepted, its degrees of freedom and its mean."""
-        return self._telemetry
-
-
-def _telemetry(seen: int, accepted: int, nis: float, expected: float) -> dict[str, float]:
-    """One step's numbers; without a measurement there is no NIS."""
-    if accepted == 0:
-        nis = expected = math.nan
-    return {
-        "beacons_seen": float(seen),
-        "beacons_accepted": float(accepted),
-        "nis": nis,
-        "nis_dof": float(MEASUREMENT_DOF * accepted),
-        "nis_expected": expected,
-    }
+    def _tell(self, seen: int, accepted: int, nis: float) -> None:
+        """One step's numbers; without a measurement there is no NIS."""
+        expected = accepted * self._expected_nis
+        if accepted == 0:
+            nis = expected = math.nan
+        self._telemetry.tell(seen, accepted, nis, MEASUREMENT_DOF * accepted, expected)

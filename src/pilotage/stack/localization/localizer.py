@@ -2,18 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Protocol, runtime_checkable
+from typing import Protocol
 
 from pilotage.core.errors import InputError
 from pilotage.core.registry import Registry
 from pilotage.sensors.readings import Readings
 from pilotage.stack.interface import Belief, BeliefStatus
-from pilotage.stack.knowledge import Knowledge
 
 
 class Localizer(Protocol):
-    """Estimates the pose. Built as ``cls(config, knowledge)``."""
+    """Estimates the pose.
+
+    Built as ``cls(config, robot: RobotKnowledge, chart: WorldMap, initial: Belief, journal: Journal)``. It
+    declares its telemetry in the journal at construction and tells it at every step; an update that it can
+    explain it puts into ``journal.update``.
+
+    One that knows, while it is lost, where to look has a method ``look_bearing_rad() -> float | None``
+    besides: the direction, in the robot's frame, worth driving in, None where any is as good. Whether it
+    has is asked once, when the stack is put together.
+    """
 
     @property
     def belief(self) -> Belief:
@@ -24,22 +31,8 @@ class Localizer(Protocol):
         """Take in one step's readings and return the belief after them."""
         ...
 
-    def telemetry(self) -> Mapping[str, float]:
-        """Numbers of the last step; the same keys at every step."""
-        ...
 
-
-@runtime_checkable
-class Seeker(Protocol):
-    """A localizer that, while it is lost, knows where to look."""
-
-    @property
-    def look_bearing_rad(self) -> float | None:
-        """Direction, in the robot's frame, worth driving in; None where any is as good."""
-        ...
-
-
-def require_initial_pose(knowledge: Knowledge, name: str) -> None:
+def require_initial_pose(initial: Belief, name: str) -> None:
     """Refuse a start without a pose.
 
     Raises
@@ -47,7 +40,7 @@ def require_initial_pose(knowledge: Knowledge, name: str) -> None:
     InputError
         If the initial pose is unknown; said by localizers that cannot find it by themselves.
     """
-    if knowledge.initial.status is BeliefStatus.LOST:
+    if initial.status is BeliefStatus.LOST:
         raise InputError(
             f"{name}: expected an initial pose, found stack.initial.known = false; set it to true or take "
             "a localizer that finds its pose by itself, such as ekf-walls"

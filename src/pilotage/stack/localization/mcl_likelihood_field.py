@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from pathlib import Path
+from typing import Any
 
 import numpy as np
-from pydantic import Field
+from pydantic import Field, model_validator
 from scipy.special import ndtri
 
 from pilotage.core.config import Config
@@ -15,18 +15,21 @@ from pilotage.core.errors import InputError
 from pilotage.core.types import FloatArray, Pose2
 from pilotage.kernels.filters import particles
 from pilotage.maps.nearest_obstacles import NearestObstacles
-from pilotage.maps.ros_map import read_ros_map
+from pilotage.maps.world_map import WorldMap
 from pilotage.models.odometry import OdometryModel
 from pilotage.sensors.lidar import LidarConfig
 from pilotage.sensors.readings import LidarScan, OdometryIncrement, Readings
 from pilotage.sensors.sensor import NonNegative, Positive
 from pilotage.sensors.wheel_odometry import WheelOdometryConfig
 from pilotage.stack.interface import Belief
-from pilotage.stack.knowledge import Knowledge
+from pilotage.stack.journal import Journal
+from pilotage.stack.knowledge import RobotKnowledge
 from pilotage.stack.localization.localizer import LOCALIZERS, require_initial_pose
 from pilotage.stack.localization.odometry_prediction import OdometryNoise, OdometryPrediction
 
 NAME = "mcl-likelihood-field"
+COLUMNS = {"particles": "1", "effective_particles": "1", "scan_parts": "1"}
+"""Size of the cloud, how much of it was effective, and how many parts the scan was let in by."""
 TABLE_PER_STD, TABLE_STDS = 50, 12
 """The table of a beam's density: entries per standard deviation, and how many of these."""
 FLOOR = np.diag([1e-12, 1e-12, 1e-12])
@@ -55,8 +58,7 @@ class MclConfig(Config):
     most_rounds: int = Field(default=30, ge=1)
     """Parts after which the rest of a scan is let in at once."""
     resolution_m: Positive = 0.05
-    grid_file: str | None = None
-    """A ROS map_server file to be localized on; None: the mission's walls."""
+    """Of the field around walls that are known exactly; a grid's field has the grid's own."""
     beams: int = Field(default=60, ge=1)
     max_range_m: Positive = 19.9
     """Readings beyond are left out."""
@@ -69,6 +71,13 @@ class MclConfig(Config):
     odometry_model: OdometryModel = OdometryModel.EXACT_ARC
     odometry: OdometryNoise = OdometryNoise()
     odometry_var_scale: Positive = 1.0
+
+    @model_validator(mode="before")
+    @classmethod
+    def _map_is_the_worlds(cls, values: Any) -> Any:
+        if isinstance(values, Mapping) and "grid_file" in values:
+            raise ValueError("grid_file is gone; expected the grid as the robot's map: world.map: FILE.yaml")
+        return values
 
 
 @LOCALIZERS.add(NAME, MclConfig)
@@ -84,32 +93,40 @@ class MclLikelihoodFieldLocalizer:
     mean and covariance, and would draw two humps together.
     """
 
-    def __init__(self, config: MclConfig, knowledge: Knowledge) -> None:
-        require_initial_pose(knowledge, NAME)
+    def __init__(
+        self,
+        config: MclConfig,
+        robot: RobotKnowledge,
+        chart: WorldMap,
+        initial: Belief,
+        journal: Journal,
+    ) -> None:
+        require_initial_pose(initial, NAME)
         if config.most_particles < config.least_particles:
             raise InputError(
                 f"stack.localizer.most_particles: expected at least least_particles "
                 f"({config.least_particles}), found {config.most_particles}"
             )
         self._config = config
-        self._odometry, odometry = knowledge.one_sensor(WheelOdometryConfig, NAME)
-        self._lidar, lidar = knowledge.one_sensor(LidarConfig, NAME)
+        self._odometry, odometry = robot.one_sensor(WheelOdometryConfig, NAME)
+        self._lidar, lidar = robot.one_sensor(LidarConfig, NAME)
         self._prediction = OdometryPrediction(
             odometry, config.odometry, config.odometry_var_scale, config.odometry_model
         )
-        self._field = _field_of(config, knowledge)
+        self._field = _field_of(config, chart)
         self._picked = np.unique(np.linspace(0, lidar.beams - 1, min(config.beams, lidar.beams)).astype(int))
         angles = lidar.beam_angles_rad()[self._picked] + lidar.mount.theta_rad
         self._directions = np.column_stack([np.cos(angles), np.sin(angles)])
         self._mount_xy = np.array([lidar.mount.x_m, lidar.mount.y_m])
         self._max_range = min(config.max_range_m, lidar.max_range_m)
         self._table, self._table_step = _beam_density(config, lidar)
-        self._rng = knowledge.streams.stream(NAME)
+        self._rng = robot.streams.stream(NAME)
         self._quantile = float(ndtri(config.kld_probability))
-        self._poses = _draw(knowledge.initial, config.most_particles, self._rng)
+        self._poses = _draw(initial, config.most_particles, self._rng)
         self._wanted = config.most_particles
         self._rounds, self._effective = 0, float(config.most_particles)
-        self.belief = knowledge.initial
+        self.belief = initial
+        self._telemetry = journal.channel(COLUMNS)
 
     @property
     def particles(self) -> FloatArray:
@@ -128,15 +145,8 @@ class MclLikelihoodFieldLocalizer:
             moments = _moments(self._poses, np.full(self._poses.shape[0], 1.0 / self._poses.shape[0]))
         mean, cov = moments
         self.belief = Belief(Pose2.from_array(mean), cov)
+        self._telemetry.tell(self._poses.shape[0], self._effective, self._rounds)
         return self.belief
-
-    def telemetry(self) -> Mapping[str, float]:
-        """Size of the cloud, how much of it was effective, and how many parts the scan was let in by."""
-        return {
-            "particles": float(self._poses.shape[0]),
-            "effective_particles": self._effective,
-            "scan_parts": float(self._rounds),
-        }
 
     def _move(self, odometry: OdometryIncrement) -> None:
         distance_var, angle_var = self._prediction.variances(odometry)
@@ -208,11 +218,14 @@ def _moments(poses: FloatArray, weights: FloatArray) -> tuple[FloatArray, FloatA
     return mean, cov + FLOOR
 
 
-def _field_of(config: MclConfig, knowledge: Knowledge) -> NearestObstacles:
-    """Distances from the walls, or from the occupied cells of a grid: unknown cells reflect nothing."""
-    if config.grid_file is None:
-        return NearestObstacles.from_map(knowledge.world_map, config.resolution_m)
-    return NearestObstacles.from_grid(read_ros_map(Path(config.grid_file)).grid)
+def _field_of(config: MclConfig, chart: WorldMap) -> NearestObstacles:
+    """Distances from the walls where these are known exactly, else from the occupied cells of the grid.
+
+    Unknown cells reflect nothing.
+    """
+    if chart.geometry is None and chart.grid is not None:
+        return NearestObstacles.from_grid(chart.grid)
+    return NearestObstacles.from_map(chart.walls, config.resolution_m)
 
 
 def _beam_density(config: MclConfig, lidar: LidarConfig) -> tuple[FloatArray, float]:

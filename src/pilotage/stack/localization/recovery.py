@@ -9,10 +9,11 @@ from pydantic import Field
 
 from pilotage.core.config import Config
 from pilotage.core.types import FloatArray
+from pilotage.maps.world_map import WorldMap
 from pilotage.sensors.lidar import LidarConfig
 from pilotage.sensors.readings import OdometryIncrement
 from pilotage.sensors.sensor import Positive
-from pilotage.stack.knowledge import Knowledge
+from pilotage.stack.knowledge import RobotKnowledge
 from pilotage.stack.localization.global_search import GlobalSearch, GlobalSearchConfig, Hypothesis
 from pilotage.stack.localization.odometry_prediction import OdometryPrediction
 from pilotage.stack.localization.scan_fit import ScanFit
@@ -55,7 +56,8 @@ class Recovery:
     def __init__(
         self,
         config: RecoveryConfig,
-        knowledge: Knowledge,
+        robot: RobotKnowledge,
+        chart: WorldMap,
         lidar: LidarConfig,
         max_range_m: float,
         matcher: WallMatcher,
@@ -63,17 +65,17 @@ class Recovery:
         prediction: OdometryPrediction,
     ) -> None:
         self._config = config
-        self._fit = ScanFit(knowledge.world_map, lidar, max_range_m, config.near_m, config.beyond_m)
+        self._fit = ScanFit(chart.walls, lidar, max_range_m, config.near_m, config.beyond_m)
         self._search = GlobalSearch(
             config.search,
-            knowledge.world_map,
+            chart.walls,
             self._fit,
             matcher,
             mount,
             prediction,
-            knowledge.body_radius_m,
+            robot.radius_m,
         )
-        self._viewpoint = Viewpoint(config.viewpoint, knowledge.world_map, lidar, knowledge.body_radius_m)
+        self._viewpoint = Viewpoint(config.viewpoint, chart.walls, lidar, robot.radius_m)
         self._contradicted = self._unexplained = self._unplaced = 0
 
     @property

@@ -11,7 +11,10 @@ from pilotage.stack.interface import Belief
 
 
 class Mapper(Protocol):
-    """Puts what was seen on the robot's own map. Built as ``cls(config, knowledge)``."""
+    """Puts what was seen on the robot's own map.
+
+    Built as ``cls(config, robot: RobotKnowledge, chart: WorldMap)``.
+    """
 
     @property
     def circles_m(self) -> FloatArray:

@@ -11,11 +11,12 @@ from pilotage.core.config import Config
 from pilotage.core.types import FloatArray
 from pilotage.kernels.scans import unexpected
 from pilotage.maps.distance_field import DistanceField
+from pilotage.maps.world_map import WorldMap
 from pilotage.sensors.lidar import LidarConfig
 from pilotage.sensors.readings import LidarScan, Readings
 from pilotage.sensors.sensor import Positive
 from pilotage.stack.interface import Belief
-from pilotage.stack.knowledge import Knowledge
+from pilotage.stack.knowledge import RobotKnowledge
 from pilotage.stack.mapping.mapper import MAPPERS
 
 
@@ -40,15 +41,15 @@ class ObstacleLayer:
     a known wall are taken for the wall, so an obstacle flush with a wall is seen only where it stands out.
     """
 
-    def __init__(self, config: ObstacleLayerConfig, knowledge: Knowledge) -> None:
+    def __init__(self, config: ObstacleLayerConfig, robot: RobotKnowledge, chart: WorldMap) -> None:
         self._config = config
-        self._lidar, lidar = knowledge.one_sensor(LidarConfig, "obstacle-layer")
+        self._lidar, lidar = robot.one_sensor(LidarConfig, "obstacle-layer")
         self._mount = lidar.mount
         self._first = float(lidar.beam_angles_rad()[0])
         self._step = lidar.beam_step_rad
         self._reach_m = min(config.reach_m, lidar.max_range_m)
-        self._known = DistanceField.from_map(knowledge.world_map)
-        xmin, ymin, xmax, ymax = knowledge.world_map.bounds_m
+        self._known = DistanceField.from_map(chart.walls)
+        xmin, ymin, xmax, ymax = chart.bounds_m
         shape = (math.ceil((ymax - ymin) / config.cell_m), math.ceil((xmax - xmin) / config.cell_m))
         self._hits = np.zeros(shape, dtype=np.int64)
         self._sums = np.zeros((*shape, 2))

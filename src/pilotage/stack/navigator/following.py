@@ -7,6 +7,7 @@ import math
 from pilotage.core.angles import wrap_to_pi
 from pilotage.core.types import STOP, FloatArray, Pose2, Twist
 from pilotage.kernels.geometry import plane
+from pilotage.maps.near_walls import NearWalls
 from pilotage.stack.control.controller import Control, Controller
 from pilotage.stack.planning.local_planner import LocalPath, LocalPlanner, RouteAhead
 
@@ -41,9 +42,9 @@ class WaypointFollower:
         self.control = NO_CONTROL
         self.feedforward = STOP
 
-    def replan(self, pose: Pose2, route: RouteAhead, segments_m: FloatArray, circles_m: FloatArray) -> bool:
+    def replan(self, pose: Pose2, route: RouteAhead, walls: NearWalls, circles_m: FloatArray) -> bool:
         """Plan from the estimate to the next reachable waypoint; False where there is none."""
-        self._local = self._local_planner.plan(pose, route, segments_m, circles_m)
+        self._local = self._local_planner.plan(pose, route, walls, circles_m)
         self._index = 0
         return self._local is not None
 

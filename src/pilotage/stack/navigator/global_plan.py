@@ -10,35 +10,34 @@ import numpy as np
 
 from pilotage.core.types import FloatArray, Goal, Pose2
 from pilotage.maps.distance_field import DistanceField
-from pilotage.maps.segment_map import SegmentMap
+from pilotage.maps.world_map import WorldMap
 from pilotage.stack.interface import PlannedPath
+from pilotage.stack.journal import Journal
 from pilotage.stack.navigator.progress import PathProgress
 from pilotage.stack.planning.planner import Path, Planner, PlanRequest, PlanResult, Smoother
 
 
 class GlobalPlan:
-    """Holds the current path and every plan adopted before it."""
+    """Holds the current path; every plan adopted goes into the journal."""
 
     def __init__(
         self,
         planner: Planner,
         smoother: Smoother | None,
-        world_map: SegmentMap,
-        goal: Goal,
+        chart: WorldMap,
         rng: np.random.Generator,
+        journal: Journal,
         least_clearance_m: float = 0.0,
     ) -> None:
         self._least_clearance_m = least_clearance_m
         self._planner = planner
         self._smoother = smoother
-        self._map = world_map
-        self._goal = goal
+        self._chart = chart
+        self._journal = journal
         self._rng = rng
         self.path: Path | None = None
         self.progress: PathProgress | None = None
-        self.circles_m: FloatArray = world_map.circles_m
-        self.history: list[PlannedPath] = []
-        self.planning_time_s = 0.0
+        self.circles_m: FloatArray = chart.walls.circles_m
 
     @property
     def clearance_m(self) -> float:
@@ -46,18 +45,23 @@ class GlobalPlan:
         return max(self._planner.clearance_m, self._least_clearance_m)
 
     def make(
-        self, t_s: float, start: Pose2, mapped_m: FloatArray, clearances_m: Sequence[float]
+        self,
+        t_s: float,
+        start: Pose2,
+        goal: Goal,
+        mapped_m: FloatArray,
+        clearances_m: Sequence[float],
     ) -> PlanResult:
         """Plan on the map with what was found on it, at the first clearance that gives a path; adopt it.
 
         Returns the last result; its path is None where no clearance gave one.
         """
         begin = time.perf_counter()
-        world = self._map.with_obstacles(np.zeros((0, 4)), mapped_m)
+        world = self._chart.walls.with_obstacles(np.zeros((0, 4)), mapped_m)
         field = DistanceField.from_map(world)
         result: PlanResult | None = None
         for clearance_m in clearances_m:
-            request = PlanRequest(start, self._goal, field, self._rng, clearance_m)
+            request = PlanRequest(start, goal, field, self._rng, clearance_m)
             result = self._planner.plan(request)
             if result.path is not None:
                 path = result.path
@@ -66,7 +70,7 @@ class GlobalPlan:
                 self._adopt(t_s, path, result, clearance_m, time.perf_counter() - begin, world.circles_m)
                 break
         assert result is not None
-        self.planning_time_s += time.perf_counter() - begin
+        self._journal.planning_time_s += time.perf_counter() - begin
         return result
 
     def _adopt(
@@ -82,7 +86,7 @@ class GlobalPlan:
         self.progress = PathProgress(path.states, path.waypoints, clearance_m)
         self.circles_m = circles_m
         first = result.first_solution_s if math.isfinite(result.first_solution_s) else planning_s
-        self.history.append(
+        self._journal.plans.append(
             PlannedPath(
                 t_s,
                 path.states,

@@ -3,22 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 
 from pilotage.core.errors import InputError
-from pilotage.core.types import STOP, Event, FloatArray, Pose2, Twist
+from pilotage.core.types import STOP, Pose2, Twist
+from pilotage.maps.world_map import WorldMap
 from pilotage.sensors.readings import Readings
 from pilotage.stack.control.guard import ArcGuard
 from pilotage.stack.control.reactive import Reaction, ReactionKind
-from pilotage.stack.interface import (
-    Belief,
-    BeliefStatus,
-    ExplainableUpdate,
-    Explaining,
-    PlannedPath,
-    StackStatus,
-)
-from pilotage.stack.knowledge import Knowledge
+from pilotage.stack.interface import Belief, BeliefStatus, StackStatus
+from pilotage.stack.journal import Journal
+from pilotage.stack.knowledge import RobotKnowledge, TaskKnowledge
 from pilotage.stack.navigator.following import WaypointFollower
 from pilotage.stack.navigator.global_plan import GlobalPlan
 from pilotage.stack.navigator.goal_config import GoalNavigatorConfig, Mode
@@ -37,6 +31,20 @@ MAPPED_TOLERANCE_M = 0.02
 PLAN_AGAIN_S = 1.0
 """A robot that found itself where no plan begins drives on for this long before the next."""
 
+COLUMNS = {
+    "ref_x_m": "m",
+    "ref_y_m": "m",
+    "ref_theta_rad": "rad",
+    "w_feedforward_rad_s": "rad/s",
+    "w_proportional_rad_s": "rad/s",
+    "w_integral_rad_s": "rad/s",
+    "w_reactive_rad_s": "rad/s",
+    "path_error_m": "m",
+    "mode": "1",
+    "distance_to_go_m": "m",
+}
+"""Reference, parts of the command, mode and progress."""
+
 NO_REACTION = Reaction(ReactionKind.NONE, 0.0, math.inf, math.inf)
 
 
@@ -50,8 +58,16 @@ class GoalNavigator:
     While its localizer is lost it wanders about by its scanner, maps nothing, and plans once it is found.
     """
 
-    def __init__(self, config: GoalNavigatorConfig, knowledge: Knowledge, parts: Parts) -> None:
-        if knowledge.goal is None:
+    def __init__(
+        self,
+        config: GoalNavigatorConfig,
+        robot: RobotKnowledge,
+        chart: WorldMap,
+        task: TaskKnowledge,
+        parts: Parts,
+        journal: Journal,
+    ) -> None:
+        if task.goal is None:
             raise InputError("navigator 'goal': expected world.goal, found none")
         if parts.planner is None or parts.local_planner is None or parts.controller is None:
             raise InputError(
@@ -59,25 +75,25 @@ class GoalNavigator:
                 "found one of them missing"
             )
         self._config = config
-        self._goal = knowledge.goal
-        self._tolerance_m = knowledge.goal_tolerance_m
-        self._radius_m = knowledge.body_radius_m
+        self._goal = task.goal
+        self._tolerance_m = task.goal_tolerance_m
+        self._radius_m = robot.radius_m
         self._localizer = parts.localizer
         self._reactive = parts.reactive
         self._mapper = parts.mapper
-        self._map = OwnMap(knowledge.world_map, parts.mapper)
+        self._map = OwnMap(chart.walls, parts.mapper)
         self._escape = parts.escape
         self._plan = GlobalPlan(
             parts.planner,
             parts.smoother,
-            knowledge.world_map,
-            knowledge.goal,
-            knowledge.streams.stream("planner"),
-            knowledge.body_radius_m + config.guard.margin_m,
+            chart,
+            robot.streams.stream("planner"),
+            journal,
+            robot.radius_m + config.guard.margin_m,
         )
-        self._follower = WaypointFollower(parts.local_planner, parts.controller, knowledge.dt_s)
-        self._guard = ArcGuard(config.guard, knowledge.body_radius_m)
-        self._lost = LostDriving(config.wander, knowledge, parts.localizer)
+        self._follower = WaypointFollower(parts.local_planner, parts.controller, robot.dt_s)
+        self._guard = ArcGuard(config.guard, robot.radius_m)
+        self._lost = LostDriving(config.wander, robot, parts.localizer)
         self._t_s = 0.0
         self._status, self._reason = StackStatus.RUNNING, ""
         self._mode = Mode.FOLLOW
@@ -86,8 +102,11 @@ class GoalNavigator:
         self._trail: list[Pose2] = []
         self._avoiding = self._escaping = self._in_hall = self._looks_around = False
         self._reaction = NO_REACTION
-        self._events: list[Event] = []
-        self.counts = {"attempts": 0, "replans": 0, "escapes": 0}
+        self._journal = journal
+        self._telemetry = journal.channel(COLUMNS, first=True)
+        journal.result("mapped_circles_m", lambda: self._map.found_circles_m)
+        journal.counts |= {"attempts": 0, "replans": 0, "escapes": 0}
+        self._plan_ahead()
 
     # --- the plug -----------------------------------------------------------------------------------
 
@@ -97,31 +116,11 @@ class GoalNavigator:
         return self._localizer.belief
 
     @property
-    def last_update(self) -> ExplainableUpdate | None:
-        """The localizer's last update, where it can be explained."""
-        return self._localizer.last_update if isinstance(self._localizer, Explaining) else None
-
-    @property
     def status(self) -> tuple[StackStatus, str]:
         """Running, arrived or failed, and why."""
         return self._status, self._reason
 
-    @property
-    def plans(self) -> list[PlannedPath]:
-        """Every plan adopted so far."""
-        return self._plan.history
-
-    @property
-    def planning_time_s(self) -> float:
-        """Wall time spent planning globally, queries without a path included."""
-        return self._plan.planning_time_s
-
-    @property
-    def mapped_circles_m(self) -> FloatArray:
-        """(M, 3) what the robot put on its own map."""
-        return self._map.found_circles_m
-
-    def prepare(self) -> None:
+    def _plan_ahead(self) -> None:
         """Plan from the initial belief; without a path the task has failed before it starts.
 
         A robot that is lost plans once it knows where it is. One that believes to stand where there is no
@@ -129,7 +128,9 @@ class GoalNavigator:
         """
         if self.belief.status is BeliefStatus.LOST:
             return
-        result = self._plan.make(0.0, self.belief.pose, self._map.found_circles_m, (self._plan.clearance_m,))
+        result = self._plan.make(
+            0.0, self.belief.pose, self._goal, self._map.found_circles_m, (self._plan.clearance_m,)
+        )
         if result.status is PlanStatus.START_BLOCKED:
             self._looks_around = True
             self._say("look-around", f"{result.reason}: looking around before planning")
@@ -140,6 +141,11 @@ class GoalNavigator:
 
     def step(self, readings: Readings) -> Twist:
         """One control step."""
+        command = self._decide(readings)
+        self._tell()
+        return command
+
+    def _decide(self, readings: Readings) -> Twist:
         self._t_s = readings.t_s
         belief = self._localizer.step(readings)
         self._follower.rest()
@@ -157,31 +163,29 @@ class GoalNavigator:
         command = self._drive(readings, belief.pose)
         # Its own trail it has driven before: there only the known walls are asked.
         circles = self._map.known_circles_m if self._mode is Mode.ESCAPE else self._map.circles_m
-        if self._guard.allows(command, belief.pose, self._map.segments_m, circles, self._room_asked_m()):
+        if self._guard.allows(command, belief.pose, self._map.walls, circles, self._room_asked_m()):
             return command
         return self._refuse(command, belief.pose)
 
-    def telemetry(self) -> Mapping[str, float]:
-        """Reference, parts of the command, mode and progress, with the localizer's own numbers."""
+    def _tell(self) -> None:
         reference, control = self._follower.reference, self._follower.control
-        return {
-            "ref_x_m": math.nan if reference is None else reference.x_m,
-            "ref_y_m": math.nan if reference is None else reference.y_m,
-            "ref_theta_rad": math.nan if reference is None else reference.theta_rad,
-            "w_feedforward_rad_s": self._follower.feedforward.w_rad_s,
-            "w_proportional_rad_s": control.proportional_rad_s,
-            "w_integral_rad_s": control.integral_rad_s,
-            "w_reactive_rad_s": self._reaction.w_rad_s,
-            "path_error_m": control.error_m,
-            "mode": float(self._mode),
-            "distance_to_go_m": self._to_go_m,
-            **self._localizer.telemetry(),
-        }
-
-    def drain_events(self) -> list[Event]:
-        """Events since the last call."""
-        events, self._events = self._events, []
-        return events
+        x_m, y_m, theta_rad = (
+            (math.nan, math.nan, math.nan)
+            if reference is None
+            else (reference.x_m, reference.y_m, reference.theta_rad)
+        )
+        self._telemetry.tell(
+            x_m,
+            y_m,
+            theta_rad,
+            self._follower.feedforward.w_rad_s,
+            control.proportional_rad_s,
+            control.integral_rad_s,
+            self._reaction.w_rad_s,
+            control.error_m,
+            self._mode,
+            self._to_go_m,
+        )
 
     # --- the loop -----------------------------------------------------------------------------------
 
@@ -193,7 +197,7 @@ class GoalNavigator:
         self._trail.append(pose)
         if self._reactive is not None:
             self._reaction = self._reactive.step(
-                readings, pose, self._map.segments_m, self._plan.circles_m, self._goes_straight()
+                readings, pose, self._map.walls, self._plan.circles_m, self._goes_straight()
             )
         kind = self._reaction.kind
         if kind is ReactionKind.TRAPPED:
@@ -219,7 +223,9 @@ class GoalNavigator:
         if self._t_s < self._config.look_around_s:
             return STOP
         self._looks_around = False
-        result = self._plan.make(self._t_s, pose, self.mapped_circles_m, self._clearances(pose))
+        result = self._plan.make(
+            self._t_s, pose, self._goal, self._map.found_circles_m, self._clearances(pose)
+        )
         if result.path is None:
             return self._fail(f"{result.status}: {result.reason}")
         self._took_plan("plan", "looked around")
@@ -240,10 +246,12 @@ class GoalNavigator:
         self._mode = Mode.WANDER
         if self._t_s < self._lost.plan_at_s:
             return self._lost.step(readings)
-        result = self._plan.make(self._t_s, pose, self._map.found_circles_m, self._clearances(pose))
-        self.counts["replans"] += 1
+        result = self._plan.make(
+            self._t_s, pose, self._goal, self._map.found_circles_m, self._clearances(pose)
+        )
+        self._journal.count("replans")
         if result.path is None:
-            if self.counts["replans"] >= self._config.max_replans:
+            if self._journal.counts["replans"] >= self._config.max_replans:
                 return self._fail(f"stuck: found itself, but {result.status} ({result.reason})")
             self._lost.plan_at_s = self._t_s + PLAN_AGAIN_S
             return self._lost.step(readings)
@@ -274,12 +282,12 @@ class GoalNavigator:
         self._mode = Mode.AVOID
         if not self._avoiding:
             self._avoiding = True
-            self.counts["attempts"] += 1
+            self._journal.count("attempts")
             side = "left" if self._reaction.w_rad_s > 0.0 else "right"
             self._say(
                 "avoid-start",
                 f"something unexpected {self._reaction.front_m:.2f} m ahead: turning {side}, "
-                f"attempt {self.counts['attempts']}",
+                f"attempt {self._journal.counts['attempts']}",
             )
         return Twist(self._reaction.speed_limit_m_s, self._reaction.w_rad_s)
 
@@ -296,7 +304,7 @@ class GoalNavigator:
     def _begin_escape(self, why: str) -> Twist:
         if self._escape is None:
             return self._fail(f"stuck: {why}, and the stack has no escape")
-        self.counts["escapes"] += 1
+        self._journal.count("escapes")
         self._say("escape", f"{why}: backing out the way it came")
         self._escape.begin(self._trail)
         self._escaping = True
@@ -319,23 +327,25 @@ class GoalNavigator:
     def _replan_locally(self, pose: Pose2) -> bool:
         assert self._plan.progress is not None
         route = self._plan.progress.route_ahead(self._config.waypoint_ahead_m)
-        return self._follower.replan(pose, route, self._map.segments_m, self._map.circles_m)
+        return self._follower.replan(pose, route, self._map.walls, self._map.circles_m)
 
     def _replan_globally(self, pose: Pose2, why: str) -> Twist:
         """Plan anew on the robot's own map; back out where even that finds no way."""
         self._mode = Mode.REPLAN
         self._follower.drop()
-        if self.counts["replans"] >= self._config.max_replans:
-            return self._fail(f"stuck: gave up after {self.counts['replans']} replans")
-        self.counts["replans"] += 1
-        result = self._plan.make(self._t_s, pose, self._map.found_circles_m, self._clearances(pose))
+        if self._journal.counts["replans"] >= self._config.max_replans:
+            return self._fail(f"stuck: gave up after {self._journal.counts['replans']} replans")
+        self._journal.count("replans")
+        result = self._plan.make(
+            self._t_s, pose, self._goal, self._map.found_circles_m, self._clearances(pose)
+        )
         if result.path is None:
             return self._begin_escape(f"replanning found {result.status} ({result.reason})")
         self._took_plan("replan", why)
         return STOP
 
     def _took_plan(self, kind: str, why: str = "") -> None:
-        plan = self._plan.history[-1]
+        plan = self._journal.plans[-1]
         self._stall.restart(self._t_s)
         self._to_go_m = plan.length_m
         because = f"{why}: " if why else ""
@@ -368,7 +378,7 @@ class GoalNavigator:
         """What the guard may ask for: what the plan keeps, and on its own trail only what the body needs."""
         if self._mode is Mode.ESCAPE:
             return self._radius_m + HERE_TOLERANCE_M
-        return self._plan.history[-1].clearance_m - HERE_TOLERANCE_M
+        return self._journal.plans[-1].clearance_m - HERE_TOLERANCE_M
 
     def _goes_straight(self) -> bool:
         assert self._plan.progress is not None
@@ -402,4 +412,4 @@ class GoalNavigator:
         return STOP
 
     def _say(self, kind: str, text: str) -> None:
-        self._events.append(Event(self._t_s, kind, text))
+        self._journal.say(self._t_s, kind, text)

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from pilotage.core.types import STOP, Twist
 from pilotage.sensors.readings import Readings
 from pilotage.stack.control.wander import WanderConfig, Wanderer
-from pilotage.stack.knowledge import Knowledge
-from pilotage.stack.localization.localizer import Localizer, Seeker
+from pilotage.stack.knowledge import RobotKnowledge
+from pilotage.stack.localization.localizer import Localizer
 
 LED_S, FREE_S = 15.0, 10.0
 """It is led for so long, then goes where it likes: what stands in the way may be on no map."""
@@ -23,9 +25,9 @@ class LostDriving:
         When to plan, once it is found.
     """
 
-    def __init__(self, config: WanderConfig, knowledge: Knowledge, localizer: Localizer) -> None:
-        self._wanderer = Wanderer.of(config, knowledge)
-        self._seeker = localizer if isinstance(localizer, Seeker) else None
+    def __init__(self, config: WanderConfig, robot: RobotKnowledge, localizer: Localizer) -> None:
+        self._wanderer = Wanderer.of(config, robot)
+        self._look: Callable[[], float | None] | None = getattr(localizer, "look_bearing_rad", None)
         self.active = False
         self.plan_at_s = 0.0
 
@@ -34,5 +36,5 @@ class LostDriving:
         if self._wanderer is None:
             return STOP
         led = readings.t_s % (LED_S + FREE_S) < LED_S
-        bearing = self._seeker.look_bearing_rad if led and self._seeker is not None else None
+        bearing = self._look() if led and self._look is not None else None
         return self._wanderer.step(readings, bearing)

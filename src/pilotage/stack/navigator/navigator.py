@@ -30,4 +30,6 @@ class Parts:
 
 
 NAVIGATORS: Registry[Stack] = Registry("navigator", "pilotage.stack.navigator")
-"""Built as ``cls(config, knowledge, parts)``."""
+"""Built as ``cls(config, robot: RobotKnowledge, chart: WorldMap, task: TaskKnowledge, parts: Parts, journal:
+Journal)``; the chart is what the robot was told of the world. What can be planned before the start is planned
+at construction."""

@@ -6,6 +6,7 @@ import numpy as np
 
 from pilotage.core.types import FloatArray, Pose2
 from pilotage.kernels.geometry import plane
+from pilotage.maps.near_walls import NearWalls
 from pilotage.maps.segment_map import SegmentMap
 from pilotage.stack.mapping.mapper import Mapper
 
@@ -15,12 +16,12 @@ class OwnMap:
 
     Attributes
     ----------
-    segments_m, known_circles_m
-        (S, 4) and (C, 3) what the robot was told of.
+    walls, known_circles_m
+        Segments, those near a place at hand, and (C, 3) discs that the robot was told of.
     """
 
     def __init__(self, told: SegmentMap, mapper: Mapper | None) -> None:
-        self.segments_m, self.known_circles_m = told.segments_m, told.circles_m
+        self.walls, self.known_circles_m = NearWalls(told.segments_m), told.circles_m
         self._mapper = mapper
         self._nothing = self.known_circles_m[:0]
         self._circles = self._last_found = self.known_circles_m
@@ -41,4 +42,4 @@ class OwnMap:
 
     def distance_m(self, pose: Pose2) -> float:
         """Distance from the pose's point to the nearest thing on the map."""
-        return plane.distance_to_nearest(pose.x_m, pose.y_m, self.segments_m, self.circles_m)
+        return plane.distance_to_nearest(pose.x_m, pose.y_m, self.walls.segments_m, self.circles_m)

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 from pilotage.core.config import Config
 from pilotage.core.errors import InputError
-from pilotage.core.types import STOP, Event, FloatArray, Twist
+from pilotage.core.types import STOP, Twist
+from pilotage.maps.world_map import WorldMap
 from pilotage.sensors.readings import Readings
-from pilotage.stack.interface import Belief, ExplainableUpdate, PlannedPath, StackStatus
-from pilotage.stack.knowledge import Knowledge
+from pilotage.stack.interface import Belief, StackStatus
+from pilotage.stack.journal import Journal
+from pilotage.stack.knowledge import RobotKnowledge, TaskKnowledge
 from pilotage.stack.navigator.global_plan import GlobalPlan
 from pilotage.stack.navigator.navigator import NAVIGATORS, Parts
 
@@ -22,26 +22,31 @@ class PlanOnlyConfig(Config):
 class PlanOnlyNavigator:
     """Plans once from the initial belief and is done; the robot stays where it is."""
 
-    counts: Mapping[str, int]
-
-    def __init__(self, config: PlanOnlyConfig, knowledge: Knowledge, parts: Parts) -> None:
+    def __init__(
+        self,
+        config: PlanOnlyConfig,
+        robot: RobotKnowledge,
+        chart: WorldMap,
+        task: TaskKnowledge,
+        parts: Parts,
+        journal: Journal,
+    ) -> None:
         del config
-        if knowledge.goal is None or parts.planner is None:
+        if task.goal is None or parts.planner is None:
             raise InputError(
                 "navigator 'plan-only': expected world.goal and stack.planner, found one missing"
             )
         self._localizer = parts.localizer
-        self._plan = GlobalPlan(
-            parts.planner,
-            parts.smoother,
-            knowledge.world_map,
-            knowledge.goal,
-            knowledge.streams.stream("planner"),
-        )
-        self._nothing = knowledge.world_map.circles_m[:0]
-        self._status, self._reason = StackStatus.RUNNING, ""
-        self._events: list[Event] = []
-        self.counts = {}
+        plan = GlobalPlan(parts.planner, parts.smoother, chart, robot.streams.stream("planner"), journal)
+        nothing = chart.walls.circles_m[:0]
+        journal.result("mapped_circles_m", lambda: nothing)
+        result = plan.make(0.0, self.belief.pose, task.goal, nothing, (plan.clearance_m,))
+        if result.path is None:
+            self._status, self._reason = StackStatus.FAILED, f"{result.status}: {result.reason}"
+            journal.say(0.0, "failed", self._reason)
+        else:
+            self._status, self._reason = StackStatus.ARRIVED, "planned"
+            journal.say(0.0, "plan", f"{journal.plans[-1].length_m:.2f} m, nobody drives it")
 
     @property
     def belief(self) -> Belief:
@@ -49,51 +54,11 @@ class PlanOnlyNavigator:
         return self._localizer.belief
 
     @property
-    def last_update(self) -> ExplainableUpdate | None:
-        """Nothing is updated."""
-        return None
-
-    @property
     def status(self) -> tuple[StackStatus, str]:
         """Arrived where there is a plan."""
         return self._status, self._reason
-
-    @property
-    def plans(self) -> list[PlannedPath]:
-        """The one plan, where there is one."""
-        return self._plan.history
-
-    @property
-    def planning_time_s(self) -> float:
-        """Wall time spent planning."""
-        return self._plan.planning_time_s
-
-    @property
-    def mapped_circles_m(self) -> FloatArray:
-        """It maps nothing."""
-        return self._nothing
-
-    def prepare(self) -> None:
-        """Plan."""
-        result = self._plan.make(0.0, self.belief.pose, self._nothing, (self._plan.clearance_m,))
-        if result.path is None:
-            self._status, self._reason = StackStatus.FAILED, f"{result.status}: {result.reason}"
-            self._events.append(Event(0.0, "failed", self._reason))
-        else:
-            plan = self._plan.history[-1]
-            self._status, self._reason = StackStatus.ARRIVED, "planned"
-            self._events.append(Event(0.0, "plan", f"{plan.length_m:.2f} m, nobody drives it"))
 
     def step(self, readings: Readings) -> Twist:
         """Stay."""
         self._localizer.step(readings)
         return STOP
-
-    def telemetry(self) -> Mapping[str, float]:
-        """What the localizer tells."""
-        return self._localizer.telemetry()
-
-    def drain_events(self) -> list[Event]:
-        """Events since the last call."""
-        events, self._events = self._events, []
-        return events

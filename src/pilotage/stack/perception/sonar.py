@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from pilotage.core.types import FloatArray, Pose2
 from pilotage.kernels.scans import rays
+from pilotage.maps.near_walls import NearWalls
 from pilotage.sensors.readings import Readings, UltrasonicReading
 from pilotage.sensors.ultrasonic import UltrasonicConfig
 
@@ -58,7 +59,7 @@ class SonarRing:
         self,
         readings: Readings,
         pose: Pose2,
-        segments_m: FloatArray,
+        walls: NearWalls,
         circles_m: FloatArray,
         watch_below_m: float,
     ) -> SonarView:
@@ -75,7 +76,7 @@ class SonarRing:
             near[side] = min(near[side], reading.range_m)
             if side == "front":
                 if reading.range_m < watch_below_m and reading.range_m < unexpected:
-                    expected = self._expected(config, pose, segments_m, circles_m)
+                    expected = self._expected(config, pose, walls, circles_m, watch_below_m)
                     if reading.range_m < expected - self._tolerance_m:
                         unexpected = reading.range_m
                 continue
@@ -88,17 +89,24 @@ class SonarRing:
         )
 
     def _expected(
-        self, config: UltrasonicConfig, pose: Pose2, segments_m: FloatArray, circles_m: FloatArray
+        self,
+        config: UltrasonicConfig,
+        pose: Pose2,
+        walls: NearWalls,
+        circles_m: FloatArray,
+        watch_below_m: float,
     ) -> float:
+        """The return that the map makes one expect; exact where it can make a watched one unexpected."""
         c, s = math.cos(pose.theta_rad), math.sin(pose.theta_rad)
         mount = config.mount
+        x, y = pose.x_m + c * mount.x_m - s * mount.y_m, pose.y_m + s * mount.x_m + c * mount.y_m
         return float(
             rays.cone_range(
-                pose.x_m + c * mount.x_m - s * mount.y_m,
-                pose.y_m + s * mount.x_m + c * mount.y_m,
+                x,
+                y,
                 pose.theta_rad + mount.theta_rad,
                 min(0.5 * config.cone_rad + self._widening_rad, 0.49 * math.pi),
-                segments_m,
+                walls.near(x, y, watch_below_m + self._tolerance_m),
                 circles_m,
             )
         )

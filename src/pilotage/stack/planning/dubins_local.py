@@ -11,8 +11,9 @@ from pilotage.core.config import Config
 from pilotage.core.errors import InputError
 from pilotage.core.types import FloatArray, Pose2
 from pilotage.kernels.rrt import local_path
+from pilotage.maps.near_walls import NearWalls
 from pilotage.sensors.sensor import NonNegative, Positive
-from pilotage.stack.knowledge import Knowledge
+from pilotage.stack.knowledge import RobotKnowledge
 from pilotage.stack.planning.local_planner import LOCAL_PLANNERS, LocalPath, RouteAhead
 
 PLAN_TOLERANCE_M = 0.005
@@ -29,7 +30,7 @@ class DubinsLocalConfig(Config):
     speed_m_s: Positive = 0.5
     turning_radius_m: Positive = 0.5
     margin_m: NonNegative = 0.05
-    """The local path keeps the body's radius plus this from everything on the robot's map."""
+    """The local path keeps this, and the radius of the disc around the robot, from all on the robot's map."""
     look_ahead: int = Field(default=5, ge=1, le=100)
     """How many waypoints are tried."""
     detour_ratio: float = Field(default=1.3, ge=1.0, le=10.0)
@@ -47,23 +48,24 @@ class DubinsLocalPlanner:
     blocked, or the robot stands across it.
     """
 
-    def __init__(self, config: DubinsLocalConfig, knowledge: Knowledge) -> None:
-        if config.speed_m_s > knowledge.max_speed_m_s:
+    def __init__(self, config: DubinsLocalConfig, robot: RobotKnowledge) -> None:
+        if config.speed_m_s > robot.motion.top_speed_m_s:
             raise InputError(
                 f"stack.local_planner.speed_m_s: expected at most robot.motion.max_speed_m_s = "
-                f"{knowledge.max_speed_m_s:g}, found {config.speed_m_s:g}"
+                f"{robot.motion.top_speed_m_s:g}, found {config.speed_m_s:g}"
             )
-        if config.speed_m_s / config.turning_radius_m > knowledge.max_turn_rate_rad_s:
+        most_turn = robot.motion.top_turn_rate_rad_s
+        if config.speed_m_s / config.turning_radius_m > most_turn:
             raise InputError(
                 f"stack.local_planner.turning_radius_m: expected at least speed over turn rate = "
-                f"{config.speed_m_s / knowledge.max_turn_rate_rad_s:g} m, found {config.turning_radius_m:g}"
+                f"{config.speed_m_s / most_turn:g} m, found {config.turning_radius_m:g}"
             )
         self._config = config
-        self._step_m = config.speed_m_s * knowledge.dt_s
-        self._clearance_m = knowledge.body_radius_m + config.margin_m
+        self._step_m = config.speed_m_s * robot.dt_s
+        self._clearance_m = robot.radius_m + config.margin_m
 
     def plan(
-        self, pose: Pose2, route: RouteAhead, segments_m: FloatArray, circles_m: FloatArray
+        self, pose: Pose2, route: RouteAhead, walls: NearWalls, circles_m: FloatArray
     ) -> LocalPath | None:
         """Try the next waypoints in turn; take the first whose curve is short and free, else the plan."""
         config = self._config
@@ -82,12 +84,12 @@ class DubinsLocalPlanner:
                 index == last,
                 config.detour_ratio * route.ahead_m[index] + config.detour_m,
             )
-            if self._is_free(states, route, segments_m, circles_m):
+            if self._is_free(states, route, walls, circles_m):
                 return LocalPath(states, config.speed_m_s)
-        return self._along_the_plan(pose, route, segments_m, circles_m)
+        return self._along_the_plan(pose, route, walls, circles_m)
 
     def _along_the_plan(
-        self, pose: Pose2, route: RouteAhead, segments_m: FloatArray, circles_m: FloatArray
+        self, pose: Pose2, route: RouteAhead, walls: NearWalls, circles_m: FloatArray
     ) -> LocalPath | None:
         """The plan itself up to the next waypoint, where the robot is still on it.
 
@@ -101,12 +103,17 @@ class DubinsLocalPlanner:
         if aside > self._config.on_plan_m or turned > self._config.on_plan_rad:
             return None
         states = local_path.resampled(route.states, self._step_m, max(route.ahead_m[0], self._step_m))
-        if self._is_free(states, route, segments_m, circles_m):
+        if self._is_free(states, route, walls, circles_m):
             return LocalPath(states, self._config.speed_m_s)
         return None
 
     def _is_free(
-        self, states: FloatArray, route: RouteAhead, segments_m: FloatArray, circles_m: FloatArray
+        self, states: FloatArray, route: RouteAhead, walls: NearWalls, circles_m: FloatArray
     ) -> bool:
+        if states.shape[0] < 2:
+            return False
         clearance = min(self._clearance_m, route.clearance_m - PLAN_TOLERANCE_M)
-        return states.shape[0] > 1 and local_path.fits(states, clearance, segments_m, circles_m)
+        (x0, y0), (x1, y1) = states[:, :2].min(axis=0), states[:, :2].max(axis=0)
+        reach = 0.5 * math.hypot(x1 - x0, y1 - y0) + max(clearance, 0.0)
+        near = walls.near(0.5 * (x0 + x1), 0.5 * (y0 + y1), reach)
+        return bool(local_path.fits(states, clearance, near, circles_m))

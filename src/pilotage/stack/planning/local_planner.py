@@ -7,6 +7,7 @@ from typing import Protocol
 
 from pilotage.core.registry import Registry
 from pilotage.core.types import FloatArray, Pose2
+from pilotage.maps.near_walls import NearWalls
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,10 +49,10 @@ class RouteAhead:
 
 
 class LocalPlanner(Protocol):
-    """Plans the next few metres. Built as ``cls(config, knowledge)``."""
+    """Plans the next few metres. Built as ``cls(config, robot: RobotKnowledge)``."""
 
     def plan(
-        self, pose: Pose2, route: RouteAhead, segments_m: FloatArray, circles_m: FloatArray
+        self, pose: Pose2, route: RouteAhead, walls: NearWalls, circles_m: FloatArray
     ) -> LocalPath | None:
         """Plan to the first waypoint that can be reached; None where none of the next few can."""
         ...
