@@ -17,8 +17,9 @@ from pilotage.evaluation.split_errors import split_errors
 
 WRONG_M, WRONG_RAD = 0.5, 0.1
 """A pose farther from the truth than this is wrong."""
+MOST_CELLS = 4_000_000
 MOST_SEGMENTS = 400
-"""Beyond so many walls the exact shortest path is not worked out: its tangent graph grows with their square."""
+"""Beyond so many walls no exact shortest path is worked out: its tangent graph grows with their square."""
 
 
 def poses(trace: Mapping[str, FloatArray], prefix: str) -> FloatArray:
@@ -75,6 +76,8 @@ def shortest_for(run: FinishedRun, robot: RobotRun) -> ShortestPath | None:
     """Exact shortest path to hold against the first plan; None where there is nothing to compare."""
     goal, plans = robot.goal, robot.plans
     if goal is None or not plans or plans[0].given or not robot.stack.initial.known:
+        return None
+    if run.chart.geometry is None and run.chart.grid is not None and run.chart.grid.cells.size > MOST_CELLS:
         return None
     if run.chart.walls.segments_m.shape[0] > MOST_SEGMENTS:
         return None

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any, TypeVar
 
 from pilotage.core.registry import Registry
-from pilotage.missions.mission import ComponentChoice
+from pilotage.missions.choice import ComponentChoice
 
 T = TypeVar("T")
 

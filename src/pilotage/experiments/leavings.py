@@ -42,13 +42,15 @@ def files_of(run: Run, verdict: Verdict, metrics: Mapping[str, object]) -> RunFi
         events=tuple(finished.events),
         mission_text=resolved_yaml(finished.mission, chart),
         world=world,
-        terrain=terrain_pictures(finished) if chart.grid is not None and chart.elevation is not None else None,
+        terrain=terrain_pictures(finished)
+        if chart.grid is not None and chart.elevation is not None
+        else None,
         grid=grid,
         robots=tuple(
             RobotFiles(
                 plans=_plans(robot, verdict),
                 sightings=run.sightings[index].seen(),
-                updates=tuple(run.albums[index].kept()),
+                updates=tuple(run.albums[index].pictures()),
                 cells=_cells(finished, robot, world, verdict),
             )
             for index, robot in enumerate(finished.robots)
@@ -100,7 +102,7 @@ def _outline(robot: RobotRun) -> RobotOutline:
     return RobotOutline(
         name=robot.name,
         radius_m=footprint.radius_m,
-        polygon_m=None if footprint.is_disc else footprint.points_m,
+        polygon_m=footprint.points_m,
         start=(start.x_m, start.y_m, start.theta_rad),
         goals=() if goal is None else ((goal.x_m, goal.y_m, goal.theta_rad),),
     )
@@ -127,7 +129,9 @@ def _cells(run: FinishedRun, robot: RobotRun, world: World, verdict: Verdict) ->
     if not isinstance(cells, CellMap) or markings is None or markings.source is None:
         return None
     left = robot.results["left"]
-    told = {name: verdict.extras[f"{robot.name}/{name}"] for name in ("visited", "first_visit_s", "reachable")}
+    told = {
+        name: verdict.extras[f"{robot.name}/{name}"] for name in ("visited", "first_visit_s", "reachable")
+    }
     return SheetData(
         size_m=markings.size_m,
         boxes_m=world.boxes_m,

@@ -1,4 +1,4 @@
-"""The one loop: the source gives readings, each robot's stack gives a command, the task says when it is over."""
+"""The one loop: readings from the source, a command from each stack, and a task that says when it is over."""
 
 from __future__ import annotations
 

@@ -10,9 +10,10 @@ from typing import Any
 
 from pilotage.core.config import validate
 from pilotage.core.errors import InputError, nearest, unknown_name
-from pilotage.experiments.kinds import KINDS, kind_name
+from pilotage.experiments.resolve import check_components
 from pilotage.experiments.values import apply_override, merge, parse_yaml, read_text
 from pilotage.missions.mission import TOP_KEYS, Mission
+from pilotage.missions.old_keys import refuse_old_keys
 
 SHIPPED = resources.files("pilotage.missions") / "files"
 
@@ -62,7 +63,10 @@ def mission_of(values: dict[str, Any], overrides: Sequence[str] = (), seed: int 
             apply_override(values, override)
     if seed is not None:
         values.setdefault("run", {})["seed"] = seed
-    return validate(KINDS[kind_name(values)]().schema, values, "")
+    refuse_old_keys(values)
+    mission = validate(Mission, values, "")
+    check_components(mission)
+    return mission
 
 
 def read_parameters(file: str) -> dict[str, Any]:
@@ -108,10 +112,12 @@ def _anchor_map(values: dict[str, Any], folder: Path) -> None:
     world = values.get("world")
     if not isinstance(world, dict):
         return
-    ground = world.get("ground")
-    places = [(world, key) for key in ("map", "sheet", "landmarks")]
-    if isinstance(ground, dict):
-        places += [(ground, key) for key in ("file", "obstacles", "environment", "landmarks")]
+    places = [(world, key) for key in ("map", "landmarks")]
+    if isinstance(world.get("map"), dict):
+        places += [(world["map"], key) for key in ("file", "obstacles", "environment", "landmarks")]
+    stack = values.get("stack")
+    if isinstance(stack, dict):
+        places.append((stack, "map"))
     for holder, key in places:
         source = holder.get(key)
         if isinstance(source, str) and (folder / source).is_file():

@@ -5,21 +5,22 @@ from __future__ import annotations
 from typing import Any
 
 from pilotage.core.registry import Registry
+from pilotage.evaluation.tasks.task import TASKS
+from pilotage.models.motion.motion import MOTIONS
 from pilotage.sensors.sensor import SENSORS
 from pilotage.stack.control.controller import CONTROLLERS
 from pilotage.stack.control.escape import ESCAPES
-from pilotage.stack.control.polar_pose import POSE_CONTROLLERS
 from pilotage.stack.control.reactive import REACTIVES
-from pilotage.stack.exploration.explorer import EXPLORERS
+from pilotage.stack.interface import NAVIGATORS
 from pilotage.stack.localization.heading_filter import HEADING_FILTERS
 from pilotage.stack.localization.localizer import LOCALIZERS
-from pilotage.stack.localization.rover_estimators import ESTIMATORS
 from pilotage.stack.mapping.mapper import MAPPERS
-from pilotage.stack.navigator.navigator import NAVIGATORS
 from pilotage.stack.planning.local_planner import LOCAL_PLANNERS
 from pilotage.stack.planning.planner import PLANNERS, SMOOTHERS
 
-REGISTRIES: dict[str, Registry[Any]] = {
+ROLES: dict[str, Registry[Any]] = {
+    "task": TASKS,
+    "motion": MOTIONS,
     "sensor": SENSORS,
     "navigator": NAVIGATORS,
     "localizer": LOCALIZERS,
@@ -31,8 +32,5 @@ REGISTRIES: dict[str, Registry[Any]] = {
     "reactive": REACTIVES,
     "mapper": MAPPERS,
     "escape": ESCAPES,
-    "explorer": EXPLORERS,
-    "estimator": ESTIMATORS,
-    "pose_controller": POSE_CONTROLLERS,
 }
-"""Roles by their key under ``stack`` (sensors: under ``robot.sensors``)."""
+"""Roles by their key under ``stack``; a task, a motion and the sensors stand elsewhere in a mission."""

@@ -9,9 +9,9 @@ from pathlib import Path
 from pilotage.core.types import FloatArray
 from pilotage.evaluation.finished import Verdict
 from pilotage.evaluation.metrics import METRICS
+from pilotage.experiments.build.build import Experiment, build
 from pilotage.experiments.leavings import files_of
 from pilotage.experiments.loop import Run, run_loop
-from pilotage.experiments.build.build import Experiment, build
 from pilotage.experiments.oracles.applicable import check_oracles
 from pilotage.experiments.progress import OnProgress
 from pilotage.experiments.resolve import run_name

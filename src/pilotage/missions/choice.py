@@ -35,7 +35,7 @@ class ComponentChoice(Config):
 
 
 def laid_over(base: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
-    """``changes`` over ``base``, mappings key by key; a component whose ``name`` changes starts from nothing."""
+    """``changes`` over ``base``, key by key; a component whose ``name`` changes starts from nothing."""
     merged = copy.deepcopy(dict(base))
     for key, value in changes.items():
         old = merged.get(key)

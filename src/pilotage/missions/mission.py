@@ -54,7 +54,8 @@ class Mission(Config):
         """Lay each entry of ``robots`` over ``robot``; without names they are numbered."""
         if not isinstance(values, dict) or not isinstance(values.get("robots"), list | tuple):
             return values
-        common = values.get("robot") if isinstance(values.get("robot"), dict) else {}
+        robot = values.get("robot")
+        common = robot if isinstance(robot, dict) else {}
         entries = []
         for number, entry in enumerate(values["robots"]):
             if isinstance(entry, dict):

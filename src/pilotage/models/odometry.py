@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from enum import StrEnum
 
 import numpy as np
@@ -49,3 +50,10 @@ def increment_variances(
         distance_var_m2_per_m * way + distance_var_m2_per_rad * turn,
         angle_var_rad2_per_rad * turn + angle_var_rad2_per_m * way,
     )
+
+
+def chord(distance_m: float, angle_rad: float) -> tuple[float, float]:
+    """The straight line of an arc: its length, and its direction less the heading at the arc's begin."""
+    half = 0.5 * angle_rad
+    shrink = 1.0 if abs(half) < 1e-9 else math.sin(half) / half
+    return distance_m * shrink, half

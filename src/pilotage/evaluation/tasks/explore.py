@@ -112,8 +112,8 @@ class ExploreTask:
             own_visited,  # type: ignore[arg-type]
         )
         extras = {
-            "visited": visits.visited.astype(float),
-            "first_visit_s": visits.first_s,
-            "reachable": reachable_cells(self._sheet, self._radii[index]).astype(float),
+            f"{robot.name}/visited": visits.visited.astype(float),
+            f"{robot.name}/first_visit_s": visits.first_s,
+            f"{robot.name}/reachable": reachable_cells(self._sheet, self._radii[index]).astype(float),
         }
         return Verdict(metrics, ({},), extras)

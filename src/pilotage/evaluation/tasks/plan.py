@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import ClassVar
 
-import numpy as np
-
 from pilotage.core.config import Config
 from pilotage.core.errors import InputError
-from pilotage.core.types import Event
+from pilotage.core.types import Event, FloatArray
+from pilotage.evaluation.cell_plans import route_columns, route_metrics, route_of
 from pilotage.evaluation.driving import header, planning_metrics, shortest_for
 from pilotage.evaluation.finished import FinishedRun, RobotRun, Verdict
 from pilotage.evaluation.tasks.task import TASKS, Attempt, TaskSetting
@@ -55,7 +54,14 @@ class PlanTask:
 
     def _judged(self, run: FinishedRun, robot: RobotRun) -> Verdict:
         shortest = shortest_for(run, robot)
-        extras = {} if shortest is None else {"shortest_path": shortest.points_xy_m}
-        metrics = header(run, robot) | planning_metrics(run, robot, shortest)
+        extras = {} if shortest is None else {f"{robot.name}/shortest_path": shortest.points_xy_m}
+        metrics = header(run, robot)
+        route = route_of(robot)
+        columns: dict[str, FloatArray] = {}
+        if route is None:
+            metrics |= planning_metrics(run, robot, shortest)
+        else:
+            metrics |= route_metrics(run, robot, route)
+            columns = route_columns(run, robot, route)
         metrics["success"] = robot.arrived
-        return Verdict(metrics, ({"nees": np.zeros(robot.trace["t_s"].shape)},), extras)
+        return Verdict(metrics, (columns,), extras)

@@ -10,12 +10,14 @@ from pilotage.core.angles import wrap_to_pi
 from pilotage.core.config import Config
 from pilotage.core.errors import InputError
 from pilotage.core.types import Event
+from pilotage.evaluation.cell_plans import route_metrics, route_of
 from pilotage.evaluation.driving import driving_metrics, header, planning_metrics, poses, shortest_for
 from pilotage.evaluation.finished import FinishedRun, RobotRun, Verdict
 from pilotage.evaluation.halls import hall_offset_m
 from pilotage.evaluation.tasks.collisions import CollisionWatch
 from pilotage.evaluation.tasks.task import TASKS, Attempt, TaskSetting, all_ended
 from pilotage.evaluation.tasks.team import verdict
+from pilotage.evaluation.terrain import terrain_columns, terrain_metrics
 from pilotage.missions.places import GoalConfig
 
 
@@ -65,13 +67,20 @@ class ReachTask:
         shortest = shortest_for(run, robot)
         metrics = header(run, robot) | planning_metrics(run, robot, shortest)
         driven, nees = driving_metrics(run, robot)
-        extras = {} if shortest is None else {"shortest_path": shortest.points_xy_m}
+        extras = {} if shortest is None else {f"{robot.name}/shortest_path": shortest.points_xy_m}
         metrics |= driven
+        columns = {"nees": nees}
+        route = route_of(robot)
+        if route is not None:
+            metrics |= route_metrics(run, robot, route)
+        if run.chart.geometry is None and robot.trace["t_s"].shape[0]:
+            columns |= terrain_columns(run, robot)
+            metrics |= terrain_metrics(run, robot, columns)
         if robot.trace["t_s"].shape[0]:
-            metrics |= self._arrival(run, robot)
-        return Verdict(metrics, ({"nees": nees},), extras)
+            metrics |= self._arrival(run, robot, metrics)
+        return Verdict(metrics, (columns,), extras)
 
-    def _arrival(self, run: FinishedRun, robot: RobotRun) -> dict[str, object]:
+    def _arrival(self, run: FinishedRun, robot: RobotRun, so_far: Mapping[str, object]) -> dict[str, object]:
         """Where it stands at the end, and whether that is where it should."""
         metrics: dict[str, object] = {}
         truth = poses(robot.trace, "true")
@@ -86,7 +95,10 @@ class ReachTask:
             turned = wrap_to_pi(truth[-1, 2] - last.theta_rad)
             metrics["goal_error_rad"] = turned
             reached = reached and abs(turned) <= last.tolerance_rad
-        metrics["success"] = robot.arrived and robot.collisions == 0 and reached
+        contacts = so_far.get("hazard_contacts", 0)
+        metrics["success"] = robot.arrived and robot.collisions == 0 and reached and not contacts
         if robot.arrived and not reached:
             metrics["reason"] = f"the robot says it arrived, but stands {away_m:.2f} m from its goal"
+        elif contacts:
+            metrics["reason"] = f"{contacts} of {run.steps} steps end on a hazard"
         return metrics

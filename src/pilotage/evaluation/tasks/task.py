@@ -69,7 +69,7 @@ class Task(Protocol):
         ...
 
     def judge(self, run: FinishedRun) -> Verdict:
-        """The metrics by their JSON keys, ``success`` and ``reason`` among them, and what else came to light."""
+        """The metrics by JSON key, ``success`` and ``reason`` among them, and what else came to light."""
         ...
 
 

@@ -21,12 +21,12 @@ from pilotage.missions.stack import InitialConfig, StackConfig
 from pilotage.stack.control.controller import CONTROLLERS
 from pilotage.stack.control.escape import ESCAPES
 from pilotage.stack.control.reactive import REACTIVES
-from pilotage.stack.interface import Belief, Stack
+from pilotage.stack.interface import NAVIGATORS, Belief, Stack
 from pilotage.stack.journal import Journal
 from pilotage.stack.knowledge import RobotKnowledge, TaskKnowledge
 from pilotage.stack.localization.localizer import LOCALIZERS, Localizer
 from pilotage.stack.mapping.mapper import MAPPERS
-from pilotage.stack.navigator.navigator import NAVIGATORS, Parts
+from pilotage.stack.navigator.navigator import Parts
 from pilotage.stack.planning.local_planner import LOCAL_PLANNERS
 from pilotage.stack.planning.planner import PLANNERS, SMOOTHERS
 
@@ -101,7 +101,7 @@ def build_stack(
         escape=optional_component(ESCAPES, config.escape, "escape", robot),
     )
     if truth is not None:
-        parts = with_oracles(parts, oracles, truth)
+        parts = with_oracles(parts, oracles, truth, robot)
     stack = build_component(NAVIGATORS, config.navigator, "navigator", robot, chart, task, parts, journal)
     watched = parts.localizer
     return WatchedStack(stack, watched.watched) if isinstance(watched, WatchedLocalizer) else stack

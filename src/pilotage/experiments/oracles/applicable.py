@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 from pilotage.core.errors import InputError
 from pilotage.missions.mission import Mission
-from pilotage.stack.navigator.navigator import NAVIGATORS
+from pilotage.stack.interface import NAVIGATORS
 
 ORACLES: Mapping[str, str] = {
     "sensors": "sensors without noise, bias, scale error or offset; the filters expect them still",

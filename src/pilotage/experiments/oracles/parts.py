@@ -7,30 +7,29 @@ from dataclasses import replace
 
 import numpy as np
 
-from pilotage.core.angles import wrap_to_pi
 from pilotage.core.types import FloatArray, Pose2, Twist
 from pilotage.experiments.oracles.certain import exactly
 from pilotage.experiments.oracles.driver import WatchedLocalizer
 from pilotage.experiments.oracles.truth import Truth
 from pilotage.maps.distance_field import DistanceField
 from pilotage.sensors.readings import Readings
-from pilotage.stack.control.controller import Control
+from pilotage.stack.control.controller import Control, Controller
+from pilotage.stack.control.kanayama import KanayamaConfig, KanayamaController
 from pilotage.stack.interface import Belief
+from pilotage.stack.knowledge import RobotKnowledge
 from pilotage.stack.navigator.navigator import Parts
 from pilotage.stack.planning.planner import Path, Planner, PlanRequest, PlanResult, Smoother
 
 SIDE_SPACING_M = 0.05
 SIDE_DISC_M = 0.03
 """Discs along an obstacle's sides, as the obstacle layer would put them there."""
-ALONG_PER_S, ACROSS_PER_M2, HEADING_PER_M = 2.0, 8.0, 4.0
-"""Gains of the tracking law; across and heading are damped alike at all speeds."""
 
 
-def with_oracles(parts: Parts, names: frozenset[str], truth: Truth) -> Parts:
+def with_oracles(parts: Parts, names: frozenset[str], truth: Truth, robot: RobotKnowledge) -> Parts:
     """The parts with those named replaced."""
     if "localizer" in names:
         parts = replace(parts, localizer=TrueLocalizer(truth))
-    if "driver" in names:
+    if "driver" in names and parts.localizer is not None:
         parts = replace(parts, localizer=WatchedLocalizer(parts.localizer, TrueLocalizer(truth)))
     if "mapper" in names:
         parts = replace(parts, mapper=KnowingMapper(truth))
@@ -39,7 +38,7 @@ def with_oracles(parts: Parts, names: frozenset[str], truth: Truth) -> Parts:
         smoother = None if parts.smoother is None else KnowingSmoother(parts.smoother, field)
         parts = replace(parts, planner=KnowingPlanner(parts.planner, field), smoother=smoother)
     if "controller" in names:
-        parts = replace(parts, controller=TrueTracking(truth))
+        parts = replace(parts, controller=TrueTracking(truth, KanayamaController(KanayamaConfig(), robot)))
     return parts
 
 
@@ -106,32 +105,15 @@ class KnowingSmoother:
 
 
 class TrueTracking:
-    """Tracks the reference from the true pose, by the law of Kanayama et al. (ICRA 1990, eq. 7)."""
+    """Tracks the reference from the true pose, whatever the robot believes."""
 
-    def __init__(self, truth: Truth) -> None:
-        self._truth = truth
+    def __init__(self, truth: Truth, tracker: Controller) -> None:
+        self._truth, self._tracker = truth, tracker
 
     def reset(self) -> None:
         """It keeps nothing."""
+        self._tracker.reset()
 
     def step(self, pose: Pose2, reference: Pose2, feedforward: Twist) -> Control:  # noqa: ARG002
         """The command that brings the true pose onto the reference."""
-        ahead = _driven(self._truth.pose, feedforward, self._truth.dt_s)
-        c, s = math.cos(ahead.theta_rad), math.sin(ahead.theta_rad)
-        dx, dy = reference.x_m - ahead.x_m, reference.y_m - ahead.y_m
-        along, across = c * dx + s * dy, -s * dx + c * dy
-        turn = wrap_to_pi(reference.theta_rad - ahead.theta_rad)
-        v = feedforward.v_m_s * math.cos(turn) + ALONG_PER_S * along
-        added = feedforward.v_m_s * (ACROSS_PER_M2 * across + HEADING_PER_M * math.sin(turn))
-        return Control(Twist(v, feedforward.w_rad_s + added), across, added, 0.0)
-
-
-def _driven(pose: Pose2, twist: Twist, dt_s: float) -> Pose2:
-    """Where a pose gets to in one step: the reference is meant for that moment, not for now."""
-    heading = pose.theta_rad + 0.5 * twist.w_rad_s * dt_s
-    distance = twist.v_m_s * dt_s
-    return Pose2(
-        pose.x_m + distance * math.cos(heading),
-        pose.y_m + distance * math.sin(heading),
-        wrap_to_pi(pose.theta_rad + twist.w_rad_s * dt_s),
-    )
+        return self._tracker.step(self._truth.pose, reference, feedforward)

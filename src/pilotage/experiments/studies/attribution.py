@@ -18,13 +18,13 @@ from pilotage.evaluation.judge import SUCCESS, Judgement, judge
 from pilotage.evaluation.metric import Aspect, Metric
 from pilotage.evaluation.metrics import METRICS
 from pilotage.evaluation.paired import Difference
-from pilotage.experiments.kinds import kind_of
+from pilotage.experiments.given import has
 from pilotage.experiments.mission import load_mission, mission_of
+from pilotage.experiments.oracles.applicable import applicable
 from pilotage.experiments.studies.definition import StudyDefinition
 from pilotage.experiments.studies.study import Study, make_study
 from pilotage.experiments.studies.sweep import settings_of
 from pilotage.experiments.studies.table import StudyTable, read_study
-from pilotage.experiments.task_of import has, task_of
 
 FIRST = 0
 """The cell of the mission as it is."""
@@ -46,9 +46,8 @@ def attribution_study(mission: str, overrides: Sequence[str], trials: int) -> St
         Where the mission has no module that an oracle can replace.
     """
     loaded = load_mission(mission, overrides)
-    kind = kind_of(loaded)
-    oracles = {name: text for name, text in kind.oracles(loaded).items() if name != DRIVER}
-    costs = METRICS.costs_of(task_of(loaded), METRICS.given_by(task_of(loaded), has(loaded)))
+    oracles = {name: text for name, text in applicable(loaded).items() if name != DRIVER}
+    costs = METRICS.costs_of(loaded.task.name, METRICS.given_by(loaded.task.name, has(loaded)))
     if not oracles:
         raise InputError(f"attribute '{mission}': expected a mission with modules that an oracle can replace")
     configurations: list[dict[str, Any]] = [{"name": BASELINE, "set": {"run.oracles": []}}]
@@ -96,8 +95,8 @@ def attribution_of(folder: Path) -> dict[str, Any]:
     """
     table = read_study(folder)
     base = mission_of(dict(table.study.base), table.study.cells[FIRST].overrides)
-    texts = kind_of(base).oracles(base)
-    judging = METRICS.costs_of(task_of(base), METRICS.given_by(task_of(base), has(base)))
+    texts = applicable(base)
+    judging = METRICS.costs_of(base.task.name, METRICS.given_by(base.task.name, has(base)))
     costs = {metric.key: metric for metric in (METRICS.find(SUCCESS), *_ranked(judging))}
     values = {name: _comparable(table, name, cost) for name, cost in costs.items() if name in table.values}
     judgement = judge(table.cell, table.trial, values, [FIRST] * len(table.study.cells))

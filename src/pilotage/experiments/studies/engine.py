@@ -15,6 +15,7 @@ from pathlib import Path
 from pilotage.core.errors import InputError, nearest
 from pilotage.core.whole_file import write_whole
 from pilotage.evaluation.metrics import METRICS
+from pilotage.experiments.given import has
 from pilotage.experiments.mission import mission_of
 from pilotage.experiments.studies.dask_workers import DaskWorkers
 from pilotage.experiments.studies.database import DATABASE, CorruptDatabaseError, StudyStoppedError
@@ -30,7 +31,6 @@ from pilotage.experiments.studies.study import (
     study_yaml,
 )
 from pilotage.experiments.studies.workers import Workers
-from pilotage.experiments.task_of import has, task_of
 
 HEAR_EVERY_S = 5.0
 TELL_EVERY_S = 0.1
@@ -246,8 +246,8 @@ def check_metric_names(study: Study) -> None:
         if asked <= known:
             return
         mission = mission_of(dict(study.base), cell.overrides)
-        tasks.add(task_of(mission))
-        known |= METRICS.given_by(task_of(mission), has(mission))
+        tasks.add(mission.task.name)
+        known |= METRICS.given_by(mission.task.name, has(mission))
     for metric in sorted(asked - known):
         close = nearest(metric, sorted(known))
         hint = f"; did you mean '{close}'?" if close else ""

@@ -15,7 +15,7 @@ import yaml
 
 from pilotage.core.config import validate
 from pilotage.core.errors import InputError, unknown_name
-from pilotage.experiments.kinds import check_oracles, kind_of
+from pilotage.experiments.oracles.applicable import check_oracles
 from pilotage.experiments.mission import mission_of, read_mission, shipped_missions
 from pilotage.experiments.resolve import resolved_values
 from pilotage.experiments.studies.cells import Cell, make_cells
@@ -164,7 +164,7 @@ def make_study(definition: StudyDefinition, folder: Path = Path()) -> Study:
 
     def resolve(overrides: Sequence[str]) -> Mapping[str, Any]:
         mission = mission_of(base, overrides)
-        check_oracles(kind_of(mission), mission)
+        check_oracles(mission)
         return resolved_values(mission)
 
     cells = make_cells(definition, resolve)

@@ -21,7 +21,6 @@ from pilotage.experiments.studies.export import save_what_is_left
 from pilotage.experiments.studies.groups import CellGroup, baselines, cell_groups
 from pilotage.experiments.studies.rows import flat, read_rows
 from pilotage.experiments.studies.study import Study, load_study
-from pilotage.experiments.task_of import task_of
 
 IDENTITY = frozenset({"seed"})
 """Numbers of a trial that say which one it is."""
@@ -61,7 +60,7 @@ class StudyTable:
         if asked:
             return asked
         mission = mission_of(dict(self.study.base), self.study.cells[0].overrides)
-        costs = METRICS.costs_of(task_of(mission), given)
+        costs = METRICS.costs_of(mission.task.name, given)
         # Where nothing is asked for, accuracy answers before time does.
         judging = sorted(costs, key=lambda metric: metric.aspect is not Aspect.ACCURACY)
         first = dict.fromkeys([*(metric.key for metric in judging), *(m for m in IDEALS if m in given)])

@@ -1,4 +1,4 @@
-"""Dead reckoning over a whole log: odometry of a rover whose heading grows uncertain.
+"""Dead reckoning: odometry of a rover whose heading grows uncertain.
 
 The motion model is equation 4.7 of the rover report with the odometer's own direction of travel: move by
 ``distance`` along the heading turned by ``aside``, then turn by ``turn``. A step of the report's kind has
@@ -81,47 +81,3 @@ def predict_second_order(
     pose[1] += step.imag
     pose[2] = wrap(pose[2] + turn)
     return distance * u * (1.0 - shrink)
-
-
-@kernel
-def dead_reckon(
-    pose: FloatArray,
-    cov: FloatArray,
-    steps: FloatArray,
-    variances: FloatArray,
-    second_order: bool,
-    poses: FloatArray,
-    covs: FloatArray,
-) -> None:
-    """Run odometry alone over a log.
-
-    Parameters
-    ----------
-    pose, cov
-        (3,) and (3, 3) the initial belief; moved in place.
-    steps
-        (T, 3) distance, aside, turn of each step as the odometer has them.
-    variances
-        (T, 2) of distance and turn.
-    poses, covs
-        (T, 3) and (T, 3, 3) are filled.
-
-    Notes
-    -----
-    Second order, the mean square of the way that the mean stays behind is added to the covariance that is
-    handed out. The mean is the best guess where every turn is as likely to be undone as made; a rover on a
-    given path is farther along than that by about as much.
-    """
-    behind = 0j
-    for t in range(steps.shape[0]):
-        distance, aside, turn = steps[t, 0], steps[t, 1], steps[t, 2]
-        if second_order:
-            behind += predict_second_order(pose, cov, distance, aside, turn, variances[t, 0], variances[t, 1])
-        else:
-            predict_first_order(pose, cov, distance, aside, turn, variances[t, 0], variances[t, 1])
-        poses[t] = pose
-        covs[t] = cov
-        covs[t, 0, 0] += behind.real * behind.real
-        covs[t, 0, 1] += behind.real * behind.imag
-        covs[t, 1, 0] += behind.real * behind.imag
-        covs[t, 1, 1] += behind.imag * behind.imag

@@ -10,14 +10,14 @@ from pilotage.maps.world_map import WorldMap
 from pilotage.sensors.readings import Readings
 from pilotage.stack.control.guard import ArcGuard
 from pilotage.stack.control.reactive import Reaction, ReactionKind
-from pilotage.stack.interface import Belief, BeliefStatus, StackStatus
+from pilotage.stack.interface import NAVIGATORS, Belief, BeliefStatus, StackStatus
 from pilotage.stack.journal import Journal
 from pilotage.stack.knowledge import RobotKnowledge, TaskKnowledge
 from pilotage.stack.navigator.following import WaypointFollower
 from pilotage.stack.navigator.global_plan import GlobalPlan
 from pilotage.stack.navigator.goal_config import GoalNavigatorConfig, Mode
 from pilotage.stack.navigator.lost import LostDriving
-from pilotage.stack.navigator.navigator import NAVIGATORS, Parts
+from pilotage.stack.navigator.navigator import Parts
 from pilotage.stack.navigator.own_map import OwnMap
 from pilotage.stack.navigator.progress import StallWatch
 from pilotage.stack.planning.planner import PlanStatus

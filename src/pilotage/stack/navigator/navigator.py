@@ -1,14 +1,13 @@
-"""The registry of navigators, and the parts one is put together from."""
+"""The parts that a navigator is put together from."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
-from pilotage.core.registry import Registry
+from pilotage.core.errors import InputError
 from pilotage.stack.control.controller import Controller
 from pilotage.stack.control.escape import Escape
 from pilotage.stack.control.reactive import Reactive
-from pilotage.stack.interface import Stack
 from pilotage.stack.localization.localizer import Localizer
 from pilotage.stack.mapping.mapper import Mapper
 from pilotage.stack.planning.local_planner import LocalPlanner
@@ -19,7 +18,7 @@ from pilotage.stack.planning.planner import Planner, Smoother
 class Parts:
     """The components of a mission's stack; None where the mission does without."""
 
-    localizer: Localizer
+    localizer: Localizer | None
     planner: Planner | None
     smoother: Smoother | None
     local_planner: LocalPlanner | None
@@ -29,7 +28,10 @@ class Parts:
     escape: Escape | None
 
 
-NAVIGATORS: Registry[Stack] = Registry("navigator", "pilotage.stack.navigator")
-"""Built as ``cls(config, robot: RobotKnowledge, chart: WorldMap, task: TaskKnowledge, parts: Parts, journal:
-Journal)``; the chart is what the robot was told of the world. What can be planned before the start is planned
-at construction."""
+def localizer_of(parts: Parts, needed_by: str) -> Localizer:
+    """The localizer; InputError where the mission has none and no oracle stands in for it."""
+    if parts.localizer is None:
+        raise InputError(
+            f"navigator '{needed_by}': expected stack.localizer, or run.oracles: [localizer], found neither"
+        )
+    return parts.localizer

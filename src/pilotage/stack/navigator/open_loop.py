@@ -7,10 +7,10 @@ from pilotage.core.types import STOP, Twist
 from pilotage.maps.world_map import WorldMap
 from pilotage.sensors.readings import Readings
 from pilotage.sensors.sensor import Positive
-from pilotage.stack.interface import Belief, StackStatus
+from pilotage.stack.interface import NAVIGATORS, Belief, StackStatus
 from pilotage.stack.journal import Journal
 from pilotage.stack.knowledge import RobotKnowledge, TaskKnowledge
-from pilotage.stack.navigator.navigator import NAVIGATORS, Parts
+from pilotage.stack.navigator.navigator import Parts, localizer_of
 
 
 class OpenLoopConfig(Config):
@@ -39,7 +39,7 @@ class OpenLoopNavigator:
     ) -> None:
         self._command = Twist(config.speed_m_s, config.turn_rate_rad_s)
         self._steps_left = max(1, round(config.duration_s / robot.dt_s))
-        self._localizer = parts.localizer
+        self._localizer = localizer_of(parts, "open-loop")
         self._status, self._reason = StackStatus.RUNNING, ""
         self._journal = journal
 

@@ -7,11 +7,11 @@ from pilotage.core.errors import InputError
 from pilotage.core.types import STOP, Twist
 from pilotage.maps.world_map import WorldMap
 from pilotage.sensors.readings import Readings
-from pilotage.stack.interface import Belief, StackStatus
+from pilotage.stack.interface import NAVIGATORS, Belief, StackStatus
 from pilotage.stack.journal import Journal
 from pilotage.stack.knowledge import RobotKnowledge, TaskKnowledge
 from pilotage.stack.navigator.global_plan import GlobalPlan
-from pilotage.stack.navigator.navigator import NAVIGATORS, Parts
+from pilotage.stack.navigator.navigator import Parts, localizer_of
 
 
 class PlanOnlyConfig(Config):
@@ -36,7 +36,7 @@ class PlanOnlyNavigator:
             raise InputError(
                 "navigator 'plan-only': expected world.goal and stack.planner, found one missing"
             )
-        self._localizer = parts.localizer
+        self._localizer = localizer_of(parts, "plan-only")
         plan = GlobalPlan(parts.planner, parts.smoother, chart, robot.streams.stream("planner"), journal)
         nothing = chart.walls.circles_m[:0]
         journal.result("mapped_circles_m", lambda: nothing)

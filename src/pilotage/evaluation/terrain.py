@@ -1,0 +1,115 @@
+"""How well a rover drove over terrain: hazards, heights along its path, and what it believed on it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+import numpy as np
+
+from pilotage.core.types import FloatArray
+from pilotage.evaluation.driving import covariances, poses
+from pilotage.evaluation.finished import FinishedRun, RobotRun
+from pilotage.evaluation.relief import relief
+from pilotage.evaluation.rover_metrics import ellipse_axes, in_ellipse, root_determinant, stretches_without
+from pilotage.kernels.grids.blocked_distance import distance_to_blocked
+from pilotage.maps.occupancy_grid import OccupancyGrid, squared_distances
+from pilotage.maps.world_map import WorldMap
+
+CLEARANCE_REACH_CELLS = 200
+"""Farther from hazards than this is not measured."""
+NEAR_CELLS = 3.0
+"""Points no farther than this beyond the nearest are measured exactly."""
+
+
+def terrain_columns(run: FinishedRun, robot: RobotRun) -> dict[str, FloatArray]:
+    """What is worked out for every row of a rover's trace: path, hazards, heights, ellipses."""
+    trace, chart = robot.trace, run.chart
+    points = poses(trace, "true")[:, :2]
+    if len(points) == 0 or chart.grid is None:
+        return {}
+    start = np.array([[robot.start.x_m, robot.start.y_m]])
+    steps = np.hypot(*np.diff(np.vstack([start, points]), axis=0).T)
+    columns = {
+        "distance_m": np.cumsum(steps),
+        "hazard_distance_m": hazard_distance_m(points, chart.grid),
+    }
+    if chart.elevation is not None:
+        columns["elevation_m"] = chart.elevation.heights_at(points)
+        columns["slope_rad"] = chart.elevation.slopes_at(chart.grid.cells_at(points))
+    covs = covariances(trace)
+    axes = ellipse_axes(covs, run.mission.run.ellipse_probability)
+    return columns | {
+        "ellipse_major_m": axes[:, 0],
+        "ellipse_minor_m": axes[:, 1],
+        "ellipse_direction_rad": axes[:, 2],
+        "root_determinant_m2": root_determinant(covs),
+    }
+
+
+def terrain_metrics(
+    run: FinishedRun, robot: RobotRun, columns: Mapping[str, FloatArray]
+) -> dict[str, object]:
+    """The numbers of a path over terrain by their JSON keys."""
+    trace, chart = robot.trace, run.chart
+    truth = poses(trace, "true")
+    if not columns:
+        return {}
+    away = columns["hazard_distance_m"]
+    metrics: dict[str, object] = {
+        "hazard_contacts": hazard_contacts(truth, chart),
+        "min_clearance_m": float(np.nanmin(away)) if np.isfinite(away).any() else math.nan,
+        "end": {"x_m": truth[-1, 0], "y_m": truth[-1, 1], "theta_rad": truth[-1, 2]},
+    }
+    if chart.elevation is not None and len(truth) > 1:
+        profile = relief(chart.elevation, truth[:, :2])
+        metrics |= {"climb_m": profile.climb_m, "descent_m": profile.descent_m}
+    if robot.stack.localizer is None:
+        return metrics
+    estimate, covs = poses(trace, "est"), covariances(trace)
+    error = estimate[-1] - truth[-1]
+    metrics["final_position_error_m"] = float(math.hypot(error[0], error[1]))
+    inside = in_ellipse(truth, estimate, covs, run.mission.run.ellipse_probability)
+    metrics["ellipse_coverage"] = float(inside.mean())
+    step_m = np.diff(np.concatenate([[0.0], columns["distance_m"]]))
+    seen = trace.get("beacons_seen", np.zeros(len(truth)))
+    metrics["blind_stretches"] = len(stretches_without(seen.astype(np.int64), step_m))
+    if "beacons_seen" in trace:
+        metrics["sightings"] = int(seen.sum())
+    return metrics
+
+
+def hazard_contacts(truth: FloatArray, chart: WorldMap) -> int:
+    """How many of (N, 3) poses lie on a hazard or off the ground."""
+    grid = chart.grid
+    if grid is None:
+        return 0
+    cells = grid.cells_at(truth[:, :2])
+    inside = (cells >= 0).all(axis=1) & (cells[:, 0] < grid.rows) & (cells[:, 1] < grid.columns)
+    on_hazard = grid.blocked()[cells[inside, 0], cells[inside, 1]]
+    return int(np.count_nonzero(~inside) + np.count_nonzero(on_hazard))
+
+
+def hazard_distance_m(points_xy_m: FloatArray, grid: OccupancyGrid) -> FloatArray:
+    """(N,) distance of points on the grid from the nearest hazard's edge; exact where it is least.
+
+    Farther off by the distance of the cells' middles, less half a cell's diagonal: tens of thousands of exact
+    distances would take seconds. More than ``CLEARANCE_REACH_CELLS`` cells are not measured.
+    """
+    blocked, reach = grid.blocked(), CLEARANCE_REACH_CELLS
+    cells = grid.cells_at(points_xy_m)
+    rows = np.clip(cells[:, 0], 0, grid.rows - 1)
+    columns = np.clip(cells[:, 1], 0, grid.columns - 1)
+    # No hazard farther than the reach counts: only the ground around the path is looked at.
+    top, left = max(int(rows.min()) - reach, 0), max(int(columns.min()) - reach, 0)
+    around = np.ascontiguousarray(
+        blocked[top : int(rows.max()) + reach + 1, left : int(columns.max()) + reach + 1]
+    )
+    if not around.any():
+        return np.full(len(points_xy_m), reach * grid.resolution_m)
+    between = np.sqrt(squared_distances(around)[rows - top, columns - left].astype(np.float64))
+    away = np.clip(between - math.sqrt(0.5), 0.0, float(reach))
+    near = between <= between.min() + NEAR_CELLS
+    places = grid.places_at(points_xy_m[near])
+    away[near] = distance_to_blocked(places, blocked, min(math.ceil(between[near].max()) + 1, reach))
+    return away * grid.resolution_m

@@ -1,1 +1,0 @@
-"""Running missions on a sheet."""

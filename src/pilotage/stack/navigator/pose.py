@@ -1,0 +1,69 @@
+"""The navigator that moves to a pose by a control law, without a path."""
+
+from __future__ import annotations
+
+import math
+
+from pilotage.core.errors import InputError
+from pilotage.core.types import STOP, Pose2, Twist
+from pilotage.maps.world_map import WorldMap
+from pilotage.sensors.readings import Readings
+from pilotage.stack.control.polar_pose import PolarPoseConfig, PolarPoseController
+from pilotage.stack.interface import NAVIGATORS, Belief, StackStatus
+from pilotage.stack.journal import Journal
+from pilotage.stack.knowledge import RobotKnowledge, TaskKnowledge
+from pilotage.stack.navigator.navigator import Parts, localizer_of
+
+
+@NAVIGATORS.add("pose", PolarPoseConfig)
+class PoseNavigator:
+    """Drives by the polar law from where it believes to be (rover report, chapter 2).
+
+    Arrives at the first step at which it believes to be within the goal's tolerance. It looks at no
+    obstacle: what lies on its way it drives over.
+    """
+
+    def __init__(
+        self,
+        config: PolarPoseConfig,
+        robot: RobotKnowledge,
+        chart: WorldMap,
+        task: TaskKnowledge,
+        parts: Parts,
+        journal: Journal,
+    ) -> None:
+        del chart
+        goal = task.goal
+        if goal is None or goal.theta_rad is None:
+            raise InputError("navigator 'pose': expected world.goal with theta_rad, found none")
+        self._localizer, self._journal = localizer_of(parts, "pose"), journal
+        pose = Pose2(goal.x_m, goal.y_m, goal.theta_rad)
+        self._law = PolarPoseController(config, pose, robot.motion.top_speed_m_s)
+        self._tolerance_m = task.goal_tolerance_m
+        self._status, self._reason = StackStatus.RUNNING, ""
+        self._channel = journal.channel({"distance_to_go_m": "m"})
+
+    @property
+    def belief(self) -> Belief:
+        """The localizer's belief."""
+        return self._localizer.belief
+
+    @property
+    def status(self) -> tuple[StackStatus, str]:
+        """Arrived where it believes to be near enough."""
+        return self._status, self._reason
+
+    def step(self, readings: Readings) -> Twist:
+        """Localize, and steer by distance and two angles."""
+        pose = self._localizer.step(readings).pose
+        to_go_m = self._law.distance_m(pose.x_m, pose.y_m)
+        self._channel.tell(to_go_m)
+        if self._status is not StackStatus.RUNNING:
+            return STOP
+        if to_go_m <= self._tolerance_m:
+            self._status = StackStatus.ARRIVED
+            self._reason = f"within {self._tolerance_m:g} m of the goal"
+            self._journal.say(readings.t_s, "arrived", self._reason)
+            return STOP
+        twist = self._law.command(pose.x_m, pose.y_m, pose.theta_rad)
+        return twist if math.isfinite(twist.w_rad_s) else STOP
