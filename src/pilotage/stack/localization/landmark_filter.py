@@ -149,12 +149,17 @@ class LandmarkFilter:
             nis,
             outcome,
         )
-        total = float(nis[outcome == sighting.OUTCOME_ACCEPTED].sum()) if used else 0.0
-        self._tell(count, used, total)
+        if used:
+            accepted = nis if used == count else nis[outcome == sighting.OUTCOME_ACCEPTED]
+            self._tell(count, used, float(accepted.sum()))
+            self._rejected = 0
+            return
+        self._tell(count, 0, 0.0)
         known = outcome != sighting.OUTCOME_UNKNOWN
-        self._rejected = 0 if used else self._rejected + int(known.any())
-        if self._doubt_after is not None and known.any() and self._rejected >= self._doubt_after:
-            self._doubt(seen, known)
+        if known.any():
+            self._rejected += 1
+            if self._doubt_after is not None and self._rejected >= self._doubt_after:
+                self._doubt(seen, known)
 
     def _doubt(self, seen: BeaconReadings, known: BoolArray) -> None:
         """Begin anew where the beacons agree on a pose, else believe the old one less."""

@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from pilotage.core.types import FloatArray, Pose2
+from pilotage.kernels.geometry import chain
 from pilotage.stack.planning.local_planner import RouteAhead
 
 WINDOW_BACK_M = 1.0
@@ -28,7 +29,7 @@ class PathProgress:
 
     def __init__(self, states: FloatArray, waypoints: FloatArray, clearance_m: float) -> None:
         self._clearance_m = clearance_m
-        self._states = states
+        self._states = np.ascontiguousarray(states)
         self._waypoints = waypoints
         self._points = states[:, :2]
         steps = np.hypot(*np.diff(self._points, axis=0).T)
@@ -54,11 +55,14 @@ class PathProgress:
 
     def update(self, pose: Pose2) -> float:
         """Project the estimate; returns the distance left to go."""
-        low = int(np.searchsorted(self._along_m, self.at_m - WINDOW_BACK_M))
-        high = int(np.searchsorted(self._along_m, self.at_m + WINDOW_AHEAD_M)) + 1
-        window = self._points[low:high]
-        dx, dy = window[:, 0] - pose.x_m, window[:, 1] - pose.y_m
-        self.at_m = float(self._along_m[low + int(np.argmin(dx * dx + dy * dy))])
+        self.at_m = chain.nearest_along(
+            self._states,
+            self._along_m,
+            pose.x_m,
+            pose.y_m,
+            self.at_m - WINDOW_BACK_M,
+            self.at_m + WINDOW_AHEAD_M,
+        )
         return self.length_m - self.at_m
 
     def next_waypoint(self, ahead_m: float) -> int:

@@ -94,7 +94,10 @@ class PlanResult:
 
 
 class Planner(Protocol):
-    """Finds a path on the robot's map. Built as ``cls(config)``."""
+    """Finds a path for the robot's centre on its map. Built as ``cls(config)``.
+
+    The clearance of a request holds the whole robot: of a polygon, the disc around it.
+    """
 
     @property
     def clearance_m(self) -> float:
@@ -107,7 +110,7 @@ class Planner(Protocol):
 
 
 class Smoother(Protocol):
-    """Shortens a path without losing its validity."""
+    """Shortens a path without losing its validity. Built as ``cls(config)``."""
 
     def smooth(self, path: Path, request: PlanRequest, clearance_m: float) -> Path:
         """Return a path from the same start to the same goal that is valid and no longer than ``path``."""

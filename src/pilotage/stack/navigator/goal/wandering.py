@@ -14,13 +14,11 @@ LED_S, FREE_S = 15.0, 10.0
 """It is led for so long, then goes where it likes: what stands in the way may be on no map."""
 
 
-class LostDriving:
+class Wandering:
     """Wanders by the scanner; without one the robot stands still.
 
     Attributes
     ----------
-    active
-        Whether the robot was lost and has had no plan since.
     plan_at_s
         When to plan, once it is found.
     """
@@ -28,7 +26,6 @@ class LostDriving:
     def __init__(self, config: WanderConfig, robot: RobotKnowledge, localizer: Localizer) -> None:
         self._wanderer = Wanderer.of(config, robot)
         self._look: Callable[[], float | None] | None = getattr(localizer, "look_bearing_rad", None)
-        self.active = False
         self.plan_at_s = 0.0
 
     def step(self, readings: Readings) -> Twist:

@@ -1,0 +1,164 @@
+"""What all states of the goal navigator share: the parts, the map, the plan, and how far it has come."""
+
+from __future__ import annotations
+
+import math
+
+from pilotage.core.types import Goal, Pose2
+from pilotage.sensors.readings import Readings
+from pilotage.stack.control.controller import Controller
+from pilotage.stack.control.guard import ArcGuard
+from pilotage.stack.control.reactive import Reaction, ReactionKind
+from pilotage.stack.interface import Belief, StackStatus
+from pilotage.stack.journal import Journal
+from pilotage.stack.knowledge import RobotKnowledge, TaskKnowledge
+from pilotage.stack.navigator.following import WaypointFollower
+from pilotage.stack.navigator.global_plan import GlobalPlan
+from pilotage.stack.navigator.goal.wandering import Wandering
+from pilotage.stack.navigator.goal_config import GoalNavigatorConfig, Mode
+from pilotage.stack.navigator.navigator import Parts
+from pilotage.stack.navigator.own_map import OwnMap
+from pilotage.stack.navigator.progress import PathProgress, StallWatch
+from pilotage.stack.planning.local_planner import LocalPlanner
+from pilotage.stack.planning.planner import PlanResult
+
+HERE_TOLERANCE_M = 0.005
+"""Slack between what a plan keeps and what is checked while driving it."""
+
+MAPPED_TOLERANCE_M = 0.02
+"""What the robot maps is drawn a little too large: where it stands there was room for it."""
+
+NO_REACTION = Reaction(ReactionKind.NONE, 0.0, math.inf, math.inf)
+
+
+class Context:
+    """The parts that the states drive with, the questions that they ask, and what the record wants to know.
+
+    Attributes
+    ----------
+    t_s, status, reason
+        Of the last step; why the task failed.
+    mode, reaction, to_go_m
+        What is recorded of the last step.
+    goals
+        Places still to be visited, the current one first.
+    trail
+        Poses since the last plan that did not start on them, for an escape to go back along.
+    """
+
+    def __init__(
+        self,
+        config: GoalNavigatorConfig,
+        robot: RobotKnowledge,
+        task: TaskKnowledge,
+        parts: Parts,
+        own_map: OwnMap,
+        plan: GlobalPlan,
+        local_planner: LocalPlanner,
+        controller: Controller,
+        journal: Journal,
+    ) -> None:
+        self.config = config
+        self.radius_m = robot.radius_m
+        self.journal = journal
+        self.goals: list[Goal] = list(task.goals)
+        self._tolerance_m = task.goal_tolerance_m
+        self.reactive, self._mapper, self.escape = parts.reactive, parts.mapper, parts.escape
+        self.own_map, self.plan = own_map, plan
+        self.follower = WaypointFollower(local_planner, controller, robot.dt_s)
+        self.guard = ArcGuard(config.guard, robot.radius_m)
+        self.wandering = Wandering(config.wander, robot, parts.localizer)
+        self._stall = StallWatch(config.stall_progress_m, config.stall_s)
+        self.t_s = 0.0
+        self.status, self.reason = StackStatus.RUNNING, ""
+        self.mode, self.reaction, self.to_go_m = Mode.FOLLOW, NO_REACTION, math.nan
+        self.trail: list[Pose2] = []
+
+    @property
+    def progress(self) -> PathProgress:
+        """On the plan; asked only where there is one."""
+        assert self.plan.progress is not None
+        return self.plan.progress
+
+    @property
+    def clearance_m(self) -> float:
+        """What the current plan keeps."""
+        return self.journal.plans[-1].clearance_m
+
+    # --- doing --------------------------------------------------------------------------------------
+
+    def rest(self, t_s: float) -> None:
+        """Begin a step: nothing is commanded yet."""
+        self.t_s = t_s
+        self.follower.rest()
+        self.reaction = NO_REACTION
+
+    def map_what_is_new(self, readings: Readings, belief: Belief) -> None:
+        """Put on the own map what the told one does not explain."""
+        if self._mapper is not None:
+            self._mapper.step(readings, belief)
+
+    def react(self, readings: Readings, pose: Pose2) -> ReactionKind:
+        """Let the reactive part say what is near."""
+        if self.reactive is not None:
+            self.reaction = self.reactive.step(
+                readings, pose, self.own_map.walls, self.plan.circles_m, self._goes_straight()
+            )
+        return self.reaction.kind
+
+    def make_plan(self, pose: Pose2, clearances_m: list[float]) -> PlanResult:
+        """Plan to the current goal on the own map."""
+        return self.plan.make(self.t_s, pose, self.goals[0], self.own_map.found_circles_m, clearances_m)
+
+    def take_plan(self, kind: str, why: str = "") -> None:
+        """Drive by the plan just made from now on."""
+        plan = self.journal.plans[-1]
+        self._stall.restart(self.t_s)
+        self.to_go_m = plan.length_m
+        because = f"{why}: " if why else ""
+        self.say(
+            kind, f"{because}{plan.length_m:.2f} m to go, planned in {plan.planning_time_s * 1e3:.0f} ms"
+        )
+
+    def replan_locally(self, pose: Pose2) -> bool:
+        """Plan to the next waypoint that can be reached; False where there is none."""
+        route = self.progress.route_ahead(self.config.waypoint_ahead_m)
+        return self.follower.replan(pose, route, self.own_map.walls, self.own_map.circles_m)
+
+    def say(self, kind: str, text: str) -> None:
+        """Tell that something happened."""
+        self.journal.say(self.t_s, kind, text)
+
+    # --- asking -------------------------------------------------------------------------------------
+
+    def stalled(self) -> bool:
+        """Whether the distance to go has not shrunk for too long."""
+        return self._stall.stalled(self.to_go_m, self.t_s)
+
+    def clearances_m(self, pose: Pose2) -> list[float]:
+        """Clearances to try in turn: the planner's own, the fallbacks, and what there is where it stands."""
+        own = self.plan.clearance_m
+        here = self.own_map.distance_m(pose)
+        asked = [own, *(self.radius_m + margin for margin in self.config.fallback_margins_m)]
+        squeezed = max(here - HERE_TOLERANCE_M, self.radius_m - MAPPED_TOLERANCE_M)
+        return [c for c in asked if c <= own] + ([squeezed] if squeezed < min(asked) else [])
+
+    def path_is_blocked(self) -> bool:
+        """Whether the local path ahead comes too near to what the robot mapped."""
+        config = self.config
+        if self._mapper is None or config.watch_ahead_m == 0.0:
+            return False
+        ahead = self.follower.clearance_ahead_m(config.watch_ahead_m, self._mapper.circles_m)
+        return ahead < min(self.radius_m + config.watch_margin_m, self.clearance_m - HERE_TOLERANCE_M)
+
+    def near_goal(self, pose: Pose2) -> bool:
+        """Whether this is the end: near the goal, and not merely passing by it with way left to go."""
+        goal = self.goals[0]
+        away = math.hypot(pose.x_m - goal.x_m, pose.y_m - goal.y_m)
+        if self.to_go_m > away + self._tolerance_m:
+            return False
+        return away <= self.config.arrival_m or (away <= self._tolerance_m and self.to_go_m < 0.02)
+
+    def _goes_straight(self) -> bool:
+        turn = self.progress.turn_ahead_rad(self.config.straight_ahead_m)
+        return turn < self.config.straight_below_rad

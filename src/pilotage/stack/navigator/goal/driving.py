@@ -1,0 +1,146 @@
+"""Driving by the plan: following it, taking the middle of a hall, turning away from the unexpected."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TypeAlias
+
+from pilotage.core.types import Pose2, Twist
+from pilotage.sensors.readings import Readings
+from pilotage.stack.control.reactive import ReactionKind
+from pilotage.stack.interface import Belief
+from pilotage.stack.navigator.goal.context import HERE_TOLERANCE_M, Context
+from pilotage.stack.navigator.goal.ended import arrive
+from pilotage.stack.navigator.goal.escaping import begin_escape, replan, set_out
+from pilotage.stack.navigator.goal.state import Move
+from pilotage.stack.navigator.goal_config import Mode
+
+
+@dataclass(frozen=True, slots=True)
+class Following:
+    """Follows the plan from waypoint to waypoint."""
+
+    context: Context
+
+    def step(self, readings: Readings, belief: Belief) -> Move:
+        """React to what is near, else follow."""
+        return drive(self.context, self, readings, belief)
+
+
+@dataclass(frozen=True, slots=True)
+class InHall:
+    """Takes the middle between two walls."""
+
+    context: Context
+
+    def step(self, readings: Readings, belief: Belief) -> Move:
+        """React to what is near; follow again where the hall ends."""
+        return drive(self.context, self, readings, belief)
+
+
+@dataclass(frozen=True, slots=True)
+class Avoiding:
+    """Turns away from something unexpected in front.
+
+    Attributes
+    ----------
+    resumes
+        What it was about before, and is again when the way is free.
+    """
+
+    context: Context
+    resumes: Following | InHall
+
+    def step(self, readings: Readings, belief: Belief) -> Move:
+        """Turn on while something is in front."""
+        return drive(self.context, self, readings, belief)
+
+
+Driving: TypeAlias = Following | InHall | Avoiding
+
+
+def drive(context: Context, state: Driving, readings: Readings, belief: Belief) -> Move:
+    """One step by the plan: what to be about is decided first, then the command is looked at by the guard."""
+    pose = belief.pose
+    context.map_what_is_new(readings, belief)
+    context.to_go_m = context.progress.update(pose)
+    move = _next(context, state, readings, pose)
+    own, command = context.own_map, move.command
+    if context.guard.allows(command, pose, own.walls, own.circles_m, context.clearance_m - HERE_TOLERANCE_M):
+        return move
+    if isinstance(move.state, Avoiding):
+        return Move(move.state, Twist(0.0, command.w_rad_s))
+    return replan(context, move.state, pose, "the robot's own map leaves no room for the command")
+
+
+def _next(context: Context, state: Driving, readings: Readings, pose: Pose2) -> Move:
+    """The transitions between the states of driving, and out of them."""
+    context.trail.append(pose)
+    kind = context.react(readings, pose)
+    resumes = state.resumes if isinstance(state, Avoiding) else state
+    if kind is ReactionKind.TRAPPED:
+        return begin_escape(context, resumes, "turning found no way out")
+    if context.stalled():
+        return begin_escape(context, resumes, f"no progress for {context.config.stall_s:g} s")
+    if kind is ReactionKind.AVOID:
+        return _avoid(context, state, resumes)
+    if isinstance(state, Avoiding):
+        context.follower.drop()
+        context.say("avoid-end", "the way in front is free again")
+    if kind is ReactionKind.HALL and not context.near_goal(pose):
+        return _take_the_middle(context, resumes)
+    if isinstance(resumes, InHall):
+        context.follower.drop()
+        resumes = Following(context)
+    return _follow(context, resumes, pose)
+
+
+def _avoid(context: Context, state: Driving, resumes: Following | InHall) -> Move:
+    context.mode = Mode.AVOID
+    reaction = context.reaction
+    if not isinstance(state, Avoiding):
+        attempt = context.journal.count("attempts")
+        side = "left" if reaction.w_rad_s > 0.0 else "right"
+        context.say(
+            "avoid-start",
+            f"something unexpected {reaction.front_m:.2f} m ahead: turning {side}, attempt {attempt}",
+        )
+        state = Avoiding(context, resumes)
+    return Move(state, Twist(reaction.speed_limit_m_s, reaction.w_rad_s))
+
+
+def _take_the_middle(context: Context, state: Following | InHall) -> Move:
+    context.mode = Mode.LATERAL
+    if not isinstance(state, InHall):
+        state = InHall(context)
+        context.say("hall", "walls close on both sides: taking the middle")
+    context.follower.drop()
+    return Move(state, Twist(context.config.cruise_speed_m_s, context.reaction.w_rad_s))
+
+
+def _follow(context: Context, state: Following, pose: Pose2) -> Move:
+    """Follow the local path; plan a new one at each waypoint; replan globally where none leads on."""
+    if not context.follower.active:
+        if context.near_goal(pose):
+            return _reach(context, state, pose)
+        if not context.replan_locally(pose):
+            return replan(context, state, pose, "no next waypoint can be reached on the robot's own map")
+    elif context.path_is_blocked():
+        return replan(context, state, pose, "a mapped obstacle stands on the local path")
+    command = context.follower.step(pose)
+    context.mode = Mode.FOLLOW
+    if context.reaction.kind is ReactionKind.LATERAL:
+        context.mode = Mode.LATERAL
+        command = Twist(command.v_m_s, command.w_rad_s + context.reaction.w_rad_s)
+    return Move(state, command)
+
+
+def _reach(context: Context, state: Following, pose: Pose2) -> Move:
+    """A goal is reached: on to the next, or the end."""
+    if len(context.goals) == 1:
+        return arrive(context)
+    context.goals.pop(0)
+    reached = context.journal.count("goals")
+    context.mode = Mode.REPLAN
+    context.follower.drop()
+    return set_out(context, state, pose, "goal", f"goal {reached} is reached, on to the next")

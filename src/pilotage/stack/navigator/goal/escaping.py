@@ -1,0 +1,75 @@
+"""Out of a trap, and the new plan after it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from pilotage.core.types import STOP, Pose2
+from pilotage.sensors.readings import Readings
+from pilotage.stack.interface import Belief
+from pilotage.stack.navigator.goal.context import HERE_TOLERANCE_M, Context
+from pilotage.stack.navigator.goal.ended import fail
+from pilotage.stack.navigator.goal.state import Move, State
+from pilotage.stack.navigator.goal_config import Mode
+
+
+@dataclass(frozen=True, slots=True)
+class Escaping:
+    """Lets the escape lead until it is over, then plans anew.
+
+    Attributes
+    ----------
+    resumes
+        What the robot was about before, and is again with the new plan.
+    """
+
+    context: Context
+    resumes: State
+
+    def step(self, readings: Readings, belief: Belief) -> Move:
+        """Go on with the escape; its own trail the robot has driven before: there only known walls count."""
+        context, pose = self.context, belief.pose
+        assert context.escape is not None, "nobody escapes without one"
+        context.map_what_is_new(readings, belief)
+        context.to_go_m = context.progress.update(pose)
+        command = context.escape.step(pose)
+        context.mode = Mode.ESCAPE
+        if command is None:
+            if context.reactive is not None:
+                context.reactive.reset()
+            return replan(context, self.resumes, pose, "backed out")
+        own, room_m = context.own_map, context.radius_m + HERE_TOLERANCE_M
+        if context.guard.allows(command, pose, own.walls, own.known_circles_m, room_m):
+            return Move(self, command)
+        return replan(context, self.resumes, pose, "the way back is blocked")
+
+
+def begin_escape(context: Context, resumes: State, why: str) -> Move:
+    """Stop, and back out from the next step on; without an escape this is the end."""
+    if context.escape is None:
+        return fail(context, f"stuck: {why}, and the stack has no escape")
+    context.journal.count("escapes")
+    context.say("escape", f"{why}: backing out the way it came")
+    context.escape.begin(context.trail)
+    context.follower.drop()
+    context.mode = Mode.ESCAPE
+    return Move(Escaping(context, resumes), STOP)
+
+
+def replan(context: Context, resumes: State, pose: Pose2, why: str) -> Move:
+    """Stop and plan anew on the robot's own map; back out where even that finds no way."""
+    context.mode = Mode.REPLAN
+    context.follower.drop()
+    if context.journal.counts["replans"] >= context.config.max_replans:
+        return fail(context, f"stuck: gave up after {context.journal.counts['replans']} replans")
+    context.journal.count("replans")
+    return set_out(context, resumes, pose, "replan", why)
+
+
+def set_out(context: Context, resumes: State, pose: Pose2, kind: str, why: str) -> Move:
+    """Stop and plan to the current goal; back out where there is no path from here."""
+    result = context.make_plan(pose, context.clearances_m(pose))
+    if result.path is None:
+        return begin_escape(context, resumes, f"replanning found {result.status} ({result.reason})")
+    context.take_plan(kind, why)
+    return Move(resumes, STOP)

@@ -1,0 +1,142 @@
+"""The goal navigator's states: several goals in order, a start that is not known, ends that stay ends."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from pilotage.core.errors import InputError
+from pilotage.core.random import RandomStreams
+from pilotage.core.types import STOP, Goal, Pose2, Twist
+from pilotage.kernels.geometry import chain
+from pilotage.missions.floor import BodyConfig, MotionConfig
+from pilotage.sensors.readings import Readings
+from pilotage.sim.simulator import Simulator
+from pilotage.sim.world import World
+from pilotage.stack.control.pi_follower import PiFollower, PiFollowerConfig
+from pilotage.stack.interface import Belief, BeliefStatus, StackStatus
+from pilotage.stack.localization.ekf_landmarks import EkfLandmarkLocalizer
+from pilotage.stack.localization.landmark_filter import LandmarkFilterConfig
+from pilotage.stack.navigator.goal import GoalNavigator
+from pilotage.stack.navigator.goal_config import GoalNavigatorConfig, Mode
+from pilotage.stack.navigator.navigator import Parts
+from pilotage.stack.planning.dubins_local import DubinsLocalConfig, DubinsLocalPlanner
+from pilotage.stack.planning.rrt_star_dubins import RrtStarDubinsConfig, RrtStarDubinsPlanner
+from support.robots import BEACONS, ROOM, Told, sensors, told_of
+
+START = Pose2(2.0, 2.0, 0.0)
+
+
+class Stub:
+    """A localizer that believes what it is told to."""
+
+    def __init__(self, belief: Belief) -> None:
+        self.belief = belief
+
+    def step(self, readings: Readings) -> Belief:  # noqa: ARG002
+        return self.belief
+
+
+def navigator(told: Told, localizer: object) -> GoalNavigator:
+    """Put together from the plainest parts."""
+    parts = Parts(
+        localizer=localizer,  # type: ignore[arg-type]
+        planner=RrtStarDubinsPlanner(RrtStarDubinsConfig(clearance_m=0.4, iterations=2000)),
+        smoother=None,
+        local_planner=DubinsLocalPlanner(DubinsLocalConfig(), told.robot),
+        controller=PiFollower(PiFollowerConfig(), told.robot),
+        reactive=None,
+        mapper=None,
+        escape=None,
+    )
+    return told.navigator(GoalNavigator, GoalNavigatorConfig(), parts)
+
+
+def test_several_goals_are_visited_in_order() -> None:
+    told = told_of(start=START, variances=(1e-4, 1e-4, 1e-4))
+    goals = (Goal(3.5, 6.0), Goal(8.0, 6.0), Goal(8.0, 2.0))
+    told = replace(told, task=replace(told.task, goals=goals))
+    stack = navigator(told, told.localizer(EkfLandmarkLocalizer, LandmarkFilterConfig()))
+    assert told.journal.counts["goals"] == 0
+    sim = Simulator(
+        World(ROOM, ROOM, BEACONS), BodyConfig(), MotionConfig(), sensors(), START, 0.1, RandomStreams(0)
+    )
+    command, nearest = STOP, [math.inf] * 3
+    for _ in range(900):
+        command = stack.step(sim.step(command))
+        away = [math.hypot(sim.truth.x_m - goal.x_m, sim.truth.y_m - goal.y_m) for goal in goals]
+        nearest = [min(pair) for pair in zip(nearest, away, strict=True)]
+        if stack.status[0] is not StackStatus.RUNNING:
+            break
+    assert stack.status[0] is StackStatus.ARRIVED
+    assert max(nearest) < 0.3
+    assert away[-1] < 0.3
+    assert told.journal.counts["goals"] == 2, "the last one is the arrival"
+    assert [event.kind for event in told.journal.events] == ["plan", "goal", "goal", "arrived"]
+    assert len(told.journal.plans) == 3
+    assert stack.step(sim.step(STOP)) == STOP
+    assert told.said["mode"] == Mode.ARRIVED
+
+
+def test_a_robot_that_starts_lost_plans_once_it_knows_where_it_is() -> None:
+    lost = Belief.anywhere(ROOM.bounds_m)
+    told = told_of(initial=lost)
+    stub = Stub(lost)
+    stack = navigator(told, stub)
+    assert told.journal.plans == []
+    stack.step(Readings(0.1, {}))
+    stack.step(Readings(0.2, {}))
+    assert told.said["mode"] == Mode.WANDER
+    stub.belief = Belief(START, 1e-4 * np.eye(3))
+    assert stack.step(Readings(0.3, {})) == STOP
+    assert [event.kind for event in told.journal.events] == ["lost", "found"]
+    stub.belief = replace(lost, status=BeliefStatus.LOST)
+    stack.step(Readings(0.4, {}))
+    assert [event.kind for event in told.journal.events] == ["lost", "found", "lost"]
+
+
+def test_a_pose_found_at_the_first_step_is_planned_from() -> None:
+    lost = Belief.anywhere(ROOM.bounds_m)
+    told = told_of(initial=lost)
+    stub = Stub(lost)
+    stack = navigator(told, stub)
+    stub.belief = Belief(START, 1e-4 * np.eye(3))
+    commands = [stack.step(Readings(0.1 * k, {})) for k in range(1, 15)]
+    assert commands[0] == STOP
+    assert commands[-1] != STOP
+    assert len(told.journal.plans) == 1
+
+
+def test_a_goal_in_the_wall_fails_before_the_start() -> None:
+    told = told_of(start=START, goal=Goal(5.0, 1.0))
+    stack = navigator(told, Stub(told.initial))
+    status, reason = stack.status
+    assert status is StackStatus.FAILED
+    assert "goal" in reason
+    assert [event.kind for event in told.journal.events] == ["failed"]
+    assert stack.step(Readings(0.1, {})) == Twist(0.0, 0.0)
+
+
+def test_no_goal_is_refused() -> None:
+    told = told_of(goal=None)
+    with pytest.raises(InputError, match=r"world\.goal"):
+        navigator(told, Stub(told.initial))
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.integers(0, 10_000), st.floats(-2.0, 12.0), st.floats(0.0, 6.0))
+def test_the_nearest_point_of_a_window_of_a_chain(seed: int, low: float, width: float) -> None:
+    rng = np.random.default_rng(seed)
+    points = np.ascontiguousarray(rng.uniform(-1.0, 1.0, (30, 3)))
+    along = np.concatenate([[0.0], np.cumsum(rng.uniform(0.1, 0.5, 29))])
+    low = min(low, float(along[-1]))
+    x, y = rng.uniform(-1.0, 1.0, 2)
+    first, last = np.searchsorted(along, [low, low + width])
+    away = np.hypot(points[first : last + 1, 0] - x, points[first : last + 1, 1] - y)
+    found = chain.nearest_along(points, along, x, y, low, low + width)
+    assert found == along[first + int(np.argmin(away))]
