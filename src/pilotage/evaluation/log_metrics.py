@@ -8,8 +8,8 @@ import numpy as np
 
 from pilotage.core.types import FloatArray
 from pilotage.evaluation.consistency import nees, nees_metrics, nis_metrics
-from pilotage.evaluation.pose_errors import pose_errors
 from pilotage.evaluation.driving import covariances, poses
+from pilotage.evaluation.pose_errors import pose_errors
 
 LOST_M = 2.0
 """A robot that ends farther than this from where it believes to be is lost."""

@@ -10,8 +10,8 @@ import numpy as np
 from pilotage.core.types import BoolArray, FloatArray
 from pilotage.evaluation.cell_map_score import CellMapScore, score_cell_map
 from pilotage.evaluation.consistency import nees, nees_metrics
-from pilotage.evaluation.pose_errors import pose_errors
 from pilotage.evaluation.driving import covariances, poses
+from pilotage.evaluation.pose_errors import pose_errors
 from pilotage.evaluation.sheet_visits import reachable_cells
 from pilotage.maps.cell_map import CellMap
 from pilotage.maps.true_cells import SheetFile, true_map

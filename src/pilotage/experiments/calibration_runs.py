@@ -10,10 +10,11 @@ import numpy as np
 from pilotage.calibration.steady import SteadyReadings
 from pilotage.core.errors import InputError
 from pilotage.core.types import STOP
-from pilotage.experiments.floor.build import build, build_sensors
-from pilotage.experiments.floor.mission import load_floor_mission
+from pilotage.experiments.build.build import build
+from pilotage.experiments.build.robots import sensors_of
+from pilotage.experiments.mission import load_mission
 from pilotage.experiments.run import run_mission
-from pilotage.missions.floor import FloorMission
+from pilotage.missions.mission import Mission
 from pilotage.sensors.beacon import BeaconConfig
 from pilotage.sensors.lidar import LidarConfig
 from pilotage.sensors.readings import BeaconReadings, LidarScan, Reading, UltrasonicReading
@@ -36,10 +37,9 @@ def drive_odometry_runs(
     Every run has a seed of its own: with a common one the noise of all four would be the same draws.
     """
     missions = [
-        load_floor_mission(name, overrides, len(ODOMETRY_RUNS) * seed + i)
-        for i, name in enumerate(ODOMETRY_RUNS)
+        load_mission(name, overrides, len(ODOMETRY_RUNS) * seed + i) for i, name in enumerate(ODOMETRY_RUNS)
     ]
-    wheels = [c for c in build_sensors(missions[0]).values() if isinstance(c, WheelOdometryConfig)]
+    wheels = [c for c in sensors_of(missions[0].robot).values() if isinstance(c, WheelOdometryConfig)]
     if len(wheels) != 1:
         raise InputError(f"calibrate odometry: expected one wheel-odometry on the robot, found {len(wheels)}")
     folders = []
@@ -56,9 +56,9 @@ def listen_in_the_room(overrides: Sequence[str], seed: int) -> list[SteadyReadin
     LiDAR and beacons from the middle of the room, an ultrasonic with the robot 2 m from the wall and turned
     so that the sensor faces it. What a perfect sensor would read comes from the same place without noise.
     """
-    mission = load_floor_mission(ROOM, overrides, seed)
+    mission = load_mission(ROOM, overrides, seed)
     out: list[SteadyReadings] = []
-    for name, config in build_sensors(mission).items():
+    for name, config in sensors_of(mission.robot).items():
         place: list[str] = []
         if isinstance(config, UltrasonicConfig):
             theta = -config.mount.theta_rad
@@ -69,8 +69,8 @@ def listen_in_the_room(overrides: Sequence[str], seed: int) -> list[SteadyReadin
         elif not isinstance(config, LidarConfig | BeaconConfig):
             continue
         here = [*overrides, *place]
-        noisy = _listen(load_floor_mission(ROOM, here, seed), name, READINGS)
-        exact = _listen(load_floor_mission(ROOM, [*here, *_silence(name, config)], seed), name, 1)
+        noisy = _listen(load_mission(ROOM, here, seed), name, READINGS)
+        exact = _listen(load_mission(ROOM, [*here, *_silence(name, config)], seed), name, 1)
         out += _series(name, config, noisy, exact[0])
     if not out:
         raise InputError(
@@ -85,12 +85,12 @@ def _silence(name: str, config: SensorConfig) -> list[str]:
     return [f"robot.sensors.{name}.{field}=0" for field in variances]
 
 
-def _listen(mission: FloorMission, sensor: str, count: int) -> list[Reading]:
+def _listen(mission: Mission, sensor: str, count: int) -> list[Reading]:
     """Stand still and take so many readings of one sensor."""
     simulator = build(mission).simulator
     readings: list[Reading] = []
     while len(readings) < count:
-        reading = simulator.step(STOP).by_sensor.get(sensor)
+        reading = simulator.step([STOP])[0].by_sensor.get(sensor)
         if reading is not None:
             readings.append(reading)
     return readings

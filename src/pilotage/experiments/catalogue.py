@@ -8,10 +8,11 @@ from pydantic_core import PydanticUndefined
 
 from pilotage.core.config import Config
 from pilotage.core.errors import unknown_name
-from pilotage.experiments.kinds import KINDS
 from pilotage.experiments.mission import read_mission, shipped_missions
-from pilotage.experiments.roles import REGISTRIES
+from pilotage.experiments.roles import ROLES
 from pilotage.missions.mission import Mission
+
+TEMPLATE = "#/$defs/{model}"
 
 
 def missions() -> list[tuple[str, str]]:
@@ -27,7 +28,7 @@ def components(name: str | None = None) -> list[tuple[str, str, str]]:
     InputError
         If there is no component of that name.
     """
-    entries = [(role, entry) for role, registry in REGISTRIES.items() for entry in registry]
+    entries = [(role, entry) for role, registry in ROLES.items() for entry in registry]
     if name is None:
         return [(role, entry.name, _first_line(entry.factory.__doc__)) for role, entry in entries]
     found = [(role, entry) for role, entry in entries if entry.name == name]
@@ -70,52 +71,31 @@ def _values(schema: dict[str, Any]) -> str:
 
 
 def mission_schema() -> dict[str, Any]:
-    """JSON schema of a mission file: one alternative for each kind of world."""
-    kinds = {name: _kind_schema(name, load().schema) for name, load in KINDS.items()}
-    definitions: dict[str, Any] = {}
-    for schema in kinds.values():
-        definitions |= schema.pop("$defs")
-    return {"title": "Mission", "anyOf": list(kinds.values()), "$defs": definitions}
-
-
-def _kind_schema(kind: str, model: type[Mission]) -> dict[str, Any]:
-    """Schema of one kind of mission, with the parameters of every component that a role can take.
-
-    Definitions carry the kind's name: each kind has a robot and a stack of its own.
-    """
-    template = f"#/$defs/{kind}.{{model}}"
-    schema = model.model_json_schema(ref_template=template)
-    definitions = {f"{kind}.{name}": entry for name, entry in schema.pop("$defs", {}).items()}
+    """JSON schema of a mission file, with the parameters of every component that a role can take."""
+    schema = Mission.model_json_schema(ref_template=TEMPLATE)
+    definitions = schema["$defs"]
     choices: dict[str, dict[str, Any]] = {}
-    for role, registry in REGISTRIES.items():
+    for role, registry in ROLES.items():
         options = []
         for entry in registry:
-            parameters = entry.config.model_json_schema(ref_template=template)
-            inner = parameters.pop("$defs", {})
-            definitions |= {f"{kind}.{name}": value for name, value in inner.items()}
+            parameters = entry.config.model_json_schema(ref_template=TEMPLATE)
+            definitions |= parameters.pop("$defs", {})
             parameters["properties"] = {"name": {"const": entry.name}, **parameters.get("properties", {})}
             parameters["required"] = ["name", *parameters.get("required", [])]
             parameters["title"] = entry.name
             options.append(parameters)
-        definitions[f"{kind}.role-{role}"] = {"oneOf": options}
-        choices[role] = {"$ref": f"#/$defs/{kind}.role-{role}"}
-    stack = _part(schema, definitions, "stack")["properties"]
+        definitions[f"role-{role}"] = {"oneOf": options}
+        choices[role] = {"$ref": f"#/$defs/role-{role}"}
+    stack = definitions["StackConfig"]["properties"]
     for role, choice in choices.items():
         if role in stack:
             stack[role] = choice if "default" not in stack[role] else {"anyOf": [choice, {"type": "null"}]}
-    robot = _part(schema, definitions, "robot")["properties"]
-    if "sensors" in robot:
-        robot["sensors"]["additionalProperties"] = choices["sensor"]
+    robot = definitions["RobotConfig"]["properties"]
+    robot["sensors"]["additionalProperties"] = choices["sensor"]
+    robot["motion"] = choices["motion"]
+    schema["properties"]["task"] = {"anyOf": [choices["task"], {"type": "string"}]}
     schema["properties"]["extends"] = {"type": "string", "description": "a shipped mission to start from"}
-    return {**schema, "$defs": definitions}
-
-
-def _part(schema: dict[str, Any], definitions: dict[str, Any], key: str) -> dict[str, Any]:
-    """The definition that a top key of a mission refers to."""
-    name = schema["properties"][key]["$ref"].removeprefix("#/$defs/")
-    part = definitions[name]
-    assert isinstance(part, dict)
-    return part
+    return schema
 
 
 def _first_line(text: str | None) -> str:

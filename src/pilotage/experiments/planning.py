@@ -10,9 +10,8 @@ from pilotage.core.errors import InputError
 from pilotage.core.random import RandomStreams
 from pilotage.core.types import Goal, Pose2
 from pilotage.evaluation.shortest_path import shortest_path
-from pilotage.experiments.floor.world_map import load_map
+from pilotage.experiments.build.charts import load_chart
 from pilotage.experiments.values import parse_override
-from pilotage.maps.map_file import LandmarkMap
 from pilotage.maps.world_map import WorldMap
 from pilotage.stack.interface import PlannedPath
 from pilotage.stack.journal import Journal
@@ -48,7 +47,7 @@ def plan_on_map(
     InputError
         Where the map, the planner, a parameter or a place is not what it should be.
     """
-    floor = load_map(map_name_or_path)
+    floor = load_chart(map_name_or_path)
     _check_on_map("--start", start, floor)
     _check_on_map("--goal", goal, floor)
     own, smoothing, smoother_name = _split(overrides)
@@ -59,7 +58,7 @@ def plan_on_map(
     plan = GlobalPlan(
         PLANNERS.entry(planner).factory(config),
         SMOOTHERS.entry(smoother_name).factory(smoother_config),
-        WorldMap(floor.name, floor.walls.bounds_m, floor.walls),
+        floor,
         RandomStreams(seed).stream("planner"),
         journal,
     )
@@ -120,9 +119,9 @@ def _split(overrides: Sequence[str]) -> tuple[dict[str, Any], dict[str, Any], st
     return own, smoothing, name
 
 
-def _check_on_map(option: str, place: Sequence[float], floor: LandmarkMap) -> None:
-    if not floor.walls.contains(place[0], place[1]):
-        xmin, ymin, xmax, ymax = floor.walls.bounds_m
+def _check_on_map(option: str, place: Sequence[float], floor: WorldMap) -> None:
+    if not floor.contains(place[0], place[1]):
+        xmin, ymin, xmax, ymax = floor.bounds_m
         raise InputError(
             f"{option}: expected a place on the map '{floor.name}' ({xmin:g} to {xmax:g}, "
             f"{ymin:g} to {ymax:g} m), found ({place[0]:g}, {place[1]:g})"

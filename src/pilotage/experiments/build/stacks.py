@@ -88,7 +88,7 @@ def build_stack(
         Where a component is unknown, or lacks what it needs.
     """
     if "explorer" in oracles and truth is not None:
-        return knowing_explorer(robot, chart, task, truth, journal)
+        return knowing_explorer(robot, task, truth, journal)
     localizer = _localizer(config, robot, chart, task, journal, truth, oracles)
     parts = Parts(
         localizer=localizer,

@@ -8,20 +8,21 @@ proof of that is offered, and one that weaves along the border of two rows could
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from itertools import pairwise
 
 import numpy as np
 
-from pilotage.core.types import STANDSTILL, BoolArray, Event, FloatArray, IntArray, Pose2, WheelSpeeds
+from pilotage.core.types import STANDSTILL, BoolArray, FloatArray, IntArray, Pose2, WheelSpeeds
 from pilotage.evaluation.sheet_visits import VisitedCells
-from pilotage.experiments.certain import exactly
+from pilotage.experiments.oracles.certain import exactly
 from pilotage.maps.cell_map import CellMap, CellState
 from pilotage.sensors.readings import Readings
 from pilotage.stack.control.waypoint_drive import WaypointDrive
-from pilotage.stack.exploration.explorer import LeftCell
+from pilotage.stack.exploration.explorer import LeftCell, offer
 from pilotage.stack.interface import Belief, StackStatus
-from pilotage.stack.knowledge import FloorPlan, SheetKnowledge
+from pilotage.stack.journal import Journal
+from pilotage.stack.knowledge import SheetKnowledge
 from pilotage.stack.mapping.sheet_grid import SheetShape
 from pilotage.stack.planning.sheet_room import Point, SheetRoom
 
@@ -42,16 +43,18 @@ class TourExplorer:
     ----------
     pose
         The true pose.
-    plan
-        The true floor plan.
     wanted
         (rows, columns) cells to visit.
     """
 
     def __init__(
-        self, knowledge: SheetKnowledge, pose: Callable[[], Pose2], plan: FloorPlan, wanted: BoolArray
+        self, knowledge: SheetKnowledge, pose: Callable[[], Pose2], wanted: BoolArray, journal: Journal
     ) -> None:
-        self._pose, self._plan, self._wanted = pose, plan, wanted
+        plan = knowledge.given.plan
+        assert plan is not None, "the tour is planned on the true sheet"
+        self._pose, self._plan, self._wanted, self._journal = pose, plan, wanted, journal
+        offer(journal, self)
+        self._channel = journal.channel({"goal_x_m": "m", "goal_y_m": "m"})
         shape = SheetShape.of(knowledge.size_m, knowledge.cells, RESOLUTION_M)
         self._room = SheetRoom(shape, knowledge.body_radius_m, ROOM_M, WIDE_M)
         self._room.update(plan.walls_m, np.zeros((0, 2)))
@@ -64,7 +67,6 @@ class TourExplorer:
         self._goal: tuple[int, int] | None = None
         self._status, self._reason = StackStatus.RUNNING, ""
         self._left: tuple[LeftCell, ...] = ()
-        self._events: list[Event] = []
         self._ahead = self._tour((knowledge.start.x_m, knowledge.start.y_m))
 
     @property
@@ -97,6 +99,8 @@ class TourExplorer:
         """Drive on; the sensors say nothing that is not known."""
         pose = self._pose()
         self._visits.add(pose.x_m, pose.y_m, readings.t_s)
+        x, y = self._driver.waypoints[-1] if self._driver.waypoints else (math.nan, math.nan)
+        self._channel.tell(x, y)
         if self._status is not StackStatus.RUNNING:
             return STANDSTILL
         if self._driver.is_stuck(readings.t_s):
@@ -105,16 +109,6 @@ class TourExplorer:
             if not self._next((pose.x_m, pose.y_m), readings.t_s):
                 return STANDSTILL
         return self._driver.step((pose.x_m, pose.y_m, pose.theta_rad), readings.t_s)
-
-    def telemetry(self) -> Mapping[str, float]:
-        """Where it is going."""
-        x, y = self._driver.waypoints[-1] if self._driver.waypoints else (math.nan, math.nan)
-        return {"goal_x_m": x, "goal_y_m": y}
-
-    def drain_events(self) -> list[Event]:
-        """Events since the last call."""
-        events, self._events = self._events, []
-        return events
 
     # --- where to ------------------------------------------------------------------------------------
 
@@ -145,7 +139,7 @@ class TourExplorer:
         self._left = tuple(LeftCell(row, column, "unreachable") for row, column in unseen)
         self._status = StackStatus.ARRIVED
         self._reason = f"done: {self._visits.count} cells visited, {len(unseen)} left"
-        self._events.append(Event(t_s, "arrived", self._reason))
+        self._journal.say(t_s, "arrived", self._reason)
         return False
 
     def _way(self, run: Run, here: Point, cost: FloatArray, parent: IntArray) -> list[Point]:

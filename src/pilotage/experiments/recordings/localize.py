@@ -18,8 +18,8 @@ from pilotage.core.errors import InputError
 from pilotage.core.random import RandomStreams
 from pilotage.core.types import Event, FloatArray, Pose2
 from pilotage.evaluation.log_metrics import log_metrics
-from pilotage.experiments.floor.recorder import BELIEF_COLUMNS, TRUTH_COLUMNS
 from pilotage.experiments.mission import read_parameters
+from pilotage.experiments.recorder import BELIEF_COLUMNS, TRUTH_COLUMNS
 from pilotage.experiments.recordings.drive import RecordedDrive, aer1513_drive, mrclam_drive
 from pilotage.experiments.recordings.parameters import shipped_parameters
 from pilotage.experiments.values import apply_override, merge

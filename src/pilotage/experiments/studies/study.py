@@ -15,8 +15,8 @@ import yaml
 
 from pilotage.core.config import validate
 from pilotage.core.errors import InputError, unknown_name
-from pilotage.experiments.oracles.applicable import check_oracles
 from pilotage.experiments.mission import mission_of, read_mission, shipped_missions
+from pilotage.experiments.oracles.applicable import check_oracles
 from pilotage.experiments.resolve import resolved_values
 from pilotage.experiments.studies.cells import Cell, make_cells
 from pilotage.experiments.studies.definition import StudyDefinition

@@ -16,7 +16,7 @@ from pilotage.stack.navigator.following import WaypointFollower
 from pilotage.stack.navigator.global_plan import GlobalPlan
 from pilotage.stack.navigator.goal.wandering import Wandering
 from pilotage.stack.navigator.goal_config import GoalNavigatorConfig, Mode
-from pilotage.stack.navigator.navigator import Parts
+from pilotage.stack.navigator.navigator import Parts, localizer_of
 from pilotage.stack.navigator.own_map import OwnMap
 from pilotage.stack.navigator.progress import PathProgress, StallWatch
 from pilotage.stack.planning.local_planner import LocalPlanner
@@ -67,7 +67,7 @@ class Context:
         self.own_map, self.plan = own_map, plan
         self.follower = WaypointFollower(local_planner, controller, robot.dt_s)
         self.guard = ArcGuard(config.guard, robot.radius_m)
-        self.wandering = Wandering(config.wander, robot, parts.localizer)
+        self.wandering = Wandering(config.wander, robot, localizer_of(parts, "goal"))
         self._stall = StallWatch(config.stall_progress_m, config.stall_s)
         self.t_s = 0.0
         self.status, self.reason = StackStatus.RUNNING, ""

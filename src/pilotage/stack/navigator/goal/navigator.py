@@ -8,7 +8,7 @@ from pilotage.core.errors import InputError
 from pilotage.core.types import Twist
 from pilotage.maps.world_map import WorldMap
 from pilotage.sensors.readings import Readings
-from pilotage.stack.interface import Belief, BeliefStatus, StackStatus
+from pilotage.stack.interface import NAVIGATORS, Belief, BeliefStatus, StackStatus
 from pilotage.stack.journal import Journal
 from pilotage.stack.knowledge import RobotKnowledge, TaskKnowledge
 from pilotage.stack.navigator.global_plan import GlobalPlan
@@ -17,7 +17,7 @@ from pilotage.stack.navigator.goal.ended import Ended
 from pilotage.stack.navigator.goal.finding import Lost, first_state, lose
 from pilotage.stack.navigator.goal.state import State
 from pilotage.stack.navigator.goal_config import GoalNavigatorConfig
-from pilotage.stack.navigator.navigator import NAVIGATORS, Parts
+from pilotage.stack.navigator.navigator import Parts, localizer_of
 from pilotage.stack.navigator.own_map import OwnMap
 
 COLUMNS = {
@@ -64,7 +64,7 @@ class GoalNavigator:
                 "navigator 'goal': expected stack.planner, stack.local_planner and stack.controller, "
                 "found one of them missing"
             )
-        self._localizer = parts.localizer
+        self._localizer = localizer_of(parts, "goal")
         self._telemetry = journal.channel(COLUMNS, first=True)
         own_map = OwnMap(chart.walls, parts.mapper)
         journal.result("mapped_circles_m", lambda: own_map.found_circles_m)
