@@ -13,7 +13,8 @@ from dataclasses import dataclass
 from typing import Any, Generic, TypeVar
 
 from pilotage.core.config import Config, validate
-from pilotage.core.errors import unknown_name
+from pilotage.core.errors import InputError, unknown_name
+from pilotage.core.plugins import load_plugins
 
 T = TypeVar("T")
 C = TypeVar("C", bound=type)
@@ -50,7 +51,7 @@ class Registry(Generic[T]):
 
         def register(cls: C) -> C:
             if name in self._entries:
-                raise ValueError(f"{self.role} '{name}' is registered twice")
+                raise InputError(f"{self.role} '{name}': expected a new name, found it registered already")
             self._entries[name] = Entry(name, cls, config)
             return cls
 
@@ -89,6 +90,7 @@ class Registry(Generic[T]):
             self._loaded = True  # first: a module that is loaded may look another name up
             for package in self._packages:
                 load_modules(package)
+            load_plugins()
 
 
 def load_modules(package: str) -> None:

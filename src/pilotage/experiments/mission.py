@@ -10,6 +10,7 @@ from typing import Any
 
 from pilotage.core.config import validate
 from pilotage.core.errors import InputError, nearest, unknown_name
+from pilotage.core.plugins import add_plugins
 from pilotage.experiments.resolve import check_components
 from pilotage.experiments.values import apply_override, merge, parse_yaml, read_text
 from pilotage.missions.mission import TOP_KEYS, Mission
@@ -64,6 +65,9 @@ def mission_of(values: dict[str, Any], overrides: Sequence[str] = (), seed: int 
     if seed is not None:
         values.setdefault("run", {})["seed"] = seed
     refuse_old_keys(values)
+    plugins = values.get("plugins", ())
+    if isinstance(plugins, list | tuple):
+        add_plugins(str(file) for file in plugins)
     mission = validate(Mission, values, "")
     check_components(mission)
     return mission

@@ -13,8 +13,7 @@ from pilotage.experiments.roles import ROLES
 from pilotage.maps.world_map import WorldMap
 from pilotage.missions.mission import Mission
 
-LONGEST_NAME = 80
-"""Of a mission, in the name of its run's folder."""
+LONGEST_SLUG_BYTES = 120
 
 
 def resolved_yaml(mission: Mission, chart: WorldMap | None = None) -> str:
@@ -76,9 +75,12 @@ def _resolved(role: str, choice: Mapping[str, Any], where: str) -> dict[str, Any
 def run_name(mission: Mission) -> str:
     """``<mission>-<seed>-<hash>``: the same mission and seed have the same name."""
     digest = hashlib.sha256(resolved_yaml(mission).encode()).hexdigest()[:8]
-    return f"{_slug(mission.mission)[:LONGEST_NAME]}-{mission.run.seed}-{digest}"
+    return f"{_slug(mission.mission)}-{mission.run.seed}-{digest}"
 
 
 def _slug(text: str) -> str:
     """A name fit for a folder."""
-    return "".join(c if c.isalnum() or c in "-_." else "-" for c in text).strip(".") or "mission"
+    plain = "".join(c if c.isalnum() or c in "-_." else "-" for c in text)
+    # Letters of some scripts take four bytes, and a folder's name has 255 with what stands around this.
+    short = plain.encode()[:LONGEST_SLUG_BYTES].decode(errors="ignore")
+    return short.strip(".") or "mission"

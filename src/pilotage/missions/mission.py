@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
-from pydantic import Field, model_validator
+from pydantic import Field, field_validator, model_validator
 
 from pilotage.core.config import Config
+from pilotage.core.shown import visible
 from pilotage.missions.choice import ComponentChoice, laid_over
 from pilotage.missions.places import GoalConfig, PoseConfig
 from pilotage.missions.robot import RobotConfig
@@ -14,7 +15,11 @@ from pilotage.missions.stack import StackConfig
 from pilotage.missions.world import WorldConfig
 from pilotage.sensors.sensor import NonNegative, Positive
 
-TOP_KEYS = ("mission", "description", "world", "robot", "robots", "task", "stack", "run")
+TOP_KEYS = ("mission", "description", "plugins", "world", "robot", "robots", "task", "stack", "run")
+LARGEST_SEED = 2**63 - 1
+"""As a database holds whole numbers."""
+LONGEST_NAME = 100
+"""Characters of a mission's name, which becomes a part of its folders' names."""
 
 
 class RunConfig(Config):
@@ -22,7 +27,7 @@ class RunConfig(Config):
 
     dt_s: float = Field(default=0.1, ge=1e-4, le=1000.0)
     time_limit_s: Positive = 600.0
-    seed: int = Field(default=0, ge=0)
+    seed: int = Field(default=0, ge=0, le=LARGEST_SEED)
     settle_s: NonNegative = 1.0
     """Errors count after this long: the start error is drawn, not earned."""
     record_every_s: NonNegative = 0.0
@@ -32,6 +37,14 @@ class RunConfig(Config):
     oracles: tuple[str, ...] = ()
     """Modules that know the truth in this run, to find out what the real ones cost."""
 
+    @field_validator("oracles")
+    @classmethod
+    def _every_oracle_once(cls, names: tuple[str, ...]) -> tuple[str, ...]:
+        for i, name in enumerate(names):
+            if name in names[:i]:
+                raise ValueError(f"expected every oracle once, found '{name}' twice")
+        return names
+
 
 class Mission(Config):
     """A mission, whatever its world, its robots and its task.
@@ -39,8 +52,10 @@ class Mission(Config):
     ``robots`` makes it one of several: each entry is laid over ``robot``.
     """
 
-    mission: str = Field(min_length=1)
+    mission: str = Field(min_length=1, max_length=LONGEST_NAME)
     description: str = ""
+    plugins: tuple[str, ...] = ()
+    """Python files that register components of their own; trusted as any code is."""
     world: WorldConfig
     robot: RobotConfig = RobotConfig()
     robots: tuple[RobotConfig, ...] = ()
@@ -64,6 +79,13 @@ class Mission(Config):
                     entry["stack"] = laid_over(values["stack"], entry["stack"])
             entries.append(entry)
         return {**values, "robots": entries}
+
+    @field_validator("mission")
+    @classmethod
+    def _can_be_shown(cls, name: str) -> str:
+        if visible(name) != name:
+            raise ValueError(f"expected a name without control characters, found '{visible(name)}'")
+        return name
 
     @model_validator(mode="after")
     def _consistent(self) -> Mission:
