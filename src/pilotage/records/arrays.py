@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import math
-import warnings
-import zipfile
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -12,13 +9,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pilotage.core.files.arrays import read_npz
+from pilotage.core.limits import MB, limit
 from pilotage.core.types import FloatArray, IntArray
 from pilotage.records.numbers import LARGEST
-from pilotage.records.reading import MOST_BYTES, broken, is_there
+from pilotage.records.reading import is_there
 
-MOST_ARRAYS = 20_000
-MOST_ARRAY_BYTES = 128 << 20
-"""All arrays of an archive together, decompressed."""
+ARCHIVE_BYTES = 128 * MB
+"""All arrays of an archive of a run; the largest that a run leaves are some megabytes."""
 
 
 def write_arrays(path: Path, arrays: Mapping[str, Any], *, compressed: bool = True) -> None:
@@ -32,8 +30,9 @@ def write_arrays(path: Path, arrays: Mapping[str, Any], *, compressed: bool = Tr
 class Arrays:
     """The arrays of an archive, handed out as what they should be; what they are not is a ValueError."""
 
-    def __init__(self, arrays: Mapping[str, NDArray[Any]]) -> None:
+    def __init__(self, arrays: Mapping[str, NDArray[Any]], most: int) -> None:
         self._arrays = arrays
+        self._most_values = most // 8  # as float64 or int64 they are as large as the whole archive may be
 
     def __contains__(self, name: str) -> bool:
         return name in self._arrays
@@ -97,53 +96,25 @@ class Arrays:
         # Nothing at all may have been written with any shape.
         if array.size == 0 and not fits and 0 in [max(n, 0) for n in shape]:
             array, fits = np.empty([max(n, 0) for n in shape], dtype=array.dtype), True
+        if array.size > self._most_values:
+            raise ValueError(f"{name}: expected at most {self._most_values} values, found {array.size}")
         if not fits or array.dtype.kind not in kinds:
             wanted = " x ".join("n" if n < 0 else str(n) for n in shape) or "one value"
             raise ValueError(f"{name}: expected {wanted}, found {array.dtype} of shape {array.shape}")
         return array
 
 
-def read_arrays(path: Path, most_bytes: int = MOST_ARRAY_BYTES) -> Arrays | None:
+def read_arrays(path: Path, most: int = ARCHIVE_BYTES) -> Arrays | None:
     """Read an archive; None where there is none.
+
+    Parameters
+    ----------
+    most
+        Limit in bytes, unpacked, before the user's setting.
 
     Raises
     ------
     InputError
-        One line, where it is no archive of plain arrays, or decompressed it is larger than ``most_bytes``.
+        One line, where it is no archive of plain arrays, or larger.
     """
-    if not is_there(path, max(MOST_BYTES, most_bytes)):
-        return None
-    try:
-        with warnings.catch_warnings(), zipfile.ZipFile(path) as archive:
-            warnings.simplefilter("ignore")  # numpy warns of headers by Python 2, zipfile of names twice
-            return Arrays(_arrays(archive, most_bytes))
-    except Exception as error:  # a damaged archive ends in whatever zip, zlib and numpy's parser run into
-        raise broken(path, error) from None
-
-
-def _arrays(archive: zipfile.ZipFile, most_bytes: int) -> dict[str, NDArray[Any]]:
-    entries = archive.infolist()
-    if len(entries) > MOST_ARRAYS:
-        raise ValueError(f"expected at most {MOST_ARRAYS} arrays, found {len(entries)}")
-    arrays: dict[str, NDArray[Any]] = {}
-    left = most_bytes
-    for entry in entries:
-        with archive.open(entry) as file:
-            left -= _bytes_of(file, entry.filename)
-        if left < 0:
-            raise ValueError(f"its arrays have more than {most_bytes} bytes")
-        with archive.open(entry) as file:
-            arrays[entry.filename.removesuffix(".npy")] = np.lib.format.read_array(file, allow_pickle=False)
-    return arrays
-
-
-def _bytes_of(file: Any, name: str) -> int:
-    """What an array takes, by its header."""
-    version = np.lib.format.read_magic(file)
-    if version not in ((1, 0), (2, 0)):
-        raise ValueError(f"{name}: an array of version {version}")
-    read = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
-    shape, _, dtype = read(file)
-    if dtype.hasobject or dtype.kind not in "fiubU" or any(n < 0 for n in shape):
-        raise ValueError(f"{name}: expected numbers or words, found {dtype}")
-    return math.prod(shape) * max(dtype.itemsize, 1)
+    return Arrays(read_npz(path, "a run's arrays", most), limit(most)) if is_there(path) else None

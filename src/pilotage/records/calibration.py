@@ -12,16 +12,15 @@ from typing import Any
 import numpy as np
 
 from pilotage.core.errors import InputError
+from pilotage.core.limits import DATA_BYTES
 from pilotage.core.types import FloatArray
 from pilotage.records.arrays import read_arrays, write_arrays
 from pilotage.records.metrics import clean
-from pilotage.records.reading import broken, is_there, read_object, read_text
+from pilotage.records.reading import broken, cleaned, is_there, object_of, text_of
 
 KINDS = ("odometry", "range", "heading", "commands")
 CALIBRATION_FILE, DATA_FILE, PARAMETER_FILE = "calibration.json", "data.npz", "parameters.yaml"
 SETS_FILE = "sets.yaml"
-MOST_DATA_BYTES = 512 << 20
-"""Hours of a gyroscope at rest are larger than any run's arrays."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,14 +79,14 @@ def read_calibration(folder: Path) -> CalibrationData:
     path = folder / CALIBRATION_FILE
     if not is_there(path):
         raise InputError(f"{folder}: expected a calibration folder, found no {CALIBRATION_FILE} in it")
-    answer = read_object(path)
+    answer = cleaned(object_of(path, "a calibration"))
     if answer.get("calibration") not in KINDS:
         raise InputError(f"{path}: expected a calibration, found something else")
-    archive = read_arrays(folder / DATA_FILE, MOST_DATA_BYTES)
+    archive = read_arrays(folder / DATA_FILE, DATA_BYTES)
     if archive is None:
         raise InputError(f"{folder}: expected a calibration folder, found no {DATA_FILE} in it")
     try:
         arrays = {name: archive.any_floats(name) for name in archive.names()}
     except ValueError as error:
         raise broken(folder / DATA_FILE, error) from None
-    return CalibrationData(folder, answer, arrays, read_text(folder / PARAMETER_FILE))
+    return CalibrationData(folder, answer, arrays, text_of(folder / PARAMETER_FILE, "a parameter file"))

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
+from typing import Any
 
 from pilotage.core.errors import InputError
+from pilotage.core.files import read_json_lines
 from pilotage.core.types import Event
 from pilotage.records.numbers import number
-from pilotage.records.reading import clean_text, parse_json, read_text
+from pilotage.records.reading import clean_text, is_there
 
 EVENTS_FILE = "events.jsonl"
 
@@ -29,16 +31,14 @@ def read_events(folder: Path) -> tuple[Event, ...]:
         One line, where a line is no object with t_s, kind and text.
     """
     path = folder / EVENTS_FILE
-    events = []
-    for index, line in enumerate(read_text(path).splitlines(), start=1):
-        if not line.strip():
-            continue
-        try:
-            entry = parse_json(line)
-            events.append(Event(number(entry["t_s"]), str(entry["kind"]), str(entry["text"])))
-        except (ValueError, KeyError, TypeError, IndexError):
-            raise InputError(
-                f"{path}: line {index}: expected an object with t_s, kind and text, "
-                f"found {clean_text(line[:60])}"
-            ) from None
-    return tuple(events)
+    if not is_there(path):
+        return ()
+    return tuple(_event(entry, path) for entry in read_json_lines(path, "a run's events"))
+
+
+def _event(entry: Mapping[str, Any], path: Path) -> Event:
+    kind, text = entry.get("kind"), entry.get("text")
+    if "t_s" not in entry or not isinstance(kind, str) or not isinstance(text, str):
+        found = ", ".join(str(key) for key in entry) or "nothing in it"
+        raise InputError(f"{path}: expected objects with t_s, kind and text, found one with {found}")
+    return Event(number(entry["t_s"]), clean_text(kind), clean_text(text))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from pilotage.records.reading import read_text
+from pilotage.records.reading import text_of
 
 LOCALIZER_FILE = "localizer.yaml"
 
@@ -16,4 +16,4 @@ def write_localizer(folder: Path, text: str) -> None:
 
 def read_localizer(folder: Path) -> str:
     """Read the text; empty where the run was no recording's."""
-    return read_text(folder / LOCALIZER_FILE)
+    return text_of(folder / LOCALIZER_FILE, "a localizer's settings")

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from pilotage.records.reading import read_object
+from pilotage.records.reading import cleaned, object_of
 
 METRICS_FILE = "metrics.json"
 
@@ -42,4 +42,5 @@ def read_metrics(folder: Path) -> Mapping[str, Any]:
     InputError
         One line, where the file is no JSON object.
     """
-    return read_object(folder / METRICS_FILE)
+    found: Mapping[str, Any] = cleaned(object_of(folder / METRICS_FILE, "a run's metrics"))
+    return found

@@ -6,7 +6,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from pilotage.records.reading import broken, parse_yaml, read_text
+from pilotage.core.yaml_text import load_yaml
+from pilotage.records.reading import text_of
 
 MISSION_FILE = "mission.yaml"
 
@@ -27,9 +28,6 @@ def read_mission(folder: Path) -> tuple[Mapping[str, Any], str]:
         One line, where the file is no YAML.
     """
     path = folder / MISSION_FILE
-    text = read_text(path)
-    try:
-        values = parse_yaml(text)
-    except ValueError as error:
-        raise broken(path, error) from None
+    text = text_of(path, "a mission")
+    values = load_yaml(text, str(path))
     return (values if isinstance(values, dict) else {}), text

@@ -11,18 +11,20 @@ from typing import Any
 import numpy as np
 
 from pilotage.core.errors import InputError
+from pilotage.core.files.parquet import parquet_metadata, read_parquet
+from pilotage.core.json_text import load_json
+from pilotage.core.limits import MB
 from pilotage.core.types import FloatArray, IntArray
 from pilotage.records.numbers import LARGEST
-from pilotage.records.reading import broken, clean_text, is_there
+from pilotage.records.reading import clean_text, is_there
 
 TRACE_FILE = "trace.parquet"
 ROBOT_COLUMN = "robot"
-ROBOTS_KEY = b"pilotage.robots"
+ROBOTS_KEY = "pilotage.robots"
 """Key of the file's metadata: the robots' names as a JSON list, in the order of their numbers."""
-MOST_COLUMNS = 2000
-MOST_VALUES = 64_000_000
-"""Half a gigabyte as float64: a day of ten steps a second in seventy columns."""
-MOST_FILE_BYTES = 1 << 30
+TRACE_BYTES = 256 * MB
+"""Unpacked: twelve hours of ten steps a second in seventy columns."""
+MOST_ROBOTS = 10_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,7 +114,7 @@ def write_trace(folder: Path, trace: Trace) -> None:
     metadata = None
     if trace.robot is not None:
         columns = {ROBOT_COLUMN: trace.robot.astype(np.int32), **columns}
-        metadata = {ROBOTS_KEY: json.dumps(list(trace.robots)).encode()}
+        metadata = {ROBOTS_KEY: json.dumps(list(trace.robots))}
     pq.write_table(pa.table(columns, metadata=metadata), folder / TRACE_FILE)
 
 
@@ -122,63 +124,41 @@ def read_trace(folder: Path, columns: Sequence[str] | None = None) -> Trace:
     Parameters
     ----------
     columns
-        Only these, of those that are there; None reads every column of numbers. A column of words (a
-        sensor's state, say) is no series and left out; a value beyond ``numbers.LARGEST`` is NaN, as
-        nothing that was measured is that large.
+        Only these; None reads every column of numbers. A column of words (a sensor's state, say) is no
+        series and left out; a value beyond ``numbers.LARGEST`` is NaN, as nothing measured is that large.
 
     Raises
     ------
     InputError
-        One line, where the file is missing, is no parquet file, or larger than any run's.
+        One line, where the file is missing, is no Parquet file, lacks a column, or is larger than any run's.
     """
-    # Imported here: a report needs it, the summary in the terminal does not.
-    import pyarrow as pa
-    import pyarrow.parquet as pq
-
     path = folder / TRACE_FILE
-    if not is_there(path, MOST_FILE_BYTES):
+    if not is_there(path):
         raise InputError(f"{path}: expected a run folder's trace, found none there")
-    try:
-        with pq.ParquetFile(path) as file:
-            schema, rows = file.schema_arrow, file.metadata.num_rows
-            wanted = [
-                field.name
-                for field in schema
-                if (pa.types.is_floating(field.type) or pa.types.is_integer(field.type))
-                and (columns is None or field.name in (*columns, ROBOT_COLUMN))
-            ]
-            if len(schema) > MOST_COLUMNS or rows * max(len(wanted), 1) > MOST_VALUES:
-                raise broken(path, f"{rows} rows in {len(schema)} columns are more than any run writes")
-            # One file of a few hundred kilobytes: starting a pool of threads costs more than it gains.
-            table = file.read(columns=wanted, use_threads=False)
-    except (pa.ArrowException, OSError, ValueError, KeyError, MemoryError, OverflowError) as error:
-        raise broken(path, str(error).partition("\n")[0]) from None
-    if table.num_rows != rows or len(table.column_names) != len(wanted):
-        raise broken(path, "its columns are not of one length or not of one name each")
-    found = {name: _numbers(table[name]) for name in wanted}
-    robots, robot = _robots(path, schema.metadata, found.pop(ROBOT_COLUMN, None))
+    stored = read_parquet(path, columns, "a run's trace", TRACE_BYTES)
+    rows = len(next(iter(stored.values()))) if stored else 0
+    found = {name: _numbers(values) for name, values in stored.items() if values.dtype.kind in "fiu"}
+    robots, robot = _robots(path, found.pop(ROBOT_COLUMN, None))
     return Trace({clean_text(name): values for name, values in found.items()}, rows, robots, robot)
 
 
-def _numbers(column: Any) -> FloatArray:
+def _numbers(values: Any) -> FloatArray:
     """A column as (N,) float64."""
-    values = np.array(column.to_numpy(), dtype=np.float64)
+    out = np.asarray(values, dtype=np.float64)
     # Infinities are left: a clearance is infinite where there is nothing.
-    values[np.isfinite(values) & (np.abs(values) > LARGEST)] = np.nan
-    return values
+    huge = np.isfinite(out) & (np.abs(out) > LARGEST)
+    return np.where(huge, np.nan, out) if bool(huge.any()) else out
 
 
-def _robots(path: Path, metadata: Any, robot: FloatArray | None) -> tuple[tuple[str, ...], IntArray | None]:
+def _robots(path: Path, robot: FloatArray | None) -> tuple[tuple[str, ...], IntArray | None]:
     """The robots' names and whose row it is."""
     if robot is None:
         return (), None
-    if not np.isfinite(robot).all() or (robot.size and not (robot.min() >= 0.0 and robot.max() < 10_000.0)):
-        raise broken(path, "column robot: expected whole numbers from 0")
+    if not bool(((robot >= 0.0) & (robot < MOST_ROBOTS)).all()):
+        raise InputError(f"{path}: robot: expected whole numbers from 0 to {MOST_ROBOTS - 1}")
     whose = robot.astype(np.int64)
     count = int(whose.max()) + 1 if whose.size else 0
-    try:
-        names = json.loads((metadata or {}).get(ROBOTS_KEY, b"[]"))
-    except (ValueError, RecursionError):
-        names = []
-    told = [clean_text(str(name)) for name in names] if isinstance(names, list) else []
-    return (*told, *(f"robot {k}" for k in range(len(told), count))), whose
+    names = parquet_metadata(path).get(ROBOTS_KEY, "[]")
+    told = load_json(names, f"{path}: {ROBOTS_KEY}")
+    named = [clean_text(str(name)) for name in told[:MOST_ROBOTS]] if isinstance(told, list) else []
+    return (*named, *(f"robot {k}" for k in range(len(named), count))), whose

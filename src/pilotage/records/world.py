@@ -13,7 +13,7 @@ import numpy as np
 
 from pilotage.core.types import FloatArray
 from pilotage.records.numbers import Pose, place, pose, table
-from pilotage.records.reading import broken, is_there, read_object
+from pilotage.records.reading import broken, clean_text, is_there, object_of
 
 WORLD_FILE = "world.json"
 
@@ -174,7 +174,7 @@ def read_world(folder: Path) -> World:
     path = folder / WORLD_FILE
     if not is_there(path):
         return World()
-    content = read_object(path)
+    content = object_of(path, "a run's world")
     try:
         return _world(content)
     except (ValueError, TypeError, KeyError, AttributeError) as error:
@@ -210,7 +210,8 @@ def _two_counts(values: object) -> bool:
 def _landmark(entry: Any) -> Landmark:
     if not isinstance(entry, Mapping) or not {"id", "x_m", "y_m"} <= set(entry):
         raise ValueError("landmarks: expected objects with id, x_m and y_m")
-    return Landmark(str(entry["id"])[:80], place(entry["x_m"], "landmarks"), place(entry["y_m"], "landmarks"))
+    x_m, y_m = (place(entry[key], "landmarks") for key in ("x_m", "y_m"))
+    return Landmark(clean_text(str(entry["id"])[:80]), x_m, y_m)
 
 
 def _outline(entry: Any) -> RobotOutline:
@@ -223,7 +224,7 @@ def _outline(entry: Any) -> RobotOutline:
         radius_m = float(np.hypot(*polygon.T).max())
     goals = [pose(goal, "goals") for goal in entry.get("goals") or (entry.get("goal"),)]
     return RobotOutline(
-        name=str(entry.get("name", "")),
+        name=clean_text(str(entry.get("name", ""))),
         radius_m=radius_m if radius_m > 0.0 else None,
         polygon_m=polygon,
         start=pose(entry.get("start"), "start"),

@@ -19,7 +19,7 @@ Array = np.ndarray[tuple[int, ...], np.dtype[Any]]
 _KINDS = frozenset("biufcSU")
 """Kinds of dtype that are plain values: numbers, truth values and text."""
 _MOST_DIMENSIONS = 8
-_MOST_MEMBERS = 1000
+_MOST_MEMBERS = 20_000
 _DAMAGED = (zipfile.BadZipFile, zlib.error, EOFError, ValueError, KeyError, RuntimeError, OSError)
 
 
@@ -45,29 +45,34 @@ def map_npy(path: Path, what: str = "a .npy file") -> Array:
         raise InputError(f"{path}: expected a NumPy array, found: {error}") from None
 
 
-def read_npz(path: Path, what: str = "an .npz file") -> dict[str, Array]:
+def read_npz(path: Path, what: str = "an .npz file", most: int = DATA_BYTES) -> dict[str, Array]:
     """Read all arrays of an archive.
+
+    Parameters
+    ----------
+    most
+        Limit in bytes, packed and unpacked, before the user's setting.
 
     Raises
     ------
     InputError
         Where it is no such archive, an array is damaged, or they unpack to more than the limit.
     """
-    with opened(path, what, DATA_BYTES) as file:
+    with opened(path, what, most) as file:
         try:
             with zipfile.ZipFile(file) as archive:
-                return _arrays(archive, str(path))
+                return _arrays(archive, str(path), limit(most))
         except InputError:
             raise
         except _DAMAGED as error:
             raise InputError(f"{path}: expected {what}, found: {error or 'damaged data'}") from None
 
 
-def _arrays(archive: zipfile.ZipFile, where: str) -> dict[str, Array]:
+def _arrays(archive: zipfile.ZipFile, where: str, most: int) -> dict[str, Array]:
     members = archive.infolist()
     if len(members) > _MOST_MEMBERS:
         raise too_large(where, _MOST_MEMBERS, len(members), "arrays")
-    total, most = sum(member.file_size for member in members), limit(DATA_BYTES)
+    total = sum(member.file_size for member in members)
     if total > most:
         raise too_large(f"{where} (unpacked)", most, total)
     found: dict[str, Array] = {}

@@ -20,7 +20,7 @@ _MOST_COLUMNS = 10_000
 
 
 def read_parquet(
-    path: Path, names: Sequence[str] | None = None, what: str = "a Parquet file"
+    path: Path, names: Sequence[str] | None = None, what: str = "a Parquet file", most: int = DATA_BYTES
 ) -> dict[str, Array]:
     """Read columns as arrays of equal length.
 
@@ -30,6 +30,8 @@ def read_parquet(
     ----------
     names
         The columns that are wanted; None for all.
+    most
+        Limit in bytes, packed and unpacked, before the user's setting.
 
     Raises
     ------
@@ -40,7 +42,7 @@ def read_parquet(
     import pyarrow as pa
     import pyarrow.parquet as pq
 
-    data = read_bytes(path, what)
+    data = read_bytes(path, what, most)
     try:
         with pq.ParquetFile(
             pa.BufferReader(data),
@@ -48,7 +50,7 @@ def read_parquet(
             thrift_container_size_limit=_HEADER_BYTES,
         ) as file:
             wanted = _wanted(file, names, str(path))
-            _require_room(file.metadata, len(wanted), str(path))
+            _require_room(file.metadata, len(wanted), str(path), limit(most))
             # Text stays a dictionary until its letters are counted: one long word may stand in every row.
             text = [name for name in wanted if _is_text(file.schema_arrow.field(name).type)]
             file = pq.ParquetFile(pa.BufferReader(data), read_dictionary=text) if text else file
@@ -57,6 +59,31 @@ def read_parquet(
         said = str(error).splitlines()[0] if str(error) else "damaged data"
         raise InputError(f"{path}: expected {what}, found: {said}") from None
     return {name: _column(table.column(name), f"{path}: {name}") for name in wanted}
+
+
+def parquet_metadata(path: Path, what: str = "a Parquet file", most: int = DATA_BYTES) -> dict[str, str]:
+    """Read the texts that stand beside the columns, by their keys; none where there are none.
+
+    Raises
+    ------
+    InputError
+        Where it is no such file.
+    """
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    data = read_bytes(path, what, most)
+    try:
+        with pq.ParquetFile(
+            pa.BufferReader(data),
+            thrift_string_size_limit=_HEADER_BYTES,
+            thrift_container_size_limit=_HEADER_BYTES,
+        ) as file:
+            found: dict[bytes, bytes] = file.schema_arrow.metadata or {}
+            return {k.decode(errors="replace"): v.decode(errors="replace") for k, v in found.items()}
+    except (pa.ArrowException, OSError, ValueError, MemoryError) as error:
+        said = str(error).splitlines()[0] if str(error) else "damaged data"
+        raise InputError(f"{path}: expected {what}, found: {said}") from None
 
 
 def _wanted(file: Any, names: Sequence[str] | None, where: str) -> list[str]:
@@ -89,12 +116,11 @@ def _is_number(kind: Any) -> bool:
     return bool(pa.types.is_integer(kind) or pa.types.is_floating(kind) or pa.types.is_boolean(kind))
 
 
-def _require_room(metadata: Any, columns: int, where: str) -> None:
+def _require_room(metadata: Any, columns: int, where: str, most: int) -> None:
     """Rows that one repeated value fills take nothing in the file: count them, and what pages unpack to."""
     groups = [metadata.row_group(i) for i in range(metadata.num_row_groups)]
     rows = max(metadata.num_rows, sum(group.num_rows for group in groups))
     size = max(rows * max(columns, 1) * _BYTES_A_VALUE, sum(group.total_byte_size for group in groups))
-    most = limit(DATA_BYTES)
     if size > most:
         raise too_large(f"{where} ({rows} rows, unpacked)", most, size)
     if rows < 0:
