@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
-from pilotage.cli.options import Json, Overrides
+from pilotage.cli.options import Json, Overrides, Plugins
 from pilotage.cli.output import print_columns, print_json, print_line
 from pilotage.cli.study import Dask, Quiet, Report, Resume, Studies, WorkerCount, run_study_quietly
 
@@ -21,6 +21,7 @@ def attribute(
     resume: Resume = False,
     out: Studies = Path("studies"),
     json: Json = False,
+    plugin: Plugins = None,  # noqa: ARG001 - loaded while the options are read
     report: Report = True,
     quiet: Quiet = False,
 ) -> int:

@@ -6,13 +6,14 @@ from typing import Annotated
 
 import typer
 
-from pilotage.cli.options import Json
+from pilotage.cli.options import Json, Plugins
 from pilotage.cli.output import print_columns, print_json
 
 
 def components(
     name: Annotated[str | None, typer.Argument(metavar="NAME", help="One component: its parameters.")] = None,
     json: Json = False,
+    plugin: Plugins = None,  # noqa: ARG001 - loaded while the options are read
 ) -> None:
     """List the components, or the parameters of one of them."""
     from pilotage.experiments.catalogue import components as registered

@@ -10,7 +10,7 @@ from typing import Annotated
 
 import typer
 
-from pilotage.cli.options import Json, Out, Overrides
+from pilotage.cli.options import Json, Out, Overrides, Plugins
 from pilotage.cli.output import print_columns, print_json, print_line, stdout_for_json
 from pilotage.core.errors import InputError, unknown_name
 
@@ -34,6 +34,7 @@ def localize(
     out: Out = Path("runs"),
     report: Annotated[bool, typer.Option(help="Write report.html into the run folder.")] = True,
     json: Json = False,
+    plugin: Plugins = None,  # noqa: ARG001 - loaded while the options are read
 ) -> int:
     """Run a localizer over a recording and score it against its truth."""
     from pilotage.experiments.recordings.localize import FORMATS, localize_log

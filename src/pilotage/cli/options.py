@@ -59,6 +59,25 @@ Overrides: TypeAlias = Annotated[
         help="Change one key, such as stack.localizer.gate=0.99, or all that a YAML file holds; repeatable.",
     ),
 ]
+
+
+def load_plugin_files(files: list[str] | None) -> list[str] | None:
+    """Load plugins before anything is looked up by name."""
+    from pilotage.core.plugins import add_plugins
+
+    add_plugins(files or ())
+    return files
+
+
+Plugins: TypeAlias = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--plugin",
+        metavar="FILE",
+        callback=load_plugin_files,
+        help="A Python file that registers components of your own; repeatable.",
+    ),
+]
 Seed: TypeAlias = Annotated[
     int | None, typer.Option(metavar="N", parser=parse_seed, help="Seed of every random draw.")
 ]

@@ -9,7 +9,7 @@ from typing import Annotated, Any
 
 import typer
 
-from pilotage.cli.options import Json, Overrides, Seed
+from pilotage.cli.options import Json, Overrides, Plugins, Seed
 from pilotage.cli.output import print_columns, print_json, stdout_for_json
 from pilotage.core.errors import InputError
 
@@ -33,6 +33,7 @@ def plan(
     overrides: Overrides = None,
     seed: Seed = None,
     json: Json = False,
+    plugin: Plugins = None,  # noqa: ARG001 - loaded while the options are read
 ) -> int:
     """Plan a path on a map and say how long it is against the shortest one."""
     from_, to = parse_pose(start, "--start"), parse_pose(goal, "--goal")

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import json
 
+from pilotage.cli.options import Plugins
 
-def schema() -> None:
+
+def schema(plugin: Plugins = None) -> None:  # noqa: ARG001 - loaded while the options are read
     """Print the JSON schema of a mission file (for editors that check while one types)."""
     from pilotage.experiments.catalogue import mission_schema
 

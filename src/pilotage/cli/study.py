@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from pilotage.cli.options import Json, Overrides, parse_out
+from pilotage.cli.options import Json, Overrides, Plugins, parse_out
 from pilotage.cli.output import print_json, print_line, stdout_for_json
 from pilotage.cli.stopped import INTERRUPTED, TERMINATED, Terminated
 from pilotage.cli.study_line import StudyLine
@@ -48,6 +48,7 @@ def study(
     resume: Resume = False,
     out: Studies = Path("studies"),
     json: Json = False,
+    plugin: Plugins = None,  # noqa: ARG001 - loaded while the options are read
     report: Report = True,
     quiet: Quiet = False,
 ) -> int:
@@ -82,6 +83,7 @@ def sweep(
     resume: Resume = False,
     out: Studies = Path("studies"),
     json: Json = False,
+    plugin: Plugins = None,  # noqa: ARG001 - loaded while the options are read
     report: Report = True,
     quiet: Quiet = False,
 ) -> int:

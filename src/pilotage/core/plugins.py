@@ -33,7 +33,7 @@ def add_plugins(files: Iterable[str]) -> None:
     InputError
         Where a file is missing, does not import, or registers a name that is taken.
     """
-    named = [name for name in os.environ.get(VARIABLE, "").split(os.pathsep) if name]
+    named = named_plugins()
     for file in files:
         path = str(Path(file).absolute())
         load_file(path)
@@ -42,12 +42,16 @@ def add_plugins(files: Iterable[str]) -> None:
     os.environ[VARIABLE] = os.pathsep.join(named)
 
 
+def named_plugins() -> list[str]:
+    """The plugin files of this process, absolute."""
+    return [name for name in os.environ.get(VARIABLE, "").split(os.pathsep) if name]
+
+
 def load_plugins() -> None:
     """Load the plugins that the environment names and those of installed packages, each once."""
-    global _seen_entry_points  # noqa: PLW0603 - once a process
-    for name in os.environ.get(VARIABLE, "").split(os.pathsep):
-        if name:
-            load_file(name)
+    global _seen_entry_points
+    for name in named_plugins():
+        load_file(name)
     if _seen_entry_points:
         return
     _seen_entry_points = True

@@ -10,7 +10,7 @@ from typing import Any
 
 from pilotage.core.config import validate
 from pilotage.core.errors import InputError, nearest, unknown_name
-from pilotage.core.plugins import add_plugins
+from pilotage.core.plugins import add_plugins, named_plugins
 from pilotage.experiments.resolve import check_components
 from pilotage.experiments.values import apply_override, merge, parse_yaml, read_text
 from pilotage.missions.mission import TOP_KEYS, Mission
@@ -68,6 +68,7 @@ def mission_of(values: dict[str, Any], overrides: Sequence[str] = (), seed: int 
     plugins = values.get("plugins", ())
     if isinstance(plugins, list | tuple):
         add_plugins(str(file) for file in plugins)
+        values["plugins"] = named_plugins()
     mission = validate(Mission, values, "")
     check_components(mission)
     return mission
@@ -119,9 +120,11 @@ def _anchor_map(values: dict[str, Any], folder: Path) -> None:
     places = [(world, key) for key in ("map", "landmarks")]
     if isinstance(world.get("map"), dict):
         places += [(world["map"], key) for key in ("file", "obstacles", "environment", "landmarks")]
-    stack = values.get("stack")
+    stack, plugins = values.get("stack"), values.get("plugins")
     if isinstance(stack, dict):
         places.append((stack, "map"))
+    if isinstance(plugins, list):
+        values["plugins"] = [str(folder / str(file)) for file in plugins]
     for holder, key in places:
         source = holder.get(key)
         if isinstance(source, str) and (folder / source).is_file():
