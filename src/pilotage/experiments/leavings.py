@@ -29,7 +29,7 @@ def files_of(run: Run, verdict: Verdict, metrics: Mapping[str, object]) -> RunFi
     finished = run.finished
     world = _world(finished)
     traces = {
-        robot.name: robot.trace | dict(columns)
+        robot.name: _joined(robot.trace, columns)
         for robot, columns in zip(finished.robots, verdict.columns, strict=True)
     }
     single = len(traces) == 1
@@ -56,6 +56,14 @@ def files_of(run: Run, verdict: Verdict, metrics: Mapping[str, object]) -> RunFi
             for index, robot in enumerate(finished.robots)
         ),
     )
+
+
+def _joined(trace: Mapping[str, FloatArray], columns: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
+    """A trace with what was worked out for its rows; where nobody drove, the rows are those of the plan."""
+    rows = len(trace["t_s"])
+    if columns and any(len(values) != rows for values in columns.values()):
+        return dict(columns)
+    return {**trace, **columns}
 
 
 def _world(run: FinishedRun) -> World:

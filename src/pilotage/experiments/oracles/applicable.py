@@ -29,8 +29,10 @@ def applicable(mission: Mission) -> dict[str, str]:
     stack = mission.stack
     taken: frozenset[str] = getattr(NAVIGATORS.entry(stack.navigator.name).factory, "TAKES", frozenset())
     there = {"sensors"} if mission.robot.sensors or mission.robots else set()
-    there |= {name for name in ("localizer", "mapper", "planner", "controller") if getattr(stack, name)}
+    there |= {name for name in ("mapper", "planner", "controller") if getattr(stack, name)}
     there |= {"initial", "driver"} if stack.localizer is not None else set()
+    # A stack without a localizer may drive on the true pose; an explorer brings its own.
+    there |= {"localizer"} if not (taken or mission.task.name == "plan") else set()
     there |= {name for name, what in TAKEN.items() if what in taken}
     there |= {"drive"} if all(robot.motion.name == "wheel-drive" for robot in mission.team) else set()
     there |= {"explorer"} if mission.task.name == "explore" and taken else set()
