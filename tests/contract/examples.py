@@ -34,6 +34,8 @@ from pilotage.stack.planning.local_planner import RouteAhead
 from pilotage.stack.planning.planner import Path, PlanRequest, PlanStatus
 from pilotage.stack.planning.rrt_star_dubins import RrtStarDubinsConfig, RrtStarDubinsPlanner
 from support.robots import BEACONS, ROOM, sensors, told_of
+from support import worlds
+from support.robots import BEACONS, ROOM, knowledge_of, sensors
 
 START, GOAL = Pose2(2.0, 2.0, 0.0), Goal(8.0, 6.0)
 WORLD = World(ROOM, ROOM, BEACONS)
@@ -60,6 +62,16 @@ def sensor_reads(_: Any, config: Any) -> None:
     assert type(config) in SIMULATED
     readings = [simulator({"it": config}).step(Twist(0.1, 0.0)).by_sensor["it"] for _ in range(2)]
     assert repr(readings[0]) == repr(readings[1])
+
+
+def sensor_reads_in_any_world(_: Any, config: Any) -> None:
+    """The same world and seed give the same readings twice."""
+    series = [
+        [sim.step([Twist(0.1, 0.0)])[0].by_sensor.get("it") for _ in range(20)]
+        for sim in (worlds.simulator(worlds.robot({"it": config})) for _ in range(2))
+    ]
+    assert repr(series[0]) == repr(series[1])
+    assert any(reading is not None for reading in series[0])
 
 
 def localizer_follows(factory: Any, config: Any) -> None:
@@ -356,6 +368,10 @@ EXAMPLES: dict[tuple[str, str], Example] = {
     ("sensor", "magnetometer"): Example(sheet_sensor_reads),
     ("sensor", "infrared"): Example(sheet_sensor_reads, pure_numbers=frozenset({"range_std_fraction"})),
     ("sensor", "line-sensor"): Example(sheet_sensor_reads),
+    ("sensor", "imu"): Example(sensor_reads_in_any_world),
+    ("sensor", "compass"): Example(sensor_reads_in_any_world),
+    ("sensor", "gps"): Example(sensor_reads_in_any_world),
+    ("sensor", "bumper"): Example(sensor_reads_in_any_world),
     ("estimator", "dead-reckoning"): Example(estimator_estimates, {"covariance": "first-order"}),
     ("estimator", "ekf-landmarks"): Example(
         estimator_estimates, {"gate": 0.999}, pure_numbers=frozenset({"gate"})

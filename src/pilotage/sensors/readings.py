@@ -12,10 +12,14 @@ from pilotage.core.types import FloatArray, IntArray
 
 @dataclass(frozen=True, slots=True)
 class OdometryIncrement:
-    """Motion since the last odometry reading: distance along the arc and change of heading."""
+    """Motion since the last odometry reading: distance along the arc and change of heading.
+
+    A base that drives sideways has a distance to the left besides.
+    """
 
     distance_m: float
     angle_rad: float
+    lateral_m: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,6 +84,35 @@ class LineReading:
     dark: bool
 
 
+@dataclass(frozen=True, slots=True)
+class YawRate:
+    """Mean turn rate since the last reading."""
+
+    rate_rad_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class CompassHeading:
+    """Heading of the body in the map, in [-pi, pi)."""
+
+    heading_rad: float
+
+
+@dataclass(frozen=True, slots=True)
+class GpsFix:
+    """Position of the antenna in the map."""
+
+    x_m: float
+    y_m: float
+
+
+@dataclass(frozen=True, slots=True)
+class BumperReading:
+    """Whether each sector of the bumper is pressed, counter-clockwise."""
+
+    pressed: tuple[bool, ...]
+
+
 Reading: TypeAlias = (
     OdometryIncrement
     | LidarScan
@@ -90,6 +123,10 @@ Reading: TypeAlias = (
     | MagneticField
     | InfraredReading
     | LineReading
+    | YawRate
+    | CompassHeading
+    | GpsFix
+    | BumperReading
 )
 
 

@@ -64,8 +64,26 @@ def table_fan_ranges(
     (beam, obstacle) pairs that can meet at all. Obstacles are turned into the fan's own frame, in which
     ``theta``, the first beam's direction in the map, is 0 and the table never changes.
     """
+    ranges = np.full(cosines.shape[0], max_range)
+    narrow_fan(ranges, x, y, theta, step, cosines, sines, max_range, segments, circles)
+    return ranges
+
+
+@kernel
+def narrow_fan(
+    ranges: FloatArray,
+    x: float,
+    y: float,
+    theta: float,
+    step: float,
+    cosines: FloatArray,
+    sines: FloatArray,
+    max_range: float,
+    segments: FloatArray,
+    circles: FloatArray,
+) -> None:
+    """Shorten the ``ranges`` of a fan, in place, where segments and circles are nearer."""
     beams = cosines.shape[0]
-    ranges = np.full(beams, max_range)
     per_step = 1.0 / (step if beams > 1 else TWO_PI)
     ct, st = math.cos(theta), math.sin(theta)
     for i in range(segments.shape[0]):
@@ -100,7 +118,7 @@ def table_fan_ranges(
         centre = math.hypot(cx, cy)
         if centre <= radius:
             ranges[:] = 0.0
-            return ranges
+            return
         half = math.asin(radius / centre)
         offset = (math.atan2(cy, cx) - half) % TWO_PI
         for turn in range(2):
@@ -112,7 +130,6 @@ def table_fan_ranges(
                 across = cx * sines[k] - cy * cosines[k]
                 rest = max(radius * radius - across * across, 0.0)
                 ranges[k] = min(ranges[k], along - math.sqrt(rest))
-    return ranges
 
 
 @kernel

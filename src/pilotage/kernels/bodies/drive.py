@@ -1,0 +1,353 @@
+"""A body that drives, and stops where its outline first touches something: between two steps as well.
+
+What is solid is handed over as arrays: walls as ``segments`` (N, 4) and ``circles`` (M, 3); a grid by its
+outlines in tiles (see ``scans.tiles``; empty without a grid); other bodies as ``others_segments`` and
+``others_circles``, of which the body's own rows, ``own`` (first side, one past the last, disc or -1), do
+not count.
+"""
+
+from __future__ import annotations
+
+import math
+
+from pilotage.kernels.arrays import FloatArray, IntArray
+from pilotage.kernels.bodies.outline import outline_clearance
+from pilotage.kernels.geometry.motion import chord_ratio, wrap
+from pilotage.kernels.jit import kernel
+from pilotage.kernels.scans.tiles import Cells, grid_clearance
+
+(
+    X,
+    Y,
+    THETA,
+    CLEARANCE,
+    FIXED_CLEARANCE,
+    TOUCHING,
+    COLLISIONS,
+    DRIVEN,
+    DISTANCE,
+    LATERAL,
+    ANGLE,
+    BLOCKED,
+    BLOCKER,
+) = range(13)
+"""Entries of a body's state: pose; clearance from everything and from what does not move (m); 1 while it
+touches, 2 where another body ran into it; how often it ran into something; path of the centre (m); of the
+last step forward and lateral distance, angle, 1 where something stopped it, 1 where that was another body."""
+STATE_SIZE = 13
+
+CONTACT_TOLERANCE_M = 1e-9
+"""An overlap below this is rounding."""
+GRAZE_M = 1e-3
+"""Near a wall a path is looked at this often; what could slip through between is half of it at most."""
+CONTACT_M = 1e-6
+"""Bodies nearer than this touch."""
+TOUCHED_RELEASE_M = 1e-3
+"""A body that another one ran into counts as touched until it is farther away than this."""
+BISECTIONS = 40
+
+
+@kernel
+def turned_part(
+    x: float, y: float, theta: float, distance: float, lateral: float, angle: float, part: float
+) -> tuple[float, float, float]:
+    """Pose after a part of a move at constant twist, without ``lateral`` an arc (Thrun et al. 2005, 5.9)."""
+    turned = part * angle
+    ratio = chord_ratio(turned)
+    chord, side = part * distance * ratio, part * lateral * ratio
+    middle = theta + 0.5 * turned
+    c, s = math.cos(middle), math.sin(middle)
+    return x + chord * c - side * s, y + chord * s + side * c, wrap(theta + turned)
+
+
+@kernel
+def fixed_clearance(
+    x: float,
+    y: float,
+    theta: float,
+    corners: FloatArray,
+    radius: float,
+    inner: float,
+    segments: FloatArray,
+    circles: FloatArray,
+    jump: Cells,
+    outlines: FloatArray,
+    starts: IntArray,
+    items: IntArray,
+    frame: FloatArray,
+) -> float:
+    """Clearance of an outline from walls and grid."""
+    c, s = math.cos(theta), math.sin(theta)
+    best = outline_clearance(x, y, c, s, corners, radius, segments, circles)
+    return min(
+        best,
+        grid_clearance(x, y, c, s, corners, radius, inner, jump, outlines, starts, items, frame),
+    )
+
+
+@kernel
+def others_clearance(
+    x: float,
+    y: float,
+    theta: float,
+    corners: FloatArray,
+    radius: float,
+    others_segments: FloatArray,
+    others_circles: FloatArray,
+    own: IntArray,
+) -> float:
+    """Clearance of an outline from the other bodies."""
+    if others_segments.shape[0] + others_circles.shape[0] == 0:
+        return math.inf
+    c, s = math.cos(theta), math.sin(theta)
+    best = math.inf
+    if own[2] >= 0:
+        before, after = others_circles[: own[2]], others_circles[own[2] + 1 :]
+        best = outline_clearance(x, y, c, s, corners, radius, others_segments, before)
+        return min(best, outline_clearance(x, y, c, s, corners, radius, others_segments[:0], after))
+    before, after = others_segments[: own[0]], others_segments[own[1] :]
+    best = outline_clearance(x, y, c, s, corners, radius, before, others_circles)
+    return min(best, outline_clearance(x, y, c, s, corners, radius, after, others_circles[:0]))
+
+
+@kernel
+def all_clearance(
+    x: float,
+    y: float,
+    theta: float,
+    corners: FloatArray,
+    radius: float,
+    inner: float,
+    segments: FloatArray,
+    circles: FloatArray,
+    jump: Cells,
+    outlines: FloatArray,
+    starts: IntArray,
+    items: IntArray,
+    frame: FloatArray,
+    others_segments: FloatArray,
+    others_circles: FloatArray,
+    own: IntArray,
+) -> float:
+    """Clearance of an outline from everything."""
+    fixed = fixed_clearance(
+        x, y, theta, corners, radius, inner, segments, circles, jump, outlines, starts, items, frame
+    )
+    return min(fixed, others_clearance(x, y, theta, corners, radius, others_segments, others_circles, own))
+
+
+@kernel
+def first_contact(
+    x: float,
+    y: float,
+    theta: float,
+    distance: float,
+    lateral: float,
+    angle: float,
+    clearance: float,
+    corners: FloatArray,
+    radius: float,
+    inner: float,
+    segments: FloatArray,
+    circles: FloatArray,
+    jump: Cells,
+    outlines: FloatArray,
+    starts: IntArray,
+    items: IntArray,
+    frame: FloatArray,
+    others_segments: FloatArray,
+    others_circles: FloatArray,
+    own: IntArray,
+) -> float:
+    """Part of a move that the outline can drive: 1 without a contact.
+
+    Clearance is 1-Lipschitz in how far the outline's points move, so where it is large nothing has to be
+    looked at (conservative advancement). Leaving a contact is allowed: only a clearance that is negative
+    and shrinking stops the body.
+
+    Parameters
+    ----------
+    clearance
+        At the start of the move.
+    """
+    reach = math.hypot(distance, lateral)
+    if corners.shape[0] > 0:
+        reach += radius * abs(angle)
+    if clearance > reach or reach == 0.0:
+        return 1.0
+    pieces = max(1, math.ceil(reach / (0.25 * inner)))
+    length = reach / pieces
+    last, last_clearance = 0.0, clearance
+    for i in range(pieces):
+        part = (i + 1) / pieces
+        px, py, ptheta = turned_part(x, y, theta, distance, lateral, angle, part)
+        here = all_clearance(
+            px, py, ptheta, corners, radius, inner, segments, circles, jump, outlines, starts, items, frame,
+            others_segments, others_circles, own,
+        )  # fmt: skip
+        low, high = -1.0, part
+        if here < -CONTACT_TOLERANCE_M and here < last_clearance:
+            low = last
+        elif last_clearance + here < length:
+            # Both ends are clear, but there may be a contact between them.
+            at, at_clearance = last, last_clearance
+            while at < part:
+                ahead = min(part, at + max(at_clearance, GRAZE_M) / reach)
+                px, py, ptheta = turned_part(x, y, theta, distance, lateral, angle, ahead)
+                there = all_clearance(
+                    px, py, ptheta, corners, radius, inner, segments, circles, jump, outlines, starts, items,
+                    frame, others_segments, others_circles, own,
+                )  # fmt: skip
+                if there < -CONTACT_TOLERANCE_M and there < at_clearance:
+                    low, high = at, ahead
+                    break
+                at, at_clearance = ahead, there
+        if low >= 0.0:
+            for _ in range(BISECTIONS):
+                middle = 0.5 * (low + high)
+                px, py, ptheta = turned_part(x, y, theta, distance, lateral, angle, middle)
+                there = all_clearance(
+                    px, py, ptheta, corners, radius, inner, segments, circles, jump, outlines, starts, items,
+                    frame, others_segments, others_circles, own,
+                )  # fmt: skip
+                if there < 0.0:
+                    high = middle
+                else:
+                    low = middle
+            return low
+        last, last_clearance = part, here
+    return 1.0
+
+
+@kernel
+def place_outline(
+    state: FloatArray,
+    corners: FloatArray,
+    others_segments: FloatArray,
+    others_circles: FloatArray,
+    own: IntArray,
+) -> None:
+    """Write where a body's outline is into its own rows, for the others to meet."""
+    x, y = state[X], state[Y]
+    if own[2] >= 0:
+        others_circles[own[2], 0], others_circles[own[2], 1] = x, y
+        return
+    c, s = math.cos(state[THETA]), math.sin(state[THETA])
+    count = own[1] - own[0]
+    for i in range(count):
+        px, py = x + c * corners[i, 0] - s * corners[i, 1], y + s * corners[i, 0] + c * corners[i, 1]
+        before = own[0] + (i - 1 if i > 0 else count - 1)
+        others_segments[own[0] + i, 0], others_segments[own[0] + i, 1] = px, py
+        others_segments[before, 2], others_segments[before, 3] = px, py
+
+
+@kernel
+def meet_others(
+    state: FloatArray,
+    corners: FloatArray,
+    radius: float,
+    others_segments: FloatArray,
+    others_circles: FloatArray,
+    own: IntArray,
+) -> None:
+    """After everybody moved: bring the clearance up to date, and count being touched by another body."""
+    others = others_clearance(
+        state[X], state[Y], state[THETA], corners, radius, others_segments, others_circles, own
+    )
+    state[CLEARANCE] = min(state[FIXED_CLEARANCE], others)
+    if others < CONTACT_M and state[TOUCHING] == 0.0:
+        state[COLLISIONS] += 1.0
+        state[TOUCHING] = 2.0
+
+
+@kernel
+def drive(
+    state: FloatArray,
+    moves: FloatArray,
+    rates: FloatArray,
+    period: float,
+    spins_on: bool,
+    release: float,
+    corners: FloatArray,
+    radius: float,
+    inner: float,
+    segments: FloatArray,
+    circles: FloatArray,
+    jump: Cells,
+    outlines: FloatArray,
+    starts: IntArray,
+    items: IntArray,
+    frame: FloatArray,
+    others_segments: FloatArray,
+    others_circles: FloatArray,
+    own: IntArray,
+) -> bool:
+    """Drive one step in place: (K, 3) moves at constant twist, each forward, to the left, turned.
+
+    Parameters
+    ----------
+    rates
+        (K,) out: the true turn rate in each move.
+    period
+        How long the step is, in seconds.
+    spins_on
+        Whether the wheels spin on at a contact: the centre stays, the body turns as far as it can, and the
+        next move is tried. Otherwise a contact ends the step.
+    release
+        How clear it has to be again before a new contact counts.
+
+    Returns
+    -------
+    Whether something stopped it.
+    """
+    state[DISTANCE] = state[LATERAL] = state[ANGLE] = state[BLOCKED] = state[BLOCKER] = 0.0
+    count = moves.shape[0]
+    rates[:] = 0.0
+    x, y, theta = state[X], state[Y], state[THETA]
+    others = others_clearance(x, y, theta, corners, radius, others_segments, others_circles, own)
+    clearance = min(state[FIXED_CLEARANCE], others)
+    for k in range(count):
+        distance, lateral, angle = moves[k, 0], moves[k, 1], moves[k, 2]
+        part = first_contact(
+            x, y, theta, distance, lateral, angle, clearance, corners, radius, inner, segments, circles, jump,
+            outlines, starts, items, frame, others_segments, others_circles, own,
+        )  # fmt: skip
+        stopped = part < 1.0
+        if stopped:
+            ahead, ahead_y, ahead_theta = turned_part(x, y, theta, distance, lateral, angle, part)
+            if spins_on:
+                distance, lateral, part = 0.0, 0.0, 1.0
+                if corners.shape[0] > 0:
+                    part = first_contact(
+                        x, y, theta, 0.0, 0.0, angle, clearance, corners, radius, inner, segments, circles,
+                        jump, outlines, starts, items, frame, others_segments, others_circles, own,
+                    )  # fmt: skip
+            near = others_clearance(
+                ahead, ahead_y, ahead_theta, corners, radius, others_segments, others_circles, own
+            )
+            if near < CONTACT_M:
+                state[BLOCKER] = 1.0
+        x, y, theta = turned_part(x, y, theta, distance, lateral, angle, part)
+        fixed = fixed_clearance(
+            x, y, theta, corners, radius, inner, segments, circles, jump, outlines, starts, items, frame
+        )
+        others = others_clearance(x, y, theta, corners, radius, others_segments, others_circles, own)
+        clearance = min(fixed, others)
+        state[FIXED_CLEARANCE] = fixed
+        distance, lateral, angle = distance * part, lateral * part, angle * part
+        state[DISTANCE] += distance
+        state[LATERAL] += lateral
+        state[ANGLE] += angle
+        state[DRIVEN] += math.hypot(distance, lateral)
+        rates[k] = angle * count / period
+        if stopped:
+            state[COLLISIONS] += 1.0 if state[TOUCHING] == 0.0 else 0.0
+            state[TOUCHING] = state[BLOCKED] = 1.0
+            if not spins_on:
+                break
+        elif state[TOUCHING] > 0.0 and clearance >= (release if state[TOUCHING] < 2.0 else TOUCHED_RELEASE_M):
+            state[TOUCHING] = 0.0
+    state[X], state[Y], state[THETA], state[CLEARANCE] = x, y, theta, clearance
+    if others_segments.shape[0] + others_circles.shape[0] > 0:
+        place_outline(state, corners, others_segments, others_circles, own)
+    return bool(state[BLOCKED] > 0.0)

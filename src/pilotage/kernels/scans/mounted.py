@@ -1,0 +1,357 @@
+"""What sensors on a body would read among all that is solid: fans, single beams, cones, lines of sight.
+
+What is solid is handed over as in ``bodies.drive``; ``mount`` is a sensor's pose on the body (3,).
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from pilotage.kernels.arrays import FloatArray, IntArray
+from pilotage.kernels.geometry.motion import wrap
+from pilotage.kernels.jit import kernel
+from pilotage.kernels.scans.rays import SIGHT_MARGIN_M, cone_range, narrow_fan
+from pilotage.kernels.scans.tiles import (
+    COSINE,
+    ORIGIN_X,
+    ORIGIN_Y,
+    SINE,
+    TILE,
+    TILE_COLUMNS,
+    TILE_ROWS,
+    Cells,
+)
+from pilotage.kernels.scans.trace import grid_beam, narrow_grid_fan
+
+
+@kernel
+def mounted(x: float, y: float, theta: float, mount: FloatArray) -> tuple[float, float, float]:
+    """Pose in the map of what is mounted on a body; the heading is not wrapped."""
+    c, s = math.cos(theta), math.sin(theta)
+    return x + c * mount[0] - s * mount[1], y + s * mount[0] + c * mount[1], theta + mount[2]
+
+
+@kernel
+def fans(
+    poses: FloatArray,
+    mount: FloatArray,
+    first: float,
+    step: float,
+    cosines: FloatArray,
+    sines: FloatArray,
+    max_range: float,
+    segments: FloatArray,
+    circles: FloatArray,
+    jump: Cells,
+    frame: FloatArray,
+    others_segments: FloatArray,
+    others_circles: FloatArray,
+    own: IntArray,
+) -> FloatArray:
+    """Ranges (R, beams) of equal fans on bodies at poses (R, >= 3); ``own`` (R, 3) are their own rows.
+
+    Beam k looks along ``first + k * step`` in the sensor's frame; the table is of the directions from the
+    first one. ``max_range`` where nothing is hit.
+    """
+    out = np.full((poses.shape[0], cosines.shape[0]), max_range)
+    for r in range(poses.shape[0]):
+        ranges = out[r]
+        x, y, theta = mounted(poses[r, 0], poses[r, 1], poses[r, 2], mount)
+        theta += first
+        narrow_fan(ranges, x, y, theta, step, cosines, sines, max_range, segments, circles)
+        narrow_grid_fan(ranges, x, y, theta, step, cosines, sines, jump, frame)
+        if others_segments.shape[0] + others_circles.shape[0] > 0:
+            before, after = others_segments[: own[r, 0]], others_segments[own[r, 1] :]
+            near, far = others_circles, others_circles[:0]
+            if own[r, 2] >= 0:
+                near, far = others_circles[: own[r, 2]], others_circles[own[r, 2] + 1 :]
+            narrow_fan(ranges, x, y, theta, step, cosines, sines, max_range, before, near)
+            narrow_fan(ranges, x, y, theta, step, cosines, sines, max_range, after, far)
+    return out
+
+
+@kernel
+def noisy_fans(
+    poses: FloatArray,
+    mount: FloatArray,
+    first: float,
+    step: float,
+    cosines: FloatArray,
+    sines: FloatArray,
+    max_range: float,
+    normals: FloatArray,
+    std: float,
+    segments: FloatArray,
+    circles: FloatArray,
+    jump: Cells,
+    frame: FloatArray,
+    others_segments: FloatArray,
+    others_circles: FloatArray,
+    own: IntArray,
+) -> FloatArray:
+    """``fans`` plus ``std`` times standard normals (R, beams); a beam without a hit stays at the reach."""
+    out = fans(
+        poses, mount, first, step, cosines, sines, max_range, segments, circles, jump, frame,
+        others_segments, others_circles, own,
+    )  # fmt: skip
+    for r in range(out.shape[0]):
+        for k in range(out.shape[1]):
+            if out[r, k] < max_range:
+                out[r, k] = min(max(out[r, k] + std * normals[r, k], 0.0), max_range)
+    return out
+
+
+@kernel
+def beam(
+    x: float, y: float, c: float, s: float, most: float, segments: FloatArray, circles: FloatArray
+) -> float:
+    """Length of a beam along the unit vector (c, s) up to a segment or circle; inf where none is nearer.
+
+    A beam that begins inside a circle has length 0.
+    """
+    best = math.inf
+    for i in range(segments.shape[0]):
+        px, py = segments[i, 0] - x, segments[i, 1] - y
+        ex, ey = segments[i, 2] - segments[i, 0], segments[i, 3] - segments[i, 1]
+        # (t, u): x + t d = p + u e
+        cross = c * ey - s * ex
+        if cross == 0.0:
+            continue
+        t, u = (px * ey - py * ex) / cross, (px * s - py * c) / cross
+        if t >= 0.0 and 0.0 <= u <= 1.0:
+            best = min(best, t)
+    for i in range(circles.shape[0]):
+        px, py, radius = circles[i, 0] - x, circles[i, 1] - y, circles[i, 2]
+        along, across = px * c + py * s, px * s - py * c
+        rest = radius * radius - across * across
+        if px * px + py * py <= radius * radius:
+            return 0.0
+        if along > 0.0 and rest >= 0.0:
+            best = min(best, along - math.sqrt(rest))
+    return best if best < most else math.inf
+
+
+@kernel
+def solid_beam(
+    x: float,
+    y: float,
+    c: float,
+    s: float,
+    most: float,
+    segments: FloatArray,
+    circles: FloatArray,
+    jump: Cells,
+    frame: FloatArray,
+    others_segments: FloatArray,
+    others_circles: FloatArray,
+    own: IntArray,
+) -> float:
+    """Length of a beam up to anything solid but the body with the rows ``own``; inf where none is nearer."""
+    best = min(beam(x, y, c, s, most, segments, circles), grid_beam(x, y, c, s, most, jump, frame))
+    if others_segments.shape[0] + others_circles.shape[0] > 0:
+        before, after = others_segments[: own[0]], others_segments[own[1] :]
+        near, far = others_circles, others_circles[:0]
+        if own[2] >= 0:
+            near, far = others_circles[: own[2]], others_circles[own[2] + 1 :]
+        best = min(best, beam(x, y, c, s, most, before, near))
+        best = min(best, beam(x, y, c, s, most, after, far))
+    return best
+
+
+@kernel
+def beam_at(
+    pose: FloatArray,
+    mount: FloatArray,
+    most: float,
+    segments: FloatArray,
+    circles: FloatArray,
+    jump: Cells,
+    frame: FloatArray,
+    others_segments: FloatArray,
+    others_circles: FloatArray,
+    own: IntArray,
+) -> float:
+    """``solid_beam`` of a sensor on a body at ``pose`` (>= 3), along the mount's heading."""
+    x, y, theta = mounted(pose[0], pose[1], pose[2], mount)
+    return solid_beam(
+        x, y, math.cos(theta), math.sin(theta), most, segments, circles, jump, frame, others_segments,
+        others_circles, own,
+    )  # fmt: skip
+
+
+@kernel
+def tiles_in_cone(
+    x: float,
+    y: float,
+    theta: float,
+    half_width: float,
+    reach: float,
+    outlines: FloatArray,
+    starts: IntArray,
+    items: IntArray,
+    frame: FloatArray,
+) -> float:
+    """``rays.cone_range`` for a grid's outlines within ``reach``; inf for none."""
+    if outlines.shape[0] == 0:
+        return math.inf
+    dx, dy = x - frame[ORIGIN_X], y - frame[ORIGIN_Y]
+    px, py = frame[COSINE] * dx + frame[SINE] * dy, frame[COSINE] * dy - frame[SINE] * dx
+    heading = theta - math.atan2(frame[SINE], frame[COSINE])
+    # The box around the cone: its apex, its two corners, and the middle of its arc, pushed out to the arc.
+    out = reach / math.cos(half_width)
+    x0, x1, y0, y1 = px, px, py, py
+    for k in range(3):
+        angle = heading + (k - 1) * half_width
+        length = reach if k == 1 else out
+        ex, ey = px + length * math.cos(angle), py + length * math.sin(angle)
+        x0, x1, y0, y1 = min(x0, ex), max(x1, ex), min(y0, ey), max(y1, ey)
+    tile, columns, rows = frame[TILE], int(frame[TILE_COLUMNS]), int(frame[TILE_ROWS])
+    best = math.inf
+    none = np.empty((0, 3))
+    near = np.empty((1, 4))
+    for row in range(max(0, math.floor(y0 / tile)), min(rows - 1, math.floor(y1 / tile)) + 1):
+        for column in range(max(0, math.floor(x0 / tile)), min(columns - 1, math.floor(x1 / tile)) + 1):
+            for n in range(starts[row * columns + column], starts[row * columns + column + 1]):
+                near[0] = outlines[items[n]]
+                best = min(best, cone_range(px, py, heading, half_width, near, none))
+    return best
+
+
+@kernel
+def cones(
+    pose: FloatArray,
+    mounts: FloatArray,
+    segments: FloatArray,
+    circles: FloatArray,
+    jump: Cells,
+    outlines: FloatArray,
+    starts: IntArray,
+    items: IntArray,
+    frame: FloatArray,
+    others_segments: FloatArray,
+    others_circles: FloatArray,
+    own: IntArray,
+    out: FloatArray,
+) -> None:
+    """Distance to the nearest return in each of the cones of a body at ``pose`` (>= 3); inf for none.
+
+    Parameters
+    ----------
+    mounts
+        (K, 5) pose of each cone on the body, half its width, its reach (for grids only).
+    out
+        (K,) filled.
+    """
+    for k in range(mounts.shape[0]):
+        x, y, theta = mounted(pose[0], pose[1], pose[2], mounts[k])
+        half = mounts[k, 3]
+        best = cone_range(x, y, theta, half, segments, circles)
+        if jump.shape[0] > 0:
+            best = min(best, tiles_in_cone(x, y, theta, half, mounts[k, 4], outlines, starts, items, frame))
+            if grid_beam(x, y, math.cos(theta), math.sin(theta), 0.0, jump, frame) == 0.0:
+                best = 0.0
+        if others_segments.shape[0] + others_circles.shape[0] > 0:
+            before, after = others_segments[: own[0]], others_segments[own[1] :]
+            near, far = others_circles, others_circles[:0]
+            if own[2] >= 0:
+                near, far = others_circles[: own[2]], others_circles[own[2] + 1 :]
+            best = min(best, cone_range(x, y, theta, half, before, near))
+            best = min(best, cone_range(x, y, theta, half, after, far))
+        out[k] = best
+
+
+@kernel
+def hidden(ax: float, ay: float, bx: float, by: float, segments: FloatArray, circles: FloatArray) -> bool:
+    """Whether a segment or circle is in the way from A to B; touching counts, as in ``plane.sees``."""
+    rx, ry = bx - ax, by - ay
+    for i in range(segments.shape[0]):
+        sx, sy = segments[i, 2] - segments[i, 0], segments[i, 3] - segments[i, 1]
+        cross = rx * sy - ry * sx
+        qx, qy = segments[i, 0] - ax, segments[i, 1] - ay
+        t, u = qx * sy - qy * sx, qx * ry - qy * rx
+        # 0 <= t <= cross without dividing; a parallel segment does not cross.
+        if cross < 0.0:
+            t, u, cross = -t, -u, -cross
+        if cross > 0.0 and 0.0 <= t <= cross and 0.0 <= u <= cross:
+            return True
+    length2 = rx * rx + ry * ry
+    for i in range(circles.shape[0]):
+        qx, qy = circles[i, 0] - ax, circles[i, 1] - ay
+        t = 0.0 if length2 == 0.0 else min(1.0, max(0.0, (qx * rx + qy * ry) / length2))
+        ex, ey = qx - t * rx, qy - t * ry
+        if ex * ex + ey * ey <= circles[i, 2] * circles[i, 2]:
+            return True
+    return False
+
+
+@kernel
+def sightings(
+    pose: FloatArray,
+    noise: FloatArray,
+    mount: FloatArray,
+    half_view: float,
+    max_range: float,
+    points: FloatArray,
+    ids: IntArray,
+    range_std: float,
+    bearing_std: float,
+    bearing_offset: float,
+    segments: FloatArray,
+    circles: FloatArray,
+    jump: Cells,
+    frame: FloatArray,
+    others_segments: FloatArray,
+    others_circles: FloatArray,
+    own: IntArray,
+) -> tuple[IntArray, FloatArray, FloatArray]:
+    """Ids, ranges and bearings of the points (M, 2) in view, with noise; what is solid hides those behind it.
+
+    Parameters
+    ----------
+    noise
+        (2, M) standard normals for range and bearing, one pair for each point, seen or not.
+    half_view
+        Half the field of view; pi sees all around.
+    """
+    x, y, theta = mounted(pose[0], pose[1], pose[2], mount)
+    count = 0
+    index = np.empty(points.shape[0], dtype=np.int64)
+    ranges = np.empty(points.shape[0])
+    bearings = np.empty(points.shape[0])
+    for i in range(points.shape[0]):
+        dx, dy = points[i, 0] - x, points[i, 1] - y
+        distance = math.hypot(dx, dy)
+        if distance > max_range or distance <= SIGHT_MARGIN_M:
+            continue
+        bearing = wrap(math.atan2(dy, dx) - theta)
+        if abs(bearing) > half_view:
+            continue
+        keep = 1.0 - SIGHT_MARGIN_M / distance
+        ex, ey = x + keep * dx, y + keep * dy
+        if hidden(x, y, ex, ey, segments, circles):
+            continue
+        if grid_beam(x, y, dx / distance, dy / distance, keep * distance, jump, frame) < math.inf:
+            continue
+        if others_segments.shape[0] + others_circles.shape[0] > 0:
+            before, after = others_segments[: own[0]], others_segments[own[1] :]
+            near, far = others_circles, others_circles[:0]
+            if own[2] >= 0:
+                near, far = others_circles[: own[2]], others_circles[own[2] + 1 :]
+            if hidden(x, y, ex, ey, before, near) or hidden(x, y, ex, ey, after, far):
+                continue
+        index[count], ranges[count], bearings[count] = i, distance, bearing
+        count += 1
+    seen = np.empty(count, dtype=np.int64)
+    for n in range(count):
+        i = index[n]
+        seen[n] = ids[i]
+        ranges[n] = abs(ranges[n] + range_std * noise[0, i])
+        bearing = bearings[n] + bearing_offset + bearing_std * noise[1, i]
+        if bearing >= math.pi:
+            bearing -= 2.0 * math.pi
+        if bearing < -math.pi:
+            bearing += 2.0 * math.pi
+        bearings[n] = bearing
+    return seen, ranges[:count].copy(), bearings[:count].copy()

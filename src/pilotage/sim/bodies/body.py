@@ -1,0 +1,146 @@
+"""A robot's body in truth: where it is, how it moves, what it runs into."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pilotage.core.types import Command, FloatArray, IntArray, Pose2, Twist
+from pilotage.kernels.bodies import clearances, drive
+from pilotage.models.footprint import Footprint
+from pilotage.sim.bodies.motion import SimulatedMotion
+from pilotage.sim.worlds.world import World
+
+COLLISIONS, TOUCHING, BLOCKED = drive.COLLISIONS, drive.TOUCHING, drive.BLOCKED
+
+
+class Body:
+    """A footprint that a motion drives through a world; a contact stops it and counts once until it is clear.
+
+    Attributes
+    ----------
+    name
+        The robot's.
+    state
+        (drive.STATE_SIZE,) what the kernels keep of it; see ``kernels.bodies.drive``.
+    rates_rad_s
+        (K,) true turn rates in the moves of the last step.
+    own
+        (3,) its rows in the world's traffic.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        footprint: Footprint,
+        motion: SimulatedMotion,
+        start: Pose2,
+        world: World,
+        dt_s: float,
+        state: FloatArray,
+        own: IntArray,
+    ) -> None:
+        self.name, self.footprint, self.motion, self.world = name, footprint, motion, world
+        self.state, self.own = state, own
+        self.rates_rad_s: FloatArray = np.zeros(len(motion.moves))
+        self._dt_s = dt_s
+        outline = (footprint.points_m, footprint.radius_m, footprint.inner_radius_m)
+        walls, grid, traffic = (world.segments_m, world.circles_m), world.grid, world.traffic
+        cells = (grid.jump, grid.outlines_m, grid.starts, grid.items, grid.frame)
+        others = (traffic.segments_m, traffic.circles_m, own)
+        # What each kernel is handed, put together once: they take arrays, and many of them.
+        self._among_fixed = (*outline, *walls, *cells)
+        self._among_others = (*outline[:2], *others)
+        self._among_all = (*outline, *walls, *cells, *others)
+        self._step = (dt_s, motion.spins_on, motion.release_m, *outline, *walls, *cells, *others)
+        self._rows = (outline[0], *others)
+        self.carry_to(start)
+
+    @property
+    def pose(self) -> Pose2:
+        """The true pose."""
+        x, y, theta = self.state[:3].tolist()
+        return Pose2(x, y, theta)
+
+    @property
+    def twist(self) -> Twist:
+        """The true velocity, the mean over the last step; at rest after a contact that ended the step."""
+        state = self.state
+        if state[BLOCKED] > 0.0 and not self.motion.spins_on:
+            return Twist(0.0, 0.0)
+        distance, lateral, angle = state[drive.DISTANCE : drive.ANGLE + 1].tolist()
+        return Twist(distance / self._dt_s, angle / self._dt_s, lateral / self._dt_s)
+
+    @property
+    def clearance_m(self) -> float:
+        """Distance from the footprint's edge to what is nearest, walls or others; inf for nothing."""
+        return float(self.state[drive.CLEARANCE])
+
+    @property
+    def collisions(self) -> int:
+        """How often it ran into something, or another body into it."""
+        return int(self.state[COLLISIONS])
+
+    @property
+    def touching(self) -> bool:
+        """Whether it touches something now."""
+        return bool(self.state[TOUCHING] > 0.0)
+
+    @property
+    def driven_m(self) -> float:
+        """Length of the centre's path so far."""
+        return float(self.state[drive.DRIVEN])
+
+    @property
+    def on_hazard(self) -> bool:
+        """Whether its centre is on a hazard of open ground, which does not stop it."""
+        ground = self.world.ground
+        return ground is not None and ground.on_hazard(float(self.state[0]), float(self.state[1]))
+
+    def step(self, command: Command) -> None:
+        """Drive one step."""
+        motion = self.motion
+        motion.command(command)
+        if drive.drive(self.state, motion.moves, self.rates_rad_s, *self._step) and not motion.spins_on:
+            motion.stop()
+
+    def carry_to(self, pose: Pose2) -> None:
+        """Set it down elsewhere, standing still; its wheels do not turn meanwhile."""
+        state = self.state
+        state[:3] = pose.x_m, pose.y_m, pose.theta_rad
+        state[drive.DISTANCE : drive.BLOCKER + 1] = 0.0
+        state[TOUCHING] = 0.0
+        self.motion.stop()
+        self.rates_rad_s[:] = 0.0
+        x, y, theta = state[:3].tolist()
+        fixed = float(drive.fixed_clearance(x, y, theta, *self._among_fixed))
+        state[drive.FIXED_CLEARANCE] = fixed
+        if len(self.world.traffic.own):
+            drive.place_outline(state, *self._rows)
+        state[drive.CLEARANCE] = min(fixed, drive.others_clearance(x, y, theta, *self._among_others))
+
+    def meet_others(self) -> None:
+        """After everybody moved: bring the clearance up to date and count who ran into this body."""
+        drive.meet_others(self.state, *self._among_others)
+
+    def run_into(self) -> None:
+        """Count that another body ran into this one, unless it touches already."""
+        if self.state[TOUCHING] == 0.0:
+            self.state[COLLISIONS] += 1.0
+            self.state[TOUCHING] = 2.0
+
+    def contact_bearing_rad(self) -> float:
+        """Where on the footprint something is nearest, from the axle in the base frame, not wrapped."""
+        x, y, theta = self.state[:3].tolist()
+        return float(clearances.contact_bearing(x, y, theta, *self._among_all))
+
+    def distance_to_m(self, other: Body) -> float:
+        """Clearance from another robot."""
+        traffic, (first, last, disc) = self.world.traffic, other.own.tolist()
+        circles = traffic.circles_m[disc : disc + 1] if disc >= 0 else traffic.circles_m[:0]
+        sides = traffic.segments_m[first:last]
+        nobody = np.array([0, 0, -1], dtype=np.int64)
+        x, y, theta = self.state[:3].tolist()
+        outline = self.footprint
+        return float(
+            drive.others_clearance(x, y, theta, outline.points_m, outline.radius_m, sides, circles, nobody)
+        )

@@ -1,0 +1,69 @@
+"""The role of a simulated motion, and the registry by which each data sheet finds its own."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+from pilotage.core.errors import InputError
+from pilotage.core.types import Command, FloatArray, Twist
+from pilotage.sim.by_config import ByConfig
+
+
+class SimulatedMotion(Protocol):
+    """How commands become moves; whether a move is possible is the body's business.
+
+    Built with its config, the step's length, the samples a step that the robot's sensors take, the robot's
+    random streams, and its place in the mission for messages.
+
+    Attributes
+    ----------
+    moves
+        (K, 3) moves of the next step, each at constant twist: forward and lateral distance, angle.
+    spins_on
+        Whether wheels spin on at a contact, so that the body turns on while its centre stays.
+    release_m
+        How clear the body has to be again before a new contact counts.
+    turned_rad
+        Angles that the left and right wheel have turned so far, on the test bench and on the floor alike;
+        None for motions without two driven wheels.
+    """
+
+    moves: FloatArray
+    spins_on: bool
+    release_m: float
+
+    @property
+    def turned_rad(self) -> tuple[float, float] | None:
+        """See above."""
+        ...
+
+    def command(self, command: Command) -> None:
+        """Fill ``moves`` for a step under a command."""
+        ...
+
+    def stop(self) -> None:
+        """Stand still: a contact ended the last step, or the robot was carried elsewhere."""
+        ...
+
+
+SIMULATED_MOTIONS: ByConfig[SimulatedMotion] = ByConfig("motion", "pilotage.sim.bodies")
+"""Data sheets to what they truly do."""
+
+
+def as_twist(command: Command, motion: str) -> Twist:
+    """The command of a motion that follows twists only.
+
+    Raises
+    ------
+    InputError
+        For wheel speeds.
+    """
+    if type(command) is Twist:
+        return command
+    raise InputError(f"{motion}: expected a twist as command, found {type(command).__name__}")
+
+
+def approach(current: float, wanted: float, limit: float, change: float) -> float:
+    """Move ``current`` towards ``wanted`` by at most ``change``, within +-limit."""
+    target = min(max(wanted, -limit), limit)
+    return min(max(target, current - change), current + change)

@@ -1,0 +1,1 @@
+"""What each sensor would read in the true world: one file a sensor or family of sensors."""

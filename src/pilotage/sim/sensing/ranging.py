@@ -1,0 +1,87 @@
+"""Range sensors of one value: ultrasonic cones and infrared beams."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from pilotage.kernels.scans import mounted
+from pilotage.sensors.infrared import InfraredConfig
+from pilotage.sensors.readings import InfraredReading, UltrasonicReading
+from pilotage.sensors.ultrasonic import UltrasonicConfig
+from pilotage.sim.normals import Normals
+from pilotage.sim.sensing.sensor import SIMULATED_SENSORS, Carrier, mount_of
+
+
+@SIMULATED_SENSORS.add(UltrasonicConfig)
+class SimulatedUltrasonic:
+    """The nearest return in the cone."""
+
+    def __init__(self, config: UltrasonicConfig, carrier: Carrier, rng: np.random.Generator) -> None:
+        carrier.world.check_solids(carrier.where, "ultrasonic")
+        world, grid, traffic = carrier.world, carrier.world.grid, carrier.world.traffic
+        self._std = math.sqrt(config.range_var_m2)
+        self._least, self._most = config.min_range_m, config.max_range_m
+        self._normals = Normals(rng)
+        mount = config.mount
+        # Noise may bring in a return from somewhat beyond the reach.
+        reach = config.max_range_m + 6.0 * self._std
+        self._found = np.empty(1)
+        self._arguments = (
+            carrier.body.state,
+            np.array([[mount.x_m, mount.y_m, mount.theta_rad, 0.5 * config.cone_rad, reach]]),
+            world.segments_m,
+            world.circles_m,
+            grid.jump,
+            grid.outlines_m,
+            grid.starts,
+            grid.items,
+            grid.frame,
+            traffic.segments_m,
+            traffic.circles_m,
+            carrier.body.own,
+            self._found,
+        )
+
+    def read(self) -> UltrasonicReading:
+        """Measure; out of reach is flagged, below the least range reads as the least range."""
+        mounted.cones(*self._arguments)
+        distance = float(self._found[0])
+        if self._std > 0.0:
+            distance += self._std * self._normals.next()
+        if distance >= self._most:
+            return UltrasonicReading(self._most, saturated=True)
+        return UltrasonicReading(max(distance, self._least), saturated=False)
+
+
+@SIMULATED_SENSORS.add(InfraredConfig)
+class SimulatedInfrared:
+    """One beam; noise in proportion to the range."""
+
+    def __init__(self, config: InfraredConfig, carrier: Carrier, rng: np.random.Generator) -> None:
+        carrier.world.check_solids(carrier.where, "infrared")
+        world, traffic = carrier.world, carrier.world.traffic
+        self._config = config
+        self._normals = Normals(rng)
+        self._arguments = (
+            carrier.body.state,
+            mount_of(config.mount),
+            config.max_range_m,
+            world.segments_m,
+            world.circles_m,
+            world.grid.jump,
+            world.grid.frame,
+            traffic.segments_m,
+            traffic.circles_m,
+            carrier.body.own,
+        )
+
+    def read(self) -> InfraredReading:
+        """Measure; one draw a reading, whatever is seen."""
+        c = self._config
+        exact = float(mounted.beam_at(*self._arguments))
+        found = min(exact, c.max_range_m) * (1.0 + c.range_std_fraction * self._normals.next())
+        if exact >= c.max_range_m or found >= c.max_range_m:
+            return InfraredReading(c.max_range_m, saturated=True)
+        return InfraredReading(max(found, c.min_range_m), saturated=False)

@@ -1,0 +1,62 @@
+"""The role of a simulated sensor, and the registry by which each config finds its own."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from pilotage.core.types import FloatArray
+from pilotage.sensors.readings import Reading
+from pilotage.sensors.sensor import Mount
+from pilotage.sim.bodies.body import Body
+from pilotage.sim.by_config import ByConfig
+from pilotage.sim.worlds.world import World
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Carrier:
+    """What a sensor is on.
+
+    Attributes
+    ----------
+    where
+        Its place in the mission, for messages.
+    dt_s, every
+        Length of a step, and how many steps lie between two readings.
+    """
+
+    world: World
+    body: Body
+    where: str
+    dt_s: float
+    every: int
+
+    @property
+    def period_s(self) -> float:
+        """Time between two readings."""
+        return self.every * self.dt_s
+
+
+class SimulatedSensor(Protocol):
+    """One sensor on one robot, built with its config, its carrier, and its noise stream.
+
+    It refuses a world that cannot serve it when it is built. A sensor that sums over time has a method
+    ``observe()`` besides, called after every step and before ``read``. One that is read in samples, several
+    in a step, sets ``sampled = True``. One whose readings are cheaper for many robots at once has a class
+    method ``together(sensors)`` that returns a function from nothing to their readings.
+    """
+
+    def read(self) -> Reading | None:
+        """Give a reading, called when the sensor's period is over; None where it fails to arrive."""
+        ...
+
+
+SIMULATED_SENSORS: ByConfig[SimulatedSensor] = ByConfig("sensor", "pilotage.sim.sensing")
+"""Sensor configs to what they would read."""
+
+
+def mount_of(mount: Mount) -> FloatArray:
+    """(3,) pose on the body, for the kernels."""
+    return np.array([mount.x_m, mount.y_m, mount.theta_rad])

@@ -1,0 +1,218 @@
+"""The simulator: one or many robots in one world; commands in, what their sensors said out."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from pilotage.core.errors import InputError
+from pilotage.core.random import RandomStreams
+from pilotage.core.types import Command, Pose2
+from pilotage.kernels.bodies import drive
+from pilotage.models.footprint import Footprint
+from pilotage.models.motion.motion import MotionConfig
+from pilotage.sensors.readings import Reading, Readings
+from pilotage.sensors.sensor import SensorConfig
+from pilotage.sim.bodies.body import Body
+from pilotage.sim.bodies.motion import SIMULATED_MOTIONS
+from pilotage.sim.sensing.sensor import SIMULATED_SENSORS, Carrier, SimulatedSensor
+from pilotage.sim.worlds.traffic import MovingBody, Traffic
+from pilotage.sim.worlds.world import World
+
+
+@dataclass(frozen=True, slots=True)
+class RobotSpec:
+    """One robot: what it is, what it carries, where it begins, and the streams that its noise comes from.
+
+    Sensors are named as in the mission; the name keys the noise stream, so switching one sensor off leaves
+    what the others draw unchanged.
+    """
+
+    name: str
+    footprint: Footprint
+    motion: MotionConfig
+    sensors: Mapping[str, SensorConfig]
+    start: Pose2
+    streams: RandomStreams
+
+
+class Simulator:
+    """Steps robots through a world and reads their sensors at their own rates.
+
+    Robots move one after the other, each against the others where they are then; people give way to nobody.
+
+    Parameters
+    ----------
+    people
+        Moving bodies besides the robots.
+
+    Raises
+    ------
+    InputError
+        Where two robots begin inside each other, or the world cannot serve a sensor.
+    """
+
+    def __init__(
+        self, world: World, robots: Sequence[RobotSpec], dt_s: float, people: Sequence[MovingBody] = ()
+    ) -> None:
+        self._dt_s, self._steps = dt_s, 0
+        self._crowded = len(robots) + len(people) > 1
+        self._traffic = (
+            Traffic([robot.footprint for robot in robots], people) if self._crowded else Traffic.none()
+        )
+        self.world = world.with_traffic(self._traffic)
+        states = np.zeros((len(robots), drive.STATE_SIZE))
+        nobody = np.array([[0, 0, -1]], dtype=np.int64)
+        own = self._traffic.own if self._crowded else nobody
+        self.bodies: tuple[Body, ...] = tuple(
+            _body(robot, self.world, dt_s, states[row], own[row]) for row, robot in enumerate(robots)
+        )
+        for body in self.bodies:
+            # Once more, now that everybody is in place.
+            body.carry_to(body.pose)
+        self._check_apart()
+        several = len(robots) > 1
+        seats = [
+            _Seat(row, name, sensor, every)
+            for row, (robot, body) in enumerate(zip(robots, self.bodies, strict=True))
+            for name, sensor, every in _sensors(robot, body, self.world, dt_s, several)
+        ]
+        self._observe: list[Callable[[], None]] = [
+            observe for seat in seats if (observe := getattr(seat.sensor, "observe", None)) is not None
+        ]
+        self._alone, self._together = _grouped(seats, robots)
+
+    @property
+    def t_s(self) -> float:
+        """Simulated time."""
+        return self._steps * self._dt_s
+
+    def step(self, commands: Sequence[Command]) -> list[Readings]:
+        """Drive one time step and return what each robot's sensors say at its end."""
+        self._steps += 1
+        t_s = self._steps * self._dt_s
+        bodies = self.bodies
+        if self._crowded:
+            self._traffic.walk_to(t_s)
+        for body, command in zip(bodies, commands, strict=True):
+            body.step(command)
+        if self._crowded:
+            self._meet()
+        for observe in self._observe:
+            observe()
+        said: list[dict[str, Reading]] = [{} for _ in bodies]
+        for row, name, read, every in self._alone:
+            if every == 1 or self._steps % every == 0:
+                reading = read()
+                if reading is not None:
+                    said[row][name] = reading
+        for group in self._together:
+            if self._steps % group.every == 0:
+                for (row, name), reading in zip(group.seats, group.read(), strict=True):
+                    if reading is not None:
+                        said[row][name] = reading
+        return [Readings(t_s, by_sensor) for by_sensor in said]
+
+    def _meet(self) -> None:
+        """Who ran into whom."""
+        for body in self.bodies:
+            body.meet_others()
+        for body in self.bodies:
+            if body.state[drive.BLOCKER] > 0.0:
+                others = [other for other in self.bodies if other is not body]
+                if others:
+                    min(others, key=body.distance_to_m).run_into()
+
+    def _check_apart(self) -> None:
+        for row, body in enumerate(self.bodies):
+            for other in self.bodies[:row]:
+                if body.distance_to_m(other) < 0.0:
+                    raise InputError(
+                        f"robots '{other.name}' and '{body.name}': expected starts apart, found them inside "
+                        f"each other; move one"
+                    )
+
+
+@dataclass(frozen=True, slots=True)
+class _Seat:
+    """A sensor with its robot and rate."""
+
+    row: int
+    name: str
+    sensor: SimulatedSensor
+    every: int
+
+
+@dataclass(frozen=True, slots=True)
+class _Group:
+    """Equal sensors of several robots, read at once."""
+
+    seats: list[tuple[int, str]]
+    read: Callable[[], list[Reading | None]]
+    every: int
+
+
+def _body(robot: RobotSpec, world: World, dt_s: float, state: np.ndarray, own: np.ndarray) -> Body:
+    """The robot's body with the motion that its data sheet asks for."""
+    where = "robot.motion"
+    samples = max(
+        (
+            _samples(config, dt_s, name)
+            for name, config in robot.sensors.items()
+            if getattr(SIMULATED_SENSORS.of(config, f"robot.sensors.{name}"), "sampled", False)
+        ),
+        default=1,
+    )
+    motion = SIMULATED_MOTIONS.of(robot.motion, where)(robot.motion, dt_s, samples, robot.streams, where)
+    return Body(robot.name, robot.footprint, motion, robot.start, world, dt_s, state, own)
+
+
+def _samples(config: SensorConfig, dt_s: float, name: str) -> int:
+    """How many samples a sampled sensor takes in a step; 1 where it is read every few steps."""
+    samples = config.rate_hz * dt_s
+    if samples < 1.0 - 1e-6:
+        return 1
+    whole = round(samples)
+    if abs(samples - whole) > 1e-6 * samples:
+        raise InputError(
+            f"robot.sensors.{name}.rate_hz: expected a multiple of {1.0 / dt_s:g} Hz "
+            f"(run.dt_s = {dt_s:g} s), found {config.rate_hz:g}"
+        )
+    return whole
+
+
+def _sensors(
+    robot: RobotSpec, body: Body, world: World, dt_s: float, several: bool
+) -> list[tuple[str, SimulatedSensor, int]]:
+    """The robot's sensors by name, and every how many steps each is read."""
+    out = []
+    for name, config in robot.sensors.items():
+        where = f"robots.{robot.name}.sensors.{name}" if several else f"robot.sensors.{name}"
+        kind = SIMULATED_SENSORS.of(config, where)
+        often = getattr(kind, "sampled", False) and config.rate_hz * dt_s > 1.0 - 1e-6
+        every = 1 if often else config.every_steps(dt_s, name)
+        carrier = Carrier(world, body, where, dt_s, every)
+        out.append((name, kind(config, carrier, robot.streams.stream(f"sensor/{name}")), every))
+    return out
+
+
+def _grouped(
+    seats: list[_Seat], robots: Sequence[RobotSpec]
+) -> tuple[list[tuple[int, str, Callable[[], Reading | None], int]], list[_Group]]:
+    """Sensors that are read one by one, and equal ones that are read together."""
+    alike: dict[object, list[_Seat]] = {}
+    for seat in seats:
+        config = robots[seat.row].sensors[seat.name]
+        together = hasattr(seat.sensor, "together")
+        alike.setdefault((type(seat.sensor), config) if together else seat, []).append(seat)
+    alone, groups = [], []
+    for found in alike.values():
+        if len(found) == 1:
+            alone.append((found[0].row, found[0].name, found[0].sensor.read, found[0].every))
+        else:
+            sensors = [seat.sensor for seat in found]
+            read = type(sensors[0]).together(sensors)  # type: ignore[attr-defined]
+            groups.append(_Group([(seat.row, seat.name) for seat in found], read, found[0].every))
+    return alone, groups

@@ -1,0 +1,76 @@
+"""A layer of occupied cells: solid squares that beams end at and bodies run into."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pilotage.core.errors import InputError
+from pilotage.core.types import FloatArray, IntArray, Pose2
+from pilotage.kernels.grids.distance import FAR
+from pilotage.kernels.scans import jumps, tiles
+from pilotage.maps.memory import require_memory
+from pilotage.maps.occupancy_grid import OccupancyGrid
+from pilotage.maps.outlines import outlines
+
+CELLS_A_TILE = 8
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class GridLayer:
+    """Occupied cells prepared for the kernels (``kernels.scans.tiles`` and ``trace``); none: all empty.
+
+    Attributes
+    ----------
+    jump
+        (rows, columns), row 0 at the bottom: how far a beam may leap from each cell.
+    outlines_m
+        (N, 4) sides of the occupied cells, in the grid's own frame.
+    starts, items
+        Which of them lie in each tile.
+    frame
+        Pose of the grid, sides of cells and tiles, columns and rows of tiles.
+    """
+
+    jump: NDArray[np.uint8]
+    outlines_m: FloatArray
+    starts: IntArray
+    items: IntArray
+    frame: FloatArray
+
+    @staticmethod
+    def none() -> GridLayer:
+        """No cells."""
+        nothing = np.zeros(0, dtype=np.int64)
+        return GridLayer(np.zeros((0, 0), np.uint8), np.zeros((0, 4)), nothing, nothing, np.ones(8))
+
+    @staticmethod
+    def of(grid: OccupancyGrid) -> GridLayer:
+        """Prepare a grid: beams pass unknown cells, and so do bodies.
+
+        Raises
+        ------
+        InputError
+            For grids of more than 32,767 cells a side, and where memory does not suffice.
+        """
+        occupied = np.ascontiguousarray(grid.blocked(unknown_is_free=True)[::-1])
+        if not occupied.any():
+            return GridLayer.none()
+        if max(occupied.shape) >= FAR:
+            raise InputError(
+                f"world.map: expected at most {FAR - 1} cells a side for what robots meet, "
+                f"found {occupied.shape}"
+            )
+        require_memory(8 * occupied.size, "what beams and bodies meet on the grid")
+        own = OccupancyGrid(grid.cells, grid.resolution_m, Pose2(0.0, 0.0, 0.0))
+        sides = outlines(own)
+        tile = CELLS_A_TILE * grid.resolution_m
+        rows, columns = (math.ceil(n / CELLS_A_TILE) for n in occupied.shape)
+        starts, items = tiles.count_in_tiles(sides, tile, columns, rows)
+        origin = grid.origin
+        c, s = math.cos(origin.theta_rad), math.sin(origin.theta_rad)
+        frame = np.array([origin.x_m, origin.y_m, c, s, grid.resolution_m, tile, columns, rows])
+        return GridLayer(jumps.leaps(occupied), sides, starts, items, frame)
