@@ -65,14 +65,13 @@ class ReachTask:
 
     def _judged(self, run: FinishedRun, robot: RobotRun) -> Verdict:
         shortest = shortest_for(run, robot)
-        metrics = header(run, robot) | planning_metrics(run, robot, shortest)
+        route = route_of(robot)
+        metrics = header(run, robot)
+        metrics |= planning_metrics(run, robot, shortest) if route is None else route_metrics(run, robot, route)
         driven, nees = driving_metrics(run, robot)
         extras = {} if shortest is None else {f"{robot.name}/shortest_path": shortest.points_xy_m}
         metrics |= driven
         columns = {"nees": nees}
-        route = route_of(robot)
-        if route is not None:
-            metrics |= route_metrics(run, robot, route)
         if run.chart.geometry is None and robot.trace["t_s"].shape[0]:
             columns |= terrain_columns(run, robot)
             metrics |= terrain_metrics(run, robot, columns)

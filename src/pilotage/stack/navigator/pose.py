@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 
+from pydantic import Field
+
 from pilotage.core.errors import InputError
 from pilotage.core.types import STOP, Pose2, Twist
 from pilotage.maps.world_map import WorldMap
@@ -15,17 +17,24 @@ from pilotage.stack.knowledge import RobotKnowledge, TaskKnowledge
 from pilotage.stack.navigator.navigator import Parts, localizer_of
 
 
-@NAVIGATORS.add("pose", PolarPoseConfig)
+class PoseConfig(PolarPoseConfig):
+    """The law's gains, and when it is there."""
+
+    arrival_m: float | None = Field(default=None, gt=0.0)
+    """How near it has to believe to be; None: the goal's tolerance."""
+
+
+@NAVIGATORS.add("pose", PoseConfig)
 class PoseNavigator:
     """Drives by the polar law from where it believes to be (rover report, chapter 2).
 
-    Arrives at the first step at which it believes to be within the goal's tolerance. It looks at no
+    Arrives at the first step at which it believes to be near enough. It looks at no
     obstacle: what lies on its way it drives over.
     """
 
     def __init__(
         self,
-        config: PolarPoseConfig,
+        config: PoseConfig,
         robot: RobotKnowledge,
         chart: WorldMap,
         task: TaskKnowledge,
@@ -39,7 +48,7 @@ class PoseNavigator:
         self._localizer, self._journal = localizer_of(parts, "pose"), journal
         pose = Pose2(goal.x_m, goal.y_m, goal.theta_rad)
         self._law = PolarPoseController(config, pose, robot.motion.top_speed_m_s)
-        self._tolerance_m = task.goal_tolerance_m
+        self._tolerance_m = min(config.arrival_m or math.inf, task.goal_tolerance_m)
         self._status, self._reason = StackStatus.RUNNING, ""
         self._channel = journal.channel({"distance_to_go_m": "m"})
 
