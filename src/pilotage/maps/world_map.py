@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from pilotage.core.types import FloatArray
 from pilotage.maps.distance_field import DistanceField
 from pilotage.maps.elevation import ElevationModel
+from pilotage.maps.ground_distance import ground_distance
 from pilotage.maps.landmarks import Landmarks
 from pilotage.maps.markings import FloorMarkings
 from pilotage.maps.occupancy_grid import OccupancyGrid
@@ -61,11 +62,24 @@ class WorldMap:
         return SegmentMap(segments, np.zeros((0, 3)), self.bounds_m)
 
     @cached_property
+    def barriers(self) -> SegmentMap:
+        """What is not driven into: the walls, and of a grid the outlines of its unknown cells as well."""
+        if self.geometry is not None or self.grid is None or not (self.grid.cells < 0).any():
+            return self.walls
+        return SegmentMap(outlines(self.grid, unknown_is_solid=True), np.zeros((0, 3)), self.bounds_m)
+
+    @cached_property
     def field(self) -> DistanceField:
-        """Distance to the nearest wall, sampled; unknown cells of a grid are not driven on."""
+        """Distance to the nearest barrier, sampled, with the barriers beside it; negative in solid cells."""
         if self.geometry is None and self.grid is not None:
-            return DistanceField.from_grid(self.grid)
-        return DistanceField.from_map(self.walls)
+            return ground_distance(self.barriers, self.grid)
+        return DistanceField.from_map(self.barriers)
+
+    @cached_property
+    def wall_field(self) -> DistanceField:
+        """Distance to the nearest wall that returns a beam, sampled."""
+        exact = self.geometry is not None or self.grid is None
+        return self.field if exact else DistanceField.from_map(self.walls)
 
     def contains(self, x_m: float, y_m: float) -> bool:
         """Whether a point lies within the bounds."""

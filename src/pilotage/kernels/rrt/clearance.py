@@ -185,10 +185,14 @@ def slack_at(x: float, y: float, space: Space, clearance: float) -> float:
     )
     if not inside >= 0.0:
         return -1.0
-    slack = interpolate_at(x, y, space.distance, space.x0, space.y0, space.resolution) - clearance
-    slack -= space.margin
-    if slack < 2.0 * space.margin:
-        slack = exact_distance(x, y, space) - clearance
+    distance = interpolate_at(x, y, space.distance, space.x0, space.y0, space.resolution)
+    slack = distance - clearance - space.margin
+    if space.margin > 0.0 and slack < 2.0 * space.margin:
+        exact = exact_distance(x, y, space)
+        if distance < -space.margin:
+            # Within something solid: of a disc the exact distance says so too, of an outline the field alone.
+            exact = min(exact, distance + space.margin)
+        slack = exact - clearance
     if -ROUNDING_M <= slack < 0.0:
         slack = 0.0
     return float(min(slack, inside))

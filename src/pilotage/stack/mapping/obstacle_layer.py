@@ -10,7 +10,6 @@ from pydantic import Field
 from pilotage.core.config import Config
 from pilotage.core.types import FloatArray
 from pilotage.kernels.scans import unexpected
-from pilotage.maps.distance_field import DistanceField
 from pilotage.maps.world_map import WorldMap
 from pilotage.sensors.lidar import LidarConfig
 from pilotage.sensors.readings import LidarScan, Readings
@@ -48,7 +47,7 @@ class ObstacleLayer:
         self._first = float(lidar.beam_angles_rad()[0])
         self._step = lidar.beam_step_rad
         self._reach_m = min(config.reach_m, lidar.max_range_m)
-        self._known = DistanceField.from_map(chart.walls)
+        self._known = chart.wall_field
         xmin, ymin, xmax, ymax = chart.bounds_m
         shape = (math.ceil((ymax - ymin) / config.cell_m), math.ceil((xmax - xmin) / config.cell_m))
         self._hits = np.zeros(shape, dtype=np.int64)

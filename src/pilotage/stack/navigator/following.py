@@ -22,6 +22,7 @@ class WaypointFollower:
         self._controller = controller
         self._dt_s = dt_s
         self._local: LocalPath | None = None
+        self._points: list[list[float]] = []
         self._index = 0
         self.control = NO_CONTROL
         self.feedforward = STOP
@@ -30,7 +31,7 @@ class WaypointFollower:
     @property
     def active(self) -> bool:
         """Whether a local path is being followed and has points left."""
-        return self._local is not None and self._index + 1 < self._local.states.shape[0]
+        return self._local is not None and self._index + 1 < len(self._points)
 
     def drop(self) -> None:
         """Forget the local path: the robot was moved by something else."""
@@ -45,6 +46,7 @@ class WaypointFollower:
     def replan(self, pose: Pose2, route: RouteAhead, walls: NearWalls, circles_m: FloatArray) -> bool:
         """Plan from the estimate to the next reachable waypoint; False where there is none."""
         self._local = self._local_planner.plan(pose, route, walls, circles_m)
+        self._points = [] if self._local is None else self._local.states.tolist()
         self._index = 0
         return self._local is not None
 
@@ -63,11 +65,11 @@ class WaypointFollower:
         """Advance the reference by one point and give the command for it."""
         local = self._local
         assert local is not None
-        here, ahead = local.states[self._index], local.states[self._index + 1]
+        here, ahead = self._points[self._index], self._points[self._index + 1]
         self._index += 1
-        self.reference = Pose2(float(ahead[0]), float(ahead[1]), float(ahead[2]))
+        self.reference = Pose2(*ahead)
         distance = math.hypot(ahead[0] - here[0], ahead[1] - here[1])
-        turn = wrap_to_pi(float(ahead[2] - here[2]))
+        turn = wrap_to_pi(ahead[2] - here[2])
         # The last piece may be shorter than a step; its speeds are those of the piece.
         self.feedforward = Twist(min(distance / self._dt_s, local.speed_m_s), turn / self._dt_s)
         self.control = self._controller.step(pose, self.reference, self.feedforward)

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from pilotage.core.types import FloatArray, Goal, Pose2
-from pilotage.maps.distance_field import DistanceField
+from pilotage.maps.ground_distance import with_circles
 from pilotage.maps.world_map import WorldMap
 from pilotage.stack.interface import PlannedPath
 from pilotage.stack.journal import Journal
@@ -37,7 +37,7 @@ class GlobalPlan:
         self._rng = rng
         self.path: Path | None = None
         self.progress: PathProgress | None = None
-        self.circles_m: FloatArray = chart.walls.circles_m
+        self.circles_m: FloatArray = chart.barriers.circles_m
 
     @property
     def clearance_m(self) -> float:
@@ -57,8 +57,7 @@ class GlobalPlan:
         Returns the last result; its path is None where no clearance gave one.
         """
         begin = time.perf_counter()
-        world = self._chart.walls.with_obstacles(np.zeros((0, 4)), mapped_m)
-        field = DistanceField.from_map(world)
+        field = with_circles(self._chart.field, mapped_m)
         result: PlanResult | None = None
         for clearance_m in clearances_m:
             request = PlanRequest(start, goal, field, self._rng, clearance_m)
@@ -67,7 +66,7 @@ class GlobalPlan:
                 path = result.path
                 if self._smoother is not None:
                     path = self._smoother.smooth(path, request, clearance_m)
-                self._adopt(t_s, path, result, clearance_m, time.perf_counter() - begin, world.circles_m)
+                self._adopt(t_s, path, result, clearance_m, time.perf_counter() - begin, field.circles_m)
                 break
         assert result is not None
         self._journal.planning_time_s += time.perf_counter() - begin

@@ -7,21 +7,28 @@ import numpy as np
 from pilotage.core.types import FloatArray, Pose2
 from pilotage.kernels.geometry import plane
 from pilotage.maps.near_walls import NearWalls
-from pilotage.maps.segment_map import SegmentMap
+from pilotage.maps.world_map import WorldMap
 from pilotage.stack.mapping.mapper import Mapper
 
 
 class OwnMap:
-    """Known segments and discs, with the discs that the mapper adds.
+    """What the robot was told of, those parts that are near a place at hand, and the discs that it adds.
 
     Attributes
     ----------
-    walls, known_circles_m
-        Segments, those near a place at hand, and (C, 3) discs that the robot was told of.
+    walls
+        Segments that return a beam.
+    barriers
+        Segments that are not driven into: the walls, and on a grid the edges of what is unknown.
+    known_circles_m
+        (C, 3) discs that the robot was told of.
     """
 
-    def __init__(self, told: SegmentMap, mapper: Mapper | None) -> None:
-        self.walls, self.known_circles_m = NearWalls(told.segments_m), told.circles_m
+    def __init__(self, told: WorldMap, mapper: Mapper | None) -> None:
+        self.walls = NearWalls(told.walls.segments_m)
+        same = told.barriers is told.walls
+        self.barriers = self.walls if same else NearWalls(told.barriers.segments_m)
+        self.known_circles_m = told.walls.circles_m
         self._mapper = mapper
         self._nothing = self.known_circles_m[:0]
         self._circles = self._last_found = self.known_circles_m
@@ -41,5 +48,5 @@ class OwnMap:
         return self._circles
 
     def distance_m(self, pose: Pose2) -> float:
-        """Distance from the pose's point to the nearest thing on the map."""
-        return plane.distance_to_nearest(pose.x_m, pose.y_m, self.walls.segments_m, self.circles_m)
+        """Distance from the pose's point to the nearest thing that is not driven into."""
+        return plane.distance_to_nearest(pose.x_m, pose.y_m, self.barriers.segments_m, self.circles_m)

@@ -54,6 +54,12 @@ class DubinsLocalPlanner:
                 f"stack.local_planner.speed_m_s: expected at most robot.motion.max_speed_m_s = "
                 f"{robot.motion.top_speed_m_s:g}, found {config.speed_m_s:g}"
             )
+        least_m = robot.motion.least_turning_radius_m
+        if config.turning_radius_m < least_m:
+            raise InputError(
+                f"stack.local_planner.turning_radius_m: expected at least the {least_m:g} m that the robot's "
+                f"motion can turn in, found {config.turning_radius_m:g}"
+            )
         most_turn = robot.motion.top_turn_rate_rad_s
         if config.speed_m_s / config.turning_radius_m > most_turn:
             raise InputError(

@@ -123,7 +123,7 @@ class Context:
     def replan_locally(self, pose: Pose2) -> bool:
         """Plan to the next waypoint that can be reached; False where there is none."""
         route = self.progress.route_ahead(self.config.waypoint_ahead_m)
-        return self.follower.replan(pose, route, self.own_map.walls, self.own_map.circles_m)
+        return self.follower.replan(pose, route, self.own_map.barriers, self.own_map.circles_m)
 
     def say(self, kind: str, text: str) -> None:
         """Tell that something happened."""

@@ -66,7 +66,9 @@ def drive(context: Context, state: Driving, readings: Readings, belief: Belief) 
     context.to_go_m = context.progress.update(pose)
     move = _next(context, state, readings, pose)
     own, command = context.own_map, move.command
-    if context.guard.allows(command, pose, own.walls, own.circles_m, context.clearance_m - HERE_TOLERANCE_M):
+    if context.guard.allows(
+        command, pose, own.barriers, own.circles_m, context.clearance_m - HERE_TOLERANCE_M
+    ):
         return move
     if isinstance(move.state, Avoiding):
         return Move(move.state, Twist(0.0, command.w_rad_s))

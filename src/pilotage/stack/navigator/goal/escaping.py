@@ -39,7 +39,7 @@ class Escaping:
                 context.reactive.reset()
             return replan(context, self.resumes, pose, "backed out")
         own, room_m = context.own_map, context.radius_m + HERE_TOLERANCE_M
-        if context.guard.allows(command, pose, own.walls, own.known_circles_m, room_m):
+        if context.guard.allows(command, pose, own.barriers, own.known_circles_m, room_m):
             return Move(self, command)
         return replan(context, self.resumes, pose, "the way back is blocked")
 

@@ -66,7 +66,7 @@ class GoalNavigator:
             )
         self._localizer = localizer_of(parts, "goal")
         self._telemetry = journal.channel(COLUMNS, first=True)
-        own_map = OwnMap(chart.walls, parts.mapper)
+        own_map = OwnMap(chart, parts.mapper)
         journal.result("mapped_circles_m", lambda: own_map.found_circles_m)
         journal.counts |= {"attempts": 0, "replans": 0, "escapes": 0}
         if len(task.goals) > 1:

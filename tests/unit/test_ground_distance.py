@@ -1,0 +1,104 @@
+"""Where a robot may drive on a grid: exact at the outlines, nowhere inside what is solid or unknown."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from pilotage.core.types import Goal, Pose2
+from pilotage.kernels.geometry import plane
+from pilotage.kernels.rrt.clearance import slack_at
+from pilotage.maps.distance_field import DistanceField
+from pilotage.maps.ground_distance import with_circles
+from pilotage.maps.occupancy_grid import OccupancyGrid
+from pilotage.maps.segment_map import SegmentMap
+from pilotage.maps.world_map import WorldMap
+from pilotage.stack.planning.driving_space import space_for
+from pilotage.stack.planning.planner import PlanRequest, PlanStatus
+from pilotage.stack.planning.rrt_star_dubins import RrtStarDubinsConfig, RrtStarDubinsPlanner
+
+CELLS_M = 0.05
+
+
+def chart_of(seed: int, theta_rad: float = 0.0) -> WorldMap:
+    """Blocks of occupied and of unknown cells on free ground within a rim."""
+    rng = np.random.default_rng(seed)
+    cells = np.zeros((120, 160), dtype=np.int8)
+    for value in (100, -1, 100, -1):
+        row, column = rng.integers(10, 80), rng.integers(10, 120)
+        cells[row : row + int(rng.integers(1, 40)), column : column + int(rng.integers(1, 40))] = value
+    cells[[0, -1], :], cells[:, [0, -1]] = 100, 100
+    grid = OccupancyGrid(cells, CELLS_M, Pose2(-1.0, 2.0, theta_rad))
+    corners = grid.points_m(np.array([[0, 0], [0, 160], [120, 0], [120, 160]]))
+    (x0, y0), (x1, y1) = corners.min(axis=0), corners.max(axis=0)
+    return WorldMap("blocks", (float(x0), float(y0), float(x1), float(y1)), grid=grid)
+
+
+@settings(max_examples=40, deadline=None)
+@given(st.integers(0, 10_000), st.sampled_from([0.0, 0.3]), st.floats(0.15, 0.6))
+def test_the_slack_says_whether_a_disc_touches_a_solid_cell(seed: int, theta: float, radius: float) -> None:
+    chart = chart_of(seed, theta)
+    grid = chart.grid
+    assert grid is not None
+    space = space_for(chart.field, radius)
+    solid = grid.blocked()
+    rng = np.random.default_rng(seed)
+    rows = np.column_stack([rng.uniform(2.0, 118.0, 80), rng.uniform(2.0, 158.0, 80)])
+    blocks = np.argwhere(solid)
+    for (row, column), (x, y) in zip(rows, grid.points_m(rows), strict=True):
+        off = np.maximum(np.abs(blocks + 0.5 - [row, column]) - 0.5, 0.0)
+        away = CELLS_M * float(np.hypot(off[:, 0], off[:, 1]).min())
+        if abs(away - radius) > 1e-6:
+            assert (slack_at(float(x), float(y), space, radius) >= 0.0) == (away > radius)
+
+
+def test_unknown_cells_return_no_beam_and_are_not_driven_on() -> None:
+    cells = np.zeros((40, 40), dtype=np.int8)
+    cells[10:20, 10:20], cells[25:30, 25:30] = -1, 100
+    chart = WorldMap("both", (0.0, 0.0, 4.0, 4.0), grid=OccupancyGrid(cells, 0.1))
+    assert chart.walls.distance_m(1.5, 2.5) > 0.9, "only the occupied block is a wall"
+    assert chart.barriers.distance_m(1.5, 2.95) == pytest.approx(0.05)
+    assert chart.field.at(np.array([[1.5, 2.5]]))[0] < -0.4
+    assert chart.wall_field.at(np.array([[1.5, 2.5]]))[0] > 0.9
+    known = WorldMap("known", chart.bounds_m, grid=OccupancyGrid(np.abs(cells), 0.1))
+    assert known.barriers is known.walls
+
+
+def test_discs_found_are_the_same_as_discs_told() -> None:
+    world = SegmentMap.of(np.array([[0.0, 0.0, 6.0, 0.0], [6.0, 0.0, 6.0, 4.0]]), np.array([[1.0, 1.0, 0.3]]))
+    found = np.array([[3.0, 2.0, 0.5], [4.5, 1.0, 0.03]])
+    told = DistanceField.from_map(world.with_obstacles(np.zeros((0, 4)), found))
+    later = with_circles(DistanceField.from_map(world), found)
+    assert later.distance_m.tobytes() == told.distance_m.tobytes()
+    assert (later.circles_m == told.circles_m).all()
+
+
+def test_a_field_without_geometry_blocks_what_it_says_is_too_near() -> None:
+    cells = np.zeros((40, 40), dtype=bool)
+    cells[20, 20] = True
+    space = space_for(DistanceField.from_grid(OccupancyGrid.of(cells, 0.1)), 0.3)
+    assert slack_at(1.0, 1.95, space, 0.3) > 0.0
+    for x in (1.85, 2.0, 2.05, 2.2):
+        assert slack_at(x, 1.95, space, 0.3) < 0.0
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_paths_on_a_grid_keep_their_clearance_from_solid_and_unknown_cells(seed: int) -> None:
+    chart = chart_of(seed)
+    planner = RrtStarDubinsPlanner(RrtStarDubinsConfig(clearance_m=0.25, turning_radius_m=0.2, stop="first"))
+    start, goal = Pose2(-0.6, 2.4, 0.0), Goal(6.6, 7.6)
+    result = planner.plan(PlanRequest(start, goal, chart.field, np.random.default_rng(seed)))
+    assert result.path is not None, result.reason
+    barriers = chart.barriers
+    points = np.ascontiguousarray(result.path.states[:, :2])
+    assert plane.least_distance(points, barriers.segments_m, barriers.circles_m) >= 0.25 - 1e-6
+    unknown = np.argwhere(chart.grid.cells == -1)  # type: ignore[union-attr]
+    row, column = unknown[len(unknown) // 2]
+    x, y = chart.grid.centres_m(np.array([[row, column]]))[0]  # type: ignore[union-attr]
+    inside = planner.plan(PlanRequest(start, Goal(x, y), chart.field, np.random.default_rng(seed)))
+    assert inside.status is PlanStatus.GOAL_BLOCKED
+    assert not math.isfinite(inside.first_solution_s)
