@@ -117,13 +117,16 @@ class Simulator:
 
     def _meet(self) -> None:
         """Who ran into whom."""
-        for body in self.bodies:
+        bodies = self.bodies
+        for body in bodies:
             body.meet_others()
-        for body in self.bodies:
-            if body.state[drive.BLOCKER] > 0.0:
-                others = [other for other in self.bodies if other is not body]
-                if others:
-                    min(others, key=body.distance_to_m).run_into()
+        hit = [
+            min((other for other in bodies if other is not body), key=body.distance_to_m)
+            for body in bodies
+            if body.state[drive.BLOCKER] > 0.0 and len(bodies) > 1
+        ]
+        for body in bodies:
+            body.run_into(body in hit)
 
     def _check_apart(self) -> None:
         for row, body in enumerate(self.bodies):

@@ -42,8 +42,6 @@ GRAZE_M = 1e-3
 """Near a wall a path is looked at this often; what could slip through between is half of it at most."""
 CONTACT_M = 1e-6
 """Bodies nearer than this touch."""
-TOUCHED_RELEASE_M = 1e-3
-"""A body that another one ran into counts as touched until it is farther away than this."""
 BISECTIONS = 40
 
 
@@ -345,7 +343,7 @@ def drive(
             state[TOUCHING] = state[BLOCKED] = 1.0
             if not spins_on:
                 break
-        elif state[TOUCHING] > 0.0 and clearance >= (release if state[TOUCHING] < 2.0 else TOUCHED_RELEASE_M):
+        elif state[TOUCHING] == 1.0 and clearance >= release:
             state[TOUCHING] = 0.0
     state[X], state[Y], state[THETA], state[CLEARANCE] = x, y, theta, clearance
     if others_segments.shape[0] + others_circles.shape[0] > 0:

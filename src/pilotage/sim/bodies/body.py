@@ -12,6 +12,9 @@ from pilotage.sim.worlds.world import World
 
 COLLISIONS, TOUCHING, BLOCKED = drive.COLLISIONS, drive.TOUCHING, drive.BLOCKED
 
+APART_M = 1e-3
+"""A body that another one ran into counts as touched until it is farther away than this."""
+
 
 class Body:
     """A footprint that a motion drives through a world; a contact stops it and counts once until it is clear.
@@ -122,11 +125,14 @@ class Body:
         """After everybody moved: bring the clearance up to date and count who ran into this body."""
         drive.meet_others(self.state, *self._among_others)
 
-    def run_into(self) -> None:
-        """Count that another body ran into this one, unless it touches already."""
-        if self.state[TOUCHING] == 0.0:
-            self.state[COLLISIONS] += 1.0
-            self.state[TOUCHING] = 2.0
+    def run_into(self, now: bool) -> None:
+        """Count that another body runs into this one, once until both are apart again."""
+        state = self.state
+        if now and state[TOUCHING] == 0.0:
+            state[COLLISIONS] += 1.0
+            state[TOUCHING] = 2.0
+        elif not now and state[TOUCHING] == 2.0 and state[drive.CLEARANCE] >= APART_M:
+            state[TOUCHING] = 0.0
 
     def contact_bearing_rad(self) -> float:
         """Where on the footprint something is nearest, from the axle in the base frame, not wrapped."""

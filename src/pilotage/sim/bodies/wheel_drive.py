@@ -24,7 +24,6 @@ class WheelDrive:
     """
 
     spins_on = True
-    release_m = 1e-3
 
     def __init__(
         self, config: WheelDriveConfig, dt_s: float, samples: int, streams: RandomStreams, where: str
@@ -34,6 +33,8 @@ class WheelDrive:
         if samples == 1:
             samples = max(1, round(dt_s * OWN_RATE_HZ))
         self._period_s = dt_s / samples
+        # It stops up to a sample's path before what it runs into.
+        self.release_m = max(1e-3, 1.5 * config.top_speed_m_s * self._period_s)
         self._samples = samples
         self.moves = np.zeros((samples, 3))
         self._wheels = np.zeros(wheels.STATE_SIZE)
