@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 from typing import Annotated
 
@@ -27,4 +28,7 @@ def report(
         return
     from pilotage.report import write_report
 
-    print(write_report(run))
+    damaged: list[str] = []
+    print(write_report(run, damaged.append))
+    if damaged:
+        print(f"pilotage: left out of the report: {'; '.join(damaged)}", file=sys.stderr)

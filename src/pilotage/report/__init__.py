@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from rich.table import Table
 
 
-def write_report(run_dir: Path) -> Path:
+def write_report(run_dir: Path, on_damage: Callable[[str], None] | None = None) -> Path:
     """Write ``report.html`` into a run, calibration or study folder: self-contained, vector figures.
 
     Parameters
@@ -22,6 +22,9 @@ def write_report(run_dir: Path) -> Path:
         Folder that a run left behind: ``metrics.json`` and ``trace.parquet`` at least; without the other
         files the figures that need them are left out, with a word. A calibration's folder is told by its
         ``calibration.json``.
+    on_damage
+        Told one line for each file of a run, other than those two, that cannot be read; the page is written
+        without it and says so. None makes it an error.
 
     Returns
     -------
@@ -42,7 +45,7 @@ def write_report(run_dir: Path) -> Path:
         return write_study_report(run_dir)
     from pilotage.report.page import write_report as write
 
-    return write(run_dir)
+    return write(run_dir, on_damage)
 
 
 def summary_table(metrics: Mapping[str, object]) -> Table:
