@@ -11,6 +11,7 @@ import pytest
 from PIL import Image
 
 from pilotage.cli.main import main
+from pilotage.cli.study_page import write_study_report
 from pilotage.experiments.kinds import kind_of
 from pilotage.experiments.mission import load_mission, shipped_missions
 from pilotage.experiments.run import run_mission
@@ -19,7 +20,6 @@ from pilotage.experiments.studies.engine import run_study
 from pilotage.experiments.studies.rows import flat
 from pilotage.experiments.studies.sweep import sweep_study
 from pilotage.report.study.ranking import module_words, ranking_answer, ranking_table
-from pilotage.report.study.write import write_study_report
 
 SMALL = """
 size_m: [1.0, 0.8]

@@ -22,7 +22,7 @@ def report(
     from pilotage.experiments.studies.study import is_study_folder
 
     if is_study_folder(str(run)):
-        from pilotage.report.study.write import write_study_report
+        from pilotage.cli.study_page import write_study_report
 
         print(write_study_report(run))
         return

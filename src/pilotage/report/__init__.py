@@ -14,7 +14,10 @@ if TYPE_CHECKING:
 
 
 def write_report(run_dir: Path, on_damage: Callable[[str], None] | None = None) -> Path:
-    """Write ``report.html`` into a run, calibration or study folder: self-contained, vector figures.
+    """Write ``report.html`` into a run or calibration folder: self-contained, vector figures.
+
+    A study's page shows trials that are run again for it, which no report does by itself: that is
+    ``pilotage report STUDY``.
 
     Parameters
     ----------
@@ -35,14 +38,10 @@ def write_report(run_dir: Path, on_damage: Callable[[str], None] | None = None) 
     InputError
         One line, where the folder is not a run folder or one of its files is broken.
     """
-    if (run_dir / "calibration.json").is_file():
+    if (run_dir / "calibration.json").exists():
         from pilotage.report.calibration.page import write_calibration_report
 
         return write_calibration_report(run_dir)
-    if (run_dir / "trials.sqlite").is_file():
-        from pilotage.report.study.write import write_study_report
-
-        return write_study_report(run_dir)
     from pilotage.report.page import write_report as write
 
     return write(run_dir, on_damage)
