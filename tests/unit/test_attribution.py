@@ -11,17 +11,15 @@ import pytest
 from PIL import Image
 
 from pilotage.cli.main import main
-from pilotage.evaluation.metrics import METRICS, costs_of
+from pilotage.cli.study_page import write_study_report
+from pilotage.experiments.kinds import kind_of
 from pilotage.experiments.mission import load_mission, shipped_missions
 from pilotage.experiments.run import run_mission
 from pilotage.experiments.studies.attribution import attribution_of, attribution_study, is_attribution
 from pilotage.experiments.studies.engine import run_study
 from pilotage.experiments.studies.rows import flat
 from pilotage.experiments.studies.sweep import sweep_study
-from pilotage.experiments.task_of import has, task_of
-from pilotage.missions.mission import Mission
 from pilotage.report.study.ranking import module_words, ranking_answer, ranking_table
-from pilotage.report.study.write import write_study_report
 
 SMALL = """
 size_m: [1.0, 0.8]
@@ -30,11 +28,6 @@ start_pose: [0.3, 0.3, 0.0]
 obstacles: [[0.62, 0.45, 0.8, 0.6]]
 lines: [[[0.2, 0.6], [0.45, 0.6]]]
 """
-
-
-def judging(mission: Mission) -> list[str]:
-    given = METRICS.given_by(task_of(mission), has(mission))
-    return [metric.key for metric in costs_of(task_of(mission), given)]
 
 
 @pytest.fixture
@@ -63,15 +56,15 @@ def test_every_shipped_mission_can_be_attributed(name: str) -> None:
     assert is_attribution(made)
     assert len(made.cells) > 1
     mission = load_mission(name)
-    assert made.definition.metrics == tuple(judging(mission))
+    assert made.definition.metrics == tuple(kind_of(mission).costs(mission))
 
 
 @pytest.mark.parametrize("name", ["gale-astar", "gale-pose", "romi-baseline", "museum-plan", "museum-1"])
 def test_what_is_compared_is_what_the_mission_gives(name: str) -> None:
     mission = load_mission(name, ["run.time_limit_s=20"])
     metrics = run_mission(mission, save=False).metrics
-    assert set(judging(mission)) <= set(metrics)
-    assert flat(metrics).keys() <= METRICS.given_by(task_of(mission), has(mission))
+    assert set(kind_of(mission).costs(mission)) <= set(metrics)
+    assert flat(metrics).keys() <= kind_of(mission).metric_names
 
 
 @pytest.mark.parametrize(
@@ -82,7 +75,7 @@ def test_every_number_of_a_run_can_be_asked_for(name: str, limit_s: float) -> No
     """A study refuses names that its kind does not know, so the kind has to know all that it gives."""
     mission = load_mission(name, [f"run.time_limit_s={limit_s}"])
     metrics = run_mission(mission, save=False).metrics
-    assert flat(metrics).keys() <= METRICS.given_by(task_of(mission), has(mission))
+    assert flat(metrics).keys() <= kind_of(mission).metric_names
 
 
 def test_a_sheet(tmp_path: Path) -> None:

@@ -18,6 +18,7 @@ import pytest
 
 from pilotage.cli.main import main
 from pilotage.cli.study import _print_cells
+from pilotage.cli.study_page import write_study_report
 from pilotage.core.config import validate
 from pilotage.core.errors import InputError
 from pilotage.experiments.run import run_mission
@@ -31,7 +32,6 @@ from pilotage.experiments.studies.study import Study, load_study, make_study, sh
 from pilotage.experiments.studies.sweep import parse_vary, sweep_study
 from pilotage.experiments.studies.table import read_study, study_object
 from pilotage.experiments.studies.trial import TIMINGS, Outcome
-from pilotage.report.study.write import write_study_report
 
 
 def small(**changes: Any) -> Study:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 from typing import Annotated
 
@@ -21,10 +22,13 @@ def report(
     from pilotage.experiments.studies.study import is_study_folder
 
     if is_study_folder(str(run)):
-        from pilotage.report.study.write import write_study_report
+        from pilotage.cli.study_page import write_study_report
 
         print(write_study_report(run))
         return
     from pilotage.report import write_report
 
-    print(write_report(run))
+    damaged: list[str] = []
+    print(write_report(run, damaged.append))
+    if damaged:
+        print(f"pilotage: left out of the report: {'; '.join(damaged)}", file=sys.stderr)

@@ -197,7 +197,7 @@ def _write_files(folder: Path, report: bool, quiet: bool) -> Path | None:
 
 
 def _page(folder: Path, quiet: bool) -> Path:
-    from pilotage.report.study.write import write_study_report
+    from pilotage.cli.study_page import write_study_report
 
     tell: Callable[[str], None] | None = None
     if not quiet and sys.stderr.isatty():

@@ -87,6 +87,9 @@ def read_calibration(folder: Path) -> CalibrationData:
         raise InputError(f"{folder}: expected a calibration folder, found no {DATA_FILE} in it")
     try:
         arrays = {name: archive.any_floats(name) for name in archive.names()}
+        endless = [name for name, values in arrays.items() if bool(np.isinf(values).any())]
+        if endless:
+            raise ValueError(f"{endless[0]}: expected finite numbers")
     except ValueError as error:
         raise broken(folder / DATA_FILE, error) from None
     return CalibrationData(folder, answer, arrays, text_of(folder / PARAMETER_FILE, "a parameter file"))

@@ -19,7 +19,7 @@ from pilotage.records.grid import read_grid_layer
 from pilotage.records.localizer import read_localizer
 from pilotage.records.metrics import METRICS_FILE, read_metrics
 from pilotage.records.mission import read_mission
-from pilotage.records.numbers import number
+from pilotage.records.numbers import FARTHEST_M, number
 from pilotage.records.plans import Plan, Plans, read_plans
 from pilotage.records.run_folder import robot_folder
 from pilotage.records.scans import Sightings, read_sightings
@@ -29,6 +29,10 @@ from pilotage.records.updates import RecordedUpdate, read_updates
 from pilotage.records.world import World, read_world
 
 T = TypeVar("T")
+PLACES = ("_x_m", "_y_m")
+"""How the names of columns end that hold places on the map."""
+LEAST = 1e-100
+"""What is smaller is nothing: quotients of such values are no numbers."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,7 +42,8 @@ class RunData:
     Attributes
     ----------
     trace
-        That robot's rows; a lost robot claims no pose, so none is in ``est_*``, ``cov_*`` and ``nees``.
+        That robot's rows, finite or NaN; a lost robot claims no pose, so none is in ``est_*``, ``cov_*`` and
+        ``nees``.
     robot, robots
         Which robot it is, and the names of all; none where the run has one only.
     """
@@ -147,7 +152,7 @@ def read_run(folder: Path, *, robot: int = 0, on_damage: OnDamage | None = None)
         plans=plans.plans,
         mapped_points_m=plans.mapped_points_m,
         shortest_path_m=plans.shortest_path_m,
-        trace=_without_lost_poses(trace.of(robot)),
+        trace=_drawable(trace.of(robot)),
         updates=part(read_updates, (), own),
         sightings=part(read_sightings, Sightings(), own),
         sheet=part(lambda place: read_cells(place, world), None, own),
@@ -159,15 +164,21 @@ def read_run(folder: Path, *, robot: int = 0, on_damage: OnDamage | None = None)
     )
 
 
-def _without_lost_poses(trace: Trace) -> Trace:
-    """Leave out what a lost robot's belief holds in place of a pose: it claims none, so none is drawn."""
+def _drawable(trace: Trace) -> Trace:
+    """What of a trace can be drawn: infinities and places beyond all maps are NaN.
+
+    A lost robot's belief holds something in place of a pose: it claims none, so that is NaN as well.
+    """
     localized = trace.columns.get("localized")
-    if localized is None or not bool((localized < 0.5).any()):
-        return trace
-    columns = {
-        name: np.where(localized < 0.5, np.nan, values)
-        if name.startswith(("est_", "cov_", "nees"))
-        else values
-        for name, values in trace.columns.items()
-    }
+    lost = None if localized is None or not bool((localized < 0.5).any()) else localized < 0.5
+    columns = {}
+    for name, values in trace.columns.items():
+        unfit = np.isinf(values)
+        if name.endswith(PLACES):
+            unfit |= np.abs(values) > FARTHEST_M
+        if lost is not None and name.startswith(("est_", "cov_", "nees")):
+            unfit |= lost
+        denormal = (np.abs(values) < LEAST) & (values != 0.0)
+        drawn = np.where(unfit, np.nan, values) if bool(unfit.any()) else values
+        columns[name] = np.where(denormal, 0.0, drawn) if bool(denormal.any()) else drawn
     return Trace(columns, trace.steps)

@@ -58,8 +58,13 @@ class Trace:
 
     @property
     def t_s(self) -> FloatArray:
-        """(N,) times; the row's number where there is no clock."""
-        return self["t_s"] if self.has("t_s") else np.arange(self.steps, dtype=np.float64)
+        """(N,) times; the row's number where there is no clock, or it does not go forward."""
+        times = self["t_s"]
+        forward = bool(np.isfinite(times).all()) and (
+            self.steps < 2
+            or (bool((np.diff(times) >= 0.0).all()) and times[-1] - times[0] > 1e-9 * np.abs(times).max())
+        )
+        return times if forward else np.arange(self.steps, dtype=np.float64)
 
     def of(self, robot: int) -> Trace:
         """Return the rows of one robot only, in their order."""

@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -13,8 +13,11 @@ if TYPE_CHECKING:
     from rich.table import Table
 
 
-def write_report(run_dir: Path) -> Path:
-    """Write ``report.html`` into a run, calibration or study folder: self-contained, vector figures.
+def write_report(run_dir: Path, on_damage: Callable[[str], None] | None = None) -> Path:
+    """Write ``report.html`` into a run or calibration folder: self-contained, vector figures.
+
+    A study's page shows trials that are run again for it, which no report does by itself: that is
+    ``pilotage report STUDY``.
 
     Parameters
     ----------
@@ -22,6 +25,9 @@ def write_report(run_dir: Path) -> Path:
         Folder that a run left behind: ``metrics.json`` and ``trace.parquet`` at least; without the other
         files the figures that need them are left out, with a word. A calibration's folder is told by its
         ``calibration.json``.
+    on_damage
+        Told one line for each file of a run, other than those two, that cannot be read; the page is written
+        without it and says so. None makes it an error.
 
     Returns
     -------
@@ -32,17 +38,13 @@ def write_report(run_dir: Path) -> Path:
     InputError
         One line, where the folder is not a run folder or one of its files is broken.
     """
-    if (run_dir / "calibration.json").is_file():
+    if (run_dir / "calibration.json").exists():
         from pilotage.report.calibration.page import write_calibration_report
 
         return write_calibration_report(run_dir)
-    if (run_dir / "trials.sqlite").is_file():
-        from pilotage.report.study.write import write_study_report
-
-        return write_study_report(run_dir)
     from pilotage.report.page import write_report as write
 
-    return write(run_dir)
+    return write(run_dir, on_damage)
 
 
 def summary_table(metrics: Mapping[str, object]) -> Table:

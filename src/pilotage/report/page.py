@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from pilotage.core.whole_file import write_whole
 from pilotage.records.numbers import number
-from pilotage.records.run_data import RunData, read_run
+from pilotage.records.run_data import OnDamage, RunData, read_run
 from pilotage.report import quantities
 from pilotage.report.figures.clearance import clearance_figure
 from pilotage.report.figures.close_ups import close_ups_figure
@@ -107,15 +107,23 @@ SCENES: dict[str, Callable[[RunData], ReplayScene | None]] = {
 _LONGEST_MISSION = 100_000
 
 
-def write_report(run_dir: Path) -> Path:
+def write_report(run_dir: Path, on_damage: OnDamage | None = None) -> Path:
     """Write ``report.html`` into a run folder and return its path; see ``pilotage.report``."""
+    damaged: list[str] = []
+
+    def left_out(line: str) -> None:
+        damaged.append(line)
+        if on_damage is not None:
+            on_damage(line)
+
+    run = read_run(run_dir, on_damage=None if on_damage is None else left_out)
     path = run_dir / REPORT_FILE
-    write_whole(path, run_page(read_run(run_dir)))
+    write_whole(path, run_page(run, damaged))
     return path
 
 
-def run_page(run: RunData) -> str:
-    """Return the report of a run as HTML."""
+def run_page(run: RunData, damaged: Sequence[str] = ()) -> str:
+    """Return the report of a run as HTML; ``damaged`` are lines on files that it was read without."""
     with drawing_style():
         figures = [draw(run) for draw in FIGURES.get(run.kind, FLOOR_FIGURES)]
         if run.kind in ("terrain", "recording"):
@@ -147,7 +155,7 @@ def run_page(run: RunData) -> str:
         script_source=script_source(),
         eyebrow=_eyebrow(run),
         heading=escape(run.name),
-        description=f'<p class="description">{escape(description)}</p>' if description else "",
+        description=_paragraphs([*([description] if description else []), *damaged]),
         outcome=_outcome(run),
         headline=escape(headline(run.metrics)),
         tiles=tiles(_tiles(run)),
@@ -158,6 +166,10 @@ def run_page(run: RunData) -> str:
             f"values come from the {source}, the robot never sees them."
         ),
     )
+
+
+def _paragraphs(texts: Sequence[str]) -> str:
+    return "".join(f'<p class="description">{escape(text)}</p>' for text in texts)
 
 
 def _eyebrow(run: RunData) -> str:

@@ -9,8 +9,8 @@ from __future__ import annotations
 import io
 import math
 import re
-from collections.abc import Sequence
-from contextlib import AbstractContextManager
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
@@ -116,9 +116,14 @@ class Illustration:
     keys: tuple[Key, ...] = ()
 
 
-def drawing_style() -> AbstractContextManager[None]:
-    """Return the context in which figures are made and rendered; it leaves the caller's settings alone."""
-    return mpl.rc_context(_RC)
+@contextmanager
+def drawing_style() -> Iterator[None]:
+    """The context in which figures are made and rendered; it leaves the caller's settings alone.
+
+    Numbers come from files: what overflows or is no number is a gap in a curve, and no warning.
+    """
+    with mpl.rc_context(_RC), np.errstate(all="ignore"):
+        yield
 
 
 def stacked_axes(
@@ -276,8 +281,8 @@ def logarithmic(axes: Axes, low: float, high: float) -> None:
     if high / low < 4.0:
         middle = math.sqrt(low * high)
         low, high = middle / 2.0, middle * 2.0
+    axes.set_ylim(low, high)  # first: a scale that is chosen by values of 0 is none
     axes.set_yscale("log")
-    axes.set_ylim(low, high)
     ratio = high / low
     steps = (1.0, 1.5, 2.0, 3.0, 5.0, 7.0) if ratio < 8.0 else (1.0, 2.0, 5.0) if ratio < 60.0 else (1.0,)
     decades = range(math.floor(math.log10(low)), math.ceil(math.log10(high)) + 1)

@@ -7,8 +7,9 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from pilotage.core.errors import InputError
 from pilotage.core.whole_file import write_whole
-from pilotage.records.calibration import CalibrationData, read_calibration
+from pilotage.records.calibration import CALIBRATION_FILE, CalibrationData, read_calibration
 from pilotage.report.calibration.drive_figures import drive_figures
 from pilotage.report.calibration.heading_figures import heading_figures
 from pilotage.report.calibration.odometry_figures import odometry_figures
@@ -82,8 +83,16 @@ _MEANINGS = {
 
 def write_calibration_report(folder: Path) -> Path:
     """Write ``report.html`` into a calibration folder and return its path."""
-    path = folder / REPORT_FILE
-    write_whole(path, calibration_page(read_calibration(folder)))
+    path, data = folder / REPORT_FILE, read_calibration(folder)
+    try:
+        page = calibration_page(data)
+    except (KeyError, TypeError, ValueError, IndexError, AttributeError, ArithmeticError) as error:
+        # What an answer holds depends on what was calibrated and found: it is checked as it is drawn.
+        raise InputError(
+            f"{folder / CALIBRATION_FILE}: expected what 'pilotage calibrate' writes, found something that "
+            f"cannot be drawn ({type(error).__name__}: {error}); calibrate again"
+        ) from None
+    write_whole(path, page)
     return path
 
 
@@ -178,7 +187,7 @@ def _offset(data: CalibrationData) -> str:
         return ""
     rows = "".join(
         f'<tr><th scope="row">{escape(str(model["shape"]))}</th>'
-        f'<td class="value">{model["free_parameters"]}</td>'
+        f'<td class="value">{escape(str(model["free_parameters"]))}</td>'
         f'<td class="value">{1e3 * model["rms_m"]:.3f} mm</td><td>{model["delta_bic"]:.1f}</td></tr>'
         for model in offset["models"]
     )

@@ -75,10 +75,9 @@ def consistency_figure(run: RunData) -> Illustration:
         shares.append(_inside("NEES", nees, np.full_like(t_s, low), np.full_like(t_s, high), run))
     else:
         note(panels[0], "not recorded")
-    dof = trace["nis_dof"]
-    if trace.has("nis", "nis_dof"):
-        dof = np.where(dof > 0.0, dof, np.nan)
-        nis = trace["nis"] / dof
+    dof = np.where(trace["nis_dof"] > 0.0, trace["nis_dof"], np.nan)
+    nis = trace["nis"] / dof
+    if bool(np.isfinite(nis).any()):
         nis_low, nis_high = (edge / dof for edge in chi_square_band(dof))
         smooth_low, smooth_high = (edge / _typical(dof, t_s) for edge in chi_square_band(_typical(dof, t_s)))
         _statistic(panels[1], t_s, nis, smooth_low, smooth_high, 1.0, window)

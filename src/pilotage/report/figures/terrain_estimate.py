@@ -25,6 +25,7 @@ from pilotage.report.style import (
     Key,
     logarithmic,
     one_shape,
+    peak,
     render,
     series,
     shade,
@@ -97,11 +98,11 @@ def drive_figure(run: RunData) -> Illustration:
     series(panels[1], hours, trace["true_theta_rad"], GREEN, linewidth=1.4)
     series(panels[2], hours, 1e3 * trace["w_rad_s"], ORANGE, linewidth=1.2)
     series(panels[3], hours, np.rad2deg(trace["steering_rad"]), PURPLE, linewidth=1.2)
-    panels[0].set_ylim(0.0, 1.15 * max(float(100.0 * trace["v_m_s"].max()), 1e-6))
+    panels[0].set_ylim(0.0, 1.15 * float(np.fmax(100.0 * peak(trace["v_m_s"]), 1e-6)))
     _over_hours(panels, hours)
     alt = "Speed, heading, turn rate and steering angle over time"
     caption = "The speed is at its limit until the goal is near, and ends in an exponential approach."
-    if float(trace["v_m_s"].min()) == float(trace["v_m_s"].max()):
+    if bool((trace["v_m_s"] == trace["v_m_s"][0]).all()):
         caption = "Along a planned curve the speed is constant; the turn rate follows the curvature."
     return Illustration(slug, title, alt, caption, render(figure, slug, alt))
 
@@ -124,13 +125,13 @@ def uncertainty_figure(run: RunData) -> Illustration:
     values = np.maximum(trace["root_determinant_m2"], 1e-9)
     for axes, x, label in ((over_time, hours, "time [h]"), (over_way, way, "distance [km]")):
         series(axes, x, values, BLUE, linewidth=1.3)
-        logarithmic(axes, 0.7 * float(values.min()), 1.4 * float(values.max()))
+        logarithmic(axes, 0.7 * float(np.nanmin(values)), 1.4 * float(np.nanmax(values)))
         blind = trace["landmarks_seen"] == 0.0 if trace.has("landmarks_seen") else np.zeros(len(x), bool)
         if blind.any() and not blind.all():
             edges = np.flatnonzero(np.diff(np.concatenate([[0], blind.astype(np.int8), [0]])))
             ends = np.minimum(edges, len(x) - 1)
             shade(axes, np.column_stack([x[ends[::2]], x[ends[1::2]]]), SHADE)
-        axes.set_xlim(0.0, float(x[-1]))
+        axes.set_xlim(0.0, float(x[-1]) if x[-1] > 0.0 else 1.0)
         axes.set_xlabel(label, labelpad=3.0)
     alt = "Square root of the determinant of the position's covariance over time and over distance"
     blind_keys = (
@@ -160,16 +161,18 @@ def rover_error_figure(run: RunData) -> Illustration:
         return Illustration(slug, title, "", "The mission has no estimator.")
     hours = trace.t_s / HOURS_S
     error = np.hypot(trace["est_x_m"] - trace["true_x_m"], trace["est_y_m"] - trace["true_y_m"])
-    sigma = np.sqrt(trace["cov_xx_m2"] + trace["cov_yy_m2"])
+    sigma = np.sqrt(np.maximum(trace["cov_xx_m2"] + trace["cov_yy_m2"], 0.0))
     turn = trace["est_theta_rad"] - trace["true_theta_rad"]
     heading = np.rad2deg(np.abs((turn + math.pi) % (2.0 * math.pi) - math.pi))
     figure, panels = stacked_axes(["Position [m]", "Heading [°]", "NEES (3 is ideal)"], (120.0, 90.0, 90.0))
     series(panels[0], hours, error, VERMILLION, linewidth=1.1)
     series(panels[0], hours, sigma, BLUE, linewidth=1.3)
     both = np.concatenate([error[error > 0.0], sigma])
-    logarithmic(panels[0], max(float(np.quantile(both, 0.002)), 1e-3), 1.4 * float(both.max()))
+    both = both[np.isfinite(both)]
+    if both.size:
+        logarithmic(panels[0], max(float(np.quantile(both, 0.002)), 1e-3), 1.4 * float(both.max()))
     series(panels[1], hours, heading, VERMILLION, linewidth=1.1)
-    series(panels[1], hours, np.rad2deg(np.sqrt(trace["cov_tt_rad2"])), BLUE, linewidth=1.3)
+    series(panels[1], hours, np.rad2deg(np.sqrt(np.maximum(trace["cov_tt_rad2"], 0.0))), BLUE, linewidth=1.3)
     series(panels[2], hours, trace["nees"], GREEN, linewidth=0.9)
     panels[2].axhline(3.0, color=MUTED, linewidth=1.0, linestyle=(0, (4.0, 3.0)))
     _over_hours(panels, hours)
@@ -184,7 +187,7 @@ def rover_error_figure(run: RunData) -> Illustration:
 
 def _over_hours(panels: list[Axes], hours: FloatArray) -> None:
     for axes in panels:
-        axes.set_xlim(0.0, float(hours[-1]))
+        axes.set_xlim(0.0, float(hours[-1]) if hours[-1] > 0.0 else 1.0)
     panels[-1].set_xlabel("time [h]", labelpad=3.0)
 
 

@@ -12,6 +12,7 @@ from matplotlib.transforms import Affine2D
 from numpy.typing import NDArray
 
 from pilotage.core.types import FloatArray
+from pilotage.records.numbers import number
 from pilotage.records.run_data import RunData
 from pilotage.records.terrain import Picture, TerrainPictures
 from pilotage.report import quantities
@@ -56,7 +57,10 @@ def close_up_figure(run: RunData) -> Illustration:
     shown = np.column_stack([run.trace[name] for name in ("true_x_m", "true_y_m")]) / unit
     estimate = np.column_stack([run.trace[name] for name in ("est_x_m", "est_y_m")]) / unit
     both = np.vstack([shown, estimate])
-    margin = MARGIN * float(np.ptp(both, axis=0).max())
+    both = both[np.isfinite(both).all(axis=1)]
+    if not len(both):
+        return Illustration(slug, title, "", "No pose of the run is known.")
+    margin = MARGIN * max(float(np.ptp(both, axis=0).max()), 1.0 / unit)
     low, high = both.min(axis=0) - margin, both.max(axis=0) + margin
     figure, axes = _ground_axes(pictures, low, high)
     ground = pictures.hazards if pictures.ground is None else pictures.ground
@@ -92,7 +96,7 @@ def looked_at_figure(run: RunData) -> Illustration:
     grey = (255 - (pictures.hazards.astype(np.uint16) * 90) // 255).astype(np.uint8)
     _show(axes, pictures, _tinted(grey, _spread(pictures.looked_at), BLUE, 1.0))
     _way(axes, run, pictures)
-    expansions = quantities.count(float(run.metrics.get("expansions") or 0))
+    expansions = quantities.count(number(run.metrics.get("expansions")))
     alt = "Map of the cells that the search queued"
     caption = (
         f"Cells that the search put into its queue, blue; hazards grey. It opened {expansions} cells. A "
@@ -104,13 +108,13 @@ def looked_at_figure(run: RunData) -> Illustration:
 
 def _told(run: RunData) -> str:
     """Length and effort in a sentence."""
-    driven = run.metrics.get("path_length_m")
-    if isinstance(driven, float):
+    driven = number(run.metrics.get("path_length_m"))
+    if math.isfinite(driven):
         return f"The way is {quantities.length(driven)} long. {ellipses_told(run)}".rstrip()
-    planned = run.metrics.get("planned_length_m")
-    if not isinstance(planned, float):
+    planned = number(run.metrics.get("planned_length_m"))
+    if not math.isfinite(planned):
         return "No way was found."
-    nodes = quantities.count(float(run.metrics.get("path_nodes") or 0))
+    nodes = quantities.count(number(run.metrics.get("path_nodes")))
     return f"The way is {quantities.length(planned)} long and has {nodes} nodes."
 
 

@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from pilotage.core.types import FloatArray
+from pilotage.records.numbers import number
 from pilotage.records.run_data import RunData
 from pilotage.report import quantities
 from pilotage.report.style import (
@@ -28,7 +29,7 @@ def terrain_profile_figure(run: RunData) -> Illustration:
     """Draw height and slope over the distance along the way."""
     slug, title = "profile", "The ground along the way"
     trace = run.trace
-    if not trace.has("distance_m", "elevation_m") or trace.steps < 2:
+    if not trace.has("elevation_m") or not _leads_on(trace["distance_m"]):
         return Illustration(slug, title, "", "No heights are known along the way.")
     unit, s = _distances(run)
     figure, (height, slope) = stacked_axes(["Height [m]", "Slope of the ground [°]"], (150.0, 110.0))
@@ -45,7 +46,7 @@ def terrain_profile_figure(run: RunData) -> Illustration:
     for axes in (height, slope):
         axes.set_xlim(0.0, s[-1])
     slope.set_xlabel(f"distance along the way [{unit}]", labelpad=3.0)
-    climb, descent = (float(run.metrics.get(key) or math.nan) for key in ("climb_m", "descent_m"))
+    climb, descent = (number(run.metrics.get(key)) for key in ("climb_m", "descent_m"))
     alt = "Height and slope over the distance along the way"
     caption = (
         f"It climbs {quantities.length(climb)} and descends {quantities.length(descent)} in all. The slope "
@@ -58,13 +59,13 @@ def hazard_distance_figure(run: RunData) -> Illustration:
     """Draw how far the way keeps from hazards."""
     slug, title = "hazard-distance", "Distance from hazards"
     trace = run.trace
-    if not trace.has("distance_m", "hazard_distance_m") or trace.steps < 2:
+    if not trace.has("hazard_distance_m") or not _leads_on(trace["distance_m"]):
         return Illustration(slug, title, "", "There is no way to measure along.")
     unit, s = _distances(run)
     figure, (axes,) = stacked_axes(["Distance from the nearest hazard's edge [m]"], (130.0,))
     away = trace["hazard_distance_m"]
     series(axes, s, away, GREEN)
-    least = int(np.argmin(away))
+    least = int(np.nanargmin(away))
     axes.set_xlim(0.0, s[-1])
     axes.set_ylim(0.0, nice_limit(peak(away)))
     axes.set_xlabel(f"distance along the way [{unit}]", labelpad=3.0)
@@ -83,6 +84,12 @@ def hazard_distance_figure(run: RunData) -> Illustration:
     return Illustration(
         slug, title, alt, caption, render(figure, slug, alt), (Key("distance from hazards", GREEN),)
     )
+
+
+def _leads_on(distances: FloatArray) -> bool:
+    """Whether there is a way to measure along."""
+    known = bool(np.isfinite(distances).all())
+    return known and len(distances) > 1 and float(distances[-1]) > 1e-9 * float(np.abs(distances).max())
 
 
 def _distances(run: RunData) -> tuple[str, FloatArray]:

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from pilotage.records.numbers import number
 from pilotage.records.run_data import RunData
 from pilotage.report import quantities
 from pilotage.report.event_kinds import event_kind
@@ -52,10 +53,10 @@ def path_figure(run: RunData) -> Illustration:
         if trace.steps:
             x, y, theta = (float(trace[f"true_{axis}"][index]) for axis in ("x_m", "y_m", "theta_rad"))
             layers.draw_body(axes, x, y, theta, sheet.robot_radius_m, colour, opacity=0.6)
-    for number, event in enumerate(run.events, start=1):
+    for count, event in enumerate(run.events, start=1):
         kind, place = event_kind(event.kind), place_at(run, event.t_s)
         if kind.on_map and place is not None:
-            badge(axes, *place, str(number), kind.colour)
+            badge(axes, *place, str(count), kind.colour)
     keys = (
         Key("true path", BLUE, layer="true"),
         Key("where it believed to be", VERMILLION, "dash", layer="estimated"),
@@ -105,13 +106,13 @@ def coverage_figure(run: RunData) -> Illustration:
         Key("of all cells", SKY),
         Key("95 %", MUTED, "dash"),
     )
-    done = run.metrics.get("time_to_95_s")
+    done = number(run.metrics.get("time_to_95_s"))
     caption = (
         f"Reachable are the {reachable} cells in at least a quarter of which the whole body can stand on the "
         "sheet, 15 mm clear of boxes. "
         + (
-            f"95 % of them were visited after {quantities.duration(float(done))}."
-            if isinstance(done, float) and math.isfinite(done)
+            f"95 % of them were visited after {quantities.duration(done)}."
+            if math.isfinite(done)
             else "The run never visited 95 % of them."
         )
         + " Thin lines are the events of the list below."

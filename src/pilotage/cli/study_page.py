@@ -1,4 +1,4 @@
-"""From a study's folder to its page, with the worst and the median trial run again for their pictures."""
+"""A study's page from its folder: its table, the worst and the median trial run again for pictures."""
 
 from __future__ import annotations
 
