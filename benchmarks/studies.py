@@ -17,9 +17,11 @@ from pathlib import Path
 from typing import Any
 
 from pilotage.core.config import validate
+from pilotage.experiments.studies.database import DATABASE
 from pilotage.experiments.studies.definition import StudyDefinition
 from pilotage.experiments.studies.engine import run_study
-from pilotage.experiments.studies.store import DATABASE, read_rows
+from pilotage.experiments.studies.options import StudyOptions
+from pilotage.experiments.studies.rows import read_rows
 from pilotage.experiments.studies.study import Study, make_study
 from pilotage.experiments.studies.trial import Task, TrialRunner
 
@@ -64,9 +66,13 @@ def killed(study: Study, folder: Path, undisturbed: Path, seconds: float) -> boo
     """Whether a study killed at random moments ends as one that was not."""
     script = (
         "from pathlib import Path\nfrom benchmarks.studies import short_missions\n"
+        "from pilotage.experiments.studies.database import DATABASE\n"
         "from pilotage.experiments.studies.engine import run_study\n"
+        "from pilotage.experiments.studies.options import StudyOptions\n"
         "if __name__ == '__main__':\n"
-        f"    run_study(short_missions(), Path({str(folder)!r}), workers=2, resume=True)\n"
+        f"    folder = Path({str(folder)!r})\n"
+        "    options = StudyOptions(workers=2, resume=(folder / DATABASE).is_file())\n"
+        "    run_study(short_missions(), folder, options)\n"
     )
     rng = random.Random(0)
     for _ in range(KILLS):
@@ -74,7 +80,7 @@ def killed(study: Study, folder: Path, undisturbed: Path, seconds: float) -> boo
         time.sleep(rng.uniform(0.3, 2.5 + seconds / KILLS))
         os.killpg(process.pid, signal.SIGKILL)
         process.wait()
-    run_study(study, folder, workers=2, resume=True)
+    run_study(study, folder, StudyOptions(workers=2, resume=True))
     return numbers(folder) == numbers(undisturbed)
 
 
@@ -83,17 +89,17 @@ def main() -> None:
     study = short_missions()
     with tempfile.TemporaryDirectory() as place:
         root = Path(place)
-        run_study(short_missions(), root / "warm", workers=2)
+        run_study(short_missions(), root / "warm", StudyOptions(workers=2))
         took: dict[int, float] = {}
         for workers in (1, 2, 1, 2):
             folder = root / f"{workers}-{len(took)}-{time.monotonic_ns()}"
             began = time.perf_counter()
-            run_study(study, folder, workers=workers)
+            run_study(study, folder, StudyOptions(workers=workers))
             took[workers] = min(took.get(workers, 1e9), time.perf_counter() - began)
         alone = in_this_process(study, 40)
         few = short_missions(10)
         began = time.perf_counter()
-        run_study(few, root / "few", workers=1)
+        run_study(few, root / "few", StudyOptions(workers=1))
         start = time.perf_counter() - began
         each = (took[1] - start) / (study.rows - few.rows)
         overhead = each - alone

@@ -20,12 +20,12 @@ ORDERS, MARKS = "HOSTILE_TRIALS", "HOSTILE_MARKS"
 """Environment: ``row:how,row:how``, and a folder that remembers which rows ran how often."""
 
 
-def work(pipe: Connection, base: Mapping[str, Any]) -> None:
+def work(pipe: Connection, base: Mapping[str, Any], memory_bytes: int) -> None:
     """In the place of a worker's life: the same, with trials that obey the orders."""
     if "unborn" in os.environ[ORDERS]:
         os._exit(7)
     trial.measured = instead
-    local_workers._work(pipe, base)
+    local_workers._work(pipe, base, memory_bytes)
 
 
 def instead(row: int, mission: Any) -> Outcome:
@@ -57,5 +57,9 @@ def misbehave(how: str) -> None:
         raise ZeroDivisionError("a\nbug")
     elif how == "deep":
         misbehave(how)
+    elif how == "swell":
+        held = []
+        while True:
+            held.append(bytearray(1 << 28))
     elif how == "slow":
         time.sleep(600)

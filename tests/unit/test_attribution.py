@@ -17,6 +17,7 @@ from pilotage.experiments.mission import load_mission, shipped_missions
 from pilotage.experiments.run import run_mission
 from pilotage.experiments.studies.attribution import attribution_of, attribution_study, is_attribution
 from pilotage.experiments.studies.engine import run_study
+from pilotage.experiments.studies.options import StudyOptions
 from pilotage.experiments.studies.rows import flat
 from pilotage.experiments.studies.sweep import sweep_study
 from pilotage.report.study.ranking import module_words, ranking_answer, ranking_table
@@ -82,7 +83,7 @@ def test_a_sheet(tmp_path: Path) -> None:
     """The random walk falls off the sheet: what a knowing explorer gains in success and coverage leads."""
     (tmp_path / "small.yaml").write_text(SMALL)
     made = attribution_study("romi-baseline", [f"world.sheet={tmp_path / 'small.yaml'}"], 8)
-    run_study(made, tmp_path / "study", workers=1)
+    run_study(made, tmp_path / "study", StudyOptions(workers=1))
     answer = attribution_of(tmp_path / "study")
     first = answer["modules"][0]
     assert first["module"] == "explorer"

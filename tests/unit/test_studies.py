@@ -18,20 +18,26 @@ import pytest
 
 from pilotage.cli.main import main
 from pilotage.cli.study import _print_cells
-from pilotage.cli.study_page import write_study_report
 from pilotage.core.config import validate
 from pilotage.core.errors import InputError
+from pilotage.evaluation.metrics import METRICS
 from pilotage.experiments.run import run_mission
 from pilotage.experiments.run_folder import clean
 from pilotage.experiments.studies.attribution import attribution_of, attribution_study
+from pilotage.experiments.studies.database import DATABASE
 from pilotage.experiments.studies.definition import StudyDefinition
 from pilotage.experiments.studies.engine import run_study
+from pilotage.experiments.studies.options import StudyOptions
 from pilotage.experiments.studies.replay import mission_from
-from pilotage.experiments.studies.store import DATABASE, Store, read_rows
+from pilotage.experiments.studies.rows import read_rows
+from pilotage.experiments.studies.store import Store
 from pilotage.experiments.studies.study import Study, load_study, make_study, shipped_studies
 from pilotage.experiments.studies.sweep import parse_vary, sweep_study
 from pilotage.experiments.studies.table import read_study, study_object
-from pilotage.experiments.studies.trial import TIMINGS, Outcome
+from pilotage.experiments.studies.trial import Outcome
+from pilotage.report.study.write import write_study_report
+
+ONE = StudyOptions(workers=1)
 
 
 def small(**changes: Any) -> Study:
@@ -62,7 +68,7 @@ def numbers(folder: Path) -> list[tuple[int, int, int, str, str]]:
 def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The small study, run by one worker."""
     folder = tmp_path_factory.mktemp("studies") / "small"
-    counts = run_study(small(), folder, workers=1)
+    counts = run_study(small(), folder, ONE)
     assert (counts.total, counts.done, counts.failed) == (12, 12, 0)
     return folder
 
@@ -85,7 +91,7 @@ def test_cells_share_their_seeds(undisturbed: Path) -> None:
 
 
 def test_two_workers_give_the_rows_of_one(undisturbed: Path, tmp_path: Path) -> None:
-    run_study(small(), tmp_path / "two", workers=2)
+    run_study(small(), tmp_path / "two", StudyOptions(workers=2))
     assert numbers(tmp_path / "two") == numbers(undisturbed)
 
 
@@ -94,14 +100,14 @@ def test_a_cluster_gives_the_same_rows(undisturbed: Path, tmp_path: Path) -> Non
     with distributed.LocalCluster(
         n_workers=2, threads_per_worker=1, dashboard_address=None, processes=True
     ) as cluster:
-        run_study(small(), tmp_path / "cluster", dask=cluster.scheduler_address)
+        run_study(small(), tmp_path / "cluster", StudyOptions(dask=cluster.scheduler_address))
     assert numbers(tmp_path / "cluster") == numbers(undisturbed)
 
 
 def test_a_row_can_be_run_again_bit_equal(undisturbed: Path) -> None:
     rows, _ = read_rows(undisturbed / DATABASE)
     metrics = clean(dict(run_mission(mission_from(f"{undisturbed}:7"), save=False).metrics))
-    again = {key: value for key, value in metrics.items() if key not in TIMINGS}
+    again = {key: value for key, value in metrics.items() if not METRICS.is_wall_clock(key)}
     assert again == rows[7]["metrics"]
 
 
@@ -113,7 +119,10 @@ def test_killed_again_and_again_it_ends_as_if_nothing_had_been(undisturbed: Path
         f"import sys; from pathlib import Path; sys.path.insert(0, {str(tests)!r})\n"
         "from unit.test_studies import small\n"
         "from pilotage.experiments.studies.engine import run_study\n"
-        f"if __name__ == '__main__': run_study(small(), Path({str(folder)!r}), workers=2, resume=True)\n"
+        "from pilotage.experiments.studies.options import StudyOptions\n"
+        "if __name__ == '__main__':\n"
+        "    options = StudyOptions(workers=2, resume=len(sys.argv) > 1)\n"
+        f"    run_study(small(), Path({str(folder)!r}), options)\n"
     )
 
     def done() -> int:
@@ -123,7 +132,7 @@ def test_killed_again_and_again_it_ends_as_if_nothing_had_been(undisturbed: Path
 
     before = 0
     for kill in range(2):
-        process = subprocess.Popen([sys.executable, "-c", script], start_new_session=True)
+        process = subprocess.Popen([sys.executable, "-c", script, *["again"] * kill], start_new_session=True)
         until = time.monotonic() + 60.0
         while done() < before + 2 and time.monotonic() < until:
             time.sleep(0.005)
@@ -135,7 +144,7 @@ def test_killed_again_and_again_it_ends_as_if_nothing_had_been(undisturbed: Path
         process.wait()
         assert done() > before
         before = done()
-    run_study(small(), folder, workers=2, resume=True)
+    run_study(small(), folder, StudyOptions(workers=2, resume=True))
     assert numbers(folder) == numbers(undisturbed)
     assert {row["attempts"] for row in read_rows(folder / DATABASE)[0]} == {1}
 
@@ -149,7 +158,7 @@ def test_two_processes_share_a_study(undisturbed: Path, tmp_path: Path) -> None:
     second.close()  # gives back what it had
     assert len(first.claim(12)) == 4
     first.close()
-    run_study(small(), folder, workers=1, resume=True)
+    run_study(small(), folder, StudyOptions(workers=1, resume=True))
     assert numbers(folder) == numbers(undisturbed)
 
 
@@ -172,7 +181,7 @@ def test_a_trial_that_the_machine_broke_is_tried_once_more(tmp_path: Path) -> No
 
 def test_a_trial_that_crashes_does_not_take_the_study_with_it(tmp_path: Path) -> None:
     study = small(factors=[{"key": "world.goal.x_m", "values": [20.0, -5.0]}], trials=2)
-    counts = run_study(study, tmp_path / "study", workers=1)
+    counts = run_study(study, tmp_path / "study", ONE)
     assert (counts.done, counts.failed) == (2, 2)
     table = read_study(tmp_path / "study")
     assert all("world.goal" in reason for _, _, _, reason in table.broken)
@@ -180,7 +189,7 @@ def test_a_trial_that_crashes_does_not_take_the_study_with_it(tmp_path: Path) ->
 
 def test_another_definition_is_refused_with_what_changed(undisturbed: Path) -> None:
     with pytest.raises(InputError, match="trials: 4 -> 5"):
-        run_study(small(trials=5), undisturbed, resume=True)
+        run_study(small(trials=5), undisturbed, StudyOptions(resume=True))
 
 
 def test_a_begun_study_asks_for_resume(tmp_path: Path) -> None:
@@ -189,18 +198,18 @@ def test_a_begun_study_asks_for_resume(tmp_path: Path) -> None:
     store.finish(Outcome(task.row, {"planned_length_m": 1.0}, {}))
     store.close()
     with pytest.raises(InputError, match="--resume"):
-        run_study(small(), tmp_path / "study", workers=1)
+        run_study(small(), tmp_path / "study", ONE)
 
 
 def test_a_metric_that_no_trial_gives_is_refused_with_the_nearest(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="did you mean 'planned_length_m'"):
-        run_study(small(metrics=["planed_length_m"], primary=None, trials=1), tmp_path / "study", workers=1)
+        run_study(small(metrics=["planed_length_m"], primary=None, trials=1), tmp_path / "study", ONE)
     assert not (tmp_path / "study").exists()
 
 
 def test_a_metric_of_other_missions_is_noticed_once_trials_ran(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="metric 'lost_s': no trial of the study"):
-        run_study(small(metrics=["lost_s"], primary=None, trials=1), tmp_path / "study", workers=1)
+        run_study(small(metrics=["lost_s"], primary=None, trials=1), tmp_path / "study", ONE)
 
 
 def test_a_corrupt_database_is_said_and_salvaged(undisturbed: Path, tmp_path: Path) -> None:
@@ -257,7 +266,7 @@ def test_the_page_shows_cells_and_examples(undisturbed: Path) -> None:
 def test_attribution_ranks_the_modules(tmp_path: Path) -> None:
     made = attribution_study("museum-1", ["run.time_limit_s=4"], 3)
     assert made.cells[0].name == "as it is"
-    run_study(made, tmp_path / "attribution", workers=1)
+    run_study(made, tmp_path / "attribution", ONE)
     answer = attribution_of(tmp_path / "attribution")
     assert {entry["module"] for entry in answer["modules"]} == {
         "sensors",

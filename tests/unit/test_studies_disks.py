@@ -11,7 +11,8 @@ import pytest
 from pilotage.cli.main import main
 from pilotage.experiments.studies import store
 from pilotage.experiments.studies.database import DATABASE
-from pilotage.experiments.studies.engine import run_study
+from pilotage.experiments.studies.engine import Listener, run_study
+from pilotage.experiments.studies.options import StudyOptions
 from support.hostile_studies import expected, rows_of, study_of
 
 
@@ -59,7 +60,9 @@ def test_a_disk_that_is_full_for_a_moment_is_tried_once_more(
         told.append(line)
         more_room(disk)
 
-    assert run_study(study_of(trials=30), disk / "x", workers=1, on_trouble=tell).done == 90
+    assert (
+        run_study(study_of(trials=30), disk / "x", StudyOptions(workers=1), Listener(trouble=tell)).done == 90
+    )
     assert len(told) == 1
     assert "(database or disk is full); trying once more" in told[0]
 

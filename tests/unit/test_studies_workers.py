@@ -5,8 +5,8 @@ from __future__ import annotations
 import asyncio
 import gc
 import json
-import os
-import signal
+import sys
+import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -14,10 +14,13 @@ from typing import Any
 import pytest
 
 from pilotage.cli.main import main
-from pilotage.experiments.studies import engine
+from pilotage.experiments.studies import local_workers
 from pilotage.experiments.studies.database import StudyStoppedError
-from pilotage.experiments.studies.engine import run_study
+from pilotage.experiments.studies.engine import Listener, run_study
+from pilotage.experiments.studies.options import StudyOptions
 from support.hostile_studies import expected, rows_of, study_of
+
+LINUX = pytest.mark.skipif(sys.platform != "linux", reason="looks at processes, bounds memory as Linux does")
 
 
 def test_what_breaks_is_tried_once_more_then_failed_with_its_reason(
@@ -26,7 +29,7 @@ def test_what_breaks_is_tried_once_more_then_failed_with_its_reason(
     order("0:kill", "2:segv", "5:sysexit", "6:memory", "8:full", "9:bug", "11:deep", "13:kill-once")
     told: list[str] = []
     folder = tmp_path / "study"
-    counts = run_study(study_of(), folder, workers=2, on_trouble=told.append)
+    counts = run_study(study_of(), folder, StudyOptions(workers=2), Listener(trouble=told.append))
     assert (counts.total, counts.done, counts.failed) == (18, 11, 7)
     rows = rows_of(folder)
     reasons = {row["row"]: row["reason"] for row in rows if row["status"] == "failed"}
@@ -35,7 +38,7 @@ def test_what_breaks_is_tried_once_more_then_failed_with_its_reason(
         0: "its worker died (signal 9)",
         2: "its worker died (signal 11)",
         5: "its worker died (exit code 4)",
-        6: "MemoryError",
+        6: "MemoryError: out of memory; a worker's is bounded by --worker-memory",
         8: "disk full: /somewhere/trace.parquet",
         9: "ZeroDivisionError: a bug",
     }
@@ -56,29 +59,72 @@ def test_workers_that_cannot_begin_stop_the_study_and_blame_no_trial(
 ) -> None:
     order("unborn")
     with pytest.raises(StudyStoppedError, match=r"exit code 7.*--resume"):
-        run_study(study_of(), tmp_path / "study", workers=2)
+        run_study(study_of(), tmp_path / "study", StudyOptions(workers=2))
     assert {(row["status"], row["attempts"]) for row in rows_of(tmp_path / "study")} == {("pending", 0)}
     order()
-    assert run_study(study_of(), tmp_path / "study", workers=1, resume=True).done == 18
+    assert run_study(study_of(), tmp_path / "study", StudyOptions(workers=1, resume=True)).done == 18
 
 
-def test_a_trial_that_may_hang_is_told_with_what_ends_it(
+@LINUX
+def test_a_trial_that_hangs_is_stopped_and_is_a_row(
     order: Callable[..., None], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    """By a clock that leaps while it hangs: no healthy trial is taken for a hung one on a slow machine."""
     order("4:slow")
-    monkeypatch.setattr(engine, "HEAR_EVERY_S", 0.1)
-    monkeypatch.setattr(engine, "LONG_S", 0.5)
+    leap_s, leaps = 1e6, [0]
+
+    def clock() -> float:
+        now_s = time.monotonic()
+        for mark in (tmp_path / "marks").glob("4-*"):
+            _, pid, began_ns = mark.name.split("-")
+            if leaps[0] < 10 and Path(f"/proc/{pid}").exists():
+                leaps[0] = max(leaps[0], int((now_s - 1e-9 * int(began_ns)) / 2.0))
+        return now_s + leap_s * leaps[0]
+
+    monkeypatch.setattr(local_workers, "_now_s", clock)
     told: list[str] = []
-
-    def tell(line: str) -> None:
-        told.append(line)
-        if "has run for" in line:
-            os.kill(int(line.rsplit("kill -9 ", 1)[1].split("'")[0]), signal.SIGKILL)
-
-    counts = run_study(study_of(), tmp_path / "study", workers=2, on_trouble=tell)
+    options = StudyOptions(workers=1, trial_timeout_s=0.9 * leap_s)
+    counts = run_study(study_of(), tmp_path / "study", options, Listener(trouble=told.append))
     assert (counts.done, counts.failed) == (17, 1)
-    assert rows_of(tmp_path / "study")[4]["reason"] == "its worker died (signal 9)"
-    assert sum(line.startswith("row 4 has run for ") for line in told) == 2
+    reason = "stopped: it ran for more than 900000 s (--trial-timeout)"
+    assert rows_of(tmp_path / "study")[4]["reason"] == reason
+    assert told == [f"row 4: {reason}; given up"]
+    order()
+    again = StudyOptions(workers=1, resume=True, retry_failed=True)
+    counts = run_study(study_of(), tmp_path / "study", again)
+    assert (counts.done, counts.failed) == (18, 0)
+    assert rows_of(tmp_path / "study")[4]["metrics"] == expected(4)
+
+
+@LINUX
+def test_a_trial_that_swells_is_a_row_and_its_worker_goes_on(
+    order: Callable[..., None], tmp_path: Path
+) -> None:
+    order("4:swell")
+    counts = run_study(study_of(), tmp_path / "study", StudyOptions(workers=1, worker_memory_mb=2000))
+    assert (counts.done, counts.failed) == (17, 1)
+    assert "MemoryError" in rows_of(tmp_path / "study")[4]["reason"]
+    assert "--worker-memory" in rows_of(tmp_path / "study")[4]["reason"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        ("--resume", "expected a study that was begun, found none; leave --resume out"),
+        ("--retry-failed", "--retry-failed: expected --resume"),
+        ("--dask=", "--dask: expected a scheduler's address"),
+        ("--trial-timeout 0", "--trial-timeout: expected seconds above 0, found 0"),
+        ("--trial-timeout nan", "--trial-timeout: expected seconds above 0, found nan"),
+    ],
+)
+def test_options_that_make_no_sense_are_one_line(
+    arguments: str, told: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    sweep = ["sweep", "museum-plan", "--vary", "stack.planner.turning_radius_m=0.3", "--out", str(tmp_path)]
+    assert main([*sweep, *arguments.split()]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert told in line
+    assert not list(tmp_path.iterdir())
 
 
 def test_the_command_says_how_many_failed(

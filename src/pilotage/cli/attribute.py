@@ -8,8 +8,21 @@ from typing import Annotated, Any
 import typer
 
 from pilotage.cli.options import Json, Overrides, Plugins
-from pilotage.cli.output import print_columns, print_json, print_line
-from pilotage.cli.study import Dask, Quiet, Report, Resume, Studies, WorkerCount, run_study_quietly
+from pilotage.cli.output import print_columns, print_json
+from pilotage.cli.study import (
+    TIMEOUT_S,
+    Dask,
+    Quiet,
+    Report,
+    Resume,
+    RetryFailed,
+    Show,
+    Studies,
+    TrialTimeout,
+    WorkerCount,
+    WorkerMemory,
+    run_study_quietly,
+)
 
 
 def attribute(
@@ -19,6 +32,9 @@ def attribute(
     workers: WorkerCount = None,
     dask: Dask = None,
     resume: Resume = False,
+    retry_failed: RetryFailed = False,
+    trial_timeout: TrialTimeout = TIMEOUT_S,
+    worker_memory: WorkerMemory = None,
     out: Studies = Path("studies"),
     json: Json = False,
     plugin: Plugins = None,  # noqa: ARG001 - loaded while the options are read
@@ -27,10 +43,12 @@ def attribute(
 ) -> int:
     """Swap one module at a time for one that knows the truth, and rank what the real ones cost."""
     from pilotage.experiments.studies.attribution import attribution_of, attribution_study
+    from pilotage.experiments.studies.options import StudyOptions
 
+    options = StudyOptions(workers, dask, resume, retry_failed, trial_timeout, worker_memory)
     made = attribution_study(mission, overrides or (), trials)
     folder = out / made.name
-    ran = run_study_quietly(made, folder, workers, dask, resume, json, report, quiet)
+    ran = run_study_quietly(made, folder, options, Show(json, report, quiet))
     if not ran.whole:
         return ran.code
     answer = attribution_of(folder)

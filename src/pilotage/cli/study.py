@@ -18,9 +18,11 @@ from pilotage.core.errors import InputError
 from pilotage.core.shown import visible
 
 if TYPE_CHECKING:
+    from pilotage.experiments.studies.options import StudyOptions
     from pilotage.experiments.studies.study import Study
 
 FAILED = 1
+TIMEOUT_S = 3600.0
 Trials = Annotated[int | None, typer.Option("--trials", metavar="N", min=1, help="Trials in every cell.")]
 WorkerCount = Annotated[
     int | None,
@@ -30,6 +32,26 @@ Dask = Annotated[
     str | None, typer.Option("--dask", metavar="ADDRESS", help="A Dask scheduler to run on instead.")
 ]
 Resume = Annotated[bool, typer.Option("--resume", help="Go on with a study that was begun before.")]
+RetryFailed = Annotated[
+    bool, typer.Option("--retry-failed", help="With --resume: run the trials that failed once more.")
+]
+TrialTimeout = Annotated[
+    float,
+    typer.Option(
+        "--trial-timeout",
+        metavar="S",
+        help="Wall time after which a trial is taken for hung and stopped: a failed row.",
+    ),
+]
+WorkerMemory = Annotated[
+    int | None,
+    typer.Option(
+        "--worker-memory",
+        metavar="MB",
+        min=256,
+        help="What a worker may allocate, else its trial fails; default: together 80 % of the machine's.",
+    ),
+]
 Studies = Annotated[
     Path,
     typer.Option("--out", metavar="DIR", parser=parse_out, help="Folder that the study's folder is made in."),
@@ -46,6 +68,9 @@ def study(
     workers: WorkerCount = None,
     dask: Dask = None,
     resume: Resume = False,
+    retry_failed: RetryFailed = False,
+    trial_timeout: TrialTimeout = TIMEOUT_S,
+    worker_memory: WorkerMemory = None,
     out: Studies = Path("studies"),
     json: Json = False,
     plugin: Plugins = None,  # noqa: ARG001 - loaded while the options are read
@@ -53,12 +78,14 @@ def study(
     quiet: Quiet = False,
 ) -> int:
     """Run a study: every setting times many seeds, finished trials never lost."""
+    from pilotage.experiments.studies.options import StudyOptions
     from pilotage.experiments.studies.study import is_study_folder, load_study
 
+    options = StudyOptions(workers, dask, resume, retry_failed, trial_timeout, worker_memory)
     changes: dict[str, Any] = {} if trials is None else {"trials": trials}
     loaded = load_study(name, changes)
     folder = Path(name) if is_study_folder(name) else out / loaded.name
-    return run_and_tell(loaded, folder, workers, dask, resume, json, report, quiet)
+    return run_and_tell(loaded, folder, options, Show(json, report, quiet))
 
 
 def sweep(
@@ -81,6 +108,9 @@ def sweep(
     workers: WorkerCount = None,
     dask: Dask = None,
     resume: Resume = False,
+    retry_failed: RetryFailed = False,
+    trial_timeout: TrialTimeout = TIMEOUT_S,
+    worker_memory: WorkerMemory = None,
     out: Studies = Path("studies"),
     json: Json = False,
     plugin: Plugins = None,  # noqa: ARG001 - loaded while the options are read
@@ -88,35 +118,37 @@ def sweep(
     quiet: Quiet = False,
 ) -> int:
     """Write a study that varies a mission's parameters, and run it."""
+    from pilotage.experiments.studies.options import StudyOptions
     from pilotage.experiments.studies.sweep import sweep_study
 
+    options = StudyOptions(workers, dask, resume, retry_failed, trial_timeout, worker_memory)
     asked = () if metrics is None else tuple(part.strip() for part in metrics.split(","))
     if not all(asked):
         raise InputError(f"--metrics '{metrics}': expected names with commas between, M1,M2")
     made = sweep_study(mission, vary, overrides or (), trials, asked, name)
-    return run_and_tell(made, out / made.name, workers, dask, resume, json, report, quiet)
+    return run_and_tell(made, out / made.name, options, Show(json, report, quiet))
 
 
-def run_and_tell(
-    loaded: Study,
-    folder: Path,
-    workers: int | None,
-    dask: str | None,
-    resume: bool,
-    json: bool,
-    report: bool,
-    quiet: bool,
-) -> int:
+@dataclass(frozen=True, slots=True)
+class Show:
+    """What a study's command shows: one JSON object, a page, progress and summary."""
+
+    json: bool
+    report: bool
+    quiet: bool
+
+
+def run_and_tell(loaded: Study, folder: Path, options: StudyOptions, show: Show) -> int:
     """Run a study, write its exports and its page, and say what came out."""
-    ran = run_study_quietly(loaded, folder, workers, dask, resume, json, report, quiet)
+    ran = run_study_quietly(loaded, folder, options, show)
     if not ran.whole:
         return ran.code
     from pilotage.experiments.studies.table import read_study, study_object
 
     answer = study_object(read_study(folder))
-    if json:
+    if show.json:
         print_json(answer | ({} if ran.page is None else {"report": str(ran.page)}))
-    elif not quiet:
+    elif not show.quiet:
         _print_cells(answer)
         print_line(f"report: {ran.page}" if ran.page is not None else f"study: {folder}")
     return ran.code
@@ -131,35 +163,19 @@ class Ran:
     whole: bool = False
 
 
-def run_study_quietly(
-    loaded: Study,
-    folder: Path,
-    workers: int | None,
-    dask: str | None,
-    resume: bool,
-    json: bool,
-    report: bool,
-    quiet: bool,
-) -> Ran:
+def run_study_quietly(loaded: Study, folder: Path, options: StudyOptions, show: Show) -> Ran:
     """Run a study, write its exports and its page, and say on standard error what went wrong."""
     from pilotage.experiments.studies.database import StudyStoppedError
-    from pilotage.experiments.studies.engine import run_study
+    from pilotage.experiments.studies.engine import Listener, run_study
 
-    line = StudyLine(quiet)
+    line = StudyLine(show.quiet)
     go_on = f"go on with --resume, what is finished is in {folder}"
     try:
-        with stdout_for_json(json):
-            counts = run_study(
-                loaded,
-                folder,
-                workers=workers,
-                dask=dask,
-                resume=resume,
-                on_progress=line,
-                on_trouble=None if quiet else line.trouble,
-            )
+        with stdout_for_json(show.json):
+            listener = Listener(line) if show.quiet else Listener(line, line.trouble)
+            counts = run_study(loaded, folder, options, listener)
             line.close()
-            page = _write_files(folder, report, quiet)
+            page = _write_files(folder, show)
     except Terminated:
         return _stopped(line, f"ended by SIGTERM; {go_on}", TERMINATED)
     except KeyboardInterrupt:
@@ -181,14 +197,14 @@ def _stopped(line: StudyLine, text: str, code: int) -> Ran:
     return Ran(code)
 
 
-def _write_files(folder: Path, report: bool, quiet: bool) -> Path | None:
+def _write_files(folder: Path, show: Show) -> Path | None:
     """Write exports and page; the rows are safe, whatever becomes of these."""
     from pilotage.experiments.studies.database import StudyStoppedError
     from pilotage.experiments.studies.export import export
 
     try:
         export(folder)
-        return _page(folder, quiet) if report else None
+        return _page(folder, show.quiet) if show.report else None
     except OSError as error:
         raise StudyStoppedError(
             f"{folder}: all trials are finished, but their exports cannot be written "

@@ -16,7 +16,8 @@ from pilotage.experiments.studies.factors import Factor
 Resolve = Callable[[Sequence[str]], Mapping[str, Any]]
 """Overrides to the mission's values in full, every default written out."""
 
-MAX_CELLS = 1_000_000
+MAX_CELLS = 10_000
+"""Each of them is laid out and validated before the first trial."""
 
 
 @dataclass(frozen=True, slots=True)

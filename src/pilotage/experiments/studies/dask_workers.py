@@ -7,14 +7,14 @@ import functools
 import json
 import logging
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from typing import Any
 
 from pilotage.core.errors import InputError
 from pilotage.experiments.studies.database import StudyStoppedError
 from pilotage.experiments.studies.trial import Outcome, Task, TrialRunner
-from pilotage.experiments.studies.workers import AHEAD, WAIT_S, Running
+from pilotage.experiments.studies.workers import AHEAD, WAIT_S, hung
 
 CONNECT_S = 10
 POLL_S = 0.005
@@ -22,6 +22,8 @@ POLL_S = 0.005
 
 class DaskWorkers:
     """Runs tasks on a cluster; the rows are those that local workers give.
+
+    A trial that hangs is given up here; its thread over there is the cluster's to end.
 
     Raises
     ------
@@ -31,7 +33,7 @@ class DaskWorkers:
         From the methods, where the cluster is lost.
     """
 
-    def __init__(self, base: Mapping[str, Any], address: str) -> None:
+    def __init__(self, base: Mapping[str, Any], address: str, timeout_s: float) -> None:
         try:
             import distributed
             from distributed.comm.addressing import resolve_address
@@ -50,7 +52,8 @@ class DaskWorkers:
             raise InputError(f"--dask {address}: expected a scheduler there, found: {error}") from None
         self._address, self._is_lost = address, False
         self._base = json.dumps(dict(base))
-        self._futures: dict[Any, Task] = {}
+        self._timeout_s = timeout_s
+        self._futures: dict[Any, tuple[Task, float]] = {}
 
     @property
     def room(self) -> int:
@@ -63,7 +66,7 @@ class DaskWorkers:
         """Submit one task; every submission is run, whatever was computed before."""
         with self._in_touch():
             future = self._client.submit(run_on_cluster, self._base, task, pure=False, retries=0)
-        self._futures[future] = task
+        self._futures[future] = task, time.monotonic()
 
     def outcomes(self) -> Iterator[Outcome]:
         """Those that are ready; a task whose worker is gone is told."""
@@ -74,7 +77,7 @@ class DaskWorkers:
                 break
             time.sleep(POLL_S)
         for future in ready:
-            task = self._futures.pop(future)
+            task, _ = self._futures.pop(future)
             if future.cancelled():  # by nobody here: its scheduler does not answer any more
                 raise self._lost("it does not answer")
             with self._in_touch():
@@ -88,6 +91,17 @@ class DaskWorkers:
                     task.row, {}, {}, f"its worker died ({type(error).__name__}: {words})", retry=True
                 )
 
+        yield from self._hung()
+
+    def _hung(self) -> Iterator[Outcome]:
+        """Give up what has been away for the time of all tasks that wait before it and its own."""
+        begun_s = time.monotonic() - AHEAD * self._timeout_s
+        for future in [future for future, (_, given_s) in self._futures.items() if given_s < begun_s]:
+            task, _ = self._futures.pop(future)
+            with self._in_touch():
+                self._client.cancel([future])
+            yield hung(task.row, self._timeout_s)
+
     @contextmanager
     def _in_touch(self) -> Iterator[None]:
         try:
@@ -98,10 +112,6 @@ class DaskWorkers:
     def _lost(self, why: str) -> StudyStoppedError:
         self._is_lost = True
         return StudyStoppedError(f"--dask {self._address}: the cluster is lost ({why}); go on with --resume")
-
-    def running(self) -> Sequence[Running]:
-        """Not known from here: the cluster's own pages tell."""
-        return ()
 
     def stop(self) -> None:
         """Cancel what is left; a scheduler that is gone has nothing to cancel."""

@@ -22,6 +22,9 @@ RETRY_S = 0.05
 LEAST_FREE = 16 * 1024
 """A disk with fewer bytes free is full: SQLite cannot even open its log there."""
 
+LONGEST = 32_000_000
+"""Bytes of the longest text in a row; a longer one is damage."""
+
 SCHEMA = """
 create table meta (key text primary key, value text not null);
 create table owners (
@@ -43,6 +46,9 @@ create table trials (
 );
 create index trials_status on trials (status, row);
 """
+
+STATEMENTS = {text.split()[2]: " ".join(text.lower().split()) for text in SCHEMA.split(";") if text.strip()}
+"""What makes each table and index, by its name, as SQLite keeps it."""
 
 _FULL = {sqlite3.SQLITE_FULL, sqlite3.SQLITE_IOERR, sqlite3.SQLITE_NOMEM}
 _SHUT = {sqlite3.SQLITE_READONLY, sqlite3.SQLITE_CANTOPEN, sqlite3.SQLITE_PERM, sqlite3.SQLITE_AUTH}
@@ -132,6 +138,15 @@ def check_sound(path: Path) -> None:
         raise CorruptDatabaseError(path, " ".join(str(found).split()))
 
 
+def foreign_tables(database: sqlite3.Connection) -> list[str]:
+    """Names of what is not as ``SCHEMA`` makes it: other tables, views, triggers, other columns."""
+    entries = database.execute("select name, sql from sqlite_master").fetchall()
+    found = {
+        str(name): " ".join(str(sql).lower().split()) for name, sql in entries if "sqlite_" not in str(name)
+    }
+    return [name for name in found.keys() | STATEMENTS.keys() if found.get(name) != STATEMENTS.get(name)]
+
+
 def close_gently(database: sqlite3.Connection, path: Path) -> None:
     """Close without holding off those who read.
 
@@ -182,7 +197,7 @@ def checksum(row: int, cell: int, seed: int, metrics: str | None, timings: str |
 
 
 def _reading_only(path: Path) -> sqlite3.Connection:
-    return sqlite3.connect(f"{path.resolve().as_uri()}?mode=ro", uri=True, timeout=BUSY_S)
+    return sqlite3.connect(f"{path.absolute().as_uri()}?mode=ro", uri=True, timeout=BUSY_S)
 
 
 def _set_mode(database: sqlite3.Connection) -> None:

@@ -8,10 +8,12 @@ from typing import Any, Literal
 from pydantic import Field, model_validator
 
 from pilotage.core.config import Config
-from pilotage.experiments.studies.factors import Factor, check_plain
+from pilotage.experiments.studies.factors import Factor, check_plain, first_twice
 
 CONFIGURATION = "configuration"
 """What the named configurations are called among the factors."""
+MANY = 1000
+"""So many factors, configurations or metrics are no study but a slip."""
 
 
 class Configuration(Config):
@@ -103,18 +105,18 @@ class StudyDefinition(Config):
     description: str = ""
     mission: str = Field(min_length=1)
     set: Mapping[str, Any] = {}
-    configurations: tuple[Configuration, ...] = ()
-    factors: tuple[Factor, ...] = ()
+    configurations: tuple[Configuration, ...] = Field((), max_length=MANY)
+    factors: tuple[Factor, ...] = Field((), max_length=MANY)
     combine: Literal["grid", "one-at-a-time", "zip"] = "grid"
     trials: int = Field(default=10, ge=1, le=10_000_000)
     seeds: Seeds = Seeds()
-    metrics: tuple[str, ...] = ()
+    metrics: tuple[str, ...] = Field((), max_length=MANY)
     primary: str | None = None
     lower_is_better: bool | None = None
     baseline: str | None = None
-    groups: tuple[Group, ...] = ()
-    contrasts: tuple[Contrast, ...] = ()
-    published: tuple[Published, ...] = ()
+    groups: tuple[Group, ...] = Field((), max_length=MANY)
+    contrasts: tuple[Contrast, ...] = Field((), max_length=MANY)
+    published: tuple[Published, ...] = Field((), max_length=MANY)
     reference: Mapping[str, Reference] = {}
 
     @model_validator(mode="after")
@@ -171,6 +173,6 @@ class StudyDefinition(Config):
 
 
 def _once(names: list[str], what: str, remedy: str) -> None:
-    twice = next((name for i, name in enumerate(names) if name in names[:i]), None)
+    twice = first_twice(names)
     if twice is not None:
         raise ValueError(f"{what}: '{twice}' stands twice; {remedy}")

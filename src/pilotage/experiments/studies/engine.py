@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import contextlib
 import errno
-import os
 import signal
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -21,6 +20,7 @@ from pilotage.experiments.studies.dask_workers import DaskWorkers
 from pilotage.experiments.studies.database import DATABASE, CorruptDatabaseError, StudyStoppedError
 from pilotage.experiments.studies.export import save_what_is_left
 from pilotage.experiments.studies.local_workers import LocalWorkers
+from pilotage.experiments.studies.options import StudyOptions, cores
 from pilotage.experiments.studies.rows import flat, read_rows
 from pilotage.experiments.studies.store import Counts, Store
 from pilotage.experiments.studies.study import (
@@ -34,9 +34,6 @@ from pilotage.experiments.studies.workers import Workers
 
 HEAR_EVERY_S = 5.0
 TELL_EVERY_S = 0.1
-LONG_S = 120.0
-LONG_TIMES = 20.0
-"""A trial that takes both more than LONG_S and so many times the longest one so far may hang."""
 ENOUGH_TO_TELL = 20
 """A metric that none of so many trials gives is given by none."""
 
@@ -50,44 +47,44 @@ class StudyProgress:
     left_s: float
 
 
+@dataclass(frozen=True, slots=True)
+class Listener:
+    """Who is told how a study goes.
+
+    Attributes
+    ----------
+    progress
+        Told some times a second.
+    trouble
+        Told, a line each, of a worker that died, a trial that broke or hung, a disk that is full.
+    """
+
+    progress: Callable[[StudyProgress], None] = lambda _: None
+    trouble: Callable[[str], None] = lambda _: None
+
+
 def run_study(
-    study: Study,
-    folder: Path,
-    *,
-    workers: int | None = None,
-    dask: str | None = None,
-    resume: bool = False,
-    on_progress: Callable[[StudyProgress], None] | None = None,
-    on_trouble: Callable[[str], None] | None = None,
+    study: Study, folder: Path, options: StudyOptions | None = None, listener: Listener | None = None
 ) -> Counts:
     """Run what is missing of a study in ``folder``.
-
-    Parameters
-    ----------
-    workers
-        Processes on this machine; None takes one a core.
-    dask
-        A scheduler's address instead.
-    resume
-        Whether to go on with a folder that was begun before; a complete one is left as it is.
-    on_trouble
-        Told, a line each, of a worker that died, a trial that broke or takes very long, a disk that is full.
 
     Raises
     ------
     InputError
-        A metric that no mission of the kind gives (nothing is run or written then), or that no trial gives;
-        the folder holds another definition, or was begun and ``resume`` is not said; a corrupt database,
-        after what can be read of it was saved.
+        A metric that no mission of the study's tasks gives (nothing is run or written then), or that no
+        trial gives; the folder holds another definition, was begun and ``resume`` is not said, or was not
+        and it is; a corrupt database, after what can be read of it was saved.
     StudyStoppedError
         The disk is full and stays so, the cluster is gone, or no worker can begin.
     KeyboardInterrupt
         Passed on, with all finished rows written and the claims given back.
     """
-    tell = on_trouble or (lambda _: None)
+    options, listener = options or StudyOptions(), listener or Listener()
     check_metric_names(study)
+    if options.resume and not (folder / DATABASE).is_file():
+        raise InputError(f"{folder}: expected a study that was begun, found none; leave --resume out")
     try:
-        counts = _run(study, folder, workers, dask, resume, on_progress, tell)
+        counts = _run(study, folder, options, listener)
         check_metrics(study, folder)
     except CorruptDatabaseError as error:
         raise save_what_is_left(folder, study, error.trouble) from None
@@ -98,40 +95,21 @@ def run_study(
     return counts
 
 
-def _run(
-    study: Study,
-    folder: Path,
-    workers: int | None,
-    dask: str | None,
-    resume: bool,
-    on_progress: Callable[[StudyProgress], None] | None,
-    tell: Callable[[str], None],
-) -> Counts:
-    # Before a folder is made: nothing is left behind where nobody answers.
-    cluster = DaskWorkers(study.base, dask) if dask else None
-    try:
-        return _run_on(cluster, study, folder, workers, resume, on_progress, tell)
-    finally:
-        if cluster is not None:
-            with _undisturbed():
-                cluster.stop()
-
-
-def _run_on(
-    cluster: Workers | None,
-    study: Study,
-    folder: Path,
-    workers: int | None,
-    resume: bool,
-    on_progress: Callable[[StudyProgress], None] | None,
-    tell: Callable[[str], None],
-) -> Counts:
-    """Run what is missing on a cluster, or on processes here."""
-    begun = (folder / DATABASE).is_file()
-    store = Store(folder, study, tell)
-    try:
+def _run(study: Study, folder: Path, options: StudyOptions, listener: Listener) -> Counts:
+    with contextlib.ExitStack() as stack:
+        # Before a folder is made: nothing is left behind where nobody answers.
+        crew: Workers | None = None
+        if options.dask is not None:
+            crew = DaskWorkers(study.base, options.dask, options.trial_timeout_s)
+            stack.callback(_put_away, crew.stop)
+        begun = (folder / DATABASE).is_file()
+        store = Store(folder, study, listener.trouble)
+        # Where this fails, as on a full disk, the claims are free again once this process is gone.
+        stack.callback(_put_away, store.close)
+        if options.retry_failed:
+            store.retry_failed()
         counts = store.counts()
-        if begun and not resume and counts.missing and counts.missing < counts.total:
+        if begun and not options.resume and 0 < counts.missing < counts.total:
             ended = f"{counts.done + counts.failed} of {counts.total} trials are finished"
             if store.others():
                 raise InputError(f"{folder}: {ended}, another process is at work; join it with --resume")
@@ -139,33 +117,19 @@ def _run_on(
         _write(folder / STUDY_FILE, study_yaml(study))
         _write(folder / MISSION_FILE, mission_yaml(study))
         if counts.missing:
-            wanted = min(workers or _cores(), counts.missing)
-            crew: Workers = cluster or LocalWorkers(study.base, wanted)
-            try:
-                _loop(study, store, crew, folder, on_progress, tell)
-            finally:
-                if cluster is None:
-                    with _undisturbed():
-                        crew.stop()
+            if crew is None:
+                count = min(options.workers or cores(), counts.missing)
+                memory = options.worker_memory_bytes(count)
+                crew = LocalWorkers(study.base, count, options.trial_timeout_s, memory)
+                stack.callback(_put_away, crew.stop)
+            _loop(study, store, crew, folder, listener)
         return store.counts()
-    finally:
-        # Where this fails, as on a full disk, the claims are free again once this process is gone.
-        with _undisturbed(), contextlib.suppress(StudyStoppedError, CorruptDatabaseError):
-            store.close()
 
 
-def _loop(
-    study: Study,
-    store: Store,
-    crew: Workers,
-    folder: Path,
-    on_progress: Callable[[StudyProgress], None] | None,
-    tell: Callable[[str], None],
-) -> None:
+def _loop(study: Study, store: Store, crew: Workers, folder: Path, listener: Listener) -> None:
     began = heard = time.monotonic()
-    shown, finished, longest_s = 0.0, 0, 0.0
+    shown, finished = 0.0, 0
     held: set[int] = set()
-    told: set[tuple[int, int]] = set()
     checked = False
     while True:
         room = crew.room
@@ -173,8 +137,7 @@ def _loop(
             held.add(task.row)
             crew.give(replace(task, overrides=study.cells[task.cell].overrides))
         if not held:
-            counts = store.counts()
-            if not counts.missing:
+            if not store.counts().missing:
                 return
             time.sleep(0.2)  # the rest is run by another process
             store.hear()
@@ -182,31 +145,29 @@ def _loop(
         for outcome in crew.outcomes():
             held.discard(outcome.row)
             again = store.finish(outcome)
+            finished += not outcome.reason
             if outcome.reason:
-                tell(f"row {outcome.row}: {outcome.reason}; {'tried once more' if again else 'given up'}")
-            else:
-                finished += 1
-                longest_s = max(longest_s, outcome.seconds)
+                then = "tried once more" if again else "given up"
+                listener.trouble(f"row {outcome.row}: {outcome.reason}; {then}")
         now = time.monotonic()
         if now - heard > HEAR_EVERY_S:
             store.hear()
             heard = now
-            for trial in crew.running():
-                if trial.seconds > max(LONG_S, LONG_TIMES * longest_s) and (trial.row, trial.pid) not in told:
-                    told.add((trial.row, trial.pid))
-                    tell(
-                        f"row {trial.row} has run for {trial.seconds:.0f} s; where it hangs, "
-                        f"'kill -9 {trial.pid}' gives it up"
-                    )
         if not checked and finished >= ENOUGH_TO_TELL:
             check_metrics(study, folder)
             checked = True
-        if on_progress is not None and now - shown > TELL_EVERY_S:
+        if now - shown > TELL_EVERY_S:
             counts = store.counts()
             rate = finished / max(now - began, 1e-9)
             left = counts.missing / rate if rate > 0.0 else float("inf")
-            on_progress(StudyProgress(counts, rate, left))
+            listener.progress(StudyProgress(counts, rate, left))
             shown = now
+
+
+def _put_away(close: Callable[[], None]) -> None:
+    """Close one of a study's helpers; a disk that is full then has been told already."""
+    with _undisturbed(), contextlib.suppress(StudyStoppedError, CorruptDatabaseError):
+        close()
 
 
 @contextlib.contextmanager
@@ -220,13 +181,6 @@ def _undisturbed() -> Iterator[None]:
         yield
     finally:
         signal.signal(signal.SIGINT, before)
-
-
-def _cores() -> int:
-    """How many cores this process may use."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
 
 
 def check_metric_names(study: Study) -> None:
@@ -248,11 +202,7 @@ def check_metric_names(study: Study) -> None:
         mission = mission_of(dict(study.base), cell.overrides)
         tasks.add(mission.task.name)
         known |= METRICS.given_by(mission.task.name, has(mission))
-    for metric in sorted(asked - known):
-        close = nearest(metric, sorted(known))
-        hint = f"; did you mean '{close}'?" if close else ""
-        named = " or ".join(f"'{task}'" for task in sorted(tasks))
-        raise InputError(f"metric '{metric}': no trial of this study gives it (its task: {named}){hint}")
+    _refuse(sorted(asked), known, f"no mission of the task {' or '.join(sorted(tasks))} gives it")
 
 
 def _asked(study: Study) -> list[str]:
@@ -278,11 +228,15 @@ def check_metrics(study: Study, folder: Path) -> None:
         given |= flat(row["metrics"]).keys() | flat(row["timings"]).keys()
     if not given:
         return
-    for metric in _asked(study):
+    _refuse(_asked(study), given, f"no trial of the study '{study.name}' gives it")
+
+
+def _refuse(asked: Sequence[str], given: set[str], why: str) -> None:
+    for metric in asked:
         if metric not in given:
-            close = nearest(metric, given)
+            close = nearest(metric, sorted(given))
             hint = f"; did you mean '{close}'?" if close else ""
-            raise InputError(f"metric '{metric}': no trial of the study '{study.name}' gives it{hint}")
+            raise InputError(f"metric '{metric}': {why}{hint}")
 
 
 def _write(path: Path, text: str) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from decimal import Decimal
 from typing import Any
 
@@ -12,7 +12,7 @@ from pydantic import Field, field_validator, model_validator
 
 from pilotage.core.config import Config
 
-MAX_VALUES = 100_000
+MAX_VALUES = 10_000
 """More values than this are a slip in the step."""
 
 
@@ -135,15 +135,16 @@ class Factor(Config):
             raise ValueError("expected the key that is varied")
         if self.levels is not None and (self.keys or self.multiply or not self.name):
             raise ValueError("levels set keys of their own: expected a name beside them, no key, no multiply")
-        twice_key = next((key for i, key in enumerate(self.keys) if key in self.keys[:i]), None)
+        twice_key = first_twice(self.keys)
         if twice_key is not None:
             raise ValueError(f"the key '{twice_key}' stands twice")
         found = self.settings()
         if not found:
             raise ValueError("an empty list of values")
         check_plain(self.levels if self.levels is not None else list(found), "values")
-        texts = [repr(value) for value in found]
-        twice = next((text for i, text in enumerate(texts) if text in texts[:i]), None)
+        if len(found) > MAX_VALUES:
+            raise ValueError(f"expected at most {MAX_VALUES} values, found {len(found)}")
+        twice = first_twice([repr(value) for value in found])
         if twice is not None:
             raise ValueError(f"the value {twice} stands twice")
         if self.multiply and not all(_is_number(value) for value in found):
@@ -169,6 +170,16 @@ class Factor(Config):
         source = self.range or self.log_range or self.random_range
         assert source is not None
         return source.values()
+
+
+def first_twice(texts: Iterable[str]) -> str | None:
+    """The first text that stands there a second time; None where each stands once."""
+    seen: set[str] = set()
+    for text in texts:
+        if text in seen:
+            return text
+        seen.add(text)
+    return None
 
 
 def check_plain(value: Any, where: str) -> None:

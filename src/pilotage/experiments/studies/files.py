@@ -7,7 +7,8 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-import yaml
+from pilotage.core.errors import InputError
+from pilotage.core.files import opened, read_yaml
 
 WORDS = frozenset({"mission", "description", "name", "kind"})
 """Keys that hold words, even where a file happens to be called like one."""
@@ -38,10 +39,13 @@ def digests(values: Any) -> dict[str, str]:
     while waiting:
         path = waiting.pop()
         if str(path) not in found:
-            content = path.read_bytes()
-            found[str(path)] = hashlib.sha256(content).hexdigest()[:16]
+            digest = hashlib.sha256()
+            with opened(path) as file:
+                while part := file.read(1 << 20):
+                    digest.update(part)
+            found[str(path)] = digest.hexdigest()[:16]
             if path.suffix in YAML:
-                waiting += _inside(content, path.parent)
+                waiting += _inside(path)
     return found
 
 
@@ -59,13 +63,13 @@ def _named(values: Any) -> Iterable[Path]:
             yield found
 
 
-def _inside(content: bytes, folder: Path) -> Iterable[Path]:
+def _inside(path: Path) -> Iterable[Path]:
     """What a YAML file names, such as a map's picture: relative to the file."""
     try:
-        values = yaml.safe_load(content)
-    except (yaml.YAMLError, ValueError):
+        values = read_yaml(path)
+    except InputError:
         return ()
-    return tuple(_named(anchored(values, (folder,))))
+    return tuple(_named(anchored(values, (path.parent,))))
 
 
 def _file(value: Any, folders: tuple[Path, ...]) -> Path | None:

@@ -7,9 +7,10 @@ import multiprocessing
 import os
 import pickle
 import signal
+import sys
 import threading
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from multiprocessing import resource_tracker
 from multiprocessing.connection import Connection, wait
@@ -18,7 +19,7 @@ from typing import Any
 
 from pilotage.experiments.studies.database import StudyStoppedError
 from pilotage.experiments.studies.trial import Outcome, Task, TrialRunner
-from pilotage.experiments.studies.workers import AHEAD, WAIT_S, Running
+from pilotage.experiments.studies.workers import AHEAD, WAIT_S, hung
 from pilotage.kernels.jit import cache_is_cold
 
 ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
@@ -33,10 +34,20 @@ class _Worker:
     tasks: list[Task] = field(default_factory=list)
     ready: bool = False
     since_s: float = 0.0
+    hung: bool = False
 
 
 class LocalWorkers:
     """Spawned processes, each with a pipe of its own.
+
+    Parameters
+    ----------
+    base
+        The mission's values before any cell's overrides.
+    timeout_s
+        Wall time after which the worker of a trial is killed.
+    memory_bytes
+        What a worker may allocate; where more is asked for its trial fails.
 
     Raises
     ------
@@ -44,8 +55,9 @@ class LocalWorkers:
         From ``outcomes``, where one worker after another dies before it can begin.
     """
 
-    def __init__(self, base: Mapping[str, Any], count: int) -> None:
+    def __init__(self, base: Mapping[str, Any], count: int, timeout_s: float, memory_bytes: int) -> None:
         self._base = dict(base)
+        self._timeout_s, self._memory_bytes = timeout_s, memory_bytes
         self._context = multiprocessing.get_context("spawn")
         # Where nothing is compiled yet, one of them does it for all.
         self._count = count
@@ -61,14 +73,14 @@ class LocalWorkers:
         """To the worker that has least to do."""
         worker = min(self._workers, key=lambda w: len(w.tasks))
         if not worker.tasks:
-            worker.since_s = time.monotonic()
+            worker.since_s = _now_s()
         worker.tasks.append(task)
         # One that has just died is seen to at the next look at the outcomes.
         with contextlib.suppress(OSError):
             worker.pipe.send(task)
 
     def outcomes(self) -> Iterator[Outcome]:
-        """What came through the pipes; a worker that died is replaced and its task told."""
+        """What came through the pipes; a worker that died or hung is replaced and its task told."""
         ready = wait([w.pipe for w in self._workers] + [w.process.sentinel for w in self._workers], WAIT_S)
         for number, worker in enumerate(list(self._workers)):
             # Read first, also what a worker left behind that has died since.
@@ -76,23 +88,18 @@ class LocalWorkers:
                 for outcome in self._received(worker):
                     yield outcome
                     self._fill_up()
-            if worker.process.sentinel in ready and not worker.process.is_alive():
+            if worker.tasks and worker.ready and _now_s() - worker.since_s > self._timeout_s:
+                worker.hung = True
+                worker.process.kill()
+                worker.process.join()
+            if not worker.process.is_alive() and (worker.hung or worker.process.sentinel in ready):
                 yield from self._replace(number)
-
-    def running(self) -> Sequence[Running]:
-        """The first task of every worker."""
-        now_s = time.monotonic()
-        return tuple(
-            Running(w.tasks[0].row, w.process.pid or 0, now_s - w.since_s)
-            for w in self._workers
-            if w.tasks and w.ready
-        )
 
     def _received(self, worker: _Worker) -> Iterator[Outcome]:
         try:
             while worker.pipe.poll():
                 message: Outcome | None = worker.pipe.recv()
-                worker.since_s = time.monotonic()
+                worker.since_s = _now_s()
                 if message is None:
                     worker.ready, self._stillborn = True, 0
                     continue
@@ -116,7 +123,9 @@ class LocalWorkers:
 
     def _start(self) -> _Worker:
         here, there = self._context.Pipe()
-        process = self._context.Process(target=_work, args=(there, self._base), daemon=True)
+        process = self._context.Process(
+            target=_work, args=(there, self._base, self._memory_bytes), daemon=True
+        )
         kept = {name: os.environ.get(name) for name in ONE_THREAD}
         os.environ.update(dict.fromkeys(ONE_THREAD, "1"))
         try:
@@ -151,9 +160,15 @@ class LocalWorkers:
             fresh.tasks.append(task)
             with contextlib.suppress(OSError):
                 fresh.pipe.send(task)
-        fresh.since_s = time.monotonic()
+        fresh.since_s = _now_s()
         if dead.tasks and dead.ready:
-            yield Outcome(dead.tasks[0].row, {}, {}, f"its worker died ({how})", retry=True)
+            row = dead.tasks[0].row
+            died = Outcome(row, {}, {}, f"its worker died ({how})", retry=True)
+            yield hung(row, self._timeout_s) if dead.hung else died
+
+
+def _now_s() -> float:
+    return time.monotonic()
 
 
 @contextlib.contextmanager
@@ -170,8 +185,9 @@ def _interrupts_held() -> Iterator[None]:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
-def _work(pipe: Connection, base: Mapping[str, Any]) -> None:
+def _work(pipe: Connection, base: Mapping[str, Any], memory_bytes: int) -> None:
     """A worker's life: run what comes, until the pipe closes."""
+    _bound_memory(memory_bytes)
     # Ctrl-C goes to the whole group: the parent decides.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     if hasattr(signal, "pthread_sigmask"):
@@ -184,6 +200,16 @@ def _work(pipe: Connection, base: Mapping[str, Any]) -> None:
             pipe.send(runner.run(pipe.recv()))
     except (EOFError, OSError):
         return
+
+
+def _bound_memory(most_bytes: int) -> None:
+    """Let what asks for more memory fail with a MemoryError, where the system knows how (Linux)."""
+    if sys.platform == "linux":
+        import resource
+
+        _, hard = resource.getrlimit(resource.RLIMIT_DATA)
+        most = most_bytes if hard == resource.RLIM_INFINITY else min(most_bytes, hard)
+        resource.setrlimit(resource.RLIMIT_DATA, (most, hard))
 
 
 def _end_with_parent() -> None:

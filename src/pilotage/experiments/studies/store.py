@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from pilotage.core.errors import InputError
+from pilotage.core.json_text import load_json
 from pilotage.experiments.studies.database import (
     DATABASE,
     SCHEMA,
@@ -26,16 +27,14 @@ from pilotage.experiments.studies.database import (
     checksum,
     close_gently,
     connect,
+    foreign_tables,
     is_full,
     put_in_place,
     telling,
 )
 from pilotage.experiments.studies.owners import ENDED, hear, others
-from pilotage.experiments.studies.rows import flat, read_rows
 from pilotage.experiments.studies.study import STUDY_FILE, Study, changes_told
 from pilotage.experiments.studies.trial import Outcome, Task
-
-__all__ = ["DATABASE", "Counts", "Store", "flat", "read_rows"]
 
 MAX_ATTEMPTS = 2
 """A trial that broke, and not by its mission's fault, is tried once more."""
@@ -90,11 +89,10 @@ class Store:
         self._db = connect(self.path)
         try:
             with telling(self.path), self._transaction():
-                tables = {name for (name,) in self._db.execute("select name from sqlite_master")}
-                if not tables:
+                if self._db.execute("select 1 from sqlite_master").fetchone() is None:
                     _fill(self._db, study)
                 else:
-                    self._check(study, tables)
+                    self._check(study)
         except BaseException:
             self._db.close()
             raise
@@ -128,6 +126,16 @@ class Store:
             return rows
 
         return [Task(row, cell, seed, ()) for row, cell, seed in self._written(claimed, "a claim")]
+
+    def retry_failed(self) -> int:
+        """Let the rows that failed wait once more; returns how many."""
+
+        def forgiven() -> int:
+            return self._db.execute(
+                "update trials set status = 'pending', attempts = 0, reason = '' where status = 'failed'"
+            ).rowcount
+
+        return self._written(forgiven, "what is to be tried again")
 
     def finish(self, outcome: Outcome) -> bool:
         """Write what came of a trial, in one transaction; only the first word on a row counts.
@@ -210,19 +218,18 @@ class Store:
                 self._db.execute("rollback")
             raise
 
-    def _check(self, study: Study, tables: set[str]) -> None:
-        if not {"meta", "owners", "trials"} <= tables:
+    def _check(self, study: Study) -> None:
+        if foreign_tables(self._db):
             raise InputError(
                 f"{self.path}: expected a study's database, found one with other tables; "
                 "give the study another folder"
             )
-        columns = {name for _, name, *_ in self._db.execute("pragma table_info(trials)")}
         found = dict(self._db.execute("select key, value from meta").fetchall())
-        if found.get("digest") == study.digest and "crc" in columns:
+        if found.get("digest") == study.digest:
             return
         raise InputError(
             f"{self.path.parent}: expected the study that it was made for, found another definition "
-            f"({changes_told(json.loads(found.get('essence', '{}')), study)}); "
+            f"({changes_told(load_json(found.get('essence', '{}'), str(self.path)), study)}); "
             "give it another name or folder"
         )
 

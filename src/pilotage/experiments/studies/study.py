@@ -15,6 +15,7 @@ import yaml
 
 from pilotage.core.config import validate
 from pilotage.core.errors import InputError, unknown_name
+from pilotage.core.files import read_values_text
 from pilotage.experiments.mission import mission_of, read_mission, shipped_missions
 from pilotage.experiments.oracles.applicable import check_oracles
 from pilotage.experiments.resolve import resolved_values
@@ -22,7 +23,7 @@ from pilotage.experiments.studies.cells import Cell, make_cells
 from pilotage.experiments.studies.definition import StudyDefinition
 from pilotage.experiments.studies.files import anchored, digests
 from pilotage.experiments.studies.groups import cell_groups
-from pilotage.experiments.values import parse_yaml, read_text
+from pilotage.experiments.values import parse_yaml
 
 SHIPPED = resources.files("pilotage.missions") / "studies"
 STUDY_FILE, MISSION_FILE = "study.yaml", "mission.yaml"
@@ -39,7 +40,7 @@ PRESENTATION = (
     "reference",
 )
 """What a definition says about its page only: it may change without touching a row."""
-MAX_ROWS = 10_000_000
+MAX_ROWS = 1_000_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,9 +129,8 @@ def load_study(name_or_path: str, changes: Mapping[str, Any] | None = None) -> S
         raise InputError(f"'{name_or_path}': expected a study's folder, found no {STUDY_FILE} in it")
     folder = Path()
     if path.suffix in {".yaml", ".yml"} or "/" in name_or_path:
-        if not path.is_file():
-            raise InputError(f"study '{name_or_path}': expected a YAML file or a study's folder, found none")
-        values, folder = parse_yaml(read_text(path), str(path)), path.parent
+        text = read_values_text(path, "a study's YAML file or folder")
+        values, folder = parse_yaml(text, str(path)), path.parent
     elif name_or_path in shipped_studies():
         values = parse_yaml((SHIPPED / f"{name_or_path}.yaml").read_text(encoding="utf-8"), name_or_path)
     else:

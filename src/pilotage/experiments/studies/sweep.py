@@ -9,10 +9,9 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-import yaml
-
 from pilotage.core.config import validate
 from pilotage.core.errors import InputError
+from pilotage.core.yaml_text import load_yaml
 from pilotage.experiments.mission import read_parameters
 from pilotage.experiments.studies.definition import StudyDefinition
 from pilotage.experiments.studies.study import Study, make_study
@@ -108,10 +107,7 @@ def parse_vary(text: str) -> dict[str, Any]:
         return {"key": key, "log_range": _log_range(text, *parts[:3])}
     if ":" in right and all(_is_number(part) for part in parts):
         raise InputError(f"--vary '{text}': expected a range as A:B:STEP")
-    try:
-        values = yaml.safe_load(f"[{right}]")
-    except (yaml.YAMLError, ValueError):
-        raise InputError(f"--vary '{text}': the values are not YAML") from None
+    values = load_yaml(f"[{right}]", f"--vary '{text}'")
     numbers = [_number(value) for value in values]
     return {"key": key, "values": numbers}
 

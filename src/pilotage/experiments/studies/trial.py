@@ -99,4 +99,6 @@ def _said(error: BaseException) -> str:
     if isinstance(error, OSError) and error.errno == errno.ENOSPC:
         return f"disk full: {error.filename or error.strerror}"
     words = " ".join(str(error).split())[:REASON_LENGTH]
+    if isinstance(error, MemoryError):
+        words = f"{words or 'out of memory'}; a worker's is bounded by --worker-memory"
     return f"{type(error).__name__}: {words}" if words else type(error).__name__

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator
 from typing import Protocol
 
 from pilotage.experiments.studies.trial import Outcome, Task
@@ -12,15 +11,6 @@ AHEAD = 2
 """Tasks that a worker holds: the one it runs and the next."""
 WAIT_S = 1.0
 """How long at most one look at the outcomes waits."""
-
-
-@dataclass(frozen=True, slots=True)
-class Running:
-    """A trial that runs: its row, the process that runs it, and for how long."""
-
-    row: int
-    pid: int
-    seconds: float
 
 
 class Workers(Protocol):
@@ -36,13 +26,14 @@ class Workers(Protocol):
         ...
 
     def outcomes(self) -> Iterator[Outcome]:
-        """What has ended since the last call; waits a moment where nothing has."""
-        ...
-
-    def running(self) -> Sequence[Running]:
-        """What runs now, as far as it is known."""
+        """What has ended since the last call, what hung included; waits a moment where nothing has."""
         ...
 
     def stop(self) -> None:
         """Stop at once; what runs is lost."""
         ...
+
+
+def hung(row: int, limit_s: float) -> Outcome:
+    """The outcome of a trial that was stopped after its time."""
+    return Outcome(row, {}, {}, f"stopped: it ran for more than {limit_s:g} s (--trial-timeout)")
