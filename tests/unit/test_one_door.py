@@ -71,7 +71,9 @@ def _is_shipped(owner: ast.expr) -> bool:
 
 
 def _is_for_writing(call: ast.Call) -> bool:
-    mode = call.args[0] if call.args else None
+    if not (isinstance(call.func, ast.Attribute) and call.func.attr == "open" and call.args):
+        return False
+    mode = call.args[0]
     return isinstance(mode, ast.Constant) and isinstance(mode.value, str) and mode.value[:1] in "wxa"
 
 

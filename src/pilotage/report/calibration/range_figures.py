@@ -11,7 +11,6 @@ from pilotage.report.calibration.folder import CalibrationData
 from pilotage.report.calibration.plots import histogram, panels_in_a_row
 from pilotage.report.style import BLUE, SKY, VERMILLION, Illustration, Key, render, series
 
-
 MOST_FIGURES = 24
 """A log may have a thousand columns; nobody looks at so many pictures, and a page of them opens nowhere."""
 
