@@ -8,7 +8,7 @@ from typing import Annotated, Any
 import typer
 
 from pilotage.cli.options import Json, Overrides, Plugins
-from pilotage.cli.output import print_columns, print_json
+from pilotage.cli.output import print_columns, print_json, print_line
 from pilotage.cli.study import (
     TIMEOUT_S,
     Dask,

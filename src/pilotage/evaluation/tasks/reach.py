@@ -67,7 +67,9 @@ class ReachTask:
         shortest = shortest_for(run, robot)
         route = route_of(robot)
         metrics = header(run, robot)
-        metrics |= planning_metrics(run, robot, shortest) if route is None else route_metrics(run, robot, route)
+        metrics |= (
+            planning_metrics(run, robot, shortest) if route is None else route_metrics(run, robot, route)
+        )
         driven, nees = driving_metrics(run, robot)
         extras = {} if shortest is None else {f"{robot.name}/shortest_path": shortest.points_xy_m}
         metrics |= driven
