@@ -61,7 +61,7 @@ class TransformTree:
             return None
         root_pose, root_moved = up[common]
         leaf_pose, leaf_moved = down[common]
-        return np.linalg.solve(root_pose, leaf_pose), root_moved or leaf_moved
+        return np.asarray(np.linalg.solve(root_pose, leaf_pose), dtype=np.float64), root_moved or leaf_moved
 
     def _to_top(self, frame: str) -> dict[str, tuple[FloatArray, bool]]:
         """Pose of ``frame`` in the frame of each of its ancestors, itself included, in this order."""
