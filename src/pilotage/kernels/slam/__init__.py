@@ -1,0 +1,1 @@
+"""Kernels of SLAM's back end: sparse least squares over planar poses."""

@@ -1,0 +1,215 @@
+"""Laser scans and odometry of ROS 1 bags, ROS 2 bags and MCAP files (extra ``ros``).
+
+Times are those of the messages' headers (of receipt where a driver left them 0). Odometry is the first topic
+of ``nav_msgs/Odometry``, else the transforms of a frame that moves above the scanner's. Poses in space are
+laid on the floor: x, y and the heading remain.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pilotage.core.errors import InputError
+from pilotage.core.types import FloatArray
+from pilotage.logs.bag_messages import OpenBag, Topic, open_damaged, open_whole
+from pilotage.logs.laser_log import LaserLog, RawScan, assemble
+from pilotage.logs.scanner_mount import TransformTree, frame_name, mount_of
+
+SCAN_TYPE = "sensor_msgs/msg/LaserScan"
+ODOMETRY_TYPE = "nav_msgs/msg/Odometry"
+TRANSFORM_TYPES = frozenset({"tf2_msgs/msg/TFMessage", "tf/msg/tfMessage"})
+USUAL_BASES = ("base_footprint", "base_link")
+USUAL_ODOMETRY_FRAMES = ("odom", "odom_combined")
+"""Frames of REP 105, for odometry that was recorded as transforms only."""
+USUAL_TOPICS = ("/scan", "/odom")
+"""Taken before others of the same type."""
+
+
+def read_bag(path: Path, scan_topic: str | None = None, odometry_topic: str | None = None) -> LaserLog:
+    """Read the scans and the odometry of a bag.
+
+    A bag that is cut or damaged is read as far as it goes; the log's ``warnings`` say so.
+
+    Parameters
+    ----------
+    path
+        ``.bag``, ``.db3``, ``.mcap`` (told by their first bytes), or the folder of a ROS 2 bag.
+    scan_topic, odometry_topic
+        By default the only ones of their types; of several, ``/scan`` and ``/odom``, else those with most
+        messages.
+
+    Raises
+    ------
+    InputError
+        Where ``rosbags`` is missing, the path is no bag, or the topics are not in it; the message then
+        tells what it holds.
+    """
+    with ExitStack() as stack:
+        bag = open_whole(path, stack)
+        if bag is not None:
+            picked = _pick(bag, path, scan_topic, odometry_topic)
+            try:
+                return _collect(bag, path, picked)
+            except InputError:
+                raise
+            except Exception:  # the library fails in many ways on a damaged part
+                bag = None
+    bag = open_damaged(path)
+    return _collect(bag, path, _pick(bag, path, scan_topic, odometry_topic))
+
+
+@dataclass(frozen=True, slots=True)
+class _Picked:
+    scan: str
+    odometry: str | None
+    transforms: tuple[str, ...]
+    warnings: tuple[str, ...]
+
+
+def _pick(bag: OpenBag, path: Path, scan_topic: str | None, odometry_topic: str | None) -> _Picked:
+    said = list(bag.warnings)
+    scan = _topic(bag, path, SCAN_TYPE, "laser scans", scan_topic, said)
+    if scan is None:
+        raise InputError(f"{path}: expected a topic of {SCAN_TYPE}, {_holds(bag.topics)}")
+    odometry = _topic(bag, path, ODOMETRY_TYPE, "odometry", odometry_topic, said)
+    transforms = tuple(topic.name for topic in bag.topics if topic.msgtype in TRANSFORM_TYPES)
+    return _Picked(scan, odometry, transforms, tuple(said))
+
+
+def _topic(
+    bag: OpenBag, path: Path, msgtype: str, what: str, asked: str | None, said: list[str]
+) -> str | None:
+    fitting = [topic for topic in bag.topics if topic.msgtype == msgtype and topic.count]
+    if asked is not None:
+        wanted = "/" + asked.lstrip("/")
+        if not any("/" + topic.name.lstrip("/") == wanted for topic in fitting):
+            raise InputError(f"{path}: expected the topic {wanted} of {msgtype}, {_holds(bag.topics)}")
+        return next(topic.name for topic in fitting if "/" + topic.name.lstrip("/") == wanted)
+    if not fitting:
+        return None
+    best = max(fitting, key=lambda topic: (topic.name in USUAL_TOPICS, topic.count))
+    if len(fitting) > 1:
+        others = ", ".join(topic.name for topic in fitting if topic is not best)
+        said.append(f"{what} are taken from {best.name} (also there: {others})")
+    return best.name
+
+
+def _holds(topics: Sequence[Topic]) -> str:
+    return "found " + (", ".join(map(str, topics)) if topics else "no topics")
+
+
+@dataclass(slots=True)
+class _Collected:
+    scans: list[RawScan] = field(default_factory=list)
+    scan_frame: str = ""
+    base_frame: str = ""
+    odometry_t_s: list[float] = field(default_factory=list)
+    odometry: list[tuple[float, float, float]] = field(default_factory=list)
+    tree: TransformTree = field(default_factory=TransformTree)
+    tf_odometry: list[tuple[str, float, float, float, float]] = field(default_factory=list)
+    damaged: int = 0
+    unstamped: int = 0
+
+
+def _collect(bag: OpenBag, path: Path, picked: _Picked) -> LaserLog:
+    found = _Collected()
+    names = {picked.scan, *picked.transforms} | ({picked.odometry} if picked.odometry else set())
+    for topic, time_ns, message in bag.messages(names):
+        if message is None:
+            found.damaged += 1
+        elif topic == picked.scan:
+            _add_scan(found, message, time_ns)
+        elif topic == picked.odometry:
+            _add_odometry(found, message, time_ns)
+        else:
+            _add_transforms(found, message, time_ns, keep_moving=picked.odometry is None)
+    said = list(picked.warnings)
+    if found.damaged:
+        said.append(f"{found.damaged} messages that cannot be read were passed over")
+    if found.unstamped:
+        said.append(f"{found.unstamped} messages carry no time: the time of receipt is used")
+    t_s, poses = _odometry(found, said)
+    mount = mount_of(found.tree, found.base_frame or _base(found), found.scan_frame)
+    if not found.scans:
+        raise InputError(f"{path}: expected laser scans in {picked.scan}, found none that can be read")
+    return assemble(
+        path.name, found.scans, mount.pose, mount.upside_down, t_s, poses, [*said, *mount.warnings]
+    )
+
+
+def _stamp_s(found: _Collected, header: Any, time_ns: int) -> float:
+    seconds, nanoseconds = int(header.stamp.sec), int(header.stamp.nanosec)
+    if seconds == 0 and nanoseconds == 0:
+        found.unstamped += 1
+        return time_ns * 1e-9
+    return seconds + nanoseconds * 1e-9
+
+
+def _add_scan(found: _Collected, message: Any, time_ns: int) -> None:
+    if not found.scans:
+        found.scan_frame = message.header.frame_id
+    found.scans.append(
+        RawScan(
+            _stamp_s(found, message.header, time_ns),
+            np.asarray(message.ranges, dtype=np.float64),
+            float(message.angle_min),
+            float(message.angle_increment),
+            float(message.range_min),
+            float(message.range_max),
+        )
+    )
+
+
+def _add_odometry(found: _Collected, message: Any, time_ns: int) -> None:
+    found.base_frame = found.base_frame or frame_name(message.child_frame_id)
+    point, turn = message.pose.pose.position, message.pose.pose.orientation
+    found.odometry_t_s.append(_stamp_s(found, message.header, time_ns))
+    found.odometry.append((float(point.x), float(point.y), _heading(turn)))
+
+
+def _add_transforms(found: _Collected, message: Any, time_ns: int, keep_moving: bool) -> None:
+    for transform in message.transforms:
+        found.tree.add(transform)
+        if keep_moving and frame_name(transform.header.frame_id) in USUAL_ODOMETRY_FRAMES:
+            shift, turn = transform.transform.translation, transform.transform.rotation
+            found.tf_odometry.append(
+                (
+                    frame_name(transform.child_frame_id),
+                    _stamp_s(found, transform.header, time_ns),
+                    float(shift.x),
+                    float(shift.y),
+                    _heading(turn),
+                )
+            )
+
+
+def _heading(turn: Any) -> float:
+    """Heading of a quaternion; NaN for one that is none, so that the reading is left out."""
+    x, y, z, w = float(turn.x), float(turn.y), float(turn.z), float(turn.w)
+    if not math.isfinite(x + y + z + w) or abs(x) + abs(y) + abs(z) + abs(w) < 1e-6:
+        return math.nan
+    return math.atan2(2.0 * (w * z + x * y), w * w + x * x - y * y - z * z)
+
+
+def _odometry(found: _Collected, said: list[str]) -> tuple[FloatArray, FloatArray]:
+    if not found.odometry and found.tf_odometry:
+        child = found.tf_odometry[0][0]
+        rows = np.array([row[1:] for row in found.tf_odometry if row[0] == child])
+        found.base_frame = child
+        said.append(f"no topic of {ODOMETRY_TYPE}: odometry is taken from the transforms of '{child}'")
+        return rows[:, 0], rows[:, 1:]
+    return np.array(found.odometry_t_s), np.array(found.odometry).reshape(-1, 3)
+
+
+def _base(found: _Collected) -> str:
+    """The robot's frame where odometry does not name it: a usual one, else the scanner's own."""
+    known = found.tree.parents
+    frames = set(known) | {parent for parent, _ in known.values()}
+    return next((frame for frame in USUAL_BASES if frame in frames), found.scan_frame)

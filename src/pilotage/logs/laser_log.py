@@ -1,0 +1,263 @@
+"""What a laser SLAM needs of a recording, in one form for bags and CARMEN logs.
+
+The readers (``logs.bags``, ``laser_log_of_carmen``) hand over what was recorded as ``RawScan`` values;
+``assemble`` brings it into order: scans by time, beams counter-clockwise, ranges of three kinds only. What it
+had to put right is said in ``warnings``; nothing is dropped without a word.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from pilotage.core.angles import wrap_array_to_pi
+from pilotage.core.errors import InputError
+from pilotage.core.types import FloatArray, IntArray, Pose2
+from pilotage.logs.carmen import CarmenLog, read_carmen
+
+CARMEN_RANGE_MIN_M = 0.05
+CARMEN_RANGE_MAX_M = 80.0
+"""A CARMEN scan of the old form says nothing of its limits; the SICK scanners in use then reach 80 m."""
+
+
+@dataclass(frozen=True, slots=True)
+class RawScan:
+    """One scan as it was recorded: beam ``k`` looks along ``first_angle_rad + k * angle_step_rad``."""
+
+    t_s: float
+    ranges_m: FloatArray
+    first_angle_rad: float
+    angle_step_rad: float
+    range_min_m: float
+    range_max_m: float
+
+
+@dataclass(frozen=True, slots=True)
+class LaserLog:
+    """Scans with odometry, in the order of time.
+
+    Attributes
+    ----------
+    name
+        The file's name, for messages.
+    t_s
+        (N,) times of the scans, not decreasing.
+    ranges_m
+        (N, B); a row shorter than B ends in NaN. Within [range_min_m, range_max_m], or ``inf``: nothing
+        within reach, or ``nan``: no measurement (or nearer than the scanner can tell).
+    beams
+        (N,) how many entries of each row are beams.
+    first_angle_rad, angle_step_rad
+        (N,) direction of each scan's first beam, and the positive angle between two: counter-clockwise in the
+        frame of ``mount``, an upside-down scanner's beams being turned round.
+    range_min_m, range_max_m
+        The scanner's limits.
+    mount
+        Pose of the scanner on the robot.
+    upside_down
+        Whether the scanner was mounted so; already accounted for in the angles.
+    odometry_t_s, odometry
+        (M,) increasing times and (M, 3) poses x, y, theta as logged; None without odometry.
+    warnings
+        What was missing, damaged or put right, a sentence each.
+    """
+
+    name: str
+    t_s: FloatArray
+    ranges_m: FloatArray
+    beams: IntArray
+    first_angle_rad: FloatArray
+    angle_step_rad: FloatArray
+    range_min_m: float
+    range_max_m: float
+    mount: Pose2
+    upside_down: bool
+    odometry_t_s: FloatArray | None
+    odometry: FloatArray | None
+    warnings: tuple[str, ...] = ()
+
+    def __len__(self) -> int:
+        return int(self.t_s.shape[0])
+
+    def angles_rad(self, scan: int) -> FloatArray:
+        """Return (B,) the directions of a scan's beams in the frame of ``mount``; NaN behind the last one."""
+        k = np.arange(self.ranges_m.shape[1], dtype=np.float64)
+        k[int(self.beams[scan]) :] = np.nan
+        return np.asarray(self.first_angle_rad[scan] + self.angle_step_rad[scan] * k)
+
+    def odometry_at_scans(self) -> FloatArray | None:
+        """Return (N, 3) the odometry at the scans' times, or None without odometry.
+
+        Position and heading are interpolated linearly (heading along the shorter arc); before the first and
+        after the last reading that one stays.
+        """
+        if self.odometry_t_s is None or self.odometry is None:
+            return None
+        return interpolate_poses(self.odometry_t_s, self.odometry, self.t_s)
+
+
+def interpolate_poses(t_s: FloatArray, poses: FloatArray, at_s: FloatArray) -> FloatArray:
+    """Return (K, 3) poses at the times ``at_s`` from poses (M, 3) at increasing times ``t_s`` (M,)."""
+    heading = np.unwrap(poses[:, 2])
+    columns = [np.interp(at_s, t_s, values) for values in (poses[:, 0], poses[:, 1], heading)]
+    columns[2] = wrap_array_to_pi(columns[2])
+    return np.column_stack(columns)
+
+
+def assemble(
+    name: str,
+    scans: Sequence[RawScan],
+    mount: Pose2,
+    upside_down: bool,
+    odometry_t_s: FloatArray,
+    odometry: FloatArray,
+    warnings: Sequence[str] = (),
+) -> LaserLog:
+    """Bring scans and odometry into order.
+
+    Parameters
+    ----------
+    scans
+        At least one, in the order of the file.
+    odometry_t_s, odometry
+        (M,), (M, 3) in the order of the file; M = 0: none was recorded.
+    warnings
+        What the reader has to say already.
+
+    Raises
+    ------
+    InputError
+        Where not one scan has a beam.
+    """
+    said = list(warnings)
+    with_beams = [scan for scan in scans if scan.ranges_m.size and _is_usable(scan)]
+    if len(with_beams) < len(scans):
+        said.append(f"{len(scans) - len(with_beams)} scans without beams, times or angles were left out")
+    if not with_beams:
+        raise InputError(f"{name}: expected laser scans, found {len(scans)} scans without a usable beam")
+    with_beams = [with_beams[k] for k in _by_time(np.array([s.t_s for s in with_beams]), "scans", said)]
+    t_s = np.array([scan.t_s for scan in with_beams])
+    beams = np.array([scan.ranges_m.size for scan in with_beams], dtype=np.int64)
+    if beams.min() < beams.max():
+        sizes = ", ".join(str(size) for size in np.unique(beams)[:8])
+        said.append(f"the number of beams changes from scan to scan ({sizes})")
+    first = np.array([scan.first_angle_rad for scan in with_beams])
+    step = np.array([scan.angle_step_rad for scan in with_beams])
+    ranges_m = np.full((beams.size, int(beams.max())), np.nan)
+    # A turned-over scanner sees its beams mirrored; a scanner of falling angles counts them clockwise.
+    clockwise = (step < 0.0) != upside_down
+    last = first + step * (beams - 1)
+    for row, scan in enumerate(with_beams):
+        ranges_m[row, : beams[row]] = scan.ranges_m[::-1] if clockwise[row] else scan.ranges_m
+    sign = -1.0 if upside_down else 1.0
+    range_min_m = float(np.median([scan.range_min_m for scan in with_beams]))
+    range_max_m = float(np.median([scan.range_max_m for scan in with_beams]))
+    no_times, poses = _in_order(odometry_t_s, odometry, said)
+    if no_times is None:
+        said.append("no odometry")
+    elif no_times[0] > t_s[0] + 1.0 or no_times[-1] < t_s[-1] - 1.0:
+        said.append(
+            f"odometry covers {no_times[0]:.1f} s to {no_times[-1]:.1f} s, "
+            f"the scans {t_s[0]:.1f} s to {t_s[-1]:.1f} s"
+        )
+    return LaserLog(
+        name,
+        t_s,
+        _three_kinds(ranges_m, range_min_m, range_max_m),
+        beams,
+        np.where(clockwise, sign * last, sign * first),
+        np.abs(step),
+        range_min_m,
+        range_max_m,
+        mount,
+        upside_down,
+        no_times,
+        poses,
+        tuple(said),
+    )
+
+
+def _is_usable(scan: RawScan) -> bool:
+    numbers = (scan.t_s, scan.first_angle_rad, scan.angle_step_rad, scan.range_min_m, scan.range_max_m)
+    finite = all(math.isfinite(number) for number in numbers[:4])  # a limit of infinity is one
+    return finite and not math.isnan(numbers[4]) and (scan.angle_step_rad != 0.0 or scan.ranges_m.size == 1)
+
+
+def _three_kinds(ranges_m: FloatArray, least: float, most: float) -> FloatArray:
+    """Ranges as REP 117 has them: measured, infinite (nothing within reach), NaN (no measurement)."""
+    with np.errstate(invalid="ignore"):
+        out = np.where(ranges_m > most, np.inf, ranges_m)
+        # Zero is what many drivers write for no measurement, also where the least range is zero.
+        return np.where((out < least) | (out <= 0.0), np.nan, out)
+
+
+def _by_time(t_s: FloatArray, what: str, said: list[str]) -> IntArray:
+    """Return the order of time; equal times stay in the order of the file."""
+    back = np.diff(t_s)
+    wrong = np.flatnonzero(back < 0.0)
+    if wrong.size:
+        said.append(
+            f"{wrong.size} times of the {what} go back (by {-back.min():.3f} s at most): sorted by time"
+        )
+    same = int(np.count_nonzero(np.diff(np.sort(t_s)) == 0.0))
+    if same:
+        said.append(f"{same} of the {what} carry the time of the one before")
+    return np.argsort(t_s, kind="stable")
+
+
+def _in_order(
+    t_s: FloatArray, poses: FloatArray, said: list[str]
+) -> tuple[FloatArray, FloatArray] | tuple[None, None]:
+    """Odometry by increasing times, all finite; of two readings of a time the later counts."""
+    poses = poses.reshape(-1, 3)
+    finite = np.isfinite(t_s) & np.isfinite(poses).all(axis=1)
+    if not finite.all():
+        said.append(f"{int(np.count_nonzero(~finite))} odometry readings that are not finite were left out")
+    t_s, poses = t_s[finite], poses[finite]
+    if t_s.size == 0:
+        return None, None
+    notes: list[str] = []
+    order = _by_time(t_s, "odometry", notes)
+    said.extend(note for note in notes if "go back" in note)
+    t_s, poses = t_s[order], poses[order]
+    kept = np.append(np.diff(t_s) > 0.0, True)
+    out = poses[kept]
+    out[:, 2] = wrap_array_to_pi(out[:, 2])
+    return t_s[kept], out
+
+
+def read_carmen_scans(path: Path) -> LaserLog:
+    """Read a CARMEN log (InputError as ``read_carmen`` has it) as a laser log."""
+    return laser_log_of_carmen(read_carmen(path), path.name)
+
+
+def laser_log_of_carmen(log: CarmenLog, name: str) -> LaserLog:
+    """Bring a CARMEN log into this form.
+
+    Odometry is that of the ODOM lines, or the robot's poses of the scans where there are none. The mount is
+    the median pose of the laser relative to the robot.
+    """
+    step = float(log.angles_rad[1] - log.angles_rad[0]) if log.angles_rad.size > 1 else 0.0
+    scans = [
+        RawScan(float(t), ranges, float(log.angles_rad[0]), step, CARMEN_RANGE_MIN_M, CARMEN_RANGE_MAX_M)
+        for t, ranges in zip(log.t_s, log.ranges_m, strict=True)
+    ]
+    said = []
+    t_s, poses = log.odometry_t_s, log.odometry
+    if t_s.size == 0:
+        t_s, poses = log.t_s, log.robot_poses
+        said.append("no ODOM lines: odometry is what the scans carry")
+    return assemble(name, scans, _mount(log), False, t_s, poses, said)
+
+
+def _mount(log: CarmenLog) -> Pose2:
+    offset = log.laser_poses - log.robot_poses
+    c, s = np.cos(log.robot_poses[:, 2]), np.sin(log.robot_poses[:, 2])
+    x = c * offset[:, 0] + s * offset[:, 1]
+    y = -s * offset[:, 0] + c * offset[:, 1]
+    turn = wrap_array_to_pi(offset[:, 2])
+    return Pose2(float(np.median(x)), float(np.median(y)), float(np.median(turn)))

@@ -1,0 +1,24 @@
+"""The library ``rosbags``, imported when it is first needed: it is an extra."""
+
+from __future__ import annotations
+
+import importlib
+from typing import Any
+
+from pilotage.core.errors import InputError
+
+
+def rosbags(module: str) -> Any:
+    """Return the module ``rosbags.<module>``.
+
+    Raises
+    ------
+    InputError
+        Where the library is not installed, with the remedy.
+    """
+    try:
+        return importlib.import_module(f"rosbags.{module}")
+    except ImportError:
+        raise InputError(
+            "bags are read by the library rosbags, which is not installed: pip install pilotage[ros]"
+        ) from None
