@@ -1,7 +1,8 @@
-"""``pilotage evaluate``: an estimated trajectory against its reference."""
+"""``pilotage evaluate``: an estimated trajectory against its reference, or against true relations."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated
 
@@ -14,16 +15,36 @@ from pilotage.core.errors import InputError, unknown_name
 
 def evaluate(
     estimate: Annotated[Path, typer.Argument(metavar="ESTIMATE", help="The trajectory to judge.")],
-    reference: Annotated[Path, typer.Argument(metavar="REFERENCE", help="The true one.")],
+    reference: Annotated[Path, typer.Argument(metavar="REFERENCE", help="The true one, or relations.")],
     form: Annotated[
         str | None,
         typer.Option("--format", metavar="tum|kitti", help="Format of both; by default told by the columns."),
     ] = None,
     align: Annotated[bool, typer.Option("--align", help="Rotate and shift the estimate first.")] = False,
     scale: Annotated[bool, typer.Option("--scale", help="Correct the estimate's scale first.")] = False,
+    relations: Annotated[
+        bool, typer.Option("--relations", help="REFERENCE holds the SLAM benchmark's relations.")
+    ] = False,
+    tolerance: Annotated[
+        float | None,
+        typer.Option(
+            "--tolerance",
+            metavar="SECONDS",
+            help="A pose this near is that of a relation (by default 0.001).",
+        ),
+    ] = None,
     json: Json = False,
 ) -> int:
     """Say how far an estimated trajectory is from its reference (absolute and relative errors)."""
+    if relations:
+        if align or scale or form not in {None, "tum"}:
+            raise InputError(
+                "evaluate: expected --relations without --align, --scale and --format kitti: "
+                "relations need neither alignment nor scale, but times"
+            )
+        return _print(_relations(estimate, reference, tolerance), json)
+    if tolerance is not None:
+        raise InputError("evaluate: expected --tolerance together with --relations only")
     from pilotage.evaluation.trajectory import trajectory_errors
     from pilotage.logs.trajectories import TrajectoryFormat, guess_format, read_trajectory
 
@@ -48,6 +69,22 @@ def evaluate(
         )
     errors = trajectory_errors(found, true, align=align, scale=scale)
     answer = {**errors.summary(), "format": form, "align": align, "scale_corrected": scale}
+    return _print(answer, json)
+
+
+def _relations(estimate: Path, reference: Path, tolerance: float | None) -> dict[str, float | int | str]:
+    from pilotage.evaluation.relations import MAX_TIME_DIFFERENCE_S, relation_errors
+    from pilotage.logs.relations import read_relations
+    from pilotage.logs.trajectories import read_tum
+
+    within_s = MAX_TIME_DIFFERENCE_S if tolerance is None else tolerance
+    if not 0.0 <= within_s < float("inf"):
+        raise InputError(f"--tolerance: expected seconds of at least 0, found {within_s}")
+    errors = relation_errors(read_tum(estimate), read_relations(reference), within_s)
+    return {**errors.summary(), "tolerance_s": within_s}
+
+
+def _print(answer: Mapping[str, float | int | str | bool], json: bool) -> int:
     if json:
         print_json(answer)
     else:

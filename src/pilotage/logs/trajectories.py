@@ -15,6 +15,7 @@ from scipy.spatial.transform import Rotation
 
 from pilotage.core.errors import InputError
 from pilotage.core.types import FloatArray
+from pilotage.core.whole_file import write_whole
 from pilotage.logs.text import check_size, check_times, read_lines, read_table
 
 TUM_COLUMNS = ("t", "x", "y", "z", "qx", "qy", "qz", "qw")
@@ -117,3 +118,17 @@ def read_kitti(path: Path) -> Trajectory3:
     if bad.size:
         raise InputError(f"{table.place(int(bad[0]))}: expected a rotation matrix in columns 1-3, 5-7, 9-11")
     return Trajectory3(None, np.ascontiguousarray(poses[:, :, 3]), rotations)
+
+
+def write_planar_tum(path: Path, t_s: FloatArray, poses: FloatArray) -> None:
+    """Write planar poses (N, 3) as a TUM trajectory; times to the microsecond, the rest to 9 digits.
+
+    Raises
+    ------
+    OSError
+        Where the file cannot be written.
+    """
+    half = 0.5 * poses[:, 2]
+    rows = zip(t_s, poses[:, 0], poses[:, 1], np.sin(half), np.cos(half), strict=True)
+    lines = [f"{t:.6f} {x:.9f} {y:.9f} 0 0 0 {s:.9f} {c:.9f}\n" for t, x, y, s, c in rows]
+    write_whole(path, "".join(lines))

@@ -28,8 +28,8 @@ class PoseGraph:
     measurements
         (M, 3) pose j as seen from pose i.
     information
-        (M, 3, 3) inverse covariances of the logarithm of ``measurements^-1 (pose_i^-1 pose_j)``, symmetric and positive
-        semi-definite.
+        (M, 3, 3) inverse covariances of the logarithm of ``measurements^-1 (pose_i^-1 pose_j)``, symmetric
+        and positive semi-definite.
 
     Raises
     ------
@@ -103,7 +103,7 @@ def first_of_components(graph: PoseGraph) -> BoolArray:
 
 def is_information(matrices: FloatArray) -> BoolArray:
     """Return (M,) which of (M, 3, 3) are finite, symmetric and positive semi-definite up to rounding."""
-    finite: BoolArray = np.isfinite(matrices).all(axis=(1, 2))
+    finite = np.asarray(np.isfinite(matrices).all(axis=(1, 2)))
     known = np.where(finite[:, None, None], matrices, 0.0)
     size = np.abs(known).max(axis=(1, 2), initial=0.0)
     turned = np.abs(known - known.transpose(0, 2, 1)).max(axis=(1, 2), initial=0.0)

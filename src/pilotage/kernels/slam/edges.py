@@ -26,7 +26,8 @@ def robust(kind: int, scale: float, square: float) -> tuple[float, float]:
     """``rho(s)`` and its slope at ``s = e' Omega e``, with ``scale`` in standard deviations.
 
     Huber, Cauchy and Geman-McClure as in Zhang, "Parameter estimation techniques", 1997 (rho ~ s for small
-    s); dynamic covariance scaling (DCS) after Agarwal and others, ICRA 2013, with ``Phi = scale^2``.
+    s); dynamic covariance scaling (DCS) after Agarwal and others, ICRA 2013, with ``Phi = scale^2``,
+    as the loss that MacTavish and Barfoot (2015) give for it.
     """
     c = scale * scale
     if kind == HUBER:
@@ -43,7 +44,7 @@ def robust(kind: int, scale: float, square: float) -> tuple[float, float]:
         if square <= c:
             return square, 1.0
         w = 2.0 * c / (c + square)
-        return square * w * w + c * (1.0 - w) * (1.0 - w), w * w
+        return 2.0 * square * w - c, w * w
     return square, 1.0
 
 

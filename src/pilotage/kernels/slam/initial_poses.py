@@ -1,9 +1,9 @@
 """Start values of a planar pose graph that need no start values: two linear problems.
 
 First the headings as free complex numbers, ``sum kappa |u_j - u_i exp(i theta_z)|^2``, then, with those
-headings, the positions (Carlone, Tron, Daniilidis and Dellaert, "Initialization techniques for 3D SLAM", ICRA 2015,
-the chordal relaxation). Both have the pattern of the pose graph, so that its factorization serves. Wrong
-loop closures pull these start values as they pull any least squares.
+headings, the positions (Carlone, Tron, Daniilidis and Dellaert, "Initialization techniques for 3D SLAM",
+ICRA 2015, the chordal relaxation). Both have the pattern of the pose graph, so that its factorization serves.
+Wrong loop closures pull these start values as they pull any least squares.
 """
 
 from __future__ import annotations

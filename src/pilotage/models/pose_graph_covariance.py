@@ -1,0 +1,122 @@
+"""How sure the poses of an optimized pose graph are, and how sure one is as seen from another."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pilotage.core.errors import InputError
+from pilotage.core.types import BoolArray, FloatArray, IntArray
+from pilotage.kernels.slam.block_cholesky import factorize
+from pilotage.kernels.slam.covariances import inverse_blocks
+from pilotage.kernels.slam.edges import SQUARE, normal_equations
+from pilotage.models.pose_graph import PoseGraph
+from pilotage.models.pose_graph_solver import Elimination, check_fixed, eliminate
+
+
+@dataclass(frozen=True, slots=True)
+class PoseCovariances:
+    """Covariances of the poses of a graph, from the factor of its information matrix.
+
+    They hold to first order around the graph's poses, given that its information matrices are true and all
+    its edges right.
+    """
+
+    graph: PoseGraph
+    plan: Elimination
+    diagonal: FloatArray
+    below: FloatArray
+
+    def marginals(self, poses: IntArray | None = None) -> FloatArray:
+        """Return (K, 3, 3) covariances of x, y, theta in the map; by default of all poses.
+
+        Those of fixed poses are zero.
+        """
+        k = np.arange(len(self.graph)) if poses is None else np.asarray(poses, dtype=np.int64)
+        return self._blocks(k, k)[0]
+
+    def relative(self, i: IntArray, j: IntArray) -> FloatArray:
+        """Return (K, 3, 3) covariances of x, y, theta of pose j as seen from pose i."""
+        i, j = np.asarray(i, dtype=np.int64), np.asarray(j, dtype=np.int64)
+        own_i, own_j, mixed = self._blocks(i, j)
+        by_i, by_j = relative_jacobians(self.graph.poses[i], self.graph.poses[j])
+        turned_i, turned_j = by_i.transpose(0, 2, 1), by_j.transpose(0, 2, 1)
+        cross = by_i @ mixed @ turned_j
+        out = by_i @ own_i @ turned_i + by_j @ own_j @ turned_j + cross + cross.transpose(0, 2, 1)
+        return np.asarray(0.5 * (out + out.transpose(0, 2, 1)))
+
+    def _blocks(self, i: IntArray, j: IntArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        for index in (i, j):
+            if index.size and not (index.min() >= 0 and index.max() < len(self.graph)):
+                raise InputError(f"covariances: expected poses 0 to {len(self.graph) - 1}, found others")
+        return inverse_blocks(
+            self.plan.column_start,
+            self.plan.rows,
+            self.diagonal,
+            self.below,
+            self.plan.column[i],
+            self.plan.column[j],
+        )
+
+
+def covariances(
+    graph: PoseGraph, *, fixed: BoolArray | None = None, weights: FloatArray | None = None
+) -> PoseCovariances:
+    """Factorize the information matrix of a graph at its poses.
+
+    Parameters
+    ----------
+    fixed
+        (N,) as in ``optimize``; the covariances are relative to these poses.
+    weights
+        (M,) how much each edge counts, such as the weights of a robust loss; by default 1.
+
+    Raises
+    ------
+    InputError
+        Where arrays do not fit, or the edges leave a pose undetermined.
+    """
+    plan = eliminate(graph, check_fixed(graph, fixed))
+    information = graph.information
+    if weights is not None:
+        if weights.shape != graph.i.shape or not (weights >= 0.0).all():
+            raise InputError(f"covariances: expected {graph.i.size} weights of at least 0")
+        information = information * weights[:, None, None]
+    n = plan.column_start.size - 1
+    diagonal, below, right = np.empty((n, 9)), np.empty((plan.rows.size, 9)), np.empty((n, 3))
+    normal_equations(
+        graph.poses,
+        graph.i,
+        graph.j,
+        graph.measurements,
+        information,
+        SQUARE,
+        1.0,
+        np.zeros(graph.i.size, dtype=np.bool_),
+        plan.column,
+        plan.places,
+        plan.turned,
+        diagonal,
+        below,
+        right,
+    )
+    done = factorize(plan.column_start, plan.rows, diagonal, below)
+    if done != n:
+        pose = int(np.flatnonzero(plan.column == -1 - done)[0])
+        raise InputError(f"covariances: expected edges that determine all poses, found pose {pose} loose")
+    return PoseCovariances(graph, plan, diagonal, below)
+
+
+def relative_jacobians(first: FloatArray, second: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Jacobians (K, 3, 3) of x, y, theta of ``second`` seen from ``first``, (K, 3) each, by the two poses."""
+    c, s = np.cos(first[:, 2]), np.sin(first[:, 2])
+    dx, dy = second[:, 0] - first[:, 0], second[:, 1] - first[:, 1]
+    by_second = np.zeros((first.shape[0], 3, 3))
+    by_second[:, 0, 0] = by_second[:, 1, 1] = c
+    by_second[:, 0, 1], by_second[:, 1, 0] = s, -s
+    by_second[:, 2, 2] = 1.0
+    by_first = -by_second
+    by_first[:, 0, 2] = -s * dx + c * dy
+    by_first[:, 1, 2] = -c * dx - s * dy
+    return by_first, by_second
