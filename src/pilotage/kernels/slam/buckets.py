@@ -1,0 +1,85 @@
+"""Points sorted into square buckets: the nearest one within reach, without a tree."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from pilotage.kernels.arrays import FloatArray, IntArray
+from pilotage.kernels.jit import kernel
+
+
+@kernel
+def sort_into_buckets(points: FloatArray, cell_m: float) -> tuple[FloatArray, IntArray, IntArray, FloatArray]:
+    """Sort points (K, 6) of ``scan_lines``, on their lines, into square buckets.
+
+    Returns
+    -------
+    box
+        (4,) x, y of the lower-left corner, the bucket's side, how many columns.
+    starts
+        (C + 1,) where each bucket begins in ``order``.
+    order
+        (K,) indices of the points, bucket by bucket.
+    sorted_points
+        (K, 4) x, y on the line and the normal, in that order.
+    """
+    count = points.shape[0]
+    box = np.zeros(4)
+    if count == 0:
+        box[2] = cell_m
+        box[3] = 1.0
+        return box, np.zeros(2, np.int64), np.zeros(0, np.int64), np.zeros((0, 4))
+    x0 = x1 = points[0, 4]
+    y0 = y1 = points[0, 5]
+    for i in range(count):
+        x0, x1 = min(x0, points[i, 4]), max(x1, points[i, 4])
+        y0, y1 = min(y0, points[i, 5]), max(y1, points[i, 5])
+    columns = int((x1 - x0) / cell_m) + 1
+    rows = int((y1 - y0) / cell_m) + 1
+    box[0], box[1], box[2], box[3] = x0, y0, cell_m, float(columns)
+    starts = np.zeros(columns * rows + 1, np.int64)
+    cell = np.empty(count, np.int64)
+    for i in range(count):
+        cell[i] = int((points[i, 5] - y0) / cell_m) * columns + int((points[i, 4] - x0) / cell_m)
+        starts[cell[i] + 1] += 1
+    for c in range(columns * rows):
+        starts[c + 1] += starts[c]
+    place = starts[:-1].copy()
+    order = np.empty(count, np.int64)
+    out = np.empty((count, 4))
+    for i in range(count):
+        at = place[cell[i]]
+        place[cell[i]] = at + 1
+        order[at] = i
+        out[at, 0] = points[i, 4]
+        out[at, 1] = points[i, 5]
+        out[at, 2] = points[i, 2]
+        out[at, 3] = points[i, 3]
+    return box, starts, order, out
+
+
+@kernel
+def nearest(
+    x: float, y: float, reach_m: float, box: FloatArray, starts: IntArray, points: FloatArray
+) -> tuple[int, float]:
+    """Index into the sorted points (K, 4) of the nearest within reach and its squared distance; -1: none."""
+    columns = int(box[3])
+    rows = (starts.shape[0] - 1) // columns
+    column0 = max(0, math.floor((x - reach_m - box[0]) / box[2]))
+    column1 = min(columns - 1, math.floor((x + reach_m - box[0]) / box[2]))
+    row0 = max(0, math.floor((y - reach_m - box[1]) / box[2]))
+    row1 = min(rows - 1, math.floor((y + reach_m - box[1]) / box[2]))
+    best = -1
+    least = reach_m * reach_m
+    for row in range(row0, row1 + 1):
+        if column1 < column0:
+            break
+        for i in range(starts[row * columns + column0], starts[row * columns + column1 + 1]):
+            dx, dy = points[i, 0] - x, points[i, 1] - y
+            d = dx * dx + dy * dy
+            if d < least:
+                least = d
+                best = i
+    return best, least

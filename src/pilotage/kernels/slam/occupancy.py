@@ -1,0 +1,75 @@
+"""Log-odds of cells from laser scans: hits speak for a wall, beams that pass through against it."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pilotage.kernels.arrays import FloatArray
+from pilotage.kernels.jit import kernel
+
+OddsArray = NDArray[np.float32]
+
+
+@kernel
+def add_scan(
+    odds: OddsArray,
+    corner_x: float,
+    corner_y: float,
+    cell_m: float,
+    pose: FloatArray,
+    ranges_m: FloatArray,
+    first_rad: float,
+    step_rad: float,
+    farthest_m: float,
+    hit_odds: float,
+    miss_odds: float,
+    most_odds: float,
+) -> None:
+    """Add a scan to the log-odds (rows, columns) of a grid, row 0 with the least y.
+
+    Parameters
+    ----------
+    pose
+        (3,) of the scanner in the map.
+    ranges_m
+        (B,) NaN for no measurement; beyond ``farthest_m`` (or infinite) a beam only clears up to there.
+    hit_odds, miss_odds, most_odds
+        What a hit adds, what a passing beam takes, and where both end.
+    """
+    rows, columns = odds.shape
+    ox, oy = (pose[0] - corner_x) / cell_m, (pose[1] - corner_y) / cell_m
+    for k in range(ranges_m.shape[0]):
+        r = ranges_m[k]
+        if not r > 0.0:
+            continue
+        hit = r <= farthest_m
+        reach = (r if hit else farthest_m) / cell_m
+        angle = pose[2] + first_rad + step_rad * k
+        ux, uy = math.cos(angle), math.sin(angle)
+        end_c, end_r = math.floor(ox + ux * reach), math.floor(oy + uy * reach)
+        # Walk from cell to cell along the beam (Amanatides and Woo, 1987).
+        c, row = math.floor(ox), math.floor(oy)
+        sc = 1 if ux > 0.0 else -1
+        sr = 1 if uy > 0.0 else -1
+        dc = 1.0 / abs(ux) if ux != 0.0 else math.inf
+        dr = 1.0 / abs(uy) if uy != 0.0 else math.inf
+        tc = ((c + 1 - ox) if ux > 0.0 else (ox - c)) * dc if ux != 0.0 else math.inf
+        tr = ((row + 1 - oy) if uy > 0.0 else (oy - row)) * dr if uy != 0.0 else math.inf
+        for _ in range(rows + columns):
+            if c == end_c and row == end_r:
+                break
+            if min(tc, tr) > reach:
+                break
+            if 0 <= row < rows and 0 <= c < columns:
+                odds[row, c] = max(-most_odds, odds[row, c] - miss_odds)
+            if tc < tr:
+                tc += dc
+                c += sc
+            else:
+                tr += dr
+                row += sr
+        if hit and 0 <= end_r < rows and 0 <= end_c < columns:
+            odds[end_r, end_c] = min(most_odds, odds[end_r, end_c] + hit_odds)

@@ -1,0 +1,121 @@
+"""The points of a laser scan and the line through each point's neighbours."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from pilotage.kernels.arrays import BoolArray, FloatArray
+from pilotage.kernels.jit import kernel
+
+_REACH = 4
+"""Beams to either side that a point's line is fitted through, at most."""
+
+
+@kernel
+def scan_points(
+    ranges_m: FloatArray, angles_rad: FloatArray, mount: FloatArray, nearest_m: float, farthest_m: float
+) -> tuple[FloatArray, BoolArray]:
+    """Points (B, 2) of a scan in the robot's frame, and which beams (B,) hit something.
+
+    Parameters
+    ----------
+    ranges_m, angles_rad
+        (B,) ranges, NaN or infinite where there was no echo, and directions in the scanner's frame.
+    mount
+        (4,) x, y, heading of the scanner in the robot's frame, and -1 where it hangs upside down, else 1.
+    nearest_m, farthest_m
+        Ranges outside are no hits.
+    """
+    count = ranges_m.shape[0]
+    points = np.zeros((count, 2))
+    hit = np.zeros(count, np.bool_)
+    for i in range(count):
+        r = ranges_m[i]
+        if not (nearest_m <= r <= farthest_m):
+            continue
+        a = mount[2] + mount[3] * angles_rad[i]
+        points[i, 0] = mount[0] + r * math.cos(a)
+        points[i, 1] = mount[1] + r * math.sin(a)
+        hit[i] = True
+    return points, hit
+
+
+@kernel
+def scan_lines(
+    points: FloatArray, hit: BoolArray, origin_x: float, origin_y: float, step_rad: float
+) -> FloatArray:
+    """Fit a line through the neighbours of every hit, by total least squares.
+
+    Neighbours are the beams beside it up to the first gap: a hit further from the one before than a surface
+    seen at a grazing angle explains. The point itself is moved onto its line: that averages range errors.
+
+    Parameters
+    ----------
+    points, hit
+        (B, 2) and (B,) from ``scan_points``.
+    origin_x, origin_y
+        Where the scanner is; normals point to its side.
+    step_rad
+        Angle between beams.
+
+    Returns
+    -------
+    (K, 6): x, y as measured, the normal's x and y (both 0 where no line holds), x, y on the line.
+    """
+    count = points.shape[0]
+    out = np.zeros((count, 6))
+    k = 0
+    for i in range(count):
+        if not hit[i]:
+            continue
+        px, py = points[i, 0], points[i, 1]
+        dx, dy = px - origin_x, py - origin_y
+        r = math.sqrt(dx * dx + dy * dy)
+        gap = 0.06 + 4.0 * r * step_rad
+        n = 1.0
+        sx = sy = sxx = sxy = syy = 0.0
+        for side in range(2):
+            step = 1 if side == 1 else -1
+            lx, ly = px, py
+            for m in range(1, _REACH + 1):
+                j = i + step * m
+                if j < 0 or j >= count or not hit[j]:
+                    break
+                qx, qy = points[j, 0], points[j, 1]
+                if (qx - lx) * (qx - lx) + (qy - ly) * (qy - ly) > gap * gap:
+                    break
+                if (qx - px) * (qx - px) + (qy - py) * (qy - py) > 0.25 and n >= 4.0:
+                    break
+                ex, ey = qx - px, qy - py
+                sx += ex
+                sy += ey
+                sxx += ex * ex
+                sxy += ex * ey
+                syy += ey * ey
+                n += 1.0
+                lx, ly = qx, qy
+        out[k, 0] = px
+        out[k, 1] = py
+        out[k, 4] = px
+        out[k, 5] = py
+        if n >= 3.0:
+            mx, my = sx / n, sy / n
+            cxx, cxy, cyy = sxx / n - mx * mx, sxy / n - mx * my, syy / n - my * my
+            half = 0.5 * (cxx - cyy)
+            root = math.sqrt(half * half + cxy * cxy)
+            small = 0.5 * (cxx + cyy) - root
+            large = 0.5 * (cxx + cyy) + root
+            angle = 0.5 * math.atan2(2.0 * cxy, cxx - cyy)
+            if large > 1e-8 and small < 0.0016 and small < 0.1 * large:
+                nx, ny = -math.sin(angle), math.cos(angle)
+                if nx * dx + ny * dy > 0.0:
+                    nx, ny = -nx, -ny
+                out[k, 2] = nx
+                out[k, 3] = ny
+                away = nx * mx + ny * my
+                out[k, 4] = px + away * nx
+                out[k, 5] = py + away * ny
+        k += 1
+    return out[:k].copy()

@@ -1,0 +1,1 @@
+"""Mapping an unknown building with a laser: local matching, verified closures, one graph, one map."""

@@ -1,0 +1,181 @@
+"""The graph of a mapped recording: closed round by round, refined, and how sure it leaves the poses."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from pilotage.core.types import FloatArray
+from pilotage.logs.laser_log import LaserLog
+from pilotage.models.pose_graph_solver import Loss, Start, optimize
+from pilotage.stack.mapping.slam.closures import (
+    Closure,
+    Verdict,
+    candidates,
+    judge,
+    relative_covariances,
+    spread,
+)
+from pilotage.stack.mapping.slam.clouds import Clouds, cloud_of
+from pilotage.stack.mapping.slam.config import SlamConfig
+from pilotage.stack.mapping.slam.local_matching import LocalTrack
+from pilotage.stack.mapping.slam.refinement import neighbours, pair_edges
+from pilotage.stack.mapping.slam.submaps import Submaps
+from pilotage.stack.mapping.slam.uncertainty import (
+    Edges,
+    edge_information,
+    joint_covariance,
+    relative_poses,
+)
+
+TRACK_STD_M = 0.03
+TRACK_FLOOR = np.diag([0.004**2, 0.004**2, 0.0015**2])
+ROBUST_STDS = 3.0
+REFINED_STDS = 3.5
+REFINED_TRACK = 0.02
+"""What the front end's own edges still count beside the refined ones: enough where those are missing."""
+SURE_M, SURE_RAD = 0.2, 0.05
+"""Standard deviations between two submaps up to which their keyframes are aligned with one another."""
+REFINEMENTS = 3
+SPACINGS = (0.990, 0.995, 1.0)
+MOST_SPACING_OFF = 0.015
+LEAST_GAIN = 0.03
+"""Share by which the objective must fall before another spacing of the beams is believed."""
+
+OnRound = Callable[[str], None]
+
+
+@dataclass(frozen=True, slots=True)
+class Solved:
+    """Poses (K, 3) of the keyframes, the edges they come from and how much each counts (M,)."""
+
+    poses: FloatArray
+    edges: Edges
+    weights: FloatArray
+    objective: float
+
+
+def track_edges(track: LocalTrack) -> Edges:
+    """Edges between consecutive keyframes, as sure as their alignment and their guesses leave them."""
+    poses = track.poses[track.keyframes]
+    count = poses.shape[0]
+    relative = relative_poses(poses[:-1], poses[1:])
+    c, s = np.cos(poses[:-1, 2]), np.sin(poses[:-1, 2])
+    turn = np.zeros((count - 1, 3, 3))
+    turn[:, 0, 0] = turn[:, 1, 1] = c
+    turn[:, 0, 1], turn[:, 1, 0] = -s, s
+    turn[:, 2, 2] = 1.0
+    hessian = turn.transpose(0, 2, 1) @ track.hessians[1:] @ turn
+    slips = track.slips[1:]
+    floor = np.zeros((count - 1, 3, 3))
+    floor[:, 0, 0] = floor[:, 1, 1] = slips[:, 0]
+    floor[:, 2, 2] = slips[:, 1]
+    k = np.arange(count - 1)
+    information = edge_information(hessian, relative[:, 2], TRACK_STD_M, TRACK_FLOOR + floor)
+    return Edges(k, k + 1, relative, information, np.zeros(count - 1, np.bool_))
+
+
+def solved(edges: Edges, poses: FloatArray, scale: float) -> Solved:
+    """Optimize from where the poses are; only edges that close loops are doubted."""
+    solution = optimize(
+        edges.graph(poses),
+        loss=Loss.CAUCHY,
+        scale=scale,
+        doubted=edges.closes,
+        start=Start.GIVEN,
+        tolerance=1e-6,
+        most_iterations=40,
+    )
+    return Solved(solution.graph.poses, edges, solution.weights, solution.objective)
+
+
+def closed(track: LocalTrack, config: SlamConfig, on_round: OnRound) -> tuple[Solved, list[Closure], Submaps]:
+    """Close loops, from the nearly certain to the wide ones, the graph being solved after each round."""
+    local = track.poses[track.keyframes].copy()
+    submaps = Submaps(track.clouds, local, config)
+    state = solved(track_edges(track), local, ROBUST_STDS)
+    closures: list[Closure] = []
+    searched: dict[tuple[int, int], float] = {}
+    accepted: set[tuple[int, int]] = set()
+    for number, window_m in enumerate(config.search_windows_m, start=1):
+        joint = joint_covariance(state.edges, state.poses, state.weights, submaps.references)
+        places = state.poses[submaps.references]
+        found = [
+            c for c in candidates(places, joint, window_m, searched) if (c.earlier, c.later) not in accepted
+        ]
+        judged, edges = judge(submaps, places, joint, found, config)
+        for closure in judged:
+            pair = closure.candidate.earlier, closure.candidate.later
+            searched[pair] = closure.candidate.half_m
+            if closure.verdict is Verdict.ACCEPTED:
+                accepted.add(pair)
+        closures += judged
+        if len(edges):
+            state = solved(state.edges.and_more(edges), state.poses, ROBUST_STDS)
+        on_round(f"round {number}: {len(found)} searched, {len(edges)} closed")
+    return state, closures, submaps
+
+
+def refined(
+    clouds: Clouds, state: Solved, own: Edges, submaps: Submaps, rounds: int = REFINEMENTS, every: int = 1
+) -> Solved:
+    """Align keyframes with all their neighbours that are surely neighbours, and solve; several times."""
+    sure = _sure(state, submaps)
+    for _ in range(rounds):
+        pairs = neighbours(state.poses)
+        owner = _owners(submaps, state.poses.shape[0])
+        pairs = pairs[sure[owner[pairs[:, 0]], owner[pairs[:, 1]]]]
+        if every > 1:
+            along = pairs[:, 1] - pairs[:, 0] == 1
+            pairs = pairs[along | (np.arange(pairs.shape[0]) % every == 0)]
+        edges = pair_edges(clouds, state.poses, pairs)
+        state = solved(edges.and_more(own.scaled(REFINED_TRACK)), state.poses, REFINED_STDS)
+    return state
+
+
+def beam_spacing(
+    log: LaserLog, track: LocalTrack, state: Solved, submaps: Submaps, config: SlamConfig
+) -> float:
+    """Estimate the angle between beams: the one with which the aligned keyframes contradict each other least.
+
+    Some drivers and converters tell a field of view that is one beam off. Where the robot turns, half a per
+    cent of wrong spacing turns the map by degrees, which no alignment of single scans can notice.
+    """
+    own = track_edges(track)
+    objectives = []
+    for spacing in SPACINGS:
+        clouds = keyframe_clouds(log, track, config, spacing)
+        objectives.append(refined(clouds, state, own, submaps, rounds=2, every=4).objective)
+    a, b, c = np.polyfit(np.array(SPACINGS) - 1.0, objectives, 2)
+    if a <= 0.0:
+        best = min(zip(objectives, SPACINGS, strict=True))[1] - 1.0
+    else:
+        best = float(np.clip(-0.5 * b / a, -MOST_SPACING_OFF, MOST_SPACING_OFF))
+    expected = a * best * best + b * best + c
+    return 1.0 + best if expected < (1.0 - LEAST_GAIN) * c else 1.0
+
+
+def keyframe_clouds(log: LaserLog, track: LocalTrack, config: SlamConfig, spacing: float) -> Clouds:
+    """Points of the keyframes with another spacing of the beams."""
+    return Clouds.of([cloud_of(log, int(k), config.max_range_m, spacing) for k in track.keyframes])
+
+
+def _owners(submaps: Submaps, count: int) -> np.ndarray[tuple[int], np.dtype[np.int64]]:
+    """(K,) a submap of each keyframe, the one whose reference is nearest along the path."""
+    middles = 0.5 * (submaps.references[1:] + submaps.references[:-1])
+    return np.searchsorted(middles, np.arange(count)).astype(np.int64)
+
+
+def _sure(state: Solved, submaps: Submaps) -> np.ndarray[tuple[int, int], np.dtype[np.bool_]]:
+    """(C, C) whether two submaps are known well enough against each other."""
+    joint = joint_covariance(state.edges, state.poses, state.weights, submaps.references)
+    count = len(submaps)
+    out = np.eye(count, dtype=np.bool_)
+    first, second = np.triu_indices(count, 1)
+    std_m, std_rad = spread(relative_covariances(joint, state.poses[submaps.references], first, second))
+    good = (std_m < SURE_M) & (std_rad < SURE_RAD)
+    good |= second - first <= 2
+    out[first, second] = out[second, first] = good
+    return out

@@ -1,0 +1,252 @@
+"""Loop closures: candidates by place, each verified alone, with the graph, and together with the others."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from enum import StrEnum
+
+import numpy as np
+
+from pilotage.core.chi_square import chi_square_quantile
+from pilotage.core.types import BoolArray, FloatArray, IntArray
+from pilotage.stack.mapping.slam.config import SlamConfig
+from pilotage.stack.mapping.slam.matching import Match, match
+from pilotage.stack.mapping.slam.submaps import Submaps
+from pilotage.stack.mapping.slam.uncertainty import (
+    Edges,
+    edge_information,
+    errors_of,
+    jacobians,
+    relative_poses,
+)
+
+LEAST_APART = 4
+"""Submaps between the two of a candidate: nearer ones share keyframes or the front end's local map."""
+NEAR_M = 3.0
+WINDOW_BASE_M, WINDOW_BASE_RAD, WINDOW_STDS, MOST_TURN_RAD = 0.3, 0.04, 3.0, 0.8
+AGAIN = 1.5
+"""A pair is searched again once its window has shrunk by this factor."""
+MOST_PER_LATER, MOST_PER_EARLIER = 3, 6
+CLOSURE_STD_M = 0.1
+CLOSURE_FLOOR = 4.0 * np.diag([0.004**2, 0.004**2, 0.0015**2])
+WIDE_M = 2.0
+NEIGHBOURHOOD = 8
+"""A wide search must be seconded by closures of submaps at most so far along the path, on both sides."""
+
+
+class Verdict(StrEnum):
+    """What became of a candidate."""
+
+    ACCEPTED = "accepted"
+    NO_MATCH = "no match"
+    LOW_SCORE = "low score"
+    LITTLE_OVERLAP = "little overlap"
+    WALLS_DISAGREE = "walls disagree"
+    AMBIGUOUS = "ambiguous"
+    AGAINST_GRAPH = "contradicts the graph"
+    AGAINST_OTHERS = "contradicts other closures"
+    ALONE = "no other closure seconds it"
+
+
+@dataclass(frozen=True, slots=True)
+class Candidate:
+    """A pair of submaps worth a search, with half the side of its window."""
+
+    earlier: int
+    later: int
+    half_m: float
+    half_rad: float
+
+
+@dataclass(frozen=True, slots=True)
+class Closure:
+    """A candidate that was searched and judged.
+
+    ``chi_square`` has three degrees of freedom, NaN where nothing matched; ``support`` counts the closures
+    of the same round and neighbourhood that agree.
+    """
+
+    candidate: Candidate
+    match: Match
+    chi_square: float
+    support: int
+    verdict: Verdict
+
+
+def relative_covariances(
+    joint: FloatArray, poses: FloatArray, first: IntArray, second: IntArray
+) -> FloatArray:
+    """Covariances (M, 3, 3) of poses (C, 3) seen from one another, from their joint covariance (3 C, 3 C)."""
+    theta = relative_poses(poses[first], poses[second])[:, 2]
+    a, b = jacobians(poses[first], poses[second], theta)
+    blocks = joint.reshape(poses.shape[0], 3, poses.shape[0], 3)
+    aa, bb, ab = blocks[first, :, first], blocks[second, :, second], blocks[first, :, second]
+    at, bt = a.transpose(0, 2, 1), b.transpose(0, 2, 1)
+    cross = a @ ab @ bt
+    return np.asarray(a @ aa @ at + b @ bb @ bt + cross + cross.transpose(0, 2, 1))
+
+
+def spread(covariance: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Greatest standard deviation of position and that of heading, (M,) each, of covariances (M, 3, 3)."""
+    xx, yy, xy = covariance[:, 0, 0], covariance[:, 1, 1], covariance[:, 0, 1]
+    largest = 0.5 * (xx + yy) + np.sqrt(0.25 * (xx - yy) ** 2 + xy**2)
+    return np.sqrt(np.maximum(largest, 0.0)), np.sqrt(np.maximum(covariance[:, 2, 2], 0.0))
+
+
+def candidates(
+    poses: FloatArray, joint: FloatArray, window_m: float, searched: dict[tuple[int, int], float]
+) -> list[Candidate]:
+    """Pairs of submaps, reference poses (C, 3), that may overlap and whose window is no larger than given."""
+    first, second = np.triu_indices(poses.shape[0], LEAST_APART)
+    distance = np.hypot(*(poses[first, :2] - poses[second, :2]).T)
+    near = distance < NEAR_M + min(window_m, 2.0)
+    first, second, distance = first[near], second[near], distance[near]
+    if first.size == 0:
+        return []
+    std_m, std_rad = spread(relative_covariances(joint, poses, first, second))
+    half_m = WINDOW_STDS * std_m + WINDOW_BASE_M
+    half_rad = np.minimum(WINDOW_STDS * std_rad + WINDOW_BASE_RAD, MOST_TURN_RAD)
+    wanted = (half_m <= window_m) & (distance < NEAR_M + np.minimum(half_m, 2.0))
+    of_later: dict[int, int] = {}
+    of_earlier: dict[int, int] = {}
+    chosen = []
+    for k in np.lexsort((distance, second)):
+        a, b = int(first[k]), int(second[k])
+        if not wanted[k] or searched.get((a, b), np.inf) < AGAIN * half_m[k]:
+            continue
+        if of_later.get(b, 0) >= MOST_PER_LATER or of_earlier.get(a, 0) >= MOST_PER_EARLIER:
+            continue
+        of_later[b] = of_later.get(b, 0) + 1
+        of_earlier[a] = of_earlier.get(a, 0) + 1
+        chosen.append(Candidate(a, b, float(half_m[k]), float(half_rad[k])))
+    return sorted(chosen, key=lambda c: (c.earlier, c.later))
+
+
+def judge(
+    submaps: Submaps, poses: FloatArray, joint: FloatArray, found: list[Candidate], config: SlamConfig
+) -> tuple[list[Closure], Edges]:
+    """Search candidates and judge what was found.
+
+    Parameters
+    ----------
+    poses
+        (C, 3) of the submaps' reference keyframes, and their joint covariance (3 C, 3 C).
+
+    Returns
+    -------
+    All closures with their verdicts, and the accepted ones as edges between keyframes.
+    """
+    closures = []
+    for c in found:
+        predicted = relative_poses(poses[c.earlier][None], poses[c.later][None])[0]
+        closures.append(
+            _alone(c, match(submaps, c.earlier, c.later, predicted, c.half_m, c.half_rad), config)
+        )
+    sound = [k for k, closure in enumerate(closures) if closure.verdict is Verdict.ACCEPTED]
+    edges = _edges([closures[k] for k in sound])
+    if not sound:
+        return closures, edges
+    chi_square, consistent = _joint_test(edges, poses, joint, config.gate_probability)
+    gate = chi_square_quantile(config.gate_probability, 3)
+    fits = chi_square <= gate
+    clique = _clique(consistent & fits[:, None] & fits[None, :], fits)
+    support = _support(edges, clique & fits)
+    for n, k in enumerate(sound):
+        closure = replace(closures[k], chi_square=float(chi_square[n]), support=int(support[n]))
+        wide = closure.candidate.half_m > WIDE_M
+        needed = config.least_support - 1 + (1 if wide else 0)
+        if not fits[n]:
+            verdict = Verdict.AGAINST_GRAPH
+        elif not clique[n]:
+            verdict = Verdict.AGAINST_OTHERS
+        elif support[n] < needed:
+            verdict = Verdict.ALONE
+        else:
+            verdict = Verdict.ACCEPTED
+        closures[k] = replace(closure, verdict=verdict)
+    taken = np.array([closures[k].verdict is Verdict.ACCEPTED for k in sound])
+    edges = edges.chosen(taken)
+    references = submaps.references
+    return closures, replace(edges, i=references[edges.i], j=references[edges.j])
+
+
+def _alone(candidate: Candidate, found: Match, config: SlamConfig) -> Closure:
+    """Judge a match by itself."""
+    if found.score <= 0.0 or not found.aligned:
+        verdict = Verdict.NO_MATCH
+    elif found.score < config.least_score:
+        verdict = Verdict.LOW_SCORE
+    elif found.overlap < config.least_overlap:
+        verdict = Verdict.LITTLE_OVERLAP
+    elif found.agreement < config.least_agreement:
+        verdict = Verdict.WALLS_DISAGREE
+    elif found.second > config.most_ambiguity * found.score:
+        verdict = Verdict.AMBIGUOUS
+    else:
+        verdict = Verdict.ACCEPTED
+    return Closure(candidate, found, np.nan, 0, verdict)
+
+
+def _edges(closures: list[Closure]) -> Edges:
+    """Edges between submaps, by their numbers."""
+    relative = np.array([c.match.relative for c in closures]).reshape(-1, 3)
+    hessian = np.array([c.match.hessian for c in closures]).reshape(-1, 3, 3)
+    return Edges(
+        np.array([c.candidate.earlier for c in closures], np.int64),
+        np.array([c.candidate.later for c in closures], np.int64),
+        relative,
+        edge_information(hessian, relative[:, 2], CLOSURE_STD_M, CLOSURE_FLOOR),
+        np.ones(len(closures), np.bool_),
+    )
+
+
+def _joint_test(
+    edges: Edges, poses: FloatArray, joint: FloatArray, probability: float
+) -> tuple[FloatArray, BoolArray]:
+    """Chi-square (M,) of each closure with the graph, and (M, M) which pairs agree.
+
+    Two closures agree where each one's innovation is probable given the other's: joint compatibility
+    (Neira and Tardos, 2001) pair by pair, as in pairwise consistency maximization (Mangelson et al., 2018).
+    """
+    count = len(edges)
+    innovation = errors_of(edges, poses)
+    a, b = jacobians(poses[edges.i], poses[edges.j], edges.relative[:, 2])
+    rows = np.zeros((count, 3, poses.shape[0], 3))
+    k = np.arange(count)
+    rows[k, :, edges.i] += a
+    rows[k, :, edges.j] += b
+    flat = rows.reshape(3 * count, -1)
+    covariance = (flat @ joint @ flat.T).reshape(count, 3, count, 3)
+    covariance[k, :, k] += np.linalg.inv(edges.information)
+    own = covariance[k, :, k]
+    chi_square = np.einsum("ki,ki->k", innovation, np.linalg.solve(own, innovation[..., None])[..., 0])
+    first, second = np.triu_indices(count, 1)
+    both = np.empty((first.size, 6, 6))
+    both[:, :3, :3], both[:, 3:, 3:] = own[first], own[second]
+    both[:, :3, 3:] = covariance[first, :, second]
+    both[:, 3:, :3] = both[:, :3, 3:].transpose(0, 2, 1)
+    errors = np.concatenate([innovation[first], innovation[second]], axis=1)
+    together = np.einsum("ki,ki->k", errors, np.linalg.solve(both, errors[..., None])[..., 0])
+    given = together - np.minimum(chi_square[first], chi_square[second])
+    agree = np.zeros((count, count), np.bool_)
+    agree[first, second] = agree[second, first] = given <= chi_square_quantile(probability, 3)
+    return np.asarray(chi_square), agree
+
+
+def _clique(agree: BoolArray, fits: BoolArray) -> BoolArray:
+    """A large set in which all agree: greedily, the one that agrees with most first."""
+    degree = agree.sum(axis=1)
+    taken = np.zeros(fits.size, np.bool_)
+    for k in np.argsort(-degree, kind="stable"):
+        if fits[k] and agree[k][taken].all():
+            taken[k] = True
+    return taken
+
+
+def _support(edges: Edges, taken: BoolArray) -> IntArray:
+    """(M,) how many other closures taken lie near along the path on both sides."""
+    near_i = np.abs(edges.i[:, None] - edges.i[None, :]) <= NEIGHBOURHOOD
+    near_j = np.abs(edges.j[:, None] - edges.j[None, :]) <= NEIGHBOURHOOD
+    near = near_i & near_j & taken[None, :]
+    np.fill_diagonal(near, False)
+    return np.asarray(near.sum(axis=1), np.int64)

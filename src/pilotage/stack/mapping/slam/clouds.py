@@ -1,0 +1,52 @@
+"""Scans as clouds of points with their lines, in the scanner's frame."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pilotage.core.types import FloatArray, IntArray
+from pilotage.kernels.slam.scan_lines import scan_lines, scan_points
+from pilotage.logs.laser_log import LaserLog
+
+_LEAST_RANGE_M = 0.1
+_NO_MOUNT = np.array([0.0, 0.0, 0.0, 1.0])
+
+
+@dataclass(frozen=True, slots=True)
+class Clouds:
+    """Points of several scans, one after the other: (K, 6) of ``scan_lines`` and (S + 1,) starts."""
+
+    points: FloatArray
+    starts: IntArray
+
+    @staticmethod
+    def of(clouds: list[FloatArray]) -> Clouds:
+        """Put clouds one after the other."""
+        sizes = [cloud.shape[0] for cloud in clouds]
+        points = np.concatenate(clouds) if clouds else np.zeros((0, 6))
+        return Clouds(np.ascontiguousarray(points), np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64))
+
+    def __len__(self) -> int:
+        return int(self.starts.shape[0] - 1)
+
+    def __getitem__(self, scan: int) -> FloatArray:
+        return self.points[self.starts[scan] : self.starts[scan + 1]]
+
+
+def cloud_of(log: LaserLog, scan: int, max_range_m: float, spacing: float = 1.0) -> FloatArray:
+    """Points (K, 6) of a scan.
+
+    Parameters
+    ----------
+    spacing
+        True angle between beams over the one that the log tells.
+    """
+    beams = int(log.beams[scan])
+    step = float(log.angle_step_rad[scan])
+    angles = log.first_angle_rad[scan] + step * np.arange(beams)
+    middle = log.first_angle_rad[scan] + 0.5 * step * (beams - 1)
+    angles = middle + spacing * (angles - middle)
+    points, hit = scan_points(log.ranges_m[scan, :beams], angles, _NO_MOUNT, _LEAST_RANGE_M, max_range_m)
+    return np.asarray(scan_lines(points, hit, 0.0, 0.0, step))

@@ -1,0 +1,82 @@
+"""The last word: all keyframes that see the same walls aligned with one another, then the graph again."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from pilotage.core.types import FloatArray, IntArray
+from pilotage.kernels.slam.align import TOO_FEW
+from pilotage.kernels.slam.pairs import align_pairs
+from pilotage.stack.mapping.slam.clouds import Clouds
+from pilotage.stack.mapping.slam.uncertainty import Edges, edge_information, relative_poses
+
+RADIUS_M = 2.5
+MOST_TURN_RAD = 1.6
+TURN_AS_DISTANCE_M = 0.6
+NEIGHBOURS = 8
+APART = 6
+"""Keyframes between two neighbours of the same one: as many different passes as possible."""
+ALONG = (1, 2, 4)
+"""Keyframes ahead that each one is aligned with along the path."""
+LEAST_BEHIND = 12
+SPREAD = 2
+PRIOR = np.diag([0.5, 0.5, 5.0])
+REACH_M, LAST_REACH_M, SCALE_M = 0.3, 0.12, 0.03
+LEAST_PAIRED = 0.4
+MOST_MOVED_M, MOST_MOVED_RAD = 0.35, 0.12
+PAIR_STD_M = 0.05
+
+
+def neighbours(poses: FloatArray) -> IntArray:
+    """Pairs (M, 2), earlier keyframe first and sorted by it, of keyframes (K, 3) that may see the same."""
+    count = poses.shape[0]
+    tree = cKDTree(poses[:, :2])
+    pairs = [(i, i + ahead) for i in range(count) for ahead in ALONG if i + ahead < count]
+    around = tree.query_ball_point(poses[:, :2], RADIUS_M, return_sorted=True)
+    for i in range(count):
+        near = np.asarray(around[i], np.int64)
+        near = near[near < i - LEAST_BEHIND]
+        turn = np.abs((poses[near, 2] - poses[i, 2] + np.pi) % (2.0 * np.pi) - np.pi)
+        near, turn = near[turn < MOST_TURN_RAD], turn[turn < MOST_TURN_RAD]
+        if near.size == 0:
+            continue
+        cost = np.hypot(*(poses[near, :2] - poses[i, :2]).T) + TURN_AS_DISTANCE_M * turn
+        chosen: list[int] = []
+        for k in near[np.argsort(cost, kind="stable")].tolist():
+            if all(abs(k - other) > APART for other in chosen):
+                chosen.append(k)
+                if len(chosen) == NEIGHBOURS:
+                    break
+        pairs += [(k, i) for k in chosen]
+    return np.array(sorted(pairs), np.int64).reshape(-1, 2)
+
+
+def pair_edges(clouds: Clouds, poses: FloatArray, pairs: IntArray) -> Edges:
+    """Align pairs (M, 2) of keyframes from where the poses have them; those that do not fit are left out."""
+    relative, hessian, fit, status = align_pairs(
+        clouds.points,
+        clouds.starts,
+        poses,
+        pairs,
+        SPREAD,
+        REACH_M,
+        LAST_REACH_M,
+        SCALE_M,
+        PRIOR,
+    )
+    relative[:, 2] = (relative[:, 2] + np.pi) % (2.0 * np.pi) - np.pi
+    moved = relative_poses(relative_poses(poses[pairs[:, 0]], poses[pairs[:, 1]]), relative)
+    sound = (
+        (status != TOO_FEW)
+        & (fit[:, 3] > LEAST_PAIRED)
+        & (np.hypot(moved[:, 0], moved[:, 1]) < MOST_MOVED_M)
+        & (np.abs(moved[:, 2]) < MOST_MOVED_RAD)
+    )
+    return Edges(
+        pairs[sound, 0],
+        pairs[sound, 1],
+        relative[sound],
+        edge_information(hessian[sound], relative[sound, 2], PAIR_STD_M),
+        pairs[sound, 1] - pairs[sound, 0] > max(ALONG),
+    )

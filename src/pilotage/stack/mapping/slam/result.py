@@ -1,0 +1,63 @@
+"""What the mapper hands over."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from pilotage.core.types import FloatArray, IntArray
+from pilotage.maps.occupancy_grid import OccupancyGrid
+from pilotage.models.pose_graph import PoseGraph
+from pilotage.stack.mapping.slam.closures import Closure
+from pilotage.stack.mapping.slam.clouds import Clouds
+from pilotage.stack.mapping.slam.submaps import Extent
+
+
+@dataclass(frozen=True, slots=True)
+class SlamResult:
+    """A mapped recording.
+
+    Attributes
+    ----------
+    t_s
+        (N,) times of the scans.
+    poses, before
+        (N, 3) of the scanner in the map after the last optimization, and by the front end alone.
+    covariances
+        (N, 3, 3) of ``poses``, the first keyframe being held, with what a single scan's own match adds.
+    keyframes
+        (K,) scans that are the graph's poses.
+    graph
+        The graph after the last optimization; weights of its edges by the robust loss in ``weights`` (M,).
+    closures
+        All candidates that were searched, round by round, with their verdicts.
+    extents
+        The submaps that closures speak of, by keyframes.
+    clouds
+        Points of the keyframes.
+    grid
+        The map.
+    beam_spacing
+        True angle between beams over the one the log tells, as estimated.
+    odometry_scale, odometry_turn_scale
+        Path and turn by the map over those by the odometry; NaN without odometry.
+    warnings
+        What the user should know, a sentence each.
+    """
+
+    t_s: FloatArray
+    poses: FloatArray
+    before: FloatArray
+    covariances: FloatArray
+    keyframes: IntArray
+    graph: PoseGraph
+    weights: FloatArray
+    closures: tuple[Closure, ...]
+    extents: tuple[Extent, ...]
+    clouds: Clouds
+    grid: OccupancyGrid
+    beam_spacing: float
+    odometry_scale: float
+    odometry_turn_scale: float
+    searched: int
+    lost: int
+    warnings: tuple[str, ...]

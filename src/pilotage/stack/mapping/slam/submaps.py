@@ -1,0 +1,130 @@
+"""Submaps: a few metres of path each, large enough to be told from its likes."""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from dataclasses import dataclass
+
+import numpy as np
+
+from pilotage.core.types import FloatArray, IntArray
+from pilotage.kernels.slam.frames import gathered
+from pilotage.kernels.slam.match_grid import ScoreArray, max_pyramid, score_grid
+from pilotage.stack.mapping.slam.clouds import Clouds
+from pilotage.stack.mapping.slam.config import SlamConfig
+from pilotage.stack.mapping.slam.uncertainty import relative_poses
+
+TURN_AS_PATH_M = 0.3
+"""Path that a turn of one radian counts as."""
+RANGE_M = 12.0
+"""Points farther from where they were seen are left out: they are few, and off by much where a heading is."""
+STD_M, OPEN_SCORE = 0.12, -0.4
+MARGIN_M = 0.5
+LEVELS = 5
+KEPT_PYRAMIDS, KEPT_SUBMAPS = 8, 400
+
+
+@dataclass(frozen=True, slots=True)
+class Extent:
+    """Keyframes ``first`` to ``last`` of a submap; its frame is that of keyframe ``reference``."""
+
+    first: int
+    last: int
+    reference: int
+
+
+@dataclass(frozen=True, slots=True)
+class Submap:
+    """One submap in its reference keyframe's frame.
+
+    Attributes
+    ----------
+    grid
+        Scores of ``score_grid``, and ``corner_xy_m`` (2,) the corner of its lower-left cell.
+    coarse, fine
+        (K, 6) points thinned for the search and for the alignment.
+    """
+
+    grid: ScoreArray
+    corner_xy_m: FloatArray
+    coarse: FloatArray
+    fine: FloatArray
+
+
+def extents(poses: FloatArray, length_m: float) -> list[Extent]:
+    """Cut the path of keyframes (K, 3) into stretches that overlap by half."""
+    moved = relative_poses(poses[:-1], poses[1:])
+    steps = np.hypot(moved[:, 0], moved[:, 1]) + TURN_AS_PATH_M * np.abs(moved[:, 2])
+    path = np.concatenate([[0.0], np.cumsum(steps)])
+    count = poses.shape[0]
+    cuts = [0]
+    while cuts[-1] < count - 1:
+        after = int(np.searchsorted(path, path[cuts[-1]] + 0.5 * length_m))
+        cuts.append(min(max(after, cuts[-1] + 1), count - 1))
+    if len(cuts) < 3:
+        return [Extent(0, count - 1, (count - 1) // 2)]
+    return [Extent(first, last, (first + last) // 2) for first, last in zip(cuts[:-2], cuts[2:], strict=True)]
+
+
+def thinned(points: FloatArray, cell_m: float) -> FloatArray:
+    """Keep the first point (K, 6) of every square cell."""
+    cells = np.floor(points[:, :2] / cell_m).astype(np.int64)
+    _, first = np.unique(cells[:, 0] * 4_000_037 + cells[:, 1], return_index=True)
+    return np.ascontiguousarray(points[np.sort(first)])
+
+
+class Submaps:
+    """All submaps of a track, drawn when they are asked for; what was not used lately is forgotten."""
+
+    def __init__(self, clouds: Clouds, local: FloatArray, config: SlamConfig) -> None:
+        self.extents = extents(local, config.submap_length_m)
+        self.references: IntArray = np.array([extent.reference for extent in self.extents], np.int64)
+        self.cell_m = config.search_cell_m
+        self._clouds = clouds
+        self._local = local
+        self._drawn: OrderedDict[int, Submap] = OrderedDict()
+        self._pyramids: OrderedDict[int, tuple[ScoreArray, int]] = OrderedDict()
+
+    def __len__(self) -> int:
+        return len(self.extents)
+
+    def __getitem__(self, index: int) -> Submap:
+        if index not in self._drawn:
+            self._drawn[index] = self._draw(self.extents[index])
+            while len(self._drawn) > KEPT_SUBMAPS:
+                self._drawn.popitem(last=False)
+        self._drawn.move_to_end(index)
+        return self._drawn[index]
+
+    def pyramid(self, index: int) -> tuple[ScoreArray, int]:
+        """Maxima for the search in a submap (``max_pyramid``)."""
+        if index not in self._pyramids:
+            self._pyramids[index] = max_pyramid(self[index].grid, LEVELS)
+            while len(self._pyramids) > KEPT_PYRAMIDS:
+                self._pyramids.popitem(last=False)
+        self._pyramids.move_to_end(index)
+        return self._pyramids[index]
+
+    def _draw(self, extent: Extent) -> Submap:
+        chosen = np.arange(extent.first, extent.last + 1)
+        frame = self._local[extent.reference]
+        points = gathered(self._clouds.points, self._clouds.starts, chosen, self._local, frame)
+        origins = relative_poses(np.repeat(frame[None], chosen.size, axis=0), self._local[chosen])[:, :2]
+        counts = np.diff(self._clouds.starts)[chosen]
+        owner = np.repeat(np.arange(chosen.size), counts)
+        near = np.hypot(*(points[:, :2] - origins[owner]).T) < RANGE_M
+        points, counts = points[near], np.bincount(owner[near], minlength=chosen.size)
+        if points.shape[0] == 0:
+            empty = np.zeros((1, 1), np.float32)
+            return Submap(empty, origins[0], points, points)
+        low, high = points[:, :2].min(axis=0) - MARGIN_M, points[:, :2].max(axis=0) + MARGIN_M
+        grid = score_grid(
+            np.ascontiguousarray(points[:, :2]),
+            np.ascontiguousarray(origins),
+            counts,
+            np.concatenate([low, high]),
+            self.cell_m,
+            STD_M,
+            OPEN_SCORE,
+        )
+        return Submap(grid, low, thinned(points, 2.0 * self.cell_m), thinned(points, 0.05))
