@@ -108,14 +108,14 @@ def rollout_cost(
             cost += dt * price.reverse
         gx, gy = x - price.goal_x, y - price.goal_y
         if gx * gx + gy * gy < price.goal_m * price.goal_m:
-            return cost
+            return float(cost)
     if not braking_is_free(x, y, theta, v, w, drive.deceleration * price.trust, body, ground, price.margin):
         cost += price.no_stop
     cost += togo_at(x, y, togo, x0, y0, coarse)
     down, slope = way_down(x, y, ground)
     if slope > 0.0:
         cost += price.heading * abs(wrap(down - theta))
-    return cost
+    return float(cost)
 
 
 @kernel

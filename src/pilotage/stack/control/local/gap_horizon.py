@@ -8,17 +8,17 @@ import numpy as np
 from pydantic import Field
 
 from pilotage.core.config import Config
-from pilotage.core.types import STOP, FloatArray, Twist
+from pilotage.core.types import FloatArray, Twist
 from pilotage.kernels.control.commands_sent import scaled
 from pilotage.kernels.control.motion_limits import Drive, command_is_safe
 from pilotage.kernels.control.rollouts import Price, follow_path, rollout_cost, rollout_costs, weighted_mean
 from pilotage.sensors.sensor import NonNegative, Positive
 from pilotage.stack.control.local.role import LOCAL_CONTROLLERS, LocalView
 from pilotage.stack.control.local.rolling import RollingConfig, RollingGround, Scene
+from pilotage.stack.control.local.rolling_step import rolling_step, what_it_does
+from pilotage.stack.control.local.sampling import NoiseBank, later
 
 Share = Field(default=0.65, gt=0.0, le=1.0)
-BANK = 64
-"""Noises are drawn once, so many times what a step needs, and a step takes a random stretch of them."""
 SPEEDS = (1.0, 0.7, 0.45, 0.25)
 LOOKS = ((0.3, 0.1), (0.45, 0.3))
 
@@ -46,8 +46,6 @@ class GapHorizonConfig(Config):
     brake_trust: float = Share
     """Share of the data sheet's braking and turning that is relied on."""
     check_step_s: Positive = 0.05
-    stuck_s: Positive = 4.0
-    stuck_m: Positive = 0.15
 
 
 @LOCAL_CONTROLLERS.add("gap-horizon", GapHorizonConfig)
@@ -70,15 +68,14 @@ class GapHorizon:
     def __init__(self, config: GapHorizonConfig, generator: np.random.Generator) -> None:
         self._config = config
         self._ground = RollingGround(config.ground)
-        self._generator = generator
         self._steps = max(2, round(config.horizon_s / config.step_s))
-        noise = generator.standard_normal((BANK * config.rollouts, self._steps, 2))
-        self._bank = _smoothed(noise) * np.array([config.speed_std_m_s, config.turn_std_rad_s])
+        self._noise = NoiseBank(
+            generator, config.rollouts, self._steps, config.speed_std_m_s, config.turn_std_rad_s
+        )
         self._commands = np.empty((config.rollouts, self._steps, 2))
         self._plan: FloatArray | None = None
         self._keep_turning = True
         self._status = "waiting"
-        self._progress: tuple[float, float] = (-math.inf, math.inf)
         self.scene: Scene | None = None
 
     @property
@@ -88,12 +85,8 @@ class GapHorizon:
 
     def step(self, view: LocalView) -> Twist:
         """Take the view in and give the next command."""
-        scene = self._ground.update(view)
-        self.scene = scene
-        command = STOP if scene.distance_m < view.goal_tolerance_m else self._decide(view, scene)
-        if scene.distance_m < view.goal_tolerance_m:
-            self._status = "arrived"
-        self._ground.sent(view.t_s, command)
+        command, self.scene = rolling_step(self._ground, view, self._decide)
+        self._status = what_it_does(command, self.scene, view)
         return command
 
     def _decide(self, view: LocalView, scene: Scene) -> Twist:
@@ -116,19 +109,14 @@ class GapHorizon:
             command = self._checked(scene, plans[i][0])
             if command is not None:
                 self._plan = plans[i]
-                self._status = "driving" if command.v_m_s > 0.05 else "turning"
-                if command.v_m_s < -0.01:
-                    self._status = "backing"
                 return command
         best = plans[int(np.argmin(costs))]
         for share in (0.6, 0.3, 0.0):
             command = self._checked(scene, share * best[0])
             if command is not None:
                 self._plan = share * best
-                self._status = "driving"
                 return command
         self._plan = None
-        self._status = "waiting"
         curvature = scene.start[4] / scene.start[3] if abs(scene.start[3]) > 0.05 else 0.0
         slower = max(abs(scene.start[3]) - scene.drive.deceleration * scene.dt_s, 0.0)
         return Twist(0.0, curvature * math.copysign(slower, scene.start[3]) if self._keep_turning else 0.0)
@@ -138,7 +126,7 @@ class GapHorizon:
         config = self._config
         plans: list[FloatArray] = []
         if self._plan is not None:
-            plans.append(_later(self._plan, scene.dt_s / config.step_s))
+            plans.append(later(self._plan, scene.dt_s / config.step_s))
         for speed in SPEEDS:
             for look_m, look_s in LOOKS:
                 plans.append(
@@ -160,12 +148,10 @@ class GapHorizon:
             for plan in plans
         ]
         mean = plans[int(np.argmin(costs))]
-        offset = int(self._generator.integers(0, (BANK - 1) * config.rollouts))
-        noise = self._bank[offset : offset + config.rollouts]
         sampled = rollout_costs(
             scene.start,
             mean,
-            noise,
+            self._noise.draw(),
             config.step_s,
             scene.drive,
             scene.body,
@@ -208,21 +194,3 @@ class GapHorizon:
                 self._keep_turning = keep_turning
                 return Twist(float(first[0]), float(first[1]))
         return None
-
-
-def _smoothed(noise: FloatArray) -> FloatArray:
-    """Noise (K, N, 2) made to hang together in time, of unit variance (an AR(1) process)."""
-    out = np.empty_like(noise)
-    out[:, 0] = noise[:, 0]
-    for k in range(1, noise.shape[1]):
-        out[:, k] = 0.8 * out[:, k - 1] + 0.6 * noise[:, k]
-    return out
-
-
-def _later(plan: FloatArray, steps: float) -> FloatArray:
-    """A plan (N, 2) as it is ``steps`` of its own steps later; the last command is held."""
-    at = np.minimum(np.arange(plan.shape[0]) + steps, plan.shape[0] - 1.0)
-    low = np.floor(at).astype(np.int64)
-    high = np.minimum(low + 1, plan.shape[0] - 1)
-    part = (at - low)[:, None]
-    return np.ascontiguousarray((1.0 - part) * plan[low] + part * plan[high])

@@ -289,32 +289,10 @@ class RollingGround:
         self._since_plan += 1
         if rolled or self._since_plan >= config.replan_steps:
             self._since_plan = 0
-            clearance = togo.coarse_clearance(
+            self._clearance = togo.coarse_clearance(
                 nearest, self._mean, self._seen.shape[0], x0, y0, self._coarse_m
             )
-            if avoid is not None and avoid.shape[0]:
-                clearance = _beside(clearance, avoid, x0, y0, self._coarse_m)
-            speed = togo.travel_speed(
-                clearance,
-                self._seen,
-                body.inner_m + config.edge_m,
-                max(config.easy_m, body.inner_m + config.edge_m + 0.05),
-                min(config.slow_m_s, drive.speed),
-                drive.speed,
-                config.unseen_share,
-            )
-            self._togo = togo.time_to_go(
-                speed,
-                x0,
-                y0,
-                self._coarse_m,
-                self._goal[0],
-                self._goal[1],
-                drive.speed,
-                self._pose[0],
-                self._pose[1],
-                BEYOND_S,
-            )
+            self._togo = self._time_to_go(avoid, body, drive)
         self._last_ground = Ground(
             shown,
             self._mean,
@@ -329,6 +307,40 @@ class RollingGround:
             1.0 / self._coarse_m,
         )
         return self._last_ground
+
+    def time_to_go_beside(self, discs: FloatArray, scene: Scene) -> FloatArray:
+        """Time to go (m, m) where discs (N, 3), x, y, radius in the map frame, are closed as well."""
+        return self._time_to_go(discs, scene.body, scene.sheet)
+
+    def _time_to_go(self, discs: FloatArray | None, body: Body, drive: Drive) -> FloatArray:
+        config = self._config
+        x0, y0 = self._corner[0] * self._coarse_m, self._corner[1] * self._coarse_m
+        clearance = self._clearance
+        if discs is not None and discs.shape[0]:
+            clearance = _beside(clearance, discs, x0, y0, self._coarse_m)
+        blocked_m = body.inner_m + config.edge_m
+        speed = togo.travel_speed(
+            clearance,
+            self._seen,
+            blocked_m,
+            max(config.easy_m, blocked_m + 0.05),
+            min(config.slow_m_s, drive.speed),
+            drive.speed,
+            config.unseen_share,
+        )
+        field: FloatArray = togo.time_to_go(
+            speed,
+            x0,
+            y0,
+            self._coarse_m,
+            self._goal[0],
+            self._goal[1],
+            drive.speed,
+            self._pose[0],
+            self._pose[1],
+            BEYOND_S,
+        )
+        return field
 
 
 def drive_of(limits: LocalLimits) -> Drive:
