@@ -11,6 +11,7 @@ import math
 import multiprocessing
 import time
 from collections import deque
+from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -29,6 +30,9 @@ from pilotage.stack.control.local.role import LOCAL_CONTROLLERS, LocalLimits, Lo
 JACKAL = np.array([[0.254, 0.215], [-0.254, 0.215], [-0.254, -0.215], [0.254, -0.215]])
 MOUNT = Pose2(0.12, 0.0, 0.0)
 SUBSTEP_S = 0.01
+STANDS_M_S = 0.02
+STANDS_RAD_S = 0.05
+"""Slower than this a robot stands."""
 NO_SEGMENTS = np.zeros((0, 4))
 
 
@@ -80,8 +84,12 @@ def drive_course(
     setting: Setting,
     seed: int,
     trace: list[tuple[float, ...]] | None = None,
+    bodies: Callable[[float], FloatArray] | None = None,
 ) -> tuple[str, float, int]:
     """Drive one course; returns the outcome (success, collision, timeout), the time and the control steps.
+
+    ``bodies`` gives moving discs (N, 3) at a time; touching one is a collision where the robot was moving,
+    and the discs go through a robot that stands.
 
     Odometry at noise 1: scale errors of 1 % (driving) and 2 % (turning) a run, and random walks of 0.01 m per
     square root of a metre and 0.01 rad per square root of a metre or radian.
@@ -124,7 +132,10 @@ def drive_course(
     t = 0.0
     steps = 0
     clear = discs_clearance(x, y, theta, JACKAL, circles)
+    standing = circles
     while t < limit_s - 1e-9:
+        if bodies is not None:
+            circles = np.vstack([standing, bodies(t)])
         c, s = math.cos(theta), math.sin(theta)
         sx, sy = x + c * MOUNT.x_m - s * MOUNT.y_m, y + s * MOUNT.x_m + c * MOUNT.y_m
         ranges = fan_ranges(
@@ -162,11 +173,15 @@ def drive_course(
                 active = pending.popleft()[1]
             nx, ny, ntheta, nv, nw = advance(x, y, theta, v, w, active.v_m_s, active.w_rad_s, SUBSTEP_S, true)
             distance, angle = 0.5 * (v + nv) * SUBSTEP_S, 0.5 * (w + nw) * SUBSTEP_S
-            if clear <= abs(distance) + 0.34 * abs(angle):
+            if bodies is not None:
+                moving = abs(distance) > SUBSTEP_S * STANDS_M_S or abs(angle) > SUBSTEP_S * STANDS_RAD_S
+                if moving and discs_clearance(nx, ny, ntheta, JACKAL, bodies(t + SUBSTEP_S)) <= 0.0:
+                    return "collision", t, steps
+            elif clear <= abs(distance) + 0.34 * abs(angle):
                 driven, _ = first_contact(x, y, theta, distance, angle, JACKAL, circles)
                 if driven < 1.0:
                     return "collision", t, steps
-            clear = discs_clearance(nx, ny, ntheta, JACKAL, circles)
+            clear = 0.0 if bodies is not None else discs_clearance(nx, ny, ntheta, JACKAL, circles)
             x, y, theta, v, w = nx, ny, ntheta, nv, nw
             moved = (
                 scale_d * distance

@@ -139,6 +139,38 @@ def clear_passed(
 
 
 @kernel
+def clear_inside(
+    hits: ByteArray,
+    mean: FloatArray,
+    x: float,
+    y: float,
+    theta: float,
+    polygon: FloatArray,
+    depth: float,
+    x0: float,
+    y0: float,
+    cell: float,
+) -> None:
+    """Empty the cells whose mean lies deeper than ``depth`` inside the footprint: the robot is there; in place."""
+    n = hits.shape[0]
+    reach = 0.0
+    for k in range(polygon.shape[0]):
+        reach = max(reach, math.hypot(polygon[k, 0], polygon[k, 1]))
+    c, s = math.cos(theta), math.sin(theta)
+    for row in range(
+        max(0, math.floor((y - reach - y0) / cell)), min(n, math.floor((y + reach - y0) / cell) + 1)
+    ):
+        for column in range(
+            max(0, math.floor((x - reach - x0) / cell)), min(n, math.floor((x + reach - x0) / cell) + 1)
+        ):
+            if hits[row, column] == 0:
+                continue
+            dx, dy = mean[row * n + column, 0] - x, mean[row * n + column, 1] - y
+            if polygon_distance(c * dx + s * dy, c * dy - s * dx, polygon) < -depth:
+                hits[row, column] = np.uint8(0)
+
+
+@kernel
 def believed(hits: ByteArray) -> BoolArray:
     """Which fine cells (n, n) hold an obstacle and not only the range noise of a neighbour's."""
     n = hits.shape[0]

@@ -8,6 +8,7 @@ from typing import NamedTuple
 from pilotage.kernels.arrays import FloatArray
 from pilotage.kernels.control.footprint import Body
 from pilotage.kernels.control.ground import Ground, clearance_of, seen_under
+from pilotage.kernels.control.movers import movers_clearance
 from pilotage.kernels.geometry.motion import exact_arc
 from pilotage.kernels.jit import kernel
 
@@ -105,6 +106,7 @@ def command_is_safe(
     worse: Drive,
     body: Body,
     ground: Ground,
+    movers: FloatArray,
     margin: float,
 ) -> tuple[bool, float]:
     """Whether a command, held and then followed by braking to rest, touches nothing that has been seen.
@@ -119,6 +121,9 @@ def command_is_safe(
         For how long it is held before the braking begins.
     keep_turning
         Brake along the arc (curvature kept) instead of straightening.
+    movers
+        (N, M, 3) moving discs at the end of each ``dt``, the last ones staying; while the robot moves it must
+        not come nearer than ``margin`` to them.
     margin
         Clearance to keep. Where there is less at the start, it must not shrink by more than a millimetre.
 
@@ -171,6 +176,10 @@ def command_is_safe(
                 return False, least
             if seen_before and not seen_under(x, y, theta, outer, discs, unseen, x0, y0, coarse, per_coarse):
                 return False, least
+            if movers.shape[1] > 0 and (v != 0.0 or w != 0.0):
+                at = min(k, movers.shape[0] - 1)
+                if movers_clearance(x, y, theta, polygon, outer, movers[at], margin) < margin:
+                    return False, least
             if k >= held and v == 0.0 and w == 0.0:
                 break
     return True, least

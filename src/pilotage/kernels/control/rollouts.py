@@ -11,12 +11,15 @@ from pilotage.kernels.arrays import FloatArray
 from pilotage.kernels.control.footprint import Body
 from pilotage.kernels.control.ground import Ground, clearance_of, seen_under
 from pilotage.kernels.control.motion_limits import Drive, advance, braking_is_free
+from pilotage.kernels.control.movers import movers_clearance
 from pilotage.kernels.control.togo import togo_at
 from pilotage.kernels.geometry.motion import wrap
 from pilotage.kernels.jit import kernel
 
 HIT_COST = 1e3
 GRADIENT_M = 0.12
+CERTAIN_S = 1.0
+"""So long a moving body is taken to be where it is foretold; later it only costs."""
 
 
 class Price(NamedTuple):
@@ -25,7 +28,8 @@ class Price(NamedTuple):
     ``near`` is paid per second at no clearance above ``margin`` and falls to 0 at ``soft`` (squared);
     ``heading`` per radian between the last heading and the way down; ``turning`` per rad/s of change of the
     turn rate and step; ``reverse`` per second driven backwards; ``no_stop`` once where the last state cannot
-    brake within what has been seen.
+    brake within what has been seen. ``people`` is paid per second at no distance from a moving body and falls
+    to 0 at ``comfort`` metres.
     """
 
     margin: float
@@ -39,6 +43,8 @@ class Price(NamedTuple):
     goal_y: float
     goal_m: float
     trust: float
+    people: float
+    comfort: float
 
 
 @kernel
@@ -66,11 +72,14 @@ def rollout_cost(
     drive: Drive,
     body: Body,
     ground: Ground,
+    movers: FloatArray,
     price: Price,
 ) -> float:
     """Cost of driving (N, 2) commands v, w of ``dt`` each from ``start`` (5,): seconds to the goal and more.
 
-    A rollout that touches something, or enters unseen ground, costs 1,000 and more, less the later it does.
+    ``movers`` (N, M, 3) are moving discs at the end of each step; into one of them foretold for the first
+        second counts as touching. A rollout that touches something, or enters unseen ground, costs 1,000 and more,
+        less the later it does.
     """
     polygon, outer, discs = body.polygon, body.outer_m, body.discs
     hits, nearest, mean, unseen = ground.hits, ground.nearest, ground.mean, ground.unseen_m
@@ -103,6 +112,12 @@ def rollout_cost(
         if here < price.soft:
             lack = (price.soft - here) / price.soft
             cost += dt * price.near * lack * lack * (0.2 + abs(v) / drive.speed)
+        if movers.shape[1] > 0:
+            away = movers_clearance(x, y, theta, polygon, outer, movers[k], price.comfort)
+            if away < price.margin and (k + 1) * dt <= CERTAIN_S and (v != 0.0 or w != 0.0):
+                return _hit_cost(k / steps, x, y, ground)
+            if away < price.comfort:
+                cost += dt * price.people * min((price.comfort - away) / price.comfort, 2.0)
         cost += price.turning * abs(w - before)
         if v < 0.0:
             cost += dt * price.reverse
@@ -127,6 +142,7 @@ def rollout_costs(
     drive: Drive,
     body: Body,
     ground: Ground,
+    movers: FloatArray,
     price: Price,
     commands: FloatArray,
 ) -> FloatArray:
@@ -137,7 +153,7 @@ def rollout_costs(
         for k in range(steps):
             commands[i, k, 0] = min(max(mean[k, 0] + noise[i, k, 0], -drive.reverse), drive.speed)
             commands[i, k, 1] = min(max(mean[k, 1] + noise[i, k, 1], -drive.turn_rate), drive.turn_rate)
-        costs[i] = rollout_cost(start, commands[i], dt, drive, body, ground, price)
+        costs[i] = rollout_cost(start, commands[i], dt, drive, body, ground, movers, price)
     return costs
 
 

@@ -45,6 +45,8 @@ class GapHorizonConfig(Config):
     no_stop_s: NonNegative = 30.0
     brake_trust: float = Share
     """Share of the data sheet's braking and turning that is relied on."""
+    people_cost: NonNegative = 1.5
+    comfort_m: Positive = 0.5
     check_step_s: Positive = 0.05
 
 
@@ -103,6 +105,8 @@ class GapHorizon:
             float(scene.goal[1]),
             view.goal_tolerance_m,
             self._worse(scene).deceleration / scene.drive.deceleration,
+            config.people_cost,
+            config.comfort_m,
         )
         plans, costs = self._plans(scene, price)
         for i in np.argsort(costs)[:6]:
@@ -143,8 +147,11 @@ class GapHorizon:
                     )
                 )
         plans.append(np.zeros((self._steps, 2)))
+        movers = scene.movers.foretold(scene.delay_s + config.step_s, config.step_s, self._steps)
         costs = [
-            rollout_cost(scene.start, plan, config.step_s, scene.drive, scene.body, scene.ground, price)
+            rollout_cost(
+                scene.start, plan, config.step_s, scene.drive, scene.body, scene.ground, movers, price
+            )
             for plan in plans
         ]
         mean = plans[int(np.argmin(costs))]
@@ -156,6 +163,7 @@ class GapHorizon:
             scene.drive,
             scene.body,
             scene.ground,
+            movers,
             price,
             self._commands,
         )
@@ -164,7 +172,9 @@ class GapHorizon:
         blended = weighted_mean(self._commands, sampled, config.temperature_s)
         plans.append(blended)
         costs.append(
-            rollout_cost(scene.start, blended, config.step_s, scene.drive, scene.body, scene.ground, price)
+            rollout_cost(
+                scene.start, blended, config.step_s, scene.drive, scene.body, scene.ground, movers, price
+            )
         )
         return plans, np.array(costs)
 
@@ -188,6 +198,7 @@ class GapHorizon:
                 self._worse(scene),
                 scene.body,
                 scene.ground,
+                scene.movers.foretold(scene.delay_s + config.check_step_s, config.check_step_s, 30),
                 config.least_margin_m,
             )
             if safe:

@@ -32,6 +32,8 @@ class MppiConfig(Config):
     turning_cost_s: NonNegative = 0.01
     reverse_cost: NonNegative = 1.0
     no_stop_s: NonNegative = 30.0
+    people_cost: NonNegative = 1.5
+    comfort_m: Positive = 0.5
 
 
 @LOCAL_CONTROLLERS.add("mppi", MppiConfig)
@@ -78,6 +80,8 @@ class Mppi:
             float(scene.goal[1]),
             view.goal_tolerance_m,
             1.0,
+            config.people_cost,
+            config.comfort_m,
         )
         mean = later(self._mean, scene.dt_s / config.step_s)
         costs = rollout_costs(
@@ -88,6 +92,7 @@ class Mppi:
             scene.drive,
             scene.body,
             scene.ground,
+            scene.movers.foretold(scene.delay_s + config.step_s, config.step_s, self._steps),
             price,
             self._commands,
         )

@@ -23,8 +23,13 @@ from pilotage.kernels.grids.distance import squared_distance
 from pilotage.sensors.sensor import NonNegative, Positive
 from pilotage.stack.control.local.answer import Answer
 from pilotage.stack.control.local.body import make_body
+from pilotage.stack.control.local.movers import Movers, MoversConfig
 from pilotage.stack.control.local.role import LocalLimits, LocalView
 
+INSIDE_M = 0.05
+"""A point so deep inside the footprint is a mistake or was a body that walked through."""
+BLIND_SHARE = 0.5
+"""With more than this share of its ranges 0 the laser is covered."""
 BEYOND_S = 6.0
 """The time to go is worked out so far past the robot: no plan goes back farther."""
 Scalar = TypeVar("Scalar", bound=np.generic)
@@ -52,6 +57,7 @@ class RollingConfig(Config):
     unseen_share: Positive = 0.7
     edge_m: NonNegative = 0.015
     """Kept beside the footprint's inner disc where the time to go looks for a way."""
+    movers: MoversConfig = MoversConfig()
     fade_hits: int = Field(default=3, ge=0, le=60)
     """Hits that a cell loses where the laser sees past it; 0 for a world in which nothing moves."""
 
@@ -70,6 +76,12 @@ class Scene:
         (2,) in the map frame.
     sheet, drive
         Limits as the data sheet gives them, and as the robot's answers so far make likely.
+    path
+        (N, 2) down the time to go, a point every 0.1 m.
+    delay_s
+        As it seems to be.
+    blind
+        The laser is covered: nothing can be said of what is around.
     """
 
     pose: FloatArray
@@ -82,6 +94,9 @@ class Scene:
     ground: Ground
     dt_s: float
     path: FloatArray
+    delay_s: float
+    movers: Movers
+    blind: bool
 
 
 class RollingGround:
@@ -105,6 +120,7 @@ class RollingGround:
         self._t_s = -math.inf
         self._dt_s = 0.05
         self._answer = Answer()
+        self._movers = Movers(config.movers)
         self._body: Body | None = None
         self._footprint: FloatArray | None = None
         self.partners = 0
@@ -129,6 +145,7 @@ class RollingGround:
         body = self._take_body(view)
         drive = drive_of(view.limits)
         ranges = np.where(np.isfinite(view.ranges_m), view.ranges_m, view.max_range_m)
+        blind = bool(np.mean(ranges <= 0.0) > BLIND_SHARE)
         ranges = np.where(ranges <= 0.0, view.max_range_m, ranges)
         angles = view.beam_angles_rad
         first = float(angles[0])
@@ -139,13 +156,15 @@ class RollingGround:
         in_base = kernels.scan_points(
             view.mount.x_m, view.mount.y_m, view.mount.theta_rad, ranges, first, step, view.max_range_m
         )
+        on_track = self._movers.update((view.mount.x_m, view.mount.y_m), in_base, self._pose, self._dt_s)
+        still = np.ascontiguousarray(in_base[~on_track])
         if self._config.match and not first_view:
-            self._match(view, in_base)
+            self._match(view, still)
         self._odometry = view.pose
         if self._goal_given != view.goal_xy_m:
             self._goal_given = view.goal_xy_m
             self._goal = _moved(view.goal_xy_m, view.pose, self._pose)
-        self._insert(view, ranges, first, step, body, first_view)
+        self._insert(view, ranges, first, step, body, first_view, still)
         ground = self._ground(body, drive, rolled, avoid)
         state = np.array([*self._pose, view.twist.v_m_s, view.twist.w_rad_s])
         self._answer.learn(view.t_s, state, view.limits.delay_s, drive)
@@ -166,6 +185,9 @@ class RollingGround:
             ground,
             self._dt_s,
             path,
+            view.limits.delay_s * self._answer.delay_factor,
+            self._movers,
+            blind,
         )
 
     def _take_body(self, view: LocalView) -> Body:
@@ -228,7 +250,14 @@ class RollingGround:
         self._pose = np.array([x, y, wrap(theta)])
 
     def _insert(
-        self, view: LocalView, ranges: FloatArray, first: float, step: float, body: Body, first_view: bool
+        self,
+        view: LocalView,
+        ranges: FloatArray,
+        first: float,
+        step: float,
+        body: Body,
+        first_view: bool,
+        still: FloatArray,
     ) -> None:
         config = self._config
         c, s = math.cos(self._pose[2]), math.sin(self._pose[2])
@@ -236,8 +265,8 @@ class RollingGround:
         y = self._pose[1] + s * view.mount.x_m + c * view.mount.y_m
         theta = self._pose[2] + view.mount.theta_rad
         x0, y0 = self._corner[0] * self._coarse_m, self._corner[1] * self._coarse_m
-        near = np.where(ranges < config.reach_m, ranges, view.max_range_m)
-        points = kernels.scan_points(x, y, theta, near, first, step, view.max_range_m)
+        near = still[np.hypot(still[:, 0] - view.mount.x_m, still[:, 1] - view.mount.y_m) < config.reach_m]
+        points = self._pose[:2] + near @ np.array([[c, s], [-s, c]])
         if config.fade_hits:
             kernels.clear_passed(
                 self._hits,
@@ -254,6 +283,18 @@ class RollingGround:
                 config.fade_hits,
             )
         kernels.add_points(self._hits, self._mean, points, x0, y0, self._cell_m)
+        kernels.clear_inside(
+            self._hits,
+            self._mean,
+            self._pose[0],
+            self._pose[1],
+            self._pose[2],
+            body.polygon,
+            INSIDE_M,
+            x0,
+            y0,
+            self._cell_m,
+        )
         kernels.mark_seen(
             self._seen,
             x,

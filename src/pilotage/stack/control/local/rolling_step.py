@@ -14,7 +14,8 @@ Decide = Callable[[LocalView, Scene], Twist]
 def rolling_step(ground: RollingGround, view: LocalView, decide: Decide) -> tuple[Twist, Scene]:
     """Update the ground, decide unless the goal is reached, and tell the ground what was commanded."""
     scene = ground.update(view)
-    command = STOP if scene.distance_m < view.goal_tolerance_m else decide(view, scene)
+    arrived = scene.distance_m < view.goal_tolerance_m
+    command = STOP if arrived or scene.blind else decide(view, scene)
     ground.sent(view.t_s, command)
     return command, scene
 
