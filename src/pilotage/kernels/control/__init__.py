@@ -1,0 +1,1 @@
+"""Local control among obstacles that only the laser tells of: map, clearance, sampling, search."""

@@ -1,0 +1,179 @@
+"""Moving bodies: clusters of scan points, tracked by constant-velocity Kalman filters, and foretold."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from pilotage.kernels.arrays import FloatArray, IntArray
+from pilotage.kernels.control.footprint import polygon_distance
+from pilotage.kernels.jit import kernel
+
+# Columns of a track: place, velocity, variances (of place, place and velocity, velocity; alike in x and y),
+# number of readings, steps since the last one, place at birth.
+X, Y, VX, VY, PP, PV, VV, READINGS, MISSED, X0, Y0 = range(11)
+COLUMNS = 11
+UNUSED = -1
+SHIFT_M = 0.18
+"""Mean of what a laser sees of a body of 0.25 m radius lies so far in front of its middle."""
+
+
+@kernel
+def scan_clusters(
+    x: float, y: float, points: FloatArray, gap: float, widest: float, least: int
+) -> tuple[FloatArray, IntArray]:
+    """Centres (C, 2) of the clusters of scan points (N, 2) in the order of the beams, and each point's (N,).
+
+    A cluster ends where two points are farther apart than ``gap``; those wider than ``widest`` or of fewer
+    than ``least`` points are none (-1). A centre is shifted away from the sensor at x, y by what a round body
+    hides.
+    """
+    count = points.shape[0]
+    centres = np.empty((count, 2))
+    of_point = np.full(count, UNUSED)
+    found = 0
+    begin = 0
+    for k in range(1, count + 1):
+        joined = k < count
+        if joined:
+            dx, dy = points[k, 0] - points[k - 1, 0], points[k, 1] - points[k - 1, 1]
+            joined = dx * dx + dy * dy <= gap * gap
+        if joined:
+            continue
+        last = k - 1
+        width = math.hypot(points[last, 0] - points[begin, 0], points[last, 1] - points[begin, 1])
+        if width <= widest and k - begin >= least:
+            mx, my = 0.0, 0.0
+            for i in range(begin, k):
+                mx += points[i, 0]
+                my += points[i, 1]
+                of_point[i] = found
+            mx /= k - begin
+            my /= k - begin
+            away = max(math.hypot(mx - x, my - y), 1e-6)
+            centres[found, 0] = mx + SHIFT_M * (mx - x) / away
+            centres[found, 1] = my + SHIFT_M * (my - y) / away
+            found += 1
+        begin = k
+    return centres[:found], of_point
+
+
+@kernel
+def track_step(
+    tracks: FloatArray,
+    centres: FloatArray,
+    dt: float,
+    place_std: float,
+    acceleration_std: float,
+    gate: float,
+    most_missed: int,
+) -> tuple[FloatArray, IntArray]:
+    """One step of all tracks (M, 11): predict, take the nearest centre (C, 2), begin and end tracks.
+
+    Constant velocity with white acceleration noise; nearest neighbour within the gate, the nearest pair first
+    (wrong where two bodies meet). Returns the tracks (M', 11) and the track of each centre (C,).
+    """
+    m, c = tracks.shape[0], centres.shape[0]
+    out = np.empty((m + c, COLUMNS))
+    q = acceleration_std * acceleration_std
+    r = place_std * place_std
+    moved = tracks.copy()
+    for i in range(m):
+        moved[i, X] += dt * moved[i, VX]
+        moved[i, Y] += dt * moved[i, VY]
+        moved[i, PP] += 2.0 * dt * moved[i, PV] + dt * dt * moved[i, VV] + q * dt**4 / 4.0
+        moved[i, PV] += dt * moved[i, VV] + q * dt**3 / 2.0
+        moved[i, VV] += q * dt * dt
+    of_centre = np.full(c, UNUSED)
+    taken = np.zeros(m, np.bool_)
+    for _ in range(min(m, c)):
+        best, bi, bj = gate, -1, -1
+        for i in range(m):
+            if taken[i]:
+                continue
+            spread = math.sqrt(moved[i, PP] + r)
+            for j in range(c):
+                if of_centre[j] >= 0:
+                    continue
+                d = math.hypot(centres[j, 0] - moved[i, X], centres[j, 1] - moved[i, Y]) / spread
+                if d < best:
+                    best, bi, bj = d, i, j
+        if bi < 0:
+            break
+        taken[bi] = True
+        of_centre[bj] = bi
+        s = moved[bi, PP] + r
+        k1, k2 = moved[bi, PP] / s, moved[bi, PV] / s
+        dx, dy = centres[bj, 0] - moved[bi, X], centres[bj, 1] - moved[bi, Y]
+        moved[bi, X] += k1 * dx
+        moved[bi, Y] += k1 * dy
+        moved[bi, VX] += k2 * dx
+        moved[bi, VY] += k2 * dy
+        moved[bi, VV] -= k2 * moved[bi, PV]
+        moved[bi, PV] *= 1.0 - k1
+        moved[bi, PP] *= 1.0 - k1
+        moved[bi, READINGS] += 1.0
+        moved[bi, MISSED] = -1.0
+    kept = 0
+    place = np.full(m, UNUSED)
+    for i in range(m):
+        moved[i, MISSED] += 1.0
+        if moved[i, MISSED] <= most_missed:
+            out[kept] = moved[i]
+            place[i] = kept
+            kept += 1
+    for j in range(c):
+        if of_centre[j] >= 0:
+            of_centre[j] = place[of_centre[j]]
+            continue
+        out[kept, X], out[kept, Y] = centres[j, 0], centres[j, 1]
+        out[kept, VX], out[kept, VY] = 0.0, 0.0
+        out[kept, PP], out[kept, PV], out[kept, VV] = r, 0.0, 1.0
+        out[kept, READINGS], out[kept, MISSED] = 1.0, 0.0
+        out[kept, X0], out[kept, Y0] = centres[j, 0], centres[j, 1]
+        of_centre[j] = kept
+        kept += 1
+    return out[:kept], of_centre
+
+
+@kernel
+def foretold(
+    tracks: FloatArray,
+    first: float,
+    dt: float,
+    steps: int,
+    radius: float,
+    deviations: float,
+    acceleration_std: float,
+) -> FloatArray:
+    """Discs (steps, M, 3) x, y, radius where tracks (M, 11) will be at ``first``, ``first`` + dt, ...
+
+    The velocity stays; the radius grows by so many standard deviations of the foretold place.
+    """
+    m = tracks.shape[0]
+    out = np.empty((steps, m, 3))
+    q = acceleration_std * acceleration_std
+    for k in range(steps):
+        t = first + k * dt
+        for i in range(m):
+            out[k, i, 0] = tracks[i, X] + t * tracks[i, VX]
+            out[k, i, 1] = tracks[i, Y] + t * tracks[i, VY]
+            variance = tracks[i, PP] + 2.0 * t * tracks[i, PV] + t * t * tracks[i, VV] + q * t**4 / 4.0
+            out[k, i, 2] = radius + deviations * math.sqrt(max(variance, 0.0))
+    return out
+
+
+@kernel
+def movers_clearance(
+    x: float, y: float, theta: float, polygon: FloatArray, outer: float, movers: FloatArray, enough: float
+) -> float:
+    """Least distance of a footprint to discs (M, 3) at one time, at most ``enough``; negative inside."""
+    best = enough
+    c, s = math.cos(theta), math.sin(theta)
+    for i in range(movers.shape[0]):
+        dx, dy = movers[i, 0] - x, movers[i, 1] - y
+        if math.sqrt(dx * dx + dy * dy) - movers[i, 2] - outer >= best:
+            continue
+        best = min(best, polygon_distance(c * dx + s * dy, c * dy - s * dx, polygon) - movers[i, 2])
+    return best

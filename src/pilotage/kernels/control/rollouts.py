@@ -1,0 +1,224 @@
+"""Command sequences driven out on the rolling grid and priced."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from pilotage.kernels.arrays import FloatArray
+from pilotage.kernels.control.footprint import Body
+from pilotage.kernels.control.ground import Ground, clearance_of, seen_under
+from pilotage.kernels.control.motion_limits import Drive, advance, braking_is_free
+from pilotage.kernels.control.movers import movers_clearance
+from pilotage.kernels.control.togo import togo_at
+from pilotage.kernels.geometry.motion import wrap
+from pilotage.kernels.jit import kernel
+
+HIT_COST = 1e3
+GRADIENT_M = 0.12
+CERTAIN_S = 1.0
+"""So long a moving body is taken to be where it is foretold; later it only costs."""
+
+
+class Price(NamedTuple):
+    """What a rollout costs beside the time it takes; times in seconds.
+
+    ``near`` is paid per second at no clearance above ``margin`` and falls to 0 at ``soft`` (squared);
+    ``heading`` per radian between the last heading and the way down; ``turning`` per rad/s of change of the
+    turn rate and step; ``reverse`` per second driven backwards; ``no_stop`` once where the last state cannot
+    brake within what has been seen. ``people`` is paid per second at no distance from a moving body and falls
+    to 0 at ``comfort`` metres.
+    """
+
+    margin: float
+    soft: float
+    near: float
+    heading: float
+    turning: float
+    reverse: float
+    no_stop: float
+    goal_x: float
+    goal_y: float
+    goal_m: float
+    trust: float
+    people: float
+    comfort: float
+
+
+@kernel
+def way_down(x: float, y: float, ground: Ground) -> tuple[float, float]:
+    """Direction in which the time to go falls fastest, and its slope in s/m, by central differences."""
+    h = GRADIENT_M
+    g, x0, y0, c = ground.togo_s, ground.x0_m, ground.y0_m, ground.coarse_m
+    dx = togo_at(x + h, y, g, x0, y0, c) - togo_at(x - h, y, g, x0, y0, c)
+    dy = togo_at(x, y + h, g, x0, y0, c) - togo_at(x, y - h, g, x0, y0, c)
+    return math.atan2(-dy, -dx), math.hypot(dx, dy) / (2.0 * h)
+
+
+@kernel
+def _hit_cost(share: float, x: float, y: float, ground: Ground) -> float:
+    """Cost of a rollout that ends after a share of its steps: the later the better, then the time to go."""
+    rest: float = togo_at(x, y, ground.togo_s, ground.x0_m, ground.y0_m, ground.coarse_m)
+    return HIT_COST * (2.0 - share) + rest
+
+
+@kernel
+def rollout_cost(
+    start: FloatArray,
+    commands: FloatArray,
+    dt: float,
+    drive: Drive,
+    body: Body,
+    ground: Ground,
+    movers: FloatArray,
+    price: Price,
+) -> float:
+    """Cost of driving (N, 2) commands v, w of ``dt`` each from ``start`` (5,): seconds to the goal and more.
+
+    ``movers`` (N, M, 3) are moving discs at the end of each step; into one of them foretold for the first
+        second counts as touching. A rollout that touches something, or enters unseen ground, costs 1,000 and more,
+        less the later it does.
+    """
+    polygon, outer, discs = body.polygon, body.outer_m, body.discs
+    hits, nearest, mean, unseen = ground.hits, ground.nearest, ground.mean, ground.unseen_m
+    x0, y0 = ground.x0_m, ground.y0_m
+    cell, per_cell, coarse, per_coarse = ground.cell_m, ground.per_cell, ground.coarse_m, ground.per_coarse
+    togo = ground.togo_s
+    x, y, theta, v, w = start[0], start[1], start[2], start[3], start[4]
+    steps = commands.shape[0]
+    cost = 0.0
+    begin = clearance_of(
+        x, y, theta, polygon, outer, discs, hits, nearest, mean, x0, y0, cell, per_cell, price.margin
+    )
+    seen = seen_under(x, y, theta, outer, discs, unseen, x0, y0, coarse, per_coarse)
+    for k in range(steps):
+        before = w
+        x, y, theta, v, w = advance(x, y, theta, v, w, commands[k, 0], commands[k, 1], dt, drive)
+        here = clearance_of(
+            x, y, theta, polygon, outer, discs, hits, nearest, mean, x0, y0, cell, per_cell, price.margin
+        )
+        # From within the margin the way out is allowed, not the way in.
+        if here < price.margin and here < begin - 1e-3:
+            return _hit_cost(k / steps, x, y, ground)
+        if not seen_under(x, y, theta, outer, discs, unseen, x0, y0, coarse, per_coarse):
+            if seen:
+                return _hit_cost(k / steps, x, y, ground)
+        else:
+            seen = True
+        begin = max(begin, here)
+        cost += dt
+        if here < price.soft:
+            lack = (price.soft - here) / price.soft
+            cost += dt * price.near * lack * lack * (0.2 + abs(v) / drive.speed)
+        if movers.shape[1] > 0:
+            away = movers_clearance(x, y, theta, polygon, outer, movers[k], price.comfort)
+            if away < price.margin and (k + 1) * dt <= CERTAIN_S and (v != 0.0 or w != 0.0):
+                return _hit_cost(k / steps, x, y, ground)
+            if away < price.comfort:
+                cost += dt * price.people * min((price.comfort - away) / price.comfort, 2.0)
+        cost += price.turning * abs(w - before)
+        if v < 0.0:
+            cost += dt * price.reverse
+        gx, gy = x - price.goal_x, y - price.goal_y
+        if gx * gx + gy * gy < price.goal_m * price.goal_m:
+            return float(cost)
+    if not braking_is_free(x, y, theta, v, w, drive.deceleration * price.trust, body, ground, price.margin):
+        cost += price.no_stop
+    cost += togo_at(x, y, togo, x0, y0, coarse)
+    down, slope = way_down(x, y, ground)
+    if slope > 0.0:
+        cost += price.heading * abs(wrap(down - theta))
+    return float(cost)
+
+
+@kernel
+def rollout_costs(
+    start: FloatArray,
+    mean: FloatArray,
+    noise: FloatArray,
+    dt: float,
+    drive: Drive,
+    body: Body,
+    ground: Ground,
+    movers: FloatArray,
+    price: Price,
+    commands: FloatArray,
+) -> FloatArray:
+    """Costs (K,) of the mean commands (N, 2) plus each noise (K, N, 2); fills ``commands`` (K, N, 2)."""
+    rollouts, steps = noise.shape[0], noise.shape[1]
+    costs = np.empty(rollouts)
+    for i in range(rollouts):
+        for k in range(steps):
+            commands[i, k, 0] = min(max(mean[k, 0] + noise[i, k, 0], -drive.reverse), drive.speed)
+            commands[i, k, 1] = min(max(mean[k, 1] + noise[i, k, 1], -drive.turn_rate), drive.turn_rate)
+        costs[i] = rollout_cost(start, commands[i], dt, drive, body, ground, movers, price)
+    return costs
+
+
+@kernel
+def weighted_mean(commands: FloatArray, costs: FloatArray, temperature: float) -> FloatArray:
+    """Mean (N, 2) of command sequences (K, N, 2) by exp(-cost / temperature) (Williams et al. 2017)."""
+    best = costs.min()
+    out = np.zeros((commands.shape[1], 2))
+    total = 0.0
+    for i in range(commands.shape[0]):
+        weight = math.exp(-(costs[i] - best) / temperature)
+        if weight < 1e-6:
+            continue
+        total += weight
+        for k in range(out.shape[0]):
+            out[k, 0] += weight * commands[i, k, 0]
+            out[k, 1] += weight * commands[i, k, 1]
+    return out / total
+
+
+@kernel
+def follow_path(
+    start: FloatArray,
+    path: FloatArray,
+    look_m: float,
+    look_s: float,
+    speed: float,
+    turn_in_place: float,
+    steps: int,
+    dt: float,
+    drive: Drive,
+) -> FloatArray:
+    """Commands (steps, 2) of pure pursuit along path points (M, 2): a rollout's good first guess.
+
+    Looks ``look_m`` + ``look_s`` * v ahead; slows with the bearing of the point ahead and turns on the spot
+    where that is above ``turn_in_place`` radians.
+    """
+    out = np.zeros((steps, 2))
+    x, y, theta, v, w = start[0], start[1], start[2], start[3], start[4]
+    at = 0
+    last = path.shape[0] - 1
+    for k in range(steps):
+        look = look_m + look_s * abs(v)
+        while at < last:
+            here = (path[at, 0] - x) ** 2 + (path[at, 1] - y) ** 2
+            there = (path[at + 1, 0] - x) ** 2 + (path[at + 1, 1] - y) ** 2
+            if there <= here:
+                at += 1
+            else:
+                break
+        ahead = at
+        while ahead < last and (path[ahead, 0] - x) ** 2 + (path[ahead, 1] - y) ** 2 < look * look:
+            ahead += 1
+        dx, dy = path[ahead, 0] - x, path[ahead, 1] - y
+        distance = max(math.hypot(dx, dy), 0.05)
+        bearing = wrap(math.atan2(dy, dx) - theta)
+        if abs(bearing) > turn_in_place:
+            cv = 0.0
+            cw = math.copysign(min(drive.turn_rate, 3.0 * abs(bearing)), bearing)
+        else:
+            cv = speed * max(0.15, math.cos(bearing)) ** 2
+            curvature = 2.0 * math.sin(bearing) / distance
+            if abs(curvature) * cv > drive.turn_rate:
+                cv = drive.turn_rate / abs(curvature)
+            cw = curvature * max(cv, 0.2)
+        out[k, 0], out[k, 1] = cv, cw
+        x, y, theta, v, w = advance(x, y, theta, v, w, cv, cw, dt, drive)
+    return out

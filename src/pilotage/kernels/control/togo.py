@@ -1,0 +1,293 @@
+"""Time to go over the rolling grid: Dijkstra from the goal, with the speed that the clearance allows."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from pilotage.kernels.arrays import BoolArray, FloatArray
+from pilotage.kernels.control.ground import FAR_M, NONE, CellIndex
+from pilotage.kernels.jit import kernel
+
+BUCKETS = 1 << 14
+BUCKET_S = 0.005
+"""Times that differ by less settle in any order: the error is a share of a bucket a cell."""
+UNREACHED_S = 1e4
+BLOCKED_EXTRA_S = 2.0
+"""What a blocked cell gets above its best neighbour, so that a field interpolated there leads out."""
+
+
+@kernel
+def coarse_clearance(
+    nearest: CellIndex, mean: FloatArray, cells: int, x0: float, y0: float, coarse: float
+) -> FloatArray:
+    """Distance (m, m) from the centre of every coarse cell to the nearest obstacle point."""
+    n = nearest.shape[0]
+    per = n // cells
+    out = np.empty((cells, cells))
+    for row in range(cells):
+        y = y0 + (row + 0.5) * coarse
+        for column in range(cells):
+            # The coarse centre is a corner of this fine cell: its nearest point is the centre's but for ties.
+            at = nearest[row * per + per // 2, column * per + per // 2]
+            if at == NONE:
+                out[row, column] = FAR_M
+                continue
+            dx = mean[at, 0] - x0 - (column + 0.5) * coarse
+            dy = mean[at, 1] - y
+            out[row, column] = math.sqrt(dx * dx + dy * dy)
+    return out
+
+
+@kernel
+def travel_speed(
+    clearance: FloatArray,
+    seen: BoolArray,
+    blocked_m: float,
+    easy_m: float,
+    slow: float,
+    fast: float,
+    unseen_share: float,
+) -> FloatArray:
+    """Speed (m, m) to reckon with in every cell, 0 where no footprint fits.
+
+    Rises from ``slow`` at a clearance of ``blocked_m`` to ``fast`` at ``easy_m``; in unseen cells
+    ``unseen_share`` of that.
+    """
+    out = np.zeros_like(clearance)
+    for row in range(clearance.shape[0]):
+        for column in range(clearance.shape[1]):
+            room = clearance[row, column] - blocked_m
+            if room < 0.0:
+                continue
+            speed = slow + (fast - slow) * min(1.0, room / (easy_m - blocked_m))
+            out[row, column] = speed if seen[row, column] else speed * unseen_share
+    return out
+
+
+@kernel
+def time_to_go(
+    speed: FloatArray,
+    x0: float,
+    y0: float,
+    coarse: float,
+    goal_x: float,
+    goal_y: float,
+    fast: float,
+    robot_x: float,
+    robot_y: float,
+    beyond_s: float,
+) -> FloatArray:
+    """Time (m, m) from every cell to the goal over 16 directions (at most 2.7 % above the straight way).
+
+    A goal off the grid is reached over the grid's edge, from there on straight at ``fast``. Dijkstra with
+    buckets (Dial 1969), ``beyond_s`` past the robot's cell; what is farther from the goal gets the time at
+    which the search ended, a lower bound. Cells without a way get ``UNREACHED_S``, blocked ones a little more
+    than their best neighbour.
+    """
+    m = speed.shape[0]
+    togo = np.full((m, m), np.inf)
+    flat = togo.reshape(-1)
+    pace = np.empty(m * m)
+    for i in range(m * m):
+        v = speed.flat[i]
+        pace[i] = 1.0 / v if v > 0.0 else np.inf
+    head = np.full(BUCKETS, np.int32(-1))
+    # A cell may stand in several buckets: entries are appended, stale ones are skipped.
+    room = 24 * m * m
+    entry_cell = np.empty(room, np.int32)
+    entry_next = np.empty(room, np.int32)
+    entries = 0
+    column = math.floor((goal_x - x0) / coarse)
+    row = math.floor((goal_y - y0) / coarse)
+    inside = 0 <= row < m and 0 <= column < m
+    if inside:
+        # The goal's surroundings are seeds, so that a post right on it does not hide it.
+        for r in range(max(0, row - 3), min(m, row + 4)):
+            for c in range(max(0, column - 3), min(m, column + 4)):
+                if pace[r * m + c] < np.inf:
+                    dx, dy = x0 + (c + 0.5) * coarse - goal_x, y0 + (r + 0.5) * coarse - goal_y
+                    flat[r * m + c] = math.sqrt(dx * dx + dy * dy) * pace[r * m + c]
+    else:
+        for r in range(m):
+            for c in range(m):
+                if (r == 0 or c == 0 or r == m - 1 or c == m - 1) and pace[r * m + c] < np.inf:
+                    dx, dy = x0 + (c + 0.5) * coarse - goal_x, y0 + (r + 0.5) * coarse - goal_y
+                    flat[r * m + c] = math.sqrt(dx * dx + dy * dy) / fast
+    lowest = np.inf
+    for i in range(m * m):
+        lowest = min(lowest, flat[i])
+    if lowest == np.inf:
+        togo[:, :] = UNREACHED_S
+        return togo
+    span = BUCKETS * BUCKET_S
+    waiting = 0
+    # Seeds beyond the buckets' span come in when the front gets there: sort them into the queue by rounds.
+    late = np.zeros(m * m, np.bool_)
+    n_late = 0
+    for i in range(m * m):
+        if flat[i] < np.inf:
+            if flat[i] - lowest < 0.5 * span:
+                b = int(flat[i] / BUCKET_S) & (BUCKETS - 1)
+                entry_cell[entries], entry_next[entries] = i, head[b]
+                head[b] = entries
+                entries += 1
+                waiting += 1
+            else:
+                late[i] = True
+                n_late += 1
+    step_r = np.array([0, 1, 0, -1, 1, 1, -1, -1, 1, 2, 2, 1, -1, -2, -2, -1])
+    step_c = np.array([1, 0, -1, 0, 1, -1, 1, -1, 2, 1, -1, -2, -2, -1, 1, 2])
+    length = np.empty(16)
+    for k in range(16):
+        length[k] = coarse * math.sqrt(step_r[k] ** 2 + step_c[k] ** 2)
+    done = np.zeros(m * m, np.bool_)
+    tick = int(lowest / BUCKET_S)
+    idle = 0
+    ends = np.inf
+    home = -1
+    column, row = math.floor((robot_x - x0) / coarse), math.floor((robot_y - y0) / coarse)
+    if 0 <= row < m and 0 <= column < m:
+        home = row * m + column
+    while waiting > 0 and idle <= BUCKETS:
+        b = tick & (BUCKETS - 1)
+        if head[b] < 0:
+            tick += 1
+            idle += 1
+            continue
+        idle = 0
+        entry = head[b]
+        head[b] = entry_next[entry]
+        waiting -= 1
+        i = entry_cell[entry]
+        if done[i] or int(flat[i] / BUCKET_S) > tick:
+            continue
+        done[i] = True
+        if i == home:
+            ends = flat[i] + beyond_s
+        if flat[i] > ends:
+            break
+        r, c = i // m, i % m
+        here = flat[i]
+        for k in range(16):
+            rr, cc = r + step_r[k], c + step_c[k]
+            if not (0 <= rr < m and 0 <= cc < m):
+                continue
+            j = rr * m + cc
+            if done[j] or pace[j] == np.inf:
+                continue
+            if k >= 8:
+                # A knight's move passes between two cells: both have to be free.
+                hr, hc = step_r[k], step_c[k]
+                if abs(hr) == 2:
+                    a, d = (r + hr // 2) * m + c, (r + hr // 2) * m + cc
+                else:
+                    a, d = r * m + c + hc // 2, rr * m + c + hc // 2
+                if pace[a] == np.inf or pace[d] == np.inf:
+                    continue
+                cost = length[k] * 0.25 * (pace[i] + pace[j] + pace[a] + pace[d])
+            elif k >= 4:
+                if pace[r * m + cc] == np.inf or pace[rr * m + c] == np.inf:
+                    continue
+                cost = length[k] * 0.5 * (pace[i] + pace[j])
+            else:
+                cost = length[k] * 0.5 * (pace[i] + pace[j])
+            there = here + cost
+            if there < flat[j] and cost < span and entries < room:
+                flat[j] = there
+                to = int(there / BUCKET_S) & (BUCKETS - 1)
+                entry_cell[entries], entry_next[entries] = j, head[to]
+                head[to] = entries
+                entries += 1
+                waiting += 1
+    for r in range(m):
+        for c in range(m):
+            i = r * m + c
+            if done[i]:
+                continue
+            if pace[i] < np.inf and flat[i] < np.inf:
+                flat[i] = min(flat[i], ends)
+                continue
+            if pace[i] < np.inf and ends < np.inf:
+                flat[i] = ends
+                continue
+            best = np.inf
+            for rr in range(max(0, r - 1), min(m, r + 2)):
+                for cc in range(max(0, c - 1), min(m, c + 2)):
+                    if done[rr * m + cc]:
+                        best = min(best, flat[rr * m + cc])
+            flat[i] = best + BLOCKED_EXTRA_S if best < np.inf else UNREACHED_S
+    return togo
+
+
+@kernel
+def togo_at(x: float, y: float, togo: FloatArray, x0: float, y0: float, coarse: float) -> float:
+    """Time to go at a point, bilinear between the cells' centres; at the grid's edge the nearest one's."""
+    m = togo.shape[0]
+    u = min(max((x - x0) / coarse - 0.5, 0.0), m - 1.000001)
+    v = min(max((y - y0) / coarse - 0.5, 0.0), m - 1.000001)
+    c, r = int(u), int(v)
+    fu, fv = u - c, v - r
+    low = (1.0 - fu) * togo[r, c] + fu * togo[r, c + 1]
+    high = (1.0 - fu) * togo[r + 1, c] + fu * togo[r + 1, c + 1]
+    value: float = (1.0 - fv) * low + fv * high
+    return value
+
+
+@kernel
+def descent_path(
+    x: float, y: float, togo: FloatArray, x0: float, y0: float, coarse: float, step: float, points: int
+) -> FloatArray:
+    """Points (N, 2) down the time to go from a place: along the way that Dijkstra found, then smoothed.
+
+    Ends at the goal, at the grid's edge, or after ``points`` of ``step`` metres.
+    """
+    m = togo.shape[0]
+    most = int(points * step / coarse) + 2
+    cells = np.empty((most, 2))
+    cells[0, 0], cells[0, 1] = x, y
+    count = 1
+    c = min(max(math.floor((x - x0) / coarse), 0), m - 1)
+    r = min(max(math.floor((y - y0) / coarse), 0), m - 1)
+    for _ in range(most - 1):
+        best, br, bc = 0.0, r, c
+        for dr in range(-2, 3):
+            for dc in range(-2, 3):
+                rr, cc = r + dr, c + dc
+                if (dr == 0 and dc == 0) or not (0 <= rr < m and 0 <= cc < m):
+                    continue
+                if abs(dr) + abs(dc) == 4 or (abs(dr) == 2 and dc == 0) or (abs(dc) == 2 and dr == 0):
+                    continue
+                gain = (togo[r, c] - togo[rr, cc]) / math.sqrt(float(dr * dr + dc * dc))
+                if gain > best:
+                    best, br, bc = gain, rr, cc
+        if best <= 0.0:
+            break
+        r, c = br, bc
+        cells[count, 0], cells[count, 1] = x0 + (c + 0.5) * coarse, y0 + (r + 0.5) * coarse
+        count += 1
+    for _ in range(3):
+        for k in range(1, count - 1):
+            for axis in range(2):
+                mean = 0.5 * (cells[k - 1, axis] + cells[k + 1, axis])
+                cells[k, axis] += 0.5 * (mean - cells[k, axis])
+    out = np.empty((points, 2))
+    out[0, 0], out[0, 1] = x, y
+    made = 1
+    left = step
+    for k in range(1, count):
+        ax, ay = cells[k - 1, 0], cells[k - 1, 1]
+        bx, by = cells[k, 0], cells[k, 1]
+        length = math.hypot(bx - ax, by - ay)
+        at = 0.0
+        while length - at >= left and made < points:
+            at += left
+            out[made, 0] = ax + (bx - ax) * at / length
+            out[made, 1] = ay + (by - ay) * at / length
+            made += 1
+            left = step
+        left -= length - at
+        if made >= points:
+            break
+    return out[:made]

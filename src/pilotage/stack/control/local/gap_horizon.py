@@ -1,0 +1,207 @@
+"""Our own: sampled plans that end in a stop on seen ground, led by the time to go, each command checked."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from pydantic import Field
+
+from pilotage.core.config import Config
+from pilotage.core.types import FloatArray, Twist
+from pilotage.kernels.control.commands_sent import scaled
+from pilotage.kernels.control.motion_limits import Drive, command_is_safe
+from pilotage.kernels.control.rollouts import Price, follow_path, rollout_cost, rollout_costs, weighted_mean
+from pilotage.sensors.sensor import NonNegative, Positive
+from pilotage.stack.control.local.role import LOCAL_CONTROLLERS, LocalView
+from pilotage.stack.control.local.rolling import RollingConfig, RollingGround, Scene
+from pilotage.stack.control.local.rolling_step import rolling_step, what_it_does
+from pilotage.stack.control.local.sampling import NoiseBank, later
+
+Share = Field(default=0.65, gt=0.0, le=1.0)
+SPEEDS = (1.0, 0.7, 0.45, 0.25)
+LOOKS = ((0.3, 0.1), (0.45, 0.3))
+
+
+class GapHorizonConfig(Config):
+    """Horizon, samples and what a plan costs beside its time."""
+
+    ground: RollingConfig = RollingConfig()
+    horizon_s: Positive = 1.6
+    step_s: Positive = 0.1
+    rollouts: int = Field(default=192, ge=8, le=20000)
+    speed_std_m_s: Positive = 0.5
+    turn_std_rad_s: Positive = 1.0
+    temperature_s: Positive = 0.05
+    margin_m: NonNegative = 0.04
+    """Between footprint and obstacle points, in plans."""
+    least_margin_m: NonNegative = 0.025
+    """The same in the last check of a command."""
+    soft_m: Positive = 0.15
+    near_cost: NonNegative = 1.0
+    heading_s_per_rad: NonNegative = 0.25
+    turning_cost_s: NonNegative = 0.01
+    reverse_cost: NonNegative = 1.0
+    no_stop_s: NonNegative = 30.0
+    brake_trust: float = Share
+    """Share of the data sheet's braking and turning that is relied on."""
+    people_cost: NonNegative = 1.5
+    comfort_m: Positive = 0.5
+    check_step_s: Positive = 0.05
+
+
+@LOCAL_CONTROLLERS.add("gap-horizon", GapHorizonConfig)
+class GapHorizon:
+    """Plans over the seen ground only, and drives only what can still be braked there.
+
+    1. The time to go (Dijkstra, speed by clearance, unseen ground taken for free but slow) says where to.
+    2. Plans: pursuit of its way down at several speeds, the last plan, and samples around the best of them
+       (MPPI: Williams et al. 2017). A plan is driven out under the limits from where the robot will be when a
+       command takes effect; it must stay on seen ground, clear of every point, and end where the robot can
+       still brake. So the speed follows from the limits and the sight.
+    3. The first command of the best plan is checked with finer steps and worse brakes, followed by a stop;
+       where that fails, the next plan's, then slower ones, then the stop that was checked a step before.
+
+    Where nothing moves and limits are no worse than ``brake_trust`` of the data sheet, it cannot hit what it
+    has seen beyond the map's errors (least margin against laser noise and odometry within a step). It does
+    not plan over orientation: in a dead end narrower than its turning circle it backs out by samples, slowly.
+    """
+
+    def __init__(self, config: GapHorizonConfig, generator: np.random.Generator) -> None:
+        self._config = config
+        self._ground = RollingGround(config.ground)
+        self._steps = max(2, round(config.horizon_s / config.step_s))
+        self._noise = NoiseBank(
+            generator, config.rollouts, self._steps, config.speed_std_m_s, config.turn_std_rad_s
+        )
+        self._commands = np.empty((config.rollouts, self._steps, 2))
+        self._plan: FloatArray | None = None
+        self._keep_turning = True
+        self._status = "waiting"
+        self.scene: Scene | None = None
+
+    @property
+    def status(self) -> str:
+        """What it is doing, in a word."""
+        return self._status
+
+    def step(self, view: LocalView) -> Twist:
+        """Take the view in and give the next command."""
+        command, self.scene = rolling_step(self._ground, view, self._decide)
+        self._status = what_it_does(command, self.scene, view)
+        return command
+
+    def _decide(self, view: LocalView, scene: Scene) -> Twist:
+        config = self._config
+        price = Price(
+            config.margin_m,
+            config.soft_m,
+            config.near_cost,
+            config.heading_s_per_rad,
+            config.turning_cost_s,
+            config.reverse_cost,
+            config.no_stop_s,
+            float(scene.goal[0]),
+            float(scene.goal[1]),
+            view.goal_tolerance_m,
+            self._worse(scene).deceleration / scene.drive.deceleration,
+            config.people_cost,
+            config.comfort_m,
+        )
+        plans, costs = self._plans(scene, price)
+        for i in np.argsort(costs)[:6]:
+            command = self._checked(scene, plans[i][0])
+            if command is not None:
+                self._plan = plans[i]
+                return command
+        best = plans[int(np.argmin(costs))]
+        for share in (0.6, 0.3, 0.0):
+            command = self._checked(scene, share * best[0])
+            if command is not None:
+                self._plan = share * best
+                return command
+        self._plan = None
+        curvature = scene.start[4] / scene.start[3] if abs(scene.start[3]) > 0.05 else 0.0
+        slower = max(abs(scene.start[3]) - scene.drive.deceleration * scene.dt_s, 0.0)
+        return Twist(0.0, curvature * math.copysign(slower, scene.start[3]) if self._keep_turning else 0.0)
+
+    def _plans(self, scene: Scene, price: Price) -> tuple[list[FloatArray], FloatArray]:
+        """All plans worth a look with their costs."""
+        config = self._config
+        plans: list[FloatArray] = []
+        if self._plan is not None:
+            plans.append(later(self._plan, scene.dt_s / config.step_s))
+        for speed in SPEEDS:
+            for look_m, look_s in LOOKS:
+                plans.append(
+                    follow_path(
+                        scene.start,
+                        scene.path,
+                        look_m,
+                        look_s,
+                        speed * scene.drive.speed,
+                        1.0,
+                        self._steps,
+                        config.step_s,
+                        scene.drive,
+                    )
+                )
+        plans.append(np.zeros((self._steps, 2)))
+        movers = scene.movers.foretold(scene.delay_s + config.step_s, config.step_s, self._steps)
+        costs = [
+            rollout_cost(
+                scene.start, plan, config.step_s, scene.drive, scene.body, scene.ground, movers, price
+            )
+            for plan in plans
+        ]
+        mean = plans[int(np.argmin(costs))]
+        sampled = rollout_costs(
+            scene.start,
+            mean,
+            self._noise.draw(),
+            config.step_s,
+            scene.drive,
+            scene.body,
+            scene.ground,
+            movers,
+            price,
+            self._commands,
+        )
+        plans.append(self._commands[int(np.argmin(sampled))].copy())
+        costs.append(float(sampled.min()))
+        blended = weighted_mean(self._commands, sampled, config.temperature_s)
+        plans.append(blended)
+        costs.append(
+            rollout_cost(
+                scene.start, blended, config.step_s, scene.drive, scene.body, scene.ground, movers, price
+            )
+        )
+        return plans, np.array(costs)
+
+    def _worse(self, scene: Scene) -> Drive:
+        """Limits that are relied on: worse than the data sheet's, and than those that seem likely."""
+        share = min(self._config.brake_trust, 0.9 * scene.drive.deceleration / scene.sheet.deceleration)
+        return Drive(*scaled(scene.sheet, share))
+
+    def _checked(self, scene: Scene, first: FloatArray) -> Twist | None:
+        """The command if it can be held for a step and braked from without touching anything."""
+        config = self._config
+        for keep_turning in (True, False):
+            safe, _ = command_is_safe(
+                scene.start,
+                float(first[0]),
+                float(first[1]),
+                scene.dt_s,
+                config.check_step_s,
+                keep_turning,
+                scene.drive,
+                self._worse(scene),
+                scene.body,
+                scene.ground,
+                scene.movers.foretold(scene.delay_s + config.check_step_s, config.check_step_s, 30),
+                config.least_margin_m,
+            )
+            if safe:
+                self._keep_turning = keep_turning
+                return Twist(float(first[0]), float(first[1]))
+        return None

@@ -1,0 +1,102 @@
+"""Who moves around the robot: tracks of scan clusters, and the discs where they will be."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from pydantic import Field
+
+from pilotage.core.config import Config
+from pilotage.core.types import BoolArray, FloatArray
+from pilotage.kernels.control import movers as kernels
+from pilotage.sensors.sensor import NonNegative, Positive
+
+
+class MoversConfig(Config):
+    """Clusters, tracks, and when one counts as a moving body."""
+
+    enabled: bool = False
+    """Off where nothing moves: posts that hide each other look like a body that jumps."""
+    gap_m: Positive = 0.22
+    widest_m: Positive = 0.8
+    least_points: int = Field(default=3, ge=2, le=100)
+    place_std_m: Positive = 0.08
+    acceleration_std_m_s2: Positive = 0.8
+    gate_std: Positive = 4.0
+    most_missed: int = Field(default=8, ge=0, le=1000)
+    readings: int = Field(default=4, ge=2, le=1000)
+    radius_m: Positive = 0.25
+    deviations: NonNegative = 1.0
+    """The disc grows by so many standard deviations of the foretold place."""
+
+
+class Movers:
+    """Tracks every narrow cluster of a scan: one that stands is foretold to stand, with its uncertainty."""
+
+    def __init__(self, config: MoversConfig) -> None:
+        self._config = config
+        self.tracks: FloatArray = np.zeros((0, kernels.COLUMNS))
+
+    def update(
+        self,
+        sensor_xy_m: tuple[float, float],
+        in_base: FloatArray,
+        pose: FloatArray,
+        dt_s: float,
+    ) -> BoolArray:
+        """Take the scan's points (N, 2), base frame, in the order of the beams; tell which are on tracks.
+
+        Returns (N,): points of bodies that count, which the obstacle grid shall not keep.
+        """
+        config = self._config
+        if not config.enabled:
+            return np.zeros(in_base.shape[0], dtype=np.bool_)
+        c, s = math.cos(pose[2]), math.sin(pose[2])
+        turn = np.array([[c, s], [-s, c]])
+        points = pose[:2] + in_base @ turn
+        x, y = pose[:2] + np.array(sensor_xy_m) @ turn
+        centres, of_point = kernels.scan_clusters(
+            x, y, points, config.gap_m, config.widest_m, config.least_points
+        )
+        self.tracks, of_centre = kernels.track_step(
+            self.tracks,
+            centres,
+            dt_s,
+            config.place_std_m,
+            config.acceleration_std_m_s2,
+            config.gate_std,
+            config.most_missed,
+        )
+        count = self._count()
+        # One more place, for the points of no cluster.
+        of_cluster = np.append(count[of_centre] if of_centre.size else np.zeros(0, np.bool_), False)
+        on_track: BoolArray = of_cluster[of_point]
+        return on_track
+
+    def _count(self) -> BoolArray:
+        """Which tracks have been read often enough."""
+        enough: BoolArray = self.tracks[:, kernels.READINGS] >= self._config.readings
+        return enough
+
+    def foretold(self, first_s: float, step_s: float, steps: int) -> FloatArray:
+        """Discs (steps, M, 3) at ``first_s`` from now and every ``step_s`` after."""
+        config = self._config
+        discs: FloatArray = kernels.foretold(
+            np.ascontiguousarray(self.tracks[self._count()]),
+            first_s,
+            step_s,
+            steps,
+            config.radius_m,
+            config.deviations,
+            config.acceleration_std_m_s2,
+        )
+        return discs
+
+    def nearest_m(self, x_m: float, y_m: float) -> float:
+        """Distance from a point to the nearest body's edge; inf without any."""
+        bodies = self.tracks[self._count()]
+        if not bodies.shape[0]:
+            return math.inf
+        away = np.hypot(bodies[:, kernels.X] - x_m, bodies[:, kernels.Y] - y_m)
+        return float(away.min()) - self._config.radius_m

@@ -1,0 +1,426 @@
+"""The rolling ground: odometry corrected by the laser, obstacles and seen ground, time to go over them."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+
+from pilotage.core.config import Config
+from pilotage.core.errors import InputError
+from pilotage.core.types import FloatArray, Pose2, Twist
+from pilotage.kernels.control import ground as kernels
+from pilotage.kernels.control import match, togo
+from pilotage.kernels.control.footprint import Body
+from pilotage.kernels.control.ground import Ground
+from pilotage.kernels.control.motion_limits import Drive
+from pilotage.kernels.geometry.motion import wrap
+from pilotage.kernels.grids.distance import squared_distance
+from pilotage.sensors.sensor import NonNegative, Positive
+from pilotage.stack.control.local.answer import Answer
+from pilotage.stack.control.local.body import make_body
+from pilotage.stack.control.local.movers import Movers, MoversConfig
+from pilotage.stack.control.local.role import LocalLimits, LocalView
+
+INSIDE_M = 0.05
+"""A point so deep inside the footprint is a mistake or was a body that walked through."""
+BLIND_SHARE = 0.5
+"""With more than this share of its ranges 0 the laser is covered."""
+BEYOND_S = 6.0
+"""The time to go is worked out so far past the robot: no plan goes back farther."""
+Scalar = TypeVar("Scalar", bound=np.generic)
+
+
+class RollingConfig(Config):
+    """The grids, the matching, and with which speed the time to go reckons."""
+
+    width_m: float = Field(default=10.0, ge=4.0, le=40.0)
+    cell_m: float = Field(default=0.05, ge=0.02, le=0.2)
+    reach_m: Positive = 5.0
+    """Farther than this the laser does not add to the grid."""
+    replan_steps: int = Field(default=2, ge=1, le=100)
+    """The time to go is worked out anew every so many steps, and when the grid rolls."""
+    match: bool = True
+    match_reach_m: Positive = 0.2
+    match_points: int = Field(default=180, ge=20, le=5000)
+    point_std_m: Positive = 0.06
+    drift_m: Positive = 0.04
+    drift_rad: Positive = 0.05
+    """Odometry's error after one metre, or one metre or radian, driven; it grows with their square root."""
+    easy_m: Positive = 0.62
+    """From this distance between base and obstacle on, full speed is reckoned with."""
+    slow_m_s: Positive = 0.35
+    unseen_share: Positive = 0.7
+    edge_m: NonNegative = 0.015
+    """Kept beside the footprint's inner disc where the time to go looks for a way."""
+    movers: MoversConfig = MoversConfig()
+    fade_hits: int = Field(default=3, ge=0, le=60)
+    """Hits that a cell loses where the laser sees past it; 0 for a world in which nothing moves."""
+
+
+@dataclass(frozen=True, slots=True)
+class Scene:
+    """The ground at one step.
+
+    Attributes
+    ----------
+    pose
+        (3,) corrected pose now, in the map frame: the odometry's at the first step.
+    start
+        (5,) x, y, theta, v, w when the next command takes effect.
+    goal
+        (2,) in the map frame.
+    sheet, drive
+        Limits as the data sheet gives them, and as the robot's answers so far make likely.
+    path
+        (N, 2) down the time to go, a point every 0.1 m.
+    delay_s
+        As it seems to be.
+    blind
+        The laser is covered: nothing can be said of what is around.
+    """
+
+    pose: FloatArray
+    start: FloatArray
+    goal: FloatArray
+    distance_m: float
+    body: Body
+    sheet: Drive
+    drive: Drive
+    ground: Ground
+    dt_s: float
+    path: FloatArray
+    delay_s: float
+    movers: Movers
+    blind: bool
+
+
+class RollingGround:
+    """Keeps the grids of one robot; give it every view and every command."""
+
+    def __init__(self, config: RollingConfig) -> None:
+        self._config = config
+        self._cells = 2 * math.ceil(0.5 * config.width_m / config.cell_m)
+        half = self._cells // 2
+        self._cell_m, self._coarse_m = config.cell_m, 2.0 * config.cell_m
+        self._hits = np.zeros((self._cells, self._cells), dtype=np.uint8)
+        self._mean = np.zeros((self._cells * self._cells, 2))
+        self._seen = np.zeros((half, half), dtype=np.bool_)
+        self._corner = (0, 0)
+        self._togo = np.zeros((half, half))
+        self._since_plan = 10**6
+        self._odometry: Pose2 | None = None
+        self._pose = np.zeros(3)
+        self._goal_given: tuple[float, float] | None = None
+        self._goal = np.zeros(2)
+        self._t_s = -math.inf
+        self._dt_s = 0.05
+        self._answer = Answer()
+        self._movers = Movers(config.movers)
+        self._body: Body | None = None
+        self._footprint: FloatArray | None = None
+        self.partners = 0
+
+    def sent(self, t_s: float, command: Twist) -> None:
+        """Remember a command: it is under way while the robot's delay lasts."""
+        self._answer.sent(t_s, command.v_m_s, command.w_rad_s)
+
+    def update(self, view: LocalView, avoid: FloatArray | None = None) -> Scene:
+        """Take a view in and give the ground as it is now.
+
+        Parameters
+        ----------
+        avoid
+            (N, 3) x, y, radius in the map frame: discs that the time to go leads around beside the obstacles.
+        """
+        if view.t_s <= self._t_s:
+            raise InputError(f"view: expected a time after {self._t_s:.3f} s, found {view.t_s:.3f} s")
+        if self._t_s > -math.inf:
+            self._dt_s = min(max(view.t_s - self._t_s, 1e-3), 0.5)
+        self._t_s = view.t_s
+        body = self._take_body(view)
+        drive = drive_of(view.limits)
+        ranges = np.where(np.isfinite(view.ranges_m), view.ranges_m, view.max_range_m)
+        blind = bool(np.mean(ranges <= 0.0) > BLIND_SHARE)
+        ranges = np.where(ranges <= 0.0, view.max_range_m, ranges)
+        angles = view.beam_angles_rad
+        first = float(angles[0])
+        step = float(angles[-1] - angles[0]) / (angles.shape[0] - 1)
+        first_view = self._odometry is None
+        self._predict(view)
+        rolled = self._roll(first_view)
+        in_base = kernels.scan_points(
+            view.mount.x_m, view.mount.y_m, view.mount.theta_rad, ranges, first, step, view.max_range_m
+        )
+        on_track = self._movers.update((view.mount.x_m, view.mount.y_m), in_base, self._pose, self._dt_s)
+        still = np.ascontiguousarray(in_base[~on_track])
+        if self._config.match and not first_view:
+            self._match(view, still)
+        self._odometry = view.pose
+        if self._goal_given != view.goal_xy_m:
+            self._goal_given = view.goal_xy_m
+            self._goal = _moved(view.goal_xy_m, view.pose, self._pose)
+        self._insert(view, ranges, first, step, body, first_view, still)
+        ground = self._ground(body, drive, rolled, avoid)
+        state = np.array([*self._pose, view.twist.v_m_s, view.twist.w_rad_s])
+        self._answer.learn(view.t_s, state, view.limits.delay_s, drive)
+        likely = self._answer.likely(drive)
+        start = self._answer.after_delay(view.t_s, state, view.limits.delay_s, likely)
+        path = togo.descent_path(
+            start[0], start[1], ground.togo_s, ground.x0_m, ground.y0_m, ground.coarse_m, 0.1, 60
+        )
+        distance = math.hypot(self._goal[0] - self._pose[0], self._goal[1] - self._pose[1])
+        return Scene(
+            self._pose.copy(),
+            start,
+            self._goal.copy(),
+            distance,
+            body,
+            drive,
+            likely,
+            ground,
+            self._dt_s,
+            path,
+            view.limits.delay_s * self._answer.delay_factor,
+            self._movers,
+            blind,
+        )
+
+    def _take_body(self, view: LocalView) -> Body:
+        if self._body is None or view.footprint_xy_m is not self._footprint:
+            self._body, self._footprint = make_body(view.footprint_xy_m), view.footprint_xy_m
+        return self._body
+
+    def _predict(self, view: LocalView) -> None:
+        """Move the corrected pose by what the odometry moved."""
+        before = self._odometry
+        if before is None:
+            self._pose = view.pose.as_array()
+            return
+        self._pose = np.array(
+            [
+                *_moved((view.pose.x_m, view.pose.y_m), before, self._pose),
+                wrap(self._pose[2] + view.pose.theta_rad - before.theta_rad),
+            ]
+        )
+
+    def _roll(self, first_view: bool) -> bool:
+        """Shift the grids by whole coarse cells, so that the robot stays near their middle."""
+        half_m = 0.5 * self._cells * self._cell_m
+        wanted = (
+            math.floor((self._pose[0] - half_m) / self._coarse_m),
+            math.floor((self._pose[1] - half_m) / self._coarse_m),
+        )
+        dc, dr = wanted[0] - self._corner[0], wanted[1] - self._corner[1]
+        if first_view:
+            self._corner = wanted
+            return True
+        if max(abs(dc), abs(dr)) * self._coarse_m < 0.5:
+            return False
+        self._hits = _shifted(self._hits, 2 * dr, 2 * dc)
+        square = (self._cells, self._cells, 2)
+        self._mean = _shifted(self._mean.reshape(square), 2 * dr, 2 * dc).reshape(-1, 2)
+        self._seen = _shifted(self._seen, dr, dc)
+        self._corner = wanted
+        return True
+
+    def _match(self, view: LocalView, in_base: FloatArray) -> None:
+        config = self._config
+        assert self._odometry is not None
+        moved = math.hypot(view.pose.x_m - self._odometry.x_m, view.pose.y_m - self._odometry.y_m)
+        turned = abs(wrap(view.pose.theta_rad - self._odometry.theta_rad))
+        position = config.drift_m * math.sqrt(moved) + 1e-3
+        pose_std = np.array([position, position, config.drift_rad * math.sqrt(moved + turned) + 1e-3])
+        ground = self._last_ground
+        x, y, theta, self.partners = match.match_scan(
+            self._pose[0],
+            self._pose[1],
+            self._pose[2],
+            in_base,
+            max(1, in_base.shape[0] // config.match_points),
+            ground,
+            config.match_reach_m,
+            config.point_std_m,
+            pose_std,
+        )
+        self._pose = np.array([x, y, wrap(theta)])
+
+    def _insert(
+        self,
+        view: LocalView,
+        ranges: FloatArray,
+        first: float,
+        step: float,
+        body: Body,
+        first_view: bool,
+        still: FloatArray,
+    ) -> None:
+        config = self._config
+        c, s = math.cos(self._pose[2]), math.sin(self._pose[2])
+        x = self._pose[0] + c * view.mount.x_m - s * view.mount.y_m
+        y = self._pose[1] + s * view.mount.x_m + c * view.mount.y_m
+        theta = self._pose[2] + view.mount.theta_rad
+        x0, y0 = self._corner[0] * self._coarse_m, self._corner[1] * self._coarse_m
+        near = still[np.hypot(still[:, 0] - view.mount.x_m, still[:, 1] - view.mount.y_m) < config.reach_m]
+        points = self._pose[:2] + near @ np.array([[c, s], [-s, c]])
+        if config.fade_hits:
+            kernels.clear_passed(
+                self._hits,
+                self._mean,
+                x,
+                y,
+                theta,
+                ranges,
+                first,
+                step,
+                view.max_range_m,
+                self._cell_m,
+                0.2,
+                config.fade_hits,
+            )
+        kernels.add_points(self._hits, self._mean, points, x0, y0, self._cell_m)
+        kernels.clear_inside(
+            self._hits,
+            self._mean,
+            self._pose[0],
+            self._pose[1],
+            self._pose[2],
+            body.polygon,
+            INSIDE_M,
+            x0,
+            y0,
+            self._cell_m,
+        )
+        kernels.mark_seen(
+            self._seen,
+            x,
+            y,
+            theta,
+            ranges,
+            first,
+            step,
+            x0,
+            y0,
+            self._coarse_m,
+            config.reach_m,
+        )
+        if first_view:
+            # Where the robot stands at first it may turn: the laser does not see the ground under it.
+            kernels.mark_disc(
+                self._seen,
+                self._pose[0],
+                self._pose[1],
+                body.outer_m + self._coarse_m,
+                x0,
+                y0,
+                self._coarse_m,
+            )
+
+    def _ground(self, body: Body, drive: Drive, rolled: bool, avoid: FloatArray | None) -> Ground:
+        config = self._config
+        x0, y0 = self._corner[0] * self._coarse_m, self._corner[1] * self._coarse_m
+        marked = kernels.believed(self._hits)
+        shown = np.where(marked, self._hits, np.uint8(0))
+        nearest = kernels.nearest_cells(marked)
+        unseen = self._coarse_m * np.sqrt(squared_distance(~self._seen).astype(np.float64))
+        self._since_plan += 1
+        if rolled or self._since_plan >= config.replan_steps:
+            self._since_plan = 0
+            self._clearance = togo.coarse_clearance(
+                nearest, self._mean, self._seen.shape[0], x0, y0, self._coarse_m
+            )
+            self._togo = self._time_to_go(avoid, body, drive)
+        self._last_ground = Ground(
+            shown,
+            self._mean,
+            nearest,
+            unseen,
+            self._togo,
+            x0,
+            y0,
+            self._cell_m,
+            self._coarse_m,
+            1.0 / self._cell_m,
+            1.0 / self._coarse_m,
+        )
+        return self._last_ground
+
+    def time_to_go_beside(self, discs: FloatArray, scene: Scene) -> FloatArray:
+        """Time to go (m, m) where discs (N, 3), x, y, radius in the map frame, are closed as well."""
+        return self._time_to_go(discs, scene.body, scene.sheet)
+
+    def _time_to_go(self, discs: FloatArray | None, body: Body, drive: Drive) -> FloatArray:
+        config = self._config
+        x0, y0 = self._corner[0] * self._coarse_m, self._corner[1] * self._coarse_m
+        clearance = self._clearance
+        if discs is not None and discs.shape[0]:
+            clearance = _beside(clearance, discs, x0, y0, self._coarse_m)
+        blocked_m = body.inner_m + config.edge_m
+        speed = togo.travel_speed(
+            clearance,
+            self._seen,
+            blocked_m,
+            max(config.easy_m, blocked_m + 0.05),
+            min(config.slow_m_s, drive.speed),
+            drive.speed,
+            config.unseen_share,
+        )
+        field: FloatArray = togo.time_to_go(
+            speed,
+            x0,
+            y0,
+            self._coarse_m,
+            self._goal[0],
+            self._goal[1],
+            drive.speed,
+            self._pose[0],
+            self._pose[1],
+            BEYOND_S,
+        )
+        return field
+
+
+def drive_of(limits: LocalLimits) -> Drive:
+    """The limits as kernels take them."""
+    return Drive(
+        limits.speed_m_s,
+        limits.reverse_m_s,
+        limits.acceleration_m_s2,
+        limits.deceleration_m_s2,
+        limits.turn_rate_rad_s,
+        limits.turn_acceleration_rad_s2,
+    )
+
+
+def _moved(point: tuple[float, float], seen_from: Pose2, now: FloatArray) -> FloatArray:
+    """Carry a point from the frame where the robot is at ``seen_from`` to that where it is at ``now``."""
+    turn = now[2] - seen_from.theta_rad
+    c, s = math.cos(turn), math.sin(turn)
+    dx, dy = point[0] - seen_from.x_m, point[1] - seen_from.y_m
+    return np.array([now[0] + c * dx - s * dy, now[1] + s * dx + c * dy])
+
+
+def _shifted(array: NDArray[Scalar], rows: int, columns: int) -> NDArray[Scalar]:
+    """Move the window over an array: what comes in is 0."""
+    out = np.zeros_like(array)
+    n, m = array.shape[:2]
+    if abs(rows) < n and abs(columns) < m:
+        out[max(0, -rows) : n - max(0, rows), max(0, -columns) : m - max(0, columns)] = array[
+            max(0, rows) : n + min(0, rows), max(0, columns) : m + min(0, columns)
+        ]
+    return out
+
+
+def _beside(clearance: FloatArray, discs: FloatArray, x0: float, y0: float, coarse: float) -> FloatArray:
+    """Clearance (m, m) with discs (N, 3) as further obstacles."""
+    m = clearance.shape[0]
+    centres = (np.arange(m) + 0.5) * coarse
+    out = clearance
+    for x, y, radius in discs:
+        away = np.hypot(x0 + centres[None, :] - x, y0 + centres[:, None] - y) - radius
+        out = np.minimum(out, np.maximum(away, 0.0))
+    return out

@@ -1,0 +1,53 @@
+"""Noise for sampled plans, drawn once, and plans carried from one step to the next."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pilotage.core.types import FloatArray
+
+STEPS_KEPT = 64
+"""Noise for so many steps is drawn beforehand; each step takes a random stretch of it."""
+KEEP = 0.8
+"""Of a command's noise goes on in the next command: independent noise would average out in the motion."""
+
+
+class NoiseBank:
+    """Noise sequences (rollouts, steps, 2) for speed and turn rate, from the generator handed in."""
+
+    def __init__(
+        self,
+        generator: np.random.Generator,
+        rollouts: int,
+        steps: int,
+        speed_std_m_s: float,
+        turn_std_rad_s: float,
+    ) -> None:
+        self._generator = generator
+        self._rollouts = rollouts
+        noise = generator.standard_normal((STEPS_KEPT * rollouts, steps, 2))
+        self._bank = _hanging_together(noise) * np.array([speed_std_m_s, turn_std_rad_s])
+
+    def draw(self) -> FloatArray:
+        """The next step's noise."""
+        offset = int(self._generator.integers(0, self._bank.shape[0] - self._rollouts + 1))
+        noise: FloatArray = self._bank[offset : offset + self._rollouts]
+        return noise
+
+
+def _hanging_together(noise: FloatArray) -> FloatArray:
+    """White noise (K, N, 2) as an AR(1) process along its second axis, still of unit variance."""
+    out = np.empty_like(noise)
+    out[:, 0] = noise[:, 0]
+    for k in range(1, noise.shape[1]):
+        out[:, k] = KEEP * out[:, k - 1] + np.sqrt(1.0 - KEEP**2) * noise[:, k]
+    return out
+
+
+def later(plan: FloatArray, steps: float) -> FloatArray:
+    """A plan (N, 2) as it is ``steps`` of its own steps later; the last command is held."""
+    at = np.minimum(np.arange(plan.shape[0]) + steps, plan.shape[0] - 1.0)
+    low = np.floor(at).astype(np.int64)
+    high = np.minimum(low + 1, plan.shape[0] - 1)
+    part = (at - low)[:, None]
+    return np.ascontiguousarray((1.0 - part) * plan[low] + part * plan[high])

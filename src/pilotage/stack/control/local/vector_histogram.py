@@ -1,0 +1,106 @@
+"""VFH+: steer into the cheapest opening of a polar histogram of what is near."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from pydantic import Field
+
+from pilotage.core.config import Config
+from pilotage.core.types import Twist
+from pilotage.kernels.control.polar_histogram import best_opening, binary_histogram, polar_histogram
+from pilotage.kernels.geometry.motion import wrap
+from pilotage.sensors.sensor import NonNegative, Positive
+from pilotage.stack.control.local.role import LOCAL_CONTROLLERS, LocalView
+from pilotage.stack.control.local.rolling import RollingConfig, RollingGround, Scene
+from pilotage.stack.control.local.rolling_step import rolling_step, what_it_does
+
+
+class VfhConfig(Config):
+    """The histogram, its thresholds, what a direction costs, and how fast it is driven."""
+
+    ground: RollingConfig = RollingConfig()
+    sectors: int = Field(default=72, ge=12, le=720)
+    active_m: Positive = 1.6
+    margin_m: NonNegative = 0.03
+    low: NonNegative = 0.05
+    high: Positive = 0.15
+    wide_sectors: int = Field(default=16, ge=2, le=360)
+    target_cost: NonNegative = 5.0
+    heading_cost: NonNegative = 2.0
+    before_cost: NonNegative = 2.0
+    lead_m: Positive = 1.2
+    """The target is the point so far down the time to go; the goal itself would lead into every pocket."""
+    turn_gain_per_s: Positive = 3.0
+    turn_in_place_rad: Positive = 1.0
+    headway_s: Positive = 0.3
+
+
+@LOCAL_CONTROLLERS.add("vfh", VfhConfig)
+class Vfh:
+    """VFH+ (Ulrich and Borenstein 1998): the robot is a disc, enlarged obstacles block directions.
+
+    Speed: what still stops before the nearest obstacle of the chosen direction, less for a turn. It takes the
+    robot for its outer disc, so openings narrower than that are closed to it.
+    """
+
+    def __init__(self, config: VfhConfig, generator: np.random.Generator) -> None:
+        del generator  # nothing here is drawn
+        self._config = config
+        self._ground = RollingGround(config.ground)
+        self._blocked = np.zeros(config.sectors, dtype=np.bool_)
+        self._before = math.nan
+        self._status = "waiting"
+
+    @property
+    def status(self) -> str:
+        """What it is doing, in a word."""
+        return self._status
+
+    def step(self, view: LocalView) -> Twist:
+        """Take the view in and give the next command."""
+        command, scene = rolling_step(self._ground, view, self._decide)
+        self._status = what_it_does(command, scene, view)
+        return command
+
+    def _decide(self, view: LocalView, scene: Scene) -> Twist:
+        del view
+        config = self._config
+        x, y, theta = scene.start[0], scene.start[1], scene.start[2]
+        ahead = scene.path[min(round(config.lead_m / 0.1), scene.path.shape[0] - 1)]
+        target = math.atan2(ahead[1] - y, ahead[0] - x) if scene.path.shape[0] > 1 else theta
+        histogram, distance = polar_histogram(
+            x, y, scene.ground, config.active_m, scene.body.outer_m + config.margin_m, config.sectors
+        )
+        self._blocked = binary_histogram(histogram, self._blocked, config.low, config.high)
+        if math.isnan(self._before):
+            self._before = theta
+        direction, cost = best_opening(
+            self._blocked,
+            target,
+            theta,
+            self._before,
+            config.wide_sectors,
+            config.target_cost,
+            config.heading_cost,
+            config.before_cost,
+        )
+        if not math.isfinite(cost):
+            # Shut in as a disc: turn towards the way down, which a footprint may still fit.
+            return Twist(0.0, self._turn(wrap(target - theta), scene))
+        self._before = direction
+        off = wrap(direction - theta)
+        if abs(off) > config.turn_in_place_rad:
+            return Twist(0.0, self._turn(off, scene))
+        width = 2.0 * math.pi / config.sectors
+        facing = int(theta % (2.0 * math.pi) / width) % config.sectors
+        near = min(float(distance[facing]), config.active_m) - scene.body.outer_m - config.margin_m
+        braking = scene.drive.deceleration
+        lag = braking * config.headway_s
+        stops = math.sqrt(lag * lag + 2.0 * braking * max(near, 0.0)) - lag
+        return Twist(min(scene.drive.speed, stops) * max(math.cos(off), 0.0), self._turn(off, scene))
+
+    def _turn(self, off: float, scene: Scene) -> float:
+        limit = scene.drive.turn_rate
+        return min(max(self._config.turn_gain_per_s * off, -limit), limit)
