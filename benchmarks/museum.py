@@ -9,10 +9,11 @@ from __future__ import annotations
 import time
 from dataclasses import dataclass
 from functools import cached_property
+from typing import cast
 
 import numpy as np
 
-from pilotage.core.types import STOP, FloatArray, Goal, Pose2
+from pilotage.core.types import STOP, FloatArray, Goal, Pose2, Twist
 from pilotage.experiments.floor.build import build
 from pilotage.experiments.floor.mission import load_floor_mission
 from pilotage.experiments.floor.world_map import load_map
@@ -220,7 +221,7 @@ class Museum:
         command, steps = STOP, 0
         begin = time.perf_counter()
         while stack.status[0] is StackStatus.RUNNING:
-            command = stack.step(simulator.step(command))
+            command = cast("Twist", stack.step(simulator.step(command)))
             steps += 1
         took = time.perf_counter() - begin
         if stack.status[0] is not StackStatus.ARRIVED or simulator.body.collisions:

@@ -8,6 +8,7 @@ band, and the share of the lines that were taken. The first argument may give an
 
 import sys
 from dataclasses import dataclass, field
+from typing import cast
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -15,7 +16,7 @@ from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 
 from pilotage.core.angles import wrap_array_to_pi
-from pilotage.core.types import STOP, FloatArray
+from pilotage.core.types import STOP, FloatArray, Twist
 from pilotage.experiments.floor.build import Experiment, build
 from pilotage.experiments.floor.mission import load_floor_mission
 
@@ -67,7 +68,7 @@ def drive(filters: list[Listener]) -> tuple[FloatArray, FloatArray]:
     times, truth, command = [], [], STOP
     while driver.status[0] == "running" and not simulator.body.collisions:
         readings = simulator.step(command)
-        command = driver.step(readings)
+        command = cast("Twist", driver.step(readings))
         for listener in filters[1:]:
             listener.experiment.stack.step(readings)
         for listener in filters:

@@ -14,6 +14,7 @@ from pilotage.core.errors import InputError
 from pilotage.core.random import RandomStreams
 from pilotage.core.types import STOP, Goal, Pose2, Twist
 from pilotage.kernels.geometry import chain
+from pilotage.maps.segment_map import SegmentMap
 from pilotage.missions.floor import BodyConfig, MotionConfig
 from pilotage.sensors.readings import Readings
 from pilotage.sim.simulator import Simulator
@@ -26,6 +27,7 @@ from pilotage.stack.navigator.goal import GoalNavigator
 from pilotage.stack.navigator.goal_config import GoalNavigatorConfig, Mode
 from pilotage.stack.navigator.navigator import Parts
 from pilotage.stack.planning.dubins_local import DubinsLocalConfig, DubinsLocalPlanner
+from pilotage.stack.planning.planner import PLANNERS
 from pilotage.stack.planning.rrt_star_dubins import RrtStarDubinsConfig, RrtStarDubinsPlanner
 from support.robots import BEACONS, ROOM, Told, sensors, told_of
 
@@ -120,6 +122,44 @@ def test_a_goal_in_the_wall_fails_before_the_start() -> None:
     assert "goal" in reason
     assert [event.kind for event in told.journal.events] == ["failed"]
     assert stack.step(Readings(0.1, {})) == Twist(0.0, 0.0)
+
+
+@pytest.mark.parametrize("heading", [0.0, 1.5, 3.0, -2.0])
+def test_a_plan_that_turns_on_the_spot_is_taken_up_by_turning(heading: float) -> None:
+    """Between two walls there is no room for an arc."""
+    walls = np.array([[0, 0, 6, 0], [6, 0, 6, 1.1], [6, 1.1, 0, 1.1], [0, 1.1, 0, 0]], dtype=float)
+    corridor, start = SegmentMap.of(walls), Pose2(0.8, 0.55, heading)
+    told = told_of(world=corridor, start=start, goal=Goal(5.0, 0.55))
+    sim = Simulator(
+        World(corridor, corridor, BEACONS),
+        BodyConfig(),
+        MotionConfig(),
+        sensors(),
+        start,
+        0.1,
+        RandomStreams(0),
+    )
+    parts = Parts(
+        localizer=Stub(told.initial),
+        planner=PLANNERS.entry("astar").factory(PLANNERS.configure("astar", {"clearance_m": 0.4}, "planner")),
+        smoother=None,
+        local_planner=DubinsLocalPlanner(DubinsLocalConfig(), told.robot),
+        controller=PiFollower(PiFollowerConfig(), told.robot),
+        reactive=None,
+        mapper=None,
+        escape=None,
+    )
+    stack = told.navigator(GoalNavigator, GoalNavigatorConfig(), parts)
+    command = STOP
+    for _ in range(400):
+        readings = sim.step(command)
+        parts.localizer.belief = Belief(sim.truth, 1e-6 * np.eye(3))  # type: ignore[misc]
+        command = stack.step(readings)
+        assert sim.body.collisions == 0
+        if stack.status[0] is not StackStatus.RUNNING:
+            break
+    assert stack.status[0] is StackStatus.ARRIVED
+    assert told.journal.counts["replans"] <= 1
 
 
 def test_no_goal_is_refused() -> None:

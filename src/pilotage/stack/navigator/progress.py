@@ -65,6 +65,11 @@ class PathProgress:
         )
         return self.length_m - self.at_m
 
+    @property
+    def heading_rad(self) -> float:
+        """Of the path where the robot is."""
+        return float(self._states[int(np.searchsorted(self._along_m, self.at_m)), 2])
+
     def next_waypoint(self, ahead_m: float) -> int:
         """Index of the first waypoint at least ``ahead_m`` farther along (the last one at the end)."""
         index = int(np.searchsorted(self.waypoint_along_m, self.at_m + ahead_m))

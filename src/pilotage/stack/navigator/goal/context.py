@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+from pilotage.core.angles import wrap_to_pi
 from pilotage.core.types import Goal, Pose2
 from pilotage.sensors.readings import Readings
 from pilotage.stack.control.controller import Controller
@@ -28,6 +29,9 @@ HERE_TOLERANCE_M = 0.005
 MAPPED_TOLERANCE_M = 0.02
 """What the robot maps is drawn a little too large: where it stands there was room for it."""
 
+TURN_RATE_RAD_S = 0.8
+"""On the spot, where the plan does."""
+
 NO_REACTION = Reaction(ReactionKind.NONE, 0.0, math.inf, math.inf)
 
 
@@ -36,6 +40,8 @@ class Context:
 
     Attributes
     ----------
+    turn_rate_rad_s
+        On the spot.
     t_s, status, reason
         Of the last step; why the task failed.
     mode, reaction, to_go_m
@@ -63,6 +69,8 @@ class Context:
         self.journal = journal
         self.goals: list[Goal] = list(task.goals)
         self._tolerance_m = task.goal_tolerance_m
+        self._turns_on_the_spot = robot.motion.least_turning_radius_m == 0.0
+        self.turn_rate_rad_s = min(TURN_RATE_RAD_S, robot.motion.top_turn_rate_rad_s)
         self.reactive, self._mapper, self.escape = parts.reactive, parts.mapper, parts.escape
         self.own_map, self.plan = own_map, plan
         self.follower = WaypointFollower(local_planner, controller, robot.dt_s)
@@ -158,6 +166,13 @@ class Context:
         if self.to_go_m > away + self._tolerance_m:
             return False
         return away <= self.config.arrival_m or (away <= self._tolerance_m and self.to_go_m < 0.02)
+
+    def turn_to_plan_rad(self, pose: Pose2) -> float:
+        """How far to turn to head as the plan does here; 0 where the plan, or the robot, does not turn so."""
+        path = self.plan.path
+        if path is None or path.turning_radius_m > 0.0 or not self._turns_on_the_spot:
+            return 0.0
+        return wrap_to_pi(self.progress.heading_rad - pose.theta_rad)
 
     def _goes_straight(self) -> bool:
         turn = self.progress.turn_ahead_rad(self.config.straight_ahead_m)

@@ -12,15 +12,25 @@ from pilotage.stack.interface import Belief
 from pilotage.stack.navigator.goal.context import HERE_TOLERANCE_M, Context
 from pilotage.stack.navigator.goal.ended import arrive
 from pilotage.stack.navigator.goal.escaping import begin_escape, replan, set_out
-from pilotage.stack.navigator.goal.state import Move
+from pilotage.stack.navigator.goal.state import Move, State
 from pilotage.stack.navigator.goal_config import Mode
+
+ALIGNED_RAD, TURN_GAIN_PER_S = 0.1, 2.0
+"""Turned on the spot until this near to the plan's heading, slower towards the end."""
 
 
 @dataclass(frozen=True, slots=True)
 class Following:
-    """Follows the plan from waypoint to waypoint."""
+    """Follows the plan from waypoint to waypoint.
+
+    Attributes
+    ----------
+    turns
+        Whether it may turn on the spot to the plan's heading: not back to what it has just turned away from.
+    """
 
     context: Context
+    turns: bool = True
 
     def step(self, readings: Readings, belief: Belief) -> Move:
         """React to what is near, else follow."""
@@ -72,7 +82,8 @@ def drive(context: Context, state: Driving, readings: Readings, belief: Belief) 
         return move
     if isinstance(move.state, Avoiding):
         return Move(move.state, Twist(0.0, command.w_rad_s))
-    return replan(context, move.state, pose, "the robot's own map leaves no room for the command")
+    resumes = _anew(context, move.state)
+    return replan(context, resumes, pose, "the robot's own map leaves no room for the command")
 
 
 def _next(context: Context, state: Driving, readings: Readings, pose: Pose2) -> Move:
@@ -81,20 +92,27 @@ def _next(context: Context, state: Driving, readings: Readings, pose: Pose2) -> 
     kind = context.react(readings, pose)
     resumes = state.resumes if isinstance(state, Avoiding) else state
     if kind is ReactionKind.TRAPPED:
-        return begin_escape(context, resumes, "turning found no way out")
+        return begin_escape(context, _anew(context, resumes), "turning found no way out")
     if context.stalled():
-        return begin_escape(context, resumes, f"no progress for {context.config.stall_s:g} s")
+        return begin_escape(context, _anew(context, resumes), f"no progress for {context.config.stall_s:g} s")
     if kind is ReactionKind.AVOID:
         return _avoid(context, state, resumes)
     if isinstance(state, Avoiding):
         context.follower.drop()
         context.say("avoid-end", "the way in front is free again")
+        if isinstance(resumes, Following):
+            resumes = Following(context, turns=False)
     if kind is ReactionKind.HALL and not context.near_goal(pose):
         return _take_the_middle(context, resumes)
     if isinstance(resumes, InHall):
         context.follower.drop()
         resumes = Following(context)
     return _follow(context, resumes, pose)
+
+
+def _anew(context: Context, state: State) -> State:
+    """The state with a plan that nothing has come in the way of yet."""
+    return Following(context) if isinstance(state, Following) else state
 
 
 def _avoid(context: Context, state: Driving, resumes: Following | InHall) -> Move:
@@ -126,15 +144,27 @@ def _follow(context: Context, state: Following, pose: Pose2) -> Move:
         if context.near_goal(pose):
             return _reach(context, state, pose)
         if not context.replan_locally(pose):
-            return replan(context, state, pose, "no next waypoint can be reached on the robot's own map")
+            off_rad = context.turn_to_plan_rad(pose) if state.turns else 0.0
+            if abs(off_rad) > ALIGNED_RAD:
+                return Move(state, _turn(context, off_rad))
+            return replan(
+                context, Following(context), pose, "no next waypoint can be reached on the robot's own map"
+            )
     elif context.path_is_blocked():
-        return replan(context, state, pose, "a mapped obstacle stands on the local path")
+        return replan(context, Following(context), pose, "a mapped obstacle stands on the local path")
     command = context.follower.step(pose)
     context.mode = Mode.FOLLOW
     if context.reaction.kind is ReactionKind.LATERAL:
         context.mode = Mode.LATERAL
         command = Twist(command.v_m_s, command.w_rad_s + context.reaction.w_rad_s)
     return Move(state, command)
+
+
+def _turn(context: Context, off_rad: float) -> Twist:
+    """On the spot: the plan does so here, and no curve leads on."""
+    context.mode = Mode.FOLLOW
+    most = context.turn_rate_rad_s
+    return Twist(0.0, min(max(TURN_GAIN_PER_S * off_rad, -most), most))
 
 
 def _reach(context: Context, state: Following, pose: Pose2) -> Move:
