@@ -93,7 +93,10 @@ def test_clearance_on_a_grid_is_that_from_its_outlines(shape: Footprint, seed: i
     cells, walls = both_worlds(grid)
     poses = free_poses(grid, seed)
     on_cells, on_walls = cells.clearance_m(shape, poses), walls.clearance_m(shape, poses)
-    assert on_cells == pytest.approx(on_walls, abs=1e-9)
+    apart = on_walls >= 0.0
+    assert on_cells[apart] == pytest.approx(on_walls[apart], abs=1e-9)
+    # How deep an overlap is depends on where sides are cut in two.
+    assert (on_cells[~apart] < 0.0).all()
 
 
 def sampled(points: np.ndarray, spacing: float = 0.008) -> np.ndarray:

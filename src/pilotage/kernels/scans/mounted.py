@@ -13,6 +13,7 @@ from pilotage.kernels.arrays import FloatArray, IntArray
 from pilotage.kernels.geometry.motion import wrap
 from pilotage.kernels.jit import kernel
 from pilotage.kernels.scans.rays import SIGHT_MARGIN_M, cone_range, narrow_fan
+from pilotage.kernels.scans.sweep import narrow_grid_fan
 from pilotage.kernels.scans.tiles import (
     COSINE,
     ORIGIN_X,
@@ -23,7 +24,7 @@ from pilotage.kernels.scans.tiles import (
     TILE_ROWS,
     Cells,
 )
-from pilotage.kernels.scans.trace import grid_beam, narrow_grid_fan
+from pilotage.kernels.scans.trace import grid_beam
 
 
 @kernel
@@ -36,6 +37,7 @@ def mounted(x: float, y: float, theta: float, mount: FloatArray) -> tuple[float,
 @kernel
 def fans(
     poses: FloatArray,
+    own: IntArray,
     mount: FloatArray,
     first: float,
     step: float,
@@ -45,10 +47,12 @@ def fans(
     segments: FloatArray,
     circles: FloatArray,
     jump: Cells,
+    outlines: FloatArray,
+    starts: IntArray,
+    items: IntArray,
     frame: FloatArray,
     others_segments: FloatArray,
     others_circles: FloatArray,
-    own: IntArray,
 ) -> FloatArray:
     """Ranges (R, beams) of equal fans on bodies at poses (R, >= 3); ``own`` (R, 3) are their own rows.
 
@@ -61,7 +65,7 @@ def fans(
         x, y, theta = mounted(poses[r, 0], poses[r, 1], poses[r, 2], mount)
         theta += first
         narrow_fan(ranges, x, y, theta, step, cosines, sines, max_range, segments, circles)
-        narrow_grid_fan(ranges, x, y, theta, step, cosines, sines, jump, frame)
+        narrow_grid_fan(ranges, x, y, theta, step, cosines, sines, jump, outlines, starts, items, frame)
         if others_segments.shape[0] + others_circles.shape[0] > 0:
             before, after = others_segments[: own[r, 0]], others_segments[own[r, 1] :]
             near, far = others_circles, others_circles[:0]
@@ -75,26 +79,29 @@ def fans(
 @kernel
 def noisy_fans(
     poses: FloatArray,
+    normals: FloatArray,
+    own: IntArray,
     mount: FloatArray,
     first: float,
     step: float,
     cosines: FloatArray,
     sines: FloatArray,
     max_range: float,
-    normals: FloatArray,
     std: float,
     segments: FloatArray,
     circles: FloatArray,
     jump: Cells,
+    outlines: FloatArray,
+    starts: IntArray,
+    items: IntArray,
     frame: FloatArray,
     others_segments: FloatArray,
     others_circles: FloatArray,
-    own: IntArray,
 ) -> FloatArray:
     """``fans`` plus ``std`` times standard normals (R, beams); a beam without a hit stays at the reach."""
     out = fans(
-        poses, mount, first, step, cosines, sines, max_range, segments, circles, jump, frame,
-        others_segments, others_circles, own,
+        poses, own, mount, first, step, cosines, sines, max_range, segments, circles, jump, outlines,
+        starts, items, frame, others_segments, others_circles,
     )  # fmt: skip
     for r in range(out.shape[0]):
         for k in range(out.shape[1]):

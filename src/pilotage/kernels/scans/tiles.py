@@ -24,6 +24,50 @@ Cells = NDArray[np.uint8]
 
 
 @kernel
+def cell_sides(occupied: NDArray[np.bool_], cell: float) -> FloatArray:
+    """(N, 4) sides between occupied cells and others, row 0 at the bottom, in the grid's own frame.
+
+    Sides in a row with their cells on the same hand are one; the cells lie to the left of it.
+    """
+    rows, columns = occupied.shape
+    out = np.empty((16, 4))
+    count = 0
+    # Below and above each row of cells, then to the left and right of each column.
+    for hand in range(4):
+        level = hand < 2
+        lines, length = (rows, columns) if level else (columns, rows)
+        ahead = hand % 2 == 1
+        for line in range(lines):
+            begin = -1
+            for k in range(length + 1):
+                side = False
+                if k < length:
+                    row, column = (line, k) if level else (k, line)
+                    over = line + (1 if ahead else -1)
+                    free = True
+                    if 0 <= over < lines:
+                        free = not (occupied[over, k] if level else occupied[k, over])
+                    side = occupied[row, column] and free
+                if side and begin < 0:
+                    begin = k
+                if not side and begin >= 0:
+                    if count == out.shape[0]:
+                        out = np.concatenate((out, np.empty_like(out)))
+                    at = (line + (1 if ahead else 0)) * cell
+                    # Cells above a level side lie to its left where it leads to larger x, cells beside an
+                    # upright one to its left where it leads to larger y from their right.
+                    forward = ahead != level
+                    first, last = (begin * cell, k * cell) if forward else (k * cell, begin * cell)
+                    if level:
+                        out[count, 0], out[count, 1], out[count, 2], out[count, 3] = first, at, last, at
+                    else:
+                        out[count, 0], out[count, 1], out[count, 2], out[count, 3] = at, first, at, last
+                    count += 1
+                    begin = -1
+    return out[:count].copy()
+
+
+@kernel
 def count_in_tiles(segments: FloatArray, tile: float, columns: int, rows: int) -> tuple[IntArray, IntArray]:
     """Sort segments (N, 4) along the axes into tiles; return ``starts`` and ``items``.
 

@@ -14,8 +14,6 @@ from pilotage.kernels.jit import kernel
 from pilotage.kernels.scans.tiles import CELL, COSINE, ORIGIN_X, ORIGIN_Y, SINE, Cells
 
 OCCUPIED = 255
-WIDE, NARROW = 32, 4
-"""Beams that are traced together while they are far from everything, at first and then."""
 
 
 @kernel
@@ -64,76 +62,6 @@ def trace(u: float, v: float, du: float, dv: float, begin: float, end: float, ju
         if t > end or not (0 <= row < rows and 0 <= column < columns):
             return math.inf
     return math.inf
-
-
-@kernel
-def common_length(
-    u: float, v: float, du: float, dv: float, spread: float, begin: float, end: float, jump: Cells
-) -> float:
-    """How far a bundle of beams is free: around the one along (du, dv), ``spread`` apart per length."""
-    rows, columns = jump.shape
-    t = begin
-    while t < end:
-        column, row = math.floor(u + t * du), math.floor(v + t * dv)
-        if not (0 <= row < rows and 0 <= column < columns):
-            break
-        free = int(jump[row, column])
-        ahead = 0.5 * free - t * spread
-        if free == OCCUPIED or ahead < 1.0:
-            break
-        t += ahead
-    return t
-
-
-@kernel
-def narrow_grid_fan(
-    ranges: FloatArray,
-    x: float,
-    y: float,
-    theta: float,
-    step: float,
-    cosines: FloatArray,
-    sines: FloatArray,
-    jump: Cells,
-    frame: FloatArray,
-) -> None:
-    """Shorten the ``ranges`` of a fan, in place, where a grid's occupied cells are nearer.
-
-    The fan is as in ``rays.table_fan_ranges``. Neighbouring beams are traced as one while the nearest
-    occupied cell is farther away than they are apart.
-    """
-    if jump.shape[0] == 0:
-        return
-    cell = frame[CELL]
-    dx, dy = x - frame[ORIGIN_X], y - frame[ORIGIN_Y]
-    u = (frame[COSINE] * dx + frame[SINE] * dy) / cell
-    v = (frame[COSINE] * dy - frame[SINE] * dx) / cell
-    # The first beam's direction in the grid's frame.
-    c = math.cos(theta) * frame[COSINE] + math.sin(theta) * frame[SINE]
-    s = math.sin(theta) * frame[COSINE] - math.cos(theta) * frame[SINE]
-    beams = cosines.shape[0]
-    inside = 0.0 <= u < jump.shape[1] and 0.0 <= v < jump.shape[0]
-    for wide in range(0, beams, WIDE):
-        wide_end = min(beams, wide + WIDE)
-        wide_free = 0.0
-        if inside:
-            k = (wide + wide_end) // 2
-            spread = 2.0 * math.sin(min(0.25 * WIDE * step, 0.5 * math.pi))
-            du, dv = c * cosines[k] - s * sines[k], s * cosines[k] + c * sines[k]
-            wide_free = common_length(u, v, du, dv, spread, 0.0, ranges[k] / cell, jump)
-        for narrow in range(wide, wide_end, NARROW):
-            narrow_end = min(wide_end, narrow + NARROW)
-            free = wide_free
-            if inside:
-                k = (narrow + narrow_end) // 2
-                spread = 2.0 * math.sin(min(0.25 * NARROW * step, 0.5 * math.pi))
-                du, dv = c * cosines[k] - s * sines[k], s * cosines[k] + c * sines[k]
-                free = common_length(u, v, du, dv, spread, wide_free, ranges[k] / cell, jump)
-            for k in range(narrow, narrow_end):
-                du, dv = c * cosines[k] - s * sines[k], s * cosines[k] + c * sines[k]
-                hit = trace(u, v, du, dv, free, ranges[k] / cell, jump)
-                if hit < math.inf:
-                    ranges[k] = min(ranges[k], hit * cell)
 
 
 @kernel

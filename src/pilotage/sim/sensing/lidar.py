@@ -29,17 +29,25 @@ class SimulatedLidar:
         self._at = BLOCK
         world, angles = carrier.world, config.beam_angles_rad()
         from_first = angles - angles[0]
-        self._fan = (
+        grid, traffic = world.grid, world.traffic
+        self._arguments = (
             mount_of(config.mount),
             float(angles[0]),
             config.beam_step_rad,
             np.cos(from_first),
             np.sin(from_first),
             config.max_range_m,
+            math.sqrt(config.range_var_m2),
+            world.segments_m,
+            world.circles_m,
+            grid.jump,
+            grid.outlines_m,
+            grid.starts,
+            grid.items,
+            grid.frame,
+            traffic.segments_m,
+            traffic.circles_m,
         )
-        self._std = math.sqrt(config.range_var_m2)
-        self._solids = (world.segments_m, world.circles_m, world.grid.jump, world.grid.frame)
-        self._others = (world.traffic.segments_m, world.traffic.circles_m)
         self._pose = self._body.state.reshape(1, -1)
         self._own = self._body.own.reshape(1, 3)
 
@@ -53,9 +61,8 @@ class SimulatedLidar:
 
     def read(self) -> LidarScan:
         """Scan from where the sensor is now."""
-        ranges = mounted.noisy_fans(
-            self._pose, *self._fan, self._next_noise(), self._std, *self._solids, *self._others, self._own
-        )
+        noise = self._next_noise()
+        ranges = mounted.noisy_fans(self._pose, noise, self._own, *self._arguments)
         return LidarScan(ranges[0])
 
     @classmethod
@@ -71,9 +78,7 @@ class SimulatedLidar:
             for row, (sensor, state) in enumerate(zip(sensors, states, strict=True)):
                 poses[row] = state[:3]
                 noise[row] = sensor._next_noise()[0]
-            ranges = mounted.noisy_fans(
-                poses, *first._fan, noise, first._std, *first._solids, *first._others, own
-            )
+            ranges = mounted.noisy_fans(poses, noise, own, *first._arguments)
             return [LidarScan(row) for row in ranges]
 
         return read

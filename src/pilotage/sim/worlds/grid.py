@@ -9,14 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pilotage.core.errors import InputError
-from pilotage.core.types import FloatArray, IntArray, Pose2
+from pilotage.core.types import FloatArray, IntArray
 from pilotage.kernels.grids.distance import FAR
 from pilotage.kernels.scans import jumps, tiles
 from pilotage.maps.memory import require_memory
 from pilotage.maps.occupancy_grid import OccupancyGrid
-from pilotage.maps.outlines import outlines
 
-CELLS_A_TILE = 8
+CELLS_A_TILE = 24
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -28,7 +27,7 @@ class GridLayer:
     jump
         (rows, columns), row 0 at the bottom: how far a beam may leap from each cell.
     outlines_m
-        (N, 4) sides of the occupied cells, in the grid's own frame.
+        (N, 4) sides of the occupied cells, in the grid's own frame, the cells to their left.
     starts, items
         Which of them lie in each tile.
     frame
@@ -65,8 +64,7 @@ class GridLayer:
                 f"found {occupied.shape}"
             )
         require_memory(8 * occupied.size, "what beams and bodies meet on the grid")
-        own = OccupancyGrid(grid.cells, grid.resolution_m, Pose2(0.0, 0.0, 0.0))
-        sides = outlines(own)
+        sides = tiles.cell_sides(occupied, grid.resolution_m)
         tile = CELLS_A_TILE * grid.resolution_m
         rows, columns = (math.ceil(n / CELLS_A_TILE) for n in occupied.shape)
         starts, items = tiles.count_in_tiles(sides, tile, columns, rows)

@@ -191,6 +191,7 @@ class World:
         from_first = angles_rad - angles_rad[0]
         return mounted.fans(
             places,
+            np.tile(NOBODY, (len(places), 1)) if own is None else own,
             np.zeros(3),
             float(angles_rad[0]),
             step,
@@ -200,10 +201,12 @@ class World:
             self.segments_m,
             self.circles_m,
             self.grid.jump,
+            self.grid.outlines_m,
+            self.grid.starts,
+            self.grid.items,
             self.grid.frame,
             self.traffic.segments_m,
             self.traffic.circles_m,
-            np.tile(NOBODY, (len(places), 1)) if own is None else own,
         )
 
     def beam(self, poses: FloatArray, max_range_m: float, own: IntArray = NOBODY) -> FloatArray:
