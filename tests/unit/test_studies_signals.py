@@ -16,7 +16,9 @@ from pilotage.cli.main import main
 from support.hostile_studies import TESTS, expected, rows_of
 
 SLOW = f"""
+import signal
 import sys
+signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background job ignores it
 sys.path.insert(0, {str(TESTS)!r})
 from support import hostile_trials
 from pilotage.experiments.studies import local_workers

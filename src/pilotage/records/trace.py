@@ -120,7 +120,8 @@ def write_trace(folder: Path, trace: Trace) -> None:
     if trace.robot is not None:
         columns = {ROBOT_COLUMN: trace.robot.astype(np.int32), **columns}
         metadata = {ROBOTS_KEY: json.dumps(list(trace.robots))}
-    pq.write_table(pa.table(columns, metadata=metadata), folder / TRACE_FILE)
+    with (folder / TRACE_FILE).open("wb") as file:  # Arrow takes no name whose bytes are no UTF-8
+        pq.write_table(pa.table(columns, metadata=metadata), file)
 
 
 def read_trace(folder: Path, columns: Sequence[str] | None = None) -> Trace:
