@@ -33,7 +33,7 @@ def test_a_full_disk_stops_it_in_one_line_and_resume_finishes(
     monkeypatch.setattr(store, "FULL_PAUSE_S", 0.05)
     disk = small_disk(size)
     sweep = ["sweep", "museum-plan", "--vary", "stack.planner.turning_radius_m=0.3,0.5,0.8", "--trials", "30"]
-    sweep += ["--name", "x", "--workers", "1", "--no-report", "--out", str(disk), "--resume"]
+    sweep += ["--name", "x", "--workers", "1", "--no-report", "--out", str(disk)]
     assert main([*sweep, "--quiet"]) == 1
     (line,) = capsys.readouterr().err.splitlines()
     assert "make room and go on with --resume" in line
@@ -42,7 +42,7 @@ def test_a_full_disk_stops_it_in_one_line_and_resume_finishes(
         assert {row["status"] for row in rows} <= {"pending", "running", "done"}
         assert all(row["metrics"] == expected(row["row"]) for row in rows if row["status"] == "done")
     more_room(disk)
-    assert main(sweep) == 0
+    assert main([*sweep, "--resume"]) == 0
     rows = rows_of(disk / "x")
     assert [row["metrics"] for row in rows] == [expected(row) for row in range(90)]
     assert {row["attempts"] for row in rows} == {1}
@@ -92,7 +92,7 @@ def test_a_folder_that_cannot_be_written_is_one_line(
     order()
     disk = small_disk("20m")
     sweep = ["sweep", "museum-plan", "--vary", "stack.planner.turning_radius_m=0.3,0.5", "--trials", "1"]
-    sweep += ["--workers", "1", "--no-report", "--out", str(disk / "Übung mit Raum"), "--resume", "--quiet"]
+    sweep += ["--workers", "1", "--no-report", "--out", str(disk / "Übung mit Raum"), "--quiet"]
     assert main([*sweep, "--name", "x"]) == 0
     subprocess.run(["mount", "-o", "remount,ro", str(disk)], check=True)
     for name in ("x", "y"):

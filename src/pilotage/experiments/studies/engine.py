@@ -81,7 +81,7 @@ def run_study(
     """
     options, listener = options or StudyOptions(), listener or Listener()
     check_metric_names(study)
-    if options.resume and not (folder / DATABASE).is_file():
+    if options.resume and not folder.is_dir():
         raise InputError(f"{folder}: expected a study that was begun, found none; leave --resume out")
     try:
         counts = _run(study, folder, options, listener)

@@ -1,0 +1,263 @@
+"""What each factor of a complete design does to a metric, how surely, and what more trials would show.
+
+A design is an array of trials by levels: every trial once at every combination of levels. Tests are by ranks
+(scipy): with shared seeds Wilcoxon's signed ranks for two levels and Friedman's for more, with seeds apart
+Mann and Whitney's and Kruskal and Wallis'. The other factors are averaged out. An interaction is tested on
+contrasts: where the effect of one factor is the same at every level of the other, its contrasts there are
+exchangeable, so that the same tests hold.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from scipy import stats
+
+from pilotage.core.types import FloatArray
+from pilotage.evaluation.intervals import ROUNDING
+from pilotage.evaluation.paired import Difference, difference, difference_apart
+
+FEWEST = 5
+"""Of fewer complete trials nothing is tested."""
+SURE = 0.05
+"""The chance of one false finding or more in a study without effects (Holm's correction)."""
+POWER = 0.8
+_EFFICIENCY = 3.0 / math.pi
+"""Of rank tests beside those of means, for normal errors (Pitman; Hollander and Wolfe 1999)."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Effect:
+    """What one factor, or two together, do to a metric.
+
+    Attributes
+    ----------
+    axes
+        The factor's place, or both factors' of an interaction.
+    n
+        Trials that are complete.
+    means
+        Of the levels, the other factors averaged out; of an interaction (levels, levels).
+    ends
+        The levels between which ``change`` is told; of an interaction, of its second factor.
+    columns
+        (n,) and (n,) what is compared between the ends; of an interaction the change along its first factor.
+    share
+        Of the variance (with shared seeds: within the seeds) that the effect explains, 0 to 1 (eta squared).
+    p_value
+        Of the test that there is no effect; nan where nothing varies.
+    variance
+        Of one value (with shared seeds: without the seed's own mean); of an interaction of one contrast.
+    spread
+        Sum of the squared deviations of the levels' means over that variance, without what chance adds.
+    alpha
+        Of the test, after the strictest correction for the family.
+    """
+
+    axes: tuple[int, ...]
+    n: int
+    means: FloatArray
+    ends: tuple[int, int]
+    columns: tuple[FloatArray, FloatArray]
+    share: float
+    p_value: float
+    levels: int
+    variance: float
+    spread: float
+    alpha: float
+    paired: bool
+
+    def change(self) -> Difference:
+        """Of the mean between the ends, with its 95 % bootstrap interval."""
+        return (difference if self.paired else difference_apart)(*self.columns)
+
+    def detectable(self) -> float:
+        """The change between the ends, the other levels evenly between, that as many trials show in four of
+        five studies; nan where nothing varies.
+        """
+        if not self.variance > 0.0:
+            return math.nan
+        need = _root(lambda spread: self._power(spread, self.n))
+        # The sum of squares of an even ladder from 0 to 1.
+        ladder = self.levels * (self.levels + 1.0) / (12.0 * (self.levels - 1.0))
+        return math.sqrt(need * self.variance / ladder)
+
+    def needed(self) -> float:
+        """Trials that show a change like the one seen in four of five studies; nan where the one seen is no
+        more than chance brings.
+        """
+        if not self.spread > 0.0:
+            return math.nan
+        return float(max(math.ceil(_root(lambda trials: self._power(self.spread, trials))), FEWEST))
+
+    def _power(self, spread: float, trials: float) -> float:
+        return power(spread, self.levels, trials, self.alpha, paired=self.paired)
+
+
+def effects(values: FloatArray, *, ordered: Sequence[bool], paired: bool, tests: int) -> list[Effect]:
+    """Main effects of all factors and the interactions of every two, not corrected yet.
+
+    Parameters
+    ----------
+    values
+        (n, l1, ..., lk), finite, at least two levels each: a trial's value at each setting.
+    ordered
+        (k,) whether a factor's levels are in an order: its ends are then the first and the last, else the
+        first and the one farthest from it.
+    paired
+        Whether a trial has the same seed at all settings.
+    tests
+        How many tests the family has, for what is told of power.
+    """
+    if values.shape[0] < FEWEST:
+        return []
+    scale = float(np.abs(values).max()) or 1.0
+    # What averages differ by from rounding alone must not get ranks of its own.
+    values = np.round(values / scale, 12)
+    axes = range(values.ndim - 1)
+    found = [_main(values, axis, ordered[axis], paired, tests) for axis in axes]
+    found += [_interaction(values, pair, paired, tests) for pair in itertools.combinations(axes, 2)]
+    return [_scaled(effect, scale) for effect in found]
+
+
+def holm(p_values: Sequence[float]) -> list[float]:
+    """P-values that hold the chance of any false finding among them (Holm 1979); nan does not count."""
+    values = np.asarray(p_values, dtype=np.float64)
+    tested = np.flatnonzero(np.isfinite(values))
+    order = tested[np.argsort(values[tested], kind="stable")]
+    out = np.full(values.shape, math.nan)
+    steps = values[order] * np.arange(order.size, 0, -1)
+    out[order] = np.minimum(np.maximum.accumulate(steps), 1.0) if order.size else 0.0
+    return [float(value) for value in out]
+
+
+def power(spread: float, levels: int, trials: float, alpha: float, *, paired: bool) -> float:
+    """Chance that the test of a factor shows its effect.
+
+    By the noncentral F distribution of the analysis of variance of the ranks (Iman and Davenport 1980;
+    Conover and Iman 1981) with the ranks' efficiency; within some points from about ten trials on.
+
+    Parameters
+    ----------
+    spread
+        Sum of the squared deviations of the levels' true means from their middle, over the variance of one
+        value (with shared seeds: of what is left without the seed's own mean).
+    alpha
+        Of the test, after the correction for the family.
+    """
+    efficiency = _EFFICIENCY * (levels / (levels + 1.0) if paired and levels > 2 else 1.0)
+    below = levels - 1.0
+    above = below * (trials - 1.0) if paired else levels * (trials - 1.0)
+    critical = float(stats.f.isf(alpha, below, above))
+    return float(stats.ncf.sf(critical, below, above, max(trials * efficiency * spread, 1e-12)))
+
+
+def _root(power_at: Callable[[float], float]) -> float:
+    """Where a power that grows reaches ``POWER``."""
+    low, high = 0.0, 2.0
+    while power_at(high) < POWER:
+        low, high = high, 2.0 * high
+    while high - low > 1e-3 * high:
+        middle = 0.5 * (low + high)
+        low, high = (low, middle) if power_at(middle) >= POWER else (middle, high)
+    return high
+
+
+def _main(values: FloatArray, axis: int, ordered: bool, paired: bool, tests: int) -> Effect:
+    others = tuple(other + 1 for other in range(values.ndim - 1) if other != axis)
+    by_level = values.mean(axis=others) if others else values
+    means = by_level.mean(axis=0)
+    last = means.size - 1 if ordered else int(np.argmax(np.abs(means - means[0])))
+    ends = (0, last or means.size - 1)
+    terms = means - means.mean()
+    size = float((terms**2).sum()) * values.shape[0] * (values[0].size / means.size)
+    return _tested((axis,), by_level[:, None, :], means, ends, size, values, paired, tests)
+
+
+def _interaction(values: FloatArray, pair: tuple[int, int], paired: bool, tests: int) -> Effect:
+    others = tuple(other + 1 for other in range(values.ndim - 1) if other not in pair)
+    both = values.mean(axis=others) if others else values
+    first, second = pair
+    if both.shape[1] > both.shape[2]:
+        both, first, second = both.transpose(0, 2, 1), second, first
+    count = both.shape[1]
+    if count == 2:
+        contrasts = (both[:, 1] - both[:, 0])[:, None, :]
+    else:
+        contrasts = (both - both.mean(axis=1, keepdims=True)) * (count / (count - 1.0))
+    means = both.mean(axis=0)
+    terms = means - means.mean(axis=0) - means.mean(axis=1)[:, None] + means.mean()
+    size = float((terms**2).sum()) * values.shape[0] * (values[0].size / means.size)
+    ends = (0, means.shape[1] - 1)
+    found = _tested((first, second), np.round(contrasts, 12), means, ends, size, values, paired, tests)
+    along = both[:, -1] - both[:, 0]
+    return replace(found, columns=(along[:, 0], along[:, -1]))
+
+
+def _tested(
+    axes: tuple[int, ...],
+    contrasts: FloatArray,
+    means: FloatArray,
+    ends: tuple[int, int],
+    size: float,
+    values: FloatArray,
+    paired: bool,
+    tests: int,
+) -> Effect:
+    """Test contrasts (n, q, levels): q tests of which any may show the effect."""
+    n, q, levels = contrasts.shape
+    found = [p for i in range(q) if math.isfinite(p := _p_value(contrasts[:, i], paired))]
+    p_value = min(1.0, q * min(found)) if found else math.nan
+    centred = contrasts - contrasts.mean(axis=0)
+    if paired:
+        centred = centred - centred.mean(axis=2, keepdims=True)
+    variances = (centred**2).sum(axis=(0, 2)) / ((n - 1) * (levels - 1 if paired else levels))
+    middle = contrasts.mean(axis=0)
+    spreads = ((middle - middle.mean(axis=1, keepdims=True)) ** 2).sum(axis=1)
+    noisy = variances > ROUNDING**2
+    # What chance alone makes of the levels' means is taken off.
+    seen = spreads[noisy] / variances[noisy] - (levels - 1.0) / n
+    seeds = values.reshape(n, -1).mean(axis=1) if paired else np.full(n, values.mean())
+    total = float(((values.reshape(n, -1) - seeds[:, None]) ** 2).sum())
+    return Effect(
+        axes=axes,
+        n=n,
+        means=means,
+        ends=ends,
+        columns=(contrasts[:, 0, ends[0]], contrasts[:, 0, ends[1]]),
+        share=min(size / total, 1.0) if total > 0.0 else 0.0,
+        p_value=p_value,
+        levels=levels,
+        variance=float(variances.max()) if noisy.any() else math.nan,
+        spread=float(seen.max()) if noisy.any() else math.nan,
+        alpha=SURE / max(tests, 1) / q,
+        paired=paired,
+    )
+
+
+def _p_value(by_level: FloatArray, paired: bool) -> float:
+    """Of no effect, from (n, levels); nan where nothing differs."""
+    columns = by_level.T
+    if np.ptp(by_level) == 0.0 or (paired and bool(np.all(np.ptp(by_level, axis=1) == 0.0))):
+        return math.nan
+    if columns.shape[0] == 2:
+        if paired:
+            return float(stats.wilcoxon(columns[1] - columns[0], zero_method="pratt").pvalue)
+        return float(stats.mannwhitneyu(columns[1], columns[0]).pvalue)
+    test: Any = stats.friedmanchisquare if paired else stats.kruskal
+    return float(test(*columns).pvalue)
+
+
+def _scaled(effect: Effect, scale: float) -> Effect:
+    first, other = effect.columns
+    return replace(
+        effect,
+        means=effect.means * scale,
+        columns=(first * scale, other * scale),
+        variance=effect.variance * scale**2,
+    )
