@@ -122,14 +122,15 @@ def _collect(bag: OpenBag, path: Path, picked: _Picked) -> LaserLog:
     found = _Collected()
     names = {picked.scan, *picked.transforms} | ({picked.odometry} if picked.odometry else set())
     for topic, time_ns, message in bag.messages(names):
-        if message is None:
-            found.damaged += 1
-        elif topic == picked.scan:
-            _add_scan(found, message, time_ns)
-        elif topic == picked.odometry:
-            _add_odometry(found, message, time_ns)
-        else:
-            _add_transforms(found, message, time_ns, keep_moving=picked.odometry is None)
+        try:
+            if topic == picked.scan:
+                _add_scan(found, message, time_ns)
+            elif topic == picked.odometry:
+                _add_odometry(found, message, time_ns)
+            else:
+                _add_transforms(found, message, time_ns, keep_moving=picked.odometry is None)
+        except (AttributeError, TypeError, ValueError, OverflowError):
+            found.damaged += 1  # None, or what a damaged definition made of it
     said = list(picked.warnings)
     if found.damaged:
         said.append(f"{found.damaged} messages that cannot be read were passed over")
@@ -170,8 +171,9 @@ def _add_scan(found: _Collected, message: Any, time_ns: int) -> None:
 def _add_odometry(found: _Collected, message: Any, time_ns: int) -> None:
     found.base_frame = found.base_frame or frame_name(message.child_frame_id)
     point, turn = message.pose.pose.position, message.pose.pose.orientation
+    row = float(point.x), float(point.y), _heading(turn)
     found.odometry_t_s.append(_stamp_s(found, message.header, time_ns))
-    found.odometry.append((float(point.x), float(point.y), _heading(turn)))
+    found.odometry.append(row)
 
 
 def _add_transforms(found: _Collected, message: Any, time_ns: int, keep_moving: bool) -> None:
