@@ -42,9 +42,7 @@ def files_of(run: Run, verdict: Verdict, metrics: Mapping[str, object]) -> RunFi
         events=tuple(finished.events),
         mission_text=resolved_yaml(finished.mission, chart),
         world=world,
-        terrain=terrain_pictures(finished)
-        if chart.grid is not None and chart.elevation is not None
-        else None,
+        terrain=terrain_pictures(finished) if chart.open_ground else None,
         grid=grid,
         robots=tuple(
             RobotFiles(

@@ -41,6 +41,8 @@ class WorldMap:
         Points with identities.
     picture
         (rows, columns) a grey picture that came with the map.
+    open_ground
+        Whether occupied cells are hazards of open ground, which stop neither body nor beam.
     """
 
     name: str
@@ -52,6 +54,7 @@ class WorldMap:
     markings: FloorMarkings | None = None
     landmarks: Landmarks = NO_LANDMARKS
     picture: NDArray[np.uint8] | None = None
+    open_ground: bool = False
 
     @cached_property
     def walls(self) -> SegmentMap:

@@ -48,12 +48,16 @@ class ElevationMap(Config):
 
 
 class GridMap(Config):
-    """Any grid map: an image, ROS map_server's YAML, MovingAI's ``.map``, a NumPy array."""
+    """Any grid map: an image, ROS map_server's YAML, MovingAI's ``.map``, a NumPy array.
+
+    Its occupied cells are walls; with ``open_ground`` they are hazards, which stop neither body nor beam.
+    """
 
     name: Literal["grid"]
     file: str = Field(min_length=1)
     resolution_m: Positive | None = None
     origin: Origin | None = None
+    open_ground: bool = False
 
 
 BY_NAME: dict[str, type[Config]] = {

@@ -74,7 +74,7 @@ class ReachTask:
         extras = {} if shortest is None else {f"{robot.name}/shortest_path": shortest.points_xy_m}
         metrics |= driven
         columns = {"nees": nees}
-        if run.chart.geometry is None and robot.trace["t_s"].shape[0]:
+        if run.chart.open_ground and robot.trace["t_s"].shape[0]:
             columns |= terrain_columns(run, robot)
             metrics |= terrain_metrics(run, robot, columns)
         if robot.trace["t_s"].shape[0]:
@@ -85,7 +85,7 @@ class ReachTask:
         """Where it stands at the end, and whether that is where it should."""
         metrics: dict[str, object] = {}
         truth = poses(robot.trace, "true")
-        if run.chart.geometry is not None:
+        if not run.chart.open_ground:
             metrics["hall_offset_m"] = hall_offset_m(truth, run.chart.walls)
         last = self.goals[-1] if self.goals else robot.goal
         assert last is not None, "refused at the build"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import math
+from dataclasses import replace
 from importlib import resources
 from itertools import pairwise
 from pathlib import Path
@@ -67,6 +68,7 @@ def load_chart(source: MapSource, markings: MarkingsConfig = PLAIN) -> WorldMap:
             elevation=terrain.elevation,
             slope_limit_deg=source.slope_limit_deg,
             landmarks=terrain.landmarks,
+            open_ground=True,
         )
     if isinstance(source, ImagesMap):
         return _images(source)
@@ -81,10 +83,11 @@ def load_chart(source: MapSource, markings: MarkingsConfig = PLAIN) -> WorldMap:
             grid=hazards,
             elevation=elevation,
             slope_limit_deg=source.slope_limit_deg,
+            open_ground=True,
         )
     if path.suffix.lower() == ".json":
         raise InputError(f"world.map.file: expected a grid map, found '{path}'; take name: elevation")
-    return _grid(path, source.resolution_m, origin)
+    return replace(_grid(path, source.resolution_m, origin), open_ground=source.open_ground)
 
 
 def chart_of(world: WorldConfig) -> WorldMap:
@@ -205,7 +208,7 @@ def _images(source: ImagesMap) -> WorldMap:
     picture = None
     if source.environment is not None:
         picture, _ = read_grey(Path(source.environment), size)
-    chart = WorldMap("images", bounds_of(hazards), grid=hazards, picture=picture)
+    chart = WorldMap("images", bounds_of(hazards), grid=hazards, picture=picture, open_ground=True)
     if source.landmarks is None:
         return chart
     return chart.with_landmarks(

@@ -57,24 +57,15 @@ class World:
         chart: WorldMap,
         obstacle_segments_m: FloatArray = NO_SEGMENTS,
         obstacle_circles_m: FloatArray = NO_CIRCLES,
-        hazards: bool | None = None,
     ) -> World:
-        """Build from a map and what stands there besides.
-
-        Parameters
-        ----------
-        hazards
-            Whether the grid's occupied cells are hazards of open ground, which stop neither rover nor beam;
-            by default those of a map with heights are.
-        """
+        """Build from a map and what stands there besides."""
         extra = np.ascontiguousarray(obstacle_segments_m, dtype=np.float64).reshape(-1, 4)
         extra_circles = np.ascontiguousarray(obstacle_circles_m, dtype=np.float64).reshape(-1, 3)
         segments, circles = extra, extra_circles
         if chart.geometry is not None:
             both = chart.geometry.with_obstacles(extra, extra_circles)
             segments, circles = both.segments_m, both.circles_m
-        if hazards is None:
-            hazards = chart.elevation is not None
+        hazards = chart.open_ground
         solid = chart.grid is not None and chart.geometry is None and not hazards
         ground = None
         if chart.elevation is not None or (hazards and chart.grid is not None):

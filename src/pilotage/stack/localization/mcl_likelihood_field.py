@@ -27,6 +27,7 @@ from pilotage.stack.knowledge import RobotKnowledge
 from pilotage.stack.localization.localizer import LOCALIZERS, require_initial_pose
 from pilotage.stack.localization.odometry_prediction import OdometryNoise, OdometryPrediction
 
+WALL_STD_M, GRID_SHARE = 0.01, 1.0 / 3.0
 NAME = "mcl-likelihood-field"
 COLUMNS = {"particles": "1", "effective_particles": "1", "scan_parts": "1"}
 """Size of the cloud, how much of it was effective, and how many parts the scan was let in by."""
@@ -63,8 +64,8 @@ class MclConfig(Config):
     max_range_m: Positive = 19.9
     """Readings beyond are left out."""
     range_var_m2: Positive | None = None
-    field_std_m: NonNegative = 0.01
-    """What the map is wrong by; added to the range's variance."""
+    field_std_m: NonNegative | None = None
+    """What the map is wrong by; added to the range's variance. None: 1 cm, of a grid a third of a cell."""
     random_share: float = Field(default=0.05, gt=0.0, lt=1.0)
     """Share of readings that are no wall of the map."""
     measurement_var_scale: Positive = 1.0
@@ -119,7 +120,7 @@ class MclLikelihoodFieldLocalizer:
         self._directions = np.column_stack([np.cos(angles), np.sin(angles)])
         self._mount_xy = np.array([lidar.mount.x_m, lidar.mount.y_m])
         self._max_range = min(config.max_range_m, lidar.max_range_m)
-        self._table, self._table_step = _beam_density(config, lidar)
+        self._table, self._table_step = _beam_density(config, lidar, _field_std_m(config, chart))
         self._rng = robot.streams.stream(NAME)
         self._quantile = float(ndtri(config.kld_probability))
         self._poses = _draw(initial, config.most_particles, self._rng)
@@ -219,19 +220,23 @@ def _moments(poses: FloatArray, weights: FloatArray) -> tuple[FloatArray, FloatA
 
 
 def _field_of(config: MclConfig, chart: WorldMap) -> NearestObstacles:
-    """Distances from the walls where these are known exactly, else from the occupied cells of the grid.
-
-    Unknown cells reflect nothing.
-    """
-    if chart.geometry is None and chart.grid is not None:
-        return NearestObstacles.from_grid(chart.grid)
+    """Distances from the walls; of a grid from its occupied cells' outlines: unknown cells reflect nothing."""
     return NearestObstacles.from_map(chart.walls, config.resolution_m)
 
 
-def _beam_density(config: MclConfig, lidar: LidarConfig) -> tuple[FloatArray, float]:
+def _field_std_m(config: MclConfig, chart: WorldMap) -> float:
+    """What the map is wrong by; of cells about their uniform spread."""
+    if config.field_std_m is not None:
+        return config.field_std_m
+    if chart.geometry is None and chart.grid is not None:
+        return GRID_SHARE * chart.grid.resolution_m
+    return WALL_STD_M
+
+
+def _beam_density(config: MclConfig, lidar: LidarConfig, field_std_m: float) -> tuple[FloatArray, float]:
     """Logarithm of a beam's density over its distance from the map, and the table's step."""
     range_var = lidar.range_var_m2 if config.range_var_m2 is None else config.range_var_m2
-    std = math.sqrt(config.measurement_var_scale * (range_var + config.field_std_m**2))
+    std = math.sqrt(config.measurement_var_scale * (range_var + field_std_m**2))
     if std == 0.0:
         raise InputError(
             f"{NAME}: a scanner without noise leaves the filter no measurement variance; "
