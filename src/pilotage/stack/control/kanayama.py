@@ -44,7 +44,9 @@ class KanayamaController:
         error = ahead.inverse().compose(reference)
         turn = wrap_to_pi(error.theta_rad)
         v = feedforward.v_m_s * math.cos(turn) + self._along * error.x_m
-        added = feedforward.v_m_s * (self._across * error.y_m + self._heading * math.sin(turn))
+        speed = feedforward.v_m_s
+        # Backwards an error across asks for the other turn, one of the heading for the same.
+        added = speed * self._across * error.y_m + abs(speed) * self._heading * math.sin(turn)
         return Control(Twist(v, feedforward.w_rad_s + added), error.y_m, added, 0.0)
 
 

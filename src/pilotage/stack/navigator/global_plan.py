@@ -11,8 +11,10 @@ import numpy as np
 from pilotage.core.types import FloatArray, Goal, Pose2
 from pilotage.maps.ground_distance import with_circles
 from pilotage.maps.world_map import WorldMap
+from pilotage.models.footprint import Footprint
 from pilotage.stack.interface import PlannedPath
 from pilotage.stack.journal import Journal
+from pilotage.stack.knowledge import RobotKnowledge
 from pilotage.stack.navigator.progress import PathProgress
 from pilotage.stack.planning.planner import Path, Planner, PlanRequest, PlanResult, Smoother
 
@@ -28,7 +30,9 @@ class GlobalPlan:
         rng: np.random.Generator,
         journal: Journal,
         least_clearance_m: float = 0.0,
+        robot: RobotKnowledge | None = None,
     ) -> None:
+        self._robot = robot
         self._least_clearance_m = least_clearance_m
         self._planner = planner
         self._smoother = smoother
@@ -60,7 +64,7 @@ class GlobalPlan:
         field = with_circles(self._chart.field, mapped_m)
         result: PlanResult | None = None
         for clearance_m in clearances_m:
-            request = PlanRequest(start, goal, field, self._rng, clearance_m)
+            request = PlanRequest(start, goal, field, self._rng, clearance_m, *self._shape())
             result = self._planner.plan(request)
             if result.path is not None:
                 path = result.path
@@ -71,6 +75,12 @@ class GlobalPlan:
         assert result is not None
         self._journal.planning_time_s += time.perf_counter() - begin
         return result
+
+    def _shape(self) -> tuple[Footprint | None, float]:
+        """Outline and tightest arc, where the robot is known."""
+        if self._robot is None:
+            return None, 0.0
+        return self._robot.footprint, self._robot.motion.least_turning_radius_m
 
     def _adopt(
         self,

@@ -11,6 +11,7 @@ import numpy as np
 from pilotage.core.registry import Registry
 from pilotage.core.types import FloatArray, Goal, Pose2
 from pilotage.maps.distance_field import DistanceField
+from pilotage.models.footprint import Footprint
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,6 +57,8 @@ class PlanRequest:
         The planner's own random stream.
     clearance_m
         Distance to keep from obstacles; None takes the planner's own setting.
+    footprint, least_turning_radius_m
+        The robot's outline and tightest arc, for planners that ask; the others plan for the centre.
     """
 
     start: Pose2
@@ -63,6 +66,8 @@ class PlanRequest:
     field: DistanceField
     rng: np.random.Generator
     clearance_m: float | None = None
+    footprint: Footprint | None = None
+    least_turning_radius_m: float = 0.0
 
 
 def _no_edges() -> FloatArray:

@@ -1,0 +1,198 @@
+"""Hybrid A* (Dolgov, Thrun, Montemerlo and Diebel 2010): poses that a car can drive, over cells.
+
+Each node is a true pose; of the poses in one cell of position and heading only the cheapest lives on. Steps
+are arcs of least radius, to both sides, straight on, forwards and back; every so often a Reeds-Shepp curve
+to the goal is tried.
+"""
+
+from __future__ import annotations
+
+import heapq
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from pilotage.kernels.arrays import FloatArray
+from pilotage.kernels.bodies.outline import outline_clearance
+from pilotage.kernels.geometry.field import interpolate_at
+from pilotage.kernels.jit import kernel
+from pilotage.kernels.rrt.reeds_shepp import follow, shortest, word_length
+
+FOUND, NO_PATH, EXHAUSTED = range(3)
+CHECK_M = 0.04
+"""Poses along a step are looked at this close together."""
+
+
+class Ground(NamedTuple):
+    """What stands there: sampled distances for quick answers, exact geometry for close ones."""
+
+    distance: FloatArray
+    x0: float
+    y0: float
+    spacing: float
+    segments: FloatArray
+    circles: FloatArray
+
+
+class Car(NamedTuple):
+    """Outline (K, 2), its outer and inner radius, the clearance to keep and the least turning radius."""
+
+    corners: FloatArray
+    radius: float
+    inner: float
+    clearance: float
+    turning: float
+
+
+class Prices(NamedTuple):
+    """What a metre backwards costs, a change of direction, and a metre of turning beside a straight one."""
+
+    reverse: float
+    switch: float
+    turn: float
+
+
+@kernel
+def pose_fits(x: float, y: float, theta: float, car: Car, ground: Ground) -> bool:
+    """Whether the outline keeps its clearance; exact geometry is asked only where the field cannot tell."""
+    away = interpolate_at(x, y, ground.distance, ground.x0, ground.y0, ground.spacing)
+    # Interpolated distances of a 1-Lipschitz field are off by less than a node's diagonal.
+    slack = 0.75 * ground.spacing
+    if away - slack >= car.radius + car.clearance:
+        return True
+    if away + slack < car.inner + car.clearance:
+        return False
+    c, s = math.cos(theta), math.sin(theta)
+    return bool(
+        outline_clearance(x, y, c, s, car.corners, car.radius, ground.segments, ground.circles)
+        >= car.clearance
+    )
+
+
+@kernel
+def word_fits(x: float, y: float, theta: float, word: FloatArray, car: Car, ground: Ground) -> bool:
+    """Whether a word can be driven from a pose."""
+    length = word_length(word, car.turning)
+    count = max(1, math.ceil(length / CHECK_M))
+    c, s = math.cos(theta), math.sin(theta)
+    for i in range(1, count + 1):
+        wx, wy, wth, _ = follow(word, length * i / count, car.turning)
+        if not pose_fits(x + c * wx - s * wy, y + s * wx + c * wy, theta + wth, car, ground):
+            return False
+    return True
+
+
+@kernel
+def search(
+    start: FloatArray,
+    goal: FloatArray,
+    car: Car,
+    ground: Ground,
+    prices: Prices,
+    to_go: FloatArray,
+    step: float,
+    cell: float,
+    headings: int,
+    most: int,
+    nodes: FloatArray,
+    parents: FloatArray,
+) -> tuple[int, int, FloatArray, int]:
+    """Search from start (3,) to goal (3,).
+
+    Parameters
+    ----------
+    to_go
+        (ny, nx) length of the shortest path of the inner disc to the goal from each node of the field.
+    step, cell, headings
+        Length of a step, side of a cell, and how many headings are told apart.
+    nodes, parents
+        (M, 3) and (M, 3) are filled: poses; parent, turn and signed length of the step that led there.
+
+    Returns
+    -------
+    status, last node, the word from there to the goal (5, 2), and how many nodes were expanded.
+    """
+    empty = np.zeros((5, 2))
+    ny, nx = to_go.shape
+    columns = math.ceil((nx - 1) * ground.spacing / cell) + 1
+    rows = math.ceil((ny - 1) * ground.spacing / cell) + 1
+    best = np.full(columns * rows * headings, np.inf)
+    closed = np.zeros(columns * rows * headings, np.bool_)
+    cost = np.empty(nodes.shape[0])
+    where = np.empty(nodes.shape[0], np.int64)
+    nodes[0] = start
+    parents[0, 0], parents[0, 1], parents[0, 2] = -1.0, 0.0, 0.0
+    cost[0] = 0.0
+    count = 1
+    heap = [(0.0, 0)]
+    expanded = 0
+    shots = 0
+    width = 2.0 * math.pi / headings
+    where[0] = -1
+    while len(heap) > 0:
+        estimate, node = heapq.heappop(heap)
+        at = where[node]
+        if at >= 0:
+            if closed[at]:
+                continue
+            closed[at] = True
+        expanded += 1
+        if expanded > most or count + 6 > nodes.shape[0]:
+            return EXHAUSTED, -1, empty, expanded
+        x, y, theta = nodes[node, 0], nodes[node, 1], nodes[node, 2]
+        # A shot at the goal: always near it, seldom far away.
+        left = estimate - cost[node]
+        shots += 1
+        if left < 12.0 * car.turning or shots >= int(left / car.turning):
+            shots = 0
+            word, _ = shortest(x, y, theta, goal[0], goal[1], goal[2], car.turning, prices.reverse)
+            if word_fits(x, y, theta, word, car, ground):
+                return FOUND, node, word, expanded
+        came = parents[node, 2]
+        for choice in range(6):
+            turn = float(choice % 3 - 1)
+            sign = 1.0 if choice < 3 else -1.0
+            ex, ey, eth = x, y, theta
+            parts = max(1, math.ceil(step / CHECK_M))
+            fits = True
+            for i in range(1, parts + 1):
+                d = sign * step * i / parts
+                if turn == 0.0:
+                    ex, ey, eth = x + d * math.cos(theta), y + d * math.sin(theta), theta
+                else:
+                    eth = theta + turn * d / car.turning
+                    ex = x + turn * car.turning * (math.sin(eth) - math.sin(theta))
+                    ey = y - turn * car.turning * (math.cos(eth) - math.cos(theta))
+                if not pose_fits(ex, ey, eth, car, ground):
+                    fits = False
+                    break
+            if not fits:
+                continue
+            col, row = int((ex - ground.x0) / cell), int((ey - ground.y0) / cell)
+            if not (0 <= col < columns and 0 <= row < rows):
+                continue
+            turns = eth - 2.0 * math.pi * math.floor(eth / (2.0 * math.pi))
+            bin_ = min(int(turns / width), headings - 1)
+            key = (row * columns + col) * headings + bin_
+            if closed[key]:
+                continue
+            price = step * (prices.reverse if sign < 0.0 else 1.0)
+            if turn != 0.0:
+                price *= prices.turn
+            if came != 0.0 and came * sign < 0.0:
+                price += prices.switch
+            new = cost[node] + price
+            if new >= best[key]:
+                continue
+            best[key] = new
+            u, v = (ex - ground.x0) / ground.spacing, (ey - ground.y0) / ground.spacing
+            iu, iv = min(max(int(u + 0.5), 0), nx - 1), min(max(int(v + 0.5), 0), ny - 1)
+            around = to_go[iv, iu] - ground.spacing
+            _, free = shortest(ex, ey, eth, goal[0], goal[1], goal[2], car.turning, prices.reverse)
+            nodes[count, 0], nodes[count, 1], nodes[count, 2] = ex, ey, eth
+            parents[count, 0], parents[count, 1], parents[count, 2] = float(node), turn, sign * step
+            cost[count], where[count] = new, key
+            heapq.heappush(heap, (new + max(around if math.isfinite(around) else 0.0, free), count))
+            count += 1
+    return NO_PATH, -1, empty, expanded

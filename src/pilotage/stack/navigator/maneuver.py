@@ -1,0 +1,183 @@
+"""The navigator that follows its plan exactly, forwards and backwards: parking, tight turns."""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+
+import numpy as np
+from pydantic import Field
+
+from pilotage.core.angles import wrap_array_to_pi, wrap_to_pi
+from pilotage.core.config import Config
+from pilotage.core.errors import InputError
+from pilotage.core.types import STOP, FloatArray, Pose2, Twist
+from pilotage.maps.world_map import WorldMap
+from pilotage.sensors.readings import Readings
+from pilotage.sensors.sensor import Positive
+from pilotage.stack.control.controller import Controller
+from pilotage.stack.control.kanayama import KanayamaConfig, KanayamaController
+from pilotage.stack.interface import NAVIGATORS, Belief, StackStatus
+from pilotage.stack.journal import Journal
+from pilotage.stack.knowledge import RobotKnowledge, TaskKnowledge
+from pilotage.stack.navigator.global_plan import GlobalPlan
+from pilotage.stack.navigator.navigator import Parts, localizer_of
+
+MOST_REPLANS = 8
+
+
+class ManeuverConfig(Config):
+    """How fast, and when a maneuver has gone wrong."""
+
+    speed_m_s: Positive = 0.5
+    acceleration_share: float = Field(default=0.4, gt=0.0, le=1.0)
+    """Of the motion's braking, in the speed profile."""
+    pause_s: float = Field(default=0.8, ge=0.0)
+    """At each change of direction: the wheels turn meanwhile."""
+    astray_m: Positive = 0.25
+    """Farther from its reference than this it stops and plans anew."""
+    tracking: KanayamaConfig = KanayamaConfig(along_per_s=1.0, length_m=0.45)
+    """Of the tracking law, where the stack names no controller."""
+
+
+@NAVIGATORS.add("maneuver", ManeuverConfig)
+class ManeuverNavigator:
+    """Follows a plan with its changes of direction by a speed profile; the plan is made on the true outline.
+
+    The profile is a trapezoid on each piece between changes of direction (LaValle 2006, 14.6.3). It looks at
+    no obstacle that is not on its map. Where the plan cannot be kept up with, it stops and plans anew.
+    """
+
+    def __init__(
+        self,
+        config: ManeuverConfig,
+        robot: RobotKnowledge,
+        chart: WorldMap,
+        task: TaskKnowledge,
+        parts: Parts,
+        journal: Journal,
+    ) -> None:
+        if task.goal is None or parts.planner is None:
+            raise InputError("navigator 'maneuver': expected world.goal and stack.planner, found one missing")
+        self._channel = journal.channel(
+            {"ref_x_m": "m", "ref_y_m": "m", "ref_theta_rad": "rad", "distance_to_go_m": "m"}, first=True
+        )
+        self._config, self._robot, self._goal, self._journal = config, robot, task.goal, journal
+        self._localizer = localizer_of(parts, "maneuver")
+        self._controller: Controller = parts.controller or KanayamaController(config.tracking, robot)
+        rng = robot.streams.stream("planner")
+        self._plan = GlobalPlan(parts.planner, parts.smoother, chart, rng, journal, robot=robot)
+        self._status, self._reason = StackStatus.RUNNING, ""
+        self._references: FloatArray = np.zeros((0, 5))
+        self._index, self._replans = 0, 0
+        self._think(0.0)
+
+    def _think(self, t_s: float) -> None:
+        """Plan from where it believes to be, and lay out the reference, one row a step."""
+        plan = self._plan
+        nothing = np.zeros((0, 3))
+        full = plan.clearance_m
+        result = plan.make(t_s, self.belief.pose, self._goal, nothing, (full, 0.6 * full, 0.3 * full, 0.0))
+        if result.path is None:
+            self._status, self._reason = StackStatus.FAILED, f"{result.status}: {result.reason}"
+            self._journal.say(t_s, "failed", self._reason)
+            return
+        braking = self._robot.motion.braking_m_s2
+        acceleration = self._config.acceleration_share * (braking if math.isfinite(braking) else 2.0)
+        speed = min(self._config.speed_m_s, self._robot.motion.top_speed_m_s)
+        self._references = laid_out(
+            result.path.states, speed, acceleration, self._config.pause_s, self._robot.dt_s
+        )
+        self._index = 0
+        self._controller.reset()
+        self._journal.say(t_s, "plan" if t_s == 0.0 else "replan", result.reason)
+
+    @property
+    def belief(self) -> Belief:
+        """The localizer's belief."""
+        return self._localizer.belief
+
+    @property
+    def status(self) -> tuple[StackStatus, str]:
+        """Arrived where the reference has come to its end."""
+        return self._status, self._reason
+
+    def step(self, readings: Readings) -> Twist:
+        """Localize, move the reference on, and follow it."""
+        pose = self._localizer.step(readings).pose
+        if self._status is not StackStatus.RUNNING:
+            return STOP
+        if self._index >= len(self._references):
+            self._status = StackStatus.ARRIVED
+            self._journal.say(readings.t_s, "arrived", "the plan was driven to its end")
+            return STOP
+        x, y, theta, v, w = self._references[self._index].tolist()
+        self._index += 1
+        self._channel.tell(x, y, theta, self._robot.dt_s * (len(self._references) - self._index) * abs(v))
+        if math.hypot(x - pose.x_m, y - pose.y_m) > self._config.astray_m:
+            return self._astray(readings.t_s)
+        if v == 0.0:
+            return Twist(0.0, w)
+        control = self._controller.step(pose, Pose2(x, y, theta), Twist(v, w))
+        # The way back along the path is the other direction's: a piece is driven in its own only.
+        forward = max(control.twist.v_m_s, 0.0) if v > 0.0 else min(control.twist.v_m_s, 0.0)
+        return Twist(forward, control.twist.w_rad_s)
+
+    def _astray(self, t_s: float) -> Twist:
+        self._replans += 1
+        if self._replans > MOST_REPLANS:
+            self._status, self._reason = StackStatus.FAILED, "stuck: it cannot keep to its plans"
+            self._journal.say(t_s, "failed", self._reason)
+        else:
+            self._journal.count("replans")
+            self._think(t_s)
+        return STOP
+
+
+def laid_out(
+    states: FloatArray, speed_m_s: float, acceleration_m_s2: float, pause_s: float, dt_s: float
+) -> FloatArray:
+    """(N, 5) x, y, theta, v, w of the reference at the end of each step.
+
+    Parameters
+    ----------
+    states
+        (M, 3) densely along the path; a step against the heading is one backwards.
+    pause_s
+        Rest before each piece; w is then what the piece begins with, for wheels that can turn meanwhile.
+    """
+    delta = np.diff(states[:, :2], axis=0)
+    length = np.hypot(delta[:, 0], delta[:, 1])
+    middle = states[:-1, 2] + 0.5 * (np.mod(np.diff(states[:, 2]) + math.pi, 2.0 * math.pi) - math.pi)
+    along = delta[:, 0] * np.cos(middle) + delta[:, 1] * np.sin(middle)
+    sign = np.where(along >= 0.0, 1.0, -1.0)
+    cuts = [0, *(np.flatnonzero(np.diff(sign)) + 1).tolist(), len(sign)]
+    rows: list[list[float]] = []
+    heading = np.unwrap(states[:, 2])
+    for first, last in pairwise(cuts):
+        s = np.concatenate([[0.0], np.cumsum(length[first:last])])
+        x, y, theta = (np.asarray(c[first : last + 1]) for c in (states[:, 0], states[:, 1], heading))
+        total = float(s[-1])
+        if total <= 0.0:
+            continue
+        curvature = float(theta[min(4, len(theta) - 1)] - theta[0])
+        resting = [x[0], y[0], wrap_to_pi(float(theta[0])), 0.0, sign[first] * math.copysign(1e-3, curvature)]
+        rows += [resting] * round(pause_s / dt_s)
+        top = min(speed_m_s, math.sqrt(acceleration_m_s2 * total))
+        ramp_s = top / acceleration_m_s2
+        duration_s = 2.0 * ramp_s + (total - top * ramp_s) / top
+        count = max(1, math.ceil(duration_s / dt_s))
+        t = np.minimum(np.arange(count + 1) * dt_s, duration_s)
+        driven = np.where(
+            t < ramp_s,
+            0.5 * acceleration_m_s2 * t * t,
+            np.where(
+                t < duration_s - ramp_s,
+                top * (t - 0.5 * ramp_s),
+                total - 0.5 * acceleration_m_s2 * (duration_s - t) ** 2,
+            ),
+        )
+        px, py, pth = (np.interp(driven, s, values) for values in (x, y, theta))
+        v, w = sign[first] * np.diff(driven) / dt_s, np.diff(pth) / dt_s
+        rows += np.column_stack([px[1:], py[1:], wrap_array_to_pi(pth[1:]), v, w]).tolist()
+    return np.array(rows).reshape(-1, 5)

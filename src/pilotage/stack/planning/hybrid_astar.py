@@ -1,0 +1,161 @@
+"""Planning for a car: Hybrid A* with Reeds-Shepp curves, on the true outline."""
+
+from __future__ import annotations
+
+import math
+import time
+
+import numpy as np
+from pydantic import Field
+
+from pilotage.core.angles import wrap_to_pi
+from pilotage.core.config import Config
+from pilotage.core.types import FloatArray
+from pilotage.kernels.grids.travel_cost import travel_costs
+from pilotage.kernels.rrt import hybrid, reeds_shepp
+from pilotage.maps.distance_field import DistanceField
+from pilotage.models.footprint import Footprint
+from pilotage.sensors.sensor import NonNegative, Positive
+from pilotage.stack.planning.driving_space import failure, spaced_waypoints
+from pilotage.stack.planning.planner import PLANNERS, Path, PlanRequest, PlanResult, PlanStatus
+
+STATE_SPACING_M = 0.025
+
+
+class HybridAstarConfig(Config):
+    """Prices, resolution, and what is kept from obstacles beside the outline itself."""
+
+    clearance_m: NonNegative = 0.06
+    """Between the outline and anything solid."""
+    turning_radius_m: Positive | None = None
+    """None: a tenth more than the motion's least, so that a follower has something left to steer with."""
+    reverse_cost: float = Field(default=1.5, ge=1.0)
+    switch_cost_m: NonNegative = 0.5
+    turn_cost: float = Field(default=1.05, ge=1.0)
+    step_m: Positive = 0.25
+    cell_m: Positive = 0.12
+    headings: int = Field(default=72, ge=8, le=720)
+    most_expansions: int = Field(default=150_000, ge=1)
+
+
+@PLANNERS.add("hybrid-astar", HybridAstarConfig)
+class HybridAstarPlanner:
+    """Drives forwards and backwards on arcs that the car can drive, its outline clear of everything.
+
+    Resolution complete only: a bay that fits with less than a cell to spare may be missed. A goal without a
+    heading is taken to have that of the straight line to it.
+    """
+
+    def __init__(self, config: HybridAstarConfig) -> None:
+        self._config = config
+
+    @property
+    def clearance_m(self) -> float:
+        """What it keeps between outline and obstacles."""
+        return self._config.clearance_m
+
+    def plan(self, request: PlanRequest) -> PlanResult:
+        """Answer one query; without an outline the robot is a point."""
+        began = time.perf_counter()
+        config, field = self._config, request.field
+        clearance_m = config.clearance_m if request.clearance_m is None else request.clearance_m
+        outline = request.footprint or Footprint.disc(0.0)
+        turning_m = config.turning_radius_m or 1.1 * max(request.least_turning_radius_m, 0.1)
+        car = hybrid.Car(
+            np.ascontiguousarray(outline.points_m),
+            outline.radius_m,
+            outline.inner_radius_m,
+            clearance_m,
+            turning_m,
+        )
+        ground = hybrid.Ground(
+            field.distance_m, *field.origin_xy_m, field.resolution_m, field.segments_m, field.circles_m
+        )
+        start, goal = request.start.as_array(), _goal_pose(request)
+        for name, pose, status in (
+            ("start", start, PlanStatus.START_BLOCKED),
+            ("goal", goal, PlanStatus.GOAL_BLOCKED),
+        ):
+            if not hybrid.pose_fits(pose[0], pose[1], pose[2], car, ground):
+                reason = f"the {name} leaves less than {clearance_m:g} m between the outline and something"
+                return failure(status, reason, time.perf_counter() - began)
+        to_go = _to_go(field, goal, car.inner)
+        size = 6 * config.most_expansions + 8
+        nodes, parents = np.empty((size, 3)), np.empty((size, 3))
+        prices = hybrid.Prices(config.reverse_cost, config.switch_cost_m, config.turn_cost)
+        ended, last, word, expanded = hybrid.search(
+            start,
+            goal,
+            car,
+            ground,
+            prices,
+            to_go,
+            max(config.step_m, 1.5 * config.cell_m),
+            config.cell_m,
+            config.headings,
+            config.most_expansions,
+            nodes,
+            parents,
+        )
+        took = time.perf_counter() - began
+        if ended != hybrid.FOUND:
+            why = "the search was exhausted" if ended == hybrid.NO_PATH else "the search was given up"
+            return failure(PlanStatus.NO_PATH, f"{why} after {expanded} expansions", took, expanded)
+        states, length_m = _states(start, nodes, parents, last, word, turning_m)
+        path = Path(states, spaced_waypoints(states, 1.0), length_m, turning_m)
+        reason = f"{length_m:.2f} m after {expanded} expansions"
+        return PlanResult(PlanStatus.FOUND, reason, path, took, time.perf_counter() - began, expanded)
+
+
+def _goal_pose(request: PlanRequest) -> FloatArray:
+    goal, start = request.goal, request.start
+    theta = goal.theta_rad
+    if theta is None:
+        theta = math.atan2(goal.y_m - start.y_m, goal.x_m - start.x_m)
+    return np.array([goal.x_m, goal.y_m, theta])
+
+
+def _to_go(field: DistanceField, goal: FloatArray, inner_m: float) -> FloatArray:
+    """(ny, nx) way of the outline's inner disc to the goal, over the field's nodes."""
+    ny, nx = field.distance_m.shape
+    x0, y0 = field.origin_xy_m
+    # A node may lie half a diagonal nearer to a wall than the path past it.
+    free = field.distance_m >= inner_m - field.resolution_m
+    factor = np.where(free, 1.0, np.inf)
+    column = min(max(round((goal[0] - x0) / field.resolution_m), 0), nx - 1)
+    row = min(max(round((goal[1] - y0) / field.resolution_m), 0), ny - 1)
+    cost, _ = travel_costs(factor, row * nx + column, field.resolution_m, field.resolution_m)
+    # Steps over eight neighbours are longer than straight lines by at most this: the estimate stays below.
+    return np.asarray(cost.reshape(ny, nx) / 1.0824)
+
+
+def _states(
+    start: FloatArray,
+    nodes: FloatArray,
+    parents: FloatArray,
+    last: int,
+    word: FloatArray,
+    turning_m: float,
+) -> tuple[FloatArray, float]:
+    """(N, 3) states along the steps and the last curve, and the path's length."""
+    steps = []
+    node = last
+    while parents[node, 0] >= 0.0:
+        steps.append((parents[node, 1], parents[node, 2] / turning_m))
+        node = int(parents[node, 0])
+    words = [np.array([step]) for step in reversed(steps)] + [word]
+    x, y, theta = start.tolist()
+    states, total = [start[None, :]], 0.0
+    for part in words:
+        length = reeds_shepp.word_length(part, turning_m)
+        count = max(1, math.ceil(length / STATE_SPACING_M))
+        c, s = math.cos(theta), math.sin(theta)
+        rows = np.empty((count, 3))
+        for i in range(count):
+            wx, wy, wth, _ = reeds_shepp.follow(part, length * (i + 1) / count, turning_m)
+            rows[i] = x + c * wx - s * wy, y + s * wx + c * wy, wrap_to_pi(theta + wth)
+        if length > 0.0:
+            states.append(rows)
+            x, y, theta = rows[-1].tolist()
+            total += length
+    return np.concatenate(states), total
