@@ -39,6 +39,11 @@ class BicycleConfig(MotionConfig):
         return self.wheelbase_m / math.tan(self.max_steering_rad)
 
     @property
+    def curvature_rate_per_m_s(self) -> float:
+        """That of wheels that stand straight: curvature is tan(steering) over wheelbase."""
+        return self.max_steering_rate_rad_s / self.wheelbase_m
+
+    @property
     def braking_m_s2(self) -> float:
         """The acceleration limit holds for braking too."""
         return self.max_acceleration_m_s2

@@ -36,6 +36,11 @@ class MotionConfig(Config):
         return 0.0
 
     @property
+    def curvature_rate_per_m_s(self) -> float:
+        """How fast it can change the curvature of its path; inf for who does so at once."""
+        return math.inf
+
+    @property
     def braking_m_s2(self) -> float:
         """Deceleration that it can be relied on for; inf for who stops at once."""
         return math.inf

@@ -220,7 +220,7 @@ def _moments(poses: FloatArray, weights: FloatArray) -> tuple[FloatArray, FloatA
 
 
 def _field_of(config: MclConfig, chart: WorldMap) -> NearestObstacles:
-    """Distances from the walls; of a grid from its occupied cells' outlines: unknown cells reflect nothing."""
+    """Distances from the walls; of a grid from the outlines of its occupied cells alone."""
     return NearestObstacles.from_map(chart.walls, config.resolution_m)
 
 

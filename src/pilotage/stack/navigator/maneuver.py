@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import math
-from itertools import pairwise
 
 import numpy as np
 from pydantic import Field
 
-from pilotage.core.angles import wrap_array_to_pi, wrap_to_pi
 from pilotage.core.config import Config
 from pilotage.core.errors import InputError
 from pilotage.core.types import STOP, FloatArray, Pose2, Twist
@@ -22,6 +20,7 @@ from pilotage.stack.journal import Journal
 from pilotage.stack.knowledge import RobotKnowledge, TaskKnowledge
 from pilotage.stack.navigator.global_plan import GlobalPlan
 from pilotage.stack.navigator.navigator import Parts, localizer_of
+from pilotage.stack.navigator.timed_path import laid_out
 
 MOST_REPLANS = 8
 
@@ -44,8 +43,7 @@ class ManeuverConfig(Config):
 class ManeuverNavigator:
     """Follows a plan with its changes of direction by a speed profile; the plan is made on the true outline.
 
-    The profile is a trapezoid on each piece between changes of direction (LaValle 2006, 14.6.3). It looks at
-    no obstacle that is not on its map. Where the plan cannot be kept up with, it stops and plans anew.
+    It looks at no obstacle that is not on its map. Where the plan cannot be kept up with, it stops and plans anew.
     """
 
     def __init__(
@@ -86,7 +84,12 @@ class ManeuverNavigator:
         acceleration = self._config.acceleration_share * (braking if math.isfinite(braking) else 2.0)
         speed = min(self._config.speed_m_s, self._robot.motion.top_speed_m_s)
         self._references = laid_out(
-            result.path.states, speed, acceleration, self._config.pause_s, self._robot.dt_s
+            result.path.states,
+            speed,
+            acceleration,
+            self._robot.motion.curvature_rate_per_m_s,
+            self._config.pause_s,
+            self._robot.dt_s,
         )
         self._index = 0
         self._controller.reset()
@@ -132,52 +135,3 @@ class ManeuverNavigator:
             self._journal.count("replans")
             self._think(t_s)
         return STOP
-
-
-def laid_out(
-    states: FloatArray, speed_m_s: float, acceleration_m_s2: float, pause_s: float, dt_s: float
-) -> FloatArray:
-    """(N, 5) x, y, theta, v, w of the reference at the end of each step.
-
-    Parameters
-    ----------
-    states
-        (M, 3) densely along the path; a step against the heading is one backwards.
-    pause_s
-        Rest before each piece; w is then what the piece begins with, for wheels that can turn meanwhile.
-    """
-    delta = np.diff(states[:, :2], axis=0)
-    length = np.hypot(delta[:, 0], delta[:, 1])
-    middle = states[:-1, 2] + 0.5 * (np.mod(np.diff(states[:, 2]) + math.pi, 2.0 * math.pi) - math.pi)
-    along = delta[:, 0] * np.cos(middle) + delta[:, 1] * np.sin(middle)
-    sign = np.where(along >= 0.0, 1.0, -1.0)
-    cuts = [0, *(np.flatnonzero(np.diff(sign)) + 1).tolist(), len(sign)]
-    rows: list[list[float]] = []
-    heading = np.unwrap(states[:, 2])
-    for first, last in pairwise(cuts):
-        s = np.concatenate([[0.0], np.cumsum(length[first:last])])
-        x, y, theta = (np.asarray(c[first : last + 1]) for c in (states[:, 0], states[:, 1], heading))
-        total = float(s[-1])
-        if total <= 0.0:
-            continue
-        curvature = float(theta[min(4, len(theta) - 1)] - theta[0])
-        resting = [x[0], y[0], wrap_to_pi(float(theta[0])), 0.0, sign[first] * math.copysign(1e-3, curvature)]
-        rows += [resting] * round(pause_s / dt_s)
-        top = min(speed_m_s, math.sqrt(acceleration_m_s2 * total))
-        ramp_s = top / acceleration_m_s2
-        duration_s = 2.0 * ramp_s + (total - top * ramp_s) / top
-        count = max(1, math.ceil(duration_s / dt_s))
-        t = np.minimum(np.arange(count + 1) * dt_s, duration_s)
-        driven = np.where(
-            t < ramp_s,
-            0.5 * acceleration_m_s2 * t * t,
-            np.where(
-                t < duration_s - ramp_s,
-                top * (t - 0.5 * ramp_s),
-                total - 0.5 * acceleration_m_s2 * (duration_s - t) ** 2,
-            ),
-        )
-        px, py, pth = (np.interp(driven, s, values) for values in (x, y, theta))
-        v, w = sign[first] * np.diff(driven) / dt_s, np.diff(pth) / dt_s
-        rows += np.column_stack([px[1:], py[1:], wrap_array_to_pi(pth[1:]), v, w]).tolist()
-    return np.array(rows).reshape(-1, 5)

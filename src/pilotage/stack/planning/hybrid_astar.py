@@ -101,7 +101,7 @@ class HybridAstarPlanner:
         if ended != hybrid.FOUND:
             why = "the search was exhausted" if ended == hybrid.NO_PATH else "the search was given up"
             return failure(PlanStatus.NO_PATH, f"{why} after {expanded} expansions", took, expanded)
-        states, length_m = _states(start, nodes, parents, last, word, turning_m)
+        states, length_m = _states(start, parents, last, word, turning_m)
         path = Path(states, spaced_waypoints(states, 1.0), length_m, turning_m)
         reason = f"{length_m:.2f} m after {expanded} expansions"
         return PlanResult(PlanStatus.FOUND, reason, path, took, time.perf_counter() - began, expanded)
@@ -131,7 +131,6 @@ def _to_go(field: DistanceField, goal: FloatArray, inner_m: float) -> FloatArray
 
 def _states(
     start: FloatArray,
-    nodes: FloatArray,
     parents: FloatArray,
     last: int,
     word: FloatArray,

@@ -1,0 +1,109 @@
+"""A path in time: the fastest speed along it under limits of acceleration and of change of curvature."""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+
+import numpy as np
+
+from pilotage.core.angles import wrap_array_to_pi, wrap_to_pi
+from pilotage.core.types import FloatArray
+
+ABRUPT_PER_M = 0.05
+"""A change of curvature larger than this from one state to the next takes a steered axle its time."""
+TRANSITION_M = 0.10
+"""The path driven meanwhile is held below this: with half of it the curvature is wrong."""
+CREEP_M_S = 0.03
+
+
+def laid_out(
+    states: FloatArray,
+    speed_m_s: float,
+    acceleration_m_s2: float,
+    curvature_rate_per_m_s: float,
+    pause_s: float,
+    dt_s: float,
+) -> FloatArray:
+    """(N, 5) x, y, theta, v, w of the reference at the end of each step.
+
+    On each piece between changes of direction the speed is the fastest that the limits allow (a forward and
+    a backward pass over the states; LaValle 2006, 14.6.3). What is fed forward as w anticipates the
+    curvature by half of what the wheels take to turn.
+
+    Parameters
+    ----------
+    states
+        (M, 3) densely along the path; a step against the heading is one backwards.
+    pause_s
+        Rest before each piece; w is then what the piece begins with, for wheels that can turn meanwhile.
+    """
+    delta = np.diff(states[:, :2], axis=0)
+    length = np.hypot(delta[:, 0], delta[:, 1])
+    turned = wrap_array_to_pi(np.diff(states[:, 2]))
+    middle = states[:-1, 2] + 0.5 * turned
+    sign = np.where(delta[:, 0] * np.cos(middle) + delta[:, 1] * np.sin(middle) >= 0.0, 1.0, -1.0)
+    cuts = [0, *(np.flatnonzero(np.diff(sign)) + 1).tolist(), len(sign)]
+    rows: list[list[float]] = []
+    heading = np.unwrap(states[:, 2])
+    for first, last in pairwise(cuts):
+        s = np.concatenate([[0.0], np.cumsum(length[first:last])])
+        if s[-1] <= 0.0:
+            continue
+        columns = states[first : last + 1, 0], states[first : last + 1, 1], heading[first : last + 1]
+        curvature = sign[first] * turned[first:last] / np.maximum(length[first:last], 1e-9)
+        x, y, theta = (float(column[0]) for column in columns)
+        first_w = sign[first] * math.copysign(1e-3, curvature[0]) if abs(curvature[0]) > ABRUPT_PER_M else 0.0
+        rows += [[x, y, wrap_to_pi(theta), 0.0, first_w]] * round(pause_s / dt_s)
+        limit = _limits(s, curvature, speed_m_s, curvature_rate_per_m_s)
+        rows += _timed(
+            s, columns, curvature, limit, sign[first], acceleration_m_s2, curvature_rate_per_m_s, dt_s
+        )
+    return np.array(rows).reshape(-1, 5)
+
+
+def _limits(s: FloatArray, curvature: FloatArray, speed_m_s: float, rate: float) -> FloatArray:
+    """(K,) speed limit at each state: slow where the curvature jumps."""
+    limit = np.full(len(s), speed_m_s)
+    jumps = np.abs(np.diff(curvature))
+    for k in np.flatnonzero(jumps > ABRUPT_PER_M):
+        slow = max(TRANSITION_M * rate / float(jumps[k]), CREEP_M_S)
+        near = np.abs(s - s[k + 1]) <= 0.5 * TRANSITION_M
+        limit[near] = np.minimum(limit[near], slow)
+    return limit
+
+
+def _timed(
+    s: FloatArray,
+    columns: tuple[FloatArray, ...],
+    curvature: FloatArray,
+    limit: FloatArray,
+    sign: float,
+    acceleration_m_s2: float,
+    rate: float,
+    dt_s: float,
+) -> list[list[float]]:
+    """The rows of one piece, at equal steps of time."""
+    v2 = limit**2
+    v2[0] = v2[-1] = 0.0
+    gain = 2.0 * acceleration_m_s2 * np.diff(s)
+    for k in range(len(gain)):
+        v2[k + 1] = min(v2[k + 1], v2[k] + gain[k])
+    for k in range(len(gain) - 1, -1, -1):
+        v2[k] = min(v2[k], v2[k + 1] + gain[k])
+    v = np.sqrt(v2)
+    t_s = np.concatenate([[0.0], np.cumsum(2.0 * np.diff(s) / np.maximum(v[:-1] + v[1:], 1e-3))])
+    count = max(1, math.ceil(float(t_s[-1]) / dt_s))
+    t = np.minimum(np.arange(count + 1) * dt_s, t_s[-1])
+    driven = np.interp(t, t_s, s)
+    px, py, ptheta = (np.interp(driven, s, column) for column in columns)
+    speed = sign * np.diff(driven) / dt_s
+    # The mean curvature around each moment is the ramp that wheels of this rate can follow.
+    widest = float(np.abs(np.diff(curvature)).max(initial=0.0))
+    window_s = max(widest / rate if math.isfinite(rate) else 0.0, dt_s)
+    cumulated = np.concatenate([[0.0], np.cumsum(curvature * np.diff(t_s))])
+    low, high = t[1:] - dt_s / 2 - window_s / 2, t[1:] - dt_s / 2 + window_s / 2
+    inside = np.minimum(high, t_s[-1]) - np.maximum(low, 0.0)
+    mean = (np.interp(high, t_s, cumulated) - np.interp(low, t_s, cumulated)) / np.maximum(inside, 1e-9)
+    w = mean * speed
+    return np.column_stack([px[1:], py[1:], wrap_array_to_pi(ptheta[1:]), speed, w]).tolist()  # type: ignore[no-any-return]
