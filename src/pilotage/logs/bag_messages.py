@@ -1,7 +1,7 @@
 """Messages of ROS 1 bags, ROS 2 bags (SQLite or MCAP storage) and MCAP files, through one door.
 
 Whole bags are read by ``rosbags``. One that it refuses (cut short, never closed, a damaged part) is walked
-record by record (``logs.bag_salvage``), and what can be read is read.
+record by record (``logs.salvage``), and what can be read is read.
 """
 
 from __future__ import annotations
@@ -13,8 +13,9 @@ from pathlib import Path
 from typing import Any, TypeAlias
 
 from pilotage.core.errors import InputError
-from pilotage.logs.bag_salvage import MAGIC_OF, BagFormat, Salvage, salvage_file
 from pilotage.logs.rosbags_extra import rosbags
+from pilotage.logs.salvage.found import MAGIC_OF, BagFormat, Salvage
+from pilotage.logs.salvage.walk import salvage_file, salvaged_messages
 
 Message: TypeAlias = tuple[str, int, Any]
 """Topic, time of receipt in nanoseconds, and the message as ``rosbags`` deserializes it."""
@@ -127,7 +128,7 @@ def open_damaged(path: Path) -> OpenBag:
     def messages(names: Collection[str]) -> Iterator[Message]:
         for part in parts:
             deserialize = _Deserializer(part)
-            for topic, time_ns, raw in part.messages(names):
+            for topic, time_ns, raw in salvaged_messages(part, names):
                 yield topic, time_ns, _deserialized(deserialize, raw, topic)
 
     return OpenBag(_sum_up(counts), messages, warnings)

@@ -19,7 +19,7 @@ LEAST_DAMPING = 1e-15
 MOST_DAMPING = 1e8
 GROWTH = 10.0
 LEAST_DIAGONAL = 1e-6
-"""Share of the largest diagonal entry that damping takes lesser ones for: a pose without information stays."""
+"""Share of the largest diagonal entry that damping lifts lesser ones to: a pose without information stays."""
 NEGLIGIBLE = 1e-12
 """An objective is a sum of squares of standard deviations: this much of it is nothing."""
 
