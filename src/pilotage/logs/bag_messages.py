@@ -15,8 +15,10 @@ from typing import Any, TypeAlias
 from pilotage.core.errors import InputError
 from pilotage.logs.rosbags_extra import rosbags
 from pilotage.logs.salvage.found import MAGIC_OF, BagFormat, Salvage
+from pilotage.logs.salvage.pieces import unpack
 from pilotage.logs.salvage.walk import salvage_file, salvaged_messages
 
+ZSTD = b"\x28\xb5\x2f\xfd"
 Message: TypeAlias = tuple[str, int, Any]
 """Topic, time of receipt in nanoseconds, and the message as ``rosbags`` deserializes it."""
 
@@ -42,8 +44,8 @@ class OpenBag:
     topics
         All of the bag, by name.
     messages
-        Yields those of the named topics in the order of the file or of their receipt; those that cannot be
-        deserialized are yielded as None.
+        Yields those of the named topics in the order of their receipt; those that cannot be deserialized
+        are yielded as None.
     warnings
         What is damaged.
     """
@@ -128,7 +130,8 @@ def open_damaged(path: Path) -> OpenBag:
     def messages(names: Collection[str]) -> Iterator[Message]:
         for part in parts:
             deserialize = _Deserializer(part)
-            for topic, time_ns, raw in salvaged_messages(part, names):
+            # In the order of receipt, as rosbags has them: within a file they stand in that of writing.
+            for topic, time_ns, raw in sorted(salvaged_messages(part, names), key=lambda row: row[1]):
                 yield topic, time_ns, _deserialized(deserialize, raw, topic)
 
     return OpenBag(_sum_up(counts), messages, warnings)
@@ -149,6 +152,8 @@ class _Deserializer:
         msgtype = self._part.types[topic]
         if self._part.encodings[topic] == "ros1":
             return store.deserialize_ros1(raw, msgtype)
+        if raw[:4] == ZSTD:  # rosbag2 may pack each message; its first bytes then are no CDR header
+            raw, _ = unpack(raw, "zstd")
         return store.deserialize_cdr(raw, msgtype)
 
     def _store(self, topic: str) -> Any:
