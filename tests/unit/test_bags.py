@@ -215,6 +215,15 @@ def test_a_folder_without_metadata(tmp_path: Path) -> None:
         assert len(read_bag(path)) == 30
 
 
+def test_a_cut_bag_of_packed_messages(tmp_path: Path) -> None:
+    path = write_ros2(tmp_path / "a", drive(400, 90), packing="MESSAGE")
+    data = (path / "a.db3").read_bytes()
+    (path / "a.db3").write_bytes(data[: 3 * len(data) // 4])
+    log = read_bag(path)
+    assert 200 < len(log) < 400
+    assert any("cut short" in said for said in log.warnings)
+
+
 def test_what_is_no_bag(tmp_path: Path) -> None:
     text = tmp_path / "a.bag"
     text.write_text("no bag")

@@ -1,7 +1,7 @@
 """Messages of ROS 1 bags, ROS 2 bags (SQLite or MCAP storage) and MCAP files, through one door.
 
 Whole bags are read by ``rosbags``. One that it refuses (cut short, never closed, a damaged part) is walked
-record by record (``logs.bag_salvage``), and what can be read is read.
+record by record (``logs.salvage``), and what can be read is read.
 """
 
 from __future__ import annotations
@@ -13,9 +13,12 @@ from pathlib import Path
 from typing import Any, TypeAlias
 
 from pilotage.core.errors import InputError
-from pilotage.logs.bag_salvage import MAGIC_OF, BagFormat, Salvage, salvage_file
 from pilotage.logs.rosbags_extra import rosbags
+from pilotage.logs.salvage.found import MAGIC_OF, BagFormat, Salvage
+from pilotage.logs.salvage.pieces import unpack
+from pilotage.logs.salvage.walk import salvage_file, salvaged_messages
 
+ZSTD = b"\x28\xb5\x2f\xfd"
 Message: TypeAlias = tuple[str, int, Any]
 """Topic, time of receipt in nanoseconds, and the message as ``rosbags`` deserializes it."""
 
@@ -41,8 +44,8 @@ class OpenBag:
     topics
         All of the bag, by name.
     messages
-        Yields those of the named topics in the order of the file or of their receipt; those that cannot be
-        deserialized are yielded as None.
+        Yields those of the named topics in the order of their receipt; those that cannot be deserialized
+        are yielded as None.
     warnings
         What is damaged.
     """
@@ -127,7 +130,8 @@ def open_damaged(path: Path) -> OpenBag:
     def messages(names: Collection[str]) -> Iterator[Message]:
         for part in parts:
             deserialize = _Deserializer(part)
-            for topic, time_ns, raw in part.messages(names):
+            # In the order of receipt, as rosbags has them: within a file they stand in that of writing.
+            for topic, time_ns, raw in sorted(salvaged_messages(part, names), key=lambda row: row[1]):
                 yield topic, time_ns, _deserialized(deserialize, raw, topic)
 
     return OpenBag(_sum_up(counts), messages, warnings)
@@ -148,6 +152,8 @@ class _Deserializer:
         msgtype = self._part.types[topic]
         if self._part.encodings[topic] == "ros1":
             return store.deserialize_ros1(raw, msgtype)
+        if raw[:4] == ZSTD:  # rosbag2 may pack each message; its first bytes then are no CDR header
+            raw, _ = unpack(raw, "zstd")
         return store.deserialize_cdr(raw, msgtype)
 
     def _store(self, topic: str) -> Any:

@@ -18,6 +18,8 @@ FIRST_DAMPING = 1e-9
 LEAST_DAMPING = 1e-15
 MOST_DAMPING = 1e8
 GROWTH = 10.0
+LEAST_DIAGONAL = 1e-6
+"""Share of the largest diagonal entry that damping lifts lesser ones to: a pose without information stays."""
 NEGLIGIBLE = 1e-12
 """An objective is a sum of squares of standard deviations: this much of it is nothing."""
 
@@ -79,9 +81,10 @@ def levenberg_marquardt(
                 right,
             )
         factor_diagonal[:], factor_below[:] = diagonal, below
+        least = LEAST_DIAGONAL * diagonal.max()
         for k in range(n):
             for r in (0, 4, 8):
-                factor_diagonal[k, r] += damping * diagonal[k, r]
+                factor_diagonal[k, r] += damping * max(diagonal[k, r], least)
         gained = False
         if factorize(column_start, rows, factor_diagonal, factor_below) == n:
             step[:] = right
@@ -90,7 +93,11 @@ def levenberg_marquardt(
             promised = 0.0
             for k in range(n):
                 for r in range(3):
-                    promised += 0.5 * step[k, r] * (right[k, r] + damping * diagonal[k, 4 * r] * step[k, r])
+                    promised += (
+                        0.5
+                        * step[k, r]
+                        * (right[k, r] + damping * max(diagonal[k, 4 * r], least) * step[k, r])
+                    )
             for p in range(poses.shape[0]):
                 if column[p] >= 0:
                     for r in range(3):

@@ -1,0 +1,54 @@
+"""The SQLite storage of rosbag2, row by row until the database ends."""
+
+from __future__ import annotations
+
+import sqlite3
+from collections.abc import Iterator
+
+from pilotage.logs.salvage.found import Raw, Salvage, damage_of
+
+
+def walk_sqlite(found: Salvage) -> Iterator[Raw]:
+    """Yield the messages of rosbag2's SQLite storage; ``found`` learns on the way."""
+    # What is missing at the end of a file is zeros to SQLite, also within a message that is cut. Filled up
+    # with two different bytes, a message that is not the same in both is cut.
+    data = found.path.read_bytes()
+    missing = _missing(data)
+    walks = [_sqlite_rows(data + missing * fill, found) for fill in ((b"\0", b"\xff") if missing else (b"",))]
+    cut = "the file is cut short" if missing else ""
+    try:
+        for rows in zip(*walks, strict=False):
+            if all(row == rows[0] for row in rows):
+                yield rows[0]
+    except (sqlite3.Error, ValueError, TypeError, OverflowError) as error:
+        cut = cut or f"the file is damaged ({error})"
+    found.damage = damage_of(found.path, 0, cut)
+
+
+def _missing(data: bytes) -> int:
+    """Bytes that a SQLite file lacks by its own header, as far as there can be use in filling them up."""
+    if len(data) < 100:
+        return 0
+    page = int.from_bytes(data[16:18], "big")
+    whole = (65536 if page == 1 else page) * int.from_bytes(data[28:32], "big")
+    return max(0, whole - len(data)) if whole < 20 * len(data) else 0
+
+
+def _sqlite_rows(data: bytes, found: Salvage) -> Iterator[Raw]:
+    base = sqlite3.connect(":memory:")
+    try:
+        base.deserialize(data)
+        # Without this, a file shorter than its header says is refused as a whole.
+        base.execute("PRAGMA writable_schema=ON")
+        names: dict[int, str] = {}
+        for number, topic, msgtype, form in base.execute(
+            "SELECT id, name, type, serialization_format FROM topics"
+        ):
+            if isinstance(topic, str) and isinstance(msgtype, str):
+                names[number] = topic
+                found.learn(topic, msgtype, str(form), "")
+        for number, stamp, raw in base.execute("SELECT topic_id, timestamp, data FROM messages NOT INDEXED"):
+            if number in names and isinstance(raw, bytes):
+                yield names[number], int(stamp), raw
+    finally:
+        base.close()
