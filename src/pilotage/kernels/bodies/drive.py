@@ -241,21 +241,40 @@ def place_outline(
 
 @kernel
 def meet_others(
-    state: FloatArray,
+    states: FloatArray,
     corners: FloatArray,
-    radius: float,
+    first: IntArray,
+    radii: FloatArray,
     others_segments: FloatArray,
     others_circles: FloatArray,
     own: IntArray,
-) -> None:
-    """After everybody moved: bring the clearance up to date, and count being touched by another body."""
-    others = others_clearance(
-        state[X], state[Y], state[THETA], corners, radius, others_segments, others_circles, own
-    )
-    state[CLEARANCE] = min(state[FIXED_CLEARANCE], others)
-    if others < CONTACT_M and state[TOUCHING] == 0.0:
-        state[COLLISIONS] += 1.0
-        state[TOUCHING] = 2.0
+) -> bool:
+    """After everybody moved: bring clearances up to date, and count being touched by another body.
+
+    Parameters
+    ----------
+    states
+        (R, STATE_SIZE) of all bodies.
+    corners, first
+        (K, 2) of all polygons, and (R + 1,) where each begins.
+
+    Returns
+    -------
+    Whether a body was run into or still counts as such.
+    """
+    marked = False
+    for r in range(states.shape[0]):
+        state = states[r]
+        shape = corners[first[r] : first[r + 1]]
+        others = others_clearance(
+            state[X], state[Y], state[THETA], shape, radii[r], others_segments, others_circles, own[r]
+        )
+        state[CLEARANCE] = min(state[FIXED_CLEARANCE], others)
+        if others < CONTACT_M and state[TOUCHING] == 0.0:
+            state[COLLISIONS] += 1.0
+            state[TOUCHING] = 2.0
+        marked = marked or state[BLOCKER] > 0.0 or state[TOUCHING] == 2.0
+    return marked
 
 
 @kernel

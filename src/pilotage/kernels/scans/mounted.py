@@ -10,7 +10,7 @@ import math
 import numpy as np
 
 from pilotage.kernels.arrays import FloatArray, IntArray
-from pilotage.kernels.geometry.motion import wrap
+from pilotage.kernels.geometry.motion import TWO_PI, wrap
 from pilotage.kernels.jit import kernel
 from pilotage.kernels.scans.rays import SIGHT_MARGIN_M, cone_range, narrow_fan
 from pilotage.kernels.scans.sweep import narrow_grid_fan
@@ -78,9 +78,11 @@ def fans(
 
 @kernel
 def noisy_fans(
-    poses: FloatArray,
-    normals: FloatArray,
+    table: FloatArray,
+    rows: IntArray,
     own: IntArray,
+    normals: FloatArray,
+    at: int,
     mount: FloatArray,
     first: float,
     step: float,
@@ -98,15 +100,23 @@ def noisy_fans(
     others_segments: FloatArray,
     others_circles: FloatArray,
 ) -> FloatArray:
-    """``fans`` plus ``std`` times standard normals (R, beams); a beam without a hit stays at the reach."""
+    """``fans`` of the bodies ``rows`` (R,) of a table, plus ``std`` times standard normals.
+
+    ``normals`` (R, blocks, beams) are taken at block ``at``. A beam without a hit stays at the reach.
+    """
+    poses = np.empty((rows.shape[0], 3))
+    own_rows = np.empty((rows.shape[0], 3), dtype=np.int64)
+    for r in range(rows.shape[0]):
+        poses[r] = table[rows[r], :3]
+        own_rows[r] = own[rows[r]]
     out = fans(
-        poses, own, mount, first, step, cosines, sines, max_range, segments, circles, jump, outlines,
+        poses, own_rows, mount, first, step, cosines, sines, max_range, segments, circles, jump, outlines,
         starts, items, frame, others_segments, others_circles,
     )  # fmt: skip
     for r in range(out.shape[0]):
         for k in range(out.shape[1]):
             if out[r, k] < max_range:
-                out[r, k] = min(max(out[r, k] + std * normals[r, k], 0.0), max_range)
+                out[r, k] = min(max(out[r, k] + std * normals[r, at, k], 0.0), max_range)
     return out
 
 
@@ -228,7 +238,9 @@ def tiles_in_cone(
 
 @kernel
 def cones(
-    pose: FloatArray,
+    table: FloatArray,
+    rows: IntArray,
+    own: IntArray,
     mounts: FloatArray,
     segments: FloatArray,
     circles: FloatArray,
@@ -239,20 +251,22 @@ def cones(
     frame: FloatArray,
     others_segments: FloatArray,
     others_circles: FloatArray,
-    own: IntArray,
     out: FloatArray,
 ) -> None:
-    """Distance to the nearest return in each of the cones of a body at ``pose`` (>= 3); inf for none.
+    """Distance to the nearest return in each cone; inf for none.
 
     Parameters
     ----------
+    table, rows, own
+        (R, >= 3) poses of bodies, (K,) which of them each cone is on, and (R, 3) their own rows.
     mounts
-        (K, 5) pose of each cone on the body, half its width, its reach (for grids only).
+        (K, 5) pose of each cone on its body, half its width, its reach (for grids only).
     out
         (K,) filled.
     """
     for k in range(mounts.shape[0]):
-        x, y, theta = mounted(pose[0], pose[1], pose[2], mounts[k])
+        body = rows[k]
+        x, y, theta = mounted(table[body, 0], table[body, 1], table[body, 2], mounts[k])
         half = mounts[k, 3]
         best = cone_range(x, y, theta, half, segments, circles)
         if jump.shape[0] > 0:
@@ -260,10 +274,10 @@ def cones(
             if grid_beam(x, y, math.cos(theta), math.sin(theta), 0.0, jump, frame) == 0.0:
                 best = 0.0
         if others_segments.shape[0] + others_circles.shape[0] > 0:
-            before, after = others_segments[: own[0]], others_segments[own[1] :]
+            before, after = others_segments[: own[body, 0]], others_segments[own[body, 1] :]
             near, far = others_circles, others_circles[:0]
-            if own[2] >= 0:
-                near, far = others_circles[: own[2]], others_circles[own[2] + 1 :]
+            if own[body, 2] >= 0:
+                near, far = others_circles[: own[body, 2]], others_circles[own[body, 2] + 1 :]
             best = min(best, cone_range(x, y, theta, half, before, near))
             best = min(best, cone_range(x, y, theta, half, after, far))
         out[k] = best
@@ -296,7 +310,7 @@ def hidden(ax: float, ay: float, bx: float, by: float, segments: FloatArray, cir
 @kernel
 def sightings(
     pose: FloatArray,
-    noise: FloatArray,
+    normals: FloatArray,
     mount: FloatArray,
     half_view: float,
     max_range: float,
@@ -312,21 +326,23 @@ def sightings(
     others_segments: FloatArray,
     others_circles: FloatArray,
     own: IntArray,
-) -> tuple[IntArray, FloatArray, FloatArray]:
-    """Ids, ranges and bearings of the points (M, 2) in view, with noise; what is solid hides those behind it.
+    seen: IntArray,
+    ranges: FloatArray,
+    bearings: FloatArray,
+) -> int:
+    """How many of the points (M, 2) are in view; their ids, ranges and bearings are filled in, with noise.
+
+    What is solid hides those behind it.
 
     Parameters
     ----------
-    noise
+    normals
         (2, M) standard normals for range and bearing, one pair for each point, seen or not.
     half_view
         Half the field of view; pi sees all around.
     """
     x, y, theta = mounted(pose[0], pose[1], pose[2], mount)
     count = 0
-    index = np.empty(points.shape[0], dtype=np.int64)
-    ranges = np.empty(points.shape[0])
-    bearings = np.empty(points.shape[0])
     for i in range(points.shape[0]):
         dx, dy = points[i, 0] - x, points[i, 1] - y
         distance = math.hypot(dx, dy)
@@ -348,17 +364,51 @@ def sightings(
                 near, far = others_circles[: own[2]], others_circles[own[2] + 1 :]
             if hidden(x, y, ex, ey, before, near) or hidden(x, y, ex, ey, after, far):
                 continue
-        index[count], ranges[count], bearings[count] = i, distance, bearing
-        count += 1
-    seen = np.empty(count, dtype=np.int64)
-    for n in range(count):
-        i = index[n]
-        seen[n] = ids[i]
-        ranges[n] = abs(ranges[n] + range_std * noise[0, i])
-        bearing = bearings[n] + bearing_offset + bearing_std * noise[1, i]
+        bearing = bearing + bearing_offset + bearing_std * normals[1, i]
         if bearing >= math.pi:
-            bearing -= 2.0 * math.pi
+            bearing -= TWO_PI
         if bearing < -math.pi:
-            bearing += 2.0 * math.pi
-        bearings[n] = bearing
-    return seen, ranges[:count].copy(), bearings[:count].copy()
+            bearing += TWO_PI
+        seen[count] = ids[i]
+        ranges[count] = abs(distance + range_std * normals[0, i])
+        bearings[count] = bearing
+        count += 1
+    return count
+
+
+@kernel
+def all_sightings(
+    table: FloatArray,
+    rows: IntArray,
+    own: IntArray,
+    normals: FloatArray,
+    at: int,
+    counts: IntArray,
+    mount: FloatArray,
+    half_view: float,
+    max_range: float,
+    points: FloatArray,
+    ids: IntArray,
+    range_std: float,
+    bearing_std: float,
+    bearing_offset: float,
+    segments: FloatArray,
+    circles: FloatArray,
+    jump: Cells,
+    frame: FloatArray,
+    others_segments: FloatArray,
+    others_circles: FloatArray,
+) -> tuple[IntArray, FloatArray, FloatArray]:
+    """``sightings`` from the bodies ``rows`` (R,) of a table: (R, M), of which ``counts`` (R,) are filled.
+
+    ``normals`` (R, blocks, 2, M) are taken at block ``at``.
+    """
+    shape = (rows.shape[0], points.shape[0])
+    seen, ranges, bearings = np.empty(shape, dtype=np.int64), np.empty(shape), np.empty(shape)
+    for r in range(rows.shape[0]):
+        counts[r] = sightings(
+            table[rows[r]], normals[r, at], mount, half_view, max_range, points, ids, range_std, bearing_std,
+            bearing_offset, segments, circles, jump, frame, others_segments, others_circles, own[rows[r]],
+            seen[r], ranges[r], bearings[r],
+        )  # fmt: skip
+    return seen, ranges, bearings
