@@ -398,17 +398,17 @@ def all_sightings(
     frame: FloatArray,
     others_segments: FloatArray,
     others_circles: FloatArray,
-) -> tuple[IntArray, FloatArray, FloatArray]:
-    """``sightings`` from the bodies ``rows`` (R,) of a table: (R, M), of which ``counts`` (R,) are filled.
+) -> tuple[IntArray, FloatArray]:
+    """``sightings`` from the bodies ``rows`` (R,) of a table: ids (R, M), ranges and bearings (2, R, M).
 
-    ``normals`` (R, blocks, 2, M) are taken at block ``at``.
+    Of each row ``counts`` (R,) are filled; ``normals`` (R, blocks, 2, M) are taken at block ``at``.
     """
-    shape = (rows.shape[0], points.shape[0])
-    seen, ranges, bearings = np.empty(shape, dtype=np.int64), np.empty(shape), np.empty(shape)
+    count = points.shape[0]
+    seen, found = np.empty((rows.shape[0], count), dtype=np.int64), np.empty((2, rows.shape[0], count))
     for r in range(rows.shape[0]):
         counts[r] = sightings(
             table[rows[r]], normals[r, at], mount, half_view, max_range, points, ids, range_std, bearing_std,
             bearing_offset, segments, circles, jump, frame, others_segments, others_circles, own[rows[r]],
-            seen[r], ranges[r], bearings[r],
+            seen[r], found[0, r], found[1, r],
         )  # fmt: skip
-    return seen, ranges, bearings
+    return seen, found

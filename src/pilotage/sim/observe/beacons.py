@@ -58,10 +58,10 @@ class SimulatedBeacons:
         )
 
         def read() -> list[BeaconReadings]:
-            found = mounted.all_sightings(table, rows, owns, values, noise.next(), *arguments)
+            ids, found = mounted.all_sightings(table, rows, owns, values, noise.next(), *arguments)
             return [
-                BeaconReadings(ids[:count], ranges[:count], bearings[:count])
-                for count, ids, ranges, bearings in zip(counts.tolist(), *found, strict=True)
+                BeaconReadings(ids[r, :count], found[0, r, :count], found[1, r, :count])
+                for r, count in enumerate(counts.tolist())
             ]
 
         return read
