@@ -119,11 +119,11 @@ class Body:
         self.motion.stop()
         self.rates_rad_s[:] = 0.0
         x, y, theta = state[:3].tolist()
-        fixed = float(drive.fixed_clearance(x, y, theta, *self._among_fixed))
+        fixed = float(clearances.fixed_clearance(x, y, theta, *self._among_fixed))
         state[drive.FIXED_CLEARANCE] = fixed
         if len(self.world.traffic.own):
             drive.place_outline(state, *self._rows)
-        state[drive.CLEARANCE] = min(fixed, drive.others_clearance(x, y, theta, *self._among_others))
+        state[drive.CLEARANCE] = min(fixed, clearances.others_clearance(x, y, theta, *self._among_others))
 
     def run_into(self, now: bool) -> None:
         """Count that another body runs into this one, once until both are apart again."""
@@ -148,5 +148,7 @@ class Body:
         x, y, theta = self.state[:3].tolist()
         outline = self.footprint
         return float(
-            drive.others_clearance(x, y, theta, outline.points_m, outline.radius_m, sides, circles, nobody)
+            clearances.others_clearance(
+                x, y, theta, outline.points_m, outline.radius_m, sides, circles, nobody
+            )
         )

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from pilotage.kernels.scans import mounted
+from pilotage.kernels.scans import sight
 from pilotage.sensors.beacon import BeaconConfig
 from pilotage.sensors.readings import BeaconReadings
 from pilotage.sim.observe.noise import NoiseBlocks
@@ -58,7 +58,7 @@ class SimulatedBeacons:
         )
 
         def read() -> list[BeaconReadings]:
-            ids, found = mounted.all_sightings(table, rows, owns, values, noise.next(), *arguments)
+            ids, found = sight.all_sightings(table, rows, owns, values, noise.next(), *arguments)
             return [
                 BeaconReadings(ids[r, :count], found[0, r, :count], found[1, r, :count])
                 for r, count in enumerate(counts.tolist())

@@ -9,7 +9,7 @@ import numpy as np
 from pilotage.core.errors import InputError
 from pilotage.core.types import BoolArray, FloatArray, IntArray, Pose2
 from pilotage.kernels.bodies import clearances, drive
-from pilotage.kernels.scans import mounted
+from pilotage.kernels.scans import mounted, sight
 from pilotage.maps.landmarks import Landmarks
 from pilotage.maps.world_map import WorldMap
 from pilotage.models.footprint import Footprint
@@ -324,7 +324,7 @@ class World:
         marks = self.landmarks
         count, nothing = len(marks), np.zeros((2, len(self.landmarks)))
         ids, ranges, bearings = np.zeros(count, dtype=np.int64), np.zeros(count), np.zeros(count)
-        seen = mounted.sightings(
+        seen = sight.sightings(
             pose.as_array(),
             nothing,
             np.zeros(3),
