@@ -1,4 +1,4 @@
-"""Clearance of an outline from all that is solid, which is handed over as in ``drive``; where a contact is."""
+"""Clearance of an outline from all that is solid, handed over as in ``drive``; where on it a contact is."""
 
 from __future__ import annotations
 
