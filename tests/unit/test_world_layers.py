@@ -229,6 +229,14 @@ def test_open_ground_has_heights_and_hazards_that_stop_nobody() -> None:
         simulator(robot({"scan": LidarConfig()}), chart)
 
 
+@given(st.floats(-6.0, 12.0), st.floats(-6.0, 12.0), st.sampled_from([0.0, 0.4, -2.0]))
+def test_hazards_of_one_point_and_of_many_agree(x: float, y: float, theta: float) -> None:
+    grid = random_grid(3, theta, 0.4)
+    ground = World.of(WorldMap("ground", WIDE, grid=grid), hazards=True).ground
+    assert ground is not None
+    assert ground.on_hazard(x, y) is bool(ground.on_hazards(np.array([[x, y]]))[0])
+
+
 def test_what_no_layer_can_answer_is_refused_in_one_line() -> None:
     empty = WorldMap("void", (0, 0, 10, 8))
     for config, words in (

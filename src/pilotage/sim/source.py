@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from pilotage.core.errors import InputError
 from pilotage.core.random import RandomStreams
-from pilotage.core.types import Command, Pose2
+from pilotage.core.types import Command, FloatArray, IntArray, Pose2
 from pilotage.kernels.bodies import drive
 from pilotage.models.footprint import Footprint
 from pilotage.models.motion.motion import MotionConfig
@@ -17,7 +18,7 @@ from pilotage.sensors.readings import Reading, Readings
 from pilotage.sensors.sensor import SensorConfig
 from pilotage.sim.bodies.body import Body
 from pilotage.sim.bodies.motion import SIMULATED_MOTIONS
-from pilotage.sim.sensing.sensor import SIMULATED_SENSORS, Carrier, SimulatedSensor
+from pilotage.sim.sensing.sensor import SIMULATED_SENSORS, Carrier, ReadTogether, SimulatedSensor
 from pilotage.sim.worlds.traffic import MovingBody, Traffic
 from pilotage.sim.worlds.world import World
 
@@ -67,12 +68,22 @@ class Simulator:
         nobody = np.array([[0, 0, -1]], dtype=np.int64)
         own = self._traffic.own if self._crowded else nobody
         self.bodies: tuple[Body, ...] = tuple(
-            _body(robot, self.world, dt_s, states[row], own[row]) for row, robot in enumerate(robots)
+            _body(robot, self.world, dt_s, states, row, own) for row, robot in enumerate(robots)
         )
         for body in self.bodies:
             # Once more, now that everybody is in place.
             body.carry_to(body.pose)
         self._check_apart()
+        shapes = [robot.footprint for robot in robots]
+        self._meeting = (
+            states,
+            np.concatenate([*(shape.points_m for shape in shapes), np.zeros((0, 2))]),
+            np.cumsum([0, *(len(shape.points_m) for shape in shapes)]),
+            np.array([shape.radius_m for shape in shapes]),
+            self._traffic.segments_m,
+            self._traffic.circles_m,
+            own,
+        )
         several = len(robots) > 1
         seats = [
             _Seat(row, name, sensor, every)
@@ -118,8 +129,8 @@ class Simulator:
     def _meet(self) -> None:
         """Who ran into whom."""
         bodies = self.bodies
-        for body in bodies:
-            body.meet_others()
+        if not drive.meet_others(*self._meeting):
+            return
         hit = [
             min((other for other in bodies if other is not body), key=body.distance_to_m)
             for body in bodies
@@ -144,20 +155,20 @@ class _Seat:
 
     row: int
     name: str
-    sensor: SimulatedSensor
+    sensor: SimulatedSensor | ReadTogether
     every: int
 
 
 @dataclass(frozen=True, slots=True)
 class _Group:
-    """Equal sensors of several robots, read at once."""
+    """Sensors that are read at once."""
 
     seats: list[tuple[int, str]]
-    read: Callable[[], list[Reading | None]]
+    read: Callable[[], Sequence[Reading | None]]
     every: int
 
 
-def _body(robot: RobotSpec, world: World, dt_s: float, state: np.ndarray, own: np.ndarray) -> Body:
+def _body(robot: RobotSpec, world: World, dt_s: float, table: FloatArray, row: int, owns: IntArray) -> Body:
     """The robot's body with the motion that its data sheet asks for."""
     where = "robot.motion"
     samples = max(
@@ -169,7 +180,7 @@ def _body(robot: RobotSpec, world: World, dt_s: float, state: np.ndarray, own: n
         default=1,
     )
     motion = SIMULATED_MOTIONS.of(robot.motion, where)(robot.motion, dt_s, samples, robot.streams, where)
-    return Body(robot.name, robot.footprint, motion, robot.start, world, dt_s, state, own)
+    return Body(robot.name, robot.footprint, motion, robot.start, world, dt_s, table, row, owns)
 
 
 def _samples(config: SensorConfig, dt_s: float, name: str) -> int:
@@ -188,7 +199,7 @@ def _samples(config: SensorConfig, dt_s: float, name: str) -> int:
 
 def _sensors(
     robot: RobotSpec, body: Body, world: World, dt_s: float, several: bool
-) -> list[tuple[str, SimulatedSensor, int]]:
+) -> list[tuple[str, SimulatedSensor | ReadTogether, int]]:
     """The robot's sensors by name, and every how many steps each is read."""
     out = []
     for name, config in robot.sensors.items():
@@ -204,18 +215,23 @@ def _sensors(
 def _grouped(
     seats: list[_Seat], robots: Sequence[RobotSpec]
 ) -> tuple[list[tuple[int, str, Callable[[], Reading | None], int]], list[_Group]]:
-    """Sensors that are read one by one, and equal ones that are read together."""
-    alike: dict[object, list[_Seat]] = {}
+    """Sensors that are read one by one, and those that are read together."""
+    alone: list[tuple[int, str, Callable[[], Reading | None], int]] = []
+    alike: dict[tuple[Any, object, int], list[_Seat]] = {}
     for seat in seats:
-        config = robots[seat.row].sensors[seat.name]
-        together = hasattr(seat.sensor, "together")
-        alike.setdefault((type(seat.sensor), config) if together else seat, []).append(seat)
-    alone, groups = [], []
-    for found in alike.values():
-        if len(found) == 1:
-            alone.append((found[0].row, found[0].name, found[0].sensor.read, found[0].every))
+        sensor: Any = seat.sensor
+        kind = type(sensor)
+        if hasattr(kind, "together"):
+            key = kind.alike(robots[seat.row].sensors[seat.name])
+            alike.setdefault((kind, key, seat.every), []).append(seat)
         else:
-            sensors = [seat.sensor for seat in found]
-            read = type(sensors[0]).together(sensors)  # type: ignore[attr-defined]
-            groups.append(_Group([(seat.row, seat.name) for seat in found], read, found[0].every))
+            alone.append((seat.row, seat.name, sensor.read, seat.every))
+    groups = [
+        _Group(
+            [(seat.row, seat.name) for seat in found],
+            kind.together([seat.sensor for seat in found]),
+            every,
+        )
+        for (kind, _, every), found in alike.items()
+    ]
     return alone, groups

@@ -1,4 +1,4 @@
-"""Clearance of an outline at many poses, and where on it a contact is."""
+"""Clearance of an outline from all that is solid, handed over as in ``drive``; where on it a contact is."""
 
 from __future__ import annotations
 
@@ -7,9 +7,85 @@ import math
 import numpy as np
 
 from pilotage.kernels.arrays import FloatArray, IntArray
-from pilotage.kernels.bodies.drive import all_clearance
+from pilotage.kernels.bodies.outline import outline_clearance
 from pilotage.kernels.jit import kernel
-from pilotage.kernels.scans.tiles import Cells
+from pilotage.kernels.scans.tiles import Cells, grid_clearance
+
+
+@kernel
+def fixed_clearance(
+    x: float,
+    y: float,
+    theta: float,
+    corners: FloatArray,
+    radius: float,
+    inner: float,
+    segments: FloatArray,
+    circles: FloatArray,
+    jump: Cells,
+    outlines: FloatArray,
+    starts: IntArray,
+    items: IntArray,
+    frame: FloatArray,
+) -> float:
+    """Clearance of an outline from walls and grid."""
+    c, s = math.cos(theta), math.sin(theta)
+    best = outline_clearance(x, y, c, s, corners, radius, segments, circles)
+    return min(
+        best,
+        grid_clearance(x, y, c, s, corners, radius, inner, jump, outlines, starts, items, frame),
+    )
+
+
+@kernel
+def others_clearance(
+    x: float,
+    y: float,
+    theta: float,
+    corners: FloatArray,
+    radius: float,
+    others_segments: FloatArray,
+    others_circles: FloatArray,
+    own: IntArray,
+) -> float:
+    """Clearance of an outline from the other bodies."""
+    if others_segments.shape[0] + others_circles.shape[0] == 0:
+        return math.inf
+    c, s = math.cos(theta), math.sin(theta)
+    best = math.inf
+    if own[2] >= 0:
+        before, after = others_circles[: own[2]], others_circles[own[2] + 1 :]
+        best = outline_clearance(x, y, c, s, corners, radius, others_segments, before)
+        return min(best, outline_clearance(x, y, c, s, corners, radius, others_segments[:0], after))
+    before, after = others_segments[: own[0]], others_segments[own[1] :]
+    best = outline_clearance(x, y, c, s, corners, radius, before, others_circles)
+    return min(best, outline_clearance(x, y, c, s, corners, radius, after, others_circles[:0]))
+
+
+@kernel
+def all_clearance(
+    x: float,
+    y: float,
+    theta: float,
+    corners: FloatArray,
+    radius: float,
+    inner: float,
+    segments: FloatArray,
+    circles: FloatArray,
+    jump: Cells,
+    outlines: FloatArray,
+    starts: IntArray,
+    items: IntArray,
+    frame: FloatArray,
+    others_segments: FloatArray,
+    others_circles: FloatArray,
+    own: IntArray,
+) -> float:
+    """Clearance of an outline from everything."""
+    fixed = fixed_clearance(
+        x, y, theta, corners, radius, inner, segments, circles, jump, outlines, starts, items, frame
+    )
+    return min(fixed, others_clearance(x, y, theta, corners, radius, others_segments, others_circles, own))
 
 
 @kernel

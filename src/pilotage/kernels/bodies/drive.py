@@ -11,10 +11,10 @@ from __future__ import annotations
 import math
 
 from pilotage.kernels.arrays import FloatArray, IntArray
-from pilotage.kernels.bodies.outline import outline_clearance
+from pilotage.kernels.bodies.clearances import all_clearance, fixed_clearance, others_clearance
 from pilotage.kernels.geometry.motion import chord_ratio, wrap
 from pilotage.kernels.jit import kernel
-from pilotage.kernels.scans.tiles import Cells, grid_clearance
+from pilotage.kernels.scans.tiles import Cells
 
 (
     X,
@@ -56,82 +56,6 @@ def turned_part(
     middle = theta + 0.5 * turned
     c, s = math.cos(middle), math.sin(middle)
     return x + chord * c - side * s, y + chord * s + side * c, wrap(theta + turned)
-
-
-@kernel
-def fixed_clearance(
-    x: float,
-    y: float,
-    theta: float,
-    corners: FloatArray,
-    radius: float,
-    inner: float,
-    segments: FloatArray,
-    circles: FloatArray,
-    jump: Cells,
-    outlines: FloatArray,
-    starts: IntArray,
-    items: IntArray,
-    frame: FloatArray,
-) -> float:
-    """Clearance of an outline from walls and grid."""
-    c, s = math.cos(theta), math.sin(theta)
-    best = outline_clearance(x, y, c, s, corners, radius, segments, circles)
-    return min(
-        best,
-        grid_clearance(x, y, c, s, corners, radius, inner, jump, outlines, starts, items, frame),
-    )
-
-
-@kernel
-def others_clearance(
-    x: float,
-    y: float,
-    theta: float,
-    corners: FloatArray,
-    radius: float,
-    others_segments: FloatArray,
-    others_circles: FloatArray,
-    own: IntArray,
-) -> float:
-    """Clearance of an outline from the other bodies."""
-    if others_segments.shape[0] + others_circles.shape[0] == 0:
-        return math.inf
-    c, s = math.cos(theta), math.sin(theta)
-    best = math.inf
-    if own[2] >= 0:
-        before, after = others_circles[: own[2]], others_circles[own[2] + 1 :]
-        best = outline_clearance(x, y, c, s, corners, radius, others_segments, before)
-        return min(best, outline_clearance(x, y, c, s, corners, radius, others_segments[:0], after))
-    before, after = others_segments[: own[0]], others_segments[own[1] :]
-    best = outline_clearance(x, y, c, s, corners, radius, before, others_circles)
-    return min(best, outline_clearance(x, y, c, s, corners, radius, after, others_circles[:0]))
-
-
-@kernel
-def all_clearance(
-    x: float,
-    y: float,
-    theta: float,
-    corners: FloatArray,
-    radius: float,
-    inner: float,
-    segments: FloatArray,
-    circles: FloatArray,
-    jump: Cells,
-    outlines: FloatArray,
-    starts: IntArray,
-    items: IntArray,
-    frame: FloatArray,
-    others_segments: FloatArray,
-    others_circles: FloatArray,
-    own: IntArray,
-) -> float:
-    """Clearance of an outline from everything."""
-    fixed = fixed_clearance(
-        x, y, theta, corners, radius, inner, segments, circles, jump, outlines, starts, items, frame
-    )
-    return min(fixed, others_clearance(x, y, theta, corners, radius, others_segments, others_circles, own))
 
 
 @kernel
@@ -241,21 +165,40 @@ def place_outline(
 
 @kernel
 def meet_others(
-    state: FloatArray,
+    states: FloatArray,
     corners: FloatArray,
-    radius: float,
+    first: IntArray,
+    radii: FloatArray,
     others_segments: FloatArray,
     others_circles: FloatArray,
     own: IntArray,
-) -> None:
-    """After everybody moved: bring the clearance up to date, and count being touched by another body."""
-    others = others_clearance(
-        state[X], state[Y], state[THETA], corners, radius, others_segments, others_circles, own
-    )
-    state[CLEARANCE] = min(state[FIXED_CLEARANCE], others)
-    if others < CONTACT_M and state[TOUCHING] == 0.0:
-        state[COLLISIONS] += 1.0
-        state[TOUCHING] = 2.0
+) -> bool:
+    """After everybody moved: bring clearances up to date, and count being touched by another body.
+
+    Parameters
+    ----------
+    states
+        (R, STATE_SIZE) of all bodies.
+    corners, first
+        (K, 2) of all polygons, and (R + 1,) where each begins.
+
+    Returns
+    -------
+    Whether a body was run into or still counts as such.
+    """
+    marked = False
+    for r in range(states.shape[0]):
+        state = states[r]
+        shape = corners[first[r] : first[r + 1]]
+        others = others_clearance(
+            state[X], state[Y], state[THETA], shape, radii[r], others_segments, others_circles, own[r]
+        )
+        state[CLEARANCE] = min(state[FIXED_CLEARANCE], others)
+        if others < CONTACT_M and state[TOUCHING] == 0.0:
+            state[COLLISIONS] += 1.0
+            state[TOUCHING] = 2.0
+        marked = marked or state[BLOCKER] > 0.0 or state[TOUCHING] == 2.0
+    return marked
 
 
 @kernel

@@ -1,4 +1,4 @@
-"""What sensors on a body would read among all that is solid: fans, single beams, cones, lines of sight.
+"""What sensors on a body would read among all that is solid: fans, single beams, cones.
 
 What is solid is handed over as in ``bodies.drive``; ``mount`` is a sensor's pose on the body (3,).
 """
@@ -10,9 +10,8 @@ import math
 import numpy as np
 
 from pilotage.kernels.arrays import FloatArray, IntArray
-from pilotage.kernels.geometry.motion import wrap
 from pilotage.kernels.jit import kernel
-from pilotage.kernels.scans.rays import SIGHT_MARGIN_M, cone_range, narrow_fan
+from pilotage.kernels.scans.rays import cone_range, narrow_fan
 from pilotage.kernels.scans.sweep import narrow_grid_fan
 from pilotage.kernels.scans.tiles import (
     COSINE,
@@ -78,9 +77,11 @@ def fans(
 
 @kernel
 def noisy_fans(
-    poses: FloatArray,
-    normals: FloatArray,
+    table: FloatArray,
+    rows: IntArray,
     own: IntArray,
+    normals: FloatArray,
+    at: int,
     mount: FloatArray,
     first: float,
     step: float,
@@ -98,15 +99,23 @@ def noisy_fans(
     others_segments: FloatArray,
     others_circles: FloatArray,
 ) -> FloatArray:
-    """``fans`` plus ``std`` times standard normals (R, beams); a beam without a hit stays at the reach."""
+    """``fans`` of the bodies ``rows`` (R,) of a table, plus ``std`` times standard normals.
+
+    ``normals`` (R, blocks, beams) are taken at block ``at``. A beam without a hit stays at the reach.
+    """
+    poses = np.empty((rows.shape[0], 3))
+    own_rows = np.empty((rows.shape[0], 3), dtype=np.int64)
+    for r in range(rows.shape[0]):
+        poses[r] = table[rows[r], :3]
+        own_rows[r] = own[rows[r]]
     out = fans(
-        poses, own, mount, first, step, cosines, sines, max_range, segments, circles, jump, outlines,
+        poses, own_rows, mount, first, step, cosines, sines, max_range, segments, circles, jump, outlines,
         starts, items, frame, others_segments, others_circles,
     )  # fmt: skip
     for r in range(out.shape[0]):
         for k in range(out.shape[1]):
             if out[r, k] < max_range:
-                out[r, k] = min(max(out[r, k] + std * normals[r, k], 0.0), max_range)
+                out[r, k] = min(max(out[r, k] + std * normals[r, at, k], 0.0), max_range)
     return out
 
 
@@ -228,7 +237,9 @@ def tiles_in_cone(
 
 @kernel
 def cones(
-    pose: FloatArray,
+    table: FloatArray,
+    rows: IntArray,
+    own: IntArray,
     mounts: FloatArray,
     segments: FloatArray,
     circles: FloatArray,
@@ -239,20 +250,22 @@ def cones(
     frame: FloatArray,
     others_segments: FloatArray,
     others_circles: FloatArray,
-    own: IntArray,
     out: FloatArray,
 ) -> None:
-    """Distance to the nearest return in each of the cones of a body at ``pose`` (>= 3); inf for none.
+    """Distance to the nearest return in each cone; inf for none.
 
     Parameters
     ----------
+    table, rows, own
+        (R, >= 3) poses of bodies, (K,) which of them each cone is on, and (R, 3) their own rows.
     mounts
-        (K, 5) pose of each cone on the body, half its width, its reach (for grids only).
+        (K, 5) pose of each cone on its body, half its width, its reach (for grids only).
     out
         (K,) filled.
     """
     for k in range(mounts.shape[0]):
-        x, y, theta = mounted(pose[0], pose[1], pose[2], mounts[k])
+        body = rows[k]
+        x, y, theta = mounted(table[body, 0], table[body, 1], table[body, 2], mounts[k])
         half = mounts[k, 3]
         best = cone_range(x, y, theta, half, segments, circles)
         if jump.shape[0] > 0:
@@ -260,105 +273,10 @@ def cones(
             if grid_beam(x, y, math.cos(theta), math.sin(theta), 0.0, jump, frame) == 0.0:
                 best = 0.0
         if others_segments.shape[0] + others_circles.shape[0] > 0:
-            before, after = others_segments[: own[0]], others_segments[own[1] :]
+            before, after = others_segments[: own[body, 0]], others_segments[own[body, 1] :]
             near, far = others_circles, others_circles[:0]
-            if own[2] >= 0:
-                near, far = others_circles[: own[2]], others_circles[own[2] + 1 :]
+            if own[body, 2] >= 0:
+                near, far = others_circles[: own[body, 2]], others_circles[own[body, 2] + 1 :]
             best = min(best, cone_range(x, y, theta, half, before, near))
             best = min(best, cone_range(x, y, theta, half, after, far))
         out[k] = best
-
-
-@kernel
-def hidden(ax: float, ay: float, bx: float, by: float, segments: FloatArray, circles: FloatArray) -> bool:
-    """Whether a segment or circle is in the way from A to B; touching counts, as in ``plane.sees``."""
-    rx, ry = bx - ax, by - ay
-    for i in range(segments.shape[0]):
-        sx, sy = segments[i, 2] - segments[i, 0], segments[i, 3] - segments[i, 1]
-        cross = rx * sy - ry * sx
-        qx, qy = segments[i, 0] - ax, segments[i, 1] - ay
-        t, u = qx * sy - qy * sx, qx * ry - qy * rx
-        # 0 <= t <= cross without dividing; a parallel segment does not cross.
-        if cross < 0.0:
-            t, u, cross = -t, -u, -cross
-        if cross > 0.0 and 0.0 <= t <= cross and 0.0 <= u <= cross:
-            return True
-    length2 = rx * rx + ry * ry
-    for i in range(circles.shape[0]):
-        qx, qy = circles[i, 0] - ax, circles[i, 1] - ay
-        t = 0.0 if length2 == 0.0 else min(1.0, max(0.0, (qx * rx + qy * ry) / length2))
-        ex, ey = qx - t * rx, qy - t * ry
-        if ex * ex + ey * ey <= circles[i, 2] * circles[i, 2]:
-            return True
-    return False
-
-
-@kernel
-def sightings(
-    pose: FloatArray,
-    noise: FloatArray,
-    mount: FloatArray,
-    half_view: float,
-    max_range: float,
-    points: FloatArray,
-    ids: IntArray,
-    range_std: float,
-    bearing_std: float,
-    bearing_offset: float,
-    segments: FloatArray,
-    circles: FloatArray,
-    jump: Cells,
-    frame: FloatArray,
-    others_segments: FloatArray,
-    others_circles: FloatArray,
-    own: IntArray,
-) -> tuple[IntArray, FloatArray, FloatArray]:
-    """Ids, ranges and bearings of the points (M, 2) in view, with noise; what is solid hides those behind it.
-
-    Parameters
-    ----------
-    noise
-        (2, M) standard normals for range and bearing, one pair for each point, seen or not.
-    half_view
-        Half the field of view; pi sees all around.
-    """
-    x, y, theta = mounted(pose[0], pose[1], pose[2], mount)
-    count = 0
-    index = np.empty(points.shape[0], dtype=np.int64)
-    ranges = np.empty(points.shape[0])
-    bearings = np.empty(points.shape[0])
-    for i in range(points.shape[0]):
-        dx, dy = points[i, 0] - x, points[i, 1] - y
-        distance = math.hypot(dx, dy)
-        if distance > max_range or distance <= SIGHT_MARGIN_M:
-            continue
-        bearing = wrap(math.atan2(dy, dx) - theta)
-        if abs(bearing) > half_view:
-            continue
-        keep = 1.0 - SIGHT_MARGIN_M / distance
-        ex, ey = x + keep * dx, y + keep * dy
-        if hidden(x, y, ex, ey, segments, circles):
-            continue
-        if grid_beam(x, y, dx / distance, dy / distance, keep * distance, jump, frame) < math.inf:
-            continue
-        if others_segments.shape[0] + others_circles.shape[0] > 0:
-            before, after = others_segments[: own[0]], others_segments[own[1] :]
-            near, far = others_circles, others_circles[:0]
-            if own[2] >= 0:
-                near, far = others_circles[: own[2]], others_circles[own[2] + 1 :]
-            if hidden(x, y, ex, ey, before, near) or hidden(x, y, ex, ey, after, far):
-                continue
-        index[count], ranges[count], bearings[count] = i, distance, bearing
-        count += 1
-    seen = np.empty(count, dtype=np.int64)
-    for n in range(count):
-        i = index[n]
-        seen[n] = ids[i]
-        ranges[n] = abs(ranges[n] + range_std * noise[0, i])
-        bearing = bearings[n] + bearing_offset + bearing_std * noise[1, i]
-        if bearing >= math.pi:
-            bearing -= 2.0 * math.pi
-        if bearing < -math.pi:
-            bearing += 2.0 * math.pi
-        bearings[n] = bearing
-    return seen, ranges[:count].copy(), bearings[:count].copy()

@@ -23,12 +23,13 @@ class Body:
     ----------
     name
         The robot's.
-    state
-        (drive.STATE_SIZE,) what the kernels keep of it; see ``kernels.bodies.drive``.
+    table, row, state
+        (R, drive.STATE_SIZE) what the kernels keep of all bodies, and this one's row of it; see
+        ``kernels.bodies.drive``.
     rates_rad_s
         (K,) true turn rates in the moves of the last step.
-    own
-        (3,) its rows in the world's traffic.
+    owns, own
+        (R, 3) the bodies' rows in the world's traffic, and (3,) this one's.
     """
 
     def __init__(
@@ -39,11 +40,14 @@ class Body:
         start: Pose2,
         world: World,
         dt_s: float,
-        state: FloatArray,
-        own: IntArray,
+        table: FloatArray,
+        row: int,
+        owns: IntArray,
     ) -> None:
         self.name, self.footprint, self.motion, self.world = name, footprint, motion, world
-        self.state, self.own = state, own
+        self.table, self.row, self.owns = table, row, owns
+        self.state, self.own = table[row], owns[row]
+        own = self.own
         self.rates_rad_s: FloatArray = np.zeros(len(motion.moves))
         self._dt_s = dt_s
         outline = (footprint.points_m, footprint.radius_m, footprint.inner_radius_m)
@@ -115,15 +119,11 @@ class Body:
         self.motion.stop()
         self.rates_rad_s[:] = 0.0
         x, y, theta = state[:3].tolist()
-        fixed = float(drive.fixed_clearance(x, y, theta, *self._among_fixed))
+        fixed = float(clearances.fixed_clearance(x, y, theta, *self._among_fixed))
         state[drive.FIXED_CLEARANCE] = fixed
         if len(self.world.traffic.own):
             drive.place_outline(state, *self._rows)
-        state[drive.CLEARANCE] = min(fixed, drive.others_clearance(x, y, theta, *self._among_others))
-
-    def meet_others(self) -> None:
-        """After everybody moved: bring the clearance up to date and count who ran into this body."""
-        drive.meet_others(self.state, *self._among_others)
+        state[drive.CLEARANCE] = min(fixed, clearances.others_clearance(x, y, theta, *self._among_others))
 
     def run_into(self, now: bool) -> None:
         """Count that another body runs into this one, once until both are apart again."""
@@ -148,5 +148,7 @@ class Body:
         x, y, theta = self.state[:3].tolist()
         outline = self.footprint
         return float(
-            drive.others_clearance(x, y, theta, outline.points_m, outline.radius_m, sides, circles, nobody)
+            clearances.others_clearance(
+                x, y, theta, outline.points_m, outline.radius_m, sides, circles, nobody
+            )
         )

@@ -34,8 +34,7 @@ class DifferentialDrive:
         twist = as_twist(command, self._where)
         self._v = approach(self._v, twist.v_m_s, self._limits[0], self._changes[0])
         self._w = approach(self._w, twist.w_rad_s, self._limits[1], self._changes[1])
-        self.moves[0, 0] = self._v * self._dt_s
-        self.moves[0, 2] = self._w * self._dt_s
+        self.moves[0] = self._v * self._dt_s, 0.0, self._w * self._dt_s
 
     def stop(self) -> None:
         """Stand still."""

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from pilotage.core.types import FloatArray
-from pilotage.kernels.scans import mounted
+from pilotage.kernels.scans import sight
 from pilotage.sensors.beacon import BeaconConfig
 from pilotage.sensors.readings import BeaconReadings
+from pilotage.sim.sensing.noise import NoiseBlocks
 from pilotage.sim.sensing.sensor import SIMULATED_SENSORS, Carrier, mount_of
 
 BLOCK_NUMBERS = 4096
@@ -21,14 +22,25 @@ class SimulatedBeacons:
     """Measures every landmark in sight; what is drawn does not depend on which are."""
 
     def __init__(self, config: BeaconConfig, carrier: Carrier, rng: np.random.Generator) -> None:
-        world, body = carrier.world, carrier.body
-        marks = world.landmarks
-        self._rng, self._count = rng, len(marks)
-        self._block = max(1, BLOCK_NUMBERS // max(1, 2 * self._count))
-        self._noise: FloatArray = np.zeros((0, 2, self._count))
-        self._at = self._block
-        self._pose = body.state
-        self._arguments = (
+        self._config, self._carrier, self._rng = config, carrier, rng
+
+    @staticmethod
+    def alike(config: BeaconConfig) -> object:
+        """Equal sensors are read together."""
+        return config
+
+    @classmethod
+    def together(cls, sensors: Sequence[SimulatedBeacons]) -> Callable[[], list[BeaconReadings]]:
+        """One call for the equal sensors of many robots."""
+        config, world, body = sensors[0]._config, sensors[0]._carrier.world, sensors[0]._carrier.body
+        marks, traffic = world.landmarks, world.traffic
+        blocks = max(1, BLOCK_NUMBERS // max(1, 2 * len(marks)))
+        noise = NoiseBlocks([sensor._rng for sensor in sensors], blocks, (2, len(marks)))
+        table, owns, values = body.table, body.owns, noise.values
+        rows = np.array([sensor._carrier.body.row for sensor in sensors])
+        counts = np.zeros(len(sensors), dtype=np.int64)
+        arguments = (
+            counts,
             mount_of(config.mount),
             0.5 * config.field_of_view_rad,
             config.max_range_m,
@@ -41,16 +53,15 @@ class SimulatedBeacons:
             world.circles_m,
             world.grid.jump,
             world.grid.frame,
-            world.traffic.segments_m,
-            world.traffic.circles_m,
-            body.own,
+            traffic.segments_m,
+            traffic.circles_m,
         )
 
-    def read(self) -> BeaconReadings:
-        """Look around."""
-        if self._at == self._block:
-            self._noise = self._rng.standard_normal((self._block, 2, self._count))
-            self._at = 0
-        noise = self._noise[self._at]
-        self._at += 1
-        return BeaconReadings(*mounted.sightings(self._pose, noise, *self._arguments))
+        def read() -> list[BeaconReadings]:
+            ids, found = sight.all_sightings(table, rows, owns, values, noise.next(), *arguments)
+            return [
+                BeaconReadings(ids[r, :count], found[0, r, :count], found[1, r, :count])
+                for r, count in enumerate(counts.tolist())
+            ]
+
+        return read

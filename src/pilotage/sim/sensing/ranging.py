@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -20,17 +21,31 @@ class SimulatedUltrasonic:
 
     def __init__(self, config: UltrasonicConfig, carrier: Carrier, rng: np.random.Generator) -> None:
         carrier.world.check_solids(carrier.where, "ultrasonic")
-        world, grid, traffic = carrier.world, carrier.world.grid, carrier.world.traffic
+        self._carrier = carrier
         self._std = math.sqrt(config.range_var_m2)
         self._least, self._most = config.min_range_m, config.max_range_m
         self._normals = Normals(rng)
         mount = config.mount
         # Noise may bring in a return from somewhat beyond the reach.
         reach = config.max_range_m + 6.0 * self._std
-        self._found = np.empty(1)
-        self._arguments = (
-            carrier.body.state,
-            np.array([[mount.x_m, mount.y_m, mount.theta_rad, 0.5 * config.cone_rad, reach]]),
+        self._mount = (mount.x_m, mount.y_m, mount.theta_rad, 0.5 * config.cone_rad, reach)
+
+    @staticmethod
+    def alike(_config: UltrasonicConfig) -> object:
+        """All cones are read together."""
+        return None
+
+    @classmethod
+    def together(cls, sensors: Sequence[SimulatedUltrasonic]) -> Callable[[], list[UltrasonicReading]]:
+        """One call for the cones of all robots."""
+        world, body = sensors[0]._carrier.world, sensors[0]._carrier.body
+        grid, traffic = world.grid, world.traffic
+        found = np.empty(len(sensors))
+        arguments = (
+            body.table,
+            np.array([sensor._carrier.body.row for sensor in sensors]),
+            body.owns,
+            np.array([sensor._mount for sensor in sensors]),
             world.segments_m,
             world.circles_m,
             grid.jump,
@@ -40,19 +55,23 @@ class SimulatedUltrasonic:
             grid.frame,
             traffic.segments_m,
             traffic.circles_m,
-            carrier.body.own,
-            self._found,
+            found,
         )
+        tell = [sensor.tell for sensor in sensors]
 
-    def read(self) -> UltrasonicReading:
-        """Measure; out of reach is flagged, below the least range reads as the least range."""
-        mounted.cones(*self._arguments)
-        distance = float(self._found[0])
+        def read() -> list[UltrasonicReading]:
+            mounted.cones(*arguments)
+            return [say(distance) for say, distance in zip(tell, found.tolist(), strict=True)]
+
+        return read
+
+    def tell(self, distance_m: float) -> UltrasonicReading:
+        """What it reads at a distance: out of reach is flagged, nearer than the least range reads as that."""
         if self._std > 0.0:
-            distance += self._std * self._normals.next()
-        if distance >= self._most:
-            return UltrasonicReading(self._most, saturated=True)
-        return UltrasonicReading(max(distance, self._least), saturated=False)
+            distance_m += self._std * self._normals.next()
+        if distance_m >= self._most:
+            return UltrasonicReading(self._most, True)
+        return UltrasonicReading(max(distance_m, self._least), False)
 
 
 @SIMULATED_SENSORS.add(InfraredConfig)

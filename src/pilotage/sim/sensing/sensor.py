@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -44,8 +45,7 @@ class SimulatedSensor(Protocol):
 
     It refuses a world that cannot serve it when it is built. A sensor that sums over time has a method
     ``observe()`` besides, called after every step and before ``read``. One that is read in samples, several
-    in a step, sets ``sampled = True``. One whose readings are cheaper for many robots at once has a class
-    method ``together(sensors)`` that returns a function from nothing to their readings.
+    in a step, sets ``sampled = True``.
     """
 
     def read(self) -> Reading | None:
@@ -53,7 +53,21 @@ class SimulatedSensor(Protocol):
         ...
 
 
-SIMULATED_SENSORS: ByConfig[SimulatedSensor] = ByConfig("sensor", "pilotage.sim.sensing")
+class ReadTogether(Protocol):
+    """A sensor that is cheaper to read for many at once: instead of ``read`` it has these."""
+
+    @staticmethod
+    def alike(config: Any) -> object:
+        """What sensors must have in common, beside their rate, to be read together."""
+        ...
+
+    @classmethod
+    def together(cls, sensors: Sequence[Any]) -> Callable[[], Sequence[Reading | None]]:
+        """A function that reads sensors of this class, in their order."""
+        ...
+
+
+SIMULATED_SENSORS: ByConfig[SimulatedSensor | ReadTogether] = ByConfig("sensor", "pilotage.sim.sensing")
 """Sensor configs to what they would read."""
 
 

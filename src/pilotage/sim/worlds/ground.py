@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,10 +23,13 @@ class GroundLayer:
         """Whether a point lies on a hazard, or off the map, where nobody knows."""
         if self.hazards is None:
             return False
-        row, column = self.hazards.cell_at(x_m, y_m)
-        if not self.hazards.contains(row, column):
-            return True
-        return bool(self.hazards.cells[row, column] >= OCCUPIED_FROM)
+        grid, origin = self.hazards, self.hazards.origin
+        # As ``cells_at``, for one point and without arrays: a drive asks at every step.
+        dx, dy = x_m - origin.x_m, y_m - origin.y_m
+        c, s = math.cos(origin.theta_rad), math.sin(origin.theta_rad)
+        column = math.floor((c * dx + s * dy) / grid.resolution_m)
+        row = math.floor((grid.rows * grid.resolution_m - (c * dy - s * dx)) / grid.resolution_m)
+        return not grid.contains(row, column) or bool(grid.cells[row, column] >= OCCUPIED_FROM)
 
     def on_hazards(self, points_xy_m: FloatArray) -> BoolArray:
         """(K,) ``on_hazard`` for points (K, 2)."""

@@ -9,7 +9,7 @@ import numpy as np
 from pilotage.core.errors import InputError
 from pilotage.core.types import BoolArray, FloatArray, IntArray, Pose2
 from pilotage.kernels.bodies import clearances, drive
-from pilotage.kernels.scans import mounted
+from pilotage.kernels.scans import mounted, sight
 from pilotage.maps.landmarks import Landmarks
 from pilotage.maps.world_map import WorldMap
 from pilotage.models.footprint import Footprint
@@ -229,25 +229,25 @@ class World:
         A cone is less than half a turn wide; returns beyond ``max_range_m`` may be left out.
         """
         places = np.ascontiguousarray(poses, dtype=np.float64).reshape(-1, 3)
-        mounts = np.array([[0.0, 0.0, 0.0, 0.5 * width_rad, max_range_m]])
-        out = np.empty((len(places), 1))
-        for place, row in zip(places, out, strict=True):
-            mounted.cones(
-                place,
-                mounts,
-                self.segments_m,
-                self.circles_m,
-                self.grid.jump,
-                self.grid.outlines_m,
-                self.grid.starts,
-                self.grid.items,
-                self.grid.frame,
-                self.traffic.segments_m,
-                self.traffic.circles_m,
-                own,
-                row,
-            )
-        return out[:, 0]
+        count = len(places)
+        out = np.empty(count)
+        mounted.cones(
+            places,
+            np.arange(count),
+            np.tile(own, (count, 1)),
+            np.tile([0.0, 0.0, 0.0, 0.5 * width_rad, max_range_m], (count, 1)),
+            self.segments_m,
+            self.circles_m,
+            self.grid.jump,
+            self.grid.outlines_m,
+            self.grid.starts,
+            self.grid.items,
+            self.grid.frame,
+            self.traffic.segments_m,
+            self.traffic.circles_m,
+            out,
+        )
+        return out
 
     def clearance_m(self, footprint: Footprint, poses: FloatArray, own: IntArray = NOBODY) -> FloatArray:
         """Exact distance (N,) of a footprint's edge at poses (N, 3) from everything solid; inf without any.
@@ -313,9 +313,11 @@ class World:
     ) -> tuple[IntArray, FloatArray, FloatArray]:
         """Ids, true ranges and bearings of the landmarks in view; what is solid hides those behind it."""
         marks = self.landmarks
-        ids, ranges, bearings = mounted.sightings(
+        count, nothing = len(marks), np.zeros((2, len(self.landmarks)))
+        ids, ranges, bearings = np.zeros(count, dtype=np.int64), np.zeros(count), np.zeros(count)
+        seen = sight.sightings(
             pose.as_array(),
-            np.zeros((2, len(marks))),
+            nothing,
             np.zeros(3),
             0.5 * field_of_view_rad,
             max_range_m,
@@ -331,8 +333,11 @@ class World:
             self.traffic.segments_m,
             self.traffic.circles_m,
             own,
+            ids,
+            ranges,
+            bearings,
         )
-        return ids, ranges, bearings
+        return ids[:seen], ranges[:seen], bearings[:seen]
 
     def is_dark(self, points_xy_m: FloatArray) -> BoolArray:
         """(K,) whether the floor is dark at points (K, 2); nowhere without markings."""

@@ -43,7 +43,7 @@ class ManeuverConfig(Config):
 class ManeuverNavigator:
     """Follows a plan with its changes of direction by a speed profile; the plan is made on the true outline.
 
-    It looks at no obstacle that is not on its map. Where the plan cannot be kept up with, it stops and plans anew.
+    It looks at no obstacle that is not on its map. Where it cannot keep up with the plan it plans anew.
     """
 
     def __init__(
