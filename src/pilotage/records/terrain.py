@@ -28,7 +28,7 @@ class TerrainPictures:
     Attributes
     ----------
     ground
-        (rows, columns) grey, lit from one side; None where nothing is known but hazards, whose shape all have.
+        (rows, columns) grey, lit from one side; None where only hazards are known; all of one shape.
     hazards, looked_at
         Shares of blocked cells and of cells that the search queued, 0 to 255; the latter None where it
         was not told.
