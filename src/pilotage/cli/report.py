@@ -8,6 +8,8 @@ from typing import Annotated
 
 import typer
 
+from pilotage.core.shown import visible
+
 
 def report(
     run: Annotated[
@@ -24,11 +26,11 @@ def report(
     if is_study_folder(str(run)):
         from pilotage.cli.study_page import write_study_report
 
-        print(write_study_report(run))
+        print(visible(str(write_study_report(run))))
         return
     from pilotage.report import write_report
 
     damaged: list[str] = []
-    print(write_report(run, damaged.append))
+    print(visible(str(write_report(run, damaged.append))))
     if damaged:
         print(f"pilotage: left out of the report: {'; '.join(damaged)}", file=sys.stderr)

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pilotage.core.errors import InputError
 from pilotage.core.files.arrays import read_npz
 from pilotage.core.limits import MB, limit
 from pilotage.core.types import FloatArray, IntArray
@@ -117,4 +118,9 @@ def read_arrays(path: Path, most: int = ARCHIVE_BYTES) -> Arrays | None:
     InputError
         One line, where it is no archive of plain arrays, or larger.
     """
-    return Arrays(read_npz(path, "a run's arrays", most), limit(most)) if is_there(path) else None
+    if not is_there(path):
+        return None
+    try:
+        return Arrays(read_npz(path, "arrays", most), limit(most))
+    except InputError as error:
+        raise InputError(f"{error}; as it cannot be read, make it again") from None

@@ -28,7 +28,7 @@ class TerrainPictures:
     Attributes
     ----------
     ground
-        (rows, columns) grey, lit from one side; None where nothing is known but hazards.
+        (rows, columns) grey, lit from one side; None where only hazards are known; all of one shape.
     hazards, looked_at
         Shares of blocked cells and of cells that the search queued, 0 to 255; the latter None where it
         was not told.
@@ -97,11 +97,12 @@ def read_terrain(folder: Path) -> TerrainPictures | None:
         return None
     try:
         landmarks = places(arrays, "landmarks", (2,))
-        hazards = _picture(arrays, "hazards")
+        hazards = _picture(arrays, "hazards", (-1, -1))
+        shape = (hazards.shape[0], hazards.shape[1])
         return TerrainPictures(
-            _picture(arrays, "ground") if "ground" in arrays else None,
+            _picture(arrays, "ground", shape) if "ground" in arrays else None,
             hazards,
-            _picture(arrays, "looked_at") if "looked_at" in arrays else None,
+            _picture(arrays, "looked_at", shape) if "looked_at" in arrays else None,
             _size(arrays),
             _place(arrays, "origin", 3),
             _place(arrays, "start", 2),
@@ -115,8 +116,8 @@ def read_terrain(folder: Path) -> TerrainPictures | None:
         raise broken(path, error) from None
 
 
-def _picture(arrays: Arrays, name: str) -> Picture:
-    picture = arrays.bytes(name, -1, -1)
+def _picture(arrays: Arrays, name: str, shape: tuple[int, int]) -> Picture:
+    picture = arrays.bytes(name, *shape)
     if not 0 < picture.size <= MOST_PIXELS:
         raise ValueError(f"{name}: expected a picture, found shape {picture.shape}")
     return picture

@@ -26,8 +26,8 @@ def write_report(run_dir: Path, on_damage: Callable[[str], None] | None = None) 
         files the figures that need them are left out, with a word. A calibration's folder is told by its
         ``calibration.json``.
     on_damage
-        Told one line for each file of a run, other than those two, that cannot be read; the page is written
-        without it and says so. None makes it an error.
+        Told one line for each file of a run that cannot be read; the page is written without it and says so.
+        None makes it an error, as it always is for what a run is told by (see ``records.run_data.read_run``).
 
     Returns
     -------
