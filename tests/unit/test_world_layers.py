@@ -232,7 +232,7 @@ def test_open_ground_has_heights_and_hazards_that_stop_nobody() -> None:
 @given(st.floats(-6.0, 12.0), st.floats(-6.0, 12.0), st.sampled_from([0.0, 0.4, -2.0]))
 def test_hazards_of_one_point_and_of_many_agree(x: float, y: float, theta: float) -> None:
     grid = random_grid(3, theta, 0.4)
-    ground = World.of(WorldMap("ground", WIDE, grid=grid), hazards=True).ground
+    ground = World.of(WorldMap("ground", WIDE, grid=grid, open_ground=True)).ground
     assert ground is not None
     assert ground.on_hazard(x, y) is bool(ground.on_hazards(np.array([[x, y]]))[0])
 
