@@ -92,12 +92,13 @@ bench: setup  ## compare with the peers: installs them, prints a table of ratios
 	@$(PY) -m benchmarks.peers $(ARGS)
 	@$(PY) -m benchmarks.ekf_peer
 	@$(PY) -m benchmarks.grid_peers
+	@$(PY) -m benchmarks.pose_graphs
 
 COMPILE = $(UV) pip compile --quiet --universal --python-version 3.11 --generate-hashes --no-header --no-annotate
 
 lock:  ## resolve both locks again (UPGRADE=--upgrade takes newer versions); needs uv
 	@command -v $(UV) >/dev/null || { echo "make lock: needs uv; name it by UV=..." >&2; exit 2; }
-	@$(COMPILE) $(UPGRADE) --extra dev --extra vision --extra cluster pyproject.toml -o requirements.lock
+	@$(COMPILE) $(UPGRADE) --extra dev --extra vision --extra cluster --extra ros pyproject.toml -o requirements.lock
 	@$(COMPILE) $(UPGRADE) --extra bench --constraint requirements.lock pyproject.toml -o requirements-bench.lock
 	@$(MAKE) locks
 
