@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from pilotage.kernels.arrays import FloatArray
 from pilotage.kernels.control.footprint import Body
-from pilotage.kernels.control.ground import Ground, clearance_of, seen_under
+from pilotage.kernels.control.ground import Ground, clearance_of, seen_under, sure_clearance
 from pilotage.kernels.control.movers import movers_clearance
 from pilotage.kernels.geometry.motion import exact_arc
 from pilotage.kernels.jit import kernel
@@ -136,13 +136,12 @@ def command_is_safe(
     x0, y0 = ground.x0_m, ground.y0_m
     cell, per_cell, coarse, per_coarse = ground.cell_m, ground.per_cell, ground.coarse_m, ground.per_coarse
     least = margin + 0.1
-    begin = clearance_of(
+    begin = sure_clearance(
         start[0],
         start[1],
         start[2],
         polygon,
         outer,
-        discs,
         hits,
         nearest,
         mean,
@@ -168,8 +167,8 @@ def command_is_safe(
                 slower = approach(v, 0.0, 0.0, limits.deceleration * dt)
                 wanted = curvature * slower if keep_turning else 0.0
                 x, y, theta, v, w = advance(x, y, theta, v, w, 0.0, wanted, dt, limits)
-            here = clearance_of(
-                x, y, theta, polygon, outer, discs, hits, nearest, mean, x0, y0, cell, per_cell, margin + 0.1
+            here = sure_clearance(
+                x, y, theta, polygon, outer, hits, nearest, mean, x0, y0, cell, per_cell, margin + 0.1
             )
             least = min(least, here)
             if here < floor:

@@ -78,8 +78,8 @@ def rollout_cost(
     """Cost of driving (N, 2) commands v, w of ``dt`` each from ``start`` (5,): seconds to the goal and more.
 
     ``movers`` (N, M, 3) are moving discs at the end of each step; into one of them foretold for the first
-        second counts as touching. A rollout that touches something, or enters unseen ground, costs 1,000 and more,
-        less the later it does.
+    second counts as touching. A rollout that touches something, or enters unseen ground, costs 1,000 and
+    more, less the later it does.
     """
     polygon, outer, discs = body.polygon, body.outer_m, body.discs
     hits, nearest, mean, unseen = ground.hits, ground.nearest, ground.mean, ground.unseen_m

@@ -8,9 +8,10 @@ import numpy as np
 from pydantic import Field
 
 from pilotage.core.config import Config
-from pilotage.core.types import FloatArray, Twist
+from pilotage.core.types import STOP, FloatArray, Twist
 from pilotage.kernels.control.commands_sent import scaled
 from pilotage.kernels.control.motion_limits import Drive, command_is_safe
+from pilotage.kernels.control.movers import movers_clearance
 from pilotage.kernels.control.rollouts import Price, follow_path, rollout_cost, rollout_costs, weighted_mean
 from pilotage.sensors.sensor import NonNegative, Positive
 from pilotage.stack.control.local.role import LOCAL_CONTROLLERS, LocalView
@@ -47,6 +48,8 @@ class GapHorizonConfig(Config):
     """Share of the data sheet's braking and turning that is relied on."""
     people_cost: NonNegative = 1.5
     comfort_m: Positive = 0.5
+    stand_m: NonNegative = 0.1
+    """A robot at rest does not start with a moving body nearer than this."""
     check_step_s: Positive = 0.05
 
 
@@ -93,6 +96,9 @@ class GapHorizon:
 
     def _decide(self, view: LocalView, scene: Scene) -> Twist:
         config = self._config
+        if self._must_stand(scene):
+            self._plan = None
+            return STOP
         price = Price(
             config.margin_m,
             config.soft_m,
@@ -177,6 +183,19 @@ class GapHorizon:
             )
         )
         return plans, np.array(costs)
+
+    def _must_stand(self, scene: Scene) -> bool:
+        """Whether a robot at rest has somebody so near that it had better not start."""
+        if abs(scene.start[3]) > 0.05 or abs(scene.start[4]) > 0.1:
+            return False
+        now = scene.movers.foretold(0.0, scene.dt_s, 1)[0]
+        if not now.shape[0]:
+            return False
+        x, y, theta = scene.pose
+        body = scene.body
+        keep = self._config.stand_m
+        near: float = movers_clearance(x, y, theta, body.polygon, body.outer_m, now, keep)
+        return near < keep
 
     def _worse(self, scene: Scene) -> Drive:
         """Limits that are relied on: worse than the data sheet's, and than those that seem likely."""

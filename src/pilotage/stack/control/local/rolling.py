@@ -156,10 +156,12 @@ class RollingGround:
         in_base = kernels.scan_points(
             view.mount.x_m, view.mount.y_m, view.mount.theta_rad, ranges, first, step, view.max_range_m
         )
-        on_track = self._movers.update((view.mount.x_m, view.mount.y_m), in_base, self._pose, self._dt_s)
+        on_track, steady = self._movers.update(
+            (view.mount.x_m, view.mount.y_m), in_base, self._pose, self._dt_s
+        )
         still = np.ascontiguousarray(in_base[~on_track])
         if self._config.match and not first_view:
-            self._match(view, still)
+            self._match(view, np.ascontiguousarray(in_base[steady]))
         self._odometry = view.pose
         if self._goal_given != view.goal_xy_m:
             self._goal_given = view.goal_xy_m
