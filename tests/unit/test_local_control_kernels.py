@@ -106,7 +106,7 @@ def test_a_command_called_safe_can_be_braked_from(v: float, w: float, seed: int)
     body = make_body(JACKAL)
     worse = Drive(*scaled(DRIVE, 0.7))
     start = np.array([0.0, 0.0, 0.0, v, w])
-    safe, _ = command_is_safe(start, v, w, 0.1, 0.05, True, DRIVE, worse, body, ground, NOBODY, 0.03)
+    safe, _ = command_is_safe(start, v, w, 0.1, 0.05, True, DRIVE, worse, body, ground, NOBODY, 0.03, 0.0)
     if not safe:
         return
     from pilotage.kernels.control.footprint import points_clearance
