@@ -27,13 +27,14 @@ from pilotage.experiments.studies.attribution import attribution_of, attribution
 from pilotage.experiments.studies.database import DATABASE
 from pilotage.experiments.studies.definition import StudyDefinition
 from pilotage.experiments.studies.engine import run_study
+from pilotage.experiments.studies.findings import study_object
 from pilotage.experiments.studies.options import StudyOptions
 from pilotage.experiments.studies.replay import mission_from
 from pilotage.experiments.studies.rows import read_rows
 from pilotage.experiments.studies.store import Store
 from pilotage.experiments.studies.study import Study, load_study, make_study, shipped_studies
 from pilotage.experiments.studies.sweep import parse_vary, sweep_study
-from pilotage.experiments.studies.table import read_study, study_object
+from pilotage.experiments.studies.table import read_study
 from pilotage.experiments.studies.trial import Outcome
 from pilotage.report.study.write import write_study_report
 

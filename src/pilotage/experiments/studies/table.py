@@ -6,7 +6,6 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -54,18 +53,41 @@ class StudyTable:
     waiting: int
 
     @property
-    def metrics(self) -> tuple[str, ...]:
-        """What is reported: what the definition asks for, else every number that varies or matters."""
-        asked = self.study.definition.metrics
-        given = [name for name in self.values if name not in {*IDENTITY, SUCCESS}]
-        if asked:
-            return asked
+    def given(self) -> list[str]:
+        """Every metric that some trial gives."""
+        return [name for name in self.values if name not in {*IDENTITY, SUCCESS}]
+
+    @property
+    def telling(self) -> tuple[str, ...]:
+        """The metrics that matter: what the definition asks for, else what judges the task."""
+        if self.study.definition.metrics:
+            return self.study.definition.metrics
         mission = mission_of(dict(self.study.base), self.study.cells[0].overrides)
-        costs = METRICS.costs_of(task_of(mission), given)
+        costs = METRICS.costs_of(task_of(mission), self.given)
         # Where nothing is asked for, accuracy answers before time does.
         judging = sorted(costs, key=lambda metric: metric.aspect is not Aspect.ACCURACY)
-        first = dict.fromkeys([*(metric.key for metric in judging), *(m for m in IDEALS if m in given)])
-        return (*first, *(m for m in given if m not in first))
+        return (*(metric.key for metric in judging), *(name for name in IDEALS if name in self.given))
+
+    @property
+    def metrics(self) -> tuple[str, ...]:
+        """What is reported: what the definition asks for, else every number, those that matter first."""
+        asked = self.study.definition.metrics
+        return asked or tuple(dict.fromkeys([*self.telling, *self.given]))
+
+    def less_is_better(self, metric: str) -> bool | None:
+        """Which way a metric is better here; None where neither is."""
+        definition = self.study.definition
+        if metric == self.primary and definition.lower_is_better is not None:
+            return definition.lower_is_better
+        return METRICS.find(metric).less_is_better
+
+    def comparable(self, metric: str) -> FloatArray:
+        """(n,) a metric's values; nan where there is none, or none of a whole run that it takes."""
+        values = self.values.get(metric, np.full(self.row.shape, math.nan))
+        success = self.values.get(SUCCESS)
+        if success is None or not METRICS.find(metric).whole_runs:
+            return values
+        return np.where(success > 0.0, values, math.nan)
 
     @property
     def primary(self) -> str:
@@ -132,46 +154,3 @@ def read_study(folder: Path) -> StudyTable:
         broken,
         waiting,
     )
-
-
-def study_object(table: StudyTable) -> dict[str, Any]:
-    """The study's JSON object: counts, and one object a cell."""
-    judgement = table.judged()
-    cells = []
-    for cell in table.study.cells:
-        rate = judgement.rates[cell.index]
-        metrics = {}
-        for name in table.metrics:
-            found = judgement.summaries[name][cell.index]
-            metrics[name] = {
-                "n": found.n,
-                "mean": found.mean,
-                "median": found.median,
-                "low": found.low,
-                "high": found.high,
-                "variance": found.variance,
-            }
-        cells.append(
-            {
-                "name": cell.name,
-                "values": dict(cell.values),
-                "success": {
-                    "n": rate.trials,
-                    "mean": rate.successes / rate.trials if rate.trials else None,
-                    "low": rate.low,
-                    "high": rate.high,
-                },
-                "metrics": metrics,
-                **({"published": dict(cell.published)} if cell.published else {}),
-            }
-        )
-    return {
-        "study": table.study.name,
-        "mission": table.study.base.get("mission", table.study.definition.mission),
-        "trials": len(table.row) + len(table.broken),
-        "failed": len(table.broken),
-        "missing": table.waiting,
-        "primary": table.primary,
-        "cells": cells,
-        "study_dir": str(table.folder),
-    }

@@ -9,10 +9,12 @@ import numpy as np
 
 from pilotage.core.whole_file import write_whole
 from pilotage.evaluation.judge import Judgement, judge
+from pilotage.experiments.studies.findings import Best, Finding
 from pilotage.report.markup import contents, document, escape, figure_section, layer_rules, tiles
 from pilotage.report.quantities import count
 from pilotage.report.study.answer import answer, answers
 from pilotage.report.study.comparisons import comparisons_table
+from pilotage.report.study.effects_section import effects_section
 from pilotage.report.study.examples import Example, examples_section
 from pilotage.report.study.factor_figures import factor_figures
 from pilotage.report.study.ranking import Module, ranking_answer, ranking_table
@@ -29,7 +31,10 @@ REPORT_FILE = "report.html"
 
 
 def study_page(
-    view: StudyView, examples: tuple[Example, ...] = (), ranking: Sequence[Module] | None = None
+    view: StudyView,
+    examples: tuple[Example, ...] = (),
+    ranking: Sequence[Module] | None = None,
+    found: tuple[Sequence[Finding], Sequence[Best]] = ((), ()),
 ) -> str:
     """Return the page of a study as HTML; ``ranking`` is an attribution's, with the oracles' texts."""
     judgement = judge_view(view)
@@ -37,6 +42,7 @@ def study_page(
         figures = [*settings_figures(view, judgement), *factor_figures(view, judgement)]
     sections = [
         ("ranking", "What each module costs", "" if ranking is None else ranking_table(ranking)),
+        ("effects", "Findings", effects_section(view, *found)),
         ("findings", "What it says", _findings(view, judgement)),
         *((f.slug, f.title, figure_section(number, f)) for number, f in enumerate(figures, start=1)),
         ("cells", "Every setting", cells_table(view, judgement)),
@@ -70,10 +76,11 @@ def write_page(
     folder: Path,
     examples: tuple[Example, ...] = (),
     ranking: Sequence[Module] | None = None,
+    found: tuple[Sequence[Finding], Sequence[Best]] = ((), ()),
 ) -> Path:
     """Write ``report.html`` into the study's folder in one go and return its path."""
     path = folder / REPORT_FILE
-    write_whole(path, study_page(view, examples, ranking))
+    write_whole(path, study_page(view, examples, ranking, found))
     return path
 
 

@@ -14,6 +14,7 @@ from pilotage.experiments.studies.attribution import attribution_of, is_attribut
 from pilotage.experiments.studies.cells import show
 from pilotage.experiments.studies.definition import CONFIGURATION
 from pilotage.experiments.studies.factors import Factor
+from pilotage.experiments.studies.findings import best_settings, findings_of
 from pilotage.experiments.studies.replay import mission_of_row
 from pilotage.experiments.studies.study import study_yaml
 from pilotage.experiments.studies.table import StudyTable, read_study
@@ -52,7 +53,8 @@ def write_study_report(
             on_example(f"{title.lower()}: row {row}, again for its picture")
         shown.append(_example(table, view, title, row))
     ranking = attribution_of(folder)["modules"] if is_attribution(table.study) else None
-    return write_page(view, folder, tuple(shown), ranking)
+    found = ((), ()) if ranking is not None else (findings_of(table), best_settings(table, table.judged()))
+    return write_page(view, folder, tuple(shown), ranking, found)
 
 
 def view_of(table: StudyTable) -> StudyView:
