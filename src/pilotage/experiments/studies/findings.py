@@ -21,6 +21,8 @@ from pilotage.experiments.studies.table import StudyTable
 
 SETTING = "setting"
 """What the cells of a group are called together, where no factors span them."""
+PARTS = 2
+"""Families of tests that share the chance of a false finding: the primary metric's, and all others'."""
 MOST_FACTORS = 6
 """Of more factors at once none is looked at alone."""
 
@@ -85,30 +87,42 @@ class _Design:
 
 
 def findings_of(table: StudyTable) -> list[Finding]:
-    """Effects of the factors on every metric that matters, the metric that answers the question first."""
-    metrics = [*dict.fromkeys([table.primary, *table.telling, SUCCESS])]
+    """Effects of the factors on every metric that matters, the metric that answers the question first.
+
+    Half of the chance of a false finding is left to that one metric, the other half to all others together
+    (Holm's correction within each half): asking for more metrics does not hide its answer.
+    """
     designs = [design for group in table.groups if (design := _design(table, group)) is not None]
-    tests = len(metrics) * sum(design.tests for design in designs)
-    found: list[tuple[str, _Design, Effect]] = []
-    for metric in metrics:
-        values = by_trial(table, metric)
-        for design in designs:
-            trials = values[:, design.cells]
-            complete = trials[np.isfinite(trials).reshape(trials.shape[0], -1).all(axis=1)]
-            tested = effects(complete, ordered=design.ordered, paired=table.same_seeds, tests=tests)
-            found += [(metric, design, effect) for effect in tested]
-    p_values = holm([effect.p_value for _, _, effect in found])
-    return [
-        Finding(
-            metric,
-            design.group.name,
-            tuple(design.factors[axis] for axis in effect.axes),
-            tuple(design.levels[axis] for axis in effect.axes),
-            effect,
-            p,
-        )
-        for (metric, design, effect), p in zip(found, p_values, strict=True)
-    ]
+    others = [metric for metric in dict.fromkeys([*table.telling, SUCCESS]) if metric != table.primary]
+    out: list[Finding] = []
+    for family in ([table.primary], others):
+        tests = PARTS * len(family) * sum(design.tests for design in designs)
+        found = [
+            (metric, design, effect)
+            for metric in family
+            for design in designs
+            for effect in _effects(table, metric, design, tests)
+        ]
+        p_values = holm([effect.p_value for _, _, effect in found], PARTS)
+        out += [
+            Finding(
+                metric,
+                design.group.name,
+                tuple(design.factors[axis] for axis in effect.axes),
+                tuple(design.levels[axis] for axis in effect.axes),
+                effect,
+                p,
+            )
+            for (metric, design, effect), p in zip(found, p_values, strict=True)
+        ]
+    return out
+
+
+def _effects(table: StudyTable, metric: str, design: _Design, tests: int) -> list[Effect]:
+    """The effects on one metric over the trials that give it at every setting of a design."""
+    trials = by_trial(table, metric)[:, design.cells]
+    complete = trials[np.isfinite(trials).reshape(trials.shape[0], -1).all(axis=1)]
+    return effects(complete, ordered=design.ordered, paired=table.same_seeds, tests=tests)
 
 
 def best_settings(table: StudyTable, judgement: Judgement) -> list[Best]:

@@ -11,7 +11,7 @@ from pilotage.evaluation.metrics import METRICS
 from pilotage.experiments.studies.cells import show
 from pilotage.experiments.studies.findings import SETTING, Best, Finding
 from pilotage.report.markup import escape
-from pilotage.report.quantities import count
+from pilotage.report.quantities import count, measured
 from pilotage.report.study.scales import Scale, p_value, points, scale_of, told
 from pilotage.report.study.view import StudyView
 
@@ -20,10 +20,11 @@ MOST_LINES = 12
 FEW_SETTINGS = 3
 HEADS = ("n", "from", "to", "change", "95 % interval", "of the variance", "p, corrected", "would have shown")
 HOW = (
-    "Each factor&#x27;s effect with the other factors averaged out, and every two factors&#x27; interaction, by "
-    "ranks ({tests}). p is corrected for all effects of this study (Holm): of studies in which nothing has "
-    "an effect, at most one in twenty tells of one. The last column is the change from the first to the last "
-    "level that as many trials show in four of five such studies."
+    "Each factor&#x27;s effect with the other factors averaged out, and every two factors&#x27; interaction, "
+    "by ranks ({tests}). p is corrected for all effects of the study (Holm&#x27;s, half of the chance is kept "
+    "for the metric that answers the question): of studies in which nothing has an effect, at most one in "
+    "twenty tells of one. The last column is the change from the first to the last level that as many trials "
+    "show in four of five such studies."
 )
 PAIRED, APART = "Wilcoxon or Friedman, on the same seeds", "Mann and Whitney or Kruskal and Wallis"
 
@@ -145,7 +146,7 @@ def _open(view: StudyView, findings: Sequence[Finding]) -> str:
         detectable = effect.detectable()
         if not math.isfinite(detectable):
             continue
-        size = points(told(finding.metric, detectable, math.nan, math.nan))
+        size = points(measured(detectable, METRICS.find(finding.metric).unit))
         needed = effect.needed()
         more = f"; the one seen would take about {count(needed)}" if effect.n < needed < 1e6 else ""
         parts.append(f"{factors} (a change of {size} would have shown{more})")
