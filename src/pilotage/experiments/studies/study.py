@@ -15,7 +15,7 @@ import yaml
 
 from pilotage.core.config import validate
 from pilotage.core.errors import InputError, unknown_name
-from pilotage.core.files import read_values_text
+from pilotage.core.files import decoded, read_bytes
 from pilotage.experiments.kinds import check_oracles, kind_of
 from pilotage.experiments.mission import mission_of, read_mission, shipped_missions
 from pilotage.experiments.resolve import resolved_values
@@ -41,6 +41,8 @@ PRESENTATION = (
 )
 """What a definition says about its page only: it may change without touching a row."""
 MAX_ROWS = 1_000_000
+MAX_BYTES = 2_000_000
+"""A longer definition takes longer to read than its study could run."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -129,7 +131,7 @@ def load_study(name_or_path: str, changes: Mapping[str, Any] | None = None) -> S
         raise InputError(f"'{name_or_path}': expected a study's folder, found no {STUDY_FILE} in it")
     folder = Path()
     if path.suffix in {".yaml", ".yml"} or "/" in name_or_path:
-        text = read_values_text(path, "a study's YAML file or folder")
+        text = decoded(read_bytes(path, "a study's YAML file or folder", MAX_BYTES), str(path))
         values, folder = parse_yaml(text, str(path)), path.parent
     elif name_or_path in shipped_studies():
         values = parse_yaml((SHIPPED / f"{name_or_path}.yaml").read_text(encoding="utf-8"), name_or_path)

@@ -21,10 +21,10 @@ FEW_SETTINGS = 3
 HEADS = ("n", "from", "to", "change", "95 % interval", "of the variance", "p, corrected", "would have shown")
 HOW = (
     "Each factor&#x27;s effect with the other factors averaged out, and every two factors&#x27; interaction, "
-    "by ranks ({tests}). p is corrected for all effects of the study (Holm&#x27;s, half of the chance is kept "
+    "by ranks ({tests}). p is corrected for all effects of the study (Holm&#x27;s, half of the chance kept "
     "for the metric that answers the question): of studies in which nothing has an effect, at most one in "
-    "twenty tells of one. The last column is the change from the first to the last level that as many trials "
-    "show in four of five such studies."
+    "twenty tells of one. The last column is the change from the first to the last level that as many "
+    "trials show in four of five such studies."
 )
 PAIRED, APART = "Wilcoxon or Friedman, on the same seeds", "Mann and Whitney or Kruskal and Wallis"
 
