@@ -18,7 +18,6 @@ from pilotage.experiments.studies.findings import SETTING, best_settings, findin
 from pilotage.experiments.studies.study import Study, make_study
 from pilotage.experiments.studies.table import StudyTable
 from pilotage.report.study.page import study_page
-from pilotage.report.study.write import view_of
 
 RADIUS, SCALE = "stack.planner.turning_radius_m", "stack.localizer.odometry_var_scale"
 STUDIES = 200
@@ -135,8 +134,7 @@ def test_the_page_tells_effects_with_their_units(shift: float) -> None:
         trials=20,
     )
     table = a_table(study, np.random.default_rng(6), position_rmse_m=np.array([0.0, shift]))
-    view, judgement = view_of(table), table.judged()
-    page = study_page(view, found=(findings_of(table), best_settings(table, judgement)))
+    page = study_page(table, found=(findings_of(table), best_settings(table, table.judged())))
     assert page.index('id="effects"') < page.index('id="cells"')
     assert "angle var 1e-05\u00a0rad²/rad" in page
     assert "per 1e-05" not in page

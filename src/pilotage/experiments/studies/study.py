@@ -23,6 +23,7 @@ from pilotage.experiments.studies.cells import Cell, make_cells
 from pilotage.experiments.studies.definition import StudyDefinition
 from pilotage.experiments.studies.files import anchored, digests
 from pilotage.experiments.studies.groups import cell_groups
+from pilotage.experiments.studies.labels import labelled
 from pilotage.experiments.values import parse_yaml
 
 SHIPPED = resources.files("pilotage.missions") / "studies"
@@ -180,7 +181,7 @@ def make_study(definition: StudyDefinition, folder: Path = Path()) -> Study:
     names = [cell.name for cell in cells]
     if definition.baseline is not None and definition.baseline not in names:
         raise unknown_name("baseline", definition.baseline, names)
-    cell_groups(definition, cells)
+    cells = labelled(definition, cells, cell_groups(definition, cells))
     named_in_cells = [json.loads(text.partition("=")[2]) for cell in cells for text in cell.overrides]
     return Study(definition, base, cells, digests([base, named_in_cells]))
 

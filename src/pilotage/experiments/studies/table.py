@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -15,15 +15,27 @@ from pilotage.evaluation.metric import Aspect
 from pilotage.evaluation.metrics import METRICS
 from pilotage.evaluation.pooled import IDEALS
 from pilotage.experiments.mission import mission_of
+from pilotage.experiments.studies.cells import Cell
 from pilotage.experiments.studies.database import DATABASE
 from pilotage.experiments.studies.export import save_what_is_left
 from pilotage.experiments.studies.groups import CellGroup, baselines, cell_groups
+from pilotage.experiments.studies.labels import unit_of
 from pilotage.experiments.studies.rows import flat, read_rows
 from pilotage.experiments.studies.study import Study, load_study
 from pilotage.experiments.task_of import task_of
 
 IDENTITY = frozenset({"seed"})
 """Numbers of a trial that say which one it is."""
+
+
+@dataclass(frozen=True, slots=True)
+class Broken:
+    """A trial that gave no numbers."""
+
+    row: int
+    cell: int
+    seed: int
+    reason: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,7 +49,7 @@ class StudyTable:
     values
         By metric, (n,): nan where a trial does not give it.
     broken
-        Rows that failed: (row, cell, seed, reason).
+        Rows that failed.
     waiting
         How many are still to run.
     """
@@ -49,7 +61,7 @@ class StudyTable:
     trial: IntArray
     seed: IntArray
     values: Mapping[str, FloatArray]
-    broken: tuple[tuple[int, int, int, str], ...]
+    broken: tuple[Broken, ...]
     waiting: int
 
     @property
@@ -74,6 +86,47 @@ class StudyTable:
         asked = self.study.definition.metrics
         return asked or tuple(dict.fromkeys([*self.telling, *self.given]))
 
+    @property
+    def cells(self) -> tuple[Cell, ...]:
+        """The settings."""
+        return self.study.cells
+
+    @property
+    def factors(self) -> tuple[str, ...]:
+        """Names of what is varied."""
+        return self.study.definition.factor_names
+
+    def column(self, metric: str) -> FloatArray:
+        """(n,) a metric's values; nan where there is none."""
+        found = self.values.get(metric)
+        return np.full(self.row.shape, math.nan) if found is None else found
+
+    def unit(self, factor: str) -> str:
+        """The unit of a factor's values; empty where it has none."""
+        return unit_of(self.study.definition, factor)
+
+    def members(self, group: CellGroup) -> list[Cell]:
+        """The cells of a group."""
+        return [self.cells[index] for index in group.cells]
+
+    def known_as(self, index: int, group: CellGroup) -> str:
+        """What a cell is called beside the cells of a group: its own name where it is none of them."""
+        return self.cells[index].text if index in group.cells else self.cells[index].name
+
+    def worth_showing(self, metric: str, cells: Iterable[Cell]) -> bool:
+        """Whether the trials of some cells give a metric, and it varies or was asked for."""
+        found = self.column(metric)[np.isin(self.cell, [cell.index for cell in cells])]
+        found = found[np.isfinite(found)]
+        if not found.size:
+            return False
+        asked = bool(self.study.definition.metrics) or metric == self.primary
+        return asked or found.size == 1 or bool(np.ptp(found) > 0.0)
+
+    @property
+    def lower_is_better(self) -> bool:
+        """Whether less of the primary metric is better; of one that has no direction, less comes first."""
+        return self.less_is_better(self.primary) is not False
+
     def less_is_better(self, metric: str) -> bool | None:
         """Which way a metric is better here; None where neither is."""
         definition = self.study.definition
@@ -83,7 +136,7 @@ class StudyTable:
 
     def comparable(self, metric: str) -> FloatArray:
         """(n,) a metric's values; nan where there is none, or none of a whole run that it takes."""
-        values = self.values.get(metric, np.full(self.row.shape, math.nan))
+        values = self.column(metric)
         success = self.values.get(SUCCESS)
         if success is None or not METRICS.find(metric).whole_runs:
             return values
@@ -112,8 +165,7 @@ class StudyTable:
     def judged(self) -> Judgement:
         """Every cell's summary, and every cell against its baseline."""
         names = dict.fromkeys([*self.metrics, self.primary, SUCCESS])
-        empty = np.full(self.row.shape, math.nan)
-        values = {name: self.values.get(name, empty) for name in names}
+        values = {name: self.column(name) for name in names}
         held_against = baselines(self.groups, len(self.study.cells))
         return judge(self.cell, self.trial, values, held_against, self.contrasts, same_seeds=self.same_seeds)
 
@@ -135,9 +187,8 @@ def read_study(folder: Path) -> StudyTable:
     numbers = [flat(row["metrics"]) | flat(row["timings"]) for row in done]
     names = sorted({name for row in numbers for name in row})
     values = {name: np.array([row.get(name, math.nan) for row in numbers]) for name in names}
-    broken = tuple(
-        (row["row"], row["cell"], row["seed"], row["reason"]) for row in rows if row["status"] == "failed"
-    )
+    failed = [row for row in rows if row["status"] == "failed"]
+    broken = tuple(Broken(row["row"], row["cell"], row["seed"], row["reason"]) for row in failed)
 
     def column(key: str) -> IntArray:
         return np.array([row[key] for row in done], dtype=np.int64)

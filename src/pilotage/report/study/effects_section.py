@@ -7,13 +7,14 @@ from collections.abc import Iterable, Sequence
 from itertools import groupby
 from typing import Any
 
+from pilotage.evaluation.metric import words_and_unit
 from pilotage.evaluation.metrics import METRICS
 from pilotage.experiments.studies.cells import show
 from pilotage.experiments.studies.findings import SETTING, Best, Finding
+from pilotage.experiments.studies.table import StudyTable
 from pilotage.report.markup import escape
 from pilotage.report.quantities import count, measured
 from pilotage.report.study.scales import Scale, p_value, points, scale_of, told
-from pilotage.report.study.view import StudyView
 
 MOST_LINES = 12
 """So many findings are told in words; the table has all."""
@@ -29,25 +30,25 @@ HOW = (
 PAIRED, APART = "Wilcoxon or Friedman, on the same seeds", "Mann and Whitney or Kruskal and Wallis"
 
 
-def effects_section(view: StudyView, findings: Sequence[Finding], best: Sequence[Best]) -> str:
+def effects_section(table: StudyTable, findings: Sequence[Finding], best: Sequence[Best]) -> str:
     """What the study found, in words and as a table; empty where nothing could be looked at."""
     if not findings:
         return ""
     sure = sorted((f for f in findings if f.is_sure), key=lambda f: -f.effect.share)
-    sure.sort(key=lambda f: f.metric != view.primary)
-    lines = [_shown(view, finding) for finding in sure[:MOST_LINES]]
+    sure.sort(key=lambda f: f.metric != table.primary)
+    lines = [_shown(table, finding) for finding in sure[:MOST_LINES]]
     if len(sure) > MOST_LINES:
         lines.append(f"{len(sure) - MOST_LINES} more effects are in the table below.")
     if not sure:
         lines.append("These trials tell no effect of any factor from chance.")
-    lines += [_best(view, entry) for entry in best if _is_about(entry.metric, view, sure)]
+    lines += [_best(table, entry) for entry in best if _is_about(entry.metric, table, sure)]
     together = groupby(_unsure(findings), key=lambda f: (f.group, f.metric))
-    open_ = [text for _, entries in together if (text := _open(view, list(entries)))]
+    open_ = [text for _, entries in together if (text := _open(list(entries)))]
     rest = f"<h3>What these trials cannot tell</h3>{_list(open_[:MOST_LINES])}" if open_ else ""
-    how = HOW.format(tests=PAIRED if view.same_seeds else APART)
+    how = HOW.format(tests=PAIRED if table.same_seeds else APART)
     return (
         '<section id="effects"><h2><a href="#effects">Findings</a></h2>'
-        f"{_list(lines)}{rest}<details><summary>All effects</summary><p>{how}</p>{_tables(view, findings)}"
+        f"{_list(lines)}{rest}<details><summary>All effects</summary><p>{how}</p>{_tables(table, findings)}"
         "</details></section>"
     )
 
@@ -56,8 +57,8 @@ def _list(texts: Iterable[str]) -> str:
     return f"<ul>{''.join(f'<li>{escape(text)}</li>' for text in texts)}</ul>"
 
 
-def _is_about(metric: str, view: StudyView, sure: Sequence[Finding]) -> bool:
-    return metric == view.primary or any(finding.metric == metric for finding in sure)
+def _is_about(metric: str, table: StudyTable, sure: Sequence[Finding]) -> bool:
+    return metric == table.primary or any(finding.metric == metric for finding in sure)
 
 
 def _unsure(findings: Sequence[Finding]) -> list[Finding]:
@@ -65,16 +66,16 @@ def _unsure(findings: Sequence[Finding]) -> list[Finding]:
     return [f for f in findings if not f.is_sure and math.isfinite(f.effect.p_value)]
 
 
-def factor_words(view: StudyView, factor: str) -> str:
+def factor_words(factor: str) -> str:
     """A factor as it is said; the settings together where no factors span them."""
-    return "the setting" if factor == SETTING else view.short(factor)
+    return "the setting" if factor == SETTING else words_and_unit(factor)[0]
 
 
-def level_words(view: StudyView, factor: str, level: Any) -> str:
+def level_words(table: StudyTable, factor: str, level: Any) -> str:
     """A level with its unit."""
     if factor == SETTING:
-        return next((cell.text for cell in view.cells if cell.name == level), str(level))
-    unit = view.unit(factor)
+        return next((cell.text for cell in table.cells if cell.name == level), str(level))
+    unit = table.unit(factor)
     text = show(level)
     return f"{text}\u00a0{unit}" if unit and isinstance(level, int | float) else text
 
@@ -85,22 +86,22 @@ def _metric(finding: Finding) -> str:
     return f"{name if name[:2].isupper() else name[:1].upper() + name[1:]}{group}"
 
 
-def _ends(view: StudyView, finding: Finding) -> tuple[str, str]:
+def _ends(table: StudyTable, finding: Finding) -> tuple[str, str]:
     factor, levels = finding.factors[-1], finding.levels[-1]
-    first, last = (level_words(view, factor, levels[end]) for end in finding.effect.ends)
+    first, last = (level_words(table, factor, levels[end]) for end in finding.effect.ends)
     return first, last
 
 
-def _shown(view: StudyView, finding: Finding) -> str:
+def _shown(table: StudyTable, finding: Finding) -> str:
     """A sure effect in one sentence."""
     effect, change = finding.effect, finding.effect.change()
     by = points(told(finding.metric, change.mean, change.low, change.high, signed=True))
-    first, last = _ends(view, finding)
+    first, last = _ends(table, finding)
     evidence = f"{100.0 * effect.share:.0f}\u00a0% of the variance, {p_value(finding.p_corrected, 'p ')}"
-    factors = [factor_words(view, factor) for factor in finding.factors]
+    factors = [factor_words(factor) for factor in finding.factors]
     if len(factors) == 2:
         one, other = factors
-        ends = [level_words(view, finding.factors[0], finding.levels[0][end]) for end in (0, -1)]
+        ends = [level_words(table, finding.factors[0], finding.levels[0][end]) for end in (0, -1)]
         return (
             f"{_metric(finding)}: {one} and {other} act together: the change from {ends[0]} to {ends[1]} of "
             f"{one} differs by {by} between {first} and {last} of {other} ({evidence})."
@@ -108,41 +109,41 @@ def _shown(view: StudyView, finding: Finding) -> str:
     start, end = (told(finding.metric, float(effect.means[i]), math.nan, math.nan) for i in effect.ends)
     return (
         f"{_metric(finding)} depends on {factors[0]}: {start} at {first}, {end} at {last}, "
-        f"a change by {by} ({evidence}){_inner(view, finding)}."
+        f"a change by {by} ({evidence}){_inner(table, finding)}."
     )
 
 
-def _inner(view: StudyView, finding: Finding) -> str:
+def _inner(table: StudyTable, finding: Finding) -> str:
     """Where the metric is lowest or highest between the ends."""
     means, (first, last) = finding.effect.means, finding.effect.ends
     out = []
     for word, index in (("lowest", int(means.argmin())), ("highest", int(means.argmax()))):
         if index not in (first, last):
-            level = level_words(view, finding.factors[0], finding.levels[0][index])
+            level = level_words(table, finding.factors[0], finding.levels[0][index])
             out.append(f"{word} at {level}, {told(finding.metric, float(means[index]), math.nan, math.nan)}")
     return f"; {', '.join(out)}" if out else ""
 
 
-def _best(view: StudyView, best: Best) -> str:
+def _best(table: StudyTable, best: Best) -> str:
     """The best setting, and how many are as good for all that these trials tell."""
     name, summary = METRICS.find(best.metric).name, best.summary
     text = (
-        f"Best {name}{f' ({best.group})' if best.group else ''}: {view.cells[best.cell].text}, "
+        f"Best {name}{f' ({best.group})' if best.group else ''}: {table.cells[best.cell].text}, "
         f"{told(best.metric, summary.mean, summary.low, summary.high)}"
     )
     if not best.also:
         return f"{text}; every other setting is worse beyond chance."
-    named = ", ".join(f"'{view.cells[index].text}'" for index in best.also)
+    named = ", ".join(f"'{table.cells[index].text}'" for index in best.also)
     also = named if len(best.also) <= FEW_SETTINGS else f"{len(best.also)} other settings"
     return f"{text}; not told from it by these trials: {also}."
 
 
-def _open(view: StudyView, findings: Sequence[Finding]) -> str:
+def _open(findings: Sequence[Finding]) -> str:
     """Which effects on one metric were not told, and how large they would have had to be."""
     parts = []
     for finding in findings:
         effect = finding.effect
-        factors = " with ".join(factor_words(view, factor) for factor in finding.factors)
+        factors = " with ".join(factor_words(factor) for factor in finding.factors)
         detectable = effect.detectable()
         if not math.isfinite(detectable):
             continue
@@ -156,13 +157,13 @@ def _open(view: StudyView, findings: Sequence[Finding]) -> str:
     return f"{_metric(findings[0])}, {count(n)} trials a setting: nothing told of {', '.join(parts)}."
 
 
-def _tables(view: StudyView, findings: Sequence[Finding]) -> str:
+def _tables(table: StudyTable, findings: Sequence[Finding]) -> str:
     parts = []
     for _, entries in groupby(findings, key=lambda f: (f.group, f.metric)):
         rows = list(entries)
         scale = scale_of(rows[0].metric, [float(value) for f in rows for value in f.effect.means.ravel()])
         heads = "".join(f'<th scope="col" class="value">{name}</th>' for name in HEADS)
-        body = "".join(_row(view, finding, scale) for finding in rows)
+        body = "".join(_row(table, finding, scale) for finding in rows)
         parts.append(
             f"<h3>{escape(_metric(rows[0]) + scale.label)}</h3>"
             '<div class="wide" tabindex="0"><table class="cells"><thead><tr><th scope="col">factor</th>'
@@ -171,7 +172,7 @@ def _tables(view: StudyView, findings: Sequence[Finding]) -> str:
     return "".join(parts)
 
 
-def _row(view: StudyView, finding: Finding, scale: Scale) -> str:
+def _row(table: StudyTable, finding: Finding, scale: Scale) -> str:
     effect, change = finding.effect, finding.effect.change()
     digits = scale.decimals(change.mean, change.low, change.high)
     mean, low, high, size = (
@@ -183,8 +184,8 @@ def _row(view: StudyView, finding: Finding, scale: Scale) -> str:
     )
     band = f"{low} to {high}" if math.isfinite(change.low) else "–"
     share = f"{100.0 * effect.share:.1f} %"
-    texts = (str(effect.n), *_ends(view, finding), mean, band, share, p_value(finding.p_corrected), size)
-    name = " with ".join(factor_words(view, factor) for factor in finding.factors)
+    texts = (str(effect.n), *_ends(table, finding), mean, band, share, p_value(finding.p_corrected), size)
+    name = " with ".join(factor_words(factor) for factor in finding.factors)
     bold = ("<b>", "</b>") if finding.is_sure else ("", "")
     values = "".join(f'<td class="value plain">{escape(text)}</td>' for text in texts)
     return f'<tr><th scope="row">{bold[0]}{escape(name)}{bold[1]}</th>{values}</tr>'
