@@ -185,7 +185,7 @@ def test_a_trial_that_crashes_does_not_take_the_study_with_it(tmp_path: Path) ->
     counts = run_study(study, tmp_path / "study", ONE)
     assert (counts.done, counts.failed) == (2, 2)
     table = read_study(tmp_path / "study")
-    assert all("world.goal" in reason for _, _, _, reason in table.broken)
+    assert all("world.goal" in entry.reason for entry in table.broken)
 
 
 def test_another_definition_is_refused_with_what_changed(undisturbed: Path) -> None:

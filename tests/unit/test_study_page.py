@@ -71,9 +71,7 @@ def made_up(
         metrics=metrics,
         primary=metrics[0],
         lower_is_better=True,
-        groups=(
-            Group(name="all", cells=("*",), baseline=None if baseline is None else cells[baseline].name),
-        ),
+        groups=(Group(name="all", cells=("*",), baseline=base),),
     )
     study = Study(definition, {"mission": "museum-1"}, tuple(cells), {})
     return StudyTable(
