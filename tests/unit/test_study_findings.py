@@ -94,6 +94,15 @@ def test_the_object_begins_with_what_was_found() -> None:
     assert not set(best["not_told_from_it"]) & {cell.name for cell in study.cells[4:]}
 
 
+def test_the_best_consistency_is_nearest_to_its_ideal() -> None:
+    """Around 3 at the third setting; lower ones are no better."""
+    shifts = np.array([-9.0, 9.0, -7.0, 0.0, 6.0, -12.0])
+    table = a_table(a_study(trials=30), np.random.default_rng(7), nees_mean=shifts)
+    best = {entry.metric: entry for entry in best_settings(table, table.judged())}
+    assert best["nees_mean"].cell == 2
+    assert "NEES nearest to 3" in study_page(table, found=(findings_of(table), list(best.values())))
+
+
 def test_seeds_of_their_own_are_no_pairs() -> None:
     study = a_study(seeds={"pairing": "independent"})
     means = {"position_rmse_m": np.array([0.0, 0.0, 0.0, 0.0, 9.0, 9.0])}

@@ -126,24 +126,29 @@ def _effects(table: StudyTable, metric: str, design: _Design, tests: int) -> lis
 
 
 def best_settings(table: StudyTable, judgement: Judgement) -> list[Best]:
-    """By group and metric with a direction, the setting with the best mean; of metrics that differ only."""
+    """By group and metric, the setting with the best mean, or the one nearest to the metric's ideal.
+
+    Metrics that do not differ, or of which nothing is known to be better, are left out.
+    """
     out = []
     for metric in dict.fromkeys([table.primary, *table.telling]):
-        lower = table.less_is_better(metric)
+        lower, ideal = table.less_is_better(metric), METRICS.find(metric).ideal
+        means = np.array([summary.mean for summary in judgement.summaries[metric]])
         values = by_trial(table, metric)
+        if lower is None:
+            means, values = np.abs(means - ideal), np.abs(values - ideal)
+        elif not lower:
+            means, values = -means, -values
         for group in table.groups:
-            summaries = judgement.summaries[metric]
-            known = [index for index in group.cells if math.isfinite(summaries[index].mean)]
-            if lower is None or len(known) < 2:
+            known = [index for index in group.cells if math.isfinite(means[index])]
+            if len(known) < 2 or np.ptp(means[known]) == 0.0:
                 continue
-            best = min(known, key=lambda index: summaries[index].mean * (1.0 if lower else -1.0))
-            if all(summaries[index].mean == summaries[best].mean for index in known):
-                continue
+            best = min(known, key=lambda index: float(means[index]))
             others = [index for index in known if index != best]
             compare = difference if table.same_seeds else difference_apart
             p_values = holm([compare(values[:, best], values[:, index]).p_value for index in others])
             also = (i for i, p in zip(others, p_values, strict=True) if not (math.isfinite(p) and p < SURE))
-            out.append(Best(metric, group.name, best, summaries[best], tuple(also)))
+            out.append(Best(metric, group.name, best, judgement.summaries[metric][best], tuple(also)))
     return out
 
 

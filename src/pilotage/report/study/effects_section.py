@@ -126,9 +126,12 @@ def _inner(table: StudyTable, finding: Finding) -> str:
 
 def _best(table: StudyTable, best: Best) -> str:
     """The best setting, and how many are as good for all that these trials tell."""
-    name, summary = METRICS.find(best.metric).name, best.summary
+    metric, summary = METRICS.find(best.metric), best.summary
+    name = f"Best {metric.name}"
+    if metric.less_is_better is None and math.isfinite(metric.ideal):
+        name = f"{metric.name} nearest to {metric.ideal:g}"
     text = (
-        f"Best {name}{f' ({best.group})' if best.group else ''}: {table.cells[best.cell].text}, "
+        f"{name}{f' ({best.group})' if best.group else ''}: {table.cells[best.cell].text}, "
         f"{told(best.metric, summary.mean, summary.low, summary.high)}"
     )
     if not best.also:
