@@ -99,7 +99,7 @@ def test_two_workers_give_the_rows_of_one(undisturbed: Path, tmp_path: Path) -> 
 def test_a_cluster_gives_the_same_rows(undisturbed: Path, tmp_path: Path) -> None:
     distributed = pytest.importorskip("distributed", reason="needs the extra cluster")
     with distributed.LocalCluster(
-        dashboard_address=":0", n_workers=2, threads_per_worker=1, dashboard_address=None, processes=True
+        dashboard_address=":0", n_workers=2, threads_per_worker=1, dashboard_address=":0", processes=True
     ) as cluster:
         run_study(small(), tmp_path / "cluster", StudyOptions(dask=cluster.scheduler_address))
     assert numbers(tmp_path / "cluster") == numbers(undisturbed)
