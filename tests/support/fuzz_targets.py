@@ -418,7 +418,7 @@ PENDING = (
         True,
     ),
 )
-"""Readers that do not all go through the door yet: run folders, studies. ``fuzz.long --pending`` tries them."""
+"""Readers that do not all go through the door yet: run folders, studies. ``--pending`` tries them."""
 BY_NAME = {target.name: target for target in TARGETS}
 
 OPTIONS: tuple[tuple[str, ...], ...] = (
