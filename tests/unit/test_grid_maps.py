@@ -143,7 +143,7 @@ class TestImages:
     def test_what_does_not_fit_is_told_before_it_is_read(self, tmp_path: Path) -> None:
         path = tmp_path / "huge.pgm"
         path.write_bytes(b"P5\n1000000 1000000\n255\n")
-        with pytest.raises(InputError, match="needs about"):
+        with pytest.raises(InputError, match="expected at most 512 MB, found 1,000,000 MB"):
             read_grey(path)
 
 
@@ -301,8 +301,12 @@ class TestOtherFiles:
         np.save(tmp_path / "a.npy", np.array([[True, False]]))
         assert read_grid(tmp_path / "a.npy", 2.0).cells.tolist() == [[OCCUPIED, FREE]]
         np.save(tmp_path / "a.npy", np.array([{}]), allow_pickle=True)
-        with pytest.raises(InputError, match="NumPy array"):
+        with pytest.raises(InputError, match="expected an array of numbers"):
             read_grid(tmp_path / "a.npy")
+        for fractions in (np.array([[0.0, 0.5]]), np.array([[0.0, 0.5]], np.float16)):
+            np.save(tmp_path / "a.npy", fractions)
+            with pytest.raises(InputError, match=r"whole per cent, found float.*--slope-limit"):
+                read_grid(tmp_path / "a.npy")
 
     def test_what_a_file_needs_is_said(self, tmp_path: Path) -> None:
         write_grey(tmp_path / "a.png", np.zeros((2, 2), np.uint8))

@@ -148,6 +148,12 @@ def test_a_new_name_drops_the_old_ones_parameters() -> None:
         ("world.obstacles.9.thickness_m=1", "index from 0 to 1"),
         ("stack.localizer.gate=1.5", "less than 1"),
         ("stack.local_planner.speed_m_s=5", "max_speed_m_s"),
+        ("run" + ".x" * 5000 + "=1", "expected at most 64 keys, found 5001"),
+        ("run.oracles=[driver, driver]", "expected every oracle once, found 'driver' twice"),
+        (f"mission={'long' * 30}", "at most 100 characters"),
+        ('mission="a\\e[31m"', "a name without control characters, found 'a\\x1b[31m'"),
+        (f"run.seed={2**63}", "less than or equal to 9223372036854775807"),
+        ("world.obstacles.².kind=box", "expected an index from 0 to 1"),
     ],
 )
 def test_bad_input_is_one_line_with_the_remedy(override: str, message: str) -> None:
@@ -169,6 +175,7 @@ def test_bad_input_is_one_line_with_the_remedy(override: str, message: str) -> N
         ("map: half\nwalls_m:\n  - [0, 0, .nan, 1]\n", "finite"),
         ("- just\n- a list\n", "mapping"),
         ("map: half\nwals_m:\n  - [0, 0, 1, 0]\n", "did you mean 'walls_m'"),
+        ("map: half\nwalls_m:\n" + "- [0, 0, 1, 0]\n" * 10_001, "at most 10,000 walls, found 10,001"),
     ],
 )
 def test_broken_maps_are_refused(tmp_path: Path, text: str, message: str) -> None:

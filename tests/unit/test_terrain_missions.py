@@ -205,7 +205,7 @@ class TestReport:
         (["world.goal.x_m=300", "world.goal.y_m=45"], "which is a hazard"),
         (["stack.cost_map.inflation_m=60", "world.start.x_m=275"], "too near to an obstacle"),
         (["world.ground.resolution_m=0"], "greater than 0, found 0"),
-        (["world.ground.obstacles=nowhere.png"], "expected an image there, found none"),
+        (["world.ground.obstacles=nowhere.png"], "expected an image, found none there"),
         (["world.ground.name=image"], "world.ground"),
         (["world.ground.obstacle=a.png"], "world.ground.images.obstacle: unknown key"),
         (["stack.planner.name=rrt-star-dubins"], "unknown grid planner"),

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 import typer
 
 from pilotage.cli.options import Json, Overrides
-from pilotage.cli.output import print_columns, print_json
+from pilotage.cli.output import print_columns, print_json, print_line
 from pilotage.cli.study import (
     TIMEOUT_S,
     Dask,
@@ -55,7 +55,7 @@ def attribute(
         print_json(answer | ({} if ran.page is None else {"report": str(ran.page)}))
     elif not quiet:
         _print(answer)
-        print(f"report: {ran.page}" if ran.page is not None else f"study: {folder}")
+        print_line(f"report: {ran.page}" if ran.page is not None else f"study: {folder}")
     return ran.code
 
 

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from pilotage.cli.options import Json
-from pilotage.cli.output import print_columns, print_json, stdout_for_json
+from pilotage.cli.output import print_columns, print_json, print_line, stdout_for_json
 
 
 def bench_scen(
@@ -29,5 +29,5 @@ def bench_scen(
             (key, f"{value:.4g}" if isinstance(value, float) else str(value)) for key, value in shown.items()
         )
         for failure in answer["failures"]:
-            print(f"missed: {failure}")
+            print_line(f"missed: {failure}")
     return 0 if answer["success"] else 1

@@ -11,7 +11,7 @@ from typing import Annotated
 import typer
 
 from pilotage.cli.options import Json, Out, Overrides
-from pilotage.cli.output import print_columns, print_json, stdout_for_json
+from pilotage.cli.output import print_columns, print_json, print_line, stdout_for_json
 from pilotage.core.errors import InputError, unknown_name
 
 NAMED = 5
@@ -58,7 +58,7 @@ def localize(
 
             page = write_report(result.run_dir)
     for line in result.left_out[:NAMED]:
-        print(line, file=sys.stderr)
+        print_line(line, sys.stderr)
     if len(result.left_out) > NAMED:
         print(f"and {len(result.left_out) - NAMED} more", file=sys.stderr)
     if json:

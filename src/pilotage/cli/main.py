@@ -17,7 +17,7 @@ from pathlib import Path
 from types import FrameType
 from typing import NoReturn
 
-from pilotage.cli.stopped import INTERRUPTED, TERMINATED, Terminated
+from pilotage.cli.stopped import INTERRUPTED, TERMINATED, Terminated, interruption_in, never_swallowed
 
 BAD_INPUT = 2
 BUG = 70
@@ -69,11 +69,12 @@ def _ended_once(for_good: bool) -> Iterator[None]:
     for number in caught:
         signal.signal(number, end)
     try:
-        yield
+        with never_swallowed():
+            yield
     finally:
-        if not for_good:
-            for number in caught:
-                signal.signal(number, before[number])
+        # Where the process ends now, nothing is left that a signal could spare it.
+        for number in caught:
+            signal.signal(number, signal.SIG_IGN if for_good else before[number])
 
 
 def _steady_streams() -> None:
@@ -93,24 +94,31 @@ def _run(arguments: list[str]) -> int:
     try:
         code = dispatch(arguments)
         sys.stdout.flush()
-    except InputError as error:
-        return _say(str(error), BAD_INPUT)
+        return code
     except BrokenPipeError:
         raise
-    except OSError as error:
-        place = f"{error.filename}: " if error.filename else ""
-        return _say(f"{place}{error.strerror or error}", BAD_INPUT)
-    except Exception:
+    except Exception as error:
+        stopped = interruption_in(error)
+        if stopped is not None:
+            raise stopped from None
+        if isinstance(error, InputError):
+            return _say(str(error), BAD_INPUT)
+        if isinstance(error, OSError):
+            place = f"{error.filename}: " if error.filename else ""
+            return _say(f"{place}{error.strerror or error}", BAD_INPUT)
+        if isinstance(error, MemoryError):
+            return _say("this needs more memory than there is; take a smaller or coarser input", BAD_INPUT)
         import traceback
 
         traceback.print_exc()
         return _say("this is a bug in pilotage; please report it with the lines above", BUG)
-    return code
 
 
 def _say(text: str, code: int) -> int:
-    """One line on standard error."""
-    print(f"pilotage: {' '.join(text.split())}", file=sys.stderr)
+    """One line on standard error, without what a terminal would obey."""
+    from pilotage.core.shown import shown
+
+    print(f"pilotage: {shown(text)}", file=sys.stderr)
     return code
 
 

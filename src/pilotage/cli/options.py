@@ -10,6 +10,9 @@ import typer
 
 from pilotage.core.errors import InputError
 
+LARGEST_SEED = 2**63 - 1
+MOST_DIGITS = 30
+
 
 def parse_seed(text: str) -> int:
     """Read a seed.
@@ -19,9 +22,10 @@ def parse_seed(text: str) -> int:
     InputError
         If it is not a whole number >= 0.
     """
-    if not (text.isascii() and text.isdigit()):
-        raise InputError(f"--seed: expected a whole number >= 0, found '{text}'")
-    return int(text)
+    seed = int(text) if text.isascii() and text.isdigit() and len(text) <= MOST_DIGITS else -1
+    if not 0 <= seed <= LARGEST_SEED:
+        raise InputError(f"--seed: expected a whole number >= 0 and < 2^63, found '{text}'")
+    return seed
 
 
 def parse_out(text: str) -> Path:

@@ -11,6 +11,8 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, redirect_stdout
 from typing import TYPE_CHECKING, Any, TextIO
 
+from pilotage.core.shown import visible
+
 if TYPE_CHECKING:
     from pilotage.experiments.progress import Progress
 
@@ -47,13 +49,18 @@ def stdout_for_json(wanted: bool) -> Iterator[None]:
 
 def print_columns(rows: Iterable[Sequence[str]]) -> None:
     """Print rows with every column but the last padded to its widest cell."""
-    cells = [tuple(row) for row in rows]
+    cells = [tuple(map(visible, row)) for row in rows]
     if not cells:
         return
     widths = [max(len(row[i]) for row in cells) for i in range(len(cells[0]) - 1)]
     for row in cells:
         padded = [cell.ljust(width) for cell, width in zip(row, [*widths, 0], strict=True)]
         print("  ".join(padded).rstrip())
+
+
+def print_line(text: str, stream: TextIO | None = None) -> None:
+    """Print one line of what came from outside: names, paths, reasons."""
+    print(visible(text), file=stream)
 
 
 class ProgressLine:

@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from pilotage.cli.options import Json, Out, Overrides, Seed
-from pilotage.cli.output import print_json, progress_line, stdout_for_json
+from pilotage.cli.output import print_json, print_line, progress_line, stdout_for_json
 from pilotage.core.errors import InputError
+from pilotage.core.shown import visible
 
 if TYPE_CHECKING:
     from pilotage.missions.mission import Mission
@@ -85,6 +86,7 @@ def _print_summary(metrics: dict[str, Any], result_path: Path | None) -> None:
 
     from pilotage.report import summary_table
 
-    Console(file=sys.stdout).print(summary_table(metrics))
+    shown = {key: visible(value) if isinstance(value, str) else value for key, value in metrics.items()}
+    Console(file=sys.stdout).print(summary_table(shown))
     if result_path is not None:
-        print(f"{'report' if result_path.suffix == '.html' else 'run'}: {result_path}")
+        print_line(f"{'report' if result_path.suffix == '.html' else 'run'}: {result_path}")

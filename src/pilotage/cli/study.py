@@ -11,10 +11,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from pilotage.cli.options import Json, Overrides, parse_out
-from pilotage.cli.output import print_json, stdout_for_json
+from pilotage.cli.output import print_json, print_line, stdout_for_json
 from pilotage.cli.stopped import INTERRUPTED, TERMINATED, Terminated
 from pilotage.cli.study_line import StudyLine
 from pilotage.core.errors import InputError
+from pilotage.core.shown import visible
 
 if TYPE_CHECKING:
     from pilotage.experiments.studies.options import StudyOptions
@@ -148,7 +149,7 @@ def run_and_tell(loaded: Study, folder: Path, options: StudyOptions, show: Show)
         print_json(answer | ({} if ran.page is None else {"report": str(ran.page)}))
     elif not show.quiet:
         _print_cells(answer)
-        print(f"report: {ran.page}" if ran.page is not None else f"study: {folder}")
+        print_line(f"report: {ran.page}" if ran.page is not None else f"study: {folder}")
     return ran.code
 
 
@@ -226,12 +227,14 @@ def _print_cells(answer: dict[str, Any]) -> None:
     """One row a setting; as many metrics beside it as the terminal has room for, none of them cut."""
     from rich.console import Console
     from rich.table import Table
+    from rich.text import Text
 
     from pilotage.evaluation.metrics import METRICS
     from pilotage.report.study.scales import told
 
     console, cells = Console(file=sys.stdout), answer["cells"]
-    table = Table(title=f"{answer['study']}: {answer['trials']} trials, {answer['failed']} failed")
+    title = f"{visible(answer['study'])}: {answer['trials']} trials, {answer['failed']} failed"
+    table = Table(title=Text(title))
     table.add_column("setting", overflow="fold")  # names are cut by nothing: settings differ at their ends
     table.add_column("success", justify="right", no_wrap=True)
     rates = [cell["success"] for cell in cells]
@@ -251,7 +254,7 @@ def _print_cells(answer: dict[str, Any]) -> None:
         table.add_column(METRICS.find(name).name, justify="right", no_wrap=True)
         columns.append(texts)
     for cell, row in zip(cells, zip(*columns, strict=True), strict=True):
-        table.add_row(cell["name"], *row)
+        table.add_row(Text(visible(cell["name"])), *row)  # brackets of a name are no markup
     console.print(table)
     more = len(cells[0]["metrics"]) - len(metrics)
     if more:

@@ -5,6 +5,8 @@ from __future__ import annotations
 import sys
 from typing import TYPE_CHECKING
 
+from pilotage.core.shown import visible
+
 if TYPE_CHECKING:
     from pilotage.experiments.studies.engine import StudyProgress
 
@@ -53,7 +55,7 @@ class StudyLine:
     def tell(self, text: str) -> None:
         """Say one line that stays."""
         self.close()
-        print(f"pilotage: {text}", file=sys.stderr)
+        print(f"pilotage: {visible(text)}", file=sys.stderr)
 
     def close(self) -> None:
         """Wipe the line."""

@@ -12,7 +12,7 @@ from typing import Annotated
 import typer
 
 from pilotage.cli.options import Json
-from pilotage.cli.output import print_columns, print_json
+from pilotage.cli.output import print_columns, print_json, print_line
 
 
 def track(
@@ -83,7 +83,7 @@ def track(
     broke = scene.film.broke_at_frame
     if broke is not None:
         promised = scene.film.promised
-        print(f"pilotage: {video}: breaks off at frame {broke} of {promised}", file=sys.stderr)
+        print_line(f"pilotage: {video}: breaks off at frame {broke} of {promised}", sys.stderr)
     if json:
         print_json(values)
     else:

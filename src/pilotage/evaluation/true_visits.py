@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pilotage.core.errors import InputError
+from pilotage.core.files import read_json
 
 
 def read_visits(path: str | Path, shape: tuple[int, int]) -> NDArray[np.bool_]:
@@ -31,13 +31,11 @@ def read_visits(path: str | Path, shape: tuple[int, int]) -> NDArray[np.bool_]:
     InputError
         One line where the file is no track, or one of another grid.
     """
+    track = read_json(Path(path), "the JSON of 'pilotage track'")
     try:
-        track = json.loads(Path(path).read_text(encoding="utf-8"))
         pairs = [(int(column), int(row)) for column, row in track["visited_cells"]]
         cells = int(track["grid"]["cells"])
-    except OSError as error:
-        raise InputError(f"{path}: {error.strerror or error}") from None
-    except (ValueError, KeyError, TypeError):
+    except (ValueError, LookupError, TypeError, OverflowError):
         raise InputError(
             f"{path}: expected the JSON of 'pilotage track' with visited_cells and grid; it is something else"
         ) from None

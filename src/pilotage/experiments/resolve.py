@@ -12,6 +12,8 @@ from pilotage.experiments.mission_kind import Record
 from pilotage.experiments.roles import REGISTRIES
 from pilotage.missions.mission import Mission
 
+LONGEST_SLUG_BYTES = 120
+
 
 def resolved_yaml(mission: Mission, record: Record | None = None) -> str:
     """The mission in full, every component's defaults included; with a record, what came from files too."""
@@ -52,4 +54,7 @@ def run_name(mission: Mission) -> str:
 
 def _slug(text: str) -> str:
     """A name fit for a folder."""
-    return "".join(c if c.isalnum() or c in "-_." else "-" for c in text).strip(".") or "mission"
+    plain = "".join(c if c.isalnum() or c in "-_." else "-" for c in text)
+    # Letters of some scripts take four bytes, and a folder's name has 255 with what stands around this.
+    short = plain.encode()[:LONGEST_SLUG_BYTES].decode(errors="ignore")
+    return short.strip(".") or "mission"

@@ -32,7 +32,8 @@ def write_run_folder(out: Path, kind: Kind, record: Record, metrics: dict[str, o
     try:
         draft.chmod(0o777 & ~_umask())
         (draft / "mission.yaml").write_text(resolved_yaml(mission, record), encoding="utf-8")
-        pq.write_table(pa.table(dict(record.trace)), draft / "trace.parquet")
+        with (draft / "trace.parquet").open("wb") as file:  # Arrow takes no name whose bytes are no UTF-8
+            pq.write_table(pa.table(dict(record.trace)), file)
         (draft / "events.jsonl").write_text(
             "".join(
                 json.dumps({"t_s": event.t_s, "kind": event.kind, "text": event.text}) + "\n"

@@ -10,9 +10,12 @@ from typing import Any
 import numpy as np
 
 from pilotage.core.errors import InputError
+from pilotage.core.limits import limit, too_large
 from pilotage.maps.moving_ai import GROUND, WATER, MovingAiMap, Scenario, read_moving_ai_map, read_scenario
 from pilotage.stack.planning.grid_space import Cell, GridSpace
 
+MOST_CELLS = 1 << 26
+"""Cells of all sizes together that a scenario's lines may stretch its map to."""
 SHOWN = 5
 """Problems that miss their length and are told one by one."""
 
@@ -29,7 +32,7 @@ def run_scenario(map_path: Path, scenario_path: Path) -> dict[str, Any]:
     map, scenario, problems, optimal (lengths within 0.01 of the file's, or within half of its last digit
     where it rounds to six), unreachable (no path found), worst_error (in cells; nan where a path is on one
     side only), worst_problem (its number, from 1), expansions, search_time_s, queries_per_s, success, and
-    failures (the first few that miss).
+    failures (the first few that miss, each with its reason).
 
     Raises
     ------
@@ -59,6 +62,7 @@ def run_scenario(map_path: Path, scenario_path: Path) -> dict[str, Any]:
             "goal_row_column": scenario.goals[i].tolist(),
             "printed": float(scenario.lengths[i]),
             "found": float(lengths[i]),
+            "reason": _reason(scenario, int(i), float(lengths[i])),
         }
         for i in np.flatnonzero(~good)[:SHOWN]
     ]
@@ -83,6 +87,7 @@ class _Spaces:
 
     def __init__(self, terrain: MovingAiMap) -> None:
         self._terrain = terrain
+        self._cells = 0
         self._scaled: dict[tuple[int, int], MovingAiMap] = {}
         self._made: dict[tuple[int, int, bytes], GridSpace] = {}
 
@@ -92,6 +97,12 @@ class _Spaces:
             rows, columns = self._terrain.terrain.shape
         size = rows, columns
         if size not in self._scaled:
+            # A line of a few digits may ask for any size, and every line for another one.
+            self._cells += rows * columns
+            if self._cells > limit(MOST_CELLS):
+                raise too_large(
+                    f"{path}: problem {i + 1}: maps in all", limit(MOST_CELLS), self._cells, "cells"
+                )
             self._scaled[size] = self._terrain.scaled(*size)
         letters = self._scaled[size].terrain
         for name, (row, column) in (("start", start), ("goal", goal)):
@@ -132,6 +143,17 @@ def _errors(scenario: Scenario, lengths: np.ndarray[Any, np.dtype[np.float64]]) 
     errors[both] = np.abs(lengths[both] - printed[both])
     errors[none_printed & none_found] = 0.0
     return errors
+
+
+def _reason(scenario: Scenario, i: int, found: float) -> str:
+    """Why a problem counts as missed, in words: JSON has no infinity to show."""
+    printed = float(scenario.lengths[i])
+    says = f"the file says {printed:g}"
+    if scenario.without_path[i]:
+        says = f"the file says that there is no path (length {printed:g})"
+    if math.isinf(found):
+        return f"{says}, found no path"
+    return f"{says}, found a path of {found:.8g}"
 
 
 def _cell(pair: Any) -> Cell:

@@ -7,19 +7,19 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-import yaml
-
 from pilotage.core.errors import InputError, nearest
+from pilotage.core.files import read_values_text
+from pilotage.core.limits import DEPTH
 from pilotage.core.yaml_text import load_yaml
 from pilotage.missions.mission import TOP_KEYS
 
+MOST_DIGITS = 9
+"""No list is longer than a whole number of so many digits says."""
+
 
 def read_text(path: Path) -> str:
-    """Read a text file; InputError where it cannot be read."""
-    try:
-        return path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"'{path}': expected a readable text file, found: {error}") from None
+    """Read the text of a file of values; InputError where it cannot be read."""
+    return read_values_text(path, "a readable text file")
 
 
 def parse_yaml(text: str, where: str) -> dict[str, Any]:
@@ -74,9 +74,11 @@ def parse_override(override: str) -> tuple[list[str], Any]:
     parts = key.strip().split(".")
     if not equals or not all(parts):
         raise InputError(f"--set '{override}': expected KEY=VALUE such as stack.localizer.gate=0.99")
+    if len(parts) > DEPTH:
+        raise InputError(f"--set '{override}': expected at most {DEPTH} keys, found {len(parts)}")
     try:
-        value = yaml.safe_load(text)
-    except (yaml.YAMLError, ValueError):
+        value = load_yaml(text, "")
+    except InputError:
         raise InputError(f"--set '{override}': the value is not YAML") from None
     if isinstance(value, str):
         value = _number(value)
@@ -139,6 +141,6 @@ def _put(place: Any, part: str, value: Any, override: str) -> None:
 
 
 def _index(place: list[Any], part: str, override: str) -> int:
-    if not part.isdigit() or int(part) >= len(place):
+    if not (part.isascii() and part.isdigit() and len(part) <= MOST_DIGITS and int(part) < len(place)):
         raise InputError(f"--set '{override}': expected an index from 0 to {len(place) - 1}, found '{part}'")
     return int(part)

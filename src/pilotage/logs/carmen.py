@@ -15,6 +15,7 @@ A FLASER scan says nothing of its angles: n beams are spread from -90 deg over 1
 from __future__ import annotations
 
 import math
+from array import array
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -26,6 +27,9 @@ from pilotage.logs.text import read_lines
 
 LARGEST = 1e12
 """Beyond any metre, radian or second of a log."""
+LEAST_BEAMS = 2
+MOST_DIGITS = 9
+"""A whole number with more is no count of beams."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,7 +65,7 @@ class CarmenLog:
 @dataclass(frozen=True, slots=True)
 class _Scan:
     t_s: float
-    ranges_m: list[float]
+    ranges_m: array[float]
     first_rad: float
     step_rad: float
     laser: list[float]
@@ -116,12 +120,14 @@ def read_carmen(path: Path) -> CarmenLog:
 
 def _flaser(words: list[str], where: str) -> _Scan:
     beams = _count(words, 1, where)
+    if beams < LEAST_BEAMS:
+        raise InputError(f"{where}: FLASER: expected {LEAST_BEAMS} or more beams, found {beams}")
     _expect(words, beams + 11, where)
     numbers = _floats(words[2 : beams + 9], where)
     step = math.pi / (beams - 1 if beams % 2 else beams)
     return _Scan(
         numbers[-1],
-        numbers[:beams],
+        array("d", numbers[:beams]),
         -0.5 * math.pi,
         step,
         numbers[beams : beams + 3],
@@ -136,15 +142,17 @@ def _robotlaser(words: list[str], where: str) -> _Scan:
     _expect(words, tail + 14, where)
     first, _, step = _floats(words[2:5], where)
     numbers = _floats(words[tail : tail + 12], where)
-    return _Scan(numbers[11], _floats(words[9 : 9 + beams], where), first, step, numbers[:3], numbers[3:6])
+    return _Scan(
+        numbers[11], array("d", _floats(words[9 : 9 + beams], where)), first, step, numbers[:3], numbers[3:6]
+    )
 
 
 def _count(words: list[str], index: int, where: str) -> int:
     """Read a whole number of values."""
-    if len(words) <= index or not words[index].isdigit():
-        found = words[index] if len(words) > index else "the end of the line"
+    found = words[index] if len(words) > index else "the end of the line"
+    if not (found.isascii() and found.isdigit() and len(found) <= MOST_DIGITS):
         raise InputError(f"{where}: {words[0]}: expected a number of values, found {found}")
-    return int(words[index])
+    return int(found)
 
 
 def _expect(words: list[str], least: int, where: str) -> None:

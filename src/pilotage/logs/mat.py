@@ -9,18 +9,20 @@ from __future__ import annotations
 
 import math
 import struct
+import warnings
 import zlib
 from collections.abc import Iterator, Sequence
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from pilotage.core.errors import InputError
+from pilotage.core.files import read_bytes
+from pilotage.core.limits import DATA_BYTES, limit, too_large
 
 HEADER_BYTES = 128
-MOST_BYTES = 1 << 30
-"""What a compressed element may unpack to."""
 MATRIX, COMPRESSED = 14, 15
 _TYPES = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8", 12: "i8", 13: "u8"}
 _CLASSES = {6: "f8", 7: "f4", 8: "i1", 9: "u1", 10: "i2", 11: "u2", 12: "i4", 13: "u4", 14: "i8", 15: "u8"}
@@ -39,12 +41,7 @@ def load_mat(path: Path, names: Sequence[str]) -> dict[str, Any]:
     InputError
         Where it cannot be read or is no such file; with the byte, where one is wrong.
     """
-    try:
-        data = path.read_bytes()
-    except OSError as error:
-        raise InputError(
-            f"{path}: expected a readable MATLAB file, found: {error.strerror or error}"
-        ) from None
+    data = read_bytes(path, "a readable MATLAB file")
     order = {b"IM": "<", b"MI": ">"}.get(data[126:128])
     if _HDF5 in (data[:8], data[512:520]) or (
         order and struct.unpack_from(order + "H", data, 124)[0] >> 8 == 2
@@ -55,9 +52,11 @@ def load_mat(path: Path, names: Sequence[str]) -> dict[str, Any]:
     if order is None:
         return _level_4(path, data, names)
     found: dict[str, Any] = {}
+    room = limit(DATA_BYTES)
     for kind, body, at in _elements(path, data, HEADER_BYTES, order):
         if kind == COMPRESSED:
-            inner = _unpacked(path, body, at)
+            inner = _unpacked(path, body, at, room)
+            room -= len(inner)
             for inner_kind, inner_body, _ in _elements(path, inner, 0, order, at):
                 if inner_kind == MATRIX:
                     _keep(found, path, inner_body, order, names, at)
@@ -95,12 +94,15 @@ def _cut(path: Path, at: int) -> InputError:
     )
 
 
-def _unpacked(path: Path, packed: bytes, at: int) -> bytes:
+def _unpacked(path: Path, packed: bytes, at: int, room: int) -> bytes:
+    """Unpack an element into what the ones before it left of the limit."""
     unpacker = zlib.decompressobj()
     try:
-        data = unpacker.decompress(packed, MOST_BYTES)
+        data = unpacker.decompress(packed, room + 1)
     except zlib.error as error:
         raise InputError(f"{path} byte {at}: expected compressed data, found: {error}") from None
+    if len(data) > room:
+        raise too_large(f"{path} (unpacked)", limit(DATA_BYTES), None)
     if not unpacker.eof:
         raise _cut(path, at)
     return data
@@ -129,6 +131,8 @@ def _keep(found: dict[str, Any], path: Path, body: bytes, order: str, names: Seq
         found[word] = np.empty(0, dtype="U1" if kind == _CHARACTERS else object)
         return
     count = math.prod(shape)
+    if 8 * count > limit(DATA_BYTES):  # MATLAB packs whole numbers into bytes; here each takes eight
+        raise too_large(f"{path}: {word}", limit(DATA_BYTES), 8 * count)
     values = _numbers(path, next(parts, None), order, count, word, at)
     if flag & _COMPLEX:
         values = values + 1j * _numbers(path, next(parts, None), order, count, word, at)
@@ -160,8 +164,11 @@ def _level_4(path: Path, data: bytes, names: Sequence[str]) -> dict[str, Any]:
 
     # What its parser stumbles over in a broken file comes as nearly anything.
     broken = (MatReadError, OSError, ValueError, TypeError, KeyError, IndexError, EOFError)
+    source: Any = BytesIO(data)
     try:
-        return dict(loadmat(path, variable_names=list(names)))
-    except (*broken, OverflowError, MemoryError, NotImplementedError) as error:
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")  # it warns of what it is about to read wrongly
+            return dict(loadmat(source, variable_names=list(names)))
+    except (*broken, OverflowError, MemoryError, NotImplementedError, Warning) as error:
         said = " ".join(str(error).split())
         raise InputError(f"{path}: expected a MATLAB file with {wanted}, found: {said}") from None

@@ -143,9 +143,11 @@ def read_landmarks(path: Path) -> Landmarks:
     table = read_table(path, columns)
     check_size(table, columns)
     ids = [_whole(table, row, 0, "subject") for row in range(table.values.shape[0])]
+    seen: set[int] = set()
     for row, subject in enumerate(ids):
-        if subject in ids[:row]:
+        if subject in seen:
             raise InputError(f"{table.place(row)}: expected every subject once, found {subject} again")
+        seen.add(subject)
     return Landmarks(np.array(ids, dtype=np.int64), table.values[:, 1:3])
 
 

@@ -15,8 +15,11 @@ import numpy as np
 from pilotage.core.errors import InputError
 from pilotage.core.types import FloatArray
 from pilotage.logs.mat import load_mat
+from pilotage.logs.text import LARGEST_TIME_S
 
 MIN_ROWS = 10
+LARGEST = 1e6
+"""Metres and radians beyond which a file is damaged."""
 MAX_GAP_S = 2.0
 """Where the reference has no pose for longer, its heading in between is not known."""
 
@@ -77,9 +80,13 @@ def _table(path: Path, content: dict[str, object], name: str, columns: int) -> F
             f"found shape {table.shape}"
         )
     table = table.astype(np.float64)
-    bad = np.flatnonzero(~np.isfinite(table).all(axis=1))
+    within = np.abs(table) <= np.array([LARGEST_TIME_S, *[LARGEST] * (columns - 1)])
+    bad = np.flatnonzero(~within.all(axis=1))
     if bad.size:
-        raise InputError(f"{path}: {name} row {int(bad[0]) + 1}: expected finite numbers")
+        raise InputError(
+            f"{path}: {name} row {int(bad[0]) + 1}: expected finite numbers within {LARGEST:g}, "
+            f"times within {LARGEST_TIME_S:g}"
+        )
     backwards = np.flatnonzero(np.diff(table[:, 0]) <= 0.0)
     if backwards.size:
         raise InputError(f"{path}: {name} row {int(backwards[0]) + 2}: the time does not increase")

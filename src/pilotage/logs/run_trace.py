@@ -7,10 +7,13 @@ from pathlib import Path
 import numpy as np
 
 from pilotage.core.errors import InputError
+from pilotage.core.files.parquet import read_parquet
 from pilotage.core.types import FloatArray
 from pilotage.logs.odometry_steps import OdometryForm, OdometrySteps, arc_ends
 
 TRACE = "trace.parquet"
+LARGEST = 1e9
+"""Farther than any coordinate on earth, longer than any run."""
 COLUMNS = ("t_s", "true_x_m", "true_y_m", "true_theta_rad", "odom_distance_m", "odom_angle_rad")
 
 
@@ -45,21 +48,22 @@ def read_columns(path: Path, names: tuple[str, ...]) -> dict[str, FloatArray]:
     Raises
     ------
     InputError
-        Where the file is missing, is no parquet file, lacks a column, or its times do not increase.
+        Where the file is missing, is no parquet file, lacks a column, its numbers are beyond all metres and
+        seconds, or its times do not increase.
     """
-    import pyarrow as pa
-    import pyarrow.parquet as pq
-
-    if not path.is_file():
-        raise InputError(f"{path}: expected a run folder's trace, found none there")
-    try:
-        table = pq.read_table(path)
-    except (pa.ArrowException, OSError) as error:
-        raise InputError(f"{path}: expected a parquet file, found: {error}") from None
-    missing = [name for name in names if name not in table.column_names]
-    if missing:
-        raise InputError(f"{path}: expected the columns {', '.join(names)}; missing: {', '.join(missing)}")
-    columns = {name: np.asarray(table[name].to_numpy(), dtype=np.float64) for name in names}
+    found = read_parquet(path, names, "a run folder's trace")
+    columns = {}
+    for name in names:
+        if found[name].dtype.kind not in "iuf":
+            raise InputError(f"{path}: {name}: expected numbers, found {found[name].dtype}")
+        columns[name] = np.asarray(found[name], dtype=np.float64)
+        with np.errstate(invalid="ignore"):
+            far = np.flatnonzero(np.abs(columns[name]) > LARGEST)
+        if far.size:
+            raise InputError(
+                f"{path} row {int(far[0]) + 1}: {name}: expected a number within {LARGEST:g}, "
+                f"found {columns[name][far[0]]:g}"
+            )
     wrong = np.flatnonzero(~(np.diff(columns["t_s"]) > 0.0))
     if wrong.size:
         raise InputError(f"{path} row {int(wrong[0]) + 2}: expected a time after that of the row before")

@@ -11,6 +11,7 @@ from pilotage.logs.text import check_size, check_times, read_lines, read_table
 
 UNITS = ("m", "rad")
 LEAST_ROWS = 10
+MOST_COLUMNS = 1000
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,6 +39,10 @@ def read_steady_csv(path: Path) -> list[Column]:
         found = ", ".join(names) or "nothing"
         raise InputError(
             f"{path} line {number}: expected columns such as range_m or bearing_rad, found {found}"
+        )
+    if len(wanted) > MOST_COLUMNS:
+        raise InputError(
+            f"{path} line {number}: expected at most {MOST_COLUMNS} columns with a unit, found {len(wanted)}"
         )
     timed = ["t_s"] if "t_s" in names else []
     table = read_table(path, [*timed, *wanted], separator=",", header=True)

@@ -5,21 +5,22 @@ Every complaint names the file and the line, so that the user can look at the pl
 
 from __future__ import annotations
 
-import gzip
 import re
-import zlib
+from array import array
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
+from pilotage.core import files
 from pilotage.core.errors import InputError
 from pilotage.core.types import FloatArray, IntArray
 
-_GZIP_MAGIC = b"\x1f\x8b"
 SAME_FORM = 3
 """So many lines in one form tell how the next one should look."""
+LARGEST_TIME_S = 1e12
+"""No clock counts further: thirty thousand years."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,38 +52,8 @@ def read_lines(path: Path) -> list[str]:
 
 
 def read_text(path: Path) -> str:
-    """Read a text file, gzipped or not.
-
-    Raises
-    ------
-    InputError
-        Where it cannot be read, is not text, or its compressed data end too early.
-    """
-    try:
-        data = path.read_bytes()
-        if data[:2] == _GZIP_MAGIC:
-            data = gzip.decompress(data)
-        text = data.decode("utf-8-sig")
-    except (EOFError, zlib.error, gzip.BadGzipFile):
-        raise InputError(f"{path} line {_whole_lines(path) + 1}: the compressed file is cut short") from None
-    except UnicodeDecodeError as error:
-        line = data[: error.start].count(b"\n") + 1
-        raise InputError(f"{path} line {line}: expected text, found bytes that are not UTF-8") from None
-    except OSError as error:
-        raise InputError(f"{path}: expected a readable file, found: {error.strerror or error}") from None
-    if "\0" in text:
-        line = text[: text.index("\0")].count("\n") + 1
-        raise InputError(f"{path} line {line}: expected text, found zero bytes")
-    return text
-
-
-def _whole_lines(path: Path) -> int:
-    """Count the whole lines that a damaged gzip file still holds."""
-    unpacker = zlib.decompressobj(wbits=31)
-    try:
-        return unpacker.decompress(path.read_bytes()).count(b"\n")
-    except zlib.error:
-        return 0
+    """Read a text file, gzipped or not; InputError as ``core.files.read_text``."""
+    return files.read_text(path, "a readable file")
 
 
 def read_table(
@@ -107,7 +78,7 @@ def read_table(
     """
     picked: list[int] | None = None
     width = len(columns)
-    rows: list[list[float]] = []
+    numbers = array("d")
     places: list[int] = []
     whole = read_text(path)
     lines = whole.splitlines()
@@ -126,13 +97,16 @@ def read_table(
                 + ("" if header else f" ({' '.join(columns)})")
                 + f", found {len(words)}{_last(number, len(lines), len(words) < width)}"
             )
-        rows.append(_numbers(path, number, words if picked is None else [words[i] for i in picked], columns))
+        numbers.extend(
+            _numbers(path, number, words if picked is None else [words[i] for i in picked], columns)
+        )
         places.append(number)
-    if not rows:
+    if not places:
         raise InputError(f"{path} line {len(lines) + 1}: expected rows of numbers, found the end of the file")
     if not whole.endswith(("\n", "\r")):
         _refuse_cut_number(path, [lines[number - 1] for number in places], places[-1])
-    return Table(path, np.array(rows), np.array(places, dtype=np.int64))
+    values = np.frombuffer(numbers, dtype=np.float64).reshape(len(places), -1)
+    return Table(path, values, np.array(places, dtype=np.int64))
 
 
 def _refuse_cut_number(path: Path, lines: Sequence[str], number: int) -> None:
@@ -185,13 +159,19 @@ def _is_number(word: str) -> bool:
 
 
 def check_times(table: Table, t_s: FloatArray, *, repeats: bool = False) -> None:
-    """Refuse times that run backwards and, unless ``repeats``, times that are there twice.
+    """Refuse times beyond all clocks, that run backwards and, unless ``repeats``, that are there twice.
 
     Raises
     ------
     InputError
         File and line of the first such row.
     """
+    far = np.flatnonzero(np.abs(t_s) > LARGEST_TIME_S)
+    if far.size:
+        row = int(far[0])
+        raise InputError(
+            f"{table.place(row)}: expected a time within {LARGEST_TIME_S:g} s, found {t_s[row]:g} s"
+        )
     steps = np.diff(t_s)
     wrong = np.flatnonzero(steps < 0.0 if repeats else steps <= 0.0)
     if wrong.size:

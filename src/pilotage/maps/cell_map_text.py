@@ -13,6 +13,8 @@ from pathlib import Path
 import numpy as np
 
 from pilotage.core.errors import InputError
+from pilotage.core.files import read_bytes
+from pilotage.core.limits import TEXT_BYTES
 from pilotage.maps.cell_map import FEATURES, CellMap, CellState
 
 CHARACTERS = {
@@ -39,10 +41,8 @@ def read_cell_map(path: str | Path, cells: int = 25) -> CellMap:
     InputError
         One line where the file cannot be read, a row is missing or too long, or a character is unknown.
     """
-    try:
-        text = Path(path).read_text(encoding="utf-8", errors="replace")
-    except OSError as error:
-        raise InputError(f"{path}: {error.strerror or error}") from None
+    # A serial line garbles a byte now and then, mostly outside the map: that is no reason to refuse it.
+    text = read_bytes(Path(path), "a printed map", TEXT_BYTES).decode("utf-8", errors="replace")
     return parse_cell_map(text, str(path), cells)
 
 

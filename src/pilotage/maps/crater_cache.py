@@ -11,6 +11,9 @@ import numpy as np
 import scipy
 
 from pilotage.core.cache import cache_folder
+from pilotage.core.errors import InputError
+from pilotage.core.files import read_bytes
+from pilotage.core.files.arrays import map_npy
 from pilotage.core.types import Pose2
 from pilotage.maps import crater_terrain as generator
 from pilotage.maps.crater_terrain import CraterTerrain, CraterTerrainConfig, crater_terrain
@@ -39,21 +42,21 @@ def cached_crater_terrain(config: CraterTerrainConfig) -> CraterTerrain:
     place = folder / _digest(config)
     try:
         return _read(place, config)
-    except (OSError, ValueError, EOFError):
+    except (OSError, ValueError, InputError):
         pass
     terrain = crater_terrain(config)
     try:
         _write(place, terrain)
         _thin_out(folder)
         return _read(place, config)
-    except (OSError, ValueError, EOFError):
+    except (OSError, ValueError, InputError):
         return terrain
 
 
 def _digest(config: CraterTerrainConfig) -> str:
     values = CraterTerrainConfig(**{name: getattr(config, name) for name in CraterTerrainConfig.model_fields})
     sha = hashlib.sha256(f"{values.model_dump_json()} {np.__version__} {scipy.__version__}".encode())
-    sha.update(Path(generator.__file__).read_bytes())
+    sha.update(read_bytes(Path(generator.__file__)))
     return sha.hexdigest()[:20]
 
 
@@ -75,13 +78,13 @@ def _write(place: Path, terrain: CraterTerrain) -> None:
 
 def _read(place: Path, config: CraterTerrainConfig) -> CraterTerrain:
     origin = Pose2(*config.origin_m, 0.0)
-    heights = np.load(place / "elevation.npy", mmap_mode="r", allow_pickle=False)
-    cells = np.load(place / "hazards.npy", mmap_mode="r", allow_pickle=False)
+    heights = map_npy(place / "elevation.npy")
+    cells = map_npy(place / "hazards.npy")
     if heights.shape != (config.rows, config.columns) or cells.shape != heights.shape:
         raise ValueError("another terrain")
     marks = Landmarks(
-        np.load(place / "landmark_ids.npy", allow_pickle=False),
-        np.load(place / "landmarks.npy", allow_pickle=False),
+        np.array(map_npy(place / "landmark_ids.npy")),
+        np.array(map_npy(place / "landmarks.npy")),
     )
     # When it was last used is what thinning out goes by.
     place.touch()

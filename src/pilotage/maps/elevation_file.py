@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from pathlib import Path
 from typing import Any
@@ -10,12 +9,16 @@ from typing import Any
 import numpy as np
 
 from pilotage.core.errors import InputError
+from pilotage.core.files import read_bytes, read_json, require_file
+from pilotage.core.limits import DATA_BYTES, limit, too_large
 from pilotage.core.types import Pose2
 from pilotage.maps.elevation import ElevationModel, HeightArray
 from pilotage.maps.grid_file import read_array
 from pilotage.maps.memory import require_memory
 from pilotage.maps.occupancy_grid import CORNER
 
+MOST_BYTES = 12 * DATA_BYTES // 4
+"""What a model takes while it is read: twelve bytes for each height of four."""
 FORMATS = {
     "uint16-le": "<u2",
     "uint16-be": ">u2",
@@ -45,8 +48,7 @@ def read_elevation(
         Where a file is missing, cut short, or does not say what is needed; for a GeoTIFF also where
         rasterio is not installed.
     """
-    if not path.is_file():
-        raise InputError(f"elevation '{path}': expected a file there, found none")
+    require_file(path, "an elevation model")
     if path.suffix.lower() == ".npy":
         return _read_npy(path, resolution_m, CORNER if origin is None else origin)
     if resolution_m is not None:
@@ -74,10 +76,7 @@ def _read_raw(path: Path, origin: Pose2) -> ElevationModel:
     columns, ``metresPerPixelLat`` and ``metresPerPixelLon``; ``elevationMin`` and ``elevationMax`` for whole
     numbers that stand for the part in between; ``file``, else the same name ending in .bin.
     """
-    try:
-        side: Any = json.loads(path.read_text(encoding="utf-8"))
-    except ValueError as error:
-        raise InputError(f"{path}: expected JSON, found something else ({error})") from None
+    side = read_json(path, "a JSON side file")
     if not isinstance(side, dict):
         raise InputError(f"{path}: expected an object with size and format, found another value")
     size = side.get("size")
@@ -95,14 +94,13 @@ def _read_raw(path: Path, origin: Pose2) -> ElevationModel:
     column_m = _positive(side, "metresPerPixelLon", path)
     require_memory(12 * rows * columns, f"{path}: an elevation model of {columns} x {rows} cells")
     raw = path.parent / side["file"] if isinstance(side.get("file"), str) else path.with_suffix(".bin")
-    if not raw.is_file():
-        raise InputError(f"{path}: expected its array in '{raw}', found none")
-    if raw.stat().st_size != rows * columns * dtype.itemsize:
+    held = require_file(raw, f"the array of '{path}'")
+    if held != rows * columns * dtype.itemsize:
         raise InputError(
             f"{raw}: expected {rows * columns * dtype.itemsize} bytes for {columns} x {rows} values, "
-            f"found {raw.stat().st_size}; the file seems to be cut short or of another size"
+            f"found {held}; the file seems to be cut short or of another size"
         )
-    heights = np.fromfile(raw, dtype=dtype).reshape(rows, columns).astype(np.float32)
+    heights = np.frombuffer(read_bytes(raw), dtype=dtype).reshape(rows, columns).astype(np.float32)
     if "elevationMin" in side or "elevationMax" in side:
         low, high = _number(side, "elevationMin", path), _number(side, "elevationMax", path)
         whole = np.iinfo(dtype).max if dtype.kind in "iu" else 1.0
@@ -135,7 +133,13 @@ def _read_geotiff(path: Path, origin: Pose2 | None) -> ElevationModel:
             f"elevation '{path}': GeoTIFF needs rasterio; install pilotage with the extra 'terrain'"
         ) from None
     try:
-        with rasterio.open(path) as source:
+        # Its other drivers follow what a file says to other files, on the network too.
+        with rasterio.open(path, driver="GTiff") as source:
+            size = 12 * source.width * source.height
+            if size > limit(MOST_BYTES):
+                raise too_large(
+                    f"elevation '{path}' ({source.width} x {source.height})", limit(MOST_BYTES), size
+                )
             require_memory(12 * source.width * source.height, f"elevation '{path}'")
             band = source.read(1, masked=True).astype(np.float32)
             place = source.transform
@@ -169,6 +173,12 @@ def _squared(heights: HeightArray, row_m: float, column_m: float, origin: Pose2)
         return ElevationModel(heights, row_m, origin)
     rows, columns = heights.shape
     count = max(2, round(columns * column_m / row_m))
+    if 12 * rows * count > limit(MOST_BYTES):
+        raise too_large(
+            f"an elevation model stretched to {count} x {rows} square cells",
+            limit(MOST_BYTES),
+            12 * rows * count,
+        )
     require_memory(12 * rows * count, f"an elevation model stretched to {count} x {rows} square cells")
     at = np.clip((np.arange(count) + 0.5) * row_m / column_m - 0.5, 0.0, columns - 1.0)
     left = np.minimum(at.astype(np.int64), columns - 2)

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from pilotage.core.errors import InputError
+from pilotage.core.files.arrays import map_npy
 from pilotage.core.types import Pose2
 from pilotage.maps.grid_image import read_hazard_image
 from pilotage.maps.memory import require_memory
@@ -43,7 +44,9 @@ def read_grid(path: Path, resolution_m: float | None = None, origin: Pose2 | Non
     if suffix == ".map":
         return read_moving_ai_map(path).grid(1.0 if resolution_m is None else resolution_m, place)
     if suffix == ".npy":
-        return OccupancyGrid.of(read_array(path), 1.0 if resolution_m is None else resolution_m, place)
+        return OccupancyGrid.of(
+            _whole(read_array(path), path), 1.0 if resolution_m is None else resolution_m, place
+        )
     if suffix in IMAGES:
         if resolution_m is None:
             raise InputError(f"{path}: expected a resolution in metres a pixel for an image, found none")
@@ -53,13 +56,18 @@ def read_grid(path: Path, resolution_m: float | None = None, origin: Pose2 | Non
 
 def read_array(path: Path) -> np.ndarray[tuple[int, ...], np.dtype[np.generic]]:
     """Load a NumPy file without running anything that it may hold."""
-    if not path.is_file():
-        raise InputError(f"array '{path}': expected a .npy file there, found none")
-    try:
-        mapped: np.ndarray[tuple[int, ...], np.dtype[np.generic]] = np.load(
-            path, mmap_mode="r", allow_pickle=False
-        )
-    except (ValueError, EOFError, OSError) as error:
-        raise InputError(f"array '{path}': expected a NumPy array of two dimensions, found {error}") from None
+    mapped = map_npy(path, "a .npy file")
     require_memory(2 * mapped.nbytes, f"array '{path}'")
     return mapped
+
+
+def _whole(
+    values: np.ndarray[tuple[int, ...], np.dtype[np.generic]], path: Path
+) -> np.ndarray[tuple[int, ...], np.dtype[np.generic]]:
+    """Refuse fractions: heights in metres would pass for probabilities where they happen to be small."""
+    if values.dtype.kind == "f":
+        raise InputError(
+            f"array '{path}': expected a grid of truth values or of whole per cent, found {values.dtype}; "
+            "save probabilities p as (100 * p).round().astype('int8'), or plan on heights with --slope-limit"
+        )
+    return values

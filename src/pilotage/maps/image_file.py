@@ -6,9 +6,10 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from PIL import Image, UnidentifiedImageError
+from PIL import Image
 
 from pilotage.core.errors import InputError
+from pilotage.core.files import images as files
 from pilotage.maps.memory import require_memory
 
 
@@ -30,24 +31,11 @@ def opened_image(
     InputError
         Where the image is missing, unreadable, of another size, or too large.
     """
-    if not path.is_file():
-        raise InputError(f"image '{path}': expected an image there, found none")
-    # Pillow guards against large images; here the memory that there is decides.
-    limit, Image.MAX_IMAGE_PIXELS = Image.MAX_IMAGE_PIXELS, None
-    try:
-        with Image.open(path) as image:
-            columns, rows = image.size
-            if size is not None and (rows, columns) != size:
-                raise InputError(
-                    f"image '{path}': expected {size[1]} x {size[0]} pixels, found {columns} x {rows}"
-                )
-            require_memory(bytes_a_pixel(image) * rows * columns, f"image '{path}'")
-            yield image
-    except UnidentifiedImageError:
-        raise InputError(
-            f"image '{path}': expected a PNG, PGM or other image, found another format"
-        ) from None
-    except (OSError, SyntaxError, ValueError) as error:
-        raise InputError(f"image '{path}': cannot be read ({error}); it may be cut short") from None
-    finally:
-        Image.MAX_IMAGE_PIXELS = limit
+    with files.opened_image(path) as image:
+        columns, rows = image.size
+        if size is not None and (rows, columns) != size:
+            raise InputError(
+                f"image '{path}': expected {size[1]} x {size[0]} pixels, found {columns} x {rows}"
+            )
+        require_memory(bytes_a_pixel(image) * rows * columns, f"image '{path}'")
+        yield image

@@ -10,9 +10,12 @@ from pydantic import Field
 
 from pilotage.core.config import Config, validate
 from pilotage.core.errors import InputError
+from pilotage.core.limits import limit, too_large
 from pilotage.maps.landmarks import Landmarks
 from pilotage.maps.segment_map import SegmentMap
 
+MOST_PARTS = 10_000
+"""Walls, circles and landmarks each: what looks at all of them in every step is slow long before."""
 Coordinates = tuple[float, float, float, float]
 
 
@@ -59,7 +62,7 @@ def parse_map(values: dict[str, Any], where: str) -> LandmarkMap:
 
 
 def build_map(entry: MapFile, where: str) -> LandmarkMap:
-    """Build a map from a validated entry; InputError where walls are missing."""
+    """Build a map from a validated entry; InputError where walls are missing or far too many."""
     counts = (
         ("walls", entry.walls_count, len(entry.walls_m)),
         ("landmarks", entry.landmarks_count, len(entry.landmarks)),
@@ -70,6 +73,13 @@ def build_map(entry: MapFile, where: str) -> LandmarkMap:
                 f"{where}: expected {expected} {what} ({what}_count), found {found}; "
                 "the file seems to be cut short"
             )
+    for what, found in (
+        ("walls", len(entry.walls_m)),
+        ("circles", len(entry.circles_m)),
+        ("landmarks", len(entry.landmarks)),
+    ):
+        if found > limit(MOST_PARTS):
+            raise too_large(where, limit(MOST_PARTS), found, what)
     walls = SegmentMap.of(np.array(entry.walls_m), np.array(entry.circles_m).reshape(-1, 3))
     if entry.bounds_m is not None:
         walls = SegmentMap(walls.segments_m, walls.circles_m, entry.bounds_m)

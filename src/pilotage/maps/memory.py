@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from pilotage.core.errors import InputError
+from pilotage.core.files import read_text
 
 SPARE_BYTES = 256 * 1024 * 1024
 """What the rest of the program and the machine keep."""
@@ -35,8 +36,8 @@ def require_memory(needed_bytes: int, what: str) -> None:
 def _meminfo() -> int | None:
     """``MemAvailable`` of Linux."""
     try:
-        lines = Path("/proc/meminfo").read_text().splitlines()
-    except OSError:
+        lines = read_text(Path("/proc/meminfo")).splitlines()
+    except InputError:
         return None
     for line in lines:
         if line.startswith("MemAvailable:"):
@@ -47,9 +48,9 @@ def _meminfo() -> int | None:
 def _container_room() -> int | None:
     """What a container's limit leaves (cgroup version 2)."""
     try:
-        limit = Path("/sys/fs/cgroup/memory.max").read_text().strip()
-        used = Path("/sys/fs/cgroup/memory.current").read_text().strip()
-    except OSError:
+        limit = read_text(Path("/sys/fs/cgroup/memory.max")).strip()
+        used = read_text(Path("/sys/fs/cgroup/memory.current")).strip()
+    except InputError:
         return None
     return max(0, int(limit) - int(used)) if limit.isdigit() and used.isdigit() else None
 

@@ -11,6 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pilotage.core.errors import InputError
+from pilotage.core.files import opened, read_text
+from pilotage.core.limits import DATA_BYTES
 from pilotage.core.types import BoolArray, FloatArray, IntArray, Pose2
 from pilotage.maps.memory import require_memory
 from pilotage.maps.occupancy_grid import CORNER, OccupancyGrid
@@ -95,9 +97,7 @@ def read_moving_ai_map(path: Path) -> MovingAiMap:
         Where the file is missing, its header is wrong, it is cut short, a row has another length than the
         header says, a letter is unknown, or the map does not fit into memory.
     """
-    if not path.is_file():
-        raise InputError(f"map '{path}': expected a MovingAI map file, found none there")
-    with path.open("rb") as file:
+    with opened(path, "a MovingAI map file", DATA_BYTES) as file:
         head = file.read(4096)
         header = re.match(rb"\s*((?:[^\n]*\n){1,20}?)map[ \t]*\r?\n", head)
         if header is None:
@@ -152,12 +152,7 @@ def read_scenario(path: Path) -> Scenario:
     InputError
         Where the file is missing, empty, or a line is not a problem.
     """
-    if not path.is_file():
-        raise InputError(f"scenario '{path}': expected a MovingAI scenario file, found none there")
-    try:
-        lines = path.read_text(encoding="ascii").splitlines()
-    except UnicodeDecodeError:
-        raise InputError(f"{path}: expected a MovingAI scenario file, found something else") from None
+    lines = read_text(path, "a MovingAI scenario file").splitlines()
     first = lines[0].split() if lines else []
     has_version = len(first) == 2 and first[0] == "version"
     # bucket, map, [columns, rows,] start x, y, goal x, y, length; before them a map's name may hold blanks.

@@ -18,8 +18,8 @@ from pydantic import Field, field_validator, model_validator
 
 from pilotage.core.config import Config, validate
 from pilotage.core.errors import InputError
+from pilotage.core.files import read_yaml
 from pilotage.core.types import Pose2
-from pilotage.core.yaml_text import load_yaml
 from pilotage.maps.grid_image import ByteArray, read_grey, write_grey
 from pilotage.maps.occupancy_grid import FREE, OCCUPIED, UNKNOWN, OccupancyArray, OccupancyGrid
 
@@ -130,7 +130,7 @@ def read_ros_map(path: Path) -> RosMap:
     InputError
         Where a file is missing, a key is wrong, or the image is not grey.
     """
-    return parse_ros_map(_load_yaml(path), path)
+    return parse_ros_map(read_yaml(path, "a map file"), path)
 
 
 def parse_ros_map(values: Any, path: Path) -> RosMap:
@@ -150,13 +150,3 @@ def write_ros_map(path: Path, ros_map: RosMap) -> None:
     values["negate"] = int(file.negate)
     values["origin"] = list(file.origin)
     path.write_text(yaml.safe_dump(values, sort_keys=False, default_flow_style=None, width=1000))
-
-
-def _load_yaml(path: Path) -> Any:
-    if not path.is_file():
-        raise InputError(f"map '{path}': expected a map file, found none there")
-    try:
-        text = path.read_text(encoding="utf-8")
-    except UnicodeDecodeError as error:
-        raise InputError(f"{path}: expected YAML, found something else ({error})") from None
-    return load_yaml(text, str(path))

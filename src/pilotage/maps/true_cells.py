@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from pilotage.core.config import Config, validate
-from pilotage.core.errors import InputError
-from pilotage.core.yaml_text import load_yaml
+from pilotage.core.files import read_yaml
 from pilotage.maps.cell_map import CellMap, CellState, TrueCellMap
 from pilotage.maps.cell_map_text import features_only, read_cell_map
 
@@ -45,13 +44,7 @@ def read_true_map(path: str | Path) -> TrueCellMap:
     """
     if Path(path).suffix.lower() not in (".yaml", ".yml"):
         return TrueCellMap(features_only(read_cell_map(path)))
-    try:
-        text = Path(path).read_text(encoding="utf-8")
-    except OSError as error:
-        raise InputError(f"{path}: {error.strerror or error}") from None
-    except UnicodeDecodeError as error:
-        raise InputError(f"{path}: not a YAML file: {error}") from None
-    return true_map(validate(SheetFile, load_yaml(text, str(path)), str(path)))
+    return true_map(validate(SheetFile, read_yaml(Path(path), "a true map"), str(path)))
 
 
 def true_map(sheet: SheetFile) -> TrueCellMap:

@@ -9,13 +9,18 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from pydantic import ConfigDict, Field, model_validator
+from pydantic import ConfigDict, Field, field_validator, model_validator
 
 from pilotage.core.config import Config
+from pilotage.core.shown import visible
 from pilotage.sensors.sensor import NonNegative, Positive
 
 TOP_KEYS = ("mission", "description", "world", "robot", "stack", "run")
 DEFAULT_KIND = "floor"
+LARGEST_SEED = 2**63 - 1
+"""As a database holds whole numbers."""
+LONGEST_NAME = 100
+"""Characters of a mission's name, which becomes a part of its folders' names."""
 
 Point = tuple[float, float]
 
@@ -62,11 +67,19 @@ class RunConfig(Config):
 
     dt_s: float = Field(default=0.1, ge=1e-4, le=10.0)
     time_limit_s: Positive = 600.0
-    seed: int = Field(default=0, ge=0)
+    seed: int = Field(default=0, ge=0, le=LARGEST_SEED)
     settle_s: NonNegative = 1.0
     """Errors count after this long: the start error is drawn, not earned."""
     oracles: tuple[str, ...] = ()
     """Modules that know the truth in this run, to find out what the real ones cost."""
+
+    @field_validator("oracles")
+    @classmethod
+    def _every_oracle_once(cls, names: tuple[str, ...]) -> tuple[str, ...]:
+        for i, name in enumerate(names):
+            if name in names[:i]:
+                raise ValueError(f"expected every oracle once, found '{name}' twice")
+        return names
 
 
 class Mission(Config):
@@ -75,9 +88,16 @@ class Mission(Config):
     Each kind is a subclass in a module of its own that adds ``world``, ``robot`` and ``stack``.
     """
 
-    mission: str = Field(min_length=1)
+    mission: str = Field(min_length=1, max_length=LONGEST_NAME)
     description: str = ""
     run: RunConfig = RunConfig()
+
+    @field_validator("mission")
+    @classmethod
+    def _can_be_shown(cls, name: str) -> str:
+        if visible(name) != name:
+            raise ValueError(f"expected a name without control characters, found '{visible(name)}'")
+        return name
 
     @model_validator(mode="after")
     def _steps(self) -> Mission:

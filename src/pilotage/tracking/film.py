@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pilotage.core.errors import InputError
+from pilotage.core.files import require_file
 from pilotage.tracking.opencv import hushed, opencv
 
 Image = NDArray[np.uint8]
@@ -120,8 +121,7 @@ def reduced(image: Image, by: int) -> Image:
 @contextmanager
 def _opened(path: Path) -> Iterator[Any]:
     cv2 = opencv()
-    if not path.is_file():
-        raise InputError(f"{path}: no such video file")
+    require_file(path, "a video file")
     with hushed():
         capture = cv2.VideoCapture(str(path), cv2.CAP_FFMPEG)
     try:

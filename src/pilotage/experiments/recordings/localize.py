@@ -247,7 +247,8 @@ def _write(
     try:
         draft.chmod(0o755)
         (draft / "localizer.yaml").write_text(settings, encoding="utf-8")
-        pq.write_table(pa.table(trace), draft / "trace.parquet")
+        with (draft / "trace.parquet").open("wb") as file:  # Arrow takes no name whose bytes are no UTF-8
+            pq.write_table(pa.table(trace), file)
         lines = [json.dumps({"t_s": e.t_s, "kind": e.kind, "text": e.text}) + "\n" for e in events]
         (draft / "events.jsonl").write_text("".join(lines), encoding="utf-8")
         (draft / "world.json").write_text(json.dumps(world), encoding="utf-8")

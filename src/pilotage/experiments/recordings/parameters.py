@@ -7,8 +7,8 @@ from importlib import resources
 from typing import Any
 
 import numpy as np
-import yaml
 
+from pilotage.core.yaml_text import load_yaml
 from pilotage.experiments.recordings.drive import BEACONS, RecordedDrive
 from pilotage.experiments.values import merge
 from pilotage.sensors.beacon import BeaconConfig
@@ -28,7 +28,7 @@ def shipped_parameters(drive: RecordedDrive, localizer: str, form: str) -> tuple
     if localizer != LEARNED:
         return {}, []
     text = (resources.files("pilotage.experiments.recordings") / f"{form}.yaml").read_text(encoding="utf-8")
-    content = yaml.safe_load(text)
+    content = load_yaml(text, f"{form}.yaml")
     if form == "aer1513":
         return _by_data_sheet(drive, content), []
     for chosen in content["sets"]:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -20,6 +18,7 @@ from pilotage.experiments.components import build_component
 from pilotage.experiments.ideal_sensors import ideal
 from pilotage.experiments.terrain.ground import Ground
 from pilotage.experiments.terrain.oracles import true_estimate
+from pilotage.maps.landmark_table import read_landmark_table
 from pilotage.maps.landmarks import Landmarks
 from pilotage.missions.terrain import TerrainMission
 from pilotage.sensors.beacon import BeaconConfig
@@ -100,35 +99,6 @@ def landmarks_of(mission: TerrainMission, ground: Ground) -> Landmarks:
         ids = np.array([entry.id for entry in table], dtype=np.int64)
         return Landmarks(ids, np.array([(entry.x_m, entry.y_m) for entry in table]).reshape(-1, 2))
     return NO_LANDMARKS if ground.landmarks is None else ground.landmarks
-
-
-def read_landmark_table(path: Path) -> Landmarks:
-    """Read a CSV file with the columns id, x_m, y_m.
-
-    Raises
-    ------
-    InputError
-        File and line of what is wrong.
-    """
-    try:
-        lines = path.read_text(encoding="utf-8-sig").splitlines()
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"landmarks '{path}': expected a CSV file, found: {error}") from None
-    rows = csv.DictReader(lines)
-    missing = [name for name in ("id", "x_m", "y_m") if name not in (rows.fieldnames or ())]
-    if missing:
-        raise InputError(f"{path} line 1: expected the columns id, x_m, y_m, found no {missing[0]}")
-    entries = []
-    for row in rows:
-        try:
-            entry = int(row["id"]), float(row["x_m"]), float(row["y_m"])
-        except (TypeError, ValueError):
-            raise InputError(f"{path} line {rows.line_num}: expected a whole id and two numbers") from None
-        if not (math.isfinite(entry[1]) and math.isfinite(entry[2])):
-            raise InputError(f"{path} line {rows.line_num}: expected finite numbers")
-        entries.append(entry)
-    table = np.array(entries).reshape(-1, 3)
-    return Landmarks(table[:, 0].astype(np.int64), table[:, 1:])
 
 
 def seen_per_step(log: LandmarkLog) -> IntArray:

@@ -11,13 +11,22 @@ from pilotage.report.calibration.folder import CalibrationData
 from pilotage.report.calibration.plots import histogram, panels_in_a_row
 from pilotage.report.style import BLUE, SKY, VERMILLION, Illustration, Key, render, series
 
+MOST_FIGURES = 24
+"""A log may have a thousand columns; nobody looks at so many pictures, and a page of them opens nowhere."""
+
 
 def range_figures(data: CalibrationData) -> list[Illustration]:
-    """Draw every quantity of every sensor."""
-    return [_figure(data, i, entry) for i, entry in enumerate(data.answer["sensors"])]
+    """Draw every quantity of every sensor, the first ones where there are many."""
+    entries = data.answer["sensors"]
+    left_out = max(0, len(entries) - MOST_FIGURES)
+    more = f" {left_out} more quantities stand in the table alone." if left_out else ""
+    return [
+        _figure(data, i, entry, more if i == MOST_FIGURES - 1 else "")
+        for i, entry in enumerate(entries[:MOST_FIGURES])
+    ]
 
 
-def _figure(data: CalibrationData, index: int, entry: Mapping[str, Any]) -> Illustration:
+def _figure(data: CalibrationData, index: int, entry: Mapping[str, Any], more: str) -> Illustration:
     values = data.arrays[str(index)]
     unit = "m" if "mean_m" in entry else "rad"
     expected = entry.get(f"expected_{unit}")
@@ -42,7 +51,7 @@ def _figure(data: CalibrationData, index: int, entry: Mapping[str, Any]) -> Illu
         (has_spread, Key("fitted normal", VERMILLION)),
     )
     keys = tuple(key for there, key in candidates if there)
-    return Illustration(slug, name, alt, _caption(entry, unit), render(figure, slug, alt), keys)
+    return Illustration(slug, name, alt, _caption(entry, unit) + more, render(figure, slug, alt), keys)
 
 
 def _caption(entry: Mapping[str, Any], unit: str) -> str:

@@ -1,0 +1,41 @@
+"""Damaged cases from healthy ones."""
+
+from __future__ import annotations
+
+import random
+import shutil
+from pathlib import Path
+
+from support import damage
+from support.fuzz_targets import Target
+
+NO_FILE_SHARE = 0.05
+
+
+class Healthy:
+    """Each use's healthy inputs, made once and copied."""
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+        self._made: dict[str, Path] = {}
+
+    def copy(self, target: Target, to: Path) -> Path:
+        """A fresh copy; what was there before is gone."""
+        if target.name not in self._made:
+            made = self._folder / str(len(self._made))
+            made.mkdir(parents=True)
+            target.write(made)
+            self._made[target.name] = made
+        shutil.rmtree(to, ignore_errors=True)
+        shutil.copytree(self._made[target.name], to)
+        return to
+
+
+def damaged_case(target: Target, healthy: Healthy, to: Path, rng: random.Random) -> str:
+    """Write a use's inputs, one of them damaged; says what was done to which."""
+    folder = healthy.copy(target, to)
+    path = folder / rng.choice(target.files)
+    if rng.random() < NO_FILE_SHARE:
+        return f"{path.name}: {damage.no_file(path, rng)}"
+    path.write_bytes(damage.damaged(path.read_bytes(), rng, target.trees))
+    return f"{path.name}: damaged"

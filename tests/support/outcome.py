@@ -1,0 +1,155 @@
+"""A command run in this process and what became of it: code, lines, processor time, memory, what is left."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import os
+import signal
+import sys
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from pilotage.cli.main import main
+
+CPU_S = 30.0
+"""Processor time after which a command counts as hung: ten times what the slowest damaged input takes."""
+WALL_S = 300.0
+"""For what waits without working, such as for a pipe that nobody writes."""
+MEMORY_MB = 1000
+"""What a damaged input may take beyond what the process holds anyway."""
+LONGEST_LINE = 1600
+
+
+class Hung(BaseException):
+    """Raised where a command takes too long; no handler of a command takes it for its own."""
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What a command did."""
+
+    code: int
+    out: str
+    err: str
+    grown_mb: float
+    new: tuple[str, ...]
+    """Files and folders that were not there before, below the working folder."""
+
+    def faults(self) -> list[str]:
+        """What it did that no command may do, whatever it is given."""
+        found = []
+        if self.code not in (0, 1, 2):
+            last = self.err.strip().splitlines()[-8:]
+            found.append(f"exit code {self.code}: {' | '.join(last)}")
+        lines = self.err.splitlines()
+        if self.code == 2:
+            if len(lines) != 1:
+                found.append(f"{len(lines)} lines on standard error: {self.err[-400:]!r}")
+            elif not lines[0].startswith("pilotage: ") or len(lines[0]) > LONGEST_LINE:
+                found.append(f"a line of {len(lines[0])} characters: {lines[0][:200]!r}")
+            if self.new:
+                found.append(f"left behind: {', '.join(self.new[:5])}")
+        if any("Warning" in line for line in lines):
+            found.append(f"a warning: {self.err[:300]!r}")
+        for name, text in (("output", self.out), ("error", self.err)):
+            wild = {c for c in text if not c.isprintable() and c != "\n"}
+            if wild:
+                found.append(f"control characters on standard {name}: {sorted(wild)}")
+        if self.grown_mb > MEMORY_MB:
+            found.append(f"{self.grown_mb:.0f} MB of memory")
+        hidden = [name for name in self.new if Path(name).name.startswith(".") and ".cache" not in name]
+        if hidden:
+            found.append(f"a draft left behind: {', '.join(hidden)}")
+        return found
+
+
+def run(words: Sequence[str], folder: Path) -> Outcome:
+    """Run ``pilotage WORDS`` in ``folder``; a command that hangs has exit code -1 and says so."""
+    before = set(_below(folder))
+    here = Path.cwd()
+    out, err = _Stream(), _Stream()
+    _forget_peak()
+    held = _peak_mb()
+    os.chdir(folder)
+    try:
+        with _limited(), contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
+            try:
+                code = main(list(words))
+            except Hung as limit:
+                code = -1
+                err.write(f"hung: {limit}")
+            except SystemExit as stop:
+                code = -2
+                err.write(f"SystemExit {stop.code}")
+    finally:
+        os.chdir(here)
+    new = tuple(sorted(set(_below(folder)) - before))
+    return Outcome(code, out.getvalue(), err.getvalue(), max(0.0, _peak_mb() - held), new)
+
+
+class _Stream(io.StringIO):
+    """As a terminal's stream: half characters are question marks, not errors."""
+
+    def write(self, text: str) -> int:
+        return super().write(text.encode("utf-8", "replace").decode("utf-8", "replace"))
+
+
+@contextlib.contextmanager
+def _limited() -> Iterator[None]:
+    """End what takes too long: by processor time, which others do not take away, and by the clock."""
+
+    def ended(signum: int, frame: object) -> None:  # noqa: ARG001 - as signal calls it
+        raise Hung(f"more than {CPU_S:g} s of processor time or {WALL_S:g} s")
+
+    before = {number: signal.signal(number, ended) for number in (signal.SIGPROF, signal.SIGUSR2)}
+    signal.setitimer(signal.ITIMER_PROF, CPU_S)
+    timer = _Timer(WALL_S)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_PROF, 0.0)
+        timer.stop()
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+class _Timer:
+    """Sends SIGUSR2 after a while: the command itself has a use for SIGALRM."""
+
+    def __init__(self, after_s: float) -> None:
+        import threading
+
+        self._timer = threading.Timer(after_s, os.kill, (os.getpid(), signal.SIGUSR2))
+        self._timer.daemon = True
+        self._timer.start()
+
+    def stop(self) -> None:
+        self._timer.cancel()
+
+
+def _below(folder: Path) -> Iterator[str]:
+    for root, folders, files in os.walk(folder):
+        for name in [*folders, *files]:
+            yield str((Path(root) / name).relative_to(folder))
+
+
+def _forget_peak() -> None:
+    """Let the kernel count the largest size anew, where it can."""
+    with contextlib.suppress(OSError):
+        Path("/proc/self/clear_refs").write_text("5")
+
+
+def _peak_mb() -> float:
+    try:
+        for line in Path("/proc/self/status").read_text().splitlines():
+            if line.startswith("VmHWM:"):
+                return int(line.split()[1]) / 1000.0
+    except OSError:
+        pass
+    return 0.0
+
+
+if __name__ == "__main__":  # one command in a process of its own, for those under a limit of memory
+    sys.exit(main(sys.argv[1:]))
