@@ -148,6 +148,7 @@ def test_a_new_name_drops_the_old_ones_parameters() -> None:
         ("world.obstacles.9.thickness_m=1", "index from 0 to 1"),
         ("stack.localizer.gate=1.5", "less than 1"),
         ("stack.local_planner.speed_m_s=5", "max_speed_m_s"),
+        ("run" + ".x" * 5000 + "=1", "expected at most 64 keys, found 5001"),
         ("run.oracles=[driver, driver]", "expected every oracle once, found 'driver' twice"),
         (f"mission={'long' * 30}", "at most 100 characters"),
         ('mission="a\\e[31m"', "a name without control characters, found 'a\\x1b[31m'"),
