@@ -39,6 +39,11 @@ def smoothed_times(t_s: FloatArray) -> FloatArray:
     return np.asarray((sums[2 * k + 1 :] - sums[: -2 * k - 1]) / (2 * k + 1))
 
 
+def distance(a: FloatArray, b: FloatArray) -> float:
+    """How far two motions (3,) are apart, a radian counting as half a metre."""
+    return float(np.hypot(a[0] - b[0], a[1] - b[1])) + 0.5 * abs(float(a[2] - b[2]))
+
+
 @dataclass(slots=True)
 class MotionGuess:
     """Guesses of the next relative motion, ordered by how far each was off lately.
@@ -50,6 +55,11 @@ class MotionGuess:
     errors: FloatArray = field(default_factory=lambda: np.array([0.0, 0.001, 0.002]))
     velocity: FloatArray = field(default_factory=lambda: np.zeros(3))
 
+    @property
+    def least_error(self) -> float:
+        """Running mean error of the most trusted guess."""
+        return float(self.errors.min())
+
     def guesses(self, step: FloatArray | None, dt_s: float) -> list[FloatArray]:
         """Return the motions (3,), the most trusted first."""
         same = self.velocity * dt_s if dt_s < 1.5 else np.zeros(3)
@@ -60,7 +70,5 @@ class MotionGuess:
         """Take in the motion that the scan told."""
         motions = [np.zeros(3) if step is None else step, self.velocity * dt_s, np.zeros(3)]
         for k, guess in enumerate(motions):
-            off = guess - motion
-            error = min(1.0, float(np.hypot(off[0], off[1])) + 0.5 * abs(float(off[2])))
-            self.errors[k] += _MEMORY * (error - self.errors[k])
+            self.errors[k] += _MEMORY * (min(1.0, distance(guess, motion)) - self.errors[k])
         self.velocity = 0.5 * self.velocity + 0.5 * motion / max(dt_s, 0.05)
