@@ -200,6 +200,9 @@ def test_covariances_are_those_of_the_dense_inverse() -> None:
     found = covariances(graph)
     expected = np.array([full[3 * k : 3 * k + 3, 3 * k : 3 * k + 3] for k in range(n)])
     np.testing.assert_allclose(found.marginals(), expected, rtol=1e-6, atol=1e-12)
+    chosen = np.array([40, 0, 7, 59, 7])
+    places = (3 * chosen[:, None] + np.arange(3)).ravel()
+    np.testing.assert_allclose(found.joint(chosen), full[np.ix_(places, places)], rtol=1e-6, atol=1e-12)
     i, j = np.array([0, 5, 5, 17, 30, 9]), np.array([4, 0, 40, 17, 12, 59])
     by_i, by_j = relative_jacobians(graph.poses[i], graph.poses[j])
     for k in range(i.size):

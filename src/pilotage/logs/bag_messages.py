@@ -64,7 +64,9 @@ def bag_format(path: Path) -> BagFormat | None:
 
 def is_bag(path: Path) -> bool:
     """Whether the path is a bag: a file of one of the kinds, or a folder that holds some."""
-    return bool(_storage_files(path)) if path.is_dir() else bag_format(path) is not None
+    if not path.is_dir():
+        return bag_format(path) is not None
+    return (path / "metadata.yaml").is_file() or bool(_storage_files(path))
 
 
 def _storage_files(folder: Path) -> list[Path]:

@@ -234,31 +234,48 @@ def _mcap_record(
 
 
 def _walk_sqlite(found: Salvage) -> Iterator[Raw]:
-    # Read-only and without a lock: the file may lie on a read-only disk.
-    base = sqlite3.connect(f"file:{_quoted(found.path)}?mode=ro&immutable=1", uri=True)
+    # What is missing at the end of a file is zeros to SQLite, also within a message that is cut. Filled up
+    # with two different bytes, a message that is not the same in both is cut.
+    data = found.path.read_bytes()
+    missing = _missing(data)
+    walks = [_sqlite_rows(data + missing * fill, found) for fill in ((b"\0", b"\xff") if missing else (b"",))]
+    cut = "the file is cut short" if missing else ""
     try:
+        for rows in zip(*walks, strict=False):
+            if all(row == rows[0] for row in rows):
+                yield rows[0]
+    except (sqlite3.Error, ValueError, TypeError, OverflowError) as error:
+        cut = cut or f"the file is damaged ({error})"
+    found.damage = _damage(found.path, 0, cut)
+
+
+def _missing(data: bytes) -> int:
+    """Bytes that a SQLite file lacks by its own header, as far as there can be use in filling them up."""
+    if len(data) < 100:
+        return 0
+    page = int.from_bytes(data[16:18], "big")
+    whole = (65536 if page == 1 else page) * int.from_bytes(data[28:32], "big")
+    return max(0, whole - len(data)) if whole < 20 * len(data) else 0
+
+
+def _sqlite_rows(data: bytes, found: Salvage) -> Iterator[Raw]:
+    base = sqlite3.connect(":memory:")
+    try:
+        base.deserialize(data)
         # Without this, a file shorter than its header says is refused as a whole.
         base.execute("PRAGMA writable_schema=ON")
         names: dict[int, str] = {}
         for number, topic, msgtype, form in base.execute(
             "SELECT id, name, type, serialization_format FROM topics"
         ):
-            names[number] = topic
-            found.learn(topic, msgtype, form, "")
+            if isinstance(topic, str) and isinstance(msgtype, str):
+                names[number] = topic
+                found.learn(topic, msgtype, str(form), "")
         for number, stamp, raw in base.execute("SELECT topic_id, timestamp, data FROM messages NOT INDEXED"):
             if number in names and isinstance(raw, bytes):
                 yield names[number], int(stamp), raw
-        found.damage = ""
-    except (sqlite3.Error, ValueError, TypeError, OverflowError) as error:
-        found.damage = (
-            f"{found.path.name}: the file is cut short or damaged ({error}); what is there was read"
-        )
     finally:
         base.close()
-
-
-def _quoted(path: Path) -> str:
-    return str(path.resolve()).replace("%", "%25").replace("?", "%3f").replace("#", "%23")
 
 
 _WALKS: dict[BagFormat, Callable[[Salvage], Iterator[Raw]]] = {

@@ -120,16 +120,12 @@ class _Collected:
 
 def _collect(bag: OpenBag, path: Path, picked: _Picked) -> LaserLog:
     found = _Collected()
-    names = {picked.scan, *picked.transforms} | ({picked.odometry} if picked.odometry else set())
-    for topic, time_ns, message in bag.messages(names):
-        if message is None:
-            found.damaged += 1
-        elif topic == picked.scan:
-            _add_scan(found, message, time_ns)
-        elif topic == picked.odometry:
-            _add_odometry(found, message, time_ns)
-        else:
-            _add_transforms(found, message, time_ns, keep_moving=picked.odometry is None)
+    static = {name for name in picked.transforms if name.endswith("static")}
+    moving = set(picked.transforms) - static
+    _read(bag, picked, {picked.scan, *static} | ({picked.odometry} if picked.odometry else set()), found)
+    # The moving transforms are as many as the odometry: they are read only where they are needed.
+    if moving and (not found.odometry or found.tree.chain(found.base_frame, found.scan_frame) is None):
+        _read(bag, picked, moving, found)
     said = list(picked.warnings)
     if found.damaged:
         said.append(f"{found.damaged} messages that cannot be read were passed over")
@@ -144,6 +140,19 @@ def _collect(bag: OpenBag, path: Path, picked: _Picked) -> LaserLog:
     )
 
 
+def _read(bag: OpenBag, picked: _Picked, names: set[str], found: _Collected) -> None:
+    for topic, time_ns, message in bag.messages(names):
+        try:
+            if topic == picked.scan:
+                _add_scan(found, message, time_ns)
+            elif topic == picked.odometry:
+                _add_odometry(found, message, time_ns)
+            else:
+                _add_transforms(found, message, time_ns)
+        except (AttributeError, TypeError, ValueError, OverflowError):
+            found.damaged += 1  # None, or what a damaged definition made of it
+
+
 def _stamp_s(found: _Collected, header: Any, time_ns: int) -> float:
     seconds, nanoseconds = int(header.stamp.sec), int(header.stamp.nanosec)
     if seconds == 0 and nanoseconds == 0:
@@ -154,7 +163,7 @@ def _stamp_s(found: _Collected, header: Any, time_ns: int) -> float:
 
 def _add_scan(found: _Collected, message: Any, time_ns: int) -> None:
     if not found.scans:
-        found.scan_frame = message.header.frame_id
+        found.scan_frame = frame_name(message.header.frame_id)
     found.scans.append(
         RawScan(
             _stamp_s(found, message.header, time_ns),
@@ -170,14 +179,15 @@ def _add_scan(found: _Collected, message: Any, time_ns: int) -> None:
 def _add_odometry(found: _Collected, message: Any, time_ns: int) -> None:
     found.base_frame = found.base_frame or frame_name(message.child_frame_id)
     point, turn = message.pose.pose.position, message.pose.pose.orientation
+    row = float(point.x), float(point.y), _heading(turn)
     found.odometry_t_s.append(_stamp_s(found, message.header, time_ns))
-    found.odometry.append((float(point.x), float(point.y), _heading(turn)))
+    found.odometry.append(row)
 
 
-def _add_transforms(found: _Collected, message: Any, time_ns: int, keep_moving: bool) -> None:
+def _add_transforms(found: _Collected, message: Any, time_ns: int) -> None:
     for transform in message.transforms:
         found.tree.add(transform)
-        if keep_moving and frame_name(transform.header.frame_id) in USUAL_ODOMETRY_FRAMES:
+        if not found.odometry and frame_name(transform.header.frame_id) in USUAL_ODOMETRY_FRAMES:
             shift, turn = transform.transform.translation, transform.transform.rotation
             found.tf_odometry.append(
                 (

@@ -22,6 +22,8 @@ from pilotage.logs.carmen import CarmenLog, read_carmen
 CARMEN_RANGE_MIN_M = 0.05
 CARMEN_RANGE_MAX_M = 80.0
 """A CARMEN scan of the old form says nothing of its limits; the SICK scanners in use then reach 80 m."""
+LARGEST_MOUNT_SPREAD = 0.02
+"""Median deviation, in metres or radians, beyond which two poses of each scan give no mount."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -251,13 +253,19 @@ def laser_log_of_carmen(log: CarmenLog, name: str) -> LaserLog:
     if t_s.size == 0:
         t_s, poses = log.t_s, log.robot_poses
         said.append("no ODOM lines: odometry is what the scans carry")
-    return assemble(name, scans, _mount(log), False, t_s, poses, said)
+    return assemble(name, scans, _mount(log, said), False, t_s, poses, said)
 
 
-def _mount(log: CarmenLog) -> Pose2:
+def _mount(log: CarmenLog, said: list[str]) -> Pose2:
     offset = log.laser_poses - log.robot_poses
     c, s = np.cos(log.robot_poses[:, 2]), np.sin(log.robot_poses[:, 2])
     x = c * offset[:, 0] + s * offset[:, 1]
     y = -s * offset[:, 0] + c * offset[:, 1]
     turn = wrap_array_to_pi(offset[:, 2])
-    return Pose2(float(np.median(x)), float(np.median(y)), float(np.median(turn)))
+    mount = np.array([np.median(x), np.median(y), np.median(turn)])
+    # Corrected logs may give the laser's pose in the map and the robot's by odometry.
+    spread = np.median(np.abs(np.column_stack([x, y, turn]) - mount), axis=0).max()
+    if spread > LARGEST_MOUNT_SPREAD:
+        said.append("the scans' laser and robot poses do not belong together: the mount is taken as zero")
+        mount[:] = 0.0
+    return Pose2(float(mount[0]), float(mount[1]), float(mount[2]))

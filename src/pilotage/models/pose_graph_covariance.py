@@ -9,7 +9,7 @@ import numpy as np
 from pilotage.core.errors import InputError
 from pilotage.core.types import BoolArray, FloatArray, IntArray
 from pilotage.kernels.slam.block_cholesky import factorize
-from pilotage.kernels.slam.covariances import inverse_blocks
+from pilotage.kernels.slam.covariances import inverse_blocks, inverse_submatrix
 from pilotage.kernels.slam.edges import SQUARE, normal_equations
 from pilotage.models.pose_graph import PoseGraph
 from pilotage.models.pose_graph_solver import Elimination, check_fixed, eliminate
@@ -46,17 +46,30 @@ class PoseCovariances:
         out = by_i @ own_i @ turned_i + by_j @ own_j @ turned_j + cross + cross.transpose(0, 2, 1)
         return np.asarray(0.5 * (out + out.transpose(0, 2, 1)))
 
+    def joint(self, poses: IntArray) -> FloatArray:
+        """Return (3 C, 3 C) the joint covariance of x, y, theta in the map of some poses (C,)."""
+        return inverse_submatrix(
+            self.plan.column_start,
+            self.plan.rows,
+            self.diagonal,
+            self.below,
+            self.plan.column[self._checked(poses)],
+        )
+
+    def _checked(self, poses: IntArray) -> IntArray:
+        index = np.asarray(poses, dtype=np.int64)
+        if index.size and not (index.min() >= 0 and index.max() < len(self.graph)):
+            raise InputError(f"covariances: expected poses 0 to {len(self.graph) - 1}, found others")
+        return index
+
     def _blocks(self, i: IntArray, j: IntArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        for index in (i, j):
-            if index.size and not (index.min() >= 0 and index.max() < len(self.graph)):
-                raise InputError(f"covariances: expected poses 0 to {len(self.graph) - 1}, found others")
         return inverse_blocks(
             self.plan.column_start,
             self.plan.rows,
             self.diagonal,
             self.below,
-            self.plan.column[i],
-            self.plan.column[j],
+            self.plan.column[self._checked(i)],
+            self.plan.column[self._checked(j)],
         )
 
 

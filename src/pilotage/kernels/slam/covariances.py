@@ -63,6 +63,45 @@ def inverse_blocks(
 
 
 @kernel
+def inverse_submatrix(
+    column_start: IntArray, rows: IntArray, diagonal: FloatArray, below: FloatArray, chosen: IntArray
+) -> FloatArray:
+    """The rows and columns of the inverse that belong to ``chosen`` columns (C,): (3 C, 3 C).
+
+    Negative columns are fixed poses: zeros. Arguments as in ``inverse_blocks``.
+    """
+    count, n = chosen.size, len(diagonal)
+    out = np.zeros((3 * count, 3 * count))
+    starts, total = np.zeros(count + 1, np.int64), 0
+    for k in range(count):
+        c = chosen[k]
+        while c >= 0:
+            total += 1
+            c = _parent(column_start, rows, c)
+        starts[k + 1] = total
+    path, kept = np.empty(total, np.int64), np.empty((total, 9))
+    y = np.zeros((n, 9))
+    block = np.empty((3, 3))
+    for k in range(count):
+        _solve_path(column_start, rows, diagonal, below, chosen[k], y)
+        c = chosen[k]
+        for q in range(starts[k], starts[k + 1]):
+            path[q], kept[q] = c, y[c]
+            c = _parent(column_start, rows, c)
+        for m in range(k + 1):
+            block[:] = 0.0
+            for q in range(starts[m], starts[m + 1]):
+                v, w = y[path[q]], kept[q]
+                for r in range(3):
+                    for s in range(3):
+                        block[r, s] += v[r] * w[s] + v[3 + r] * w[3 + s] + v[6 + r] * w[6 + s]
+            out[3 * k : 3 * k + 3, 3 * m : 3 * m + 3] = block
+            out[3 * m : 3 * m + 3, 3 * k : 3 * k + 3] = block.T
+        _clear_path(column_start, rows, chosen[k], y)
+    return out
+
+
+@kernel
 def _parent(column_start: IntArray, rows: IntArray, c: int) -> int:
     """The next column on the path to the root of the elimination tree, or -1."""
     return rows[column_start[c]] if column_start[c] < column_start[c + 1] else -1

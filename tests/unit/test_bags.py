@@ -1,0 +1,264 @@
+"""Bags of every form read alike; what is missing, damaged or odd is said and nothing lost."""
+
+from __future__ import annotations
+
+import contextlib
+import math
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pilotage.core.errors import InputError
+from pilotage.logs.bags import read_bag
+from pilotage.logs.laser_log import LaserLog
+from support.laser_bags import FORMS, Drive, Scan, drive, with_scan, write_ros1, write_ros2
+
+pytest.importorskip("rosbags")
+pytest.importorskip("mcap_ros2")
+
+UPSIDE_DOWN = (1.0, 0.0, 0.0, 0.0)
+"""Half a turn about the axis ahead."""
+CUT_FORMS = ["ros1", "ros1-bz2", "ros1-lz4", "ros2-sqlite-file", "ros2-mcap-file", "foreign-mcap"]
+CUT_FORMS += ["foreign-mcap-lz4", "foreign-mcap-plain", "ros1-mcap"]
+
+
+def read(folder: Path, whole: Drive, form: str = "ros1") -> LaserLog:
+    return read_bag(FORMS[form](folder, whole))
+
+
+@pytest.mark.parametrize("form", list(FORMS))
+def test_every_form_reads_alike(tmp_path: Path, form: str) -> None:
+    whole = drive()
+    log = read(tmp_path, whole, form)
+    assert log.warnings == ()
+    np.testing.assert_allclose(log.t_s, [scan.t_s for scan in whole.scans], atol=1e-6)
+    assert np.array_equal(log.ranges_m, [scan.ranges_m for scan in whole.scans])
+    assert (log.beams == 21).all()
+    np.testing.assert_allclose(log.angles_rad(3), -1.0 + 0.1 * np.arange(21), atol=1e-6)
+    assert [log.range_min_m, log.range_max_m] == pytest.approx([0.1, 30.0])
+    assert (log.mount.x_m, log.mount.y_m, log.mount.theta_rad) == pytest.approx((0.2, 0.1, 0.0))
+    assert not log.upside_down
+    assert log.odometry is not None
+    assert log.odometry_t_s is not None
+    rows = np.array(whole.odometry)
+    np.testing.assert_allclose(log.odometry_t_s, rows[:, 0], atol=1e-6)
+    np.testing.assert_allclose(log.odometry, rows[:, 1:], atol=1e-9)
+
+
+def test_odometry_is_interpolated_over_the_turn_of_headings(tmp_path: Path) -> None:
+    at = read(tmp_path, drive()).odometry_at_scans()
+    assert at is not None
+    k = 1.0 + 2.0 * np.arange(30)
+    np.testing.assert_allclose(at[:, 0], 0.01 * k, atol=1e-6)
+    assert np.abs(np.angle(np.exp(1j * (at[:, 2] - 3.0 - 0.01 * k)))).max() < 1e-6
+    assert ((at[:, 2] >= -math.pi) & (at[:, 2] < math.pi)).all()
+
+
+def test_an_upside_down_scanner_is_turned_round(tmp_path: Path) -> None:
+    """Beam k of the scanner points to -angle on the robot; the log's beams go counter-clockwise again."""
+    whole = replace(drive(), mount_turn=UPSIDE_DOWN)
+    log = read(tmp_path, whole)
+    assert log.upside_down
+    assert log.mount.theta_rad == pytest.approx(0.0)
+    assert np.array_equal(log.ranges_m[0], whole.scans[0].ranges_m[::-1])
+    np.testing.assert_allclose(log.angles_rad(0), -1.0 + 0.1 * np.arange(21), atol=1e-6)
+    lopsided = replace(whole, scans=(replace(whole.scans[0], first_rad=-0.5),))
+    (tmp_path / "b").mkdir()
+    again = read(tmp_path / "b", lopsided)
+    np.testing.assert_allclose(again.angles_rad(0), -1.5 + 0.1 * np.arange(21), atol=1e-6)
+
+
+def test_a_turned_scanner(tmp_path: Path) -> None:
+    whole = replace(drive(), mount_turn=(0.0, 0.0, math.sin(0.4), math.cos(0.4)))
+    assert read(tmp_path, whole).mount.theta_rad == pytest.approx(0.8)
+
+
+def test_a_tilted_scanner_is_told(tmp_path: Path) -> None:
+    whole = replace(drive(), mount_turn=(0.0, math.sin(0.1), 0.0, math.cos(0.1)))
+    assert any("tilted by 11 deg" in said for said in read(tmp_path, whole).warnings)
+
+
+def test_a_scanner_that_counts_clockwise(tmp_path: Path) -> None:
+    whole = drive(1)
+    whole = with_scan(whole, 0, first_rad=1.0, step_rad=-0.1)
+    log = read(tmp_path, whole)
+    assert np.array_equal(log.ranges_m[0], whole.scans[0].ranges_m[::-1])
+    np.testing.assert_allclose(log.angles_rad(0), -1.0 + 0.1 * np.arange(21), atol=1e-6)
+
+
+def test_ranges_of_three_kinds(tmp_path: Path) -> None:
+    odd = np.array([1.0, np.nan, np.inf, -np.inf, 0.0, -2.0, 0.05, 0.1, 30.0, 31.0])
+    log = read(tmp_path, with_scan(drive(), 4, ranges_m=odd))
+    expected = [1.0, np.nan, np.inf, np.nan, np.nan, np.nan, np.nan, 0.1, 30.0, np.inf]
+    np.testing.assert_allclose(log.ranges_m[4, :10], expected, rtol=1e-6)
+    assert np.isnan(log.ranges_m[4, 10:]).all()
+    assert log.beams[4] == 10
+    assert np.isnan(log.angles_rad(4)[10:]).all()
+    assert log.warnings == ("the number of beams changes from scan to scan (10, 21)",)
+
+
+def test_times_that_go_back_are_sorted_and_told(tmp_path: Path) -> None:
+    """The stamp, not the receipt, is a scan's time."""
+    whole = drive()
+    whole = replace(whole, received_s={5: whole.scans[8].t_s + 0.01})
+    log = read(tmp_path, whole)
+    np.testing.assert_allclose(log.t_s, [scan.t_s for scan in whole.scans], atol=1e-6)
+    assert np.array_equal(log.ranges_m[5], whole.scans[5].ranges_m)
+    assert log.warnings == ("1 times of the scans go back (by 0.300 s at most): sorted by time",)
+
+
+def test_two_scans_of_one_time_are_kept_and_told(tmp_path: Path) -> None:
+    whole = drive()
+    log = read(tmp_path, with_scan(whole, 3, t_s=whole.scans[2].t_s))
+    assert len(log) == 30
+    assert log.warnings == ("1 of the scans carry the time of the one before",)
+
+
+def test_messages_without_stamps_go_by_their_receipt(tmp_path: Path) -> None:
+    log = read(tmp_path, replace(drive(), stamped=False))
+    np.testing.assert_allclose(log.t_s, 1000.0 + 0.1 * np.arange(30), atol=1e-6)
+    assert log.warnings == ("30 messages carry no time: the time of receipt is used",)
+
+
+def test_no_odometry_is_allowed_and_told(tmp_path: Path) -> None:
+    log = read(tmp_path, replace(drive(), odometry=()))
+    assert log.odometry is None
+    assert log.odometry_at_scans() is None
+    assert log.warnings == ("no odometry",)
+    assert log.mount.x_m == pytest.approx(0.2)
+
+
+def test_odometry_from_transforms(tmp_path: Path) -> None:
+    whole = replace(drive(), odometry_as_transforms=True)
+    log = read(tmp_path, whole)
+    assert log.odometry is not None
+    np.testing.assert_allclose(log.odometry, np.array(whole.odometry)[:, 1:], atol=1e-9)
+    assert log.mount.x_m == pytest.approx(0.2)
+    assert any("taken from the transforms of 'base_link'" in said for said in log.warnings)
+
+
+def test_odometry_that_is_not_finite_or_short(tmp_path: Path) -> None:
+    rows = list(drive().odometry[:30])
+    rows[7] = (rows[7][0], math.nan, 0.0, 0.0)
+    log = read(tmp_path, replace(drive(), odometry=tuple(rows)))
+    assert log.odometry is not None
+    assert log.odometry.shape == (29, 3)
+    assert "1 odometry readings that are not finite were left out" in log.warnings
+    assert any("odometry covers" in said for said in log.warnings)
+
+
+def test_no_mount_is_told(tmp_path: Path) -> None:
+    log = read(tmp_path, replace(drive(), without_mount=True))
+    assert log.mount.x_m == 0.0
+    assert any("no transforms from 'base_link' to the scanner's frame 'laser'" in s for s in log.warnings)
+
+
+def test_topics_by_name_and_by_default(tmp_path: Path) -> None:
+    whole = drive()
+    rear = tuple(replace(scan, topic="/rear/scan", ranges_m=scan.ranges_m + 1.0) for scan in whole.scans)
+    path = write_ros1(tmp_path / "two.bag", replace(whole, scans=whole.scans + rear[:-1]))
+    log = read_bag(path)
+    assert np.array_equal(log.ranges_m[0], whole.scans[0].ranges_m)
+    assert "laser scans are taken from /scan (also there: /rear/scan)" in log.warnings
+    other = read_bag(path, scan_topic="rear/scan")
+    assert len(other) == 29
+    np.testing.assert_allclose(other.ranges_m[0], whole.scans[0].ranges_m + 1.0, rtol=1e-6)
+    with pytest.raises(
+        InputError, match=r"topic /front of sensor_msgs/msg/LaserScan, found /odom \(nav_msgs"
+    ):
+        read_bag(path, scan_topic="/front")
+    with pytest.raises(InputError, match="topic /wheels of nav_msgs/msg/Odometry"):
+        read_bag(path, odometry_topic="/wheels")
+
+
+def test_a_bag_without_scans_tells_what_it_holds(tmp_path: Path) -> None:
+    with pytest.raises(InputError) as told:
+        read(tmp_path, replace(drive(), scans=()), "ros2-mcap")
+    assert "expected a topic of sensor_msgs/msg/LaserScan, found /odom (nav_msgs/msg/Odometry, 62)" in str(
+        told.value
+    )
+    assert "\n" not in str(told.value)
+
+
+def test_scans_without_beams(tmp_path: Path) -> None:
+    none = np.empty(0)
+    log = read(tmp_path, with_scan(drive(), 0, ranges_m=none))
+    assert len(log) == 29
+    assert log.warnings == ("1 scans without beams, times or angles were left out",)
+    (tmp_path / "b").mkdir()
+    with pytest.raises(InputError, match="30 scans without a usable beam"):
+        read(tmp_path / "b", Drive(tuple(Scan(scan.t_s, none) for scan in drive().scans)))
+
+
+@pytest.mark.parametrize("form", CUT_FORMS)
+@pytest.mark.parametrize("share", [0.5, 0.75, 0.95])
+def test_a_bag_cut_short_is_read_as_far_as_it_goes(tmp_path: Path, form: str, share: float) -> None:
+    whole = drive(400, 90)
+    path = FORMS[form](tmp_path, whole)
+    data = path.read_bytes()
+    path.write_bytes(data[: int(share * len(data))])
+    log = read_bag(path)
+    assert len(log) > 0.4 * share * 400
+    assert len(log) == 400 or any("cut short" in said for said in log.warnings)
+    number = np.round((log.t_s - 1000.0) / 0.1).astype(int)
+    assert np.array_equal(log.ranges_m, np.array([scan.ranges_m for scan in whole.scans])[number])
+    assert log.mount.x_m == pytest.approx(0.2)
+
+
+def test_a_folder_without_metadata(tmp_path: Path) -> None:
+    for storage in ("SQLITE3", "MCAP"):
+        path = write_ros2(tmp_path / storage.lower(), drive(), storage)
+        (path / "metadata.yaml").unlink()
+        assert len(read_bag(path)) == 30
+
+
+def test_what_is_no_bag(tmp_path: Path) -> None:
+    text = tmp_path / "a.bag"
+    text.write_text("no bag")
+    for path in (text, tmp_path):
+        with pytest.raises(InputError, match="expected a ROS 1 bag, a ROS 2 bag"):
+            read_bag(path)
+    with pytest.raises(InputError, match="no such file"):
+        read_bag(tmp_path / "missing.bag")
+    text.write_bytes(b"#ROSBAG V2.0\n")
+    with pytest.raises(InputError, match=r"none that can be read: a\.bag: the bag is cut short"):
+        read_bag(text)
+
+
+def test_without_the_library(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = write_ros1(tmp_path / "a.bag", drive())
+    for name in [name for name in sys.modules if name.split(".")[0] == "rosbags"]:
+        monkeypatch.delitem(sys.modules, name)
+    monkeypatch.setitem(sys.modules, "rosbags", None)
+    with pytest.raises(InputError, match=r"pip install pilotage\[ros\]"):
+        read_bag(path)
+
+
+@pytest.fixture(scope="module")
+def small_bags(tmp_path_factory: pytest.TempPathFactory) -> dict[str, bytes]:
+    out = {}
+    for form in CUT_FORMS:
+        folder = tmp_path_factory.mktemp(form)
+        out[form] = FORMS[form](folder, drive(10, 5)).read_bytes()
+    return out
+
+
+@pytest.mark.parametrize("form", CUT_FORMS)
+def test_damaged_bytes_are_one_line_or_a_log(tmp_path: Path, small_bags: dict[str, bytes], form: str) -> None:
+    """No other error than ours, whatever bytes are changed and wherever the file ends."""
+    suffix = ".bag" if form in {"ros1", "ros1-bz2", "ros1-lz4"} else ".db3" if "sqlite" in form else ".mcap"
+    path = tmp_path / f"a{suffix}"
+    for seed in range(20):
+        rng = np.random.default_rng(seed)
+        whole = bytearray(small_bags[form])
+        for _ in range(rng.integers(1, 9)):
+            whole[rng.integers(0, len(whole))] = rng.integers(0, 256)
+        cut = len(whole) if seed % 3 else int(rng.integers(len(whole) // 4, len(whole)))
+        path.write_bytes(bytes(whole[:cut]))
+        with contextlib.suppress(InputError):
+            log = read_bag(path)
+            assert len(log) > 0
+            assert (np.diff(log.t_s) >= 0.0).all()

@@ -1,0 +1,97 @@
+"""Laser logs from CARMEN logs, and which reader a recording gets."""
+
+from __future__ import annotations
+
+import gzip
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pilotage.core.errors import InputError
+from pilotage.core.types import FloatArray
+from pilotage.logs.laser_log import interpolate_poses, read_carmen_scans
+from pilotage.logs.laser_recordings import read_laser_log
+from support.laser_bags import drive, write_ros1
+
+
+def flaser(t_s: float, robot: tuple[float, float, float], ahead_m: float = 0.0) -> str:
+    x, y, theta = robot
+    laser = f"{x + ahead_m * math.cos(theta)} {y + ahead_m * math.sin(theta)} {theta}"
+    return f"FLASER 3 1.0 2.0 81.83 {laser} {x} {y} {theta} {t_s} nohost {t_s}\n"
+
+
+def odom(t_s: float, robot: tuple[float, float, float]) -> str:
+    return f"ODOM {robot[0]} {robot[1]} {robot[2]} 0 0 0 {t_s} nohost {t_s}\n"
+
+
+def poses(count: int) -> list[tuple[float, float, float]]:
+    return [(0.3 * k, 0.1 * k * k, math.remainder(0.7 * k, math.tau)) for k in range(count)]
+
+
+def written(folder: Path, text: str) -> Path:
+    path = folder / "a.log"
+    path.write_text(text)
+    return path
+
+
+def test_a_carmen_log(tmp_path: Path) -> None:
+    text = "".join(odom(k - 0.5, pose) + flaser(k, pose, 0.2) for k, pose in enumerate(poses(6)))
+    log = read_carmen_scans(written(tmp_path, text))
+    assert log.t_s.tolist() == [0, 1, 2, 3, 4, 5]
+    assert log.ranges_m[0].tolist() == [1.0, 2.0, math.inf]
+    np.testing.assert_allclose(log.angles_rad(0), [-math.pi / 2, 0.0, math.pi / 2])
+    assert (log.mount.x_m, log.mount.y_m, log.mount.theta_rad) == pytest.approx((0.2, 0.0, 0.0), abs=1e-9)
+    assert log.odometry_t_s is not None
+    assert log.odometry_t_s.tolist() == [-0.5, 0.5, 1.5, 2.5, 3.5, 4.5]
+    assert log.warnings == ()
+
+
+def test_odometry_of_the_scans_where_there_are_no_lines_of_it(tmp_path: Path) -> None:
+    log = read_carmen_scans(written(tmp_path, "".join(flaser(k, p) for k, p in enumerate(poses(4)))))
+    at = log.odometry_at_scans()
+    assert at is not None
+    np.testing.assert_allclose(at, poses(4))
+    assert log.warnings == ("no ODOM lines: odometry is what the scans carry",)
+
+
+def test_times_that_go_back(tmp_path: Path) -> None:
+    text = "".join(flaser(t, poses(9)[int(t)]) for t in (0.0, 2.0, 1.0, 3.0))
+    log = read_carmen_scans(written(tmp_path, text))
+    assert log.t_s.tolist() == [0, 1, 2, 3]
+    assert any("1 times of the scans go back (by 1.000 s at most)" in said for said in log.warnings)
+
+
+def test_poses_of_two_frames_give_no_mount(tmp_path: Path) -> None:
+    text = "".join(
+        flaser(k, pose).replace(f"{pose[0]} {pose[1]} {pose[2]} {k}", f"{9.0 * k} 0 0 {k}")
+        for k, pose in enumerate(poses(6))
+    )
+    log = read_carmen_scans(written(tmp_path, text))
+    assert log.mount.x_m == 0.0
+    assert any("do not belong together" in said for said in log.warnings)
+
+
+def test_headings_are_interpolated_along_the_shorter_arc() -> None:
+    t_s: FloatArray = np.array([0.0, 1.0])
+    rows = np.array([[0.0, 0.0, 3.0], [1.0, 2.0, -3.0]])
+    found = interpolate_poses(t_s, rows, np.array([-1.0, 0.5, 9.0]))
+    np.testing.assert_allclose(found[1], [0.5, 1.0, -math.pi])
+    assert found[0].tolist() == rows[0].tolist()
+    assert found[2].tolist() == rows[1].tolist()
+
+
+def test_the_reader_is_told_by_the_content(tmp_path: Path) -> None:
+    pytest.importorskip("rosbags")
+    bag = write_ros1(tmp_path / "a.bag", drive()).rename(tmp_path / "bag.log")
+    assert len(read_laser_log(bag)) == 30
+    packed = tmp_path / "carmen.bag"
+    packed.write_bytes(gzip.compress("".join(flaser(k, p) for k, p in enumerate(poses(4))).encode()))
+    assert len(read_laser_log(packed)) == 4
+    with pytest.raises(InputError, match="CARMEN logs have no topics"):
+        read_laser_log(packed, scan_topic="/scan")
+    with pytest.raises(InputError, match="no such file"):
+        read_laser_log(tmp_path / "none")
+    with pytest.raises(InputError, match="expected a ROS 1 bag"):
+        read_laser_log(tmp_path)
