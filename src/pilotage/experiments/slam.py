@@ -19,9 +19,9 @@ from pilotage.core.errors import InputError
 from pilotage.core.types import FloatArray
 from pilotage.core.yaml_text import load_yaml
 from pilotage.experiments.run_folder import clean, replace_folder
-from pilotage.logs.bags import read_bag
 from pilotage.logs.g2o import write_g2o
-from pilotage.logs.laser_log import LaserLog, read_carmen_scans
+from pilotage.logs.laser_log import LaserLog
+from pilotage.logs.laser_recordings import read_laser_log
 from pilotage.maps.ros_map import RosMap, write_ros_map
 from pilotage.stack.mapping.slam.closures import Closure, Verdict
 from pilotage.stack.mapping.slam.config import SlamConfig
@@ -29,8 +29,6 @@ from pilotage.stack.mapping.slam.mapper import map_log
 from pilotage.stack.mapping.slam.result import SlamResult
 from pilotage.stack.mapping.slam.uncertainty import relative_poses
 
-BAG_ENDINGS = {".bag", ".db3", ".mcap"}
-BAG_STARTS = (b"#ROSBAG", b"SQLite format 3", b"\x89MCAP")
 OnStage = Callable[[str, float], None]
 
 
@@ -43,26 +41,14 @@ class SlamRun:
     warnings: tuple[str, ...]
 
 
-def read_laser_log(path: Path) -> LaserLog:
-    """Read a bag or a CARMEN log, told by what is in it.
-
-    Raises
-    ------
-    InputError
-        Where it is neither, or holds no scans.
-    """
+def read_recording(path: Path) -> LaserLog:
+    """Read a bag or a CARMEN log; InputError also for a run folder, which holds no raw scans."""
     if (path / "mission.yaml").is_file():
         raise InputError(
             f"{path}: expected a bag or a CARMEN log, found a run folder, which holds no raw scans; "
             "export the run as a bag and map that"
         )
-    if not path.exists():
-        raise InputError(f"slam: expected a log at '{path}', found none there")
-    if path.is_dir() or path.suffix in BAG_ENDINGS:
-        return read_bag(path)
-    with path.open("rb") as file:
-        start = file.read(16)
-    return read_bag(path) if start.startswith(BAG_STARTS) else read_carmen_scans(path)
+    return read_laser_log(path)
 
 
 def read_slam_config(path: Path | None) -> SlamConfig:
@@ -93,7 +79,7 @@ def slam_log(path: Path, out: Path, config: SlamConfig, on_stage: OnStage | None
         What of the log cannot be used.
     """
     began = time.perf_counter()
-    log = read_laser_log(path)
+    log = read_recording(path)
     read = time.perf_counter()
     matched = [read]
 

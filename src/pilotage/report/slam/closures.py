@@ -62,7 +62,8 @@ def closures_figure(data: SlamFolder) -> Illustration:
         axes.set_xticks([])
         axes.set_yticks([])
     caption = (
-        "Two stretches of the path laid over each other as the search found best, 14 m a side: of the accepted "
+        "Two stretches of the path laid over each other as the search found best, 14 m a side: of accepted "
+        "ones "
         "those with the widest windows, of the refused the best-scoring of each reason. Numbers are those of "
         "the table."
     )

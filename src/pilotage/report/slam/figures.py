@@ -59,9 +59,10 @@ def map_figure(data: SlamFolder) -> Illustration:
     alt = "Occupancy grid with the path and the closed loops"
     count = data.metrics["closures_accepted"]
     caption = (
-        f"White is free, dark is wall, grey was never seen; cells of {grid.resolution_m:g} m. The path is that "
-        f"of the scanner after the last optimization; each of the {count} green lines joins the middles of two "
-        "stretches of the path that were found to see the same walls."
+        f"White is free, dark is wall, grey was never seen; cells of {grid.resolution_m:g} m. The path is "
+        "that of the scanner after the last optimization; each of the "
+        f"{count} green lines joins the middles of two stretches of the path that were found to see the same "
+        "walls."
     )
     keys = (Key("path", BLUE, "line", "path"), Key("closed loops", GREEN, "line", "loops"))
     return Illustration("map", "The map", alt, caption, render(figure, "map", alt), keys)
@@ -78,8 +79,10 @@ def before_after_figure(data: SlamFolder) -> Illustration:
         axes.set_aspect("equal", adjustable="datalim")
     end = data.poses[-1, :2] - data.before[-1, :2]
     caption = (
-        "What the scans show, put where the front end alone had it and where the closed graph has it. The end "
-        f"of the path moved by {float(np.hypot(*end)):.2f} m; walls drawn twice on the left are one on the right."
+        "What the scans show, put where the front end alone had it and where the closed graph has it. The "
+        "end "
+        f"of the path moved by {float(np.hypot(*end)):.2f} m; walls drawn twice on the left are one "
+        "on the right."
     )
     alt = "Points of all keyframes before and after the loops were closed"
     return Illustration("before", "Before and after", alt, caption, render(figure, "before", alt))

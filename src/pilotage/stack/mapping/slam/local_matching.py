@@ -25,7 +25,8 @@ from pilotage.stack.mapping.slam.odometry import MotionGuess, distance, scanner_
 BUCKET_M = 0.25
 START_REACH_M, REACH_M, SCALE_M = 0.4, 0.2, 0.05
 PRIOR = np.diag([2.0, 2.0, 20.0])
-"""Holds the pose at the guess where the scan leaves it open, in squared residuals."""
+"""Holds the pose at the guess where the scan leaves it open, in squared residuals. More would pull every
+scan a little towards an odometry whose errors all have one sign."""
 GOOD, POOR = 0.92, 0.75
 """Fit over its running mean from which no further guess is tried, and below which there is a search."""
 SEARCH_RANGE_M, SEARCH_CELL_M, SEARCH_STD_M, SEARCH_STEP_RAD = 12.0, 0.05, 0.07, 0.02
@@ -33,7 +34,7 @@ SEARCH_BUDGET = 200_000
 SEARCH_KEYFRAMES, SEARCH_LEVELS = 8, 4
 BETTER_POOR, BETTER_GOOD = 1.1, 1.03
 """By how much a place that was searched must fit better than the guesses."""
-OFF_M, OFF_ERRORS = 0.15, 10.0
+OFF_M, OFF_ERRORS = 0.05, 10.0
 """A match this far from all guesses, and so many of their usual errors more, counts half."""
 SLIP_SHARE, SLIP_M = 0.15, 0.4
 """A match as far as SLIP_M from its guess may be off by as much; a nearer one by that share and less."""
@@ -119,9 +120,9 @@ class LocalMatcher:
             Smoothed and stamped time since.
         """
         best: _Fit | None = None
-        guesses = self._guess.guesses(step, dt_s)
-        for motion in guesses:
-            fit = self._plausible(self._align(cloud, composed(last, motion), START_REACH_M), last, guesses)
+        credible = self._guess.credible(step, dt_s)
+        for motion in self._guess.guesses(step, dt_s):
+            fit = self._plausible(self._align(cloud, composed(last, motion), START_REACH_M), last, credible)
             if fit is not None and (best is None or fit.value > 1.03 * best.value + 0.005):
                 best = fit
             if best is not None and best.value > GOOD * self._usual:
@@ -131,7 +132,7 @@ class LocalMatcher:
             # Without odometry a scan may slide along a corridor and still fit: look around every time.
             self.searched += 1
             around = self._search(cloud, last, min(max(dt_s, gap_s, 0.2), 2.0))
-            found = self._plausible(around, last, guesses)
+            found = self._plausible(around, last, credible)
             better = BETTER_POOR if poor else BETTER_GOOD
             if found is not None and (best is None or found.value > better * best.value + 0.01):
                 best = found
@@ -147,7 +148,7 @@ class LocalMatcher:
         return np.asarray(composed(last, self._guess.guesses(step, dt_s)[0]))
 
     def _plausible(self, fit: _Fit | None, last: FloatArray, guesses: list[FloatArray]) -> _Fit | None:
-        """Lower a fit's value by how far it is from all guesses, measured by how good those were lately."""
+        """Lower a fit's value by how far it is from all credible guesses, in units of their usual error."""
         if fit is None:
             return None
         motion = between(last, fit.pose)

@@ -1,9 +1,10 @@
 """How sure the poses of scans are, alone and seen from one another.
 
 What the graph says holds given that its edges err independently; they do not, as each scan is in many of
-them, so its covariances are doubled. On top, every scan has an error of its own: stamps that are some milliseconds
-off, a body that moves while the mirror turns, a mount known to a centimetre or two. Both were set so that the
-relations of the Intel and the Freiburg 079 recordings come out consistent; see docs/decisions/0038.
+them, so its covariances are doubled. On top, every scan has an error of its own: stamps that are some
+milliseconds off, a body that moves while the mirror turns, a mount known to a centimetre or two. Both were
+set so that the relations of the Intel and the Freiburg 079 recordings come out consistent; see
+docs/decisions/0038.
 """
 
 from __future__ import annotations
