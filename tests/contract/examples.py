@@ -54,20 +54,15 @@ class Example:
     pure_numbers: frozenset[str] = frozenset()
 
 
-def simulator(configs: dict[str, Any] | None = None) -> Simulator:
+def simulator(configs: dict[str, Any] | None = None) -> worlds.Alone:
     """The small robot in the small room."""
-    return worlds.simulator(worlds.robot(configs or sensors(), start=START))
-
-
-def stepped(sim: Simulator, command: Twist) -> Readings:
-    """One step of the one robot."""
-    return sim.step([command])[0]
+    return worlds.alone(worlds.robot(configs or sensors(), start=START))
 
 
 def sensor_reads(_: Any, config: Any) -> None:
     """The same world gives the same reading twice."""
     assert SIMULATED_SENSORS.of(config, "robot.sensors.it") is not None
-    readings = [stepped(simulator({"it": config}), Twist(0.1, 0.0)).by_sensor["it"] for _ in range(2)]
+    readings = [simulator({"it": config}).step(Twist(0.1, 0.0)).by_sensor["it"] for _ in range(2)]
     assert repr(readings[0]) == repr(readings[1])
 
 
@@ -87,14 +82,14 @@ def localizer_follows(factory: Any, config: Any) -> None:
     told = told_of(start=START, variances=(1e-4, 1e-4, 1e-4))
     localizer = told.localizer(factory, config)
     for step in range(60):
-        belief = localizer.step(stepped(sim, Twist(0.3, 0.4 if step < 30 else -0.4)))
+        belief = localizer.step(sim.step(Twist(0.3, 0.4 if step < 30 else -0.4)))
         assert (belief.cov == belief.cov.T).all()
         assert np.linalg.eigvalsh(belief.cov).min() > 0.0
-        truth = sim.bodies[0].pose
+        truth = sim.truth
         error = np.hypot(truth.x_m - belief.pose.x_m, truth.y_m - belief.pose.y_m)
         assert error < 5.0 * np.sqrt(np.linalg.eigvalsh(belief.cov[:2, :2])[-1])
     handed_out = belief.cov.copy()
-    localizer.step(stepped(sim, Twist(0.3, 0.0)))
+    localizer.step(sim.step(Twist(0.3, 0.0)))
     assert (belief.cov == handed_out).all(), "a belief that was handed out must not change"
 
 
@@ -111,7 +106,7 @@ def localizer_runs(factory: Any, config: Any) -> None:
     told = told_of(start=START, variances=(1e-4, 1e-4, 1e-4))
     localizer = told.localizer(factory, config)
     for step in range(60):
-        belief = localizer.step(stepped(sim, Twist(0.3, 0.4 if step < 30 else -0.4)))
+        belief = localizer.step(sim.step(Twist(0.3, 0.4 if step < 30 else -0.4)))
         assert np.isfinite(belief.cov).all()
         assert np.linalg.eigvalsh(belief.cov).min() > 0.0
 
@@ -222,11 +217,11 @@ def reactive_reacts(factory: Any, config: Any) -> None:
 def mapper_maps(factory: Any, config: Any) -> None:
     """An unexpected disc comes to the map where it is; known walls do not."""
     surprised = World.of(worlds.ROOM_MAP, obstacle_circles_m=np.array([[3.5, 2.0, 0.3]]))
-    sim = Simulator(surprised, [worlds.robot(sensors(), start=START)], 0.1)
+    sim = worlds.Alone(Simulator(surprised, [worlds.robot(sensors(), start=START)], 0.1))
     told = told_of(variances=(1e-6, 1e-6, 1e-6))
     mapper = factory(config, told.robot, told.chart)
     for _ in range(20):
-        mapper.step(stepped(sim, Twist(0.0, 0.0)), told.initial)
+        mapper.step(sim.step(Twist(0.0, 0.0)), told.initial)
     assert mapper.circles_m.shape[0] > 0
     away = np.hypot(mapper.circles_m[:, 0] - 3.5, mapper.circles_m[:, 1] - 2.0)
     assert (np.abs(away - 0.3) < 0.15).all()
@@ -262,11 +257,11 @@ def navigator_arrives(factory: Any, config: Any) -> None:
     stack = told.navigator(factory, config, parts)
     sim, command = simulator(), Twist(0.0, 0.0)
     for _ in range(600):
-        command = stack.step(stepped(sim, command))
+        command = stack.step(sim.step(command))
         if stack.status[0] is not StackStatus.RUNNING:
             break
     assert stack.status[0] is StackStatus.ARRIVED
-    truth = sim.bodies[0].pose
+    truth = sim.truth
     assert np.hypot(truth.x_m - GOAL.x_m, truth.y_m - GOAL.y_m) < 0.3
     assert {event.kind for event in told.journal.events} >= {"plan", "arrived"}
 
@@ -279,7 +274,7 @@ def navigator_keeps_its_command(factory: Any, config: Any) -> None:
     sim, command = simulator(), Twist(0.0, 0.0)
     commands = []
     while stack.status[0] is StackStatus.RUNNING:
-        command = stack.step(stepped(sim, command))
+        command = stack.step(sim.step(command))
         commands.append(command)
     assert commands == [Twist(0.2, 0.1)] * 20 + [Twist(0.0, 0.0)]
     assert stack.status[0] is StackStatus.ARRIVED

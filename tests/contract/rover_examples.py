@@ -87,7 +87,7 @@ dead_reckoning_follows_the_bend = _follows_the_bend
 
 
 def rover_filter_follows(factory: Any, config: Any) -> None:
-    """The bend; and a sighting of what is not on the map, or none at all, changes nothing but the odometry."""
+    """The bend; and a sighting of what is on no map changes nothing."""
     _follows_the_bend(factory, config)
     initial = Belief(Pose2(0.0, 0.0, 0.0), np.diag([1.0, 1.0, 1e-4]))
     told = []

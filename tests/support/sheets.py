@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from pilotage.core.random import RandomStreams
-from pilotage.core.types import Command, Pose2
+from pilotage.core.types import Pose2
 from pilotage.experiments.build.charts import load_chart
 from pilotage.maps.true_cells import SheetFile
 from pilotage.maps.world_map import WorldMap
@@ -21,15 +21,14 @@ from pilotage.models.motion.wheel_drive import WheelDriveConfig, WheelErrorsConf
 from pilotage.sensors.gyroscope import GyroscopeConfig
 from pilotage.sensors.infrared import InfraredConfig
 from pilotage.sensors.line_sensor import LineSensorConfig
-from pilotage.sensors.readings import Readings
 from pilotage.sensors.sensor import Mount, SensorConfig
 from pilotage.sensors.wheel_encoders import WheelEncodersConfig
-from pilotage.sim.bodies.body import Body
 from pilotage.sim.source import RobotSpec, Simulator
 from pilotage.sim.worlds.world import World
 from pilotage.stack.interface import Belief
 from pilotage.stack.journal import Journal
 from pilotage.stack.knowledge import RobotKnowledge, SheetKnowledge, TaskKnowledge
+from support.worlds import Alone
 
 T = TypeVar("T")
 
@@ -65,25 +64,8 @@ def sheet_chart(sheet: SheetFile = SHEET) -> WorldMap:
 
 
 @dataclass(frozen=True)
-class OnSheet:
+class OnSheet(Alone):
     """The one robot on its sheet, in the one simulator."""
-
-    simulator: Simulator
-
-    @property
-    def body(self) -> Body:
-        """The robot's body."""
-        return self.simulator.bodies[0]
-
-    @property
-    def truth(self) -> Pose2:
-        """Its true pose."""
-        return self.body.pose
-
-    @property
-    def t_s(self) -> float:
-        """Simulated time."""
-        return self.simulator.t_s
 
     @property
     def on_sheet(self) -> bool:
@@ -91,10 +73,6 @@ class OnSheet:
         markings = self.simulator.world.chart.markings
         assert markings is not None
         return markings.holds(self.truth.x_m, self.truth.y_m)
-
-    def step(self, command: Command) -> Readings:
-        """Drive one step."""
-        return self.simulator.step([command])[0]
 
 
 def sheet_simulator(

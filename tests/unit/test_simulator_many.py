@@ -339,7 +339,7 @@ SONAR = '''
 from dataclasses import dataclass
 
 from pilotage.sensors.sensor import SENSORS, SensorConfig
-from pilotage.sim.observe.sensor import SIMULATED_SENSORS
+from pilotage.sim.sensing.sensor import SIMULATED_SENSORS
 
 
 @dataclass(frozen=True, slots=True)
