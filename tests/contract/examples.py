@@ -9,20 +9,24 @@ from typing import Any
 import numpy as np
 import pytest
 
-from contract.rover_examples import estimator_estimates, pose_controller_arrives
+from contract.rover_examples import (
+    dead_reckoning_follows_the_bend,
+    drives_over_cells,
+    moves_to_a_pose,
+    rover_filter_follows,
+)
 from contract.sheet_examples import explorer_explores, sheet_sensor_reads
+from contract.task_examples import motion_moves, task_runs
 from pilotage.core.angles import wrap_to_pi
 from pilotage.core.errors import InputError
-from pilotage.core.random import RandomStreams
 from pilotage.core.types import Goal, Pose2, Twist
 from pilotage.kernels.geometry import plane
 from pilotage.maps.distance_field import DistanceField
 from pilotage.maps.near_walls import NearWalls
-from pilotage.missions.floor import BodyConfig, MotionConfig
 from pilotage.sensors.readings import Readings, UltrasonicReading
-from pilotage.sim.sensing import SIMULATED
-from pilotage.sim.simulator import Simulator
-from pilotage.sim.world import World
+from pilotage.sim.sensing.sensor import SIMULATED_SENSORS
+from pilotage.sim.source import Simulator
+from pilotage.sim.worlds.world import World
 from pilotage.stack.control.pi_follower import PiFollower, PiFollowerConfig
 from pilotage.stack.interface import StackStatus
 from pilotage.stack.localization.ekf_landmarks import EkfLandmarkLocalizer
@@ -33,12 +37,10 @@ from pilotage.stack.planning.dubins_local import DubinsLocalConfig, DubinsLocalP
 from pilotage.stack.planning.local_planner import RouteAhead
 from pilotage.stack.planning.planner import Path, PlanRequest, PlanStatus
 from pilotage.stack.planning.rrt_star_dubins import RrtStarDubinsConfig, RrtStarDubinsPlanner
-from support.robots import BEACONS, ROOM, sensors, told_of
 from support import worlds
-from support.robots import BEACONS, ROOM, knowledge_of, sensors
+from support.robots import ROOM, sensors, told_of
 
 START, GOAL = Pose2(2.0, 2.0, 0.0), Goal(8.0, 6.0)
-WORLD = World(ROOM, ROOM, BEACONS)
 NO_CIRCLES = ROOM.circles_m
 WALLS = NearWalls(ROOM.segments_m)
 
@@ -52,14 +54,14 @@ class Example:
     pure_numbers: frozenset[str] = frozenset()
 
 
-def simulator(configs: dict[str, Any] | None = None) -> Simulator:
+def simulator(configs: dict[str, Any] | None = None) -> worlds.Alone:
     """The small robot in the small room."""
-    return Simulator(WORLD, BodyConfig(), MotionConfig(), configs or sensors(), START, 0.1, RandomStreams(0))
+    return worlds.alone(worlds.robot(configs or sensors(), start=START))
 
 
 def sensor_reads(_: Any, config: Any) -> None:
     """The same world gives the same reading twice."""
-    assert type(config) in SIMULATED
+    assert SIMULATED_SENSORS.of(config, "robot.sensors.it") is not None
     readings = [simulator({"it": config}).step(Twist(0.1, 0.0)).by_sensor["it"] for _ in range(2)]
     assert repr(readings[0]) == repr(readings[1])
 
@@ -83,11 +85,19 @@ def localizer_follows(factory: Any, config: Any) -> None:
         belief = localizer.step(sim.step(Twist(0.3, 0.4 if step < 30 else -0.4)))
         assert (belief.cov == belief.cov.T).all()
         assert np.linalg.eigvalsh(belief.cov).min() > 0.0
-        error = np.hypot(sim.truth.x_m - belief.pose.x_m, sim.truth.y_m - belief.pose.y_m)
+        truth = sim.truth
+        error = np.hypot(truth.x_m - belief.pose.x_m, truth.y_m - belief.pose.y_m)
         assert error < 5.0 * np.sqrt(np.linalg.eigvalsh(belief.cov[:2, :2])[-1])
     handed_out = belief.cov.copy()
     localizer.step(sim.step(Twist(0.3, 0.0)))
     assert (belief.cov == handed_out).all(), "a belief that was handed out must not change"
+
+
+def dead_reckoning_follows(factory: Any, config: Any) -> None:
+    """Through the room, and along a bend, with either covariance."""
+    localizer_follows(factory, config)
+    for covariance in ("first-order", "second-order"):
+        dead_reckoning_follows_the_bend(factory, config.model_copy(update={"covariance": covariance}))
 
 
 def localizer_runs(factory: Any, config: Any) -> None:
@@ -206,10 +216,8 @@ def reactive_reacts(factory: Any, config: Any) -> None:
 
 def mapper_maps(factory: Any, config: Any) -> None:
     """An unexpected disc comes to the map where it is; known walls do not."""
-    surprise = ROOM.with_obstacles(np.zeros((0, 4)), np.array([[3.5, 2.0, 0.3]]))
-    sim = Simulator(
-        World(ROOM, surprise, BEACONS), BodyConfig(), MotionConfig(), sensors(), START, 0.1, RandomStreams(0)
-    )
+    surprised = World.of(worlds.ROOM_MAP, obstacle_circles_m=np.array([[3.5, 2.0, 0.3]]))
+    sim = worlds.Alone(Simulator(surprised, [worlds.robot(sensors(), start=START)], 0.1))
     told = told_of(variances=(1e-6, 1e-6, 1e-6))
     mapper = factory(config, told.robot, told.chart)
     for _ in range(20):
@@ -253,7 +261,8 @@ def navigator_arrives(factory: Any, config: Any) -> None:
         if stack.status[0] is not StackStatus.RUNNING:
             break
     assert stack.status[0] is StackStatus.ARRIVED
-    assert np.hypot(sim.truth.x_m - GOAL.x_m, sim.truth.y_m - GOAL.y_m) < 0.3
+    truth = sim.truth
+    assert np.hypot(truth.x_m - GOAL.x_m, truth.y_m - GOAL.y_m) < 0.3
     assert {event.kind for event in told.journal.events} >= {"plan", "arrived"}
 
 
@@ -320,7 +329,7 @@ EXAMPLES: dict[tuple[str, str], Example] = {
         ),
     ),
     ("localizer", "dead-reckoning"): Example(
-        localizer_follows, pure_numbers=frozenset({"odometry_var_scale"})
+        dead_reckoning_follows, pure_numbers=frozenset({"odometry_var_scale"})
     ),
     ("localizer", "ekf-walls"): Example(
         localizer_follows,
@@ -372,16 +381,25 @@ EXAMPLES: dict[tuple[str, str], Example] = {
     ("sensor", "compass"): Example(sensor_reads_in_any_world),
     ("sensor", "gps"): Example(sensor_reads_in_any_world),
     ("sensor", "bumper"): Example(sensor_reads_in_any_world),
-    ("estimator", "dead-reckoning"): Example(estimator_estimates, {"covariance": "first-order"}),
-    ("estimator", "ekf-landmarks"): Example(
-        estimator_estimates, {"gate": 0.999}, pure_numbers=frozenset({"gate"})
+    ("localizer", "invariant-ekf-landmarks"): Example(
+        rover_filter_follows, {"gate": 0.999}, pure_numbers=frozenset({"gate"})
     ),
-    ("pose_controller", "polar"): Example(pose_controller_arrives, {"max_steering_rad": 1.2}),
-    ("explorer", "random-walk"): Example(explorer_explores),
-    ("explorer", "frontier"): Example(
+    ("navigator", "pose"): Example(moves_to_a_pose, {"arrival_m": 0.01}),
+    ("navigator", "curve"): Example(drives_over_cells, {"speed_m_s": 0.5}),
+    ("controller", "kanayama"): Example(controller_turns_to_the_reference),
+    ("navigator", "random-walk"): Example(explorer_explores),
+    ("navigator", "frontier"): Example(
         explorer_explores, pure_numbers=frozenset({"depth_std", "speed_share"})
     ),
-    ("explorer", "surround-check"): Example(
+    ("navigator", "surround-check"): Example(
         explorer_explores, {"margin_cells": 1}, pure_numbers=frozenset({"far_cells"})
     ),
+    ("motion", "differential-drive"): Example(motion_moves),
+    ("motion", "wheel-drive"): Example(motion_moves, {"max_wheel_speed_rad_s": 20.0}),
+    ("motion", "bicycle"): Example(motion_moves, {"wheelbase_m": 0.5}),
+    ("motion", "omnidirectional"): Example(motion_moves),
+    ("task", "reach"): Example(task_runs("reach")),
+    ("task", "plan"): Example(task_runs("plan")),
+    ("task", "drive"): Example(task_runs("drive")),
+    ("task", "explore"): Example(task_runs("explore"), {"blocked_s": 2.0}),
 }

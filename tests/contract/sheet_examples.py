@@ -10,7 +10,7 @@ from pilotage.core.random import RandomStreams
 from pilotage.core.types import Pose2, WheelSpeeds
 from pilotage.evaluation.sheet_visits import VisitedCells
 from pilotage.stack.interface import StackStatus
-from support.sheets import SHEET, sheet_knowledge, sheet_sensors, sheet_simulator
+from support.sheets import SHEET, ToldOfSheet, sheet_sensors, sheet_simulator
 
 
 def sheet_sensor_reads(_: Any, config: Any) -> None:
@@ -31,10 +31,11 @@ def sheet_sensor_reads(_: Any, config: Any) -> None:
 
 def explorer_explores(factory: Any, config: Any) -> None:
     """Two minutes on a small sheet: commands within limits, cells visited, a belief near the truth."""
-    knowledge = sheet_knowledge()
+    told = ToldOfSheet()
     sim = sheet_simulator(sheet_sensors(), RandomStreams(2))
-    explorer = factory(config, knowledge)
-    keys = set(explorer.telemetry())
+    explorer = told.explorer(factory, config)
+    units = dict(told.journal.units)
+    assert units, "an explorer tells something at every step"
     visits = VisitedCells(SHEET.size_m, SHEET.cells)
     command = WheelSpeeds(0.0, 0.0)
     for _ in range(12_000):
@@ -44,14 +45,18 @@ def explorer_explores(factory: Any, config: Any) -> None:
         visits.add(sim.truth.x_m, sim.truth.y_m, sim.t_s)
         command = explorer.step(readings)
         assert np.isfinite([command.left_rad_s, command.right_rad_s]).all()
-        assert set(explorer.telemetry()) == keys
         status, reason = explorer.status
         if status is not StackStatus.RUNNING:
             assert reason
             break
+    assert told.journal.units == units
+    assert np.isfinite(told.journal.row).any()
     assert visits.count > 5
     assert explorer.cells.shape == explorer.visited.shape == SHEET.cells[::-1]
     assert int(explorer.visited.sum()) > 3
+    offered = told.journal.results()
+    assert offered.keys() >= {"cells", "visited", "left"}
+    assert offered["visited"] is explorer.visited or np.array_equal(offered["visited"], explorer.visited)  # type: ignore[arg-type]
     pose: Pose2 = explorer.belief.pose
     assert np.hypot(pose.x_m - sim.truth.x_m, pose.y_m - sim.truth.y_m) < 0.5
     assert np.linalg.eigvalsh(explorer.belief.cov).min() > 0.0

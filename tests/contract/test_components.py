@@ -11,11 +11,11 @@ from contract.examples import EXAMPLES
 from pilotage.core.config import Config
 from pilotage.core.errors import InputError
 from pilotage.core.registry import Entry, Registry
-from pilotage.experiments.roles import REGISTRIES
+from pilotage.experiments.roles import ROLES
 
 CASES = [
     pytest.param(role, registry, entry, id=f"{role}:{entry.name}")
-    for role, registry in REGISTRIES.items()
+    for role, registry in ROLES.items()
     for entry in registry
 ]
 UNITS = {"m", "s", "rad", "hz", "m2", "rad2", "per", "ratio", "share", "deg", "ut"}
@@ -87,5 +87,5 @@ class TestComponent:
 
 
 def test_every_example_is_of_something_registered() -> None:
-    registered = {(role, entry.name) for role, registry in REGISTRIES.items() for entry in registry}
+    registered = {(role, entry.name) for role, registry in ROLES.items() for entry in registry}
     assert set(EXAMPLES) <= registered

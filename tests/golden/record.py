@@ -6,13 +6,16 @@ import json
 from pathlib import Path
 from typing import Any
 
-from pilotage.experiments.floor.mission import load_floor_mission
-from pilotage.experiments.floor.simulate import simulate
+from pilotage.experiments.loop import simulate
+from pilotage.experiments.mission import load_mission
 
 RUNS: dict[str, tuple[str, list[str], int]] = {
     "route": ("museum-route", ["run.time_limit_s=30"], 1),
     "hall": ("museum-hall", [], 2),
     "dead-reckoning": ("museum-route", ["run.time_limit_s=10", "stack.localizer.name=dead-reckoning"], 3),
+    "plan": ("museum-plan", ["stack.planner.stop=first"], 4),
+    "gale": ("gale-ekf", ["run.time_limit_s=20000", "world.goal.x_m=42000", "world.goal.y_m=12000"], 5),
+    "romi": ("romi-explore", ["run.time_limit_s=30"], 6),
 }
 COLUMNS = (
     "true_x_m",
@@ -28,18 +31,21 @@ COLUMNS = (
 
 def recorded(mission: str, overrides: list[str], seed: int) -> dict[str, Any]:
     """A few rows of one run."""
-    record = simulate(load_floor_mission(mission, overrides, seed))
-    steps = record.trace["t_s"].shape[0]
+    finished = simulate(load_mission(mission, overrides, seed)).finished
+    (robot,) = finished.robots
+    steps = robot.trace["t_s"].shape[0]
     rows = {
-        str(step): {column: float(record.trace[column][step]) for column in COLUMNS}
-        for step in (0, steps // 3, steps - 1)
+        str(step): {column: float(robot.trace[column][step]) for column in COLUMNS}
+        for step in ((0, steps // 3, steps - 1) if steps else ())
     }
     return {
         "mission": mission,
         "overrides": overrides,
         "seed": seed,
-        "arrived": record.outcome.arrived,
-        "steps": steps,
+        "arrived": robot.arrived,
+        "steps": finished.steps,
+        "recorded": steps,
+        "planned_m": [plan.length_m for plan in robot.plans],
         "rows": rows,
     }
 

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
 from pilotage.core.random import RandomStreams
-from pilotage.core.types import FloatArray, Pose2
+from pilotage.core.types import Command, FloatArray, Pose2
 from pilotage.maps.markings import FloorMarkings
 from pilotage.maps.segment_map import SegmentMap, box_segments
 from pilotage.maps.true_cells import SheetFile
@@ -17,7 +18,9 @@ from pilotage.maps.world_map import WorldMap
 from pilotage.models.footprint import Footprint
 from pilotage.models.motion.differential_drive import DifferentialDriveConfig
 from pilotage.models.motion.motion import MotionConfig
+from pilotage.sensors.readings import Readings
 from pilotage.sensors.sensor import SensorConfig
+from pilotage.sim.bodies.body import Body
 from pilotage.sim.source import RobotSpec, Simulator
 from pilotage.sim.worlds.world import World
 from support.robots import BEACONS, ROOM
@@ -45,6 +48,37 @@ def robot(
 def simulator(spec: RobotSpec | None = None, chart: WorldMap = ROOM_MAP, dt_s: float = 0.1) -> Simulator:
     """One robot alone."""
     return Simulator(World.of(chart), [robot() if spec is None else spec], dt_s)
+
+
+@dataclass(frozen=True)
+class Alone:
+    """A simulator with one robot, stepped without lists."""
+
+    simulator: Simulator
+
+    @property
+    def body(self) -> Body:
+        """The robot's body."""
+        return self.simulator.bodies[0]
+
+    @property
+    def truth(self) -> Pose2:
+        """Its true pose."""
+        return self.body.pose
+
+    @property
+    def t_s(self) -> float:
+        """Simulated time."""
+        return self.simulator.t_s
+
+    def step(self, command: Command) -> Readings:
+        """Drive one step."""
+        return self.simulator.step([command])[0]
+
+
+def alone(spec: RobotSpec | None = None, chart: WorldMap = ROOM_MAP, dt_s: float = 0.1) -> Alone:
+    """One robot alone, stepped without lists."""
+    return Alone(simulator(spec, chart, dt_s))
 
 
 def sheet_map(sheet: SheetFile, tape_m: float, edge_is_dark: bool = True) -> WorldMap:

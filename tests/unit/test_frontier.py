@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -18,7 +16,7 @@ from pilotage.stack.exploration.frontier import FrontierExplorer
 from pilotage.stack.exploration.frontier_config import FrontierConfig
 from pilotage.stack.exploration.frontier_reasons import LeftReason
 from pilotage.stack.interface import StackStatus
-from support.sheets import START, sheet_knowledge, sheet_sensors, sheet_simulator
+from support.sheets import START, ToldOfSheet, sheet_sensors, sheet_simulator
 
 OPEN = SheetFile(
     size_m=(1.0, 0.8),
@@ -35,14 +33,14 @@ WALLED = SheetFile(
 )
 
 
-def explore(sheet: SheetFile, start: Pose2, seed: int) -> tuple[FrontierExplorer, VisitedCells, int]:
-    """A whole run; the explorer, the true visits, the contacts."""
+def explore(
+    sheet: SheetFile, start: Pose2, seed: int
+) -> tuple[FrontierExplorer, VisitedCells, int, ToldOfSheet]:
+    """A whole run; the explorer, the true visits, the contacts, and what it was told and wrote."""
     streams = RandomStreams(seed)
     sim = sheet_simulator(sheet_sensors(), streams, sheet, start)
-    knowledge = replace(
-        sheet_knowledge(), size_m=sheet.size_m, cells=sheet.cells, start=start, streams=streams
-    )
-    explorer = FrontierExplorer(FrontierConfig(), knowledge)
+    told = ToldOfSheet(sheet, start, streams=streams)
+    explorer = told.explorer(FrontierExplorer, FrontierConfig())
     visits = VisitedCells(sheet.size_m, sheet.cells)
     command = STANDSTILL
     for _ in range(90_000):
@@ -52,12 +50,12 @@ def explore(sheet: SheetFile, start: Pose2, seed: int) -> tuple[FrontierExplorer
         command = explorer.step(readings)
         if explorer.status[0] is not StackStatus.RUNNING:
             break
-    return explorer, visits, sim.contacts
+    return explorer, visits, sim.body.collisions, told
 
 
 @pytest.mark.parametrize("seed", [11, 12])
 def test_it_visits_all_that_can_be_reached_and_says_that_it_is_done(seed: int) -> None:
-    explorer, visits, contacts = explore(OPEN, START, seed)
+    explorer, visits, contacts, told = explore(OPEN, START, seed)
     status, reason = explorer.status
     assert status is StackStatus.ARRIVED
     assert reason.startswith("done")
@@ -73,11 +71,11 @@ def test_it_visits_all_that_can_be_reached_and_says_that_it_is_done(seed: int) -
     left = {(cell.row, cell.column) for cell in explorer.left}
     assert left == {(int(row), int(column)) for row, column in np.argwhere(~explorer.visited)}
     assert {cell.reason for cell in explorer.left} <= set(LeftReason)
-    assert any(event.kind == "arrived" for event in explorer.drain_events())
+    assert any(event.kind == "arrived" for event in told.journal.events)
 
 
 def test_what_lies_behind_a_wall_is_unreachable_and_the_wall_blocks() -> None:
-    explorer, visits, contacts = explore(WALLED, Pose2(0.3, 0.4, 0.0), 3)
+    explorer, visits, contacts, _ = explore(WALLED, Pose2(0.3, 0.4, 0.0), 3)
     assert explorer.status[0] is StackStatus.ARRIVED
     assert contacts == 0
     assert not visits.visited[:, 10:].any()
@@ -97,4 +95,4 @@ def test_the_same_seed_explores_the_same_way() -> None:
 def test_a_robot_that_sees_nothing_is_refused() -> None:
     blind = {name: s for name, s in sheet_sensors().items() if not isinstance(s, InfraredConfig)}
     with pytest.raises(InputError, match="infrared"):
-        FrontierExplorer(FrontierConfig(), replace(sheet_knowledge(), sensors=blind))
+        ToldOfSheet(sensors=blind).explorer(FrontierExplorer, FrontierConfig())

@@ -9,10 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pilotage.core.types import STANDSTILL, Event, FloatArray
+from pilotage.core.types import STANDSTILL, Command, FloatArray
+from pilotage.experiments.build.build import build
 from pilotage.experiments.mission import load_mission
-from pilotage.experiments.sheet.build import build
-from pilotage.missions.sheet import SheetMission
 from pilotage.stack.exploration.frontier import FrontierExplorer
 from pilotage.stack.exploration.frontier_retreat import RETREAT_M, is_walled_in, trail_back
 from pilotage.stack.interface import StackStatus
@@ -60,10 +59,10 @@ def test_the_trail_goes_back_so_far_and_no_farther() -> None:
 def test_it_comes_out_and_goes_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """After 20 s its map is a ring around it, as a pose that slipped makes one, until it goes back."""
     (tmp_path / "small.yaml").write_text(SMALL)
-    mission = load_mission("romi-explore", [f"world.sheet={tmp_path / 'small.yaml'}"])
-    assert isinstance(mission, SheetMission)
+    mission = load_mission("romi-explore", [f"world.map={tmp_path / 'small.yaml'}"])
     experiment = build(mission)
-    explorer, simulator = experiment.explorer, experiment.simulator
+    (member,), simulator = experiment.team, experiment.simulator
+    explorer = member.stack
     assert isinstance(explorer, FrontierExplorer)
     seen = explorer._senses.obstacles
 
@@ -74,17 +73,15 @@ def test_it_comes_out_and_goes_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
         return seen()
 
     monkeypatch.setattr(explorer._senses, "obstacles", obstacles)
-    events: list[Event] = []
 
     def told(kind: str) -> bool:
-        return any(event.kind == kind for event in events)
+        return any(event.kind == kind for event in member.journal.events)
 
-    command = STANDSTILL
+    command: Command = STANDSTILL
     while explorer.status[0] is StackStatus.RUNNING and simulator.t_s < 400.0:
-        command = explorer.step(simulator.step(command))
-        events += explorer.drain_events()
+        command = explorer.step(simulator.step([command])[0])
     assert told("retreat")
     assert told("arrived")
-    assert simulator.contacts == 0
+    assert simulator.bodies[0].collisions == 0
     assert sum(cell.reason == "unreachable" for cell in explorer.left) == 0
     assert explorer.visited.sum() > 40

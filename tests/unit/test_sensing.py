@@ -9,9 +9,7 @@ import pytest
 from scipy import stats
 
 from pilotage.core.errors import InputError
-from pilotage.core.random import RandomStreams
 from pilotage.core.types import Pose2, Twist
-from pilotage.missions.floor import BodyConfig, MotionConfig
 from pilotage.sensors.lidar import LidarConfig
 from pilotage.sensors.readings import (
     BeaconReadings,
@@ -23,18 +21,16 @@ from pilotage.sensors.readings import (
 from pilotage.sensors.sensor import SensorConfig
 from pilotage.sensors.ultrasonic import UltrasonicConfig
 from pilotage.sensors.wheel_odometry import WheelOdometryConfig
-from pilotage.sim.simulator import Simulator
-from pilotage.sim.world import World
-from support.robots import BEACONS, ROOM, sensors
+from support.robots import sensors
+from support.worlds import Alone, alone, robot
 
-WORLD = World(ROOM, ROOM, BEACONS)
 START = Pose2(2.0, 4.0, 0.0)
 ALPHA = 1e-4
 """False-alarm rate of each statistical test here; the seeds are fixed, so a pass stays a pass."""
 
 
-def simulator(configs: dict[str, SensorConfig], seed: int = 0, start: Pose2 = START) -> Simulator:
-    return Simulator(WORLD, BodyConfig(), MotionConfig(), configs, start, 0.1, RandomStreams(seed))
+def simulator(configs: dict[str, SensorConfig], seed: int = 0, start: Pose2 = START) -> Alone:
+    return alone(robot(configs, start=start, seed=seed))
 
 
 def variance_interval(values: np.ndarray, alpha: float = ALPHA) -> tuple[float, float]:

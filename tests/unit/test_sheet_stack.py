@@ -13,7 +13,7 @@ from pilotage.core.angles import wrap_to_pi
 from pilotage.core.random import RandomStreams
 from pilotage.core.types import Pose2, WheelSpeeds
 from pilotage.maps.cell_map import CellMap, CellState, grown
-from pilotage.missions.sheet import FirmwareConfig
+from pilotage.missions.explorer import FirmwareConfig
 from pilotage.sensors.infrared import InfraredConfig
 from pilotage.sensors.magnetometer import MagnetometerConfig
 from pilotage.sensors.readings import InfraredReading, LineReading, Readings
@@ -23,7 +23,7 @@ from pilotage.stack.exploration.surround_check import SurroundCheck, SurroundChe
 from pilotage.stack.interface import StackStatus
 from pilotage.stack.localization.wheel_pose import WheelPose
 from pilotage.stack.mapping.cell_marks import CellMarks
-from support.sheets import START, sheet_knowledge, sheet_sensors, sheet_simulator
+from support.sheets import START, ToldOfSheet, sheet_knowledge, sheet_sensors, sheet_simulator
 
 OBSTACLE, LINE, BORDER = CellState.OBSTACLE, CellState.LINE, CellState.BORDER
 VISITED, EXPLORED, UNKNOWN = CellState.VISITED, CellState.EXPLORED, CellState.UNKNOWN
@@ -154,7 +154,7 @@ def test_the_field_turns_away_from_what_is_near_and_is_silent_otherwise() -> Non
 
 
 def test_the_explorer_looks_north_first_and_says_when_nothing_is_left() -> None:
-    explorer = SurroundCheck(SurroundCheckConfig(margin_cells=0), sheet_knowledge(fusion=False))
+    explorer = ToldOfSheet().explorer(SurroundCheck, SurroundCheckConfig(margin_cells=0, fusion=False))
     marks = explorer._marks
     here = marks.cell_of(START.x_m, START.y_m)
     assert here is not None

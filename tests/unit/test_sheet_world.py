@@ -13,19 +13,22 @@ from hypothesis import strategies as st
 from pilotage.core.errors import InputError
 from pilotage.core.random import RandomStreams
 from pilotage.core.types import Pose2, WheelSpeeds
-from pilotage.kernels.bodies import wheel_drive
+from pilotage.kernels.bodies import wheels
 from pilotage.kernels.geometry import boxes
 from pilotage.maps.true_cells import SheetFile
-from pilotage.missions.sheet import DriveErrorsConfig, WheelDriveConfig
+from pilotage.models.motion.wheel_drive import WheelDriveConfig, WheelErrorsConfig
 from pilotage.sensors.gyroscope import GyroscopeConfig
 from pilotage.sensors.infrared import InfraredConfig
 from pilotage.sensors.readings import EncoderCounts, GyroscopeRates, InfraredReading, LineReading
 from pilotage.sensors.wheel_encoders import WheelEncodersConfig
-from pilotage.sim.sheet_simulator import SheetSimulator
-from pilotage.sim.sheet_world import true_drive
-from support.sheets import sheet_sensors, sheet_simulator
+from pilotage.sim.bodies.wheel_drive import true_wheels
+from pilotage.stack.exploration.frontier import FrontierExplorer
+from pilotage.stack.exploration.frontier_config import FrontierConfig
+from pilotage.stack.exploration.random_walk import RandomWalk, RandomWalkConfig
+from pilotage.stack.exploration.surround_check import SurroundCheck, SurroundCheckConfig
+from support.sheets import OnSheet, ToldOfSheet, sheet_sensors, sheet_simulator
 
-EXACT = DriveErrorsConfig(
+EXACT = WheelErrorsConfig(
     radius_difference=0.0, separation_error=(0.0, 0.0), slip=(0.0, 0.0), slip_std_m_sqrt_m=0.0
 )
 BOXES = np.array([[0.2, 0.1, 0.5, 0.4], [0.45, 0.35, 0.9, 0.6]])
@@ -59,7 +62,7 @@ def test_distance_to_boxes_is_the_least_over_their_points(x: float, y: float) ->
     assert found == pytest.approx(min(each), abs=1e-12)
 
 
-def drive_for(sim: SheetSimulator, command: WheelSpeeds, seconds: float) -> np.ndarray:
+def drive_for(sim: OnSheet, command: WheelSpeeds, seconds: float) -> np.ndarray:
     counts = np.zeros(2, dtype=np.int64)
     for _ in range(round(seconds * 100)):
         reading = sim.step(command).by_sensor["encoders"]
@@ -86,15 +89,15 @@ def test_a_turn_on_the_spot_follows_the_separation() -> None:
 
 
 def test_slip_and_unequal_wheels_are_drawn_within_what_is_stated() -> None:
-    motion, errors = WheelDriveConfig(), DriveErrorsConfig()
-    drawn = np.array([true_drive(motion, errors, np.random.default_rng(seed)) for seed in range(200)])
-    ratio = drawn[:, wheel_drive.RADIUS_LEFT] / drawn[:, wheel_drive.RADIUS_RIGHT] - 1.0
+    motion = WheelDriveConfig()
+    drawn = np.array([true_wheels(motion, np.random.default_rng(seed)) for seed in range(200)])
+    ratio = drawn[:, wheels.RADIUS_LEFT] / drawn[:, wheels.RADIUS_RIGHT] - 1.0
     assert np.allclose(np.abs(ratio), 0.005, atol=1e-4)
     assert (ratio > 0.0).any()
     assert (ratio < 0.0).any()
-    off = np.abs(drawn[:, wheel_drive.SEPARATION] / motion.wheel_separation_m - 1.0)
+    off = np.abs(drawn[:, wheels.SEPARATION] / motion.wheel_separation_m - 1.0)
     assert ((off >= 0.01 - 1e-12) & (off <= 0.02 + 1e-12)).all()
-    slip = drawn[:, [wheel_drive.SLIP_LEFT, wheel_drive.SLIP_RIGHT]]
+    slip = drawn[:, [wheels.SLIP_LEFT, wheels.SLIP_RIGHT]]
     assert ((slip >= 0.01) & (slip <= 0.02)).all()
 
 
@@ -102,14 +105,14 @@ def test_the_body_stops_at_a_box_while_the_wheels_turn_on_and_can_back_off() -> 
     sheet = SheetFile(size_m=(4.0, 4.0), cells=(10, 10), obstacles=((2.3, 1.5, 2.6, 2.5),))
     sim = sheet_simulator(sheet_sensors(), RandomStreams(0), sheet, MIDDLE, EXACT)
     counts = drive_for(sim, WheelSpeeds(3.0, 3.0), 6.0)
-    assert sim.contacts == 1
-    assert sim.touching
-    assert -1e-9 <= sim.clearance_m < 1e-3
+    assert sim.body.collisions == 1
+    assert sim.body.touching
+    assert -1e-9 <= sim.body.clearance_m < 1e-3
     assert 2.0 * math.pi * 0.035 * counts.mean() / 1440 > 0.5
     before = sim.truth.x_m
     drive_for(sim, WheelSpeeds(-3.0, -3.0), 1.0)
     assert sim.truth.x_m < before - 0.05
-    assert not sim.touching
+    assert not sim.body.touching
 
 
 def test_there_is_no_wall_at_the_edge() -> None:
@@ -117,7 +120,7 @@ def test_there_is_no_wall_at_the_edge() -> None:
     assert sim.on_sheet
     drive_for(sim, WheelSpeeds(3.0, 3.0), 4.0)
     assert not sim.on_sheet
-    assert sim.contacts == 0
+    assert sim.body.collisions == 0
 
 
 def test_the_gyroscope_has_a_bias_of_either_sign_and_a_scale_error() -> None:
@@ -169,11 +172,36 @@ def test_line_sensors_see_tape_and_the_dark_floor() -> None:
     ("change", "complaint"),
     [
         ({"encoders": WheelEncodersConfig(rate_hz=150.0)}, "multiple of 100 Hz"),
-        ({"gyroscope": GyroscopeConfig(rate_hz=100.0)}, "the encoders' 200 Hz"),
+        (
+            {"encoders": WheelEncodersConfig(rate_hz=300.0), "gyroscope": GyroscopeConfig(rate_hz=200.0)},
+            "a whole part of 300 Hz",
+        ),
         ({"ir_left": InfraredConfig(rate_hz=30.0)}, "whole fraction"),
-        ({"more": WheelEncodersConfig()}, "expected one WheelEncoders"),
     ],
 )
 def test_rates_that_do_not_fit_are_told(change: dict[str, Any], complaint: str) -> None:
     with pytest.raises(InputError, match=complaint):
         sheet_simulator(sheet_sensors() | change, RandomStreams(0))
+
+
+def test_a_slower_gyroscope_beside_the_encoders_reads_means() -> None:
+    sensors = sheet_sensors() | {"gyroscope": GyroscopeConfig(rate_hz=100.0, rate_std_rad_s=0.0)}
+    reading = sheet_simulator(sensors, RandomStreams(0)).step(WheelSpeeds(1.0, 1.0)).by_sensor["gyroscope"]
+    assert isinstance(reading, GyroscopeRates)
+    assert len(reading.rates_rad_s) == 1
+
+
+@pytest.mark.parametrize("count", [0, 2])
+@pytest.mark.parametrize(
+    ("explorer", "config"),
+    [
+        (RandomWalk, RandomWalkConfig()),
+        (SurroundCheck, SurroundCheckConfig()),
+        (FrontierExplorer, FrontierConfig()),
+    ],
+)
+def test_an_explorer_needs_its_encoders_once(explorer: Any, config: Any, count: int) -> None:
+    others = {k: s for k, s in sheet_sensors().items() if not isinstance(s, WheelEncodersConfig)}
+    told = ToldOfSheet(sensors=others | {f"encoders-{k}": WheelEncodersConfig() for k in range(count)})
+    with pytest.raises(InputError, match=f"expected one WheelEncoders among robot.sensors, found {count}"):
+        told.explorer(explorer, config)

@@ -15,6 +15,7 @@ from pilotage.evaluation.rover_metrics import ellipse_axes, in_ellipse, root_det
 from pilotage.kernels.grids.blocked_distance import distance_to_blocked
 from pilotage.maps.occupancy_grid import OccupancyGrid, squared_distances
 from pilotage.maps.world_map import WorldMap
+from pilotage.models.motion.bicycle import BicycleConfig
 
 CLEARANCE_REACH_CELLS = 200
 """Farther from hazards than this is not measured."""
@@ -37,6 +38,8 @@ def terrain_columns(run: FinishedRun, robot: RobotRun) -> dict[str, FloatArray]:
     if chart.elevation is not None:
         columns["elevation_m"] = chart.elevation.heights_at(points)
         columns["slope_rad"] = chart.elevation.slopes_at(chart.grid.cells_at(points))
+    if isinstance(robot.motion, BicycleConfig):
+        columns["steering_rad"] = steering_rad(trace, robot.motion.wheelbase_m)
     covs = covariances(trace)
     axes = ellipse_axes(covs, run.mission.run.ellipse_probability)
     return columns | {
@@ -45,6 +48,15 @@ def terrain_columns(run: FinishedRun, robot: RobotRun) -> dict[str, FloatArray]:
         "ellipse_direction_rad": axes[:, 2],
         "root_determinant_m2": root_determinant(covs),
     }
+
+
+def steering_rad(trace: Mapping[str, FloatArray], wheelbase_m: float) -> FloatArray:
+    """(N,) steering angle that a bicycle drove with, tan(gamma) = L w / v; nan where it stood still."""
+    speed, rate = trace["v_true_m_s"], trace["w_true_rad_s"]
+    moves = speed != 0.0
+    found = np.full(len(speed), math.nan)
+    found[moves] = np.arctan(wheelbase_m * rate[moves] / speed[moves])
+    return found
 
 
 def terrain_metrics(

@@ -21,6 +21,7 @@ from pilotage.models.footprint import Footprint
 from pilotage.models.motion.motion import MotionConfig
 from pilotage.models.motion.wheel_drive import WheelDriveConfig
 from pilotage.sensors.sensor import SensorConfig
+from pilotage.sensors.wheel_encoders import WheelEncodersConfig
 from pilotage.stack.interface import Belief
 
 S = TypeVar("S", bound=SensorConfig)
@@ -189,13 +190,14 @@ class SheetKnowledge:
         Raises
         ------
         InputError
-            Where the world is no sheet or the robot does not drive by its wheels' speeds.
+            Where the world is no sheet, or the robot does not drive by its wheels' speeds or count them.
         """
         markings, motion = chart.markings, robot.motion
         if markings is None:
             raise InputError(f"{needed_by}: expected a sheet with cells as world.map, found '{chart.name}'")
         if not isinstance(motion, WheelDriveConfig):
             raise InputError(f"{needed_by}: expected robot.motion.name: wheel-drive, found another motion")
+        robot.one_sensor(WheelEncodersConfig, needed_by)
         plan = None
         if markings.source is not None:
             plan = FloorPlan(true_map(markings.source).cells, chart.walls.segments_m)
