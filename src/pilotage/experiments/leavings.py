@@ -39,7 +39,7 @@ def files_of(run: Run, verdict: Verdict, metrics: Mapping[str, object]) -> RunFi
         events=tuple(finished.events),
         mission_text=resolved_yaml(finished.mission, chart),
         world=world,
-        terrain=terrain_pictures(finished, run.sightings[0].seen()) if chart.open_ground else None,
+        terrain=terrain_pictures(finished, run.sightings[0].seen()),
         grid=grid,
         robots=tuple(
             RobotFiles(
