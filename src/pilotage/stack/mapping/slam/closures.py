@@ -24,6 +24,9 @@ LEAST_APART = 4
 """Submaps between the two of a candidate: nearer ones share keyframes or the front end's local map."""
 NEAR_M = 3.0
 WINDOW_BASE_M, WINDOW_BASE_RAD, WINDOW_STDS, MOST_TURN_RAD = 0.3, 0.04, 3.0, 0.8
+SLIP = np.diag([WINDOW_BASE_M / WINDOW_STDS, WINDOW_BASE_M / WINDOW_STDS, WINDOW_BASE_RAD / WINDOW_STDS]) ** 2
+"""What the front end may have slipped unnoticed anywhere, in the gate as in the window. Two closures across
+the same slip still have to agree without it."""
 AGAIN = 1.5
 """A pair is searched again once its window has shrunk by this factor."""
 MOST_PER_LATER, MOST_PER_EARLIER = 3, 6
@@ -219,18 +222,24 @@ def _joint_test(
     covariance = (flat @ joint @ flat.T).reshape(count, 3, count, 3)
     covariance[k, :, k] += np.linalg.inv(edges.information)
     own = covariance[k, :, k]
-    chi_square = np.einsum("ki,ki->k", innovation, np.linalg.solve(own, innovation[..., None])[..., 0])
+    alone = _squared(innovation, own)
+    chi_square = _squared(innovation, own + SLIP)
     first, second = np.triu_indices(count, 1)
     both = np.empty((first.size, 6, 6))
     both[:, :3, :3], both[:, 3:, 3:] = own[first], own[second]
     both[:, :3, 3:] = covariance[first, :, second]
     both[:, 3:, :3] = both[:, :3, 3:].transpose(0, 2, 1)
     errors = np.concatenate([innovation[first], innovation[second]], axis=1)
-    together = np.einsum("ki,ki->k", errors, np.linalg.solve(both, errors[..., None])[..., 0])
-    given = together - np.minimum(chi_square[first], chi_square[second])
+    together = _squared(errors, both)
+    given = together - np.minimum(alone[first], alone[second])
     agree = np.zeros((count, count), np.bool_)
     agree[first, second] = agree[second, first] = given <= chi_square_quantile(probability, 3)
     return np.asarray(chi_square), agree
+
+
+def _squared(errors: FloatArray, covariance: FloatArray) -> FloatArray:
+    """Squared Mahalanobis distances (M,) of errors (M, n) under covariances (M, n, n)."""
+    return np.asarray(np.einsum("ki,ki->k", errors, np.linalg.solve(covariance, errors[..., None])[..., 0]))
 
 
 def _clique(agree: BoolArray, fits: BoolArray) -> BoolArray:
