@@ -17,8 +17,8 @@ from pilotage.evaluation.metrics import METRICS
 from pilotage.evaluation.metrics.registry import Metrics
 from pilotage.evaluation.metrics.table import DECISIVE, shipped_metrics
 from pilotage.evaluation.pose_errors import pose_errors
+from pilotage.experiments.given import has
 from pilotage.experiments.mission import load_mission, shipped_missions
-from pilotage.experiments.task_of import has, task_of
 from pilotage.report.quantities import measured
 
 
@@ -36,7 +36,7 @@ def test_what_judges_a_task_is_declared_and_has_a_direction() -> None:
 @pytest.mark.parametrize("name", shipped_missions())
 def test_every_shipped_mission_is_judged_by_something(name: str) -> None:
     mission = load_mission(name)
-    costs = METRICS.costs_of(task_of(mission), METRICS.given_by(task_of(mission), has(mission)))
+    costs = METRICS.costs_of(mission.task.name, METRICS.given_by(mission.task.name, has(mission)))
     assert len(costs) >= 3
 
 

@@ -11,16 +11,16 @@ import pytest
 from PIL import Image
 
 from pilotage.cli.main import main
-from pilotage.core.angles import wrap_array_to_pi
-from pilotage.experiments.floor.kind import FLOOR
-from pilotage.experiments.ideal_sensors import FAULTS, ideal
-from pilotage.experiments.kinds import kind_of
+from pilotage.core.errors import InputError
+from pilotage.evaluation.finished import FinishedRun, RobotRun
+from pilotage.experiments.build.build import build
+from pilotage.experiments.loop import run_loop
 from pilotage.experiments.mission import load_mission
-from pilotage.experiments.run import simulate
-from pilotage.experiments.sheet.kind import SHEET
-from pilotage.experiments.sheet.simulate import SheetRecord
-from pilotage.experiments.terrain.kind import TERRAIN
-from pilotage.experiments.terrain.record import TerrainRecord
+from pilotage.experiments.oracles.applicable import applicable, check_oracles
+from pilotage.experiments.oracles.ideal_sensors import FAULTS, ideal
+from pilotage.experiments.run import judge
+from pilotage.experiments.studies.attribution import attribution_study
+from pilotage.missions.mission import Mission
 from pilotage.sensors.sensor import SENSORS, Mount, SensorConfig
 
 PROPERTIES = {
@@ -35,8 +35,23 @@ PROPERTIES = {
     "counts_per_turn",
     "field_ut",
     "disturbance_length_m",
+    "bias_time_s",
+    "sectors",
 }
 """What a sensor is, as opposed to what it does wrong."""
+
+
+def simulated(mission: Mission) -> tuple[FinishedRun, dict[str, Any]]:
+    """A run and its metrics."""
+    check_oracles(mission)
+    experiment = build(mission)
+    run = run_loop(experiment)
+    return run.finished, judge(experiment, run).metrics
+
+
+def only(run: FinishedRun) -> RobotRun:
+    (robot,) = run.robots
+    return robot
 
 
 class TestIdealSensors:
@@ -74,18 +89,17 @@ class TestFloor:
             "run.oracles=[sensors, initial]",
         ]
         mission = load_mission("museum-1", wrong)
-        metrics = FLOOR.metrics(simulate(mission))  # type: ignore[arg-type]
+        metrics = simulated(mission)[1]
         assert metrics["position_rmse_m"] == pytest.approx(0.0, abs=1e-3)
         mission = load_mission("museum-1", [*wrong[:-1], "run.oracles=[initial]"])
-        assert FLOOR.metrics(simulate(mission))["position_rmse_m"] > 0.1  # type: ignore[arg-type, operator]
+        assert simulated(mission)[1]["position_rmse_m"] > 0.1
 
     def test_the_start_is_told(self) -> None:
         first = []
         for oracle in ("", "initial"):
             settings = ["stack.initial.x_var_m2=100", "run.time_limit_s=1", f"run.oracles=[{oracle}]"]
-            trace: Any = simulate(
-                load_mission("museum-1", ["stack.localizer=dead-reckoning", *settings])
-            ).trace
+            mission = load_mission("museum-1", ["stack.localizer=dead-reckoning", *settings])
+            trace = only(simulated(mission)[0]).trace
             off = np.hypot(trace["est_x_m"] - trace["true_x_m"], trace["est_y_m"] - trace["true_y_m"])
             first.append(off[0])
         assert first[1] < 0.01 < 0.1 < first[0]
@@ -109,14 +123,17 @@ def small(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
-def explored(small: Path, oracle: str, *more: str, seed: int = 3) -> tuple[SheetRecord, dict[str, Any]]:
-    settings = [f"world.sheet={small}", f"run.oracles=[{oracle}]", f"run.seed={seed}", *more]
-    record: Any = simulate(load_mission("romi-explore", settings))
-    return record, SHEET.metrics(record)
+def explored(small: Path, oracle: str, *more: str, seed: int = 3) -> tuple[FinishedRun, dict[str, Any]]:
+    settings = [f"world.map={small}", f"run.oracles=[{oracle}]", f"run.seed={seed}", *more]
+    return simulated(load_mission("romi-explore", settings))
 
 
-REPORTS = ("stack.explorer.name=surround-check", "stack.explorer.margin_cells=0")
-WANDERS = ("stack.explorer.name=random-walk", "stack.fusion=false", "stack.avoidance=false")
+REPORTS = ("stack.navigator.name=surround-check", "stack.navigator.margin_cells=0")
+WANDERS = (
+    "stack.navigator.name=random-walk",
+    "stack.navigator.fusion=false",
+    "stack.navigator.avoidance=false",
+)
 
 
 class TestSheets:
@@ -144,9 +161,9 @@ class TestSheets:
         """Wheels and encoders then say exactly where the robot is; not so with the drive's errors."""
         worst = []
         for oracle in ("", "drive"):
-            trace = explored(small, oracle, *WANDERS)[0].trace
+            trace = only(explored(small, oracle, *WANDERS)[0]).trace
             # A box that stops the body while the wheels spin on is no fault of the drive.
-            free = trace["contacts"] == 0.0
+            free = trace["collisions"] == 0.0
             off = np.hypot(trace["est_x_m"] - trace["true_x_m"], trace["est_y_m"] - trace["true_y_m"])
             worst.append(off[free].max())
         assert worst[0] > 3e-3
@@ -162,12 +179,12 @@ class TestSheets:
 
     @pytest.mark.parametrize("explorer", [(), REPORTS, WANDERS])
     def test_who_knows_covers_all_and_is_the_fastest(self, small: Path, explorer: tuple[str, ...]) -> None:
-        record, knows = explored(small, "explorer", *explorer)
+        run, knows = explored(small, "explorer", *explorer)
         assert knows["success"]
         assert knows["coverage_reachable"] == 1.0
         assert knows["position_rmse_m"] == 0.0
         assert knows["overhang_max_m"] < 1e-3
-        assert record.experiment.explorer.left == ()
+        assert only(run).results["left"] == ()
         if not explorer:
             assert knows["duration_s"] < 0.7 * explored(small, "")[1]["duration_s"]
         # A cell a step of its side at full speed, and no less.
@@ -178,10 +195,10 @@ class TestSheets:
         sheet = tmp_path / "parted.yaml"
         sheet.write_text("size_m: [1.0, 0.5]\nstart_pose: [0.2, 0.25, 1]\ncells: [10, 5]\n"
                          "obstacles: [[0.5, 0.0, 0.55, 0.5]]\n")  # fmt: skip
-        record, knows = explored(sheet, "explorer")
-        assert record.outcome.done
+        run, knows = explored(sheet, "explorer")
+        assert knows["success"]
         assert 0.3 < knows["coverage_reachable"] < 0.7
-        assert len(record.experiment.explorer.left) == knows["cells_left"] > 0
+        assert len(only(run).results["left"]) == knows["cells_left"] > 0
 
     def test_the_same_seed_has_the_same_robot(self, small: Path) -> None:
         """What an oracle replaces changes; the drive's errors and everybody's noise do not."""
@@ -190,9 +207,9 @@ class TestSheets:
         again, _ = explored(small, "localizer", *WANDERS)
         # The wanderer drives by chance and one beam: where it goes does not depend on its pose at all.
         for name in ("true_x_m", "true_y_m", "true_theta_rad"):
-            np.testing.assert_array_equal(plain.trace[name], knows.trace[name])
-        for name, column in knows.trace.items():
-            np.testing.assert_array_equal(column, again.trace[name])
+            np.testing.assert_array_equal(only(plain).trace[name], only(knows).trace[name])
+        for name, column in only(knows).trace.items():
+            np.testing.assert_array_equal(column, only(again).trace[name])
 
 
 # --- terrain -----------------------------------------------------------------------------------------
@@ -206,60 +223,79 @@ def ground(tmp_path_factory: pytest.TempPathFactory) -> list[str]:
     pixels[3:, 30] = 255
     Image.fromarray(pixels).save(folder / "obstacles.png")
     return [
-        "world.ground.name=images",
-        f"world.ground.obstacles={folder / 'obstacles.png'}",
+        "world.map.name=images",
+        f"world.map.obstacles={folder / 'obstacles.png'}",
         "world.start.x_m=55",
         "world.start.y_m=45",
         "world.goal.x_m=545",
         "world.goal.y_m=45",
+        "stack.navigator.cost_map.inflation_m=10",
         "world.landmarks=[{id: 7, x_m: 100, y_m: 200}, {id: 3, x_m: 400, y_m: 300}]",
     ]
 
 
 def driven(
     mission: str, ground: list[str], oracle: str, *more: str, seed: int = 5
-) -> tuple[TerrainRecord, dict[str, Any]]:
+) -> tuple[FinishedRun, dict[str, Any]]:
     settings = [*ground, f"run.oracles=[{oracle}]", f"run.seed={seed}", *more]
-    record: Any = simulate(load_mission(mission, settings))
-    return record, TERRAIN.metrics(record)
+    return simulated(load_mission(mission, settings))
 
 
-FREE = ("world.start.y_m=372", "world.goal.y_m=372", "world.start.theta_rad=0", "world.goal.theta_rad=0")
+CURVE = "gale-astar-ekf"
 
 
 class TestTerrain:
     def test_the_true_pose(self, ground: list[str]) -> None:
-        assert driven("gale-astar-ekf", ground, "")[1]["position_rmse_m"] > 0.01
-        record, knows = driven("gale-astar-ekf", ground, "estimator")
+        assert driven(CURVE, ground, "")[1]["position_rmse_m"] > 0.01
+        run, knows = driven(CURVE, ground, "localizer")
         assert knows["position_rmse_m"] == 0.0
         assert knows["final_position_error_m"] == 0.0
-        assert record.estimation is not None
-        assert (
-            np.abs(wrap_array_to_pi(record.trace["est_theta_rad"] - record.trace["true_theta_rad"])).max()
-            < 1e-9
-        )
+        trace = only(run).trace
+        np.testing.assert_array_equal(trace["est_theta_rad"], trace["true_theta_rad"])
 
     def test_silent_sensors_and_a_known_start_leave_no_error(self, ground: list[str]) -> None:
+        """Watched, so that both drive the same way."""
         wrong = "robot.sensors.odometer.angle_scale=1.05"
-        plain = driven("gale-astar-ekf", ground, "initial", wrong)[1]["position_rmse_m"]
-        record, silent = driven("gale-astar-ekf", ground, "initial, sensors", wrong)
+        plain = driven(CURVE, ground, "driver, initial", wrong)[1]["position_rmse_m"]
+        run, silent = driven(CURVE, ground, "driver, initial, sensors", wrong)
         assert silent["position_rmse_m"] < 1e-3 < plain
         # The filter expects noise still: its covariance grows as it would.
-        assert record.estimation is not None
-        assert (record.estimation.log.variances[:, 0] > 0.0).all()
+        assert only(run).trace["cov_xx_m2"].max() > 1e-4
 
     def test_one_oracle_leaves_what_the_others_draw(self, ground: list[str]) -> None:
-        plain, _ = driven("gale-astar-ekf", ground, "")
-        told, _ = driven("gale-astar-ekf", ground, "initial")
-        silent, _ = driven("gale-astar-ekf", ground, "sensors")
-        assert plain.estimation is not None
-        assert told.estimation is not None
-        assert silent.estimation is not None
-        np.testing.assert_array_equal(plain.estimation.log.steps, told.estimation.log.steps)
-        np.testing.assert_array_equal(plain.estimation.log.ranges_m, told.estimation.log.ranges_m)
-        np.testing.assert_array_equal(plain.estimation.log.ids, silent.estimation.log.ids)
-        assert plain.estimation.initial.pose == silent.estimation.initial.pose
-        assert plain.estimation.initial.pose != told.estimation.initial.pose
+        plain, told, silent = (
+            only(driven(CURVE, ground, oracle)[0]).trace
+            for oracle in ("driver", "driver, initial", "driver, sensors")
+        )
+        for name in ("odom_distance_m", "odom_angle_rad", "beacons_seen", "true_x_m"):
+            np.testing.assert_array_equal(plain[name], told[name])
+        np.testing.assert_array_equal(plain["beacons_seen"], silent["beacons_seen"])
+        assert not np.array_equal(plain["odom_distance_m"], silent["odom_distance_m"], equal_nan=True)
+        initial = load_mission(CURVE, [*ground, "run.seed=5"])
+        first = {
+            name: build(
+                initial.model_copy(
+                    update={"run": initial.run.model_copy(update={"oracles": ("driver", *name.split())})}
+                )
+            )
+            .team[0]
+            .stack.belief.pose
+            for name in ("", "sensors", "initial")
+        }
+        assert first[""] == first["sensors"] != first["initial"]
+
+    def test_the_controller_follows_from_the_true_pose(self, ground: list[str]) -> None:
+        """With an odometer that turns 5 % too far, who steers by the estimate leaves the path."""
+        wrong = ("robot.sensors.odometer.angle_scale=1.05", "stack.localizer=dead-reckoning")
+        off = []
+        for oracle in ("initial", "initial, controller"):
+            trace = only(driven(CURVE, ground, oracle, *wrong)[0]).trace
+            ahead = np.isfinite(trace["ref_x_m"])
+            dx = trace["true_x_m"][:, None] - trace["ref_x_m"][ahead]
+            dy = trace["true_y_m"][:, None] - trace["ref_y_m"][ahead]
+            off.append(np.hypot(dx, dy).min(axis=1).max())
+        # References are 3.2 m apart.
+        assert off[1] < 4.0 < 2.0 * off[1] < off[0]
 
     def test_any_angle_is_no_longer(self, ground: list[str]) -> None:
         own = driven("gale-astar", ground, "")[1]
@@ -269,33 +305,9 @@ class TestTerrain:
         top = 45.0 + 32 * 10.0
         assert knows["planned_length_m"] >= 2.0 * math.hypot(245.0, top - 45.0) * 0.99
 
-    def test_the_shortest_way_to_a_pose(self, ground: list[str]) -> None:
-        """Round the wall, where the pose controller runs into it; between free poses no longer than it."""
-        into = driven("gale-pose", ground, "", "world.goal.theta_rad=0")[1]
-        around, metrics = driven("gale-pose", ground, "pose_controller", "world.goal.theta_rad=0")
-        assert not into["success"]
-        assert metrics["success"], metrics["reason"]
-        assert metrics["goal_error_m"] < 1e-6
-        assert metrics["goal_error_rad"] < 0.05
-        speeds = np.hypot(*np.diff(around.motion.poses[:, :2], axis=0).T) / np.diff(around.motion.t_s)  # type: ignore[union-attr]
-        assert speeds.max() <= 0.04 + 1e-6
-        own, best = (driven("gale-pose", ground, oracle, *FREE)[1] for oracle in ("", "pose_controller"))
-        assert own["success"]
-        assert best["success"]
-        assert best["path_length_m"] <= 1.001 * own["path_length_m"]
-        assert best["duration_s"] < own["duration_s"]
-
-    def test_no_way_and_no_time(self, ground: list[str], tmp_path: Path) -> None:
-        pixels = np.zeros((40, 60), np.uint8)
-        pixels[:, 30] = 255
-        Image.fromarray(pixels).save(tmp_path / "closed.png")
-        closed = f"world.ground.obstacles={tmp_path / 'closed.png'}"
-        metrics = driven("gale-pose", ground, "pose_controller", "world.goal.theta_rad=0", closed)[1]
-        assert not metrics["success"]
-        assert "not connected" in metrics["reason"]
-        late = driven("gale-pose", ground, "pose_controller", "run.time_limit_s=100", *FREE)[1]
-        assert not late["success"]
-        assert late["duration_s"] <= 100.0
+    def test_a_rover_that_needs_an_oracle_says_so(self, ground: list[str]) -> None:
+        with pytest.raises(InputError, match=r"stack\.localizer, or run\.oracles: \[localizer\]"):
+            driven("gale-pose", [w for w in ground if "cost_map" not in w], "", "world.goal.theta_rad=0")
 
 
 # --- what is offered ---------------------------------------------------------------------------------
@@ -304,20 +316,29 @@ class TestTerrain:
 @pytest.mark.parametrize(
     ("mission", "more", "offered"),
     [
-        ("gale-pose", [], {"pose_controller"}),
+        ("gale-pose", [], {"localizer"}),
         ("gale-astar", [], {"planner"}),
         ("gale-astar", ["stack.planner.name=theta-star"], set()),
-        ("gale-astar", ["stack.cost_map.slope_that_doubles_deg=10"], set()),
-        ("gale-ekf", [], {"sensors", "initial", "estimator", "pose_controller"}),
-        ("gale-astar-ekf", [], {"sensors", "initial", "estimator", "planner"}),
+        ("gale-astar", ["stack.navigator.cost_map.slope_that_doubles_deg=10"], set()),
+        ("gale-ekf", [], {"sensors", "initial", "localizer", "driver"}),
+        (CURVE, [], {"sensors", "initial", "localizer", "planner", "controller", "driver"}),
         ("romi-explore", [], {"sensors", "drive", "localizer", "mapper", "explorer"}),
         ("romi-baseline", [], {"sensors", "drive", "localizer", "mapper", "explorer"}),
-        ("museum-plan", [], {"sensors", "initial", "localizer", "planner", "driver"}),
+        ("museum-plan", [], {"initial", "planner"}),
+        ("museum-1", [], {"sensors", "initial", "localizer", "mapper", "planner", "controller", "driver"}),
     ],
 )
 def test_what_a_mission_offers(mission: str, more: list[str], offered: set[str]) -> None:
-    loaded = load_mission(mission, more)
-    assert set(kind_of(loaded).oracles(loaded)) == offered
+    assert set(applicable(load_mission(mission, more))) == offered
+
+
+def test_an_attribution_keeps_the_oracles_that_the_mission_has() -> None:
+    cells = {cell.name: cell.overrides for cell in attribution_study(CURVE, (), 2).cells}
+    assert "driver" in str(cells["as it is"])
+    assert "driver" in str(cells["oracle planner"])
+    assert "planner" in str(cells["oracle planner"])
+    with pytest.raises(InputError, match="modules that an oracle can replace"):
+        attribution_study("gale-pose", (), 2)
 
 
 @pytest.mark.parametrize(
@@ -326,7 +347,7 @@ def test_what_a_mission_offers(mission: str, more: list[str], offered: set[str])
         (["run", "gale-astar", "--set", "run.oracles=[localizer]"], "expected one of planner in the mission"),
         (
             ["run", "romi-explore", "--set", "run.oracles=[planner]"],
-            "expected one of sensors, drive, localizer",
+            "expected one of sensors, localizer, mapper, drive, explorer",
         ),
         (
             ["run", "gale-astar", "--set", "stack.planner.name=theta-star", "--set", "run.oracles=[planner]"],

@@ -14,13 +14,13 @@ import numpy as np
 import pytest
 
 from pilotage.core.errors import InputError
-from pilotage.experiments.floor.sightings import MOST_SCANS, Sightings
+from pilotage.experiments.sightings import MOST_SCANS, Sightings
+from pilotage.records.run_data import read_run
 from pilotage.report import write_report
 from pilotage.report.replay.floor import floor_scene
 from pilotage.report.replay.packing import pack
 from pilotage.report.replay.scene import PoseTrack, Raster, ReplayScene
 from pilotage.report.replay.section import replay_section
-from pilotage.report.run_folder import read_run
 from pilotage.sensors.beacon import BeaconConfig
 from pilotage.sensors.lidar import LidarConfig
 from pilotage.sensors.readings import BeaconReadings, LidarScan, Readings

@@ -13,8 +13,8 @@ import pytest
 
 from pilotage.core.errors import InputError
 from pilotage.core.types import Event
+from pilotage.records.run_data import read_run
 from pilotage.report import write_report
-from pilotage.report.run_folder import read_run
 from support.fabricated_run import (
     fabricate_columns,
     fabricate_metrics,

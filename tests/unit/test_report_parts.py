@@ -16,12 +16,12 @@ from rich.console import Console
 from scipy.stats import chi2
 
 from pilotage.core.types import FloatArray
+from pilotage.records.run_data import read_run
 from pilotage.report import quantities, summary_table
 from pilotage.report.figures.consistency import chi_square_band
 from pilotage.report.figures.layers import ellipse_outlines
 from pilotage.report.figures.map_view import view_limits
 from pilotage.report.figures.placing import LabelPlacer, along
-from pilotage.report.run_folder import read_run
 from pilotage.report.series import band, decimate, merge_spans, running_mean, spans
 from support.fabricated_run import fabricate_metrics, fabricate_run, fabricate_world
 from support.pages import page_of

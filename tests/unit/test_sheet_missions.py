@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,17 +13,19 @@ import pytest
 from pilotage.cli.main import main
 from pilotage.core.errors import InputError
 from pilotage.evaluation.sheet_visits import VisitedCells, reachable_cells
-from pilotage.experiments.mission import load_mission
+from pilotage.experiments.build.build import build
+from pilotage.experiments.build.charts import load_chart
+from pilotage.experiments.loop import run_loop, simulate
+from pilotage.experiments.mission import load_mission, mission_of
 from pilotage.experiments.run import run_mission
-from pilotage.experiments.sheet.sheets import load_sheet
-from pilotage.experiments.sheet.simulate import _reason, simulate
 from pilotage.maps.cell_map_text import read_cell_map
 from pilotage.maps.ros_map import read_ros_map
 from pilotage.maps.true_cells import SheetFile
-from pilotage.missions.sheet import SheetMission
+from pilotage.sim.bodies.wheel_drive import WheelDrive
 from pilotage.stack.interface import StackStatus
+from support.missions import explore
 
-REPORT = "stack.explorer.name=surround-check"
+REPORT = "stack.navigator.name=surround-check"
 
 
 def metrics(name: str, *overrides: str, seed: int = 0) -> dict[str, object]:
@@ -34,7 +37,10 @@ def metrics(name: str, *overrides: str, seed: int = 0) -> dict[str, object]:
     [
         ("romi-baseline", ()),
         *(
-            ("romi-explore", (REPORT, f"stack.fusion={fusion}", f"stack.avoidance={avoidance}"))
+            (
+                "romi-explore",
+                (REPORT, f"stack.navigator.fusion={fusion}", f"stack.navigator.avoidance={avoidance}"),
+            )
             for fusion in ("on", "off")
             for avoidance in ("on", "off")
         ),
@@ -48,19 +54,25 @@ def test_every_configuration_ends_with_a_reason(name: str, overrides: tuple[str,
 
 
 def test_one_that_is_done_but_touched_a_box_says_why_it_is_no_success() -> None:
-    mission = load_mission("romi-explore")
-    assert isinstance(mission, SheetMission)
-    assert _reason(StackStatus.ARRIVED, "done: all", mission, 0) == "done: all"
-    assert _reason(StackStatus.ARRIVED, "done: all", mission, 1) == "done: all; touched a box once"
-    assert _reason(StackStatus.FAILED, "left the sheet", mission, 2) == "left the sheet"
+    experiment = build(mission_of({**explore(), "run": {"dt_s": 0.01, "time_limit_s": 0.5}}))
+    finished = run_loop(experiment).finished
+
+    def told(status: StackStatus, ending: str, collisions: int) -> tuple[object, object]:
+        robot = replace(finished.robots[0], status=status, reason="done: all", collisions=collisions)
+        metrics = experiment.task.judge(replace(finished, robots=(robot,), ending=ending)).metrics
+        return metrics["success"], metrics["reason"]
+
+    assert told(StackStatus.ARRIVED, "", 0) == (True, "done: all")
+    assert told(StackStatus.ARRIVED, "", 1) == (False, "done: all; touched a box once")
+    assert told(StackStatus.ARRIVED, "", 2) == (False, "done: all; touched a box 2 times")
+    assert told(StackStatus.RUNNING, "left the sheet", 2) == (False, "left the sheet")
 
 
 def test_the_same_seed_gives_the_same_run_and_another_one_another() -> None:
     traces = []
     for seed in (3, 3, 4):
         mission = load_mission("romi-explore", (REPORT, "run.time_limit_s=40"), seed)
-        assert isinstance(mission, SheetMission)
-        traces.append(simulate(mission).trace["true_x_m"])
+        traces.append(simulate(mission).finished.robots[0].trace["true_x_m"])
     assert np.array_equal(traces[0], traces[1])
     assert not np.array_equal(traces[0], traces[2])
 
@@ -69,12 +81,10 @@ def test_a_switch_leaves_the_other_modules_their_draws() -> None:
     """The robot's true drive and its gyroscope's bias do not depend on the switches."""
     first = []
     for fusion in ("on", "off"):
-        mission = load_mission("romi-explore", (REPORT, f"stack.fusion={fusion}"), 1)
-        assert isinstance(mission, SheetMission)
-        mission = mission.model_copy(update={"run": mission.run.model_copy(update={"time_limit_s": 0.5})})
-        from pilotage.experiments.sheet.build import build
-
-        first.append(build(mission).simulator._drive)
+        mission = load_mission("romi-explore", (REPORT, f"stack.navigator.fusion={fusion}"), 1)
+        motion = build(mission).simulator.bodies[0].motion
+        assert isinstance(motion, WheelDrive)
+        first.append(motion._parameters)
     assert np.array_equal(first[0], first[1])
 
 
@@ -102,9 +112,16 @@ def test_the_run_folder_holds_map_and_report(tmp_path: Path, capsys: pytest.Capt
     assert score["feature_precision"] == pytest.approx(found["feature_precision"], nan_ok=True)
 
 
+def shipped_sheet() -> SheetFile:
+    markings = load_chart("treasure-hunt").markings
+    assert markings is not None
+    assert markings.source is not None
+    return markings.source
+
+
 def sheet_file(folder: Path) -> Path:
     path = folder / "sheet.yaml"
-    sheet = load_sheet("treasure-hunt").model_dump(mode="json")
+    sheet = shipped_sheet().model_dump(mode="json")
     path.write_text(json.dumps(sheet), encoding="utf-8")
     return path
 
@@ -113,8 +130,12 @@ def test_a_broken_cell_file_is_one_line(tmp_path: Path, capsys: pytest.CaptureFi
     main(["run", "romi-baseline", "--set", "run.time_limit_s=2", "--out", str(tmp_path), "--json"])
     folder = Path(json.loads(capsys.readouterr().out)["run_dir"])
     (folder / "cells.npz").write_bytes(b"no archive")
-    assert main(["report", str(folder)]) == 2
+    capsys.readouterr()
+    # The page is written without it, and says so.
+    assert main(["report", str(folder)]) == 0
     error = capsys.readouterr().err.strip()
+    assert error.startswith("pilotage: left out of the report: ")
+    assert "cells.npz" in (folder / "report.html").read_text(encoding="utf-8")
     assert error.count("\n") == 0
     assert "cells.npz" in error
 
@@ -122,18 +143,19 @@ def test_a_broken_cell_file_is_one_line(tmp_path: Path, capsys: pytest.CaptureFi
 @pytest.mark.parametrize(
     ("override", "complaint"),
     [
-        ("world.sheet={size_m: [1.8, 1.8], cells: [0, 25]}", "cells"),
-        ("world.sheet={size_m: [0, 1.8]}", "size_m"),
-        ("world.sheet={size_m: [1.8, 1.8], lines: [[[0, 0]]]}", "lines"),
-        ("world.sheet={size_m: [1.8, 1.8], obstacle: []}", "obstacles"),
-        ("world.sheet=treasure-hnt", "treasure-hunt"),
-        ("world.sheet=no/such.yaml", "none there"),
-        ("world.start={x_m: 0.4, y_m: 0.5}", "with room for the body"),
-        ("world.start={x_m: 2.4, y_m: 0.5}", "on the sheet"),
-        ("stack.fusion=perhaps", "fusion"),
-        ("robot.sensors.lidar={name: lidar}", "cannot carry"),
-        ("robot.errors.slip=[0.02, 0.01]", "smaller bound first"),
-        ("stack.explorer.name=surround-chek", "surround-check"),
+        ("world.map={size_m: [1.8, 1.8], cells: [0, 25]}", "cells"),
+        ("world.map={size_m: [0, 1.8]}", "size_m"),
+        ("world.map={size_m: [1.8, 1.8], lines: [[[0, 0]]]}", "lines"),
+        ("world.map={size_m: [1.8, 1.8], obstacle: []}", "obstacles"),
+        ("world.map=treasure-hnt", "treasure-hunt"),
+        ("world.map=no/such.yaml", "none there"),
+        ("world.start={x_m: 0.4, y_m: 0.5}", "at least the body's radius"),
+        ("world.start={x_m: 2.4, y_m: 0.5}", "expected a place on the map"),
+        ("stack.navigator.fusion=perhaps", "fusion"),
+        ("robot.motion=differential-drive", "expected robot.motion.name: wheel-drive"),
+        ("world.map=museum", "expected a start pose"),
+        ("robot.motion.errors.slip=[0.02, 0.01]", "smaller bound first"),
+        ("stack.navigator.name=surround-chek", "surround-check"),
         ("run.dt_s=0.003", "rate_hz"),
     ],
 )
@@ -147,15 +169,15 @@ def test_bad_input_is_one_line(override: str, complaint: str, capsys: pytest.Cap
 
 def test_any_sheet_will_do() -> None:
     """Not square, no boxes, odd cells: it runs, writes what it can, and a cell too small is no failure."""
-    sheet = "world.sheet={size_m: [1.2, 0.9], cells: [8, 9]}"
-    found = metrics("romi-explore", REPORT, sheet, "run.time_limit_s=20", "stack.explorer.margin_cells=0")
+    sheet = "world.map={size_m: [1.2, 0.9], cells: [8, 9]}"
+    found = metrics("romi-explore", REPORT, sheet, "run.time_limit_s=20", "stack.navigator.margin_cells=0")
     assert found["reachable_cells"]
-    one = "world.sheet={size_m: [0.6, 0.6], cells: [1, 1]}"
+    one = "world.map={size_m: [0.6, 0.6], cells: [1, 1]}"
     assert metrics("romi-explore", REPORT, one, "run.time_limit_s=5")["reason"]
 
 
 def test_the_reachable_cells_of_the_shipped_sheet() -> None:
-    assert int(reachable_cells(load_sheet("treasure-hunt"), 0.0815).sum()) == 406
+    assert int(reachable_cells(shipped_sheet(), 0.0815).sum()) == 406
 
 
 def test_reachable_cells_by_hand() -> None:
@@ -177,8 +199,13 @@ def test_visited_cells_count_once_and_only_on_the_sheet() -> None:
 
 def test_fusion_needs_a_gyroscope() -> None:
     mission = load_mission("romi-explore", (REPORT, "run.time_limit_s=1"))
-    assert isinstance(mission, SheetMission)
     sensors = {name: choice for name, choice in mission.robot.sensors.items() if name != "gyroscope"}
     robot = mission.robot.model_copy(update={"sensors": sensors})
     with pytest.raises(InputError, match="gyroscope"):
         simulate(mission.model_copy(update={"robot": robot}))
+
+
+def test_exploring_needs_a_sheet() -> None:
+    elsewhere = ("world.map=museum", "world.start={x_m: 1, y_m: 1}")
+    with pytest.raises(InputError, match=r"expected a sheet with cells as world\.map, found 'museum'"):
+        build(load_mission("romi-explore", elsewhere))

@@ -18,11 +18,11 @@ import pytest
 
 from pilotage.cli.main import main
 from pilotage.cli.study import _print_cells
+from pilotage.cli.study_page import write_study_report
 from pilotage.core.config import validate
 from pilotage.core.errors import InputError
 from pilotage.evaluation.metrics import METRICS
 from pilotage.experiments.run import run_mission
-from pilotage.experiments.run_folder import clean
 from pilotage.experiments.studies.attribution import attribution_of, attribution_study
 from pilotage.experiments.studies.database import DATABASE
 from pilotage.experiments.studies.definition import StudyDefinition
@@ -35,7 +35,7 @@ from pilotage.experiments.studies.study import Study, load_study, make_study, sh
 from pilotage.experiments.studies.sweep import parse_vary, sweep_study
 from pilotage.experiments.studies.table import read_study, study_object
 from pilotage.experiments.studies.trial import Outcome
-from pilotage.report.study.write import write_study_report
+from pilotage.records.metrics import clean
 
 ONE = StudyOptions(workers=1)
 

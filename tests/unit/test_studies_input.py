@@ -166,14 +166,14 @@ FLOOR = {
 SHEET = {
     "extends": "romi-explore",
     "mission": "mine",
-    "world": {"sheet": "blatt.yaml"},
+    "world": {"map": "blatt.yaml"},
     "run": {"time_limit_s": 8},
 }
 TERRAIN: dict[str, Any] = {
     "extends": "gale-ekf",
     "mission": "mine",
     "run": {"time_limit_s": 20000},
-    "world": {"ground": {"columns": 4400}},
+    "world": {"map": {"columns": 4400}},
 }
 KINDS: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
     "floor": (
@@ -194,8 +194,11 @@ KINDS: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
         {
             "seeds": {"first": 7, "pairing": "independent"},
             "factors": [
-                {"name": "fusion", "levels": {"with": {}, "without": {"stack.fusion": False}}},
-                {"key": "world.tape_width_m", "log_range": {"start": 0.01, "stop": 0.02, "count": 2}},
+                {"name": "fusion", "levels": {"with": {}, "without": {"stack.navigator.fusion": False}}},
+                {
+                    "key": "world.markings.tape_width_m",
+                    "log_range": {"start": 0.01, "stop": 0.02, "count": 2},
+                },
             ],
         },
     ),
@@ -209,7 +212,7 @@ KINDS: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
                     "multiply": True,
                     "values": [0.1, 10],
                 },
-                {"key": "stack.estimator.covariance", "values": ["first-order"]},
+                {"key": "stack.localizer.gate", "values": [0.99]},
             ],
         },
     ),
@@ -220,18 +223,16 @@ def test_another_ground_is_set_with_its_own_keys(tmp_path: Path) -> None:
     """As ``run --set`` takes them."""
     (tmp_path / "obstacles.png").touch()
     changes = {
-        "world.ground.obstacles": str(tmp_path / "obstacles.png"),
-        "world.ground.resolution_m": 5.0,
-        "world.ground.name": "images",
+        "world.map.obstacles": str(tmp_path / "obstacles.png"),
+        "world.map.resolution_m": 5.0,
+        "world.map.name": "images",
     }
     study = make_study(
         StudyDefinition(study="x", mission="gale-astar", set=changes, factors=()),
     )
     assert len(study.cells) == 1
     with pytest.raises(InputError, match="columns"):  # that was the crater's
-        make_study(
-            StudyDefinition(study="x", mission="gale-astar", set={**changes, "world.ground.columns": 9})
-        )
+        make_study(StudyDefinition(study="x", mission="gale-astar", set={**changes, "world.map.columns": 9}))
 
 
 def made(folder: Path, study: Study) -> Path:
@@ -255,7 +256,7 @@ def world(tmp_path: Path) -> Path:
     place.mkdir()
     missions = Path(str(SHIPPED)).parent
     shutil.copyfile(missions / "maps" / "museum.yaml", place / "my map.yaml")
-    shutil.copyfile(missions / "sheets" / "treasure-hunt.yaml", place / "blatt.yaml")
+    shutil.copyfile(missions / "maps" / "treasure-hunt.yaml", place / "blatt.yaml")
     return place
 
 

@@ -15,8 +15,8 @@ from PIL import Image
 from pilotage.cli.main import main
 from pilotage.core.errors import InputError
 from pilotage.experiments.mission import load_mission
+from pilotage.experiments.pictures import shares
 from pilotage.experiments.run import run_mission
-from pilotage.experiments.terrain.ground import shares
 from pilotage.maps.crater_cache import cached_crater_terrain
 from pilotage.maps.crater_terrain import CraterTerrainConfig, crater_terrain
 from pilotage.report import write_report
@@ -33,8 +33,8 @@ def wall(tmp_path: Path) -> Path:
 
 def settings(wall: Path, *more: str) -> list[str]:
     return [
-        "world.ground.name=images",
-        f"world.ground.obstacles={wall}",
+        "world.map.name=images",
+        f"world.map.obstacles={wall}",
         "world.start.x_m=55",
         "world.start.y_m=45",
         "world.goal.x_m=545",
@@ -77,8 +77,8 @@ class TestGround:
         grey[5, 7] = 255, 220, 0
         Image.fromarray(grey).save(tmp_path / "landmarks.png")
         images = [
-            f"world.ground.environment={tmp_path / 'environment.png'}",
-            f"world.ground.landmarks={tmp_path / 'landmarks.png'}",
+            f"world.map.environment={tmp_path / 'environment.png'}",
+            f"world.map.landmarks={tmp_path / 'landmarks.png'}",
         ]
         around = run(wall, *images)
         assert around["success"]
@@ -88,18 +88,18 @@ class TestGround:
         for name, size in (("environment", (41, 60)), ("landmarks", (40, 61))):
             Image.fromarray(np.zeros((*size, 3), np.uint8)).save(tmp_path / "odd.png")
             with pytest.raises(InputError, match=r"expected 60 x 40 pixels, found 6"):
-                run(wall, *images, f"world.ground.{name}={tmp_path / 'odd.png'}")
+                run(wall, *images, f"world.map.{name}={tmp_path / 'odd.png'}")
 
     def test_elevation_and_grids(self, wall: Path, tmp_path: Path) -> None:
         heights = np.zeros((40, 60), np.float32)
         heights[3:, 30] = 20.0
         np.save(tmp_path / "heights.npy", heights)
         np.save(tmp_path / "grid.npy", heights > 0.0)
-        place = ["world.ground.resolution_m=10", "world.ground.origin=[0, -10, 0]"]
+        place = ["world.map.resolution_m=10", "world.map.origin=[0, -10, 0]"]
         elevation = run(
-            wall, "world.ground.name=elevation", f"world.ground.file={tmp_path / 'heights.npy'}", *place
+            wall, "world.map.name=elevation", f"world.map.file={tmp_path / 'heights.npy'}", *place
         )
-        grid = run(wall, "world.ground.name=grid", f"world.ground.file={tmp_path / 'grid.npy'}", *place)
+        grid = run(wall, "world.map.name=grid", f"world.map.file={tmp_path / 'grid.npy'}", *place)
         assert grid["planned_length_m"] == run(wall)["planned_length_m"]
         # Steep is what rises beside the wall, a cell to each side.
         assert elevation["planned_length_m"] >= grid["planned_length_m"]
@@ -112,7 +112,7 @@ class TestGround:
             "extends": "gale-astar",
             "mission": "wall",
             "world": {
-                "ground": {"name": "images", "obstacles": wall.name},
+                "map": {"name": "images", "obstacles": wall.name},
                 "start": {"x_m": 55.0, "y_m": 45.0},
                 "goal": {"x_m": 545.0, "y_m": 45.0},
             },
@@ -156,21 +156,21 @@ class TestOptions:
     def test_inflation_keeps_away(self, wall: Path) -> None:
         assert run(wall)["min_clearance_m"] == pytest.approx(5.0)
         # The gap is three cells wide; the grid's edge is no hazard.
-        assert run(wall, "stack.cost_map.inflation_m=20")["min_clearance_m"] >= 15.0
-        closed = run(wall, "stack.cost_map.inflation_m=40")
+        assert run(wall, "stack.navigator.cost_map.inflation_m=20")["min_clearance_m"] >= 15.0
+        closed = run(wall, "stack.navigator.cost_map.inflation_m=40")
         assert not closed["success"]
         assert "not connected" in str(closed["reason"])
 
     def test_slope_as_a_cost_needs_heights(self, wall: Path, tmp_path: Path) -> None:
-        dear = "stack.cost_map.slope_that_doubles_deg=2"
-        with pytest.raises(InputError, match="expected ground with heights"):
+        dear = "stack.navigator.cost_map.slope_that_doubles_deg=2"
+        with pytest.raises(InputError, match="expected a map with heights"):
             run(wall, dear)
         heights = np.zeros((40, 60), np.float32)
         heights[10:, 25:35] = 10.0 * np.sin(np.linspace(0.0, math.pi, 10))
         np.save(tmp_path / "hill.npy", heights)
-        ground = ["world.ground.name=elevation", f"world.ground.file={tmp_path / 'hill.npy'}"]
-        ground += ["world.ground.resolution_m=10", "world.ground.origin=[0, -10, 0]"]
-        limit = "world.ground.slope_limit_deg=40"
+        ground = ["world.map.name=elevation", f"world.map.file={tmp_path / 'hill.npy'}"]
+        ground += ["world.map.resolution_m=10", "world.map.origin=[0, -10, 0]"]
+        limit = "world.map.slope_limit_deg=40"
         over, around = run(wall, *ground, limit), run(wall, *ground, limit, dear)
         assert over["climb_m"] > around["climb_m"]
         assert around["planned_length_m"] > over["planned_length_m"]
@@ -181,7 +181,7 @@ class TestOptions:
 class TestReport:
     @pytest.mark.parametrize("closed", [False, True])
     def test_one_page_with_pictures(self, wall: Path, tmp_path: Path, closed: bool) -> None:
-        more = ["stack.cost_map.inflation_m=40"] if closed else []
+        more = ["stack.navigator.cost_map.inflation_m=40"] if closed else []
         metrics = run(wall, *more, out=tmp_path / "runs")
         page = write_report(Path(metrics["run_dir"])).read_text()
         assert "img-src data:" in page
@@ -193,22 +193,27 @@ class TestReport:
     def test_broken_pictures_are_one_line(self, wall: Path, tmp_path: Path) -> None:
         folder = Path(run(wall, out=tmp_path / "runs")["run_dir"])
         (folder / "terrain.npz").write_bytes(b"PK")
-        with pytest.raises(InputError, match="cannot be read"):
+        with pytest.raises(InputError, match=r"terrain\.npz: expected a run's arrays"):
             write_report(folder)
 
 
 @pytest.mark.parametrize(
     ("words", "told"),
     [
-        (["world.start.x_m=305"], "world.start: expected free ground, found (305, 45)"),
-        (["world.goal.x_m=600.1"], "world.goal: expected a place on the map, 600 x 400 m"),
-        (["world.goal.x_m=300", "world.goal.y_m=45"], "which is a hazard"),
-        (["stack.cost_map.inflation_m=60", "world.start.x_m=275"], "too near to an obstacle"),
-        (["world.ground.resolution_m=0"], "greater than 0, found 0"),
-        (["world.ground.obstacles=nowhere.png"], "expected an image, found none there"),
-        (["world.ground.name=image"], "world.ground"),
-        (["world.ground.obstacle=a.png"], "world.ground.images.obstacle: unknown key"),
-        (["stack.planner.name=rrt-star-dubins"], "unknown grid planner"),
+        (
+            ["world.start.x_m=305"],
+            "world.start: expected at least the body's radius of 1.5 m to the nearest wall",
+        ),
+        (
+            ["world.goal.x_m=600.1"],
+            "world.goal: expected a place on the map 'images' (0 to 600, -10 to 390 m)",
+        ),
+        (["world.goal.x_m=300", "world.goal.y_m=45"], "found 0.000 m at (300, 45)"),
+        (["world.map.resolution_m=0"], "greater than 0, found 0"),
+        (["world.map.obstacles=nowhere.png"], "expected an image, found none there"),
+        (["world.map.name=image"], "unknown world.map.name 'image'; did you mean 'images'?"),
+        (["world.map.obstacle=a.png"], "world.map.images.obstacle: unknown key"),
+        (["stack.planner.name=rrt-star-dubins"], "a stack.planner over cells (astar, dijkstra, theta-star)"),
         (["stack.planner.corner_cuting=true"], "did you mean 'corner_cutting'"),
         (["run.oracles=[localization]"], "run.oracles: expected one of planner"),
     ],
@@ -229,9 +234,17 @@ def test_no_way_is_a_failure_in_the_field(
     wall: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     sets = [
-        word for setting in settings(wall, "stack.cost_map.inflation_m=40") for word in ("--set", setting)
+        word
+        for setting in settings(wall, "stack.navigator.cost_map.inflation_m=40")
+        for word in ("--set", setting)
     ]
     assert main(["run", "gale-astar", *sets, "--json", "--out", str(tmp_path)]) == 1
     answer = json.loads(capsys.readouterr().out)
     assert answer["success"] is False
     assert answer["reason"].startswith("no path: ")
+
+
+def test_a_start_that_inflation_blocks_is_said(wall: Path) -> None:
+    metrics = run(wall, "stack.navigator.cost_map.inflation_m=60", "world.start.x_m=275")
+    assert not metrics["success"]
+    assert "start blocked: the start, row 34 and column 27, is blocked" in metrics["reason"]

@@ -12,11 +12,11 @@ from PIL import Image
 
 from pilotage.experiments.mission import load_mission
 from pilotage.experiments.run import run_mission
+from pilotage.records.run_data import read_run
+from pilotage.records.terrain import TerrainPictures, read_terrain
 from pilotage.report import write_report
 from pilotage.report.replay.section import LONG_SPEEDS, replay_section
 from pilotage.report.replay.terrain import GREYS, SHARES, ground_raster, terrain_scene
-from pilotage.report.run_folder import read_run
-from pilotage.report.terrain_pictures import TerrainPictures, read_pictures
 from support.browser import Browser, find_browser
 
 PLAYER = 'document.getElementById("replay-player").player'
@@ -30,8 +30,8 @@ def driven(folder: Path, mission: str, *more: str) -> Path:
     pixels[3:, 30] = 255
     Image.fromarray(pixels).save(folder / "obstacles.png")
     settings = [
-        "world.ground.name=images",
-        f"world.ground.obstacles={folder / 'obstacles.png'}",
+        "world.map.name=images",
+        f"world.map.obstacles={folder / 'obstacles.png'}",
         "world.start.x_m=55",
         "world.start.y_m=45",
         "world.goal.x_m=545",
@@ -45,7 +45,9 @@ def driven(folder: Path, mission: str, *more: str) -> Path:
 
 @pytest.fixture(scope="module")
 def estimated(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    more = [f"world.landmarks={MARKS}", "robot.sensors.lidar.max_range_m=150", "stack.spline.samples=9000"]
+    more = [f"world.landmarks={MARKS}", "robot.sensors.lidar.max_range_m=150", "run.dt_s=1"]
+    more += ["stack.navigator.cost_map.inflation_m=10"]
+    more += ["robot.sensors.lidar.rate_hz=1", "robot.sensors.odometer.rate_hz=1"]
     return driven(tmp_path_factory.mktemp("estimated"), "gale-astar-ekf", *more)
 
 
@@ -56,7 +58,7 @@ def test_a_drive_with_its_estimate(estimated: Path) -> None:
     assert [track.name for track in scene.poses] == ["true pose", "estimate, 95 % ellipse"]
     assert scene.poses[1].cov_m2 is not None
     assert scene.bounds_m == (0.0, -10.0, 600.0, 390.0)
-    # 9000 samples are thinned, the last one is there.
+    # More than 9000 steps are thinned, the last one is there.
     assert 3000 < len(scene.t_s) <= 6001
     assert scene.t_s[-1] == run.trace.t_s[-1]
     assert "One step in 2" in scene.note
@@ -91,7 +93,7 @@ def test_no_way_no_replay(tmp_path: Path) -> None:
     pixels = np.zeros((40, 60), np.uint8)
     pixels[:, 30] = 255
     Image.fromarray(pixels).save(tmp_path / "closed.png")
-    closed = f"world.ground.obstacles={tmp_path / 'closed.png'}"
+    closed = f"world.map.obstacles={tmp_path / 'closed.png'}"
     assert terrain_scene(read_run(driven(tmp_path, "gale-astar", closed))) is None
 
 
@@ -141,7 +143,7 @@ def test_the_ground_lies_where_it_should_also_turned() -> None:
 
 
 def test_sightings_that_do_not_fit_are_left_out(estimated: Path) -> None:
-    found = read_pictures(estimated)
+    found = read_terrain(estimated)
     assert found is not None
     assert found.seen_counts.sum() == len(found.seen) > 0
     arrays = dict(np.load(estimated / "terrain.npz"))
@@ -149,7 +151,7 @@ def test_sightings_that_do_not_fit_are_left_out(estimated: Path) -> None:
     folder.mkdir()
     for changed in ({"seen": arrays["seen"] + 9}, {"seen_counts": arrays["seen_counts"][:-5] + 1}):
         np.savez(folder / "terrain.npz", **{**arrays, **changed})
-        odd = read_pictures(folder)
+        odd = read_terrain(folder)
         assert odd is not None
         assert len(odd.seen) == len(odd.seen_counts) == 0
 

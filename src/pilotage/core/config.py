@@ -90,13 +90,27 @@ def describe(error: ValidationError, model: type[BaseModel], where: str) -> str:
 def _fields_at(model: type[BaseModel], path: list[str]) -> list[str]:
     """Names of the fields of the model that ``path`` leads to."""
     current: type[BaseModel] = model
+    annotation: Any = None
     for part in path:
         field = current.model_fields.get(part)
-        inner = _model_in(field.annotation) if field is not None else None
+        if field is not None:
+            annotation = field.annotation
+        inner = _model_in(annotation) if field is not None else _model_tagged(annotation, part)
         if inner is None:
             continue
         current = inner
     return list(current.model_fields)
+
+
+def _model_tagged(annotation: Any, tag: str) -> type[BaseModel] | None:
+    """The model that a tag stands for among the alternatives of an annotation."""
+    if any(getattr(note, "tag", None) == tag for note in getattr(annotation, "__metadata__", ())):
+        return _model_in(annotation)
+    for argument in getattr(annotation, "__args__", ()):
+        found = _model_tagged(argument, tag)
+        if found is not None:
+            return found
+    return None
 
 
 def _model_in(annotation: Any) -> type[BaseModel] | None:

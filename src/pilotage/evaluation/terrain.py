@@ -15,6 +15,7 @@ from pilotage.evaluation.rover_metrics import ellipse_axes, in_ellipse, root_det
 from pilotage.kernels.grids.blocked_distance import distance_to_blocked
 from pilotage.maps.occupancy_grid import OccupancyGrid, squared_distances
 from pilotage.maps.world_map import WorldMap
+from pilotage.models.motion.bicycle import BicycleConfig
 
 CLEARANCE_REACH_CELLS = 200
 """Farther from hazards than this is not measured."""
@@ -37,6 +38,8 @@ def terrain_columns(run: FinishedRun, robot: RobotRun) -> dict[str, FloatArray]:
     if chart.elevation is not None:
         columns["elevation_m"] = chart.elevation.heights_at(points)
         columns["slope_rad"] = chart.elevation.slopes_at(chart.grid.cells_at(points))
+    if isinstance(robot.motion, BicycleConfig):
+        columns["steering_rad"] = steering_rad(trace, robot.motion.wheelbase_m)
     covs = covariances(trace)
     axes = ellipse_axes(covs, run.mission.run.ellipse_probability)
     return columns | {
@@ -45,6 +48,15 @@ def terrain_columns(run: FinishedRun, robot: RobotRun) -> dict[str, FloatArray]:
         "ellipse_direction_rad": axes[:, 2],
         "root_determinant_m2": root_determinant(covs),
     }
+
+
+def steering_rad(trace: Mapping[str, FloatArray], wheelbase_m: float) -> FloatArray:
+    """(N,) steering angle that a bicycle drove with, tan(gamma) = L w / v; nan where it stood still."""
+    speed, rate = trace["v_true_m_s"], trace["w_true_rad_s"]
+    moves = speed != 0.0
+    found = np.full(len(speed), math.nan)
+    found[moves] = np.arctan(wheelbase_m * rate[moves] / speed[moves])
+    return found
 
 
 def terrain_metrics(
@@ -71,9 +83,10 @@ def terrain_metrics(
     metrics["final_position_error_m"] = float(math.hypot(error[0], error[1]))
     inside = in_ellipse(truth, estimate, covs, run.mission.run.ellipse_probability)
     metrics["ellipse_coverage"] = float(inside.mean())
+    # Not a number where nobody listened: before the first reading, and where the truth stood in.
+    seen = np.nan_to_num(trace.get("beacons_seen", np.zeros(len(truth)))).astype(np.int64)
     step_m = np.diff(np.concatenate([[0.0], columns["distance_m"]]))
-    seen = trace.get("beacons_seen", np.zeros(len(truth)))
-    metrics["blind_stretches"] = len(stretches_without(seen.astype(np.int64), step_m))
+    metrics["blind_stretches"] = len(stretches_without(seen, step_m))
     if "beacons_seen" in trace:
         metrics["sightings"] = int(seen.sum())
     return metrics

@@ -9,7 +9,7 @@ import numpy as np
 from pilotage.core.types import FloatArray
 from pilotage.evaluation.finished import FinishedRun, RobotRun, Verdict
 from pilotage.experiments.loop import Run
-from pilotage.experiments.pictures import terrain_pictures
+from pilotage.experiments.pictures import is_large, terrain_pictures
 from pilotage.experiments.resolve import resolved_yaml
 from pilotage.maps.cell_map import CellMap
 from pilotage.maps.true_cells import true_map
@@ -19,9 +19,6 @@ from pilotage.records.plans import Plan, Plans
 from pilotage.records.run_folder import RobotFiles, RunFiles
 from pilotage.records.trace import merged, trace_of
 from pilotage.records.world import RobotOutline, World, landmarks_of
-
-MOST_GRID_CELLS = 4_000_000
-"""A grid of more cells than this is kept as a picture only."""
 
 
 def files_of(run: Run, verdict: Verdict, metrics: Mapping[str, object]) -> RunFiles:
@@ -34,7 +31,7 @@ def files_of(run: Run, verdict: Verdict, metrics: Mapping[str, object]) -> RunFi
     }
     single = len(traces) == 1
     grid, chart = None, finished.chart
-    if chart.grid is not None and chart.geometry is None and chart.grid.cells.size <= MOST_GRID_CELLS:
+    if chart.grid is not None and chart.geometry is None and not is_large(chart.grid):
         grid = chart.grid
     return RunFiles(
         trace=trace_of(next(iter(traces.values()))) if single else merged(traces),
@@ -42,7 +39,7 @@ def files_of(run: Run, verdict: Verdict, metrics: Mapping[str, object]) -> RunFi
         events=tuple(finished.events),
         mission_text=resolved_yaml(finished.mission, chart),
         world=world,
-        terrain=terrain_pictures(finished) if chart.open_ground else None,
+        terrain=terrain_pictures(finished, run.sightings[0].seen()),
         grid=grid,
         robots=tuple(
             RobotFiles(
@@ -98,7 +95,7 @@ def _drawn_walls(chart: WorldMap) -> FloatArray:
     """Walls as segments; a grid is drawn as a grid, beyond some size as a picture."""
     if chart.geometry is not None:
         return chart.geometry.segments_m
-    if chart.grid is not None and chart.grid.cells.size > MOST_GRID_CELLS:
+    if chart.grid is not None and is_large(chart.grid):
         return np.zeros((0, 4))
     return chart.walls.segments_m
 

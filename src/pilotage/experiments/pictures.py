@@ -7,20 +7,36 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from pilotage.core.types import IntArray
 from pilotage.evaluation.finished import FinishedRun
 from pilotage.maps.elevation import ElevationModel
+from pilotage.maps.occupancy_grid import OccupancyGrid
 from pilotage.maps.world_map import WorldMap
+from pilotage.records.scans import Sightings
 from pilotage.records.terrain import TerrainPictures
 
+MOST_GRID_CELLS = 4_000_000
+"""A grid of more cells than this is kept as a picture only."""
 PICTURE_COLUMNS = 900
 """Ground and hazards are kept for the report no wider and no higher than this."""
 
 
-def terrain_pictures(run: FinishedRun) -> TerrainPictures:
-    """Ground and hazards, no wider than a report shows them, and the places on them."""
+def terrain_pictures(run: FinishedRun, sightings: Sightings) -> TerrainPictures | None:
+    """Ground and hazards, no wider than a report shows them, and the places on them; None where it is no
+    ground: neither with heights or a picture, nor planned over by cells, nor too large to be drawn as it is.
+
+    Parameters
+    ----------
+    sightings
+        What the first robot saw.
+    """
     chart = run.chart
     grid = chart.grid
-    assert grid is not None, "asked for terrain only"
+    if grid is None or chart.geometry is not None:
+        return None
+    planned = any("route" in robot.results for robot in run.robots)
+    if not (planned or chart.elevation is not None or chart.picture is not None or is_large(grid)):
+        return None
     robot = run.robots[0]
     step = max(1, math.ceil(max(grid.rows, grid.columns) / PICTURE_COLUMNS))
     looked_at = None
@@ -30,7 +46,7 @@ def terrain_pictures(run: FinishedRun) -> TerrainPictures:
         cells[visited] = True
         looked_at = shares(cells.reshape(grid.rows, grid.columns), step)
     route = robot.plans[0].states[:, :2] if robot.plans else np.zeros((0, 2))
-    counts, seen = _seen(run)
+    counts, seen = _seen(run, sightings)
     goal = robot.goal
     return TerrainPictures(
         ground=_seen_ground(chart, step),
@@ -60,10 +76,25 @@ def _seen_ground(chart: WorldMap, step: int) -> NDArray[np.uint8] | None:
     return ElevationModel(coarse, chart.elevation.resolution_m * step).shaded()
 
 
-def _seen(run: FinishedRun) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def is_large(grid: OccupancyGrid) -> bool:
+    """Whether a grid is kept as a picture only."""
+    return grid.cells.size > MOST_GRID_CELLS
+
+
+def _seen(run: FinishedRun, sightings: Sightings) -> tuple[IntArray, IntArray]:
     """How many landmarks were in sight at each row of the trace, and which (rows of the table)."""
-    del run
-    return np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64)
+    nothing, known = np.zeros(0, dtype=np.int64), run.chart.landmarks.ids
+    t_s, counts = run.robots[0].trace["t_s"], sightings.beacon_counts
+    if not len(counts) or not len(known):
+        return nothing, nothing
+    # The trace may hold a row every so many steps; what was seen was noted at each of them.
+    row_of_step = np.full(len(counts), -1)
+    row_of_step[np.rint(t_s / run.mission.run.dt_s).astype(np.int64) - 1] = np.arange(len(t_s))
+    rows = np.repeat(row_of_step, counts)
+    order = np.argsort(known)
+    at = np.minimum(np.searchsorted(known, sightings.beacon_ids, sorter=order), len(known) - 1)
+    found = (rows >= 0) & (known[order[at]] == sightings.beacon_ids)
+    return np.bincount(rows[found], minlength=len(t_s)).astype(np.int64), order[at][found]
 
 
 def shares(mask: NDArray[np.bool_], step: int) -> NDArray[np.uint8]:

@@ -8,6 +8,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Discriminator, Field, Tag
 
 from pilotage.core.config import Config
+from pilotage.core.errors import unknown_name
 from pilotage.maps.crater_terrain import CraterTerrainConfig
 from pilotage.maps.map_file import MapFile
 from pilotage.maps.true_cells import SheetFile
@@ -76,7 +77,9 @@ def _which(value: Any) -> str:
     if isinstance(value, Mapping):
         name = value.get("name")
         if isinstance(name, str):
-            return name if name in BY_NAME else "grid"
+            if name not in BY_NAME:
+                raise unknown_name("world.map.name", name, BY_NAME)
+            return name
         return "sheet" if "size_m" in value and "walls_m" not in value else "walls"
     return "file"
 

@@ -5,7 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from pilotage.core.errors import InputError
+from pilotage.evaluation.tasks.task import TASKS
+from pilotage.experiments.oracles.parts import ANY_ANGLE
 from pilotage.missions.mission import Mission
+from pilotage.missions.stack import StackConfig
 from pilotage.stack.interface import NAVIGATORS
 
 ORACLES: Mapping[str, str] = {
@@ -13,7 +16,7 @@ ORACLES: Mapping[str, str] = {
     "initial": "the start pose told exactly",
     "localizer": "the true pose instead of an estimate",
     "mapper": "every unexpected obstacle is on the robot's own map from the start",
-    "planner": "the mission's planner on the world as it is, unexpected obstacles included",
+    "planner": "the planner on the world as it is, unexpected obstacles included; over cells at any angle",
     "controller": "the reference followed from the true pose, whatever the robot believes",
     "driver": "everything drives on the true pose; the localizer runs along and is judged",
     "drive": "wheels that do what the data sheet says, at once: alike, without slip, without lag",
@@ -26,17 +29,34 @@ TAKEN = {"localizer": "pose", "mapper": "plan"}
 
 def applicable(mission: Mission) -> dict[str, str]:
     """The oracles that can stand in for something in a mission."""
-    stack = mission.stack
+    stack, task = mission.stack, TASKS.entry(mission.task.name).factory
+    if not getattr(task, "drives", True):
+        there = {"initial"} if stack.localizer is not None else set()
+        there |= {"planner"} if _plans_worse(stack) else set()
+        return {name: text for name, text in ORACLES.items() if name in there}
     taken: frozenset[str] = getattr(NAVIGATORS.entry(stack.navigator.name).factory, "TAKES", frozenset())
     there = {"sensors"} if mission.robot.sensors or mission.robots else set()
-    there |= {name for name in ("mapper", "planner", "controller") if getattr(stack, name)}
+    there |= {name for name in ("mapper", "controller") if getattr(stack, name)}
+    there |= {"planner"} if _plans_worse(stack) else set()
     there |= {"initial", "driver"} if stack.localizer is not None else set()
     # A stack without a localizer may drive on the true pose; an explorer brings its own.
-    there |= {"localizer"} if not (taken or mission.task.name == "plan") else set()
+    there |= {"localizer"} if not taken else set()
     there |= {name for name, what in TAKEN.items() if what in taken}
     there |= {"drive"} if all(robot.motion.name == "wheel-drive" for robot in mission.team) else set()
     there |= {"explorer"} if mission.task.name == "explore" and taken else set()
     return {name: text for name, text in ORACLES.items() if name in there}
+
+
+def _plans_worse(stack: StackConfig) -> bool:
+    """Whether the planner can be bettered.
+
+    Over cells straight lines at any angle do; they do not know what slopes cost.
+    """
+    if stack.planner is None or stack.navigator.name != "curve":
+        return stack.planner is not None
+    cost_map = stack.navigator.parameters.get("cost_map")
+    dear = cost_map.get("slope_that_doubles_deg") if isinstance(cost_map, Mapping) else None
+    return stack.planner.name != ANY_ANGLE and dear is None
 
 
 def check_oracles(mission: Mission) -> None:

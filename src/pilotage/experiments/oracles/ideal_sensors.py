@@ -1,4 +1,4 @@
-"""Sensors without faults, for the oracle ``sensors`` of every kind of mission.
+"""Sensors without faults, for the oracle ``sensors`` of every mission.
 
 A sensor's description holds what it is (reach, rate, mounting, resolution) and what it does wrong. Here is
 what each does wrong, and the value at which it does not.
@@ -10,7 +10,11 @@ from collections.abc import Mapping
 from typing import Any, TypeVar
 
 from pilotage.sensors.beacon import BeaconConfig
+from pilotage.sensors.bumper import BumperConfig
+from pilotage.sensors.compass import CompassConfig
+from pilotage.sensors.gps import GpsConfig
 from pilotage.sensors.gyroscope import GyroscopeConfig
+from pilotage.sensors.imu import ImuConfig
 from pilotage.sensors.infrared import InfraredConfig
 from pilotage.sensors.lidar import LidarConfig
 from pilotage.sensors.line_sensor import LineSensorConfig
@@ -50,6 +54,10 @@ FAULTS: Mapping[type[SensorConfig], Mapping[str, Any]] = {
         "field_std_ut": 0.0,
         "disturbance_ut": 0.0,
     },
+    ImuConfig: {"bias_rad_s": 0.0, "bias_walk_rad_s_sqrt_s": 0.0, "rate_std_rad_s": 0.0},
+    CompassConfig: {"heading_std_rad": 0.0, "declination_rad": 0.0, "disturbance_rad": 0.0},
+    GpsConfig: {"position_std_m": 0.0, "bias_std_m": 0.0, "dropout_share": 0.0},
+    BumperConfig: {},
 }
 """By sensor, what it may do wrong and the value that means it does not: variances and standard deviations,
 scales, biases and their drift, offsets, iron. Encoders count exactly; what a wheel does on the floor is no

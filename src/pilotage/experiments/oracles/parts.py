@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from typing import cast
 
 import numpy as np
 
@@ -11,15 +12,17 @@ from pilotage.core.types import FloatArray, Pose2, Twist
 from pilotage.experiments.oracles.certain import exactly
 from pilotage.experiments.oracles.driver import WatchedLocalizer
 from pilotage.experiments.oracles.truth import Truth
-from pilotage.maps.distance_field import DistanceField
 from pilotage.sensors.readings import Readings
 from pilotage.stack.control.controller import Control, Controller
 from pilotage.stack.control.kanayama import KanayamaConfig, KanayamaController
 from pilotage.stack.interface import Belief
 from pilotage.stack.knowledge import RobotKnowledge
 from pilotage.stack.navigator.navigator import Parts
+from pilotage.stack.planning.grid_planner import GRID_PLANNERS, GridPlanner, GridRequest, GridResult
 from pilotage.stack.planning.planner import Path, Planner, PlanRequest, PlanResult, Smoother
 
+ANY_ANGLE = "theta-star"
+"""The grid planner of straight lines at any angle."""
 SIDE_SPACING_M = 0.05
 SIDE_DISC_M = 0.03
 """Discs along an obstacle's sides, as the obstacle layer would put them there."""
@@ -34,11 +37,13 @@ def with_oracles(parts: Parts, names: frozenset[str], truth: Truth, robot: Robot
     if "mapper" in names:
         parts = replace(parts, mapper=KnowingMapper(truth))
     if "planner" in names and parts.planner is not None:
-        field = DistanceField.from_map(truth.geometry)
-        smoother = None if parts.smoother is None else KnowingSmoother(parts.smoother, field)
-        parts = replace(parts, planner=KnowingPlanner(parts.planner, field), smoother=smoother)
+        smoother = None if parts.smoother is None else KnowingSmoother(parts.smoother, truth)
+        knowing = KnowingCellPlanner if hasattr(parts.planner, "search") else KnowingPlanner
+        parts = replace(parts, planner=knowing(parts.planner, truth), smoother=smoother)
     if "controller" in names:
-        parts = replace(parts, controller=TrueTracking(truth, KanayamaController(KanayamaConfig(), robot)))
+        own = parts.controller
+        tracker = own if isinstance(own, KanayamaController) else KanayamaController(KanayamaConfig(), robot)
+        parts = replace(parts, controller=TrueTracking(truth, tracker))
     return parts
 
 
@@ -78,9 +83,9 @@ class KnowingMapper:
 class KnowingPlanner:
     """Asks the mission's planner about the world as it is."""
 
-    def __init__(self, planner: Planner, field: DistanceField) -> None:
+    def __init__(self, planner: Planner, truth: Truth) -> None:
         self._planner = planner
-        self._field = field
+        self._truth = truth
 
     @property
     def clearance_m(self) -> float:
@@ -89,19 +94,34 @@ class KnowingPlanner:
 
     def plan(self, request: PlanRequest) -> PlanResult:
         """Answer on the true map."""
-        return self._planner.plan(replace(request, field=self._field))
+        return self._planner.plan(replace(request, field=self._truth.field))
+
+
+class KnowingCellPlanner(KnowingPlanner):
+    """Over cells: the mission's path, or the one of straight lines at any angle where that is shorter."""
+
+    def search(self, request: GridRequest) -> GridResult:
+        """Answer one query by both; the time is that of both."""
+        own = cast(GridPlanner, self._planner).search(request)
+        config = GRID_PLANNERS.configure(ANY_ANGLE, {"corner_cutting": False}, "oracle 'planner'")
+        other = GRID_PLANNERS.entry(ANY_ANGLE).factory(config).search(request)
+        took = own.planning_time_s + other.planning_time_s
+        if own.path is None or other.path is None:
+            return replace(own, planning_time_s=took)
+        shorter = other.path.length_cells < own.path.length_cells
+        return replace(other if shorter else own, planning_time_s=took)
 
 
 class KnowingSmoother:
     """Smooths in the world as it is."""
 
-    def __init__(self, smoother: Smoother, field: DistanceField) -> None:
+    def __init__(self, smoother: Smoother, truth: Truth) -> None:
         self._smoother = smoother
-        self._field = field
+        self._truth = truth
 
     def smooth(self, path: Path, request: PlanRequest, clearance_m: float) -> Path:
         """Smooth on the true map."""
-        return self._smoother.smooth(path, replace(request, field=self._field), clearance_m)
+        return self._smoother.smooth(path, replace(request, field=self._truth.field), clearance_m)
 
 
 class TrueTracking:

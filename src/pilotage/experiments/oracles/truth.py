@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from pilotage.core.types import FloatArray, Pose2
+from pilotage.maps.distance_field import DistanceField
 from pilotage.maps.segment_map import SegmentMap
 from pilotage.maps.world_map import WorldMap
 from pilotage.sim.bodies.body import Body
@@ -45,3 +46,8 @@ class Truth:
     def geometry(self) -> SegmentMap:
         """Walls and obstacles."""
         return self.chart.walls.with_obstacles(self.obstacle_segments_m, self.obstacle_circles_m)
+
+    @cached_property
+    def field(self) -> DistanceField:
+        """Distance to the nearest of them."""
+        return DistanceField.from_map(self.geometry)

@@ -40,18 +40,21 @@ RANKED = ({Aspect.ACCURACY}, {Aspect.SAFETY}, {Aspect.TIME, Aspect.EFFORT})
 def attribution_study(mission: str, overrides: Sequence[str], trials: int) -> Study:
     """A study with one configuration an oracle, and the mission as it is as the baseline.
 
+    Oracles that the mission has already stay in all of them.
+
     Raises
     ------
     InputError
         Where the mission has no module that an oracle can replace.
     """
     loaded = load_mission(mission, overrides)
-    oracles = {name: text for name, text in applicable(loaded).items() if name != DRIVER}
+    own = loaded.run.oracles
+    oracles = {name: text for name, text in applicable(loaded).items() if name not in (DRIVER, *own)}
     costs = METRICS.costs_of(loaded.task.name, METRICS.given_by(loaded.task.name, has(loaded)))
     if not oracles:
         raise InputError(f"attribute '{mission}': expected a mission with modules that an oracle can replace")
-    configurations: list[dict[str, Any]] = [{"name": BASELINE, "set": {"run.oracles": []}}]
-    configurations += [{"name": f"{ORACLE}{name}", "set": {"run.oracles": [name]}} for name in oracles]
+    configurations: list[dict[str, Any]] = [{"name": BASELINE, "set": {"run.oracles": list(own)}}]
+    configurations += [{"name": f"{ORACLE}{name}", "set": {"run.oracles": [*own, name]}} for name in oracles]
     primary, named = costs[0], Path(mission).stem
     changed = f" (with {', '.join(overrides)})" if overrides else ""
     values: dict[str, Any] = {

@@ -89,20 +89,20 @@ def drive_figure(run: RunData) -> Illustration:
     """Speed, heading and turn rate over time (report figure 2)."""
     slug, title = "drive", "Speed, heading and turn rate"
     trace = run.trace
-    if not trace.has("v_m_s", "w_rad_s", "true_theta_rad") or trace.steps < 2:
+    if not trace.has("v_true_m_s", "w_true_rad_s", "true_theta_rad") or trace.steps < 2:
         return Illustration(slug, title, "", "The mission plans only: nothing is driven.")
     hours = trace.t_s / HOURS_S
     names = ["Speed [cm/s]", "Heading [rad]", "Turn rate [mrad/s]", "Steering angle of a bicycle [°]"]
     figure, panels = stacked_axes(names, (90.0, 90.0, 90.0, 90.0))
-    series(panels[0], hours, 100.0 * trace["v_m_s"], BLUE, linewidth=1.4)
+    series(panels[0], hours, 100.0 * trace["v_true_m_s"], BLUE, linewidth=1.4)
     series(panels[1], hours, trace["true_theta_rad"], GREEN, linewidth=1.4)
-    series(panels[2], hours, 1e3 * trace["w_rad_s"], ORANGE, linewidth=1.2)
+    series(panels[2], hours, 1e3 * trace["w_true_rad_s"], ORANGE, linewidth=1.2)
     series(panels[3], hours, np.rad2deg(trace["steering_rad"]), PURPLE, linewidth=1.2)
-    panels[0].set_ylim(0.0, 1.15 * float(np.fmax(100.0 * peak(trace["v_m_s"]), 1e-6)))
+    panels[0].set_ylim(0.0, 1.15 * float(np.fmax(100.0 * peak(trace["v_true_m_s"]), 1e-6)))
     _over_hours(panels, hours)
     alt = "Speed, heading, turn rate and steering angle over time"
     caption = "The speed is at its limit until the goal is near, and ends in an exponential approach."
-    if bool((trace["v_m_s"] == trace["v_m_s"][0]).all()):
+    if bool((trace["v_true_m_s"] == trace["v_true_m_s"][0]).all()):
         caption = "Along a planned curve the speed is constant; the turn rate follows the curvature."
     return Illustration(slug, title, alt, caption, render(figure, slug, alt))
 
@@ -126,7 +126,7 @@ def uncertainty_figure(run: RunData) -> Illustration:
     for axes, x, label in ((over_time, hours, "time [h]"), (over_way, way, "distance [km]")):
         series(axes, x, values, BLUE, linewidth=1.3)
         logarithmic(axes, 0.7 * float(np.nanmin(values)), 1.4 * float(np.nanmax(values)))
-        blind = trace["landmarks_seen"] == 0.0 if trace.has("landmarks_seen") else np.zeros(len(x), bool)
+        blind = trace["beacons_seen"] == 0.0 if trace.has("beacons_seen") else np.zeros(len(x), bool)
         if blind.any() and not blind.all():
             edges = np.flatnonzero(np.diff(np.concatenate([[0], blind.astype(np.int8), [0]])))
             ends = np.minimum(edges, len(x) - 1)
@@ -136,7 +136,7 @@ def uncertainty_figure(run: RunData) -> Illustration:
     alt = "Square root of the determinant of the position's covariance over time and over distance"
     blind_keys = (
         ()
-        if not trace.has("landmarks_seen") or not trace["landmarks_seen"].any()
+        if not trace.has("beacons_seen") or not trace["beacons_seen"].any()
         else (Key("no landmark in sight", "#c3cad3", "band"),)
     )
     caption = (

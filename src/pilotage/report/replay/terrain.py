@@ -223,9 +223,9 @@ def _series(run: RunData, frames: IntArray) -> tuple[Series, ...]:
     estimated = trace.has("est_x_m", "est_y_m")
     series = [position_error(column)]
     if estimated:
-        series.append(Series("landmarks in sight", "", column("landmarks_seen"), GREEN))
+        series.append(Series("landmarks in sight", "", column("beacons_seen"), GREEN))
     else:
-        series.append(Series("speed", "m/s", column("v_m_s"), BLUE))
+        series.append(Series("speed", "m/s", column("v_true_m_s"), BLUE))
         series.append(Series("steering", "°", np.degrees(column("steering_rad")), PURPLE))
     series.append(Series("nearest hazard", "m", column("hazard_distance_m"), ORANGE))
     series.append(Series("height above the lowest", "m", _above(column("elevation_m")), SKY))
