@@ -152,6 +152,13 @@ def test_a_new_name_drops_the_old_ones_parameters() -> None:
         ("world.obstacles.9.thickness_m=1", "index from 0 to 1"),
         ("stack.localizer.gate=1.5", "less than 1"),
         ("stack.local_planner.speed_m_s=5", "max_speed_m_s"),
+        (
+            "world.obstacles.0.from_m=[1e308, 4]",
+            "from_m.0: expected 0 or a number from 1e-100",
+        ),
+        ("robot.sensors.lidar.field_of_view_rad=1e-320", "expected 0 or a number from 1e-100 to 1e+15"),
+        ("run.time_limit_s=1" + "0" * 30, "in size, found 1e+30"),
+        ("run" + ".x" * 5000 + "=1", "expected at most 64 keys, found 5001"),
         ("run.oracles=[driver, driver]", "expected every oracle once, found 'driver' twice"),
         (f"mission={'long' * 30}", "at most 100 characters"),
         ('mission="a\\e[31m"', "a name without control characters, found 'a\\x1b[31m'"),

@@ -19,6 +19,7 @@ from pilotage.cli.plan import plan
 from pilotage.cli.report import report
 from pilotage.cli.run import run
 from pilotage.cli.schema import schema
+from pilotage.cli.slam import slam
 from pilotage.cli.study import study, sweep
 from pilotage.cli.track import track
 from pilotage.core.errors import InputError
@@ -39,6 +40,7 @@ COMMANDS = (
     evaluate,
     calibrate,
     localize,
+    slam,
     study,
     sweep,
     attribute,

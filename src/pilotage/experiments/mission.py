@@ -89,8 +89,11 @@ def read_parameters(file: str) -> dict[str, Any]:
     return values
 
 
-def read_mission(name_or_path: str) -> dict[str, Any]:
-    """Read a mission's YAML with its ``extends`` resolved, without validating it."""
+def read_mission(name_or_path: str, extended_by: tuple[str, ...] = ()) -> dict[str, Any]:
+    """Read a mission's YAML with its ``extends`` resolved, without validating it.
+
+    ``extended_by``: those on the way to it, which it must not extend in turn.
+    """
     path = Path(name_or_path)
     looks_like_file = path.suffix in {".yaml", ".yml"} or "/" in name_or_path
     if looks_like_file:
@@ -107,9 +110,9 @@ def read_mission(name_or_path: str) -> dict[str, Any]:
         return values
     if not isinstance(base, str):
         raise InputError(f"{name_or_path}: extends: expected the name of a shipped mission, found {base}")
-    if base == values.get("mission") or base == name_or_path:
+    if base in (values.get("mission"), name_or_path, *extended_by):
         raise InputError(f"{name_or_path}: extends: a mission cannot extend itself")
-    return merge(read_mission(base), values)
+    return merge(read_mission(base, (*extended_by, name_or_path)), values)
 
 
 def _anchor_map(values: dict[str, Any], folder: Path) -> None:

@@ -9,6 +9,7 @@ from typing import Any
 
 from pilotage.core.errors import InputError, nearest
 from pilotage.core.files import read_values_text
+from pilotage.core.limits import DEPTH
 from pilotage.core.yaml_text import load_yaml
 from pilotage.missions.mission import TOP_KEYS
 
@@ -73,6 +74,8 @@ def parse_override(override: str) -> tuple[list[str], Any]:
     parts = key.strip().split(".")
     if not equals or not all(parts):
         raise InputError(f"--set '{override}': expected KEY=VALUE such as stack.localizer.gate=0.99")
+    if len(parts) > DEPTH:
+        raise InputError(f"--set '{override}': expected at most {DEPTH} keys, found {len(parts)}")
     try:
         value = load_yaml(text, "")
     except InputError:
