@@ -18,7 +18,7 @@ class ComponentChoice(Config):
     parameters.
     """
 
-    model_config = ConfigDict(extra="allow", frozen=True, ser_json_inf_nan="constants")
+    model_config = ConfigDict(extra="allow", frozen=True)
 
     name: str
 
