@@ -15,7 +15,13 @@ class Config(BaseModel):
     """A frozen pydantic model that refuses unknown keys, NaN and infinities."""
 
     model_config = ConfigDict(
-        extra="forbid", frozen=True, allow_inf_nan=False, validate_default=True, strict=False
+        extra="forbid",
+        frozen=True,
+        allow_inf_nan=False,
+        validate_default=True,
+        strict=False,
+        # A component's parameters are written out before they are validated: not a number stays what it is.
+        ser_json_inf_nan="constants",
     )
 
     @model_validator(mode="before")
