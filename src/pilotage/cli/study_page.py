@@ -18,7 +18,7 @@ from pilotage.experiments.studies.replay import mission_of_row
 from pilotage.experiments.studies.study import study_yaml
 from pilotage.experiments.studies.table import StudyTable, read_study
 from pilotage.records.run_data import read_run
-from pilotage.report.page import FIGURES, FLOOR_FIGURES
+from pilotage.report.drawn import map_of
 from pilotage.report.page import write_report as write_run_report
 from pilotage.report.study.examples import Example, describe, rows_to_show
 from pilotage.report.study.page import write_page
@@ -143,7 +143,7 @@ def _example(table: StudyTable, view: StudyView, title: str, row: int) -> Exampl
     page = write_run_report(result.run_dir)
     run = read_run(result.run_dir)
     with drawing_style():
-        picture = FIGURES.get(run.kind, FLOOR_FIGURES)[0](run)
+        picture = map_of(run)
     return Example(
         title,
         row,
