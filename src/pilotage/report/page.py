@@ -10,25 +10,7 @@ from pilotage.core.whole_file import write_whole
 from pilotage.records.numbers import number
 from pilotage.records.run_data import OnDamage, RunData, read_run
 from pilotage.report import quantities
-from pilotage.report.figures.clearance import clearance_figure
-from pilotage.report.figures.close_ups import close_ups_figure
-from pilotage.report.figures.consistency import consistency_figure
-from pilotage.report.figures.control import control_figure
-from pilotage.report.figures.covariance import covariance_figure
-from pilotage.report.figures.map import map_figure
-from pilotage.report.figures.pose_error import pose_error_figure
-from pilotage.report.figures.slow_errors import slow_errors_figure
-from pilotage.report.figures.terrain_estimate import drive_figure, rover_error_figure, uncertainty_figure
-from pilotage.report.figures.terrain_map import (
-    close_up_figure,
-    hazard_map_figure,
-    looked_at_figure,
-    terrain_map_figure,
-)
-from pilotage.report.figures.terrain_profile import hazard_distance_figure, terrain_profile_figure
-from pilotage.report.figures.timeline import timeline_figure
-from pilotage.report.figures.ultrasonic import ultrasonic_figure
-from pilotage.report.figures.updates import updates_figure
+from pilotage.report.drawn import figures_of, scene_of
 from pilotage.report.headline import headline, outcome
 from pilotage.report.markup import (
     contents,
@@ -41,69 +23,11 @@ from pilotage.report.markup import (
     tiles,
 )
 from pilotage.report.metrics_table import metric_rows
-from pilotage.report.replay.floor import floor_scene
-from pilotage.report.replay.scene import ReplayScene
 from pilotage.report.replay.section import SLUG, TITLE, replay_section, script_source, style
-from pilotage.report.replay.terrain import terrain_scene
-from pilotage.report.sheet.maps import accuracy_figure, printed_figure
-from pilotage.report.sheet.path import coverage_figure, path_figure
-from pilotage.report.sheet.replay import sheet_scene
-from pilotage.report.style import Illustration, drawing_style
+from pilotage.report.style import drawing_style
 
 REPORT_FILE = "report.html"
 
-Draw = Callable[[RunData], Illustration]
-
-FLOOR_FIGURES: tuple[Draw, ...] = (
-    map_figure,
-    close_ups_figure,
-    timeline_figure,
-    pose_error_figure,
-    covariance_figure,
-    consistency_figure,
-    control_figure,
-    ultrasonic_figure,
-    clearance_figure,
-)
-TERRAIN_FIGURES: tuple[Draw, ...] = (
-    terrain_map_figure,
-    close_up_figure,
-    hazard_map_figure,
-    looked_at_figure,
-    drive_figure,
-    rover_error_figure,
-    uncertainty_figure,
-    terrain_profile_figure,
-    hazard_distance_figure,
-)
-SHEET_FIGURES: tuple[Draw, ...] = (
-    path_figure,
-    coverage_figure,
-    accuracy_figure,
-    printed_figure,
-    pose_error_figure,
-)
-RECORDING_FIGURES: tuple[Draw, ...] = (
-    map_figure,
-    close_ups_figure,
-    pose_error_figure,
-    covariance_figure,
-    consistency_figure,
-    slow_errors_figure,
-)
-FIGURES: dict[str, tuple[Draw, ...]] = {
-    "floor": FLOOR_FIGURES,
-    "terrain": TERRAIN_FIGURES,
-    "sheet": SHEET_FIGURES,
-    "recording": RECORDING_FIGURES,
-}
-"""What is drawn of a run, by the kind of its mission."""
-SCENES: dict[str, Callable[[RunData], ReplayScene | None]] = {
-    "floor": floor_scene,
-    "terrain": terrain_scene,
-    "sheet": sheet_scene,
-}
-"""How a run of each kind becomes a scene to replay."""
 _LONGEST_MISSION = 100_000
 
 
@@ -125,13 +49,8 @@ def write_report(run_dir: Path, on_damage: OnDamage | None = None) -> Path:
 def run_page(run: RunData, damaged: Sequence[str] = ()) -> str:
     """Return the report of a run as HTML; ``damaged`` are lines on files that it was read without."""
     with drawing_style():
-        figures = [draw(run) for draw in FIGURES.get(run.kind, FLOOR_FIGURES)]
-        if run.kind in ("terrain", "recording"):
-            # They differ in what they do at all: what they do not do is not missing.
-            figures = [figure for figure in figures if figure.svg or figure.slug == "hazards"]
-        if run.updates:
-            figures.append(updates_figure(run))
-    sections: list[str] = [replay_section(SCENES.get(run.kind, floor_scene)(run))]
+        figures = figures_of(run)
+    sections: list[str] = [replay_section(scene_of(run))]
     entries: list[tuple[str, str]] = [(SLUG, TITLE)]
     drawn = 0
     slugs = [figure.slug for figure in figures]
@@ -148,7 +67,7 @@ def run_page(run: RunData, damaged: Sequence[str] = ()) -> str:
         sections.append(_mission_section(run.mission_text))
         entries.append(("mission", "The mission as it ran"))
     description = str(run.mission.get("description") or "")
-    source = "recording" if run.kind == "recording" else "simulator"
+    source = "recording" if run.recorded else "simulator"
     return document(
         title=escape(f"{run.name}: run report"),
         layers="".join(layer_rules(figure) for figure in figures) + style(),
@@ -209,7 +128,7 @@ def _tiles(run: RunData) -> list[tuple[str, str]]:
         ("NEES (ideal 3)", value("nees_mean"), lambda x: f"{x:.2f}"),
         ("collisions", value("collisions"), quantities.count),
     )
-    if run.kind == "terrain":
+    if run.terrain is not None or not run.trace.has("true_x_m"):
         entries += (
             ("planned way", planned, quantities.length),
             ("travel time", value("travel_time_s"), quantities.duration),
