@@ -18,11 +18,12 @@ from pilotage.core.config import validate
 from pilotage.core.errors import InputError
 from pilotage.core.types import FloatArray
 from pilotage.core.yaml_text import load_yaml
-from pilotage.experiments.run_folder import clean, replace_folder
 from pilotage.logs.g2o import write_g2o
 from pilotage.logs.laser_log import LaserLog
 from pilotage.logs.laser_recordings import read_laser_log
 from pilotage.maps.ros_map import RosMap, write_ros_map
+from pilotage.records.metrics import clean
+from pilotage.records.run_folder import replace_folder
 from pilotage.stack.mapping.slam.closures import Closure, Verdict
 from pilotage.stack.mapping.slam.config import SlamConfig
 from pilotage.stack.mapping.slam.mapper import map_log
