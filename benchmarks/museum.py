@@ -12,15 +12,15 @@ from functools import cached_property
 from typing import cast
 
 import numpy as np
+from pilotage.missions.floor import FloorMission
 
 from pilotage.core.types import STOP, FloatArray, Goal, Pose2, Twist
 from pilotage.experiments.build.build import build
-from pilotage.experiments.mission import load_mission
 from pilotage.experiments.build.charts import load_chart
+from pilotage.experiments.mission import load_mission
 from pilotage.kernels.geometry import plane
 from pilotage.maps.distance_field import DistanceField
 from pilotage.maps.map_file import LandmarkMap
-from pilotage.missions.floor import FloorMission
 from pilotage.sensors.lidar import LidarConfig
 from pilotage.sensors.readings import LidarScan
 from pilotage.sim.sensing import Motion, SimulatedLidar

@@ -13,14 +13,14 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from pilotage.evaluation.run_metrics import run_metrics
 from rich.console import Console
 from rich.table import Table
 
 from pilotage.core.types import FloatArray
 from pilotage.evaluation.consistency import fraction_in_band
-from pilotage.evaluation.run_metrics import run_metrics
-from pilotage.experiments.mission import load_mission
 from pilotage.experiments.loop import simulate
+from pilotage.experiments.mission import load_mission
 
 MISSIONS = ("museum-1", "museum-2", "museum-route", "museum-concave", "museum-hall")
 SETTLE_STEPS = 10

@@ -14,10 +14,10 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
+from pilotage.experiments.floor.build import Experiment, build
 
 from pilotage.core.angles import wrap_array_to_pi
 from pilotage.core.types import STOP, FloatArray, Twist
-from pilotage.experiments.floor.build import Experiment, build
 from pilotage.experiments.mission import load_mission
 
 SETTINGS = {15: (0.0039, 0.01), 16: (0.1, 0.5), 17: (1.0, 1.0), 18: (2.0, 5.0)}

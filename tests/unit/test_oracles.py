@@ -229,7 +229,9 @@ def ground(tmp_path_factory: pytest.TempPathFactory) -> list[str]:
         "world.start.y_m=45",
         "world.goal.x_m=545",
         "world.goal.y_m=45",
-        "stack.navigator.cost_map.inflation_m=10",
+        # Two cells off the hazards, which stop it, and heading along the path.
+        "stack.navigator.cost_map.inflation_m=15",
+        "world.start.theta_rad=0.8",
         "world.landmarks=[{id: 7, x_m: 100, y_m: 200}, {id: 3, x_m: 400, y_m: 300}]",
     ]
 
