@@ -133,13 +133,8 @@ def _apply(values: dict[str, Any], parts: list[str], value: Any, told: str) -> N
         inner = _child(place, part, told)
         if inner is None:
             inner = {}
-<<<<<<< HEAD
             _put(place, part, inner, told)
-        if isinstance(inner, str) and _holds_components(parts[:depth]):
-=======
-            _put(place, part, inner, override)
         if isinstance(inner, str) and _is_component(parts[: depth + 1]):
->>>>>>> h-t1
             inner = {"name": inner}
             _put(place, part, inner, told)
         if not isinstance(inner, dict | list):
@@ -148,14 +143,10 @@ def _apply(values: dict[str, Any], parts: list[str], value: Any, told: str) -> N
     last = parts[-1]
     if last == "name" and isinstance(place, dict) and place.get("name") != value:
         place.clear()
-<<<<<<< HEAD
-    _put(place, last, value, told)
-=======
     for own, other in EXCLUSIVE:
         if last == own and isinstance(place, dict):
             place.pop(other, None)
-    _put(place, last, value, override)
->>>>>>> h-t1
+    _put(place, last, value, told)
 
 
 def _number(text: str) -> Any:
