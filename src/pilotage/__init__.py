@@ -15,6 +15,8 @@ from __future__ import annotations
 import importlib
 from typing import TYPE_CHECKING, Any
 
+from pilotage.core.version import VERSION as __version__
+
 if TYPE_CHECKING:
     from pilotage.core.errors import InputError as InputError
     from pilotage.core.types import Pose2 as Pose2
@@ -39,8 +41,6 @@ if TYPE_CHECKING:
     from pilotage.face.studies import Study as Study
     from pilotage.face.studies import study as study
     from pilotage.missions.mission import Mission as Mission
-
-__version__ = "0.1.0"
 
 _PLACES = {
     "load": "face.missions",

@@ -215,12 +215,12 @@ def _summary_html(run: Run) -> str:
 
 def _map_html(folder: Path) -> str:
     """The first figure of the run's page."""
-    from pilotage.report.page import FIGURES, FLOOR_FIGURES
+    from pilotage.report.drawn import map_of
     from pilotage.report.style import drawing_style
 
     data = read_run(folder)
     with drawing_style():
-        picture = FIGURES.get(data.kind, FLOOR_FIGURES)[0](data)
+        picture = map_of(data)
     if not picture.svg:
         return f"<p>{html.escape(picture.caption)}</p>"
     return f'<div style="max-width:760px">{picture.svg}</div>'

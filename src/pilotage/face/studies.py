@@ -18,10 +18,11 @@ from pilotage.experiments.resolve import resolved_values
 from pilotage.experiments.studies.definition import StudyDefinition
 from pilotage.experiments.studies.engine import Listener, run_study
 from pilotage.experiments.studies.export import export
+from pilotage.experiments.studies.findings import study_object
 from pilotage.experiments.studies.options import StudyOptions
 from pilotage.experiments.studies.study import Study as Definition
 from pilotage.experiments.studies.study import make_study
-from pilotage.experiments.studies.table import StudyTable, read_study, study_object
+from pilotage.experiments.studies.table import StudyTable, read_study
 from pilotage.face.missions import MissionLike, as_mission
 from pilotage.face.tables import Table
 
@@ -155,7 +156,7 @@ def study(
         export(folder)
     if counts.failed == counts.total:
         reasons = read_study(folder).broken
-        told = reasons[0][3] if reasons else "no reason given"
+        told = reasons[0].reason if reasons else "no reason given"
         raise InputError(f"study: every trial failed, the first with: {told}")
     return Study(folder)
 
