@@ -15,7 +15,7 @@ from __future__ import annotations
 import importlib
 from typing import TYPE_CHECKING, Any
 
-from pilotage.core.version import VERSION as __version__
+from pilotage.core.version import __version__ as __version__
 
 if TYPE_CHECKING:
     from pilotage.core.errors import InputError as InputError

@@ -22,7 +22,7 @@ from pilotage.cli.slam import slam
 from pilotage.cli.study import study, sweep
 from pilotage.cli.track import track
 from pilotage.core.errors import InputError
-from pilotage.core.version import VERSION
+from pilotage.core.version import __version__
 
 app = typer.Typer(
     name="pilotage",
@@ -58,7 +58,7 @@ for _command in COMMANDS:
 
 def _version(wanted: bool) -> None:
     if wanted:
-        print(f"pilotage {VERSION}")
+        print(f"pilotage {__version__}")
         raise typer.Exit
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from pilotage.core.version import VERSION
+from pilotage.core.version import __version__
 from pilotage.core.whole_file import write_whole
 from pilotage.evaluation.judge import Judgement
 from pilotage.experiments.studies.findings import Best, Finding
@@ -135,5 +135,5 @@ def _again(table: StudyTable) -> str:
 def versions() -> str:
     """What made the rows and the page: releases of pilotage and of what its numbers come from."""
     names = ("numpy", "scipy", "numba")
-    parts = [f"pilotage {VERSION}", f"Python {platform.python_version()}"]
+    parts = [f"pilotage {__version__}", f"Python {platform.python_version()}"]
     return ", ".join([*parts, *(f"{name} {metadata.version(name)}" for name in names)])
