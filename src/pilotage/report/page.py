@@ -8,9 +8,10 @@ from pathlib import Path
 
 from pilotage.core.whole_file import write_whole
 from pilotage.records.numbers import number
-from pilotage.records.run_data import OnDamage, RunData, read_run
+from pilotage.records.run_data import OnDamage, RunData, read_run, read_team
 from pilotage.report import quantities
 from pilotage.report.drawn import figures_of, scene_of
+from pilotage.report.figures.team import team_figures
 from pilotage.report.headline import headline, outcome
 from pilotage.report.markup import (
     contents,
@@ -24,7 +25,11 @@ from pilotage.report.markup import (
 )
 from pilotage.report.metrics_table import metric_rows
 from pilotage.report.replay.section import SLUG, TITLE, replay_section, script_source, style
+from pilotage.report.replay.team import team_scene
 from pilotage.report.style import drawing_style
+from pilotage.report.team import SLUG as TEAM_SLUG
+from pilotage.report.team import TITLE as TEAM_TITLE
+from pilotage.report.team import team_section, team_tiles
 
 REPORT_FILE = "report.html"
 
@@ -36,22 +41,40 @@ def write_report(run_dir: Path, on_damage: OnDamage | None = None) -> Path:
     damaged: list[str] = []
 
     def left_out(line: str) -> None:
+        # Files that the robots share are read once for each: one line for each damage is enough.
+        if line in damaged:
+            return
         damaged.append(line)
         if on_damage is not None:
             on_damage(line)
 
-    run = read_run(run_dir, on_damage=None if on_damage is None else left_out)
+    told = None if on_damage is None else left_out
+    run = read_run(run_dir, on_damage=told)
+    team = read_team(run_dir, run, told)
     path = run_dir / REPORT_FILE
-    write_whole(path, run_page(run, damaged))
+    write_whole(path, run_page(run, damaged, team))
     return path
 
 
-def run_page(run: RunData, damaged: Sequence[str] = ()) -> str:
-    """Return the report of a run as HTML; ``damaged`` are lines on files that it was read without."""
+def run_page(run: RunData, damaged: Sequence[str] = (), team: Sequence[RunData] = ()) -> str:
+    """Return the report of a run as HTML.
+
+    Parameters
+    ----------
+    damaged
+        Lines on files that it was read without.
+    team
+        The views of all its robots where there are several; what is drawn shows them all.
+    """
+    several = len(team) > 1
     with drawing_style():
-        figures = figures_of(run)
-    sections: list[str] = [replay_section(scene_of(run))]
+        figures = team_figures(team) if several else figures_of(run)
+        scene = team_scene(team) if several else scene_of(run)
+    sections: list[str] = [replay_section(scene)]
     entries: list[tuple[str, str]] = [(SLUG, TITLE)]
+    if several:
+        sections.append(team_section(run.metrics))
+        entries.append((TEAM_SLUG, TEAM_TITLE))
     drawn = 0
     slugs = [figure.slug for figure in figures]
     explained = next((slug for slug in ("timeline", "coverage") if slug in slugs), slugs[0] if slugs else "")
@@ -77,7 +100,7 @@ def run_page(run: RunData, damaged: Sequence[str] = ()) -> str:
         description=_paragraphs([*([description] if description else []), *damaged]),
         outcome=_outcome(run),
         headline=escape(headline(run.metrics)),
-        tiles=tiles(_tiles(run)),
+        tiles=tiles(team_tiles(run.metrics) if several else _tiles(run)),
         contents=contents(entries),
         body="\n".join(sections),
         footer=escape(
