@@ -5,6 +5,7 @@ from __future__ import annotations
 import html
 import shutil
 import tempfile
+import weakref
 from functools import cached_property
 from os import PathLike
 from pathlib import Path
@@ -37,9 +38,10 @@ class Run:
         Where its evidence is.
     """
 
-    def __init__(self, folder: Path, keep: object = None) -> None:
+    def __init__(self, folder: Path, passing: Path | None = None) -> None:
         self.folder = folder
-        self._keep = keep  # a temporary folder lives as long as the run that is in it
+        if passing is not None:  # a folder that lives as long as the run that is in it
+            weakref.finalize(self, shutil.rmtree, passing, ignore_errors=True)
 
     def __repr__(self) -> str:
         word = "success" if self.success else f"failed: {self.reason}"
@@ -165,14 +167,19 @@ def run(
     (True, True)
     """
     loaded = as_mission(mission, seed)
-    kept = None if save else tempfile.TemporaryDirectory(prefix="pilotage-run-", ignore_cleanup_errors=True)
-    folder = Path(out) if kept is None else Path(kept.name)
-    if folder.exists() and not folder.is_dir():
-        raise InputError(f"out: expected a folder, found a file: '{folder}'")
-    with showing_progress(progress, loaded.run.time_limit_s) as on_progress:
-        result = run_mission(loaded, out=folder, on_progress=on_progress)
+    passing = None if save else Path(tempfile.mkdtemp(prefix="pilotage-run-"))
+    folder = Path(out) if passing is None else passing
+    try:
+        if folder.exists() and not folder.is_dir():
+            raise InputError(f"out: expected a folder, found a file: '{folder}'")
+        with showing_progress(progress, loaded.run.time_limit_s) as on_progress:
+            result = run_mission(loaded, out=folder, on_progress=on_progress)
+    except BaseException:
+        if passing is not None:
+            shutil.rmtree(passing, ignore_errors=True)
+        raise
     assert result.run_dir is not None, "asked for above"
-    return Run(result.run_dir, kept)
+    return Run(result.run_dir, passing)
 
 
 def open_run(folder: str | PathLike[str]) -> Run:

@@ -171,7 +171,7 @@ def _definition(
         if isinstance(values, str) or not hasattr(values, "__iter__"):
             raise InputError(f"vary '{key}': expected a list of values, found {values!r}")
         plain = [value.item() if hasattr(value, "item") else value for value in values]
-        factors.append({"key": key, "values": plain})
+        factors.append({"name": str(key), "key": key, "values": plain})
     if isinstance(metrics, str):
         raise InputError(f"metrics: expected a list of names, found the text '{metrics}'")
     for metric in metrics:
