@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from tests.support.laser_rooms import BEAMS, SPAN_RAD, furnished, ranges
 
 from pilotage.core.types import FloatArray
 from pilotage.kernels.slam.align import CAPPED, CONVERGED, TOO_FEW, align, normal_equations
@@ -16,6 +15,7 @@ from pilotage.kernels.slam.frames import between, carried, composed
 from pilotage.kernels.slam.match_grid import max_pyramid, score_grid
 from pilotage.kernels.slam.occupancy import add_scan
 from pilotage.kernels.slam.scan_lines import scan_lines, scan_points
+from support.laser_rooms import BEAMS, SPAN_RAD, furnished, ranges
 
 ANGLES = np.linspace(-0.5 * SPAN_RAD, 0.5 * SPAN_RAD, BEAMS)
 MOUNT = np.array([0.0, 0.0, 0.0, 1.0])
