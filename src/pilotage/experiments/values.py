@@ -11,6 +11,7 @@ from pilotage.core.errors import InputError, nearest
 from pilotage.core.files import read_values_text
 from pilotage.core.limits import DEPTH
 from pilotage.core.yaml_text import load_yaml
+from pilotage.missions.choice import EXCLUSIVE
 from pilotage.missions.mission import TOP_KEYS
 
 MOST_DIGITS = 9
@@ -44,7 +45,7 @@ def merge(base: dict[str, Any], changes: dict[str, Any], place: Sequence[str] = 
     merged = copy.deepcopy(base)
     for key, value in changes.items():
         old = merged.get(key)
-        if isinstance(old, str) and isinstance(value, dict) and _holds_components(place):
+        if isinstance(old, str) and isinstance(value, dict) and _is_component([*place, key]):
             old = {"name": old}
         if isinstance(value, dict) and isinstance(old, dict) and not _renames(old, value):
             merged[key] = merge(old, value, [*place, key])
@@ -53,13 +54,22 @@ def merge(base: dict[str, Any], changes: dict[str, Any], place: Sequence[str] = 
     return merged
 
 
-def _holds_components(place: Sequence[str]) -> bool:
-    """Whether the values there are components, of which a name alone is the short form."""
-    return list(place) in (["stack"], ["robot", "sensors"])
+def _is_component(place: Sequence[str]) -> bool:
+    """Whether a component stands there, of which a name alone is the short form."""
+    keys = list(place)
+    if keys[:1] == ["robots"]:
+        keys = ["robot", *keys[2:]]
+    if keys[:2] == ["robot", "stack"]:
+        keys = keys[1:]
+    if keys in (["task"], ["robot", "motion"]):
+        return True
+    return keys[:-1] in (["stack"], ["robot", "sensors"])
 
 
 def _renames(old: dict[str, Any], new: dict[str, Any]) -> bool:
-    return "name" in new and new["name"] != old.get("name")
+    """Whether ``new`` is another component, or another of two alternatives without names."""
+    named = "name" in new and new["name"] != old.get("name")
+    return named or any(a in new and b in old for a, b in EXCLUSIVE)
 
 
 def parse_override(override: str) -> tuple[list[str], Any]:
@@ -105,7 +115,7 @@ def apply_override(values: dict[str, Any], override: str) -> None:
         if inner is None:
             inner = {}
             _put(place, part, inner, override)
-        if isinstance(inner, str) and _holds_components(parts[:depth]):
+        if isinstance(inner, str) and _is_component(parts[: depth + 1]):
             inner = {"name": inner}
             _put(place, part, inner, override)
         if not isinstance(inner, dict | list):
@@ -116,6 +126,9 @@ def apply_override(values: dict[str, Any], override: str) -> None:
     last = parts[-1]
     if last == "name" and isinstance(place, dict) and place.get("name") != value:
         place.clear()
+    for own, other in EXCLUSIVE:
+        if last == own and isinstance(place, dict):
+            place.pop(other, None)
     _put(place, last, value, override)
 
 
