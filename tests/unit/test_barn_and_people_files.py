@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pilotage.core.errors import InputError
-from pilotage.evaluation.barn import BarnRun, barn_metric, summarize
+from pilotage.evaluation.barn import BarnRun, barn_metric, summarize, time_bound_s
 from pilotage.logs.barn import read_barn
 from pilotage.logs.people import read_people
 
@@ -114,3 +114,18 @@ def test_damaged_tracks_are_one_line(tmp_path: Path, text: str, words: str) -> N
     path.write_text(text)
     with pytest.raises(InputError, match=words):
         read_people(path)
+
+
+def test_the_time_bound_is_the_straight_way_in_an_empty_lane() -> None:
+    sides = np.array([[x, y, 0.075] for x in (-2.0, 2.0) for y in np.arange(0.0, 10.0, 0.15)])
+    bound = time_bound_s(sides, (0.0, 0.0), (0.0, 10.0), 1.0, 0.2, 2.0, 3.0)
+    assert bound == pytest.approx(9.0 / 2.0 + 2.0 / 6.0)
+    post = np.vstack([sides, [[0.0, 5.0, 0.5]]])
+    longer = time_bound_s(post, (0.0, 0.0), (0.0, 10.0), 1.0, 0.2, 2.0, 3.0)
+    assert bound is not None
+    assert longer is not None
+    assert longer > bound
+    short = time_bound_s(sides, (0.0, 0.0), (0.0, 1.2), 1.0, 0.2, 2.0, 3.0)
+    assert short == pytest.approx((2.0 * 0.2 / 3.0) ** 0.5)
+    shut = np.vstack([sides, [[x, 5.0, 0.3] for x in np.arange(-1.6, 1.7, 0.2)]])
+    assert time_bound_s(shut, (0.0, 0.0), (0.0, 10.0), 1.0, 0.2, 2.0, 3.0) is None

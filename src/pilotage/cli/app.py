@@ -6,7 +6,6 @@ from typing import Annotated
 
 import typer
 
-from pilotage import __version__
 from pilotage.cli.attribute import attribute
 from pilotage.cli.bench_scen import bench_scen
 from pilotage.cli.calibrate import calibrate
@@ -23,6 +22,7 @@ from pilotage.cli.slam import slam
 from pilotage.cli.study import study, sweep
 from pilotage.cli.track import track
 from pilotage.core.errors import InputError
+from pilotage.core.version import __version__
 
 app = typer.Typer(
     name="pilotage",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -12,13 +12,14 @@ from pilotage.core.angles import wrap_to_pi
 from pilotage.core.types import STOP, Command, Event, Pose2
 from pilotage.evaluation.finished import FinishedRun, RobotRun
 from pilotage.evaluation.tasks.task import Attempt, all_ended
-from pilotage.experiments.build.build import Experiment, build
+from pilotage.experiments.build.build import Experiment, Member, build
 from pilotage.experiments.progress import EVERY_S, OnProgress, Progress, metres
 from pilotage.experiments.recorder import Recorder
 from pilotage.experiments.sightings import Sightings
 from pilotage.experiments.update_album import UpdateAlbum
 from pilotage.missions.mission import Mission
 from pilotage.missions.places import Kidnap
+from pilotage.sim.source import Simulator
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,7 +66,7 @@ def run_loop(experiment: Experiment, on_progress: OnProgress | None = None) -> R
     step = 0
     while ending is None and step < limit:
         while kidnaps and source.t_s >= kidnaps[0].at_s:
-            events.append(_carry(experiment, kidnaps.pop(0)))
+            events.append(carry(source, kidnaps.pop(0)))
         readings = source.step(commands)
         step += 1
         for index, member in enumerate(team):
@@ -86,7 +87,7 @@ def run_loop(experiment: Experiment, on_progress: OnProgress | None = None) -> R
     planning_s = sum(member.journal.planning_time_s for member in team) - planned_s
     if ending is None:
         ending = f"time limit of {mission.run.time_limit_s:g} s reached"
-    events += [event for member in team for event in member.journal.events] + task.events
+    events += [event for member in team for event in _events(member, several=len(team) > 1)] + task.events
     placed = experiment.obstacles
     finished = FinishedRun(
         mission,
@@ -102,6 +103,13 @@ def run_loop(experiment: Experiment, on_progress: OnProgress | None = None) -> R
         ending,
     )
     return Run(finished, sightings, albums)
+
+
+def _events(member: Member, *, several: bool) -> list[Event]:
+    """What a robot told; among several it says who it is."""
+    told = member.journal.events
+    name = member.config.name
+    return [replace(event, text=f"{name}: {event.text}") for event in told] if several else list(told)
 
 
 def _robot_run(experiment: Experiment, index: int, recorder: Recorder) -> RobotRun:
@@ -130,13 +138,13 @@ def _robot_run(experiment: Experiment, index: int, recorder: Recorder) -> RobotR
     )
 
 
-def _carry(experiment: Experiment, kidnap: Kidnap) -> Event:
+def carry(source: Simulator, kidnap: Kidnap) -> Event:
     """Carry a robot elsewhere; nobody tells it."""
     assert kidnap.to is not None, "settled by the build"
     to = Pose2(kidnap.to.x_m, kidnap.to.y_m, wrap_to_pi(kidnap.to.theta_rad))
-    experiment.simulator.bodies[kidnap.robot].carry_to(to)
+    source.bodies[kidnap.robot].carry_to(to)
     return Event(
-        experiment.simulator.t_s,
+        source.t_s,
         "kidnap",
         f"the robot is carried to ({to.x_m:.2f}, {to.y_m:.2f}) and not told",
     )

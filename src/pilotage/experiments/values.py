@@ -104,24 +104,41 @@ def apply_override(values: dict[str, Any], override: str) -> None:
         If the text is not of that form or the key leads through something that has no keys.
     """
     parts, value = parse_override(override)
+    _apply(values, parts, value, f"--set '{override}'")
+
+
+def apply_setting(values: dict[str, Any], key: str, value: Any) -> None:
+    """Set a dotted key in place to a value that is one already, not text to be read.
+
+    Raises
+    ------
+    InputError
+        As ``apply_override``.
+    """
+    parts = str(key).split(".")
+    if not all(part.strip() for part in parts):
+        raise InputError(f"set: expected keys such as 'stack.localizer.gate', found '{key}'")
+    _apply(values, parts, copy.deepcopy(value), f"set '{key}'")
+
+
+def _apply(values: dict[str, Any], parts: list[str], value: Any, told: str) -> None:
+    """Put a value where its key leads; ``told`` is how the user said it."""
     top = list(TOP_KEYS)
     if parts[0] not in top:
         close = nearest(parts[0], top)
         hint = f"did you mean '{close}'?" if close else "known: " + ", ".join(top)
-        raise InputError(f"--set '{override}': unknown key '{parts[0]}'; {hint}")
+        raise InputError(f"{told}: unknown key '{parts[0]}'; {hint}")
     place: Any = values
     for depth, part in enumerate(parts[:-1]):
-        inner = _child(place, part, override)
+        inner = _child(place, part, told)
         if inner is None:
             inner = {}
-            _put(place, part, inner, override)
+            _put(place, part, inner, told)
         if isinstance(inner, str) and _is_component(parts[: depth + 1]):
             inner = {"name": inner}
-            _put(place, part, inner, override)
+            _put(place, part, inner, told)
         if not isinstance(inner, dict | list):
-            raise InputError(
-                f"--set '{override}': '{'.'.join(parts[: depth + 1])}' is a value, it has no keys"
-            )
+            raise InputError(f"{told}: '{'.'.join(parts[: depth + 1])}' is a value, it has no keys")
         place = inner
     last = parts[-1]
     if last == "name" and isinstance(place, dict) and place.get("name") != value:
@@ -129,7 +146,7 @@ def apply_override(values: dict[str, Any], override: str) -> None:
     for own, other in EXCLUSIVE:
         if last == own and isinstance(place, dict):
             place.pop(other, None)
-    _put(place, last, value, override)
+    _put(place, last, value, told)
 
 
 def _number(text: str) -> Any:
@@ -140,20 +157,20 @@ def _number(text: str) -> Any:
         return text
 
 
-def _child(place: Any, part: str, override: str) -> Any:
+def _child(place: Any, part: str, told: str) -> Any:
     if isinstance(place, list):
-        return place[_index(place, part, override)]
+        return place[_index(place, part, told)]
     return place.get(part)
 
 
-def _put(place: Any, part: str, value: Any, override: str) -> None:
+def _put(place: Any, part: str, value: Any, told: str) -> None:
     if isinstance(place, list):
-        place[_index(place, part, override)] = value
+        place[_index(place, part, told)] = value
     else:
         place[part] = value
 
 
-def _index(place: list[Any], part: str, override: str) -> int:
+def _index(place: list[Any], part: str, told: str) -> int:
     if not (part.isascii() and part.isdigit() and len(part) <= MOST_DIGITS and int(part) < len(place)):
-        raise InputError(f"--set '{override}': expected an index from 0 to {len(place) - 1}, found '{part}'")
+        raise InputError(f"{told}: expected an index from 0 to {len(place) - 1}, found '{part}'")
     return int(part)

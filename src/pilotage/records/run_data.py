@@ -27,7 +27,7 @@ from pilotage.records.scans import Sightings, read_sightings
 from pilotage.records.terrain import TerrainPictures, read_terrain
 from pilotage.records.trace import TRACE_FILE, Trace, read_trace
 from pilotage.records.updates import RecordedUpdate, read_updates
-from pilotage.records.world import World, read_world
+from pilotage.records.world import RobotOutline, World, read_world
 
 T = TypeVar("T")
 PLACES = ("_x_m", "_y_m")
@@ -74,17 +74,15 @@ class RunData:
         return str(self.metrics.get("mission") or self.mission.get("mission") or self.run_dir.name)
 
     @property
-    def kind(self) -> str:
-        """What is drawn of it: "terrain", "sheet" or "floor", "recording" for a recorded log."""
-        if not self.mission and "localizer" in self.metrics:
-            return "recording"
-        world = self.mission.get("world")
-        told = world.get("kind") if isinstance(world, Mapping) else None
-        if told is not None:
-            return str(told)
-        if self.terrain is not None:
-            return "terrain"
-        return "floor" if self.sheet is None else "sheet"
+    def recorded(self) -> bool:
+        """Whether it replays a recorded log instead of a simulation."""
+        return not self.mission and "localizer" in self.metrics
+
+    @property
+    def outline(self) -> RobotOutline:
+        """The robot as it is drawn."""
+        known = self.world.robots
+        return known[self.robot] if self.robot < len(known) else RobotOutline()
 
     @property
     def settle_s(self) -> float:
@@ -97,6 +95,12 @@ class RunData:
         """(N,) steps that count for the errors; all of them in a run that ended before settling."""
         after = self.trace.t_s > self.settle_s
         return after if bool(after.any()) else np.ones(self.trace.steps, dtype=np.bool_)
+
+
+def read_team(folder: Path, first: RunData, on_damage: OnDamage | None = None) -> tuple[RunData, ...]:
+    """All robots' views of a run, ``first`` among them; one alone where there is one robot."""
+    others = range(1, len(first.robots))
+    return first, *(read_run(folder, robot=k, on_damage=on_damage) for k in others)
 
 
 OnDamage = Callable[[str], None]

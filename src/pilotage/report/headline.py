@@ -16,8 +16,24 @@ def outcome(metrics: Mapping[str, Any]) -> bool | None:
     return success if isinstance(success, bool) else None
 
 
+def own_metrics(metrics: Mapping[str, Any]) -> dict[str, Mapping[str, Any]]:
+    """Each robot's own metrics by its name; none where there is one robot."""
+    told = metrics.get("robots")
+    if not isinstance(told, Mapping):
+        return {}
+    return {str(name): entry for name, entry in told.items() if isinstance(entry, Mapping)}
+
+
+def succeeded(metrics: Mapping[str, Any]) -> tuple[int, int]:
+    """How many robots succeeded, of how many."""
+    each = own_metrics(metrics)
+    return sum(entry.get("success") is True for entry in each.values()), len(each)
+
+
 def headline(metrics: Mapping[str, Any]) -> str:
     """Return one sentence with the run's answer and its main numbers, those that there are."""
+    if len(own_metrics(metrics)) > 1:
+        return _team_headline(metrics)
     success = outcome(metrics)
     duration = number(metrics.get("duration_s"))
     after = f" after {quantities.duration(duration)}" if math.isfinite(duration) else ""
@@ -56,6 +72,32 @@ def headline(metrics: Mapping[str, Any]) -> str:
         details.append(text)
     elif success and math.isfinite(planned):
         details.append(_planned(metrics, planned))
+    return f"{answer}; {'; '.join(details)}." if details else f"{answer}."
+
+
+def _team_headline(metrics: Mapping[str, Any]) -> str:
+    """The same of several robots."""
+    good, count = succeeded(metrics)
+    duration = number(metrics.get("duration_s"))
+    after = f" after {quantities.duration(duration)}" if math.isfinite(duration) else ""
+    answer = (
+        f"All {count} robots succeeded{after}"
+        if good == count
+        else f"{good} of {count} robots succeeded{after}"
+    )
+    if good < count:
+        reason = str(metrics.get("reason") or "no reason given").strip().rstrip(".")
+        answer += f" ({reason})"
+    collisions, driven = number(metrics.get("collisions")), number(metrics.get("path_length_m"))
+    details = []
+    if math.isfinite(collisions):
+        text = "no collision" if collisions == 0.0 else f"{quantities.count(collisions)} collisions"
+        details.append("1 collision" if collisions == 1.0 else text)
+    if math.isfinite(driven):
+        details.append(f"{quantities.length(driven)} driven in all")
+    rmse = number(metrics.get("position_rmse_m"))
+    if math.isfinite(rmse):
+        details.append(f"positions known to {quantities.length(rmse)} (RMSE, mean of the robots)")
     return f"{answer}; {'; '.join(details)}." if details else f"{answer}."
 
 

@@ -8,27 +8,10 @@ from pathlib import Path
 
 from pilotage.core.whole_file import write_whole
 from pilotage.records.numbers import number
-from pilotage.records.run_data import OnDamage, RunData, read_run
+from pilotage.records.run_data import OnDamage, RunData, read_run, read_team
 from pilotage.report import quantities
-from pilotage.report.figures.clearance import clearance_figure
-from pilotage.report.figures.close_ups import close_ups_figure
-from pilotage.report.figures.consistency import consistency_figure
-from pilotage.report.figures.control import control_figure
-from pilotage.report.figures.covariance import covariance_figure
-from pilotage.report.figures.map import map_figure
-from pilotage.report.figures.pose_error import pose_error_figure
-from pilotage.report.figures.slow_errors import slow_errors_figure
-from pilotage.report.figures.terrain_estimate import drive_figure, rover_error_figure, uncertainty_figure
-from pilotage.report.figures.terrain_map import (
-    close_up_figure,
-    hazard_map_figure,
-    looked_at_figure,
-    terrain_map_figure,
-)
-from pilotage.report.figures.terrain_profile import hazard_distance_figure, terrain_profile_figure
-from pilotage.report.figures.timeline import timeline_figure
-from pilotage.report.figures.ultrasonic import ultrasonic_figure
-from pilotage.report.figures.updates import updates_figure
+from pilotage.report.drawn import figures_of, scene_of
+from pilotage.report.figures.team import team_figures
 from pilotage.report.headline import headline, outcome
 from pilotage.report.markup import (
     contents,
@@ -41,69 +24,15 @@ from pilotage.report.markup import (
     tiles,
 )
 from pilotage.report.metrics_table import metric_rows
-from pilotage.report.replay.floor import floor_scene
-from pilotage.report.replay.scene import ReplayScene
 from pilotage.report.replay.section import SLUG, TITLE, replay_section, script_source, style
-from pilotage.report.replay.terrain import terrain_scene
-from pilotage.report.sheet.maps import accuracy_figure, printed_figure
-from pilotage.report.sheet.path import coverage_figure, path_figure
-from pilotage.report.sheet.replay import sheet_scene
-from pilotage.report.style import Illustration, drawing_style
+from pilotage.report.replay.team import team_scene
+from pilotage.report.style import drawing_style
+from pilotage.report.team import SLUG as TEAM_SLUG
+from pilotage.report.team import TITLE as TEAM_TITLE
+from pilotage.report.team import team_section, team_tiles
 
 REPORT_FILE = "report.html"
 
-Draw = Callable[[RunData], Illustration]
-
-FLOOR_FIGURES: tuple[Draw, ...] = (
-    map_figure,
-    close_ups_figure,
-    timeline_figure,
-    pose_error_figure,
-    covariance_figure,
-    consistency_figure,
-    control_figure,
-    ultrasonic_figure,
-    clearance_figure,
-)
-TERRAIN_FIGURES: tuple[Draw, ...] = (
-    terrain_map_figure,
-    close_up_figure,
-    hazard_map_figure,
-    looked_at_figure,
-    drive_figure,
-    rover_error_figure,
-    uncertainty_figure,
-    terrain_profile_figure,
-    hazard_distance_figure,
-)
-SHEET_FIGURES: tuple[Draw, ...] = (
-    path_figure,
-    coverage_figure,
-    accuracy_figure,
-    printed_figure,
-    pose_error_figure,
-)
-RECORDING_FIGURES: tuple[Draw, ...] = (
-    map_figure,
-    close_ups_figure,
-    pose_error_figure,
-    covariance_figure,
-    consistency_figure,
-    slow_errors_figure,
-)
-FIGURES: dict[str, tuple[Draw, ...]] = {
-    "floor": FLOOR_FIGURES,
-    "terrain": TERRAIN_FIGURES,
-    "sheet": SHEET_FIGURES,
-    "recording": RECORDING_FIGURES,
-}
-"""What is drawn of a run, by the kind of its mission."""
-SCENES: dict[str, Callable[[RunData], ReplayScene | None]] = {
-    "floor": floor_scene,
-    "terrain": terrain_scene,
-    "sheet": sheet_scene,
-}
-"""How a run of each kind becomes a scene to replay."""
 _LONGEST_MISSION = 100_000
 
 
@@ -112,27 +41,40 @@ def write_report(run_dir: Path, on_damage: OnDamage | None = None) -> Path:
     damaged: list[str] = []
 
     def left_out(line: str) -> None:
+        # Files that the robots share are read once for each: one line for each damage is enough.
+        if line in damaged:
+            return
         damaged.append(line)
         if on_damage is not None:
             on_damage(line)
 
-    run = read_run(run_dir, on_damage=None if on_damage is None else left_out)
+    told = None if on_damage is None else left_out
+    run = read_run(run_dir, on_damage=told)
+    team = read_team(run_dir, run, told)
     path = run_dir / REPORT_FILE
-    write_whole(path, run_page(run, damaged))
+    write_whole(path, run_page(run, damaged, team))
     return path
 
 
-def run_page(run: RunData, damaged: Sequence[str] = ()) -> str:
-    """Return the report of a run as HTML; ``damaged`` are lines on files that it was read without."""
+def run_page(run: RunData, damaged: Sequence[str] = (), team: Sequence[RunData] = ()) -> str:
+    """Return the report of a run as HTML.
+
+    Parameters
+    ----------
+    damaged
+        Lines on files that it was read without.
+    team
+        The views of all its robots where there are several; what is drawn shows them all.
+    """
+    several = len(team) > 1
     with drawing_style():
-        figures = [draw(run) for draw in FIGURES.get(run.kind, FLOOR_FIGURES)]
-        if run.kind in ("terrain", "recording"):
-            # They differ in what they do at all: what they do not do is not missing.
-            figures = [figure for figure in figures if figure.svg or figure.slug == "hazards"]
-        if run.updates:
-            figures.append(updates_figure(run))
-    sections: list[str] = [replay_section(SCENES.get(run.kind, floor_scene)(run))]
+        figures = team_figures(team) if several else figures_of(run)
+        scene = team_scene(team) if several else scene_of(run)
+    sections: list[str] = [replay_section(scene)]
     entries: list[tuple[str, str]] = [(SLUG, TITLE)]
+    if several:
+        sections.append(team_section(run.metrics))
+        entries.append((TEAM_SLUG, TEAM_TITLE))
     drawn = 0
     slugs = [figure.slug for figure in figures]
     explained = next((slug for slug in ("timeline", "coverage") if slug in slugs), slugs[0] if slugs else "")
@@ -148,7 +90,7 @@ def run_page(run: RunData, damaged: Sequence[str] = ()) -> str:
         sections.append(_mission_section(run.mission_text))
         entries.append(("mission", "The mission as it ran"))
     description = str(run.mission.get("description") or "")
-    source = "recording" if run.kind == "recording" else "simulator"
+    source = "recording" if run.recorded else "simulator"
     return document(
         title=escape(f"{run.name}: run report"),
         layers="".join(layer_rules(figure) for figure in figures) + style(),
@@ -158,7 +100,7 @@ def run_page(run: RunData, damaged: Sequence[str] = ()) -> str:
         description=_paragraphs([*([description] if description else []), *damaged]),
         outcome=_outcome(run),
         headline=escape(headline(run.metrics)),
-        tiles=tiles(_tiles(run)),
+        tiles=tiles(team_tiles(run.metrics) if several else _tiles(run)),
         contents=contents(entries),
         body="\n".join(sections),
         footer=escape(
@@ -209,7 +151,7 @@ def _tiles(run: RunData) -> list[tuple[str, str]]:
         ("NEES (ideal 3)", value("nees_mean"), lambda x: f"{x:.2f}"),
         ("collisions", value("collisions"), quantities.count),
     )
-    if run.kind == "terrain":
+    if run.terrain is not None or not run.trace.has("true_x_m"):
         entries += (
             ("planned way", planned, quantities.length),
             ("travel time", value("travel_time_s"), quantities.duration),

@@ -145,13 +145,17 @@ def load_study(name_or_path: str, changes: Mapping[str, Any] | None = None) -> S
         raise InputError(f"study '{name_or_path}': {error}") from None
 
 
-def make_study(definition: StudyDefinition, folder: Path = Path()) -> Study:
+def make_study(
+    definition: StudyDefinition, folder: Path = Path(), values: Mapping[str, Any] | None = None
+) -> Study:
     """Read the mission and validate every cell of a study.
 
     Parameters
     ----------
     folder
         Where a mission's file is looked for.
+    values
+        The mission itself, where it is in no file.
 
     Raises
     ------
@@ -162,7 +166,7 @@ def make_study(definition: StudyDefinition, folder: Path = Path()) -> Study:
     if named not in shipped_missions() and not Path(named).is_absolute() and (folder / named).is_file():
         named = str(folder / named)
     places = (folder, Path())
-    base = anchored(read_mission(named), places)
+    base = anchored(read_mission(named) if values is None else dict(values), places)
     definition = _at_their_places(definition, places)
 
     def resolve(overrides: Sequence[str]) -> Mapping[str, Any]:

@@ -51,23 +51,25 @@ def travel_speed(
     clearance: FloatArray,
     seen: BoolArray,
     blocked_m: float,
+    tight_m: float,
     easy_m: float,
+    crawl: float,
     slow: float,
     fast: float,
     unseen_share: float,
 ) -> FloatArray:
     """Speed (m, m) to reckon with in every cell, 0 where no footprint fits.
 
-    Rises from ``slow`` at a clearance of ``blocked_m`` to ``fast`` at ``easy_m``; in unseen cells
-    ``unseen_share`` of that.
+    ``crawl`` from a clearance of ``blocked_m`` on, where a footprint has to stand straight to pass; from
+    ``tight_m`` on it rises from ``slow`` to ``fast`` at ``easy_m``. In unseen cells ``unseen_share`` of that.
     """
     out = np.zeros_like(clearance)
     for row in range(clearance.shape[0]):
         for column in range(clearance.shape[1]):
-            room = clearance[row, column] - blocked_m
-            if room < 0.0:
+            if clearance[row, column] < blocked_m:
                 continue
-            speed = slow + (fast - slow) * min(1.0, room / (easy_m - blocked_m))
+            room = clearance[row, column] - tight_m
+            speed = crawl if room < 0.0 else slow + (fast - slow) * min(1.0, room / (easy_m - tight_m))
             out[row, column] = speed if seen[row, column] else speed * unseen_share
     return out
 

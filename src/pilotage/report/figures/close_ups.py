@@ -18,6 +18,7 @@ from pilotage.records.world import World
 from pilotage.report import quantities
 from pilotage.report.event_kinds import event_kind
 from pilotage.report.figures import layers
+from pilotage.report.figures.grid import draw_grid
 from pilotage.report.style import (
     BLACK,
     BLUE,
@@ -56,7 +57,7 @@ def close_ups_figure(run: RunData) -> Illustration:
     moments = _moments(run, path)
     if not moments:
         return Illustration(SLUG, TITLE, "", "The run recorded no true path to look at closely.")
-    radius = run.world.robot_radius_m or 0.3
+    radius = run.outline.radius_m or 0.3
     half_m = 6.0 * radius
     side = (WIDTH_PT - _LEFT_PT - _RIGHT_PT - (MOST - 1) * _GAP_PT) / MOST
     total = side + _TOP_PT + _BOTTOM_PT
@@ -74,7 +75,7 @@ def close_ups_figure(run: RunData) -> Illustration:
         _draw(axes, _window(run, x, y, half_m, moment.step), run, moment.step, radius)
     caption = (
         f"Windows of {quantities.length(2.0 * half_m)}, in metres like the map, with the way of "
-        f"{WAY_S:g} s before and after. The disc is the robot at that moment, the dashed ring is where it "
+        f"{WAY_S:g} s before and after. The body is the robot at that moment, dashed is where it "
         "believed to be; the small black ellipses hold it with 95 % probability and are to scale."
     )
     candidates = (
@@ -128,7 +129,11 @@ def _draw(axes: Axes, inside: RunData, run: RunData, step: int, radius: float) -
     """Draw what lies inside the window, and the robot of one step."""
     layers.draw_plans(axes, inside, linewidth=9.0)
     layers.draw_obstacles(axes, inside.world)
-    layers.draw_walls(axes, inside.world, linewidth=2.0)
+    if run.grid is None:
+        layers.draw_walls(axes, inside.world, linewidth=2.0)
+    else:
+        (x0, x1), (y0, y1) = axes.get_xlim(), axes.get_ylim()
+        draw_grid(axes, run.grid, (x0, y0, x1, y1))
     layers.draw_mapped_points(axes, inside, 0.05)
     trace = run.trace
     layers.draw_body(
@@ -139,19 +144,12 @@ def _draw(axes: Axes, inside: RunData, run: RunData, step: int, radius: float) -
         radius,
         BLUE,
         opacity=0.3,
+        polygon_m=run.outline.polygon_m,
     )
     layers.draw_paths(axes, inside, linewidth=2.6)
-    believed = np.array([[trace["est_x_m"][step], trace["est_y_m"][step], radius]])
-    layers.circles(
-        axes,
-        believed,
-        "body",
-        facecolor="none",
-        edgecolor=VERMILLION,
-        linewidth=1.2,
-        linestyle=(0, (3, 2)),
-        zorder=9,
-    )
+    x, y, theta = (float(trace[f"est_{name}"][step]) for name in ("x_m", "y_m", "theta_rad"))
+    look = {"facecolor": "none", "linewidth": 1.2, "linestyle": (0, (3, 2)), "alpha": 1.0}
+    layers.draw_body(axes, x, y, theta, radius, VERMILLION, polygon_m=run.outline.polygon_m, look=look)
     known = np.flatnonzero(np.isfinite(layers.estimated_path(inside)).all(axis=1))
     shown = sorted({step, *(int(k) for k in known[:: max(1, len(known) // 12)])})
     one_shape(

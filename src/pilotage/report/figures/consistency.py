@@ -19,7 +19,6 @@ from pilotage.report.style import (
     Illustration,
     Key,
     logarithmic,
-    note,
     render,
     series,
     stacked_axes,
@@ -57,34 +56,33 @@ def consistency_figure(run: RunData) -> Illustration:
         return Illustration(
             SLUG, TITLE, "", "The run recorded neither NEES nor NIS: nothing was estimated against a truth."
         )
-    figure, panels = stacked_axes(
-        [
-            "NEES (3 is ideal)",
-            "NIS per degree of freedom (1 is ideal)",
-            f"{what.capitalize()} seen and accepted",
-        ],
-        (115.0, 115.0, 70.0),
-    )
-    time_limits(panels, t_s)
+    dof = np.where(trace["nis_dof"] > 0.0, trace["nis_dof"], np.nan)
+    nis = trace["nis"] / dof
+    known = {
+        "NEES (3 is ideal)": (trace.has("nees"), 115.0),
+        "NIS per degree of freedom (1 is ideal)": (bool(np.isfinite(nis).any()), 115.0),
+        f"{what.capitalize()} seen and accepted": (trace.has(f"{what}_seen"), 70.0),
+    }
+    shown = {title: height for title, (there, height) in known.items() if there}
+    if not shown:
+        return Illustration(SLUG, TITLE, "", "The run recorded no NIS with its degrees of freedom.")
+    figure, drawn = stacked_axes(list(shown), list(shown.values()))
+    time_limits(drawn, t_s)
+    panels = iter(drawn)
     window = _steps(t_s, WINDOW_S)
     low, high = chi_square_band(float(POSE_DOF))
     shares = []
     nees = trace["nees"]
     if trace.has("nees"):
-        _statistic(panels[0], t_s, nees, np.full_like(t_s, low), np.full_like(t_s, high), POSE_DOF, window)
+        _statistic(next(panels), t_s, nees, np.full_like(t_s, low), np.full_like(t_s, high), POSE_DOF, window)
         shares.append(_inside("NEES", nees, np.full_like(t_s, low), np.full_like(t_s, high), run))
-    else:
-        note(panels[0], "not recorded")
-    dof = np.where(trace["nis_dof"] > 0.0, trace["nis_dof"], np.nan)
-    nis = trace["nis"] / dof
     if bool(np.isfinite(nis).any()):
         nis_low, nis_high = (edge / dof for edge in chi_square_band(dof))
         smooth_low, smooth_high = (edge / _typical(dof, t_s) for edge in chi_square_band(_typical(dof, t_s)))
-        _statistic(panels[1], t_s, nis, smooth_low, smooth_high, 1.0, window)
+        _statistic(next(panels), t_s, nis, smooth_low, smooth_high, 1.0, window)
         shares.append(_inside("NIS", nis, nis_low, nis_high, run))
-    else:
-        note(panels[1], "not recorded")
-    _measurements(panels[2], run)
+    if trace.has(f"{what}_seen"):
+        _measurements(next(panels), run)
     seen, accepted = np.nansum(trace[f"{what}_seen"]), np.nansum(trace[f"{what}_accepted"])
     refused = (
         f" The gate let {quantities.count(accepted)} of {quantities.count(seen)} {what} through."
@@ -144,9 +142,6 @@ def measured(run: RunData) -> str:
 
 def _measurements(axes: Axes, run: RunData) -> None:
     trace, t_s, what = run.trace, run.trace.t_s, measured(run)
-    if not trace.has(f"{what}_seen"):
-        note(axes, "not recorded")
-        return
     seen = trace[f"{what}_seen"]
     axes.set_ylim(0.0, float(np.nanmax(seen)) + 1.0)
     axes.yaxis.set_major_locator(MaxNLocator(4, integer=True))

@@ -16,7 +16,6 @@ from pilotage.report.style import (
     Illustration,
     Key,
     nice_limit,
-    note,
     peak,
     render,
     series,
@@ -45,21 +44,17 @@ def control_figure(run: RunData) -> Illustration:
     if not any(trace.has(column) for column, *_ in _PARTS):
         return Illustration(SLUG, TITLE, "", "The run recorded no controller.")
     factor, unit = (1.0, "m") if peak(trace["path_error_m"]) > 0.5 else (1000.0, "mm")
-    figure, panels = stacked_axes(
-        [
-            f"Lateral error to the path [{unit}]",
-            "Turn rate from the PI controller [rad/s]",
-            "Turn rate, feed-forward and reactive [rad/s]",
-            "Speed [m/s]",
-        ],
-        (85.0, 85.0, 85.0, 65.0),
+    titles = (
+        f"Lateral error to the path [{unit}]",
+        "Turn rate from the PI controller [rad/s]",
+        "Turn rate, feed-forward and reactive [rad/s]",
+        "Speed [m/s]",
     )
+    shown = [k for k in range(4) if any(panel == k and trace.has(column) for column, _, _, panel in _PARTS)]
+    figure, panels = stacked_axes([titles[k] for k in shown], [(85.0, 85.0, 85.0, 65.0)[k] for k in shown])
     time_limits(panels, t_s)
-    for index, axes in enumerate(panels):
+    for index, axes in zip(shown, panels, strict=True):
         parts = [part for part in _PARTS if part[3] == index and trace.has(part[0])]
-        if not parts:
-            note(axes, "not recorded")
-            continue
         scale = factor if index == 0 else 1.0
         values = np.concatenate([trace[column] for column, *_ in parts]) * scale
         if index < 3:
@@ -72,7 +67,9 @@ def control_figure(run: RunData) -> Illustration:
             width = 2.2 if name == "true speed" else 0.9
             series(axes, t_s, trace[column] * scale, colour, linewidth=width)
     caption = (
-        "The lateral error is what the controller sees, the distance of its own estimate from the reference. "
+        ""
+        if not trace.has("path_error_m")
+        else "The lateral error is what the controller sees: how far its own estimate is from the reference. "
         "While it follows the path the commanded turn rate is the sum of four parts: feed-forward along the "
         "path, proportional and integral on the error, and the reactive part that keeps off walls."
     )

@@ -6,7 +6,7 @@ Each is one path element with a name, so that the page stays small and can switc
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
@@ -169,26 +169,46 @@ def draw_body(
     colour: str,
     filled: bool = True,
     opacity: float = 0.75,
+    polygon_m: FloatArray | None = None,
+    look: Mapping[str, Any] | None = None,
 ) -> None:
-    """Draw the robot's disc to scale, with a stroke from its centre to where it looks."""
+    """Draw the robot's disc or polygon to scale, with a stroke from its origin to where it looks.
+
+    A polygon needs a heading; where that is unknown the circle around it is drawn.
+    """
     if not math.isfinite(x + y):
         return
-    rim = (radius_m * _CIRCLE).T + np.array([x, y])
+    rim = body_outline(x, y, theta, radius_m, polygon_m)
     face = colour if filled else "white"
     one_shape(
         axes,
         [Outline(rim, closed=True)],
-        facecolor=face,
-        edgecolor=colour,
-        linewidth=1.0,
-        alpha=opacity,
-        zorder=9,
-        gid="layer-body",
+        **{
+            "facecolor": face,
+            "edgecolor": colour,
+            "linewidth": 1.0,
+            "alpha": opacity,
+            "zorder": 9,
+            "gid": "layer-body",
+            **(look or {}),
+        },
     )
-    if theta is not None and math.isfinite(theta):
-        tip = (x + radius_m * math.cos(theta), y + radius_m * math.sin(theta))
+    if look is None and theta is not None and math.isfinite(theta):
+        ahead_m = radius_m if polygon_m is None or not len(polygon_m) else float(polygon_m[:, 0].max())
+        tip = (x + ahead_m * math.cos(theta), y + ahead_m * math.sin(theta))
         stroke = "white" if filled else colour
         line(axes, np.array([(x, y), tip]), "body", color=stroke, linewidth=1.0, zorder=9.1)
+
+
+def body_outline(
+    x: float, y: float, theta: float | None, radius_m: float, polygon_m: FloatArray | None = None
+) -> FloatArray:
+    """(n, 2) closed rim of a body at a pose."""
+    if polygon_m is None or not len(polygon_m) or theta is None or not math.isfinite(theta):
+        return np.asarray((radius_m * _CIRCLE).T + np.array([x, y]))
+    c, s = math.cos(theta), math.sin(theta)
+    turned = polygon_m @ np.array([(c, s), (-s, c)]) + (x, y)
+    return np.vstack([turned, turned[:1]])
 
 
 def line(axes: Axes, points: FloatArray, layer: str, **look: Any) -> None:

@@ -11,6 +11,7 @@ from pilotage.core.types import FloatArray
 from pilotage.records.run_data import RunData
 from pilotage.report import quantities
 from pilotage.report.figures import layers, map_marks
+from pilotage.report.figures.grid import OCCUPIED_COLOUR, UNKNOWN_COLOUR, draw_grid, has_unknown
 from pilotage.report.figures.map_view import Limits, map_axes, view_limits
 from pilotage.report.style import (
     BLACK,
@@ -45,7 +46,10 @@ def map_figure(run: RunData) -> Illustration:
     layers.draw_tree(axes, run)
     layers.draw_plans(axes, run)
     layers.draw_obstacles(axes, world)
-    layers.draw_walls(axes, world)
+    if run.grid is None:
+        layers.draw_walls(axes, world)
+    else:
+        draw_grid(axes, run.grid)
     # A cell of a third of a millimetre on the page: closer points are one dot.
     layers.draw_mapped_points(axes, run, max(0.04, 1.6 / points_per_m))
     layers.draw_shortest(axes, run)
@@ -123,18 +127,26 @@ def _keys(run: RunData, magnification: int) -> tuple[Key, ...]:
         (bool(world.landmarks), Key("beacons", GREEN, "spot", "beacons")),
         (magnification > 0, Key("95 % ellipses to scale", BLACK, "line", "ellipses")),
         (magnification > 1, Key(f"ellipses magnified {magnification} ×", SKY, "band", "magnified")),
-        (len(world.segments_m) > 0, Key("walls", INK, "line", "walls")),
+        (run.grid is None and len(world.segments_m) > 0, Key("walls", INK, "line", "walls")),
+        (run.grid is not None, Key("occupied", OCCUPIED_COLOUR, "band", "grid", 1.0)),
+        (has_unknown(run.grid), Key("unknown", UNKNOWN_COLOUR, "band", "grid", 1.0)),
     )
     return tuple(key for there, key in candidates if there)
 
 
 def _caption(run: RunData, limits: Limits, magnification: int) -> str:
-    radius = run.world.robot_radius_m
+    outline, radius = run.outline, run.outline.radius_m
     parts = ["Numbers are those of the event list. Tick a layer off to see what lies beneath it."]
     ends = run.world.segments_m.reshape(-1, 2)
     if bool(((ends < limits[:2]) | (ends > limits[2:])).any()):
         parts.append("Only the part of the floor around the run is shown.")
-    if radius is not None:
+    if len(outline.polygon_m):
+        long, wide = (float(side) for side in np.ptp(outline.polygon_m, axis=0))
+        parts.append(
+            "The robot's outline at start (open), end (filled) and goal (dashed) is to scale, "
+            f"{quantities.length(long)} long and {quantities.length(wide)} wide."
+        )
+    elif radius is not None:
         parts.append(
             "The robot's disc at start (open) and end (filled) is to scale, "
             f"{quantities.length(radius)} in radius."

@@ -36,31 +36,37 @@ def label_placer(run: RunData, axes: Axes, points_per_m: float) -> LabelPlacer:
 
 def draw_robot(axes: Axes, run: RunData, placer: LabelPlacer, points_per_m: float) -> None:
     """Draw the robot at its start and end, the goal, and write what is what."""
-    world, trace = run.world, run.trace
-    radius = world.robot_radius_m or 0.0
+    trace, outline = run.trace, run.outline
+    radius, polygon = outline.radius_m or 0.0, outline.polygon_m
+    goal = outline.goals[-1] if outline.goals else None
     path = layers.true_path(run)
     known = np.flatnonzero(np.isfinite(path).all(axis=1))
     names: list[tuple[str, float, float]] = []
-    start = world.start
+    start = outline.start
     if start is None and len(known):
         first = int(known[0])
         start = (float(path[first, 0]), float(path[first, 1]), float(trace["true_theta_rad"][first]))
     if start is not None:
-        layers.draw_body(axes, *start, radius, BLUE, filled=False)
+        layers.draw_body(axes, *start, radius, BLUE, filled=False, polygon_m=polygon)
         names.append(("start", start[0], start[1]))
-    if world.goal is not None:
-        x, y, theta = world.goal
+    for x, y, _ in outline.goals[:-1]:
+        axes.plot([x], [y], marker="x", color=GREEN, markersize=7.0, markeredgewidth=1.6, zorder=9.5)
+    if goal is not None:
+        x, y, theta = goal
         axes.plot([x], [y], marker="X", color=GREEN, markersize=9.0, markeredgecolor="white", zorder=9.5)
         if theta is not None:
             reach = max(2.0 * radius, 14.0 / points_per_m)
             tip = np.array([(x, y), (x + reach * math.cos(theta), y + reach * math.sin(theta))])
             layers.line(axes, tip, "body", color=GREEN, linewidth=1.4, zorder=9.4)
+            if len(polygon):
+                look = {"facecolor": "none", "linewidth": 1.3, "linestyle": (0, (3, 2)), "zorder": 9.3}
+                layers.draw_body(axes, x, y, theta, radius, GREEN, polygon_m=polygon, look=look)
         names.append(("goal", x, y))
     if len(known):
         last = int(known[-1])
         x, y = float(path[last, 0]), float(path[last, 1])
-        layers.draw_body(axes, x, y, float(trace["true_theta_rad"][last]), radius, BLUE)
-        near_goal = world.goal is not None and math.hypot(x - world.goal[0], y - world.goal[1]) < 1.0
+        layers.draw_body(axes, x, y, float(trace["true_theta_rad"][last]), radius, BLUE, polygon_m=polygon)
+        near_goal = goal is not None and math.hypot(x - goal[0], y - goal[1]) < 1.0
         if not near_goal and len(known) > 1:
             names.append(("end", x, y))
     gap = radius * points_per_m + 3.0

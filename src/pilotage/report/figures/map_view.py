@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 from pilotage.core.types import FloatArray
 from pilotage.records.run_data import RunData
 from pilotage.report.figures import layers
+from pilotage.report.figures.grid import known_corners
 from pilotage.report.style import WIDTH_PT
 
 Limits: TypeAlias = tuple[float, float, float, float]
@@ -29,7 +30,7 @@ def view_limits(run: RunData) -> Limits | None:
     """
     whole = _extent(_world_points(run), 0.015, 0.3)
     world = run.world
-    ends = [pose[:2] for pose in (world.start, world.goal) if pose is not None]
+    ends = [pose[:2] for robot in world.robots for pose in (robot.start, *robot.goals) if pose is not None]
     visited = [
         layers.true_path(run),
         *(plan.path[:, :2] for plan in run.plans),
@@ -51,6 +52,11 @@ def view_limits(run: RunData) -> Limits | None:
 def _world_points(run: RunData) -> FloatArray:
     """(n, 2) points that span the world and everything that truly happened in it."""
     world = run.world
+    if run.grid is not None:
+        # A grid's rim is often unknown for many metres.
+        visited = [layers.true_path(run), *(plan.path[:, :2] for plan in run.plans)]
+        ends = [robot.start[:2] for robot in world.robots if robot.start is not None]
+        return np.concatenate([known_corners(run.grid), *visited, np.array(ends).reshape(-1, 2)])
     discs = [discs for discs in (world.circles_m, world.obstacle_circles_m) if len(discs)]
     parts = [
         world.segments_m.reshape(-1, 2),

@@ -36,29 +36,36 @@ _MODE_PT = 13.0
 def timeline_figure(run: RunData) -> Illustration:
     """Draw the numbered events, the distance to go and a strip a mode over time."""
     trace, t_s = run.trace, run.trace.t_s
+    to_go_known = trace.has("distance_to_go_m")
     if not trace.steps:
         return Illustration(SLUG, TITLE, "", "The run ended before its first step.")
     rows = _badge_rows(run)
     used = [(mode, stretches) for mode in MODES if len(stretches := mode_spans(trace, mode))]
-    figure, panels = stacked_axes(
-        ["Events, numbered as in the list", "Distance to go [m]", "Mode"],
-        (max(1, 1 + max(rows, default=0)) * _ROW_PT, 85.0, max(1, len(used)) * _MODE_PT),
-    )
+    if not (rows or used or to_go_known):
+        return Illustration(SLUG, TITLE, "", "The run recorded neither events nor modes.")
+    titles, heights = ["Events, numbered as in the list"], [max(1, 1 + max(rows, default=0)) * _ROW_PT]
+    if to_go_known:
+        titles.append("Distance to go [m]")
+        heights.append(85.0)
+    if used:
+        titles.append("Mode")
+        heights.append(len(used) * _MODE_PT)
+    figure, panels = stacked_axes(titles, heights)
     time_limits(panels, t_s)
-    _events(panels[0], panels[1], run, rows)
-    to_go = trace["distance_to_go_m"]
-    if trace.has("distance_to_go_m"):
+    _events(panels[0], panels[1] if to_go_known else panels[0], run, rows)
+    if to_go_known:
+        to_go = trace["distance_to_go_m"]
         panels[1].set_ylim(0.0, nice_limit(peak(to_go)))
         series(panels[1], t_s, to_go, BLUE, linewidth=1.4)
-    else:
-        note(panels[1], "not recorded")
-    _modes(panels[2], used)
+    if used:
+        _modes(panels[-1], used)
     dt_s = float(np.median(np.diff(t_s))) if len(t_s) > 1 else 0.1
     spent = [
         f"{mode.name} {float(np.sum(trace['mode'] == mode.number)) * dt_s:.1f}\u00a0s" for mode, _ in used
     ]
     caption = (
-        "Each number is an event of the list below; thin lines carry it down to the way that was still to go."
+        "Each number is an event of the list below"
+        + ("; thin lines carry it down to the way that was still to go." if to_go_known else ".")
         + (f" Time spent: {', '.join(spent)}." if spent else "")
     )
     keys = tuple(Key(mode.name, mode.colour, "band", opacity=1.0) for mode, _ in used)
@@ -99,9 +106,6 @@ def _events(axes: Axes, below: Axes, run: RunData, rows: list[int]) -> None:
 
 
 def _modes(axes: Axes, used: list[tuple[Mode, FloatArray]]) -> None:
-    if not used:
-        note(axes, "not recorded")
-        return
     axes.set_ylim(len(used), 0.0)
     axes.set_yticks([index + 0.5 for index in range(len(used))], [mode.short for mode, _ in used])
     axes.grid(visible=False, axis="y")

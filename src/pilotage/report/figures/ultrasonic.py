@@ -32,6 +32,8 @@ def ultrasonic_figure(run: RunData) -> Illustration:
     ranges = trace.ultrasonics()
     if not ranges:
         return Illustration(SLUG, TITLE, "", "The robot carried no ultrasonic sensors.")
+    if not trace.steps:
+        return Illustration(SLUG, TITLE, "", "The run ended before its first step.")
     shown = dict(list(ranges.items())[:MOST_PANELS])
     figure, panels = stacked_axes([f"{name.replace('_', ' ')} [m]" for name in shown], [75.0] * len(shown))
     time_limits(panels, t_s)

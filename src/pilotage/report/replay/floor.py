@@ -8,6 +8,8 @@ import numpy as np
 
 from pilotage.core.types import FloatArray, IntArray
 from pilotage.records.run_data import RunData
+from pilotage.report.figures.grid import OCCUPIED_COLOUR, UNKNOWN_COLOUR, cell_classes, known_corners
+from pilotage.report.figures.layers import body_outline
 from pilotage.report.modes import MODES
 from pilotage.report.replay.common import Column, position_error, scene_events
 from pilotage.report.replay.scene import (
@@ -16,12 +18,14 @@ from pilotage.report.replay.scene import (
     Marks,
     PathTrack,
     PoseTrack,
+    Raster,
     ReplayScene,
     ScanTrack,
     Series,
     SightTrack,
     States,
 )
+from pilotage.report.replay.upright import upright
 from pilotage.report.style import BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILLION
 
 MOST_FRAMES = 20_000
@@ -29,6 +33,7 @@ MOST_FRAMES = 20_000
 MOST_SCAN_VALUES = 400_000
 MOST_PATH_POINTS = 1500
 DEFAULT_RADIUS_M = 0.2
+GRID_PALETTE = ("transparent", UNKNOWN_COLOUR, OCCUPIED_COLOUR)
 
 
 def floor_scene(run: RunData) -> ReplayScene | None:
@@ -58,6 +63,7 @@ def floor_scene(run: RunData) -> ReplayScene | None:
     return ReplayScene(
         t_s=t_s[frames],
         bounds_m=_bounds(run, poses),
+        rasters=_rasters(run),
         lines=_lines(run),
         circles=(
             Circles("walls", run.world.circles_m, "ink"),
@@ -77,7 +83,7 @@ def floor_scene(run: RunData) -> ReplayScene | None:
 
 
 def _poses(run: RunData, column: Column) -> tuple[PoseTrack, ...]:
-    radius_m = run.world.robot_radius_m or DEFAULT_RADIUS_M
+    radius_m, body_m = run.outline.radius_m or DEFAULT_RADIUS_M, run.outline.polygon_m
     tracks = []
     if run.trace.has("true_x_m", "true_y_m"):
         tracks.append(
@@ -89,6 +95,7 @@ def _poses(run: RunData, column: Column) -> tuple[PoseTrack, ...]:
                 colour=BLUE,
                 radius_m=radius_m,
                 trail=True,
+                body_m=body_m,
             )
         )
     if run.trace.has("est_x_m", "est_y_m"):
@@ -104,6 +111,7 @@ def _poses(run: RunData, column: Column) -> tuple[PoseTrack, ...]:
                 radius_m=radius_m,
                 cov_m2=cov,
                 absent="lost",
+                body_m=body_m,
             )
         )
     if run.trace.has("ref_x_m", "ref_y_m"):
@@ -113,12 +121,26 @@ def _poses(run: RunData, column: Column) -> tuple[PoseTrack, ...]:
 
 
 def _lines(run: RunData) -> tuple[Lines, ...]:
-    world = run.world
+    world, outline = run.world, run.outline
+    goal = outline.goals[-1] if outline.goals else None
+    bay = None
+    if goal is not None and goal[2] is not None and len(outline.polygon_m):
+        bay = body_outline(goal[0], goal[1], goal[2], 0.0, outline.polygon_m)
     return (
         Lines("unexpected obstacles", world.obstacle_polygons_m, VERMILLION, fill=True),
         Lines("unexpected obstacles", _segments(world.obstacle_segments_m), VERMILLION, 2.5),
-        Lines("walls", _segments(world.segments_m), "ink", 2.2),
+        # The walls of a grid are its cells.
+        *((Lines("walls", _segments(world.segments_m), "ink", 2.2),) if run.grid is None else ()),
+        *((Lines("goal", (bay,), "muted", 1.5, dash=True),) if bay is not None else ()),
     )
+
+
+def _rasters(run: RunData) -> tuple[Raster, ...]:
+    if run.grid is None:
+        return ()
+    classes, size_m = cell_classes(run.grid)
+    box, cells = upright(classes[::-1], run.grid.origin.as_array(), size_m)
+    return (Raster("map", box, cells, GRID_PALETTE),)
 
 
 def _segments(table: FloatArray) -> tuple[FloatArray, ...]:
@@ -126,14 +148,17 @@ def _segments(table: FloatArray) -> tuple[FloatArray, ...]:
 
 
 def _marks(run: RunData) -> tuple[Marks, ...]:
-    world = run.world
+    world, outline = run.world, run.outline
     marks = []
     if world.landmarks:
         points = np.array([[mark.x_m, mark.y_m] for mark in world.landmarks])
         marks.append(Marks("landmarks", points, tuple(mark.id for mark in world.landmarks), GREEN))
-    for name, place, look in (("start", world.start, "ring"), ("goal", world.goal, "cross")):
-        if place is not None:
-            marks.append(Marks(name, np.array([place[:2]], dtype=np.float64), (name,), "muted", look))
+    starts = () if outline.start is None else (outline.start,)
+    for name, places, look in (("start", starts, "ring"), ("goal", outline.goals, "cross")):
+        if places:
+            points = np.array([place[:2] for place in places], dtype=np.float64)
+            names = (name,) if len(places) == 1 else tuple(f"{name} {k}" for k in range(1, len(places) + 1))
+            marks.append(Marks(name, points, names, "muted", look))
     return tuple(marks)
 
 
@@ -218,6 +243,10 @@ def _breaks(run: RunData, t_s: FloatArray) -> IntArray:
 
 
 def _bounds(run: RunData, poses: tuple[PoseTrack, ...]) -> tuple[float, float, float, float]:
+    if run.grid is not None:
+        corners = known_corners(run.grid)
+        (x0, y0), (x1, y1) = corners.min(axis=0).tolist(), corners.max(axis=0).tolist()
+        return x0, y0, x1, y1
     if run.world.bounds_m is not None:
         return run.world.bounds_m
     x = np.concatenate([p.x_m for p in poses] + [run.world.segments_m[:, [0, 2]].reshape(-1)])

@@ -369,7 +369,16 @@ class ReplayMap {
       pen.fill();
       return;
     }
-    pen.arc(cx, cy, radius, 0, 2 * Math.PI);
+    // A body of a few pixels is a disc, as its corners could not be told.
+    const polygon = track.body_m.length && theta === theta && track.radius_m * this.scale > 5;
+    if (polygon) {
+      const c = Math.cos(theta), s = Math.sin(theta);
+      for (let k = 0; k + 1 < track.body_m.length; k += 2) {
+        const bx = x + c * track.body_m[k] - s * track.body_m[k + 1], by = y + s * track.body_m[k] + c * track.body_m[k + 1];
+        if (k) pen.lineTo(this.px(bx), this.py(by)); else pen.moveTo(this.px(bx), this.py(by));
+      }
+      pen.closePath();
+    } else pen.arc(cx, cy, radius, 0, 2 * Math.PI);
     if (track.look === "robot") {
       pen.fillStyle = this.stateColour || this.colour(track.colour);
       pen.globalAlpha = 0.5;

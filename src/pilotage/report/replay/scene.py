@@ -1,6 +1,6 @@
-"""What a replay shows, whatever the kind of run: fixed layers, tracks that move, series, events.
+"""What a replay shows, whatever the run: fixed layers, tracks that move, series, events.
 
-A kind's page fills a ``ReplayScene``; the player knows nothing of kinds. All tracks share the scene's frames
+A page fills a ``ReplayScene``; the player knows nothing else of the run. All tracks share the scene's frames
 (one a step, or thinned); what comes at its own times (scans, paths, cells that change) brings them along.
 Colours are CSS colours, or ``ink``, ``muted``, ``line`` and ``soft`` for the page's own.
 """
@@ -70,8 +70,9 @@ class PoseTrack:
     """A pose a frame, (N,) each, nan where there is none.
 
     ``look``: ``robot`` (a disc of ``radius_m`` with its heading), ``outline`` (the same, not filled) or
-    ``point``. ``trail`` draws the way so far. ``cov_m2`` (N, 3) is xx, xy, yy of its 95 % ellipse.
-    ``absent`` is said where there is no pose.
+    ``point``; ``body_m`` (K, 2) is a polygon in the robot's frame that is drawn in the disc's place.
+    ``trail`` draws the way so far. ``cov_m2`` (N, 3) is xx, xy, yy of its 95 % ellipse. ``absent`` is said
+    where there is no pose.
     """
 
     name: str
@@ -84,6 +85,7 @@ class PoseTrack:
     trail: bool = False
     cov_m2: FloatArray | None = None
     absent: str = ""
+    body_m: FloatArray = field(default_factory=lambda: np.empty((0, 2)))
 
 
 @dataclass(frozen=True, slots=True)

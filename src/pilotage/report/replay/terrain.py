@@ -20,6 +20,7 @@ from pilotage.report.replay.scene import (
     Series,
     SightTrack,
 )
+from pilotage.report.replay.upright import box_around, upright
 from pilotage.report.style import BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILLION
 
 MOST_FRAMES = 6000
@@ -69,9 +70,8 @@ def ground_raster(pictures: TerrainPictures) -> Raster:
     levels, shares = _levels(pictures), _quantised(pictures.hazards, SHARES)
     cells = (levels * SHARES + shares).astype(np.int64)[::-1] + 1
     palette = ("transparent", *(_colour(k // SHARES, k % SHARES) for k in range(GREYS * SHARES)))
-    if pictures.origin[2] != 0.0:
-        cells = _turned(cells, pictures)
-    return Raster("ground, hazards tinted", _ground_bounds(pictures), cells, palette, smooth=True)
+    bounds, cells = upright(cells, pictures.origin, pictures.size_m)
+    return Raster("ground, hazards tinted", bounds, cells, palette, smooth=True)
 
 
 def _levels(pictures: TerrainPictures) -> IntArray:
@@ -93,47 +93,9 @@ def _colour(level: int, share: int) -> str:
     return f"#{red:02x}{green:02x}{blue:02x}"
 
 
-def _corners(pictures: TerrainPictures) -> FloatArray:
-    width, height = pictures.size_m
-    return _placed(np.array([(0.0, 0.0), (width, 0.0), (width, height), (0.0, height)]), pictures)
-
-
-def _placed(points: FloatArray, pictures: TerrainPictures) -> FloatArray:
-    x, y, turned = pictures.origin.tolist()
-    c, s = math.cos(turned), math.sin(turned)
-    return np.asarray(points @ np.array([(c, s), (-s, c)]) + (x, y))
-
-
-def _ground_bounds(pictures: TerrainPictures) -> tuple[float, float, float, float]:
-    corners = _corners(pictures)
-    (x0, y0), (x1, y1) = corners.min(axis=0).tolist(), corners.max(axis=0).tolist()
-    return x0, y0, x1, y1
-
-
-def _turned(cells: IntArray, pictures: TerrainPictures) -> IntArray:
-    """The cells nearest to the points of an upright grid around turned ground; 0 beyond it."""
-    x0, y0, x1, y1 = _ground_bounds(pictures)
-    rows, columns = cells.shape
-    side = max(pictures.size_m[0] / columns, pictures.size_m[1] / rows)
-    high, wide = max(1, round((y1 - y0) / side)), max(1, round((x1 - x0) / side))
-    y, x = np.meshgrid(
-        y0 + (np.arange(high) + 0.5) * (y1 - y0) / high,
-        x0 + (np.arange(wide) + 0.5) * (x1 - x0) / wide,
-        indexing="ij",
-    )
-    c, s = math.cos(pictures.origin[2]), math.sin(pictures.origin[2])
-    dx, dy = x - pictures.origin[0], y - pictures.origin[1]
-    column = np.floor((c * dx + s * dy) / pictures.size_m[0] * columns).astype(np.int64)
-    row = np.floor((c * dy - s * dx) / pictures.size_m[1] * rows).astype(np.int64)
-    inside = (row >= 0) & (row < rows) & (column >= 0) & (column < columns)
-    out = np.zeros((high, wide), dtype=np.int64)
-    out[inside] = cells[row[inside], column[inside]]
-    return out
-
-
 def _bounds(run: RunData, pictures: TerrainPictures | None) -> tuple[float, float, float, float]:
     if pictures is not None:
-        return _ground_bounds(pictures)
+        return box_around(pictures.origin, pictures.size_m)
     names = ("true", "path") if run.trace.has("true_x_m") else ("path",)
     x = np.concatenate([run.trace[f"{name}_x_m"] for name in names])
     y = np.concatenate([run.trace[f"{name}_y_m"] for name in names])

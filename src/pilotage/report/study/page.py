@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from pilotage import __version__
+from pilotage.core.version import __version__
 from pilotage.core.whole_file import write_whole
 from pilotage.evaluation.judge import Judgement
 from pilotage.experiments.studies.findings import Best, Finding

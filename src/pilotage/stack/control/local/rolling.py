@@ -53,7 +53,10 @@ class RollingConfig(Config):
     """Odometry's error after one metre, or one metre or radian, driven; it grows with their square root."""
     easy_m: Positive = 0.62
     """From this distance between base and obstacle on, full speed is reckoned with."""
-    slow_m_s: Positive = 0.35
+    slow_m_s: Positive = 0.5
+    """From where the footprint may turn on, less than a cell's doubt."""
+    crawl_m_s: Positive = 0.08
+    """Where it fits only straight: stopping, backing off and turning are part of the way through."""
     unseen_share: Positive = 0.7
     edge_m: float = Field(default=-0.01, ge=-0.1, le=1.0)
     """Kept beside the footprint's inner disc where the time to go looks for a way; below 0 for gaps whose
@@ -376,11 +379,14 @@ class RollingGround:
         if discs is not None and discs.shape[0]:
             clearance = _beside(clearance, discs, x0, y0, self._coarse_m)
         blocked_m = body.inner_m + config.edge_m
+        tight_m = max(blocked_m, body.outer_m - config.cell_m)
         speed = togo.travel_speed(
             clearance,
             self._seen,
             blocked_m,
-            max(config.easy_m, blocked_m + 0.05),
+            tight_m,
+            max(config.easy_m, tight_m + 0.05),
+            min(config.crawl_m_s, drive.speed),
             min(config.slow_m_s, drive.speed),
             drive.speed,
             config.unseen_share,

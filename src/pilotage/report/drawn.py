@@ -1,0 +1,90 @@
+"""Which figures and which replay a run gets: those that what it holds allows."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from pilotage.records.run_data import RunData
+from pilotage.report.figures.clearance import clearance_figure
+from pilotage.report.figures.close_ups import close_ups_figure
+from pilotage.report.figures.consistency import consistency_figure
+from pilotage.report.figures.control import control_figure
+from pilotage.report.figures.covariance import covariance_figure
+from pilotage.report.figures.map import map_figure
+from pilotage.report.figures.pose_error import pose_error_figure
+from pilotage.report.figures.slow_errors import slow_errors_figure
+from pilotage.report.figures.terrain_estimate import drive_figure, rover_error_figure, uncertainty_figure
+from pilotage.report.figures.terrain_map import (
+    close_up_figure,
+    hazard_map_figure,
+    looked_at_figure,
+    terrain_map_figure,
+)
+from pilotage.report.figures.terrain_profile import hazard_distance_figure, terrain_profile_figure
+from pilotage.report.figures.timeline import timeline_figure
+from pilotage.report.figures.ultrasonic import ultrasonic_figure
+from pilotage.report.figures.updates import updates_figure
+from pilotage.report.replay.floor import floor_scene
+from pilotage.report.replay.scene import ReplayScene
+from pilotage.report.replay.terrain import terrain_scene
+from pilotage.report.sheet.maps import accuracy_figure, printed_figure
+from pilotage.report.sheet.path import coverage_figure, path_figure
+from pilotage.report.sheet.replay import sheet_scene
+from pilotage.report.style import Illustration
+
+Draw = Callable[[RunData], Illustration]
+
+ON_TERRAIN: tuple[Draw, ...] = (
+    terrain_map_figure,
+    close_up_figure,
+    hazard_map_figure,
+    looked_at_figure,
+    drive_figure,
+    rover_error_figure,
+    uncertainty_figure,
+    terrain_profile_figure,
+    hazard_distance_figure,
+)
+ON_A_SHEET: tuple[Draw, ...] = (
+    path_figure,
+    coverage_figure,
+    accuracy_figure,
+    printed_figure,
+)
+ON_A_MAP: tuple[Draw, ...] = (map_figure, close_ups_figure)
+OF_THE_DRIVE: tuple[Draw, ...] = (
+    timeline_figure,
+    pose_error_figure,
+    covariance_figure,
+    consistency_figure,
+    slow_errors_figure,
+    control_figure,
+    ultrasonic_figure,
+    clearance_figure,
+)
+
+
+def figures_of(run: RunData) -> list[Illustration]:
+    """Draw what there is to draw; without anything the map alone is left, which says so."""
+    if run.terrain is not None:
+        draws = ON_TERRAIN
+    elif run.sheet is not None:
+        draws = ON_A_SHEET + OF_THE_DRIVE
+    else:
+        draws = ON_A_MAP + OF_THE_DRIVE
+    figures = [draw(run) for draw in (*draws, *((updates_figure,) if run.updates else ()))]
+    return [figure for figure in figures if figure.svg] or figures[:1]
+
+
+def map_of(run: RunData) -> Illustration:
+    """Draw the one figure that shows where the run went."""
+    if run.terrain is not None:
+        return terrain_map_figure(run) if run.terrain.ground is not None else hazard_map_figure(run)
+    return map_figure(run) if run.sheet is None else path_figure(run)
+
+
+def scene_of(run: RunData) -> ReplayScene | None:
+    """What there is to replay; None where nothing moved."""
+    if run.terrain is not None:
+        return terrain_scene(run)
+    return floor_scene(run) if run.sheet is None else sheet_scene(run)
