@@ -11,16 +11,12 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import chi2
 
-from pilotage.core.angles import wrap_array_to_pi
-from pilotage.core.chi_square import chi_square_quantile, gated_mean
 from pilotage.core.types import FloatArray
 from pilotage.evaluation.consistency import nees
+from pilotage.evaluation.driving import covariances, poses
 from pilotage.evaluation.rover_metrics import in_ellipse, stretches_without
+from pilotage.experiments.loop import simulate
 from pilotage.experiments.mission import load_mission
-from pilotage.experiments.terrain.estimation import estimate, seen_per_step
-from pilotage.experiments.terrain.ground import load_ground
-from pilotage.experiments.terrain.motion import drive_to_pose
-from pilotage.missions.terrain import TerrainMission
 
 EVERY = 50
 
@@ -37,26 +33,29 @@ class Sample:
 
 
 def sample(name: str, runs: int, *overrides: str) -> Sample:
-    """Estimate the same drive with many seeds."""
-    mission = load_mission(name, overrides)
-    assert isinstance(mission, TerrainMission)
-    ground = load_ground(mission.world.ground)
-    motion = drive_to_pose(mission, ground)
-    truth = np.column_stack([motion.poses[1:, :2], wrap_array_to_pi(motion.poses[1:, 2])])
-    step_m = np.concatenate([[0.0], np.hypot(*np.diff(truth[:, :2], axis=0).T)])
+    """The same drive, by the truth and watched, with many seeds."""
     covered, final, consistency, nis, stretches = [], [], [], [], 0
     for seed in range(runs):
-        run = mission.run.model_copy(update={"seed": seed})
-        made = estimate(mission.model_copy(update={"run": run}), ground, motion.poses)
-        found = made.estimate
-        covered.append(in_ellipse(truth, found.poses, found.covs, 0.95).mean())
-        final.append(np.hypot(*(found.poses[-1, :2] - truth[-1, :2])))
-        consistency.append(nees(truth.copy(), found.poses, found.covs)[::EVERY])
-        used = found.outcome == 1
-        if used.any():
-            nis.append(found.nis[used].mean() / gated_mean(chi_square_quantile(found.gate, 2), 2))
-        stretches = len(stretches_without(seen_per_step(made.log), step_m))
-    return Sample(np.array(covered), np.array(final), np.array(consistency), np.array(nis), stretches)
+        mission = load_mission(name, ["run.oracles=[driver]", *overrides], seed)
+        trace = simulate(mission).finished.robots[0].trace
+        truth, estimate, covs = poses(trace, "true"), poses(trace, "est"), covariances(trace)
+        covered.append(in_ellipse(truth, estimate, covs, 0.95).mean())
+        final.append(np.hypot(*(estimate[-1, :2] - truth[-1, :2])))
+        consistency.append(nees(truth, estimate, covs))
+        if "nis" in trace:
+            nis.append(np.nansum(trace["nis"]) / np.nansum(trace["nis_expected"]))
+        step_m = np.concatenate([[0.0], np.hypot(*np.diff(truth[:, :2], axis=0).T)])
+        seen = np.nan_to_num(trace.get("beacons_seen", np.zeros(len(truth)))).astype(np.int64)
+        stretches = len(stretches_without(seen, step_m))
+    # The drives differ by nothing, so their lengths may differ by a step at most.
+    steps = min(len(series) for series in consistency)
+    return Sample(
+        np.array(covered),
+        np.array(final),
+        np.array([series[:steps:EVERY] for series in consistency]),
+        np.array(nis),
+        stretches,
+    )
 
 
 def main() -> None:
@@ -64,7 +63,7 @@ def main() -> None:
     runs = int(sys.argv[1]) if len(sys.argv) > 1 else 300
     few = max(runs // 3, 10)
     reckoned = {
-        order: sample("gale-dead-reckoning", runs, f"stack.estimator.covariance={order}")
+        order: sample("gale-dead-reckoning", runs, f"stack.localizer.covariance={order}")
         for order in ("second-order", "first-order")
     }
     for order, found in reckoned.items():

@@ -9,21 +9,25 @@ from __future__ import annotations
 import time
 from dataclasses import dataclass
 from functools import cached_property
-from typing import cast
 
 import numpy as np
-from pilotage.missions.floor import FloorMission
 
-from pilotage.core.types import STOP, FloatArray, Goal, Pose2, Twist
+from pilotage.core.random import RandomStreams
+from pilotage.core.types import STOP, Command, FloatArray, Goal, Pose2
 from pilotage.experiments.build.build import build
 from pilotage.experiments.build.charts import load_chart
+from pilotage.experiments.build.robots import footprint_of
 from pilotage.experiments.mission import load_mission
 from pilotage.kernels.geometry import plane
 from pilotage.maps.distance_field import DistanceField
-from pilotage.maps.map_file import LandmarkMap
+from pilotage.maps.world_map import WorldMap
+from pilotage.missions.mission import Mission
+from pilotage.models.footprint import Footprint
+from pilotage.models.motion.differential_drive import DifferentialDriveConfig
 from pilotage.sensors.lidar import LidarConfig
 from pilotage.sensors.readings import LidarScan
-from pilotage.sim.sensing import Motion, SimulatedLidar
+from pilotage.sim.source import RobotSpec, Simulator
+from pilotage.sim.worlds.world import World
 from pilotage.stack.interface import StackStatus
 from pilotage.stack.planning.planner import PLANNERS, Planner, PlanRequest, PlanResult
 
@@ -95,7 +99,7 @@ class Museum:
     """The floor and pilotage's planner, scanner and closed loop on it."""
 
     @cached_property
-    def floor(self) -> LandmarkMap:
+    def floor(self) -> WorldMap:
         """Walls and landmarks."""
         return load_chart("museum")
 
@@ -105,9 +109,14 @@ class Museum:
         return DistanceField.from_map(self.floor.walls)
 
     @cached_property
-    def mission(self) -> FloorMission:
+    def mission(self) -> Mission:
         """The programmed route with all sensors on."""
         return load_mission(ROUTE)
+
+    @property
+    def radius_m(self) -> float:
+        """The robot's."""
+        return footprint_of(self.mission.robot, "robot").radius_m
 
     @property
     def route_xy_m(self) -> list[tuple[float, float]]:
@@ -124,7 +133,7 @@ class Museum:
     @cached_property
     def poses(self) -> list[Pose2]:
         """Poses about a metre apart along the route, for scans."""
-        states = build(self.mission).journal.plans[0].states
+        states = build(self.mission).team[0].journal.plans[0].states
         step = np.hypot(*np.diff(states[:, :2], axis=0).T)
         marks = np.searchsorted(np.cumsum(step), np.arange(0.0, step.sum(), POSE_SPACING_M))
         return [Pose2.from_array(state) for state in states[marks]]
@@ -186,26 +195,38 @@ class Museum:
 
     # Scans
 
-    def scanner(self, range_var_m2: float | None = None) -> SimulatedLidar:
-        """The simulated scanner of the missions, its noise changed where asked for."""
+    def scanner(self, range_var_m2: float | None = None) -> Simulator:
+        """A robot with the missions' scanner alone, its noise changed where asked for."""
         config = LidarConfig() if range_var_m2 is None else LidarConfig(range_var_m2=range_var_m2)
-        walls = self.floor.walls
-        return SimulatedLidar(config, World(walls, walls, self.floor.landmarks), np.random.default_rng(0))
+        robot = RobotSpec(
+            "robot",
+            Footprint.disc(self.radius_m),
+            DifferentialDriveConfig(),
+            {"lidar": config},
+            self.poses[0],
+            RandomStreams(0),
+        )
+        return Simulator(World.of(self.floor), [robot], self.mission.run.dt_s)
 
-    def scans_per_s(self, scanner: SimulatedLidar, rounds: int = 15) -> float:
-        """Scan at every pose, ``rounds`` times over."""
-        motions = [Motion(pose, 0.0, 0.0) for pose in self.poses]
+    def scans_per_s(self, scanner: Simulator, rounds: int = 15) -> float:
+        """Scan at every pose, ``rounds`` times over; the step that a scan belongs to counts, too."""
         begin = time.perf_counter()
         for _ in range(rounds):
-            for motion in motions:
-                scanner.read(motion)
-        return rounds * len(motions) / (time.perf_counter() - begin)
+            for pose in self.poses:
+                self._scan_at(scanner, pose)
+        return rounds * len(self.poses) / (time.perf_counter() - begin)
 
     def exact_ranges(self) -> FloatArray:
         """(poses, beams) ranges without noise, to be held against the peer's."""
         scanner = self.scanner(range_var_m2=0.0)
-        scans = [scanner.read(Motion(pose, 0.0, 0.0)) for pose in self.poses]
-        return np.array([scan.ranges_m for scan in scans if isinstance(scan, LidarScan)])
+        return np.array([self._scan_at(scanner, pose) for pose in self.poses])
+
+    @staticmethod
+    def _scan_at(scanner: Simulator, pose: Pose2) -> FloatArray:
+        scanner.bodies[0].carry_to(pose)
+        scan = scanner.step([STOP])[0].by_sensor["lidar"]
+        assert isinstance(scan, LidarScan)
+        return scan.ranges_m
 
     # Closed loop
 
@@ -216,13 +237,14 @@ class Museum:
         and runs the robot's stack: EKF, local planner, path follower, map of obstacles, guard.
         """
         experiment = build(load_mission(ROUTE, seed=seed))
-        simulator, stack = experiment.simulator, experiment.stack
-        command, steps = STOP, 0
+        simulator, stack = experiment.simulator, experiment.team[0].stack
+        command: Command = STOP
+        steps = 0
         begin = time.perf_counter()
         while stack.status[0] is StackStatus.RUNNING:
-            command = cast("Twist", stack.step(simulator.step(command)))
+            command = stack.step(simulator.step([command])[0])
             steps += 1
         took = time.perf_counter() - begin
-        if stack.status[0] is not StackStatus.ARRIVED or simulator.body.collisions:
+        if stack.status[0] is not StackStatus.ARRIVED or simulator.bodies[0].collisions:
             raise RuntimeError(f"{ROUTE}, seed {seed}: expected an arrival, found {stack.status}")
         return steps, took

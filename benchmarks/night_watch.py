@@ -13,14 +13,15 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from pilotage.evaluation.run_metrics import run_metrics
 from rich.console import Console
 from rich.table import Table
 
 from pilotage.core.types import FloatArray
 from pilotage.evaluation.consistency import fraction_in_band
-from pilotage.experiments.loop import simulate
+from pilotage.experiments.build.build import build
+from pilotage.experiments.loop import run_loop, simulate
 from pilotage.experiments.mission import load_mission
+from pilotage.experiments.run import judge
 
 MISSIONS = ("museum-1", "museum-2", "museum-route", "museum-concave", "museum-hall")
 SETTLE_STEPS = 10
@@ -54,11 +55,10 @@ def sample(mission: str, seeds: int) -> Sample:
     metrics, series = [], []
     simulate(load_mission(mission, seed=0))  # compiles
     for seed in range(seeds):
-        config = load_mission(mission, seed=seed)
-        record = simulate(config)
-        found, nees = run_metrics(config, record.trace, record.outcome, record.experiment.floor.walls)
-        metrics.append(found)
-        series.append(nees)
+        experiment = build(load_mission(mission, seed=seed))
+        verdict = judge(experiment, run_loop(experiment))
+        metrics.append(verdict.metrics)
+        series.append(verdict.columns[0]["nees"])
     return Sample(metrics, series)
 
 

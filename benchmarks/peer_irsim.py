@@ -27,6 +27,7 @@ import yaml
 from benchmarks.museum import GOAL_TOLERANCE_M, Museum
 
 from pilotage.core.types import FloatArray
+from pilotage.experiments.build.robots import motion_of
 from pilotage.sensors.lidar import LidarConfig
 
 MORE_STEPS = 1.5
@@ -100,7 +101,8 @@ class IrsimPeer:
     def _world(self, noisy: bool) -> dict[str, Any]:
         """IR-SIM's description of the museum, from pilotage's mission."""
         mission, scanner = self._museum.mission, LidarConfig()
-        start, motion = mission.world.start, mission.robot.motion
+        start, motion = mission.world.start, motion_of(mission.robot, "robot")
+        assert start is not None
         xmin, ymin, xmax, ymax = self._museum.floor.walls.bounds_m
         dt_s = mission.run.dt_s
         lidar = {
@@ -114,12 +116,12 @@ class IrsimPeer:
         }
         robot = {
             "kinematics": {"name": "diff"},
-            "shape": {"name": "circle", "radius": mission.robot.body.radius_m},
+            "shape": {"name": "circle", "radius": self._museum.radius_m},
             "state": [start.x_m, start.y_m, start.theta_rad],
             "goal": [*self._museum.route_xy_m[1], 0.0],
             "goal_threshold": GOAL_TOLERANCE_M,
-            "vel_min": [-motion.max_speed_m_s, -motion.max_turn_rate_rad_s],
-            "vel_max": [motion.max_speed_m_s, motion.max_turn_rate_rad_s],
+            "vel_min": [-motion.top_speed_m_s, -motion.top_turn_rate_rad_s],
+            "vel_max": [motion.top_speed_m_s, motion.top_turn_rate_rad_s],
             "behavior": {"name": "dash"},
             "sensors": [lidar],
         }

@@ -26,11 +26,11 @@ from pilotage.evaluation.paired import corrected, difference
 from pilotage.experiments.mission import load_mission
 from pilotage.experiments.run import run_mission
 
-EXPLORER = "stack.explorer.name=surround-check"
-ALWAYS = "stack.explorer.avoid=always"
-TRUNCATED = "stack.firmware.truncated_wheel_speed=true"
-CENTRE = "stack.firmware.lines_at_centre=true"
-LATE = "stack.firmware.pose_period_s=0.05"
+EXPLORER = "stack.navigator.name=surround-check"
+ALWAYS = "stack.navigator.avoid=always"
+TRUNCATED = "stack.navigator.firmware.truncated_wheel_speed=true"
+CENTRE = "stack.navigator.firmware.lines_at_centre=true"
+LATE = "stack.navigator.firmware.pose_period_s=0.05"
 
 
 @dataclass(frozen=True)
@@ -46,7 +46,8 @@ class Configuration:
 def _exploration(
     name: str, fusion: bool, avoidance: bool, reported: float = np.nan, *more: str
 ) -> Configuration:
-    switches = (f"stack.fusion={str(fusion).lower()}", f"stack.avoidance={str(avoidance).lower()}")
+    given = {"fusion": fusion, "avoidance": avoidance}
+    switches = tuple(f"stack.navigator.{key}={str(value).lower()}" for key, value in given.items())
     return Configuration(name, "romi-explore", (EXPLORER, *switches, *more), reported)
 
 

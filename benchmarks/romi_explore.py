@@ -14,7 +14,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from pilotage.experiments.mission import load_mission
-from pilotage.experiments.sheet.kind import SHEET
+from pilotage.experiments.run import run_mission
 
 BARS = {
     "coverage_reachable": (0.98, 0.95),
@@ -30,9 +30,8 @@ TOLD = ("duration_s", "path_length_m", "position_rmse_m", "position_max_m", "min
 
 def trial(seed: int, overrides: Sequence[str]) -> dict[str, object]:
     """The metrics of one run."""
-    mission = load_mission("romi-explore", ["stack.explorer.name=frontier", *overrides], seed)
-    SHEET.warm_up(mission)
-    return SHEET.metrics(SHEET.simulate(mission))
+    mission = load_mission("romi-explore", ["stack.navigator.name=frontier", *overrides], seed)
+    return run_mission(mission, save=False).metrics
 
 
 def main() -> None:

@@ -8,16 +8,15 @@ band, and the share of the lines that were taken. The first argument may give an
 
 import sys
 from dataclasses import dataclass, field
-from typing import cast
 
 import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
-from pilotage.experiments.floor.build import Experiment, build
 
 from pilotage.core.angles import wrap_array_to_pi
-from pilotage.core.types import STOP, FloatArray, Twist
+from pilotage.core.types import STOP, Command, FloatArray
+from pilotage.experiments.build.build import Experiment, build
 from pilotage.experiments.mission import load_mission
 
 SETTINGS = {15: (0.0039, 0.01), 16: (0.1, 0.5), 17: (1.0, 1.0), 18: (2.0, 5.0)}
@@ -38,8 +37,7 @@ class Listener:
 
     def note(self) -> None:
         """Keep what it believes now."""
-        stack = self.experiment.stack
-        journal = self.experiment.journal
+        stack, journal = self.experiment.team[0].stack, self.experiment.team[0].journal
         telemetry = dict(zip(journal.units, journal.row, strict=True))
         self.poses.append(stack.belief.pose.as_array())
         self.heading_vars.append(float(stack.belief.cov[2, 2]))
@@ -64,17 +62,18 @@ def listeners(seed: int) -> list[Listener]:
 
 def drive(filters: list[Listener]) -> tuple[FloatArray, FloatArray]:
     """Drive by the first filter, let all listen; returns times (N,) and true poses (N, 3)."""
-    simulator, driver = filters[0].experiment.simulator, filters[0].experiment.stack
-    times, truth, command = [], [], STOP
-    while driver.status[0] == "running" and not simulator.body.collisions:
-        readings = simulator.step(command)
-        command = cast("Twist", driver.step(readings))
+    simulator, driver = filters[0].experiment.simulator, filters[0].experiment.team[0].stack
+    times, truth = [], []
+    command: Command = STOP
+    while driver.status[0] == "running" and not simulator.bodies[0].collisions:
+        (readings,) = simulator.step([command])
+        command = driver.step(readings)
         for listener in filters[1:]:
-            listener.experiment.stack.step(readings)
+            listener.experiment.team[0].stack.step(readings)
         for listener in filters:
             listener.note()
         times.append(readings.t_s)
-        truth.append(simulator.truth.as_array())
+        truth.append(simulator.bodies[0].pose.as_array())
     return np.array(times), np.array(truth)
 
 
@@ -85,7 +84,7 @@ def draw(columns: list[Axes], listener: Listener, t_s: FloatArray, truth: FloatA
     distance = np.hypot(off[:, 0], off[:, 1])
     heading = wrap_array_to_pi(off[:, 2])
     way, position, turned, lines = columns
-    walls = listener.experiment.floor.walls.segments_m.reshape(-1, 2, 2)
+    walls = listener.experiment.chart.walls.segments_m.reshape(-1, 2, 2)
     way.add_collection(LineCollection(list(walls), colors="black", linewidths=0.8))
     way.plot(*truth[:, :2].T, color="#0072B2", linewidth=2.5, label="true")
     way.plot(*poses[:, :2].T, "--", color="#D55E00", linewidth=1.2, label="estimated")

@@ -22,7 +22,7 @@ from pilotage.stack.localization.heading_filter import HEADING_FILTERS
 from pilotage.stack.localization.localizer import LOCALIZERS
 
 RUNS, SETTLE = 24, 10
-ON_BEACONS = ("ukf-landmarks", "iekf-landmarks")
+ON_BEACONS = ("ukf-landmarks", "iekf-landmarks", "invariant-ekf-landmarks")
 SURE_START = ("x_var_m2=1e-8", "y_var_m2=1e-8", "theta_var_rad2=1e-8")
 """So that what odometry adds is what there is."""
 
@@ -37,6 +37,7 @@ ASKED_IN = {
     "encoder-magnetometer": "test_heading_filters.py",
     "gyro-bias": "test_heading_filters.py",
     "iekf-landmarks": "test_other_filters.py",
+    "invariant-ekf-landmarks": "test_other_filters.py",
     "mcl-likelihood-field": "test_particle_filter.py",
     "ukf-landmarks": "test_other_filters.py",
 }

@@ -17,6 +17,7 @@ from pilotage.maps.world_map import WorldMap
 from pilotage.models.odometry import OdometryModel, chord
 from pilotage.sensors.beacon import BeaconConfig
 from pilotage.sensors.readings import BeaconReadings, OdometryIncrement, Readings
+from pilotage.sensors.sensor import Positive
 from pilotage.sensors.wheel_odometry import WheelOdometryConfig
 from pilotage.stack.interface import Belief
 from pilotage.stack.journal import Journal
@@ -33,6 +34,9 @@ class InvariantEkfConfig(Config):
 
     gate: float = Field(default=0.9999, gt=0.0, lt=1.0)
     odometry: OdometryNoise = OdometryNoise()
+    measurement_var_scale: Positive = 1.0
+    odometry_var_scale: Positive = 1.0
+    """Factors on the variances, for experiments with a filter that is wrong about its noise."""
 
 
 @LOCALIZERS.add(NAME, InvariantEkfConfig)
@@ -62,11 +66,13 @@ class InvariantEkfLocalizer:
             raise InputError(f"{NAME}: expected the beacon sensor in the base's origin, found it elsewhere")
         if seer.range_var_m2 == 0.0 or seer.bearing_var_rad2 == 0.0:
             raise InputError(f"{NAME}: expected a beacon sensor with noise, found one without")
-        self._prediction = OdometryPrediction(odometry, config.odometry, 1.0, OdometryModel.EXACT_ARC)
+        self._prediction = OdometryPrediction(
+            odometry, config.odometry, config.odometry_var_scale, OdometryModel.EXACT_ARC
+        )
         order = np.argsort(chart.landmarks.ids)
         self._ids = np.ascontiguousarray(chart.landmarks.ids[order])
         self._points = np.ascontiguousarray(chart.landmarks.points_xy_m[order])
-        self._R = np.diag([seer.range_var_m2, seer.bearing_var_rad2])
+        self._R = config.measurement_var_scale * np.diag([seer.range_var_m2, seer.bearing_var_rad2])
         self._gate = chi_square_quantile(config.gate, 2)
         self._expected_nis = gated_mean(self._gate, 2)
         self._pose, self._cov = initial.pose.as_array(), initial.cov.copy()
