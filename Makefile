@@ -13,6 +13,7 @@ UV ?= uv
 JOBS ?= 2
 ARGS ?=
 MISSION ?= museum-1
+MINUTES ?= 10
 
 PIP := $(PY) -m pip --disable-pip-version-check --no-input
 # What the environment was made from: another lock, another pyproject or a moved folder renews it.
@@ -20,7 +21,7 @@ FINGERPRINT = { pwd; cat requirements.lock pyproject.toml | cksum; }
 STAMP := $(VENV)/.made-from
 BENCH_STAMP := $(VENV)/.bench-made-from
 
-.PHONY: help setup demo test check format format-check lint types contracts locks examples bench lock clean
+.PHONY: help setup demo test fuzz check format format-check lint types contracts locks examples bench lock clean
 
 help:  ## this list
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/  make \1|\2/p' Makefile | awk -F'|' '{ printf "%-20s %s\n", $$1, $$2 }'
@@ -57,6 +58,9 @@ demo: setup  ## run the night watch and name the report to open
 test: setup  ## run the tests (ARGS="-k name" picks some, JOBS=4 takes more processes)
 	@$(PY) -m pytest -n $(JOBS) --dist worksteal $(ARGS)
 
+fuzz: setup  ## damaged inputs over all commands for ten minutes (MINUTES=60; guided by coverage with atheris)
+	@PYTHONPATH=tests MPLBACKEND=Agg $(PY) -W error -m fuzz.long --minutes $(MINUTES) $(ARGS)
+
 check: format-check lint types contracts locks test  ## all that CI runs (the examples are among the tests)
 
 format: setup  ## format the code
@@ -92,15 +96,16 @@ bench: setup  ## compare with the peers: installs them, prints a table of ratios
 	@$(PY) -m benchmarks.peers $(ARGS)
 	@$(PY) -m benchmarks.ekf_peer
 	@$(PY) -m benchmarks.grid_peers
+	@$(PY) -m benchmarks.pose_graphs
 
 COMPILE = $(UV) pip compile --quiet --universal --python-version 3.11 --generate-hashes --no-header --no-annotate
 
 lock:  ## resolve both locks again (UPGRADE=--upgrade takes newer versions); needs uv
 	@command -v $(UV) >/dev/null || { echo "make lock: needs uv; name it by UV=..." >&2; exit 2; }
-	@$(COMPILE) $(UPGRADE) --extra dev --extra vision --extra cluster pyproject.toml -o requirements.lock
+	@$(COMPILE) $(UPGRADE) --extra dev --extra vision --extra cluster --extra ros pyproject.toml -o requirements.lock
 	@$(COMPILE) $(UPGRADE) --extra bench --constraint requirements.lock pyproject.toml -o requirements-bench.lock
 	@$(MAKE) locks
 
 clean:  ## remove .venv and the tools' caches; runs/ and studies/ stay
-	@rm -rf $(VENV) .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache build dist
+	@rm -rf $(VENV) .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache build dist fuzz-found
 	@find src tests examples benchmarks -name __pycache__ -type d -prune -exec rm -rf {} + 2>/dev/null || true

@@ -85,9 +85,11 @@ def drive_course(
     seed: int,
     trace: list[tuple[float, ...]] | None = None,
     bodies: Callable[[float], FloatArray] | None = None,
+    segments: FloatArray = NO_SEGMENTS,
 ) -> tuple[str, float, int]:
     """Drive one course; returns the outcome (success, collision, timeout), the time and the control steps.
 
+    ``segments`` (N, 4) are walls out of the robot's reach: seen, not touched.
     ``bodies`` gives moving discs (N, 3) at a time; touching one is a collision where the robot was moving,
     and the discs go through a robot that stands.
 
@@ -145,7 +147,7 @@ def drive_course(
             step_rad,
             setting.beams,
             setting.max_range_m,
-            NO_SEGMENTS,
+            segments,
             circles,
         )
         ranges = add_range_noise(

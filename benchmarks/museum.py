@@ -12,19 +12,18 @@ from functools import cached_property
 from typing import cast
 
 import numpy as np
+from pilotage.missions.floor import FloorMission
 
 from pilotage.core.types import STOP, FloatArray, Goal, Pose2, Twist
-from pilotage.experiments.floor.build import build
-from pilotage.experiments.floor.mission import load_floor_mission
-from pilotage.experiments.floor.world_map import load_map
+from pilotage.experiments.build.build import build
+from pilotage.experiments.build.charts import load_chart
+from pilotage.experiments.mission import load_mission
 from pilotage.kernels.geometry import plane
 from pilotage.maps.distance_field import DistanceField
 from pilotage.maps.map_file import LandmarkMap
-from pilotage.missions.floor import FloorMission
 from pilotage.sensors.lidar import LidarConfig
 from pilotage.sensors.readings import LidarScan
 from pilotage.sim.sensing import Motion, SimulatedLidar
-from pilotage.sim.world import World
 from pilotage.stack.interface import StackStatus
 from pilotage.stack.planning.planner import PLANNERS, Planner, PlanRequest, PlanResult
 
@@ -98,7 +97,7 @@ class Museum:
     @cached_property
     def floor(self) -> LandmarkMap:
         """Walls and landmarks."""
-        return load_map("museum")
+        return load_chart("museum")
 
     @cached_property
     def field(self) -> DistanceField:
@@ -108,7 +107,7 @@ class Museum:
     @cached_property
     def mission(self) -> FloorMission:
         """The programmed route with all sensors on."""
-        return load_floor_mission(ROUTE)
+        return load_mission(ROUTE)
 
     @property
     def route_xy_m(self) -> list[tuple[float, float]]:
@@ -216,7 +215,7 @@ class Museum:
         Every step simulates the body, collisions, odometry, scanner, beacons and three ultrasonic cones,
         and runs the robot's stack: EKF, local planner, path follower, map of obstacles, guard.
         """
-        experiment = build(load_floor_mission(ROUTE, seed=seed))
+        experiment = build(load_mission(ROUTE, seed=seed))
         simulator, stack = experiment.simulator, experiment.stack
         command, steps = STOP, 0
         begin = time.perf_counter()

@@ -13,14 +13,14 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from pilotage.evaluation.run_metrics import run_metrics
 from rich.console import Console
 from rich.table import Table
 
 from pilotage.core.types import FloatArray
 from pilotage.evaluation.consistency import fraction_in_band
-from pilotage.evaluation.run_metrics import run_metrics
-from pilotage.experiments.floor.mission import load_floor_mission
-from pilotage.experiments.floor.simulate import simulate
+from pilotage.experiments.loop import simulate
+from pilotage.experiments.mission import load_mission
 
 MISSIONS = ("museum-1", "museum-2", "museum-route", "museum-concave", "museum-hall")
 SETTLE_STEPS = 10
@@ -52,9 +52,9 @@ class Sample:
 def sample(mission: str, seeds: int) -> Sample:
     """Run a mission with seeds 0 .. seeds - 1."""
     metrics, series = [], []
-    simulate(load_floor_mission(mission, seed=0))  # compiles
+    simulate(load_mission(mission, seed=0))  # compiles
     for seed in range(seeds):
-        config = load_floor_mission(mission, seed=seed)
+        config = load_mission(mission, seed=seed)
         record = simulate(config)
         found, nees = run_metrics(config, record.trace, record.outcome, record.experiment.floor.walls)
         metrics.append(found)

@@ -14,7 +14,7 @@ import time
 import numpy as np
 
 from pilotage.core.types import FloatArray, Pose2
-from pilotage.experiments.floor.world_map import load_map
+from pilotage.experiments.build.charts import load_chart
 from pilotage.kernels.scans import rays
 from pilotage.sensors.lidar import LidarConfig
 from pilotage.stack.localization.wall_matching import WallMatcher, WallMatchingConfig
@@ -28,7 +28,7 @@ LIDAR = LidarConfig()
 
 def scans() -> list[tuple[Pose2, FloatArray]]:
     """Noisy scans from random places of the museum."""
-    world, rng = load_map("museum").walls, np.random.default_rng(0)
+    world, rng = load_chart("museum").walls, np.random.default_rng(0)
     first, std = float(LIDAR.beam_angles_rad()[0]), math.sqrt(LIDAR.range_var_m2)
     made: list[tuple[Pose2, FloatArray]] = []
     while len(made) < SCANS:
@@ -54,7 +54,7 @@ def main() -> int:
     """Measure and report."""
     config = LineExtractionConfig()
     extractor = LineExtractor(config, LIDAR, LIDAR.range_var_m2, np.random.default_rng(0))
-    matcher = WallMatcher(WallMatchingConfig(), 0.999, load_map("museum").walls, np.zeros(3))
+    matcher = WallMatcher(WallMatchingConfig(), 0.999, load_chart("museum").walls, np.zeros(3))
     cov = np.diag([1e-4, 1e-4, 1e-6])
     data = scans()
     matcher.match(data[0][0].as_array(), cov, extractor.extract(data[0][1]))  # compiles

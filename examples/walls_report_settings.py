@@ -14,11 +14,11 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
+from pilotage.experiments.floor.build import Experiment, build
 
 from pilotage.core.angles import wrap_array_to_pi
 from pilotage.core.types import STOP, FloatArray, Twist
-from pilotage.experiments.floor.build import Experiment, build
-from pilotage.experiments.floor.mission import load_floor_mission
+from pilotage.experiments.mission import load_mission
 
 SETTINGS = {15: (0.0039, 0.01), 16: (0.1, 0.5), 17: (1.0, 1.0), 18: (2.0, 5.0)}
 """Threshold of the Mahalanobis distance and variance of a wall's distance, by the report's figure."""
@@ -49,7 +49,7 @@ class Listener:
 
 def listeners(seed: int) -> list[Listener]:
     """Ours first, then the report's four."""
-    ours = Listener("ours: ekf-walls", build(load_floor_mission("museum-walls", [], seed)))
+    ours = Listener("ours: ekf-walls", build(load_mission("museum-walls", [], seed)))
     theirs = []
     for number, (threshold, variance) in SETTINGS.items():
         overrides = [
@@ -58,7 +58,7 @@ def listeners(seed: int) -> list[Listener]:
             f"stack.localizer.distance_var_m2={variance}",
         ]
         title = f"report fig. {number}: {threshold:g} and {variance:g} m²"
-        theirs.append(Listener(title, build(load_floor_mission("museum-walls", overrides, seed))))
+        theirs.append(Listener(title, build(load_mission("museum-walls", overrides, seed))))
     return [ours, *theirs]
 
 

@@ -14,9 +14,9 @@ import pytest
 from pilotage.core.chi_square import chi_square_quantile
 from pilotage.core.types import FloatArray
 from pilotage.evaluation.consistency import fraction_in_band, nees
-from pilotage.evaluation.run_metrics import covariances, poses
-from pilotage.experiments.floor.mission import load_floor_mission
-from pilotage.experiments.floor.simulate import simulate
+from pilotage.evaluation.driving import covariances, poses
+from pilotage.experiments.loop import simulate
+from pilotage.experiments.mission import load_mission
 from pilotage.stack.localization.ekf_augmented import SystematicErrors
 
 RUNS, STEPS, SETTLE = 30, 300, 10
@@ -37,12 +37,12 @@ def sample(name: str, *overrides: str) -> tuple[FloatArray, FloatArray]:
         rng = np.random.default_rng([seed, 7])
         given = {key: float(rng.normal()) * std for key, std in STD.items()}
         keys = [f"{key}={value + ('scale' in key)!r}" for key, value in given.items()]
-        mission = load_floor_mission(
+        mission = load_mission(
             "museum-route",
             [f"stack.localizer.name={name}", *keys, f"run.time_limit_s={STEPS / 10}", *overrides],
             seed,
         )
-        trace = simulate(mission).trace
+        trace = simulate(mission).finished.robots[0].trace
         rows.append(nees(poses(trace, "true"), poses(trace, "est"), covariances(trace))[SETTLE:])
         if name == "ekf-augmented":
             last = {key.rsplit(".", 1)[1]: value + ("scale" in key) for key, value in given.items()}

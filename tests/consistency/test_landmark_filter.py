@@ -14,9 +14,9 @@ import pytest
 
 from pilotage.core.types import FloatArray
 from pilotage.evaluation.consistency import correlated_mean, fraction_in_band, nees
-from pilotage.evaluation.run_metrics import covariances, poses
-from pilotage.experiments.floor.mission import load_floor_mission
-from pilotage.experiments.floor.simulate import simulate
+from pilotage.evaluation.driving import covariances, poses
+from pilotage.experiments.loop import simulate
+from pilotage.experiments.mission import load_mission
 
 RUNS = 40
 STEPS = 850
@@ -36,7 +36,7 @@ def sample(*overrides: str) -> Sample:
     """Drive the museum route with ``RUNS`` seeds."""
     rows, nis, expected = [], 0.0, 0.0
     for seed in range(RUNS):
-        trace = simulate(load_floor_mission("museum-route", overrides, seed)).trace
+        trace = simulate(load_mission("museum-route", overrides, seed)).finished.robots[0].trace
         values = nees(poses(trace, "true"), poses(trace, "est"), covariances(trace))
         rows.append(values[SETTLE:STEPS])
         nis += float(np.nansum(trace["nis"][SETTLE:]))

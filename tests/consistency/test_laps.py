@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from pilotage.core.types import FloatArray
-from pilotage.experiments.floor.mission import load_floor_mission
-from pilotage.experiments.floor.simulate import simulate
+from pilotage.experiments.loop import simulate
+from pilotage.experiments.mission import load_mission
 
 LAPS = 5
 SEEDS = 8
@@ -15,9 +15,9 @@ SETTLE = 10
 
 def lap_mean_squares(seed: int) -> FloatArray:
     """(LAPS,) mean squared position error of each lap."""
-    record = simulate(load_floor_mission("museum-laps", seed=seed))
-    assert record.outcome.arrived, record.outcome.reason
-    trace = record.trace
+    (run,) = simulate(load_mission("museum-laps", seed=seed)).finished.robots
+    assert run.arrived, run.reason
+    trace = run.trace
     squared = (trace["est_x_m"] - trace["true_x_m"]) ** 2 + (trace["est_y_m"] - trace["true_y_m"]) ** 2
     return np.array([lap.mean() for lap in np.array_split(squared[SETTLE:], LAPS)])
 

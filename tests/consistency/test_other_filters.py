@@ -15,9 +15,9 @@ import pytest
 
 from pilotage.core.types import FloatArray
 from pilotage.evaluation.consistency import fraction_in_band, nees
-from pilotage.evaluation.run_metrics import covariances, poses
-from pilotage.experiments.floor.mission import load_floor_mission
-from pilotage.experiments.floor.simulate import simulate
+from pilotage.evaluation.driving import covariances, poses
+from pilotage.experiments.loop import simulate
+from pilotage.experiments.mission import load_mission
 from pilotage.stack.localization.heading_filter import HEADING_FILTERS
 from pilotage.stack.localization.localizer import LOCALIZERS
 
@@ -64,7 +64,7 @@ def sample(name: str, *overrides: str) -> Sample:
         settings = [f"stack.localizer.name={name}", "run.time_limit_s=20", *overrides]
         if name == "dead-reckoning":
             settings += [f"stack.initial.{entry}" for entry in SURE_START]
-        trace = simulate(load_floor_mission("museum-route", settings, seed)).trace
+        trace = simulate(load_mission("museum-route", settings, seed)).finished.robots[0].trace
         rows.append(nees(poses(trace, "true"), poses(trace, "est"), covariances(trace))[SETTLE:])
         if "nis" in trace:
             nis += float(np.nansum(trace["nis"][SETTLE:]))

@@ -15,9 +15,9 @@ import numpy as np
 import pytest
 
 from pilotage.evaluation.consistency import nees
-from pilotage.evaluation.run_metrics import covariances, poses
-from pilotage.experiments.floor.mission import load_floor_mission
-from pilotage.experiments.floor.simulate import simulate
+from pilotage.evaluation.driving import covariances, poses
+from pilotage.experiments.loop import simulate
+from pilotage.experiments.mission import load_mission
 
 SEEDS, LIMIT_S, SETTLE = 6, 25, 10
 FILTERS = {"museum-route": "beacons", "museum-walls": "lines"}
@@ -40,7 +40,7 @@ def influence(mission: str, *overrides: str) -> Influence:
     normalized, squared, nis, expected, seen, accepted = [], [], 0.0, 0.0, 0.0, 0.0
     for seed in range(SEEDS):
         settings = [f"run.time_limit_s={LIMIT_S}", *(f"stack.localizer.{entry}" for entry in overrides)]
-        trace = simulate(load_floor_mission(mission, settings, seed)).trace
+        trace = simulate(load_mission(mission, settings, seed)).finished.robots[0].trace
         truth, estimate = poses(trace, "true"), poses(trace, "est")
         normalized.append(nees(truth, estimate, covariances(trace))[SETTLE:].mean())
         squared.append(np.mean(np.sum((estimate - truth)[SETTLE:, :2] ** 2, axis=1)))

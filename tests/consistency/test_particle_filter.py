@@ -15,9 +15,9 @@ import pytest
 
 from pilotage.core.types import FloatArray
 from pilotage.evaluation.consistency import nees
-from pilotage.evaluation.run_metrics import covariances, poses
-from pilotage.experiments.floor.mission import load_floor_mission
-from pilotage.experiments.floor.simulate import simulate
+from pilotage.evaluation.driving import covariances, poses
+from pilotage.experiments.loop import simulate
+from pilotage.experiments.mission import load_mission
 
 RUNS, SETTLE = 24, 20
 LOW, HIGH = 1.85, 3.2
@@ -34,7 +34,7 @@ def sample(*overrides: str) -> FloatArray:
     """NEES (R, N)."""
     rows = []
     for seed in range(RUNS):
-        trace = simulate(load_floor_mission("museum-walls", [*WORLD, *overrides], seed)).trace
+        trace = simulate(load_mission("museum-walls", [*WORLD, *overrides], seed)).finished.robots[0].trace
         rows.append(nees(poses(trace, "true"), poses(trace, "est"), covariances(trace))[SETTLE:])
     return np.array(rows)
 
@@ -56,8 +56,8 @@ def test_a_filter_that_is_wrong_about_its_scanner_by_a_factor_of_two_is_found_ou
 def test_with_room_for_an_imperfect_map_it_is_cautious_never_overconfident() -> None:
     values = []
     for seed in range(4):
-        mission = load_floor_mission("museum-walls", [WORLD[0], WORLD[-1]], seed)
-        trace = simulate(mission).trace
+        mission = load_mission("museum-walls", [WORLD[0], WORLD[-1]], seed)
+        trace = simulate(mission).finished.robots[0].trace
         values.append(nees(poses(trace, "true"), poses(trace, "est"), covariances(trace))[SETTLE:])
     upper = np.array(values).mean(axis=0) <= 3.0 * 3.0
     assert upper.mean() >= 0.99

@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-from pilotage.evaluation.run_metrics import run_metrics
-from pilotage.experiments.floor.mission import load_floor_mission
-from pilotage.experiments.floor.simulate import simulate
+from pilotage.experiments.mission import load_mission
+from pilotage.experiments.run import run_mission
 
 RUNS = 20
 
 
 def numbers(name: str, seed: int, limit_s: float) -> dict[str, object]:
     """Metrics of one run."""
-    record = simulate(load_floor_mission(name, [f"run.time_limit_s={limit_s}"], seed))
-    floor = record.experiment.floor.walls
-    return run_metrics(record.experiment.mission, record.trace, record.outcome, floor)[0]
+    return run_mission(load_mission(name, [f"run.time_limit_s={limit_s}"], seed), save=False).metrics
 
 
 def test_lost_robots_find_themselves_and_are_never_wrong() -> None:

@@ -8,37 +8,38 @@ dead reckoning hold the truth in 95 % +- 1.1 % at a step; bounds at 4 standard e
 from __future__ import annotations
 
 import math
-from typing import Any
+from collections.abc import Iterator
 
 import numpy as np
 import pytest
 from scipy.stats import chi2
 
 from pilotage.core.angles import wrap_array_to_pi
+from pilotage.core.chi_square import chi_square_quantile
 from pilotage.core.random import RandomStreams
-from pilotage.core.types import FloatArray, Pose2
+from pilotage.core.types import FloatArray, IntArray, Pose2
 from pilotage.evaluation.consistency import nees
 from pilotage.evaluation.rover_metrics import in_ellipse
+from pilotage.kernels.filters import rover_filter, rover_odometry
+from pilotage.kernels.filters.invariant import moments
 from pilotage.maps.landmarks import Landmarks
+from pilotage.maps.world_map import WorldMap
+from pilotage.models.footprint import Footprint
+from pilotage.models.motion.differential_drive import DifferentialDriveConfig
+from pilotage.models.odometry import chord
 from pilotage.sensors.beacon import BeaconConfig
+from pilotage.sensors.readings import BeaconReadings, OdometryIncrement, Readings
 from pilotage.sensors.wheel_odometry import WheelOdometryConfig
-from pilotage.sim.rover_sensing import landmark_log
 from pilotage.stack.interface import Belief
-from pilotage.stack.localization.rover_estimators import (
-    DeadReckoningLog,
-    DeadReckoningLogConfig,
-    LandmarkLogFilter,
-    LandmarkLogFilterConfig,
-    LogEstimate,
-)
+from pilotage.stack.journal import Journal
+from pilotage.stack.knowledge import RobotKnowledge
+from pilotage.stack.localization.dead_reckoning import DeadReckoningConfig, DeadReckoningLocalizer
+from pilotage.stack.localization.invariant_ekf import InvariantEkfConfig, InvariantEkfLocalizer
 
 # Steps of 4 m: the noise of ten of the report's steps in one, so that few steps make a long way.
-ODOMETER = WheelOdometryConfig(
-    distance_var_m2_per_m=4e-5, angle_var_rad2_per_rad=0.0, angle_var_rad2_per_m=1.9038589e-6
-)
-SEER = BeaconConfig(
-    field_of_view_rad=2.0 * math.pi, max_range_m=500.0, range_var_m2=0.01, bearing_var_rad2=1.9038589e-5
-)
+DISTANCE_VAR_M2_PER_M, TURN_VAR_RAD2_PER_M = 4e-5, 1.9038589e-6
+RANGE_VAR_M2, BEARING_VAR_RAD2, REACH_M = 0.01, 1.9038589e-5, 500.0
+STEP_M = 4.0
 INITIAL = np.array([36.0, 36.0, math.radians(1.0) ** 2])
 STEPS = 2000
 
@@ -46,32 +47,70 @@ STEPS = 2000
 def way() -> FloatArray:
     """(N, 3) 8 km in a wide bend."""
     theta = 0.9 * np.linspace(0.0, 1.0, STEPS + 1) ** 2
-    x = np.concatenate([[0.0], np.cumsum(4.0 * np.cos(theta[:-1]))])
-    y = np.concatenate([[0.0], np.cumsum(4.0 * np.sin(theta[:-1]))])
+    x = np.concatenate([[0.0], np.cumsum(STEP_M * np.cos(theta[:-1]))])
+    y = np.concatenate([[0.0], np.cumsum(STEP_M * np.sin(theta[:-1]))])
     return np.column_stack([x, y, theta])
 
 
 TRUTH = way()
 # One landmark at a time, and more than a kilometre without any: the hard case for a filter.
-LANDMARKS = Landmarks(np.arange(4), TRUTH[[250, 750, 1250, 1750], :2] + np.array([120.0, -210.0]))
+IDS: IntArray = np.arange(4)
+POINTS: FloatArray = TRUTH[[250, 750, 1250, 1750], :2] + np.array([120.0, -210.0])
+NOISE: FloatArray = np.diag([RANGE_VAR_M2, BEARING_VAR_RAD2])
+GATE = chi_square_quantile(0.9999, 2)
 
 
-def estimate(seed: int, estimator: Any, odometer: WheelOdometryConfig = ODOMETER) -> LogEstimate:
+def drawn(seed: int, turn_noisier: float = 1.0) -> tuple[FloatArray, FloatArray]:
+    """A believed start (3,), and what the odometer says of each step (N, 2): distance and turn."""
     streams = RandomStreams(seed)
-    log = landmark_log(TRUTH, ("odometer", ODOMETER), ("lidar", SEER), LANDMARKS, streams)
-    if odometer is not ODOMETER:
-        claimed = landmark_log(TRUTH, ("odometer", odometer), None, LANDMARKS, streams).variances
-        log = type(log)(log.steps, claimed, log.first, log.ids, log.ranges_m, log.bearings_rad)
-    x, y, theta = (TRUTH[0] + np.sqrt(INITIAL) * streams.stream("initial").standard_normal(3)).tolist()
-    found = estimator.estimate(Belief(Pose2(x, y, theta), np.diag(INITIAL)), log, LANDMARKS, SEER)
-    assert isinstance(found, LogEstimate)
-    return found
+    start = TRUTH[0] + np.sqrt(INITIAL) * streams.stream("initial").standard_normal(3)
+    noise = streams.stream("sensor/odometer").standard_normal((2, STEPS))
+    spread = np.sqrt(STEP_M * np.array([DISTANCE_VAR_M2_PER_M, turn_noisier * TURN_VAR_RAD2_PER_M]))
+    said = np.column_stack([np.full(STEPS, STEP_M), np.diff(TRUTH[:, 2])]) + noise.T * spread
+    return start, said
 
 
-def mean_nees(estimator: Any, odometer: WheelOdometryConfig = ODOMETER, runs: int = 60) -> FloatArray:
-    truth = np.column_stack([TRUTH[1:, :2], wrap_array_to_pi(TRUTH[1:, 2])])
-    found = [estimate(seed, estimator, odometer) for seed in range(runs)]
-    return np.asarray(np.mean([nees(truth.copy(), run.poses, run.covs) for run in found], axis=0))
+def sighted(seed: int) -> Iterator[tuple[IntArray, FloatArray, FloatArray]]:
+    """Ids, ranges and bearings of the landmarks within reach at the end of each step."""
+    rng = RandomStreams(seed).stream("sensor/lidar")
+    for x, y, theta in TRUTH[1:].tolist():
+        offsets = POINTS - (x, y)
+        away = np.hypot(offsets[:, 0], offsets[:, 1])
+        near = away <= REACH_M
+        count = int(near.sum())
+        ranges = away[near] + math.sqrt(RANGE_VAR_M2) * rng.standard_normal(count)
+        bearings = np.arctan2(offsets[near, 1], offsets[near, 0]) - theta
+        yield (
+            IDS[near],
+            ranges,
+            wrap_array_to_pi(bearings + math.sqrt(BEARING_VAR_RAD2) * rng.standard_normal(count)),
+        )
+
+
+def filtered(seed: int, second_order: bool, claimed: float) -> FloatArray:
+    """(4,) NEES of one run at the steps ``AT``; ``claimed`` scales the odometry variances it believes."""
+    pose, said = drawn(seed)
+    cov, refused = np.diag(INITIAL), np.zeros(1, dtype=np.int64)
+    q_distance, q_turn = claimed * STEP_M * DISTANCE_VAR_M2_PER_M, claimed * STEP_M * TURN_VAR_RAD2_PER_M
+    mean, spread = np.empty(3), np.empty((3, 3))
+    found = []
+    for k, ((distance, turn), seen) in enumerate(zip(said.tolist(), sighted(seed), strict=True)):
+        rover_filter.predict(pose, cov, distance, 0.0, turn, q_distance, q_turn, second_order)
+        if len(seen[0]):
+            rover_filter.update(pose, cov, *seen, IDS, POINTS, NOISE, GATE, second_order, refused)
+        if k in AT:
+            if second_order:
+                moments(pose, cov, mean, spread)
+            else:
+                mean, spread = pose.copy(), cov.copy()
+            truth = TRUTH[k + 1 : k + 2].copy()
+            truth[:, 2] = wrap_array_to_pi(truth[:, 2])
+            found.append(float(nees(truth, mean[None].copy(), spread[None].copy())[0]))
+    return np.array(found)
+
+
+def mean_nees(second_order: bool = True, claimed: float = 1.0, runs: int = 60) -> FloatArray:
+    return np.asarray(np.mean([filtered(seed, second_order, claimed) for seed in range(runs)], axis=0))
 
 
 AT = [300, 600, 800, 1980]
@@ -80,45 +119,88 @@ AT = [300, 600, 800, 1980]
 
 def inside(values: FloatArray, runs: int = 60) -> list[bool]:
     low, high = (float(chi2.ppf(share, 3 * runs)) / runs for share in (5e-5, 1.0 - 5e-5))
-    return [bool(low < float(values[k]) < high) for k in AT]
+    return [bool(low < value < high) for value in values.tolist()]
 
 
 def test_the_filter_on_landmarks_is_consistent() -> None:
-    values = mean_nees(LandmarkLogFilter(LandmarkLogFilterConfig()))
-    assert all(inside(values)), values[AT]
+    values = mean_nees()
+    assert all(inside(values)), values
 
 
 @pytest.mark.parametrize("factor", [0.25, 4.0])
 def test_a_filter_with_wrong_odometry_variances_is_found_out(factor: float) -> None:
-    off = ODOMETER.model_copy(
-        update={
-            name: factor * getattr(ODOMETER, name)
-            for name in ("distance_var_m2_per_m", "angle_var_rad2_per_m")
-        }
-    )
-    assert not all(inside(mean_nees(LandmarkLogFilter(LandmarkLogFilterConfig()), off)))
+    assert not all(inside(mean_nees(claimed=factor)))
 
 
 def test_the_first_order_filter_is_too_sure() -> None:
-    values = mean_nees(LandmarkLogFilter(LandmarkLogFilterConfig(covariance="first-order")))
-    assert not all(inside(values))
+    assert not all(inside(mean_nees(second_order=False)))
 
 
-@pytest.mark.parametrize(
-    ("order", "low", "high"), [("second-order", 0.93, 0.97), ("first-order", 0.80, 0.925)]
-)
+def reckoned(seed: int, second_order: bool) -> tuple[FloatArray, FloatArray]:
+    """(N, 3) poses and (N, 3, 3) covariances of one run by odometry alone, as the localizer tells them."""
+    # Twice the turn noise, for a heading as uncertain as at the end of the report's 13 km.
+    pose, said = drawn(seed, turn_noisier=2.0)
+    cov, behind = np.diag(INITIAL), 0j
+    q_distance, q_turn = STEP_M * DISTANCE_VAR_M2_PER_M, 2.0 * STEP_M * TURN_VAR_RAD2_PER_M
+    poses, covs = np.empty((STEPS, 3)), np.empty((STEPS, 3, 3))
+    for k, (distance, turn) in enumerate(said.tolist()):
+        if second_order:
+            behind += rover_odometry.predict_second_order(pose, cov, distance, 0.0, turn, q_distance, q_turn)
+        else:
+            rover_odometry.predict_first_order(pose, cov, distance, 0.0, turn, q_distance, q_turn)
+        poses[k], covs[k] = pose, cov
+        offset = np.array([behind.real, behind.imag])
+        covs[k, :2, :2] += np.outer(offset, offset)
+    return poses, covs
+
+
+@pytest.mark.parametrize(("second_order", "low", "high"), [(True, 0.93, 0.97), (False, 0.80, 0.925)])
 def test_the_ellipses_of_dead_reckoning_hold_the_truth_as_often_as_said(
-    order: Any, low: float, high: float
+    second_order: bool, low: float, high: float
 ) -> None:
     """Averaged over the second half of the way, where the heading is uncertain by some degrees."""
-    # Twice the turn noise, for a heading as uncertain as at the end of the report's 13 km.
-    noisy = ODOMETER.model_copy(update={"angle_var_rad2_per_m": 2.0 * ODOMETER.angle_var_rad2_per_m})
-    estimator = DeadReckoningLog(DeadReckoningLogConfig(covariance=order))
     held = []
     for seed in range(400):
-        streams = RandomStreams(seed)
-        log = landmark_log(TRUTH, ("odometer", noisy), None, LANDMARKS, streams)
-        x, y, theta = (TRUTH[0] + np.sqrt(INITIAL) * streams.stream("initial").standard_normal(3)).tolist()
-        run = estimator.estimate(Belief(Pose2(x, y, theta), np.diag(INITIAL)), log, LANDMARKS, None)
-        held.append(in_ellipse(TRUTH[1:], run.poses, run.covs, 0.95)[STEPS // 2 :].mean())
+        poses, covs = reckoned(seed, second_order)
+        held.append(in_ellipse(TRUTH[1:], poses, covs, 0.95)[STEPS // 2 :].mean())
     assert low < float(np.mean(held)) < high
+
+
+def test_the_localizers_are_these_kernels() -> None:
+    """A few steps of each localizer give what stepping the kernels by hand gives."""
+    odometer = WheelOdometryConfig(
+        rate_hz=1.0,
+        distance_var_m2_per_m=DISTANCE_VAR_M2_PER_M,
+        angle_var_rad2_per_rad=0.0,
+        angle_var_rad2_per_m=TURN_VAR_RAD2_PER_M,
+    )
+    seer = BeaconConfig(rate_hz=1.0, range_var_m2=RANGE_VAR_M2, bearing_var_rad2=BEARING_VAR_RAD2)
+    streams = RandomStreams(0)
+    sensors = {"odometer": odometer, "lidar": seer}
+    robot = RobotKnowledge(Footprint.disc(0.5), DifferentialDriveConfig(), sensors, 1.0, streams)
+    chart = WorldMap("open", (-1e4, -1e4, 1e4, 1e4), landmarks=Landmarks(IDS, POINTS))
+    initial = Belief(Pose2.from_array(TRUTH[0]), np.diag(INITIAL))
+    filter_ = InvariantEkfLocalizer(InvariantEkfConfig(), robot, chart, initial, Journal())
+    reckoning = DeadReckoningLocalizer(
+        DeadReckoningConfig(covariance="second-order"), robot, chart, initial, Journal()
+    )
+    pose, cov, alone, alone_cov = TRUTH[0].copy(), np.diag(INITIAL), TRUTH[0].copy(), np.diag(INITIAL)
+    mean, spread, behind = np.empty(3), np.empty((3, 3)), 0j
+    refused = np.zeros(1, dtype=np.int64)
+    ids, ranges, bearings = IDS[:1], np.array([260.0]), np.array([-0.9])
+    for turn in (0.02, -0.01, 0.0):
+        readings = Readings(
+            0.0,
+            {"odometer": OdometryIncrement(4.0, turn), "lidar": BeaconReadings(ids, ranges, bearings)},
+        )
+        distance, aside = chord(4.0, turn)
+        noise = STEP_M * DISTANCE_VAR_M2_PER_M, STEP_M * TURN_VAR_RAD2_PER_M
+        rover_filter.predict(pose, cov, distance, aside, turn, *noise, True)
+        rover_filter.update(pose, cov, ids, ranges, bearings, IDS, POINTS, NOISE, GATE, True, refused)
+        moments(pose, cov, mean, spread)
+        behind += rover_odometry.predict_second_order(alone, alone_cov, distance, aside, turn, *noise)
+        belief, reckoned_ = filter_.step(readings), reckoning.step(readings)
+        np.testing.assert_allclose(belief.pose.as_array(), mean, rtol=1e-12)
+        np.testing.assert_allclose(belief.cov, spread, rtol=1e-12)
+        np.testing.assert_allclose(reckoned_.pose.as_array(), alone, rtol=1e-12)
+        assert reckoned_.cov[0, 0] == pytest.approx(alone_cov[0, 0] + behind.real**2, rel=1e-12)

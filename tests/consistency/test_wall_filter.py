@@ -14,9 +14,9 @@ import pytest
 
 from pilotage.core.types import FloatArray
 from pilotage.evaluation.consistency import fraction_in_band, nees
-from pilotage.evaluation.run_metrics import covariances, poses
-from pilotage.experiments.floor.mission import load_floor_mission
-from pilotage.experiments.floor.simulate import simulate
+from pilotage.evaluation.driving import covariances, poses
+from pilotage.experiments.loop import simulate
+from pilotage.experiments.mission import load_mission
 
 RUNS = 24
 LIMIT_S = 30
@@ -37,8 +37,8 @@ def sample(*overrides: str) -> Sample:
     """Drive the first part of the route on walls alone with ``RUNS`` seeds."""
     rows, worst, nis, expected = [], [], 0.0, 0.0
     for seed in range(RUNS):
-        mission = load_floor_mission("museum-walls", [f"run.time_limit_s={LIMIT_S}", *overrides], seed)
-        trace = simulate(mission).trace
+        mission = load_mission("museum-walls", [f"run.time_limit_s={LIMIT_S}", *overrides], seed)
+        trace = simulate(mission).finished.robots[0].trace
         truth, estimate = poses(trace, "true"), poses(trace, "est")
         worst.append(float(np.hypot(*(estimate - truth)[20:, :2].T).max()))
         rows.append(nees(truth, estimate, covariances(trace))[SETTLE:])
@@ -94,7 +94,7 @@ def test_the_reports_filter_is_lost_where_ours_is_not() -> None:
     lost = 0
     for seed in range(4):
         overrides = ["stack.localizer.name=ekf-walls-report", "run.time_limit_s=60"]
-        trace = simulate(load_floor_mission("museum-walls", overrides, seed)).trace
+        trace = simulate(load_mission("museum-walls", overrides, seed)).finished.robots[0].trace
         error = np.hypot(*(poses(trace, "est") - poses(trace, "true"))[:, :2].T)
         lost += bool(error.max() > 0.5)
     assert lost >= 3

@@ -23,7 +23,7 @@ class Healthy:
         """A fresh copy; what was there before is gone."""
         if target.name not in self._made:
             made = self._folder / str(len(self._made))
-            made.mkdir()
+            made.mkdir(parents=True)
             target.write(made)
             self._made[target.name] = made
         shutil.rmtree(to, ignore_errors=True)

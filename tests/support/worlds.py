@@ -92,3 +92,8 @@ def sheet_map(sheet: SheetFile, tape_m: float, edge_is_dark: bool = True) -> Wor
     walls = SegmentMap(np.concatenate([*boxes, np.zeros((0, 4))]), np.zeros((0, 3)), bounds)
     markings = FloorMarkings(sheet.size_m, sheet.cells, pieces, tape_m, edge_is_dark)
     return WorldMap("sheet", bounds, geometry=walls, markings=markings)
+
+
+def walled(world: SegmentMap) -> WorldMap:
+    """Walls alone as a chart, with the room's beacons."""
+    return WorldMap("walls", world.bounds_m, geometry=world, landmarks=BEACONS)

@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 
 from pilotage.core.angles import wrap_to_pi
 from pilotage.core.types import FloatArray
-from pilotage.evaluation.run_metrics import poses
-from pilotage.experiments.floor.mission import load_floor_mission
-from pilotage.experiments.floor.simulate import simulate
+from pilotage.evaluation.driving import poses
+from pilotage.experiments.loop import simulate
+from pilotage.experiments.mission import load_mission
 from pilotage.kernels.filters import augmented, sighting
 
 NONE = np.zeros(4)
@@ -118,10 +118,12 @@ HELD = [
 
 def test_with_its_errors_held_it_is_the_plain_filter() -> None:
     limit = "run.time_limit_s=20"
-    plain = simulate(load_floor_mission("museum-route", [limit], 3)).trace
-    held = simulate(
-        load_floor_mission("museum-route", ["stack.localizer.name=ekf-augmented", *HELD, limit], 3)
-    ).trace
+    plain = simulate(load_mission("museum-route", [limit], 3)).finished.robots[0].trace
+    held = (
+        simulate(load_mission("museum-route", ["stack.localizer.name=ekf-augmented", *HELD, limit], 3))
+        .finished.robots[0]
+        .trace
+    )
     assert held["est_x_m"] == pytest.approx(plain["est_x_m"], abs=1e-9)
     assert held["cov_tt_rad2"] == pytest.approx(plain["cov_tt_rad2"], rel=1e-6)
 
@@ -139,9 +141,11 @@ FAULTY = [
 
 
 def test_it_recovers_the_errors_that_the_sensors_were_given() -> None:
-    trace = simulate(
-        load_floor_mission("museum-route", ["stack.localizer.name=ekf-augmented", *FAULTY], 1)
-    ).trace
+    trace = (
+        simulate(load_mission("museum-route", ["stack.localizer.name=ekf-augmented", *FAULTY], 1))
+        .finished.robots[0]
+        .trace
+    )
     for name, injected in INJECTED.items():
         found, std = float(trace[name][-1]), float(trace[f"{name}_std"][-1])
         assert abs(found - injected) < 3.5 * std, name  # four errors: false alarm 2e-3
@@ -155,7 +159,7 @@ def test_the_plain_filter_is_off_where_this_one_is_not() -> None:
         for seed in range(3):
             # Started where it is: a bearing offset of a few standard deviations must not end the plain one.
             overrides = [f"stack.localizer.name={name}", *FAULTY, "stack.localizer.gate=0.999999"]
-            trace = simulate(load_floor_mission("museum-route", overrides, seed)).trace
+            trace = simulate(load_mission("museum-route", overrides, seed)).finished.robots[0].trace
             error = (poses(trace, "est") - poses(trace, "true"))[50:, :2]
             squared.append(np.mean(np.sum(error**2, axis=1)))
         rmse[name] = float(np.sqrt(np.mean(squared)))

@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 
 from pilotage.core.angles import wrap_to_pi
 from pilotage.core.types import FloatArray, Pose2
-from pilotage.evaluation.run_metrics import poses
-from pilotage.experiments.floor.mission import load_floor_mission
-from pilotage.experiments.floor.simulate import simulate
+from pilotage.evaluation.driving import poses
+from pilotage.experiments.loop import simulate
+from pilotage.experiments.mission import load_mission
 from pilotage.models.range_bearing import range_bearing
 from pilotage.stack.localization.beacon_fix import fix_from_beacons
 
@@ -70,7 +70,7 @@ def test_a_false_sighting_shows() -> None:
 
 def last_error_m(mission: str, overrides: list[str], seed: int) -> float:
     """Position error at the end."""
-    trace = simulate(load_floor_mission(mission, overrides, seed)).trace
+    trace = simulate(load_mission(mission, overrides, seed)).finished.robots[0].trace
     return float(np.hypot(*(poses(trace, "est") - poses(trace, "true"))[-1, :2]))
 
 

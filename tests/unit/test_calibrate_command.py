@@ -14,7 +14,7 @@ import pytest
 import yaml
 
 from pilotage.cli.main import main
-from pilotage.experiments.floor.mission import load_floor_mission
+from pilotage.experiments.mission import load_mission
 from pilotage.logs.odometry_csv import COLUMNS
 from support.pages import check_self_contained
 
@@ -72,7 +72,7 @@ def test_simulated_drives_give_back_what_the_robot_was_given(tmp_path: Path, cap
     assert answer["offset"]["shape"] == "scale"
     assert all(log["form"] == "increments" for log in answer["logs"])
 
-    mission = load_floor_mission("museum-1", [f"@{answer['parameter_file']}"])
+    mission = load_mission("museum-1", [f"@{answer['parameter_file']}"])
     sensor = mission.robot.sensors["odometry"].parameters
     assert sensor["distance_scale"] == pytest.approx(answer["distance_scale"]["value"], rel=1e-6)
     assert sensor["rate_hz"] == 10

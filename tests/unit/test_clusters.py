@@ -9,13 +9,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from pilotage.core.types import Pose2
-from pilotage.experiments.floor.world_map import load_map
+from pilotage.experiments.build.charts import load_chart
 from pilotage.kernels.lines.clustering import beam_directions
 from pilotage.sensors.lidar import LidarConfig
 from pilotage.stack.perception.clusters import DROPPED, linkage_clusters, window_clusters
 from support.walls import scan_of
 
-MUSEUM = load_map("museum").walls
+MUSEUM = load_chart("museum").walls
 
 
 @settings(max_examples=200)

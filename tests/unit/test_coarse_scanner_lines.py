@@ -8,15 +8,15 @@ import numpy as np
 
 from pilotage.core.angles import wrap_to_pi
 from pilotage.core.types import Pose2
-from pilotage.experiments.floor.places import random_pose
-from pilotage.experiments.floor.world_map import load_map
+from pilotage.experiments.build.charts import load_chart
+from pilotage.experiments.build.places import random_pose
 from pilotage.maps.wall_lines import WallLines
-from pilotage.missions.mission import PoseConfig
+from pilotage.missions.places import PoseConfig
 from pilotage.sensors.lidar import LidarConfig
 from pilotage.stack.perception.lines import LineExtractionConfig, LineExtractor
 from support.walls import scan_of
 
-MUSEUM = load_map("museum").walls
+MUSEUM = load_chart("museum").walls
 COARSE = LidarConfig(range_var_m2=1e-3)
 
 
@@ -26,7 +26,7 @@ def test_corners_do_not_bend_the_lines_of_a_coarse_scanner() -> None:
     lines = LineExtractor(LineExtractionConfig(), COARSE, COARSE.range_var_m2, np.random.default_rng(7))
     distances = []
     for _ in range(300):
-        pose = random_pose(MUSEUM, PoseConfig(x_m=1.0, y_m=1.0), 0.6, rng)
+        pose = random_pose(load_chart("museum"), PoseConfig(x_m=1.0, y_m=1.0), 0.6, rng)
         truth = Pose2(pose.x_m, pose.y_m, pose.theta_rad)
         found = lines.extract(scan_of(MUSEUM, truth, rng, COARSE))
         for (rho, alpha), cov in zip(found.rho_alpha, found.covs, strict=True):

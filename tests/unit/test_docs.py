@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from pilotage.evaluation.metrics import METRICS
-from pilotage.experiments.roles import REGISTRIES
+from pilotage.experiments.roles import ROLES
 
 ROOT = Path(__file__).parents[2]
 PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", ROOT / "CHANGELOG.md", *(ROOT / "docs").rglob("*.md")]
@@ -51,7 +51,7 @@ def test_files_that_are_named_are_there() -> None:
 def test_every_component_and_every_metric_is_told_of() -> None:
     told = "".join(page.read_text() for page in (ROOT / "docs").glob("*.md"))
     changes = (ROOT / "CHANGELOG.md").read_text()
-    names = {entry.name for registry in REGISTRIES.values() for entry in registry}
+    names = {entry.name for registry in ROLES.values() for entry in registry}
     assert sorted(name for name in names if f"`{name}`" not in told) == []
     assert sorted(name for name in names if f"`{name}`" not in changes) == []
     keys = {metric.key for metric in METRICS if metric.group}

@@ -11,14 +11,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from pilotage.core.errors import InputError
-from pilotage.core.random import RandomStreams
 from pilotage.core.types import STOP, Goal, Pose2, Twist
 from pilotage.kernels.geometry import chain
 from pilotage.maps.segment_map import SegmentMap
-from pilotage.missions.floor import BodyConfig, MotionConfig
 from pilotage.sensors.readings import Readings
-from pilotage.sim.simulator import Simulator
-from pilotage.sim.world import World
 from pilotage.stack.control.pi_follower import PiFollower, PiFollowerConfig
 from pilotage.stack.interface import Belief, BeliefStatus, StackStatus
 from pilotage.stack.localization.ekf_landmarks import EkfLandmarkLocalizer
@@ -29,7 +25,8 @@ from pilotage.stack.navigator.navigator import Parts
 from pilotage.stack.planning.dubins_local import DubinsLocalConfig, DubinsLocalPlanner
 from pilotage.stack.planning.planner import PLANNERS
 from pilotage.stack.planning.rrt_star_dubins import RrtStarDubinsConfig, RrtStarDubinsPlanner
-from support.robots import BEACONS, ROOM, Told, sensors, told_of
+from support.robots import ROOM, Told, sensors, told_of
+from support.worlds import alone, robot, walled
 
 START = Pose2(2.0, 2.0, 0.0)
 
@@ -65,9 +62,7 @@ def test_several_goals_are_visited_in_order() -> None:
     told = replace(told, task=replace(told.task, goals=goals))
     stack = navigator(told, told.localizer(EkfLandmarkLocalizer, LandmarkFilterConfig()))
     assert told.journal.counts["goals"] == 0
-    sim = Simulator(
-        World(ROOM, ROOM, BEACONS), BodyConfig(), MotionConfig(), sensors(), START, 0.1, RandomStreams(0)
-    )
+    sim = alone(robot(sensors(), start=START, seed=0))
     command, nearest = STOP, [math.inf] * 3
     for _ in range(900):
         command = stack.step(sim.step(command))
@@ -130,15 +125,7 @@ def test_a_plan_that_turns_on_the_spot_is_taken_up_by_turning(heading: float) ->
     walls = np.array([[0, 0, 6, 0], [6, 0, 6, 1.1], [6, 1.1, 0, 1.1], [0, 1.1, 0, 0]], dtype=float)
     corridor, start = SegmentMap.of(walls), Pose2(0.8, 0.55, heading)
     told = told_of(world=corridor, start=start, goal=Goal(5.0, 0.55))
-    sim = Simulator(
-        World(corridor, corridor, BEACONS),
-        BodyConfig(),
-        MotionConfig(),
-        sensors(),
-        start,
-        0.1,
-        RandomStreams(0),
-    )
+    sim = alone(robot(sensors(), start=start, seed=0), walled(corridor))
     parts = Parts(
         localizer=Stub(told.initial),
         planner=PLANNERS.entry("astar").factory(PLANNERS.configure("astar", {"clearance_m": 0.4}, "planner")),
@@ -153,7 +140,7 @@ def test_a_plan_that_turns_on_the_spot_is_taken_up_by_turning(heading: float) ->
     command = STOP
     for _ in range(400):
         readings = sim.step(command)
-        parts.localizer.belief = Belief(sim.truth, 1e-6 * np.eye(3))  # type: ignore[misc]
+        parts.localizer.belief = Belief(sim.truth, 1e-6 * np.eye(3))  # type: ignore[misc, union-attr]
         command = stack.step(readings)
         assert sim.body.collisions == 0
         if stack.status[0] is not StackStatus.RUNNING:

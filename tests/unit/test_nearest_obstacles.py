@@ -11,10 +11,12 @@ from hypothesis import strategies as st
 
 from pilotage.core.errors import InputError
 from pilotage.core.types import Pose2
+from pilotage.experiments.build.charts import bounds_of
 from pilotage.maps.distance_field import DistanceField
 from pilotage.maps.nearest_obstacles import NearestObstacles
 from pilotage.maps.occupancy_grid import OccupancyGrid
 from pilotage.maps.segment_map import SegmentMap
+from pilotage.maps.world_map import WorldMap
 
 WORLD = SegmentMap.of(
     np.array(
@@ -72,21 +74,26 @@ def test_unknown_cells_block_unless_they_are_said_to_be_free() -> None:
 def test_an_empty_grid_is_as_far_from_obstacles_as_it_is_wide() -> None:
     empty = OccupancyGrid.of(np.zeros((3, 4), dtype=np.int8), 0.5)
     assert DistanceField.from_grid(empty).distance_m == pytest.approx(np.full((3, 4), 2.5))
-    with pytest.raises(InputError, match="occupied cells"):
-        NearestObstacles.from_grid(empty)
+    chart = WorldMap("empty", (0.0, 0.0, 2.0, 1.5), grid=empty)
+    with pytest.raises(InputError, match="walls or discs"):
+        NearestObstacles.from_map(chart.walls, 0.1)
 
 
 @pytest.mark.parametrize("theta", [0.0, 0.7, 3.0])
-def test_nearest_cells_are_discs_as_wide_as_the_cell(theta: float) -> None:
+def test_a_grids_nearest_obstacle_is_the_outline_of_its_cells(theta: float) -> None:
     some = grid(theta)
-    occupied = some.centres_m(np.argwhere(some.blocked(unknown_is_free=True)))
-    points = some.centres_m(np.random.default_rng(1).uniform([0, 0], [39, 59], size=(300, 2)))
-    brute = np.hypot(*(points[:, None] - occupied[None]).transpose(2, 0, 1)).min(axis=1) - 0.05
-    found = NearestObstacles.from_grid(some).at(points)
+    occupied = np.argwhere(some.blocked(unknown_is_free=True))
+    places = np.random.default_rng(1).uniform([0, 0], [39, 59], size=(300, 2))
+    # In cells: a cell is the unit square around its centre.
+    beside = np.maximum(np.abs(places[:, None] - occupied[None]) - 0.5, 0.0)
+    brute = 0.1 * np.hypot(beside[..., 0], beside[..., 1]).min(axis=1)
+    chart = WorldMap("grid", bounds_of(some), grid=some)
+    found = NearestObstacles.from_map(chart.walls, 0.1).at(some.centres_m(places))
     outside = brute > 0.0
     assert (found[outside] >= brute[outside] - 1e-9).all()
-    assert (found[outside] <= brute[outside] + 2.0 * math.sqrt(2.0) * 0.1).all()
+    assert (found[outside] <= brute[outside] + math.sqrt(2.0) * 0.1 + 1e-9).all()
     near = outside & (brute < 0.03)
+    assert near.any()
     assert np.median(found[near] - brute[near]) < 1e-9
 
 

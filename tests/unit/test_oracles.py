@@ -198,7 +198,9 @@ class TestSheets:
         run, knows = explored(sheet, "explorer")
         assert knows["success"]
         assert 0.3 < knows["coverage_reachable"] < 0.7
-        assert len(only(run).results["left"]) == knows["cells_left"] > 0
+        left = only(run).results["left"]
+        assert isinstance(left, tuple)
+        assert len(left) == knows["cells_left"] > 0
 
     def test_the_same_seed_has_the_same_robot(self, small: Path) -> None:
         """What an oracle replaces changes; the drive's errors and everybody's noise do not."""
@@ -229,7 +231,9 @@ def ground(tmp_path_factory: pytest.TempPathFactory) -> list[str]:
         "world.start.y_m=45",
         "world.goal.x_m=545",
         "world.goal.y_m=45",
-        "stack.navigator.cost_map.inflation_m=10",
+        # Two cells off the hazards, which stop it, and heading along the path.
+        "stack.navigator.cost_map.inflation_m=15",
+        "world.start.theta_rad=0.8",
         "world.landmarks=[{id: 7, x_m: 100, y_m: 200}, {id: 3, x_m: 400, y_m: 300}]",
     ]
 
@@ -258,7 +262,8 @@ class TestTerrain:
         wrong = "robot.sensors.odometer.angle_scale=1.05"
         plain = driven(CURVE, ground, "driver, initial", wrong)[1]["position_rmse_m"]
         run, silent = driven(CURVE, ground, "driver, initial, sensors", wrong)
-        assert silent["position_rmse_m"] < 1e-3 < plain
+        # The mean of a pose whose heading is uncertain lies a millimetre beside the likeliest one.
+        assert silent["position_rmse_m"] < 2e-3 < 0.1 * plain
         # The filter expects noise still: its covariance grows as it would.
         assert only(run).trace["cov_xx_m2"].max() > 1e-4
 
@@ -290,9 +295,12 @@ class TestTerrain:
         off = []
         for oracle in ("initial", "initial, controller"):
             trace = only(driven(CURVE, ground, oracle, *wrong)[0]).trace
-            away = np.hypot(trace["true_x_m"] - trace["ref_x_m"], trace["true_y_m"] - trace["ref_y_m"])
-            off.append(np.nanmax(away))
-        assert off[1] < 5.0 < off[0]
+            ahead = np.isfinite(trace["ref_x_m"])
+            dx = trace["true_x_m"][:, None] - trace["ref_x_m"][ahead]
+            dy = trace["true_y_m"][:, None] - trace["ref_y_m"][ahead]
+            off.append(np.hypot(dx, dy).min(axis=1).max())
+        # References are 3.2 m apart.
+        assert off[1] < 4.0 < 2.0 * off[1] < off[0]
 
     def test_any_angle_is_no_longer(self, ground: list[str]) -> None:
         own = driven("gale-astar", ground, "")[1]

@@ -12,21 +12,18 @@ from hypothesis import strategies as st
 from scipy.stats import chi2, norm
 
 from pilotage.core.errors import InputError
-from pilotage.core.random import RandomStreams
 from pilotage.core.types import FloatArray, Pose2, Twist
-from pilotage.evaluation.run_metrics import poses
-from pilotage.experiments.floor.mission import load_floor_mission
-from pilotage.experiments.floor.simulate import simulate
+from pilotage.evaluation.driving import poses
+from pilotage.experiments.loop import simulate
+from pilotage.experiments.mission import load_mission
 from pilotage.kernels.filters import particles
 from pilotage.maps.rasterize import rasterized
 from pilotage.maps.world_map import WorldMap
-from pilotage.missions.floor import BodyConfig, MotionConfig
 from pilotage.sensors.readings import LidarScan, Readings
-from pilotage.sim.simulator import Simulator
-from pilotage.sim.world import World
 from pilotage.stack.localization.localizer import LOCALIZERS
 from pilotage.stack.localization.mcl_likelihood_field import MclConfig, MclLikelihoodFieldLocalizer
-from support.robots import BEACONS, ROOM, sensors, told_of
+from support.robots import ROOM, sensors, told_of
+from support.worlds import alone, robot
 
 MCL = "stack.localizer.name=mcl-likelihood-field"
 
@@ -111,8 +108,8 @@ def test_motion_spreads_as_the_noise_says() -> None:
 
 
 def test_a_vague_start_takes_more_particles_and_parts_than_a_sure_belief() -> None:
-    mission = load_floor_mission("museum-walls", [MCL, "run.time_limit_s=5"], 0)
-    trace = simulate(mission).trace
+    mission = load_mission("museum-walls", [MCL, "run.time_limit_s=5"], 0)
+    trace = simulate(mission).finished.robots[0].trace
     assert trace["scan_parts"][0] > 3
     assert trace["particles"][-1] < 2000
     assert trace["scan_parts"][10:].max() <= 3
@@ -120,9 +117,9 @@ def test_a_vague_start_takes_more_particles_and_parts_than_a_sure_belief() -> No
 
 @pytest.mark.parametrize("seed", [0, 1])
 def test_it_tracks_the_route(seed: int) -> None:
-    record = simulate(load_floor_mission("museum-walls", [MCL], seed))
-    assert record.outcome.arrived, record.outcome.reason
-    error = np.hypot(*(poses(record.trace, "est") - poses(record.trace, "true"))[:, :2].T)
+    (run,) = simulate(load_mission("museum-walls", [MCL], seed)).finished.robots
+    assert run.arrived, run.reason
+    error = np.hypot(*(poses(run.trace, "est") - poses(run.trace, "true"))[:, :2].T)
     assert error[20:].max() < 0.05
     assert np.sqrt(np.mean(error[20:] ** 2)) < 0.005
 
@@ -134,9 +131,7 @@ def test_it_tracks_on_an_occupancy_grid() -> None:
     chart = WorldMap("room", ROOM.bounds_m, grid=rasterized(ROOM, 0.05))
     told = replace(told, chart=chart)
     localizer = told.localizer(MclLikelihoodFieldLocalizer, MclConfig(field_std_m=0.05))
-    sim = Simulator(
-        World(ROOM, ROOM, BEACONS), BodyConfig(), MotionConfig(), sensors(), start, 0.1, RandomStreams(0)
-    )
+    sim = alone(robot(sensors(), start=start, seed=0))
     for step in range(100):
         belief = localizer.step(sim.step(Twist(0.3, 0.4 if step % 60 < 30 else -0.4)))
         if step > 20:

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from scipy import ndimage
 
 from pilotage.core.errors import InputError
-from pilotage.experiments.floor.world_map import load_map
+from pilotage.experiments.build.charts import load_chart
 from pilotage.maps.rasterize import rasterized
 from pilotage.maps.segment_map import SegmentMap
 
@@ -55,7 +55,7 @@ def test_a_thin_wall_does_not_leak_in_any_direction(angle: float, resolution: fl
 
 def test_the_museum_as_the_report_planned_on_it() -> None:
     # Every wall thickened to about 0.93 m: 0.46 m on each side.
-    grid = rasterized(load_map("museum").walls, 0.05, 0.46)
+    grid = rasterized(load_chart("museum").walls, 0.05, 0.46)
     assert (grid.rows, grid.columns) == (800, 800)
     start, goal = grid.cell_at(1.0, 1.0), grid.cell_at(2.0, 27.0)
     labels, _ = ndimage.label(~grid.blocked())

@@ -9,24 +9,20 @@ import pytest
 
 from pilotage.core.angles import wrap_to_pi
 from pilotage.core.errors import InputError
-from pilotage.core.random import RandomStreams
 from pilotage.core.types import FloatArray, Pose2, Twist
-from pilotage.experiments.floor.build import build
-from pilotage.experiments.floor.mission import load_floor_mission
-from pilotage.experiments.floor.places import random_pose
-from pilotage.experiments.floor.world_map import load_map
+from pilotage.experiments.build.build import build
+from pilotage.experiments.build.charts import load_chart
+from pilotage.experiments.build.places import random_pose
+from pilotage.experiments.mission import load_mission
 from pilotage.experiments.resolve import resolved_yaml
 from pilotage.kernels.geometry import plane
 from pilotage.kernels.lines import viewpoints
 from pilotage.kernels.scans import wander
 from pilotage.maps.distance_field import DistanceField
 from pilotage.maps.segment_map import SegmentMap, box_segments
-from pilotage.missions.floor import BodyConfig, MotionConfig
-from pilotage.missions.mission import PoseConfig
+from pilotage.missions.places import PoseConfig
 from pilotage.models.odometry import OdometryModel
 from pilotage.sensors.wheel_odometry import WheelOdometryConfig
-from pilotage.sim.simulator import Simulator
-from pilotage.sim.world import World
 from pilotage.stack.control.wander import WanderConfig, Wanderer
 from pilotage.stack.interface import Belief, BeliefStatus
 from pilotage.stack.localization.ekf_walls import EkfWallsConfig, EkfWallsLocalizer
@@ -35,10 +31,11 @@ from pilotage.stack.localization.localizer import LOCALIZERS
 from pilotage.stack.localization.odometry_prediction import OdometryNoise, OdometryPrediction
 from pilotage.stack.localization.scan_fit import ScanFit
 from pilotage.stack.localization.wall_matching import WallMatcher, WallMatchingConfig
-from support.robots import BEACONS, ROOM, Told, sensors, told_of
+from support.robots import ROOM, Told, sensors, told_of
 from support.walls import LIDAR, extractor, scan_of
+from support.worlds import ROOM_MAP, Alone, alone, robot, walled
 
-MUSEUM = load_map("museum").walls
+MUSEUM = load_chart("museum").walls
 BOX = SegmentMap.of(box_segments(5.0, 4.0, 10.0, 8.0, 0.0))
 
 
@@ -63,12 +60,10 @@ def is_near(pose: FloatArray, truth: Pose2) -> bool:
     return away < 0.1 and abs(wrap_to_pi(float(pose[2]) - truth.theta_rad)) < 0.035
 
 
-def lost_in(world: SegmentMap, start: Pose2) -> tuple[Simulator, EkfWallsLocalizer, Told]:
+def lost_in(world: SegmentMap, start: Pose2) -> tuple[Alone, EkfWallsLocalizer, Told]:
     """A robot at ``start`` that is told nothing."""
     told = told_of(world=world, start=start, initial=Belief.anywhere(world.bounds_m))
-    sim = Simulator(
-        World(world, world, BEACONS), BodyConfig(), MotionConfig(), sensors(), start, 0.1, RandomStreams(1)
-    )
+    sim = alone(robot(sensors(), start=start, seed=1), walled(world))
     return sim, told.localizer(EkfWallsLocalizer, EkfWallsConfig()), told
 
 
@@ -78,9 +73,7 @@ def test_a_wrong_and_vague_start_is_noticed(off: tuple[float, float, float]) -> 
     truth = Pose2(3.5, 16.0, 0.4)
     believed = Pose2(truth.x_m + off[0], truth.y_m + off[1], truth.theta_rad + off[2])
     told = told_of(world=MUSEUM, start=believed, initial=Belief(believed, 0.01 * np.eye(3)))
-    sim = Simulator(
-        World(MUSEUM, MUSEUM, BEACONS), BodyConfig(), MotionConfig(), sensors(), truth, 0.1, RandomStreams(1)
-    )
+    sim = alone(robot(sensors(), start=truth, seed=1), walled(MUSEUM))
     localizer = told.localizer(EkfWallsLocalizer, EkfWallsConfig())
     lost_at = -1
     for step in range(80):
@@ -95,7 +88,7 @@ def test_a_wrong_and_vague_start_is_noticed(off: tuple[float, float, float]) -> 
 def test_the_true_pose_is_among_the_hypotheses_of_one_scan() -> None:
     rng = np.random.default_rng(1)
     for seed in range(40):
-        drawn = random_pose(MUSEUM, PoseConfig(x_m=1.0, y_m=1.0), 0.45, rng)
+        drawn = random_pose(load_chart("museum"), PoseConfig(x_m=1.0, y_m=1.0), 0.45, rng)
         truth = Pose2(drawn.x_m, drawn.y_m, drawn.theta_rad)
         ranges = scan_of(MUSEUM, truth, rng)
         search = search_in(MUSEUM)
@@ -130,15 +123,7 @@ def test_in_a_room_with_a_mark_it_finds_itself_and_says_so_only_then() -> None:
 
 def test_a_robot_carried_elsewhere_notices_at_once() -> None:
     told = told_of(start=Pose2(2.0, 2.0, 0.0), variances=(1e-4, 1e-4, 1e-4))
-    sim = Simulator(
-        World(ROOM, ROOM, BEACONS),
-        BodyConfig(),
-        MotionConfig(),
-        sensors(),
-        Pose2(2.0, 2.0, 0.0),
-        0.1,
-        RandomStreams(0),
-    )
+    sim = alone(robot(sensors(), start=Pose2(2.0, 2.0, 0.0), seed=0))
     localizer = told.localizer(EkfWallsLocalizer, EkfWallsConfig())
     for _ in range(10):
         assert localizer.step(sim.step(Twist(0.2, 0.3))).status is BeliefStatus.LOCALIZED
@@ -190,18 +175,10 @@ def test_wandering_touches_nothing(bearing: float | None) -> None:
     """Even where it is led into the walls all the time."""
     for seed in range(4):
         rng = np.random.default_rng(seed)
-        drawn = random_pose(ROOM, PoseConfig(x_m=2.0, y_m=2.0), 0.5, rng)
+        drawn = random_pose(ROOM_MAP, PoseConfig(x_m=2.0, y_m=2.0), 0.5, rng)
         start = Pose2(drawn.x_m, drawn.y_m, drawn.theta_rad)
         told = told_of(start=start)
-        sim = Simulator(
-            World(ROOM, ROOM, BEACONS),
-            BodyConfig(),
-            MotionConfig(),
-            sensors(),
-            start,
-            0.1,
-            RandomStreams(seed),
-        )
+        sim = alone(robot(sensors(), start=start, seed=seed))
         wanderer = Wanderer.of(WanderConfig(), told.robot)
         assert wanderer is not None
         command, way = Twist(0.0, 0.0), 0.0
@@ -216,13 +193,13 @@ def test_wandering_touches_nothing(bearing: float | None) -> None:
 
 
 def test_random_places_are_drawn_from_the_seed_and_recorded() -> None:
-    mission = load_floor_mission("museum-lost", seed=4)
+    mission = load_mission("museum-lost", seed=4)
     settled = build(mission).mission
     assert settled.world.random_start is None
     assert settled == build(mission).mission
-    assert build(load_floor_mission("museum-lost", seed=5)).mission.world.start != settled.world.start
+    assert build(load_mission("museum-lost", seed=5)).mission.world.start != settled.world.start
     assert "random_start: null" in resolved_yaml(settled)
-    carried = build(load_floor_mission("museum-kidnap", seed=4)).mission.world.kidnaps[0].to
+    carried = build(load_mission("museum-kidnap", seed=4)).mission.world.kidnaps[0].to
     assert carried is not None
     assert MUSEUM.distance_m(carried.x_m, carried.y_m) >= 0.6
 
@@ -231,8 +208,8 @@ def test_random_places_are_connected_to_the_start() -> None:
     walled_off = BOX.with_obstacles(np.array([[5.0, 0.0, 5.0, 8.0]]), np.zeros((0, 3)))
     rng = np.random.default_rng(0)
     for _ in range(50):
-        pose = random_pose(walled_off, PoseConfig(x_m=1.0, y_m=1.0), 0.5, rng)
+        pose = random_pose(walled(walled_off), PoseConfig(x_m=1.0, y_m=1.0), 0.5, rng)
         assert pose.x_m <= 4.5 + 1e-9
         assert plane.distance_to_nearest(pose.x_m, pose.y_m, walled_off.segments_m, np.zeros((0, 3))) >= 0.5
     with pytest.raises(InputError, match="nearest wall"):
-        random_pose(walled_off, PoseConfig(x_m=0.1, y_m=1.0), 0.5, rng)
+        random_pose(walled(walled_off), PoseConfig(x_m=0.1, y_m=1.0), 0.5, rng)

@@ -29,7 +29,7 @@ from support.fabricated_run import fabricate_run
 
 PLAYER = 'document.getElementById("replay-player").player'
 READY = 'document.getElementById("replay-player")?.player'
-LEAST_FRAMES_PER_S = 30.0
+LEAST_SHARE_OF_FRAMES = 0.8
 MOST_BYTES = 8_000_000
 
 
@@ -151,11 +151,12 @@ def test_plays_a_run_of_3000_steps_smoothly_without_asking_outside(browser: Brow
     centre(browser, "map")
     measure = (
         f"new Promise((done) => {{ const p = {PLAYER}; p.setSpeed(64); p.play(true); p.frames = 0;"
-        " const begin = performance.now(), rate = () => p.frames / (performance.now() - begin) * 1000;"
-        " setTimeout(() => done(rate()), 2500); })"
+        " let offered = 0; const count = () => { offered += 1; requestAnimationFrame(count); };"
+        " requestAnimationFrame(count);"
+        " setTimeout(() => done(p.frames / offered), 2500); })"
     )
-    # The machine may be busy with other things for a while; the best of three tells what the player can do.
-    assert max(browser.js(f"{PLAYER}.seek(0) || {measure}") for _ in range(3)) >= LEAST_FRAMES_PER_S
+    # Against the frames that the browser offered meanwhile: how many those are is the machine's affair.
+    assert max(browser.js(f"{PLAYER}.seek(0) || {measure}") for _ in range(3)) >= LEAST_SHARE_OF_FRAMES
     browser.js(f"{PLAYER}.play(false)")
     asked = [
         e["params"]["request"]["url"] for e in browser.events if e["method"] == "Network.requestWillBeSent"

@@ -129,3 +129,14 @@ def test_distance_is_one_lipschitz(scene: tuple[FloatArray, FloatArray], x: floa
     for angle in np.linspace(0.0, 2 * math.pi, 9):
         there = plane.distance_to_nearest(x + 0.1 * math.cos(angle), y + 0.1 * math.sin(angle), walls, discs)
         assert abs(there - here) <= 0.1 + 1e-12
+
+
+@pytest.mark.parametrize("far", [1e155, 1e308, math.inf, math.nan])
+@pytest.mark.parametrize("step", [0.01, 1e-320, 0.0])
+def test_what_is_no_number_or_infinitely_far_is_not_seen(far: float, step: float) -> None:
+    """Nothing is read beside the table of beams: a damaged map once took the process down here."""
+    segments = np.array([[far, 4.0, 2.0, 4.0], [far, far, -far, 1.0], [1.0, -1.0, 1.0, far]])
+    circles = np.array([[far, 1.0, 0.5], [3.0, 0.0, 0.5]])
+    found = rays.fan_ranges(0.0, 0.0, 0.0, step, 400, 20.0, segments, circles)
+    assert found.shape == (400,)
+    assert not (found > 20.0).any()

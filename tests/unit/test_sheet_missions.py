@@ -207,5 +207,5 @@ def test_fusion_needs_a_gyroscope() -> None:
 
 def test_exploring_needs_a_sheet() -> None:
     elsewhere = ("world.map=museum", "world.start={x_m: 1, y_m: 1}")
-    with pytest.raises(InputError, match="expected a sheet with cells as world.map, found 'museum'"):
+    with pytest.raises(InputError, match=r"expected a sheet with cells as world\.map, found 'museum'"):
         build(load_mission("romi-explore", elsewhere))

@@ -129,7 +129,7 @@ store.close()
         assert process.stdin is not None
         process.stdin.write("go\n")
         process.stdin.flush()
-    claimed = [int(line) for process in crew for line in process.communicate(timeout=60)[0].split()]
+    claimed = [int(line) for process in crew for line in process.communicate(timeout=600)[0].split()]
     assert [process.returncode for process in crew] == [0] * 3
     assert sorted(claimed) == list(range(18))
     assert [row["status"] for row in rows_of(tmp_path / "x")] == ["done"] * 18

@@ -232,9 +232,7 @@ def test_another_ground_is_set_with_its_own_keys(tmp_path: Path) -> None:
     )
     assert len(study.cells) == 1
     with pytest.raises(InputError, match="columns"):  # that was the crater's
-        make_study(
-            StudyDefinition(study="x", mission="gale-astar", set={**changes, "world.map.columns": 9})
-        )
+        make_study(StudyDefinition(study="x", mission="gale-astar", set={**changes, "world.map.columns": 9}))
 
 
 def made(folder: Path, study: Study) -> Path:

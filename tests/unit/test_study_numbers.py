@@ -10,7 +10,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pilotage.report.study.scales import Scale, key_and_unit, p_value, scale_of, told
+from pilotage.evaluation.metric import words_and_unit
+from pilotage.report.study.scales import Scale, p_value, scale_of, told
 
 
 @pytest.mark.parametrize(
@@ -65,9 +66,9 @@ def test_small_p_values_are_not_told_apart() -> None:
 
 
 def test_a_keys_unit_is_its_ending() -> None:
-    assert key_and_unit("stack.planner.turning_radius_m") == ("turning radius", "m")
-    assert key_and_unit("stack.local_planner.speed_m_s") == ("speed", "m/s")
-    assert key_and_unit("stack.localizer.gate") == ("gate", "")
+    assert words_and_unit("stack.planner.turning_radius_m") == ("turning radius", "m")
+    assert words_and_unit("stack.local_planner.speed_m_s") == ("speed", "m/s")
+    assert words_and_unit("stack.localizer.gate") == ("gate", "")
 
 
 def test_small_variances_are_short_and_rounding_is_none() -> None:

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import replace
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,20 +15,36 @@ import pytest
 from pilotage.evaluation.judge import judge, paired_columns
 from pilotage.evaluation.metrics import METRICS
 from pilotage.evaluation.paired import difference
+from pilotage.experiments.studies.cells import Cell
+from pilotage.experiments.studies.definition import (
+    CONFIGURATION,
+    Configuration,
+    Contrast,
+    Group,
+    StudyDefinition,
+)
+from pilotage.experiments.studies.factors import Factor
+from pilotage.experiments.studies.study import Study
+from pilotage.experiments.studies.table import Broken, StudyTable
 from pilotage.report.study.answer import answer, answers
 from pilotage.report.study.comparisons import verdict
 from pilotage.report.study.examples import Example, describe, rows_to_show
 from pilotage.report.study.factor_figures import lines_over
-from pilotage.report.study.page import judge_view, study_page
-from pilotage.report.study.view import Cell, Failure, Group, StudyView
+from pilotage.report.study.page import study_page
 
 TRIALS = 20
 
 
-def all_of(cells: Sequence[Cell], baseline: int | None, name: str = "") -> Group:
-    """A group of these cells, held against one of them."""
-    held = tuple(None if cell.index == baseline else baseline for cell in cells)
-    return Group(name, tuple(cell.index for cell in cells), held)
+def cell_of(
+    index: int, name: str, values: Mapping[str, Any], published: Mapping[str, float], label: str = ""
+) -> Cell:
+    return Cell(index, name, values, (), published, label)
+
+
+def changed(table: StudyTable, **definition: Any) -> StudyTable:
+    """The same trials of a study that is defined otherwise."""
+    study = replace(table.study, definition=table.study.definition.model_copy(update=definition))
+    return replace(table, study=study)
 
 
 def made_up(
@@ -34,50 +52,58 @@ def made_up(
     metrics: tuple[str, ...],
     value: Callable[[Cell, int, str], float],
     baseline: int | None,
-) -> StudyView:
-    """A study of these cells with these values."""
+) -> StudyTable:
+    """A study of these cells with these values; every factor's values are told with its name alone."""
     places = [(cell.index, trial) for cell in cells for trial in range(TRIALS)]
     values = {m: np.array([value(cells[c], t, m) for c, t in places]) for m in metrics}
     values["success"] = np.ones(len(places))
     trial = np.array([t for _, t in places])
-    return StudyView(
-        name="made-up",
+    names = dict.fromkeys(factor for cell in cells for factor in cell.values if factor != CONFIGURATION)
+    named = any(CONFIGURATION in cell.values for cell in cells)
+    base = None if baseline is None else cells[baseline].name
+    definition = StudyDefinition.model_construct(
+        study="made-up",
         question="Does it matter?",
         mission="museum-1",
-        cells=tuple(cells),
-        factors=tuple(dict.fromkeys(factor for cell in cells for factor in cell.values)),
+        configurations=(Configuration(name="one"),) if named else (),
+        factors=tuple(Factor(key=name, name=name, values=(0,)) for name in names),
+        trials=TRIALS,
         metrics=metrics,
         primary=metrics[0],
         lower_is_better=True,
-        groups=(all_of(cells, baseline),),
-        reference={},
-        trials_per_cell=TRIALS,
-        first_seed=0,
-        row=np.arange(len(places)),
-        cell=np.array([c for c, _ in places]),
-        trial=trial,
-        seed=trial,
-        values=values,
-        failures=(),
-        waiting=0,
-        definition="study: made-up\n",
+        groups=(Group(name="all", cells=("*",), baseline=base),),
+    )
+    study = Study(definition, {"mission": "museum-1"}, tuple(cells), {})
+    return StudyTable(
+        study,
+        Path("made-up"),
+        np.arange(len(places)),
+        np.array([c for c, _ in places]),
+        trial,
+        trial,
+        values,
+        (),
+        0,
     )
 
 
-def two_settings(shift_m: float) -> StudyView:
+def two_settings(shift_m: float) -> StudyTable:
     noise = np.random.default_rng(0).normal(0.0, 0.02, (2, TRIALS))
     seeds = np.random.default_rng(1).normal(10.0, 3.0, TRIALS)
 
     def value(cell: Cell, trial: int, _: str) -> float:
         return float(seeds[trial] + shift_m * cell.index + noise[cell.index, trial])
 
-    cells = [Cell(0, "plain", {"configuration": "plain"}, {}), Cell(1, "new", {"configuration": "new"}, {})]
+    cells = [
+        cell_of(0, "plain", {"configuration": "plain"}, {}),
+        cell_of(1, "new", {"configuration": "new"}, {}),
+    ]
     return made_up(cells, ("path_length_m",), value, baseline=0)
 
 
 def test_a_better_setting_is_named_with_its_gain() -> None:
     view = two_settings(-0.5)
-    text = answer(view, judge_view(view)).replace("\u00a0", " ")
+    text = answer(view, view.judged()).replace("\u00a0", " ")
     assert re.match(
         r"Path driven is 10\.\d+ m \([\d.]+ to [\d.]+\) with plain; lowest with new, 9\.\d+ m, ", text
     )
@@ -87,7 +113,7 @@ def test_a_better_setting_is_named_with_its_gain() -> None:
 
 def test_a_difference_that_is_none_is_called_chance() -> None:
     view = two_settings(-0.008)
-    assert "not told from chance" in answer(view, judge_view(view))
+    assert "not told from chance" in answer(view, view.judged())
 
 
 def test_pairs_are_matched_by_their_trial_not_by_their_place() -> None:
@@ -122,7 +148,7 @@ def test_a_cell_without_a_finished_trial_does_not_break_the_page() -> None:
         seed=view.seed[keep],
         values={name: column[keep] for name, column in view.values.items()},
         waiting=TRIALS,
-        failures=(Failure(3, 1, 3, "the worker <died> twice"),),
+        broken=(Broken(3, 1, 3, "the worker <died> twice"),),
     )
     page = study_page(half)
     assert "still to run" in page
@@ -133,7 +159,7 @@ def test_a_cell_without_a_finished_trial_does_not_break_the_page() -> None:
 def test_numbers_over_a_factor_are_drawn_and_the_best_is_bold(metric: str) -> None:
     key = "stack.planner.turning_radius_m"
     cells = [
-        Cell(i, f"turning radius {radius:g} m", {key: radius}, {metric: 30.0})
+        cell_of(i, f"turning radius {radius:g} m", {key: radius}, {metric: 30.0})
         for i, radius in enumerate([0.1, 0.2, 0.5, 1.0])
     ]
 
@@ -176,17 +202,21 @@ def test_examples_link_to_their_replay() -> None:
     assert "pilotage run --from x:5" in page
 
 
-def with_groups(view: StudyView, *groups: Group, contrasts: tuple[tuple[str, str], ...] = ()) -> StudyView:
-    return replace(view, groups=groups, contrasts=contrasts)
+def with_groups(view: StudyTable, *groups: Group) -> StudyTable:
+    return changed(view, groups=groups)
 
 
-def four_settings(metrics: tuple[str, ...] = ("position_rmse_m", "nees_mean")) -> StudyView:
+BEACONS = Group(name="on beacons", cells=("beacons, *",), baseline="beacons, plain")
+WALLS = Group(name="on walls", cells=("walls, *",), baseline="walls, plain")
+
+
+def four_settings(metrics: tuple[str, ...] = ("position_rmse_m", "nees_mean")) -> StudyTable:
     """Two filters, each plain and with a gate: 10 and 12 mm, 1 and 40 mm; NEES 3, 6, 3, 1."""
     rng = np.random.default_rng(4)
     centre = {"position_rmse_m": (0.010, 0.012, 0.001, 0.040), "nees_mean": (3.0, 6.0, 3.0, 1.0)}
     names = ("beacons, plain", "beacons, gate", "walls, plain", "walls, gate")
     cells = [
-        Cell(i, name, {"configuration": name}, {}, name.partition(", ")[2]) for i, name in enumerate(names)
+        cell_of(i, name, {"configuration": name}, {}, name.partition(", ")[2]) for i, name in enumerate(names)
     ]
 
     def value(cell: Cell, trial: int, metric: str) -> float:  # noqa: ARG001
@@ -194,13 +224,12 @@ def four_settings(metrics: tuple[str, ...] = ("position_rmse_m", "nees_mean")) -
         return float(middle * (1.0 + 0.01 * rng.normal()))
 
     view = made_up(cells, metrics, value, baseline=None)
-    beacons, walls = all_of(cells[:2], 0, "on beacons"), all_of(cells[2:], 2, "on walls")
-    return with_groups(view, beacons, walls)
+    return with_groups(view, BEACONS, WALLS)
 
 
 def test_every_group_answers_for_itself_against_its_own_baseline() -> None:
     view = four_settings()
-    judged = judge_view(view)
+    judged = view.judged()
     headline = answer(view, judged).replace("\u00a0", " ")
     assert re.search(
         r"On beacons: least 9\.\d+ mm \(.*\) with plain, most 1[12]\.\d+ mm \(.*\) with gate; on walls: ",
@@ -219,10 +248,9 @@ def test_every_group_answers_for_itself_against_its_own_baseline() -> None:
 
 def test_settings_of_another_group_are_called_by_their_own_name() -> None:
     view = four_settings()
-    held = Group("on walls", (2, 3), (0, 1))
-    text = answers(
-        with_groups(view, view.groups[0], held), judge_view(with_groups(view, view.groups[0], held))
-    )
+    pairs = {"walls, plain": "beacons, plain", "walls, gate": "beacons, gate"}
+    view = with_groups(view, BEACONS, WALLS.model_copy(update={"baseline": pairs}))
+    text = answers(view, view.judged())
     assert "against beacons, plain" in dict(text)["on walls"][0]
     assert "against beacons, gate" in dict(text)["on walls"][0]
 
@@ -230,10 +258,9 @@ def test_settings_of_another_group_are_called_by_their_own_name() -> None:
 def test_metrics_of_the_same_trials_are_held_against_each_other() -> None:
     view = four_settings(("position_rmse_m", "other_m"))
     other = view.values["position_rmse_m"] + 0.002
-    view = replace(
-        view, values={**view.values, "other_m": other}, contrasts=(("other_m", "position_rmse_m"),)
-    )
-    judged = judge_view(view)
+    contrast = Contrast(metric="other_m", against="position_rmse_m")
+    view = changed(replace(view, values={**view.values, "other_m": other}), contrasts=(contrast,))
+    judged = view.judged()
     found = judged.contrasts["other_m", "position_rmse_m"]
     assert [round(entry.mean, 9) for entry in found] == [0.002] * 4
     assert "within each trial" in study_page(view)
@@ -252,9 +279,9 @@ def test_a_test_that_is_sure_of_ranks_alone_says_so() -> None:
 
 
 def test_what_ended_early_is_not_called_quick() -> None:
-    cells = [Cell(i, name, {"configuration": name}, {}) for i, name in enumerate(("falls", "arrives"))]
+    cells = [cell_of(i, name, {"configuration": name}, {}) for i, name in enumerate(("falls", "arrives"))]
     view = made_up(cells, ("coverage_visited", "duration_s"), lambda c, t, _: 10.0 + 5 * c.index + 0.1 * t, 0)
-    view = replace(view, lower_is_better=False)
+    view = changed(view, lower_is_better=False)
     assert "<b>10.95" in study_page(view)  # all succeed: the shorter duration is the better one
     failing = replace(view, values={**view.values, "success": np.where(view.cell == 0, 0.0, 1.0)})
     page = study_page(failing)
@@ -281,16 +308,16 @@ def test_which_way_a_metric_is_better_is_declared_with_it(metric: str, lower: bo
 def test_consistency_is_judged_only_where_it_is_reported() -> None:
     view = four_settings()
     assert 'id="consistency"' in study_page(view)
-    assert 'id="consistency"' not in study_page(replace(view, metrics=("position_rmse_m",)))
+    assert 'id="consistency"' not in study_page(changed(view, metrics=("position_rmse_m",)))
 
 
 def test_metrics_that_never_vary_are_left_out_unless_asked_for() -> None:
     view = four_settings()
     calm = {**view.values, "collisions": np.zeros(view.row.size)}
-    with_it = replace(view, metrics=(*view.metrics, "collisions"), values=calm)
+    with_it = changed(replace(view, values=calm), metrics=(*view.metrics, "collisions"))
     assert view.worth_showing("nees_mean", view.cells)
     assert with_it.worth_showing("collisions", view.cells)
-    assert not replace(with_it, asked=False).worth_showing("collisions", view.cells)
+    assert not changed(with_it, metrics=()).worth_showing("collisions", view.cells)
 
 
 def test_one_setting_that_gave_something_is_not_the_lowest_and_the_highest() -> None:
@@ -305,20 +332,22 @@ def test_one_setting_that_gave_something_is_not_the_lowest_and_the_highest() -> 
         seed=view.seed[keep],
         values=values,
     )
-    alone = with_groups(alone, Group("", (0, 1), (None, None)))
+    alone = changed(alone, groups=(Group(name="all", cells=("*",)),))
     assert "the only setting that gave it" in answer_over_a_factor(alone)
 
 
-def answer_over_a_factor(view: StudyView) -> str:
+def answer_over_a_factor(view: StudyTable) -> str:
     cells = tuple(replace(cell, values={"gate": 0.5 + cell.index}) for cell in view.cells)
-    view = replace(view, cells=cells, factors=("gate",))
-    return answer(view, judge_view(view))
+    gate = Factor(key="gate", name="gate", values=(0,))
+    view = replace(view, study=replace(view.study, cells=cells))
+    view = changed(view, factors=(gate,), configurations=())
+    return answer(view, view.judged())
 
 
 def test_configurations_are_drawn_over_what_their_settings_amount_to() -> None:
     pairs = [(m, o) for m in (1.0, 0.1, 10.0) for o in (1.0, 10.0, 0.1)]
     cells = [
-        Cell(i, f"m {m}, o {o}", {"configuration": f"m {m}, o {o}", "measurement": m, "odometry": o}, {})
+        cell_of(i, f"m {m}, o {o}", {"configuration": f"m {m}, o {o}", "measurement": m, "odometry": o}, {})
         for i, (m, o) in enumerate(pairs)
     ]
     view = made_up(cells, ("position_rmse_m",), lambda c, t, _: 1.0 + c.index + 0.1 * t, 4)
@@ -342,4 +371,4 @@ def test_nothing_finished_yet_is_said() -> None:
         waiting=2 * TRIALS,
     )
     assert "No trial gave path driven" in study_page(empty)
-    assert math.isnan(judge_view(empty).rates[0].low)
+    assert math.isnan(empty.judged().rates[0].low)

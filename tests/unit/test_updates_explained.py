@@ -10,10 +10,10 @@ import pytest
 
 from pilotage.core.errors import InputError
 from pilotage.core.types import Event, Pose2
-from pilotage.experiments.floor.mission import load_floor_mission
-from pilotage.experiments.floor.simulate import simulate
-from pilotage.experiments.floor.update_album import UpdateAlbum
+from pilotage.experiments.loop import simulate
+from pilotage.experiments.mission import load_mission
 from pilotage.experiments.run import run_mission
+from pilotage.experiments.update_album import UpdateAlbum
 from pilotage.report import write_report
 from pilotage.report.figures.layers import _cut_where_carried, true_path
 from pilotage.report.run_folder import read_run
@@ -103,7 +103,7 @@ def test_the_album_keeps_the_telling_ones_and_stays_small() -> None:
 
 
 def test_a_run_keeps_them_and_its_report_shows_them(tmp_path: Path) -> None:
-    result = run_mission(load_floor_mission("museum-walls", ["run.time_limit_s=15"], 1), out=tmp_path)
+    result = run_mission(load_mission("museum-walls", ["run.time_limit_s=15"], 1), out=tmp_path)
     assert result.run_dir is not None
     run = read_run(result.run_dir)
     assert 3 <= len(run.updates) <= 6
@@ -121,14 +121,14 @@ def test_a_run_keeps_them_and_its_report_shows_them(tmp_path: Path) -> None:
 
 
 def test_a_run_on_beacons_has_none(tmp_path: Path) -> None:
-    result = run_mission(load_floor_mission("museum-route", ["run.time_limit_s=3"], 1), out=tmp_path)
+    result = run_mission(load_mission("museum-route", ["run.time_limit_s=3"], 1), out=tmp_path)
     assert result.run_dir is not None
     assert not (result.run_dir / "updates.npz").exists()
     assert 'id="updates"' not in write_report(result.run_dir).read_text()
 
 
 def test_the_path_is_cut_where_the_robot_was_carried(tmp_path: Path) -> None:
-    result = run_mission(load_floor_mission("museum-kidnap", ["run.time_limit_s=62"], 1), out=tmp_path)
+    result = run_mission(load_mission("museum-kidnap", ["run.time_limit_s=62"], 1), out=tmp_path)
     assert result.run_dir is not None
     run = read_run(result.run_dir)
     path = _cut_where_carried(run, true_path(run))
@@ -141,12 +141,15 @@ def test_the_path_is_cut_where_the_robot_was_carried(tmp_path: Path) -> None:
 
 
 def test_the_record_costs_the_run_nothing_it_would_draw_differently() -> None:
-    traces = [simulate(load_floor_mission("museum-walls", ["run.time_limit_s=5"], 2)).trace for _ in range(2)]
+    traces = [
+        simulate(load_mission("museum-walls", ["run.time_limit_s=5"], 2)).finished.robots[0].trace
+        for _ in range(2)
+    ]
     assert (traces[0]["est_x_m"] == traces[1]["est_x_m"]).all()
 
 
 def test_the_consistency_figure_counts_lines_where_there_are_no_beacons(tmp_path: Path) -> None:
-    result = run_mission(load_floor_mission("museum-walls", ["run.time_limit_s=5"], 1), out=tmp_path)
+    result = run_mission(load_mission("museum-walls", ["run.time_limit_s=5"], 1), out=tmp_path)
     assert result.run_dir is not None
     page = write_report(result.run_dir).read_text()
     assert "Lines seen and accepted" in page

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from pilotage.core.angles import wrap_to_pi
 from pilotage.core.types import FloatArray, Pose2
-from pilotage.experiments.floor.world_map import load_map
+from pilotage.experiments.build.charts import load_chart
 from pilotage.kernels.filters.wall_line import innovation_distance
 from pilotage.kernels.lines import joint_association
 from pilotage.maps.segment_map import SegmentMap, box_segments
@@ -21,7 +21,7 @@ from pilotage.stack.localization.wall_matching import AMBIGUOUS, UNMATCHED, Wall
 from support.walls import extractor, scan_of
 
 MOUNT = np.zeros(3)
-MUSEUM = load_map("museum").walls
+MUSEUM = load_chart("museum").walls
 TIGHT = np.diag([1e-4, 1e-4, 1e-5])
 
 

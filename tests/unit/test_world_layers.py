@@ -212,7 +212,14 @@ def test_open_ground_has_heights_and_hazards_that_stop_nobody() -> None:
     x = np.arange(20.0) * 2.0
     heights = np.tile(np.where(x > 20.0, x - 20.0, 0.0), (10, 1)).astype(np.float32)
     model = ElevationModel(heights, 2.0)
-    chart = WorldMap("hill", (0, 0, 40, 20), grid=model.hazards(30.0), elevation=model, slope_limit_deg=30.0)
+    chart = WorldMap(
+        "hill",
+        (0, 0, 40, 20),
+        grid=model.hazards(30.0),
+        elevation=model,
+        slope_limit_deg=30.0,
+        open_ground=True,
+    )
     world = World.of(chart)
     points = np.array([[5.0, 10.0], [31.0, 10.0], [-5.0, 3.0]])
     assert world.on_hazard(points).tolist() == [False, True, True]

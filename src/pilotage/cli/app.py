@@ -6,7 +6,6 @@ from typing import Annotated
 
 import typer
 
-from pilotage import __version__
 from pilotage.cli.attribute import attribute
 from pilotage.cli.bench_scen import bench_scen
 from pilotage.cli.calibrate import calibrate
@@ -19,9 +18,11 @@ from pilotage.cli.plan import plan
 from pilotage.cli.report import report
 from pilotage.cli.run import run
 from pilotage.cli.schema import schema
+from pilotage.cli.slam import slam
 from pilotage.cli.study import study, sweep
 from pilotage.cli.track import track
 from pilotage.core.errors import InputError
+from pilotage.core.version import __version__
 
 app = typer.Typer(
     name="pilotage",
@@ -39,6 +40,7 @@ COMMANDS = (
     evaluate,
     calibrate,
     localize,
+    slam,
     study,
     sweep,
     attribute,

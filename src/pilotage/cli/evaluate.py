@@ -74,6 +74,7 @@ def evaluate(
 
 def _relations(estimate: Path, reference: Path, tolerance: float | None) -> dict[str, float | int | str]:
     from pilotage.evaluation.relations import MAX_TIME_DIFFERENCE_S, relation_errors
+    from pilotage.evaluation.slam_consistency import nees_summary
     from pilotage.logs.relations import read_relations
     from pilotage.logs.trajectories import read_tum
 
@@ -81,7 +82,7 @@ def _relations(estimate: Path, reference: Path, tolerance: float | None) -> dict
     if not 0.0 <= within_s < float("inf"):
         raise InputError(f"--tolerance: expected seconds of at least 0, found {within_s}")
     errors = relation_errors(read_tum(estimate), read_relations(reference), within_s)
-    return {**errors.summary(), "tolerance_s": within_s}
+    return {**errors.summary(), **nees_summary(errors, estimate), "tolerance_s": within_s}
 
 
 def _print(answer: Mapping[str, float | int | str | bool], json: bool) -> int:

@@ -143,7 +143,8 @@ def run_and_tell(loaded: Study, folder: Path, options: StudyOptions, show: Show)
     ran = run_study_quietly(loaded, folder, options, show)
     if not ran.whole:
         return ran.code
-    from pilotage.experiments.studies.table import read_study, study_object
+    from pilotage.experiments.studies.findings import study_object
+    from pilotage.experiments.studies.table import read_study
 
     answer = study_object(read_study(folder))
     if show.json:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
-from typing import Any, TypeVar
+from typing import Any, Self, TypeVar
 
 from pydantic import BaseModel, ConfigDict, ValidationError, model_validator
 
@@ -14,7 +15,13 @@ class Config(BaseModel):
     """A frozen pydantic model that refuses unknown keys, NaN and infinities."""
 
     model_config = ConfigDict(
-        extra="forbid", frozen=True, allow_inf_nan=False, validate_default=True, strict=False
+        extra="forbid",
+        frozen=True,
+        allow_inf_nan=False,
+        validate_default=True,
+        strict=False,
+        # A component's parameters are written out before they are validated: not a number stays what it is.
+        ser_json_inf_nan="constants",
     )
 
     @model_validator(mode="before")
@@ -34,11 +41,23 @@ class Config(BaseModel):
                 words[name] = str(value).lower()
         return {**values, **words} if words else values
 
+    @model_validator(mode="after")
+    def _numbers_are_quantities(self) -> Self:
+        """Refuse what is finite and yet no length, time or variance, in text and lists too."""
+        for name in type(self).model_fields:
+            wrong = _out_of_range(getattr(self, name), name)
+            if wrong is not None:
+                raise ValueError(wrong)
+        return self
+
 
 def _takes(annotation: Any, *kinds: type) -> bool:
     """Whether an annotation such as ``float | None`` names one of the types itself."""
     return annotation in kinds or any(_takes(part, *kinds) for part in getattr(annotation, "__args__", ()))
 
+
+SMALLEST, LARGEST, LARGEST_WHOLE = 1e-100, 1e15, 2**64
+"""Sizes of the numbers in files: metres, radians, seconds, their variances and counts are far within."""
 
 ConfigT = TypeVar("ConfigT", bound=BaseModel)
 
@@ -63,6 +82,22 @@ def validate(model: type[ConfigT], values: Any, where: str) -> ConfigT:
         return model.model_validate(values)
     except ValidationError as error:
         raise InputError(describe(error, model, where)) from None
+
+
+def _out_of_range(value: Any, place: str) -> str | None:
+    """What is wrong with a number that no quantity has: products of such are infinite or no numbers."""
+    if isinstance(value, float):
+        if math.isfinite(value) and value != 0.0 and not SMALLEST <= abs(value) <= LARGEST:
+            return (
+                f"{place}: expected 0 or a number from {SMALLEST:g} to {LARGEST:g} in size, found {value:g}"
+            )
+    elif isinstance(value, int):
+        if abs(value) > LARGEST_WHOLE:
+            return f"{place}: expected a whole number within 2^64, found {str(value)[:30]}"
+    elif isinstance(value, list | tuple):
+        wrong = (_out_of_range(item, f"{place}.{i}") for i, item in enumerate(value))
+        return next((text for text in wrong if text), None)
+    return None
 
 
 def describe(error: ValidationError, model: type[BaseModel], where: str) -> str:

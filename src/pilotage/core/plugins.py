@@ -85,10 +85,11 @@ def load_file(path: str) -> None:
     sys.modules[name] = module
     try:
         spec.loader.exec_module(module)
-    except InputError as error:
-        raise InputError(f"plugin '{path}': {error}") from None
     except (Exception, SystemExit) as error:
-        raise InputError(f"plugin '{path}': {_where(error, path)}") from None
+        # Asked for once more it is refused once more.
+        del _loaded[path], sys.modules[name]
+        told = str(error) if isinstance(error, InputError) else _where(error, path)
+        raise InputError(f"plugin '{path}': {told}") from None
 
 
 def _where(error: BaseException, path: str = "") -> str:

@@ -50,6 +50,8 @@ class Registry(Generic[T]):
         """Register the decorated class under ``name`` with its config model."""
 
         def register(cls: C) -> C:
+            if not cls.__module__.startswith("pilotage."):
+                self._load()  # so that who comes from outside and takes a name of ours is the one refused
             if name in self._entries:
                 raise InputError(f"{self.role} '{name}': expected a new name, found it registered already")
             self._entries[name] = Entry(name, cls, config)

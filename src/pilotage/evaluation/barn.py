@@ -9,11 +9,17 @@ from dataclasses import dataclass
 import numpy as np
 
 from pilotage.core.errors import InputError
+from pilotage.core.types import FloatArray
 from pilotage.evaluation.intervals import bootstrap_mean
+from pilotage.evaluation.shortest_path import shortest_path
+from pilotage.maps.segment_map import SegmentMap
 
 BEST = 2.0
 WORST = 8.0
 """The time counts between these multiples of the optimal one, so a run has at most 0.5 and at least 0.125."""
+
+SIDE_M = 0.35
+"""Posts so near to the lane's sides leave no room for a robot beside them."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,6 +71,40 @@ def barn_metric(success: bool, time_s: float, optimal_time_s: float) -> float:
     if not success:
         return 0.0
     return optimal_time_s / min(max(time_s, BEST * optimal_time_s), WORST * optimal_time_s)
+
+
+def time_bound_s(
+    circles_m: FloatArray,
+    start_xy: tuple[float, float],
+    goal_xy: tuple[float, float],
+    tolerance_m: float,
+    inner_radius_m: float,
+    speed_m_s: float,
+    acceleration_m_s2: float,
+) -> float | None:
+    """Time that no robot of these limits undercuts on a lane along y, though it knew the course.
+
+    The exact shortest path of the footprint's inner disc, less the tolerance about the goal, from rest with
+    full acceleration to full speed. Turning takes no time and corners pass through posts there, and the posts
+    within ``SIDE_M`` of the lane's sides are left out: all of that only lowers the bound.
+
+    Returns
+    -------
+    Seconds; None where the disc has no way.
+    """
+    left, right = float(circles_m[:, 0].min()), float(circles_m[:, 0].max())
+    low, high = min(start_xy[1], goal_xy[1]) - 1.0, max(start_xy[1], goal_xy[1]) + 1.0
+    x, y = circles_m[:, 0], circles_m[:, 1]
+    inside = (x > left + SIDE_M) & (x < right - SIDE_M) & (y > low) & (y < high)
+    world = SegmentMap(np.zeros((0, 4)), circles_m[inside], (left, low, right, high))
+    path = shortest_path(world, start_xy, goal_xy, inner_radius_m)
+    if path is None:
+        return None
+    length = max(path.length_m - tolerance_m, 0.0)
+    speeding_m = 0.5 * speed_m_s**2 / acceleration_m_s2
+    if length <= speeding_m:
+        return math.sqrt(2.0 * length / acceleration_m_s2)
+    return length / speed_m_s + 0.5 * speed_m_s / acceleration_m_s2
 
 
 def summarize(runs: Sequence[BarnRun]) -> BarnSummary:

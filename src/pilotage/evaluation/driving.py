@@ -66,7 +66,8 @@ def driving_metrics(run: FinishedRun, robot: RobotRun) -> tuple[dict[str, object
         "path_length_m": robot.driven_m,
     }
     metrics |= pose_errors(truth, estimate, counted).metrics()
-    if counted.any():
+    # Where nothing is solid, everywhere is open and no place narrow.
+    if counted.any() and np.isfinite(trace["clearance_m"]).any():
         metrics |= split_errors(trace, pose_errors(truth, estimate).distance_m, counted)
     metrics |= _consistency(trace, values, counted)
     return metrics | _recovery(run, robot, truth, estimate), values

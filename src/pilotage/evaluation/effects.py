@@ -125,13 +125,16 @@ def effects(values: FloatArray, *, ordered: Sequence[bool], paired: bool, tests:
     return [_scaled(effect, scale) for effect in found]
 
 
-def holm(p_values: Sequence[float]) -> list[float]:
-    """P-values that hold the chance of any false finding among them (Holm 1979); nan does not count."""
+def holm(p_values: Sequence[float], parts: int = 1) -> list[float]:
+    """P-values that hold the chance of any false finding among them (Holm 1979); nan does not count.
+
+    ``parts``: how many families share that chance evenly.
+    """
     values = np.asarray(p_values, dtype=np.float64)
     tested = np.flatnonzero(np.isfinite(values))
     order = tested[np.argsort(values[tested], kind="stable")]
     out = np.full(values.shape, math.nan)
-    steps = values[order] * np.arange(order.size, 0, -1)
+    steps = parts * values[order] * np.arange(order.size, 0, -1)
     out[order] = np.minimum(np.maximum.accumulate(steps), 1.0) if order.size else 0.0
     return [float(value) for value in out]
 

@@ -43,7 +43,7 @@ Compute = Callable[[Mapping[str, FloatArray], Mapping[str, object]], float | Non
 UNITS = frozenset(
     {
         *("", "share", "count", "ratio", "×", "1/s"),
-        *("m", "m²", "m/s", "m/s²", "s", "rad", "rad²", "rad/s", "rad/s²", "deg", "Hz"),
+        *("m", "m²", "m/s", "m/s²", "s", "rad", "rad²", "rad/s", "rad/s²", "°", "Hz"),
     }
 )
 _ENDINGS = {
@@ -54,7 +54,7 @@ _ENDINGS = {
     "m2": "m²",
     "rad2": "rad²",
     "hz": "Hz",
-    "deg": "deg",
+    "deg": "°",
     "rad": "rad",
     "m": "m",
     "s": "s",

@@ -83,9 +83,10 @@ def terrain_metrics(
     metrics["final_position_error_m"] = float(math.hypot(error[0], error[1]))
     inside = in_ellipse(truth, estimate, covs, run.mission.run.ellipse_probability)
     metrics["ellipse_coverage"] = float(inside.mean())
+    # Not a number where nobody listened: before the first reading, and where the truth stood in.
+    seen = np.nan_to_num(trace.get("beacons_seen", np.zeros(len(truth)))).astype(np.int64)
     step_m = np.diff(np.concatenate([[0.0], columns["distance_m"]]))
-    seen = trace.get("beacons_seen", np.zeros(len(truth)))
-    metrics["blind_stretches"] = len(stretches_without(seen.astype(np.int64), step_m))
+    metrics["blind_stretches"] = len(stretches_without(seen, step_m))
     if "beacons_seen" in trace:
         metrics["sightings"] = int(seen.sum())
     return metrics

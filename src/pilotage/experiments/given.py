@@ -5,22 +5,31 @@ from __future__ import annotations
 from pilotage.experiments.build.charts import shipped_maps
 from pilotage.maps.map_file import MapFile
 from pilotage.maps.true_cells import SheetFile
+from pilotage.missions.map_choice import CraterMap, ElevationMap, GridMap, ImagesMap
 from pilotage.missions.mission import Mission
 
 
 def has(mission: Mission) -> frozenset[str]:
-    """A goal, a planner, an estimate, walls, ground: as far as the mission's text says."""
+    """A goal, a planner, an estimate, walls, ground, clearance: as far as the mission's text says."""
     found = set()
     if any(mission.goal_of(robot) is not None for robot in mission.team):
         found.add("goal")
     stacks = [mission.stack_of(robot) for robot in mission.team]
     if any(stack.planner is not None for stack in stacks):
         found.add("planner")
-    if mission.task.name == "explore" or any(stack.localizer is not None for stack in stacks):
+    told = "localizer" in mission.run.oracles
+    if told or mission.task.name == "explore" or any(stack.localizer is not None for stack in stacks):
         found.add("estimate")
+    over_cells = any(stack.navigator.name == "curve" for stack in stacks)
+    if mission.task.name != "plan" or over_cells:
+        found.add("clearance")  # of what is driven, or of a path over cells
     source = mission.world.map
     if isinstance(source, str) and source not in shipped_maps():
         found |= {"walls", "ground"}  # a file may hold either
     else:
-        found.add("walls" if isinstance(source, str | MapFile | SheetFile) else "ground")
+        solid = isinstance(source, GridMap | ImagesMap) and not over_cells
+        if solid or isinstance(source, str | MapFile | SheetFile):
+            found.add("walls")
+        if isinstance(source, GridMap | ImagesMap | CraterMap | ElevationMap):
+            found.add("ground")
     return frozenset(found)

@@ -19,6 +19,7 @@ from pilotage.experiments.sightings import Sightings
 from pilotage.experiments.update_album import UpdateAlbum
 from pilotage.missions.mission import Mission
 from pilotage.missions.places import Kidnap
+from pilotage.sim.source import Simulator
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,7 +66,7 @@ def run_loop(experiment: Experiment, on_progress: OnProgress | None = None) -> R
     step = 0
     while ending is None and step < limit:
         while kidnaps and source.t_s >= kidnaps[0].at_s:
-            events.append(_carry(experiment, kidnaps.pop(0)))
+            events.append(carry(source, kidnaps.pop(0)))
         readings = source.step(commands)
         step += 1
         for index, member in enumerate(team):
@@ -137,13 +138,13 @@ def _robot_run(experiment: Experiment, index: int, recorder: Recorder) -> RobotR
     )
 
 
-def _carry(experiment: Experiment, kidnap: Kidnap) -> Event:
+def carry(source: Simulator, kidnap: Kidnap) -> Event:
     """Carry a robot elsewhere; nobody tells it."""
     assert kidnap.to is not None, "settled by the build"
     to = Pose2(kidnap.to.x_m, kidnap.to.y_m, wrap_to_pi(kidnap.to.theta_rad))
-    experiment.simulator.bodies[kidnap.robot].carry_to(to)
+    source.bodies[kidnap.robot].carry_to(to)
     return Event(
-        experiment.simulator.t_s,
+        source.t_s,
         "kidnap",
         f"the robot is carried to ({to.x_m:.2f}, {to.y_m:.2f}) and not told",
     )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -12,7 +12,7 @@ from pilotage.core.config import validate
 from pilotage.core.errors import InputError, nearest, unknown_name
 from pilotage.core.plugins import add_plugins, named_plugins
 from pilotage.experiments.resolve import check_components
-from pilotage.experiments.values import apply_override, merge, parse_yaml, read_text
+from pilotage.experiments.values import apply_override, apply_setting, merge, parse_yaml, read_text
 from pilotage.missions.mission import TOP_KEYS, Mission
 from pilotage.missions.old_keys import refuse_old_keys
 
@@ -48,28 +48,40 @@ def load_mission(name_or_path: str, overrides: Sequence[str] = (), seed: int | N
     return mission_of(read_mission(name_or_path), overrides, seed)
 
 
-def mission_of(values: dict[str, Any], overrides: Sequence[str] = (), seed: int | None = None) -> Mission:
+def mission_of(
+    values: Mapping[str, Any],
+    overrides: Sequence[str] = (),
+    seed: int | None = None,
+    settings: Mapping[str, Any] | None = None,
+) -> Mission:
     """Override and validate a mission that was read before; ``values`` stay as they are.
+
+    Parameters
+    ----------
+    settings
+        By dotted key, values that take the mission's place, after ``overrides``.
 
     Raises
     ------
     InputError
         As ``load_mission``.
     """
-    values = copy.deepcopy(values)
+    changed = copy.deepcopy(dict(values))
     for override in overrides:
         if override.startswith("@"):
-            values = merge(values, read_parameters(override[1:]))
+            changed = merge(changed, read_parameters(override[1:]))
         else:
-            apply_override(values, override)
+            apply_override(changed, override)
+    for key, value in (settings or {}).items():
+        apply_setting(changed, key, value)
     if seed is not None:
-        values.setdefault("run", {})["seed"] = seed
-    refuse_old_keys(values)
-    plugins = values.get("plugins", ())
+        apply_setting(changed, "run.seed", seed)
+    refuse_old_keys(changed)
+    plugins = changed.get("plugins", ())
     if isinstance(plugins, list | tuple):
         add_plugins(str(file) for file in plugins)
-        values["plugins"] = named_plugins()
-    mission = validate(Mission, values, "")
+        changed["plugins"] = named_plugins()
+    mission = validate(Mission, changed, "")
     check_components(mission)
     return mission
 
@@ -89,8 +101,11 @@ def read_parameters(file: str) -> dict[str, Any]:
     return values
 
 
-def read_mission(name_or_path: str) -> dict[str, Any]:
-    """Read a mission's YAML with its ``extends`` resolved, without validating it."""
+def read_mission(name_or_path: str, extended_by: tuple[str, ...] = ()) -> dict[str, Any]:
+    """Read a mission's YAML with its ``extends`` resolved, without validating it.
+
+    ``extended_by``: those on the way to it, which it must not extend in turn.
+    """
     path = Path(name_or_path)
     looks_like_file = path.suffix in {".yaml", ".yml"} or "/" in name_or_path
     if looks_like_file:
@@ -102,14 +117,26 @@ def read_mission(name_or_path: str) -> dict[str, Any]:
         values = parse_yaml((SHIPPED / f"{name_or_path}.yaml").read_text(), name_or_path)
     else:
         raise unknown_name("mission", name_or_path, shipped_missions())
+    return extended(values, name_or_path, extended_by)
+
+
+def extended(values: dict[str, Any], where: str, extended_by: tuple[str, ...] = ()) -> dict[str, Any]:
+    """A mission's values with its ``extends`` resolved; ``extended_by`` must not come up again.
+
+    Raises
+    ------
+    InputError
+        Where it extends itself or something that is no shipped mission.
+    """
+    values = dict(values)
     base = values.pop("extends", None)
     if base is None:
         return values
     if not isinstance(base, str):
-        raise InputError(f"{name_or_path}: extends: expected the name of a shipped mission, found {base}")
-    if base == values.get("mission") or base == name_or_path:
-        raise InputError(f"{name_or_path}: extends: a mission cannot extend itself")
-    return merge(read_mission(base), values)
+        raise InputError(f"{where}: extends: expected the name of a shipped mission, found {base}")
+    if base in (values.get("mission"), where, *extended_by):
+        raise InputError(f"{where}: extends: a mission cannot extend itself")
+    return merge(read_mission(base, (*extended_by, where)), values)
 
 
 def _anchor_map(values: dict[str, Any], folder: Path) -> None:

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pilotage.core.types import IntArray
+from pilotage.evaluation.cell_plans import route_of
 from pilotage.evaluation.finished import FinishedRun
 from pilotage.maps.elevation import ElevationModel
 from pilotage.maps.occupancy_grid import OccupancyGrid
@@ -45,7 +46,11 @@ def terrain_pictures(run: FinishedRun, sightings: Sightings) -> TerrainPictures 
         cells = np.zeros(grid.rows * grid.columns, dtype=np.bool_)
         cells[visited] = True
         looked_at = shares(cells.reshape(grid.rows, grid.columns), step)
+    cells_route = route_of(robot)
+    # Over cells the bends say it all; the curve along them is what was driven.
     route = robot.plans[0].states[:, :2] if robot.plans else np.zeros((0, 2))
+    if cells_route is not None:
+        route = cells_route.path_xy_m
     counts, seen = _seen(run, sightings)
     goal = robot.goal
     return TerrainPictures(

@@ -28,6 +28,7 @@ def plan_on_map(
     planner: str,
     overrides: Sequence[str] = (),
     seed: int = 0,
+    clearance_m: float | None = None,
 ) -> dict[str, Any]:
     """Plan from ``start`` to ``goal`` (x, y in m and, where given, theta in rad).
 
@@ -36,6 +37,8 @@ def plan_on_map(
     overrides
         ``parameter=value`` for the planner, ``smoother.parameter=value`` for the smoother, or
         ``smoother=none`` for the planner's path as it is.
+    clearance_m
+        Distance to keep from obstacles; None: the planner's own.
 
     Returns
     -------
@@ -63,19 +66,20 @@ def plan_on_map(
         journal,
     )
     pose = Pose2(start[0], start[1], wrap_to_pi(start[2]) if len(start) > 2 else 0.0)
-    result = plan.make(0.0, pose, to, floor.walls.circles_m[:0], (plan.clearance_m,))
+    kept_m = plan.clearance_m if clearance_m is None else clearance_m
+    result = plan.make(0.0, pose, to, floor.walls.circles_m[:0], (kept_m,))
     answer: dict[str, Any] = {
         "success": result.path is not None,
         "reason": _reason(result, journal.plans[-1] if journal.plans else None),
         "planner": planner,
         "seed": seed,
-        "clearance_m": plan.clearance_m,
+        "clearance_m": kept_m,
         "iterations": result.iterations,
     }
     if plan.path is None:
         return answer
     adopted = journal.plans[-1]
-    shortest = shortest_path(floor.walls, (start[0], start[1]), (goal[0], goal[1]), plan.clearance_m)
+    shortest = shortest_path(floor.walls, (start[0], start[1]), (goal[0], goal[1]), kept_m)
     answer |= {
         "planned_length_m": adopted.length_m,
         "shortest_length_m": None if shortest is None else shortest.length_m,

@@ -9,7 +9,9 @@ from typing import Any
 
 from pilotage.core.errors import InputError, nearest
 from pilotage.core.files import read_values_text
+from pilotage.core.limits import DEPTH
 from pilotage.core.yaml_text import load_yaml
+from pilotage.missions.choice import EXCLUSIVE
 from pilotage.missions.mission import TOP_KEYS
 
 MOST_DIGITS = 9
@@ -43,7 +45,7 @@ def merge(base: dict[str, Any], changes: dict[str, Any], place: Sequence[str] = 
     merged = copy.deepcopy(base)
     for key, value in changes.items():
         old = merged.get(key)
-        if isinstance(old, str) and isinstance(value, dict) and _holds_components(place):
+        if isinstance(old, str) and isinstance(value, dict) and _is_component([*place, key]):
             old = {"name": old}
         if isinstance(value, dict) and isinstance(old, dict) and not _renames(old, value):
             merged[key] = merge(old, value, [*place, key])
@@ -52,13 +54,22 @@ def merge(base: dict[str, Any], changes: dict[str, Any], place: Sequence[str] = 
     return merged
 
 
-def _holds_components(place: Sequence[str]) -> bool:
-    """Whether the values there are components, of which a name alone is the short form."""
-    return list(place) in (["stack"], ["robot", "sensors"])
+def _is_component(place: Sequence[str]) -> bool:
+    """Whether a component stands there, of which a name alone is the short form."""
+    keys = list(place)
+    if keys[:1] == ["robots"]:
+        keys = ["robot", *keys[2:]]
+    if keys[:2] == ["robot", "stack"]:
+        keys = keys[1:]
+    if keys in (["task"], ["robot", "motion"]):
+        return True
+    return keys[:-1] in (["stack"], ["robot", "sensors"])
 
 
 def _renames(old: dict[str, Any], new: dict[str, Any]) -> bool:
-    return "name" in new and new["name"] != old.get("name")
+    """Whether ``new`` is another component, or another of two alternatives without names."""
+    named = "name" in new and new["name"] != old.get("name")
+    return named or any(a in new and b in old for a, b in EXCLUSIVE)
 
 
 def parse_override(override: str) -> tuple[list[str], Any]:
@@ -73,6 +84,8 @@ def parse_override(override: str) -> tuple[list[str], Any]:
     parts = key.strip().split(".")
     if not equals or not all(parts):
         raise InputError(f"--set '{override}': expected KEY=VALUE such as stack.localizer.gate=0.99")
+    if len(parts) > DEPTH:
+        raise InputError(f"--set '{override}': expected at most {DEPTH} keys, found {len(parts)}")
     try:
         value = load_yaml(text, "")
     except InputError:
@@ -91,29 +104,49 @@ def apply_override(values: dict[str, Any], override: str) -> None:
         If the text is not of that form or the key leads through something that has no keys.
     """
     parts, value = parse_override(override)
+    _apply(values, parts, value, f"--set '{override}'")
+
+
+def apply_setting(values: dict[str, Any], key: str, value: Any) -> None:
+    """Set a dotted key in place to a value that is one already, not text to be read.
+
+    Raises
+    ------
+    InputError
+        As ``apply_override``.
+    """
+    parts = str(key).split(".")
+    if not all(part.strip() for part in parts):
+        raise InputError(f"set: expected keys such as 'stack.localizer.gate', found '{key}'")
+    _apply(values, parts, copy.deepcopy(value), f"set '{key}'")
+
+
+def _apply(values: dict[str, Any], parts: list[str], value: Any, told: str) -> None:
+    """Put a value where its key leads; ``told`` is how the user said it."""
     top = list(TOP_KEYS)
     if parts[0] not in top:
         close = nearest(parts[0], top)
         hint = f"did you mean '{close}'?" if close else "known: " + ", ".join(top)
-        raise InputError(f"--set '{override}': unknown key '{parts[0]}'; {hint}")
+        raise InputError(f"{told}: unknown key '{parts[0]}'; {hint}")
     place: Any = values
     for depth, part in enumerate(parts[:-1]):
-        inner = _child(place, part, override)
+        inner = _child(place, part, told)
         if inner is None:
             inner = {}
-            _put(place, part, inner, override)
-        if isinstance(inner, str) and _holds_components(parts[:depth]):
+            _put(place, part, inner, told)
+        if isinstance(inner, str) and _is_component(parts[: depth + 1]):
             inner = {"name": inner}
-            _put(place, part, inner, override)
+            _put(place, part, inner, told)
         if not isinstance(inner, dict | list):
-            raise InputError(
-                f"--set '{override}': '{'.'.join(parts[: depth + 1])}' is a value, it has no keys"
-            )
+            raise InputError(f"{told}: '{'.'.join(parts[: depth + 1])}' is a value, it has no keys")
         place = inner
     last = parts[-1]
     if last == "name" and isinstance(place, dict) and place.get("name") != value:
         place.clear()
-    _put(place, last, value, override)
+    for own, other in EXCLUSIVE:
+        if last == own and isinstance(place, dict):
+            place.pop(other, None)
+    _put(place, last, value, told)
 
 
 def _number(text: str) -> Any:
@@ -124,20 +157,20 @@ def _number(text: str) -> Any:
         return text
 
 
-def _child(place: Any, part: str, override: str) -> Any:
+def _child(place: Any, part: str, told: str) -> Any:
     if isinstance(place, list):
-        return place[_index(place, part, override)]
+        return place[_index(place, part, told)]
     return place.get(part)
 
 
-def _put(place: Any, part: str, value: Any, override: str) -> None:
+def _put(place: Any, part: str, value: Any, told: str) -> None:
     if isinstance(place, list):
-        place[_index(place, part, override)] = value
+        place[_index(place, part, told)] = value
     else:
         place[part] = value
 
 
-def _index(place: list[Any], part: str, override: str) -> int:
+def _index(place: list[Any], part: str, told: str) -> int:
     if not (part.isascii() and part.isdigit() and len(part) <= MOST_DIGITS and int(part) < len(place)):
-        raise InputError(f"--set '{override}': expected an index from 0 to {len(place) - 1}, found '{part}'")
+        raise InputError(f"{told}: expected an index from 0 to {len(place) - 1}, found '{part}'")
     return int(part)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 import struct
+import warnings
 import zlib
 from collections.abc import Iterator, Sequence
 from io import BytesIO
@@ -165,7 +166,9 @@ def _level_4(path: Path, data: bytes, names: Sequence[str]) -> dict[str, Any]:
     broken = (MatReadError, OSError, ValueError, TypeError, KeyError, IndexError, EOFError)
     source: Any = BytesIO(data)
     try:
-        return dict(loadmat(source, variable_names=list(names)))
-    except (*broken, OverflowError, MemoryError, NotImplementedError) as error:
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")  # it warns of what it is about to read wrongly
+            return dict(loadmat(source, variable_names=list(names)))
+    except (*broken, OverflowError, MemoryError, NotImplementedError, Warning) as error:
         said = " ".join(str(error).split())
         raise InputError(f"{path}: expected a MATLAB file with {wanted}, found: {said}") from None

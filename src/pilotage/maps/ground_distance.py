@@ -36,12 +36,8 @@ def with_circles(field: DistanceField, circles_m: FloatArray) -> DistanceField:
     """A new field with discs (M, 3) x, y, radius beside what the old one was sampled from."""
     if circles_m.shape[0] == 0:
         return field
-    ny, nx = field.distance_m.shape
-    found = kernels.sample_distance(
-        *field.origin_xy_m, field.resolution_m, nx, ny, field.segments_m[:0], np.ascontiguousarray(circles_m)
+    distance_m = field.distance_m.copy()
+    kernels.lower_by_circles(
+        distance_m, *field.origin_xy_m, field.resolution_m, np.ascontiguousarray(circles_m)
     )
-    return replace(
-        field,
-        distance_m=np.minimum(field.distance_m, found),
-        circles_m=np.concatenate([field.circles_m, circles_m]),
-    )
+    return replace(field, distance_m=distance_m, circles_m=np.concatenate([field.circles_m, circles_m]))

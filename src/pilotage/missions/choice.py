@@ -34,8 +34,15 @@ class ComponentChoice(Config):
         return dict(self.model_extra or {})
 
 
+EXCLUSIVE = (("points_m", "radius_m"), ("radius_m", "points_m"))
+"""Keys of alternatives that need no name: an outline has corners or a radius."""
+
+
 def laid_over(base: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
-    """``changes`` over ``base``, key by key; a component whose ``name`` changes starts from nothing."""
+    """``changes`` over ``base``, key by key; a component whose ``name`` changes starts from nothing.
+
+    So does what is told apart without a name, by its keys: a polygon is not laid over a disc.
+    """
     merged = copy.deepcopy(dict(base))
     for key, value in changes.items():
         old = merged.get(key)
@@ -43,6 +50,7 @@ def laid_over(base: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, 
             isinstance(value, Mapping)
             and isinstance(old, Mapping)
             and value.get("name", old.get("name")) == old.get("name")
+            and not any(a in value and b in old for a, b in EXCLUSIVE)
         ):
             merged[key] = laid_over(old, value)
         else:

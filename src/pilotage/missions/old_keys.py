@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 from pilotage.core.errors import InputError
@@ -40,6 +40,17 @@ def refuse_old_keys(values: Mapping[str, Any]) -> None:
     """
     for old, new in OLD_KEYS.items():
         top, key = old.split(".")
-        part = values.get(top)
-        if isinstance(part, Mapping) and key in part:
-            raise InputError(f"{old}: is {new}")
+        for place, part in _parts(values, top):
+            if key in part:
+                raise InputError(f"{place}.{key}: is {new}")
+
+
+def _parts(values: Mapping[str, Any], top: str) -> Iterator[tuple[str, Mapping[str, Any]]]:
+    """Where a part of a mission stands: at its top, and for one of several robots in the robot's entry."""
+    part, robots = values.get(top), values.get("robots")
+    if isinstance(part, Mapping):
+        yield top, part
+    for index, robot in enumerate(robots if isinstance(robots, list | tuple) else ()):
+        own = robot if top == "robot" else robot.get(top) if isinstance(robot, Mapping) else None
+        if isinstance(own, Mapping):
+            yield f"robots.{index}" if top == "robot" else f"robots.{index}.{top}", own

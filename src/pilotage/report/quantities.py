@@ -77,7 +77,7 @@ BY_UNIT: Mapping[str, Callable[[float], str]] = {
     "m": length,
     "s": duration,
     "rad": angle,
-    "deg": _degrees,
+    "°": _degrees,
     "share": share,
     "count": count,
     "1/s": _rate,

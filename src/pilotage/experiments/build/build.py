@@ -62,6 +62,57 @@ class Experiment:
     task: Task
 
 
+@dataclass(frozen=True, slots=True)
+class Source:
+    """What robots meet, without what runs on them: for whoever drives by hand.
+
+    Attributes
+    ----------
+    mission
+        With its random places drawn.
+    """
+
+    mission: Mission
+    chart: WorldMap
+    obstacles: Obstacles
+    simulator: Simulator
+
+
+PUT_ACROSS = frozenset({"across-path", "u-trap"})
+"""Kinds of obstacles that are put across what the first robot plans."""
+
+
+def build_source(mission: Mission) -> Source:
+    """Build a mission's world and robots alone: the very ones that ``build`` gives, in less time.
+
+    Raises
+    ------
+    InputError
+        As ``build``, of the world and the robots.
+    """
+    if any(obstacle.kind in PUT_ACROSS for obstacle in mission.world.obstacles):
+        built = build(mission)
+        return Source(built.mission, built.chart, built.obstacles, built.simulator)
+    chart = chart_of(mission.world)
+    mission = settle_places(mission, chart)
+    streams = RandomStreams(mission.run.seed)
+    sheets = [_data_sheet(mission, index, streams) for index in range(len(mission.team))]
+    _check_places(mission, chart, sheets)
+    obstacles = _obstacles(mission, chart, sheets, (), streams)
+    return Source(mission, chart, obstacles, _simulator(mission, chart, obstacles, sheets))
+
+
+def _simulator(
+    mission: Mission, chart: WorldMap, obstacles: Obstacles, sheets: Sequence[RobotKnowledge]
+) -> Simulator:
+    oracles = frozenset(mission.run.oracles)
+    return Simulator(
+        World.of(chart, obstacles.segments_m, obstacles.circles_m),
+        [_spec(mission, index, sheet, oracles) for index, sheet in enumerate(sheets)],
+        mission.run.dt_s,
+    )
+
+
 def build(mission: Mission) -> Experiment:
     """Build a mission.
 
@@ -95,11 +146,7 @@ def build(mission: Mission) -> Experiment:
             _member(mission, index, chart, sheet, truths[index], oracles, task.goals)
             for index, sheet in enumerate(sheets)
         ]
-    simulator = Simulator(
-        World.of(chart, obstacles.segments_m, obstacles.circles_m),
-        [_spec(mission, index, sheet, oracles) for index, sheet in enumerate(sheets)],
-        mission.run.dt_s,
-    )
+    simulator = _simulator(mission, chart, obstacles, sheets)
     for truth, body in zip(truths, simulator.bodies, strict=True):
         truth.body = body
     return Experiment(mission, chart, obstacles, simulator, tuple(team), task)
@@ -200,7 +247,7 @@ def _obstacles(
     robot = mission.team[0]
     start, goal = mission.start_of(robot), mission.goal_of(robot)
     assert start is not None, "settled above"
-    plans = team[0].journal.plans
+    plans = team[0].journal.plans if team else []
     return place_obstacles(
         mission.world.obstacles,
         chart.walls,

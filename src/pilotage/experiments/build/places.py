@@ -55,7 +55,7 @@ def settle_places(mission: Mission, chart: WorldMap) -> Mission:
     starts = given
     if world.random_start is not None:
         rng, clearance_m = streams.stream("start"), world.random_start.clearance_m
-        starts = [_random_pose(chart, start, clearance_m, rng) for start in given]
+        starts = [random_pose(chart, start, clearance_m, rng) for start in given]
     rng = streams.stream("kidnap")
     kidnaps = tuple(
         kidnap if kidnap.to is not None else _carried(kidnap, chart, given[kidnap.robot], rng)
@@ -121,10 +121,10 @@ def pose_of(place: PoseConfig) -> Pose2:
 
 
 def _carried(kidnap: Kidnap, chart: WorldMap, near: PoseConfig, rng: np.random.Generator) -> Kidnap:
-    return kidnap.model_copy(update={"to": _random_pose(chart, near, kidnap.clearance_m, rng)})
+    return kidnap.model_copy(update={"to": random_pose(chart, near, kidnap.clearance_m, rng)})
 
 
-def _random_pose(
+def random_pose(
     chart: WorldMap, reachable_from: PoseConfig, clearance_m: float, rng: np.random.Generator
 ) -> PoseConfig:
     """Draw a pose, uniform over the floor that is connected to a place at a clearance.

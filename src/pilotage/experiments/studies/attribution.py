@@ -101,7 +101,7 @@ def attribution_of(folder: Path) -> dict[str, Any]:
     texts = applicable(base)
     judging = METRICS.costs_of(base.task.name, METRICS.given_by(base.task.name, has(base)))
     costs = {metric.key: metric for metric in (METRICS.find(SUCCESS), *_ranked(judging))}
-    values = {name: _comparable(table, name, cost) for name, cost in costs.items() if name in table.values}
+    values = {name: table.comparable(name) for name in costs if name in table.values}
     judgement = judge(table.cell, table.trial, values, [FIRST] * len(table.study.cells))
     before = _baseline(judgement, FIRST)
     ranked: list[tuple[tuple[float, ...], dict[str, Any]]] = []
@@ -133,15 +133,6 @@ def _ranked(costs: Sequence[Metric]) -> list[Metric]:
     """Costs in the order in which they count."""
     rank = {aspect: place for place, aspects in enumerate(RANKED) for aspect in aspects}
     return sorted(costs, key=lambda cost: rank.get(cost.aspect, len(RANKED)))
-
-
-def _comparable(table: StudyTable, name: str, cost: Metric) -> FloatArray:
-    """(n,) a metric's values; nan where the run did not come to its end and that counts."""
-    values = table.values[name]
-    succeeded = table.values.get(SUCCESS)
-    if not cost.whole_runs or succeeded is None:
-        return values
-    return np.where(succeeded > 0.0, values, math.nan)
 
 
 def _is_sure(table: StudyTable, values: FloatArray, cell: int, change: Difference) -> bool:

@@ -34,6 +34,8 @@ class Cell:
         ``KEY=VALUE`` each, as ``--set`` takes them.
     published
         By metric, what others found for it.
+    label
+        How it is called among the cells of its group, with units; empty: by its name.
     """
 
     index: int
@@ -41,6 +43,12 @@ class Cell:
     values: Mapping[str, Any]
     overrides: tuple[str, ...]
     published: Mapping[str, float]
+    label: str = ""
+
+    @property
+    def text(self) -> str:
+        """How it is called on a page."""
+        return self.label or self.name
 
 
 def make_cells(definition: StudyDefinition, resolve: Resolve) -> tuple[Cell, ...]:

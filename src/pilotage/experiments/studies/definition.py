@@ -105,19 +105,27 @@ class StudyDefinition(Config):
     description: str = ""
     mission: str = Field(min_length=1)
     set: Mapping[str, Any] = {}
-    configurations: tuple[Configuration, ...] = Field((), max_length=MANY)
-    factors: tuple[Factor, ...] = Field((), max_length=MANY)
+    configurations: tuple[Configuration, ...] = ()
+    factors: tuple[Factor, ...] = ()
     combine: Literal["grid", "one-at-a-time", "zip"] = "grid"
     trials: int = Field(default=10, ge=1, le=10_000_000)
     seeds: Seeds = Seeds()
-    metrics: tuple[str, ...] = Field((), max_length=MANY)
+    metrics: tuple[str, ...] = ()
     primary: str | None = None
     lower_is_better: bool | None = None
     baseline: str | None = None
-    groups: tuple[Group, ...] = Field((), max_length=MANY)
-    contrasts: tuple[Contrast, ...] = Field((), max_length=MANY)
-    published: tuple[Published, ...] = Field((), max_length=MANY)
+    groups: tuple[Group, ...] = ()
+    contrasts: tuple[Contrast, ...] = ()
+    published: tuple[Published, ...] = ()
     reference: Mapping[str, Reference] = {}
+
+    @model_validator(mode="before")
+    @classmethod
+    def _not_too_many(cls, values: Any) -> Any:
+        for key, value in values.items() if isinstance(values, Mapping) else ():
+            if isinstance(value, list | tuple) and len(value) > MANY:
+                raise ValueError(f"{key}: expected at most {MANY}, found {len(value)}")
+        return values
 
     @model_validator(mode="after")
     def _sound(self) -> StudyDefinition:

@@ -22,6 +22,15 @@ class CellGroup:
     cells: tuple[int, ...]
     baselines: tuple[int | None, ...]
 
+    @property
+    def baseline(self) -> int | None:
+        """The one cell of the group that all others of it are held against; None where there is none such."""
+        found = {base for base in self.baselines if base is not None}
+        if len(found) != 1:
+            return None
+        (only,) = found
+        return only if only in self.cells and self.baselines.count(only) == len(self.cells) - 1 else None
+
 
 def cell_groups(definition: StudyDefinition, cells: Sequence[Cell]) -> tuple[CellGroup, ...]:
     """The groups that a definition names; without any, all cells are one group.

@@ -10,6 +10,7 @@ import signal
 import sys
 import threading
 import time
+import types
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from multiprocessing import resource_tracker
@@ -129,7 +130,7 @@ class LocalWorkers:
         kept = {name: os.environ.get(name) for name in ONE_THREAD}
         os.environ.update(dict.fromkeys(ONE_THREAD, "1"))
         try:
-            with _interrupts_held():
+            with _interrupts_held(), _main_left_alone():
                 process.start()
         finally:
             for name, value in kept.items():
@@ -169,6 +170,20 @@ class LocalWorkers:
 
 def _now_s() -> float:
     return time.monotonic()
+
+
+@contextlib.contextmanager
+def _main_left_alone() -> Iterator[None]:
+    """Spawned workers do not run the user's script again: a study is started in a plain script as well.
+
+    What they work on is imported by name; components of the user's own come from plugin files.
+    """
+    main = sys.modules["__main__"]
+    sys.modules["__main__"] = types.ModuleType("__main__")
+    try:
+        yield
+    finally:
+        sys.modules["__main__"] = main
 
 
 @contextlib.contextmanager

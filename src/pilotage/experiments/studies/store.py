@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from pilotage.core.errors import InputError
+from pilotage.core.files import require_file
 from pilotage.core.json_text import load_json
 from pilotage.experiments.studies.database import (
     DATABASE,
@@ -80,6 +81,8 @@ class Store:
         self._owner = uuid.uuid4().hex
         self._on_trouble = on_trouble
         folder.mkdir(parents=True, exist_ok=True)
+        if self.path.is_symlink() or self.path.exists():
+            require_file(self.path, "a study's database")
         if self.path.is_file():
             if self.path.stat().st_size == 0 and (folder / STUDY_FILE).is_file():
                 raise CorruptDatabaseError(self.path, "the file is empty")

@@ -15,7 +15,7 @@ import yaml
 
 from pilotage.core.config import validate
 from pilotage.core.errors import InputError, unknown_name
-from pilotage.core.files import read_values_text
+from pilotage.core.files import decoded, read_bytes
 from pilotage.experiments.mission import mission_of, read_mission, shipped_missions
 from pilotage.experiments.oracles.applicable import check_oracles
 from pilotage.experiments.resolve import resolved_values
@@ -23,6 +23,7 @@ from pilotage.experiments.studies.cells import Cell, make_cells
 from pilotage.experiments.studies.definition import StudyDefinition
 from pilotage.experiments.studies.files import anchored, digests
 from pilotage.experiments.studies.groups import cell_groups
+from pilotage.experiments.studies.labels import labelled
 from pilotage.experiments.values import parse_yaml
 
 SHIPPED = resources.files("pilotage.missions") / "studies"
@@ -41,6 +42,8 @@ PRESENTATION = (
 )
 """What a definition says about its page only: it may change without touching a row."""
 MAX_ROWS = 1_000_000
+MAX_BYTES = 2_000_000
+"""A longer definition takes longer to read than its study could run."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -129,7 +132,7 @@ def load_study(name_or_path: str, changes: Mapping[str, Any] | None = None) -> S
         raise InputError(f"'{name_or_path}': expected a study's folder, found no {STUDY_FILE} in it")
     folder = Path()
     if path.suffix in {".yaml", ".yml"} or "/" in name_or_path:
-        text = read_values_text(path, "a study's YAML file or folder")
+        text = decoded(read_bytes(path, "a study's YAML file or folder", MAX_BYTES), str(path))
         values, folder = parse_yaml(text, str(path)), path.parent
     elif name_or_path in shipped_studies():
         values = parse_yaml((SHIPPED / f"{name_or_path}.yaml").read_text(encoding="utf-8"), name_or_path)
@@ -142,13 +145,17 @@ def load_study(name_or_path: str, changes: Mapping[str, Any] | None = None) -> S
         raise InputError(f"study '{name_or_path}': {error}") from None
 
 
-def make_study(definition: StudyDefinition, folder: Path = Path()) -> Study:
+def make_study(
+    definition: StudyDefinition, folder: Path = Path(), values: Mapping[str, Any] | None = None
+) -> Study:
     """Read the mission and validate every cell of a study.
 
     Parameters
     ----------
     folder
         Where a mission's file is looked for.
+    values
+        The mission itself, where it is in no file.
 
     Raises
     ------
@@ -159,7 +166,7 @@ def make_study(definition: StudyDefinition, folder: Path = Path()) -> Study:
     if named not in shipped_missions() and not Path(named).is_absolute() and (folder / named).is_file():
         named = str(folder / named)
     places = (folder, Path())
-    base = anchored(read_mission(named), places)
+    base = anchored(read_mission(named) if values is None else dict(values), places)
     definition = _at_their_places(definition, places)
 
     def resolve(overrides: Sequence[str]) -> Mapping[str, Any]:
@@ -178,7 +185,7 @@ def make_study(definition: StudyDefinition, folder: Path = Path()) -> Study:
     names = [cell.name for cell in cells]
     if definition.baseline is not None and definition.baseline not in names:
         raise unknown_name("baseline", definition.baseline, names)
-    cell_groups(definition, cells)
+    cells = labelled(definition, cells, cell_groups(definition, cells))
     named_in_cells = [json.loads(text.partition("=")[2]) for cell in cells for text in cell.overrides]
     return Study(definition, base, cells, digests([base, named_in_cells]))
 

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -16,14 +15,26 @@ from pilotage.evaluation.metric import Aspect
 from pilotage.evaluation.metrics import METRICS
 from pilotage.evaluation.pooled import IDEALS
 from pilotage.experiments.mission import mission_of
+from pilotage.experiments.studies.cells import Cell
 from pilotage.experiments.studies.database import DATABASE
 from pilotage.experiments.studies.export import save_what_is_left
 from pilotage.experiments.studies.groups import CellGroup, baselines, cell_groups
+from pilotage.experiments.studies.labels import unit_of
 from pilotage.experiments.studies.rows import flat, read_rows
 from pilotage.experiments.studies.study import Study, load_study
 
 IDENTITY = frozenset({"seed"})
 """Numbers of a trial that say which one it is."""
+
+
+@dataclass(frozen=True, slots=True)
+class Broken:
+    """A trial that gave no numbers."""
+
+    row: int
+    cell: int
+    seed: int
+    reason: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,7 +48,7 @@ class StudyTable:
     values
         By metric, (n,): nan where a trial does not give it.
     broken
-        Rows that failed: (row, cell, seed, reason).
+        Rows that failed.
     waiting
         How many are still to run.
     """
@@ -49,22 +60,86 @@ class StudyTable:
     trial: IntArray
     seed: IntArray
     values: Mapping[str, FloatArray]
-    broken: tuple[tuple[int, int, int, str], ...]
+    broken: tuple[Broken, ...]
     waiting: int
 
     @property
-    def metrics(self) -> tuple[str, ...]:
-        """What is reported: what the definition asks for, else every number that varies or matters."""
-        asked = self.study.definition.metrics
-        given = [name for name in self.values if name not in {*IDENTITY, SUCCESS}]
-        if asked:
-            return asked
+    def given(self) -> list[str]:
+        """Every metric that some trial gives."""
+        return [name for name in self.values if name not in {*IDENTITY, SUCCESS}]
+
+    @property
+    def telling(self) -> tuple[str, ...]:
+        """The metrics that matter: what the definition asks for, else what judges the task."""
+        if self.study.definition.metrics:
+            return self.study.definition.metrics
         mission = mission_of(dict(self.study.base), self.study.cells[0].overrides)
-        costs = METRICS.costs_of(mission.task.name, given)
+        costs = METRICS.costs_of(mission.task.name, self.given)
         # Where nothing is asked for, accuracy answers before time does.
         judging = sorted(costs, key=lambda metric: metric.aspect is not Aspect.ACCURACY)
-        first = dict.fromkeys([*(metric.key for metric in judging), *(m for m in IDEALS if m in given)])
-        return (*first, *(m for m in given if m not in first))
+        return (*(metric.key for metric in judging), *(name for name in IDEALS if name in self.given))
+
+    @property
+    def metrics(self) -> tuple[str, ...]:
+        """What is reported: what the definition asks for, else every number, those that matter first."""
+        asked = self.study.definition.metrics
+        return asked or tuple(dict.fromkeys([*self.telling, *self.given]))
+
+    @property
+    def cells(self) -> tuple[Cell, ...]:
+        """The settings."""
+        return self.study.cells
+
+    @property
+    def factors(self) -> tuple[str, ...]:
+        """Names of what is varied."""
+        return self.study.definition.factor_names
+
+    def column(self, metric: str) -> FloatArray:
+        """(n,) a metric's values; nan where there is none."""
+        found = self.values.get(metric)
+        return np.full(self.row.shape, math.nan) if found is None else found
+
+    def unit(self, factor: str) -> str:
+        """The unit of a factor's values; empty where it has none."""
+        return unit_of(self.study.definition, factor)
+
+    def members(self, group: CellGroup) -> list[Cell]:
+        """The cells of a group."""
+        return [self.cells[index] for index in group.cells]
+
+    def known_as(self, index: int, group: CellGroup) -> str:
+        """What a cell is called beside the cells of a group: its own name where it is none of them."""
+        return self.cells[index].text if index in group.cells else self.cells[index].name
+
+    def worth_showing(self, metric: str, cells: Iterable[Cell]) -> bool:
+        """Whether the trials of some cells give a metric, and it varies or was asked for."""
+        found = self.column(metric)[np.isin(self.cell, [cell.index for cell in cells])]
+        found = found[np.isfinite(found)]
+        if not found.size:
+            return False
+        asked = bool(self.study.definition.metrics) or metric == self.primary
+        return asked or found.size == 1 or bool(np.ptp(found) > 0.0)
+
+    @property
+    def lower_is_better(self) -> bool:
+        """Whether less of the primary metric is better; of one that has no direction, less comes first."""
+        return self.less_is_better(self.primary) is not False
+
+    def less_is_better(self, metric: str) -> bool | None:
+        """Which way a metric is better here; None where neither is."""
+        definition = self.study.definition
+        if metric == self.primary and definition.lower_is_better is not None:
+            return definition.lower_is_better
+        return METRICS.find(metric).less_is_better
+
+    def comparable(self, metric: str) -> FloatArray:
+        """(n,) a metric's values; nan where there is none, or none of a whole run that it takes."""
+        values = self.column(metric)
+        success = self.values.get(SUCCESS)
+        if success is None or not METRICS.find(metric).whole_runs:
+            return values
+        return np.where(success > 0.0, values, math.nan)
 
     @property
     def primary(self) -> str:
@@ -89,8 +164,7 @@ class StudyTable:
     def judged(self) -> Judgement:
         """Every cell's summary, and every cell against its baseline."""
         names = dict.fromkeys([*self.metrics, self.primary, SUCCESS])
-        empty = np.full(self.row.shape, math.nan)
-        values = {name: self.values.get(name, empty) for name in names}
+        values = {name: self.column(name) for name in names}
         held_against = baselines(self.groups, len(self.study.cells))
         return judge(self.cell, self.trial, values, held_against, self.contrasts, same_seeds=self.same_seeds)
 
@@ -112,9 +186,8 @@ def read_study(folder: Path) -> StudyTable:
     numbers = [flat(row["metrics"]) | flat(row["timings"]) for row in done]
     names = sorted({name for row in numbers for name in row})
     values = {name: np.array([row.get(name, math.nan) for row in numbers]) for name in names}
-    broken = tuple(
-        (row["row"], row["cell"], row["seed"], row["reason"]) for row in rows if row["status"] == "failed"
-    )
+    failed = [row for row in rows if row["status"] == "failed"]
+    broken = tuple(Broken(row["row"], row["cell"], row["seed"], row["reason"]) for row in failed)
 
     def column(key: str) -> IntArray:
         return np.array([row[key] for row in done], dtype=np.int64)
@@ -131,46 +204,3 @@ def read_study(folder: Path) -> StudyTable:
         broken,
         waiting,
     )
-
-
-def study_object(table: StudyTable) -> dict[str, Any]:
-    """The study's JSON object: counts, and one object a cell."""
-    judgement = table.judged()
-    cells = []
-    for cell in table.study.cells:
-        rate = judgement.rates[cell.index]
-        metrics = {}
-        for name in table.metrics:
-            found = judgement.summaries[name][cell.index]
-            metrics[name] = {
-                "n": found.n,
-                "mean": found.mean,
-                "median": found.median,
-                "low": found.low,
-                "high": found.high,
-                "variance": found.variance,
-            }
-        cells.append(
-            {
-                "name": cell.name,
-                "values": dict(cell.values),
-                "success": {
-                    "n": rate.trials,
-                    "mean": rate.successes / rate.trials if rate.trials else None,
-                    "low": rate.low,
-                    "high": rate.high,
-                },
-                "metrics": metrics,
-                **({"published": dict(cell.published)} if cell.published else {}),
-            }
-        )
-    return {
-        "study": table.study.name,
-        "mission": table.study.base.get("mission", table.study.definition.mission),
-        "trials": len(table.row) + len(table.broken),
-        "failed": len(table.broken),
-        "missing": table.waiting,
-        "primary": table.primary,
-        "cells": cells,
-        "study_dir": str(table.folder),
-    }

@@ -21,7 +21,7 @@ ARC_STEP_RAD = 0.2
 def window(v: float, w: float, dt: float, drive: Drive) -> tuple[float, float, float, float]:
     """Least and highest speed and turn rate within reach in ``dt`` (Fox, Burgard and Thrun 1997)."""
     up = drive.acceleration if v >= 0.0 else drive.deceleration
-    down = drive.deceleration if v >= 0.0 else drive.acceleration
+    down = drive.deceleration if v > 0.0 else drive.acceleration
     low_v = max(-drive.reverse, v - down * dt)
     high_v = min(drive.speed, v + up * dt)
     low_w = max(-drive.turn_rate, w - drive.turn_acceleration * dt)

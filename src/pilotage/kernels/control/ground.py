@@ -25,6 +25,8 @@ MOST_HITS = 60
 SCATTER = 0.12
 """A cell with less than this share of its neighbour's hits is that neighbour's range noise."""
 NONE = -1
+DOUBT_CELLS = 3.0
+"""Two diagonals: half a one for the query in its cell and for each point in its own, there and back."""
 
 
 class Ground(NamedTuple):
@@ -151,7 +153,7 @@ def clear_inside(
     y0: float,
     cell: float,
 ) -> None:
-    """Empty the cells whose mean lies deeper than ``depth`` inside the footprint: the robot is there; in place."""
+    """Empty the cells whose mean lies deeper than ``depth`` inside the footprint; in place."""
     n = hits.shape[0]
     reach = 0.0
     for k in range(polygon.shape[0]):
@@ -321,9 +323,9 @@ def nearest_m(x: float, y: float, ground: Ground) -> float:
 def clearance_m(x: float, y: float, theta: float, body: Body, ground: Ground, enough: float) -> float:
     """Clearance of a footprint at a pose, told apart from ``enough``.
 
-    At or above ``enough`` it is a lower bound, by discs. Below, the distance to an obstacle point, exact
-    where the points nearest to the discs' centres include the nearest one of all, else above it by little.
-    Negative where an obstacle point lies inside the footprint.
+    At or above ``enough`` it is a bound by discs, below it the distance to an obstacle point; negative where
+    one lies inside the footprint. A cell knows one point, the nearest to its centre by the cells' centres, so
+    either may be above the true clearance by up to two diagonals of a cell, and mostly is by none.
     """
     return clearance_of(
         x,
@@ -416,6 +418,36 @@ def clearance_of(
         return max(bound, covered)
     if found < enough:
         return found
+    return exact_clearance(x, y, theta, polygon, outer, hits, mean, x0, y0, cell, enough)
+
+
+@kernel
+def sure_clearance(
+    x: float,
+    y: float,
+    theta: float,
+    polygon: FloatArray,
+    outer: float,
+    hits: ByteArray,
+    nearest: CellIndex,
+    mean: FloatArray,
+    x0: float,
+    y0: float,
+    cell: float,
+    per_cell: float,
+    enough: float,
+) -> float:
+    """Clearance of a footprint, exact below ``enough``, else at least ``enough``: for the last word."""
+    n = nearest.shape[0]
+    column, row = math.floor((x - x0) * per_cell), math.floor((y - y0) * per_cell)
+    if 0 <= row < n and 0 <= column < n:
+        at = nearest[row, column]
+        if at < 0:
+            return FAR_M
+        dx, dy = mean[at, 0] - x, mean[at, 1] - y
+        bound = math.sqrt(dx * dx + dy * dy) - outer - DOUBT_CELLS * cell
+        if bound >= enough:
+            return bound
     return exact_clearance(x, y, theta, polygon, outer, hits, mean, x0, y0, cell, enough)
 
 

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from pilotage.kernels.arrays import FloatArray
 from pilotage.kernels.control.footprint import Body
-from pilotage.kernels.control.ground import Ground, clearance_of, seen_under
+from pilotage.kernels.control.ground import Ground, clearance_of, seen_under, sure_clearance
 from pilotage.kernels.control.movers import movers_clearance
 from pilotage.kernels.geometry.motion import exact_arc
 from pilotage.kernels.jit import kernel
@@ -108,6 +108,7 @@ def command_is_safe(
     ground: Ground,
     movers: FloatArray,
     margin: float,
+    margin_s: float,
 ) -> tuple[bool, float]:
     """Whether a command, held and then followed by braking to rest, touches nothing that has been seen.
 
@@ -124,8 +125,9 @@ def command_is_safe(
     movers
         (N, M, 3) moving discs at the end of each ``dt``, the last ones staying; while the robot moves it must
         not come nearer than ``margin`` to them.
-    margin
-        Clearance to keep. Where there is less at the start, it must not shrink by more than a millimetre.
+    margin, margin_s
+        Clearance to keep, and how much more per m/s. Where there is less at the start, it must not shrink by
+        more than a millimetre.
 
     Returns
     -------
@@ -136,13 +138,12 @@ def command_is_safe(
     x0, y0 = ground.x0_m, ground.y0_m
     cell, per_cell, coarse, per_coarse = ground.cell_m, ground.per_cell, ground.coarse_m, ground.per_coarse
     least = margin + 0.1
-    begin = clearance_of(
+    begin = sure_clearance(
         start[0],
         start[1],
         start[2],
         polygon,
         outer,
-        discs,
         hits,
         nearest,
         mean,
@@ -152,7 +153,6 @@ def command_is_safe(
         per_cell,
         least,
     )
-    floor = min(margin, begin - 1e-3)
     seen_before = seen_under(start[0], start[1], start[2], outer, discs, unseen, x0, y0, coarse, per_coarse)
     for model in range(2):
         limits = drive if model == 0 else worse
@@ -168,11 +168,11 @@ def command_is_safe(
                 slower = approach(v, 0.0, 0.0, limits.deceleration * dt)
                 wanted = curvature * slower if keep_turning else 0.0
                 x, y, theta, v, w = advance(x, y, theta, v, w, 0.0, wanted, dt, limits)
-            here = clearance_of(
-                x, y, theta, polygon, outer, discs, hits, nearest, mean, x0, y0, cell, per_cell, margin + 0.1
+            here = sure_clearance(
+                x, y, theta, polygon, outer, hits, nearest, mean, x0, y0, cell, per_cell, margin + 0.1
             )
             least = min(least, here)
-            if here < floor:
+            if here < min(margin + margin_s * abs(v), begin - 1e-3):
                 return False, least
             if seen_before and not seen_under(x, y, theta, outer, discs, unseen, x0, y0, coarse, per_coarse):
                 return False, least

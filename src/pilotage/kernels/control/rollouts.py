@@ -25,7 +25,8 @@ CERTAIN_S = 1.0
 class Price(NamedTuple):
     """What a rollout costs beside the time it takes; times in seconds.
 
-    ``near`` is paid per second at no clearance above ``margin`` and falls to 0 at ``soft`` (squared);
+    A footprint keeps ``margin`` plus ``margin_s`` times its speed. ``near`` is paid per second at no
+    clearance and falls to 0 at ``soft`` (squared);
     ``heading`` per radian between the last heading and the way down; ``turning`` per rad/s of change of the
     turn rate and step; ``reverse`` per second driven backwards; ``no_stop`` once where the last state cannot
     brake within what has been seen. ``people`` is paid per second at no distance from a moving body and falls
@@ -33,6 +34,7 @@ class Price(NamedTuple):
     """
 
     margin: float
+    margin_s: float
     soft: float
     near: float
     heading: float
@@ -78,8 +80,8 @@ def rollout_cost(
     """Cost of driving (N, 2) commands v, w of ``dt`` each from ``start`` (5,): seconds to the goal and more.
 
     ``movers`` (N, M, 3) are moving discs at the end of each step; into one of them foretold for the first
-        second counts as touching. A rollout that touches something, or enters unseen ground, costs 1,000 and more,
-        less the later it does.
+    second counts as touching. A rollout that touches something, or enters unseen ground, costs 1,000 and
+    more, less the later it does.
     """
     polygon, outer, discs = body.polygon, body.outer_m, body.discs
     hits, nearest, mean, unseen = ground.hits, ground.nearest, ground.mean, ground.unseen_m
@@ -90,17 +92,18 @@ def rollout_cost(
     steps = commands.shape[0]
     cost = 0.0
     begin = clearance_of(
-        x, y, theta, polygon, outer, discs, hits, nearest, mean, x0, y0, cell, per_cell, price.margin
+        x, y, theta, polygon, outer, discs, hits, nearest, mean, x0, y0, cell, per_cell, price.margin + 0.1
     )
     seen = seen_under(x, y, theta, outer, discs, unseen, x0, y0, coarse, per_coarse)
     for k in range(steps):
         before = w
         x, y, theta, v, w = advance(x, y, theta, v, w, commands[k, 0], commands[k, 1], dt, drive)
+        need = price.margin + price.margin_s * abs(v)
         here = clearance_of(
-            x, y, theta, polygon, outer, discs, hits, nearest, mean, x0, y0, cell, per_cell, price.margin
+            x, y, theta, polygon, outer, discs, hits, nearest, mean, x0, y0, cell, per_cell, need
         )
         # From within the margin the way out is allowed, not the way in.
-        if here < price.margin and here < begin - 1e-3:
+        if here < need and here < begin - 1e-3:
             return _hit_cost(k / steps, x, y, ground)
         if not seen_under(x, y, theta, outer, discs, unseen, x0, y0, coarse, per_coarse):
             if seen:
@@ -124,7 +127,8 @@ def rollout_cost(
         gx, gy = x - price.goal_x, y - price.goal_y
         if gx * gx + gy * gy < price.goal_m * price.goal_m:
             return float(cost)
-    if not braking_is_free(x, y, theta, v, w, drive.deceleration * price.trust, body, ground, price.margin):
+    need = price.margin + 0.5 * price.margin_s * abs(v)
+    if not braking_is_free(x, y, theta, v, w, drive.deceleration * price.trust, body, ground, need):
         cost += price.no_stop
     cost += togo_at(x, y, togo, x0, y0, coarse)
     down, slope = way_down(x, y, ground)

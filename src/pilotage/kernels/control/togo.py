@@ -22,21 +22,27 @@ BLOCKED_EXTRA_S = 2.0
 def coarse_clearance(
     nearest: CellIndex, mean: FloatArray, cells: int, x0: float, y0: float, coarse: float
 ) -> FloatArray:
-    """Distance (m, m) from the centre of every coarse cell to the nearest obstacle point."""
+    """Distance (m, m) to the nearest obstacle point from the fine cell of each coarse one that is farthest.
+
+    A gap's middle need not lie on a coarse cell's centre: its best fine cell is off it by half of one.
+    """
     n = nearest.shape[0]
     per = n // cells
     out = np.empty((cells, cells))
+    fine = coarse / per
     for row in range(cells):
-        y = y0 + (row + 0.5) * coarse
         for column in range(cells):
-            # The coarse centre is a corner of this fine cell: its nearest point is the centre's but for ties.
-            at = nearest[row * per + per // 2, column * per + per // 2]
-            if at == NONE:
-                out[row, column] = FAR_M
-                continue
-            dx = mean[at, 0] - x0 - (column + 0.5) * coarse
-            dy = mean[at, 1] - y
-            out[row, column] = math.sqrt(dx * dx + dy * dy)
+            best = 0.0
+            for r in range(row * per, (row + 1) * per):
+                for c in range(column * per, (column + 1) * per):
+                    at = nearest[r, c]
+                    if at == NONE:
+                        best = FAR_M * FAR_M
+                        continue
+                    dx = mean[at, 0] - x0 - (c + 0.5) * fine
+                    dy = mean[at, 1] - y0 - (r + 0.5) * fine
+                    best = max(best, dx * dx + dy * dy)
+            out[row, column] = math.sqrt(best)
     return out
 
 
@@ -45,23 +51,25 @@ def travel_speed(
     clearance: FloatArray,
     seen: BoolArray,
     blocked_m: float,
+    tight_m: float,
     easy_m: float,
+    crawl: float,
     slow: float,
     fast: float,
     unseen_share: float,
 ) -> FloatArray:
     """Speed (m, m) to reckon with in every cell, 0 where no footprint fits.
 
-    Rises from ``slow`` at a clearance of ``blocked_m`` to ``fast`` at ``easy_m``; in unseen cells
-    ``unseen_share`` of that.
+    ``crawl`` from a clearance of ``blocked_m`` on, where a footprint has to stand straight to pass; from
+    ``tight_m`` on it rises from ``slow`` to ``fast`` at ``easy_m``. In unseen cells ``unseen_share`` of that.
     """
     out = np.zeros_like(clearance)
     for row in range(clearance.shape[0]):
         for column in range(clearance.shape[1]):
-            room = clearance[row, column] - blocked_m
-            if room < 0.0:
+            if clearance[row, column] < blocked_m:
                 continue
-            speed = slow + (fast - slow) * min(1.0, room / (easy_m - blocked_m))
+            room = clearance[row, column] - tight_m
+            speed = crawl if room < 0.0 else slow + (fast - slow) * min(1.0, room / (easy_m - tight_m))
             out[row, column] = speed if seen[row, column] else speed * unseen_share
     return out
 

@@ -65,6 +65,40 @@ def sample_distance(
 
 
 @kernel
+def lower_by_circles(
+    distance: FloatArray, x0: float, y0: float, resolution: float, circles: FloatArray
+) -> None:
+    """Lower a field (ny, nx) in place to the distance from circles (M, 3), where these are nearer.
+
+    A circle can be nearer to a node of a block only if it is nearer to the block than the block's largest
+    distance: of a few walls' field most circles are passed over at most blocks.
+    """
+    ny, nx = distance.shape
+    near = np.empty_like(circles)
+    for row0 in range(0, ny, BLOCK):
+        row1 = min(ny, row0 + BLOCK)
+        for col0 in range(0, nx, BLOCK):
+            col1 = min(nx, col0 + BLOCK)
+            mx = x0 + 0.5 * (col0 + col1 - 1) * resolution
+            my = y0 + 0.5 * (row0 + row1 - 1) * resolution
+            reach = 0.5 * math.hypot(col1 - col0, row1 - row0) * resolution * (1.0 + 1e-9)
+            largest = distance[row0:row1, col0:col1].max()
+            m = 0
+            for i in range(circles.shape[0]):
+                away = math.hypot(mx - circles[i, 0], my - circles[i, 1]) - circles[i, 2]
+                if away - reach < largest:
+                    near[m] = circles[i]
+                    m += 1
+            for row in range(row0, row1):
+                y = y0 + row * resolution
+                for col in range(col0, col1):
+                    x = x0 + col * resolution
+                    for i in range(m):
+                        away = math.hypot(x - near[i, 0], y - near[i, 1]) - near[i, 2]
+                        distance[row, col] = min(distance[row, col], away)
+
+
+@kernel
 def interpolate_at(
     x: float, y: float, distance: FloatArray, x0: float, y0: float, resolution: float
 ) -> float:

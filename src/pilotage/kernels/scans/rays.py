@@ -47,6 +47,19 @@ def fan_ranges(
 
 
 @kernel
+def _beams_between(first: float, last: float, beams: int) -> tuple[int, int]:
+    """The range of beams from one place in beams to another; empty where either is no number.
+
+    Compared before they are cast: a cast of what is infinite or no number may be any index.
+    """
+    if not (first - BEAM_SLACK < beams and last + BEAM_SLACK >= 0.0):
+        return 0, 0
+    low = math.ceil(first - BEAM_SLACK) if first > BEAM_SLACK else 0
+    high = math.floor(last + BEAM_SLACK) + 1 if last + BEAM_SLACK < beams else beams
+    return low, high
+
+
+@kernel
 def table_fan_ranges(
     x: float,
     y: float,
@@ -106,8 +119,7 @@ def narrow_fan(
         # The second turn serves obstacles that begin before the first beam.
         for turn in range(2):
             start = offset - turn * TWO_PI
-            low = max(0, math.ceil(start * per_step - BEAM_SLACK))
-            high = min(beams, math.floor((start + width) * per_step + BEAM_SLACK) + 1)
+            low, high = _beams_between(start * per_step, (start + width) * per_step, beams)
             for k in range(low, high):
                 # On the line a + u e: range = (a x e) / (d x e), and a x e = a x b.
                 denominator = cosines[k] * ey - sines[k] * ex
@@ -123,8 +135,7 @@ def narrow_fan(
         offset = (math.atan2(cy, cx) - half) % TWO_PI
         for turn in range(2):
             start = offset - turn * TWO_PI
-            low = max(0, math.ceil(start * per_step - BEAM_SLACK))
-            high = min(beams, math.floor((start + 2.0 * half) * per_step + BEAM_SLACK) + 1)
+            low, high = _beams_between(start * per_step, (start + 2.0 * half) * per_step, beams)
             for k in range(low, high):
                 along = cx * cosines[k] + cy * sines[k]
                 across = cx * sines[k] - cy * cosines[k]

@@ -10,10 +10,11 @@ import numpy as np
 from pilotage.evaluation.judge import Judgement
 from pilotage.evaluation.metrics import METRICS
 from pilotage.evaluation.paired import Difference
+from pilotage.experiments.studies.groups import CellGroup
+from pilotage.experiments.studies.table import StudyTable
 from pilotage.report.markup import escape
 from pilotage.report.study.answer import SURE
 from pilotage.report.study.scales import Scale, p_value, scale_of
-from pilotage.report.study.view import Group, StudyView
 
 Row = tuple[str, Difference]
 PAIRED = (
@@ -33,24 +34,24 @@ APART = (
 HEADS = ("difference", "95 % interval", "median", "p, corrected", "effect")
 
 
-def comparisons_table(view: StudyView, judgement: Judgement) -> str:
+def comparisons_table(table: StudyTable, judgement: Judgement) -> str:
     """Differences on the same seeds, one folding table a metric; empty where nothing is compared."""
     parts = []
-    success = view.column("success")
-    told_apart = (*view.metrics, "success") if bool(np.any(success == 0.0)) else view.metrics
-    for group in view.groups:
+    success = table.column("success")
+    told_apart = (*table.metrics, "success") if bool(np.any(success == 0.0)) else table.metrics
+    for group in table.groups:
         tables = [
-            table
+            html
             for metric in told_apart
-            if (table := _table(metric, list(_rows(view, judgement, group, metric)), metric == view.primary))
+            if (html := _table(metric, list(_rows(table, judgement, group, metric)), metric == table.primary))
         ]
         if tables:
             base = group.baseline
-            against = "" if base is None else f" against {view.cells[base].text}"
-            title = f"{group.name}{',' if against else ''}" if len(view.groups) > 1 else "Every setting"
+            against = "" if base is None else f" against {table.cells[base].text}"
+            title = f"{group.name}{',' if against else ''}" if len(table.groups) > 1 else "Every setting"
             parts.append(f"<h3>{escape(f'{title}{against}')}</h3>{''.join(tables)}")
     for pair, found in judgement.contrasts.items():
-        rows = [(cell.text, found[cell.index]) for cell in view.cells if found[cell.index].n]
+        rows = [(cell.text, found[cell.index]) for cell in table.cells if found[cell.index].n]
         if rows:
             names = [METRICS.find(name).name for name in pair]
             parts.append(
@@ -61,17 +62,17 @@ def comparisons_table(view: StudyView, judgement: Judgement) -> str:
         return ""
     return (
         '<section id="comparisons"><h2><a href="#comparisons">Comparisons</a></h2>'
-        f"<p>{PAIRED if view.same_seeds else APART}</p>{''.join(parts)}</section>"
+        f"<p>{PAIRED if table.same_seeds else APART}</p>{''.join(parts)}</section>"
     )
 
 
-def _rows(view: StudyView, judgement: Judgement, group: Group, metric: str) -> Iterator[Row]:
+def _rows(table: StudyTable, judgement: Judgement, group: CellGroup, metric: str) -> Iterator[Row]:
     for index, base in zip(group.cells, group.baselines, strict=True):
         found = judgement.differences[metric][index]
         if base is None or found is None or found.n == 0:
             continue
-        against = "" if group.baseline is not None else f" against {view.known_as(base, group)}"
-        yield f"{view.cells[index].text}{against}", found
+        against = "" if group.baseline is not None else f" against {table.known_as(base, group)}"
+        yield f"{table.cells[index].text}{against}", found
 
 
 def _table(metric: str, rows: list[Row], shown: bool) -> str:

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from pilotage.evaluation.metrics import METRICS
+from pilotage.experiments.studies.table import StudyTable
 from pilotage.report import quantities
 from pilotage.report.markup import escape
 from pilotage.report.replay.section import SLUG
-from pilotage.report.study.view import StudyView
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,32 +31,32 @@ class Example:
     replay: bool = True
 
 
-def rows_to_show(view: StudyView) -> list[tuple[str, int]]:
+def rows_to_show(table: StudyTable) -> list[tuple[str, int]]:
     """The worst and the median trial by the metric that answers the question: (what it is, row).
 
     A trial that failed in the field is worse than any that succeeded.
     """
-    column = view.column(view.primary)
-    success = view.column("success")
-    badness = column if view.lower_is_better else -column
+    column = table.column(table.primary)
+    success = table.column("success")
+    badness = column if table.lower_is_better else -column
     badness = np.where(np.isfinite(badness), badness, np.inf)
     failed = np.where(np.isfinite(success) & (success < 0.5), 1.0, 0.0)
-    if not view.row.size:
+    if not table.row.size:
         return []
-    order = np.lexsort((view.row, badness, failed))
-    worst, median = int(view.row[order[-1]]), int(view.row[order[(len(order) - 1) // 2]])
+    order = np.lexsort((table.row, badness, failed))
+    worst, median = int(table.row[order[-1]]), int(table.row[order[(len(order) - 1) // 2]])
     return [("The worst trial", worst)] + ([("The median trial", median)] if median != worst else [])
 
 
-def describe(view: StudyView, row: int) -> str:
+def describe(table: StudyTable, row: int) -> str:
     """Which setting, which seed, what it gave."""
-    at = int(np.flatnonzero(view.row == row)[0])
-    metric = METRICS.find(view.primary)
-    value = quantities.measured(float(view.column(view.primary)[at]), metric.unit)
-    ended = "" if view.column("success")[at] != 0.0 else "; it failed"
-    cell = view.cells[int(view.cell[at])]
-    setting = cell.text if len(view.groups) == 1 else cell.name
-    return f"{setting}, seed {int(view.seed[at])}: {metric.name} {value}{ended}."
+    at = int(np.flatnonzero(table.row == row)[0])
+    metric = METRICS.find(table.primary)
+    value = quantities.measured(float(table.column(table.primary)[at]), metric.unit)
+    ended = "" if table.column("success")[at] != 0.0 else "; it failed"
+    cell = table.cells[int(table.cell[at])]
+    setting = cell.text if len(table.groups) == 1 else cell.name
+    return f"{setting}, seed {int(table.seed[at])}: {metric.name} {value}{ended}."
 
 
 def examples_section(examples: Sequence[Example]) -> str:

@@ -14,8 +14,20 @@ from matplotlib.ticker import NullLocator
 from pilotage.core.types import FloatArray
 from pilotage.evaluation.intervals import Summary
 from pilotage.evaluation.judge import Judgement
-from pilotage.report.study.panels import dots_of, drawable, is_wide, reference_line, scale_for, set_log, title
-from pilotage.report.study.view import Cell, Group, StudyView
+from pilotage.evaluation.metric import words_and_unit
+from pilotage.experiments.studies.cells import Cell
+from pilotage.experiments.studies.groups import CellGroup
+from pilotage.experiments.studies.table import StudyTable
+from pilotage.report.study.panels import (
+    dots_of,
+    drawable,
+    is_wide,
+    reference_line,
+    references,
+    scale_for,
+    set_log,
+    title,
+)
 from pilotage.report.style import (
     BLUE,
     GREEN,
@@ -42,21 +54,21 @@ MOST_TICKS = 12
 Line = tuple[str, list[Cell]]
 
 
-def factor_figures(view: StudyView, judgement: Judgement) -> list[Illustration]:
+def factor_figures(table: StudyTable, judgement: Judgement) -> list[Illustration]:
     """One figure a group and numeric factor, one panel a metric."""
     out = []
-    for number, group in enumerate(view.groups, start=1):
-        for factor in view.factors:
-            lines = lines_over(view, view.members(group), factor)
+    for number, group in enumerate(table.groups, start=1):
+        for factor in table.factors:
+            lines = lines_over(table, table.members(group), factor)
             if lines:
-                out.append(_factor_figure(view, judgement, group, number, factor, lines))
+                out.append(_factor_figure(table, judgement, group, number, factor, lines))
     return out
 
 
-def lines_over(view: StudyView, cells: Sequence[Cell], factor: str) -> list[Line]:
+def lines_over(table: StudyTable, cells: Sequence[Cell], factor: str) -> list[Line]:
     """The cells along a numeric factor, one line for each combination of the other factors."""
     numeric = [cell for cell in cells if _is_number(cell.values.get(factor))]
-    others = [f for f in view.factors if f != factor]
+    others = [f for f in table.factors if f != factor]
     if any(_is_number(cell.values.get(f)) for f in others for cell in numeric):
         # What a named configuration amounts to is in its values; its name would set every cell apart.
         named = {f for f in others if len({str(c.values.get(f)) for c in numeric}) == len(numeric)}
@@ -69,16 +81,16 @@ def lines_over(view: StudyView, cells: Sequence[Cell], factor: str) -> list[Line
     differing = [i for i in range(len(others)) if len({key[i] for key in kept}) > 1]
     if len(kept) == 1:
         return [("mean with its 95 % interval", next(iter(kept.values())))]
-    names = [", ".join(_said(view, others[i], key[i]) for i in differing) for key in kept]
+    names = [", ".join(_said(table, others[i], key[i]) for i in differing) for key in kept]
     return list(zip(names, kept.values(), strict=True))[: len(COLOURS)]
 
 
-def _said(view: StudyView, factor: str, value: object) -> str:
+def _said(table: StudyTable, factor: str, value: object) -> str:
     """A factor's value with its name and its unit; a level or a configuration by its own name."""
     if not _is_number(value):
         return str(value)
-    unit = view.unit(factor)
-    return f"{view.short(factor)} {value:g}{f' {unit}' if unit else ''}"
+    unit = table.unit(factor)
+    return f"{words_and_unit(factor)[0]} {value:g}{f' {unit}' if unit else ''}"
 
 
 def _is_number(value: object) -> bool:
@@ -86,14 +98,14 @@ def _is_number(value: object) -> bool:
 
 
 def _factor_figure(
-    view: StudyView,
+    table: StudyTable,
     judgement: Judgement,
-    group: Group,
+    group: CellGroup,
     number: int,
     factor: str,
     lines: Sequence[Line],
 ) -> Illustration:
-    metrics = drawable(view, [cell for _, cells in lines for cell in cells])
+    metrics = drawable(table, [cell for _, cells in lines for cell in cells])
     rows = math.ceil(len(metrics) / PANELS_ACROSS)
     total = TOP_PT + rows * PANEL_PT + (rows - 1) * GAP_Y_PT + BOTTOM_PT
     width = (WIDTH_PT - LEFT_PT - RIGHT_PT - GAP_X_PT * (PANELS_ACROSS - 1)) / PANELS_ACROSS
@@ -103,14 +115,14 @@ def _factor_figure(
         left = LEFT_PT + across * (width + GAP_X_PT)
         bottom = total - TOP_PT - PANEL_PT - line * (PANEL_PT + GAP_Y_PT)
         axes = figure.add_axes((left / WIDTH_PT, bottom / total, width / WIDTH_PT, PANEL_PT / total))
-        _factor_panel(axes, view, judgement, factor, metric, lines)
+        _factor_panel(axes, table, judgement, factor, metric, lines)
     keys = [Key(label, COLOURS[i % len(COLOURS)]) for i, (label, _) in enumerate(lines)]
     if any(metric in cell.published for _, cells in lines for cell in cells for metric in metrics):
         keys.append(Key("published", ORANGE, "spot"))
-    keys += [Key(text, MUTED, "dash") for metric, (text, _) in view.reference.items() if metric in metrics]
-    alone = len(view.groups) == 1 or group.name == factor
+    keys += [Key(text, MUTED, "dash") for metric, text in references(table).items() if metric in metrics]
+    alone = len(table.groups) == 1 or group.name == factor
     slug = f"factor-{'' if alone else f'{number}-'}{''.join(c if c.isalnum() else '-' for c in factor)}"
-    short = view.short(factor)
+    short = words_and_unit(factor)[0]
     alt = f"The study's metrics over {short}: means with 95 % intervals."
     caption = (
         f"Means over the trials at each {short}, with 95 % bootstrap intervals; small dots are single trials."
@@ -120,20 +132,20 @@ def _factor_figure(
 
 
 def _factor_panel(
-    axes: Axes, view: StudyView, judgement: Judgement, factor: str, metric: str, lines: Sequence[Line]
+    axes: Axes, table: StudyTable, judgement: Judgement, factor: str, metric: str, lines: Sequence[Line]
 ) -> None:
     """One metric over one factor."""
     everything = [cell for _, cells in lines for cell in cells]
     scale = scale_for(judgement, metric, everything)
     title(axes, metric, scale)
-    unit = view.unit(factor)
-    axes.set_xlabel(view.short(factor) + (f" [{unit}]" if unit else ""), labelpad=3.0)
+    unit = table.unit(factor)
+    axes.set_xlabel(words_and_unit(factor)[0] + (f" [{unit}]" if unit else ""), labelpad=3.0)
     found = [judgement.summaries[metric][cell.index] for cell in everything]
     if is_wide([summary.mean for summary in found], [summary.smallest for summary in found]):
         set_log(axes, "y")
     places = _Places([_value(cell, factor) for cell in everything])
     places.prepare(axes)
-    column = view.column(metric) * scale.times
+    column = table.column(metric) * scale.times
     for number, (_, cells) in enumerate(lines):
         colour = COLOURS[number % len(COLOURS)]
         ordered = sorted(cells, key=lambda cell: _value(cell, factor))
@@ -141,7 +153,7 @@ def _factor_panel(
         aside = 0.1 * (number - 0.5 * (len(lines) - 1))
         at = [places.of(_value(cell, factor), aside) for cell in ordered]
         for cell in ordered:
-            dots = column[view.cell == cell.index]
+            dots = column[table.cell == cell.index]
             x = places.of(_value(cell, factor), aside - 0.06)
             axes.plot(
                 np.full(dots.shape, x),
@@ -160,11 +172,11 @@ def _factor_panel(
         ]
         if published:
             axes.plot(*np.array(published).T, "D", color=ORANGE, markersize=4.0, linestyle="none", zorder=3.0)
-    reference_line(axes, view, metric, scale, upright=False)
+    reference_line(axes, table, metric, scale, upright=False)
 
 
 def _value(cell: Cell, factor: str) -> float:
-    return float(cell.values[factor])  # type: ignore[arg-type]
+    return float(cell.values[factor])
 
 
 class _Places:

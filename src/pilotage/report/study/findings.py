@@ -8,26 +8,28 @@ from collections import Counter
 from pilotage.evaluation.judge import Judgement, Rate
 from pilotage.evaluation.metrics import METRICS
 from pilotage.evaluation.pooled import FEWEST_RUNS, IDEALS, pool
+from pilotage.experiments.studies.cells import Cell
+from pilotage.experiments.studies.groups import CellGroup
+from pilotage.experiments.studies.table import StudyTable
 from pilotage.report.study.scales import p_value, points, told
-from pilotage.report.study.view import Cell, Group, StudyView
 
 FEW = 3
 """So many settings are named one by one; of more, their number."""
 
 
-def facts(view: StudyView, judgement: Judgement, group: Group) -> list[str]:
+def facts(table: StudyTable, judgement: Judgement, group: CellGroup) -> list[str]:
     """Sentences about a group, each only where the study can tell."""
     found = [
-        _success(view, judgement, group),
-        *_contrasts(view, judgement, group),
-        _consistency(view, group),
-        _published(view, judgement, group),
+        _success(table, judgement, group),
+        *_contrasts(table, judgement, group),
+        _consistency(table, group),
+        _published(table, judgement, group),
     ]
     return [text for text in found if text]
 
 
-def _success(view: StudyView, judgement: Judgement, group: Group) -> str:
-    rated = [(cell, judgement.rates[cell.index]) for cell in view.members(group)]
+def _success(table: StudyTable, judgement: Judgement, group: CellGroup) -> str:
+    rated = [(cell, judgement.rates[cell.index]) for cell in table.members(group)]
     rated = [(cell, rate) for cell, rate in rated if rate.trials]
     if not rated:
         return ""
@@ -45,11 +47,11 @@ def rate_text(rate: Rate) -> str:
     return f"{rate.successes} of {rate.trials} ({100.0 * rate.low:.0f} to {100.0 * rate.high:.0f}\u00a0%)"
 
 
-def _contrasts(view: StudyView, judgement: Judgement, group: Group) -> list[str]:
+def _contrasts(table: StudyTable, judgement: Judgement, group: CellGroup) -> list[str]:
     out = []
     for (first, other), found in judgement.contrasts.items():
         parts = []
-        for cell in view.members(group):
+        for cell in table.members(group):
             change = found[cell.index]
             if not change.n:
                 continue
@@ -69,14 +71,14 @@ def _contrasts(view: StudyView, judgement: Judgement, group: Group) -> list[str]
     return [text[:1].upper() + text[1:] for text in out]
 
 
-def _consistency(view: StudyView, group: Group) -> str:
+def _consistency(table: StudyTable, group: CellGroup) -> str:
     parts = []
     for metric in IDEALS:
-        if metric not in view.metrics:
+        if metric not in table.metrics:
             continue
         verdicts = {
-            cell.text: pool(view.column(metric)[view.cell == cell.index], IDEALS[metric])
-            for cell in view.members(group)
+            cell.text: pool(table.column(metric)[table.cell == cell.index], IDEALS[metric])
+            for cell in table.members(group)
         }
         known = {name: entry.verdict for name, entry in verdicts.items() if entry.n >= FEWEST_RUNS}
         if not known:
@@ -91,9 +93,9 @@ def _consistency(view: StudyView, group: Group) -> str:
     return f"Consistency of the settings: {'; '.join(parts)}." if parts else ""
 
 
-def _published(view: StudyView, judgement: Judgement, group: Group) -> str:
-    metric = view.primary
-    cells: list[Cell] = [cell for cell in view.members(group) if metric in cell.published]
+def _published(table: StudyTable, judgement: Judgement, group: CellGroup) -> str:
+    metric = table.primary
+    cells: list[Cell] = [cell for cell in table.members(group) if metric in cell.published]
     known = [(cell.published[metric], judgement.summaries[metric][cell.index]) for cell in cells]
     known = [(value, summary) for value, summary in known if math.isfinite(summary.mean)]
     if not known:

@@ -12,9 +12,10 @@ from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from pilotage.evaluation.judge import Judgement
 from pilotage.evaluation.metrics import METRICS
+from pilotage.experiments.studies.cells import Cell
+from pilotage.experiments.studies.table import StudyTable
 from pilotage.report import quantities
 from pilotage.report.study.scales import Scale, scale_of
-from pilotage.report.study.view import Cell, StudyView
 from pilotage.report.style import MUTED
 
 MOST = 12
@@ -30,11 +31,11 @@ def dots_of(trials: int) -> dict[str, Any]:
     return {"marker": "o", "markersize": 2.6 if few else 1.5, "markeredgewidth": 0.0, "linestyle": "none"}
 
 
-def drawable(view: StudyView, cells: Iterable[Cell]) -> list[str]:
+def drawable(table: StudyTable, cells: Iterable[Cell]) -> list[str]:
     """Metrics that trials of these cells gave a value of."""
     chosen = list(cells)
-    names = dict.fromkeys([view.primary, *view.metrics])
-    return [metric for metric in names if view.worth_showing(metric, chosen)][:MOST]
+    names = dict.fromkeys([table.primary, *table.metrics])
+    return [metric for metric in names if table.worth_showing(metric, chosen)][:MOST]
 
 
 def scale_for(judgement: Judgement, metric: str, cells: Iterable[Cell]) -> Scale:
@@ -68,10 +69,17 @@ def set_log(axes: Axes, which: Literal["x", "y"]) -> None:
     axis.set_minor_formatter(NullFormatter())
 
 
-def reference_line(axes: Axes, view: StudyView, metric: str, scale: Scale, *, upright: bool) -> None:
+def reference_line(axes: Axes, table: StudyTable, metric: str, scale: Scale, *, upright: bool) -> None:
     """Draw what the metric is held against, where there is such."""
-    if metric not in view.reference:
+    known = table.study.definition.reference
+    if metric not in known:
         return
-    at = view.reference[metric][1] * scale.times
+    at = known[metric].value * scale.times
     draw = axes.axvline if upright else axes.axhline
     draw(at, color=MUTED, linestyle=(0, (5, 3)), linewidth=1.0, zorder=2.0)
+
+
+def references(table: StudyTable) -> dict[str, str]:
+    """By metric, what it is held against in words."""
+    known = table.study.definition.reference
+    return {metric: f"{entry.name}, {entry.value:g}" for metric, entry in known.items()}

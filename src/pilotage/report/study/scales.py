@@ -7,7 +7,6 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from statistics import median
 
-from pilotage.evaluation.metric import words_and_unit
 from pilotage.evaluation.metrics import METRICS
 from pilotage.report import quantities
 
@@ -118,11 +117,5 @@ def p_value(value: float, letter: str = "") -> str:
     return f"{letter}{'= ' if letter else ''}{value:.3f}"
 
 
-_UNWRITTEN = {"count": "", "ratio": "", "deg": "°"}
-"""Units of metrics that are written otherwise, or not at all."""
-
-
-def key_and_unit(key: str) -> tuple[str, str]:
-    """A parameter's key as words, and its unit by its ending: ``turning radius``, ``m``."""
-    words, unit = words_and_unit(key)
-    return words, _UNWRITTEN.get(unit, unit)
+_UNWRITTEN = {"count": "", "ratio": ""}
+"""Units of metrics that are not written."""

@@ -10,9 +10,20 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from pilotage.evaluation.judge import Judgement
+from pilotage.experiments.studies.cells import Cell
+from pilotage.experiments.studies.groups import CellGroup
+from pilotage.experiments.studies.table import StudyTable
 from pilotage.report.study.factor_figures import lines_over
-from pilotage.report.study.panels import dots_of, drawable, is_wide, reference_line, scale_for, set_log, title
-from pilotage.report.study.view import Cell, Group, StudyView
+from pilotage.report.study.panels import (
+    dots_of,
+    drawable,
+    is_wide,
+    reference_line,
+    references,
+    scale_for,
+    set_log,
+    title,
+)
 from pilotage.report.style import BLUE, FAINT, MUTED, ORANGE, WIDTH_PT, Illustration, Key, render
 
 PANELS_ACROSS = 2
@@ -21,24 +32,26 @@ ROW_PT, LETTER_PT = 17.0, 5.3
 MAX_LABEL = 44
 
 
-def settings_figures(view: StudyView, judgement: Judgement) -> list[Illustration]:
+def settings_figures(table: StudyTable, judgement: Judgement) -> list[Illustration]:
     """One figure a group whose settings differ in more than the numbers that the other figures are over."""
-    several = len(view.groups) > 1
+    several = len(table.groups) > 1
     out = []
-    for number, group in enumerate(view.groups, start=1):
-        cells = view.members(group)
-        drawn = {cell.index for f in view.factors for _, line in lines_over(view, cells, f) for cell in line}
-        if len(cells) < 2 or drawn.issuperset(group.cells) or not drawable(view, cells):
+    for number, group in enumerate(table.groups, start=1):
+        cells = table.members(group)
+        drawn = {
+            cell.index for f in table.factors for _, line in lines_over(table, cells, f) for cell in line
+        }
+        if len(cells) < 2 or drawn.issuperset(group.cells) or not drawable(table, cells):
             continue
         slug = f"settings-{number}" if several else "settings"
         name = f"Side by side: {group.name}" if several else "Settings side by side"
-        out.append(_figure(view, judgement, group, slug, name))
+        out.append(_figure(table, judgement, group, slug, name))
     return out
 
 
-def _figure(view: StudyView, judgement: Judgement, group: Group, slug: str, name: str) -> Illustration:
-    cells = view.members(group)
-    metrics = drawable(view, cells)
+def _figure(table: StudyTable, judgement: Judgement, group: CellGroup, slug: str, name: str) -> Illustration:
+    cells = table.members(group)
+    metrics = drawable(table, cells)
     panel = len(cells) * ROW_PT
     height = TOP_PT + panel + BOTTOM_PT
     longest = max(len(cell.text) for cell in cells)
@@ -52,20 +65,20 @@ def _figure(view: StudyView, judgement: Judgement, group: Group, slug: str, name
         left = label_pt + across * (width + GAP_X_PT)
         bottom = total - line * height - TOP_PT - panel
         axes = figure.add_axes((left / WIDTH_PT, bottom / total, width / WIDTH_PT, panel / total))
-        _panel(axes, view, judgement, metric, cells, labelled=across == 0)
+        _panel(axes, table, judgement, metric, cells, labelled=across == 0)
     keys = [Key("mean with its 95 % interval", BLUE, "spot"), Key("a trial", FAINT, "spot")]
     if any(metric in cell.published for cell in cells for metric in metrics):
         keys.append(Key("published", ORANGE, "spot"))
-    keys += [Key(text, MUTED, "dash") for metric, (text, _) in view.reference.items() if metric in metrics]
-    alt = f"The settings of the study {view.name}, {len(cells)} of them, with their trials and their means."
+    keys += [Key(text, MUTED, "dash") for metric, text in references(table).items() if metric in metrics]
+    alt = f"The {len(cells)} settings of the study {table.study.name}, with their trials and their means."
     caption = "Each setting's trials and their mean with its 95 % bootstrap interval."
-    if view.same_seeds:
+    if table.same_seeds:
         caption += " Settings share their seeds: comparisons of pairs are sharper than overlapping intervals."
     return Illustration(slug, name, alt, caption, render(figure, slug, alt), tuple(keys))
 
 
 def _panel(
-    axes: Axes, view: StudyView, judgement: Judgement, metric: str, cells: list[Cell], *, labelled: bool
+    axes: Axes, table: StudyTable, judgement: Judgement, metric: str, cells: list[Cell], *, labelled: bool
 ) -> None:
     """One metric in all settings, one row each, the first on top."""
     scale = scale_for(judgement, metric, cells)
@@ -75,10 +88,10 @@ def _panel(
         set_log(axes, "x")
     else:
         axes.xaxis.set_major_locator(MaxNLocator(5))
-    column, count = view.column(metric) * scale.times, len(cells)
+    column, count = table.column(metric) * scale.times, len(cells)
     for row, (cell, summary) in enumerate(zip(cells, found, strict=True)):
         y = count - 1 - row
-        trials = column[view.cell == cell.index]
+        trials = column[table.cell == cell.index]
         spread = np.linspace(-0.22, 0.22, trials.size) if trials.size > 1 else np.zeros(trials.size)
         axes.plot(trials, y + spread, color=FAINT, alpha=0.8, **dots_of(trials.size))
         if math.isfinite(summary.mean):
@@ -90,7 +103,7 @@ def _panel(
         if metric in cell.published:
             at = cell.published[metric] * scale.times
             axes.plot([at], [y], "D", color=ORANGE, markersize=4.5, zorder=3.2)
-    reference_line(axes, view, metric, scale, upright=True)
+    reference_line(axes, table, metric, scale, upright=True)
     axes.set_ylim(-0.6, count - 0.4)
     names = [_clipped(cell.text) for cell in reversed(cells)] if labelled else [""] * count
     axes.set_yticks(range(count), names)

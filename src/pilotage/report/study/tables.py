@@ -9,50 +9,53 @@ from pilotage.evaluation.intervals import COVERAGE, Summary
 from pilotage.evaluation.judge import Judgement, Rate
 from pilotage.evaluation.metrics import METRICS
 from pilotage.evaluation.pooled import IDEALS, Pooled, pool
+from pilotage.experiments.studies.cells import Cell
+from pilotage.experiments.studies.groups import CellGroup
+from pilotage.experiments.studies.table import StudyTable
 from pilotage.report import quantities
 from pilotage.report.markup import escape
 from pilotage.report.study.answer import best_cell
 from pilotage.report.study.scales import Scale, scale_of
-from pilotage.report.study.view import Cell, Group, StudyView
 
 
-def cells_table(view: StudyView, judgement: Judgement) -> str:
+def cells_table(table: StudyTable, judgement: Judgement) -> str:
     """Mean and interval of each metric in each setting, beside what was published; all numbers folded."""
-    parts = [_group_table(view, judgement, group) for group in view.groups]
-    published = any(cell.published for cell in view.cells)
+    parts = [_group_table(table, judgement, group) for group in table.groups]
+    published = any(cell.published for cell in table.cells)
     return (
         '<section id="cells"><h2><a href="#cells">Every setting</a></h2>'
         "<p>Means over the trials; below each its 95 % bootstrap interval, the variance in the square of the "
         f"column&#x27;s unit{', and what was published' if published else ''}. The best mean of a column is "
-        f"bold. Success with its 95 % Wilson interval.{_of_few(view)}</p>{''.join(parts)}</section>"
+        f"bold. Success with its 95 % Wilson interval.{_of_few(table)}</p>{''.join(parts)}</section>"
     )
 
 
-def _of_few(view: StudyView) -> str:
+def _of_few(table: StudyTable) -> str:
     """What the intervals of a handful of trials are worth."""
-    held = COVERAGE.get(view.trials_per_cell)
+    trials = table.study.definition.trials
+    held = COVERAGE.get(trials)
     if held is None:
         return ""
     return (
-        f" Of {view.trials_per_cell} trials a bootstrap interval is too short: it holds the true mean in "
+        f" Of {trials} trials a bootstrap interval is too short: it holds the true mean in "
         f"about {100.0 * held:.0f} % of such studies."
     )
 
 
-def _group_table(view: StudyView, judgement: Judgement, group: Group) -> str:
-    given = [m for m in view.metrics if any(judgement.summaries[m][i].n for i in group.cells)]
-    metrics = [m for m in given if view.worth_showing(m, view.members(group))]
-    scales = {m: _scale(judgement, m, view.members(group)) for m in metrics}
+def _group_table(table: StudyTable, judgement: Judgement, group: CellGroup) -> str:
+    given = [m for m in table.metrics if any(judgement.summaries[m][i].n for i in group.cells)]
+    metrics = [m for m in given if table.worth_showing(m, table.members(group))]
+    scales = {m: _scale(judgement, m, table.members(group)) for m in metrics}
     best = {
         m: best_cell(judgement, m, lower, group.cells)
         for m in metrics
-        if (lower := _lower(view, judgement, m, group)) is not None and _differ(judgement, m, group)
+        if (lower := _lower(table, judgement, m, group)) is not None and _differ(judgement, m, group)
     }
     head = "".join(
         f'<th scope="col" class="value">{escape(METRICS.find(m).name)}{scales[m].label}</th>' for m in metrics
     )
     rows = []
-    for cell in view.members(group):
+    for cell in table.members(group):
         parts = [
             f'<th scope="row">{escape(cell.text)}</th><td class="value">{_rate(judgement.rates[cell.index])}'
         ]
@@ -66,11 +69,11 @@ def _group_table(view: StudyView, judgement: Judgement, group: Group) -> str:
             for m in metrics
         ]
         rows.append(f"<tr>{'</td>'.join(parts)}</td></tr>")
-    caption = f"<h3>{escape(group.name)}</h3>" if len(view.groups) > 1 else ""
+    caption = f"<h3>{escape(group.name)}</h3>" if len(table.groups) > 1 else ""
     return (
         f'{caption}<div class="wide" tabindex="0"><table class="cells"><thead><tr>'
         f'<th scope="col">setting</th><th scope="col" class="value">success</th>{head}</tr></thead>'
-        f"<tbody>{''.join(rows)}</tbody></table></div>{_all_numbers(view, judgement, group, given)}"
+        f"<tbody>{''.join(rows)}</tbody></table></div>{_all_numbers(table, judgement, group, given)}"
     )
 
 
@@ -87,14 +90,14 @@ def _entry(summary: Summary, scale: Scale, best: bool, published: float | None) 
     return f'<td class="value plain">{f"<b>{mean}</b>" if best else mean}{small}'
 
 
-def _all_numbers(view: StudyView, judgement: Judgement, group: Group, metrics: Sequence[str]) -> str:
+def _all_numbers(table: StudyTable, judgement: Judgement, group: CellGroup, metrics: Sequence[str]) -> str:
     """Per metric the count, median, variance and extremes as well, folded away."""
     rows = []
     for metric in metrics:
-        scale = _scale(judgement, metric, view.members(group))
+        scale = _scale(judgement, metric, table.members(group))
         head = f"{METRICS.find(metric).name}{scale.label}, variance in its square"
         rows.append(f'<tr class="group"><th colspan="8" scope="rowgroup">{escape(head)}</th></tr>')
-        for cell in view.members(group):
+        for cell in table.members(group):
             found = judgement.summaries[metric][cell.index]
             digits = scale.decimals(found.mean, found.low, found.high)
             numbers = (found.mean, found.low, found.high, found.median, found.smallest, found.largest)
@@ -104,7 +107,7 @@ def _all_numbers(view: StudyView, judgement: Judgement, group: Group, metrics: S
             rows.append(f'<tr><th scope="row">{escape(cell.text)}</th>{values}</tr>')
     names = ("n", "mean", "from", "to", "median", "variance", "smallest", "largest")
     heads = "".join(f'<th scope="col" class="value">{name}</th>' for name in names)
-    what = f" of {group.name}" if len(view.groups) > 1 else ""
+    what = f" of {group.name}" if len(table.groups) > 1 else ""
     return (
         f"<details><summary>All numbers{escape(what)}: count, median, variance, extremes</summary>"
         f'<div class="wide" tabindex="0"><table class="cells"><thead><tr><th scope="col">setting</th>{heads}'
@@ -112,14 +115,14 @@ def _all_numbers(view: StudyView, judgement: Judgement, group: Group, metrics: S
     )
 
 
-def consistency_table(view: StudyView) -> str:
+def consistency_table(table: StudyTable) -> str:
     """NEES and NIS pooled over the runs of each setting; empty where the study reports neither."""
-    shown = [metric for metric in IDEALS if metric in view.metrics]
+    shown = [metric for metric in IDEALS if metric in table.metrics]
     tables = []
-    for group in view.groups:
+    for group in table.groups:
         rows = []
-        for cell in view.members(group):
-            pooled = [pool(view.column(m)[view.cell == cell.index], IDEALS[m]) for m in shown]
+        for cell in table.members(group):
+            pooled = [pool(table.column(m)[table.cell == cell.index], IDEALS[m]) for m in shown]
             if any(entry.n for entry in pooled):
                 rows.append(
                     f'<tr><th scope="row">{escape(cell.text)}</th>{"".join(map(_pooled, pooled))}</tr>'
@@ -130,7 +133,7 @@ def consistency_table(view: StudyView) -> str:
                 '<th scope="col">verdict</th>'
                 for m in shown
             )
-            caption = f"<h3>{escape(group.name)}</h3>" if len(view.groups) > 1 else ""
+            caption = f"<h3>{escape(group.name)}</h3>" if len(table.groups) > 1 else ""
             tables.append(
                 f'{caption}<div class="wide" tabindex="0"><table class="cells"><thead><tr>'
                 f'<th scope="col">setting</th>{head}</tr></thead><tbody>{"".join(rows)}</tbody></table></div>'
@@ -155,14 +158,14 @@ def _pooled(entry: Pooled) -> str:
     return f'<td class="value plain">{scale.write(entry.mean, digits)}{below}</td><td>{entry.verdict}</td>'
 
 
-def failures_table(view: StudyView) -> str:
+def failures_table(table: StudyTable) -> str:
     """Trials that gave no numbers, with the reason; empty where there are none."""
-    if not view.failures:
+    if not table.broken:
         return ""
     rows = "".join(
-        f'<tr><td class="value">{failure.row}</td><td>{escape(view.cells[failure.cell].name)}</td>'
+        f'<tr><td class="value">{failure.row}</td><td>{escape(table.cells[failure.cell].name)}</td>'
         f'<td class="value">{failure.seed}</td><td>{escape(failure.reason)}</td></tr>'
-        for failure in view.failures
+        for failure in table.broken
     )
     return (
         '<section id="failures"><h2><a href="#failures">Trials that broke</a></h2>'
@@ -178,17 +181,17 @@ def _scale(judgement: Judgement, metric: str, cells: Sequence[Cell]) -> Scale:
     return scale_of(metric, [judgement.summaries[metric][cell.index].mean for cell in cells])
 
 
-def _lower(view: StudyView, judgement: Judgement, metric: str, group: Group) -> bool | None:
+def _lower(table: StudyTable, judgement: Judgement, metric: str, group: CellGroup) -> bool | None:
     """Whether less of a metric is better in a group; None where neither is."""
-    if metric == view.primary:
-        return view.lower_is_better
+    if metric == table.primary:
+        return table.lower_is_better
     rates = [judgement.rates[index] for index in group.cells]
     if METRICS.find(metric).whole_runs and any(rate.successes < rate.trials for rate in rates):
         return None  # a trial that broke off early was not quick
     return METRICS.find(metric).less_is_better
 
 
-def _differ(judgement: Judgement, metric: str, group: Group) -> bool:
+def _differ(judgement: Judgement, metric: str, group: CellGroup) -> bool:
     means = [judgement.summaries[metric][index].mean for index in group.cells]
     finite = [mean for mean in means if math.isfinite(mean)]
     return len(finite) > 1 and min(finite) < max(finite)

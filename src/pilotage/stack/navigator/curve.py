@@ -71,7 +71,7 @@ class CurveNavigator:
         self._status, self._reason = StackStatus.RUNNING, ""
         self._references: FloatArray = np.zeros((0, 4))
         planner = cast(GridPlanner, parts.planner)
-        route = route_over_cells(chart, planner, config.cost_map, task.initial.pose, goal, NAME)
+        route = route_over_cells(chart, planner, config.cost_map, self.belief.pose, goal, NAME)
         journal.planning_time_s += route.result.planning_time_s
         journal.result("route", lambda: route)
         path = route.result.path

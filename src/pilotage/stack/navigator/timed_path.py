@@ -52,6 +52,10 @@ def laid_out(
             continue
         columns = states[first : last + 1, 0], states[first : last + 1, 1], heading[first : last + 1]
         curvature = sign[first] * turned[first:last] / np.maximum(length[first:last], 1e-9)
+        if len(s) == 2:  # at rest at both ends: it moves only with a state between them
+            middle_s = np.array([0.0, 0.5 * s[1], s[1]])
+            columns = tuple(np.interp(middle_s, s, column) for column in columns)
+            s, curvature = middle_s, np.repeat(curvature, 2)
         x, y, theta = (float(column[0]) for column in columns)
         first_w = sign[first] * math.copysign(1e-3, curvature[0]) if abs(curvature[0]) > ABRUPT_PER_M else 0.0
         rows += [[x, y, wrap_to_pi(theta), 0.0, first_w]] * round(pause_s / dt_s)
@@ -95,7 +99,10 @@ def _timed(
     t_s = np.concatenate([[0.0], np.cumsum(2.0 * np.diff(s) / np.maximum(v[:-1] + v[1:], 1e-3))])
     count = max(1, math.ceil(float(t_s[-1]) / dt_s))
     t = np.minimum(np.arange(count + 1) * dt_s, t_s[-1])
-    driven = np.interp(t, t_s, s)
+    # Between two states the acceleration is constant, the speed is not.
+    k = np.clip(np.searchsorted(t_s, t, side="right") - 1, 0, len(s) - 2)
+    spent = t - t_s[k]
+    driven = s[k] + spent * (v[k] + 0.5 * spent * (v[k + 1] - v[k]) / np.diff(t_s)[k])
     px, py, ptheta = (np.interp(driven, s, column) for column in columns)
     speed = sign * np.diff(driven) / dt_s
     # The mean curvature around each moment is the ramp that wheels of this rate can follow.

@@ -142,7 +142,8 @@ def _states(
     while parents[node, 0] >= 0.0:
         steps.append((parents[node, 1], parents[node, 2] / turning_m))
         node = int(parents[node, 0])
-    words = [np.array([step]) for step in reversed(steps)] + [word]
+    # Piece by piece: where the curvature or the direction changes there is a state.
+    words = [np.array([step]) for step in reversed(steps)] + [piece[None, :] for piece in word]
     x, y, theta = start.tolist()
     states, total = [start[None, :]], 0.0
     for part in words:

@@ -8,16 +8,22 @@ import numpy as np
 from pydantic import Field
 
 from pilotage.core.config import Config
-from pilotage.core.types import FloatArray, Twist
+from pilotage.core.types import STOP, FloatArray, Twist
+from pilotage.kernels.control.band import path_distances
 from pilotage.kernels.control.commands_sent import scaled
 from pilotage.kernels.control.motion_limits import Drive, command_is_safe
+from pilotage.kernels.control.movers import movers_clearance
 from pilotage.kernels.control.rollouts import Price, follow_path, rollout_cost, rollout_costs, weighted_mean
+from pilotage.kernels.control.togo import UNREACHED_S, togo_at
 from pilotage.sensors.sensor import NonNegative, Positive
+from pilotage.stack.control.local.narrow_passage import NarrowPassage, find_narrow_passage
 from pilotage.stack.control.local.role import LOCAL_CONTROLLERS, LocalView
 from pilotage.stack.control.local.rolling import RollingConfig, RollingGround, Scene
 from pilotage.stack.control.local.rolling_step import rolling_step, what_it_does
 from pilotage.stack.control.local.sampling import NoiseBank, later
 
+TRIED_M = 0.3
+"""Two narrow places nearer to each other than this are one."""
 Share = Field(default=0.65, gt=0.0, le=1.0)
 SPEEDS = (1.0, 0.7, 0.45, 0.25)
 LOOKS = ((0.3, 0.1), (0.45, 0.3))
@@ -33,9 +39,11 @@ class GapHorizonConfig(Config):
     speed_std_m_s: Positive = 0.5
     turn_std_rad_s: Positive = 1.0
     temperature_s: Positive = 0.05
-    margin_m: NonNegative = 0.04
-    """Between footprint and obstacle points, in plans."""
-    least_margin_m: NonNegative = 0.025
+    margin_m: NonNegative = 0.015
+    margin_s: NonNegative = 0.02
+    """Between footprint and obstacle points, in plans: at rest, and more per m/s."""
+    least_margin_m: NonNegative = 0.01
+    least_margin_s: NonNegative = 0.015
     """The same in the last check of a command."""
     soft_m: Positive = 0.15
     near_cost: NonNegative = 1.0
@@ -47,6 +55,13 @@ class GapHorizonConfig(Config):
     """Share of the data sheet's braking and turning that is relied on."""
     people_cost: NonNegative = 1.5
     comfort_m: Positive = 0.5
+    stuck_s: Positive = 2.0
+    stuck_m: Positive = 0.15
+    """Where it came no farther than this in that time, it tries the narrowest place ahead straight; where it
+    has tried that, it closes the place and looks elsewhere."""
+    close_ahead_m: Positive = 1.2
+    stand_m: NonNegative = 0.1
+    """A robot at rest does not start with a moving body nearer than this."""
     check_step_s: Positive = 0.05
 
 
@@ -64,7 +79,7 @@ class GapHorizon:
 
     Where nothing moves and limits are no worse than ``brake_trust`` of the data sheet, it cannot hit what it
     has seen beyond the map's errors (least margin against laser noise and odometry within a step). It does
-    not plan over orientation: in a dead end narrower than its turning circle it backs out by samples, slowly.
+    not plan over orientation but for one gap at a time, once it is stuck before it (``NarrowPassage``).
     """
 
     def __init__(self, config: GapHorizonConfig, generator: np.random.Generator) -> None:
@@ -79,6 +94,10 @@ class GapHorizon:
         self._keep_turning = True
         self._status = "waiting"
         self.scene: Scene | None = None
+        self._passage: NarrowPassage | None = None
+        self._moved_s = 0.0
+        self._tried: list[tuple[float, float]] = []
+        self._since: tuple[float, float, float] | None = None
 
     @property
     def status(self) -> str:
@@ -88,13 +107,27 @@ class GapHorizon:
     def step(self, view: LocalView) -> Twist:
         """Take the view in and give the next command."""
         command, self.scene = rolling_step(self._ground, view, self._decide)
+        self._watch(view, self.scene)
         self._status = what_it_does(command, self.scene, view)
         return command
 
     def _decide(self, view: LocalView, scene: Scene) -> Twist:
         config = self._config
+        if self._must_stand(scene):
+            self._plan = None
+            return STOP
+        if self._passage is not None:
+            self._passage, wanted = self._passage.step(scene, view.t_s)
+            for share in (1.0, 0.5):
+                command = self._checked(scene, share * np.array([wanted.v_m_s, wanted.w_rad_s]))
+                if command is not None:
+                    if abs(command.v_m_s) + abs(command.w_rad_s) > 0.02:
+                        self._moved_s = view.t_s
+                    return command
+            return STOP
         price = Price(
             config.margin_m,
+            config.margin_s,
             config.soft_m,
             config.near_cost,
             config.heading_s_per_rad,
@@ -124,6 +157,41 @@ class GapHorizon:
         curvature = scene.start[4] / scene.start[3] if abs(scene.start[3]) > 0.05 else 0.0
         slower = max(abs(scene.start[3]) - scene.drive.deceleration * scene.dt_s, 0.0)
         return Twist(0.0, curvature * math.copysign(slower, scene.start[3]) if self._keep_turning else 0.0)
+
+    def _watch(self, view: LocalView, scene: Scene) -> None:
+        """Where the robot is stuck: try the narrowest place straight, or close it; reopen where all is."""
+        config = self._config
+        x, y = float(scene.pose[0]), float(scene.pose[1])
+        if self._passage is not None and view.t_s - self._moved_s < config.stuck_s:
+            self._since = (view.t_s, x, y)
+            return
+        if self._since is None or math.hypot(x - self._since[1], y - self._since[2]) > config.stuck_m:
+            self._since = (view.t_s, x, y)
+        if view.t_s - self._since[0] < config.stuck_s or scene.distance_m < view.goal_tolerance_m:
+            return
+        self._since = (view.t_s, x, y)
+        self._plan = None
+        here = togo_at(x, y, scene.ground.togo_s, scene.ground.x0_m, scene.ground.y0_m, scene.ground.coarse_m)
+        if here >= UNREACHED_S:
+            self._tried = []
+            self._passage = None
+            self._ground.open_all()
+            return
+        found = None if self._passage else find_narrow_passage(scene, config.close_ahead_m, view.t_s)
+        if found and all(math.hypot(found.x_m - a, found.y_m - b) > TRIED_M for a, b in self._tried):
+            # Straight through it first; where that fails as well it is closed.
+            self._tried.append((found.x_m, found.y_m))
+            self._passage = found
+            self._moved_s = view.t_s
+            return
+        self._passage = None
+        ahead = np.ascontiguousarray(scene.path[: max(3, round(config.close_ahead_m / 0.1))])
+        away = path_distances(ahead, scene.ground)
+        narrow = int(np.argmin(away))
+        if away[narrow] > scene.body.outer_m:
+            self._ground.open_all()
+            return
+        self._ground.close(float(ahead[narrow, 0]), float(ahead[narrow, 1]), float(away[narrow]) + 0.05)
 
     def _plans(self, scene: Scene, price: Price) -> tuple[list[FloatArray], FloatArray]:
         """All plans worth a look with their costs."""
@@ -178,6 +246,19 @@ class GapHorizon:
         )
         return plans, np.array(costs)
 
+    def _must_stand(self, scene: Scene) -> bool:
+        """Whether a robot at rest has somebody so near that it had better not start."""
+        if abs(scene.start[3]) > 0.05 or abs(scene.start[4]) > 0.1:
+            return False
+        now = scene.movers.foretold(0.0, scene.dt_s, 1)[0]
+        if not now.shape[0]:
+            return False
+        x, y, theta = scene.pose
+        body = scene.body
+        keep = self._config.stand_m
+        near: float = movers_clearance(x, y, theta, body.polygon, body.outer_m, now, keep)
+        return near < keep
+
     def _worse(self, scene: Scene) -> Drive:
         """Limits that are relied on: worse than the data sheet's, and than those that seem likely."""
         share = min(self._config.brake_trust, 0.9 * scene.drive.deceleration / scene.sheet.deceleration)
@@ -200,6 +281,7 @@ class GapHorizon:
                 scene.ground,
                 scene.movers.foretold(scene.delay_s + config.check_step_s, config.check_step_s, 30),
                 config.least_margin_m,
+                config.least_margin_s,
             )
             if safe:
                 self._keep_turning = keep_turning

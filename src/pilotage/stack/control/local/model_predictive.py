@@ -70,6 +70,7 @@ class Mppi:
         config = self._config
         price = Price(
             config.margin_m,
+            0.0,
             config.soft_m,
             config.near_cost,
             config.heading_s_per_rad,

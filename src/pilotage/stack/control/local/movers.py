@@ -26,6 +26,8 @@ class MoversConfig(Config):
     gate_std: Positive = 4.0
     most_missed: int = Field(default=8, ge=0, le=1000)
     readings: int = Field(default=4, ge=2, le=1000)
+    stands_readings: int = Field(default=30, ge=2, le=1000)
+    stands_m: Positive = 0.15
     radius_m: Positive = 0.25
     deviations: NonNegative = 1.0
     """The disc grows by so many standard deviations of the foretold place."""
@@ -44,14 +46,15 @@ class Movers:
         in_base: FloatArray,
         pose: FloatArray,
         dt_s: float,
-    ) -> BoolArray:
+    ) -> tuple[BoolArray, BoolArray]:
         """Take the scan's points (N, 2), base frame, in the order of the beams; tell which are on tracks.
 
-        Returns (N,): points of bodies that count, which the obstacle grid shall not keep.
+        Returns (N,) points of bodies that count, which the obstacle grid shall not keep, and (N,) those that
+        the odometry may be corrected by: of wide things, and of narrow ones that have stood for long.
         """
         config = self._config
         if not config.enabled:
-            return np.zeros(in_base.shape[0], dtype=np.bool_)
+            return np.zeros(in_base.shape[0], dtype=np.bool_), np.ones(in_base.shape[0], dtype=np.bool_)
         c, s = math.cos(pose[2]), math.sin(pose[2])
         turn = np.array([[c, s], [-s, c]])
         points = pose[:2] + in_base @ turn
@@ -69,10 +72,18 @@ class Movers:
             config.most_missed,
         )
         count = self._count()
+        moved = np.hypot(
+            self.tracks[:, kernels.X] - self.tracks[:, kernels.X0],
+            self.tracks[:, kernels.Y] - self.tracks[:, kernels.Y0],
+        )
+        stands = (self.tracks[:, kernels.READINGS] >= config.stands_readings) & (moved < config.stands_m)
         # One more place, for the points of no cluster.
         of_cluster = np.append(count[of_centre] if of_centre.size else np.zeros(0, np.bool_), False)
         on_track: BoolArray = of_cluster[of_point]
-        return on_track
+        still: BoolArray = np.append(stands[of_centre] if of_centre.size else np.zeros(0, np.bool_), True)[
+            of_point
+        ]
+        return on_track, still
 
     def _count(self) -> BoolArray:
         """Which tracks have been read often enough."""

@@ -20,7 +20,7 @@ from pilotage.kernels.control.ground import Ground
 from pilotage.kernels.control.motion_limits import Drive
 from pilotage.kernels.geometry.motion import wrap
 from pilotage.kernels.grids.distance import squared_distance
-from pilotage.sensors.sensor import NonNegative, Positive
+from pilotage.sensors.sensor import Positive
 from pilotage.stack.control.local.answer import Answer
 from pilotage.stack.control.local.body import make_body
 from pilotage.stack.control.local.movers import Movers, MoversConfig
@@ -53,10 +53,14 @@ class RollingConfig(Config):
     """Odometry's error after one metre, or one metre or radian, driven; it grows with their square root."""
     easy_m: Positive = 0.62
     """From this distance between base and obstacle on, full speed is reckoned with."""
-    slow_m_s: Positive = 0.35
+    slow_m_s: Positive = 0.5
+    """From where the footprint may turn on, less than a cell's doubt."""
+    crawl_m_s: Positive = 0.08
+    """Where it fits only straight: stopping, backing off and turning are part of the way through."""
     unseen_share: Positive = 0.7
-    edge_m: NonNegative = 0.015
-    """Kept beside the footprint's inner disc where the time to go looks for a way."""
+    edge_m: float = Field(default=-0.01, ge=-0.1, le=1.0)
+    """Kept beside the footprint's inner disc where the time to go looks for a way; below 0 for gaps whose
+    middle no cell hits: what then proves too narrow has to be found out by trying."""
     movers: MoversConfig = MoversConfig()
     fade_hits: int = Field(default=3, ge=0, le=60)
     """Hits that a cell loses where the laser sees past it; 0 for a world in which nothing moves."""
@@ -120,6 +124,7 @@ class RollingGround:
         self._t_s = -math.inf
         self._dt_s = 0.05
         self._answer = Answer()
+        self._closed: list[tuple[float, float, float]] = []
         self._movers = Movers(config.movers)
         self._body: Body | None = None
         self._footprint: FloatArray | None = None
@@ -156,10 +161,12 @@ class RollingGround:
         in_base = kernels.scan_points(
             view.mount.x_m, view.mount.y_m, view.mount.theta_rad, ranges, first, step, view.max_range_m
         )
-        on_track = self._movers.update((view.mount.x_m, view.mount.y_m), in_base, self._pose, self._dt_s)
+        on_track, steady = self._movers.update(
+            (view.mount.x_m, view.mount.y_m), in_base, self._pose, self._dt_s
+        )
         still = np.ascontiguousarray(in_base[~on_track])
         if self._config.match and not first_view:
-            self._match(view, still)
+            self._match(view, np.ascontiguousarray(in_base[steady]))
         self._odometry = view.pose
         if self._goal_given != view.goal_xy_m:
             self._goal_given = view.goal_xy_m
@@ -349,6 +356,16 @@ class RollingGround:
         )
         return self._last_ground
 
+    def close(self, x_m: float, y_m: float, radius_m: float) -> None:
+        """Lead no way through a disc of the map frame any more: it proved too narrow."""
+        self._closed.append((x_m, y_m, radius_m))
+        self._since_plan = 10**6
+
+    def open_all(self) -> None:
+        """Forget what was closed: a way through it may be better than none."""
+        self._closed.clear()
+        self._since_plan = 10**6
+
     def time_to_go_beside(self, discs: FloatArray, scene: Scene) -> FloatArray:
         """Time to go (m, m) where discs (N, 3), x, y, radius in the map frame, are closed as well."""
         return self._time_to_go(discs, scene.body, scene.sheet)
@@ -357,14 +374,19 @@ class RollingGround:
         config = self._config
         x0, y0 = self._corner[0] * self._coarse_m, self._corner[1] * self._coarse_m
         clearance = self._clearance
+        if self._closed:
+            clearance = _beside(clearance, np.array(self._closed), x0, y0, self._coarse_m)
         if discs is not None and discs.shape[0]:
             clearance = _beside(clearance, discs, x0, y0, self._coarse_m)
         blocked_m = body.inner_m + config.edge_m
+        tight_m = max(blocked_m, body.outer_m - config.cell_m)
         speed = togo.travel_speed(
             clearance,
             self._seen,
             blocked_m,
-            max(config.easy_m, blocked_m + 0.05),
+            tight_m,
+            max(config.easy_m, tight_m + 0.05),
+            min(config.crawl_m_s, drive.speed),
             min(config.slow_m_s, drive.speed),
             drive.speed,
             config.unseen_share,

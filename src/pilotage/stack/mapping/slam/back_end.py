@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -11,6 +12,8 @@ from pilotage.core.types import FloatArray
 from pilotage.logs.laser_log import LaserLog
 from pilotage.models.pose_graph_solver import Loss, Start, optimize
 from pilotage.stack.mapping.slam.closures import (
+    LARGE_SLIP,
+    USUAL_SLIP,
     Closure,
     Verdict,
     candidates,
@@ -39,6 +42,8 @@ REFINED_TRACK = 0.02
 SURE_M, SURE_RAD = 0.2, 0.05
 """Standard deviations between two submaps up to which their keyframes are aligned with one another."""
 REFINEMENTS = 3
+SECOND_LOOK_M, SECOND_LOOKS, ATTACHED = 3.0, 3, 2
+"""Largest window and number of the second looks, and closures with which a stretch is attached."""
 SPACINGS = (0.990, 0.995, 1.0)
 MOST_SPACING_OFF = 0.015
 LEAST_GAIN = 0.03
@@ -77,43 +82,57 @@ def track_edges(track: LocalTrack) -> Edges:
     return Edges(k, k + 1, relative, information, np.zeros(count - 1, np.bool_))
 
 
-def solved(edges: Edges, poses: FloatArray, scale: float) -> Solved:
-    """Optimize from where the poses are; only edges that close loops are doubted."""
+def solved(edges: Edges, poses: FloatArray, scale: float, slipped: bool = False) -> Solved:
+    """Optimize from where the poses are; only closures are doubted, all edges where the track slipped."""
     solution = optimize(
         edges.graph(poses),
         loss=Loss.CAUCHY,
         scale=scale,
-        doubted=edges.closes,
+        doubted=np.ones(len(edges), np.bool_) if slipped else edges.closes,
         start=Start.GIVEN,
         tolerance=1e-6,
-        most_iterations=40,
+        most_iterations=60 if slipped else 40,
     )
     return Solved(solution.graph.poses, edges, solution.weights, solution.objective)
 
 
 def closed(track: LocalTrack, config: SlamConfig, on_round: OnRound) -> tuple[Solved, list[Closure], Submaps]:
-    """Close loops, from the nearly certain to the wide ones, the graph being solved after each round."""
+    """Close loops, from the nearly certain to the wide ones, the graph being solved after each round.
+
+    In the end stretches that lie beside others and were not closed are looked at again: there the front end
+    may have slipped by more than it knows.
+    """
     local = track.poses[track.keyframes].copy()
     submaps = Submaps(track.clouds, local, config)
     state = solved(track_edges(track), local, ROBUST_STDS)
     closures: list[Closure] = []
     searched: dict[tuple[int, int], float] = {}
-    accepted: set[tuple[int, int]] = set()
-    for number, window_m in enumerate(config.search_windows_m, start=1):
+    accepted: dict[tuple[int, int], int] = {}
+    rounds = [(window_m, USUAL_SLIP) for window_m in config.search_windows_m]
+    rounds += [(SECOND_LOOK_M, LARGE_SLIP)] * SECOND_LOOKS
+    slipped = False
+    for number, (window_m, slip) in enumerate(rounds, start=1):
         joint = joint_covariance(state.edges, state.poses, state.weights, submaps.references)
         places = state.poses[submaps.references]
+        if slip is LARGE_SLIP:
+            searched = dict.fromkeys(searched, np.inf)
+        closed_often = Counter(later for _, later in accepted)
         found = [
-            c for c in candidates(places, joint, window_m, searched) if (c.earlier, c.later) not in accepted
+            c
+            for c in candidates(places, joint, window_m, searched, slip)
+            if (c.earlier, c.later) not in accepted
+            and not (slip is LARGE_SLIP and closed_often[c.later] >= ATTACHED)
         ]
-        judged, edges = judge(submaps, places, joint, found, config)
+        judged, edges = judge(submaps, places, joint, found, config, slip)
         for closure in judged:
             pair = closure.candidate.earlier, closure.candidate.later
             searched[pair] = closure.candidate.half_m
             if closure.verdict is Verdict.ACCEPTED:
-                accepted.add(pair)
+                accepted[pair] = number
         closures += judged
         if len(edges):
-            state = solved(state.edges.and_more(edges), state.poses, ROBUST_STDS)
+            slipped |= slip is LARGE_SLIP
+            state = solved(state.edges.and_more(edges), state.poses, ROBUST_STDS, slipped)
         on_round(f"round {number}: {len(found)} searched, {len(edges)} closed")
     return state, closures, submaps
 

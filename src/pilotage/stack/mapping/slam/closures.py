@@ -23,7 +23,7 @@ from pilotage.stack.mapping.slam.uncertainty import (
 LEAST_APART = 4
 """Submaps between the two of a candidate: nearer ones share keyframes or the front end's local map."""
 NEAR_M = 3.0
-WINDOW_BASE_M, WINDOW_BASE_RAD, WINDOW_STDS, MOST_TURN_RAD = 0.3, 0.04, 3.0, 0.8
+WINDOW_STDS, MOST_TURN_RAD = 3.0, 0.8
 AGAIN = 1.5
 """A pair is searched again once its window has shrunk by this factor."""
 MOST_PER_LATER, MOST_PER_EARLIER = 3, 6
@@ -32,6 +32,28 @@ CLOSURE_FLOOR = 4.0 * np.diag([0.004**2, 0.004**2, 0.0015**2])
 WIDE_M = 2.0
 NEIGHBOURHOOD = 8
 """A wide search must be seconded by closures of submaps at most so far along the path, on both sides."""
+
+
+@dataclass(frozen=True, slots=True)
+class Slip:
+    """What the front end may have slipped unnoticed anywhere: three standard deviations of it.
+
+    It widens the windows and the gate with the graph. Two closures across the same slip still have to agree
+    without it. ``support`` closures more than usual are needed.
+    """
+
+    shift_m: float
+    turn_rad: float
+    support: int = 0
+
+    def covariance(self) -> FloatArray:
+        """(3, 3)."""
+        return np.diag(np.array([self.shift_m, self.shift_m, self.turn_rad]) / WINDOW_STDS) ** 2
+
+
+USUAL_SLIP = Slip(0.3, 0.04)
+LARGE_SLIP = Slip(1.5, 0.3, 2)
+"""For a second look at stretches that should have been closed and were not."""
 
 
 class Verdict(StrEnum):
@@ -94,7 +116,7 @@ def spread(covariance: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 
 def candidates(
-    poses: FloatArray, joint: FloatArray, window_m: float, searched: dict[tuple[int, int], float]
+    poses: FloatArray, joint: FloatArray, window_m: float, searched: dict[tuple[int, int], float], slip: Slip
 ) -> list[Candidate]:
     """Pairs of submaps, reference poses (C, 3), that may overlap and whose window is no larger than given."""
     first, second = np.triu_indices(poses.shape[0], LEAST_APART)
@@ -104,8 +126,8 @@ def candidates(
     if first.size == 0:
         return []
     std_m, std_rad = spread(relative_covariances(joint, poses, first, second))
-    half_m = WINDOW_STDS * std_m + WINDOW_BASE_M
-    half_rad = np.minimum(WINDOW_STDS * std_rad + WINDOW_BASE_RAD, MOST_TURN_RAD)
+    half_m = WINDOW_STDS * std_m + slip.shift_m
+    half_rad = np.minimum(WINDOW_STDS * std_rad + slip.turn_rad, MOST_TURN_RAD)
     wanted = (half_m <= window_m) & (distance < NEAR_M + np.minimum(half_m, 2.0))
     of_later: dict[int, int] = {}
     of_earlier: dict[int, int] = {}
@@ -123,7 +145,12 @@ def candidates(
 
 
 def judge(
-    submaps: Submaps, poses: FloatArray, joint: FloatArray, found: list[Candidate], config: SlamConfig
+    submaps: Submaps,
+    poses: FloatArray,
+    joint: FloatArray,
+    found: list[Candidate],
+    config: SlamConfig,
+    slip: Slip,
 ) -> tuple[list[Closure], Edges]:
     """Search candidates and judge what was found.
 
@@ -146,7 +173,7 @@ def judge(
     edges = _edges([closures[k] for k in sound])
     if not sound:
         return closures, edges
-    chi_square, consistent = _joint_test(edges, poses, joint, config.gate_probability)
+    chi_square, consistent = _joint_test(edges, poses, joint, config.gate_probability, slip)
     gate = chi_square_quantile(config.gate_probability, 3)
     fits = chi_square <= gate
     clique = _clique(consistent & fits[:, None] & fits[None, :], fits)
@@ -154,7 +181,7 @@ def judge(
     for n, k in enumerate(sound):
         closure = replace(closures[k], chi_square=float(chi_square[n]), support=int(support[n]))
         wide = closure.candidate.half_m > WIDE_M
-        needed = config.least_support - 1 + (1 if wide else 0)
+        needed = config.least_support - 1 + (1 if wide else 0) + slip.support
         if not fits[n]:
             verdict = Verdict.AGAINST_GRAPH
         elif not clique[n]:
@@ -201,7 +228,7 @@ def _edges(closures: list[Closure]) -> Edges:
 
 
 def _joint_test(
-    edges: Edges, poses: FloatArray, joint: FloatArray, probability: float
+    edges: Edges, poses: FloatArray, joint: FloatArray, probability: float, slip: Slip
 ) -> tuple[FloatArray, BoolArray]:
     """Chi-square (M,) of each closure with the graph, and (M, M) which pairs agree.
 
@@ -219,18 +246,28 @@ def _joint_test(
     covariance = (flat @ joint @ flat.T).reshape(count, 3, count, 3)
     covariance[k, :, k] += np.linalg.inv(edges.information)
     own = covariance[k, :, k]
-    chi_square = np.einsum("ki,ki->k", innovation, np.linalg.solve(own, innovation[..., None])[..., 0])
+    alone = _squared(innovation, own)
+    chi_square = _squared(innovation, own + slip.covariance())
     first, second = np.triu_indices(count, 1)
     both = np.empty((first.size, 6, 6))
     both[:, :3, :3], both[:, 3:, 3:] = own[first], own[second]
     both[:, :3, 3:] = covariance[first, :, second]
     both[:, 3:, :3] = both[:, :3, 3:].transpose(0, 2, 1)
     errors = np.concatenate([innovation[first], innovation[second]], axis=1)
-    together = np.einsum("ki,ki->k", errors, np.linalg.solve(both, errors[..., None])[..., 0])
-    given = together - np.minimum(chi_square[first], chi_square[second])
+    together = _squared(errors, both)
+    given = together - np.minimum(alone[first], alone[second])
     agree = np.zeros((count, count), np.bool_)
-    agree[first, second] = agree[second, first] = given <= chi_square_quantile(probability, 3)
+    agreeing = given <= chi_square_quantile(probability, 3)
+    if slip.support:
+        # Of a large slip only closures around it can tell the size: far ones need not agree on it.
+        agreeing |= ~_near(edges)[first, second]
+    agree[first, second] = agree[second, first] = agreeing
     return np.asarray(chi_square), agree
+
+
+def _squared(errors: FloatArray, covariance: FloatArray) -> FloatArray:
+    """Squared Mahalanobis distances (M,) of errors (M, n) under covariances (M, n, n)."""
+    return np.asarray(np.einsum("ki,ki->k", errors, np.linalg.solve(covariance, errors[..., None])[..., 0]))
 
 
 def _clique(agree: BoolArray, fits: BoolArray) -> BoolArray:
@@ -245,8 +282,13 @@ def _clique(agree: BoolArray, fits: BoolArray) -> BoolArray:
 
 def _support(edges: Edges, taken: BoolArray) -> IntArray:
     """(M,) how many other closures taken lie near along the path on both sides."""
-    near_i = np.abs(edges.i[:, None] - edges.i[None, :]) <= NEIGHBOURHOOD
-    near_j = np.abs(edges.j[:, None] - edges.j[None, :]) <= NEIGHBOURHOOD
-    near = near_i & near_j & taken[None, :]
+    near = _near(edges) & taken[None, :]
     np.fill_diagonal(near, False)
     return np.asarray(near.sum(axis=1), np.int64)
+
+
+def _near(edges: Edges) -> BoolArray:
+    """(M, M) which closures lie near each other along the path on both sides."""
+    near_i = np.abs(edges.i[:, None] - edges.i[None, :]) <= NEIGHBOURHOOD
+    near_j = np.abs(edges.j[:, None] - edges.j[None, :]) <= NEIGHBOURHOOD
+    return np.asarray(near_i & near_j)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Literal
+
 from pydantic import Field
 
 from pilotage.core.config import Config
@@ -35,3 +37,5 @@ class SlamConfig(Config):
     """How many closures of a round must agree before any of them counts."""
     resolution_m: float = Field(0.05, gt=0.005, le=0.5)
     """Side of a cell of the map."""
+    trajectory: Literal["scanner", "base"] = "scanner"
+    """Whose poses ``trajectory.tum`` holds: the scanner's, or the robot's by the log's mount."""

@@ -7,7 +7,7 @@ as good as usual, the neighbourhood is searched by branch and bound.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -16,22 +16,28 @@ from pilotage.kernels.slam.align import TOO_FEW, align
 from pilotage.kernels.slam.branch_bound import search_window
 from pilotage.kernels.slam.buckets import sort_into_buckets
 from pilotage.kernels.slam.frames import between, carried, composed
-from pilotage.kernels.slam.match_grid import max_pyramid, score_grid
+from pilotage.kernels.slam.match_grid import ScoreArray, max_pyramid, score_grid
 from pilotage.logs.laser_log import LaserLog
 from pilotage.stack.mapping.slam.clouds import Clouds, cloud_of
 from pilotage.stack.mapping.slam.config import SlamConfig
-from pilotage.stack.mapping.slam.odometry import MotionGuess, scanner_odometry, smoothed_times
+from pilotage.stack.mapping.slam.odometry import MotionGuess, distance, scanner_odometry, smoothed_times
 
 BUCKET_M = 0.25
 START_REACH_M, REACH_M, SCALE_M = 0.4, 0.2, 0.05
 PRIOR = np.diag([2.0, 2.0, 20.0])
-"""Holds the pose at the guess where the scan leaves it open, in squared residuals."""
+"""Holds the pose at the guess where the scan leaves it open, in squared residuals. More would pull every
+scan a little towards an odometry whose errors all have one sign."""
 GOOD, POOR = 0.92, 0.75
 """Fit over its running mean from which no further guess is tried, and below which there is a search."""
 SEARCH_RANGE_M, SEARCH_CELL_M, SEARCH_STD_M, SEARCH_STEP_RAD = 12.0, 0.05, 0.07, 0.02
 SEARCH_BUDGET = 200_000
-SLIP_SHARE = 0.15
-"""Share of the distance between guess and match that counts as the match's own uncertainty."""
+SEARCH_KEYFRAMES, SEARCH_LEVELS = 8, 4
+BETTER_POOR, BETTER_GOOD = 1.1, 1.03
+"""By how much a place that was searched must fit better than the guesses."""
+OFF_M, OFF_ERRORS = 0.05, 10.0
+"""A match this far from all guesses, and so many of their usual errors more, counts half."""
+SLIP_SHARE, SLIP_M = 0.15, 0.4
+"""A match as far as SLIP_M from its guess may be off by as much; a nearer one by that share and less."""
 
 OnScan = Callable[[int], None]
 
@@ -76,6 +82,7 @@ class _Fit:
     pose: FloatArray
     hessian: FloatArray
     start: FloatArray
+    off: float = 0.0
 
 
 class LocalMatcher:
@@ -87,6 +94,7 @@ class LocalMatcher:
         self._local: list[FloatArray] = []
         self._usual = 0.6
         self._reference: tuple[FloatArray, IntArray, FloatArray] | None = None
+        self._around: tuple[ScoreArray, int, FloatArray] | None = None
         self.searched = 0
         self.lost = 0
 
@@ -95,6 +103,7 @@ class LocalMatcher:
         self._local = [*self._local, carried(cloud, pose)][-self._config.local_keyframes :]
         box, starts, _, points = sort_into_buckets(np.concatenate(self._local), BUCKET_M)
         self._reference = box, starts, points
+        self._around = None
 
     def match(
         self, cloud: FloatArray, last: FloatArray, step: FloatArray | None, dt_s: float, gap_s: float
@@ -111,16 +120,21 @@ class LocalMatcher:
             Smoothed and stamped time since.
         """
         best: _Fit | None = None
+        credible = self._guess.credible(step, dt_s)
         for motion in self._guess.guesses(step, dt_s):
-            fit = self._align(cloud, composed(last, motion), START_REACH_M)
+            fit = self._plausible(self._align(cloud, composed(last, motion), START_REACH_M), last, credible)
             if fit is not None and (best is None or fit.value > 1.03 * best.value + 0.005):
                 best = fit
             if best is not None and best.value > GOOD * self._usual:
                 break
-        if best is None or best.value < POOR * self._usual:
+        poor = best is None or best.value < POOR * self._usual
+        if poor or step is None:
+            # Without odometry a scan may slide along a corridor and still fit: look around every time.
             self.searched += 1
-            found = self._search(cloud, last, min(max(dt_s, gap_s, 0.2), 2.0))
-            if found is not None and (best is None or found.value > 1.1 * best.value + 0.01):
+            around = self._search(cloud, last, min(max(dt_s, gap_s, 0.2), 2.0))
+            found = self._plausible(around, last, credible)
+            better = BETTER_POOR if poor else BETTER_GOOD
+            if found is not None and (best is None or found.value > better * best.value + 0.01):
                 best = found
         if best is None:
             self.lost += 1
@@ -132,6 +146,15 @@ class LocalMatcher:
     def fallback(self, last: FloatArray, step: FloatArray | None, dt_s: float) -> FloatArray:
         """Pose by the most trusted guess alone."""
         return np.asarray(composed(last, self._guess.guesses(step, dt_s)[0]))
+
+    def _plausible(self, fit: _Fit | None, last: FloatArray, guesses: list[FloatArray]) -> _Fit | None:
+        """Lower a fit's value by how far it is from all credible guesses, in units of their usual error."""
+        if fit is None:
+            return None
+        motion = between(last, fit.pose)
+        off = min(distance(motion, guess) for guess in guesses)
+        scale = OFF_M + OFF_ERRORS * self._guess.least_error
+        return replace(fit, value=fit.value / (1.0 + (off / scale) ** 2), off=off)
 
     def _align(self, cloud: FloatArray, start: FloatArray, reach_m: float) -> _Fit | None:
         if self._reference is None or cloud.shape[0] == 0:
@@ -146,17 +169,12 @@ class LocalMatcher:
 
     def _search(self, cloud: FloatArray, last: FloatArray, gap_s: float) -> _Fit | None:
         """Search the neighbourhood of the last pose, the wider the longer ago it was."""
-        xy = np.concatenate(self._local[-8:])[:, :2] if self._local else np.zeros((0, 2))
-        xy = np.ascontiguousarray(xy[np.hypot(*(xy - last[:2]).T) < SEARCH_RANGE_M])
         near = cloud[np.hypot(cloud[:, 0], cloud[:, 1]) < SEARCH_RANGE_M]
-        if xy.shape[0] < 20 or near.shape[0] < 10:
+        if self._around is None:
+            self._around = self._surroundings(last)
+        if self._around is None or near.shape[0] < 10:
             return None
-        low, high = xy.min(axis=0) - 0.3, xy.max(axis=0) + 0.3
-        box = np.concatenate([low, high])
-        grid = score_grid(
-            xy, np.zeros((1, 2)), np.array([xy.shape[0]]), box, SEARCH_CELL_M, SEARCH_STD_M, 0.0
-        )
-        pyramid, margin = max_pyramid(grid, 4)
+        pyramid, margin, low = self._around
         turns = round((0.3 + 0.8 * gap_s) / SEARCH_STEP_RAD)
         best, _ = search_window(
             pyramid,
@@ -173,6 +191,24 @@ class LocalMatcher:
             SEARCH_BUDGET,
         )
         return self._align(cloud, best[:3].copy(), 0.3) if np.isfinite(best[3]) else None
+
+    def _surroundings(self, last: FloatArray) -> tuple[ScoreArray, int, FloatArray] | None:
+        """Maxima of the score grid of the last keyframes' points around a pose, margin and corner."""
+        xy = np.concatenate(self._local[-SEARCH_KEYFRAMES:])[:, :2] if self._local else np.zeros((0, 2))
+        xy = np.ascontiguousarray(xy[np.hypot(*(xy - last[:2]).T) < SEARCH_RANGE_M])
+        if xy.shape[0] < 20:
+            return None
+        low, high = xy.min(axis=0) - 0.3, xy.max(axis=0) + 0.3
+        grid = score_grid(
+            xy,
+            np.zeros((1, 2)),
+            np.array([xy.shape[0]]),
+            np.concatenate([low, high]),
+            SEARCH_CELL_M,
+            SEARCH_STD_M,
+            0.0,
+        )
+        return (*max_pyramid(grid, SEARCH_LEVELS), low)
 
 
 def track(log: LaserLog, config: SlamConfig, on_scan: OnScan | None = None) -> LocalTrack:
@@ -200,8 +236,7 @@ def track(log: LaserLog, config: SlamConfig, on_scan: OnScan | None = None) -> L
                 slip += [0.05**2, 0.05**2]
             else:
                 poses[i], hessian, fits[i] = fit.pose, fit.hessian, fit.value
-                off = between(fit.start, fit.pose)
-                slip += [(SLIP_SHARE**2) * (off[0] ** 2 + off[1] ** 2), (SLIP_SHARE**2) * off[2] ** 2]
+                slip += _slip(between(fit.start, fit.pose))
         if i == 0 or _is_new(between(poses[keyframes[-1]], poses[i]), config):
             keyframes.append(i)
             clouds.append(cloud)
@@ -223,6 +258,12 @@ def track(log: LaserLog, config: SlamConfig, on_scan: OnScan | None = None) -> L
         matcher.searched,
         matcher.lost,
     )
+
+
+def _slip(off: FloatArray) -> FloatArray:
+    """Variances (2,) of position and heading of a match by how far (3,) it is from its guess."""
+    far = np.array([float(np.hypot(off[0], off[1])), abs(float(off[2]))])
+    return np.asarray((SLIP_SHARE * far) ** 2 + (far * far / np.array([SLIP_M, 0.5 * SLIP_M])) ** 2)
 
 
 def _is_new(motion: FloatArray, config: SlamConfig) -> bool:

@@ -9,8 +9,8 @@ import numpy as np
 from pilotage.core.errors import InputError
 from pilotage.core.types import FloatArray
 from pilotage.logs.laser_log import LaserLog
+from pilotage.models.pose_graph import PoseGraph
 from pilotage.stack.mapping.slam.back_end import (
-    Solved,
     beam_spacing,
     closed,
     keyframe_clouds,
@@ -22,7 +22,9 @@ from pilotage.stack.mapping.slam.drawing import drawn_map
 from pilotage.stack.mapping.slam.local_matching import LocalTrack, track
 from pilotage.stack.mapping.slam.odometry import scanner_odometry
 from pilotage.stack.mapping.slam.result import SlamResult
-from pilotage.stack.mapping.slam.scan_poses import pose_covariances, scan_poses
+from pilotage.stack.mapping.slam.scan_covariances import ScanCovariances
+from pilotage.stack.mapping.slam.scan_poses import scan_poses
+from pilotage.stack.mapping.slam.uncertainty import relative_poses
 
 LEAST_SCANS = 2
 OnStage = Callable[[str, float], None]
@@ -60,14 +62,13 @@ def map_log(log: LaserLog, config: SlamConfig, on_stage: OnStage | None = None) 
     say("drawing", 1.0)
     grid = drawn_map(log, poses, config.resolution_m, config.max_range_m, spacing)
     scale, turn = _odometry_scales(log, poses, config)
+    known = ScanCovariances(state.edges.graph(state.poses), state.weights, local.owner, poses)
     return SlamResult(
         log.t_s,
         poses,
         local.poses,
-        pose_covariances(state, local),
+        known,
         local.keyframes,
-        state.edges.graph(state.poses),
-        state.weights,
         tuple(closures),
         tuple(submaps.extents),
         clouds,
@@ -87,18 +88,14 @@ def _silent(text: str, share: float) -> None:
 
 def _standing(log: LaserLog, config: SlamConfig, local: LocalTrack) -> SlamResult:
     """A recording in which the robot never left its first keyframe."""
-    from pilotage.models.pose_graph import PoseGraph
-
     none = np.zeros(0, np.int64)
     graph = PoseGraph(np.zeros((1, 3)), none, none, np.zeros((0, 3)), np.zeros((0, 3, 3)))
     return SlamResult(
         log.t_s,
         local.poses,
         local.poses,
-        np.zeros((len(log), 3, 3)),
+        ScanCovariances(graph, np.zeros(0), local.owner, local.poses),
         local.keyframes,
-        graph,
-        np.zeros(0),
         (),
         (),
         local.clouds,
@@ -117,8 +114,6 @@ def _odometry_scales(log: LaserLog, poses: FloatArray, config: SlamConfig) -> tu
     odometry = scanner_odometry(log, config.use_odometry)
     if odometry is None:
         return float("nan"), float("nan")
-    from pilotage.stack.mapping.slam.uncertainty import relative_poses
-
     true, told = relative_poses(poses[:-1], poses[1:]), relative_poses(odometry[:-1], odometry[1:])
     sane = (np.hypot(*(true - told)[:, :2].T) < 0.1) & (np.abs(true - told)[:, 2] < 0.1)
     true, told = true[sane], told[sane]
@@ -137,4 +132,4 @@ def _warnings(log: LaserLog, local: LocalTrack) -> tuple[str, ...]:
     return tuple(out)
 
 
-__all__ = ["SlamResult", "Solved", "map_log"]
+__all__ = ["SlamResult", "map_log"]

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 from pilotage.core.types import FloatArray, IntArray
 from pilotage.maps.occupancy_grid import OccupancyGrid
-from pilotage.models.pose_graph import PoseGraph
 from pilotage.stack.mapping.slam.closures import Closure
 from pilotage.stack.mapping.slam.clouds import Clouds
+from pilotage.stack.mapping.slam.scan_covariances import ScanCovariances
 from pilotage.stack.mapping.slam.submaps import Extent
 
 
@@ -22,12 +22,10 @@ class SlamResult:
         (N,) times of the scans.
     poses, before
         (N, 3) of the scanner in the map after the last optimization, and by the front end alone.
-    covariances
-        (N, 3, 3) of ``poses``, the first keyframe being held, with what a single scan's own match adds.
+    known
+        How sure ``poses`` are; holds the graph after the last optimization.
     keyframes
         (K,) scans that are the graph's poses.
-    graph
-        The graph after the last optimization; weights of its edges by the robust loss in ``weights`` (M,).
     closures
         All candidates that were searched, round by round, with their verdicts.
     extents
@@ -40,6 +38,8 @@ class SlamResult:
         True angle between beams over the one the log tells, as estimated.
     odometry_scale, odometry_turn_scale
         Path and turn by the map over those by the odometry; NaN without odometry.
+    searched, lost
+        Scans whose neighbourhood had to be searched, and those that could not be aligned.
     warnings
         What the user should know, a sentence each.
     """
@@ -47,10 +47,8 @@ class SlamResult:
     t_s: FloatArray
     poses: FloatArray
     before: FloatArray
-    covariances: FloatArray
+    known: ScanCovariances
     keyframes: IntArray
-    graph: PoseGraph
-    weights: FloatArray
     closures: tuple[Closure, ...]
     extents: tuple[Extent, ...]
     clouds: Clouds

@@ -1,4 +1,4 @@
-"""Poses and covariances of all scans from those of the keyframes."""
+"""Poses of all scans from those of the keyframes."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ import numpy as np
 
 from pilotage.core.types import FloatArray
 from pilotage.kernels.slam.frames import between, composed
-from pilotage.stack.mapping.slam.back_end import Solved
 from pilotage.stack.mapping.slam.local_matching import LocalTrack
 from pilotage.stack.mapping.slam.uncertainty import relative_poses
 
@@ -38,8 +37,3 @@ def scan_poses(track: LocalTrack, keyframe_poses: FloatArray) -> FloatArray:
             )
         out[i] = here
     return out
-
-
-def pose_covariances(state: Solved, track: LocalTrack) -> FloatArray:
-    """(N, 3, 3) in the map, the first keyframe being held; filled in below once calibrated."""
-    return np.zeros((track.poses.shape[0], 3, 3))

@@ -1,0 +1,85 @@
+"""``pilotage slam``: a map from a recording of a building that nobody has mapped."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from pilotage.cli.options import Json, Out
+from pilotage.cli.output import print_columns, print_json, stdout_for_json
+
+_TOLD = (
+    "log",
+    "scans",
+    "duration_s",
+    "path_length_m",
+    "keyframes",
+    "closures_searched",
+    "closures_accepted",
+    "position_std_max_m",
+    "beam_spacing",
+    "times_real_time",
+)
+
+
+def slam(
+    log: Annotated[Path, typer.Argument(metavar="LOG", help="A ROS bag, an MCAP file or a CARMEN log.")],
+    config: Annotated[
+        Path | None, typer.Option("--config", metavar="FILE", help="YAML file with the few parameters.")
+    ] = None,
+    out: Out = Path("runs"),
+    report: Annotated[bool, typer.Option(help="Write report.html into the run folder.")] = True,
+    json: Json = False,
+    quiet: Annotated[bool, typer.Option("--quiet", help="Show neither progress nor summary.")] = False,
+) -> int:
+    """Map a recording: scans to a map, a path, and how sure both are."""
+    from pilotage.experiments.slam import read_slam_config, slam_log
+
+    settings = read_slam_config(config)
+    with stdout_for_json(json), _stages(not quiet) as on_stage:
+        run = slam_log(log, out, settings, on_stage)
+        page: Path | None = None
+        if report:
+            from pilotage.report.slam.page import write_slam_report
+
+            page = write_slam_report(run.run_dir)
+    metrics = {**run.metrics, "run_dir": str(run.run_dir)}
+    if json:
+        print_json(metrics)
+    elif not quiet:
+        rows = [(key, _text(metrics[key])) for key in _TOLD]
+        rows += [("warning", str(text)) for text in run.warnings]
+        print_columns([*rows, ("report" if page else "run_dir", str(page or run.run_dir))])
+    return 0
+
+
+def _text(value: object) -> str:
+    return f"{value:.4g}" if isinstance(value, float) else str(value)
+
+
+@contextmanager
+def _stages(wanted: bool) -> Iterator[Callable[[str, float], None] | None]:
+    """Yield what shows where the mapping stands on standard error, one line that rewrites itself."""
+    if not (wanted and sys.stderr.isatty()):
+        yield None
+        return
+    shown = [-1.0]
+
+    def show(text: str, share: float) -> None:
+        if text == "matching" and share - shown[0] < 0.01 and share < 1.0:
+            return
+        shown[0] = share if text == "matching" else -1.0
+        told = f"{text} {share:.0%}" if text == "matching" else text
+        sys.stderr.write(f"\r{told}\x1b[K")
+        sys.stderr.flush()
+
+    try:
+        yield show
+    finally:
+        sys.stderr.write("\r\x1b[K")
+        sys.stderr.flush()

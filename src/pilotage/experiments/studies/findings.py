@@ -1,0 +1,297 @@
+"""What a study found: the effect of each factor on what matters, the best settings, and what stays open."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from pilotage.core.types import FloatArray, IntArray
+from pilotage.evaluation.effects import SURE, Effect, effects, holm
+from pilotage.evaluation.intervals import Summary
+from pilotage.evaluation.judge import SUCCESS, Judgement
+from pilotage.evaluation.metrics import METRICS
+from pilotage.evaluation.paired import difference, difference_apart
+from pilotage.experiments.studies.definition import CONFIGURATION
+from pilotage.experiments.studies.groups import CellGroup
+from pilotage.experiments.studies.table import StudyTable
+
+SETTING = "setting"
+"""What the cells of a group are called together, where no factors span them."""
+PARTS = 2
+"""Families of tests that share the chance of a false finding: the primary metric's, and all others'."""
+MOST_FACTORS = 6
+"""Of more factors at once none is looked at alone."""
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """One effect on one metric.
+
+    Attributes
+    ----------
+    group
+        Name of the group of cells, empty where there is but one.
+    factors
+        One for a main effect, two for an interaction.
+    levels
+        By factor, its levels.
+    p_corrected
+        Corrected for all findings of the study (Holm): at most one study in twenty without any effect has one
+        below 0.05.
+    """
+
+    metric: str
+    group: str
+    factors: tuple[str, ...]
+    levels: tuple[tuple[Any, ...], ...]
+    effect: Effect
+    p_corrected: float
+
+    @property
+    def is_sure(self) -> bool:
+        """Whether chance does not explain it."""
+        return math.isfinite(self.p_corrected) and self.p_corrected < SURE
+
+
+@dataclass(frozen=True, slots=True)
+class Best:
+    """The best setting of a group by one metric, and those that these trials do not tell from it."""
+
+    metric: str
+    group: str
+    cell: int
+    summary: Summary
+    also: tuple[int, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class _Design:
+    """Cells of a group as a complete design: by factor its levels; ``cells`` (l1, ..., lk)."""
+
+    group: CellGroup
+    factors: tuple[str, ...]
+    levels: tuple[tuple[Any, ...], ...]
+    cells: IntArray
+
+    @property
+    def ordered(self) -> list[bool]:
+        return [all(_is_number(level) for level in levels) for levels in self.levels]
+
+    @property
+    def tests(self) -> int:
+        return len(self.factors) + math.comb(len(self.factors), 2)
+
+
+def findings_of(table: StudyTable) -> list[Finding]:
+    """Effects of the factors on every metric that matters, the metric that answers the question first.
+
+    Half of the chance of a false finding is left to that one metric, the other half to all others together
+    (Holm's correction within each half): asking for more metrics does not hide its answer.
+    """
+    designs = [design for group in table.groups if (design := _design(table, group)) is not None]
+    others = [metric for metric in dict.fromkeys([*table.telling, SUCCESS]) if metric != table.primary]
+    out: list[Finding] = []
+    for family in ([table.primary], others):
+        tests = PARTS * len(family) * sum(design.tests for design in designs)
+        found = [
+            (metric, design, effect)
+            for metric in family
+            for design in designs
+            for effect in _effects(table, metric, design, tests)
+        ]
+        p_values = holm([effect.p_value for _, _, effect in found], PARTS)
+        out += [
+            Finding(
+                metric,
+                design.group.name,
+                tuple(design.factors[axis] for axis in effect.axes),
+                tuple(design.levels[axis] for axis in effect.axes),
+                effect,
+                p,
+            )
+            for (metric, design, effect), p in zip(found, p_values, strict=True)
+        ]
+    return out
+
+
+def _effects(table: StudyTable, metric: str, design: _Design, tests: int) -> list[Effect]:
+    """The effects on one metric over the trials that give it at every setting of a design."""
+    trials = by_trial(table, metric)[:, design.cells]
+    complete = trials[np.isfinite(trials).reshape(trials.shape[0], -1).all(axis=1)]
+    return effects(complete, ordered=design.ordered, paired=table.same_seeds, tests=tests)
+
+
+def best_settings(table: StudyTable, judgement: Judgement) -> list[Best]:
+    """By group and metric, the setting with the best mean, or the one nearest to the metric's ideal.
+
+    Metrics that do not differ, or of which nothing is known to be better, are left out.
+    """
+    out = []
+    for metric in dict.fromkeys([table.primary, *table.telling]):
+        lower, ideal = table.less_is_better(metric), METRICS.find(metric).ideal
+        means = np.array([summary.mean for summary in judgement.summaries[metric]])
+        values = by_trial(table, metric)
+        if lower is None:
+            means, values = np.abs(means - ideal), np.abs(values - ideal)
+        elif not lower:
+            means, values = -means, -values
+        for group in table.groups:
+            known = [index for index in group.cells if math.isfinite(means[index])]
+            if len(known) < 2 or np.ptp(means[known]) == 0.0:
+                continue
+            best = min(known, key=lambda index: float(means[index]))
+            others = [index for index in known if index != best]
+            compare = difference if table.same_seeds else difference_apart
+            p_values = holm([compare(values[:, best], values[:, index]).p_value for index in others])
+            also = (i for i, p in zip(others, p_values, strict=True) if not (math.isfinite(p) and p < SURE))
+            out.append(Best(metric, group.name, best, judgement.summaries[metric][best], tuple(also)))
+    return out
+
+
+def by_trial(table: StudyTable, metric: str) -> FloatArray:
+    """(trials, cells) a metric's values; nan where there is none, or none that compares."""
+    out = np.full((table.study.definition.trials, len(table.study.cells)), math.nan)
+    out[table.trial, table.cell] = table.comparable(metric)
+    return out
+
+
+def study_object(table: StudyTable) -> dict[str, Any]:
+    """The study's JSON object: what it found, counts, and one object a cell."""
+    judgement = table.judged()
+    cells = []
+    for cell in table.study.cells:
+        rate = judgement.rates[cell.index]
+        metrics = {}
+        for name in table.metrics:
+            found = judgement.summaries[name][cell.index]
+            metrics[name] = {
+                "n": found.n,
+                "mean": found.mean,
+                "median": found.median,
+                "low": found.low,
+                "high": found.high,
+                "variance": found.variance,
+            }
+        cells.append(
+            {
+                "name": cell.name,
+                "values": dict(cell.values),
+                "success": {
+                    "n": rate.trials,
+                    "mean": rate.successes / rate.trials if rate.trials else None,
+                    "low": rate.low,
+                    "high": rate.high,
+                },
+                "metrics": metrics,
+                **({"published": dict(cell.published)} if cell.published else {}),
+            }
+        )
+    return {
+        **_found(table, judgement),
+        "study": table.study.name,
+        "mission": table.study.base.get("mission", table.study.definition.mission),
+        "trials": len(table.row) + len(table.broken),
+        "failed": len(table.broken),
+        "missing": table.waiting,
+        "primary": table.primary,
+        "cells": cells,
+        "study_dir": str(table.folder),
+    }
+
+
+def _found(table: StudyTable, judgement: Judgement) -> dict[str, Any]:
+    """Findings and best settings as plain values."""
+    names = [cell.name for cell in table.study.cells]
+    return {
+        "findings": [_plain(finding) for finding in findings_of(table)],
+        "best": [
+            {
+                "metric": best.metric,
+                **({"group": best.group} if best.group else {}),
+                "setting": names[best.cell],
+                "mean": best.summary.mean,
+                "low": best.summary.low,
+                "high": best.summary.high,
+                "not_told_from_it": [names[index] for index in best.also],
+            }
+            for best in best_settings(table, judgement)
+        ],
+    }
+
+
+def _plain(finding: Finding) -> dict[str, Any]:
+    effect, change = finding.effect, finding.effect.change()
+    needed = math.nan if finding.is_sure else effect.needed()
+    return {
+        "metric": finding.metric,
+        "unit": METRICS.find(finding.metric).unit,
+        **({"group": finding.group} if finding.group else {}),
+        "factors": list(finding.factors),
+        "levels": [list(levels) for levels in finding.levels],
+        "means": effect.means.tolist(),
+        "trials": effect.n,
+        "from": finding.levels[-1][effect.ends[0]],
+        "to": finding.levels[-1][effect.ends[1]],
+        "change": change.mean,
+        "low": change.low,
+        "high": change.high,
+        "share_of_variance": effect.share,
+        "p": effect.p_value,
+        "p_corrected": finding.p_corrected,
+        "sure": finding.is_sure,
+        "detectable_change": effect.detectable(),
+        "trials_needed": needed,
+    }
+
+
+def _design(table: StudyTable, group: CellGroup) -> _Design | None:
+    """The factors that span a group's cells; all cells as levels of one where none do; None for one cell."""
+    if len(group.cells) < 2:
+        return None
+    cells = [table.study.cells[index] for index in group.cells]
+    named = [
+        factor
+        for factor in table.study.definition.factor_names
+        if all(factor in cell.values for cell in cells)
+        and len({repr(cell.values[factor]) for cell in cells}) > 1
+    ]
+    for factors in _candidates(named):
+        levels = tuple(_levels([cell.values[factor] for cell in cells]) for factor in factors)
+        if math.prod(map(len, levels)) != len(cells):
+            continue
+        places = [
+            tuple(known.index(cell.values[factor]) for known, factor in zip(levels, factors, strict=True))
+            for cell in cells
+        ]
+        if len(set(places)) == len(cells):
+            index = np.zeros(tuple(map(len, levels)), dtype=np.int64)
+            for place, cell in zip(places, cells, strict=True):
+                index[place] = cell.index
+            return _Design(group, tuple(factors), levels, index)
+    everything = tuple(cell.name for cell in cells)
+    return _Design(group, (SETTING,), (everything,), np.array(group.cells, dtype=np.int64))
+
+
+def _candidates(named: Sequence[str]) -> Iterator[list[str]]:
+    """Sets of factors that may span the cells: what configurations amount to, rather than their names."""
+    alone = [factor for factor in named if factor != CONFIGURATION]
+    for factors in (alone, list(named)):
+        if 0 < len(factors) <= MOST_FACTORS:
+            yield factors
+
+
+def _levels(values: Sequence[Any]) -> tuple[Any, ...]:
+    """Each value once, numbers in their order, others as they come."""
+    once: list[Any] = []
+    for value in values:
+        if value not in once:
+            once.append(value)
+    return tuple(sorted(once)) if all(_is_number(value) for value in once) else tuple(once)
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool)

@@ -1,0 +1,1 @@
+"""What ``import pilotage`` offers, function by function; ``pilotage.__all__`` lists it."""

@@ -1,0 +1,161 @@
+"""One planning query on a map of any format."""
+
+from __future__ import annotations
+
+import html
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from os import PathLike
+from pathlib import Path
+from typing import Any, TypeAlias
+
+import numpy as np
+
+from pilotage.core.errors import InputError
+from pilotage.core.types import FloatArray, Pose2
+from pilotage.experiments.grid_planning import is_grid_map, plan_on_grid
+from pilotage.experiments.planning import plan_on_map
+
+WALL_PLANNER, GRID_PLANNER = "rrt-star-dubins", "astar"
+Place: TypeAlias = "Sequence[float] | FloatArray | Pose2"
+"""x, y in metres and, where it matters, the heading in radians."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Plan:
+    """The answer to a planning query.
+
+    Attributes
+    ----------
+    success, reason
+        Whether there is a path, and how the search ended, in words.
+    path
+        (N, 3) x, y, theta of a path over walls, (N, 2) x, y of one over cells; (0, 2) where there is none.
+    length_m, shortest_length_m
+        Its length, and that of the exact shortest path at the same clearance; nan where unknown.
+    planning_time_s
+        Wall time.
+    answer
+        Everything, by its JSON key.
+    """
+
+    success: bool
+    reason: str
+    path: FloatArray
+    length_m: float
+    shortest_length_m: float
+    planning_time_s: float
+    answer: Mapping[str, Any] = field(repr=False)
+
+    def _repr_html_(self) -> str:
+        told = {key: value for key, value in self.answer.items() if key != "path"}
+        rows = "".join(
+            f"<tr><td>{html.escape(key)}</td><td>{html.escape(str(value))}</td></tr>"
+            for key, value in told.items()
+        )
+        return f"<table>{rows}</table>"
+
+
+def plan(
+    map: str | PathLike[str],  # noqa: A002 - the word for it
+    start: Place,
+    goal: Place,
+    *,
+    planner: str | None = None,
+    clearance_m: float | None = None,
+    slope_limit_deg: float | None = None,
+    seed: int = 0,
+    set: Mapping[str, Any] | Sequence[str] | None = None,  # noqa: A002 - as the command line calls it
+) -> Plan:
+    """Plan a path on a map.
+
+    Parameters
+    ----------
+    map
+        A shipped map's name or a file: walls, a ROS map, a MovingAI map, an image, an elevation model.
+    start, goal
+        x, y in metres and, where given, theta in radians; without one any heading will do.
+    planner
+        A registered name (``pilotage components``); by default ``rrt-star-dubins``, ``astar`` on grids.
+    clearance_m
+        Distance to keep from obstacles; None: the planner's own on walls, none on grids.
+    slope_limit_deg
+        The map is an elevation model, and what is steeper is a hazard.
+    seed
+        Of planners that draw.
+    set
+        The planner's own parameters by name, ``smoother.NAME`` and ``map.NAME`` among them.
+
+    Returns
+    -------
+    Plan
+        ``plan.path`` and how good it is; where there is no path, ``plan.reason`` says why.
+
+    Raises
+    ------
+    InputError
+        Where the map, the planner, a parameter or a place is not what it should be.
+
+    Examples
+    --------
+    >>> import pilotage as pl
+    >>> found = pl.plan("museum", (1.0, 1.0, 0.0), (20.0, 12.0), seed=3)
+    >>> found.success, found.length_m < 1.02 * found.shortest_length_m, found.path.shape[1]
+    (True, True, 3)
+    >>> pl.plan("museum", (1.0, 1.0), (20.0, 12.0), planner="astar", clearance_m=0.3).success
+    True
+    """
+    if clearance_m is not None and not (math.isfinite(clearance_m) and clearance_m >= 0.0):
+        raise InputError(f"clearance_m: expected metres of 0 or more, found {clearance_m}")
+    source, settings = str(map), _settings(set)
+    from_, to = _place("start", start), _place("goal", goal)
+    if Path(source).suffix and is_grid_map(source):
+        if clearance_m is not None:
+            settings = [*settings, f"map.inflation_m={clearance_m!r}"]
+        answer = plan_on_grid(Path(source), from_, to, planner or GRID_PLANNER, settings, slope_limit_deg)
+    elif slope_limit_deg is not None:
+        raise InputError(f"--slope-limit: expected an elevation model's file, found the map '{source}'")
+    else:
+        answer = plan_on_map(source, from_, to, planner or WALL_PLANNER, settings, seed, clearance_m)
+    path = np.array(answer.get("path", ()), dtype=np.float64)
+    return Plan(
+        bool(answer["success"]),
+        str(answer["reason"]),
+        path if path.size else np.zeros((0, 2)),
+        _number(answer.get("planned_length_m")),
+        _number(answer.get("shortest_length_m")),
+        _number(answer.get("planning_time_s")),
+        answer,
+    )
+
+
+def _place(name: str, place: Place) -> tuple[float, ...]:
+    if isinstance(place, Pose2):
+        return place.x_m, place.y_m, place.theta_rad
+    try:
+        values = tuple(float(value) for value in place)
+    except (TypeError, ValueError):
+        values = ()
+    if len(values) not in (2, 3) or not all(math.isfinite(value) for value in values):
+        raise InputError(f"{name}: expected x, y or x, y, theta in metres and radians, found {place!r}")
+    return values
+
+
+def _settings(settings: Mapping[str, Any] | Sequence[str] | None) -> list[str]:
+    """As the command line has them."""
+    if settings is None:
+        return []
+    if isinstance(settings, Mapping):
+        return [f"{key}={_yaml(value)}" for key, value in settings.items()]
+    if isinstance(settings, str):
+        raise InputError(f"set: expected a mapping of parameters to values, found the text '{settings}'")
+    return list(settings)
+
+
+def _yaml(value: Any) -> str:
+    return str(value).lower() if isinstance(value, bool) else str(value)
+
+
+def _number(value: Any) -> float:
+    return math.nan if value is None else float(value)

@@ -1,0 +1,131 @@
+"""Every closure explained: a choice of them drawn, all of them in a table."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from pilotage.report.markup import escape
+from pilotage.report.slam.folder import SlamFolder, placed
+from pilotage.report.style import BLUE, VERMILLION, WIDTH_PT, Illustration, Key, render
+
+COLUMNS = 4
+ACCEPTED_DRAWN, REFUSED_DRAWN = 4, 8
+LISTED = 400
+"""Rows of the table; ``closures.json`` has all."""
+POINTS = 900
+
+MEANINGS = {
+    "accepted": "fits alone, with the graph and with the others around it",
+    "no match": "nothing in the window was alike",
+    "low score": "the best place in the window is not alike enough",
+    "little overlap": "too few points fall where the other stretch saw",
+    "walls disagree": "walls of the one stand where the other saw through",
+    "ambiguous": "another place in the window is nearly as good",
+    "contradicts the graph": "farther off than the graph's uncertainty allows",
+    "contradicts other closures": "does not go with the larger group of closures that agree",
+    "no other closure seconds it": "no agreeing closure near it on both stretches",
+}
+
+
+def closures_figure(data: SlamFolder) -> Illustration:
+    """Draw the accepted closures of the widest windows, and refused ones of every reason."""
+    chosen = _choice(data.closures)
+    title, slug = "Closures, looked at", "overlays"
+    if not chosen:
+        return Illustration(slug, title, "", "No two stretches of the path were near enough to be compared.")
+    rows = -(-len(chosen) // COLUMNS)
+    cell = WIDTH_PT / COLUMNS
+    figure = Figure(figsize=(WIDTH_PT / 72.0, rows * (cell + 26.0) / 72.0))
+    for n, closure in enumerate(chosen):
+        row, column = divmod(n, COLUMNS)
+        axes = figure.add_axes(
+            (
+                (column + 0.03) / COLUMNS,
+                1.0 - (row + 1) / rows + 0.02 / rows,
+                0.94 / COLUMNS,
+                cell / (cell + 26.0) / rows * 0.94,
+            )
+        )
+        axes.set_title(f"{closure['number']}: {closure['verdict']}", fontsize=7.5)
+        for number, colour in ((closure["earlier_submap"], BLUE), (closure["later_submap"], VERMILLION)):
+            points = data.submap(number, data.poses)
+            if colour is VERMILLION:
+                points = placed(points, np.array(closure["relative"]))
+            points = points[:: max(1, len(points) // POINTS)]
+            axes.plot(points[:, 0], points[:, 1], ",", color=colour, alpha=0.8, rasterized=True)
+        axes.set_xlim(-7.0, 7.0)
+        axes.set_ylim(-7.0, 7.0)
+        axes.set_aspect("equal")
+        axes.set_xticks([])
+        axes.set_yticks([])
+    caption = (
+        "Two stretches of the path laid over each other as the search found best, 14 m a side: of accepted "
+        "ones "
+        "those with the widest windows, of the refused the best-scoring of each reason. Numbers are those of "
+        "the table."
+    )
+    keys = (Key("earlier stretch", BLUE, "spot"), Key("later stretch", VERMILLION, "spot"))
+    alt = "Pairs of submaps laid over each other"
+    return Illustration(slug, title, alt, caption, render(figure, slug, alt), keys)
+
+
+def closures_section(data: SlamFolder) -> str:
+    """Return the table: how many of each verdict, then closure by closure."""
+    counts = data.metrics["closures_by_verdict"]
+    summary = "".join(
+        f'<tr><th scope="row">{escape(verdict)}</th><td class="value">{count}</td>'
+        f"<td>{escape(MEANINGS.get(verdict, ''))}</td></tr>"
+        for verdict, count in counts.items()
+    )
+    listed = sorted(data.closures, key=lambda c: (_interest(c), c["number"]))[:LISTED]
+    rows = "".join(_row(c) for c in sorted(listed, key=lambda c: c["number"]))
+    left = len(data.closures) - len(listed)
+    more = f'<p class="absent">{left} more are in closures.json.</p>' if left else ""
+    return (
+        '<section id="closures"><h2><a href="#closures">Closures, all</a></h2>'
+        '<table class="metrics"><thead><tr><th scope="col">verdict</th>'
+        '<th scope="col" class="value">count</th>'
+        f'<th scope="col">why</th></tr></thead><tbody>{summary}</tbody></table>'
+        '<div class="long"><table class="events"><thead><tr><th scope="col">no.</th>'
+        '<th scope="col" class="value">scans</th><th scope="col" class="value">window</th>'
+        '<th scope="col" class="value">score</th><th scope="col" class="value">second</th>'
+        '<th scope="col" class="value">agreement</th><th scope="col" class="value">chi-square</th>'
+        '<th scope="col" class="value">seconded by</th><th scope="col">verdict</th></tr></thead>'
+        f"<tbody>{rows}</tbody></table></div>{more}</section>"
+    )
+
+
+def _row(c: dict[str, Any]) -> str:
+    chi = "–" if c["chi_square"] is None else f"{c['chi_square']:.1f}"
+    cells = (
+        f"{c['earlier_scan']} ↔ {c['later_scan']}",
+        f"±{c['window_m']:.1f} m",
+        f"{c['score']:.2f}",
+        f"{c['second_score']:.2f}",
+        f"{c['agreement']:.0%}",
+        chi,
+        str(c["support"]),
+    )
+    values = "".join(f'<td class="value">{escape(cell)}</td>' for cell in cells)
+    return f"<tr><td>{c['number']}</td>{values}<td>{escape(c['verdict'])}</td></tr>"
+
+
+def _interest(c: dict[str, Any]) -> int:
+    """Accepted ones first, then what was refused late; what never matched tells least."""
+    if c["accepted"]:
+        return 0
+    return 2 if c["verdict"] in {"no match", "low score"} else 1
+
+
+def _choice(closures: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    accepted = sorted((c for c in closures if c["accepted"]), key=lambda c: -c["window_m"])
+    chosen = accepted[:ACCEPTED_DRAWN]
+    reasons: dict[str, list[dict[str, Any]]] = {}
+    for c in sorted(closures, key=lambda c: -c["score"]):
+        if not c["accepted"] and c["score"] > 0.0:
+            reasons.setdefault(c["verdict"], []).append(c)
+    refused = [group[k] for k in range(2) for group in reasons.values() if len(group) > k]
+    return chosen + refused[:REFUSED_DRAWN]

@@ -1,0 +1,172 @@
+"""Figures of a mapped recording: the map, before and after, how it grew, and how sure its path is."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection
+from matplotlib.colors import ListedColormap
+from matplotlib.figure import Figure
+
+from pilotage.core.types import FloatArray
+from pilotage.report.slam.folder import SlamFolder, placed
+from pilotage.report.style import (
+    BLUE,
+    FAINT,
+    GREEN,
+    INK,
+    MUTED,
+    ORANGE,
+    SHADE,
+    VERMILLION,
+    WIDTH_PT,
+    Illustration,
+    Key,
+    nice_limit,
+    render,
+    series,
+    stacked_axes,
+    time_limits,
+)
+
+STAGES = 4
+MOST_POINTS = 12_000
+"""Dots in a panel: more than the page can show apart."""
+
+
+def map_figure(data: SlamFolder) -> Illustration:
+    """Draw the map with the path and the loops that were closed."""
+    grid = data.grid
+    width, height = grid.size_m
+    figure, axes = _square_axes(width, height)
+    x0, y0 = grid.origin.x_m, grid.origin.y_m
+    shades = np.select([grid.cells > 50, grid.cells >= 0], [2, 0], 1)
+    axes.imshow(
+        shades,
+        extent=(x0, x0 + width, y0, y0 + height),
+        cmap=ListedColormap(["#ffffff", SHADE, INK]),
+        vmin=0,
+        vmax=2,
+        interpolation="nearest",
+        zorder=0,
+    )
+    axes.plot(data.poses[:, 0], data.poses[:, 1], color=BLUE, linewidth=0.9, zorder=3, gid="layer-path")
+    lines = _closure_lines(data, True)
+    axes.add_collection(LineCollection(lines, colors=GREEN, linewidths=0.8, zorder=4), autolim=False)
+    axes.collections[-1].set_gid("layer-loops")
+    axes.set_xlim(x0, x0 + width)
+    axes.set_ylim(y0, y0 + height)
+    alt = "Occupancy grid with the path and the closed loops"
+    count = data.metrics["closures_accepted"]
+    caption = (
+        f"White is free, dark is wall, grey was never seen; cells of {grid.resolution_m:g} m. The path is "
+        "that of the scanner after the last optimization; each of the "
+        f"{count} green lines joins the middles of two stretches of the path that were found to see the same "
+        "walls."
+    )
+    keys = (Key("path", BLUE, "line", "path"), Key("closed loops", GREEN, "line", "loops"))
+    return Illustration("map", "The map", alt, caption, render(figure, "map", alt), keys)
+
+
+def before_after_figure(data: SlamFolder) -> Illustration:
+    """Draw the keyframes' points at the poses of the front end alone, and at the last ones."""
+    figure = Figure(figsize=(WIDTH_PT / 72.0, 0.5 * WIDTH_PT / 72.0))
+    for index, (title, poses) in enumerate((("before: matching alone", data.before), ("after", data.poses))):
+        axes = figure.add_axes((0.05 + 0.49 * index, 0.07, 0.44, 0.85))
+        axes.set_title(title)
+        _dots(axes, _cloud(data, poses, len(data.keyframes)))
+        axes.plot(poses[:, 0], poses[:, 1], color=ORANGE if index == 0 else BLUE, linewidth=0.8)
+        axes.set_aspect("equal", adjustable="datalim")
+    end = data.poses[-1, :2] - data.before[-1, :2]
+    caption = (
+        "What the scans show, put where the front end alone had it and where the closed graph has it. The "
+        "end "
+        f"of the path moved by {float(np.hypot(*end)):.2f} m; walls drawn twice on the left are one "
+        "on the right."
+    )
+    alt = "Points of all keyframes before and after the loops were closed"
+    return Illustration("before", "Before and after", alt, caption, render(figure, "before", alt))
+
+
+def growth_figure(data: SlamFolder) -> Illustration:
+    """Draw the map after each quarter of the recording."""
+    figure = Figure(figsize=(WIDTH_PT / 72.0, 0.27 * WIDTH_PT / 72.0))
+    everything = _cloud(data, data.poses, len(data.keyframes))
+    low, high = everything.min(axis=0), everything.max(axis=0)
+    for stage in range(1, STAGES + 1):
+        axes = figure.add_axes((0.01 + 0.247 * (stage - 1), 0.02, 0.235, 0.84))
+        until = max(1, len(data.keyframes) * stage // STAGES)
+        scan = int(data.keyframes[until - 1])
+        axes.set_title(f"after {data.t_s[scan] - data.t_s[0]:.0f} s")
+        _dots(axes, _cloud(data, data.poses, until))
+        axes.plot(data.poses[:scan, 0], data.poses[:scan, 1], color=BLUE, linewidth=0.6)
+        axes.plot(*data.poses[scan, :2], marker="o", markersize=3.5, color=VERMILLION)
+        axes.set_xlim(low[0], high[0])
+        axes.set_ylim(low[1], high[1])
+        axes.set_aspect("equal", adjustable="box", anchor="C")
+        axes.set_axis_off()
+    alt = "The map after each quarter of the recording"
+    caption = "The map as it grew, with the path so far and where the robot was."
+    return Illustration("growth", "How the map grew", alt, caption, render(figure, "growth", alt))
+
+
+def uncertainty_figure(data: SlamFolder) -> Illustration:
+    """Draw the standard deviations of position and heading along the path, with the loops' times."""
+    figure, (position, heading) = stacked_axes(
+        ["standard deviation of the position [m]", "standard deviation of the heading [deg]"], [120.0, 90.0]
+    )
+    t_s = data.t_s - data.t_s[0]
+    largest = np.sqrt(np.linalg.eigvalsh(data.covariances[:, :2, :2])[:, -1])
+    angle = np.degrees(np.sqrt(data.covariances[:, 2, 2]))
+    series(position, t_s, largest, BLUE)
+    series(heading, t_s, angle, BLUE)
+    for axes, values in ((position, largest), (heading, angle)):
+        axes.set_ylim(0.0, nice_limit(float(values.max())))
+        ticks = [c["later_t_s"] - data.t_s[0] for c in data.closures if c["accepted"]]
+        axes.plot(ticks, np.zeros(len(ticks)), "|", color=GREEN, markersize=7.0, clip_on=False)
+    time_limits([position, heading], t_s)
+    caption = (
+        "How unsure the path is, seen from its first scan: the larger axis of the position's ellipse, and "
+        "the heading. Green ticks are the later ends of closed loops, where the graph learns most."
+    )
+    keys = (Key("standard deviation", BLUE), Key("a loop was closed", GREEN, "spot"))
+    alt = "Standard deviations along the path"
+    return Illustration(
+        "uncertainty", "Uncertainty along the path", alt, caption, render(figure, "uncertainty", alt), keys
+    )
+
+
+def _square_axes(width_m: float, height_m: float) -> tuple[Figure, Axes]:
+    """One panel to scale, as wide as the page."""
+    drawn_pt = WIDTH_PT - 50.0
+    tall_pt = min(drawn_pt * height_m / width_m, 900.0)
+    total = tall_pt + 40.0
+    figure = Figure(figsize=(WIDTH_PT / 72.0, total / 72.0))
+    axes = figure.add_axes((40.0 / WIDTH_PT, 28.0 / total, drawn_pt / WIDTH_PT, tall_pt / total))
+    axes.set_aspect("equal", adjustable="box", anchor="C")
+    axes.grid(visible=False)
+    axes.set_xlabel("x [m]", labelpad=3.0)
+    axes.tick_params(colors=FAINT, labelcolor=MUTED)
+    return figure, axes
+
+
+def _closure_lines(data: SlamFolder, accepted: bool) -> list[FloatArray]:
+    chosen = [c for c in data.closures if c["accepted"] is accepted]
+    return [data.poses[[c["earlier_scan"], c["later_scan"]], :2] for c in chosen]
+
+
+def _cloud(data: SlamFolder, poses: FloatArray, until: int) -> FloatArray:
+    """Points (K, 2) of the first keyframes at given scan poses, thinned evenly."""
+    clouds = []
+    for k in range(until):
+        cloud = data.points_xy_m[data.starts[k] : data.starts[k + 1]].astype(np.float64)
+        clouds.append(placed(cloud, poses[data.keyframes[k]]))
+    points = np.concatenate(clouds) if clouds else np.zeros((0, 2))
+    if not len(points):
+        return np.zeros((1, 2))
+    return np.asarray(points[:: max(1, len(points) // MOST_POINTS)])
+
+
+def _dots(axes: Axes, points: FloatArray) -> None:
+    """Dots as an image within the drawing: as elements they would be most of the page."""
+    axes.plot(points[:, 0], points[:, 1], ",", color=INK, alpha=0.5, rasterized=True)

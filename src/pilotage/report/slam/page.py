@@ -1,0 +1,113 @@
+"""The page itself: map, closures, uncertainty, numbers."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from pilotage.core.whole_file import write_whole
+from pilotage.report.markup import contents, document, escape, figure_section, layer_rules, tiles
+from pilotage.report.slam.closures import closures_figure, closures_section
+from pilotage.report.slam.figures import (
+    before_after_figure,
+    growth_figure,
+    map_figure,
+    uncertainty_figure,
+)
+from pilotage.report.slam.folder import SlamFolder, read_slam_folder
+from pilotage.report.style import drawing_style
+
+REPORT_FILE = "report.html"
+MEANINGS = {
+    "scans": "scans of the recording, each with a pose in trajectory.tum",
+    "scans_searched": "scans whose neighbourhood was searched because no guess of the motion fitted",
+    "scans_lost": "scans that could not be aligned: their poses are guesses",
+    "keyframes": "scans that are poses of the graph",
+    "edges": "relative poses the graph is made of after the refinement",
+    "closures_searched": "pairs of stretches that were compared",
+    "closures_accepted": "pairs that count",
+    "duration_s": "length of the recording",
+    "path_length_m": "path of the scanner",
+    "position_std_max_m": "largest standard deviation of a position, seen from the first scan",
+    "beam_spacing": "true angle between beams over the one the log tells, as the closures have it",
+    "odometry_scale": "path by the map over path by the odometry",
+    "odometry_turn_scale": "turn by the map over turn by the odometry",
+    "front_end_times_real_time": "how much faster than the recording the front end ran",
+    "times_real_time": "the same of reading, mapping and drawing the map together",
+}
+
+
+def write_slam_report(folder: Path) -> Path:
+    """Write ``report.html`` into a folder of ``pilotage slam`` and return its path."""
+    path = folder / REPORT_FILE
+    write_whole(path, slam_page(read_slam_folder(folder)))
+    return path
+
+
+def slam_page(data: SlamFolder) -> str:
+    """Return the page as HTML."""
+    with drawing_style():
+        figures = [
+            map_figure(data),
+            before_after_figure(data),
+            growth_figure(data),
+            closures_figure(data),
+            uncertainty_figure(data),
+        ]
+    m = data.metrics
+    sections = [figure_section(n, figure) for n, figure in enumerate(figures, start=1)]
+    sections.insert(4, closures_section(data))
+    sections += [_numbers(m), _warnings(m)]
+    entries = [(figure.slug, figure.title) for figure in figures]
+    entries.insert(4, ("closures", "Closures, all"))
+    entries += [("numbers", "Numbers")]
+    headline = (
+        f"{m['scans']} scans over {m['path_length_m']:.0f} m; {m['closures_accepted']} of "
+        f"{m['closures_searched']} compared pairs of stretches closed a loop."
+    )
+    return document(
+        title=escape(f"Map of {m['log']}"),
+        layers="".join(layer_rules(figure) for figure in figures),
+        eyebrow="pilotage slam",
+        heading=escape(f"Map of {m['log']}"),
+        description="",
+        outcome="",
+        headline=escape(headline),
+        tiles=tiles(_tiles(m)),
+        contents=contents(entries),
+        body="\n".join(section for section in sections if section),
+        footer=escape(f"Made by pilotage from {data.folder.name}."),
+    )
+
+
+def _tiles(m: dict[str, Any]) -> list[tuple[str, str]]:
+    return [
+        ("map", f"{m['map_columns'] * m['resolution_m']:.0f} x {m['map_rows'] * m['resolution_m']:.0f} m"),
+        ("closed loops", str(m["closures_accepted"])),
+        ("least sure position", f"±{m['position_std_max_m']:.2f} m"),
+        ("faster than real time", f"{m['times_real_time']:.0f} x"),
+    ]
+
+
+def _numbers(m: dict[str, Any]) -> str:
+    rows = "".join(
+        f'<tr><th scope="row">{escape(key.replace("_", " "))}</th><td class="value">{_text(m.get(key))}</td>'
+        f"<td>{escape(meaning)}</td></tr>"
+        for key, meaning in MEANINGS.items()
+    )
+    return (
+        '<section id="numbers"><h2><a href="#numbers">Numbers</a></h2><table class="metrics"><thead><tr>'
+        '<th scope="col">what</th><th scope="col" class="value">value</th><th scope="col">what it means</th>'
+        f"</tr></thead><tbody>{rows}</tbody></table></section>"
+    )
+
+
+def _warnings(m: dict[str, Any]) -> str:
+    lines = "".join(f'<p class="absent">{escape(str(text))}.</p>' for text in m["warnings"])
+    return f'<section id="warnings"><h2>What the recording lacked</h2>{lines}</section>' if lines else ""
+
+
+def _text(value: object) -> str:
+    if value is None:
+        return "–"
+    return f"{value:.4g}" if isinstance(value, float) else escape(str(value))

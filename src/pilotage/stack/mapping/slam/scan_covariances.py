@@ -1,0 +1,74 @@
+"""How sure the poses of scans are, alone and seen from one another.
+
+What the graph says holds given that its edges err independently; they do not, as each scan is in many of
+them, so its covariances are doubled. On top, every scan has an error of its own: stamps that are some
+milliseconds off, a body that moves while the mirror turns, a mount known to a centimetre or two. Both were
+set so that the relations of the Intel and the Freiburg 079 recordings come out consistent; see
+docs/decisions/0038.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pilotage.core.types import FloatArray, IntArray
+from pilotage.models.pose_graph import PoseGraph
+from pilotage.models.pose_graph_covariance import PoseCovariances, covariances
+
+SHARED_EDGES = 2.0
+SCAN_STD = np.array([0.02, 0.02, 0.006])
+
+
+@dataclass(frozen=True, slots=True)
+class ScanCovariances:
+    """Covariances of scans' poses.
+
+    Attributes
+    ----------
+    graph, weights
+        Of keyframes, and how much each edge counts.
+    owner
+        (N,) keyframe of each scan.
+    poses
+        (N, 3) of the scans in the map.
+    """
+
+    graph: PoseGraph
+    weights: FloatArray
+    owner: IntArray
+    poses: FloatArray
+
+    def marginals(self) -> FloatArray:
+        """Return (N, 3, 3) in the map, the first keyframe being held."""
+        own = self._of_graph().marginals() if len(self.graph) > 1 else np.zeros((1, 3, 3))
+        keyframes = self.graph.poses[self.owner]
+        carry = np.tile(np.eye(3), (self.owner.size, 1, 1))
+        carry[:, 0, 2] = -(self.poses[:, 1] - keyframes[:, 1])
+        carry[:, 1, 2] = self.poses[:, 0] - keyframes[:, 0]
+        shared = carry @ (SHARED_EDGES * own[self.owner]) @ carry.transpose(0, 2, 1)
+        return np.asarray(shared + np.diag(SCAN_STD**2))
+
+    def relative(self, i: IntArray, j: IntArray) -> FloatArray:
+        """Return (K, 3, 3) of x, y, theta of scan j as seen from scan i."""
+        first, second = self.owner[i], self.owner[j]
+        between = np.zeros((first.size, 3, 3))
+        apart = first != second
+        if apart.any():
+            between[apart] = SHARED_EDGES * self._of_graph().relative(first[apart], second[apart])
+        turn = self.graph.poses[first, 2] - self.poses[i, 2]
+        rotation = np.tile(np.eye(3), (first.size, 1, 1))
+        rotation[:, 0, 0] = rotation[:, 1, 1] = np.cos(turn)
+        rotation[:, 0, 1], rotation[:, 1, 0] = -np.sin(turn), np.sin(turn)
+        own = np.diag(SCAN_STD**2)
+        c, s = np.cos(self.poses[i, 2]), np.sin(self.poses[i, 2])
+        d = self.poses[j] - self.poses[i]
+        lever = np.tile(np.eye(3), (first.size, 1, 1))
+        lever[:, 0, 2] = -s * d[:, 0] + c * d[:, 1]
+        lever[:, 1, 2] = -c * d[:, 0] - s * d[:, 1]
+        out = rotation @ between @ rotation.transpose(0, 2, 1) + own + lever @ own @ lever.transpose(0, 2, 1)
+        return np.asarray(0.5 * (out + out.transpose(0, 2, 1)))
+
+    def _of_graph(self) -> PoseCovariances:
+        return covariances(self.graph, weights=self.weights)

@@ -1,0 +1,1 @@
+"""Damaged inputs: a short run as a test, long ones by ``make fuzz``."""

@@ -1,0 +1,151 @@
+# ruff: noqa: T201 - a command of its own, it prints
+"""The long run of ``make fuzz``: damaged inputs over all commands, and readers guided by coverage.
+
+What breaks something is kept in ``fuzz-found/`` with its seed and words; ``--again FOLDER`` tries it once
+more. A quarter of the time goes to ``fuzz.guided``, reader by reader, where atheris is installed.
+"""
+
+from __future__ import annotations
+
+import argparse
+import importlib.util
+import json
+import os
+import random
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+from collections import Counter
+from pathlib import Path
+
+from fuzz.guided import READERS, seed_of
+from support import damage
+from support.fuzz_targets import BY_NAME, FILM_TARGETS, OPTIONS, PENDING, TARGETS, Target
+from support.fuzzing import Healthy, damaged_case
+from support.outcome import Outcome, run
+
+# FFmpeg's own words about a damaged film, where it was loaded before pilotage could silence it.
+os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")
+os.environ.setdefault("OPENCV_LOG_LEVEL", "SILENT")
+
+FOUND = Path("fuzz-found")
+GUIDED_SHARE = 0.25
+OPTIONS_SHARE = 0.15
+SHOWN_OF_A_KIND = 3
+
+
+def main() -> int:
+    """Fuzz; 1 where anything broke."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--minutes", type=float, default=10.0)
+    parser.add_argument("--seed", type=int, default=None, help="else by the clock")
+    parser.add_argument("--only", default="", help="uses whose name holds this")
+    parser.add_argument("--pending", action="store_true", help="uses whose readers are still to be mended")
+    parser.add_argument("--again", type=Path, help="a folder of fuzz-found")
+    asked = parser.parse_args()
+    if asked.again is not None:
+        return again(asked.again)
+    seed = int(time.time()) if asked.seed is None else asked.seed
+    guided = importlib.util.find_spec("atheris") is not None and not asked.only
+    end = time.monotonic() + 60.0 * asked.minutes * (1.0 - GUIDED_SHARE if guided else 1.0)
+    targets = PENDING if asked.pending else (*TARGETS, *FILM_TARGETS)
+    broken = drawn(seed, end, [target for target in targets if asked.only in target.name], not asked.only)
+    if guided:
+        broken += coverage_guided(60.0 * asked.minutes * GUIDED_SHARE / len(READERS))
+    return 1 if broken else 0
+
+
+def drawn(seed: int, end: float, targets: list[Target], with_words: bool) -> int:
+    """Damaged inputs and words until the time is over; returns how many broke something."""
+    codes: Counter[int] = Counter()
+    kinds: Counter[str] = Counter()
+    number = 0
+    with tempfile.TemporaryDirectory(prefix="pilotage-fuzz-") as place:
+        healthy, case = Healthy(Path(place) / "healthy"), Path(place) / "case"
+        while time.monotonic() < end:
+            rng = random.Random(f"{seed}-{number}")
+            target = targets[number % len(targets)]
+            words: tuple[str, ...] = target.words
+            if with_words and rng.random() < OPTIONS_SHARE:
+                healthy.copy(BY_NAME["run floor"], case)
+                value = rng.choice((*damage.NUMBERS, *damage.WORDS))
+                words = tuple(word.replace("VALUE", value) for word in rng.choice(OPTIONS))
+                what = "words"
+            else:
+                what = damaged_case(target, healthy, case, rng)
+            outcome = run(words, case)
+            codes[outcome.code] += 1
+            for fault in outcome.faults()[:1]:
+                kind = f"{words[0]}: {fault[-80:]}"
+                kinds[kind] += 1
+                if kinds[kind] <= SHOWN_OF_A_KIND:
+                    print(f"seed {seed}, case {number}, {target.name}, {what}: {fault[:600]}", flush=True)
+                    keep(case, f"{seed}-{number}", words, outcome)
+            number += 1
+    told = ", ".join(f"{count} with {code}" for code, count in sorted(codes.items()))
+    print(f"seed {seed}: {number} cases ({told}), {sum(kinds.values())} broke something", flush=True)
+    return sum(kinds.values())
+
+
+def keep(case: Path, name: str, words: tuple[str, ...], outcome: Outcome) -> None:
+    """Keep a case for another look; what is endless is not copied."""
+    folder = FOUND / name
+    shutil.rmtree(folder, ignore_errors=True)
+    folder.mkdir(parents=True)
+    for path in case.rglob("*"):
+        if path.is_file() and not path.is_symlink() and path.stat().st_size < 10_000_000:
+            kept = folder / path.relative_to(case)
+            kept.parent.mkdir(parents=True, exist_ok=True)
+            shutil.copyfile(path, kept)
+    (folder / "words.json").write_text(json.dumps(words))
+    (folder / "said.txt").write_text(outcome.err)
+
+
+def again(folder: Path) -> int:
+    """Run a kept case once more."""
+    outcome = run(json.loads((folder / "words.json").read_text()), folder)
+    print(outcome.err, end="")
+    print(f"exit code {outcome.code}; {'; '.join(outcome.faults()) or 'nothing broke'}")
+    return 1 if outcome.faults() else 0
+
+
+def coverage_guided(seconds: float) -> int:
+    """Each reader in a process of its own; returns how many crashed."""
+    crashed = 0
+    FOUND.mkdir(exist_ok=True)
+    for reader in READERS:
+        seeds = tempfile.mkdtemp(prefix="pilotage-seeds-")
+        (Path(seeds) / "healthy").write_bytes(seed_of(reader))
+        done = subprocess.run(
+            [
+                sys.executable,
+                "-m",
+                "fuzz.guided",
+                reader,
+                f"-max_total_time={max(1, round(seconds))}",
+                "-timeout=30",
+                "-rss_limit_mb=2000",
+                "-max_len=65536",
+                f"-artifact_prefix={FOUND}/{reader}-",
+                seeds,
+            ],
+            capture_output=True,
+            text=True,
+            check=False,
+            env=os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)},
+        )
+        shutil.rmtree(seeds)
+        runs = [line for line in done.stderr.splitlines() if line.startswith("Done ")]
+        print(f"{reader}: {runs[-1] if runs else 'crashed'}", flush=True)
+        if done.returncode != 0:
+            crashed += 1
+            print(done.stderr[-1500:], flush=True)
+    if not any(FOUND.iterdir()):
+        FOUND.rmdir()
+    return crashed
+
+
+if __name__ == "__main__":
+    sys.exit(main())

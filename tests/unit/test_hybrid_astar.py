@@ -1,0 +1,122 @@
+"""Hybrid A*: the whole path keeps the true outline clear, turns no tighter than it may, ends at the goal."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from pilotage.core.types import FloatArray, Goal, Pose2
+from pilotage.kernels.bodies.outline import outline_clearance
+from pilotage.maps.distance_field import DistanceField
+from pilotage.maps.segment_map import SegmentMap, box_segments
+from pilotage.models.footprint import Footprint
+from pilotage.stack.planning.hybrid_astar import HybridAstarConfig, HybridAstarPlanner
+from pilotage.stack.planning.planner import Path, PlanRequest, PlanStatus
+
+CAR = Footprint.polygon(np.array([[0.8, 0.3], [-0.2, 0.3], [-0.2, -0.3], [0.8, -0.3]]))
+TURNING_M = 0.9
+
+
+def yard(*boxes: tuple[float, float, float, float], side_m: float = 9.0) -> SegmentMap:
+    """A square yard with boxes x, y, width, height."""
+    walls = [box_segments(0.5 * side_m, 0.5 * side_m, side_m, side_m, 0.0)]
+    walls += [box_segments(x, y, width, height, 0.0) for x, y, width, height in boxes]
+    return SegmentMap(np.concatenate(walls), np.array([[6.5, 2.5, 0.4]]), (0.0, 0.0, side_m, side_m))
+
+
+def request(world: SegmentMap, start: Pose2, goal: Goal, clearance_m: float | None = None) -> PlanRequest:
+    rng = np.random.default_rng(0)
+    field = DistanceField.from_map(world)
+    return PlanRequest(start, goal, field, rng, clearance_m, CAR, TURNING_M)
+
+
+def least_clearance_m(path: Path, world: SegmentMap) -> float:
+    """Exact, of the outline at states halfway between those of the path as well."""
+    states: FloatArray = path.states
+    steps = np.diff(states, axis=0)
+    steps[:, 2] = (steps[:, 2] + math.pi) % (2.0 * math.pi) - math.pi
+    poses = np.concatenate([states, states[:-1] + 0.5 * steps])
+    return min(
+        float(
+            outline_clearance(
+                x,
+                y,
+                math.cos(theta),
+                math.sin(theta),
+                np.ascontiguousarray(CAR.points_m),
+                CAR.radius_m,
+                world.segments_m,
+                world.circles_m,
+            )
+        )
+        for x, y, theta in poses.tolist()
+    )
+
+
+WORLDS = {
+    "an empty yard": yard(),
+    "a wall to go around": yard((4.5, 3.0, 0.2, 4.0)),
+    "a narrow gate": yard((4.5, 2.0, 0.3, 4.0), (4.5, 7.0, 0.3, 4.0)),
+}
+
+
+@pytest.mark.parametrize("name", WORLDS)
+@pytest.mark.parametrize("theta", [0.0, math.pi / 2, -2.5])
+def test_the_whole_path_is_clear_smooth_and_ends_at_the_goal(name: str, theta: float) -> None:
+    world = WORLDS[name]
+    start, goal = Pose2(1.5, 4.5, theta), Goal(7.5, 5.5, -theta)
+    planner = HybridAstarPlanner(HybridAstarConfig(clearance_m=0.08))
+    result = planner.plan(request(world, start, goal))
+    assert result.path is not None, result.reason
+    states = result.path.states
+    # Between two looks, 4 cm apart, a corner moves little: a chord's sagitta and the outline's turn.
+    assert least_clearance_m(result.path, world) >= 0.08 - 0.02 * (1.0 + CAR.radius_m / TURNING_M) - 1e-9
+    assert least_clearance_m(result.path, world) > 0.0
+    assert states[0] == pytest.approx(start.as_array())
+    assert math.hypot(states[-1, 0] - goal.x_m, states[-1, 1] - goal.y_m) < 1e-4
+    assert abs(math.sin(0.5 * (states[-1, 2] + theta))) < 1e-4
+    chords = np.hypot(*np.diff(states[:, :2], axis=0).T)
+    assert chords.max() < 0.03
+    assert chords.sum() == pytest.approx(result.path.length_m, rel=1e-3)
+    turned = np.abs((np.diff(states[:, 2]) + math.pi) % (2.0 * math.pi) - math.pi)
+    assert (turned * 1.1 * TURNING_M <= chords * 1.001 + 1e-6).all()
+    # Along its own heading, forwards or backwards: never sideways.
+    middle = states[:-1, 2] + 0.5 * ((np.diff(states[:, 2]) + math.pi) % (2.0 * math.pi) - math.pi)
+    dx, dy = np.diff(states[:, 0]), np.diff(states[:, 1])
+    assert np.abs(dy * np.cos(middle) - dx * np.sin(middle)).max() < 1e-6
+
+
+def test_it_backs_into_a_bay() -> None:
+    bay = yard((3.0, 8.0, 2.0, 2.0), (6.0, 8.0, 2.0, 2.0))
+    start, goal = Pose2(1.5, 5.5, 0.0), Goal(4.5, 8.5, -math.pi / 2)
+    result = HybridAstarPlanner(HybridAstarConfig()).plan(request(bay, start, goal))
+    assert result.path is not None, result.reason
+    assert least_clearance_m(result.path, bay) > 0.02
+    states = result.path.states
+    delta = np.diff(states[:, :2], axis=0)
+    backwards = delta[:, 0] * np.cos(states[1:, 2]) + delta[:, 1] * np.sin(states[1:, 2]) < 0.0
+    assert backwards[-1], "its nose looks out"
+
+
+def test_what_does_not_fit_is_a_status_with_its_reason() -> None:
+    world = yard((4.5, 4.5, 0.2, 9.0))
+    planner = HybridAstarPlanner(HybridAstarConfig(most_expansions=3000))
+    shut = planner.plan(request(world, Pose2(1.5, 4.5, 0.0), Goal(7.5, 5.5, 0.0)))
+    assert (shut.status, shut.path) == (PlanStatus.NO_PATH, None)
+    assert "expansions" in shut.reason
+    at_wall = planner.plan(request(world, Pose2(0.2, 4.5, 0.0), Goal(3.0, 5.5, 0.0)))
+    assert at_wall.status is PlanStatus.START_BLOCKED or at_wall.path is not None
+    nose_in = planner.plan(request(world, Pose2(1.5, 4.5, 0.0), Goal(8.5, 5.5, 0.0)))
+    assert nose_in.status is PlanStatus.GOAL_BLOCKED
+    assert "outline" in nose_in.reason
+
+
+def test_the_same_query_has_the_same_answer() -> None:
+    world = WORLDS["a narrow gate"]
+    asked = request(world, Pose2(1.5, 4.5, 0.0), Goal(7.5, 5.5, 0.0))
+    first, second = (HybridAstarPlanner(HybridAstarConfig()).plan(asked) for _ in range(2))
+    assert first.path is not None
+    assert second.path is not None
+    assert (first.path.states == second.path.states).all()

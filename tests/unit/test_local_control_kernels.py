@@ -1,0 +1,232 @@
+"""Kernels of local control: window, rollouts, time to go, matching, bands, movers."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from pilotage.core.types import FloatArray
+from pilotage.kernels.control.band import path_time, speed_profile
+from pilotage.kernels.control.commands_sent import drive_out, limit_errors, scaled
+from pilotage.kernels.control.dynamic_window import choose_in_window, window
+from pilotage.kernels.control.ground import Ground, believed, nearest_cells
+from pilotage.kernels.control.match import match_scan
+from pilotage.kernels.control.motion_limits import Drive, advance, approach, command_is_safe
+from pilotage.kernels.control.movers import COLUMNS, VX, VY, X, Y, foretold, scan_clusters, track_step
+from pilotage.kernels.control.rollouts import weighted_mean
+from pilotage.kernels.control.togo import UNREACHED_S, descent_path, time_to_go
+from pilotage.stack.control.local.body import make_body
+
+JACKAL = np.array([[0.254, 0.215], [-0.254, 0.215], [-0.254, -0.215], [0.254, -0.215]])
+DRIVE = Drive(2.0, 0.5, 3.0, 2.0, 4.0, 6.0)
+NOBODY = np.zeros((1, 0, 3))
+SPEED = st.floats(-0.5, 2.0)
+TURN = st.floats(-4.0, 4.0)
+
+
+def ground_of(points: FloatArray, togo: FloatArray | None = None) -> Ground:
+    """All seen ground of 8 m about the origin with obstacle points."""
+    n = 160
+    hits = np.zeros((n, n), dtype=np.uint8)
+    mean = np.zeros((n * n, 2))
+    for x, y in points:
+        row, column = int((y + 4.0) / 0.05), int((x + 4.0) / 0.05)
+        hits[row, column] = 5
+        mean[row * n + column] = x, y
+    half = n // 2
+    far = np.full((half, half), 9.0)
+    field = np.zeros((half, half)) if togo is None else togo
+    return Ground(hits, mean, nearest_cells(believed(hits)), far, field, -4.0, -4.0, 0.05, 0.1, 20.0, 10.0)
+
+
+@given(st.lists(st.tuples(st.integers(0, 14), st.integers(0, 11)), max_size=12))
+def test_nearest_cell_is_the_nearest(marked: list[tuple[int, int]]) -> None:
+    grid = np.zeros((15, 12), dtype=np.bool_)
+    for row, column in marked:
+        grid[row, column] = True
+    found = nearest_cells(grid)
+    rows, columns = np.nonzero(grid)
+    for row in range(15):
+        for column in range(12):
+            if not rows.size:
+                assert found[row, column] == -1
+                continue
+            at = found[row, column]
+            mine = (at // 12 - row) ** 2 + (at % 12 - column) ** 2
+            assert grid[at // 12, at % 12]
+            assert mine == ((rows - row) ** 2 + (columns - column) ** 2).min()
+
+
+@given(SPEED, SPEED, st.floats(0.01, 0.5))
+def test_a_rate_approaches_and_never_passes(value: float, wanted: float, dt: float) -> None:
+    after = approach(value, wanted, 3.0 * dt, 2.0 * dt)
+    assert min(value, wanted) <= after <= max(value, wanted)
+    assert abs(after - value) <= 3.0 * dt + 1e-12
+
+
+@given(SPEED, TURN, st.floats(0.02, 0.4))
+def test_the_window_holds_what_can_be_reached(v: float, w: float, dt: float) -> None:
+    low_v, high_v, low_w, high_w = window(v, w, dt, DRIVE)
+    for cv in (-9.0, 0.0, 9.0):
+        for cw in (-9.0, 0.0, 9.0):
+            _, _, _, nv, nw = advance(0.0, 0.0, 0.0, v, w, cv, cw, dt, DRIVE)
+            assert low_v - 1e-9 <= nv <= high_v + 1e-9
+            assert low_w - 1e-9 <= nw <= high_w + 1e-9
+
+
+@given(
+    SPEED,
+    TURN,
+    st.lists(st.tuples(st.floats(-2.0, 2.0), st.floats(-2.0, 2.0)), max_size=20),
+)
+def test_dwa_never_leaves_its_window(v: float, w: float, places: list[tuple[float, float]]) -> None:
+    points = np.array([p for p in places if math.hypot(*p) > 0.5]).reshape(-1, 2)
+    ground = ground_of(points)
+    start = np.array([0.0, 0.0, 0.2, v, w])
+    cv, cw, _ = choose_in_window(
+        start, 0.2, 1.0, 5, 7, DRIVE, make_body(JACKAL), ground, 0.03, 0.2, 1.0, 0.3, 0.2
+    )
+    low_v, high_v, low_w, high_w = window(v, w, 0.2, DRIVE)
+    assert low_v - 1e-9 <= cv <= high_v + 1e-9
+    assert low_w - 1e-9 <= cw <= high_w + 1e-9
+
+
+@given(st.floats(0.2, 2.0), st.floats(-1.5, 1.5), st.integers(0, 10_000))
+def test_a_command_called_safe_can_be_braked_from(v: float, w: float, seed: int) -> None:
+    """Driven out finely with the worse limits, the manoeuvre touches no point."""
+    rng = np.random.default_rng(seed)
+    points = rng.uniform(-2.0, 2.0, (25, 2))
+    points = points[np.hypot(points[:, 0], points[:, 1]) > 0.45]
+    ground = ground_of(points)
+    kept = ground.mean[ground.hits.reshape(-1) > 0]
+    body = make_body(JACKAL)
+    worse = Drive(*scaled(DRIVE, 0.7))
+    start = np.array([0.0, 0.0, 0.0, v, w])
+    safe, _ = command_is_safe(start, v, w, 0.1, 0.05, True, DRIVE, worse, body, ground, NOBODY, 0.03, 0.0)
+    if not safe:
+        return
+    from pilotage.kernels.control.footprint import points_clearance
+
+    for limits in (DRIVE, worse):
+        x, y, theta, nv, nw = start
+        for k in range(2000):
+            slower = approach(nv, 0.0, 0.0, limits.deceleration * 0.01)
+            cv, cw = (v, w) if k < 10 else (0.0, w / v * slower)
+            x, y, theta, nv, nw = advance(x, y, theta, nv, nw, cv, cw, 0.01, limits)
+            assert points_clearance(x, y, theta, JACKAL, kept) > 0.0
+            if nv == 0.0:
+                break
+
+
+def test_weighted_mean_goes_to_the_cheapest_as_the_temperature_falls() -> None:
+    rng = np.random.default_rng(5)
+    commands = rng.normal(size=(50, 8, 2))
+    costs = rng.uniform(1.0, 5.0, 50)
+    cold = weighted_mean(commands, costs, 1e-4)
+    assert np.allclose(cold, commands[int(np.argmin(costs))])
+    warm = weighted_mean(commands, costs, 1e6)
+    assert np.allclose(warm, commands.mean(axis=0), atol=1e-4)
+
+
+def test_time_to_go_is_the_distance_in_the_open_and_goes_around_walls() -> None:
+    m = 60
+    speed = np.full((m, m), 2.0)
+    field = time_to_go(speed, 0.0, 0.0, 0.1, 3.05, 3.05, 2.0, 0.0, 0.0, 1e9)
+    rows, columns = np.indices((m, m))
+    straight = np.hypot(0.1 * columns + 0.05 - 3.05, 0.1 * rows + 0.05 - 3.05) / 2.0
+    assert np.all(field >= straight - 1e-9)
+    assert np.all(field <= 1.03 * straight + 0.02)
+    speed[30, :50] = 0.0
+    wall = time_to_go(speed, 0.0, 0.0, 0.1, 1.05, 5.05, 2.0, 0.0, 0.0, 1e9)
+    assert wall[10, 10] > 1.2 * (4.0 / 2.0)
+    path = descent_path(1.05, 1.05, wall, 0.0, 0.0, 0.1, 0.1, 200)
+    assert math.hypot(path[-1, 0] - 1.05, path[-1, 1] - 5.05) < 0.6
+    speed[30, :] = 0.0
+    closed = time_to_go(speed, 0.0, 0.0, 0.1, 1.05, 5.05, 2.0, 0.0, 0.0, 1e9)
+    assert closed[10, 10] == UNREACHED_S
+
+
+@given(st.floats(-0.06, 0.06), st.floats(-0.06, 0.06), st.floats(-0.04, 0.04))
+def test_matching_finds_a_small_displacement(dx: float, dy: float, turn: float) -> None:
+    rng = np.random.default_rng(11)
+    points = rng.uniform(-3.0, 3.0, (120, 2))
+    ground = ground_of(points)
+    kept = ground.mean[ground.hits.reshape(-1) > 0]
+    c, s = math.cos(turn), math.sin(turn)
+    # What a robot at (dx, dy, turn) sees of them, in its own frame.
+    seen = np.ascontiguousarray((kept - [dx, dy]) @ np.array([[c, -s], [s, c]]))
+    std = np.array([0.1, 0.1, 0.1])
+    x, y, theta, partners = match_scan(0.0, 0.0, 0.0, seen, 1, ground, 0.3, 0.02, std)
+    assert partners > 50
+    assert math.hypot(x - dx, y - dy) < 0.02
+    assert abs(theta - turn) < 0.01
+
+
+def test_matching_leaves_the_odometry_alone_without_partners() -> None:
+    ground = ground_of(np.array([[3.0, 3.0]]))
+    seen = np.random.default_rng(1).uniform(-2.0, 0.0, (50, 2))
+    pose = match_scan(0.1, 0.2, 0.3, seen, 1, ground, 0.2, 0.05, np.full(3, 0.1))
+    assert pose[:3] == (0.1, 0.2, 0.3)
+
+
+@given(st.floats(0.0, 2.0), st.integers(0, 1000))
+def test_a_speed_profile_keeps_its_limits(v_now: float, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    path = np.cumsum(rng.uniform(0.02, 0.2, (30, 2)), axis=0)
+    caps = rng.uniform(0.3, 2.0, 30)
+    speeds = speed_profile(path, v_now, 0.0, caps, DRIVE)
+    steps = np.hypot(*np.diff(path, axis=0).T)
+    assert np.all(speeds <= caps + 1e-9)
+    squares = np.diff(speeds**2)
+    assert np.all(squares <= 2.0 * DRIVE.acceleration * steps + 1e-9)
+    assert np.all(squares >= -2.0 * DRIVE.deceleration * steps - 1e-9)
+    assert path_time(path, speeds) >= steps.sum() / DRIVE.speed
+
+
+def test_commands_under_way_are_driven_out_in_their_order() -> None:
+    sent = np.array([[0.0, 1.0, 0.0], [0.1, 0.0, 0.0]])
+    state = np.array([0.0, 0.0, 0.0, 0.0, 0.0])
+    out = drive_out(state, 0.1, 0.2, 0.1, sent, DRIVE)
+    assert out[3] == pytest.approx(0.3)
+    assert drive_out(state, 0.1, 0.6, 0.1, sent, DRIVE)[3] == 0.0
+
+
+def test_the_true_limits_explain_the_answers_best() -> None:
+    sent = np.array([[0.0, 2.0, 1.0]])
+    hypotheses = np.array([[1.0, 1.0], [0.7, 1.0], [0.5, 1.0]])
+    before = np.zeros(5)
+    after = drive_out(before, 0.1, 0.2, 0.1, sent, Drive(*scaled(DRIVE, 0.7)))
+    errors = limit_errors(before, after, 0.1, 0.2, 0.1, sent, DRIVE, hypotheses, 0.03, 0.06)
+    assert int(np.argmin(errors)) == 1
+
+
+def test_a_walker_is_tracked_and_foretold() -> None:
+    tracks = np.zeros((0, COLUMNS))
+    rng = np.random.default_rng(2)
+    for k in range(60):
+        place = np.array([[0.05 * 1.2 * k, 1.0], [3.0, -2.0]]) + rng.normal(0.0, 0.03, (2, 2))
+        tracks, of_centre = track_step(tracks, place, 0.05, 0.08, 0.8, 4.0, 8)
+        assert of_centre.shape == (2,)
+    assert tracks.shape[0] == 2
+    walker = tracks[int(np.argmax(np.abs(tracks[:, VX])))]
+    assert walker[VX] == pytest.approx(1.2, abs=0.25)
+    assert abs(walker[VY]) < 0.25
+    discs = foretold(tracks, 0.0, 0.5, 3, 0.25, 1.0, 0.8)
+    i = int(np.argmax(np.abs(tracks[:, VX])))
+    assert discs[2, i, 0] == pytest.approx(walker[X] + walker[VX])
+    assert discs[2, i, 1] == pytest.approx(walker[Y] + walker[VY])
+    assert np.all(np.diff(discs[:, :, 2], axis=0) > 0.0)
+
+
+def test_clusters_end_at_gaps_and_wide_ones_are_none() -> None:
+    wall = np.column_stack([np.full(40, 3.0), np.linspace(-2.0, 1.0, 40)])
+    body = np.column_stack([np.full(6, 2.0), np.linspace(1.5, 1.8, 6)])
+    centres, of_point = scan_clusters(0.0, 0.0, np.vstack([wall, body]), 0.2, 0.8, 3)
+    assert centres.shape == (1, 2)
+    assert np.all(of_point[:40] == -1)
+    assert np.all(of_point[40:] == 0)
+    assert math.hypot(*centres[0]) > math.hypot(2.0, 1.65)

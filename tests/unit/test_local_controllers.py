@@ -1,0 +1,162 @@
+"""Every registered local controller in a small closed loop, and what our own one promises."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from pilotage.core.errors import InputError
+from pilotage.core.types import FloatArray, Pose2, Twist
+from pilotage.kernels.control.footprint import discs_clearance
+from pilotage.kernels.control.motion_limits import Drive, advance
+from pilotage.kernels.scans.rays import fan_ranges
+from pilotage.stack.control.local.role import (
+    LOCAL_CONTROLLERS,
+    LocalController,
+    LocalLimits,
+    LocalView,
+)
+
+JACKAL = np.array([[0.254, 0.215], [-0.254, 0.215], [-0.254, -0.215], [0.254, -0.215]])
+LIMITS = LocalLimits(2.0, 0.5, 3.0, 3.0, 4.0, 6.0)
+ANGLES = np.linspace(-0.75 * math.pi, 0.75 * math.pi, 271)
+MOUNT = Pose2(0.12, 0.0, 0.0)
+NO_SEGMENTS = np.zeros((0, 4))
+POSTS = np.array([[2.0, 0.1, 0.075], [3.0, 0.9, 0.075], [3.0, -0.8, 0.075], [4.2, -0.1, 0.2]])
+
+
+def view_of(
+    t: float, pose: Pose2, twist: Twist, circles: FloatArray, limits: LocalLimits = LIMITS
+) -> LocalView:
+    """What a robot with true odometry and a perfect laser sees; the goal is 6 m ahead."""
+    x = pose.x_m + math.cos(pose.theta_rad) * MOUNT.x_m
+    y = pose.y_m + math.sin(pose.theta_rad) * MOUNT.x_m
+    step = float(ANGLES[1] - ANGLES[0])
+    ranges = fan_ranges(
+        x, y, pose.theta_rad + float(ANGLES[0]), step, ANGLES.shape[0], 20.0, NO_SEGMENTS, circles
+    )
+    return LocalView(t, pose, twist, ranges, ANGLES, MOUNT, 20.0, (6.0, 0.0), limits, JACKAL, 0.3)
+
+
+def drive(
+    controller: LocalController,
+    circles: FloatArray,
+    limits: LocalLimits = LIMITS,
+    true_share: float = 1.0,
+    seconds: float = 15.0,
+) -> tuple[bool, float, list[Twist]]:
+    """Whether it came to the goal, its least clearance, and its commands; with the delay of the limits."""
+    true = Drive(
+        limits.speed_m_s,
+        limits.reverse_m_s,
+        limits.acceleration_m_s2 * true_share,
+        limits.deceleration_m_s2 * true_share,
+        limits.turn_rate_rad_s,
+        limits.turn_acceleration_rad_s2 * true_share,
+    )
+    x, y, theta, v, w = 0.0, 0.0, 0.0, 0.0, 0.0
+    least = math.inf
+    commands: list[Twist] = []
+    late = round(limits.delay_s / 0.05)
+    for k in range(round(seconds / 0.05)):
+        view = view_of(0.05 * k, Pose2(x, y, theta), Twist(v, w), circles, limits)
+        commands.append(controller.step(view))
+        acting = commands[-1 - late] if len(commands) > late else Twist(0.0, 0.0)
+        for _ in range(5):
+            x, y, theta, v, w = advance(x, y, theta, v, w, acting.v_m_s, acting.w_rad_s, 0.01, true)
+            least = min(least, discs_clearance(x, y, theta, JACKAL, circles))
+        if math.hypot(x - 6.0, y) < 0.35:
+            return True, least, commands
+    return False, least, commands
+
+
+def make(name: str, seed: int = 1, **parameters: object) -> LocalController:
+    """A controller by its name."""
+    config = LOCAL_CONTROLLERS.configure(name, dict(parameters), name)
+    return LOCAL_CONTROLLERS.entry(name).factory(config, np.random.default_rng(seed))
+
+
+def test_all_are_registered() -> None:
+    assert {"dwa", "vfh", "teb", "mppi", "pure-pursuit", "gap-horizon"} <= set(LOCAL_CONTROLLERS.names())
+
+
+@pytest.mark.parametrize("name", ["dwa", "vfh", "teb", "mppi", "pure-pursuit", "gap-horizon"])
+def test_each_drives_around_posts(name: str) -> None:
+    arrived, least, commands = drive(make(name), POSTS)
+    assert arrived
+    assert least > 0.0
+    for command in commands:
+        assert -LIMITS.reverse_m_s - 1e-9 <= command.v_m_s <= LIMITS.speed_m_s + 1e-9
+        assert abs(command.w_rad_s) <= LIMITS.turn_rate_rad_s + 1e-9
+
+
+@pytest.mark.parametrize("name", ["mppi", "gap-horizon"])
+def test_samplers_repeat_with_their_generator(name: str) -> None:
+    first = drive(make(name, seed=4), POSTS, seconds=1.0)[2]
+    again = drive(make(name, seed=4), POSTS, seconds=1.0)[2]
+    other = drive(make(name, seed=5), POSTS, seconds=1.0)[2]
+    assert first == again
+    assert first != other
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_our_own_hits_nothing_it_has_seen_with_weak_brakes_worse_than_told(seed: int) -> None:
+    """Random posts, some of which leave no way: it may stand still, it may not touch."""
+    rng = np.random.default_rng(seed)
+    places = rng.uniform([1.2, -2.0], [5.2, 2.0], (14, 2))
+    circles = np.column_stack([places, np.full(14, 0.1)])
+    weak = LocalLimits(2.0, 0.5, 1.0, 1.0, 4.0, 6.0, 0.1)
+    _, least, _ = drive(make("gap-horizon"), circles, weak, true_share=0.75, seconds=12.0)
+    assert least > 0.0
+
+
+def test_it_stands_before_a_closed_wall() -> None:
+    y = np.arange(-4.5, 4.6, 0.15)
+    wall = np.column_stack([np.full(y.shape[0], 2.5), y, np.full(y.shape[0], 0.08)])
+    sides = np.column_stack([np.arange(-2.0, 2.6, 0.15), np.full(31, 4.5), np.full(31, 0.08)])
+    back = np.column_stack([np.full(y.shape[0], -2.0), y, np.full(y.shape[0], 0.08)])
+    room = np.vstack([wall, sides, sides * [1.0, -1.0, 1.0], back])
+    arrived, least, _ = drive(make("gap-horizon"), room, seconds=6.0)
+    assert not arrived
+    assert least > 0.0
+
+
+def test_a_covered_laser_stops_it() -> None:
+    controller = make("gap-horizon")
+    view = view_of(0.0, Pose2(0.0, 0.0, 0.0), Twist(0.0, 0.0), POSTS)
+    covered = LocalView(
+        0.0,
+        view.pose,
+        view.twist,
+        np.zeros_like(view.ranges_m),
+        ANGLES,
+        MOUNT,
+        20.0,
+        (6.0, 0.0),
+        LIMITS,
+        JACKAL,
+    )
+    assert controller.step(covered) == Twist(0.0, 0.0)
+
+
+def test_bad_views_are_refused_in_one_line() -> None:
+    pose, twist = Pose2(0.0, 0.0, 0.0), Twist(0.0, 0.0)
+    with pytest.raises(InputError, match="as many ranges"):
+        LocalView(0.0, pose, twist, np.ones(5), ANGLES, MOUNT, 20.0, (6.0, 0.0), LIMITS, JACKAL)
+    with pytest.raises(InputError, match="evenly"):
+        LocalView(
+            0.0, pose, twist, np.ones(3), np.array([0.0, 0.1, 0.5]), MOUNT, 20.0, (6.0, 0.0), LIMITS, JACKAL
+        )
+    with pytest.raises(InputError, match="deceleration_m_s2"):
+        LocalLimits(2.0, 0.5, 3.0, 0.0, 4.0, 6.0)
+    with pytest.raises(InputError, match="delay_s"):
+        LocalLimits(2.0, 0.5, 3.0, 3.0, 4.0, 6.0, -0.1)
+    controller = make("gap-horizon")
+    view = view_of(1.0, pose, twist, POSTS)
+    controller.step(view)
+    with pytest.raises(InputError, match=r"after 1\.000 s"):
+        controller.step(view)
+    with pytest.raises(InputError, match="did you mean 'gap-horizon'"):
+        LOCAL_CONTROLLERS.entry("gap-horizn")

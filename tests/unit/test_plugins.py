@@ -1,0 +1,139 @@
+"""Components from files outside the package: a whole mission made of them, and plugins that are refused."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+
+from pilotage.cli.main import main
+from pilotage.core import plugins
+from support.missions import reach
+
+FOLDER = Path(__file__).parents[1] / "support" / "plugins"
+FILES = sorted(str(path) for path in FOLDER.glob("*.py"))
+REGISTERED = {
+    ("sensor", "position-fix"),
+    ("motion", "tricycle"),
+    ("planner", "straight-line"),
+    ("localizer", "last-fix"),
+    ("task", "stroll"),
+}
+
+
+RUN = "import sys; from pilotage.cli.main import main; sys.exit(main(sys.argv[1:]))"
+
+
+def mission() -> dict[str, Any]:
+    """Half the room at a stroll, on nothing but what the plugins bring."""
+    values = reach(mission="a-stroll")
+    values["world"]["goal"] = {"x_m": 2.0, "y_m": 6.5}
+    values["robot"]["motion"] = {"name": "tricycle", "wheelbase_m": 0.5}
+    values["robot"]["sensors"]["fix"] = {"name": "position-fix", "position_std_m": 0.01}
+    values["stack"] |= {"localizer": {"name": "last-fix"}, "planner": {"name": "straight-line"}}
+    values["task"] = {"name": "stroll", "distance_m": 1.5}
+    return values
+
+
+def pilotage(*words: str, folder: Path) -> subprocess.CompletedProcess[str]:
+    """A process of its own: what a plugin registers stays for as long as a process lives."""
+    environment = {key: value for key, value in os.environ.items() if key != plugins.VARIABLE}
+    return subprocess.run(
+        [sys.executable, "-c", RUN, *words],
+        cwd=folder,
+        env=environment,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+
+
+def named(files: list[str]) -> list[str]:
+    return [word for file in files for word in ("--plugin", file)]
+
+
+def test_a_mission_of_plugins_alone(tmp_path: Path) -> None:
+    (tmp_path / "stroll.yaml").write_text(yaml.safe_dump(mission()))
+    done = pilotage("run", "stroll.yaml", *named(FILES), "--json", "--out", "runs", folder=tmp_path)
+    assert done.returncode == 0, done.stderr
+    answer = json.loads(done.stdout)
+    assert (answer["success"], answer["reason"]) == (True, "strolled")
+    assert answer["path_length_m"] >= 1.5
+    assert answer["position_rmse_m"] < 0.03
+    assert answer["wobble_rad"] > 0.0
+    # It runs again from its folder alone: the resolved mission names the plugins.
+    again = pilotage("run", f"{answer['run_dir']}/mission.yaml", "--json", folder=tmp_path)
+    assert again.returncode == 0, again.stderr
+    assert json.loads(again.stdout)["wobble_rad"] == answer["wobble_rad"]
+    # Without them it is refused in one line, with the nearest right name.
+    refused = pilotage("run", "stroll.yaml", "--json", folder=tmp_path)
+    assert refused.returncode == 2
+    assert refused.stdout == ""
+    assert refused.stderr.count("\n") == 1
+    assert "unknown task 'stroll'" in refused.stderr
+
+
+def test_they_are_shown_with_the_others(tmp_path: Path) -> None:
+    shown = pilotage("components", *named(FILES), "--json", folder=tmp_path)
+    assert shown.returncode == 0, shown.stderr
+    rows = json.loads(shown.stdout)["components"]
+    assert {(role, name) for role, name, _ in rows} >= REGISTERED | {("planner", "astar")}
+    assert all(text for _, _, text in rows)
+
+
+@pytest.fixture
+def alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What a refused plugin leaves in this process is taken back."""
+    monkeypatch.delenv(plugins.VARIABLE, raising=False)
+    monkeypatch.setattr(plugins, "_loaded", dict(plugins._loaded))
+
+
+TAKEN = """
+from pilotage.core.config import Config
+from pilotage.stack.planning.planner import PLANNERS
+class Mine(Config):
+    "Nothing."
+@PLANNERS.add("astar", Mine)
+class Astar:
+    "Mine."
+"""
+TAKEN_METRIC = """
+from pilotage.evaluation.metric import Metric
+from pilotage.evaluation.metrics import METRICS
+METRICS.add(Metric("duration_s", "mine", "s", ""))
+"""
+
+
+@pytest.mark.usefixtures("alone")
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("import no_such_module_anywhere\n", "line 1: ModuleNotFoundError"),
+        ("x = 1\n\ny = x / 0\n", "line 3: ZeroDivisionError: division by zero"),
+        ("def broken(:\n    pass\n", "line 1: SyntaxError"),
+        ("raise SystemExit(3)\n", "line 1: SystemExit: 3"),
+        (TAKEN, "planner 'astar': expected a new name, found it registered already"),
+        (TAKEN_METRIC, "metric 'duration_s': expected a new key, found it declared already"),
+        (None, "expected a Python file, found none there"),
+    ],
+)
+def test_a_plugin_that_cannot_be_used_is_one_line(
+    text: str | None, told: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "mine.py"
+    if text is not None:
+        file.write_text(text)
+    for _ in range(2):  # it stays refused
+        assert main(["components", "--plugin", str(file)]) == 2
+        answer = capsys.readouterr()
+        assert answer.out == ""
+        assert answer.err.count("\n") == 1
+        assert told in answer.err
+        assert f"plugin '{file}'" in answer.err
+    assert str(file) not in plugins.named_plugins()

@@ -1,0 +1,67 @@
+"""Buildings made to look alike: a ring of equal corridors with niches at a regular spacing."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from pilotage.core.types import FloatArray
+from pilotage.kernels.slam.frames import between
+from pilotage.stack.mapping.slam.closures import Verdict
+from pilotage.stack.mapping.slam.config import SlamConfig
+from pilotage.stack.mapping.slam.mapper import map_log
+from support.laser_rooms import along, recording
+
+WIDTH_M = 2.0
+
+
+def niches(
+    start: FloatArray, end: FloatArray, outward: FloatArray, spacing_m: float, depth_m: float
+) -> list[list[float]]:
+    """A wall from start to end with niches at a regular spacing."""
+    length = float(np.hypot(*(end - start)))
+    course = (end - start) / length
+    corners = [start]
+    for k in range(int(length / spacing_m)):
+        first, last = (start + course * spacing_m * (k + share) for share in (0.35, 0.6))
+        corners += [first, first + depth_m * outward, last + depth_m * outward, last]
+    corners.append(end)
+    return [[*a, *b] for a, b in pairwise(corners)]
+
+
+def ring(side_m: float, spacing_m: float) -> FloatArray:
+    """Walls (W, 4) of a square ring of corridors, every side and every few metres like the next."""
+    walls: list[list[float]] = []
+    for margin, depth, sign in ((0.0, 0.8, 1.0), (WIDTH_M, 0.3, -1.0)):
+        low, high = margin, side_m - margin
+        corners = np.array([(low, low), (high, low), (high, high), (low, high)])
+        for k in range(4):
+            start, end = corners[k], corners[(k + 1) % 4]
+            course = (end - start) / np.hypot(*(end - start))
+            walls += niches(start, end, sign * np.array([course[1], -course[0]]), spacing_m, depth)
+    return np.array(walls)
+
+
+@pytest.mark.parametrize(("seed", "side_m", "spacing_m"), [(0, 12.0, 2.0), (1, 16.0, 2.0), (2, 12.0, 4.0)])
+def test_nothing_is_closed_between_places_that_only_look_alike(
+    seed: int, side_m: float, spacing_m: float
+) -> None:
+    middle, far = 0.5 * WIDTH_M, side_m - 0.5 * WIDTH_M
+    loop = [(middle + 1.0, middle), (far, middle), (far, far), (middle, far), (middle, middle), (far, middle)]
+    path = along([*loop, (far, 0.5 * side_m)])
+    log = recording(ring(side_m, spacing_m), path, np.random.default_rng(seed), 0.015, 0.03)
+    if seed == 2:
+        log = replace(log, odometry=None, odometry_t_s=None)
+    result = map_log(log, SlamConfig(calibrate_beam_spacing=False))
+    accepted = [closure for closure in result.closures if closure.verdict is Verdict.ACCEPTED]
+    assert accepted
+    for closure in accepted:
+        ends = (result.extents[k].reference for k in (closure.candidate.earlier, closure.candidate.later))
+        a, b = (int(result.keyframes[k]) for k in ends)
+        off = between(between(path[a], path[b]), closure.match.relative)
+        assert np.hypot(off[0], off[1]) < 0.5
+    true = np.array([between(path[0], pose) for pose in path])
+    assert np.hypot(*(result.poses - true)[:, :2].T).max() < 0.15

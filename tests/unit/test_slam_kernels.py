@@ -1,0 +1,188 @@
+"""Kernels of the mapper: alignment, its covariance, the search, and the grids they work on."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from pilotage.core.types import FloatArray
+from pilotage.kernels.slam.align import CAPPED, CONVERGED, TOO_FEW, align, normal_equations
+from pilotage.kernels.slam.branch_bound import search_window
+from pilotage.kernels.slam.buckets import nearest, sort_into_buckets
+from pilotage.kernels.slam.frames import between, carried, composed
+from pilotage.kernels.slam.match_grid import max_pyramid, score_grid
+from pilotage.kernels.slam.occupancy import add_scan
+from pilotage.kernels.slam.scan_lines import scan_lines, scan_points
+from support.laser_rooms import BEAMS, SPAN_RAD, furnished, ranges
+
+ANGLES = np.linspace(-0.5 * SPAN_RAD, 0.5 * SPAN_RAD, BEAMS)
+MOUNT = np.array([0.0, 0.0, 0.0, 1.0])
+NO_PRIOR = 1e-9 * np.eye(3)
+HERE = np.array([2.0, 3.5, 0.2])
+
+
+def cloud(pose: FloatArray, noise: FloatArray | float = 0.0) -> FloatArray:
+    points, hit = scan_points(ranges(furnished(), pose, ANGLES) + noise, ANGLES, MOUNT, 0.1, 30.0)
+    return scan_lines(points, hit, 0.0, 0.0, float(ANGLES[1] - ANGLES[0]))
+
+
+def aligned(
+    source: FloatArray, start: FloatArray, reference: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray, int]:
+    box, starts, _, points = sort_into_buckets(reference, 0.25)
+    return align(source, start, NO_PRIOR, 0.4, 0.2, 0.05, 50, box, starts, points)
+
+
+@settings(max_examples=25, deadline=None)
+@given(st.floats(-0.15, 0.15), st.floats(-0.15, 0.15), st.floats(-0.08, 0.08))
+def test_a_known_displacement_is_found(dx: float, dy: float, turn: float) -> None:
+    there = composed(HERE, np.array([dx, dy, turn]))
+    pose, _, _, status = aligned(cloud(there), np.zeros(3), cloud(HERE))
+    assert status in {CONVERGED, CAPPED}
+    assert np.hypot(pose[0] - dx, pose[1] - dy) < 0.01
+    assert abs(pose[2] - turn) < 0.004
+
+
+def test_the_gradient_is_that_of_the_residuals() -> None:
+    """Against central differences of half the squared residuals, pairs and weights held."""
+    box, starts, _, points = sort_into_buckets(cloud(HERE), 0.25)
+    source = cloud(HERE)[20:160]
+    hessian, gradient = np.zeros((3, 3)), np.zeros(3)
+    at = np.array([1e-3, -5e-4, 2e-4])
+    # So wide a scale weighs all pairs with one.
+    normal_equations(source, *at, 0.2, 1e6, box, starts, points, hessian, gradient)
+    numeric = np.zeros(3)
+    for k in range(3):
+        for sign in (1.0, -1.0):
+            moved = at.copy()
+            moved[k] += sign * 1e-7
+            h, g = np.zeros((3, 3)), np.zeros(3)
+            squares, _, _ = normal_equations(source, *moved, 0.2, 1e6, box, starts, points, h, g)
+            numeric[k] += sign * 0.5 * squares / 2e-7
+    assert gradient == pytest.approx(numeric, rel=1e-3, abs=1e-4)
+
+
+def test_the_covariance_of_a_match_is_that_of_many_matches() -> None:
+    """Monte Carlo over range noise: inverse Hessian times the points' variance, within a factor of two.
+
+    120 draws: a true ratio of one would fall outside of 0.5 to 2 far less than once in a thousand times.
+    """
+    rng = np.random.default_rng(7)
+    std_m = 0.01
+    reference = cloud(HERE)
+    poses, hessians = [], []
+    for _ in range(120):
+        pose, hessian, _, _ = aligned(cloud(HERE, std_m * rng.standard_normal(BEAMS)), np.zeros(3), reference)
+        poses.append(pose)
+        hessians.append(hessian)
+    told = np.sqrt(np.diag(np.linalg.inv(np.mean(hessians, axis=0)) * std_m**2))
+    found = np.std(poses, axis=0)
+    assert (found / told > 0.5).all()
+    assert (found / told < 2.0).all()
+
+
+def test_a_bare_corridor_leaves_its_direction_open() -> None:
+    walls = np.array([(-60.0, -1.0, 60.0, -1.0), (-60.0, 1.0, 60.0, 1.0)])
+    points, hit = scan_points(ranges(walls, np.zeros(3), ANGLES), ANGLES, MOUNT, 0.1, 25.0)
+    lines = scan_lines(points, hit, 0.0, 0.0, float(ANGLES[1] - ANGLES[0]))
+    _, hessian, _, _ = aligned(lines, np.zeros(3), lines)
+    assert hessian[0, 0] < 1e-3 * hessian[1, 1]
+
+
+def test_too_few_points_are_said() -> None:
+    _, _, _, status = aligned(cloud(HERE)[:5], np.zeros(3), cloud(HERE))
+    assert status == TOO_FEW
+    box, starts, _, points = sort_into_buckets(np.zeros((0, 6)), 0.25)
+    assert nearest(0.0, 0.0, 1.0, box, starts, points)[0] == -1
+
+
+@settings(max_examples=40, deadline=None)
+@given(st.integers(0, 2**31), st.floats(0.05, 0.8))
+def test_the_nearest_point_is_the_nearest(seed: int, reach: float) -> None:
+    rng = np.random.default_rng(seed)
+    cloud_ = np.zeros((60, 6))
+    cloud_[:, 4:6] = rng.uniform(-2.0, 2.0, (60, 2))
+    box, starts, order, points = sort_into_buckets(cloud_, 0.25)
+    assert (points[:, :2] == cloud_[order, 4:6]).all()
+    for x, y in rng.uniform(-2.5, 2.5, (20, 2)):
+        distance = np.hypot(points[:, 0] - x, points[:, 1] - y)
+        found, square = nearest(x, y, reach, box, starts, points)
+        if distance.min() < reach:
+            assert np.sqrt(square) == pytest.approx(distance.min())
+            assert distance[found] == pytest.approx(distance.min())
+        else:
+            assert found == -1
+
+
+@settings(max_examples=15, deadline=None)
+@given(st.integers(0, 2**31))
+def test_branch_and_bound_finds_what_looking_everywhere_finds(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    grid = np.where(rng.random((40, 50)) < 0.1, rng.random((40, 50)), -0.2 * (rng.random((40, 50)) < 0.5))
+    grid = grid.astype(np.float32)
+    points = rng.uniform(-0.8, 0.8, (25, 2))
+    centre, angles = np.array([2.0, 2.0, 0.3]), np.array([-0.2, 0.0, 0.2])
+    pyramid, margin = max_pyramid(grid, 3)
+    none = np.array([0.0, 0.0, 0.0, -1.0, 0.0])
+    best, _ = search_window(pyramid, margin, 0.0, 0.0, 0.1, points, centre, 0.7, angles, -10.0, none, 10**6)
+    flat, no_margin = max_pyramid(grid, 0)
+    everywhere, _ = search_window(
+        flat, no_margin, 0.0, 0.0, 0.1, points, centre, 0.7, angles, -10.0, none, 10**6
+    )
+    assert best[3] == pytest.approx(everywhere[3], abs=1e-6)
+
+
+def test_the_second_best_is_elsewhere() -> None:
+    grid = np.zeros((30, 60), np.float32)
+    grid[15, 10], grid[15, 40] = 1.0, 0.9
+    pyramid, margin = max_pyramid(grid, 3)
+    point, centre = np.zeros((1, 2)), np.array([2.5, 1.5, 0.0])
+    window = (pyramid, margin, 0.0, 0.0, 0.1, point, centre, 2.0, np.zeros(1))
+    best, _ = search_window(*window, 0.1, np.array([0.0, 0.0, 0.0, -1.0, 0.0]), 10**6)
+    other, _ = search_window(*window, 0.1, np.array([*best[:3], 0.8, 0.3]), 10**6)
+    assert best[3] == pytest.approx(1.0)
+    assert other[3] == pytest.approx(0.9)
+    assert np.hypot(*(best[:2] - other[:2])) > 2.5
+
+
+def test_walls_score_and_open_floor_counts_against() -> None:
+    points = cloud(HERE)[:, :2]
+    low, high = points.min(axis=0) - 0.5, points.max(axis=0) + 0.5
+    grid = score_grid(
+        np.ascontiguousarray(points),
+        np.zeros((1, 2)),
+        np.array([len(points)]),
+        np.concatenate([low, high]),
+        0.1,
+        0.12,
+        -0.4,
+    )
+    column, row = np.floor((points - low) / 0.1).astype(int).T
+    assert grid[row, column].min() > 0.5
+    column, row = np.floor((0.5 * points - low) / 0.1).astype(int).T
+    assert np.mean(grid[row, column] < 0.0) > 0.7
+
+
+@settings(max_examples=50, deadline=None)
+@given(st.lists(st.floats(-3.0, 3.0), min_size=6, max_size=6))
+def test_between_undoes_composed(values: list[float]) -> None:
+    a, b = np.array(values[:3]), np.array(values[3:])
+    assert between(a, composed(a, b)) == pytest.approx(b, abs=1e-9)
+    points = np.arange(12.0).reshape(2, 6)
+    there = carried(points, a)
+    assert carried(there, between(a, np.zeros(3)))[:, [0, 1, 4, 5]] == pytest.approx(
+        points[:, [0, 1, 4, 5]], abs=1e-9
+    )
+
+
+def test_a_beam_clears_its_way_and_marks_its_end() -> None:
+    odds = np.zeros((10, 40), np.float32)
+    beams = np.array([2.0, np.nan, np.inf])
+    add_scan(odds, 0.0, 0.0, 0.1, np.array([0.55, 0.55, 0.0]), beams, 0.0, 1e-9, 3.0, 0.9, 0.4, 5.0)
+    assert odds[5, 25] == pytest.approx(0.9 - 0.4)
+    assert (odds[5, 6:25] == pytest.approx(-0.8)) if odds[5, 6] else True
+    assert (odds[5, 6:25] < 0.0).all()
+    assert odds[5, 36:].max() <= 0.0
+    assert (odds[:5] == 0.0).all()

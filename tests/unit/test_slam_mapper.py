@@ -1,0 +1,147 @@
+"""The mapper in simulated buildings, and what it says to damaged recordings."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pilotage.cli.main import main
+from pilotage.core.errors import InputError
+from pilotage.experiments.slam import read_slam_config
+from pilotage.kernels.slam.frames import between
+from pilotage.stack.mapping.slam.closures import Verdict
+from pilotage.stack.mapping.slam.config import SlamConfig
+from pilotage.stack.mapping.slam.mapper import map_log
+from pilotage.stack.mapping.slam.result import SlamResult
+from support.laser_rooms import along, furnished, recording
+
+ROUND = [(1.5, 1.2), (5.0, 1.2), (5.0, 4.0), (8.5, 5.8), (5.0, 6.0), (2.0, 4.0), (1.5, 1.2), (4.0, 1.2)]
+
+
+def rms_m(result: SlamResult, path: np.ndarray) -> float:
+    true = np.array([between(path[0], pose) for pose in path])
+    return float(np.sqrt(((result.poses[:, :2] - true[:, :2]) ** 2).sum(axis=1).mean()))
+
+
+def wrong_closures(result: SlamResult, path: np.ndarray) -> int:
+    wrong = 0
+    for closure in result.closures:
+        if closure.verdict is Verdict.ACCEPTED:
+            ends = (result.extents[k].reference for k in (closure.candidate.earlier, closure.candidate.later))
+            a, b = (result.keyframes[k] for k in ends)
+            off = between(between(path[a], path[b]), closure.match.relative)
+            wrong += bool(np.hypot(off[0], off[1]) > 0.5)
+    return wrong
+
+
+def test_a_room_is_mapped_and_its_loop_closed() -> None:
+    path = along(ROUND + ROUND[1:])
+    log = recording(furnished(), path, np.random.default_rng(1))
+    result = map_log(log, SlamConfig())
+    assert rms_m(result, path) < 0.03
+    assert any(closure.verdict is Verdict.ACCEPTED for closure in result.closures)
+    assert wrong_closures(result, path) == 0
+    assert result.odometry_scale == pytest.approx(1.0 / 1.02, abs=0.01)
+    again = map_log(log, SlamConfig())
+    assert np.array_equal(result.poses, again.poses)
+    assert np.array_equal(result.grid.cells, again.grid.cells)
+
+
+def test_no_odometry_is_needed() -> None:
+    path = along(ROUND)
+    log = recording(furnished(), path, np.random.default_rng(2))
+    result = map_log(replace(log, odometry=None, odometry_t_s=None), SlamConfig())
+    assert rms_m(result, path) < 0.04
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_two_rooms_that_look_alike_are_two_rooms(seed: int) -> None:
+    """Equal rooms at both ends of a corridor: nothing is closed between them."""
+    walls = [(0.0, 0.0, 5.0, 0.0), (0.0, 0.0, 0.0, 5.0), (0.0, 5.0, 5.0, 5.0)]
+    walls += [(5.0, 0.0, 5.0, 2.0), (5.0, 3.0, 5.0, 5.0), (5.0, 2.0, 11.0, 2.0), (5.0, 3.0, 11.0, 3.0)]
+    walls += [(11.0, 0.0, 11.0, 2.0), (11.0, 3.0, 11.0, 5.0), (11.0, 0.0, 16.0, 0.0), (11.0, 5.0, 16.0, 5.0)]
+    walls += [(16.0, 0.0, 16.0, 5.0)]
+    path = along([(1.0, 1.0), (3.5, 1.0), (3.5, 2.5), (12.5, 2.5), (12.5, 1.0), (15.0, 4.0), (12.0, 4.0)])
+    result = map_log(recording(np.array(walls), path, np.random.default_rng(seed)), SlamConfig())
+    assert wrong_closures(result, path) == 0
+    assert rms_m(result, path) < 0.25
+
+
+def test_a_robot_that_stands_is_mapped_with_a_word() -> None:
+    path = np.tile([[2.0, 3.0, 0.5]], (12, 1))
+    log = recording(furnished(), path, np.random.default_rng(3))
+    result = map_log(log, SlamConfig())
+    assert any("hardly moved" in text for text in result.warnings)
+    assert result.poses.shape == (12, 3)
+
+
+def test_too_little_to_map_is_refused() -> None:
+    path = along(ROUND)[:5]
+    log = recording(furnished(), path, np.random.default_rng(4))
+    one = replace(log, t_s=log.t_s[:1], ranges_m=log.ranges_m[:1], beams=log.beams[:1])
+    with pytest.raises(InputError, match="at least 2 scans"):
+        map_log(one, SlamConfig())
+    blind = replace(log, ranges_m=np.full_like(log.ranges_m, np.inf))
+    with pytest.raises(InputError, match="max_range_m"):
+        map_log(blind, SlamConfig())
+
+
+def carmen_log(path: Path) -> Path:
+    route = along([(1.5, 1.2), (4.5, 1.2), (5.0, 4.0), (2.0, 4.0), (1.5, 1.2)])
+    log = recording(furnished(), route, np.random.default_rng(5))
+    assert log.odometry is not None
+    lines = []
+    for k in range(len(log)):
+        x, y, a = log.odometry[k]
+        pose = f"{x:.5f} {y:.5f} {a:.5f}"
+        beams = " ".join(f"{min(r, 81.0):.3f}" for r in log.ranges_m[k])
+        lines.append(f"ODOM {pose} 0 0 0 {log.t_s[k]:.3f} host {log.t_s[k]:.3f}\n")
+        lines.append(f"FLASER 180 {beams} {pose} {pose} {log.t_s[k]:.3f} host {log.t_s[k]:.3f}\n")
+    path.write_text("".join(lines), encoding="utf-8")
+    return path
+
+
+def test_the_command_leaves_a_folder_and_a_page(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    log = carmen_log(tmp_path / "lab.log")
+    assert main(["slam", str(log), "--out", str(tmp_path / "runs"), "--json"]) == 0
+    answer = json.loads(capsys.readouterr().out)
+    folder = Path(answer["run_dir"])
+    names = {"trajectory.tum", "map.yaml", "map.pgm", "graph.g2o", "covariances.npz", "closures.json"}
+    assert names | {"metrics.json", "report.html", "config.yaml"} <= {item.name for item in folder.iterdir()}
+    assert len((folder / "trajectory.tum").read_text().splitlines()) == answer["scans"]
+    closures = json.loads((folder / "closures.json").read_text())
+    assert sum(c["accepted"] for c in closures) == answer["closures_accepted"]
+    page = (folder / "report.html").read_text()
+    assert "://" not in page.replace("http://www.w3.org", "")
+    assert main(["evaluate", str(folder / "trajectory.tum"), str(folder / "before.tum"), "--json"]) == 0
+
+
+def test_bad_input_is_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    log = carmen_log(tmp_path / "lab.log")
+    config = tmp_path / "slam.yaml"
+    config.write_text("keyframe_distance: 0.3\n")
+    (tmp_path / "empty.log").write_text("")
+    (tmp_path / "run").mkdir()
+    (tmp_path / "run" / "mission.yaml").write_text("")
+    for words, told in (
+        ([str(tmp_path / "none.bag")], "found no such file"),
+        ([str(tmp_path / "empty.log")], "expected FLASER"),
+        ([str(tmp_path / "run")], "run folder"),
+        ([str(log), "--config", str(config)], "keyframe_distance_m"),
+        ([str(log), "--config", str(tmp_path / "no.yaml")], "found none"),
+    ):
+        assert main(["slam", *words, "--out", str(tmp_path / "runs")]) == 2
+        said = capsys.readouterr().err
+        assert told in said
+        assert said.count("\n") == 1
+    assert not (tmp_path / "runs").exists() or not list((tmp_path / "runs").iterdir())
+
+
+def test_the_shipped_configuration_is_the_default(tmp_path: Path) -> None:
+    assert read_slam_config(None) == SlamConfig()
+    (tmp_path / "c.yaml").write_text("use_odometry: false\n")
+    assert not read_slam_config(tmp_path / "c.yaml").use_odometry

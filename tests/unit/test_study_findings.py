@@ -1,0 +1,154 @@
+"""Findings of simulated studies whose effects are known: what is there is found, what is not is not."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from pilotage.core.config import validate
+from pilotage.core.types import FloatArray
+from pilotage.evaluation.judge import SUCCESS
+from pilotage.experiments.studies.definition import StudyDefinition
+from pilotage.experiments.studies.findings import SETTING, best_settings, findings_of, study_object
+from pilotage.experiments.studies.study import Study, make_study
+from pilotage.experiments.studies.table import StudyTable
+from pilotage.report.study.page import study_page
+
+RADIUS, SCALE = "stack.planner.turning_radius_m", "stack.localizer.odometry_var_scale"
+STUDIES = 200
+
+
+def a_study(**changes: Any) -> Study:
+    """Three radii by two scales, 12 seeds, three metrics."""
+    values: dict[str, Any] = {
+        "study": "simulated",
+        "mission": "museum-1",
+        "factors": [{"key": RADIUS, "values": [0.3, 0.5, 0.8]}, {"key": SCALE, "values": [0.1, 10.0]}],
+        "trials": 12,
+        "metrics": ["position_rmse_m", "min_clearance_m", "nees_mean"],
+    }
+    return make_study(validate(StudyDefinition, values | changes, ""))
+
+
+def a_table(study: Study, rng: np.random.Generator, **means: FloatArray) -> StudyTable:
+    """Trials with noise and a seed's own mean; ``means`` by metric, one a cell."""
+    rows = np.arange(study.rows)
+    places = np.array([study.place(int(row)) for row in rows])
+    cell, trial = places[:, 0], places[:, 1]
+    values: dict[str, FloatArray] = {SUCCESS: np.ones(rows.size)}
+    for metric in study.definition.metrics:
+        of_seed = 2.0 * rng.normal(size=study.definition.trials)[trial]
+        shift = means.get(metric, np.zeros(len(study.cells)))[cell]
+        values[metric] = 10.0 + shift + of_seed + rng.normal(size=rows.size)
+    seed = np.array([study.seed(int(row)) for row in rows])
+    return StudyTable(study, Path("simulated"), rows, cell, trial, seed, values, (), 0)
+
+
+def test_at_most_one_study_in_twenty_tells_of_what_is_not_there() -> None:
+    """18 tests a study, nothing has an effect: at 5 % more than 20 of 200 come once in 1000."""
+    study, rng = a_study(), np.random.default_rng(0)
+    alarms = sum(any(f.is_sure for f in findings_of(a_table(study, rng))) for _ in range(STUDIES))
+    assert alarms <= stats.binom.isf(0.001, STUDIES, 0.05)
+
+
+def test_what_is_there_is_found_and_nothing_else_is_blamed() -> None:
+    """The radius moves the error, both together the clearance; the same false-alarm rate for the rest."""
+    study, rng = a_study(), np.random.default_rng(1)
+    radius = np.array([cell.values["turning_radius_m"] for cell in study.cells])
+    scale = np.array([cell.values["odometry_var_scale"] for cell in study.cells])
+    means = {
+        "position_rmse_m": 8.0 * radius,
+        "min_clearance_m": 12.0 * (radius - radius.mean()) * np.where(scale > 1.0, 1.0, -1.0),
+    }
+    there = {
+        ("position_rmse_m", ("turning_radius_m",)),
+        ("min_clearance_m", ("odometry_var_scale", "turning_radius_m")),
+    }
+    missed = alarms = 0
+    for _ in range(STUDIES):
+        sure = {(f.metric, f.factors) for f in findings_of(a_table(study, rng, **means)) if f.is_sure}
+        missed += bool(there - sure)
+        alarms += bool(sure - there)
+    assert missed <= 4
+    assert alarms <= stats.binom.isf(0.001, STUDIES, 0.05)
+
+
+def test_the_object_begins_with_what_was_found() -> None:
+    study = a_study()
+    means = {"position_rmse_m": np.array([0.0, 0.0, 0.0, 0.0, 9.0, 9.0])}
+    found = study_object(a_table(study, np.random.default_rng(2), **means))
+    assert list(found)[:2] == ["findings", "best"]
+    first = found["findings"][0]
+    assert (first["metric"], first["factors"]) == ("position_rmse_m", ["turning_radius_m"])
+    assert first["sure"]
+    assert first["low"] < 9.0 < first["high"]
+    assert (first["from"], first["to"]) == (0.3, 0.8)
+    assert first["detectable_change"] > 0.0
+    best = found["best"][0]
+    assert best["setting"] in {cell.name for cell in study.cells[:4]}
+    assert not set(best["not_told_from_it"]) & {cell.name for cell in study.cells[4:]}
+
+
+def test_the_best_consistency_is_nearest_to_its_ideal() -> None:
+    """Around 3 at the third setting; lower ones are no better."""
+    shifts = np.array([-9.0, 9.0, -7.0, 0.0, 6.0, -12.0])
+    table = a_table(a_study(trials=30), np.random.default_rng(7), nees_mean=shifts)
+    best = {entry.metric: entry for entry in best_settings(table, table.judged())}
+    assert best["nees_mean"].cell == 2
+    assert "NEES nearest to 3" in study_page(table, found=(findings_of(table), list(best.values())))
+
+
+def test_seeds_of_their_own_are_no_pairs() -> None:
+    study = a_study(seeds={"pairing": "independent"})
+    means = {"position_rmse_m": np.array([0.0, 0.0, 0.0, 0.0, 9.0, 9.0])}
+    found = findings_of(a_table(study, np.random.default_rng(3), **means))
+    assert not any(f.effect.paired for f in found)
+    assert [f.factors for f in found if f.is_sure] == [("turning_radius_m",)]
+
+
+def test_factors_that_span_nothing_are_one_setting() -> None:
+    study = a_study(
+        combine="zip", factors=[{"key": RADIUS, "values": [0.3, 0.5]}, {"key": SCALE, "values": [1.0, 2.0]}]
+    )
+    found = findings_of(a_table(study, np.random.default_rng(4)))
+    assert {f.factors for f in found} == {(SETTING,)}
+    alone = a_study(combine="one-at-a-time")
+    found = findings_of(a_table(alone, np.random.default_rng(4)))
+    assert {(f.group, f.factors) for f in found} == {
+        (name, (name,)) for name in ("turning_radius_m", "odometry_var_scale")
+    }
+
+
+def test_trials_that_lack_a_metric_are_left_out_at_every_setting() -> None:
+    table = a_table(a_study(), np.random.default_rng(5))
+    table.values["position_rmse_m"][0] = math.nan
+    counts = {f.metric: f.effect.n for f in findings_of(table)}
+    assert counts == {"position_rmse_m": 11, "min_clearance_m": 12, "nees_mean": 12, SUCCESS: 12}
+    table.values["position_rmse_m"][table.cell == 2] = math.nan
+    assert "position_rmse_m" not in {f.metric for f in findings_of(table)}
+
+
+@pytest.mark.parametrize("shift", [0.0, 9.0])
+def test_the_page_tells_effects_with_their_units(shift: float) -> None:
+    key = "robot.sensors.odometer.angle_var_rad2_per_rad"
+    study = a_study(
+        mission="gale-ekf",
+        factors=[{"key": key, "values": [0.00001, 0.0001]}],
+        metrics=["position_rmse_m"],
+        trials=20,
+    )
+    table = a_table(study, np.random.default_rng(6), position_rmse_m=np.array([0.0, shift]))
+    page = study_page(table, found=(findings_of(table), best_settings(table, table.judged())))
+    assert page.index('id="effects"') < page.index('id="cells"')
+    assert "angle var 1e-05\u00a0rad²/rad" in page
+    assert "per 1e-05" not in page
+    if shift:
+        assert "depends on angle var" in page
+    else:
+        assert "tell no effect of any factor from chance" in page
+        assert "What these trials cannot tell" in page
