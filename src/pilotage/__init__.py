@@ -23,6 +23,8 @@ if TYPE_CHECKING:
     from pilotage.face import filters as filters
     from pilotage.face import lines as lines
     from pilotage.face import planners as planners
+    from pilotage.face.maps import draw as draw
+    from pilotage.face.maps import vectorize as vectorize
     from pilotage.face.missions import load as load
     from pilotage.face.planning import Plan as Plan
     from pilotage.face.planning import plan as plan
@@ -49,6 +51,8 @@ _PLACES = {
     "make": "face.stepping",
     "plan": "face.planning",
     "study": "face.studies",
+    "draw": "face.maps",
+    "vectorize": "face.maps",
     "localize": "face.recordings",
     "slam": "face.recordings",
     "calibrate": "face.recordings",
@@ -79,6 +83,7 @@ __all__ = [
     "Twist",
     "WheelSpeeds",
     "calibrate",
+    "draw",
     "evaluate",
     "filters",
     "lines",
@@ -92,6 +97,7 @@ __all__ = [
     "slam",
     "study",
     "track",
+    "vectorize",
 ]
 
 
