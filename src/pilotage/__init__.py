@@ -101,15 +101,17 @@ __all__ = [
 ]
 
 
-def __getattr__(name: str) -> Any:
-    if name in _ROOMS:
-        found: Any = importlib.import_module(f"pilotage.face.{name}")
-    elif name in _PLACES:
-        found = getattr(importlib.import_module(f"pilotage.{_PLACES[name]}"), name)
-    else:
-        raise AttributeError(f"module 'pilotage' has no attribute '{name}'")
-    globals()[name] = found
-    return found
+if not TYPE_CHECKING:  # a checker that saw this would take any name for a right one
+
+    def __getattr__(name: str) -> Any:
+        if name in _ROOMS:
+            found: Any = importlib.import_module(f"pilotage.face.{name}")
+        elif name in _PLACES:
+            found = getattr(importlib.import_module(f"pilotage.{_PLACES[name]}"), name)
+        else:
+            raise AttributeError(f"module 'pilotage' has no attribute '{name}'")
+        globals()[name] = found
+        return found
 
 
 def __dir__() -> list[str]:
