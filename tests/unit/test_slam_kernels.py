@@ -59,7 +59,9 @@ def test_the_gradient_is_that_of_the_residuals() -> None:
             moved = at.copy()
             moved[k] += sign * 1e-7
             h, g = np.zeros((3, 3)), np.zeros(3)
-            squares, _, _ = normal_equations(source, moved[0], moved[1], moved[2], 0.2, 1e6, box, starts, points, h, g)
+            squares, _, _ = normal_equations(
+                source, moved[0], moved[1], moved[2], 0.2, 1e6, box, starts, points, h, g
+            )
             numeric[k] += sign * 0.5 * squares / 2e-7
     assert gradient == pytest.approx(numeric, rel=1e-3, abs=1e-4)
 
