@@ -21,11 +21,7 @@ FINGERPRINT = { pwd; cat requirements.lock pyproject.toml | cksum; }
 STAMP := $(VENV)/.made-from
 BENCH_STAMP := $(VENV)/.bench-made-from
 
-<<<<<<< HEAD
-.PHONY: help setup demo test fuzz check format format-check lint types contracts locks examples bench lock clean
-=======
-.PHONY: help setup demo test check format format-check lint types contracts locks api examples bench lock clean
->>>>>>> h-face
+.PHONY: help setup demo test fuzz check format format-check lint types contracts locks api examples bench lock clean
 
 help:  ## this list
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/  make \1|\2/p' Makefile | awk -F'|' '{ printf "%-20s %s\n", $$1, $$2 }'
