@@ -88,7 +88,7 @@ def team_section(metrics: Mapping[str, Any]) -> str:
 
 def _row(robot: int, name: str, entry: Mapping[str, Any], keys: Sequence[str]) -> str:
     reason = str(entry.get("reason") or "")
-    outcome = f"{'✓' if entry.get('success') is True else '✗'} {reason}"
+    outcome = "✓ success" if entry.get("success") is True else f"✗ {reason}"
     texts = (quantities.measured(number(entry.get(key)), METRICS.find(key).unit) for key in keys)
     values = "".join(f'<td class="value">{escape(text)}</td>' for text in texts)
     badge = f'<span class="badge" style="border-color:{colour_of(robot)}">{robot + 1}</span>'

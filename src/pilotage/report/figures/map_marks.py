@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Collection
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -86,12 +87,15 @@ def draw_robot(axes: Axes, run: RunData, placer: LabelPlacer, points_per_m: floa
         )
 
 
-def draw_events(axes: Axes, run: RunData, placer: LabelPlacer, points_per_m: float) -> None:
-    """Mark where events happened; those at one place share a badge."""
+def draw_events(
+    axes: Axes, run: RunData, placer: LabelPlacer, points_per_m: float, of: Collection[int] | None = None
+) -> None:
+    """Mark where events happened, all or those ``of`` some indices; those at one place share a badge."""
     clusters: list[tuple[float, float, list[int], str]] = []
     for index, event in enumerate(run.events, start=1):
         kind = event_kind(event.kind)
-        place = place_at(run, event.t_s) if kind.on_map else None
+        asked = of is None or index - 1 in of
+        place = place_at(run, event.t_s) if asked and kind.on_map else None
         if place is None:
             continue
         x, y = place[0] * points_per_m, place[1] * points_per_m

@@ -9,9 +9,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from pilotage.records.run_data import RunData
-from pilotage.report.event_kinds import event_kind
 from pilotage.report.figures import layers, map_marks
-from pilotage.report.figures.badge import badge
 from pilotage.report.figures.grid import OCCUPIED_COLOUR, UNKNOWN_COLOUR, draw_grid, has_unknown
 from pilotage.report.figures.map_view import map_axes, view_limits
 from pilotage.report.figures.placing import LabelPlacer
@@ -59,11 +57,10 @@ def team_map_figure(team: Sequence[RunData]) -> Illustration:
         draw_grid(axes, first.grid)
     for run in team:
         _draw_robot(axes, run, placer, points_per_m)
-    for index, event in enumerate(first.events, start=1):
-        kind, whose = event_kind(event.kind), robot_of(event, first.robots)
-        place = None if whose is None or not kind.on_map else map_marks.place_at(team[whose], event.t_s)
-        if place is not None:
-            badge(axes, *place, str(index), kind.colour)
+    whose = [robot_of(event, first.robots) for event in first.events]
+    for run in team:
+        own = {index for index, robot in enumerate(whose) if robot == run.robot}
+        map_marks.draw_events(axes, run, placer, points_per_m, own)
     map_marks.draw_beacons(axes, first, placer, points_per_m)
     names = [run.outline.name or first.robots[k] for k, run in enumerate(team)]
     shown = enumerate(names if len(names) <= MOST_KEYS else [])
