@@ -12,6 +12,7 @@ import types
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -54,14 +55,15 @@ class Lab:
         sys.stdout.write("a library talks\n")
         return run_dir / "report.html"
 
-    def plan_on_map(self, *query: Any) -> dict[str, Any]:
-        self.asked["query"] = query
-        return {
+    def plan(self, *query: Any, **options: Any) -> SimpleNamespace:
+        self.asked["query"] = (*query, options)
+        answer = {
             "success": self.success,
             "planned_length_m": 24.5,
             "first_solution_s": math.nan,
             "path": [[1]],
         }
+        return SimpleNamespace(answer=answer)
 
 
 @pytest.fixture
@@ -76,7 +78,7 @@ def lab(monkeypatch: pytest.MonkeyPatch) -> Lab:
 
     module("pilotage.experiments.mission", load_mission=lab.load_mission)
     module("pilotage.experiments.run", run_mission=lab.run_mission)
-    module("pilotage.experiments.planning", plan_on_map=lab.plan_on_map)
+    module("pilotage.face.planning", plan=lab.plan)
     module(
         "pilotage.experiments.catalogue",
         missions=lambda: [("museum-1", "the night watch"), ("museum-hall", "a corridor")],
@@ -227,10 +229,14 @@ def test_wrong_usage_is_one_line_that_names_the_right_one(
 
 
 def test_plan_hands_its_query_on(lab: Lab, pilotage: Call) -> None:
-    answer = pilotage("plan", "museum", "--start", "1,1,0", "--goal", "-2,2.5", "--set", "a=1", "--json")
+    place = ("--start", "1,1,0", "--goal", "-2,2.5", "--clearance", "0.5")
+    answer = pilotage("plan", "museum", *place, "--set", "a=1", "--json")
     assert answer.code == 0
     assert json.loads(answer.out)["first_solution_s"] is None
-    assert lab.asked["query"] == ("museum", (1.0, 1.0, 0.0), (-2.0, 2.5), "rrt-star-dubins", ["a=1"], 0)
+    name, start, goal, options = lab.asked["query"]
+    assert (name, start, goal) == ("museum", (1.0, 1.0, 0.0), (-2.0, 2.5))
+    asked = {"planner": None, "clearance_m": 0.5, "slope_limit_deg": None, "seed": 0, "set": ["a=1"]}
+    assert options == asked
 
 
 def test_plan_without_a_path_is_exit_code_1(lab: Lab, pilotage: Call) -> None:

@@ -13,10 +13,11 @@ import numpy as np
 import pytest
 
 from pilotage import __version__
-from pilotage.cli.output import ProgressLine, plain, progress_line, progress_text
+from pilotage.cli.output import plain, progress_line
 from pilotage.cli.plan import parse_pose
 from pilotage.core.errors import InputError
 from pilotage.experiments.progress import Progress, metres
+from pilotage.face.progress import ProgressLine, progress_text
 
 
 @pytest.mark.parametrize(

@@ -14,6 +14,8 @@ import pytest
 import pilotage as pl
 from pilotage.core.types import FloatArray
 from pilotage.experiments.loop import simulate
+from pilotage.experiments.progress import Progress
+from pilotage.face.progress import showing_progress
 from pilotage.maps.occupancy_grid import OccupancyGrid
 from pilotage.maps.ros_map import RosMap, write_ros_map
 from pilotage.sensors.readings import LidarScan, OdometryIncrement
@@ -418,3 +420,45 @@ def test_lines_and_planners_take_arrays() -> None:
         pl.planners.on_walls([[0, 0, 4, 0], [4, 0, 4, 4]], (1, 1), (9, 9))
     with pytest.raises(pl.InputError, match="start: expected a row"):
         pl.planners.on_cells(np.zeros((3, 3), dtype=bool), (5, 5), (0, 0))
+
+
+class FakeNotebook:
+    """What IPython offers in a notebook, as far as it is used."""
+
+    def __init__(self) -> None:
+        self.shown: list[dict[str, str]] = []
+        self.kernel = object()
+
+    def get_ipython(self) -> FakeNotebook:
+        return self
+
+    def display(self, shown: dict[str, str], **options: object) -> FakeNotebook:
+        assert options == {"raw": True, "display_id": True}
+        self.shown.append(shown)
+        return self
+
+    def update(self, shown: dict[str, str], **options: object) -> None:
+        assert options == {"raw": True}
+        self.shown.append(shown)
+
+
+def test_a_notebook_shows_a_bar_that_goes_away(monkeypatch: pytest.MonkeyPatch) -> None:
+    notebook = FakeNotebook()
+    monkeypatch.setitem(sys.modules, "IPython", notebook)
+    monkeypatch.setitem(sys.modules, "IPython.display", notebook)
+    with showing_progress(None, 60.0) as show:
+        assert show is not None
+        for t_s in (1.0, 2.0):
+            show(Progress(t_s, (("error", "<3 mm"),)))
+    bars = [entry["text/html"] for entry in notebook.shown]
+    assert ['value="1"' in bars[0], 'value="2"' in bars[1], bars[2]] == [True, True, ""]
+    assert "&lt;3 mm" in bars[0]
+
+
+def test_a_log_is_left_alone(capsys: pytest.CaptureFixture[str]) -> None:
+    for wanted in (None, False):
+        with showing_progress(wanted, 60.0) as show:
+            assert show is None
+    with showing_progress(True, 60.0) as show:
+        assert show is not None
+    assert capsys.readouterr().err == ""

@@ -10,7 +10,7 @@ import typer
 
 from pilotage.cli.options import Json
 from pilotage.cli.output import print_columns, print_json
-from pilotage.core.errors import InputError, unknown_name
+from pilotage.core.errors import InputError
 
 
 def evaluate(
@@ -45,30 +45,17 @@ def evaluate(
         return _print(_relations(estimate, reference, tolerance), json)
     if tolerance is not None:
         raise InputError("evaluate: expected --tolerance together with --relations only")
-    from pilotage.evaluation.trajectory import trajectory_errors
-    from pilotage.logs.trajectories import TrajectoryFormat, guess_format, read_trajectory
+    from pilotage.face.recordings import evaluate as judged_by
+    from pilotage.face.recordings import judged_format
 
-    names = [str(name) for name in TrajectoryFormat]
-    if form is not None and form not in names:
-        raise unknown_name("--format", form, names)
-    if form is None:
-        formats = [guess_format(path) for path in (estimate, reference)]
-        if formats[0] is not formats[1]:
-            raise InputError(
-                "evaluate: expected both files in one format, found by their columns "
-                f"{estimate} as {formats[0]} and {reference} as {formats[1]}"
-            )
-        form = formats[0]
-    judged = TrajectoryFormat(form)
-    found, true = read_trajectory(estimate, judged), read_trajectory(reference, judged)
-    if found.t_s is None and len(found) != len(true):
-        short, full = (estimate, reference) if len(found) < len(true) else (reference, estimate)
-        raise InputError(
-            f"{short}: without times expected as many poses as in {full} ({max(len(found), len(true))}), "
-            f"found {min(len(found), len(true))}; is the file cut short?"
-        )
-    errors = trajectory_errors(found, true, align=align, scale=scale)
-    answer = {**errors.summary(), "format": form, "align": align, "scale_corrected": scale}
+    told = str(judged_format(estimate, reference, form))
+    errors = judged_by(estimate, reference, format=told, align=align, scale=scale)
+    answer: dict[str, float | int | str | bool] = {
+        **errors,
+        "format": told,
+        "align": align,
+        "scale_corrected": scale,
+    }
     return _print(answer, json)
 
 

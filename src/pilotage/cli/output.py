@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-import os
 import sys
-import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, redirect_stdout
 from typing import TYPE_CHECKING, Any, TextIO
@@ -63,63 +61,16 @@ def print_line(text: str, stream: TextIO | None = None) -> None:
     print(visible(text), file=stream)
 
 
-class ProgressLine:
-    """Where a run stands, on standard error: one line that rewrites itself on a terminal.
-
-    Elsewhere a plain line from time to time, so that a log shows life and stays short.
-
-    Parameters
-    ----------
-    stream
-        Standard error.
-    clock_s
-        A monotonic clock.
-    """
-
-    _TERMINAL_PERIOD_S = 0.1
-    _LOG_PERIOD_S = 10.0
-
-    def __init__(self, stream: TextIO, clock_s: Callable[[], float] = time.monotonic) -> None:
-        self._stream = stream
-        self._clock_s = clock_s
-        self._terminal = stream.isatty() and os.environ.get("TERM") != "dumb"
-        self._period_s = self._TERMINAL_PERIOD_S if self._terminal else self._LOG_PERIOD_S
-        self._next_s = clock_s() + (0.0 if self._terminal else self._period_s)
-        self._drawn = False
-
-    def __call__(self, progress: Progress) -> None:
-        """Show ``progress`` if it is time for it."""
-        now_s = self._clock_s()
-        if now_s < self._next_s:
-            return
-        self._next_s = now_s + self._period_s
-        text = progress_text(progress)
-        self._stream.write(f"\r{text}\x1b[K" if self._terminal else f"{text}\n")
-        self._stream.flush()
-        self._drawn = self._terminal
-
-    def close(self) -> None:
-        """Wipe the line."""
-        if self._drawn:
-            self._stream.write("\r\x1b[K")
-            self._stream.flush()
-            self._drawn = False
-
-
 @contextmanager
 def progress_line(wanted: bool) -> Iterator[Callable[[Progress], None] | None]:
     """Yield what shows a run's progress, or None; the line is gone afterwards, whatever happened."""
     if not wanted:
         yield None
         return
+    from pilotage.face.progress import ProgressLine
+
     line = ProgressLine(sys.stderr)
     try:
         yield line
     finally:
         line.close()
-
-
-def progress_text(progress: Progress) -> str:
-    """One line: simulated time and the numbers of a run of its kind."""
-    words = [f"t {progress.t_s:>6.1f} s", *(f"{label} {text}" for label, text in progress.numbers)]
-    return "   ".join(words)

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from pathlib import Path
 from typing import Annotated, Any
 
 import typer
@@ -30,6 +28,9 @@ def plan(
         float | None,
         typer.Option(metavar="DEG", help="MAP is an elevation model; what is steeper is a hazard."),
     ] = None,
+    clearance: Annotated[
+        float | None, typer.Option(metavar="M", help="Distance to keep; default the planner's own.")
+    ] = None,
     overrides: Overrides = None,
     seed: Seed = None,
     json: Json = False,
@@ -37,35 +38,24 @@ def plan(
 ) -> int:
     """Plan a path on a map and say how long it is against the shortest one."""
     from_, to = parse_pose(start, "--start"), parse_pose(goal, "--goal")
+    from pilotage.face.planning import plan as planned_by
+
     with stdout_for_json(json):
-        answer = _answer(map_, from_, to, planner, overrides or (), seed or 0, slope_limit)
+        answer = planned_by(
+            map_,
+            from_,
+            to,
+            planner=planner,
+            clearance_m=clearance,
+            slope_limit_deg=slope_limit,
+            seed=seed or 0,
+            set=overrides or (),
+        ).answer
     if json:
         print_json(answer)
     else:
         print_columns((key, _show(value)) for key, value in answer.items() if key != "path")
     return 0 if answer["success"] else 1
-
-
-def _answer(
-    map_: str,
-    start: tuple[float, ...],
-    goal: tuple[float, ...],
-    planner: str | None,
-    overrides: Sequence[str],
-    seed: int,
-    slope_limit_deg: float | None,
-) -> dict[str, Any]:
-    """Ask on a grid where the file holds one, else on a map of walls."""
-    if Path(map_).suffix:
-        from pilotage.experiments.grid_planning import is_grid_map, plan_on_grid
-
-        if is_grid_map(map_):
-            return plan_on_grid(Path(map_), start, goal, planner or "astar", overrides, slope_limit_deg)
-    if slope_limit_deg is not None:
-        raise InputError(f"--slope-limit: expected an elevation model's file, found the map '{map_}'")
-    from pilotage.experiments.planning import plan_on_map
-
-    return plan_on_map(map_, start, goal, planner or "rrt-star-dubins", overrides, seed)
 
 
 def parse_pose(text: str, option: str) -> tuple[float, ...]:

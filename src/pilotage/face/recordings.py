@@ -257,7 +257,7 @@ def evaluate(
     estimate: FilePath | FloatArray,
     reference: FilePath | FloatArray,
     *,
-    format: Literal["tum", "kitti"] | None = None,  # noqa: A002 - as the command line calls it
+    format: str | None = None,  # noqa: A002 - as the command line calls it
     align: bool = False,
     scale: bool = False,
 ) -> Evaluation:
@@ -268,7 +268,7 @@ def evaluate(
     estimate, reference
         Files of one format, or arrays: (N, 3) x, y, theta of the same moments, or (N, 4) with times first.
     format
-        Of the files; None: told by their columns.
+        Of the files, ``tum`` or ``kitti``; None: told by their columns.
     align, scale
         Rotate and shift the estimate first; correct its scale first.
 
