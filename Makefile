@@ -21,7 +21,7 @@ FINGERPRINT = { pwd; cat requirements.lock pyproject.toml | cksum; }
 STAMP := $(VENV)/.made-from
 BENCH_STAMP := $(VENV)/.bench-made-from
 
-.PHONY: help setup demo test fuzz check format format-check lint types contracts locks examples bench lock clean
+.PHONY: help setup demo test fuzz check format format-check lint types contracts locks api examples bench lock clean
 
 help:  ## this list
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/  make \1|\2/p' Makefile | awk -F'|' '{ printf "%-20s %s\n", $$1, $$2 }'
@@ -82,6 +82,9 @@ contracts: setup
 # A lock names packages and hashes, never where they were fetched from.
 locks:
 	@! grep -nE '://|--(extra-)?index-url|--find-links' requirements.lock requirements-bench.lock
+
+api: setup  ## write docs/api anew from the docstrings
+	@$(PY) docs/make_api.py
 
 examples: setup  ## run the examples alone
 	@$(PY) -m pytest tests/unit/test_examples.py $(ARGS)

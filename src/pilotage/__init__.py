@@ -25,6 +25,8 @@ if TYPE_CHECKING:
     from pilotage.face import filters as filters
     from pilotage.face import lines as lines
     from pilotage.face import planners as planners
+    from pilotage.face.maps import draw as draw
+    from pilotage.face.maps import vectorize as vectorize
     from pilotage.face.missions import load as load
     from pilotage.face.planning import Plan as Plan
     from pilotage.face.planning import plan as plan
@@ -49,6 +51,8 @@ _PLACES = {
     "make": "face.stepping",
     "plan": "face.planning",
     "study": "face.studies",
+    "draw": "face.maps",
+    "vectorize": "face.maps",
     "localize": "face.recordings",
     "slam": "face.recordings",
     "calibrate": "face.recordings",
@@ -79,6 +83,7 @@ __all__ = [
     "Twist",
     "WheelSpeeds",
     "calibrate",
+    "draw",
     "evaluate",
     "filters",
     "lines",
@@ -92,18 +97,21 @@ __all__ = [
     "slam",
     "study",
     "track",
+    "vectorize",
 ]
 
 
-def __getattr__(name: str) -> Any:
-    if name in _ROOMS:
-        found: Any = importlib.import_module(f"pilotage.face.{name}")
-    elif name in _PLACES:
-        found = getattr(importlib.import_module(f"pilotage.{_PLACES[name]}"), name)
-    else:
-        raise AttributeError(f"module 'pilotage' has no attribute '{name}'")
-    globals()[name] = found
-    return found
+if not TYPE_CHECKING:  # a checker that saw this would take any name for a right one
+
+    def __getattr__(name: str) -> Any:
+        if name in _ROOMS:
+            found: Any = importlib.import_module(f"pilotage.face.{name}")
+        elif name in _PLACES:
+            found = getattr(importlib.import_module(f"pilotage.{_PLACES[name]}"), name)
+        else:
+            raise AttributeError(f"module 'pilotage' has no attribute '{name}'")
+        globals()[name] = found
+        return found
 
 
 def __dir__() -> list[str]:

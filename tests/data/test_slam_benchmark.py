@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from tests.support.recordings import recording
 
 from pilotage.evaluation.relations import relation_errors
 from pilotage.evaluation.slam_consistency import nees_summary
@@ -13,6 +12,7 @@ from pilotage.experiments.slam import slam_log
 from pilotage.logs.relations import read_relations
 from pilotage.logs.trajectories import read_tum
 from pilotage.stack.mapping.slam.config import SlamConfig
+from support.recordings import recording
 
 pytest.importorskip("rosbags")
 

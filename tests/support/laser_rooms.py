@@ -33,7 +33,7 @@ def ranges(walls: FloatArray, pose: FloatArray, angles: FloatArray) -> FloatArra
         t = (start[:, 0] * along[:, 1] - start[:, 1] * along[:, 0])[None] / cross
         u = (start[None, :, 0] * directions[:, None, 1] - start[None, :, 1] * directions[:, None, 0]) / cross
         hit = (t > 0.0) & (u >= 0.0) & (u <= 1.0)
-    return np.where(hit, t, np.inf).min(axis=1)
+    return np.asarray(np.where(hit, t, np.inf).min(axis=1), dtype=np.float64)
 
 
 def recording(
@@ -46,9 +46,9 @@ def recording(
 ) -> LaserLog:
     """A laser log along poses (N, 3), a scan every 0.2 s, with odometry whose path and turns are too long."""
     step = SPAN_RAD / (beams - 1)
-    angles = -0.5 * SPAN_RAD + step * np.arange(beams)
+    angles = np.asarray(-0.5 * SPAN_RAD + step * np.arange(beams), dtype=np.float64)
     scans = np.array([ranges(walls, pose, angles) for pose in path])
-    scans = scans + range_std_m * rng.standard_normal(scans.shape)
+    scans = np.asarray(scans + range_std_m * rng.standard_normal(scans.shape), dtype=np.float64)
     odometry = np.zeros_like(path)
     for k in range(1, len(path)):
         c, s = np.cos(path[k - 1, 2]), np.sin(path[k - 1, 2])
@@ -57,7 +57,7 @@ def recording(
         x, y = (1.0 + drift) * (c * dx + s * dy), (1.0 + drift) * (-s * dx + c * dy)
         co, so = np.cos(odometry[k - 1, 2]), np.sin(odometry[k - 1, 2])
         odometry[k] = odometry[k - 1] + [co * x - so * y, so * x + co * y, (1.0 + drift) * turn]
-    t_s = 0.2 * np.arange(len(path))
+    t_s = np.asarray(0.2 * np.arange(len(path)), dtype=np.float64)
     return LaserLog(
         "simulated",
         t_s,

@@ -230,7 +230,7 @@ def test_wrong_steps_are_told_in_one_line() -> None:
         (pl.Twist(float("nan"), 0.0), "expected finite speeds"),
     ):
         with pytest.raises(pl.InputError, match=message):
-            sim.step(wrong)  # type: ignore[call-overload]
+            sim.step(wrong)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("planner", [None, "theta-star"])

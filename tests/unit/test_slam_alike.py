@@ -7,13 +7,13 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from tests.support.laser_rooms import along, recording
 
 from pilotage.core.types import FloatArray
 from pilotage.kernels.slam.frames import between
 from pilotage.stack.mapping.slam.closures import Verdict
 from pilotage.stack.mapping.slam.config import SlamConfig
 from pilotage.stack.mapping.slam.mapper import map_log
+from support.laser_rooms import along, recording
 
 WIDTH_M = 2.0
 

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from tests.support.laser_rooms import BEAMS, SPAN_RAD, furnished, ranges
 
 from pilotage.core.types import FloatArray
 from pilotage.kernels.slam.align import CAPPED, CONVERGED, TOO_FEW, align, normal_equations
@@ -16,6 +15,7 @@ from pilotage.kernels.slam.frames import between, carried, composed
 from pilotage.kernels.slam.match_grid import max_pyramid, score_grid
 from pilotage.kernels.slam.occupancy import add_scan
 from pilotage.kernels.slam.scan_lines import scan_lines, scan_points
+from support.laser_rooms import BEAMS, SPAN_RAD, furnished, ranges
 
 ANGLES = np.linspace(-0.5 * SPAN_RAD, 0.5 * SPAN_RAD, BEAMS)
 MOUNT = np.array([0.0, 0.0, 0.0, 1.0])
@@ -52,14 +52,16 @@ def test_the_gradient_is_that_of_the_residuals() -> None:
     hessian, gradient = np.zeros((3, 3)), np.zeros(3)
     at = np.array([1e-3, -5e-4, 2e-4])
     # So wide a scale weighs all pairs with one.
-    normal_equations(source, *at, 0.2, 1e6, box, starts, points, hessian, gradient)
+    normal_equations(source, at[0], at[1], at[2], 0.2, 1e6, box, starts, points, hessian, gradient)
     numeric = np.zeros(3)
     for k in range(3):
         for sign in (1.0, -1.0):
             moved = at.copy()
             moved[k] += sign * 1e-7
             h, g = np.zeros((3, 3)), np.zeros(3)
-            squares, _, _ = normal_equations(source, *moved, 0.2, 1e6, box, starts, points, h, g)
+            squares, _, _ = normal_equations(
+                source, moved[0], moved[1], moved[2], 0.2, 1e6, box, starts, points, h, g
+            )
             numeric[k] += sign * 0.5 * squares / 2e-7
     assert gradient == pytest.approx(numeric, rel=1e-3, abs=1e-4)
 

@@ -8,7 +8,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.support.laser_rooms import along, furnished, recording
 
 from pilotage.cli.main import main
 from pilotage.core.errors import InputError
@@ -18,6 +17,7 @@ from pilotage.stack.mapping.slam.closures import Verdict
 from pilotage.stack.mapping.slam.config import SlamConfig
 from pilotage.stack.mapping.slam.mapper import map_log
 from pilotage.stack.mapping.slam.result import SlamResult
+from support.laser_rooms import along, furnished, recording
 
 ROUND = [(1.5, 1.2), (5.0, 1.2), (5.0, 4.0), (8.5, 5.8), (5.0, 6.0), (2.0, 4.0), (1.5, 1.2), (4.0, 1.2)]
 

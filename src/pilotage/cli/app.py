@@ -10,10 +10,12 @@ from pilotage.cli.attribute import attribute
 from pilotage.cli.bench_scen import bench_scen
 from pilotage.cli.calibrate import calibrate
 from pilotage.cli.components import components
+from pilotage.cli.draw import draw, vectorize
 from pilotage.cli.evaluate import evaluate
 from pilotage.cli.localize import localize
 from pilotage.cli.map_score import map_score
 from pilotage.cli.missions import missions
+from pilotage.cli.new import new
 from pilotage.cli.plan import plan
 from pilotage.cli.report import report
 from pilotage.cli.run import run
@@ -46,7 +48,10 @@ COMMANDS = (
     attribute,
     track,
     map_score,
+    draw,
+    vectorize,
     report,
+    new,
     missions,
     components,
     schema,

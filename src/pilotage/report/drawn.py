@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 from pilotage.records.run_data import RunData
+from pilotage.records.trace import Trace
 from pilotage.report.figures.clearance import clearance_figure
 from pilotage.report.figures.close_ups import close_ups_figure
 from pilotage.report.figures.consistency import consistency_figure
@@ -51,9 +53,8 @@ ON_A_SHEET: tuple[Draw, ...] = (
     accuracy_figure,
     printed_figure,
 )
-ON_A_MAP: tuple[Draw, ...] = (map_figure, close_ups_figure)
+ON_A_MAP: tuple[Draw, ...] = (map_figure, close_ups_figure, timeline_figure)
 OF_THE_DRIVE: tuple[Draw, ...] = (
-    timeline_figure,
     pose_error_figure,
     covariance_figure,
     consistency_figure,
@@ -67,13 +68,31 @@ OF_THE_DRIVE: tuple[Draw, ...] = (
 def figures_of(run: RunData) -> list[Illustration]:
     """Draw what there is to draw; without anything the map alone is left, which says so."""
     if run.terrain is not None:
-        draws = ON_TERRAIN
+        draws, run = ON_TERRAIN, without_given_pose(run)
     elif run.sheet is not None:
         draws = ON_A_SHEET + OF_THE_DRIVE
     else:
         draws = ON_A_MAP + OF_THE_DRIVE
     figures = [draw(run) for draw in (*draws, *((updates_figure,) if run.updates else ()))]
     return [figure for figure in figures if figure.svg] or figures[:1]
+
+
+def pose_given(run: RunData) -> bool:
+    """Whether the robot was told its true pose: nothing was estimated, and all errors are 0."""
+    trace = run.trace
+    if not trace.has("est_x_m", "true_x_m"):
+        return False
+    told = (trace["est_x_m"] == trace["true_x_m"]) & (trace["est_y_m"] == trace["true_y_m"])
+    return bool(told.all())
+
+
+def without_given_pose(run: RunData) -> RunData:
+    """The run without its estimate where that is the truth by definition."""
+    if not pose_given(run):
+        return run
+    believed = ("est_", "cov_", "nees", "ellipse_", "root_determinant")
+    columns = {name: v for name, v in run.trace.columns.items() if not name.startswith(believed)}
+    return replace(run, trace=Trace(columns, run.trace.steps))
 
 
 def map_of(run: RunData) -> Illustration:
@@ -86,5 +105,5 @@ def map_of(run: RunData) -> Illustration:
 def scene_of(run: RunData) -> ReplayScene | None:
     """What there is to replay; None where nothing moved."""
     if run.terrain is not None:
-        return terrain_scene(run)
+        return terrain_scene(without_given_pose(run))
     return floor_scene(run) if run.sheet is None else sheet_scene(run)

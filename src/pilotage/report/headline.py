@@ -36,7 +36,8 @@ def headline(metrics: Mapping[str, Any]) -> str:
         return _team_headline(metrics)
     success = outcome(metrics)
     duration = number(metrics.get("duration_s"))
-    after = f" after {quantities.duration(duration)}" if math.isfinite(duration) else ""
+    # What was only planned took no time of the world's clock.
+    after = f" after {quantities.duration(duration)}" if duration > 0.0 else ""
     if success is None:
         answer = f"Ended{after}"
     elif success:

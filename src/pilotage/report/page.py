@@ -10,7 +10,7 @@ from pilotage.core.whole_file import write_whole
 from pilotage.records.numbers import number
 from pilotage.records.run_data import OnDamage, RunData, read_run, read_team
 from pilotage.report import quantities
-from pilotage.report.drawn import figures_of, scene_of
+from pilotage.report.drawn import figures_of, pose_given, scene_of
 from pilotage.report.figures.team import team_figures
 from pilotage.report.headline import headline, outcome
 from pilotage.report.markup import (
@@ -33,6 +33,8 @@ from pilotage.report.team import team_section, team_tiles
 
 REPORT_FILE = "report.html"
 
+ESTIMATED = frozenset({"position_rmse_m", "position_max_m", "heading_rmse_rad", "nees_mean"})
+"""What says nothing where the pose was given."""
 _LONGEST_MISSION = 100_000
 
 
@@ -70,8 +72,12 @@ def run_page(run: RunData, damaged: Sequence[str] = (), team: Sequence[RunData] 
     with drawing_style():
         figures = team_figures(team) if several else figures_of(run)
         scene = team_scene(team) if several else scene_of(run)
-    sections: list[str] = [replay_section(scene)]
-    entries: list[tuple[str, str]] = [(SLUG, TITLE)]
+    sections: list[str] = []
+    entries: list[tuple[str, str]] = []
+    # What was only planned has nothing to replay, and nothing is missing.
+    if scene is not None or run.trace.steps:
+        sections.append(replay_section(scene))
+        entries.append((SLUG, TITLE))
     if several:
         sections.append(team_section(run.metrics))
         entries.append((TEAM_SLUG, TEAM_TITLE))
@@ -133,6 +139,10 @@ def _outcome(run: RunData) -> str:
 def _tiles(run: RunData) -> list[tuple[str, str]]:
     """Return the handful of numbers that most readers came for."""
     values = {key: number(value) for key, value in run.metrics.items()}
+    if values.get("duration_s") == 0.0:
+        del values["duration_s"]
+    if run.terrain is not None and pose_given(run):
+        values = {key: value for key, value in values.items() if key not in ESTIMATED}
 
     def value(key: str) -> float:
         return values.get(key, math.nan)

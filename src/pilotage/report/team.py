@@ -89,9 +89,8 @@ def team_section(metrics: Mapping[str, Any]) -> str:
 def _row(robot: int, name: str, entry: Mapping[str, Any], keys: Sequence[str]) -> str:
     reason = str(entry.get("reason") or "")
     outcome = f"{'✓' if entry.get('success') is True else '✗'} {reason}"
-    values = "".join(
-        f'<td class="value">{escape(quantities.measured(number(entry.get(key)), METRICS.find(key).unit))}</td>'
-        for key in keys
-    )
+    texts = (quantities.measured(number(entry.get(key)), METRICS.find(key).unit) for key in keys)
+    values = "".join(f'<td class="value">{escape(text)}</td>' for text in texts)
     badge = f'<span class="badge" style="border-color:{colour_of(robot)}">{robot + 1}</span>'
-    return f'<tr><th scope="row" style="white-space:nowrap">{badge} {escape(name)}</th><td>{escape(outcome)}</td>{values}</tr>'
+    head = f'<th scope="row" style="white-space:nowrap">{badge} {escape(name)}</th>'
+    return f"<tr>{head}<td>{escape(outcome)}</td>{values}</tr>"

@@ -128,8 +128,8 @@ def _keys(run: RunData, magnification: int) -> tuple[Key, ...]:
         (magnification > 0, Key("95 % ellipses to scale", BLACK, "line", "ellipses")),
         (magnification > 1, Key(f"ellipses magnified {magnification} ×", SKY, "band", "magnified")),
         (run.grid is None and len(world.segments_m) > 0, Key("walls", INK, "line", "walls")),
-        (run.grid is not None, Key("occupied", OCCUPIED_COLOUR, "band", "grid", 1.0)),
-        (has_unknown(run.grid), Key("unknown", UNKNOWN_COLOUR, "band", "grid", 1.0)),
+        (run.grid is not None, Key("grid: occupied", OCCUPIED_COLOUR, "band", "grid", 1.0)),
+        (has_unknown(run.grid), Key("grid: unknown", UNKNOWN_COLOUR, "band", opacity=1.0)),
     )
     return tuple(key for there, key in candidates if there)
 

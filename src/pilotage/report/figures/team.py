@@ -74,8 +74,8 @@ def team_map_figure(team: Sequence[RunData]) -> Illustration:
         (world.has_obstacles, Key("unexpected obstacles", ORANGE, "band", "obstacles", 1.0)),
         (bool(world.landmarks), Key("beacons", GREEN, "spot", "beacons")),
         (first.grid is None and len(world.segments_m) > 0, Key("walls", INK, "line", "walls")),
-        (first.grid is not None, Key("occupied", OCCUPIED_COLOUR, "band", "grid", 1.0)),
-        (has_unknown(first.grid), Key("unknown", UNKNOWN_COLOUR, "band", "grid", 1.0)),
+        (first.grid is not None, Key("grid: occupied", OCCUPIED_COLOUR, "band", "grid", 1.0)),
+        (has_unknown(first.grid), Key("grid: unknown", UNKNOWN_COLOUR, "band", opacity=1.0)),
     )
     keys = [Key(name, colour_of(k), "line", f"robot-{k}") for k, name in shown]
     keys += [key for there, key in candidates if there]

@@ -1,0 +1,54 @@
+"""``pilotage draw`` and ``pilotage vectorize``: what was understood of a map, and walls from its cells."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from pilotage.cli.options import Json
+from pilotage.cli.output import print_columns, print_json, print_line
+
+MAP_HELP = "A shipped map's name or a file: walls, a sheet, a ROS map, MovingAI, an image, heights."
+
+
+def draw(
+    map_: Annotated[str, typer.Argument(metavar="MAP", help=MAP_HELP)],
+    out: Annotated[
+        Path | None, typer.Option(metavar="FILE.png", help="The picture; default the map's name, .png.")
+    ] = None,
+    json: Json = False,
+) -> None:
+    """Draw a map as it is understood, and say what it has."""
+    from pilotage.face.maps import draw as drawn_by
+
+    drawn = drawn_by(map_, out)
+    answer = {**drawn.layers, "picture": str(drawn.path)}
+    if json:
+        print_json(answer)
+    else:
+        print_columns((key, str(value)) for key, value in answer.items())
+
+
+def vectorize(
+    map_: Annotated[str, typer.Argument(metavar="MAP", help="A ROS map, a MovingAI map or an image.")],
+    out: Annotated[
+        Path | None, typer.Option(metavar="FILE.yaml", help="The map; default the map's name, -walls.yaml.")
+    ] = None,
+    tolerance: Annotated[
+        float,
+        typer.Option(metavar="M", help="How far a wall may lie from the cells: 0 keeps their staircases."),
+    ] = 0.0,
+    json: Json = False,
+) -> None:
+    """Make a map of walls from a map of cells, so that a filter on walls works on it."""
+    from pilotage.experiments.build.charts import load_chart
+    from pilotage.face.maps import vectorize as vectorized_by
+
+    path = vectorized_by(map_, out, tolerance_m=tolerance)
+    walls = len(load_chart(str(path)).walls.segments_m)
+    if json:
+        print_json({"map": str(path), "walls": walls})
+    else:
+        print_line(f"{path}: {walls} walls")

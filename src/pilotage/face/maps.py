@@ -1,0 +1,127 @@
+"""Maps of any format: what was understood of one, and walls from a grid."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+from pilotage.core.errors import InputError
+from pilotage.experiments.build.charts import load_chart
+from pilotage.maps.occupancy_grid import OCCUPIED_FROM
+from pilotage.maps.vectorize import wall_segments, write_wall_map
+from pilotage.maps.world_map import WorldMap
+
+
+@dataclass(frozen=True, slots=True)
+class Drawn:
+    """A map as it was understood.
+
+    Attributes
+    ----------
+    path
+        The picture.
+    layers
+        By name, what the map has: bounds, walls, circles, cells, landmarks, heights, tapes.
+    """
+
+    path: Path
+    layers: Mapping[str, Any]
+
+
+def draw(map: str | PathLike[str], out: str | PathLike[str] | None = None) -> Drawn:  # noqa: A002 - its word
+    """Draw a map as it is understood: walls, cells, heights, tapes, landmarks and bounds.
+
+    Parameters
+    ----------
+    map
+        A shipped map's name or a file of any format that ``plan`` and missions take.
+    out
+        A PNG file; None: the map's name in the working folder.
+
+    Raises
+    ------
+    InputError
+        Where it is no map, or the picture cannot be named so.
+
+    Examples
+    --------
+    >>> import pilotage as pl
+    >>> drawn = pl.draw("museum", "museum.png")
+    >>> drawn.layers["walls"], drawn.layers["landmarks"]
+    (32, 35)
+    """
+    from pilotage.report.map_picture import draw_map
+
+    chart = load_chart(str(map))
+    path = Path(f"{Path(map).stem}.png") if out is None else Path(out)
+    if path.suffix.lower() != ".png":
+        raise InputError(f"--out: expected a PNG file, found '{path}'")
+    if path.is_dir() or (out is None and path.exists()):
+        raise InputError(f"--out: expected a file that can be written, found '{path}' there; name another")
+    if not path.parent.is_dir():
+        raise InputError(f"--out: expected a folder that is there, found none: '{path.parent}'")
+    draw_map(chart, path)
+    return Drawn(path, layers_of(chart))
+
+
+def vectorize(
+    map: str | PathLike[str],  # noqa: A002 - the word for it
+    out: str | PathLike[str] | None = None,
+    *,
+    tolerance_m: float = 0.0,
+) -> Path:
+    """Make a map of walls from a map of cells, so that what needs walls works on it.
+
+    Parameters
+    ----------
+    map
+        A ROS map, a MovingAI map or an image.
+    out
+        A YAML file; None: the map's name with ``-walls.yaml`` in the working folder.
+    tolerance_m
+        How far a wall may lie from the cells' outline: 0 keeps the staircases of slanted walls, a cell's side
+        makes them straight.
+
+    Raises
+    ------
+    InputError
+        Where the map has no cells, or too many walls come of them.
+    """
+    chart = load_chart(str(map))
+    if chart.grid is None or chart.geometry is not None:
+        raise InputError(f"vectorize: expected a map of cells, found '{map}', which has walls already")
+    path = Path(f"{Path(map).stem}-walls.yaml") if out is None else Path(out)
+    if path.suffix.lower() not in {".yaml", ".yml"}:
+        raise InputError(f"--out: expected a YAML file, found '{path}'")
+    if path.is_dir() or not path.parent.is_dir():
+        raise InputError(f"--out: expected a file in a folder that is there, found '{path}'")
+    if path.exists() and path.resolve() == Path(map).resolve():
+        raise InputError(f"--out: expected another file than the map itself, found '{path}'")
+    segments = wall_segments(chart.grid, tolerance_m)
+    name = "".join(c if c.isalnum() or c in "-_" else "-" for c in path.stem)
+    write_wall_map(path, f"'{name}'", segments, chart.bounds_m, Path(map).name)
+    return path
+
+
+def layers_of(chart: WorldMap) -> dict[str, Any]:
+    """What a map has, by name."""
+    layers: dict[str, Any] = {"map": chart.name, "bounds_m": list(chart.bounds_m)}
+    if chart.geometry is not None:
+        layers |= {"walls": len(chart.geometry.segments_m), "circles": len(chart.geometry.circles_m)}
+    if chart.grid is not None:
+        cells = chart.grid.cells
+        layers |= {
+            "rows": chart.grid.rows,
+            "columns": chart.grid.columns,
+            "resolution_m": chart.grid.resolution_m,
+            "occupied_cells": int((cells >= OCCUPIED_FROM).sum()),
+            "unknown_cells": int((cells < 0).sum()),
+        }
+    if chart.elevation is not None:
+        layers["slope_limit_deg"] = chart.slope_limit_deg
+    if chart.markings is not None:
+        layers["tapes"] = len(chart.markings.tapes_m)
+    return layers | {"landmarks": len(chart.landmarks)}
