@@ -13,9 +13,12 @@ import yaml
 from pilotage.core.errors import InputError
 from pilotage.core.yaml_text import load_yaml
 from pilotage.evaluation.metrics import METRICS
+from pilotage.experiments.build.charts import load_chart
 from pilotage.experiments.mission import load_mission
 from pilotage.experiments.roles import ROLES
 from pilotage.experiments.run import run_mission
+from pilotage.maps.map_file import MapFile
+from pilotage.missions.mission import Mission
 from pilotage.missions.old_keys import OLD_KEYS
 
 ROOT = Path(__file__).parents[2]
@@ -82,8 +85,11 @@ MISSIONS = {values["mission"]: values for values in examples() if "mission" in v
 def test_the_page_about_missions_shows_a_map_as_well() -> None:
     assert len(MISSIONS) >= 5
     (room,) = [values for values in examples() if "walls_m" in values]
-    values = {"extends": "museum-1", "mission": "m", "world": {"map": room}}
-    assert values["world"]["map"]["map"] == "room"
+    values = load_mission("museum-1").model_dump()
+    values["world"]["map"] = room
+    source = Mission.model_validate(values).world.map
+    assert isinstance(source, MapFile)
+    assert load_chart(source).walls.segments_m.shape == (4, 4)
 
 
 @pytest.mark.parametrize("name", MISSIONS)
