@@ -21,7 +21,7 @@ OLD_KEYS: Mapping[str, str] = {
     "stack.estimator": "now stack.localizer",
     "stack.pose_controller": "now stack.navigator (name: pose)",
     "stack.spline": "now stack.navigator.spline (name: curve)",
-    "stack.cost_map": "now stack.planner.cost_map",
+    "stack.cost_map": "now stack.navigator.cost_map (name: curve)",
     "stack.fusion": "now stack.navigator.fusion",
     "stack.avoidance": "now stack.navigator.avoidance",
     "stack.magnetometer": "now stack.navigator.magnetometer",

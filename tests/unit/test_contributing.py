@@ -1,0 +1,99 @@
+"""CONTRIBUTING.md holds: its rooms are those of import-linter, its worked examples run as they stand."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import subprocess
+import sys
+import tomllib
+from collections import defaultdict
+from pathlib import Path
+
+import pytest
+
+from pilotage.core import plugins
+
+ROOT = Path(__file__).parents[2]
+TEXT = (ROOT / "CONTRIBUTING.md").read_text()
+MODULES = dict(re.findall(r"^```python\n# src/pilotage/(\S+)\n(.*?)^```", TEXT, re.MULTILINE | re.DOTALL))
+(MISSION,) = re.findall(r"^```yaml\n(.*?)^```", TEXT, re.MULTILINE | re.DOTALL)
+NAMES = {"beeline", "position_fix", "tricycle", "stroll"}
+
+FROM_INSIDE = """
+import importlib, pathlib, sys
+from pilotage.cli.main import main
+for room in {path.parent for path in pathlib.Path("rooms").rglob("*.py")}:
+    package = ".".join(["pilotage", *room.relative_to("rooms").parts])
+    importlib.import_module(package).__path__.append(str(room.absolute()))
+sys.exit(main(sys.argv[1:]))
+"""
+"""The rooms with one more module each, as if it stood there."""
+FROM_OUTSIDE = "import sys; from pilotage.cli.main import main; sys.exit(main(sys.argv[1:]))"
+
+
+def run(folder: Path, program: str, *words: str) -> subprocess.CompletedProcess[str]:
+    """In a process of its own: what is registered stays for as long as a process lives."""
+    environment = {key: value for key, value in os.environ.items() if key != plugins.VARIABLE}
+    (folder / "a-stroll.yaml").write_text(MISSION)
+    return subprocess.run(
+        [sys.executable, "-c", program, "run", "a-stroll.yaml", "--json", "--out", "runs", *words],
+        cwd=folder,
+        env=environment,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+
+
+def check(done: subprocess.CompletedProcess[str]) -> float:
+    assert done.returncode == 0, done.stderr
+    answer = json.loads(done.stdout)
+    assert (answer["success"], answer["reason"]) == (True, "strolled")
+    assert answer["collisions"] == 0
+    return float(answer["path_length_m"])
+
+
+def test_the_rooms_are_those_of_the_contracts() -> None:
+    contracts = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["importlinter"]["contracts"]
+    listed = [
+        [part.strip() for part in block.split(">") if part.strip()]
+        for block in re.findall(r"((?:^    [a-z].*\n?(?:^        > .*\n)*))", TEXT, re.MULTILINE)
+        if " > " in block
+    ]
+    for contract in contracts[:2]:
+        assert contract["layers"] in listed
+    there = {path.name for path in (ROOT / "src/pilotage").iterdir() if (path / "__init__.py").is_file()}
+    assert there == {room for layer in contracts[0]["layers"] for room in layer.split(" | ")}
+
+
+def test_the_examples_run_from_inside(tmp_path: Path) -> None:
+    for place, text in MODULES.items():
+        path = tmp_path / "rooms" / place
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text)
+    assert check(run(tmp_path, FROM_INSIDE)) >= 2.0
+
+
+def test_the_examples_run_from_outside(tmp_path: Path) -> None:
+    parts: dict[str, list[str]] = defaultdict(list)
+    for place, text in MODULES.items():
+        parts[Path(place).stem].append(text)
+    assert set(parts) == NAMES
+    words = []
+    for name, texts in parts.items():
+        between = re.compile(rf"^from pilotage\.[\w.]+\.{name} import .*\n", re.MULTILINE)
+        (tmp_path / f"{name}.py").write_text("\n\n".join(between.sub("", text) for text in texts))
+        words += ["--plugin", f"{name}.py"]
+        assert f"--plugin {name}.py" in TEXT
+    assert check(run(tmp_path, FROM_OUTSIDE, *words)) >= 2.0
+
+
+@pytest.mark.parametrize("word", ["stroll", "beeline"])
+def test_without_them_the_mission_is_refused_in_one_line(word: str, tmp_path: Path) -> None:
+    program = FROM_OUTSIDE
+    done = run(tmp_path, program, *(["--set", "task=reach"] if word == "beeline" else []))
+    assert done.returncode == 2
+    assert done.stdout == ""
+    assert done.stderr.count("\n") == 1
