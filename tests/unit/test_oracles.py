@@ -198,7 +198,9 @@ class TestSheets:
         run, knows = explored(sheet, "explorer")
         assert knows["success"]
         assert 0.3 < knows["coverage_reachable"] < 0.7
-        assert len(only(run).results["left"]) == knows["cells_left"] > 0
+        left = only(run).results["left"]
+        assert isinstance(left, tuple)
+        assert len(left) == knows["cells_left"] > 0
 
     def test_the_same_seed_has_the_same_robot(self, small: Path) -> None:
         """What an oracle replaces changes; the drive's errors and everybody's noise do not."""
@@ -260,7 +262,8 @@ class TestTerrain:
         wrong = "robot.sensors.odometer.angle_scale=1.05"
         plain = driven(CURVE, ground, "driver, initial", wrong)[1]["position_rmse_m"]
         run, silent = driven(CURVE, ground, "driver, initial, sensors", wrong)
-        assert silent["position_rmse_m"] < 1e-3 < plain
+        # The mean of a pose whose heading is uncertain lies a millimetre beside the likeliest one.
+        assert silent["position_rmse_m"] < 2e-3 < 0.1 * plain
         # The filter expects noise still: its covariance grows as it would.
         assert only(run).trace["cov_xx_m2"].max() > 1e-4
 

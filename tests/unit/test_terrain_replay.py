@@ -45,9 +45,9 @@ def driven(folder: Path, mission: str, *more: str) -> Path:
 
 @pytest.fixture(scope="module")
 def estimated(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    more = [f"world.landmarks={MARKS}", "robot.sensors.lidar.max_range_m=150", "run.dt_s=1"]
+    more = [f"world.landmarks={MARKS}", "robot.sensors.lidar.max_range_m=150", "run.dt_s=2"]
     more += ["stack.navigator.cost_map.inflation_m=15", "world.start.theta_rad=0.8"]
-    more += ["robot.sensors.lidar.rate_hz=1", "robot.sensors.odometer.rate_hz=1"]
+    more += ["robot.sensors.lidar.rate_hz=0.5", "robot.sensors.odometer.rate_hz=0.5"]
     return driven(tmp_path_factory.mktemp("estimated"), "gale-astar-ekf", *more)
 
 

@@ -6,10 +6,8 @@ import math
 
 import numpy as np
 
-from pilotage.core.chi_square import chi_square_quantile, gated_mean
+from pilotage.core.chi_square import chi_square_quantile
 from pilotage.core.types import BoolArray, FloatArray, IntArray
-from pilotage.evaluation.consistency import nees, nees_metrics, nis_metrics
-from pilotage.evaluation.pose_errors import pose_errors
 
 STRETCH_M = 1000.0
 """A way of this length without a landmark is a stretch to get over."""
@@ -33,44 +31,6 @@ def stretches_without(seen: IntArray, step_m: FloatArray) -> list[tuple[int, int
     way = np.concatenate([[0.0], np.cumsum(step_m)])
     pairs = zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True)
     return [(a, b - 1) for a, b in pairs if way[b] - way[a] > STRETCH_M]
-
-
-def estimation_metrics(
-    truth: FloatArray,
-    poses: FloatArray,
-    covs: FloatArray,
-    probability: float,
-    seen: IntArray,
-    nis: FloatArray,
-    outcome: IntArray,
-    gate: float,
-) -> dict[str, object]:
-    """Errors and consistency of a path of T steps.
-
-    Parameters
-    ----------
-    truth, poses, covs
-        (T, 3), (T, 3) and (T, 3, 3) after each step.
-    seen
-        (T,) sightings of each step.
-    nis, outcome
-        (S,) of the sightings; accepted where the outcome is 1.
-    """
-    errors = pose_errors(truth, poses)
-    step_m = np.concatenate([[0.0], np.hypot(*np.diff(truth[:, :2], axis=0).T)])
-    metrics: dict[str, object] = {
-        **errors.metrics(),
-        "final_position_error_m": float(errors.distance_m[-1]),
-        "ellipse_coverage": float(in_ellipse(truth, poses, covs, probability).mean()),
-        **nees_metrics(nees(truth, poses, covs)),
-        "blind_stretches": len(stretches_without(seen, step_m)),
-    }
-    accepted = outcome == 1
-    if accepted.any():
-        metrics |= nis_metrics(nis[accepted], gated_mean(chi_square_quantile(gate, 2), 2))
-        metrics["accepted_fraction"] = float(accepted.sum() / (outcome >= 0).sum())
-        metrics["sightings"] = len(outcome)
-    return metrics
 
 
 def root_determinant(covs: FloatArray) -> FloatArray:

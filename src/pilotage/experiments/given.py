@@ -20,13 +20,15 @@ def has(mission: Mission) -> frozenset[str]:
     told = "localizer" in mission.run.oracles
     if told or mission.task.name == "explore" or any(stack.localizer is not None for stack in stacks):
         found.add("estimate")
-    if mission.task.name != "plan" or any(stack.navigator.name == "curve" for stack in stacks):
+    over_cells = any(stack.navigator.name == "curve" for stack in stacks)
+    if mission.task.name != "plan" or over_cells:
         found.add("clearance")  # of what is driven, or of a path over cells
     source = mission.world.map
     if isinstance(source, str) and source not in shipped_maps():
         found |= {"walls", "ground"}  # a file may hold either
     else:
-        if isinstance(source, str | MapFile | SheetFile | GridMap | ImagesMap):
+        solid = isinstance(source, GridMap | ImagesMap) and not over_cells
+        if solid or isinstance(source, str | MapFile | SheetFile):
             found.add("walls")
         if isinstance(source, GridMap | ImagesMap | CraterMap | ElevationMap):
             found.add("ground")
