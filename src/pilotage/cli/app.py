@@ -8,6 +8,7 @@ import typer
 
 from pilotage import __version__
 from pilotage.cli.attribute import attribute
+from pilotage.cli.bench import bench
 from pilotage.cli.bench_scen import bench_scen
 from pilotage.cli.calibrate import calibrate
 from pilotage.cli.components import components
@@ -54,6 +55,7 @@ COMMANDS = (
 
 for _command in COMMANDS:
     app.command()(_command)
+app.add_typer(bench)
 
 
 def _version(wanted: bool) -> None:
