@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from contract.local_examples import LOCAL_EXAMPLES, navigator_drives_by_the_laser
 from contract.rover_examples import (
     dead_reckoning_follows_the_bend,
     drives_over_cells,
@@ -368,6 +369,10 @@ EXAMPLES: dict[tuple[str, str], Example] = {
     ("mapper", "obstacle-layer"): Example(mapper_maps, pure_numbers=frozenset({"sigmas"})),
     ("escape", "back-out"): Example(escape_ends),
     ("navigator", "goal"): Example(navigator_arrives),
+    ("navigator", "local"): Example(navigator_drives_by_the_laser, {"arrival_m": 0.25}),
+    **{
+        ("local_controller", name): Example(works, {}, pure) for name, (works, pure) in LOCAL_EXAMPLES.items()
+    },
     ("navigator", "open-loop"): Example(
         navigator_keeps_its_command, {"speed_m_s": 0.2, "turn_rate_rad_s": 0.1, "duration_s": 2.0}
     ),

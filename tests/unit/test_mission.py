@@ -58,7 +58,7 @@ def test_a_mission_resolves_to_a_file_that_loads_as_itself(tmp_path: Path) -> No
             assert again.stack.navigator.parameters["arrival_m"] == 0.15
         lidar = again.robot.sensors.get("lidar")
         if lidar is not None and lidar.name == "lidar":
-            assert lidar.parameters["beams"] == (720 if name == "car-park" else 539)
+            assert lidar.parameters["beams"] == (720 if name in ("car-park", "barn-course") else 539)
 
 
 def test_overrides_reach_every_depth() -> None:

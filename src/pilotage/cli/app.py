@@ -7,6 +7,7 @@ from typing import Annotated
 import typer
 
 from pilotage.cli.attribute import attribute
+from pilotage.cli.bench import bench
 from pilotage.cli.bench_scen import bench_scen
 from pilotage.cli.calibrate import calibrate
 from pilotage.cli.components import components
@@ -59,6 +60,7 @@ COMMANDS = (
 
 for _command in COMMANDS:
     app.command()(_command)
+app.add_typer(bench)
 
 
 def _version(wanted: bool) -> None:

@@ -10,6 +10,7 @@ from pilotage.models.motion.motion import MOTIONS
 from pilotage.sensors.sensor import SENSORS
 from pilotage.stack.control.controller import CONTROLLERS
 from pilotage.stack.control.escape import ESCAPES
+from pilotage.stack.control.local.role import LOCAL_CONTROLLERS
 from pilotage.stack.control.reactive import REACTIVES
 from pilotage.stack.interface import NAVIGATORS
 from pilotage.stack.localization.heading_filter import HEADING_FILTERS
@@ -29,6 +30,7 @@ ROLES: dict[str, Registry[Any]] = {
     "smoother": SMOOTHERS,
     "local_planner": LOCAL_PLANNERS,
     "controller": CONTROLLERS,
+    "local_controller": LOCAL_CONTROLLERS,
     "reactive": REACTIVES,
     "mapper": MAPPERS,
     "escape": ESCAPES,

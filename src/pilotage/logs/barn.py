@@ -14,6 +14,7 @@ from pilotage.logs.text import Table, check_size, read_table
 CYLINDERS = "cylinders.csv"
 PATHS = "paths.csv"
 WORLDS = "worlds.csv"
+PUBLISHED = ("world", "succeeded", "collided", "timed_out", "time_s")
 RADIUS_M = 0.075
 START = (-2.25, 3.0, np.pi / 2.0)
 """Pose x, y, theta at which a run begins, in the organizers' files of 2024."""
@@ -78,6 +79,34 @@ def read_barn(folder: Path) -> tuple[BarnWorld, ...]:
         _world(worlds, row, cylinders.values[of_cylinder == numbers[row]], paths, of_path, int(numbers[row]))
         for row in np.argsort(numbers)
     )
+
+
+def path_clearance_m(world: BarnWorld) -> float:
+    """Least distance between the organizers' reference path and a post's surface."""
+    begin, step = world.path_xy_m[:-1], np.diff(world.path_xy_m, axis=0)
+    square = np.maximum((step**2).sum(axis=1), 1e-12)
+    least = np.inf
+    for x, y, radius in world.circles_m:
+        along = np.clip(((np.array([x, y]) - begin) * step).sum(axis=1) / square, 0.0, 1.0)
+        away = np.hypot(*(begin + along[:, None] * step - [x, y]).T).min()
+        least = min(least, float(away) - radius)
+    return least
+
+
+def read_published(folder: Path) -> dict[str, Table]:
+    """Results that others published, by the name in ``published_NAME.csv``; none where there is no such file.
+
+    Columns: world, succeeded, collided, timed_out (0 or 1), time_s.
+
+    Raises
+    ------
+    InputError
+        File and line of what is wrong.
+    """
+    return {
+        path.stem.removeprefix("published_"): _read(path, PUBLISHED)
+        for path in sorted(folder.glob("published_*.csv"))
+    }
 
 
 def _read(path: Path, columns: tuple[str, ...]) -> Table:

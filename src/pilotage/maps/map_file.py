@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated, Any
+from typing import Any
 
 import numpy as np
-from pydantic import Field
+from pydantic import model_validator
 
 from pilotage.core.config import Config, validate
 from pilotage.core.errors import InputError
@@ -33,12 +33,18 @@ class MapFile(Config):
     map: str
     description: str = ""
     bounds_m: Coordinates | None = None
-    walls_m: Annotated[tuple[Coordinates, ...], Field(min_length=1)]
+    walls_m: tuple[Coordinates, ...]
     circles_m: tuple[tuple[float, float, float], ...] = ()
     landmarks: tuple[LandmarkEntry, ...] = ()
     walls_count: int | None = None
     landmarks_count: int | None = None
     """Where given, how many the file must hold: a file cut in half is noticed."""
+
+    @model_validator(mode="after")
+    def _something_solid(self) -> MapFile:
+        if not self.walls_m and not self.circles_m:
+            raise ValueError("walls_m: expected at least 1 item, or one in circles_m, found none in either")
+        return self
 
 
 @dataclass(frozen=True, slots=True)

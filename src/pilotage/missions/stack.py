@@ -31,6 +31,8 @@ class StackConfig(Config):
     smoother: ComponentChoice | None = None
     local_planner: ComponentChoice | None = None
     controller: ComponentChoice | None = None
+    local_controller: ComponentChoice | None = None
+    """Finds its way by the laser alone, beside or without a plan."""
     reactive: ComponentChoice | None = None
     mapper: ComponentChoice | None = None
     escape: ComponentChoice | None = None

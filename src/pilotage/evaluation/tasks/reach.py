@@ -9,7 +9,7 @@ from typing import ClassVar
 from pilotage.core.angles import wrap_to_pi
 from pilotage.core.config import Config
 from pilotage.core.errors import InputError
-from pilotage.core.types import Event
+from pilotage.core.types import Event, Pose2
 from pilotage.evaluation.cell_plans import route_metrics, route_of
 from pilotage.evaluation.driving import driving_metrics, header, planning_metrics, poses, shortest_for
 from pilotage.evaluation.finished import FinishedRun, RobotRun, Verdict
@@ -25,6 +25,11 @@ class ReachConfig(Config):
     """Further goals after ``world.goal``, to be reached in this order."""
 
     goals: tuple[GoalConfig, ...] = ()
+    ends_there: bool = False
+    """Over as soon as every robot truly is at its last goal, as a referee sees it; else when they say so."""
+
+
+THERE = "the goal is reached"
 
 
 @TASKS.add("reach", ReachConfig)
@@ -41,6 +46,8 @@ class ReachTask:
             if mission.goal_of(robot) is None and not config.goals:
                 raise InputError("task 'reach': expected world.goal, found none")
         self.columns, self.goals = {}, config.goals
+        self._ends_there = config.ends_there
+        self._last = [config.goals[-1] if config.goals else mission.goal_of(robot) for robot in mission.team]
         self.events: list[Event] = []
         self._watch = CollisionWatch(self.events)
 
@@ -49,6 +56,11 @@ class ReachTask:
         collision = self._watch.step(t_s, attempts)
         if collision is not None:
             return collision
+        if self._ends_there and all(
+            goal is not None and _is_there(goal, attempt.body.pose)
+            for goal, attempt in zip(self._last, attempts, strict=True)
+        ):
+            return THERE
         return "" if all_ended(attempts) else None
 
     def row(self, index: int) -> tuple[float, ...]:  # noqa: ARG002
@@ -97,9 +109,19 @@ class ReachTask:
             metrics["goal_error_rad"] = turned
             reached = reached and abs(turned) <= last.tolerance_rad
         contacts = so_far.get("hazard_contacts", 0)
-        metrics["success"] = robot.arrived and robot.collisions == 0 and reached and not contacts
+        done = robot.arrived or (self._ends_there and run.ending == THERE)
+        metrics["success"] = done and robot.collisions == 0 and reached and not contacts
         if robot.arrived and not reached:
             metrics["reason"] = f"the robot says it arrived, but stands {away_m:.2f} m from its goal"
         elif contacts:
             metrics["reason"] = f"{contacts} of {run.steps} steps end on a hazard"
         return metrics
+
+
+def _is_there(goal: GoalConfig, pose: Pose2) -> bool:
+    """Whether a true pose is at a goal."""
+    turned = 0.0 if goal.theta_rad is None else abs(wrap_to_pi(pose.theta_rad - goal.theta_rad))
+    return (
+        math.hypot(pose.x_m - goal.x_m, pose.y_m - goal.y_m) <= goal.tolerance_m
+        and turned <= goal.tolerance_rad
+    )

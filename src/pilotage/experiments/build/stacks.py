@@ -20,6 +20,7 @@ from pilotage.missions.places import GoalConfig
 from pilotage.missions.stack import InitialConfig, StackConfig
 from pilotage.stack.control.controller import CONTROLLERS
 from pilotage.stack.control.escape import ESCAPES
+from pilotage.stack.control.local.role import LOCAL_CONTROLLERS
 from pilotage.stack.control.reactive import REACTIVES
 from pilotage.stack.interface import NAVIGATORS, Belief, Stack
 from pilotage.stack.journal import Journal
@@ -99,6 +100,9 @@ def build_stack(
         reactive=optional_component(REACTIVES, config.reactive, "reactive", robot),
         mapper=optional_component(MAPPERS, config.mapper, "mapper", robot, chart),
         escape=optional_component(ESCAPES, config.escape, "escape", robot),
+        local_controller=optional_component(
+            LOCAL_CONTROLLERS, config.local_controller, "local_controller", robot.streams.stream("controller")
+        ),
     )
     if truth is not None:
         parts = with_oracles(parts, oracles, truth, robot)

@@ -28,3 +28,8 @@ class DifferentialDriveConfig(MotionConfig):
     def braking_m_s2(self) -> float:
         """The acceleration limit holds for braking too."""
         return self.max_acceleration_m_s2
+
+    @property
+    def turn_acceleration_rad_s2(self) -> float:
+        """How fast it can change its turn rate."""
+        return self.max_turn_acceleration_rad_s2

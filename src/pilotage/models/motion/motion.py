@@ -45,6 +45,11 @@ class MotionConfig(Config):
         """Deceleration that it can be relied on for; inf for who stops at once."""
         return math.inf
 
+    @property
+    def turn_acceleration_rad_s2(self) -> float:
+        """How fast it can change its turn rate; inf for who does so at once."""
+        return math.inf
+
 
 MOTIONS: Registry[MotionConfig] = Registry("motion", "pilotage.models.motion")
 """Motion names to their data sheets; ``sim`` says for each what it truly does."""

@@ -29,3 +29,8 @@ class OmnidirectionalConfig(MotionConfig):
     def braking_m_s2(self) -> float:
         """The acceleration limit holds for braking too."""
         return self.max_acceleration_m_s2
+
+    @property
+    def turn_acceleration_rad_s2(self) -> float:
+        """How fast it can change its turn rate."""
+        return self.max_turn_acceleration_rad_s2

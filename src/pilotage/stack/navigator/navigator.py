@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pilotage.core.errors import InputError
 from pilotage.stack.control.controller import Controller
 from pilotage.stack.control.escape import Escape
+from pilotage.stack.control.local.role import LocalController
 from pilotage.stack.control.reactive import Reactive
 from pilotage.stack.localization.localizer import Localizer
 from pilotage.stack.mapping.mapper import Mapper
@@ -26,6 +27,7 @@ class Parts:
     reactive: Reactive | None
     mapper: Mapper | None
     escape: Escape | None
+    local_controller: LocalController | None = None
 
 
 def localizer_of(parts: Parts, needed_by: str) -> Localizer:

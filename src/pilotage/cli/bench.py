@@ -1,0 +1,130 @@
+"""``pilotage bench``: controllers against public courses."""
+
+from __future__ import annotations
+
+import os
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from pilotage.cli.options import Json, Overrides, Seed, parse_out
+from pilotage.cli.output import print_columns, print_json, print_line, stdout_for_json
+from pilotage.core.errors import InputError
+
+if TYPE_CHECKING:
+    from pilotage.experiments.barn_benchmark import BarnAnswer
+
+bench = typer.Typer(
+    name="bench",
+    help="Drive controllers through public courses and put them side by side.",
+    add_completion=False,
+    rich_markup_mode=None,
+    no_args_is_help=True,
+)
+
+
+@bench.command()
+def barn(
+    worlds: Annotated[
+        Path, typer.Argument(metavar="WORLDS", help="A folder with cylinders.csv, paths.csv, worlds.csv.")
+    ],
+    controller: Annotated[
+        list[str] | None,
+        typer.Option(metavar="NAME", help="A local controller; repeatable. Default: gap-horizon."),
+    ] = None,
+    trials: Annotated[int, typer.Option(metavar="N", min=1, max=10_000, help="Runs on each course.")] = 10,
+    count: Annotated[
+        int | None,
+        typer.Option("--courses", metavar="N", min=1, help="So many courses, evenly spread; default: all."),
+    ] = None,
+    workers: Annotated[
+        int | None, typer.Option(metavar="N", min=1, help="Processes on this machine; default: all cores.")
+    ] = None,
+    seed: Seed = None,
+    overrides: Overrides = None,
+    out: Annotated[
+        Path, typer.Option(metavar="DIR", parser=parse_out, help="Folder for the rows and the page.")
+    ] = Path("runs/bench-barn"),
+    replays: Annotated[
+        int, typer.Option(metavar="N", min=0, max=100, help="Worst runs of each controller with a replay.")
+    ] = 3,
+    json: Json = False,
+) -> int:
+    """Drive the BARN courses: first contact fails, 100 s are the limit, within 1 m of the goal is there."""
+    from pilotage.experiments.barn_benchmark import BarnRequest, bench_barn, first_worlds, summary_values
+    from pilotage.experiments.barn_files import write_barn
+    from pilotage.logs.barn import read_barn
+
+    names = tuple(controller or ("gap-horizon",))
+    if len(set(names)) < len(names):
+        raise InputError("--controller: expected every name once, found one twice")
+    courses = first_worlds(read_barn(worlds), count)
+    request = BarnRequest(
+        courses, names, trials, workers or os.cpu_count() or 1, seed or 0, tuple(overrides or ())
+    )
+    with stdout_for_json(json):
+        answer = bench_barn(request, _show if sys.stderr.isatty() else None)
+        replayed = write_barn(answer, out, replays)
+        page = _write_page(answer, worlds, out, replayed)
+    for number in answer.without_way:
+        print_line(f"world {number}: no way through for this robot, not driven", sys.stderr)
+    if json:
+        print_json(summary_values(answer))
+    else:
+        _print_table(answer)
+        print_line(f"report: {page}")
+    return 0
+
+
+def _show(done: int, total: int) -> None:
+    end = "\r\x1b[K" if done == total else ""
+    sys.stderr.write(f"\r{done} of {total} runs\x1b[K{end}")
+    sys.stderr.flush()
+
+
+def _write_page(
+    answer: BarnAnswer, folder: Path, out: Path, replayed: dict[tuple[str, int, int], Path]
+) -> Path:
+    from pilotage.experiments.barn_benchmark import published_runs
+    from pilotage.logs.barn import path_clearance_m
+    from pilotage.report.barn.page import BarnPage, write_barn_report
+    from pilotage.report.page import write_report
+
+    links = []
+    for name, runs in answer.runs.items():
+        for run in runs:
+            run_dir = replayed.get((name, run.world, run.trial))
+            if run_dir is not None:
+                links.append((name, run, write_report(run_dir).relative_to(out).as_posix()))
+    courses = answer.request.worlds
+    page = BarnPage(
+        answer.runs,
+        published_runs(folder, courses),
+        {world.number: path_clearance_m(world) for world in courses},
+        answer.without_way,
+        links,
+    )
+    return write_barn_report(out, page)
+
+
+def _print_table(answer: BarnAnswer) -> None:
+    from pilotage.evaluation.barn import summarize
+
+    rows = [("controller", "metric", "success", "collision", "timeout", "time_s", "runs", "courses")]
+    for name, runs in answer.runs.items():
+        found = summarize(runs)
+        rows.append(
+            (
+                name,
+                f"{found.metric:.4f}",
+                f"{found.success:.4f}",
+                f"{found.collision:.4f}",
+                f"{found.timeout:.4f}",
+                f"{found.time_s:.2f}",
+                str(found.trials),
+                str(found.worlds),
+            )
+        )
+    print_columns(rows)

@@ -1,0 +1,322 @@
+"""The BARN benchmark: every course a mission of its own, built and driven as all missions are."""
+
+from __future__ import annotations
+
+import math
+import multiprocessing
+import signal
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures.process import BrokenProcessPool
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.ndimage import label
+from scipy.spatial import cKDTree
+
+from pilotage.core.errors import InputError
+from pilotage.core.types import FloatArray
+from pilotage.evaluation.barn import BarnRun, summarize
+from pilotage.experiments.build.build import build
+from pilotage.experiments.build.robots import footprint_of
+from pilotage.experiments.loop import run_loop
+from pilotage.experiments.mission import mission_of, read_mission
+from pilotage.kernels.control.pose_search import CLOSED, passage
+from pilotage.logs.barn import (
+    GOAL_AHEAD_M,
+    GOAL_TOLERANCE_M,
+    START,
+    TIME_LIMIT_S,
+    BarnWorld,
+    read_published,
+)
+from pilotage.missions.mission import Mission
+from pilotage.stack.navigator.local import outline_of
+
+MISSION = "barn-course"
+"""What the courses are put into: robot, sensors, stack, and how it is judged."""
+MARGIN_M = 2.0
+"""Floor beyond the posts, the start and the goal."""
+DISTANCE_SCALE_STD, ANGLE_SCALE_STD = 0.01, 0.02
+"""Errors of the odometry's scales, drawn for each run: tyre pressure, and skid steering on another floor."""
+CELL_M = 0.04
+"""Of the search for a way; half of it is the doubt that counts for the course."""
+Values = Mapping[str, Any]
+OnRun = Callable[[int, int], None]
+
+
+@dataclass(frozen=True, slots=True)
+class BarnRequest:
+    """What is to be driven.
+
+    Attributes
+    ----------
+    controllers
+        Registered names of local controllers.
+    overrides
+        ``key=value`` over the mission ``barn-course``, for all controllers alike.
+    """
+
+    worlds: tuple[BarnWorld, ...]
+    controllers: tuple[str, ...]
+    trials: int = 10
+    workers: int = 1
+    seed: int = 0
+    overrides: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class BarnAnswer:
+    """What came out.
+
+    Attributes
+    ----------
+    runs
+        By controller, in the order of worlds and trials; the same trial has the same seed for each.
+    without_way
+        Worlds that the robot does not fit through, which nobody drove.
+    """
+
+    request: BarnRequest
+    runs: Mapping[str, tuple[BarnRun, ...]]
+    without_way: tuple[int, ...]
+
+
+def bench_barn(request: BarnRequest, on_run: OnRun | None = None) -> BarnAnswer:
+    """Drive every course with every controller.
+
+    Parameters
+    ----------
+    on_run
+        Called after each run with how many are done and how many there are.
+
+    Raises
+    ------
+    InputError
+        Where a controller is unknown, or no course has a way that the robot fits through.
+    """
+    if not request.worlds:
+        raise InputError("bench barn: expected one world or more, found none")
+    base = read_mission(MISSION)
+    for controller in request.controllers:
+        course_mission(request, base, request.worlds[0], 0, controller)
+    robot = mission_of(base, request.overrides).robot
+    outline = outline_of(footprint_of(robot, "robot"))
+    open_worlds = [world for world in request.worlds if has_way(world, outline)]
+    if not open_worlds:
+        raise InputError(
+            "bench barn: expected a course with a way through, found the robot wider than the gaps of all "
+            f"{len(request.worlds)}; take a smaller robot.footprint"
+        )
+    jobs = [
+        (world, trial, controller)
+        for world in open_worlds
+        for trial in range(request.trials)
+        for controller in request.controllers
+    ]
+    done: dict[str, list[BarnRun]] = {controller: [] for controller in request.controllers}
+    for number, (controller, run) in enumerate(_driven(request, base, jobs), start=1):
+        done[controller].append(run)
+        if on_run is not None:
+            on_run(number, len(jobs))
+    drove = {world.number for world in open_worlds}
+    return BarnAnswer(
+        request,
+        {name: tuple(sorted(runs, key=lambda run: (run.world, run.trial))) for name, runs in done.items()},
+        tuple(world.number for world in request.worlds if world.number not in drove),
+    )
+
+
+Job = tuple[BarnWorld, int, str]
+
+
+def _driven(request: BarnRequest, base: Values, jobs: Sequence[Job]) -> Iterator[tuple[str, BarnRun]]:
+    """Every run with its controller, as they come in."""
+    if request.workers == 1:
+        for world, trial, controller in jobs:
+            yield controller, drive_world(request, base, world, trial, controller)
+        return
+    pool = ProcessPoolExecutor(
+        min(request.workers, len(jobs)), multiprocessing.get_context("spawn"), _leave_ctrl_c_to_the_parent
+    )
+    slim = BarnRequest((), request.controllers, request.trials, 1, request.seed, request.overrides)
+    try:
+        waiting = {pool.submit(drive_world, slim, base, *job): job[2] for job in jobs}
+        for future in as_completed(waiting):
+            yield waiting[future], future.result()
+    except BrokenProcessPool:
+        raise InputError("bench barn: a worker died; take fewer --workers, or more memory") from None
+    finally:
+        pool.shutdown(cancel_futures=True)
+
+
+def _leave_ctrl_c_to_the_parent() -> None:
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
+def course_mission(
+    request: BarnRequest, base: Values, world: BarnWorld, trial: int, controller: str
+) -> Mission:
+    """The mission of one run; all its chance comes from the seed, the world's number and the trial.
+
+    Raises
+    ------
+    InputError
+        Where the controller or an override is not what it should be.
+    """
+    draw = np.random.default_rng([request.seed, world.number, trial])
+    mission = mission_of(base, request.overrides)
+    settings: dict[str, Any] = {
+        "run.seed": int(draw.integers(0, 2**62)),
+        "run.time_limit_s": TIME_LIMIT_S,
+        "stack.local_controller.name": controller,
+        "world.start": dict(zip(("x_m", "y_m", "theta_rad"), START, strict=True)),
+        "world.goal": {
+            "x_m": START[0],
+            "y_m": START[1] + GOAL_AHEAD_M,
+            "tolerance_m": GOAL_TOLERANCE_M,
+        },
+        "world.map": {
+            "map": f"barn-{world.number}",
+            "bounds_m": list(bounds_of(world)),
+            "walls_m": [],
+            "circles_m": world.circles_m.tolist(),
+        },
+    }
+    for name, sensor in mission.robot.sensors.items():
+        if sensor.name == "wheel-odometry":
+            for key, std in (("distance_scale", DISTANCE_SCALE_STD), ("angle_scale", ANGLE_SCALE_STD)):
+                scale = float(sensor.parameters.get(key, 1.0)) + std * float(draw.standard_normal())
+                settings[f"robot.sensors.{name}.{key}"] = scale
+    settings["mission"] = f"barn-{world.number}-{trial}-{controller}"
+    return mission_of(base, request.overrides, settings=settings)
+
+
+def drive_world(request: BarnRequest, base: Values, world: BarnWorld, trial: int, controller: str) -> BarnRun:
+    """Drive one course once, and judge it as the challenge does: first contact fails, so does time."""
+    experiment = build(course_mission(request, base, world, trial, controller))
+    finished = run_loop(experiment).finished
+    body, goal = experiment.simulator.bodies[0], experiment.mission.world.goal
+    assert goal is not None, "set above"
+    collided = body.collisions > 0
+    away_m = math.hypot(body.pose.x_m - goal.x_m, body.pose.y_m - goal.y_m)
+    success = not collided and away_m <= goal.tolerance_m
+    timeout = not (success or collided)
+    time_s = TIME_LIMIT_S if timeout else finished.duration_s
+    return BarnRun(world.number, trial, success, collided, timeout, time_s, world.optimal_time_s)
+
+
+def bounds_of(world: BarnWorld) -> tuple[float, float, float, float]:
+    """The floor (xmin, ymin, xmax, ymax) of a course."""
+    low, high = _extent(world)
+    return (
+        float(low[0] - MARGIN_M),
+        float(low[1] - MARGIN_M),
+        float(high[0] + MARGIN_M),
+        float(high[1] + MARGIN_M),
+    )
+
+
+def has_way(world: BarnWorld, outline: FloatArray) -> bool:
+    """Whether the outline (K, 2) gets from start to goal between the posts' bounds.
+
+    Where the disc around it has a way over cells of ``CELL_M``, it has. Otherwise a search over poses says,
+    for a robot that turns in place and drives straight; what only half a cell keeps it from is left to the
+    controllers.
+    """
+    low, high = _extent(world)
+    if _disc_has_way(world, float(np.hypot(*outline.T).max()), low, high):
+        return True
+    status, _ = passage(
+        np.array(START),
+        START[0],
+        START[1] + GOAL_AHEAD_M,
+        GOAL_TOLERANCE_M,
+        np.ascontiguousarray(outline),
+        world.circles_m,
+        low,
+        high,
+        CELL_M,
+        -0.5 * CELL_M,
+    )
+    return bool(status != CLOSED)
+
+
+def _disc_has_way(world: BarnWorld, radius_m: float, low: FloatArray, high: FloatArray) -> bool:
+    """Whether cells that surely hold the disc, and so do the steps between neighbours, join both ends."""
+    x = np.arange(low[0], high[0] + CELL_M, CELL_M)
+    y = np.arange(low[1], high[1] + CELL_M, CELL_M)
+    cells = np.stack(np.meshgrid(x, y), axis=-1)
+    away, nearest = cKDTree(world.circles_m[:, :2]).query(cells.reshape(-1, 2))
+    clearance = (away - world.circles_m[nearest, 2]).reshape(cells.shape[:2])
+    regions, _ = label(clearance >= radius_m + 0.5 * CELL_M)
+
+    def region(at_x: float, at_y: float) -> int:
+        row, column = round((at_y - low[1]) / CELL_M), round((at_x - low[0]) / CELL_M)
+        return int(regions[row, column])
+
+    start = region(START[0], START[1])
+    return start > 0 and start == region(START[0], START[1] + GOAL_AHEAD_M)
+
+
+def _extent(world: BarnWorld) -> tuple[FloatArray, FloatArray]:
+    """Lower and upper corner of posts, start and goal with its tolerance."""
+    x, y, _ = START
+    points = np.vstack(
+        [world.circles_m[:, :2], [[x, y], [x, y + GOAL_AHEAD_M + GOAL_TOLERANCE_M], [x - 1, y], [x + 1, y]]]
+    )
+    return points.min(axis=0), points.max(axis=0)
+
+
+def published_runs(folder: Path, worlds: Sequence[BarnWorld]) -> dict[str, tuple[BarnRun, ...]]:
+    """Results that lie beside the courses, of another simulator: by name, those of the given courses."""
+    optimal_s = {world.number: world.optimal_time_s for world in worlds}
+    found: dict[str, tuple[BarnRun, ...]] = {}
+    for name, table in read_published(folder).items():
+        runs: list[BarnRun] = []
+        for world, succeeded, collided, timed_out, time_s in table.values[:, :5].tolist():
+            if int(world) in optimal_s:
+                trial = sum(run.world == int(world) for run in runs)
+                flags = bool(succeeded), bool(collided), bool(timed_out)
+                runs.append(BarnRun(int(world), trial, *flags, max(time_s, 0.0), optimal_s[int(world)]))
+        if runs:
+            found[name] = tuple(runs)
+    return found
+
+
+def summary_values(answer: BarnAnswer) -> dict[str, Any]:
+    """``metric success collision timeout time_s trials worlds``; of several controllers these by name."""
+    summaries = {name: _summary(runs) for name, runs in answer.runs.items()}
+    return summaries[answer.request.controllers[0]] if len(summaries) == 1 else summaries
+
+
+def _summary(runs: Sequence[BarnRun]) -> dict[str, Any]:
+    found = summarize(runs)
+    return {
+        "metric": found.metric,
+        "success": found.success,
+        "collision": found.collision,
+        "timeout": found.timeout,
+        "time_s": found.time_s,
+        "trials": found.trials,
+        "worlds": found.worlds,
+    }
+
+
+def first_worlds(worlds: Sequence[BarnWorld], count: int | None) -> tuple[BarnWorld, ...]:
+    """So many of the worlds, evenly spread over their numbers; all for None."""
+    if count is None or count >= len(worlds):
+        return tuple(worlds)
+    return tuple(worlds[int(i)] for i in np.arange(count) * len(worlds) // count)
+
+
+def replay_missions(answer: BarnAnswer, controller: str, count: int) -> list[tuple[BarnRun, Mission]]:
+    """The worst runs of a controller as missions: each drives as it did."""
+    base = read_mission(MISSION)
+    worlds = {world.number: world for world in answer.request.worlds}
+    worst = sorted(answer.runs[controller], key=lambda run: (run.metric, -run.time_s))[:count]
+    return [
+        (run, course_mission(answer.request, base, worlds[run.world], run.trial, controller)) for run in worst
+    ]

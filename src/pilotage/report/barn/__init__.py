@@ -1,0 +1,1 @@
+"""The page of a BARN benchmark: controllers side by side, courses by difficulty, others' results."""
