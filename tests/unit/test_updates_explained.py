@@ -14,9 +14,9 @@ from pilotage.experiments.loop import simulate
 from pilotage.experiments.mission import load_mission
 from pilotage.experiments.run import run_mission
 from pilotage.experiments.update_album import UpdateAlbum
+from pilotage.records.run_data import read_run
 from pilotage.report import write_report
 from pilotage.report.figures.layers import _cut_where_carried, true_path
-from pilotage.report.run_folder import read_run
 from pilotage.sensors.readings import LidarScan, Readings
 from pilotage.stack.interface import ExplainableUpdate, LineVerdict, ScanUpdate
 from pilotage.stack.localization.ekf_walls import EkfWallsConfig, EkfWallsLocalizer

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from pilotage.core.errors import InputError
+from pilotage.core.files import read_npz
 from pilotage.evaluation.relations import RelationErrors, relation_nees
 from pilotage.models.pose_graph import PoseGraph
 from pilotage.stack.mapping.slam.scan_covariances import ScanCovariances
@@ -40,15 +41,15 @@ def read_scan_covariances(path: Path) -> ScanCovariances:
     InputError
         Where the file is damaged or lacks something.
     """
+    file = read_npz(path, "covariances of 'pilotage slam'")
     try:
-        with np.load(path, allow_pickle=False) as file:
-            graph = PoseGraph(
-                file["graph_poses"],
-                file["graph_i"],
-                file["graph_j"],
-                file["graph_measurements"],
-                file["graph_information"],
-            )
-            return ScanCovariances(graph, file["graph_weights"], file["owner"], file["poses"])
-    except (OSError, ValueError, KeyError) as error:
+        graph = PoseGraph(
+            file["graph_poses"],
+            file["graph_i"],
+            file["graph_j"],
+            file["graph_measurements"],
+            file["graph_information"],
+        )
+        return ScanCovariances(graph, file["graph_weights"], file["owner"], file["poses"])
+    except (ValueError, KeyError) as error:
         raise InputError(f"{path}: expected covariances of 'pilotage slam', found {error}") from None

@@ -16,8 +16,8 @@ import yaml
 
 from pilotage.core.config import validate
 from pilotage.core.errors import InputError
+from pilotage.core.files import read_yaml
 from pilotage.core.types import FloatArray
-from pilotage.core.yaml_text import load_yaml
 from pilotage.logs.g2o import write_g2o
 from pilotage.logs.laser_log import LaserLog
 from pilotage.logs.laser_recordings import read_laser_log
@@ -62,13 +62,7 @@ def read_slam_config(path: Path | None) -> SlamConfig:
     """
     if path is None:
         return SlamConfig()
-    if not path.is_file():
-        raise InputError(f"--config: expected a YAML file, found none at '{path}'")
-    try:
-        text = path.read_text(encoding="utf-8")
-    except UnicodeDecodeError:
-        raise InputError(f"--config: expected YAML text, found something else in '{path}'") from None
-    return validate(SlamConfig, load_yaml(text, str(path)) or {}, str(path))
+    return validate(SlamConfig, read_yaml(path, "a YAML file of SLAM's settings") or {}, str(path))
 
 
 def slam_log(path: Path, out: Path, config: SlamConfig, on_stage: OnStage | None = None) -> SlamRun:

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any, TypeAlias
 
 from pilotage.core.errors import InputError
+from pilotage.core.files import opened
 from pilotage.logs.rosbags_extra import rosbags
 from pilotage.logs.salvage.found import MAGIC_OF, BagFormat, Salvage
 from pilotage.logs.salvage.pieces import unpack
@@ -57,11 +58,8 @@ class OpenBag:
 
 def bag_format(path: Path) -> BagFormat | None:
     """Tell the kind of a file by its first bytes; None if it is none of a bag's."""
-    try:
-        with path.open("rb") as file:
-            head = file.read(16)
-    except OSError as error:
-        raise InputError(f"{path}: expected a readable file, found: {error.strerror or error}") from None
+    with opened(path, "a recording") as file:
+        head = file.read(16)
     return next((form for form, magic in MAGIC_OF.items() if head.startswith(magic)), None)
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import mmap
 from collections.abc import Iterator
 
+from pilotage.core.files import opened
 from pilotage.logs.salvage.found import MAGIC_OF, BagFormat, Raw, Salvage, damage_of
 from pilotage.logs.salvage.pieces import CutError, string, uint, unpack
 
@@ -13,7 +14,7 @@ _SCHEMA, _CHANNEL, _MESSAGE, _CHUNK, _DATA_END = 3, 4, 5, 6, 15
 
 def walk_mcap(found: Salvage) -> Iterator[Raw]:
     """Yield the messages of an MCAP file; ``found`` learns on the way."""
-    with found.path.open("rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as data:
+    with opened(found.path, "a bag") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as data:
         schemas: dict[int, tuple[str, str]] = {}
         channels: dict[int, str] = {}
         place, damaged, closed = len(MAGIC_OF[BagFormat.MCAP]), 0, False

@@ -5,6 +5,7 @@ from __future__ import annotations
 import sqlite3
 from collections.abc import Iterator
 
+from pilotage.core.files import read_bytes
 from pilotage.logs.salvage.found import Raw, Salvage, damage_of
 
 
@@ -12,7 +13,7 @@ def walk_sqlite(found: Salvage) -> Iterator[Raw]:
     """Yield the messages of rosbag2's SQLite storage; ``found`` learns on the way."""
     # What is missing at the end of a file is zeros to SQLite, also within a message that is cut. Filled up
     # with two different bytes, a message that is not the same in both is cut.
-    data = found.path.read_bytes()
+    data = read_bytes(found.path, "a bag")
     missing = _missing(data)
     walks = [_sqlite_rows(data + missing * fill, found) for fill in ((b"\0", b"\xff") if missing else (b"",))]
     cut = "the file is cut short" if missing else ""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import json
+import io
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from pilotage.core.errors import InputError
+from pilotage.core.files import read_json, read_npz, read_text
 from pilotage.core.types import FloatArray, IntArray
 from pilotage.maps.occupancy_grid import OccupancyGrid
 from pilotage.maps.ros_map import read_ros_map
@@ -67,13 +68,13 @@ def read_slam_folder(folder: Path) -> SlamFolder:
     for name in names:
         if not (folder / name).is_file():
             raise InputError(f"{folder}: expected what 'pilotage slam' writes, found no {name}")
-    known, keyframes = np.load(folder / "covariances.npz"), np.load(folder / "keyframes.npz")
-    before = np.loadtxt(folder / "before.tum", ndmin=2)
+    known, keyframes = read_npz(folder / "covariances.npz"), read_npz(folder / "keyframes.npz")
+    before = np.loadtxt(io.StringIO(read_text(folder / "before.tum")), ndmin=2)
     theta = 2.0 * np.arctan2(before[:, 6], before[:, 7])
     return SlamFolder(
         folder,
-        json.loads((folder / "metrics.json").read_text("utf-8")),
-        json.loads((folder / "closures.json").read_text("utf-8")),
+        read_json(folder / "metrics.json"),
+        read_json(folder / "closures.json"),
         read_ros_map(folder / "map.yaml").grid,
         known["t_s"],
         known["poses"],
