@@ -312,7 +312,7 @@ def test_a_run_that_fails_in_the_field_leaves_its_evidence(pilotage: Call, tmp_p
         (["museum-1", "--set", "stack.localiser.gate=0.9"], "did you mean 'localizer'?"),
         (["museum-1", "--set", "stack.localizer.gat=0.9"], "did you mean 'gate'?"),
         (["museum-1", "--set", "stack.localizer.name=ekf-landmark"], "did you mean 'ekf-landmarks'?"),
-        (["museum-1", "--set", "robot.body.radius_m=30 cm"], "found '30 cm'"),
+        (["museum-1", "--set", "robot.footprint.radius_m=30 cm"], "found '30 cm'"),
         (["museum-1", "--set", "stack.initial.x_var_m2=nan"], "finite number, found nan"),
         (["museum-1", "--set", "robot.sensors.odometry.distance_var_m2_per_m=-1"], "found -1"),
         (["museum-1", "--set", "world.start.x_m=0"], "world.start: expected"),

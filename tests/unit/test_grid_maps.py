@@ -24,7 +24,14 @@ from pilotage.maps.occupancy_grid import FREE, OCCUPIED, UNKNOWN, OccupancyGrid,
 from pilotage.maps.ros_map import RosMap, RosMapFile, read_ros_map, write_ros_map
 
 SHAPES = array_shapes(min_dims=2, max_dims=2, min_side=1, max_side=6)
-FINITE = st.floats(-1e6, 1e6)
+
+
+def is_meant(number: float) -> bool:
+    """Whether a file may say it: 0, or not absurdly small."""
+    return number == 0.0 or abs(number) >= 1e-100
+
+
+FINITE = (st.floats(-1e6, 1e6)).filter(is_meant)
 IN_A_FOLDER = settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
 
 
@@ -149,15 +156,15 @@ class TestImages:
 
 @st.composite
 def ros_maps(draw: st.DrawFn) -> RosMap:
-    free = draw(st.floats(0.0, 0.99))
+    free = draw(st.floats(0.0, 0.99).filter(is_meant))
     file = RosMapFile(
         image=draw(st.sampled_from(["a.png", "map.v2.png", "yes.png"])),
         mode=draw(st.sampled_from(["trinary", "scale", "raw"])),
         resolution=draw(st.floats(1e-6, 1e6)),
-        origin=(draw(FINITE), draw(FINITE), draw(st.floats(-7.0, 7.0))),
+        origin=(draw(FINITE), draw(FINITE), draw(st.floats(-7.0, 7.0).filter(is_meant))),
         negate=draw(st.booleans()),
         free_thresh=free,
-        occupied_thresh=draw(st.floats(free, 1.0, exclude_min=True)),
+        occupied_thresh=draw(st.floats(free, 1.0, exclude_min=True).filter(is_meant)),
     )
     pixels = draw(arrays(np.uint8, SHAPES))
     alpha = draw(st.none() | arrays(np.uint8, pixels.shape))
