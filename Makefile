@@ -105,7 +105,7 @@ COMPILE = $(UV) pip compile --quiet --universal --python-version 3.11 --generate
 
 lock:  ## resolve both locks again (UPGRADE=--upgrade takes newer versions); needs uv
 	@command -v $(UV) >/dev/null || { echo "make lock: needs uv; name it by UV=..." >&2; exit 2; }
-	@$(COMPILE) $(UPGRADE) --extra dev --extra vision --extra cluster --extra ros pyproject.toml -o requirements.lock
+	@$(COMPILE) $(UPGRADE) --extra dev --extra vision --extra cluster --extra ros --extra gym pyproject.toml -o requirements.lock
 	@$(COMPILE) $(UPGRADE) --extra bench --constraint requirements.lock pyproject.toml -o requirements-bench.lock
 	@$(MAKE) locks
 

@@ -69,14 +69,14 @@ ALLOWED = {
     (
         "experiments/studies/engine.py",
         "*.read_text",
-    ): "what stands where the same text is about to be written",
+    ): "what stands where the same text is to be written",
     ("experiments/studies/study.py", "json.loads"): "of what json.dumps wrote, or of one override",
     ("experiments/studies/replay.py", "json.loads"): "of what json.dumps just wrote",
     ("experiments/studies/dask_workers.py", "json.loads"): "of the text that the study's own process sent",
     (
         "experiments/studies/database.py",
         "sqlite3.connect",
-    ): "a database is written and read in place, by SQLite",
+    ): "a database is read and written in place",
     ("experiments/studies/rows.py", "sqlite3.connect"): "a database is read in place, by SQLite",
 }
 
@@ -116,7 +116,7 @@ def openings(tree: ast.AST) -> list[tuple[str, int]]:
 
 
 def modules(room: str) -> list[Path]:
-    return [path for path in sorted((SOURCE / room).rglob("*.py"))]
+    return sorted((SOURCE / room).rglob("*.py"))
 
 
 @pytest.mark.parametrize("room", ROOMS)

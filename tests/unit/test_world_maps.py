@@ -67,6 +67,7 @@ def images(folder: Path) -> Any:
         "obstacles": str(folder / "obstacles.png"),
         "resolution_m": CELL_M,
         "origin_m": [0.0, 0.0],
+        "open_ground": False,
     }
 
 

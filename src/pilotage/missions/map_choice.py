@@ -26,6 +26,7 @@ class CraterMap(CraterTerrainConfig):
 class ImagesMap(Config):
     """The three images of the rover report; obstacles are white.
 
+    Obstacles are hazards on open ground, which stop neither body nor beam, unless ``open_ground`` is false.
     ``origin_m`` is the outer corner of the lower-left pixel. Landmarks are the coloured points of their
     image, which needs no obstacles of its own; all images have the obstacles' size.
     """
@@ -36,6 +37,7 @@ class ImagesMap(Config):
     landmarks: str | None = None
     resolution_m: Positive = 10.0
     origin_m: tuple[float, float] = (0.0, -10.0)
+    open_ground: bool = True
 
 
 class ElevationMap(Config):

@@ -155,7 +155,7 @@ class World:
         chart = self.chart
         names = {
             "walls": chart.geometry,
-            "a grid": chart.grid,
+            "hazards on open ground" if chart.open_ground else "a grid": chart.grid,
             "heights": chart.elevation,
             "floor markings": chart.markings,
         }
