@@ -38,7 +38,7 @@ ASKED_IN = {
     "gyro-bias": "test_heading_filters.py",
     "iekf-landmarks": "test_other_filters.py",
     "invariant-ekf-landmarks": "test_other_filters.py",
-    "mcl-likelihood-field": "test_particle_filter.py",
+    "particle-filter": "test_particle_filter.py",
     "ukf-landmarks": "test_other_filters.py",
 }
 

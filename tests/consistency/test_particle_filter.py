@@ -22,7 +22,7 @@ from pilotage.experiments.mission import load_mission
 RUNS, SETTLE = 24, 20
 LOW, HIGH = 1.85, 3.2
 WORLD = (
-    "stack.localizer.name=mcl-likelihood-field",
+    "stack.localizer.name=particle-filter",
     "stack.localizer.field_std_m=0",
     "robot.sensors.lidar.range_var_m2=4e-4",
     "run.time_limit_s=30",

@@ -337,7 +337,7 @@ EXAMPLES: dict[tuple[str, str], Example] = {
         {"gate": 0.99, "matching": {"overlap": 0.7}},
         frozenset({"gate", "measurement_var_scale", "odometry_var_scale"}),
     ),
-    ("localizer", "mcl-likelihood-field"): Example(
+    ("localizer", "particle-filter"): Example(
         localizer_follows,
         {"beams": 90},
         FILTER_NUMBERS | {"kld_error", "kld_probability", "spread"},

@@ -21,11 +21,11 @@ from pilotage.maps.rasterize import rasterized
 from pilotage.maps.world_map import WorldMap
 from pilotage.sensors.readings import LidarScan, Readings
 from pilotage.stack.localization.localizer import LOCALIZERS
-from pilotage.stack.localization.mcl_likelihood_field import MclConfig, MclLikelihoodFieldLocalizer
+from pilotage.stack.localization.particle_filter import MclConfig, ParticleFilterLocalizer
 from support.robots import ROOM, sensors, told_of
 from support.worlds import alone, robot
 
-MCL = "stack.localizer.name=mcl-likelihood-field"
+MCL = "stack.localizer.name=particle-filter"
 
 
 def cloud(count: int = 500, seed: int = 0) -> FloatArray:
@@ -130,7 +130,7 @@ def test_it_tracks_on_an_occupancy_grid() -> None:
     told = told_of(start=start, variances=(1e-4, 1e-4, 1e-4))
     chart = WorldMap("room", ROOM.bounds_m, grid=rasterized(ROOM, 0.05))
     told = replace(told, chart=chart)
-    localizer = told.localizer(MclLikelihoodFieldLocalizer, MclConfig(field_std_m=0.05))
+    localizer = told.localizer(ParticleFilterLocalizer, MclConfig(field_std_m=0.05))
     sim = alone(robot(sensors(), start=start, seed=0))
     for step in range(100):
         belief = localizer.step(sim.step(Twist(0.3, 0.4 if step % 60 < 30 else -0.4)))
@@ -140,7 +140,7 @@ def test_it_tracks_on_an_occupancy_grid() -> None:
 
 def test_a_scan_without_returns_leaves_the_belief_and_strange_ranges_do_no_harm() -> None:
     told = told_of(ROOM)
-    localizer = told.localizer(MclLikelihoodFieldLocalizer, MclConfig())
+    localizer = told.localizer(ParticleFilterLocalizer, MclConfig())
     before = localizer.step(Readings(0.1, {"lidar": LidarScan(np.full(539, 20.0))}))
     assert told.said["scan_parts"] == 0
     for ranges in (np.full(539, np.nan), np.full(539, np.inf), np.zeros(539)):
@@ -153,6 +153,6 @@ def test_a_scan_without_returns_leaves_the_belief_and_strange_ranges_do_no_harm(
 
 def test_misuse_is_told() -> None:
     with pytest.raises(InputError, match="at least least_particles"):
-        told_of().localizer(MclLikelihoodFieldLocalizer, MclConfig(least_particles=500, most_particles=100))
+        told_of().localizer(ParticleFilterLocalizer, MclConfig(least_particles=500, most_particles=100))
     with pytest.raises(InputError, match=r"world\.map"):
-        LOCALIZERS.configure("mcl-likelihood-field", {"grid_file": "office.yaml"}, "stack.localizer")
+        LOCALIZERS.configure("particle-filter", {"grid_file": "office.yaml"}, "stack.localizer")

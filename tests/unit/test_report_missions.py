@@ -69,7 +69,7 @@ def in_a_room(tmp_path_factory: pytest.TempPathFactory) -> Path:
         "world.goal={x_m: 4.5, y_m: 3.0}",
         "world.obstacles=[]",
         "robot.footprint={radius_m: 0.2}",
-        "stack.localizer={name: mcl-likelihood-field}",
+        "stack.localizer={name: particle-filter}",
         "stack.reactive=null",
         "run.time_limit_s=3",
     )

@@ -208,7 +208,9 @@ def _images(source: ImagesMap) -> WorldMap:
     picture = None
     if source.environment is not None:
         picture, _ = read_grey(Path(source.environment), size)
-    chart = WorldMap("images", bounds_of(hazards), grid=hazards, picture=picture, open_ground=source.open_ground)
+    chart = WorldMap(
+        "images", bounds_of(hazards), grid=hazards, picture=picture, open_ground=source.open_ground
+    )
     if source.landmarks is None:
         return chart
     return chart.with_landmarks(

@@ -28,7 +28,7 @@ from pilotage.stack.localization.localizer import LOCALIZERS, require_initial_po
 from pilotage.stack.localization.odometry_prediction import OdometryNoise, OdometryPrediction
 
 WALL_STD_M, GRID_SHARE = 0.01, 1.0 / 3.0
-NAME = "mcl-likelihood-field"
+NAME = "particle-filter"
 COLUMNS = {"particles": "1", "effective_particles": "1", "scan_parts": "1"}
 """Size of the cloud, how much of it was effective, and how many parts the scan was let in by."""
 TABLE_PER_STD, TABLE_STDS = 50, 12
@@ -82,7 +82,7 @@ class MclConfig(Config):
 
 
 @LOCALIZERS.add(NAME, MclConfig)
-class MclLikelihoodFieldLocalizer:
+class ParticleFilterLocalizer:
     """Monte-Carlo localization with the likelihood field (Thrun et al. 2005, tables 6.3, 8.2 and 8.4).
 
     The cloud has as many particles as KLD sampling asks for. A scan far sharper than the cloud would leave
