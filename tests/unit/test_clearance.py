@@ -32,9 +32,12 @@ def test_field_is_that_of_the_full_search() -> None:
     assert (field.distance_m == full).all()
 
 
-def test_field_without_geometry_is_infinite() -> None:
-    empty = SegmentMap(NO_WALLS, np.zeros((0, 3)), (0.0, 0.0, 3.0, 2.0))
-    assert np.isinf(DistanceField.from_map(empty).distance_m).all()
+def test_without_geometry_everything_is_as_far_as_the_map_is_wide() -> None:
+    """And not infinite: interpolation between infinite nodes is no number."""
+    empty = SegmentMap(NO_WALLS, np.zeros((0, 3)), (0.0, 0.0, 3.0, 4.0))
+    field = DistanceField.from_map(empty)
+    assert (field.distance_m == 5.0).all()
+    assert slack_at(1.23, 2.0, space_for(field, 0.3), 0.3) == 1.23  # the edge: beyond it nothing is known
 
 
 @given(st.floats(0.0, 16.0), st.floats(0.0, 16.0))

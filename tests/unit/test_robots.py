@@ -106,6 +106,25 @@ class TestStarts:
         with pytest.raises(InputError, match=r"^robots\.1\.start: expected at least the body's radius"):
             build(team(LEFT, {"start": {"x_m": 2.0, "y_m": 7.9}}))
 
+    def test_each_needs_room_among_what_is_on_no_map_too(self) -> None:
+        values = drive()
+        values["world"]["obstacles"] = [{"kind": "circle", "centre_m": [2.0, 6.0], "radius_m": 0.2}]
+        values["robots"] = [LEFT, RIGHT]
+        with pytest.raises(InputError, match=r"^robots\.1\.start: expected room for the robot's footprint"):
+            build(mission_of(values))
+
+    def test_a_polygon_that_stands_with_its_nose_in_a_wall_is_refused(self) -> None:
+        values = drive()
+        values["robot"]["footprint"] = {"points_m": CAR}
+        values["world"]["start"] = {"x_m": 2.0, "y_m": 0.4, "theta_rad": -1.5}
+        with pytest.raises(InputError, match=r"^world\.start: expected room for the robot's footprint"):
+            build(mission_of(values))
+
+    def test_a_sensor_is_named_with_its_robot(self) -> None:
+        odd = {**RIGHT, "sensors": {"lidar": {"name": "lidar", "rate_hz": 7.0}}}
+        with pytest.raises(InputError, match=r"^robots\.robot-1\.sensors\.lidar\.rate_hz: expected a whole"):
+            build(team(LEFT, odd))
+
     def test_a_kidnap_of_nobody_is_refused(self) -> None:
         values = drive()
         values["world"]["kidnaps"] = [{"at_s": 1.0, "robot": 2}]

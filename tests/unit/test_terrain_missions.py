@@ -212,7 +212,7 @@ class TestReport:
         (["world.map.resolution_m=0"], "greater than 0, found 0"),
         (["world.map.obstacles=nowhere.png"], "expected an image, found none there"),
         (["world.map.name=image"], "unknown world.map.name 'image'; did you mean 'images'?"),
-        (["world.map.obstacle=a.png"], "world.map.images.obstacle: unknown key"),
+        (["world.map.obstacle=a.png"], "world.map.obstacle: unknown key"),
         (["stack.planner.name=rrt-star-dubins"], "a stack.planner over cells (astar, dijkstra, theta-star)"),
         (["stack.planner.corner_cuting=true"], "did you mean 'corner_cutting'"),
         (["run.oracles=[localization]"], "run.oracles: expected one of planner"),

@@ -220,12 +220,12 @@ class TestHeights:
         ("room.png", "expected a resolution in metres a pixel"),
         ("{name: grid, file: nowhere.png, resolution_m: 0.1}", "found none there"),
         ("{name: crtaer}", "did you mean 'crater'?"),
-        ("{name: grid, fil: a.png}", "world.map.grid.fil: unknown key; did you mean 'file'?"),
+        ("{name: grid, fil: a.png}", "world.map.fil: unknown key; did you mean 'file'?"),
         (
             "{size_m: [1.0, 1.0], obstacle: []}",
-            "world.map.sheet.obstacle: unknown key; did you mean 'obstacles'?",
+            "world.map.obstacle: unknown key; did you mean 'obstacles'?",
         ),
-        ("{map: room, wals_m: []}", "world.map.walls.wals_m: unknown key; did you mean 'walls_m'?"),
+        ("{map: room, wals_m: []}", "world.map.wals_m: unknown key; did you mean 'walls_m'?"),
         ("{map: room, walls_m: [[0, 0, 0, 4]]}", "expected bounds"),
     ],
 )
@@ -244,3 +244,19 @@ def test_what_is_no_map_is_one_line(
     assert answer.out == ""
     assert answer.err.count("\n") == 1
     assert told in answer.err
+
+
+@pytest.mark.parametrize(
+    ("landmarks", "told"),
+    [
+        ([{"id": 1, "x": 0.0, "y_m": 1.0}], "world.landmarks.0.x: unknown key; did you mean 'x_m'?"),
+        ([{"id": 1, "y_m": 1.0}], "world.landmarks.0.x_m: missing; it has to be given"),
+        (3, "world.landmarks: input should be a valid tuple, found 3"),
+    ],
+)
+def test_a_wrong_table_of_landmarks_is_named_as_it_is_written(landmarks: Any, told: str) -> None:
+    values = drive()
+    values["world"]["landmarks"] = landmarks
+    with pytest.raises(InputError) as raised:
+        mission_of(values)
+    assert str(raised.value) == told

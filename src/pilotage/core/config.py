@@ -106,7 +106,8 @@ def describe(error: ValidationError, model: type[BaseModel], where: str) -> str:
     # An unknown key is the likelier slip and explains a missing one: say it first.
     first = next((e for e in errors if e["type"] == "extra_forbidden"), errors[0])
     path = [str(part) for part in first["loc"]]
-    place = ".".join([where, *path] if where else path)
+    said = _without_tags(model, path)
+    place = ".".join([where, *said] if where else said)
     if first["type"] == "extra_forbidden":
         known = _fields_at(model, path[:-1])
         close = nearest(path[-1], known)
@@ -135,6 +136,30 @@ def _fields_at(model: type[BaseModel], path: list[str]) -> list[str]:
             continue
         current = inner
     return list(current.model_fields)
+
+
+def _without_tags(model: type[BaseModel], path: list[str]) -> list[str]:
+    """The keys of a path as a file has them: pydantic puts in which of several alternatives it took."""
+    current: type[BaseModel] | None = model
+    annotation: Any = None
+    said = []
+    for part in path:
+        field = None if current is None else current.model_fields.get(part)
+        if field is None and _has_tag(annotation, part):
+            current = _model_tagged(annotation, part)
+            continue
+        said.append(part)
+        if field is not None:
+            annotation = field.annotation
+            current = _model_in(annotation)
+    return said
+
+
+def _has_tag(annotation: Any, tag: str) -> bool:
+    """Whether a tag stands for one of the alternatives of an annotation."""
+    if any(getattr(note, "tag", None) == tag for note in getattr(annotation, "__metadata__", ())):
+        return True
+    return any(_has_tag(argument, tag) for argument in getattr(annotation, "__args__", ()))
 
 
 def _model_tagged(annotation: Any, tag: str) -> type[BaseModel] | None:

@@ -43,7 +43,10 @@ class DistanceField:
 
     @staticmethod
     def from_map(world: SegmentMap, resolution_m: float = 0.1) -> DistanceField:
-        """Sample the exact distance of a segment map; the bounds' edge is no obstacle by itself."""
+        """Sample the exact distance of a segment map; the bounds' edge is no obstacle by itself.
+
+        A map without walls and discs is as far from obstacles as it is wide, as an empty grid is.
+        """
         if not resolution_m > 0.0:
             raise InputError(f"distance field: expected a resolution above 0 m, found {resolution_m}")
         xmin, ymin, xmax, ymax = world.bounds_m
@@ -54,6 +57,9 @@ class DistanceField:
                 f"distance field: {nx} x {ny} nodes need {nx * ny * 8 / 1e9:.1f} GB; "
                 f"take a resolution coarser than {resolution_m} m"
             )
+        if world.segments_m.shape[0] + world.circles_m.shape[0] == 0:
+            values = np.full((ny, nx), math.hypot(xmax - xmin, ymax - ymin))
+            return DistanceField(values, (xmin, ymin), resolution_m, world.segments_m, world.circles_m)
         values = field.sample_distance(xmin, ymin, resolution_m, nx, ny, world.segments_m, world.circles_m)
         return DistanceField(values, (xmin, ymin), resolution_m, world.segments_m, world.circles_m)
 

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import Field
+from pydantic import Discriminator, Field, Tag
 
 from pilotage.core.config import Config
 from pilotage.maps.map_file import LandmarkEntry
@@ -62,6 +62,17 @@ class MarkingsConfig(Config):
     """Whether line sensors read dark beyond the sheet's edge, as on the film's grey carpet."""
 
 
+def _which(value: Any) -> str:
+    """Tell the two apart beforehand, so that an error speaks of what was meant."""
+    return "file" if isinstance(value, str) else "table"
+
+
+Landmarks = Annotated[
+    Annotated[str, Tag("file")] | Annotated[tuple[LandmarkEntry, ...], Tag("table")],
+    Discriminator(_which),
+]
+
+
 class WorldConfig(Config):
     """The map, start and goal, and what should not be there.
 
@@ -70,7 +81,7 @@ class WorldConfig(Config):
     """
 
     map: MapChoice
-    landmarks: str | tuple[LandmarkEntry, ...] | None = None
+    landmarks: Landmarks | None = None
     """The table itself, or a CSV file with the columns id, x_m, y_m."""
     markings: MarkingsConfig = MarkingsConfig()
     start: PoseConfig | None = None

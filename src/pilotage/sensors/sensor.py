@@ -29,8 +29,8 @@ class SensorConfig(Config):
     rate_hz: Positive = 10.0
     mount: Mount = Mount()
 
-    def every_steps(self, dt_s: float, name: str) -> int:
-        """How many control steps lie between two readings.
+    def every_steps(self, dt_s: float, where: str) -> int:
+        """How many control steps lie between two readings; ``where`` names the sensor in a mission.
 
         Raises
         ------
@@ -41,7 +41,7 @@ class SensorConfig(Config):
         whole = round(steps)
         if whole < 1 or abs(steps - whole) > 1e-6 * steps:
             raise InputError(
-                f"robot.sensors.{name}.rate_hz: expected a whole fraction of {1.0 / dt_s:g} Hz "
+                f"{where}.rate_hz: expected a whole fraction of {1.0 / dt_s:g} Hz "
                 f"(run.dt_s = {dt_s:g} s), found {self.rate_hz:g}"
             )
         return whole

@@ -68,7 +68,8 @@ class Simulator:
         nobody = np.array([[0, 0, -1]], dtype=np.int64)
         own = self._traffic.own if self._crowded else nobody
         self.bodies: tuple[Body, ...] = tuple(
-            _body(robot, self.world, dt_s, states, row, own) for row, robot in enumerate(robots)
+            _body(robot, self.world, dt_s, states, row, own, len(robots) > 1)
+            for row, robot in enumerate(robots)
         )
         for body in self.bodies:
             # Once more, now that everybody is in place.
@@ -168,14 +169,22 @@ class _Group:
     every: int
 
 
-def _body(robot: RobotSpec, world: World, dt_s: float, table: FloatArray, row: int, owns: IntArray) -> Body:
+def _place(robot: RobotSpec, several: bool) -> str:
+    """How a message names a robot of the mission."""
+    return f"robots.{robot.name}" if several else "robot"
+
+
+def _body(
+    robot: RobotSpec, world: World, dt_s: float, table: FloatArray, row: int, owns: IntArray, several: bool
+) -> Body:
     """The robot's body with the motion that its data sheet asks for."""
-    where = "robot.motion"
+    place = _place(robot, several)
+    where = f"{place}.motion"
     samples = max(
         (
-            _samples(config, dt_s, name)
+            _samples(config, dt_s, f"{place}.sensors.{name}")
             for name, config in robot.sensors.items()
-            if getattr(SIMULATED_SENSORS.of(config, f"robot.sensors.{name}"), "sampled", False)
+            if getattr(SIMULATED_SENSORS.of(config, f"{place}.sensors.{name}"), "sampled", False)
         ),
         default=1,
     )
@@ -183,7 +192,7 @@ def _body(robot: RobotSpec, world: World, dt_s: float, table: FloatArray, row: i
     return Body(robot.name, robot.footprint, motion, robot.start, world, dt_s, table, row, owns)
 
 
-def _samples(config: SensorConfig, dt_s: float, name: str) -> int:
+def _samples(config: SensorConfig, dt_s: float, where: str) -> int:
     """How many samples a sampled sensor takes in a step; 1 where it is read every few steps."""
     samples = config.rate_hz * dt_s
     if samples < 1.0 - 1e-6:
@@ -191,7 +200,7 @@ def _samples(config: SensorConfig, dt_s: float, name: str) -> int:
     whole = round(samples)
     if abs(samples - whole) > 1e-6 * samples:
         raise InputError(
-            f"robot.sensors.{name}.rate_hz: expected a multiple of {1.0 / dt_s:g} Hz "
+            f"{where}.rate_hz: expected a multiple of {1.0 / dt_s:g} Hz "
             f"(run.dt_s = {dt_s:g} s), found {config.rate_hz:g}"
         )
     return whole
@@ -203,10 +212,10 @@ def _sensors(
     """The robot's sensors by name, and every how many steps each is read."""
     out = []
     for name, config in robot.sensors.items():
-        where = f"robots.{robot.name}.sensors.{name}" if several else f"robot.sensors.{name}"
+        where = f"{_place(robot, several)}.sensors.{name}"
         kind = SIMULATED_SENSORS.of(config, where)
         often = getattr(kind, "sampled", False) and config.rate_hz * dt_s > 1.0 - 1e-6
-        every = 1 if often else config.every_steps(dt_s, name)
+        every = 1 if often else config.every_steps(dt_s, where)
         carrier = Carrier(world, body, where, dt_s, every)
         out.append((name, kind(config, carrier, robot.streams.stream(f"sensor/{name}")), every))
     return out

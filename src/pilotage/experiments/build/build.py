@@ -106,8 +106,15 @@ def _simulator(
     mission: Mission, chart: WorldMap, obstacles: Obstacles, sheets: Sequence[RobotKnowledge]
 ) -> Simulator:
     oracles = frozenset(mission.run.oracles)
+    world = World.of(chart, obstacles.segments_m, obstacles.circles_m)
+    for index, sheet in enumerate(sheets):
+        # The map was looked at before; now what is on no map, and how a polygon stands.
+        start = mission.start_of(mission.team[index])
+        assert start is not None, "settled above"
+        own = f"robots.{index}" if mission.robots else "world"
+        world.check_place(f"{own}.start", sheet.footprint, pose_of(start))
     return Simulator(
-        World.of(chart, obstacles.segments_m, obstacles.circles_m),
+        world,
         [_spec(mission, index, sheet, oracles) for index, sheet in enumerate(sheets)],
         mission.run.dt_s,
     )

@@ -94,12 +94,16 @@ class World:
     @property
     def has_solids(self) -> bool:
         """Whether it has a layer that beams end at."""
-        open_ground = self.ground is not None and self.ground.hazards is not None
         return (
             self.chart.geometry is not None
-            or (self.chart.grid is not None and not open_ground)
+            or (self.chart.grid is not None and not self._open_ground)
             or len(self.segments_m) + len(self.circles_m) > 0
         )
+
+    @property
+    def _open_ground(self) -> bool:
+        """Whether what its grid blocks is a hazard that stops neither body nor beam."""
+        return self.ground is not None and self.ground.hazards is not None
 
     def check_solids(self, where: str, what: str) -> None:
         """Refuse ``what`` in a world that no beam can end in.
@@ -155,7 +159,7 @@ class World:
         chart = self.chart
         names = {
             "walls": chart.geometry,
-            "hazards on open ground" if chart.open_ground else "a grid": chart.grid,
+            "hazards on open ground" if self._open_ground else "a grid": chart.grid,
             "heights": chart.elevation,
             "floor markings": chart.markings,
         }

@@ -221,7 +221,13 @@ def _moments(poses: FloatArray, weights: FloatArray) -> tuple[FloatArray, FloatA
 
 def _field_of(config: MclConfig, chart: WorldMap) -> NearestObstacles:
     """Distances from the walls; of a grid from the outlines of its occupied cells alone."""
-    return NearestObstacles.from_map(chart.walls, config.resolution_m)
+    walls = chart.walls
+    if walls.segments_m.shape[0] + walls.circles_m.shape[0] == 0:
+        raise InputError(
+            f"mcl-likelihood-field: expected walls or blocked cells on the robot's map, found none on "
+            f"'{chart.name}'; see stack.map"
+        )
+    return NearestObstacles.from_map(walls, config.resolution_m)
 
 
 def _field_std_m(config: MclConfig, chart: WorldMap) -> float:
