@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from pilotage.cli.main import main
-from pilotage.experiments.barn_benchmark import has_way
+from pilotage.experiments.barn_ways import has_way
 from pilotage.logs.barn import START, BarnWorld, path_clearance_m
 
 KEYS = {"metric", "success", "collision", "timeout", "time_s", "trials", "worlds"}
@@ -103,7 +103,12 @@ def test_a_course_without_a_way_is_said_and_counted_apart(
         assert (answer[name]["success"], answer[name]["worlds"]) == (1.0, 1)
     assert json.loads((out / "summary.json").read_text())["without_way"] == [0]
     page = (out / "report.html").read_text()
-    for word in ("peer (Gazebo)", "dwa minus gap-horizon", "not driven: 0"):
+    for word in (
+        "peer (Gazebo)",
+        "metric: dwa minus gap-horizon",
+        "time (s): dwa minus gap-horizon",
+        "not driven: 0",
+    ):
         assert word in page
     # What is replayed is the run of the row.
     replays = {path.parent: json.loads(path.read_text()) for path in (out / "replays").glob("*/metrics.json")}

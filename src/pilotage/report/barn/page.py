@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import math
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -18,7 +19,7 @@ from pilotage.report.markup import contents, document, escape, figure_section, l
 from pilotage.report.style import drawing_style
 
 REPORT_FILE = "report.html"
-WORST = 12
+WORST = 6
 """Courses listed of each controller."""
 HEAD = (
     "controller",
@@ -32,6 +33,11 @@ HEAD = (
     "runs",
     "courses",
 )
+COMPARED: tuple[tuple[str, int, Callable[[BarnRun], float]], ...] = (
+    ("metric", 4, lambda run: run.metric),
+    ("time (s)", 2, lambda run: run.time_s if run.success else math.nan),
+)
+"""What is compared course by course; the time where every run of both reached the goal."""
 Runs = Mapping[str, Sequence[BarnRun]]
 
 
@@ -137,12 +143,12 @@ def _row(name: str, runs: Sequence[BarnRun]) -> list[str]:
     ]
 
 
-def by_world(runs: Sequence[BarnRun], worlds: Sequence[int]) -> FloatArray:
-    """(W,) mean metric of each world; NaN where it was not driven."""
+def by_world(runs: Sequence[BarnRun], worlds: Sequence[int], value: Callable[[BarnRun], float]) -> FloatArray:
+    """(W,) mean of a value in each world; NaN where it was not driven or a run has none."""
     gathered: dict[int, list[float]] = {world: [] for world in worlds}
     for run in runs:
         if run.world in gathered:
-            gathered[run.world].append(run.metric)
+            gathered[run.world].append(value(run))
     return np.array([np.mean(found) if found else np.nan for found in gathered.values()])
 
 
@@ -154,17 +160,19 @@ def _pairs(runs: Runs) -> str:
     worlds = sorted({run.world for member in runs.values() for run in member})
     rows = []
     for name in names[1:]:
-        found = difference(by_world(runs[names[0]], worlds), by_world(runs[name], worlds))
-        rows.append(
-            [
-                f"{name} minus {names[0]}",
-                f"{found.mean:+.4f}",
-                f"{found.low:+.4f} to {found.high:+.4f}",
-                f"{found.p_value:.2g}" if np.isfinite(found.p_value) else "–",
-                str(found.n),
-            ]
-        )
-    head = ("metric", "mean difference", "95 %", "p (Wilcoxon)", "courses")
+        for what, digits, value in COMPARED:
+            one, other = (by_world(runs[member], worlds, value) for member in (names[0], name))
+            found = difference(one, other)
+            rows.append(
+                [
+                    f"{what}: {name} minus {names[0]}",
+                    f"{found.mean:+.{digits}f}",
+                    f"{found.low:+.{digits}f} to {found.high:+.{digits}f}",
+                    f"{found.p_value:.2g}" if math.isfinite(found.p_value) else "–",
+                    str(found.n),
+                ]
+            )
+    head = ("what", "mean difference", "95 %", "p (Wilcoxon)", "courses")
     return _section("pairs", "On the same courses", _table(head, rows))
 
 
@@ -180,7 +188,9 @@ def _worst(page: BarnPage) -> str:
             rows.append("".join(_cell(text) for text in cells) + f"<td>{replay}</td>")
     head = ("controller", "course", "trial", "outcome", "time", "metric", "")
     body = "".join(f"<tr>{row}</tr>" for row in rows)
-    return _section("worst", "Worst courses", f"<table>{_head(head)}<tbody>{body}</tbody></table>")
+    return _section(
+        "worst", "Worst courses", f'<div class="wide"><table>{_head(head)}<tbody>{body}</tbody></table></div>'
+    )
 
 
 def _published(page: BarnPage) -> str:
@@ -209,7 +219,7 @@ def _section(slug: str, title: str, body: str) -> str:
 
 def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     body = "".join(f"<tr>{''.join(_cell(text) for text in row)}</tr>" for row in rows)
-    return f'<div class="long"><table>{_head(head)}<tbody>{body}</tbody></table></div>'
+    return f'<div class="wide"><table>{_head(head)}<tbody>{body}</tbody></table></div>'
 
 
 def _head(names: Sequence[str]) -> str:
