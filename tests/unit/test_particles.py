@@ -155,7 +155,7 @@ def test_a_scan_without_returns_leaves_the_belief_and_strange_ranges_do_no_harm(
 def test_misuse_is_told() -> None:
     nothing = SegmentMap(np.zeros((0, 4)), np.zeros((0, 3)), (0.0, 0.0, 5.0, 5.0))
     with pytest.raises(InputError, match="expected walls or blocked cells on the robot's map, found none"):
-        told_of(nothing).localizer(MclLikelihoodFieldLocalizer, MclConfig())
+        told_of(nothing).localizer(ParticleFilterLocalizer, MclConfig())
     with pytest.raises(InputError, match="at least least_particles"):
         told_of().localizer(ParticleFilterLocalizer, MclConfig(least_particles=500, most_particles=100))
     with pytest.raises(InputError, match=r"world\.map"):

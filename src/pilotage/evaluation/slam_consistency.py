@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from pilotage.core.errors import InputError
-from pilotage.core.files import read_npz
+from pilotage.core.files.arrays import read_npz
 from pilotage.evaluation.relations import RelationErrors, relation_nees
 from pilotage.models.pose_graph import PoseGraph
 from pilotage.stack.mapping.slam.scan_covariances import ScanCovariances

@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 
 from pilotage.core.errors import InputError
-from pilotage.core.files import read_json, read_npz, read_text
+from pilotage.core.files import read_json, read_text
+from pilotage.core.files.arrays import read_npz
 from pilotage.core.types import FloatArray, IntArray
 from pilotage.maps.occupancy_grid import OccupancyGrid
 from pilotage.maps.ros_map import read_ros_map
