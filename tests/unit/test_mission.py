@@ -19,13 +19,14 @@ from pilotage.experiments.build.charts import load_chart
 from pilotage.experiments.build.obstacles import place_obstacles
 from pilotage.experiments.build.stacks import initial_belief
 from pilotage.experiments.loop import simulate
-from pilotage.experiments.mission import load_mission, shipped_missions
+from pilotage.experiments.mission import load_mission, mission_of, shipped_missions
 from pilotage.experiments.resolve import resolved_yaml
 from pilotage.experiments.values import apply_override, merge, parse_override
 from pilotage.kernels.geometry import plane
 from pilotage.maps.map_file import MapFile
 from pilotage.missions.mission import Mission
 from pilotage.missions.world import AcrossPathObstacle, BoxObstacle, TrapObstacle
+from support.missions import reach
 from support.robots import ROOM
 
 MUSEUM = load_chart("museum")
@@ -354,3 +355,20 @@ def test_who_seems_to_start_too_near_a_wall_looks_around_first(
     finished = simulate(Mission.model_validate(values)).finished
     assert [event.kind for event in finished.events][:2] == ["look-around", "plan"]
     assert finished.robots[0].arrived
+
+
+def test_a_task_of_planning_refuses_a_navigator_that_drives() -> None:
+    with pytest.raises(InputError, match=r"^task 'plan': .* such as plan-only, found 'goal', which goes on"):
+        build(mission_of(reach(task="plan")))
+
+
+def test_parameters_of_what_was_left_out_are_those_of_its_default() -> None:
+    """A shipped mission without a task, and a robot without a motion."""
+    loaded = load_mission("museum-1", ["task.goals=[{x_m: 3.0, y_m: 3.0}]"])
+    assert (loaded.task.name, list(loaded.task.parameters)) == ("reach", ["goals"])
+    values = reach()
+    values["robot"]["motion"] = {"max_speed_m_s": 0.7}
+    assert mission_of(values).robot.motion.name == "differential-drive"
+    values["robot"]["motion"] = {"wheelbase_m": 0.7}
+    with pytest.raises(InputError, match=r"robot\.motion\.wheelbase_m: unknown key"):
+        mission_of(values)

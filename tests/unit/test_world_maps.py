@@ -251,7 +251,7 @@ def test_what_is_no_map_is_one_line(
     [
         ([{"id": 1, "x": 0.0, "y_m": 1.0}], "world.landmarks.0.x: unknown key; did you mean 'x_m'?"),
         ([{"id": 1, "y_m": 1.0}], "world.landmarks.0.x_m: missing; it has to be given"),
-        (3, "world.landmarks: input should be a valid tuple, found 3"),
+        (3, "world.landmarks: input should be a list, found 3"),
     ],
 )
 def test_a_wrong_table_of_landmarks_is_named_as_it_is_written(landmarks: Any, told: str) -> None:

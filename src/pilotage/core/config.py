@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Mapping
 from typing import Any, Self, TypeVar
 
@@ -117,6 +118,9 @@ def describe(error: ValidationError, model: type[BaseModel], where: str) -> str:
         return f"{place}: missing; it has to be given"
     message = first["msg"].removeprefix("Value error, ")
     message = message[:1].lower() + message[1:]
+    # A file knows mappings and lists, not Python's classes.
+    message = re.sub(r" or instance of \w+$", "", message)
+    message = message.replace("a valid dictionary", "a mapping").replace("a valid tuple", "a list")
     # A rule that says itself what it found, or is about the whole file: the dump would only bury it.
     if place and ", found " not in message:
         message += f", found {_show(first['input'])}"

@@ -6,7 +6,7 @@ import copy
 from collections.abc import Mapping
 from typing import Any
 
-from pydantic import ConfigDict, model_validator
+from pydantic import BeforeValidator, ConfigDict, model_validator
 
 from pilotage.core.config import Config
 
@@ -32,6 +32,13 @@ class ComponentChoice(Config):
     def parameters(self) -> dict[str, Any]:
         """All keys but the name."""
         return dict(self.model_extra or {})
+
+
+def by_default(name: str) -> BeforeValidator:
+    """Parameters without a name are those of the component that is taken where nothing is said."""
+    return BeforeValidator(
+        lambda value: {"name": name, **value} if isinstance(value, Mapping) and "name" not in value else value
+    )
 
 
 EXCLUSIVE = (("points_m", "radius_m"), ("radius_m", "points_m"))

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Annotated, Any
 
 from pydantic import Field, field_validator, model_validator
 
 from pilotage.core.config import Config
 from pilotage.core.shown import visible
-from pilotage.missions.choice import ComponentChoice, laid_over
+from pilotage.missions.choice import ComponentChoice, by_default, laid_over
 from pilotage.missions.places import GoalConfig, PoseConfig
 from pilotage.missions.robot import RobotConfig
 from pilotage.missions.stack import StackConfig
@@ -59,7 +59,7 @@ class Mission(Config):
     world: WorldConfig
     robot: RobotConfig = RobotConfig()
     robots: tuple[RobotConfig, ...] = ()
-    task: ComponentChoice = ComponentChoice(name="reach")
+    task: Annotated[ComponentChoice, by_default("reach")] = ComponentChoice(name="reach")
     stack: StackConfig
     run: RunConfig = RunConfig()
 

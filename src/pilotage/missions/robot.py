@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Discriminator, Field, Tag
 
 from pilotage.core.config import Config
-from pilotage.missions.choice import ComponentChoice
+from pilotage.missions.choice import ComponentChoice, by_default
 from pilotage.missions.places import GoalConfig, Point, PoseConfig
 from pilotage.missions.stack import StackConfig
 from pilotage.sensors.sensor import Positive
@@ -51,7 +51,9 @@ class RobotConfig(Config):
 
     name: str = "robot"
     footprint: FootprintChoice = DiscFootprint()
-    motion: ComponentChoice = ComponentChoice(name="differential-drive")
+    motion: Annotated[ComponentChoice, by_default("differential-drive")] = ComponentChoice(
+        name="differential-drive"
+    )
     sensors: dict[str, ComponentChoice] = Field(default_factory=dict)
     start: PoseConfig | None = None
     goal: GoalConfig | None = None

@@ -26,7 +26,7 @@ from pilotage.missions.robot import RobotConfig
 from pilotage.missions.stack import StackConfig
 from pilotage.sim.source import RobotSpec, Simulator
 from pilotage.sim.worlds.world import World
-from pilotage.stack.interface import Stack
+from pilotage.stack.interface import Stack, StackStatus
 from pilotage.stack.journal import Journal
 from pilotage.stack.knowledge import RobotKnowledge, TaskKnowledge
 
@@ -153,6 +153,8 @@ def build(mission: Mission) -> Experiment:
             _member(mission, index, chart, sheet, truths[index], oracles, task.goals)
             for index, sheet in enumerate(sheets)
         ]
+    if not task.drives:
+        _check_ended(mission, team)
     simulator = _simulator(mission, chart, obstacles, sheets)
     for truth, body in zip(truths, simulator.bodies, strict=True):
         truth.body = body
@@ -196,6 +198,16 @@ def _check_places(mission: Mission, chart: WorldMap, sheets: Sequence[RobotKnowl
         assert kidnap.to is not None, "settled above"
         footprint = sheets[kidnap.robot].footprint
         check_place(f"world.kidnaps.{number}.to", kidnap.to.x_m, kidnap.to.y_m, footprint, chart)
+
+
+def _check_ended(mission: Mission, team: Sequence[Member]) -> None:
+    """Refuse a navigator that would drive on where the task ends before the first step."""
+    for member in team:
+        if member.stack.status[0] is StackStatus.RUNNING:
+            raise InputError(
+                f"task '{mission.task.name}': expected a navigator that only plans, such as plan-only, found "
+                f"'{member.stack_config.navigator.name}', which goes on to drive; or take another task"
+            )
 
 
 def _task(mission: Mission, chart: WorldMap, sheets: Sequence[RobotKnowledge]) -> Task:
