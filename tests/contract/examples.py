@@ -35,8 +35,9 @@ from pilotage.stack.localization.heading_filter import HeadingEstimate
 from pilotage.stack.localization.landmark_filter import LandmarkFilterConfig
 from pilotage.stack.navigator.navigator import Parts
 from pilotage.stack.planning.dubins_local import DubinsLocalConfig, DubinsLocalPlanner
+from pilotage.stack.planning.hybrid_astar import HybridAstarConfig, HybridAstarPlanner
 from pilotage.stack.planning.local_planner import RouteAhead
-from pilotage.stack.planning.planner import Path, PlanRequest, PlanStatus
+from pilotage.stack.planning.planner import Path, Planner, PlanRequest, PlanStatus
 from pilotage.stack.planning.rrt_star_dubins import RrtStarDubinsConfig, RrtStarDubinsPlanner
 from support import worlds
 from support.robots import ROOM, sensors, told_of
@@ -140,24 +141,24 @@ def request(seed: int = 0, goal: Goal = GOAL) -> PlanRequest:
     return PlanRequest(START, goal, DistanceField.from_map(ROOM), np.random.default_rng(seed), 0.4)
 
 
-def assert_valid(path: Path, goal: Goal) -> None:
+def assert_valid(path: Path, goal: Goal, clearance_m: float = 0.4) -> None:
     """Starts at the start, ends at the goal, keeps its clearance, has its waypoints on it."""
     assert np.allclose(path.states[0, :2], [START.x_m, START.y_m], atol=1e-6)
     assert np.allclose(path.states[-1, :2], [goal.x_m, goal.y_m], atol=1e-6)
     assert plane.least_distance(np.ascontiguousarray(path.states[:, :2]), ROOM.segments_m, NO_CIRCLES) >= (
-        0.4 - 1e-6
+        clearance_m - 1e-6
     )
     assert np.hypot(*np.diff(path.states[:, :2], axis=0).T).max() <= 0.05 + 1e-9
     for x, y, _ in path.waypoints:
         assert np.hypot(path.states[:, 0] - x, path.states[:, 1] - y).min() < 0.05
 
 
-def planner_plans(factory: Any, config: Any) -> None:
+def planner_plans(factory: Any, config: Any, kept_m: float = 0.4) -> None:
     """A valid path, the same for the same seed; blocked ends are a status, not an exception."""
     results = [factory(config).plan(request()) for _ in range(2)]
     assert results[0].status is PlanStatus.FOUND
     assert results[0].path is not None
-    assert_valid(results[0].path, GOAL)
+    assert_valid(results[0].path, GOAL, kept_m)
     assert (results[0].path.states == results[1].path.states).all()
     assert factory(config).clearance_m > 0.0
     in_the_wall = factory(config).plan(
@@ -165,6 +166,11 @@ def planner_plans(factory: Any, config: Any) -> None:
     )
     assert in_the_wall.path is None
     assert in_the_wall.reason
+
+
+def hybrid_astar_plans(factory: Any, config: Any) -> None:
+    """As the others; it looks at its arcs every 4 cm, so a wall may come 2 cm nearer in between."""
+    planner_plans(factory, config, kept_m=0.38)
 
 
 def smoother_smooths(factory: Any, config: Any) -> None:
@@ -242,15 +248,20 @@ def escape_ends(factory: Any, config: Any) -> None:
     assert pose.x_m < 4.0
 
 
-def navigator_arrives(factory: Any, config: Any) -> None:
+def navigator_maneuvers(factory: Any, config: Any) -> None:
+    """With the planner that it is made for."""
+    navigator_arrives(factory, config, HybridAstarPlanner(HybridAstarConfig(clearance_m=0.4)))
+
+
+def navigator_arrives(factory: Any, config: Any, planner: Planner | None = None) -> None:
     """Put together from the plainest parts, it drives to its goal."""
     told = told_of(start=START, goal=GOAL, variances=(1e-4, 1e-4, 1e-4))
     parts = Parts(
         localizer=told.localizer(EkfLandmarkLocalizer, LandmarkFilterConfig()),
-        planner=RrtStarDubinsPlanner(RrtStarDubinsConfig(clearance_m=0.4, iterations=2000)),
+        planner=planner or RrtStarDubinsPlanner(RrtStarDubinsConfig(clearance_m=0.4, iterations=2000)),
         smoother=None,
         local_planner=DubinsLocalPlanner(DubinsLocalConfig(), told.robot),
-        controller=PiFollower(PiFollowerConfig(), told.robot),
+        controller=None if planner else PiFollower(PiFollowerConfig(), told.robot),
         reactive=None,
         mapper=None,
         escape=None,
@@ -361,6 +372,7 @@ EXAMPLES: dict[tuple[str, str], Example] = {
     ("planner", "astar"): Example(planner_plans),
     ("planner", "dijkstra"): Example(planner_plans),
     ("planner", "theta-star"): Example(planner_plans),
+    ("planner", "hybrid-astar"): Example(hybrid_astar_plans, {}, frozenset({"reverse_cost", "turn_cost"})),
     ("smoother", "shortcut"): Example(smoother_smooths),
     ("smoother", "none"): Example(smoother_smooths),
     ("local_planner", "dubins"): Example(local_planner_reaches_the_waypoint),
@@ -369,6 +381,7 @@ EXAMPLES: dict[tuple[str, str], Example] = {
     ("mapper", "obstacle-layer"): Example(mapper_maps, pure_numbers=frozenset({"sigmas"})),
     ("escape", "back-out"): Example(escape_ends),
     ("navigator", "goal"): Example(navigator_arrives),
+    ("navigator", "maneuver"): Example(navigator_maneuvers, {}, frozenset({"acceleration_share"})),
     ("navigator", "local"): Example(navigator_drives_by_the_laser, {"arrival_m": 0.25}),
     **{
         ("local_controller", name): Example(works, {}, pure) for name, (works, pure) in LOCAL_EXAMPLES.items()
@@ -387,7 +400,9 @@ EXAMPLES: dict[tuple[str, str], Example] = {
     ("sensor", "gps"): Example(sensor_reads_in_any_world),
     ("sensor", "bumper"): Example(sensor_reads_in_any_world),
     ("localizer", "invariant-ekf-landmarks"): Example(
-        rover_filter_follows, {"gate": 0.999}, pure_numbers=frozenset({"gate"})
+        rover_filter_follows,
+        {"gate": 0.999},
+        frozenset({"gate", "measurement_var_scale", "odometry_var_scale"}),
     ),
     ("navigator", "pose"): Example(moves_to_a_pose, {"arrival_m": 0.01}),
     ("navigator", "curve"): Example(drives_over_cells, {"speed_m_s": 0.5}),
