@@ -153,24 +153,29 @@ def _terrain(folder: Path) -> None:
     write_grey(folder / "obstacles.png", blocked)
     (folder / "landmarks.csv").write_text("id,x_m,y_m\n1,10.0,10.0\n2,50.0,30.0\n3,30.0,50.0\n")
     sensors = {
-        "odometer": {"name": "wheel-odometry", "distance_var_m2_per_m": 4.0e-5},
-        "lidar": {"name": "beacons", "max_range_m": 500.0, "field_of_view_rad": 6.28},
+        "odometer": {"name": "wheel-odometry", "rate_hz": 1, "distance_var_m2_per_m": 4.0e-5},
+        "lidar": {"name": "beacons", "rate_hz": 1, "max_range_m": 500.0, "field_of_view_rad": 6.28},
     }
     mission = {
         "mission": "fuzzed-terrain",
         "world": {
-            "kind": "terrain",
-            "ground": {"name": "images", "obstacles": "obstacles.png", "resolution_m": 10.0},
+            "map": {"name": "images", "obstacles": "obstacles.png", "resolution_m": 10.0},
             "start": {"x_m": 15.0, "y_m": 15.0, "theta_rad": 0.0},
             "goal": {"x_m": 130.0, "y_m": 60.0},
             "landmarks": "landmarks.csv",
         },
-        "robot": {"speed_m_s": 0.04, "wheelbase_m": 3.0, "sensors": sensors},
+        "robot": {
+            "footprint": {"radius_m": 1.5},
+            "motion": {"name": "bicycle", "wheelbase_m": 3.0, "max_speed_m_s": 0.05},
+            "sensors": sensors,
+        },
         "stack": {
             "planner": {"name": "astar", "corner_cutting": False},
-            "spline": {"samples": 100, "clear": True},
-            "estimator": {"name": "ekf-landmarks"},
+            "navigator": {"name": "curve", "spline": {"clear": True}, "speed_m_s": 0.04},
+            "localizer": {"name": "ekf-landmarks"},
+            "controller": "kanayama",
         },
+        "run": {"dt_s": 1.0, "time_limit_s": 20.0},
     }
     _yaml(folder / "mission.yaml", mission)
 
@@ -180,8 +185,8 @@ def _sheet(folder: Path) -> None:
     mission = {
         "extends": "romi-explore",
         "mission": "fuzzed-sheet",
-        "world": {"kind": "sheet", "sheet": "sheet.yaml"},
-        "stack": {"explorer": {"name": "surround-check", "margin_cells": 2}},
+        "world": {"map": "sheet.yaml"},
+        "stack": {"navigator": {"name": "surround-check", "margin_cells": 2}},
     }
     _yaml(folder / "mission.yaml", mission)
 

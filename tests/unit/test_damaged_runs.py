@@ -57,10 +57,10 @@ def a_drive_on_terrain(folder: Path) -> Path:
     pixels = np.zeros((40, 60), np.uint8)
     pixels[3:, 30] = 255
     Image.fromarray(pixels).save(folder / "obstacles.png")
-    ground = ["world.ground.name=images", f"world.ground.obstacles={folder / 'obstacles.png'}"]
+    ground = ["world.map.name=images", f"world.map.obstacles={folder / 'obstacles.png'}"]
     start = ["world.start.x_m=55", "world.start.y_m=45", "world.goal.x_m=545", "world.goal.y_m=45"]
     marks = ["world.landmarks=[{id: 7, x_m: 100, y_m: 200}, {id: 3, x_m: 400, y_m: 300}]"]
-    return driven(folder, "gale-astar-ekf", *ground, *start, *marks, "stack.spline.samples=300")
+    return driven(folder, "gale-astar-ekf", *ground, *start, *marks)
 
 
 def a_recording(folder: Path) -> Path:

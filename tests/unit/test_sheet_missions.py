@@ -100,9 +100,9 @@ def test_the_run_folder_holds_map_and_report(tmp_path: Path, capsys: pytest.Capt
         assert archive["visited"].sum() == found["visited_cells"]
     assert read_ros_map(folder / "map.yaml").grid.cells.shape == cells.shape
     page = (folder / "report.html").read_text(encoding="utf-8")
-    for slug in ("sheet-path", "coverage", "accuracy", "printed-map", "pose-error"):
+    for slug in ("sheet-path", "coverage", "accuracy", "printed-map", "pose-error", "control", "clearance"):
         assert f'<section id="{slug}"><h2>' in page
-    assert page.count('role="img"') == 5
+    assert page.count('role="img"') == 8
     # It reruns from what it wrote, to the same numbers.
     again = run_mission(load_mission(str(folder / "mission.yaml")), save=False).metrics
     assert again["position_rmse_m"] == found["position_rmse_m"]

@@ -190,11 +190,19 @@ class TestReport:
         assert page.count("data:image/png;base64") == (1 if closed else 2)
         assert page.count('role="img"') == (1 if closed else 3)
 
-    def test_broken_pictures_are_one_line(self, wall: Path, tmp_path: Path) -> None:
+    def test_broken_pictures_are_one_line(
+        self, wall: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    ) -> None:
         folder = Path(run(wall, out=tmp_path / "runs")["run_dir"])
         (folder / "terrain.npz").write_bytes(b"PK")
-        with pytest.raises(InputError, match=r"terrain\.npz: expected a run's arrays"):
-            write_report(folder)
+        capsys.readouterr()
+        # The page is written without them, and says so.
+        assert main(["report", str(folder)]) == 0
+        error = capsys.readouterr().err.strip()
+        assert error.startswith("pilotage: left out of the report: ")
+        assert error.count("\n") == 0
+        assert "terrain.npz" in error
+        assert "terrain.npz" in (folder / "report.html").read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize(

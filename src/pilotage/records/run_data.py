@@ -13,7 +13,7 @@ import numpy as np
 from pilotage.core.errors import InputError
 from pilotage.core.types import BoolArray, Event, FloatArray
 from pilotage.maps.occupancy_grid import OccupancyGrid
-from pilotage.records.cells import CELLS_FILE, SheetData, read_cells
+from pilotage.records.cells import SheetData, read_cells
 from pilotage.records.events import read_events
 from pilotage.records.grid import read_grid_layer
 from pilotage.records.localizer import read_localizer
@@ -21,7 +21,6 @@ from pilotage.records.metrics import METRICS_FILE, read_metrics
 from pilotage.records.mission import read_mission
 from pilotage.records.numbers import FARTHEST_M, number
 from pilotage.records.plans import Plan, Plans, read_plans
-from pilotage.records.reading import is_there
 from pilotage.records.run_folder import robot_folder
 from pilotage.records.scans import Sightings, read_sightings
 from pilotage.records.terrain import TerrainPictures, read_terrain
@@ -118,7 +117,7 @@ def read_run(folder: Path, *, robot: int = 0, on_damage: OnDamage | None = None)
         Whose rows and files, where there are several.
     on_damage
         Where given, a damaged file is told to it and left out; else it is an error, as it always is for those
-        two, for a sheet's cells with their world, and for the pictures of terrain.
+        two.
 
     Raises
     ------
@@ -146,9 +145,7 @@ def read_run(folder: Path, *, robot: int = 0, on_damage: OnDamage | None = None)
     nothing: tuple[Mapping[str, Any], str] = ({}, "")
     mission, mission_text = part(read_mission, nothing)
     own = robot_folder(folder, robot)
-    # What was done on a sheet or on terrain is told by one file: a page without it would show nothing.
-    on_a_sheet = is_there(own / CELLS_FILE)
-    world = read_world(folder) if on_a_sheet else part(read_world, World())
+    world = part(read_world, World())
     plans = part(read_plans, Plans(), own)
     return RunData(
         run_dir=folder,
@@ -163,8 +160,8 @@ def read_run(folder: Path, *, robot: int = 0, on_damage: OnDamage | None = None)
         trace=_drawable(trace.of(robot)),
         updates=part(read_updates, (), own),
         sightings=part(read_sightings, Sightings(), own),
-        sheet=read_cells(own, world),
-        terrain=read_terrain(folder),
+        sheet=part(lambda place: read_cells(place, world), None, own),
+        terrain=part(read_terrain, None),
         grid=part(read_grid_layer, None),
         localizer_text=part(read_localizer, ""),
         robot=robot,
