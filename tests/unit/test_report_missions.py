@@ -70,7 +70,6 @@ def in_a_room(tmp_path_factory: pytest.TempPathFactory) -> Path:
         "world.obstacles=[]",
         "robot.footprint={radius_m: 0.2}",
         "stack.localizer={name: particle-filter}",
-        "robot.sensors.beacons=null",
         "stack.reactive=null",
         "run.time_limit_s=3",
     )

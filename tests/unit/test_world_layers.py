@@ -19,7 +19,6 @@ from pilotage.maps.outlines import outlines
 from pilotage.maps.segment_map import SegmentMap
 from pilotage.maps.world_map import WorldMap
 from pilotage.models.footprint import Footprint
-from pilotage.sensors.beacon import BeaconConfig
 from pilotage.sensors.infrared import InfraredConfig
 from pilotage.sensors.lidar import LidarConfig
 from pilotage.sensors.line_sensor import LineSensorConfig
@@ -250,7 +249,6 @@ def test_what_no_layer_can_answer_is_refused_in_one_line() -> None:
     for config, words in (
         (LidarConfig(), "robot.sensors.it: lidar needs a world with walls or a grid, found an empty map"),
         (InfraredConfig(rate_hz=10), "infrared needs a world with walls or a grid"),
-        (BeaconConfig(), "robot.sensors.it: beacons need a world with landmarks, found none"),
         (LineSensorConfig(rate_hz=10), "line-sensor needs a world with floor markings, found an empty map"),
     ):
         with pytest.raises(InputError, match=words) as caught:

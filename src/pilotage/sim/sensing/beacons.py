@@ -22,7 +22,6 @@ class SimulatedBeacons:
     """Measures every landmark in sight; what is drawn does not depend on which are."""
 
     def __init__(self, config: BeaconConfig, carrier: Carrier, rng: np.random.Generator) -> None:
-        carrier.world.check_landmarks(carrier.where, "beacons")
         self._config, self._carrier, self._rng = config, carrier, rng
 
     @staticmethod

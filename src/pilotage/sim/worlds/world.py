@@ -134,20 +134,6 @@ class World:
             )
         return self.floor
 
-    def check_landmarks(self, where: str, what: str) -> None:
-        """Refuse ``what`` in a world without a landmark to see.
-
-        Raises
-        ------
-        InputError
-            Where there are none.
-        """
-        if not len(self.landmarks):
-            raise InputError(
-                f"{where}: {what} need a world with landmarks, found none on '{self.chart.name}'; "
-                f"give world.landmarks or take the sensor off"
-            )
-
     def check_place(self, where: str, footprint: Footprint, pose: Pose2) -> None:
         """Refuse a place that leaves no room for a footprint.
 
