@@ -22,7 +22,7 @@ from pathlib import Path
 
 from fuzz.guided import READERS, seed_of
 from support import damage
-from support.fuzz_targets import BY_NAME, FILM_TARGETS, OPTIONS, PENDING, TARGETS, Target
+from support.fuzz_targets import BY_NAME, FILM_TARGETS, OPTIONS, TARGETS, Target
 from support.fuzzing import Healthy, damaged_case
 from support.outcome import Outcome, run
 
@@ -42,7 +42,6 @@ def main() -> int:
     parser.add_argument("--minutes", type=float, default=10.0)
     parser.add_argument("--seed", type=int, default=None, help="else by the clock")
     parser.add_argument("--only", default="", help="uses whose name holds this")
-    parser.add_argument("--pending", action="store_true", help="uses whose readers are still to be mended")
     parser.add_argument("--again", type=Path, help="a folder of fuzz-found")
     asked = parser.parse_args()
     if asked.again is not None:
@@ -50,7 +49,7 @@ def main() -> int:
     seed = int(time.time()) if asked.seed is None else asked.seed
     guided = importlib.util.find_spec("atheris") is not None and not asked.only
     end = time.monotonic() + 60.0 * asked.minutes * (1.0 - GUIDED_SHARE if guided else 1.0)
-    targets = PENDING if asked.pending else (*TARGETS, *FILM_TARGETS)
+    targets = (*TARGETS, *FILM_TARGETS)
     broken = drawn(seed, end, [target for target in targets if asked.only in target.name], not asked.only)
     if guided:
         broken += coverage_guided(60.0 * asked.minutes * GUIDED_SHARE / len(READERS))

@@ -401,12 +401,12 @@ def _study(folder: Path) -> None:
         "mission": "museum-plan",
         "trials": 1,
         "set": {"stack.planner.iterations": 100},
-        "factors": {"stack.planner.turning_radius_m": [0.3, 0.5]},
+        "factors": [{"key": "stack.planner.turning_radius_m", "values": [0.3, 0.5]}],
     }
     _yaml(folder / "study.yaml", definition)
 
 
-PENDING = (
+TARGETS += (
     Target(
         "report run",
         _run_folder,
@@ -423,7 +423,6 @@ PENDING = (
         True,
     ),
 )
-"""Readers that do not all go through the door yet: run folders, studies. ``--pending`` tries them."""
 BY_NAME = {target.name: target for target in TARGETS}
 
 OPTIONS: tuple[tuple[str, ...], ...] = (

@@ -38,7 +38,9 @@ def write_report(run_dir: Path, on_damage: Callable[[str], None] | None = None) 
     InputError
         One line, where the folder is not a run folder or one of its files is broken.
     """
-    if (run_dir / "calibration.json").exists():
+    from pilotage.records.calibration import is_calibration
+
+    if is_calibration(run_dir):
         from pilotage.report.calibration.page import write_calibration_report
 
         return write_calibration_report(run_dir)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from pilotage.core.angles import wrap_to_pi
-from pilotage.core.errors import InputError
 from pilotage.core.random import RandomStreams
 from pilotage.core.types import Goal, Pose2
 from pilotage.experiments.build.charts import load_chart
@@ -134,10 +133,3 @@ def first_belief(
     if told_exactly:
         return exactly(start)
     return belief if initial.known else Belief.anywhere(chart.bounds_m)
-
-
-def require_goal(goal: GoalConfig | None, needed_by: str) -> GoalConfig:
-    """The goal; InputError where there is none."""
-    if goal is None:
-        raise InputError(f"{needed_by}: expected world.goal, found none")
-    return goal
