@@ -251,7 +251,7 @@ def _film(folder: Path) -> None:
 ENDS = ("--start", "1,1", "--goal", "2,5")
 ROOM = ("--start", "1,1", "--goal", "6.2,1.3")
 
-TARGETS = (
+TARGETS: tuple[Target, ...] = (
     Target(
         "plan walls", _walls, ("plan", "walls.yaml", *ENDS, "--set", "iterations=200"), ("walls.yaml",), True
     ),
