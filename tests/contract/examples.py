@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from contract.local_examples import LOCAL_EXAMPLES, navigator_drives_by_the_laser
+from contract.patrol_examples import strategy_patrols
 from contract.rover_examples import (
     dead_reckoning_follows_the_bend,
     drives_over_cells,
@@ -414,6 +415,8 @@ EXAMPLES: dict[tuple[str, str], Example] = {
     ("navigator", "surround-check"): Example(
         explorer_explores, {"margin_cells": 1}, pure_numbers=frozenset({"far_cells"})
     ),
+    ("strategy", "conscientious-reactive"): Example(strategy_patrols),
+    ("strategy", "cyclic"): Example(strategy_patrols),
     ("motion", "differential-drive"): Example(motion_moves),
     ("motion", "wheel-drive"): Example(motion_moves, {"max_wheel_speed_rad_s": 20.0}),
     ("motion", "bicycle"): Example(motion_moves, {"wheelbase_m": 0.5}),

@@ -16,6 +16,7 @@ from pilotage.stack.interface import NAVIGATORS
 from pilotage.stack.localization.heading_filter import HEADING_FILTERS
 from pilotage.stack.localization.localizer import LOCALIZERS
 from pilotage.stack.mapping.mapper import MAPPERS
+from pilotage.stack.patrol.strategy import STRATEGIES
 from pilotage.stack.planning.local_planner import LOCAL_PLANNERS
 from pilotage.stack.planning.planner import PLANNERS, SMOOTHERS
 
@@ -34,5 +35,6 @@ ROLES: dict[str, Registry[Any]] = {
     "reactive": REACTIVES,
     "mapper": MAPPERS,
     "escape": ESCAPES,
+    "strategy": STRATEGIES,
 }
 """Roles by their key under ``stack``; a task, a motion and the sensors stand elsewhere in a mission."""

@@ -1,0 +1,206 @@
+"""What robots on patrol tell each other, and what one of them knows from its own visits and from that."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from pilotage.core.types import FloatArray
+
+NOTHING: FloatArray = np.zeros(0)
+NOTHING.flags.writeable = False
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PatrolState:
+    """What one robot says of itself.
+
+    Attributes
+    ----------
+    robot
+        Its number in the team, from 0.
+    t_s
+        When it said so; clocks are taken to agree.
+    at, target
+        The vertex that it came to last, and the one that it drives to (the same while it waits there).
+    arrives_s
+        When it expects to be at the target.
+    speed_m_s
+        Speed made good along edges, stops on the path included.
+    on_duty
+        False while it charges or looks for its place: others take its share.
+    words
+        (K,) what its strategy adds for its like on other robots: bids, say.
+    """
+
+    robot: int
+    t_s: float
+    at: int
+    target: int
+    arrives_s: float
+    speed_m_s: float
+    on_duty: bool = True
+    words: FloatArray = field(default_factory=lambda: NOTHING)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PatrolMessage:
+    """One broadcast: what the sender saw and was told, so that news travel from robot to robot.
+
+    Attributes
+    ----------
+    states
+        The newest word of each robot that the sender knows of; its own among them.
+    visited_s
+        (V,) when each vertex was last visited by anybody, as far as the sender knows.
+    """
+
+    sender: int
+    sent_s: float
+    states: tuple[PatrolState, ...]
+    visited_s: FloatArray
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PatrolKnowledge:
+    """What a strategy decides on.
+
+    Attributes
+    ----------
+    now_s
+        The robot's clock.
+    robot
+        Its number.
+    at
+        The vertex where it is: it came there, passes it, or waits.
+    target
+        Where it was bound for; ``at`` where it has arrived or never was sent.
+    own_visited_s
+        (V,) when this robot itself was last at each vertex; the patrol's beginning where it never was.
+    visited_s
+        (V,) the same of anybody, as far as it knows.
+    speed_m_s
+        Its speed made good along edges.
+    states
+        (N,) the newest word of each robot by its number, its own included; None of one never heard.
+    """
+
+    now_s: float
+    robot: int
+    at: int
+    target: int
+    own_visited_s: FloatArray
+    visited_s: FloatArray
+    speed_m_s: float
+    states: tuple[PatrolState | None, ...]
+
+    @property
+    def own_idleness_s(self) -> FloatArray:
+        """(V,) time since this robot's own last visits."""
+        return self.now_s - self.own_visited_s
+
+    @property
+    def idleness_s(self) -> FloatArray:
+        """(V,) time since the last visits that it knows of."""
+        return self.now_s - self.visited_s
+
+    def others(self, silent_s: float = np.inf) -> list[PatrolState]:
+        """Team mates on duty that were heard of within ``silent_s``, by their number."""
+        return [
+            state
+            for state in self.states
+            if state is not None
+            and state.robot != self.robot
+            and state.on_duty
+            and self.now_s - state.t_s <= silent_s
+        ]
+
+
+class PatrolMemory:
+    """Keeps what one robot knows: its visits, and what it was told. The navigator and the simulator write it.
+
+    Parameters
+    ----------
+    vertices, team_size
+        Numbers of vertices and robots.
+    speed_m_s
+        Speed to begin with, before any edge was driven.
+    begin_s
+        Time of the patrol's beginning; all vertices count as visited then.
+    """
+
+    def __init__(
+        self, vertices: int, robot: int, team_size: int, at: int, speed_m_s: float, begin_s: float = 0.0
+    ) -> None:
+        self._own_s = np.full(vertices, begin_s)
+        self._visited_s = np.full(vertices, begin_s)
+        self._states: list[PatrolState | None] = [None] * team_size
+        self._own = PatrolState(robot, begin_s, at, at, begin_s, speed_m_s)
+        self._states[robot] = self._own
+
+    @property
+    def own(self) -> PatrolState:
+        """What it would say of itself."""
+        return self._own
+
+    def visit(self, vertex: int, t_s: float) -> None:
+        """It is at a vertex, to stay or on its way."""
+        self._own_s[vertex] = max(self._own_s[vertex], t_s)
+        self._visited_s[vertex] = max(self._visited_s[vertex], t_s)
+        self._tell(replace(self._own, t_s=t_s, at=vertex))
+
+    def bound(self, target: int, t_s: float, arrives_s: float) -> None:
+        """It drives to a target, or waits there."""
+        self._tell(replace(self._own, t_s=t_s, target=target, arrives_s=arrives_s))
+
+    def update(
+        self,
+        t_s: float,
+        *,
+        speed_m_s: float | None = None,
+        on_duty: bool | None = None,
+        words: FloatArray | None = None,
+    ) -> None:
+        """Something else about itself changed."""
+        old = self._own
+        self._tell(
+            replace(
+                old,
+                t_s=t_s,
+                speed_m_s=old.speed_m_s if speed_m_s is None else speed_m_s,
+                on_duty=old.on_duty if on_duty is None else on_duty,
+                words=old.words if words is None else words,
+            )
+        )
+
+    def receive(self, message: PatrolMessage) -> None:
+        """Take in what somebody else sent: the newer word of each robot, the later visit of each vertex."""
+        np.maximum(self._visited_s, message.visited_s, out=self._visited_s)
+        for state in message.states:
+            known = self._states[state.robot]
+            if state.robot != self._own.robot and (known is None or state.t_s > known.t_s):
+                self._states[state.robot] = state
+
+    def message(self, t_s: float) -> PatrolMessage:
+        """What it sends now."""
+        self._tell(replace(self._own, t_s=t_s))
+        states = tuple(state for state in self._states if state is not None)
+        return PatrolMessage(self._own.robot, t_s, states, self._visited_s.copy())
+
+    def knowledge(self, t_s: float) -> PatrolKnowledge:
+        """What its strategy is told."""
+        own = self._own
+        return PatrolKnowledge(
+            t_s,
+            own.robot,
+            own.at,
+            own.target,
+            self._own_s.copy(),
+            self._visited_s.copy(),
+            own.speed_m_s,
+            tuple(self._states),
+        )
+
+    def _tell(self, own: PatrolState) -> None:
+        self._own = self._states[own.robot] = own

@@ -1,0 +1,1 @@
+"""Strategies of patrol, registered by name."""

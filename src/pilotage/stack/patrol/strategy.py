@@ -1,0 +1,68 @@
+"""What a patrol strategy is given and asked; the registry of strategies."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from pilotage.core.registry import Registry
+from pilotage.core.types import FloatArray, IntArray
+from pilotage.stack.patrol.graph import PatrolGraph
+from pilotage.stack.patrol.messages import PatrolKnowledge
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PatrolSetting:
+    """What every robot is told before the patrol begins.
+
+    Attributes
+    ----------
+    robot
+        This robot's number.
+    starts
+        (N,) the vertex nearest to each robot's starting place.
+    speed_m_s
+        Speed at which the robots drive along edges, by their data sheets.
+    begin_s
+        When the patrol begins.
+    rng
+        This robot's own stream; what the whole team must agree on is not drawn from it.
+    """
+
+    graph: PatrolGraph
+    robot: int
+    starts: IntArray
+    speed_m_s: float
+    rng: np.random.Generator
+    begin_s: float = 0.0
+
+    @property
+    def team_size(self) -> int:
+        """Number of robots."""
+        return len(self.starts)
+
+
+class Strategy(Protocol):
+    """Decides for one robot, on what this robot knows. Built as ``cls(config, setting)``.
+
+    It is asked at every vertex that the robot comes to or passes, and about once a second while it waits.
+    """
+
+    def next_vertex(self, knowledge: PatrolKnowledge) -> int:
+        """Where to drive now: any vertex, by the shortest path; ``knowledge.at`` is to wait there."""
+        ...
+
+    def words(self, knowledge: PatrolKnowledge) -> FloatArray:
+        """(K,) what is added to this robot's messages for its like on other robots; may be empty."""
+        ...
+
+
+STRATEGIES: Registry[Strategy] = Registry("strategy", "pilotage.stack.patrol.strategies")
+
+
+def best_of(vertices: IntArray, values: FloatArray, rng: np.random.Generator) -> int:
+    """The vertex (K,) of the largest value (K,); one by lot where several have it."""
+    ties = vertices[values >= values.max() - 1e-12]
+    return int(ties[0] if len(ties) == 1 else rng.choice(ties))

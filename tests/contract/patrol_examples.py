@@ -1,0 +1,33 @@
+"""Examples of patrol strategies: a small team on a small graph."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from pilotage.experiments.graph_patrol import GraphPatrol, Radio, patrol
+from pilotage.stack.patrol.graph import PatrolGraph
+
+
+def lattice(columns: int = 4, rows: int = 3, side_m: float = 2.0) -> PatrolGraph:
+    """Vertices in rows and columns, edges between neighbours, and a dead end."""
+    places = [(side_m * c, side_m * r) for r in range(rows) for c in range(columns)] + [(-3.0 * side_m, 0.0)]
+    xy = np.array(places)
+    apart = np.hypot(*(xy[:, None] - xy[None]).transpose(2, 0, 1))
+    edges = np.where(apart <= side_m + 1e-9, apart, math.inf)
+    edges[0, -1] = edges[-1, 0] = 3.0 * side_m
+    return PatrolGraph.of(xy, edges)
+
+
+def strategy_patrols(factory: Any, config: Any) -> None:
+    """Alone and in a team it comes to every vertex again and again, twice the same; with a deaf radio too."""
+    graph = lattice()
+    for team, radio in ((1, Radio()), (3, Radio()), (3, Radio(range_m=0.0))):
+        trial = GraphPatrol(graph, np.arange(team), 1500.0, 0.5, radio=radio)
+        visits, again = (patrol(trial, lambda setting: factory(config, setting), 4) for _ in range(2))
+        assert np.array_equal(visits.times_s, again.times_s)
+        assert np.array_equal(visits.vertices, again.vertices)
+        late = visits.vertices[visits.times_s > 500.0]
+        assert set(late.tolist()) == set(range(len(graph)))
