@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any
 from pilotage.core.version import __version__ as __version__
 
 if TYPE_CHECKING:
+    from pilotage.bridges.export import export as export
     from pilotage.core.errors import InputError as InputError
     from pilotage.core.types import Pose2 as Pose2
     from pilotage.core.types import Twist as Twist
@@ -57,6 +58,7 @@ _PLACES = {
     "slam": "face.recordings",
     "calibrate": "face.recordings",
     "evaluate": "face.recordings",
+    "export": "bridges.export",
     "track": "face.recordings",
     "Mission": "missions.mission",
     "Run": "face.runs",
@@ -85,6 +87,7 @@ __all__ = [
     "calibrate",
     "draw",
     "evaluate",
+    "export",
     "filters",
     "lines",
     "load",

@@ -137,3 +137,35 @@ def test_a_plugin_that_cannot_be_used_is_one_line(
         assert told in answer.err
         assert f"plugin '{file}'" in answer.err
     assert str(file) not in plugins.named_plugins()
+
+
+BUGGY = """
+from pilotage.core.config import Config
+from pilotage.stack.planning.planner import PLANNERS
+class Mine(Config):
+    "Nothing."
+@PLANNERS.add("buggy", Mine)
+class Buggy:
+    "Mine."
+    def __init__(self, config):
+        self.clearance_m = 0.5
+    def plan(self, request):
+        return half(request.start.x_m)
+def half(x):
+    return x / 0
+"""
+
+
+def test_a_plugin_that_fails_is_told_as_the_plugins(tmp_path: Path) -> None:
+    """Its own lines are shown, ours are not; nothing is left behind."""
+    file = tmp_path / "mine.py"
+    file.write_text(BUGGY)
+    words = ("--plugin", str(file), "--set", "stack.planner.name=buggy", "--json", "--out", "runs")
+    done = pilotage("run", "museum-1", *words, folder=tmp_path)
+    assert (done.returncode, done.stdout) == (2, "")
+    lines = done.stderr.splitlines()
+    assert lines[0] == "Traceback of the plugin (most recent call last):"
+    assert [line.split()[-1] for line in lines if line.startswith("  File")] == ["plan", "half"]
+    assert all("pilotage/" not in line for line in lines[:-1])
+    assert lines[-1] == f"pilotage: plugin '{file}' line 14: ZeroDivisionError: float division by zero"
+    assert not (tmp_path / "runs").exists()

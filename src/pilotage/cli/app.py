@@ -13,6 +13,7 @@ from pilotage.cli.calibrate import calibrate
 from pilotage.cli.components import components
 from pilotage.cli.draw import draw, vectorize
 from pilotage.cli.evaluate import evaluate
+from pilotage.cli.export import export
 from pilotage.cli.localize import localize
 from pilotage.cli.map_score import map_score
 from pilotage.cli.missions import missions
@@ -52,6 +53,7 @@ COMMANDS = (
     draw,
     vectorize,
     report,
+    export,
     new,
     missions,
     components,

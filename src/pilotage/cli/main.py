@@ -1,7 +1,8 @@
 """The entry point: run one command, turn what went wrong into one line and an exit code.
 
 Exit codes: 0 done, 1 the task failed in the field, 2 bad input, 130 interrupted, 143 asked to end by
-SIGTERM, 141 the reader of the output went away, 70 a bug (the only case that shows a traceback).
+SIGTERM, 141 the reader of the output went away, 70 a bug (it alone shows our traceback; a plugin's bug is
+bad input and shows the plugin's).
 """
 
 from __future__ import annotations
@@ -108,6 +109,12 @@ def _run(arguments: list[str]) -> int:
             return _say(f"{place}{error.strerror or error}", BAD_INPUT)
         if isinstance(error, MemoryError):
             return _say("this needs more memory than there is; take a smaller or coarser input", BAD_INPUT)
+        from pilotage.core.plugins import fault_of
+
+        fault = fault_of(error)
+        if fault is not None:
+            print(fault.traceback, file=sys.stderr)
+            return _say(fault.line, BAD_INPUT)
         import traceback
 
         traceback.print_exc()

@@ -10,7 +10,8 @@ import importlib.util
 import os
 import sys
 import traceback
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
 from importlib.metadata import entry_points
 from pathlib import Path
 
@@ -22,6 +23,8 @@ VARIABLE = "PILOTAGE_PLUGINS"
 """Files named here are loaded too, so that worker processes know what their parent was told."""
 
 _loaded: dict[str, str] = {}
+_packages: dict[str, str] = {}
+"""Folder or file of each installed plugin's code, by the entry point's name."""
 _seen_entry_points = False
 
 
@@ -58,6 +61,7 @@ def load_plugins() -> None:
     for entry in entry_points(group=GROUP):
         try:
             entry.load()
+            _packages[entry.name] = _home(entry.value)
         except InputError as error:
             raise InputError(f"plugin '{entry.name}': {error}") from None
         except Exception as error:
@@ -90,6 +94,44 @@ def load_file(path: str) -> None:
         del _loaded[path], sys.modules[name]
         told = str(error) if isinstance(error, InputError) else _where(error, path)
         raise InputError(f"plugin '{path}': {told}") from None
+
+
+@dataclass(frozen=True, slots=True)
+class Fault:
+    """A plugin's own mistake: the line to say, and the plugin's part of the traceback."""
+
+    line: str
+    traceback: str
+
+
+def fault_of(error: BaseException) -> Fault | None:
+    """Tell whether an error came out of a plugin's code, or of ours as a plugin called it; None: neither."""
+    frames = traceback.extract_tb(error.__traceback__)
+    homes = {path: f"'{path}'" for path in _loaded}
+    homes |= {home: f"'{name}'" for name, home in _packages.items() if home}
+    own = [frame for frame in frames if _home_of(frame.filename, homes) is not None]
+    if not own:
+        return None
+    last = own[-1]
+    home = _home_of(last.filename, homes)
+    assert home is not None, "only such frames are kept"
+    place = f"line {last.lineno}" if last.filename == home else f"{last.filename} line {last.lineno}"
+    told = "".join(traceback.format_exception_only(error)).strip()
+    text = "Traceback of the plugin (most recent call last):\n" + "".join(traceback.format_list(own)) + told
+    return Fault(f"plugin {homes[home]} {place}: {type(error).__name__}: {error}", text)
+
+
+def _home_of(file: str, homes: Mapping[str, str]) -> str | None:
+    return next((home for home in homes if file == home or file.startswith(home + os.sep)), None)
+
+
+def _home(value: str) -> str:
+    """Where the code of an entry point lies; nowhere where it is built in."""
+    module = sys.modules[value.partition(":")[0].partition(".")[0]]
+    file = getattr(module, "__file__", None)
+    if file is None:
+        return ""
+    return str(Path(file).parent) if Path(file).stem == "__init__" else file
 
 
 def _where(error: BaseException, path: str = "") -> str:

@@ -10,6 +10,7 @@ import numpy as np
 from pilotage.core.types import Command, FloatArray, Twist, WheelSpeeds
 from pilotage.evaluation.tasks.task import Task
 from pilotage.experiments.build.build import Member
+from pilotage.models.motion.omnidirectional import OmnidirectionalConfig
 from pilotage.models.motion.wheel_drive import WheelDriveConfig
 from pilotage.sensors.readings import OdometryIncrement, Readings, UltrasonicReading
 from pilotage.sensors.ultrasonic import UltrasonicConfig
@@ -33,6 +34,8 @@ WHEEL_COLUMNS = ("left_cmd_rad_s", "right_cmd_rad_s")
 BODY_COLUMNS = ("v_true_m_s", "w_true_rad_s", "clearance_m", "collisions")
 ODOMETRY_COLUMNS = ("odom_distance_m", "odom_angle_rad")
 """The wheel odometry's reading of the step; nan where there was none."""
+SIDEWAYS_COLUMNS = ("lateral_cmd_m_s", "odom_lateral_m")
+"""Of a base that drives sideways besides."""
 
 
 class Recorder:
@@ -46,6 +49,7 @@ class Recorder:
         wheels = [name for name, config in sensors.items() if isinstance(config, WheelOdometryConfig)]
         self._odometer = wheels[0] if wheels else None
         self._by_wheels = isinstance(member.known.motion, WheelDriveConfig)
+        self._sideways = isinstance(member.known.motion, OmnidirectionalConfig)
         self._rows = array("d")
         self.names = (
             *TRUTH_COLUMNS,
@@ -53,6 +57,7 @@ class Recorder:
             *(WHEEL_COLUMNS if self._by_wheels else TWIST_COLUMNS),
             *BODY_COLUMNS,
             *ODOMETRY_COLUMNS,
+            *(SIDEWAYS_COLUMNS if self._sideways else ()),
             *(f"us_{name}_m" for name in self._sonars),
             *task.columns,
             *member.journal.units,
@@ -83,6 +88,7 @@ class Recorder:
                 body.clearance_m,
                 body.collisions,
                 *_odometry(readings, self._odometer),
+                *(self._lateral(readings, command) if self._sideways else ()),
                 *[_sonar_m(readings, name) for name in self._sonars],
                 *self._task.row(self._index),
             )
@@ -98,6 +104,14 @@ class Recorder:
         if isinstance(command, Twist):
             return command.v_m_s, command.w_rad_s
         return math.nan, math.nan
+
+    def _lateral(self, readings: Readings, command: Command) -> tuple[float, float]:
+        """Speed asked for and distance read to the left."""
+        reading = None if self._odometer is None else readings.by_sensor.get(self._odometer)
+        return (
+            command.lateral_m_s if isinstance(command, Twist) else math.nan,
+            reading.lateral_m if isinstance(reading, OdometryIncrement) else math.nan,
+        )
 
     def trace(self) -> dict[str, FloatArray]:
         """Columns by name, each (rows,)."""

@@ -20,5 +20,5 @@ def rosbags(module: str) -> Any:
         return importlib.import_module(f"rosbags.{module}")
     except ImportError:
         raise InputError(
-            "bags are read by the library rosbags, which is not installed: pip install pilotage[ros]"
+            "bags need the library rosbags, which is not installed: pip install pilotage[ros]"
         ) from None

@@ -1,0 +1,1 @@
+"""ROS: messages as plain values, bags of them, and live topics."""
