@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pathlib
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
@@ -11,6 +12,7 @@ import pytest
 
 from contract.local_examples import LOCAL_EXAMPLES, navigator_drives_by_the_laser
 from contract.patrol_examples import strategy_patrols
+from contract.people_examples import people_walk
 from contract.rover_examples import (
     dead_reckoning_follows_the_bend,
     drives_over_cells,
@@ -417,6 +419,10 @@ EXAMPLES: dict[tuple[str, str], Example] = {
     ),
     ("strategy", "conscientious-reactive"): Example(strategy_patrols),
     ("strategy", "cyclic"): Example(strategy_patrols),
+    ("people", "track"): Example(
+        people_walk, {"file": str(pathlib.Path(__file__).parent.parent / "support" / "walkers.txt")}
+    ),
+    ("people", "social-force"): Example(people_walk, {"count": 6}),
     ("motion", "differential-drive"): Example(motion_moves),
     ("motion", "wheel-drive"): Example(motion_moves, {"max_wheel_speed_rad_s": 20.0}),
     ("motion", "bicycle"): Example(motion_moves, {"wheelbase_m": 0.5}),

@@ -90,13 +90,21 @@ def test_people_walk_straight_between_their_annotations(tmp_path: Path) -> None:
     path = tmp_path / "tracks.txt"
     path.write_text("0\t1.0\t0.0\t0.0\n10\t1.0\t0.4\t0.8\n10\t2.0\t5.0\t5.0\n20\t2.0\t5.0\t6.0\n")
     tracks = read_people(path)
-    places, velocities = tracks.at(0.1)
+    rows, places = tracks.at(0.1)
+    assert rows.tolist() == [0]
     assert np.allclose(places, [[0.1, 0.2]])
-    assert np.allclose(velocities, [[1.0, 2.0]])
-    assert tracks.at(0.5)[0].shape == (1, 2)
-    assert tracks.at(0.9)[0].shape == (0, 2)
-    assert tracks.discs_at(0.1).tolist()[0][2] == 0.25
+    assert tracks.at(0.5)[1].tolist() == [[5.0, 5.25]]
+    assert tracks.at(0.9)[0].shape == (0,)
+    assert tracks.slots(1.0).tolist() == [0, 0, 1, 1]
     assert tracks.duration_s == pytest.approx(0.8)
+
+
+def test_who_comes_long_after_another_has_his_row(tmp_path: Path) -> None:
+    path = tmp_path / "tracks.txt"
+    path.write_text("0 7 0 0\n10 7 1 0\n30 8 0 0\n40 8 1 0\n100 9 0 0\n110 9 1 0\n")
+    tracks = read_people(path, 10.0)
+    assert tracks.duration_s == 11.0
+    assert tracks.slots(3.0).tolist() == [0, 0, 1, 1, 0, 0]
 
 
 @pytest.mark.parametrize(

@@ -38,7 +38,6 @@ from pilotage.sensors.sensor import SENSORS, Mount
 from pilotage.sensors.wheel_encoders import WheelEncodersConfig
 from pilotage.sensors.wheel_odometry import WheelOdometryConfig
 from pilotage.sim.source import RobotSpec, Simulator
-from pilotage.sim.worlds.traffic import MovingBody
 from pilotage.sim.worlds.world import World
 from support.worlds import CAR, DISC, ROOM_MAP, robot, simulator
 
@@ -127,35 +126,6 @@ def test_a_crowd_never_overlaps() -> None:
 def test_robots_that_start_inside_each_other_are_refused() -> None:
     with pytest.raises(InputError, match="robots 'one' and 'two': expected starts apart"):
         Simulator(solid(), [at(0.0, name="one"), at(0.5, name="two")], 0.1)
-
-
-def test_people_are_seen_and_walk_into_robots() -> None:
-    walker = MovingBody("a visitor", 0.25, lambda t: (4.0 - t, 0.0))
-    sim = Simulator(solid(), [at(0.0)], 0.1, [walker])
-    scan = sim.step([Twist(0.0, 0.0)])[0].by_sensor["scan"]
-    assert isinstance(scan, LidarScan)
-    assert scan.ranges_m[2] == pytest.approx(3.65)
-    body = sim.bodies[0]
-    for _ in range(33):
-        sim.step([Twist(0.0, 0.0)])
-    assert body.collisions == 0
-    for _ in range(5):
-        sim.step([Twist(0.0, 0.0)])
-    assert body.collisions == 1
-    assert body.pose.x_m == 0.0
-    for _ in range(20):
-        sim.step([Twist(-1.0, 0.0)])
-    assert body.pose.x_m < -1.0
-    assert body.collisions == 1
-
-
-def test_a_robot_does_not_drive_into_a_person() -> None:
-    walker = MovingBody("a visitor", 0.25, lambda _t: (2.0, 0.0))
-    sim = Simulator(solid(), [at(0.0)], 0.1, [walker])
-    for _ in range(40):
-        sim.step([Twist(1.0, 0.0)])
-    assert sim.bodies[0].pose.x_m == pytest.approx(2.0 - 0.25 - 0.3, abs=1e-6)
-    assert sim.bodies[0].collisions == 1
 
 
 def test_each_robot_draws_from_its_own_streams() -> None:

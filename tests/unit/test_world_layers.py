@@ -22,7 +22,7 @@ from pilotage.models.footprint import Footprint
 from pilotage.sensors.infrared import InfraredConfig
 from pilotage.sensors.lidar import LidarConfig
 from pilotage.sensors.line_sensor import LineSensorConfig
-from pilotage.sim.worlds.traffic import MovingBody, Traffic
+from pilotage.sim.worlds.traffic import NOWHERE_M, Traffic
 from pilotage.sim.worlds.world import World
 from support.worlds import ROOM_MAP, robot, simulator
 
@@ -168,8 +168,9 @@ def test_clearance_changes_by_no_more_than_the_outline_moves(
 
 def test_traffic_is_seen_and_kept_clear_of_but_for_oneself() -> None:
     box = SHAPES[1]
-    person = MovingBody.along("a guard", 0.3, np.array([0.0, 10.0]), np.array([[3.0, 0.0], [5.0, 0.0]]))
-    traffic = Traffic([Footprint.disc(0.2), box], [person])
+    traffic = Traffic([Footprint.disc(0.2), box], np.array([0.3]))
+    assert traffic.circles_m[1].tolist() == [NOWHERE_M, NOWHERE_M, 0.3]
+    traffic.put_people(np.array([[3.0, 0.0]]))
     world = World.of(WorldMap("empty", WIDE)).with_traffic(traffic)
     traffic.circles_m[0, :2] = 0.0, 0.0
     corners = box.points_m + np.array([0.0, 4.0])
@@ -181,10 +182,10 @@ def test_traffic_is_seen_and_kept_clear_of_but_for_oneself() -> None:
     assert world.cone(at, 0.5, 9.0, traffic.own[0])[0] == pytest.approx(2.7)
     assert world.clearance_m(Footprint.disc(0.2), at, traffic.own[0])[0] == pytest.approx(2.5)
     assert world.clearance_m(box, np.array([[0.0, 4.0, 0.0]]), traffic.own[1])[0] == pytest.approx(3.6)
-    traffic.walk_to(5.0)
+    traffic.put_people(np.array([[4.0, 0.0]]))
     assert world.scan(at, np.array([0.0]), 9.0, traffic.own[:1])[0, 0] == pytest.approx(3.7)
-    traffic.walk_to(99.0)
-    assert traffic.circles_m[1].tolist() == [5.0, 0.0, 0.3]
+    traffic.put_people(np.array([[np.nan, np.nan]]))
+    assert world.scan(at, np.array([0.0]), 9.0, traffic.own[:1])[0, 0] == 9.0
 
 
 def test_cells_and_bodies_hide_landmarks() -> None:
@@ -263,10 +264,3 @@ def test_places_without_room_are_refused() -> None:
         world.check_place("world.start", SHAPES[1], Pose2(4.8, 2.0, 0.0))
     with pytest.raises(InputError, match="expected a place on the map 'room'"):
         world.check_place("world.start", SHAPES[0], Pose2(-4.8, 2.0, 0.0))
-
-
-def test_tracks_that_are_none_are_refused() -> None:
-    with pytest.raises(InputError, match="rising times"):
-        MovingBody.along("a guard", 0.3, np.array([0.0, 0.0]), np.zeros((2, 2)))
-    with pytest.raises(InputError, match="expected times"):
-        MovingBody.along("a guard", 0.3, np.array([0.0, 1.0]), np.zeros((3, 2)))

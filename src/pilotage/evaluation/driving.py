@@ -65,6 +65,15 @@ def driving_metrics(run: FinishedRun, robot: RobotRun) -> tuple[dict[str, object
         "min_clearance_m": float(trace["clearance_m"].min()),
         "path_length_m": robot.driven_m,
     }
+    met = robot.encounters
+    if met is not None:
+        metrics |= {
+            "people_collisions": met.collisions,
+            "people_touches": met.touches,
+            "people_near_share": met.near_share,
+        }
+        if np.isfinite(met.closest_m):
+            metrics["people_closest_m"] = met.closest_m
     metrics |= pose_errors(truth, estimate, counted).metrics()
     # Where nothing is solid, everywhere is open and no place narrow.
     if counted.any() and np.isfinite(trace["clearance_m"]).any():

@@ -12,6 +12,7 @@ from pilotage.missions.places import GoalConfig
 from pilotage.missions.stack import StackConfig
 from pilotage.models.footprint import Footprint
 from pilotage.models.motion.motion import MotionConfig
+from pilotage.sim.people.crowd import Encounters
 from pilotage.stack.interface import PlannedPath, StackStatus
 
 
@@ -33,6 +34,8 @@ class RobotRun:
         What the robot itself says of its task.
     collisions, driven_m
         Contacts counted, and the length of the path that the body drove.
+    encounters
+        How it got on with people; None where there were none.
     """
 
     name: str
@@ -51,6 +54,7 @@ class RobotRun:
     reason: str
     collisions: int
     driven_m: float
+    encounters: Encounters | None = None
 
     @property
     def arrived(self) -> bool:

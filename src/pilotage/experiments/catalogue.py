@@ -93,6 +93,9 @@ def mission_schema() -> dict[str, Any]:
     robot = definitions["RobotConfig"]["properties"]
     robot["sensors"]["additionalProperties"] = choices["sensor"]
     robot["motion"] = choices["motion"]
+    definitions["WorldConfig"]["properties"]["people"]["items"] = {
+        "anyOf": [choices["people"], {"type": "string"}]
+    }
     schema["properties"]["task"] = {"anyOf": [choices["task"], {"type": "string"}]}
     schema["properties"]["extends"] = {"type": "string", "description": "a shipped mission to start from"}
     return schema

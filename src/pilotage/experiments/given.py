@@ -10,7 +10,7 @@ from pilotage.missions.mission import Mission
 
 
 def has(mission: Mission) -> frozenset[str]:
-    """A goal, a planner, an estimate, walls, ground, clearance: as far as the mission's text says."""
+    """A goal, a planner, an estimate, walls, ground, clearance, people: as far as the mission's text says."""
     found = set()
     if any(mission.goal_of(robot) is not None for robot in mission.team):
         found.add("goal")
@@ -23,6 +23,8 @@ def has(mission: Mission) -> frozenset[str]:
     over_cells = any(stack.navigator.name == "curve" for stack in stacks)
     if mission.task.name != "plan" or over_cells:
         found.add("clearance")  # of what is driven, or of a path over cells
+    if mission.world.people:
+        found.add("people")
     source = mission.world.map
     if isinstance(source, str) and source not in shipped_maps():
         found |= {"walls", "ground"}  # a file may hold either

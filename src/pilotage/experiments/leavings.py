@@ -41,6 +41,7 @@ def files_of(run: Run, verdict: Verdict, metrics: Mapping[str, object]) -> RunFi
         world=world,
         terrain=terrain_pictures(finished, run.sightings[0].seen()),
         grid=grid,
+        people=run.people.tracks(),
         robots=tuple(
             RobotFiles(
                 plans=_plans(robot, verdict),

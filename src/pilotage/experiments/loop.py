@@ -13,6 +13,7 @@ from pilotage.core.types import STOP, Command, Event, Pose2
 from pilotage.evaluation.finished import FinishedRun, RobotRun
 from pilotage.evaluation.tasks.task import Attempt, all_ended
 from pilotage.experiments.build.build import Experiment, Member, build
+from pilotage.experiments.people_trail import PeopleTrail
 from pilotage.experiments.progress import EVERY_S, OnProgress, Progress, metres
 from pilotage.experiments.recorder import Recorder
 from pilotage.experiments.sightings import Sightings
@@ -24,11 +25,12 @@ from pilotage.sim.source import Simulator
 
 @dataclass(frozen=True, slots=True)
 class Run:
-    """A finished run, and of every robot what its sensors saw and which updates are worth a picture."""
+    """A finished run, what each robot's sensors saw, its updates worth a picture; where people walked."""
 
     finished: FinishedRun
     sightings: tuple[Sightings, ...]
     albums: tuple[UpdateAlbum, ...]
+    people: PeopleTrail
 
 
 def simulate(mission: Mission, on_progress: OnProgress | None = None) -> Run:
@@ -55,6 +57,7 @@ def run_loop(experiment: Experiment, on_progress: OnProgress | None = None) -> R
     )
     sightings = tuple(Sightings(dict(member.known.sensors)) for member in team)
     albums = tuple(UpdateAlbum() for _ in team)
+    trail = PeopleTrail(source.crowd)
     events: list[Event] = []
     planned_s = sum(member.journal.planning_time_s for member in team)
     every = max(1, round(mission.run.record_every_s / mission.run.dt_s))
@@ -83,6 +86,8 @@ def run_loop(experiment: Experiment, on_progress: OnProgress | None = None) -> R
         if on_progress is not None and time.perf_counter() - last_told > EVERY_S:
             last_told = time.perf_counter()
             on_progress(_progress(experiment, attempts))
+        if step % every == 0 or ending is not None:
+            trail.record(source.t_s)
     loop_s = time.perf_counter() - begin
     planning_s = sum(member.journal.planning_time_s for member in team) - planned_s
     if ending is None:
@@ -102,7 +107,7 @@ def run_loop(experiment: Experiment, on_progress: OnProgress | None = None) -> R
         max(loop_s - planning_s, 1e-9),
         ending,
     )
-    return Run(finished, sightings, albums)
+    return Run(finished, sightings, albums, trail)
 
 
 def _events(member: Member, *, several: bool) -> list[Event]:
@@ -114,7 +119,7 @@ def _events(member: Member, *, several: bool) -> list[Event]:
 
 def _robot_run(experiment: Experiment, index: int, recorder: Recorder) -> RobotRun:
     member, body = experiment.team[index], experiment.simulator.bodies[index]
-    mission, journal = experiment.mission, member.journal
+    mission, journal, crowd = experiment.mission, member.journal, experiment.simulator.crowd
     start = mission.start_of(member.config)
     assert start is not None, "settled by the build"
     status, reason = member.stack.status
@@ -135,6 +140,7 @@ def _robot_run(experiment: Experiment, index: int, recorder: Recorder) -> RobotR
         reason,
         body.collisions,
         body.driven_m,
+        None if crowd is None else crowd.encounters(index),
     )
 
 

@@ -147,6 +147,9 @@ def _anchor_map(values: dict[str, Any], folder: Path) -> None:
     places = [(world, key) for key in ("map", "landmarks")]
     if isinstance(world.get("map"), dict):
         places += [(world["map"], key) for key in ("file", "obstacles", "environment", "landmarks")]
+    people = world.get("people")
+    if isinstance(people, list):
+        places += [(entry, "file") for entry in people if isinstance(entry, dict)]
     stack, plugins = values.get("stack"), values.get("plugins")
     if isinstance(stack, dict):
         places.append((stack, "map"))

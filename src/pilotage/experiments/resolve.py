@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
 import yaml
@@ -31,12 +32,18 @@ def resolved_values(mission: Mission, chart: WorldMap | None = None) -> dict[str
     """
     values = mission.model_dump(mode="json")
     values["task"] = _resolved("task", values["task"], "task")
+    people = values["world"]["people"]
+    for index, choice in enumerate(people):
+        people[index] = _resolved("people", choice, f"world.people.{index}")
     _resolve_stack(values["stack"], "stack")
     _resolve_robot(values["robot"], "robot")
     for index, robot in enumerate(values["robots"]):
         _resolve_robot(robot, f"robots.{index}")
     if chart is not None:
         values["world"]["map"] = inlined(mission.world.map, chart)
+        for choice in people:
+            if isinstance(choice.get("file"), str):
+                choice["file"] = str(Path(choice["file"]).absolute())
     return values
 
 

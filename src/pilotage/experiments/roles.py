@@ -8,6 +8,7 @@ from pilotage.core.registry import Registry
 from pilotage.evaluation.tasks.task import TASKS
 from pilotage.models.motion.motion import MOTIONS
 from pilotage.sensors.sensor import SENSORS
+from pilotage.sim.people.people import PEOPLE
 from pilotage.stack.control.controller import CONTROLLERS
 from pilotage.stack.control.escape import ESCAPES
 from pilotage.stack.control.local.role import LOCAL_CONTROLLERS
@@ -24,6 +25,7 @@ ROLES: dict[str, Registry[Any]] = {
     "task": TASKS,
     "motion": MOTIONS,
     "sensor": SENSORS,
+    "people": PEOPLE,
     "navigator": NAVIGATORS,
     "localizer": LOCALIZERS,
     "heading_filter": HEADING_FILTERS,
@@ -37,4 +39,4 @@ ROLES: dict[str, Registry[Any]] = {
     "escape": ESCAPES,
     "strategy": STRATEGIES,
 }
-"""Roles by their key under ``stack``; a task, a motion and the sensors stand elsewhere in a mission."""
+"""Roles by their key under ``stack``; a task, a motion, sensors and people stand elsewhere in a mission."""

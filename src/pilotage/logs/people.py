@@ -11,7 +11,7 @@ from pilotage.core.errors import InputError
 from pilotage.core.types import FloatArray, IntArray
 from pilotage.logs.text import check_size, read_table
 
-FRAMES_PER_S = 25.0
+FRAME_RATE_HZ = 25.0
 RADIUS_M = 0.25
 COLUMNS = ("frame", "person", "x", "y")
 
@@ -35,25 +35,37 @@ class PeopleTracks:
         """Time of the last annotation."""
         return float(self.t_s.max())
 
-    def at(self, t_s: float) -> tuple[FloatArray, FloatArray]:
-        """Places (K, 2) and velocities (K, 2) of those who are there, straight between their annotations.
+    def at(self, t_s: float) -> tuple[IntArray, FloatArray]:
+        """Rows (K,) of the last annotations of those who are there, and their places (K, 2) by now.
 
-        A person is there from its first annotation to its last.
+        Straight between annotations; a person is there from its first one to its last.
         """
-        begins = np.flatnonzero(self.person[1:] == self.person[:-1])
-        inside = begins[(self.t_s[begins] <= t_s) & (t_s < self.t_s[begins + 1])]
-        span = (self.t_s[inside + 1] - self.t_s[inside])[:, None]
-        step = self.places_xy_m[inside + 1] - self.places_xy_m[inside]
-        places = self.places_xy_m[inside] + (t_s - self.t_s[inside])[:, None] / span * step
-        return places, step / span
+        rows = np.flatnonzero(self.person[1:] == self.person[:-1])
+        rows = rows[(self.t_s[rows] <= t_s) & (t_s < self.t_s[rows + 1])]
+        share = (t_s - self.t_s[rows]) / (self.t_s[rows + 1] - self.t_s[rows])
+        places = self.places_xy_m[rows]
+        return rows, places + share[:, None] * (self.places_xy_m[rows + 1] - places)
 
-    def discs_at(self, t_s: float, radius_m: float = RADIUS_M) -> FloatArray:
-        """Discs (K, 3) x, y, radius of those who are there."""
-        places, _ = self.at(t_s)
-        return np.column_stack([places, np.full(places.shape[0], radius_m)])
+    def slots(self, apart_s: float) -> IntArray:
+        """(N,) a small number for each annotation's person, another one for who is there at the same time.
+
+        Who comes more than ``apart_s`` after another one has left may have the same number.
+        """
+        starts = np.flatnonzero(np.diff(self.person, prepend=self.person[0] - 1))
+        ends = np.append(starts[1:], len(self.person)) - 1
+        out = np.empty(len(self.person), dtype=np.int64)
+        free_from: list[float] = []
+        for k in np.argsort(self.t_s[starts], kind="stable"):
+            begin = float(self.t_s[starts[k]])
+            slot = next((n for n, free in enumerate(free_from) if free < begin), len(free_from))
+            if slot == len(free_from):
+                free_from.append(0.0)
+            free_from[slot] = float(self.t_s[ends[k]]) + apart_s
+            out[starts[k] : ends[k] + 1] = slot
+        return out
 
 
-def read_people(path: Path) -> PeopleTracks:
+def read_people(path: Path, frame_rate_hz: float = FRAME_RATE_HZ) -> PeopleTracks:
     """Read a file of tracks.
 
     Raises
@@ -75,7 +87,7 @@ def read_people(path: Path) -> PeopleTracks:
     order = np.lexsort((table.values[:, 0], table.values[:, 1]))
     rows = table.values[order]
     person = rows[:, 1].astype(np.int64)
-    t_s = (rows[:, 0] - rows[:, 0].min()) / FRAMES_PER_S
+    t_s = (rows[:, 0] - rows[:, 0].min()) / frame_rate_hz
     same = person[1:] == person[:-1]
     twice = np.flatnonzero(same & (np.diff(t_s) <= 0.0))
     if twice.size:

@@ -8,6 +8,7 @@ from pydantic import Discriminator, Field, Tag
 
 from pilotage.core.config import Config
 from pilotage.maps.map_file import LandmarkEntry
+from pilotage.missions.choice import ComponentChoice
 from pilotage.missions.map_choice import MapChoice
 from pilotage.missions.places import GoalConfig, Kidnap, Point, PoseConfig, RandomPlace
 from pilotage.sensors.sensor import NonNegative, Positive
@@ -87,5 +88,7 @@ class WorldConfig(Config):
     start: PoseConfig | None = None
     goal: GoalConfig | None = None
     obstacles: tuple[Obstacle, ...] = ()
+    people: tuple[ComponentChoice, ...] = ()
+    """Plans of those who walk there; no robot is told of them."""
     random_start: RandomPlace | None = None
     kidnaps: tuple[Kidnap, ...] = ()

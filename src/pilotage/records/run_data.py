@@ -20,6 +20,7 @@ from pilotage.records.localizer import read_localizer
 from pilotage.records.metrics import METRICS_FILE, read_metrics
 from pilotage.records.mission import read_mission
 from pilotage.records.numbers import FARTHEST_M, number
+from pilotage.records.people import PeopleTracks, read_people_tracks
 from pilotage.records.plans import Plan, Plans, read_plans
 from pilotage.records.run_folder import robot_folder
 from pilotage.records.scans import Sightings, read_sightings
@@ -63,6 +64,7 @@ class RunData:
     sheet: SheetData | None = None
     terrain: TerrainPictures | None = None
     grid: OccupancyGrid | None = None
+    people: PeopleTracks = field(default_factory=PeopleTracks)
     localizer_text: str = ""
     robot: int = 0
     robots: tuple[str, ...] = ()
@@ -163,6 +165,7 @@ def read_run(folder: Path, *, robot: int = 0, on_damage: OnDamage | None = None)
         sheet=part(lambda place: read_cells(place, world), None, own),
         terrain=part(read_terrain, None),
         grid=part(read_grid_layer, None),
+        people=part(read_people_tracks, PeopleTracks()),
         localizer_text=part(read_localizer, ""),
         robot=robot,
         robots=trace.robots,

@@ -18,6 +18,7 @@ from pilotage.records.grid import write_grid
 from pilotage.records.localizer import write_localizer
 from pilotage.records.metrics import write_metrics
 from pilotage.records.mission import write_mission
+from pilotage.records.people import PeopleTracks, write_people
 from pilotage.records.plans import Plans, write_plans
 from pilotage.records.scans import Sightings, write_sightings
 from pilotage.records.terrain import TerrainPictures, write_terrain
@@ -46,7 +47,7 @@ class RunFiles:
         Every run has them.
     mission_text, localizer_text
         YAML: the mission in full, or for a recorded log its localizer; '' leaves the file out.
-    world, terrain, grid
+    world, terrain, grid, people
         None leaves the file out.
     robots
         One a robot, in the order of the trace's; the first one's files lie in the run folder itself, those of
@@ -61,6 +62,7 @@ class RunFiles:
     world: World | None = None
     terrain: TerrainPictures | None = None
     grid: OccupancyGrid | None = None
+    people: PeopleTracks | None = None
     robots: tuple[RobotFiles, ...] = ()
 
 
@@ -87,6 +89,8 @@ def write_run(out: Path, name: str, files: RunFiles) -> Path:
             write_terrain(draft, files.terrain)
         if files.grid is not None:
             write_grid(draft, files.grid)
+        if files.people is not None:
+            write_people(draft, files.people)
         for robot, told in enumerate(files.robots):
             write_robot(robot_folder(draft, robot), told)
         write_metrics(draft, {**files.metrics, "run_dir": str(out / name)})

@@ -16,10 +16,12 @@ from pilotage.models.footprint import Footprint
 from pilotage.models.motion.motion import MotionConfig
 from pilotage.sensors.readings import Reading, Readings
 from pilotage.sensors.sensor import SensorConfig
-from pilotage.sim.bodies.body import Body
+from pilotage.sim.bodies.body import APART_M, Body
 from pilotage.sim.bodies.motion import SIMULATED_MOTIONS
+from pilotage.sim.people.crowd import Crowd
+from pilotage.sim.people.people import People
 from pilotage.sim.sensing.sensor import SIMULATED_SENSORS, Carrier, ReadTogether, SimulatedSensor
-from pilotage.sim.worlds.traffic import MovingBody, Traffic
+from pilotage.sim.worlds.traffic import NO_RADII, Traffic
 from pilotage.sim.worlds.world import World
 
 
@@ -42,12 +44,17 @@ class RobotSpec:
 class Simulator:
     """Steps robots through a world and reads their sensors at their own rates.
 
-    Robots move one after the other, each against the others where they are then; people give way to nobody.
+    People move first, then the robots one after the other, each against the others where they are then.
 
     Parameters
     ----------
     people
-        Moving bodies besides the robots.
+        Plans of the people besides the robots.
+
+    Attributes
+    ----------
+    crowd
+        The people; None where there are none.
 
     Raises
     ------
@@ -56,15 +63,17 @@ class Simulator:
     """
 
     def __init__(
-        self, world: World, robots: Sequence[RobotSpec], dt_s: float, people: Sequence[MovingBody] = ()
+        self, world: World, robots: Sequence[RobotSpec], dt_s: float, people: Sequence[People] = ()
     ) -> None:
         self._dt_s, self._steps = dt_s, 0
-        self._crowded = len(robots) + len(people) > 1
-        self._traffic = (
-            Traffic([robot.footprint for robot in robots], people) if self._crowded else Traffic.none()
-        )
-        self.world = world.with_traffic(self._traffic)
+        shapes = [robot.footprint for robot in robots]
         states = np.zeros((len(robots), drive.STATE_SIZE))
+        self.crowd = Crowd(people, shapes, states, dt_s) if people else None
+        self._crowded = len(robots) > 1 or self.crowd is not None
+        self._traffic = Traffic.none()
+        if self._crowded:
+            self._traffic = Traffic(shapes, NO_RADII if self.crowd is None else self.crowd.radius_m)
+        self.world = world.with_traffic(self._traffic)
         nobody = np.array([[0, 0, -1]], dtype=np.int64)
         own = self._traffic.own if self._crowded else nobody
         self.bodies: tuple[Body, ...] = tuple(
@@ -75,7 +84,8 @@ class Simulator:
             # Once more, now that everybody is in place.
             body.carry_to(body.pose)
         self._check_apart()
-        shapes = [robot.footprint for robot in robots]
+        if self.crowd is not None:
+            self.crowd.walk_to(0.0, self._traffic)
         self._meeting = (
             states,
             np.concatenate([*(shape.points_m for shape in shapes), np.zeros((0, 2))]),
@@ -84,6 +94,7 @@ class Simulator:
             self._traffic.segments_m,
             self._traffic.circles_m,
             own,
+            self._traffic.first_person,
         )
         several = len(robots) > 1
         seats = [
@@ -106,8 +117,8 @@ class Simulator:
         self._steps += 1
         t_s = self._steps * self._dt_s
         bodies = self.bodies
-        if self._crowded:
-            self._traffic.walk_to(t_s)
+        if self.crowd is not None:
+            self.crowd.walk_to(t_s, self._traffic)
         for body, command in zip(bodies, commands, strict=True):
             body.step(command)
         if self._crowded:
@@ -130,13 +141,18 @@ class Simulator:
     def _meet(self) -> None:
         """Who ran into whom."""
         bodies = self.bodies
-        if not drive.meet_others(*self._meeting):
+        marked = drive.meet_others(*self._meeting)
+        if self.crowd is not None:
+            self.crowd.meet()
+        if not marked or len(bodies) == 1:
             return
-        hit = [
-            min((other for other in bodies if other is not body), key=body.distance_to_m)
-            for body in bodies
-            if body.state[drive.BLOCKER] > 0.0 and len(bodies) > 1
-        ]
+        hit = []
+        for body in bodies:
+            if body.state[drive.BLOCKER] > 0.0:
+                other = min((one for one in bodies if one is not body), key=body.distance_to_m)
+                # Else it was a person that stopped it.
+                if body.distance_to_m(other) < APART_M + body.motion.release_m:
+                    hit.append(other)
         for body in bodies:
             body.run_into(body in hit)
 

@@ -8,8 +8,18 @@ import numpy as np
 
 from pilotage.evaluation.finished import FinishedRun, Verdict
 
-SUMMED = frozenset({"collisions", "path_length_m", "attempts", "replans", "escapes"})
-LEAST = frozenset({"min_clearance_m"})
+SUMMED = frozenset(
+    {
+        "collisions",
+        "path_length_m",
+        "attempts",
+        "replans",
+        "escapes",
+        "people_collisions",
+        "people_touches",
+    }
+)
+LEAST = frozenset({"min_clearance_m", "people_closest_m"})
 LARGEST = frozenset({"position_max_m"})
 
 

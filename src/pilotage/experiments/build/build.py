@@ -24,6 +24,7 @@ from pilotage.missions.mission import Mission
 from pilotage.missions.places import GoalConfig
 from pilotage.missions.robot import RobotConfig
 from pilotage.missions.stack import StackConfig
+from pilotage.sim.people.people import PEOPLE, People, PeopleSetting
 from pilotage.sim.source import RobotSpec, Simulator
 from pilotage.sim.worlds.world import World
 from pilotage.stack.interface import Stack, StackStatus
@@ -113,11 +114,22 @@ def _simulator(
         assert start is not None, "settled above"
         own = f"robots.{index}" if mission.robots else "world"
         world.check_place(f"{own}.start", sheet.footprint, pose_of(start))
-    return Simulator(
-        world,
-        [_spec(mission, index, sheet, oracles) for index, sheet in enumerate(sheets)],
-        mission.run.dt_s,
-    )
+    robots = [_spec(mission, index, sheet, oracles) for index, sheet in enumerate(sheets)]
+    return Simulator(world, robots, mission.run.dt_s, _people(mission, world, robots))
+
+
+def _people(mission: Mission, world: World, robots: Sequence[RobotSpec]) -> list[People]:
+    """The plans of those who walk there, each with a random stream of its own."""
+    streams = RandomStreams(mission.run.seed)
+    starts = np.array([(r.start.x_m, r.start.y_m, r.start.theta_rad, r.footprint.radius_m) for r in robots])
+    plans = []
+    for index, choice in enumerate(mission.world.people):
+        where = f"world.people.{index}"
+        config = PEOPLE.configure(choice.name, choice.parameters, where)
+        rng = streams.stream(f"people/{index}")
+        setting = PeopleSetting(world, starts, mission.run.dt_s, rng, where)
+        plans.append(PEOPLE.entry(choice.name).factory(config, setting))
+    return plans
 
 
 def build(mission: Mission) -> Experiment:

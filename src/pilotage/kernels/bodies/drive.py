@@ -172,8 +172,9 @@ def meet_others(
     others_segments: FloatArray,
     others_circles: FloatArray,
     own: IntArray,
+    first_person: int,
 ) -> bool:
-    """After everybody moved: bring clearances up to date, and count being touched by another body.
+    """After everybody moved: bring clearances up to date, and count being touched by another robot.
 
     Parameters
     ----------
@@ -181,6 +182,8 @@ def meet_others(
         (R, STATE_SIZE) of all bodies.
     corners, first
         (K, 2) of all polygons, and (R + 1,) where each begins.
+    first_person
+        Row of ``others_circles`` from which on they are people, who are counted elsewhere.
 
     Returns
     -------
@@ -194,6 +197,11 @@ def meet_others(
             state[X], state[Y], state[THETA], shape, radii[r], others_segments, others_circles, own[r]
         )
         state[CLEARANCE] = min(state[FIXED_CLEARANCE], others)
+        if first_person < others_circles.shape[0] and others < CONTACT_M:
+            robots = others_circles[:first_person]
+            others = others_clearance(
+                state[X], state[Y], state[THETA], shape, radii[r], others_segments, robots, own[r]
+            )
         if others < CONTACT_M and state[TOUCHING] == 0.0:
             state[COLLISIONS] += 1.0
             state[TOUCHING] = 2.0

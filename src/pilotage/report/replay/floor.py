@@ -14,6 +14,7 @@ from pilotage.report.modes import MODES
 from pilotage.report.replay.common import Column, position_error, scene_events
 from pilotage.report.replay.scene import (
     Circles,
+    DiscTrack,
     Lines,
     Marks,
     PathTrack,
@@ -33,6 +34,7 @@ MOST_FRAMES = 20_000
 MOST_SCAN_VALUES = 400_000
 MOST_PATH_POINTS = 1500
 DEFAULT_RADIUS_M = 0.2
+PEOPLE_COLOUR = GREEN
 GRID_PALETTE = ("transparent", UNKNOWN_COLOUR, OCCUPIED_COLOUR)
 
 
@@ -72,6 +74,7 @@ def floor_scene(run: RunData) -> ReplayScene | None:
         marks=_marks(run),
         paths=_paths(run),
         poses=poses,
+        discs=_people(run, t_s[frames]),
         scans=scan,
         sights=_sights(run, frames, 0),
         states=_states(column),
@@ -118,6 +121,16 @@ def _poses(run: RunData, column: Column) -> tuple[PoseTrack, ...]:
         x, y, theta = column("ref_x_m"), column("ref_y_m"), column("ref_theta_rad")
         tracks.append(PoseTrack("reference", x, y, theta, colour=PURPLE, look="point"))
     return tuple(tracks)
+
+
+def _people(run: RunData, frames_s: FloatArray) -> tuple[DiscTrack, ...]:
+    """Everybody at the frames: at the last time before each that was kept."""
+    people = run.people
+    if not len(people.t_s):
+        return ()
+    at = np.searchsorted(people.t_s, frames_s + 1e-6, side="right") - 1
+    places = people.places_m[np.maximum(at, 0)]
+    return (DiscTrack("people", places, people.radius_m, PEOPLE_COLOUR),)
 
 
 def _lines(run: RunData) -> tuple[Lines, ...]:

@@ -185,6 +185,7 @@ class ReplayMap {
     this.drawSights(pen, i, poses);
     this.drawScans(pen, t);
     this.drawMarks(pen);
+    this.drawDiscs(pen, i, share);
     scene.poses.forEach((track, k) => this.shows(track) && this.drawPose(pen, track, poses[k], i));
     this.drawRuler(pen);
   }
@@ -215,6 +216,29 @@ class ReplayMap {
           pen.beginPath();
           pen.arc(layer.circles_m[k], layer.circles_m[k + 1], layer.circles_m[k + 2], 0, 2 * Math.PI);
           if (layer.fill) { pen.globalAlpha = 0.3; pen.fill(); pen.globalAlpha = 1; }
+          pen.stroke();
+        }
+      }
+    });
+  }
+
+  // People between two frames; who comes or goes is where the frame has him.
+  drawDiscs(pen, i, share) {
+    this.inMetres(pen, (pixel) => {
+      for (const track of this.scene.discs) {
+        if (!this.shows(track)) continue;
+        const count = track.radius_m.length, places = track.places_m;
+        pen.strokeStyle = pen.fillStyle = this.colour(track.colour);
+        pen.lineWidth = 1.5 * pixel;
+        for (let k = 0; k < count; k++) {
+          const at = 2 * (i * count + k), next = at + 2 * count;
+          let x = places[at], y = places[at + 1];
+          if (!(x === x && y === y)) continue;
+          const dx = places[next] - x, dy = places[next + 1] - y;
+          if (dx * dx + dy * dy < 4) { x += share * dx; y += share * dy; }
+          pen.beginPath();
+          pen.arc(x, y, track.radius_m[k], 0, 2 * Math.PI);
+          pen.globalAlpha = 0.45; pen.fill(); pen.globalAlpha = 1;
           pen.stroke();
         }
       }

@@ -113,7 +113,7 @@ class ReplayPlayer {
 
   fillLayers() {
     const list = this.find("layers"), s = this.scene, seen = new Map();
-    for (const group of [s.rasters, s.lines, s.circles, s.marks, s.paths, s.sights, s.scans, s.poses]) {
+    for (const group of [s.rasters, s.lines, s.circles, s.marks, s.paths, s.sights, s.scans, s.discs, s.poses]) {
       for (const layer of group) {
         const size = layer.lines_m || layer.circles_m;
         if (!size || size.length) seen.set(layer.name, layer.colour || (layer.palette || ["muted"]).at(-1));

@@ -89,6 +89,16 @@ class PoseTrack:
 
 
 @dataclass(frozen=True, slots=True)
+class DiscTrack:
+    """Discs that move: ``places_m`` (N, P, 2) at the frames, nan for who is not there; ``radius_m`` (P,)."""
+
+    name: str
+    places_m: FloatArray
+    radius_m: FloatArray
+    colour: str
+
+
+@dataclass(frozen=True, slots=True)
 class ScanTrack:
     """Scans (S, B) seen from a pose track (by its number), each shown until the next; nan for no return."""
 
@@ -172,6 +182,7 @@ class ReplayScene:
     marks: tuple[Marks, ...] = ()
     paths: tuple[PathTrack, ...] = ()
     poses: tuple[PoseTrack, ...] = ()
+    discs: tuple[DiscTrack, ...] = ()
     scans: tuple[ScanTrack, ...] = ()
     sights: tuple[SightTrack, ...] = ()
     states: States | None = None

@@ -1,0 +1,1 @@
+"""People who walk: how they push each other, and what touches them."""
