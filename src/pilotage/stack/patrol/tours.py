@@ -9,10 +9,8 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 
 from pilotage.core.types import FloatArray, IntArray
-from pilotage.kernels.tours.local_search import shortest_tour
+from pilotage.models.tour import closed_tour
 from pilotage.stack.patrol.graph import PatrolGraph
-
-SHAKES_A_VERTEX = 60
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -52,8 +50,11 @@ class Round:
 
 @lru_cache(maxsize=512)
 def _best(graph: PatrolGraph, vertices: tuple[int, ...]) -> Round:
-    draws = np.random.default_rng(0).random((SHAKES_A_VERTEX * len(vertices), 3))
-    order, _ = shortest_tour(np.array(vertices, dtype=np.int64), graph.shortest_m, draws)
+    chosen = np.array(vertices, dtype=np.int64)
+    # Every robot must come to the same tour: no stream of its own.
+    tour = closed_tour(graph.shortest_m[np.ix_(chosen, chosen)], np.random.default_rng(0))
+    assert tour is not None  # the graph is connected
+    order = chosen[list(tour.order)]
     return Round.through(graph, order)
 
 

@@ -1,0 +1,1 @@
+"""Patrol: what is seen from where, and how few places see everything."""

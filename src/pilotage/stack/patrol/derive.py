@@ -1,0 +1,194 @@
+"""A patrol graph from any map: rooms, doors, and viewpoints from which the whole floor is seen."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import ndimage
+
+from pilotage.core.config import Config
+from pilotage.core.errors import InputError
+from pilotage.core.types import BoolArray, FloatArray, IntArray
+from pilotage.kernels.patrol.cover import greedy_cover
+from pilotage.kernels.patrol.visibility import seen_from
+from pilotage.maps.floor import Floor
+from pilotage.maps.world_map import WorldMap
+from pilotage.sensors.sensor import Positive
+from pilotage.stack.patrol.graph import PatrolGraph
+
+BEAMS = 1440
+MOST_PAIRS = 30_000_000
+"""Of places to look from and points to see: both are thinned beyond."""
+MOST_VERTICES = 400
+
+
+class DerivationConfig(Config):
+    """How a graph is laid over a floor."""
+
+    reach_m: Positive = 8.0
+    """As far as a vertex is taken to see: the laser's range, or less for more vertices."""
+    door_width_m: Positive = 2.0
+    """Passages narrower than this between wider places are doors."""
+    apart_m: Positive = 1.0
+    """A door this near to a viewpoint has no vertex of its own."""
+    see_every_m: Positive = 0.25
+    stand_every_m: Positive = 0.5
+    """Spacing of the points that must be seen, and of those to look from."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Derived:
+    """A graph and what it was derived from.
+
+    Attributes
+    ----------
+    doors_xy_m
+        (D, 2) middles of doors.
+    rooms
+        Number of rooms.
+    points_xy_m
+        (M, 2) the floor's points, each in view from some vertex within reach.
+    viewpoints
+        How many of the vertices, the first ones, were chosen for what they see.
+    """
+
+    graph: PatrolGraph
+    doors_xy_m: FloatArray
+    rooms: int
+    points_xy_m: FloatArray
+    viewpoints: int
+
+
+def derive_graph(world: WorldMap, floor: Floor, config: DerivationConfig | None = None) -> Derived:
+    """Lay a patrol graph over a floor.
+
+    Rooms are what is left of the floor where passages narrower than a door are closed, grown back (Bormann
+    et al. 2016, morphological segmentation); doors are where two of them meet. Viewpoints are chosen
+    greedily until every point that the robot's body can cover is in view from one within reach. Edges join
+    vertices whose regions, by length of path, touch.
+
+    Raises
+    ------
+    InputError
+        Where parts of the floor are seen from nowhere at the given spacing, or need far too many vertices.
+    """
+    config = config or DerivationConfig()
+    rooms, doors_xy_m = _rooms_and_doors(floor, config.door_width_m)
+    stand, points, sees = views(world, floor, config.reach_m, config.stand_every_m, config.see_every_m)
+    covered = np.zeros(len(points), np.bool_)
+    # Between places that see as much, the one farther from walls: others pass, and people do.
+    rows, columns = np.array([floor.cell_of(place) for place in stand]).T
+    chosen = greedy_cover(sees, floor.clearance_m[rows, columns], covered)
+    if not covered.all():
+        x, y = points[np.argmin(covered)]
+        raise InputError(
+            f"patrol graph of '{world.name}': {np.count_nonzero(~covered)} of {len(points)} points of the "
+            f"floor are seen from nowhere (({x:.1f}, {y:.1f}) m is one); take a smaller stand_every_m"
+        )
+    vertices = stand[chosen]
+    for door in doors_xy_m:
+        if np.hypot(*(vertices - door).T).min() >= config.apart_m:
+            vertices = np.vstack([vertices, door])
+    if len(vertices) > MOST_VERTICES:
+        raise InputError(
+            f"patrol graph of '{world.name}': expected at most {MOST_VERTICES} vertices, found "
+            f"{len(vertices)}; take a larger reach_m"
+        )
+    edges = floor.lengths_m(vertices, _touching(floor, vertices), "vertex")
+    graph = PatrolGraph.of(vertices, edges, f"patrol graph of '{world.name}'")
+    return Derived(graph, doors_xy_m, rooms, points, len(chosen))
+
+
+def views(
+    world: WorldMap, floor: Floor, reach_m: float, stand_every_m: float, see_every_m: float
+) -> tuple[FloatArray, FloatArray, BoolArray]:
+    """Places to look from (P, 2), points to see (M, 2), and which see which (P, M), all around within reach.
+
+    Points are middles of cells that the robot's body can cover, places of cells that its centre can reach;
+    both are thinned to a spacing, more where there would be too many.
+    """
+    area_m2 = np.count_nonzero(floor.swept) * floor.cell_m**2
+    pairs = area_m2**2 / (stand_every_m * see_every_m) ** 2
+    coarser = max(1.0, (pairs / MOST_PAIRS) ** 0.25)
+    stand = floor.middles(_thinned(floor.reachable, floor, coarser * stand_every_m))
+    points = floor.middles(_thinned(floor.swept, floor, coarser * see_every_m))
+    walls = world.walls
+    return stand, points, seen_from(stand, reach_m, points, BEAMS, walls.segments_m, walls.circles_m)
+
+
+def _thinned(cells: BoolArray, floor: Floor, every_m: float) -> BoolArray:
+    """One marked cell of each square of a side: the one farthest from walls."""
+    side = max(1, round(every_m / floor.cell_m))
+    out = np.zeros_like(cells)
+    row, column = np.nonzero(cells)
+    square = (row // side) * (cells.shape[1] // side + 1) + column // side
+    order = np.lexsort((-floor.clearance_m[row, column], square))
+    first = np.ones(len(order), np.bool_)
+    first[1:] = square[order][1:] != square[order][:-1]
+    kept = order[first]
+    out[row[kept], column[kept]] = True
+    return out
+
+
+def _rooms_and_doors(floor: Floor, door_width_m: float) -> tuple[int, FloatArray]:
+    """How many rooms, and the middles of the doors between them (D, 2)."""
+    wide = floor.reachable & (floor.clearance_m >= 0.5 * door_width_m)
+    room, count = ndimage.label(wide)
+    if count < 2:
+        return 1, np.zeros((0, 2))
+    grown = _grown(floor, room.astype(np.int64))
+    doors: dict[tuple[int, int], list[tuple[int, int]]] = {}
+    for beside in ((0, 1), (1, 0)):
+        ahead = np.roll(grown, (-beside[0], -beside[1]), axis=(0, 1))
+        inner = np.zeros_like(floor.reachable)
+        inner[: grown.shape[0] - beside[0], : grown.shape[1] - beside[1]] = True
+        for row, column in np.argwhere(inner & (grown > 0) & (ahead > 0) & (grown != ahead)):
+            a, b = sorted((int(grown[row, column]), int(ahead[row, column])))
+            doors.setdefault((a, b), []).append((int(row), int(column)))
+    middles = []
+    for cells in doors.values():
+        mark = np.zeros_like(floor.reachable)
+        mark[tuple(np.array(cells).T)] = True
+        # Two rooms may share several doors.
+        pieces, number = ndimage.label(mark, structure=np.ones((3, 3)))
+        for piece in range(1, number + 1):
+            where = np.where(pieces == piece, floor.clearance_m, -np.inf)
+            best = np.unravel_index(int(np.argmax(where)), where.shape)
+            middles.append(floor.middles(_only(mark.shape, best))[0])
+    return count, np.array(middles).reshape(-1, 2)
+
+
+def _only(shape: tuple[int, ...], cell: tuple[np.intp, ...]) -> BoolArray:
+    mark = np.zeros(shape, np.bool_)
+    mark[cell] = True
+    return mark
+
+
+def _grown(floor: Floor, label: IntArray) -> IntArray:
+    """Labels spread over the reachable floor, ring after ring."""
+    label = label.copy()
+    cross = ndimage.generate_binary_structure(2, 1)
+    while True:
+        ring = ndimage.grey_dilation(label, footprint=cross)
+        new = floor.reachable & (label == 0) & (ring > 0)
+        if not new.any():
+            return label
+        label[new] = ring[new]
+
+
+def _touching(floor: Floor, vertices: FloatArray) -> BoolArray:
+    """(V, V) whose regions of nearest cells, by length of path, share a border."""
+    count = len(vertices)
+    nearest = np.full(floor.reachable.size, np.inf)
+    region = np.full(floor.reachable.size, -1, dtype=np.int64)
+    for vertex, place in enumerate(vertices):
+        cost, _ = floor.costs_from(place, f"vertex {vertex}")
+        nearer = cost < nearest
+        nearest[nearer], region[nearer] = cost[nearer], vertex
+    cells = region.reshape(floor.reachable.shape)
+    touch = np.zeros((count, count), np.bool_)
+    for one, other in ((cells[:, :-1], cells[:, 1:]), (cells[:-1], cells[1:])):
+        differ = (one >= 0) & (other >= 0) & (one != other)
+        touch[one[differ], other[differ]] = True
+    return touch | touch.T

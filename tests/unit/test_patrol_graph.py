@@ -1,0 +1,173 @@
+"""Patrol graphs: read, refused, laid over a floor; tours on them."""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from contract.patrol_examples import lattice
+from pilotage.core.errors import InputError
+from pilotage.evaluation.shortest_path import shortest_path
+from pilotage.kernels.geometry.plane import sees
+from pilotage.maps.floor import Floor
+from pilotage.maps.occupancy_grid import OccupancyGrid
+from pilotage.maps.segment_map import SegmentMap
+from pilotage.maps.world_map import WorldMap
+from pilotage.stack.patrol.derive import DerivationConfig, derive_graph
+from pilotage.stack.patrol.graph import PatrolGraph
+from pilotage.stack.patrol.graph_file import on_floor, read_patrol_graph
+from pilotage.stack.patrol.tours import Round, spread
+
+PAIR = "2 100 80 0.1 1 2\n\n0 10 20 1 1 E 30\n\n1 40 20 1 0 W 34"
+# Two rooms of 6 m x 5 m, a door of 1.2 m between them.
+ROOMS = SegmentMap(
+    np.array(
+        [[0, 0, 12, 0], [12, 0, 12, 5], [12, 5, 0, 5], [0, 5, 0, 0], [6, 0, 6, 1.9], [6, 3.1, 6, 5]],
+        dtype=float,
+    ),
+    np.zeros((0, 3)),
+    (0.0, 0.0, 12.0, 5.0),
+)
+WORLD = WorldMap("rooms", ROOMS.bounds_m, geometry=ROOMS)
+
+
+def graph_in(folder: Path, text: str) -> PatrolGraph:
+    path = folder / "floor.graph"
+    path.write_text(text)
+    return read_patrol_graph(path)
+
+
+def test_a_file_in_pixels_becomes_metres(tmp_path: Path) -> None:
+    graph = graph_in(tmp_path, PAIR)
+    assert np.allclose(graph.vertices_xy_m, [[2.0, 4.0], [5.0, 4.0]])
+    assert graph.edges_m[0, 1] == graph.edges_m[1, 0] == pytest.approx(3.2)  # costs of 30 and 34
+    assert graph_in(tmp_path, PAIR.replace("34", "3")).edges_m[0, 1] == pytest.approx(
+        3.0
+    )  # not below straight
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        (PAIR[:-3], "cut short"),
+        ("", "cut short"),
+        (PAIR + " 7", "no more"),
+        (PAIR.replace("0.1", "-1"), "above 0"),
+        (PAIR.replace("0.1", "nan"), "found 'nan'"),
+        (PAIR.replace("\n1 40", "\n2 40"), "expected vertex 1, found 2"),
+        (PAIR.replace("1 0 W", "1 5 W"), "neighbours among"),
+        (PAIR.replace("1 40 20 1 0 W 34", "1 40 20 0"), "one way only"),
+        (PAIR.replace("10 20 1 1 E 30", "10 20 0").replace("1 0 W 34", "0"), "connected"),
+        (PAIR.replace("40 20", "140 20"), "pixels from 0 to 100"),
+        (PAIR.replace("E 30", "E x"), "found 'x'"),
+        ("99999" + PAIR[1:], "at most 2,000"),
+    ],
+)
+def test_what_is_no_graph_is_refused_in_one_line(tmp_path: Path, text: str, said: str) -> None:
+    with pytest.raises(InputError, match=said) as caught:
+        graph_in(tmp_path, text)
+    assert "\n" not in str(caught.value)
+    assert "floor.graph" in str(caught.value)
+
+
+@settings(max_examples=200, deadline=None)
+@given(st.data())
+def test_damaged_files_are_read_or_refused(
+    tmp_path_factory: pytest.TempPathFactory, data: st.DataObject
+) -> None:
+    words = PAIR.split()
+    for _ in range(data.draw(st.integers(1, 3))):
+        place = data.draw(st.integers(0, len(words) - 1))
+        words[place] = data.draw(
+            st.sampled_from(["", "-1", "0", "1e400", "nan", "x", "3", "9" * 30, "٣", "1.5"])
+        )
+    try:
+        graph = graph_in(tmp_path_factory.mktemp("damaged"), " ".join(words))
+    except InputError:
+        return
+    assert np.isfinite(graph.shortest_m).all()
+
+
+def test_paths_follow_edges_and_have_the_shortest_length() -> None:
+    graph = lattice()
+    for a in range(len(graph)):
+        for b in range(len(graph)):
+            path = graph.path(a, b)
+            legs = [graph.edges_m[u, v] for u, v in pairwise(path)]
+            assert sum(legs) == pytest.approx(graph.shortest_m[a, b])
+            assert all(math.isfinite(leg) for leg in legs)
+
+
+def test_the_best_round_of_a_lattice_with_a_dead_end_is_known() -> None:
+    walk = Round.best(lattice(4, 3, 2.0))
+    assert walk.length_m == pytest.approx(12 * 2.0 + 2 * 6.0)
+    assert set(walk.stops.tolist()) == set(range(13))
+    legs = np.diff([*walk.at_m, walk.length_m])
+    assert np.allclose(legs, lattice().edges_m[walk.stops, np.roll(walk.stops, -1)])
+
+
+def test_slots_are_evenly_spaced_and_can_be_reached_in_time() -> None:
+    graph = lattice()
+    walk, starts = Round.best(graph), np.array([0, 0, 5, 12])
+    slots = spread(walk, graph, starts, 0.5, 10.0)
+    # Where each would have begun at one instant, had it driven on before.
+    last_s = max(slot.leaves_s for slot in slots)
+    at_m = np.sort(
+        [(walk.at_m[slot.place] + 0.5 * (last_s - slot.leaves_s)) % walk.length_m for slot in slots]
+    )
+    gaps = np.diff([*at_m, at_m[0] + walk.length_m])
+    assert np.allclose(gaps, walk.length_m / 4)
+    for start, slot in zip(starts, slots, strict=True):
+        assert slot.leaves_s >= 10.0 + graph.shortest_m[start, walk.stops[slot.place]] / 0.5 - 1e-9
+
+
+def test_edges_on_a_floor_are_as_long_as_the_path_that_is_driven() -> None:
+    floor = Floor.of(WORLD, 0.3)
+    far = 30.0
+    graph = PatrolGraph.of(np.array([[3.0, 4.4], [9.0, 4.4]]), np.array([[0.0, far], [far, 0.0]]))
+    length = on_floor(graph, floor).edges_m[0, 1]
+    exact = shortest_path(ROOMS, (3.0, 4.4), (9.0, 4.4), 0.3)
+    assert exact is not None
+    assert exact.length_m - 0.1 < length < 1.06 * exact.length_m
+
+
+@pytest.mark.parametrize("place", [(6.0, 1.0), (20.0, 2.0), (6.0, 4.0)])
+def test_vertices_in_walls_are_refused(place: tuple[float, float]) -> None:
+    graph = PatrolGraph.of(np.array([[3.0, 2.0], place]), np.array([[0.0, 9.0], [9.0, 0.0]]))
+    if place == (6.0, 1.0) or place == (6.0, 4.0):
+        floor = Floor.of(WORLD, 0.7, inside_xy_m=(3.0, 2.0))  # the door is too narrow, the wall near
+    else:
+        floor = Floor.of(WORLD, 0.3)
+    with pytest.raises(InputError, match=r"my.graph: vertex 1 \(.*expected a place on the reachable floor"):
+        on_floor(graph, floor, "my.graph")
+
+
+def test_every_point_of_a_derived_floor_is_seen_from_a_vertex() -> None:
+    floor = Floor.of(WORLD, 0.3)
+    derived = derive_graph(WORLD, floor, DerivationConfig(reach_m=5.0))
+    graph = derived.graph
+    assert derived.rooms == 2
+    assert len(derived.doors_xy_m) == 1
+    assert np.hypot(*(derived.doors_xy_m[0] - [6.0, 2.5])) < 0.4
+    viewpoints = graph.vertices_xy_m[: derived.viewpoints]
+    for x, y in derived.points_xy_m:
+        assert any(
+            math.hypot(x - vx, y - vy) <= 5.0 and sees(vx, vy, x, y, ROOMS.segments_m, ROOMS.circles_m)
+            for vx, vy in viewpoints
+        )
+    assert all(ROOMS.distance_m(x, y) >= 0.25 for x, y in graph.vertices_xy_m)
+    assert len(graph) < 12
+
+
+def test_a_floor_without_room_for_the_robot_is_refused() -> None:
+    with pytest.raises(InputError, match="found none"):
+        Floor.of(WORLD, 4.0)
+    solid = WorldMap("solid", (0.0, 0.0, 2.0, 2.0), grid=OccupancyGrid.of(np.ones((20, 20), bool), 0.1))
+    with pytest.raises(InputError, match="found none"):
+        Floor.of(solid, 0.2)
