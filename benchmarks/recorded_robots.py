@@ -1,8 +1,8 @@
-"""Textbook landmark filters beside ``ekf-slow-errors`` on the recorded robots of a MRCLAM data set.
+"""Textbook landmark filters beside ``ekf-gauss-markov`` on the recorded robots of a MRCLAM data set.
 
     python -m benchmarks.recorded_robots ../shared/data/mrclam/MRCLAM_Dataset6
 
-Prints the table of docs/localization.md. Exit code 0 where ``ekf-slow-errors`` keeps its bars: nobody ever
+Prints the table of docs/localization.md. Exit code 0 where ``ekf-gauss-markov`` keeps its bars: nobody ever
 2 m off, position RMSE at most 0.13 m on the mean and 0.17 m each, mean NEES from 1.5 to 6 for each.
 """
 
@@ -26,10 +26,10 @@ FILTERS: tuple[tuple[str, str, tuple[str, ...]], ...] = (
     ("`ukf-landmarks`", "ukf-landmarks", ()),
     ("`ekf-augmented`", "ekf-augmented", ()),
     ("`ekf-landmarks`, gate 0.9, no doubt", "ekf-landmarks", NAIVE),
-    ("`ekf-slow-errors`", "ekf-slow-errors", ()),
+    ("`ekf-gauss-markov`", "ekf-gauss-markov", ()),
 )
 LOST_M = 2.0
-OURS = "ekf-slow-errors"
+OURS = "ekf-gauss-markov"
 
 
 @dataclass(frozen=True)

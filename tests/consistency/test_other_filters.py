@@ -30,7 +30,7 @@ ASKED_IN = {
     "dead-reckoning": "test_other_filters.py",
     "ekf-augmented": "test_augmented_filter.py",
     "ekf-landmarks": "test_landmark_filter.py",
-    "ekf-slow-errors": "../unit/test_localize_logs.py",
+    "ekf-gauss-markov": "../unit/test_localize_logs.py",
     "ekf-walls": "test_wall_filter.py",
     "ekf-walls-report": "test_wall_filter.py",  # which shows that it is not
     "encoder-gyro": "test_heading_filters.py",

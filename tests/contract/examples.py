@@ -328,7 +328,7 @@ EXAMPLES: dict[tuple[str, str], Example] = {
     ("localizer", "ekf-augmented"): Example(
         localizer_follows, {"systematic": {"distance_scale_var": 1e-3}}, FILTER_NUMBERS
     ),
-    ("localizer", "ekf-slow-errors"): Example(
+    ("localizer", "ekf-gauss-markov"): Example(
         localizer_follows,
         {"gate": 0.999},
         frozenset(

@@ -28,7 +28,7 @@ UNKNOWN_BARCODE = 99
 
 @dataclass(frozen=True)
 class Robot:
-    """What drives; stds of the slow errors are relative or radians."""
+    """What drives; stds of the Gauss-Markov errors are relative or radians."""
 
     speed_gain: float = 1.042
     speed_loss: float = 1.12

@@ -86,7 +86,7 @@ def test_sets_leave_each_recording_out(recordings: Path, tmp_path: Path, capsys:
     assert learned == [[1, 2, 3, 4], [2, 3, 4], [1, 3, 4], [1, 2, 4], [1, 2, 3]]
     parameters = yaml.safe_load(Path(answer["parameter_file"]).read_text())["stack"]["localizer"]
     assert {"name": parameters.pop("name"), **sets[0]["parameters"]} == {
-        "name": "ekf-slow-errors",
+        "name": "ekf-gauss-markov",
         **parameters,
     }
 

@@ -58,7 +58,7 @@ def test_consistent_whatever_befalls_it(
 ) -> None:
     found, _ = localized(tmp_path, events, seed)
     assert number(found, "position_rmse_m") <= rmse_m
-    # Below the 1.5: the shipped parameters allow for slow errors that these lasers do not have.
+    # Below the 1.5: the shipped parameters allow for Gauss-Markov errors, which these have not.
     assert 0.8 <= number(found, "nees_mean") <= 6.0
     if events.missing_s:
         assert found["truth_gaps"] == 1

@@ -1,4 +1,4 @@
-"""A recorded log through the plug by ``ekf-slow-errors``: the AER1513 form, simulated, and bad files."""
+"""A recorded log through the plug by ``ekf-gauss-markov``: the AER1513 form, simulated, and bad files."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from pilotage.cli.localize import localize
 from pilotage.core.errors import InputError
 from pilotage.core.types import FloatArray
 from pilotage.experiments.recordings.localize import localize_log
-from pilotage.kernels.filters import slow_errors
+from pilotage.kernels.filters import gauss_markov
 from pilotage.logs.aer1513 import read_aer1513
 from pilotage.report import write_report
 from support.laser_drives import laser_drive
@@ -51,27 +51,27 @@ def test_the_slopes_are_those_of_central_differences() -> None:
     places = np.array([0, 1, 2, 8, 9, 10, 11, 12, 13, 14, 16, 18])
     mount, motion = np.array([0.2, 0.05, 0.1, 0.05]), np.array([0.4, 0.3])
     scales = np.array([0.01, 0.03, 0.02, 0.05])
-    slant = slow_errors.slant_of_depth(0.3, 0.9)
+    slant = gauss_markov.slant_of_depth(0.3, 0.9)
     z, H, scratch = np.empty(2), np.empty((2, 12)), np.empty((2, 12))
-    assert slow_errors.measure(state, 4.0, 3.0, places, mount, motion, scales, slant, z, H)
+    assert gauss_markov.measure(state, 4.0, 3.0, places, mount, motion, scales, slant, z, H)
     for column, place in enumerate(places):
         ends = []
         for sign in (1.0, -1.0):
             moved, there = state.copy(), np.empty(2)
             moved[place] += sign * 1e-6
-            slow_errors.measure(moved, 4.0, 3.0, places, mount, motion, scales, slant, there, scratch)
+            gauss_markov.measure(moved, 4.0, 3.0, places, mount, motion, scales, slant, there, scratch)
             ends.append(there)
         slope = (ends[0] - ends[1]) / 2e-6
-        np.testing.assert_allclose(slope, H[:, column], atol=1e-2 if place == slow_errors.AGE else 1e-6)
+        np.testing.assert_allclose(slope, H[:, column], atol=1e-2 if place == gauss_markov.AGE else 1e-6)
 
 
 @given(range_m=st.floats(0.3, 8.0), bearing=st.floats(-0.6, 0.6), axis=st.floats(-0.05, 0.05))
 def test_a_camera_s_depth_is_measured_along_its_own_axis(range_m: float, bearing: float, axis: float) -> None:
     depth = range_m * math.cos(bearing - axis)
-    made = slow_errors.range_of_depth(depth / math.cos(bearing), bearing, 0.0)
-    predicted = range_m * (1.0 + slow_errors.slant_of_depth(bearing, 1.0) * axis)
+    made = gauss_markov.range_of_depth(depth / math.cos(bearing), bearing, 0.0)
+    predicted = range_m * (1.0 + gauss_markov.slant_of_depth(bearing, 1.0) * axis)
     assert made == pytest.approx(predicted, rel=axis**2)
-    assert slow_errors.slant_of_depth(bearing, 0.0) == 0.0
+    assert gauss_markov.slant_of_depth(bearing, 0.0) == 0.0
 
 
 def test_the_motion_s_slopes_are_those_of_central_differences() -> None:
@@ -80,7 +80,7 @@ def test_the_motion_s_slopes_are_those_of_central_differences() -> None:
     no_fading, nothing = np.zeros((size, 3)), np.zeros(size)
 
     def move(state: FloatArray, cov: FloatArray) -> None:
-        slow_errors.predict(state, cov, 0.3, 0.2, 0.5, 0.0, 0.0, no_fading, nothing)
+        gauss_markov.predict(state, cov, 0.3, 0.2, 0.5, 0.0, 0.0, no_fading, nothing)
 
     for place in range(size):
         ends = []
@@ -104,7 +104,7 @@ def test_errors_keep_their_variance_and_fade_by_time_way_and_turn() -> None:
     stationary[15:18] = 1.0
     state, cov = np.zeros(size), np.diag(stationary)
     state[15:18] = 1.0
-    slow_errors.predict(state, cov, 0.3, -0.2, 0.5, 0.0, 0.0, fading, stationary)
+    gauss_markov.predict(state, cov, 0.3, -0.2, 0.5, 0.0, 0.0, fading, stationary)
     np.testing.assert_allclose(state[15:18], np.exp([-0.05, -0.6, -0.6]))
     np.testing.assert_allclose(np.diag(cov)[15:18], 1.0)
 

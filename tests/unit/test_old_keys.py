@@ -8,9 +8,11 @@ import pytest
 
 from pilotage.cli.main import main
 from pilotage.core.errors import InputError
+from pilotage.core.registry import RENAMED
 from pilotage.experiments.mission import load_mission, mission_of, read_mission
 from pilotage.missions.mission import Mission
 from pilotage.missions.old_keys import OLD_KEYS, refuse_old_keys
+from pilotage.stack.localization.localizer import LOCALIZERS
 from support.missions import reach
 
 LISTED = {
@@ -94,3 +96,10 @@ def test_on_the_command_line_it_is_one_line(capsys: pytest.CaptureFixture[str]) 
     answer = capsys.readouterr()
     assert answer.out == ""
     assert answer.err == "pilotage: robot.body: is now robot.footprint\n"
+
+
+@pytest.mark.parametrize("old", sorted(RENAMED))
+def test_an_old_name_is_refused_with_the_new_one(old: str) -> None:
+    with pytest.raises(InputError, match=f"localizer '{old}': is now '{RENAMED[old]}'"):
+        load_mission("museum-1", [f"stack.localizer.name={old}"])
+    LOCALIZERS.entry(RENAMED[old])

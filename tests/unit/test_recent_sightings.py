@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from pilotage.core.angles import wrap_to_pi
+from pilotage.stack.localization.gauss_markov_config import EkfGaussMarkovConfig
 from pilotage.stack.localization.recent_sightings import WINDOW_S, RecentSightings
-from pilotage.stack.localization.slow_errors_config import EkfSlowErrorsConfig
 
 POINTS = np.array([[3.0, 1.0], [1.0, 4.0], [-2.0, 2.0], [4.0, -3.0]])
 MOUNT = np.array([0.2, -0.1, 0.3])
@@ -60,6 +60,6 @@ def test_old_sightings_and_those_before_unknown_motion_are_dropped() -> None:
 
 
 def test_an_error_of_which_one_field_is_given_keeps_the_others() -> None:
-    config = EkfSlowErrorsConfig.model_validate({"landmark_range_error": {"std": 0.02}})
+    config = EkfGaussMarkovConfig.model_validate({"landmark_range_error": {"std": 0.02}})
     assert config.landmark_range_error.std == 0.02
     assert config.landmark_range_error.time_constant_s == 30.0

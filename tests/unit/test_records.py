@@ -85,7 +85,7 @@ def a_sheet(world: World) -> SheetData:
         np.where(flags, 1.5, np.nan),
         flags,
         np.array([[1, 2]]),
-        ("no way leads there",),
+        ("no path leads there",),
     )
 
 

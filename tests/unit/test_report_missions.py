@@ -146,7 +146,7 @@ def test_a_team_is_shown_whole(two: Path) -> None:
 def test_what_is_only_planned(tmp_path: Path) -> None:
     page = checked_page(run_of(tmp_path, "museum-plan"), "map", "metrics")
     assert 'id="replay"' not in page
-    assert "planned way" in page
+    assert "planned path" in page
 
 
 def test_an_explored_sheet(tmp_path: Path) -> None:

@@ -65,7 +65,7 @@ class DriveCommands:
         return self.estimates[name].value
 
     def parameters(self) -> dict[str, object]:
-        """As parameters of the localizer ``ekf-slow-errors``."""
+        """As parameters of the localizer ``ekf-gauss-markov``."""
         return {
             "commands": {
                 "delay_s": round(self["delay_s"], 3),

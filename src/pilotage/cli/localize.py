@@ -26,7 +26,7 @@ def localize(
     ] = None,
     localizer: Annotated[
         str, typer.Option(metavar="NAME", help="A registered localizer that knows its landmarks.")
-    ] = "ekf-slow-errors",
+    ] = "ekf-gauss-markov",
     max_range: Annotated[
         float | None, typer.Option(metavar="M", help="aer1513: leave out readings beyond, in metres.")
     ] = None,

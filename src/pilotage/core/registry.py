@@ -16,6 +16,9 @@ from pilotage.core.config import Config, validate
 from pilotage.core.errors import InputError, unknown_name
 from pilotage.core.plugins import load_plugins
 
+RENAMED = {"ekf-slow-errors": "ekf-gauss-markov", "mcl-likelihood-field": "particle-filter"}
+"""Components' old names, each with today's."""
+
 T = TypeVar("T")
 C = TypeVar("C", bound=type)
 
@@ -70,6 +73,8 @@ class Registry(Generic[T]):
     def entry(self, name: str) -> Entry[T]:
         """Look a name up; InputError with the nearest right name where it is unknown."""
         self._load()
+        if name in RENAMED and name not in self._entries:
+            raise InputError(f"{self.role} '{name}': is now '{RENAMED[name]}'")
         if name not in self._entries:
             raise unknown_name(self.role, name, self._entries)
         return self._entries[name]

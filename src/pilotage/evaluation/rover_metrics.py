@@ -28,9 +28,9 @@ def stretches_without(seen: IntArray, step_m: FloatArray) -> list[tuple[int, int
     """Ways of more than ``STRETCH_M`` without a sighting: (first, last) step of each."""
     blind = np.concatenate([[False], seen == 0, [False]])
     edges = np.flatnonzero(np.diff(blind.astype(np.int8)))
-    way = np.concatenate([[0.0], np.cumsum(step_m)])
+    driven_m = np.concatenate([[0.0], np.cumsum(step_m)])
     pairs = zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True)
-    return [(a, b - 1) for a, b in pairs if way[b] - way[a] > STRETCH_M]
+    return [(a, b - 1) for a, b in pairs if driven_m[b] - driven_m[a] > STRETCH_M]
 
 
 def root_determinant(covs: FloatArray) -> FloatArray:

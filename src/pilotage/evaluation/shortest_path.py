@@ -54,7 +54,7 @@ def shortest_path(
 
     Returns
     -------
-    The path, or None where there is none: the start or goal is too near or off the map, or all ways are
+    The path, or None where there is none: the start or goal is too near or off the map, or all paths are
     too narrow.
 
     Raises
@@ -146,13 +146,13 @@ def _cheapest(
     length_m = float(distance[0, count + 1])
     if not math.isfinite(length_m):
         return None
-    way = [count + 1]
-    while way[-1] != count:
-        way.append(int(before[0, way[-1]]))
-    way.reverse()
+    visited = [count + 1]
+    while visited[-1] != count:
+        visited.append(int(before[0, visited[-1]]))
+    visited.reverse()
     arc_of = {(int(a), int(b)): float(sweep) for (a, b), sweep in zip(pairs, sweeps, strict=True)}
     line = [np.array([ends[0]], dtype=np.float64)]
-    for a, b in itertools.pairwise(way[1:-1]):
+    for a, b in itertools.pairwise(visited[1:-1]):
         sweep = arc_of.get((a, b), -arc_of.get((b, a), 0.0))
         if sweep != 0.0 and circle[a] == circle[b]:
             x, y, radius = nodes[circle[a]]

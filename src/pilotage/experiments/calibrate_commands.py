@@ -17,7 +17,7 @@ from pilotage.experiments.calibrate import CalibrationResult, write_calibration
 from pilotage.logs.mrclam import ROBOTS, MrclamLog, read_mrclam
 from pilotage.records.calibration import PARAMETER_FILE, SETS_FILE
 
-LOCALIZER = "ekf-slow-errors"
+LOCALIZER = "ekf-gauss-markov"
 
 
 def commands_from(

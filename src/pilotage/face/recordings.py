@@ -28,7 +28,7 @@ def localize(
     *,
     format: Literal["mrclam", "aer1513"],  # noqa: A002 - as the command line calls it
     robot: int | None = None,
-    localizer: str = "ekf-slow-errors",
+    localizer: str = "ekf-gauss-markov",
     max_range_m: float | None = None,
     set: Mapping[str, Any] | None = None,  # noqa: A002 - as the command line calls it
     out: FilePath = "runs",

@@ -16,7 +16,7 @@ class NearWalls:
     """Walls, and those of them near a place; exact for the reach that is asked.
 
     The walls found around one place are kept and serve while the robot stays near: to go through all of
-    them is due once a metre of way, not once a step. One neighbourhood is kept for each power of two of
+    them is due once a metre of path, not once a step. One neighbourhood is kept for each power of two of
     the reach.
 
     Attributes

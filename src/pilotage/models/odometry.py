@@ -41,14 +41,14 @@ def increment_variances(
     angle_var_rad2_per_rad: float,
     angle_var_rad2_per_m: float,
 ) -> tuple[float, float]:
-    """Variances of an odometry increment: noise grows with the way driven and the angle turned.
+    """Variances of an odometry increment: noise grows with the path driven and the angle turned.
 
     A random walk's variance adds up, so it is proportional to the distance (m^2) and the angle (rad^2).
     """
-    way, turn = abs(distance_m), abs(angle_rad)
+    distance, turn = abs(distance_m), abs(angle_rad)
     return (
-        distance_var_m2_per_m * way + distance_var_m2_per_rad * turn,
-        angle_var_rad2_per_rad * turn + angle_var_rad2_per_m * way,
+        distance_var_m2_per_m * distance + distance_var_m2_per_rad * turn,
+        angle_var_rad2_per_rad * turn + angle_var_rad2_per_m * distance,
     )
 
 

@@ -12,9 +12,9 @@ from pilotage.report.figures.close_ups import close_ups_figure
 from pilotage.report.figures.consistency import consistency_figure
 from pilotage.report.figures.control import control_figure
 from pilotage.report.figures.covariance import covariance_figure
+from pilotage.report.figures.gauss_markov import gauss_markov_figure
 from pilotage.report.figures.map import map_figure
 from pilotage.report.figures.pose_error import pose_error_figure
-from pilotage.report.figures.slow_errors import slow_errors_figure
 from pilotage.report.figures.terrain_estimate import drive_figure, rover_error_figure, uncertainty_figure
 from pilotage.report.figures.terrain_map import (
     close_up_figure,
@@ -58,7 +58,7 @@ OF_THE_DRIVE: tuple[Draw, ...] = (
     pose_error_figure,
     covariance_figure,
     consistency_figure,
-    slow_errors_figure,
+    gauss_markov_figure,
     control_figure,
     ultrasonic_figure,
     clearance_figure,

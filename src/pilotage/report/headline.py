@@ -103,7 +103,7 @@ def _team_headline(metrics: Mapping[str, Any]) -> str:
 
 
 def _planned(metrics: Mapping[str, Any], planned_m: float) -> str:
-    """A way that was planned and not driven."""
+    """A path that was planned and not driven."""
     took, travel = number(metrics.get("planning_time_s")), number(metrics.get("travel_time_s"))
     text = f"a way of {quantities.length(planned_m)}"
     if math.isfinite(took):

@@ -163,7 +163,7 @@ def _tiles(run: RunData) -> list[tuple[str, str]]:
     )
     if run.terrain is not None or not run.trace.has("true_x_m"):
         entries += (
-            ("planned way", planned, quantities.length),
+            ("planned path", planned, quantities.length),
             ("travel time", value("travel_time_s"), quantities.duration),
             ("planning time", value("planning_time_s"), quantities.duration),
             ("cells opened", value("expansions"), quantities.count),

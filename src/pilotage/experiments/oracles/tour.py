@@ -31,7 +31,7 @@ ROOM_M, WIDE_M = 0.006, 0.02
 OVERHANG_M, KEEP_OFF_M = 0.0, 0.006
 SPEED_SHARE, TURN_SHARE, STUCK_S = 0.96, 0.9, 6.0
 TURN_M = 0.12
-"""Way that a turn at the end of a run costs: what is driven meanwhile elsewhere."""
+"""Distance that a turn at the end of a run costs: what is driven meanwhile elsewhere."""
 TRIES = 3
 Run = tuple[Point, ...]
 
@@ -92,7 +92,7 @@ class TourExplorer:
 
     @property
     def left(self) -> tuple[LeftCell, ...]:
-        """Cells that no way leads to."""
+        """Cells that no path leads to."""
         return self._left
 
     def step(self, readings: Readings) -> WheelSpeeds:
@@ -120,9 +120,9 @@ class TourExplorer:
         cost, parent = self._room.costs(*here)
         while self._ahead:
             run = self._ahead.pop(0)
-            way = self._way(run, here, cost, parent)
-            if way:
-                self._driver.follow(way, t_s, slow_at_end=False)
+            path = self._path(run, here, cost, parent)
+            if path:
+                self._driver.follow(path, t_s, slow_at_end=False)
                 return True
         missed = np.argwhere(self._wanted & ~self._visits.visited & (self._tries < TRIES))
         reached = [
@@ -133,7 +133,7 @@ class TourExplorer:
         if reached:
             _, self._goal, node = min(reached)
             x, y = self._stands[self._goal][:2].tolist()
-            self._driver.follow(self._room.way(parent, node, here, (x, y)), t_s, slow_at_end=True)
+            self._driver.follow(self._room.path(parent, node, here, (x, y)), t_s, slow_at_end=True)
             return True
         unseen = np.argwhere(self._wanted & ~self._visits.visited).tolist()
         self._left = tuple(LeftCell(row, column, "unreachable") for row, column in unseen)
@@ -142,12 +142,12 @@ class TourExplorer:
         self._journal.say(t_s, "arrived", self._reason)
         return False
 
-    def _way(self, run: Run, here: Point, cost: FloatArray, parent: IntArray) -> list[Point]:
+    def _path(self, run: Run, here: Point, cost: FloatArray, parent: IntArray) -> list[Point]:
         """Along a run from its first point; straight there where nothing stands between."""
         if self._room.clear(here, run[0]) >= ROOM_M:
             return list(run)
         node = self._room.entry(cost, *run[0])
-        return [] if node < 0 else [*self._room.way(parent, node, here, run[0]), *run[1:]]
+        return [] if node < 0 else [*self._room.path(parent, node, here, run[0]), *run[1:]]
 
     def _tour(self, start: Point) -> list[Run]:
         """The shorter of the tours along rows and along columns."""
@@ -186,7 +186,7 @@ class TourExplorer:
         return x, y
 
     def _ordered(self, runs: Sequence[Run], start: Point) -> tuple[float, list[Run]]:
-        """The runs in a good order and direction, and the way all in all."""
+        """The runs in a good order and direction, and the length all in all."""
         if not runs:
             return 0.0, []
         ends = [point for run in runs for point in (run[0], run[-1])]
@@ -201,7 +201,7 @@ class TourExplorer:
         )
 
     def _away(self, start: FloatArray, ends: FloatArray) -> FloatArray:
-        """(E,) way from a point to others; far beyond all where there is none."""
+        """(E,) distance from a point to others; far beyond all where there is none."""
         cost, _ = self._room.costs(*start.tolist())
         nodes = [self._room.entry(cost, *end) for end in ends.tolist()]
         away = np.array([cost[node] if node >= 0 else math.inf for node in nodes])
@@ -223,7 +223,7 @@ def _length(run: Run) -> float:
 
 
 def _cost(order: Sequence[int], away: FloatArray) -> float:
-    """Way between the runs. Entry k of the order begins at its end k and comes out at the other, k ^ 1."""
+    """Distance between the runs: entry k of the order begins at its end k and ends at the other, k ^ 1."""
     total, at = 0.0, 0
     for k in order:
         total += float(away[at, k + 1])
@@ -244,7 +244,7 @@ def _nearest_first(away: FloatArray) -> list[int]:
 
 
 def _two_opt(order: list[int], away: FloatArray) -> list[int]:
-    """Turn parts of the order round, runs and all, while that is shorter; ways there and back are alike."""
+    """Turn parts of the order round, runs and all, while that is shorter; paths there and back are alike."""
     improved = True
     while improved:
         improved = False

@@ -38,7 +38,7 @@ from pilotage.stack.localization.localizer import LOCALIZERS, Localizer
 FORMATS = ("mrclam", "aer1513")
 START_STDS = (0.05, 0.05, 0.03)
 """Metres, metres and radians of the start, whose mean is the true pose."""
-DEFAULT = "ekf-slow-errors"
+DEFAULT = "ekf-gauss-markov"
 SUMS = ("beacons_seen", "beacons_accepted", "nis", "nis_dof", "nis_expected")
 """Telemetry that adds up between scored steps; of the rest the last value is kept."""
 

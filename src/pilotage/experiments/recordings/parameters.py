@@ -13,9 +13,9 @@ from pilotage.experiments.recordings.drive import BEACONS, RecordedDrive
 from pilotage.experiments.values import merge
 from pilotage.sensors.beacon import BeaconConfig
 
-LEARNED = "ekf-slow-errors"
+LEARNED = "ekf-gauss-markov"
 SLOW_SHARE = 0.5
-"""Variance of a landmark's slow error over that of a single reading."""
+"""Variance of a landmark's Gauss-Markov error over that of a single reading."""
 SAME_RECORDING_S = 600.0
 """Clocks that begin this close tell of the same drive, also where the log was cut."""
 

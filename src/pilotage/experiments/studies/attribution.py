@@ -94,7 +94,7 @@ def attribution_of(folder: Path) -> dict[str, Any]:
     interval and whether it is for the better, and sentences on those that differ surely, or else may differ.
     Success counts before accuracy (errors, coverage), that before safety and time; among them the share that
     is gained. What an oracle makes worse is no cost of its module: it is told, and counts nothing, but for
-    success. Times and ways are compared on the seeds where both runs succeeded.
+    success. Times and paths are compared on the seeds where both runs succeeded.
     """
     table = read_study(folder)
     base = mission_of(dict(table.study.base), table.study.cells[FIRST].overrides)

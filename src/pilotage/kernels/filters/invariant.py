@@ -102,19 +102,19 @@ def update_invariant(
         P[:, :] = cov
         if math.isnan(joseph_update2(full, P, H, innovation, R, math.inf)):
             return math.nan
-        share, gained, way = 1.0, 0.0, 0.0
+        share, gained, step = 1.0, 0.0, 0.0
         for _ in range(MAX_HALVINGS):
             trial[:] = xi + share * (full - xi)
             retract(pose, trial, at, slope)
             cost = posterior_cost(trial, inverse, at, mx, my, r, b, R)
             if cost <= best:
                 gained, best = best - cost, cost
-                way = abs(trial[0] - xi[0]) + abs(trial[1] - xi[1]) + abs(trial[2] - xi[2])
+                step = abs(trial[0] - xi[0]) + abs(trial[1] - xi[1]) + abs(trial[2] - xi[2])
                 xi[:] = trial
                 M[:, :] = slope
                 break
             share *= 0.5
-        if way < CONVERGED or gained < 1e-9 * best:
+        if step < CONVERGED or gained < 1e-9 * best:
             break
     if not best <= gate:
         return best
@@ -157,7 +157,7 @@ def add_commutators(cov: FloatArray, q_turn: float) -> None:
     """Add to second order what the turns' errors do among one another, in place.
 
     exp(a) exp(b) = exp(a + b + [a, b] / 2 + ...): a step's turn w and the error v before it give -w J v / 2,
-    of variance var(w) J Pvv J' / 4 (Barfoot and Furgale 2014, equation 55). It lies along the way, where the
+    of variance var(w) J Pvv J' / 4 (Barfoot and Furgale 2014, equation 55). It lies along the path, where the
     odometer is good to decimetres, and is what makes a long error bent rather than straight.
     """
     p00, p01, p11 = cov[0, 0], cov[0, 1], cov[1, 1]

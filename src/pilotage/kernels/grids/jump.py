@@ -131,7 +131,7 @@ def jump_search(
     status, path, expansions
         As there; what is expanded are jump points.
     queued
-        Flat indices of the cells that were queued, again where a better way to one was found.
+        Flat indices of the cells that were queued, again where a better path to one was found.
     """
     straight, diagonal, top, shift = scale.straight, scale.diagonal, scale.top, scale.shift
     rows = states.shape[0] // stride

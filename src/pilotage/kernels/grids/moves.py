@@ -102,7 +102,7 @@ def pruned_moves(
     straight on comes last.
 
     No optimum is lost whichever of several equally good ways to a cell a search keeps. Let y be reached
-    optimally over x, the search's way into x coming from p, and the step x-y be left out. Then p reaches y
+    optimally over x, the search's path into x coming from p, and the step x-y be left out. Then p reaches y
     as well without x; that is shorter (and x-y was not optimal) or p-x is straight, x-y diagonal, and p-z
     diagonal, z-y straight is as long. So z-y is an optimal last step. Had z been reached by a direction
     for which the straight z-y is left out, the cell before z would have a shorter way to y, so y is found

@@ -125,7 +125,7 @@ def search(
     expansions
         Cells whose successors were looked at, counted again where they were opened again.
     queued
-        Flat indices of the cells that were queued, again where a better way to one was found.
+        Flat indices of the cells that were queued, again where a better path to one was found.
     """
     straight, diagonal, top, shift = scale.straight, scale.diagonal, scale.top, scale.shift
     # Along an edge the octile distance grows by no more than the edge costs.
@@ -158,7 +158,7 @@ def search(
             break
         if n_noted + 8 > noted.shape[0]:
             noted, after = doubled(noted), doubled(after)
-        # A weighted way may be cheaper than one that is shorter: nothing is pruned there.
+        # A weighted path may be cheaper than one that is shorter: nothing is pruned there.
         row_of_table = came if weights is None else NO_DIRECTION
         moves = signed(table[row_of_table, blocked_around(states, cell, stride)])
         held = -1

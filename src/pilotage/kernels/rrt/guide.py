@@ -1,4 +1,4 @@
-"""Cost-to-go over a coarse grid of the distance field: proves that there is no way, or shows one.
+"""Cost-to-go over a coarse grid of the distance field: proves that there is no path, or shows one.
 
 Dijkstra with a bucket queue (Dial 1969, CACM 12(11)) over sixteen moves whose integer costs 5, 7 and 11
 stand for 1, sqrt(2) and sqrt(5) cells. Path costs exceed the Euclidean shortest path by 2.8 % at most on
@@ -58,12 +58,12 @@ def cost_to_go(
     until_row: int,
     until_col: int,
 ) -> tuple[IntArray, IntArray]:
-    """Cost of the cheapest way from each node to the goal, and the move that begins it.
+    """Cost of the cheapest path from each node to the goal, and the move that begins it.
 
     Moves over nodes that are not free cost ``tight_factor`` times as much as others. Nodes farther than
     the one at ``until_row``, ``until_col`` are not all reached; -1 reaches all.
 
-    Returns (rows, columns) costs in units of a fifth of a cell (``UNREACHED`` where there is no way) and
+    Returns (rows, columns) costs in units of a fifth of a cell (``UNREACHED`` where there is no path) and
     (rows, columns) row of ``MOVES`` to take towards the goal (-1 at the goal and where there is none).
     """
     rows, cols = classes.shape
@@ -115,7 +115,7 @@ def cost_to_go(
             reached = cost[u] + MOVES[k, 2] * (1 if kind == 2 else tight_factor)
             if reached >= cost[v]:
                 continue
-            # Between free nodes a way is taken for granted; elsewhere the cells' sides are looked at.
+            # Between free nodes a path is taken for granted; elsewhere the cells' sides are looked at.
             plain = kind == 2 and (k < 4 or k >= 8 or max(classes[row, c], classes[r, col]) == 2)
             if not plain and not move_is_open(gates, classes, space, stride, clearance, row, col, dr, dc):
                 continue
@@ -135,7 +135,7 @@ def cost_to_go(
                 queued[v] = True
                 waiting += 1
             cost[v] = reached
-            # The way from v to the goal takes this move backwards.
+            # The path from v to the goal takes this move backwards.
             move[v] = (k + 2) % 4 if k < 4 else (4 + (k - 2) % 4 if k < 8 else 8 + (k - 4) % 8)
             slot = reached % BUCKETS
             before[v] = -1
@@ -166,7 +166,7 @@ def nearest_node(x: float, y: float, classes: IntArray, space: Space, stride: in
 
 @kernel
 def trace(move: IntArray, space: Space, stride: int, row: int, col: int, half_window: int) -> FloatArray:
-    """Way from a node to the goal as states (K, 3): node positions averaged along the way, with headings."""
+    """Path from a node to the goal as states (K, 3): node positions averaged along it, with headings."""
     count, r, c = 1, row, col
     while move[r, c] >= 0:
         k = move[r, c]
@@ -195,7 +195,7 @@ def trace(move: IntArray, space: Space, stride: int, row: int, col: int, half_wi
 def widest_way(distance: FloatArray, row: int, col: int, goal_row: int, goal_col: int) -> float:
     """The largest clearance with which nodes of a field (ny, nx) are joined, over eight neighbours.
 
-    A way between two true points is wider than this by at most half a cell's diagonal.
+    A path between two true points is wider than this by at most half a cell's diagonal.
     """
     ny, nx = distance.shape
     # Widest-path by repeated flooding with bisection on the clearance: few passes, no heap.

@@ -1,6 +1,6 @@
 """Nodes of a coarse grid over the distance field, and which moves between them are open.
 
-Nothing that is passable is called closed, so that a search over these moves can prove that there is no way.
+Nothing that is passable is called closed, so that a search over these moves can prove that there is no path.
 """
 
 from __future__ import annotations

@@ -49,7 +49,7 @@ class Search(NamedTuple):
 
 
 class Bound(NamedTuple):
-    """Lower bound of the way left to the goal on a coarse grid; (1, 1) zeros where none is known.
+    """Lower bound of the path left to the goal on a coarse grid; (1, 1) zeros where none is known.
 
     ``cost`` (rows, columns) in metres, inf where the goal cannot be reached; ``cell`` is the nodes' spacing.
     """

@@ -132,27 +132,27 @@ def best_chain(samples: FloatArray, s: FloatArray, space: Space, rules: Rules) -
 
 @kernel
 def tighten(
-    way: FloatArray, kept: BoolArray, space: Space, rules: Rules, first_step: float, last_step: float
+    path: FloatArray, kept: BoolArray, space: Space, rules: Rules, first_step: float, last_step: float
 ) -> FloatArray:
     """Move waypoints (K, 3) one at a time while that shortens the chain of curves through them.
 
     Waypoints at the ends of kept pieces (K - 1,) stay, as do start and goal. Steps are metres and
     radians, halved from ``first_step`` to ``last_step``. Returns the moved waypoints.
     """
-    k = way.shape[0]
-    way = way.copy()
+    k = path.shape[0]
+    path = path.copy()
     step = np.full(k, first_step)
     length = np.zeros(k)
     for i in range(k - 1):
         if not kept[i]:
             free = rules.goal_heading_free and i == k - 2
             _, l0, l1, l2 = connect(
-                way[i, 0],
-                way[i, 1],
-                way[i, 2],
-                way[i + 1, 0],
-                way[i + 1, 1],
-                way[i + 1, 2],
+                path[i, 0],
+                path[i, 1],
+                path[i, 2],
+                path[i + 1, 0],
+                path[i + 1, 1],
+                path[i + 1, 2],
                 free,
                 rules.radius,
             )
@@ -166,19 +166,19 @@ def tighten(
             free = rules.goal_heading_free and i == k - 2
             moved = False
             for p in range(PATTERN.shape[0]):
-                c, n = math.cos(way[i, 2]), math.sin(way[i, 2])
+                c, n = math.cos(path[i, 2]), math.sin(path[i, 2])
                 forward, left = step[i] * PATTERN[p, 0], step[i] * PATTERN[p, 1]
-                x, y = way[i, 0] + c * forward - n * left, way[i, 1] + n * forward + c * left
-                th = way[i, 2] + step[i] * PATTERN[p, 2]
+                x, y = path[i, 0] + c * forward - n * left, path[i, 1] + n * forward + c * left
+                th = path[i, 2] + step[i] * PATTERN[p, 2]
                 old = length[i - 1] + length[i] - 1e-7
-                ax, ay, ath = way[i - 1, 0], way[i - 1, 1], way[i - 1, 2]
-                if math.hypot(x - ax, y - ay) + math.hypot(way[i + 1, 0] - x, way[i + 1, 1] - y) >= old:
+                ax, ay, ath = path[i - 1, 0], path[i - 1, 1], path[i - 1, 2]
+                if math.hypot(x - ax, y - ay) + math.hypot(path[i + 1, 0] - x, path[i + 1, 1] - y) >= old:
                     continue
                 w0, a0, a1, a2 = dubins.shortest(ax, ay, ath, x, y, th, rules.radius)
                 if a0 + a1 + a2 >= old:
                     continue
                 w1, b0, b1, b2 = connect(
-                    x, y, th, way[i + 1, 0], way[i + 1, 1], way[i + 1, 2], free, rules.radius
+                    x, y, th, path[i + 1, 0], path[i + 1, 1], path[i + 1, 2], free, rules.radius
                 )
                 if a0 + a1 + a2 + b0 + b1 + b2 >= old:
                     continue
@@ -186,7 +186,7 @@ def tighten(
                     continue
                 if not _is_free(x, y, th, w1, b0, b1, b2, space, rules):
                     continue
-                way[i, 0], way[i, 1], way[i, 2] = x, y, th
+                path[i, 0], path[i, 1], path[i, 2] = x, y, th
                 length[i - 1], length[i] = a0 + a1 + a2, b0 + b1 + b2
                 moved = True
             if not moved:
@@ -197,25 +197,25 @@ def tighten(
                 step[i + 1] = max(step[i + 1], step[i])
         if not active:
             break
-    return way
+    return path
 
 
 @kernel
 def split(
-    way: FloatArray, kept: BoolArray, space: Space, rules: Rules, spacing: float
+    path: FloatArray, kept: BoolArray, space: Space, rules: Rules, spacing: float
 ) -> tuple[FloatArray, BoolArray, IntArray]:
     """Insert a waypoint into each curve where it comes nearest to an obstacle: there it may have to bend.
 
     Curves shorter than four ``spacing`` stay whole. Returns the new waypoints, which pieces are kept,
     and for each piece the index of the piece that it was.
     """
-    k = way.shape[0]
+    k = path.shape[0]
     out = np.empty((2 * k, 3))
     out_kept = np.zeros(2 * k, np.bool_)
     was = np.zeros(2 * k, np.int64)
     n = 0
     for i in range(k - 1):
-        out[n] = way[i]
+        out[n] = path[i]
         out_kept[n] = kept[i]
         was[n] = i
         n += 1
@@ -223,22 +223,29 @@ def split(
             continue
         free = rules.goal_heading_free and i == k - 2
         word, l0, l1, l2 = connect(
-            way[i, 0], way[i, 1], way[i, 2], way[i + 1, 0], way[i + 1, 1], way[i + 1, 2], free, rules.radius
+            path[i, 0],
+            path[i, 1],
+            path[i, 2],
+            path[i + 1, 0],
+            path[i + 1, 1],
+            path[i + 1, 2],
+            free,
+            rules.radius,
         )
         total = l0 + l1 + l2
         if total < 4.0 * spacing:
             continue
         best, at, s = math.inf, -1.0, spacing
         while s <= total - spacing:
-            x, y, _ = dubins.pose_at(way[i, 0], way[i, 1], way[i, 2], rules.radius, word, l0, l1, l2, s)
+            x, y, _ = dubins.pose_at(path[i, 0], path[i, 1], path[i, 2], rules.radius, word, l0, l1, l2, s)
             slack = slack_at(x, y, space, rules.clearance)
             if slack < best:
                 best, at = slack, s
             s += 0.25 * spacing
         out[n, 0], out[n, 1], out[n, 2] = dubins.pose_at(
-            way[i, 0], way[i, 1], way[i, 2], rules.radius, word, l0, l1, l2, at
+            path[i, 0], path[i, 1], path[i, 2], rules.radius, word, l0, l1, l2, at
         )
         was[n] = i
         n += 1
-    out[n] = way[k - 1]
+    out[n] = path[k - 1]
     return out[: n + 1].copy(), out_kept[:n].copy(), was[:n].copy()

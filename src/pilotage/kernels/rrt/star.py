@@ -1,6 +1,6 @@
 """RRT* with Dubins curves (Karaman and Frazzoli 2011, IJRR 30(7); k-nearest variant).
 
-Samples come from four sources: the goal, the neighbourhood of a guide (a rough way from the start to the
+Samples come from four sources: the goal, the neighbourhood of a guide (a rough path from the start to the
 goal, later the incumbent), and the floor, with the heading drawn or left free. Once a solution is known,
 samples and nodes that cannot improve it are turned away (Gammell, Srinivasa and Barfoot 2014, IROS: the
 ellipse test, sharpened where a lower bound of the cost-to-go is given). The guide only shifts where
@@ -133,7 +133,7 @@ def grow(
     Parameters
     ----------
     guide
-        (K, 3) states of a rough way from start to goal; fewer than two are no guide.
+        (K, 3) states of a rough path from start to goal; fewer than two are no guide.
     stop_at_solution
         Return as soon as the goal is joined.
 
@@ -269,7 +269,7 @@ def _rewire(
         length = l0 + l1 + l2
         if length > search.connection or tree.cost[new] + length >= tree.cost[node] - 1e-9:
             continue
-        # Costs grow along branches, so a cheaper way to a node never leads through its own descendants.
+        # Costs grow along branches, so a cheaper path to a node never leads through its own descendants.
         if _node_is_free_to(tree, new, word, l0, l1, l2, space, search):
             attach(tree, node, new, word, l0, l1, l2)
             changed = True

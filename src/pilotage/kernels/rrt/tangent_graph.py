@@ -3,7 +3,7 @@
 Around every wall end and disc lies a circle that the path may touch; a shortest path is made of arcs of
 these circles and of straight tangents to two of them (or from the start or goal to one). See LaValle
 (2006), Planning Algorithms, 6.2.4, for the polygonal case; here walls grow to capsules. Straights and arcs
-that come nearer than the clearance are left out, so the cheapest way through the graph is the exact optimum.
+that come nearer than the clearance are left out, so the cheapest path through the graph is the exact optimum.
 """
 
 from __future__ import annotations

@@ -23,7 +23,7 @@ class Tree(NamedTuple):
     Attributes
     ----------
     pose, cost
-        (cap, 3) x, y, theta and (cap,) length of the way from the start; inf where a node is cut off.
+        (cap, 3) x, y, theta and (cap,) length of the path from the start; inf where a node is cut off.
     parent, word, lengths
         (cap,), (cap,) and (cap, 3): the Dubins curve by which the parent reaches the node.
     child, after, before

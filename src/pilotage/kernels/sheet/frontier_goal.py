@@ -32,8 +32,8 @@ def entry_node(
     best, node = np.inf, -1
     for r in range(max(row - reach, 0), min(row + reach + 1, rows)):
         for c in range(max(column - reach, 0), min(column + reach + 1, columns)):
-            way = math.hypot(c * width_m - x, r * height_m - y)
-            value = cost[r * columns + c] + 3.0 * way
+            path = math.hypot(c * width_m - x, r * height_m - y)
+            value = cost[r * columns + c] + 3.0 * path
             if value < best and (
                 clearance_along(c * width_m, r * height_m, x, y, segments, points, 0.006) > clearance_m
             ):
@@ -64,7 +64,7 @@ def choose_goal(
 ) -> tuple[int, int]:
     """Choose among the wanted cells.
 
-    A goal's value is the length of the way, plus ``turn_m_rad`` for each radian to turn first, less
+    A goal's value is the length of the path, plus ``turn_m_rad`` for each radian to turn first, less
     ``hug_m`` for each side on which nothing is left to do (so that no single cells stay behind), less
     ``gain_m`` times the share of it that no beam has seen (the information gained).
 
@@ -135,27 +135,27 @@ def straightened(
     segments: FloatArray,
     points: FloatArray,
 ) -> FloatArray:
-    """(K, 2) way from a point to a node: as few straight lines as keep the clearance, else node by node."""
+    """(K, 2) path from a point to a node: as few straight lines as keep the clearance, else node by node."""
     count = 0
     at = node
     while at >= 0:
         count += 1
         at = parent[at]
-    way = np.empty((count, 2))
+    path = np.empty((count, 2))
     at = node
     for k in range(count - 1, -1, -1):
-        way[k, 0], way[k, 1] = (at % columns) * width_m, (at // columns) * height_m
+        path[k, 0], path[k, 1] = (at % columns) * width_m, (at // columns) * height_m
         at = parent[at]
     out = np.empty((count, 2))
     used, k = 0, 0
     while k < count:
         target = k
         for far in range(count - 1, k, -1):
-            if clearance_along(x, y, way[far, 0], way[far, 1], segments, points, 0.009) > clearance_m:
+            if clearance_along(x, y, path[far, 0], path[far, 1], segments, points, 0.009) > clearance_m:
                 target = far
                 break
-        out[used] = way[target]
+        out[used] = path[target]
         used += 1
-        x, y = way[target, 0], way[target, 1]
+        x, y = path[target, 0], path[target, 1]
         k = target + 1
     return out[:used]

@@ -54,10 +54,10 @@ _UNITS = (
 _MEANINGS = {
     "distance_var_per_step_m2": "Variance of the distance error of one step of the logs.",
     "angle_var_per_step_rad2": "Variance of the heading error of one step of the logs.",
-    "distance_var_m2_per_m": "Distance variance that grows with the way driven.",
+    "distance_var_m2_per_m": "Distance variance that grows with the path driven.",
     "distance_var_m2_per_rad": "Distance variance that grows with the angle turned.",
     "angle_var_rad2_per_rad": "Heading variance that grows with the angle turned.",
-    "angle_var_rad2_per_m": "Heading variance that grows with the way driven.",
+    "angle_var_rad2_per_m": "Heading variance that grows with the path driven.",
     "cross_cov_m_rad": "Covariance of distance and heading error of the same step.",
     "distance_scale": "Claimed over true distance: 1 is ideal.",
     "angle_scale": "Claimed over true turn: 1 is ideal.",

@@ -37,7 +37,7 @@ from pilotage.report.style import (
 SLUG = "close-ups"
 TITLE = "Close-ups"
 MOST = 3
-WAY_S = 30.0
+PATH_S = 30.0
 _LEFT_PT, _RIGHT_PT, _TOP_PT, _BOTTOM_PT, _GAP_PT = 24.0, 4.0, 20.0, 22.0, 28.0
 # What went wrong is worth more than what went well.
 _TELLING = ("collision", "failed", "stuck", "escape", "avoid-start", "replan", "hall")
@@ -74,8 +74,8 @@ def close_ups_figure(run: RunData) -> Illustration:
         axes.locator_params(nbins=5)
         _draw(axes, _window(run, x, y, half_m, moment.step), run, moment.step, radius)
     caption = (
-        f"Windows of {quantities.length(2.0 * half_m)}, in metres like the map, with the way of "
-        f"{WAY_S:g} s before and after. The body is the robot at that moment, dashed is where it "
+        f"Windows of {quantities.length(2.0 * half_m)}, in metres like the map, with the path of "
+        f"{PATH_S:g} s before and after. The body is the robot at that moment, dashed is where it "
         "believed to be; the small black ellipses hold it with 95 % probability and are to scale."
     )
     candidates = (
@@ -168,9 +168,9 @@ def _draw(axes: Axes, inside: RunData, run: RunData, step: int, radius: float) -
 def _window(run: RunData, x: float, y: float, half_m: float, step: int) -> RunData:
     """Return the run with only what lies in a window: lines are cut at its rim to keep the page small.
 
-    Of the ways only those of `WAY_S` around the moment: a robot that passes often would fill the window.
+    Of the paths only those of `PATH_S` around the moment: a robot that passes often would fill the window.
     """
-    soon = np.abs(run.trace.t_s - run.trace.t_s[step]) <= WAY_S
+    soon = np.abs(run.trace.t_s - run.trace.t_s[step]) <= PATH_S
 
     def near(points: FloatArray) -> BoolArray:
         # A little more than the window, so that lines leave it instead of ending at its rim.

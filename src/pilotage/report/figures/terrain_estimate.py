@@ -33,13 +33,13 @@ from pilotage.report.style import (
 )
 
 ELLIPSES = 24
-"""So many along the way, at equal distances."""
+"""So many along the path, at equal distances."""
 MOST_POINTS = 4000
 HOURS_S = 3600.0
 
 
 def thinned(points: FloatArray) -> FloatArray:
-    """Points that still show the way: the last one always among them."""
+    """Points that still show the path: the last one always among them."""
     step = max(1, math.ceil(len(points) / MOST_POINTS))
     return points if step == 1 else np.vstack([points[::step], points[-1:]])
 
@@ -59,7 +59,7 @@ def estimate_layers(axes: Axes, run: RunData, landmarks: FloatArray, unit: float
         y = estimate[k, 1] + along * math.sin(turn) + across * math.cos(turn)
         outlines.append(Outline(np.column_stack([x, y]), closed=True))
     one_shape(axes, outlines, facecolor="none", edgecolor=VERMILLION, linewidth=1.0, zorder=5.6)
-    keys = [Key("estimated way", YELLOW), Key(f"{_probability(run)} ellipses", VERMILLION)]
+    keys = [Key("estimated path", YELLOW), Key(f"{_probability(run)} ellipses", VERMILLION)]
     inside = landmarks / unit
     if len(inside):
         axes.plot(
@@ -113,8 +113,8 @@ def uncertainty_figure(run: RunData) -> Illustration:
     trace = run.trace
     if not trace.has("root_determinant_m2") or trace.steps < 2:
         return Illustration(slug, title, "", "The mission has no estimator.")
-    hours, way = trace.t_s / HOURS_S, trace["distance_m"] / 1000.0
-    figure, (over_time, over_way) = stacked_axes(
+    hours, distance_km = trace.t_s / HOURS_S, trace["distance_m"] / 1000.0
+    figure, (over_time, over_distance) = stacked_axes(
         [
             "Root of the determinant of the position's covariance [m²]",
             "The same over the distance driven [m²]",
@@ -123,7 +123,7 @@ def uncertainty_figure(run: RunData) -> Illustration:
         share_time=False,
     )
     values = np.maximum(trace["root_determinant_m2"], 1e-9)
-    for axes, x, label in ((over_time, hours, "time [h]"), (over_way, way, "distance [km]")):
+    for axes, x, label in ((over_time, hours, "time [h]"), (over_distance, distance_km, "distance [km]")):
         series(axes, x, values, BLUE, linewidth=1.3)
         logarithmic(axes, 0.7 * float(np.nanmin(values)), 1.4 * float(np.nanmax(values)))
         blind = trace["beacons_seen"] == 0.0 if trace.has("beacons_seen") else np.zeros(len(x), bool)
@@ -191,10 +191,10 @@ def _over_hours(panels: list[Axes], hours: FloatArray) -> None:
     panels[-1].set_xlabel("time [h]", labelpad=3.0)
 
 
-def _along(way: FloatArray) -> list[int]:
-    """Samples at equal distances along the way, the end among them."""
-    wanted = np.linspace(0.0, float(way[-1]), ELLIPSES + 1)[1:]
-    return sorted({min(int(k), len(way) - 1) for k in np.searchsorted(way, wanted)})
+def _along(distance_km: FloatArray) -> list[int]:
+    """Samples at equal distances along the path, the end among them."""
+    wanted = np.linspace(0.0, float(distance_km[-1]), ELLIPSES + 1)[1:]
+    return sorted({min(int(k), len(distance_km) - 1) for k in np.searchsorted(distance_km, wanted)})
 
 
 def _probability(run: RunData) -> str:

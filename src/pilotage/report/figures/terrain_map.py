@@ -1,4 +1,4 @@
-"""The way over the ground and over the hazards, and what the search looked at."""
+"""The path over the ground and over the hazards, and what the search looked at."""
 
 from __future__ import annotations
 
@@ -22,15 +22,15 @@ from pilotage.report.style import BLUE, GREEN, ORANGE, SKY, VERMILLION, WIDTH_PT
 _LEFT_PT, _RIGHT_PT, _TOP_PT, _BOTTOM_PT = 44.0, 8.0, 8.0, 32.0
 _MOST_HEIGHT_PT = 900.0
 MARGIN = 0.06
-"""Around the way seen from near, as a share of its extent."""
+"""Around the path seen from near, as a share of its extent."""
 _NOTHING = "The run left no picture of its ground."
 
 Rgb = NDArray[np.uint8]
 
 
 def terrain_map_figure(run: RunData) -> Illustration:
-    """Draw the way over the shaded ground, hazards tinted."""
-    slug, title = "terrain", "The way over the ground"
+    """Draw the path over the shaded ground, hazards tinted."""
+    slug, title = "terrain", "The path over the ground"
     pictures = run.terrain
     if pictures is None:
         return Illustration(slug, title, "", _NOTHING)
@@ -38,18 +38,18 @@ def terrain_map_figure(run: RunData) -> Illustration:
         return Illustration(slug, title, "", "The ground was given as hazards only; see below.")
     figure, axes = _ground_axes(pictures)
     _show(axes, pictures, _tinted(pictures.ground, pictures.hazards, ORANGE, 0.45))
-    drawn = _way(axes, run, pictures, SKY)
+    drawn = _path(axes, run, pictures, SKY)
     limit = pictures.slope_limit_deg
     steep = f"steeper than {limit:g}°" if math.isfinite(limit) else "hazards"
-    alt = "Shaded map of the ground with the way"
+    alt = "Shaded map of the ground with the path"
     keys = (*drawn, Key(steep, ORANGE, "band"))
     caption = f"The ground lit from the north-west, what is {steep} tinted. {_told(run)}"
     return Illustration(slug, title, alt, caption, render(figure, slug, alt), keys)
 
 
 def close_up_figure(run: RunData) -> Illustration:
-    """Draw the way and its estimate, hazards tinted, as large as the page allows."""
-    slug, title = "close-up", "The way from near"
+    """Draw the path and its estimate, hazards tinted, as large as the page allows."""
+    slug, title = "close-up", "The path from near"
     pictures = run.terrain
     if pictures is None or not run.trace.has("true_x_m", "est_x_m"):
         return Illustration(slug, title, "", "The mission has no estimator.")
@@ -65,22 +65,22 @@ def close_up_figure(run: RunData) -> Illustration:
     figure, axes = _ground_axes(pictures, low, high)
     ground = pictures.hazards if pictures.ground is None else pictures.ground
     _show(axes, pictures, _tinted(ground, pictures.hazards, ORANGE, 0.45))
-    keys = _way(axes, run, pictures, SKY)
-    alt = "The way, its estimate and the ellipses from near"
-    caption = f"Ellipses stand at equal distances along the way. {ellipses_told(run)}".rstrip()
+    keys = _path(axes, run, pictures, SKY)
+    alt = "The path, its estimate and the ellipses from near"
+    caption = f"Ellipses stand at equal distances along the path. {ellipses_told(run)}".rstrip()
     return Illustration(slug, title, alt, caption, render(figure, slug, alt), tuple(keys))
 
 
 def hazard_map_figure(run: RunData) -> Illustration:
-    """Draw the way over the hazards, white on black as obstacle maps are."""
-    slug, title = "hazards", "The way between the hazards"
+    """Draw the path over the hazards, white on black as obstacle maps are."""
+    slug, title = "hazards", "The path between the hazards"
     pictures = run.terrain
     if pictures is None:
         return Illustration(slug, title, "", _NOTHING)
     figure, axes = _ground_axes(pictures)
     _show(axes, pictures, np.repeat(pictures.hazards[..., None], 3, axis=2))
-    drawn = _way(axes, run, pictures, SKY if run.trace.has("est_x_m") else VERMILLION)
-    alt = "Map of the hazards, white, with the way"
+    drawn = _path(axes, run, pictures, SKY if run.trace.has("est_x_m") else VERMILLION)
+    alt = "Map of the hazards, white, with the path"
     share = quantities.share(float(pictures.hazards.mean()) / 255.0)
     caption = f"Hazards are white, as in the obstacle map of the report; they cover {share} of the map."
     return Illustration(slug, title, alt, caption, render(figure, slug, alt), tuple(drawn))
@@ -95,14 +95,14 @@ def looked_at_figure(run: RunData) -> Illustration:
     figure, axes = _ground_axes(pictures)
     grey = (255 - (pictures.hazards.astype(np.uint16) * 90) // 255).astype(np.uint8)
     _show(axes, pictures, _tinted(grey, _spread(pictures.looked_at), BLUE, 1.0))
-    _way(axes, run, pictures)
+    _path(axes, run, pictures)
     expansions = quantities.count(number(run.metrics.get("expansions")))
     alt = "Map of the cells that the search queued"
     caption = (
         f"Cells that the search put into its queue, blue; hazards grey. It opened {expansions} cells. A "
         "search by jump points passes over all between them unqueued, so that only corners and turns show."
     )
-    keys = (Key("planned way", VERMILLION), Key("queued", BLUE, "band"))
+    keys = (Key("planned path", VERMILLION), Key("queued", BLUE, "band"))
     return Illustration(slug, title, alt, caption, render(figure, slug, alt), keys)
 
 
@@ -110,12 +110,12 @@ def _told(run: RunData) -> str:
     """Length and effort in a sentence."""
     driven = number(run.metrics.get("path_length_m"))
     if math.isfinite(driven):
-        return f"The way is {quantities.length(driven)} long. {ellipses_told(run)}".rstrip()
+        return f"The path is {quantities.length(driven)} long. {ellipses_told(run)}".rstrip()
     planned = number(run.metrics.get("planned_length_m"))
     if not math.isfinite(planned):
-        return "No way was found."
+        return "No path was found."
     nodes = quantities.count(number(run.metrics.get("path_nodes")))
-    return f"The way is {quantities.length(planned)} long and has {nodes} nodes."
+    return f"The path is {quantities.length(planned)} long and has {nodes} nodes."
 
 
 def _ground_axes(
@@ -172,14 +172,14 @@ def _show(axes: Axes, pictures: TerrainPictures, rgb: Rgb) -> None:
     axes.set_ylim(limits[1])
 
 
-def _way(axes: Axes, run: RunData, pictures: TerrainPictures, colour: str = VERMILLION) -> list[Key]:
-    """Draw the way, planned or true, with its estimate where there is one; return what was drawn."""
+def _path(axes: Axes, run: RunData, pictures: TerrainPictures, colour: str = VERMILLION) -> list[Key]:
+    """Draw the path, planned or true, with its estimate where there is one; return what was drawn."""
     unit = _unit(pictures)
     dark = [Stroke(linewidth=3.4, foreground="#12212f"), Normal()]
     driven = run.trace.has("true_x_m", "true_y_m")
     names = ("true_x_m", "true_y_m") if driven else ("path_x_m", "path_y_m")
     points = thinned(np.column_stack([run.trace[name] for name in names])) / unit
-    keys = [Key("true way" if driven else "planned way", colour)]
+    keys = [Key("true path" if driven else "planned path", colour)]
     if len(points) > 1:
         axes.plot(*points.T, color=colour, linewidth=1.8, path_effects=dark, zorder=5)
     if run.trace.has("est_x_m", "ellipse_major_m"):

@@ -1,4 +1,4 @@
-"""What happened and when: the numbered events over the way still to go, and the modes below."""
+"""What happened and when: the numbered events over the path still to go, and the modes below."""
 
 from __future__ import annotations
 

@@ -71,7 +71,7 @@ class PoseTrack:
 
     ``look``: ``robot`` (a disc of ``radius_m`` with its heading), ``outline`` (the same, not filled) or
     ``point``; ``body_m`` (K, 2) is a polygon in the robot's frame that is drawn in the disc's place.
-    ``trail`` draws the way so far. ``cov_m2`` (N, 3) is xx, xy, yy of its 95 % ellipse. ``absent`` is said
+    ``trail`` draws the path so far. ``cov_m2`` (N, 3) is xx, xy, yy of its 95 % ellipse. ``absent`` is said
     where there is no pose.
     """
 

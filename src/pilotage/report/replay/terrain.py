@@ -1,4 +1,4 @@
-"""The scene of a run on terrain: ground and hazards, the way, its estimate, what was in sight."""
+"""The scene of a run on terrain: ground and hazards, the path, its estimate, what was in sight."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def terrain_scene(run: RunData) -> ReplayScene | None:
     pictures = run.terrain
     bounds = _bounds(run, pictures)
     width_m = max(bounds[2] - bounds[0], bounds[3] - bounds[1])
-    note = "" if driven else "Nothing was driven: the rover is shown along the planned way at its speed."
+    note = "" if driven else "Nothing was driven: the rover is shown along the planned path at its speed."
     return ReplayScene(
         t_s=t_s[frames],
         bounds_m=bounds,

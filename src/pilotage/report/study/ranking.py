@@ -37,7 +37,7 @@ def ranking_table(modules: Sequence[Module]) -> str:
         '<section id="ranking"><h2><a href="#ranking">What each module costs</a></h2>'
         "<p>How the mission changes where an oracle replaces one module, on the same seeds; below it the "
         "95 % interval. Bold is what the trials tell from chance. Success counts before accuracy, accuracy "
-        "before safety and time; times and ways are compared where both runs succeeded.</p>"
+        "before safety and time; times and paths are compared where both runs succeeded.</p>"
         '<div class="wide" tabindex="0"><table class="cells"><thead><tr><th scope="col">oracle for</th>'
         f"{head}</tr></thead><tbody>{''.join(rows)}</tbody></table></div></section>"
     )

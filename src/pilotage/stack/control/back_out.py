@@ -29,7 +29,7 @@ class BackOut:
     """Reverses along the robot's own trail by pure pursuit: that ground was free a moment ago.
 
     The trail is used up as it is driven back, so a second escape starts where the first one ended. Where
-    nothing is left of it the robot turns on the spot, to look for a way with another heading. Something
+    nothing is left of it the robot turns on the spot, to look for a path with another heading. Something
     that moved in behind is not seen.
     """
 

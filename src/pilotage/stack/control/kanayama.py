@@ -17,7 +17,7 @@ class KanayamaConfig(Config):
 
     along_per_s: Positive = 2.0
     length_m: Positive = 0.354
-    """Way over which errors across the path and of the heading die out, damped alike at all speeds."""
+    """Distance over which errors across the path and of the heading die out, damped alike at all speeds."""
 
 
 @CONTROLLERS.add("kanayama", KanayamaConfig)

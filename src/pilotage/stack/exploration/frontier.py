@@ -47,7 +47,7 @@ class FrontierExplorer:
     """Visits every cell it can, nearest and most telling first, on a map and a pose that correct each other.
 
     Goals are unvisited cells at the frontier of what was visited, chosen by travel cost and information
-    gain (Yamauchi 1997; Burgard and others 2005); ways are planned on the map as it grows, unknown floor
+    gain (Yamauchi 1997; Burgard and others 2005); paths are planned on the map as it grows, unknown floor
     being taken for free. When the position becomes unsure it returns to a landmark. The pose comes from
     ``SheetSmoother``; at the end the whole run is smoothed once more, cells whose visit then proves
     doubtful are visited again, and only when none is left is it done.
@@ -163,7 +163,7 @@ class FrontierExplorer:
         return command
 
     def _keep_up(self, t_s: float) -> None:
-        """After beams and line sensors spoke: solve in time, look whether the way is still free."""
+        """After beams and line sensors spoke: solve in time, look whether the path is still free."""
         if self._driver.moves_ahead and self._senses.is_over_edge():
             self._back_from_edge(t_s)
             return
@@ -212,7 +212,7 @@ class FrontierExplorer:
         self._ground.age()
 
     def _way_is_free(self) -> bool:
-        """Whether the next pieces of the way keep their room, by the map as it is now."""
+        """Whether the next pieces of the path keep their room, by the map as it is now."""
         self._ground.refresh()
         x, y, _ = self._smoother.keyframes.pose
         return self._ground.way_is_free((x, y), self._driver.waypoints)
@@ -255,11 +255,11 @@ class FrontierExplorer:
 
     def _look(self, look: Look, here: Point, parent: IntArray, t_s: float) -> None:
         """Set out to see a landmark."""
-        way = [*self._ground.room.way(parent, look.node, here, look.begin), look.end]
+        path = [*self._ground.room.path(parent, look.node, here, look.begin), look.end]
         if look.back:
-            way.append(look.begin)
+            path.append(look.begin)
         self._doing = Doing.LOOK
-        self._driver.follow(way, t_s, slow_at_end=True, back=look.back)
+        self._driver.follow(path, t_s, slow_at_end=True, back=look.back)
 
     def _inspect(self, here: Point, cost: FloatArray, parent: IntArray, t_s: float) -> bool:
         """Set out to see where a tape ends; False where that is known of all."""
@@ -289,7 +289,7 @@ class FrontierExplorer:
             return False
         self._goal = goal.cell
         self._doing = Doing.GO
-        self._driver.follow(goal.way, t_s, slow_at_end=goal.is_shallow)
+        self._driver.follow(goal.path, t_s, slow_at_end=goal.is_shallow)
         return True
 
     def _arrive(self, t_s: float) -> None:
@@ -346,13 +346,13 @@ class FrontierExplorer:
 
     def _retreat(self, cost: FloatArray, t_s: float) -> bool:
         """Set out back along the trail where the map closes the robot in; False where it does not."""
-        way = trail_back(self._smoother.keyframes.poses[: self._smoother.keyframes.count])
-        if self._retreats >= RETREATS or not way or not is_walled_in(self._ground.room, cost, self.visited):
+        path = trail_back(self._smoother.keyframes.poses[: self._smoother.keyframes.count])
+        if self._retreats >= RETREATS or not path or not is_walled_in(self._ground.room, cost, self.visited):
             return False
         self._retreats += 1
         self._journal.say(t_s, "retreat", "the map leaves no way out: back along its own trail")
         self._doing = Doing.LOOK
-        self._driver.follow(way, t_s, slow_at_end=True)
+        self._driver.follow(path, t_s, slow_at_end=True)
         # Nothing was looked at again: that review is still to come.
         self._reviews -= 1
         self._goals.is_review = self._reviews > 0

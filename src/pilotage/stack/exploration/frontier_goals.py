@@ -31,7 +31,7 @@ class Goal:
     """A cell (row, column) to visit, the way to the best place in it, and whether that lies near its rim."""
 
     cell: Cell
-    way: list[Point]
+    path: list[Point]
     is_shallow: bool
 
 
@@ -101,8 +101,8 @@ class Goals:
             return None
         row, column = divmod(cell, self._grid.shape.columns)
         stand_x, stand_y, depth, _ = stands[row, column]
-        way = room.way(parent, node, pose[:2], (float(stand_x), float(stand_y)))
-        return Goal((row, column), way, bool(depth < DEEP_M))
+        path = room.path(parent, node, pose[:2], (float(stand_x), float(stand_y)))
+        return Goal((row, column), path, bool(depth < DEEP_M))
 
     def _stands(self) -> FloatArray:
         return self._ground.find_stands(self._grid.depth_m < DEEP_M)

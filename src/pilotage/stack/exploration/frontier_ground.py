@@ -13,13 +13,13 @@ OVERHANG_M = 0.004
 """The body may reach over the sheet's edge by this much."""
 KEEP_OFF_M = 0.004
 GUARD_AHEAD_M, GUARD_ROOM_M = 0.05, 0.011
-"""It stops for what would come this near within so much way: a few millimetres are driven while it brakes."""
+"""It stops for what would come this near within so much path: braking takes a few millimetres."""
 CAUTION_ROOM_M = 0.022
 """With less room ahead it drives more slowly."""
 NEARER_M = 0.0015
 """What is no nearer ahead than here by this much does not stop it: it is leaving that behind."""
 SLACK_ON_WAY_M, SLACK_HERE_M = 0.003, 0.002
-"""How much less room than planned is let pass before a way counts as closed: the map trembles a little."""
+"""How much less room than planned is let pass before a path counts as closed: the map trembles a little."""
 
 
 class Ground:
@@ -49,7 +49,7 @@ class Ground:
         return self.stands
 
     def way_is_free(self, here: Point, waypoints: Sequence[Point]) -> bool:
-        """Whether the next pieces of the way keep their room, which is less where the body stands in less."""
+        """Whether the next pieces of the path keep their room, less where the body stands in less."""
         room = self.room
         least = min(room.room_m - SLACK_ON_WAY_M, room.at(*here) - SLACK_HERE_M)
         for waypoint in waypoints[:2]:

@@ -21,9 +21,9 @@ class LeftReason(StrEnum):
     NARROW = "too narrow"
     """The body finds no room there between what stands around."""
     UNREACHABLE = "unreachable"
-    """There is room, but no way there."""
+    """There is room, but no path there."""
     FAILED = "not reached"
-    """There seems to be a way, but it was tried often enough."""
+    """There seems to be a path, but it was tried often enough."""
 
 
 def reasons(

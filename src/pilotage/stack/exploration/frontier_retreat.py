@@ -1,7 +1,7 @@
 """Out of a place that the map has closed behind the robot: back along its own trail.
 
 Where the pose has drifted in a narrow place, walls seen lately leave no room on the map for a body that
-stands there. But the ground behind was free a moment ago, and over so short a way odometry is exact.
+stands there. But the ground behind was free a moment ago, and over so short a path odometry is exact.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ ENCLOSED_SHARE = 0.5
 
 
 def is_walled_in(room: SheetRoom, cost: FloatArray, visited: BoolArray) -> bool:
-    """Whether no way leads to most of the cells (rows, columns) that it came from."""
+    """Whether no path leads to most of the cells (rows, columns) that it came from."""
     width, height = room.shape.cell_width_m, room.shape.cell_height_m
     cells = zip(*visited.nonzero(), strict=True)
     been = [((column + 0.5) * width, (row + 0.5) * height) for row, column in cells]
@@ -29,12 +29,12 @@ def is_walled_in(room: SheetRoom, cost: FloatArray, visited: BoolArray) -> bool:
 def trail_back(poses: FloatArray, most_m: float = RETREAT_M) -> list[Point]:
     """Points back along the keyframes (N, >= 2), the newest first; empty where it has not moved."""
     points = [(float(x), float(y)) for x, y in poses[::-1, :2]]
-    way, kept, gone = [], points[:1], 0.0
+    path, kept, gone = [], points[:1], 0.0
     for before, point in pairwise(points):
         gone += math.dist(before, point)
         if math.dist(kept[-1], point) >= STEP_M:
             kept.append(point)
-            way.append(point)
+            path.append(point)
         if gone >= most_m:
             break
-    return way
+    return path

@@ -1,4 +1,4 @@
-"""Returning to a known landmark: from where to look at it, and which one is worth the way."""
+"""Returning to a known landmark: from where to look at it, and which one is worth the path."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def best_look(
     here: Point,
     sensors_ahead_m: float,
 ) -> Look | None:
-    """The look with the least way for each millimetre of position gained; None where none gains 2 mm.
+    """The look with the least path for each millimetre of position gained; None where none gains 2 mm.
 
     Parameters
     ----------

@@ -22,7 +22,7 @@ SURE_M = 1e-5
 
 
 class GivenKeyframes(Keyframes):
-    """The chain of keyframes along a given way: odometry is what the pose did, and no solution moves it."""
+    """The chain of keyframes along a given path: odometry is what the pose did, and no solution moves it."""
 
     def __init__(
         self,

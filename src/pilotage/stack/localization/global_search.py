@@ -48,7 +48,7 @@ class GlobalSearchConfig(Config):
     confirm_m: NonNegative = 0.5
     """And once it has been followed over this distance,"""
     turn_counts_m_per_rad: NonNegative = 0.25
-    """a turn counting like this much of a way, because it shows what was behind,"""
+    """a turn counting like this much of a path, because it shows what was behind,"""
     confirm_scans: int = Field(default=8, ge=1)
     """and over so many scans."""
     std_m: Positive = 0.05

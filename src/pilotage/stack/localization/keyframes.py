@@ -25,7 +25,7 @@ class OdometryErrorsConfig(Config):
     turn_scale_std: float = Field(default=0.02, gt=0.0)
     """How unsure the wheels' separation is, as a share."""
     radius_difference_std: float = Field(default=0.008, gt=0.0)
-    """How unequal the wheels' way may be, as a share, slip included."""
+    """How unequal the wheels may be, as a share, slip included."""
     slip_std_m_sqrt_m: float = Field(default=0.002, gt=0.0)
     """Random slip of a wheel over one metre."""
     keyframe_distance_m: float = Field(default=0.03, gt=0.0)
@@ -86,7 +86,7 @@ class Keyframes:
     def _begin(self) -> None:
         """Start gathering anew from the last keyframe."""
         self.ahead_m = self.aside_m = self.turned_rad = 0.0
-        self._turn_by_encoders = self._way = self._both_ways = self._gyro_integral = self._time = 0.0
+        self._turn_by_encoders = self._distance = self._both_ways = self._gyro_integral = self._time = 0.0
         x, y, theta, bias = self.poses[self.count - 1]
         self._x, self._y, self._theta, self._bias = float(x), float(y), float(theta), float(bias)
         self._cos, self._sin = math.cos(self._theta), math.sin(self._theta)
@@ -95,20 +95,20 @@ class Keyframes:
         self.distance_scale = 1.0 + distance
 
     def add(self, left_m: float, right_m: float, gyro_rad: float, dt_s: float) -> None:
-        """Take in one control period: way of each wheel by its encoder, integral of the gyroscope."""
-        way, turn = 0.5 * (left_m + right_m), (right_m - left_m) / self._separation
+        """Take in one control period: distance of each wheel by its encoder, integral of the gyroscope."""
+        distance, turn = 0.5 * (left_m + right_m), (right_m - left_m) / self._separation
         if self._trusts_gyro:
             # Wheels that stand still do not turn the robot, whatever the gyroscope says.
             moved = left_m != 0.0 or right_m != 0.0
             turned = (gyro_rad - self._bias * dt_s) * self._gyro_scale if moved else 0.0
         else:
-            turned = turn * self._turn_scale + way * self._turn_per_m
+            turned = turn * self._turn_scale + distance * self._turn_per_m
         middle = self.turned_rad + 0.5 * turned
-        self.ahead_m += way * math.cos(middle)
-        self.aside_m += way * math.sin(middle)
+        self.ahead_m += distance * math.cos(middle)
+        self.aside_m += distance * math.sin(middle)
         self.turned_rad += turned
         self._turn_by_encoders += turn
-        self._way += way
+        self._distance += distance
         self._both_ways += abs(left_m) + abs(right_m)
         self._gyro_integral += gyro_rad
         self._time += dt_s
@@ -139,12 +139,12 @@ class Keyframes:
             self.ahead_m,
             self.aside_m,
             self._turn_by_encoders,
-            self._way,
+            self._distance,
             self._gyro_integral,
             self._time,
         )
         slip = self._errors.slip_std_m_sqrt_m * math.sqrt(self._both_ways)
-        # A count of an encoder is 0.15 mm of way; at rest not even that.
+        # A count of an encoder is 0.15 mm; at rest not even that.
         turn = 5e-5 if self._both_ways == 0.0 else math.hypot(slip / self._separation, 4e-4)
         self.spreads[n - 1] = (
             0.7 * slip + 1e-4,

@@ -224,7 +224,7 @@ def _field_of(config: MclConfig, chart: WorldMap) -> NearestObstacles:
     walls = chart.walls
     if walls.segments_m.shape[0] + walls.circles_m.shape[0] == 0:
         raise InputError(
-            f"mcl-likelihood-field: expected walls or blocked cells on the robot's map, found none on "
+            f"particle-filter: expected walls or blocked cells on the robot's map, found none on "
             f"'{chart.name}'; see stack.map"
         )
     return NearestObstacles.from_map(walls, config.resolution_m)

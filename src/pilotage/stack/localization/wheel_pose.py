@@ -1,4 +1,4 @@
-"""The exploring robot's pose: way from the encoders along a heading by encoders, or by a gyroscope too."""
+"""The exploring robot's pose: encoders' distance along a heading by encoders, or by a gyroscope too."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ from pilotage.stack.localization.heading_report import (
 
 ALIGN_S = 1.0
 """The gyroscope's bias is its mean over the first moments, in which the robot stands still."""
-WAY_VAR_PER_M = 4.0e-4
-"""Variance of the way over a metre: 2 % of slip and the like."""
+DISTANCE_VAR_PER_M = 4.0e-4
+"""Variance of the distance over a metre: 2 % of slip and the like."""
 LEAST_VAR = 1e-8
 """Keeps the covariance positive definite where a start pose is certain."""
 
@@ -115,7 +115,7 @@ class WheelPose:
         return float(np.trunc(counts * self._rad_per_count / sample_s).sum()) * sample_s
 
     def _move(self, left_rad: float, right_rad: float, rate: float | None, dt_s: float) -> None:
-        way = 0.5 * self._radius * (left_rad + right_rad)
+        distance = 0.5 * self._radius * (left_rad + right_rad)
         turn = self._radius * (right_rad - left_rad) / self._separation
         before = self._pose.theta_rad
         estimate = self._heading.step(turn, rate, dt_s, resting=False)
@@ -123,8 +123,8 @@ class WheelPose:
             estimate = self._compass.correct(estimate, dt_s)
         theta = before + 0.5 * wrap_to_pi(estimate.heading_rad - before)
         c, s = math.cos(theta), math.sin(theta)
-        self._pose = Pose2(self._pose.x_m + way * c, self._pose.y_m + way * s, estimate.heading_rad)
-        self._cov.move(way, c, s)
+        self._pose = Pose2(self._pose.x_m + distance * c, self._pose.y_m + distance * s, estimate.heading_rad)
+        self._cov.move(distance, c, s)
         self._cov.tt = estimate.variance_rad2
 
 
@@ -172,10 +172,10 @@ class _Covariance:
         self.xx = self.xy = self.yy = self.xt = self.yt = 0.0
         self.tt = 1e-6
 
-    def move(self, way: float, c: float, s: float) -> None:
-        """P <- F P F' + G q G' for a way along (c, s), to first order; the heading's own is its filter's."""
-        fx, fy = -way * s, way * c
-        along = WAY_VAR_PER_M * abs(way)
+    def move(self, distance: float, c: float, s: float) -> None:
+        """P <- F P F' + G q G' for a distance along (c, s), first order; the heading's is its filter's."""
+        fx, fy = -distance * s, distance * c
+        along = DISTANCE_VAR_PER_M * abs(distance)
         self.xx += 2.0 * fx * self.xt + fx * fx * self.tt + along * c * c
         self.xy += fx * self.yt + fy * self.xt + fx * fy * self.tt + along * c * s
         self.yy += 2.0 * fy * self.yt + fy * fy * self.tt + along * s * s

@@ -43,7 +43,7 @@ class PathProgress:
         along = np.empty(waypoints.shape[0])
         start = 0
         for i, waypoint in enumerate(waypoints):
-            # Look ahead only as far as twice the straight way, so that a later crossing is not taken.
+            # Look ahead only as far as twice the straight path, so that a later crossing is not taken.
             here = self._along_m[start]
             gap = np.hypot(*(waypoint[:2] - self._points[start]))
             stop = int(np.searchsorted(self._along_m, here + 3.0 * gap + 0.2)) + 1

@@ -23,7 +23,7 @@ PLAN_TOLERANCE_M = 0.005
 class DubinsLocalConfig(Config):
     """Speed, turning radius, and when a waypoint is passed over.
 
-    A curve longer than ``detour_ratio`` times the way along the plan plus ``detour_m`` is a loop: the
+    A curve longer than ``detour_ratio`` times the path along the plan plus ``detour_m`` is a loop: the
     waypoint lies beside or behind the robot, and the next one is taken instead.
     """
 
@@ -44,7 +44,7 @@ class DubinsLocalConfig(Config):
 class DubinsLocalPlanner:
     """From the current estimate to the next waypoint, one point a control step at constant speed.
 
-    Fails (None) where no curve to any of the next waypoints is free on the robot's map: the way is
+    Fails (None) where no curve to any of the next waypoints is free on the robot's map: the path is
     blocked, or the robot stands across it.
     """
 

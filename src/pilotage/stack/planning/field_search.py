@@ -45,7 +45,7 @@ def plan_over_nodes(
     d away; nodes are free where d leaves the clearance so, and the path keeps it everywhere. A line at
     any angle stays within half a cell's diagonal of free nodes, and these keep that much more.
 
-    The path turns on the spot where it bends. Ways that are narrower than the nodes' margin are missed.
+    The path turns on the spot where it bends. Paths that are narrower than the nodes' margin are missed.
 
     Raises
     ------
@@ -72,7 +72,7 @@ def plan_over_nodes(
     start, goal = joined
     found = None if start is None or goal is None else find(nodes, start, goal)
     if found is None:
-        reason = f"no way over the grid's nodes keeps {clearance_m:g} m from the obstacles"
+        reason = f"no path over the grid's nodes keeps {clearance_m:g} m from the obstacles"
         return failure(PlanStatus.NO_PATH, reason, time.perf_counter() - began)
     x0, y0 = request.field.origin_xy_m
     middle = np.array([x0, y0]) + found.cells[:, ::-1] * request.field.resolution_m
@@ -98,8 +98,8 @@ def _joints(
     ]
     for _, r, c in sorted(near):
         if nodes.is_free((r, c)):
-            way = np.array([[x_m, y_m], [x0 + c * spacing_m, y0 + r * spacing_m]])
-            if is_valid(_states(way, CHECK_SPACING_M), space, clearance_m):
+            leg = np.array([[x_m, y_m], [x0 + c * spacing_m, y0 + r * spacing_m]])
+            if is_valid(_states(leg, CHECK_SPACING_M), space, clearance_m):
                 yield r, c
 
 

@@ -116,7 +116,7 @@ def _goal_pose(request: PlanRequest) -> FloatArray:
 
 
 def _to_go(field: DistanceField, goal: FloatArray, inner_m: float) -> FloatArray:
-    """(ny, nx) way of the outline's inner disc to the goal, over the field's nodes."""
+    """(ny, nx) path of the outline's inner disc to the goal, over the field's nodes."""
     ny, nx = field.distance_m.shape
     x0, y0 = field.origin_xy_m
     # A node may lie half a diagonal nearer to a wall than the path past it.

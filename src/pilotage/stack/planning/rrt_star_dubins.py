@@ -47,7 +47,7 @@ class RrtStarDubinsConfig(Config):
 
     ``validation_distance_m`` is the largest spacing between checked states along an edge; the check goes
     finer by itself where an obstacle could hide in between, and the finished path is checked every
-    centimetre. ``guide_bias`` is the share of samples near a rough way found on the distance field, later
+    centimetre. ``guide_bias`` is the share of samples near a rough path found on the distance field, later
     near the incumbent: 0 is plain RRT*. With ``stop`` 'first' the search ends at the first solution (the
     report's way), with 'optimize' after ``iterations``. A time budget makes the result depend on the
     machine; without one the same seed gives the same path.
@@ -71,7 +71,7 @@ class RrtStarDubinsConfig(Config):
 class RrtStarDubinsPlanner:
     """Sampling-based planner for forward driving with a turning radius (see ``kernels.rrt_star``).
 
-    Asymptotically optimal with ``stop='optimize'`` (Karaman and Frazzoli 2011). Fails to find ways whose
+    Asymptotically optimal with ``stop='optimize'`` (Karaman and Frazzoli 2011). Fails to find paths whose
     free width is below about a millimetre.
 
     Raises
@@ -99,7 +99,7 @@ class RrtStarDubinsPlanner:
         blocked = blocked_end(request, space, clearance_m)
         if blocked is not None:
             return failure(*blocked, time.perf_counter() - began)
-        way, bound, proof = _look_around(request, space, clearance_m, config)
+        guide_path, bound, proof = _look_around(request, space, clearance_m, config)
         if proof is not None:
             return failure(PlanStatus.NO_PATH, proof, time.perf_counter() - began)
         search = self._search(request, space, clearance_m)
@@ -128,13 +128,13 @@ class RrtStarDubinsPlanner:
                     first_s = time.perf_counter() - began
                 best, checked_cost = path, cost
                 if config.guide_bias > 0.0:
-                    way = path.states[:: max(1, round(0.25 / STATE_SPACING_M))].copy()
+                    guide_path = path.states[:: max(1, round(0.25 / STATE_SPACING_M))].copy()
             elapsed = time.perf_counter() - began
             out_of_time = config.time_budget_s is not None and elapsed > config.time_budget_s
             if done >= config.iterations or out_of_time or (best is not None and config.stop == "first"):
                 break
             chunk = min(CHUNK, config.iterations - done)
-            ran = rrt_star.grow(tree, space, search, bound, way, request.rng, chunk, best is None)
+            ran = rrt_star.grow(tree, space, search, bound, guide_path, request.rng, chunk, best is None)
             done += int(ran)
             if ran < chunk and not tree.cost[rrt_tree.GOAL] < checked_cost:
                 break
@@ -173,7 +173,7 @@ class RrtStarDubinsPlanner:
 def _look_around(
     request: PlanRequest, space: Space, clearance_m: float, config: RrtStarDubinsConfig
 ) -> tuple[FloatArray, rrt_samples.Bound, str | None]:
-    """Rough way to the goal, lower bound of the cost-to-go, and the proof where there is no way at all."""
+    """Rough path to the goal, lower bound of the cost-to-go, and the proof where there is no path at all."""
     space = _fine_enough(space, clearance_m)
     stride = max(1, int(clearance_m / (2.0 * space.resolution)))
     cell = stride * space.resolution
@@ -197,15 +197,15 @@ def _look_around(
         return (
             NO_GUIDE,
             NO_BOUND,
-            f"no way from start to goal keeps {clearance_m:g} m from the obstacles: the widest way needs a "
+            f"no path from start to goal keeps {clearance_m:g} m from the obstacles: the widest path needs a "
             f"clearance of at most {at_most_m:g} m (clearance_m; a narrow body can do with less)",
         )
-    way = guide.trace(move, space, stride, *start, 3) if config.guide_bias > 0.0 else NO_GUIDE
+    guide_path = guide.trace(move, space, stride, *start, 3) if config.guide_bias > 0.0 else NO_GUIDE
     if config.stop == "first" or config.guide_bias == 0.0:
-        return way, NO_BOUND, None
+        return guide_path, NO_BOUND, None
     loose, _ = guide.cost_to_go(classes, space, stride, clearance_m, 1, *goal, -1, -1)
     metres = np.where(loose == guide.UNREACHED, np.inf, loose * (cell / guide.UNIT / 1.03) - cell)
-    return way, rrt_samples.Bound(metres, space.x0, space.y0, cell), None
+    return guide_path, rrt_samples.Bound(metres, space.x0, space.y0, cell), None
 
 
 def _fine_enough(space: Space, clearance_m: float) -> Space:

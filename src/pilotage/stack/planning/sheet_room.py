@@ -1,4 +1,4 @@
-"""Room to move on a half-known sheet: what stands around, where the body fits, what ways cost."""
+"""Room to move on a half-known sheet: what stands around, where the body fits, what paths cost."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ NO_SEGMENTS: FloatArray = np.zeros((0, 4))
 
 
 class SheetRoom:
-    """Obstacles as walls and points, and a lattice of nodes for ways; unknown floor is taken to be free.
+    """Obstacles as walls and points, and a lattice of nodes for paths; unknown floor is taken to be free.
 
     Parameters
     ----------
@@ -115,9 +115,9 @@ class SheetRoom:
             )
         )
 
-    def way(self, parent: IntArray, node: int, start: Point, end: Point | None) -> list[Point]:
+    def path(self, parent: IntArray, node: int, start: Point, end: Point | None) -> list[Point]:
         """Straight pieces from a point by a node to another point."""
-        way = frontier_goal.straightened(
+        path = frontier_goal.straightened(
             parent,
             node,
             self.columns,
@@ -127,7 +127,7 @@ class SheetRoom:
             self.segments,
             self.points,
         )
-        points = [(float(x), float(y)) for x, y in way]
+        points = [(float(x), float(y)) for x, y in path]
         if end is None:
             return points
         # The last node is left out where the point behind it is in plain sight.

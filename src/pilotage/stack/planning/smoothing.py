@@ -99,10 +99,10 @@ class ShortcutSmoother:
         samples = np.ascontiguousarray(chain.states[picked])
         nodes, kept = shortcut.best_chain(samples, s[picked], space, rules)
         ranges = np.column_stack([picked[nodes[:-1]], picked[nodes[1:]]])
-        way = shortcut.tighten(samples[nodes], kept, space, rules, 0.4, 0.01)
-        way, kept, was = shortcut.split(way, kept, space, rules, self._config.sample_spacing_m)
-        way = shortcut.tighten(way, kept, space, rules, 0.2, 0.004)
-        return _Chain.through(way, kept, ranges[was], chain, s, rules)
+        nodes_path = shortcut.tighten(samples[nodes], kept, space, rules, 0.4, 0.01)
+        nodes_path, kept, was = shortcut.split(nodes_path, kept, space, rules, self._config.sample_spacing_m)
+        nodes_path = shortcut.tighten(nodes_path, kept, space, rules, 0.2, 0.004)
+        return _Chain.through(nodes_path, kept, ranges[was], chain, s, rules)
 
 
 class _Chain:
@@ -118,7 +118,7 @@ class _Chain:
 
     @staticmethod
     def through(
-        way: FloatArray,
+        nodes_path: FloatArray,
         kept: BoolArray,
         ranges: IntArray,
         old: _Chain,
@@ -136,8 +136,8 @@ class _Chain:
                 length_m += float(s[high] - s[low])
                 continue
             free = rules.goal_heading_free and i == len(kept) - 1
-            x, y, th = way[i]
-            gx, gy, gth = way[i + 1]
+            x, y, th = nodes_path[i]
+            gx, gy, gth = nodes_path[i + 1]
             word, l0, l1, l2 = shortcut.connect(x, y, th, gx, gy, gth, free, rules.radius)
             curve = (x, y, th, rules.radius, word, l0, l1, l2)
             coarse.append(dubins.sample(*curve, STATE_SPACING_M)[1:])

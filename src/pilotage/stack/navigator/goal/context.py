@@ -160,7 +160,7 @@ class Context:
         return ahead < min(self.radius_m + config.watch_margin_m, self.clearance_m - HERE_TOLERANCE_M)
 
     def near_goal(self, pose: Pose2) -> bool:
-        """Whether this is the end: near the goal, and not merely passing by it with way left to go."""
+        """Whether this is the end: near the goal, and not merely passing by it with path left to go."""
         goal = self.goals[0]
         away = math.hypot(pose.x_m - goal.x_m, pose.y_m - goal.y_m)
         if self.to_go_m > away + self._tolerance_m:

@@ -55,7 +55,7 @@ class Avoiding:
     Attributes
     ----------
     resumes
-        What it was about before, and is again when the way is free.
+        What it was about before, and is again when the path is free.
     """
 
     context: Context
@@ -99,7 +99,7 @@ def _next(context: Context, state: Driving, readings: Readings, pose: Pose2) -> 
         return _avoid(context, state, resumes)
     if isinstance(state, Avoiding):
         context.follower.drop()
-        context.say("avoid-end", "the way in front is free again")
+        context.say("avoid-end", "the path in front is free again")
         if isinstance(resumes, Following):
             resumes = Following(context, turns=False)
     if kind is ReactionKind.HALL and not context.near_goal(pose):

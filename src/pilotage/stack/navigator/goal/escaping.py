@@ -57,7 +57,7 @@ def begin_escape(context: Context, resumes: State, why: str) -> Move:
 
 
 def replan(context: Context, resumes: State, pose: Pose2, why: str) -> Move:
-    """Stop and plan anew on the robot's own map; back out where even that finds no way."""
+    """Stop and plan anew on the robot's own map; back out where even that finds no path."""
     context.mode = Mode.REPLAN
     context.follower.drop()
     if context.journal.counts["replans"] >= context.config.max_replans:

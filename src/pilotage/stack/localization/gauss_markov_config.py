@@ -1,4 +1,4 @@
-"""What ``ekf-slow-errors`` can be told: noise, slow errors, and how the odometry's words become motion."""
+"""Parameters of ``ekf-gauss-markov``: noise, Gauss-Markov errors, the odometry's words."""
 
 from __future__ import annotations
 
@@ -12,18 +12,18 @@ from pilotage.sensors.sensor import NonNegative, Positive
 from pilotage.stack.localization.odometry_prediction import OdometryNoise
 
 
-class SlowError(Config):
+class GaussMarkovError(Config):
     """A first-order Gauss-Markov error: the standard deviation that it keeps, and its time constant."""
 
     std: NonNegative
     time_constant_s: Positive = 1.0e4
 
 
-class LandmarkError(SlowError):
+class LandmarkError(GaussMarkovError):
     """Of one landmark's readings: ``std`` (fraction of the range, or radians) and metres, together.
 
     The metres are along the line of sight for a range, and across it for a bearing. Such an error changes
-    as the robot sees the landmark from elsewhere: within ``length_m`` of way and ``angle_rad`` of turn, and
+    as the robot sees the landmark from elsewhere: within ``length_m`` of path and ``angle_rad`` of turn, and
     within the time constant at rest.
     """
 
@@ -47,7 +47,7 @@ class CommandMap(Config):
     bend_rad_per_m: float = 0.0
 
 
-class EkfSlowErrorsConfig(Config):
+class EkfGaussMarkovConfig(Config):
     """Variances left out are taken from the sensors' data sheets; the errors' from the fields below."""
 
     gate: float = Field(default=0.999, gt=0.0, lt=1.0)
@@ -66,19 +66,19 @@ class EkfSlowErrorsConfig(Config):
     """Read over true range."""
     depth_power: float = Field(default=0.0, ge=0.0, le=2.0)
     """The reading is the range times cos(bearing) to this power: 0 a range, 1 the depth of a camera."""
-    speed_error: SlowError = SlowError(std=0.01, time_constant_s=30.0)
-    turn_error: SlowError = SlowError(std=0.01, time_constant_s=30.0)
-    speed_offset_m_s: SlowError = SlowError(std=0.0)
-    turn_offset_rad_s: SlowError = SlowError(std=0.0)
-    course_rad: SlowError = SlowError(std=0.002)
-    bearing_rad: SlowError = SlowError(std=0.002)
-    range_error: SlowError = SlowError(std=0.002)
+    speed_error: GaussMarkovError = GaussMarkovError(std=0.01, time_constant_s=30.0)
+    turn_error: GaussMarkovError = GaussMarkovError(std=0.01, time_constant_s=30.0)
+    speed_offset_m_s: GaussMarkovError = GaussMarkovError(std=0.0)
+    turn_offset_rad_s: GaussMarkovError = GaussMarkovError(std=0.0)
+    course_rad: GaussMarkovError = GaussMarkovError(std=0.002)
+    bearing_rad: GaussMarkovError = GaussMarkovError(std=0.002)
+    range_error: GaussMarkovError = GaussMarkovError(std=0.002)
     """Of the sensor, a fraction of the range."""
-    range_offset_m: SlowError = SlowError(std=0.0)
-    mount_ahead_m: SlowError = SlowError(std=0.0)
-    mount_left_m: SlowError = SlowError(std=0.0)
-    age_error_s: SlowError = SlowError(std=0.0)
-    axis_rad: SlowError = SlowError(std=0.0)
+    range_offset_m: GaussMarkovError = GaussMarkovError(std=0.0)
+    mount_ahead_m: GaussMarkovError = GaussMarkovError(std=0.0)
+    mount_left_m: GaussMarkovError = GaussMarkovError(std=0.0)
+    age_error_s: GaussMarkovError = GaussMarkovError(std=0.0)
+    axis_rad: GaussMarkovError = GaussMarkovError(std=0.0)
     """Of a camera that measures depth, beside where its bearings say it looks."""
     landmark_range_error: LandmarkError = LandmarkError(std=0.002, time_constant_s=30.0)
     landmark_bearing_error: LandmarkError = LandmarkError(std=0.0, time_constant_s=30.0)
@@ -107,6 +107,6 @@ class EkfSlowErrorsConfig(Config):
         filled = dict(values)
         for name, field in cls.model_fields.items():
             given = filled.get(name)
-            if isinstance(field.default, SlowError) and isinstance(given, Mapping):
+            if isinstance(field.default, GaussMarkovError) and isinstance(given, Mapping):
                 filled[name] = {**field.default.model_dump(), **given}
         return filled

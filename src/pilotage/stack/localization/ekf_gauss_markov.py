@@ -1,4 +1,4 @@
-"""The EKF for real drives and sensors: their slowly varying errors are part of its state."""
+"""The EKF for real drives and sensors: their Gauss-Markov errors are part of its state."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 from pilotage.core.chi_square import chi_square_quantile, gated_mean
 from pilotage.core.errors import InputError
 from pilotage.core.types import FloatArray, Pose2
-from pilotage.kernels.filters import slow_errors
+from pilotage.kernels.filters import gauss_markov
 from pilotage.kernels.filters.sighting import OUTCOME_ACCEPTED, OUTCOME_GATED, landmark_index
 from pilotage.maps.world_map import WorldMap
 from pilotage.models.odometry import OdometryModel
@@ -20,28 +20,32 @@ from pilotage.sensors.wheel_odometry import WheelOdometryConfig
 from pilotage.stack.interface import Belief
 from pilotage.stack.journal import Journal
 from pilotage.stack.knowledge import RobotKnowledge
+from pilotage.stack.localization.gauss_markov_config import (
+    EkfGaussMarkovConfig,
+    GaussMarkovError,
+    LandmarkError,
+)
 from pilotage.stack.localization.landmark_filter import MEASUREMENT_DOF, MOST_HEADING_VAR, SIGHTING_COLUMNS
 from pilotage.stack.localization.localizer import LOCALIZERS, require_initial_pose
 from pilotage.stack.localization.odometry_prediction import OdometryPrediction
 from pilotage.stack.localization.recent_sightings import RecentSightings
-from pilotage.stack.localization.slow_errors_config import EkfSlowErrorsConfig, LandmarkError, SlowError
 
-NAME = "ekf-slow-errors"
+NAME = "ekf-gauss-markov"
 
 TYPICAL_RANGE_M = 3.0
 TELEMETRY = {
-    "speed_error": slow_errors.SPEED,
-    "turn_error": slow_errors.TURN,
-    "speed_offset_m_s": slow_errors.SPEED_OFFSET,
-    "turn_offset_rad_s": slow_errors.TURN_OFFSET,
-    "course_rad": slow_errors.COURSE,
-    "bearing_offset_rad": slow_errors.BEARING,
-    "range_error": slow_errors.SCALE,
-    "range_offset_m": slow_errors.OFFSET,
-    "mount_ahead_m": slow_errors.AHEAD,
-    "mount_left_m": slow_errors.LEFT,
-    "age_error_s": slow_errors.AGE,
-    "axis_rad": slow_errors.AXIS,
+    "speed_error": gauss_markov.SPEED,
+    "turn_error": gauss_markov.TURN,
+    "speed_offset_m_s": gauss_markov.SPEED_OFFSET,
+    "turn_offset_rad_s": gauss_markov.TURN_OFFSET,
+    "course_rad": gauss_markov.COURSE,
+    "bearing_offset_rad": gauss_markov.BEARING,
+    "range_error": gauss_markov.SCALE,
+    "range_offset_m": gauss_markov.OFFSET,
+    "mount_ahead_m": gauss_markov.AHEAD,
+    "mount_left_m": gauss_markov.LEFT,
+    "age_error_s": gauss_markov.AGE,
+    "axis_rad": gauss_markov.AXIS,
 }
 """Names of the errors in a trace; each has a standard deviation beside it."""
 UNITS = {"_m_s": "m/s", "_rad_s": "rad/s", "_rad": "rad", "_m": "m", "_s": "s"}
@@ -55,13 +59,13 @@ COLUMNS = {
     },
 }
 """Beacons seen and accepted, their NIS, recoveries so far, and the errors as believed."""
-DOUBTED = (slow_errors.SPEED, slow_errors.TURN, slow_errors.AGE)
+DOUBTED = (gauss_markov.SPEED, gauss_markov.TURN, gauss_markov.AGE)
 """What another drive than the expected one has otherwise."""
 
 
-@LOCALIZERS.add(NAME, EkfSlowErrorsConfig)
-class EkfSlowErrorsLocalizer:
-    """Extended Kalman filter with the slowly varying errors of drive and sensor in its state.
+@LOCALIZERS.add(NAME, EkfGaussMarkovConfig)
+class EkfGaussMarkovLocalizer:
+    """Extended Kalman filter with the Gauss-Markov errors of drive and sensor in its state.
 
     State augmentation (Bar-Shalom et al. 2001, sect. 11.9): what stays the same from one reading to the
     next does not average out, and a filter that takes it for white noise becomes overconfident. Known
@@ -74,7 +78,7 @@ class EkfSlowErrorsLocalizer:
 
     def __init__(
         self,
-        config: EkfSlowErrorsConfig,
+        config: EkfGaussMarkovConfig,
         robot: RobotKnowledge,
         chart: WorldMap,
         initial: Belief,
@@ -104,7 +108,7 @@ class EkfSlowErrorsLocalizer:
         self._scales = np.array([along.std, along.std_m, across.std, across.std_m])
         self._gate = chi_square_quantile(config.gate, MEASUREMENT_DOF)
         self._expected_nis = gated_mean(self._gate, MEASUREMENT_DOF)
-        errors: list[SlowError] = [
+        errors: list[GaussMarkovError] = [
             config.speed_error,
             config.turn_error,
             config.speed_offset_m_s,
@@ -190,7 +194,7 @@ class EkfSlowErrorsLocalizer:
         place = self._config.unlogged_speed_m_s**2 * growth
         heading = self._config.unlogged_turn_rate_rad_s**2 * growth
         heading = min(heading, max(MOST_HEADING_VAR - self._cov[2, 2], 0.0))
-        slow_errors.inflate(self._cov, 1.0, np.array([place, place, heading]))
+        gauss_markov.inflate(self._cov, 1.0, np.array([place, place, heading]))
 
     def _predict(self, distance: float, angle: float, dt_s: float) -> None:
         if dt_s <= 0.0:
@@ -201,7 +205,7 @@ class EkfSlowErrorsLocalizer:
         moved = gain * distance
         turned = commands.turn_gain * angle + commands.bend_rad_per_m * moved
         distance_var, angle_var = self._noise.variances(OdometryIncrement(moved, turned))
-        slow_errors.predict(
+        gauss_markov.predict(
             self._state,
             self._cov,
             moved,
@@ -214,8 +218,8 @@ class EkfSlowErrorsLocalizer:
         )
         state = self._state
         self._recent.move(moved, turned, self._t_s or 0.0)
-        self._motion[0] = moved / dt_s * (1.0 + state[slow_errors.SPEED]) + state[slow_errors.SPEED_OFFSET]
-        self._motion[1] = turned / dt_s * (1.0 + state[slow_errors.TURN]) + state[slow_errors.TURN_OFFSET]
+        self._motion[0] = moved / dt_s * (1.0 + state[gauss_markov.SPEED]) + state[gauss_markov.SPEED_OFFSET]
+        self._motion[1] = turned / dt_s * (1.0 + state[gauss_markov.TURN]) + state[gauss_markov.TURN_OFFSET]
 
     def _update(self, seen: BeaconReadings) -> None:
         config, count = self._config, seen.ids.shape[0]
@@ -225,7 +229,7 @@ class EkfSlowErrorsLocalizer:
             self._tell(count, 0, 0.0)
             return
         nis, outcome = np.empty(count), np.empty(count, dtype=np.int64)
-        used = slow_errors.update_range_bearings(
+        used = gauss_markov.update_range_bearings(
             self._state,
             self._cov,
             seen.ids,
@@ -248,7 +252,7 @@ class EkfSlowErrorsLocalizer:
             elif result == OUTCOME_GATED:
                 self._rejections += 1
         if self._rejections >= config.recovery_rejections:
-            slow_errors.inflate(self._cov, config.recovery_factor, self._floor)
+            gauss_markov.inflate(self._cov, config.recovery_factor, self._floor)
             self._rejections = 0
             self.recoveries += 1
             self._doubt_the_drive()
@@ -279,13 +283,13 @@ class EkfSlowErrorsLocalizer:
         for landmark, range_m, bearing in zip(seen.ids, seen.ranges_m, seen.bearings_rad, strict=True):
             row = landmark_index(self._ids, landmark)
             if row >= 0:
-                reading = slow_errors.range_of_depth(
+                reading = gauss_markov.range_of_depth(
                     range_m / config.range_scale, bearing, config.depth_power
                 )
                 self._recent.add(self._t_s or 0.0, row, reading, bearing, self._mount)
 
     def _begin_anew(self, least_landmarks: int) -> None:
-        """Take the pose that the last seconds' landmarks agree on; the slow errors stay as believed."""
+        """Take the pose that the last seconds' landmarks agree on; the errors stay as believed."""
         fix = self._recent.fix(self._points, self._reading_cov(), least_landmarks)
         if fix is None or fix.chi2 > chi_square_quantile(self._config.gate, fix.dof):
             return
@@ -299,9 +303,9 @@ class EkfSlowErrorsLocalizer:
         """(2, 2) of range and bearing at `TYPICAL_RANGE_M`, white and slow together."""
         r2 = TYPICAL_RANGE_M**2
         white, scales, slow = self._white, self._scales**2, self._stationary
-        along = white[0] + scales[1] + slow[slow_errors.OFFSET]
-        along += (white[1] + scales[0] + slow[slow_errors.SCALE]) * r2
-        across = white[2] + scales[2] + slow[slow_errors.BEARING] + (white[3] + scales[3]) / r2
+        along = white[0] + scales[1] + slow[gauss_markov.OFFSET]
+        along += (white[1] + scales[0] + slow[gauss_markov.SCALE]) * r2
+        across = white[2] + scales[2] + slow[gauss_markov.BEARING] + (white[3] + scales[3]) / r2
         return np.diag([along, across])
 
     def _tell(self, seen: int, accepted: int, nis: float) -> None:

@@ -1,4 +1,4 @@
-"""The EKF whose state holds, after the pose, the slowly varying errors of drive and sensor.
+"""The EKF whose state holds, after the pose, the Gauss-Markov errors of drive and sensor.
 
 State (15 + 2 L): x, y, theta; of the drive: relative errors of speed and turn rate, their offsets, and
 the course (direction of travel less heading); of the sensor: bearing offset, relative range error, range

@@ -1,4 +1,4 @@
-"""What a filter found out about drive and sensor while it drove: each slow error with its band."""
+"""What a filter found out about drive and sensor while it drove: each Gauss-Markov error with its band."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from pilotage.report import quantities
 from pilotage.report.series import band
 from pilotage.report.style import BLUE, SKY, Illustration, Key, render, series, stacked_axes, time_limits
 
-SLUG = "slow-errors"
+SLUG = "gauss-markov"
 TITLE = "What the filter found out about robot and sensor"
 
 _ERRORS: tuple[tuple[str, str, str, float, Callable[[float], str]], ...] = (
@@ -33,8 +33,8 @@ _ERRORS: tuple[tuple[str, str, str, float, Callable[[float], str]], ...] = (
 """Column, name, unit and its factor, and how the last value is written."""
 
 
-def slow_errors_figure(run: RunData) -> Illustration:
-    """Draw every slow error that the filter was free to estimate, one panel each."""
+def gauss_markov_figure(run: RunData) -> Illustration:
+    """Draw every Gauss-Markov error that the filter was free to estimate, one panel each."""
     trace, t_s = run.trace, run.trace.t_s
     free = [error for error in _ERRORS if bool(np.any(np.nan_to_num(trace[f"{error[0]}_std"]) > 0.0))]
     if not free:
@@ -53,7 +53,7 @@ def slow_errors_figure(run: RunData) -> Illustration:
         "Errors that stay the same for a while and so do not average out, as believed, with two standard "
         f"deviations. At the end: {'; '.join(found)}."
     )
-    alt = "Estimated slow errors of drive and sensor over time, each with its band of two standard deviations"
+    alt = "Estimated Gauss-Markov errors of drive and sensor over time, with bands of two standard deviations"
     keys = (Key("estimate", BLUE), Key("±2σ", SKY, "band", opacity=0.4))
     return Illustration(SLUG, TITLE, alt, caption, render(figure, SLUG, alt), keys)
 
