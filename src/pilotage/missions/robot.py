@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal
 
-from pydantic import Discriminator, Field, Tag
+from pydantic import Discriminator, Field, Tag, field_validator
 
 from pilotage.core.config import Config
 from pilotage.missions.choice import ComponentChoice, by_default
@@ -55,6 +55,15 @@ class RobotConfig(Config):
         name="differential-drive"
     )
     sensors: dict[str, ComponentChoice] = Field(default_factory=dict)
+    """By names of the mission's own; null takes one off that was there before."""
     start: PoseConfig | None = None
     goal: GoalConfig | None = None
     stack: StackConfig | None = None
+
+    @field_validator("sensors", mode="before")
+    @classmethod
+    def _taken_off(cls, sensors: Any) -> Any:
+        """Leave out what is null."""
+        if not isinstance(sensors, Mapping):
+            return sensors
+        return {name: sensor for name, sensor in sensors.items() if sensor is not None}
