@@ -77,10 +77,12 @@ def _pyastar2d(blocked: BoolArray, start: Cell, goal: Cell) -> Solve:
 
 def _scikit_image(blocked: BoolArray, start: Cell, goal: Cell) -> Solve:
     """Dijkstra with geometric costs; negative cells cannot be entered."""
-    from skimage.graph import route_through_array
+    from skimage import graph
+
+    find: Any = graph.route_through_array  # untyped in some of its versions
 
     cost = np.where(blocked, -1.0, 1.0)
-    return lambda: route_through_array(cost, start, goal, fully_connected=True, geometric=True)[0]
+    return lambda: find(cost, start, goal, fully_connected=True, geometric=True)[0]
 
 
 PEERS: dict[str, Callable[[BoolArray, Cell, Cell], Solve]] = {

@@ -99,6 +99,10 @@ class RrtStarDubinsPlanner:
         blocked = blocked_end(request, space, clearance_m)
         if blocked is not None:
             return failure(*blocked, time.perf_counter() - began)
+        direct = self._direct(request, space, clearance_m)
+        if direct is not None:
+            took = time.perf_counter() - began
+            return PlanResult(PlanStatus.FOUND, f"{direct.length_m:.2f} m directly", direct, took, took)
         guide_path, bound, proof = _look_around(request, space, clearance_m, config)
         if proof is not None:
             return failure(PlanStatus.NO_PATH, proof, time.perf_counter() - began)
@@ -147,6 +151,23 @@ class RrtStarDubinsPlanner:
             return PlanResult(PlanStatus.NO_PATH, reason, None, math.nan, elapsed, done, edges)
         reason = f"{best.length_m:.2f} m after {done} iterations"
         return PlanResult(PlanStatus.FOUND, reason, best, first_s, elapsed, done, edges)
+
+    def _direct(self, request: PlanRequest, space: Space, clearance_m: float) -> Path | None:
+        """The shortest Dubins curve to the goal where it is free: no tree finds a better path."""
+        radius_m, goal = self._config.turning_radius_m, request.goal
+        x, y, th = request.start.x_m, request.start.y_m, request.start.theta_rad
+        if goal.theta_rad is None:
+            word, *lengths = dubins.shortest_to_point(x, y, th, goal.x_m, goal.y_m, radius_m)
+        else:
+            word, *lengths = dubins.shortest(x, y, th, goal.x_m, goal.y_m, goal.theta_rad, radius_m)
+        curve = (x, y, th, radius_m, word, *lengths)
+        if first_blocked(dubins.sample(*curve, CHECK_SPACING_M), space, clearance_m) >= 0:
+            return None
+        states = dubins.sample(*curve, STATE_SPACING_M)
+        waypoints = dubins.sample(*curve, self._config.max_connection_distance_m)
+        for poses in (states, waypoints):
+            poses[:, 2] = wrap_array_to_pi(poses[:, 2])
+        return Path(states, waypoints, sum(lengths), radius_m)
 
     def _search(self, request: PlanRequest, space: Space, clearance_m: float) -> rrt_samples.Search:
         """Settings for the kernel; edges keep a little more clearance for what checks may step over."""
