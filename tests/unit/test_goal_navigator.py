@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from typing import cast
 
 import numpy as np
 import pytest
@@ -12,6 +13,8 @@ from hypothesis import strategies as st
 
 from pilotage.core.errors import InputError
 from pilotage.core.types import STOP, Goal, Pose2, Twist
+from pilotage.experiments.mission import mission_of
+from pilotage.experiments.run import run_mission
 from pilotage.kernels.geometry import chain
 from pilotage.maps.segment_map import SegmentMap
 from pilotage.sensors.readings import Readings
@@ -25,6 +28,7 @@ from pilotage.stack.navigator.navigator import Parts
 from pilotage.stack.planning.dubins_local import DubinsLocalConfig, DubinsLocalPlanner
 from pilotage.stack.planning.planner import PLANNERS
 from pilotage.stack.planning.rrt_star_dubins import RrtStarDubinsConfig, RrtStarDubinsPlanner
+from support.missions import reach
 from support.robots import ROOM, Told, sensors, told_of
 from support.worlds import alone, robot, walled
 
@@ -167,3 +171,24 @@ def test_the_nearest_point_of_a_window_of_a_chain(seed: int, low: float, width: 
     away = np.hypot(points[first : last + 1, 0] - x, points[first : last + 1, 1] - y)
     found = chain.nearest_along(points, along, x, y, low, low + width)
     assert found == along[first + int(np.argmin(away))]
+
+
+def test_it_turns_on_the_spot_where_no_curve_leads_on_from_its_heading() -> None:
+    """It faces the wall of a dead end too narrow for the planner's turns; a car stays refused there."""
+    corridor = [[0.0, 0.0, 6.0, 0.0], [0.0, 1.1, 6.0, 1.1], [0.0, 0.0, 0.0, 1.1], [6.0, 0.0, 6.0, 1.1]]
+    values = reach()
+    values["world"] = {
+        "map": {"map": "corridor", "walls_m": corridor, "landmarks": [{"id": 1, "x_m": 6.0, "y_m": 0.5}]},
+        "start": {"x_m": 0.5, "y_m": 0.55, "theta_rad": 3.0},
+        "goal": {"x_m": 5.0, "y_m": 0.55},
+    }
+    values["robot"]["footprint"]["radius_m"] = 0.2
+    values["stack"]["planner"] = {"name": "rrt-star-dubins", "clearance_m": 0.3, "iterations": 1000}
+    found = run_mission(mission_of(values), save=False)
+    assert found.success
+    assert found.metrics["collisions"] == 0
+    assert cast(float, found.metrics["path_length_m"]) < 5.0
+    values["robot"]["motion"] = {"name": "bicycle", "wheelbase_m": 0.25, "max_steering_rad": 0.5}
+    stays = run_mission(mission_of(values), save=False)
+    assert not stays.success
+    assert "no path" in str(stays.metrics["reason"])

@@ -9,6 +9,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from pilotage.core.types import FloatArray, Goal, Pose2
+from pilotage.maps.distance_field import DistanceField
 from pilotage.maps.ground_distance import with_circles
 from pilotage.maps.world_map import WorldMap
 from pilotage.models.footprint import Footprint
@@ -16,11 +17,28 @@ from pilotage.stack.interface import PlannedPath
 from pilotage.stack.journal import Journal
 from pilotage.stack.knowledge import RobotKnowledge
 from pilotage.stack.navigator.progress import PathProgress
-from pilotage.stack.planning.planner import Path, Planner, PlanRequest, PlanResult, Smoother
+from pilotage.stack.planning.planner import (
+    Path,
+    Planner,
+    PlanRequest,
+    PlanResult,
+    PlanStatus,
+    Smoother,
+)
+
+HEADINGS, TRIED = 16, 4
+"""Headings to turn to before setting out, and how many of them are tried, the freest first."""
+
+FAR_M = 3.0
+"""Free ground farther ahead makes a heading no better."""
 
 
 class GlobalPlan:
-    """Holds the current path; every plan adopted goes into the journal."""
+    """Holds the current path; every plan adopted goes into the journal.
+
+    A robot that can turn on the spot, and that no curve leads on from as it stands, plans from other headings
+    of the same place: ``turns_first`` says that the path begins with such a turn.
+    """
 
     def __init__(
         self,
@@ -31,8 +49,11 @@ class GlobalPlan:
         journal: Journal,
         least_clearance_m: float = 0.0,
         robot: RobotKnowledge | None = None,
+        can_turn_first: bool = False,
     ) -> None:
         self._robot = robot
+        self._can_turn_first = can_turn_first
+        self.turns_first = False
         self._least_clearance_m = least_clearance_m
         self._planner = planner
         self._smoother = smoother
@@ -62,6 +83,28 @@ class GlobalPlan:
         """
         begin = time.perf_counter()
         field = with_circles(self._chart.field, mapped_m)
+        result = self._try(t_s, start, goal, field, clearances_m, begin)
+        self.turns_first = False
+        if result.status is PlanStatus.NO_PATH and result.iterations and self._can_turn_first:
+            for heading_rad in _free_headings(field, start, clearances_m[-1]):
+                turned = Pose2(start.x_m, start.y_m, heading_rad)
+                other = self._try(t_s, turned, goal, field, clearances_m, begin)
+                if other.path is not None:
+                    result, self.turns_first = other, True
+                    break
+        self._journal.planning_time_s += time.perf_counter() - begin
+        return result
+
+    def _try(
+        self,
+        t_s: float,
+        start: Pose2,
+        goal: Goal,
+        field: DistanceField,
+        clearances_m: Sequence[float],
+        begin: float,
+    ) -> PlanResult:
+        """Plan at the first clearance that gives a path."""
         result: PlanResult | None = None
         for clearance_m in clearances_m:
             request = PlanRequest(start, goal, field, self._rng, clearance_m, *self._shape())
@@ -73,7 +116,6 @@ class GlobalPlan:
                 self._adopt(t_s, path, result, clearance_m, time.perf_counter() - begin, field.circles_m)
                 break
         assert result is not None
-        self._journal.planning_time_s += time.perf_counter() - begin
         return result
 
     def _shape(self) -> tuple[Footprint | None, float]:
@@ -108,3 +150,18 @@ class GlobalPlan:
                 first,
             )
         )
+
+
+def _free_headings(field: DistanceField, start: Pose2, clearance_m: float) -> list[float]:
+    """Headings with the most free ground straight ahead, those that differ least from the present first."""
+    headings = start.theta_rad + np.linspace(-math.pi, math.pi, HEADINGS, endpoint=False)
+    ahead_m = np.arange(0.0, FAR_M, 0.5 * max(field.resolution_m, 0.05))
+    free_m = []
+    for heading in headings:
+        points = np.column_stack(
+            [start.x_m + ahead_m * math.cos(heading), start.y_m + ahead_m * math.sin(heading)]
+        )
+        blocked = np.flatnonzero(field.at(points) < clearance_m)
+        free_m.append(float(ahead_m[blocked[0]]) if len(blocked) else FAR_M)
+    turn = np.abs(headings - start.theta_rad)
+    return [float(headings[k]) for k in np.lexsort((turn, -np.array(free_m)))[:TRIED]]

@@ -29,6 +29,9 @@ HERE_TOLERANCE_M = 0.005
 MAPPED_TOLERANCE_M = 0.02
 """What the robot maps is drawn a little too large: where it stands there was room for it."""
 
+SETTING_OUT_M = 0.1
+"""A plan that begins with a turn on the spot is still at its beginning."""
+
 TURN_RATE_RAD_S = 0.8
 """On the spot, where the plan does."""
 
@@ -170,7 +173,10 @@ class Context:
     def turn_to_plan_rad(self, pose: Pose2) -> float:
         """How far to turn to head as the plan does here; 0 where the plan, or the robot, does not turn so."""
         path = self.plan.path
-        if path is None or path.turning_radius_m > 0.0 or not self._turns_on_the_spot:
+        if path is None or not self._turns_on_the_spot:
+            return 0.0
+        first = self.plan.turns_first and self.progress.at_m < SETTING_OUT_M
+        if path.turning_radius_m > 0.0 and not first:
             return 0.0
         return wrap_to_pi(self.progress.heading_rad - pose.theta_rad)
 

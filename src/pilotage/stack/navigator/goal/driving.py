@@ -75,15 +75,23 @@ def drive(context: Context, state: Driving, readings: Readings, belief: Belief) 
     context.map_what_is_new(readings, belief)
     context.to_go_m = context.progress.update(pose)
     move = _next(context, state, readings, pose)
-    own, command = context.own_map, move.command
-    if context.guard.allows(
-        command, pose, own.barriers, own.circles_m, context.clearance_m - HERE_TOLERANCE_M
-    ):
+    if _allows(context, pose, move.command):
         return move
+    if isinstance(move.state, InHall):
+        # Where there is no room to get to the middle, the plan leads.
+        move = _follow(context, Following(context), pose)
+        if _allows(context, pose, move.command):
+            return move
     if isinstance(move.state, Avoiding):
-        return Move(move.state, Twist(0.0, command.w_rad_s))
+        return Move(move.state, Twist(0.0, move.command.w_rad_s))
     resumes = _anew(context, move.state)
     return replan(context, resumes, pose, "the robot's own map leaves no room for the command")
+
+
+def _allows(context: Context, pose: Pose2, command: Twist) -> bool:
+    """Whether the robot's own map leaves room for a command."""
+    own, room_m = context.own_map, context.clearance_m - HERE_TOLERANCE_M
+    return context.guard.allows(command, pose, own.barriers, own.circles_m, room_m)
 
 
 def _next(context: Context, state: Driving, readings: Readings, pose: Pose2) -> Move:

@@ -73,7 +73,8 @@ class GoalNavigator:
             journal.counts["goals"] = 0
         least_m = robot.radius_m + config.guard.margin_m
         rng = robot.streams.stream("planner")
-        plan = GlobalPlan(parts.planner, parts.smoother, chart, rng, journal, least_m)
+        turns = robot.motion.least_turning_radius_m == 0.0
+        plan = GlobalPlan(parts.planner, parts.smoother, chart, rng, journal, least_m, can_turn_first=turns)
         self._context = Context(
             config, robot, task, parts, own_map, plan, parts.local_planner, parts.controller, journal
         )
