@@ -157,17 +157,17 @@ class RrtStarDubinsPlanner:
         radius_m, goal = self._config.turning_radius_m, request.goal
         x, y, th = request.start.x_m, request.start.y_m, request.start.theta_rad
         if goal.theta_rad is None:
-            word, *lengths = dubins.shortest_to_point(x, y, th, goal.x_m, goal.y_m, radius_m)
+            word, l0, l1, l2 = dubins.shortest_to_point(x, y, th, goal.x_m, goal.y_m, radius_m)
         else:
-            word, *lengths = dubins.shortest(x, y, th, goal.x_m, goal.y_m, goal.theta_rad, radius_m)
-        curve = (x, y, th, radius_m, word, *lengths)
+            word, l0, l1, l2 = dubins.shortest(x, y, th, goal.x_m, goal.y_m, goal.theta_rad, radius_m)
+        curve = (x, y, th, radius_m, word, l0, l1, l2)
         if first_blocked(dubins.sample(*curve, CHECK_SPACING_M), space, clearance_m) >= 0:
             return None
         states = dubins.sample(*curve, STATE_SPACING_M)
         waypoints = dubins.sample(*curve, self._config.max_connection_distance_m)
         for poses in (states, waypoints):
             poses[:, 2] = wrap_array_to_pi(poses[:, 2])
-        return Path(states, waypoints, sum(lengths), radius_m)
+        return Path(states, waypoints, l0 + l1 + l2, radius_m)
 
     def _search(self, request: PlanRequest, space: Space, clearance_m: float) -> rrt_samples.Search:
         """Settings for the kernel; edges keep a little more clearance for what checks may step over."""
