@@ -430,5 +430,7 @@ EXAMPLES: dict[tuple[str, str], Example] = {
     ("task", "reach"): Example(task_runs("reach")),
     ("task", "plan"): Example(task_runs("plan")),
     ("task", "drive"): Example(task_runs("drive")),
+    ("task", "follow"): Example(task_runs("follow"), {"points_m": ((4.0, 4.0), (7.0, 4.0))}),
+    ("task", "localize"): Example(task_runs("localize")),
     ("task", "explore"): Example(task_runs("explore"), {"blocked_s": 2.0}),
 }

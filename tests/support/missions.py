@@ -75,6 +75,19 @@ def drive() -> dict[str, Any]:
     return reach(mission="a-bend", task="drive", world=world, stack=stack)
 
 
+def follow() -> dict[str, Any]:
+    """Through the gap by two points."""
+    world = {"map": ROOM_MAP, "start": {"x_m": 2.0, "y_m": 2.0, "theta_rad": 1.1}}
+    values = reach(mission="by-two-points", world=world)
+    values["stack"]["planner"] = {"name": "rrt-star-dubins", "clearance_m": 0.35}
+    return values
+
+
+def localize() -> dict[str, Any]:
+    """The bend, and where it ends."""
+    return {**drive(), "mission": "where-a-bend-ends", "task": "localize"}
+
+
 def explore() -> dict[str, Any]:
     """An empty sheet, half a metre wide."""
     sides = {"ir_left": 0.785, "ir_front": 0.209, "ir_front2": -0.209, "ir_right": -0.785}
@@ -103,5 +116,7 @@ MISSIONS: dict[str, dict[str, Any]] = {
     "reach": reach(),
     "plan": plan(),
     "drive": drive(),
+    "follow": {**follow(), "task": {"name": "follow", "points_m": [[4.0, 4.0], [7.0, 4.0]]}},
+    "localize": localize(),
     "explore": explore(),
 }
