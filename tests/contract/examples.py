@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from contract.local_examples import LOCAL_EXAMPLES, navigator_drives_by_the_laser
-from contract.patrol_examples import strategy_patrols
+from contract.patrol_examples import STRATEGY_NUMBERS, strategy_patrols
 from contract.people_examples import people_walk
 from contract.rover_examples import (
     dead_reckoning_follows_the_bend,
@@ -417,8 +417,7 @@ EXAMPLES: dict[tuple[str, str], Example] = {
     ("navigator", "surround-check"): Example(
         explorer_explores, {"margin_cells": 1}, pure_numbers=frozenset({"far_cells"})
     ),
-    ("strategy", "conscientious-reactive"): Example(strategy_patrols),
-    ("strategy", "cyclic"): Example(strategy_patrols),
+    **{("strategy", name): Example(strategy_patrols, {}, pure) for name, pure in STRATEGY_NUMBERS.items()},
     ("people", "track"): Example(
         people_walk, {"file": str(pathlib.Path(__file__).parent.parent / "support" / "walkers.txt")}
     ),

@@ -10,6 +10,16 @@ import numpy as np
 from pilotage.experiments.graph_patrol import GraphPatrol, Radio, patrol
 from pilotage.stack.patrol.graph import PatrolGraph
 
+STRATEGY_NUMBERS: dict[str, frozenset[str]] = {
+    **dict.fromkeys(
+        ("conscientious-reactive", "heuristic-conscientious", "cyclic", "msp-partition"), frozenset()
+    ),
+    **dict.fromkeys(("greedy-bayesian", "sebs"), frozenset({"probability_at_zero"})),
+    **dict.fromkeys(("cbls", "dtag", "dtap"), frozenset()),
+    "adaptive-rounds": frozenset({"mean_weight", "sharing_cost", "slack"}),
+}
+"""Every strategy, with its parameters that are pure numbers."""
+
 
 def lattice(columns: int = 4, rows: int = 3, side_m: float = 2.0) -> PatrolGraph:
     """Vertices in rows and columns, edges between neighbours, and a dead end."""

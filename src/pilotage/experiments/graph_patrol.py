@@ -145,6 +145,9 @@ class _Run:
                 self._visits.append((index, robot.here, t_s))
                 self._decide(index, robot, t_s)
             elif kind == "wait":
+                # Where it stands nothing is left alone.
+                robot.memory.visit(robot.here, t_s)
+                self._visits.append((index, robot.here, t_s))
                 self._decide(index, robot, t_s)
             elif kind == "beat":
                 self._broadcast(index, robot, t_s)
@@ -168,14 +171,13 @@ class _Run:
         speed_m_s = memory.own.speed_m_s
         changed = goal != memory.own.target
         memory.bound(goal, t_s, t_s + float(trial.graph.shortest_m[here, goal]) / speed_m_s)
+        memory.update(t_s, words=robot.strategy.words(memory.knowledge(t_s)))
+        if changed:
+            self._broadcast(index, robot, t_s)
         if goal == here:
             robot.leaves_s = robot.arrives_s = t_s
             self._push(t_s + WAIT_S, "wait", index)
             return
-        words = robot.strategy.words(memory.knowledge(t_s))
-        memory.update(t_s, words=words)
-        if changed:
-            self._broadcast(index, robot, t_s)
         robot.there = int(trial.graph.next_hop[here, goal])
         length_m = float(trial.graph.edges_m[here, robot.there])
         luck = math.exp(trial.edge_std * robot.rng.standard_normal())

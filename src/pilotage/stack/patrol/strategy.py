@@ -55,7 +55,10 @@ class Strategy(Protocol):
         ...
 
     def words(self, knowledge: PatrolKnowledge) -> FloatArray:
-        """(K,) what is added to this robot's messages for its like on other robots; may be empty."""
+        """(K,) what is added to this robot's messages for its like on other robots; may be empty.
+
+        Asked after every ``next_vertex``, with its answer as the target.
+        """
         ...
 
 

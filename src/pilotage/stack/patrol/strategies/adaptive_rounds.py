@@ -1,0 +1,220 @@
+"""Our own: rounds chosen by what they promise, evenly spaced by what is told, new when the team changes."""
+
+from __future__ import annotations
+
+import math
+import zlib
+
+import numpy as np
+from pydantic import Field
+from scipy.optimize import linear_sum_assignment
+
+from pilotage.core.config import Config
+from pilotage.core.types import FloatArray, IntArray
+from pilotage.sensors.sensor import NonNegative, Positive
+from pilotage.stack.patrol.messages import NOTHING, PatrolKnowledge, PatrolState
+from pilotage.stack.patrol.partition import Plan, even_sizes, partition
+from pilotage.stack.patrol.strategy import STRATEGIES, PatrolSetting
+from pilotage.stack.patrol.tours import Round, spread
+
+KEY, PHASE_M, PHASE_S = range(3)
+"""What a robot says: which round it goes, how far along it was, and when."""
+
+
+class AdaptiveRoundsConfig(Config):
+    """How plans are weighed, and when a robot waits or gives another one up.
+
+    A plan's cost is its worst idleness plus ``mean_weight`` times its mean; rounds that several robots share
+    count ``sharing_cost`` more, for what keeping apart costs. A robot waits while it is further ahead of its
+    place among those that share its round than ``slack`` of the distance between them.
+    """
+
+    mean_weight: NonNegative = 2.0
+    sharing_cost: NonNegative = 0.03
+    slack: Positive = Field(default=0.05, le=0.5)
+    silent_s: Positive = 30.0
+    silent_ratio: Positive = 4.0
+    """A robot is given up when silent for ``silent_s`` and so many times its longest silence before."""
+
+
+def best_plan(setting: PatrolSetting, robots: int, config: AdaptiveRoundsConfig) -> Plan:
+    """The cheapest plan for so many robots: one round for all, one for each, and what lies between."""
+    graph = setting.graph
+    most = min(robots, len(graph))
+    plans = [partition(graph, even_sizes(robots, groups)) for groups in range(1, most + 1)]
+
+    def cost(plan: Plan) -> float:
+        # By the longest of the rounds, each as it is shared: those of one robot need not keep apart.
+        extra = 1.0 + config.sharing_cost * (max(plan.sizes) > 1)
+        return extra * (plan.worst_m + config.mean_weight * plan.mean_m)
+
+    return min(plans, key=cost)
+
+
+@STRATEGIES.add("adaptive-rounds", AdaptiveRoundsConfig)
+class AdaptiveRoundsStrategy:
+    """Rounds for groups of robots, from one tour for all to a share for each, by the idleness they promise.
+
+    Robots say how far along their round they are. Those who share one wait at vertices where they are ahead
+    of the even spacing; positions told some time ago are carried on at the speed that was told. Where a
+    robot falls silent or goes off duty the others plan for those who are left, and again when it is back;
+    who goes where is settled by distance, and by counting heads where news differ.
+    """
+
+    def __init__(self, config: AdaptiveRoundsConfig, setting: PatrolSetting) -> None:
+        self._config, self._setting, self._graph = config, setting, setting.graph
+        team = setting.team_size
+        self._team = frozenset(range(team))
+        self._heard_s = np.full(team, setting.begin_s)
+        self._silence_s = np.zeros(team)
+        self._times_heard = np.zeros(team, dtype=np.int64)
+        self._plan = best_plan(setting, team, config)
+        groups = self._seats(dict(enumerate(setting.starts.tolist())))
+        self._round = self._plan.rounds[groups[setting.robot]]
+        mates = [robot for robot in sorted(groups) if groups[robot] == groups[setting.robot]]
+        slots = spread(self._round, self._graph, setting.starts[mates], setting.speed_m_s, setting.begin_s)
+        slot = slots[mates.index(setting.robot)]
+        self._place = slot.place
+        self._leaves_s = slot.leaves_s if len(mates) > 1 else setting.begin_s
+        self._phase_s = setting.begin_s
+        self._is_on_round, self._waited_s = False, 0.0
+        self._last_wait_s: float | None = None
+
+    def next_vertex(self, knowledge: PatrolKnowledge) -> int:
+        """The next stop of its round; where it stands, to let the others catch up."""
+        self._listen(knowledge)
+        self._change_rounds(knowledge)
+        stops, here, now_s = self._round.stops, knowledge.at, knowledge.now_s
+        if here != stops[self._place]:
+            return int(stops[self._place])
+        self._phase_s, self._is_on_round = now_s, True
+        if now_s < self._leaves_s or len(stops) == 1 or self._is_ahead(knowledge):
+            return here
+        self._waited_s, self._last_wait_s = 0.0, None
+        self._place = (self._place + 1) % len(stops)
+        # A walk may pass a vertex twice, never twice in a row.
+        return int(stops[self._place])
+
+    def words(self, knowledge: PatrolKnowledge) -> FloatArray:
+        """Its round, and where it was along it when; nothing before it is on it."""
+        if not self._is_on_round:
+            return NOTHING
+        before = self._place if knowledge.at == knowledge.target else self._place - 1
+        return np.array([_key(self._round), self._round.at_m[before], self._phase_s])
+
+    def _listen(self, knowledge: PatrolKnowledge) -> None:
+        """Note who is heard, how often, and who has fallen silent; plan anew where that changes the team."""
+        now_s, config = knowledge.now_s, self._config
+        # Before it is known how often somebody is heard, as long as half a round.
+        patience_s = 0.5 * self._round.length_m / self._setting.speed_m_s
+        team = {knowledge.robot}
+        for robot, state in enumerate(knowledge.states):
+            if robot == knowledge.robot:
+                continue
+            if state is not None and state.t_s > self._heard_s[robot]:
+                self._silence_s[robot] = max(self._silence_s[robot], state.t_s - self._heard_s[robot])
+                self._heard_s[robot] = state.t_s
+                self._times_heard[robot] += 1
+            known = config.silent_ratio * self._silence_s[robot]
+            limit_s = max(config.silent_s, known if self._times_heard[robot] > 3 else patience_s)
+            if now_s - self._heard_s[robot] <= limit_s and (state is None or state.on_duty):
+                team.add(robot)
+        if frozenset(team) != self._team:
+            self._team = frozenset(team)
+            self._plan = best_plan(self._setting, len(team), config)
+            groups = self._seats({robot: self._place_of(knowledge, robot) for robot in sorted(team)})
+            self._join(self._plan.rounds[groups[knowledge.robot]], knowledge)
+
+    def _seats(self, places: dict[int, int]) -> dict[int, int]:
+        """Which group each robot belongs to: the least sum of squared distances to the rounds."""
+        plan, robots = self._plan, sorted(places)
+        seats = np.repeat(np.arange(len(plan.sizes)), plan.sizes)
+        away = np.array(
+            [[self._graph.shortest_m[places[r], walk.stops].min() for walk in plan.rounds] for r in robots]
+        )
+        row, column = linear_sum_assignment(away[:, seats] ** 2)
+        return {robots[r]: int(seats[c]) for r, c in zip(row, column, strict=True)}
+
+    def _place_of(self, knowledge: PatrolKnowledge, robot: int) -> int:
+        """The vertex that a robot is at or bound for; its start where it was never heard."""
+        if robot == knowledge.robot:
+            return knowledge.at
+        state = knowledge.states[robot]
+        return int(self._setting.starts[robot]) if state is None else state.target
+
+    def _join(self, walk: Round, knowledge: PatrolKnowledge) -> None:
+        """Go to the nearest stop of another round; stay where it is the same one."""
+        if _key(walk) == _key(self._round):
+            return
+        self._round, self._leaves_s, self._is_on_round = walk, -math.inf, False
+        self._place = int(np.argmin(self._graph.shortest_m[knowledge.at, walk.stops]))
+
+    def _change_rounds(self, knowledge: PatrolKnowledge) -> None:
+        """Leave a round that has too many for one that has too few, if nobody else of it is nearer."""
+        plan, keys = self._plan, [_key(walk) for walk in self._plan.rounds]
+        if len(keys) == 1:
+            return
+        on: dict[float, list[PatrolState]] = {key: [] for key in keys}
+        for state in self._mates(knowledge):
+            if state.words[KEY] not in on:
+                return  # it plans for another team yet
+            on[float(state.words[KEY])].append(state)
+        own = _key(self._round)
+        if len(on[own]) + 1 <= plan.sizes[keys.index(own)]:
+            return
+        for key, walk, size in zip(keys, plan.rounds, plan.sizes, strict=True):
+            if key == own or len(on[key]) >= size:
+                continue
+            away = self._graph.shortest_m[:, walk.stops].min(axis=1)
+            mine = float(away[knowledge.at]), knowledge.robot
+            if all(mine < (float(away[state.target]), state.robot) for state in on[own]):
+                self._join(walk, knowledge)
+                return
+
+    def _mates(self, knowledge: PatrolKnowledge) -> list[PatrolState]:
+        """Robots of the team that have said where they are."""
+        return [state for state in knowledge.others() if state.robot in self._team and len(state.words) == 3]
+
+    def _is_ahead(self, knowledge: PatrolKnowledge) -> bool:
+        """Whether to wait here: ahead of the even spacing, and not waited for long yet."""
+        key, length_m = _key(self._round), self._round.length_m
+        mates = [state for state in self._mates(knowledge) if state.words[KEY] == key]
+        size = 1 + len(mates)
+        for walk, planned in zip(self._plan.rounds, self._plan.sizes, strict=True):
+            size = max(size, planned) if _key(walk) == key else size
+        if not mates:
+            return False
+        apart_m = length_m / size
+        now_s = knowledge.now_s
+        gap_m = np.array(
+            [state.words[PHASE_M] + state.speed_m_s * (now_s - state.words[PHASE_S]) for state in mates]
+        )
+        gap_m = np.mod(gap_m - self._round.at_m[self._place], length_m)
+        # How much farther the others are than their places in the row say, as seen from here.
+        off_m = _off_even(gap_m, apart_m, complete=len(mates) + 1 == size)
+        # Measured from the last one of all: by neighbours' gaps or the mean, small errors add up along the
+        # row.
+        ahead_m = -float(off_m.min())
+        patience_s = 0.5 * apart_m / self._setting.speed_m_s
+        if ahead_m <= self._config.slack * apart_m or self._waited_s > patience_s:
+            return False
+        if self._last_wait_s is not None:
+            self._waited_s += now_s - self._last_wait_s
+        self._last_wait_s = now_s
+        return True
+
+
+def _off_even(gap_m: FloatArray, apart_m: float, complete: bool) -> FloatArray:
+    """(K,) how far others, so far ahead on the round (K,), are beyond the places of an even row."""
+    rank: FloatArray | IntArray
+    if complete:
+        rank = np.empty(len(gap_m))
+        rank[np.argsort(gap_m, kind="stable")] = np.arange(1, len(gap_m) + 1)
+    else:  # somebody is missing: the nearest place of the row
+        rank = np.rint(gap_m / apart_m)
+    return gap_m - rank * apart_m
+
+
+def _key(walk: Round) -> float:
+    """A number that tells rounds apart."""
+    return float(zlib.crc32(walk.stops.tobytes()))
