@@ -114,9 +114,10 @@ def test_limits_are_those_of_the_data_sheet() -> None:
             max_turn_rate_rad_s=3.0,
             max_acceleration_m_s2=1.2,
             max_turn_acceleration_rad_s2=5.0,
+            delay_s=0.1,
         ),
     )
-    limits = limits_of(robot, LocalConfig(reverse_m_s=4.0, delay_s=0.1))
+    limits = limits_of(robot, LocalConfig(reverse_m_s=4.0))
     assert (limits.speed_m_s, limits.reverse_m_s, limits.delay_s) == (1.5, 1.5, 0.1)
     assert (limits.acceleration_m_s2, limits.deceleration_m_s2) == (1.2, 1.2)
     assert (limits.turn_rate_rad_s, limits.turn_acceleration_rad_s2) == (3.0, 5.0)

@@ -16,6 +16,7 @@ from pilotage.core.types import Pose2, Twist
 from pilotage.maps.segment_map import SegmentMap
 from pilotage.maps.world_map import WorldMap
 from pilotage.models.footprint import Footprint
+from pilotage.models.motion.differential_drive import DifferentialDriveConfig
 from pilotage.models.motion.motion import MOTIONS
 from pilotage.models.motion.omnidirectional import OmnidirectionalConfig
 from pilotage.models.motion.wheel_drive import WheelDriveConfig
@@ -39,7 +40,7 @@ from pilotage.sensors.wheel_encoders import WheelEncodersConfig
 from pilotage.sensors.wheel_odometry import WheelOdometryConfig
 from pilotage.sim.source import RobotSpec, Simulator
 from pilotage.sim.worlds.world import World
-from support.worlds import CAR, DISC, ROOM_MAP, robot, simulator
+from support.worlds import CAR, DISC, ROOM_MAP, START, robot, simulator
 
 EMPTY = WorldMap("empty", (-50.0, -50.0, 50.0, 50.0))
 BOX = Footprint.polygon(np.array([[0.4, 0.3], [-0.4, 0.3], [-0.4, -0.3], [0.4, -0.3]]))
@@ -126,6 +127,24 @@ def test_a_crowd_never_overlaps() -> None:
 def test_robots_that_start_inside_each_other_are_refused() -> None:
     with pytest.raises(InputError, match="robots 'one' and 'two': expected starts apart"):
         Simulator(solid(), [at(0.0, name="one"), at(0.5, name="two")], 0.1)
+
+
+def test_commands_act_after_the_motions_delay() -> None:
+    prompt, late = (
+        Simulator(solid(), [robot(motion=DifferentialDriveConfig(delay_s=delay_s))], 0.1)
+        for delay_s in (0.0, 0.3)
+    )
+    commands = [Twist(0.1 * k, 0.2 * k) for k in range(8)]
+    poses = [[_stepped(sim, command) for command in commands] for sim in (prompt, late)]
+    assert poses[1][:3] == [START] * 3
+    assert poses[1][3:] == poses[0][:-3]
+    with pytest.raises(InputError, match=r"robot\.motion\.delay_s: expected a multiple of run\.dt_s"):
+        Simulator(solid(), [robot(motion=DifferentialDriveConfig(delay_s=0.25))], 0.1)
+
+
+def _stepped(sim: Simulator, command: Twist) -> Pose2:
+    sim.step([command])
+    return sim.bodies[0].pose
 
 
 def test_each_robot_draws_from_its_own_streams() -> None:

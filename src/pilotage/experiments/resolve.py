@@ -9,6 +9,7 @@ from typing import Any
 
 import yaml
 
+from pilotage.core.errors import InputError
 from pilotage.experiments.build.charts import inlined
 from pilotage.experiments.roles import ROLES
 from pilotage.maps.world_map import WorldMap
@@ -65,7 +66,14 @@ def _resolve_stack(stack: dict[str, Any], where: str) -> None:
 
 
 def _resolve_robot(robot: dict[str, Any], where: str) -> None:
+    truly = {**robot["motion"], **robot["true_motion"]}
     robot["motion"] = _resolved("motion", robot["motion"], f"{where}.motion")
+    if truly.get("name") != robot["motion"]["name"]:
+        raise InputError(
+            f"{where}.true_motion: expected parameters of the motion '{robot['motion']['name']}' alone, "
+            f"found another name"
+        )
+    _resolved("motion", truly, f"{where}.true_motion")
     for name, choice in robot["sensors"].items():
         robot["sensors"][name] = _resolved("sensor", choice, f"{where}.sensors.{name}")
     if robot["stack"] is not None:

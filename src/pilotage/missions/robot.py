@@ -54,6 +54,8 @@ class RobotConfig(Config):
     motion: Annotated[ComponentChoice, by_default("differential-drive")] = ComponentChoice(
         name="differential-drive"
     )
+    true_motion: dict[str, Any] = Field(default_factory=dict)
+    """Parameters of the motion that are not as the data sheet says; the robot does not know of them."""
     sensors: dict[str, ComponentChoice] = Field(default_factory=dict)
     """By names of the mission's own; null takes one off that was there before."""
     start: PoseConfig | None = None

@@ -205,7 +205,18 @@ def _body(
         default=1,
     )
     motion = SIMULATED_MOTIONS.of(robot.motion, where)(robot.motion, dt_s, samples, robot.streams, where)
-    return Body(robot.name, robot.footprint, motion, robot.start, world, dt_s, table, row, owns)
+    delay = _delay_steps(robot.motion, dt_s, where)
+    return Body(robot.name, robot.footprint, motion, robot.start, world, dt_s, table, row, owns, delay)
+
+
+def _delay_steps(motion: MotionConfig, dt_s: float, where: str) -> int:
+    """How many steps late commands act."""
+    steps = motion.delay_s / dt_s
+    if abs(steps - round(steps)) > 1e-6:
+        raise InputError(
+            f"{where}.delay_s: expected a multiple of run.dt_s ({dt_s:g} s), found {motion.delay_s:g}"
+        )
+    return round(steps)
 
 
 def _samples(config: SensorConfig, dt_s: float, where: str) -> int:

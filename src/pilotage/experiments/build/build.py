@@ -292,12 +292,14 @@ def _obstacles(
 
 def _spec(mission: Mission, index: int, sheet: RobotKnowledge, oracles: frozenset[str]) -> RobotSpec:
     """The robot as it truly is: with the faults that it has, or without those that an oracle takes away."""
-    start = mission.start_of(mission.team[index])
+    robot = mission.team[index]
+    start = mission.start_of(robot)
     assert start is not None, "settled above"
+    truly = motion_of(robot, f"robots.{index}" if mission.robots else "robot", truly=True)
     return RobotSpec(
         sheet.name,
         sheet.footprint,
-        faithful(sheet.motion) if "drive" in oracles else sheet.motion,
+        faithful(sheet.motion) if "drive" in oracles else truly,
         ideal_sensors(sheet.sensors) if "sensors" in oracles else sheet.sensors,
         pose_of(start),
         sheet.streams,

@@ -18,10 +18,11 @@ def footprint_of(robot: RobotConfig, where: str) -> Footprint:
     return Footprint.polygon(np.array(robot.footprint.points_m), f"{where}.footprint.points_m")
 
 
-def motion_of(robot: RobotConfig, where: str) -> MotionConfig:
-    """The validated data sheet of the robot's motion."""
+def motion_of(robot: RobotConfig, where: str, *, truly: bool = False) -> MotionConfig:
+    """The validated data sheet of the robot's motion, or how it ``truly`` moves."""
     choice = robot.motion
-    config = MOTIONS.configure(choice.name, choice.parameters, f"{where}.motion")
+    parameters = choice.parameters | (robot.true_motion if truly else {})
+    config = MOTIONS.configure(choice.name, parameters, f"{where}.motion")
     if not isinstance(config, MotionConfig):
         raise InputError(
             f"{where}.motion: '{choice.name}' is registered with a config that is no MotionConfig"

@@ -20,6 +20,9 @@ class MotionConfig(Config):
     from its wheels) override the three properties.
     """
 
+    delay_s: float = Field(default=0.0, ge=0.0, le=2.0)
+    """From a command until the robot follows it: a multiple of the run's time step."""
+
     @property
     def top_speed_m_s(self) -> float:
         """Fastest forward speed."""

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections import deque
+
 import numpy as np
 
-from pilotage.core.types import Command, FloatArray, IntArray, Pose2, Twist
+from pilotage.core.types import STOP, Command, FloatArray, IntArray, Pose2, Twist
 from pilotage.kernels.bodies import clearances, drive
 from pilotage.models.footprint import Footprint
 from pilotage.sim.bodies.motion import SimulatedMotion
@@ -43,6 +45,7 @@ class Body:
         table: FloatArray,
         row: int,
         owns: IntArray,
+        delay_steps: int = 0,
     ) -> None:
         self.name, self.footprint, self.motion, self.world = name, footprint, motion, world
         self.table, self.row, self.owns = table, row, owns
@@ -50,6 +53,7 @@ class Body:
         own = self.own
         self.rates_rad_s: FloatArray = np.zeros(len(motion.moves))
         self._dt_s = dt_s
+        self._under_way: deque[Command] | None = deque([STOP] * delay_steps) if delay_steps else None
         outline = (footprint.points_m, footprint.radius_m, footprint.inner_radius_m)
         walls, grid, traffic = (world.segments_m, world.circles_m), world.grid, world.traffic
         cells = (grid.jump, grid.outlines_m, grid.starts, grid.items, grid.frame)
@@ -104,8 +108,11 @@ class Body:
         return ground is not None and ground.on_hazard(float(self.state[0]), float(self.state[1]))
 
     def step(self, command: Command) -> None:
-        """Drive one step."""
+        """Drive one step, by the command that takes effect now."""
         motion = self.motion
+        if self._under_way is not None:
+            self._under_way.append(command)
+            command = self._under_way.popleft()
         motion.command(command)
         if drive.drive(self.state, motion.moves, self.rates_rad_s, *self._step) and not motion.spins_on:
             motion.stop()

@@ -34,8 +34,6 @@ class LocalConfig(Config):
 
     reverse_m_s: NonNegative = 0.5
     """Fastest backwards, never above the forward speed; 0 for a robot that does not see behind it."""
-    delay_s: float = Field(default=0.0, ge=0.0, le=2.0)
-    """From a command until the robot follows it."""
     arrival_m: float | None = Field(default=None, gt=0.0)
     """How near it has to believe to be; None: the goal's tolerance."""
     shift_m: Positive = 0.1
@@ -179,7 +177,7 @@ def limits_of(robot: RobotKnowledge, config: LocalConfig) -> LocalLimits:
         deceleration_m_s2=acceleration,
         turn_rate_rad_s=rate,
         turn_acceleration_rad_s2=min(motion.turn_acceleration_rad_s2, rate / robot.dt_s),
-        delay_s=config.delay_s,
+        delay_s=motion.delay_s,
     )
 
 
