@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pilotage.core.angles import wrap_to_pi
-from pilotage.core.types import STOP, Command, Event, Pose2
+from pilotage.core.types import Event, Pose2
 from pilotage.evaluation.finished import FinishedRun, RobotRun
 from pilotage.evaluation.tasks.task import Attempt, all_ended
 from pilotage.experiments.build.build import Experiment, Member, build
@@ -17,6 +17,7 @@ from pilotage.experiments.people_trail import PeopleTrail
 from pilotage.experiments.progress import EVERY_S, OnProgress, Progress, metres
 from pilotage.experiments.recorder import Recorder
 from pilotage.experiments.sightings import Sightings
+from pilotage.experiments.source import stepped
 from pilotage.experiments.update_album import UpdateAlbum
 from pilotage.missions.mission import Mission
 from pilotage.missions.places import Kidnap
@@ -63,17 +64,13 @@ def run_loop(experiment: Experiment, on_progress: OnProgress | None = None) -> R
     every = max(1, round(mission.run.record_every_s / mission.run.dt_s))
     limit = math.ceil(mission.run.time_limit_s / mission.run.dt_s) if task.drives else 0
     kidnaps = sorted(mission.world.kidnaps, key=lambda kidnap: kidnap.at_s)
-    commands: list[Command] = [STOP] * len(team)
     ending = "" if not task.drives or all_ended(attempts) else None
     begin = last_told = time.perf_counter()
     step = 0
-    while ending is None and step < limit:
-        while kidnaps and source.t_s >= kidnaps[0].at_s:
-            events.append(carry(source, kidnaps.pop(0)))
-        readings = source.step(commands)
+    stacks = [member.stack for member in team] if ending is None and limit > 0 else []
+    _carry_whose_time_has_come(source, kidnaps, events)
+    for readings, commands in stepped(source, stacks) if stacks else ():
         step += 1
-        for index, member in enumerate(team):
-            commands[index] = member.stack.step(readings[index])
         ending = task.step(source.t_s, attempts)
         for index, member in enumerate(team):
             if step % every == 0 or ending is not None:
@@ -88,6 +85,9 @@ def run_loop(experiment: Experiment, on_progress: OnProgress | None = None) -> R
             on_progress(_progress(experiment, attempts))
         if step % every == 0 or ending is not None:
             trail.record(source.t_s)
+        if ending is not None or step >= limit:
+            break
+        _carry_whose_time_has_come(source, kidnaps, events)
     loop_s = time.perf_counter() - begin
     planning_s = sum(member.journal.planning_time_s for member in team) - planned_s
     if ending is None:
@@ -142,6 +142,11 @@ def _robot_run(experiment: Experiment, index: int, recorder: Recorder) -> RobotR
         body.driven_m,
         None if crowd is None else crowd.encounters(index),
     )
+
+
+def _carry_whose_time_has_come(source: Simulator, kidnaps: list[Kidnap], events: list[Event]) -> None:
+    while kidnaps and source.t_s >= kidnaps[0].at_s:
+        events.append(carry(source, kidnaps.pop(0)))
 
 
 def carry(source: Simulator, kidnap: Kidnap) -> Event:

@@ -112,6 +112,11 @@ class Simulator:
         """Simulated time."""
         return self._steps * self._dt_s
 
+    @property
+    def is_over(self) -> bool:
+        """Never: it goes on as long as it is asked to."""
+        return False
+
     def step(self, commands: Sequence[Command]) -> list[Readings]:
         """Drive one time step and return what each robot's sensors say at its end."""
         self._steps += 1

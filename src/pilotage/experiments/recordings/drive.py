@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from pilotage.core.errors import InputError
-from pilotage.core.types import BoolArray, FloatArray, IntArray
+from pilotage.core.types import BoolArray, Command, FloatArray, IntArray
 from pilotage.logs.aer1513 import read_aer1513
 from pilotage.logs.mrclam import TRUTH_GAP_S, MrclamLog, read_mrclam
 from pilotage.maps.landmarks import Landmarks
@@ -68,16 +68,43 @@ class RecordedDrive:
     rate_var: tuple[float, float] | None = None
     stale: tuple[str, ...] = ()
 
-    def readings(self) -> Iterator[Readings]:
-        """The log through the robot's plug, from the first step after the begin."""
-        for k in range(1, self.t_s.shape[0]):
-            said: dict[str, Reading] = {}
-            if np.isfinite(self.distance_m[k]):
-                said[ODOMETRY] = OdometryIncrement(float(self.distance_m[k]), float(self.angle_rad[k]))
-            rows = slice(int(self.first[k]), int(self.first[k + 1]))
-            if rows.stop > rows.start:
-                said[BEACONS] = BeaconReadings(self.ids[rows], self.ranges_m[rows], self.bearings_rad[rows])
-            yield Readings(float(self.t_s[k]), said)
+    def readings_at(self, k: int) -> Readings:
+        """What was sensed at step ``k``, as the robot's plug takes it."""
+        said: dict[str, Reading] = {}
+        if np.isfinite(self.distance_m[k]):
+            said[ODOMETRY] = OdometryIncrement(float(self.distance_m[k]), float(self.angle_rad[k]))
+        rows = slice(int(self.first[k]), int(self.first[k + 1]))
+        if rows.stop > rows.start:
+            said[BEACONS] = BeaconReadings(self.ids[rows], self.ranges_m[rows], self.bearings_rad[rows])
+        return Readings(float(self.t_s[k]), said)
+
+
+class RecordedSource:
+    """A recording as a source of readings: it says what was sensed, and cannot carry out a command.
+
+    Attributes
+    ----------
+    at
+        The step of the last readings.
+    """
+
+    def __init__(self, drive: RecordedDrive) -> None:
+        self._drive, self.at = drive, 0
+
+    @property
+    def t_s(self) -> float:
+        """Time of the last readings."""
+        return float(self._drive.t_s[self.at])
+
+    @property
+    def is_over(self) -> bool:
+        """Whether the recording has ended."""
+        return self.at + 1 >= len(self._drive.t_s)
+
+    def step(self, commands: Sequence[Command]) -> list[Readings]:  # noqa: ARG002
+        """The next step of the recording."""
+        self.at += 1
+        return [self._drive.readings_at(self.at)]
 
 
 def mrclam_drive(folder: Path, robot: int) -> RecordedDrive:

@@ -16,12 +16,13 @@ import yaml
 from pilotage.core.config import Config
 from pilotage.core.errors import InputError
 from pilotage.core.random import RandomStreams
-from pilotage.core.types import Event, FloatArray, Pose2
+from pilotage.core.types import STOP, Command, Event, FloatArray, Pose2
 from pilotage.evaluation.log_metrics import log_metrics
 from pilotage.experiments.mission import read_parameters
 from pilotage.experiments.recorder import BELIEF_COLUMNS, TRUTH_COLUMNS
-from pilotage.experiments.recordings.drive import RecordedDrive, aer1513_drive, mrclam_drive
+from pilotage.experiments.recordings.drive import RecordedDrive, RecordedSource, aer1513_drive, mrclam_drive
 from pilotage.experiments.recordings.parameters import shipped_parameters
+from pilotage.experiments.source import stepped
 from pilotage.experiments.values import apply_override, merge
 from pilotage.maps.segment_map import SegmentMap
 from pilotage.maps.world_map import WorldMap
@@ -30,7 +31,8 @@ from pilotage.models.motion.differential_drive import DifferentialDriveConfig
 from pilotage.records.run_folder import RunFiles, write_run
 from pilotage.records.trace import trace_of
 from pilotage.records.world import RobotOutline, World, landmarks_of
-from pilotage.stack.interface import Belief
+from pilotage.sensors.readings import Readings
+from pilotage.stack.interface import Belief, StackStatus
 from pilotage.stack.journal import Journal
 from pilotage.stack.knowledge import RobotKnowledge
 from pilotage.stack.localization.localizer import LOCALIZERS, Localizer
@@ -165,6 +167,32 @@ def build_localizer(drive: RecordedDrive, name: str, config: Config) -> tuple[Lo
     return LOCALIZERS.entry(name).factory(config, robot, chart, initial, journal), journal
 
 
+class _Listener:
+    """A stack that localizes and commands nothing: the recorded robot was driven by somebody else.
+
+    Attributes
+    ----------
+    took_s
+        Wall time in the localizer.
+    """
+
+    def __init__(self, localizer: Localizer) -> None:
+        self._localizer, self.took_s = localizer, 0.0
+        self.status = (StackStatus.RUNNING, "")
+
+    @property
+    def belief(self) -> Belief:
+        """The localizer's."""
+        return self._localizer.belief
+
+    def step(self, readings: Readings) -> Command:
+        """Localize."""
+        begin = time.perf_counter()
+        self._localizer.step(readings)
+        self.took_s += time.perf_counter() - begin
+        return STOP
+
+
 def follow(
     drive: RecordedDrive, localizer: Localizer, journal: Journal, steps: int | None = None
 ) -> tuple[dict[str, FloatArray], list[Event], float]:
@@ -175,11 +203,10 @@ def follow(
     rows: list[list[float]] = []
     events: list[Event] = []
     total = [math.nan] * len(names)
-    recoveries, loop_s = 0.0, 0.0
-    for k, readings in enumerate(drive.readings(), start=1):
-        begin = time.perf_counter()
-        belief = localizer.step(readings)
-        loop_s += time.perf_counter() - begin
+    recoveries = 0.0
+    source, listener = RecordedSource(drive), _Listener(localizer)
+    for (readings,), _ in stepped(source, [listener]):
+        k = source.at
         for i, value in enumerate(journal.row):
             if not sums[i] or math.isnan(total[i]):
                 total[i] = value
@@ -195,7 +222,7 @@ def follow(
                 )
             )
         if drive.scored[k]:
-            pose, cov = belief.pose, belief.cov
+            pose, cov = listener.belief.pose, listener.belief.cov
             upper = (cov[0, 0], cov[0, 1], cov[1, 1], cov[0, 2], cov[1, 2], cov[2, 2])
             x, y, theta = drive.truth[k]
             heading = (theta + math.pi) % (2.0 * math.pi) - math.pi
@@ -205,7 +232,11 @@ def follow(
             break
     columns = (*TRUTH_COLUMNS, *BELIEF_COLUMNS, *names)
     table = np.array(rows, dtype=np.float64).reshape(-1, len(columns))
-    return {name: np.ascontiguousarray(table[:, i]) for i, name in enumerate(columns)}, events, loop_s
+    return (
+        {name: np.ascontiguousarray(table[:, i]) for i, name in enumerate(columns)},
+        events,
+        listener.took_s,
+    )
 
 
 def _bounds(drive: RecordedDrive) -> tuple[float, float, float, float]:
