@@ -402,6 +402,7 @@ EXAMPLES: dict[tuple[str, str], Example] = {
     ("sensor", "compass"): Example(sensor_reads_in_any_world),
     ("sensor", "gps"): Example(sensor_reads_in_any_world),
     ("sensor", "bumper"): Example(sensor_reads_in_any_world),
+    ("sensor", "radio"): Example(sensor_reads_in_any_world, pure_numbers=frozenset({"loss"})),
     ("localizer", "invariant-ekf-landmarks"): Example(
         rover_filter_follows,
         {"gate": 0.999},

@@ -37,6 +37,7 @@ SENSOR_EXAMPLES: dict[str, dict[str, Any]] = {
     "compass": {},
     "gps": {"dropout_share": 0.2},
     "bumper": {},
+    "radio": {"loss": 0.2},
 }
 
 

@@ -35,11 +35,11 @@ RIGHT = {"start": {"x_m": 2.0, "y_m": 6.0}}
 class TestNames:
     def test_without_names_they_are_numbered(self) -> None:
         mission = team(LEFT, {**RIGHT, "name": "watch"})
-        assert [robot.name for robot in mission.team] == ["robot-0", "watch"]
+        assert [robot.name for robot in mission.members] == ["robot-0", "watch"]
 
     def test_each_is_laid_over_the_common_one(self) -> None:
         mission = team(LEFT, {**RIGHT, "footprint": {"radius_m": 0.2}, "motion": "omnidirectional"})
-        one, other = mission.team
+        one, other = mission.members
         assert (one.footprint.radius_m, other.footprint.radius_m) == (0.3, 0.2)  # type: ignore[union-attr]
         assert (one.motion.name, other.motion.name) == ("differential-drive", "omnidirectional")
         assert one.sensors == other.sensors
@@ -47,13 +47,13 @@ class TestNames:
     def test_another_outline_is_not_laid_over_the_common_one(self) -> None:
         """Neither in an entry of ``robots``, nor by an override."""
         mission = team(LEFT, {**RIGHT, "footprint": {"points_m": CAR}})
-        assert isinstance(mission.team[1].footprint, PolygonFootprint)
+        assert isinstance(mission.members[1].footprint, PolygonFootprint)
         loaded = load_mission("museum-1", [f"robot.footprint={{points_m: {CAR}}}"])
         assert isinstance(loaded.robot.footprint, PolygonFootprint)
         corners = load_mission("museum-1", [f"robot.footprint.points_m={CAR}"])
         assert corners.robot == loaded.robot
         back = team({"footprint": {"radius_m": 0.2}, **LEFT}, robot={"footprint": {"points_m": CAR}})
-        assert isinstance(back.team[0].footprint, DiscFootprint)
+        assert isinstance(back.members[0].footprint, DiscFootprint)
 
     def test_short_forms_take_parameters(self) -> None:
         """A task, a motion and one robot's sensor that are a name alone."""
@@ -68,7 +68,7 @@ class TestNames:
     def test_a_stack_of_its_own_is_laid_over_the_common_one(self) -> None:
         own = {**RIGHT, "stack": {"navigator": {"speed_m_s": 0.1}}}
         mission = team(LEFT, own)
-        speeds = [mission.stack_of(robot).navigator.parameters["speed_m_s"] for robot in mission.team]
+        speeds = [mission.stack_of(robot).navigator.parameters["speed_m_s"] for robot in mission.members]
         assert speeds == [0.2, 0.1]
 
     @pytest.mark.parametrize(
@@ -183,7 +183,7 @@ class TestRuns:
         mission = team(LEFT, {**RIGHT, "name": "watch", "footprint": {"points_m": CAR}})
         experiment = build(mission)
         again = mission_of(yaml.safe_load(resolved_yaml(experiment.mission, experiment.chart)))
-        assert [robot.name for robot in again.team] == ["robot-0", "watch"]
+        assert [robot.name for robot in again.members] == ["robot-0", "watch"]
         assert resolved_values(again)["robots"] == resolved_values(experiment.mission)["robots"]
 
 

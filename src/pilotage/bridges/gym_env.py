@@ -68,11 +68,11 @@ class MissionEnv(gymnasium.Env[Any, Any]):
             raise InputError(
                 f"gymnasium: expected a mission with one robot, found {len(self.mission.robots)}"
             )
-        goal = self.mission.goal_of(self.mission.team[0])
+        goal = self.mission.goal_of(self.mission.members[0])
         if goal is None:
             raise InputError(f"gymnasium: expected a mission with world.goal, found '{self.mission.mission}'")
         self._goal = goal
-        robot = self.mission.team[0]
+        robot = self.mission.members[0]
         motion = motion_of(robot, "robot")
         self._top = motion.top_speed_m_s, motion.top_turn_rate_rad_s
         self._rest: Observation = {}

@@ -12,9 +12,9 @@ from pilotage.missions.mission import Mission
 def has(mission: Mission) -> frozenset[str]:
     """A goal, a planner, an estimate, walls, ground, clearance, people: as far as the mission's text says."""
     found = set()
-    if any(mission.goal_of(robot) is not None for robot in mission.team):
+    if any(mission.goal_of(robot) is not None for robot in mission.members):
         found.add("goal")
-    stacks = [mission.stack_of(robot) for robot in mission.team]
+    stacks = [mission.stack_of(robot) for robot in mission.members]
     if any(stack.planner is not None for stack in stacks):
         found.add("planner")
     told = "localizer" in mission.run.oracles

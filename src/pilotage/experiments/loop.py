@@ -71,6 +71,10 @@ def run_loop(experiment: Experiment, on_progress: OnProgress | None = None) -> R
     _carry_whose_time_has_come(source, kidnaps, events)
     for readings, commands in stepped(source, stacks) if stacks else ():
         step += 1
+        for index, member in enumerate(team):
+            if member.journal.outbox:
+                source.transmit(index, member.journal.outbox)
+                member.journal.outbox.clear()
         ending = task.step(source.t_s, attempts)
         for index, member in enumerate(team):
             if step % every == 0 or ending is not None:

@@ -30,7 +30,7 @@ def warm_up(mission: Mission) -> None:
 def _components(mission: Mission) -> tuple[str, ...]:
     """Names of everything that a mission is made of."""
     chosen = {f"task={mission.task.name}", f"map={type(mission.world.map).__name__}"}
-    for robot in mission.team:
+    for robot in mission.members:
         roles = mission.stack_of(robot).roles()
         chosen |= {f"{role}={choice.name}" for role, choice in roles.items()}
         chosen |= {f"sensor={choice.name}" for choice in robot.sensors.values()}

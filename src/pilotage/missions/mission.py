@@ -12,10 +12,11 @@ from pilotage.missions.choice import ComponentChoice, by_default, laid_over
 from pilotage.missions.places import GoalConfig, PoseConfig
 from pilotage.missions.robot import RobotConfig
 from pilotage.missions.stack import StackConfig
+from pilotage.missions.team import TeamConfig, with_team
 from pilotage.missions.world import WorldConfig
 from pilotage.sensors.sensor import NonNegative, Positive
 
-TOP_KEYS = ("mission", "description", "plugins", "world", "robot", "robots", "task", "stack", "run")
+TOP_KEYS = ("mission", "description", "plugins", "world", "robot", "robots", "team", "task", "stack", "run")
 LARGEST_SEED = 2**63 - 1
 """As a database holds whole numbers."""
 LONGEST_NAME = 100
@@ -49,7 +50,7 @@ class RunConfig(Config):
 class Mission(Config):
     """A mission, whatever its world, its robots and its task.
 
-    ``robots`` makes it one of several: each entry is laid over ``robot``.
+    ``robots`` makes it one of several: each entry is laid over ``robot``. So does ``team.size``.
     """
 
     mission: str = Field(min_length=1, max_length=LONGEST_NAME)
@@ -59,6 +60,7 @@ class Mission(Config):
     world: WorldConfig
     robot: RobotConfig = RobotConfig()
     robots: tuple[RobotConfig, ...] = ()
+    team: TeamConfig = TeamConfig()
     task: Annotated[ComponentChoice, by_default("reach")] = ComponentChoice(name="reach")
     stack: StackConfig
     run: RunConfig = RunConfig()
@@ -67,6 +69,7 @@ class Mission(Config):
     @classmethod
     def _each_over_the_common_one(cls, values: Any) -> Any:
         """Lay each entry of ``robots`` over ``robot``; without names they are numbered."""
+        values = with_team(values) if isinstance(values, dict) else values
         if not isinstance(values, dict) or not isinstance(values.get("robots"), list | tuple):
             return values
         robot = values.get("robot")
@@ -95,13 +98,18 @@ class Mission(Config):
         if len(set(names)) < len(names):
             twice = next(name for name in names if names.count(name) > 1)
             raise ValueError(f"robots: expected every name once, found '{twice}' twice")
+        if self.team.size not in (None, len(self.robots)):
+            raise ValueError(
+                f"team.size: expected {len(self.robots)}, as many as robots lists, or no robots, "
+                f"found {self.team.size}"
+            )
         for kidnap in self.world.kidnaps:
-            if kidnap.robot >= len(self.team):
-                raise ValueError(f"world.kidnaps: there is no robot {kidnap.robot} of {len(self.team)}")
+            if kidnap.robot >= len(self.members):
+                raise ValueError(f"world.kidnaps: there is no robot {kidnap.robot} of {len(self.members)}")
         return self
 
     @property
-    def team(self) -> tuple[RobotConfig, ...]:
+    def members(self) -> tuple[RobotConfig, ...]:
         """All robots: the one, or the several."""
         return self.robots or (self.robot,)
 

@@ -113,6 +113,22 @@ class BumperReading:
     pressed: tuple[bool, ...]
 
 
+@dataclass(frozen=True, slots=True)
+class RadioMessage:
+    """What another robot sent: its name, when, and whatever it said."""
+
+    sender: str
+    sent_s: float
+    content: object
+
+
+@dataclass(frozen=True, slots=True)
+class RadioMessages:
+    """All messages that arrived since the last reading, oldest first."""
+
+    messages: tuple[RadioMessage, ...]
+
+
 Reading: TypeAlias = (
     OdometryIncrement
     | LidarScan
@@ -127,6 +143,7 @@ Reading: TypeAlias = (
     | CompassHeading
     | GpsFix
     | BumperReading
+    | RadioMessages
 )
 
 

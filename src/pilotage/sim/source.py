@@ -20,6 +20,7 @@ from pilotage.sim.bodies.body import APART_M, Body
 from pilotage.sim.bodies.motion import SIMULATED_MOTIONS
 from pilotage.sim.people.crowd import Crowd
 from pilotage.sim.people.people import People
+from pilotage.sim.sensing.radio import SimulatedRadio
 from pilotage.sim.sensing.sensor import SIMULATED_SENSORS, Carrier, ReadTogether, SimulatedSensor
 from pilotage.sim.worlds.traffic import NO_RADII, Traffic
 from pilotage.sim.worlds.world import World
@@ -55,6 +56,8 @@ class Simulator:
     ----------
     crowd
         The people; None where there are none.
+    radios
+        The robots' radios by their number.
 
     Raises
     ------
@@ -102,6 +105,9 @@ class Simulator:
             for row, (robot, body) in enumerate(zip(robots, self.bodies, strict=True))
             for name, sensor, every in _sensors(robot, body, self.world, dt_s, several)
         ]
+        self.radios = {seat.row: seat.sensor for seat in seats if isinstance(seat.sensor, SimulatedRadio)}
+        for radio in self.radios.values():
+            radio.connect(tuple(self.radios.values()))
         self._observe: list[Callable[[], None]] = [
             observe for seat in seats if (observe := getattr(seat.sensor, "observe", None)) is not None
         ]
@@ -142,6 +148,13 @@ class Simulator:
                     if reading is not None:
                         said[row][name] = reading
         return [Readings(t_s, by_sensor) for by_sensor in said]
+
+    def transmit(self, row: int, contents: Sequence[object]) -> None:
+        """Broadcast what a robot sends; one without a radio is not heard."""
+        radio = self.radios.get(row)
+        if radio is not None:
+            for content in contents:
+                radio.send(self.t_s, content)
 
     def _meet(self) -> None:
         """Who ran into whom."""

@@ -51,6 +51,8 @@ class Journal:
         Telemetry columns by name with their units, in the order of ``row``.
     row
         The last numbers told.
+    outbox
+        What it sends by radio in this step; whoever runs it takes it out.
     update
         The last step's sensor update where it can be explained; whoever reads it sets it back to None.
     """
@@ -61,6 +63,7 @@ class Journal:
     planning_time_s: float = 0.0
     units: dict[str, str] = field(default_factory=dict)
     row: array[float] = field(default_factory=lambda: array("d"))
+    outbox: list[object] = field(default_factory=list)
     update: ExplainableUpdate | None = None
     _results: dict[str, Callable[[], object]] = field(default_factory=dict)
     _channels: list[Channel] = field(default_factory=list)

@@ -39,7 +39,7 @@ class FollowTask(WatchedTask):
                 raise InputError(
                     f"task 'follow': expected points on the map '{setting.chart.name}', found ({x:g}, {y:g})"
                 )
-        if any(setting.mission.goal_of(robot) is not None for robot in setting.mission.team):
+        if any(setting.mission.goal_of(robot) is not None for robot in setting.mission.members):
             raise InputError(
                 "task 'follow': expected no world.goal, since the route's last point is the goal, found one; "
                 "take it off with world.goal: null"

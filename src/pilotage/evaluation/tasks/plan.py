@@ -31,7 +31,7 @@ class PlanTask:
     def __init__(self, config: PlanConfig, setting: TaskSetting) -> None:
         del config
         mission = setting.mission
-        if any(mission.goal_of(robot) is None for robot in mission.team):
+        if any(mission.goal_of(robot) is None for robot in mission.members):
             raise InputError("task 'plan': expected world.goal, found none")
         self.columns, self.goals = {}, ()
         self.events: list[Event] = []

@@ -42,12 +42,14 @@ class ReachTask:
 
     def __init__(self, config: ReachConfig, setting: TaskSetting) -> None:
         mission = setting.mission
-        for robot in mission.team:
+        for robot in mission.members:
             if mission.goal_of(robot) is None and not config.goals:
                 raise InputError("task 'reach': expected world.goal, found none")
         self.columns, self.goals = {}, config.goals
         self._ends_there = config.ends_there
-        self._last = [config.goals[-1] if config.goals else mission.goal_of(robot) for robot in mission.team]
+        self._last = [
+            config.goals[-1] if config.goals else mission.goal_of(robot) for robot in mission.members
+        ]
         self.events: list[Event] = []
         self._watch = CollisionWatch(self.events)
 

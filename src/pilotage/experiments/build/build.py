@@ -97,7 +97,7 @@ def build_source(mission: Mission) -> Source:
     chart = chart_of(mission.world)
     mission = settle_places(mission, chart)
     streams = RandomStreams(mission.run.seed)
-    sheets = [_data_sheet(mission, index, streams) for index in range(len(mission.team))]
+    sheets = [_data_sheet(mission, index, streams) for index in range(len(mission.members))]
     _check_places(mission, chart, sheets)
     obstacles = _obstacles(mission, chart, sheets, (), streams)
     return Source(mission, chart, obstacles, _simulator(mission, chart, obstacles, sheets))
@@ -110,7 +110,7 @@ def _simulator(
     world = World.of(chart, obstacles.segments_m, obstacles.circles_m)
     for index, sheet in enumerate(sheets):
         # The map was looked at before; now what is on no map, and how a polygon stands.
-        start = mission.start_of(mission.team[index])
+        start = mission.start_of(mission.members[index])
         assert start is not None, "settled above"
         own = f"robots.{index}" if mission.robots else "world"
         world.check_place(f"{own}.start", sheet.footprint, pose_of(start))
@@ -145,7 +145,7 @@ def build(mission: Mission) -> Experiment:
     chart = chart_of(mission.world)
     mission = settle_places(mission, chart)
     streams = RandomStreams(mission.run.seed)
-    sheets = [_data_sheet(mission, index, streams) for index in range(len(mission.team))]
+    sheets = [_data_sheet(mission, index, streams) for index in range(len(mission.members))]
     _check_places(mission, chart, sheets)
     task = _task(mission, chart, sheets)
     oracles = frozenset(mission.run.oracles)
@@ -175,7 +175,7 @@ def build(mission: Mission) -> Experiment:
 
 def _data_sheet(mission: Mission, index: int, streams: RandomStreams) -> RobotKnowledge:
     """What a robot knows of itself; one of several has random streams of its own."""
-    robot = mission.team[index]
+    robot = mission.members[index]
     where = f"robots.{index}" if mission.robots else "robot"
     return RobotKnowledge(
         footprint_of(robot, where),
@@ -190,7 +190,7 @@ def _data_sheet(mission: Mission, index: int, streams: RandomStreams) -> RobotKn
 def _check_places(mission: Mission, chart: WorldMap, sheets: Sequence[RobotKnowledge]) -> None:
     """Starts, goals and where robots are carried to must be on the map and leave room; no two starts meet."""
     starts: list[FloatArray] = []
-    for index, (robot, sheet) in enumerate(zip(mission.team, sheets, strict=True)):
+    for index, (robot, sheet) in enumerate(zip(mission.members, sheets, strict=True)):
         start, goal = mission.start_of(robot), mission.goal_of(robot)
         assert start is not None, "settled above"
         own = f"robots.{index}" if mission.robots else "world"
@@ -232,7 +232,7 @@ def _task(mission: Mission, chart: WorldMap, sheets: Sequence[RobotKnowledge]) -
 def _truth(
     mission: Mission, index: int, chart: WorldMap, segments_m: FloatArray, circles_m: FloatArray
 ) -> Truth:
-    start = mission.start_of(mission.team[index])
+    start = mission.start_of(mission.members[index])
     assert start is not None, "settled above"
     return Truth(chart, segments_m, circles_m, pose_of(start), mission.run.dt_s)
 
@@ -246,7 +246,7 @@ def _member(
     oracles: frozenset[str],
     further: tuple[GoalConfig, ...],
 ) -> Member:
-    robot = mission.team[index]
+    robot = mission.members[index]
     config = mission.stack_of(robot)
     goal = mission.goal_of(robot)
     own = told(config, chart)
@@ -275,7 +275,7 @@ def _obstacles(
     """What is on no map; what lies across a path lies across the first robot's."""
     if not mission.world.obstacles:
         return Obstacles(np.zeros((0, 4)), np.zeros((0, 3)), [])
-    robot = mission.team[0]
+    robot = mission.members[0]
     start, goal = mission.start_of(robot), mission.goal_of(robot)
     assert start is not None, "settled above"
     plans = team[0].journal.plans if team else []
@@ -292,7 +292,7 @@ def _obstacles(
 
 def _spec(mission: Mission, index: int, sheet: RobotKnowledge, oracles: frozenset[str]) -> RobotSpec:
     """The robot as it truly is: with the faults that it has, or without those that an oracle takes away."""
-    robot = mission.team[index]
+    robot = mission.members[index]
     start = mission.start_of(robot)
     assert start is not None, "settled above"
     truly = motion_of(robot, f"robots.{index}" if mission.robots else "robot", truly=True)

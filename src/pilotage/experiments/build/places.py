@@ -12,15 +12,19 @@ from pilotage.core.angles import wrap_to_pi
 from pilotage.core.errors import InputError
 from pilotage.core.random import RandomStreams
 from pilotage.core.types import Pose2
+from pilotage.experiments.build.robots import footprint_of
 from pilotage.kernels.grids.blocked_distance import distance_to_blocked
 from pilotage.maps.distance_field import DistanceField
 from pilotage.maps.world_map import WorldMap
 from pilotage.missions.mission import Mission
 from pilotage.missions.places import Kidnap, PoseConfig
+from pilotage.missions.robot import RobotConfig
 from pilotage.models.footprint import Footprint
 
 GRID_M = 0.1
 MAX_DRAWS = 100_000
+ROOM_M = 0.1
+"""Of a starting place that is drawn, beyond the body."""
 
 
 def start_pose(mission: Mission, index: int, chart: WorldMap) -> PoseConfig:
@@ -31,7 +35,7 @@ def start_pose(mission: Mission, index: int, chart: WorldMap) -> PoseConfig:
     InputError
         Where neither the mission nor its map says.
     """
-    start = mission.start_of(mission.team[index])
+    start = mission.start_of(mission.members[index])
     if start is not None:
         return start
     sheet = None if chart.markings is None else chart.markings.source
@@ -47,8 +51,10 @@ def start_pose(mission: Mission, index: int, chart: WorldMap) -> PoseConfig:
 
 def settle_places(mission: Mission, chart: WorldMap) -> Mission:
     """Return the mission with all its places known, so that it can be recorded and run again as it is."""
+    if mission.team.size is not None:
+        mission = _with_drawn_starts(mission, chart)
     world = mission.world
-    given = [start_pose(mission, index, chart) for index in range(len(mission.team))]
+    given = [start_pose(mission, index, chart) for index in range(len(mission.members))]
     if world.random_start is None and all(kidnap.to is not None for kidnap in world.kidnaps):
         return mission if mission.robots or world.start is not None else _started(mission, given)
     streams = RandomStreams(mission.run.seed)
@@ -75,6 +81,39 @@ def _started(mission: Mission, starts: Sequence[PoseConfig]) -> Mission:
         robot.model_copy(update={"start": start}) for robot, start in zip(mission.robots, starts, strict=True)
     )
     return mission.model_copy(update={"robots": robots})
+
+
+def _with_drawn_starts(mission: Mission, chart: WorldMap) -> Mission:
+    """The mission with a place for every robot that has none: drawn in turn, apart from those before.
+
+    They are places that ``world.start`` is connected to, or on the largest floor of the map without it.
+
+    Raises
+    ------
+    InputError
+        Where the floor has no room for so many.
+    """
+    rng = RandomStreams(mission.run.seed).stream("starts")
+    spacing_m = mission.team.spacing_m
+    placed: list[PoseConfig] = [robot.start for robot in mission.robots if robot.start is not None]
+    robots: list[RobotConfig] = []
+    floors: dict[float, OpenFloor] = {}
+    for index, robot in enumerate(mission.robots):
+        start = robot.start
+        if start is None:
+            clear_m = footprint_of(robot, f"robots.{index}").radius_m + ROOM_M
+            if clear_m not in floors:
+                floors[clear_m] = OpenFloor(chart, clear_m, mission.world.start)
+            start = floors[clear_m].draw(rng, placed, spacing_m)
+            if start is None:
+                raise InputError(
+                    f"team.size: expected {index} robots at most, as starting places {spacing_m:g} m "
+                    f"apart were found on '{chart.name}', found {len(mission.robots)}; ask for fewer, or for "
+                    f"less team.spacing_m"
+                )
+            placed.append(start)
+        robots.append(robot.model_copy(update={"start": start}))
+    return mission.model_copy(update={"robots": tuple(robots)})
 
 
 def check_place(where: str, x_m: float, y_m: float, footprint: Footprint, chart: WorldMap) -> None:
@@ -134,27 +173,53 @@ def random_pose(
     InputError
         Where the place itself has less clearance, or nothing is found.
     """
-    field = chart.field if chart.geometry is None else DistanceField.from_map(chart.walls, GRID_M)
-    regions, _ = label(field.distance_m >= clearance_m)
-    x0, y0 = field.origin_xy_m
-    step = field.resolution_m
+    found = OpenFloor(chart, clearance_m, reachable_from).draw(rng)
+    if found is None:
+        raise InputError(f"random place: found none with {clearance_m:g} m of clearance; ask for less")
+    return found
 
-    def region(x: float, y: float) -> int:
+
+class OpenFloor:
+    """The floor that is connected to a place at a clearance; without a place the largest one.
+
+    Raises
+    ------
+    InputError
+        Where the place itself has less clearance.
+    """
+
+    def __init__(self, chart: WorldMap, clearance_m: float, reachable_from: PoseConfig | None) -> None:
+        self._chart, self._clearance_m = chart, clearance_m
+        self._field = chart.field if chart.geometry is None else DistanceField.from_map(chart.walls, GRID_M)
+        self._regions, count = label(self._field.distance_m >= clearance_m)
+        if reachable_from is None:
+            sizes = np.bincount(self._regions.ravel(), minlength=2)
+            self._home = int(np.argmax(sizes[1:])) + 1 if count else 0
+            return
+        self._home = self._region(reachable_from.x_m, reachable_from.y_m)
+        if self._home == 0:
+            raise InputError(
+                f"world.start: expected {clearance_m:g} m to the nearest wall, from where random places are "
+                f"reached, found less at ({reachable_from.x_m:g}, {reachable_from.y_m:g})"
+            )
+
+    def _region(self, x: float, y: float) -> int:
+        (x0, y0), step = self._field.origin_xy_m, self._field.resolution_m
         row, col = round((y - y0) / step), round((x - x0) / step)
-        inside = 0 <= row < regions.shape[0] and 0 <= col < regions.shape[1]
-        return int(regions[row, col]) if inside else 0
+        inside = 0 <= row < self._regions.shape[0] and 0 <= col < self._regions.shape[1]
+        return int(self._regions[row, col]) if inside else 0
 
-    home = region(reachable_from.x_m, reachable_from.y_m)
-    if home == 0:
-        raise InputError(
-            f"world.start: expected {clearance_m:g} m to the nearest wall, from where random places are "
-            f"reached, found less at ({reachable_from.x_m:g}, {reachable_from.y_m:g})"
-        )
-    xmin, ymin, xmax, ymax = chart.bounds_m
-    for _ in range(MAX_DRAWS):
-        x, y, theta = rng.uniform([xmin, ymin, -math.pi], [xmax, ymax, math.pi])
-        if region(x, y) != home:
-            continue
-        if room_m(chart, float(x), float(y), clearance_m) >= clearance_m:
-            return PoseConfig(x_m=float(x), y_m=float(y), theta_rad=float(theta))
-    raise InputError(f"random place: found none with {clearance_m:g} m of clearance; ask for less")
+    def draw(
+        self, rng: np.random.Generator, apart_from: Sequence[PoseConfig] = (), spacing_m: float = 0.0
+    ) -> PoseConfig | None:
+        """Draw a pose, at least ``spacing_m`` from others; None where nothing is found."""
+        xmin, ymin, xmax, ymax = self._chart.bounds_m
+        for _ in range(MAX_DRAWS if self._home else 0):
+            x, y, theta = rng.uniform([xmin, ymin, -math.pi], [xmax, ymax, math.pi])
+            if self._region(x, y) != self._home:
+                continue
+            if any(math.hypot(x - place.x_m, y - place.y_m) < spacing_m for place in apart_from):
+                continue
+            if room_m(self._chart, float(x), float(y), self._clearance_m) >= self._clearance_m:
+                return PoseConfig(x_m=float(x), y_m=float(y), theta_rad=float(theta))
+        return None

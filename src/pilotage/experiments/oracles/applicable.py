@@ -42,7 +42,7 @@ def applicable(mission: Mission) -> dict[str, str]:
     # A stack without a localizer may drive on the true pose; an explorer brings its own.
     there |= {"localizer"} if not taken else set()
     there |= {name for name, what in TAKEN.items() if what in taken}
-    there |= {"drive"} if all(robot.motion.name == "wheel-drive" for robot in mission.team) else set()
+    there |= {"drive"} if all(robot.motion.name == "wheel-drive" for robot in mission.members) else set()
     there |= {"explorer"} if mission.task.name == "explore" and taken else set()
     return {name: text for name, text in ORACLES.items() if name in there}
 

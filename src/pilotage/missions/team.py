@@ -1,0 +1,78 @@
+"""A team: how many robots of one description, where they begin, how they share out a task and talk."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Annotated, Any
+
+from pydantic import Field, model_validator
+
+from pilotage.core.config import Config
+from pilotage.missions.choice import ComponentChoice, by_default
+from pilotage.missions.places import PoseConfig
+from pilotage.sensors.sensor import Positive
+
+LARGEST_TEAM = 64
+RADIO = "radio"
+"""What a team's radio is called among a robot's sensors."""
+
+
+class TeamConfig(Config):
+    """With ``size``, so many robots as ``robot`` describes; else ``robots`` lists them.
+
+    Without ``starts`` their starting places are drawn from the run's seed.
+    """
+
+    size: int | None = Field(default=None, ge=1, le=LARGEST_TEAM)
+    strategy: ComponentChoice | None = None
+    """Who goes where next; None: the task needs none."""
+    radio: Annotated[ComponentChoice, by_default(RADIO)] | None = None
+    """Of every robot that has none of its own; None: they cannot talk."""
+    starts: tuple[PoseConfig, ...] = ()
+    spacing_m: Positive = 1.5
+    """At least so far apart are starting places that are drawn, middle to middle."""
+
+    @model_validator(mode="after")
+    def _a_place_for_each(self) -> TeamConfig:
+        if self.size is not None and self.starts and self.size > len(self.starts):
+            raise ValueError(
+                f"size: expected at most {len(self.starts)} robots, one for each of team.starts, "
+                f"found {self.size}"
+            )
+        return self
+
+
+def with_team(values: dict[str, Any]) -> dict[str, Any]:
+    """A mission's values with its team written out: entries of ``robots`` and the radio of each.
+
+    Where the team cannot be read it is left as it is, for its own check to say why.
+    """
+    team = values.get("team")
+    if not isinstance(team, Mapping):
+        return values
+    size, robots, starts = team.get("size"), values.get("robots"), team.get("starts") or ()
+    if isinstance(size, int) and not isinstance(size, bool) and 1 <= size <= LARGEST_TEAM and not robots:
+        placed = [{"start": start} for start in starts[:size]] if isinstance(starts, list | tuple) else []
+        robots = placed + [{} for _ in range(size - len(placed))]
+        values = {**values, "robots": robots}
+    radio = team.get("radio")
+    if radio is not None and isinstance(robots, list | tuple):
+        entries = [_with_radio(entry, values.get("robot"), radio) for entry in robots]
+        values = {**values, "robots": entries}
+    return values
+
+
+def _with_radio(entry: Any, common: Any, radio: Any) -> Any:
+    """An entry of ``robots`` with the team's radio, unless it or the common robot has one."""
+    if not isinstance(entry, Mapping):
+        return entry
+    sensors = entry.get("sensors") or {}
+    shared = common.get("sensors") if isinstance(common, Mapping) else None
+    if (
+        not isinstance(sensors, Mapping)
+        or RADIO in sensors
+        or (isinstance(shared, Mapping) and RADIO in shared)
+    ):
+        return entry
+    chosen = {"name": RADIO, **radio} if isinstance(radio, Mapping) else {"name": radio}
+    return {**entry, "sensors": {**sensors, RADIO: chosen}}

@@ -1,0 +1,22 @@
+"""A radio: what the others sent, as far as it carries."""
+
+from __future__ import annotations
+
+from pydantic import Field
+
+from pilotage.sensors.sensor import SENSORS, NonNegative, Positive, SensorConfig
+
+
+@SENSORS.add_config("radio")
+class RadioConfig(SensorConfig):
+    """Broadcasts reach every radio on the same world within both ranges, late, and some fail to arrive.
+
+    A disc model: walls neither stop nor weaken it, and messages do not collide.
+    """
+
+    range_m: Positive | None = None
+    """None: everywhere."""
+    loss: float = Field(default=0.0, ge=0.0, le=1.0)
+    """Share of messages that do not arrive, each at each receiver for itself."""
+    delay_s: NonNegative = 0.0
+    """At the receiver, beside the step that any message takes."""

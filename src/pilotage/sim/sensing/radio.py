@@ -1,0 +1,61 @@
+"""The radio's other side: who is near enough, which messages are lost, when they arrive."""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Sequence
+
+import numpy as np
+
+from pilotage.sensors.radio import RadioConfig
+from pilotage.sensors.readings import RadioMessage, RadioMessages
+from pilotage.sim.sensing.sensor import SIMULATED_SENSORS, Carrier
+
+SLACK_S = 1e-6
+"""Step times are sums of dt."""
+
+
+@SIMULATED_SENSORS.add(RadioConfig)
+class SimulatedRadio:
+    """Sends to all radios of its world, and holds what is under way to itself.
+
+    Attributes
+    ----------
+    works
+        False while it is broken: it neither sends nor receives.
+    """
+
+    def __init__(self, config: RadioConfig, carrier: Carrier, rng: np.random.Generator) -> None:
+        self.config, self.works = config, True
+        self._name, self._state, self._rng = carrier.body.name, carrier.body.state, rng
+        self._t_s, self._period_s = 0.0, carrier.period_s
+        self._peers: tuple[SimulatedRadio, ...] = ()
+        self._coming: deque[tuple[float, RadioMessage]] = deque()
+
+    def connect(self, radios: Sequence[SimulatedRadio]) -> None:
+        """Tell it which radios there are in this world, itself among them."""
+        self._peers = tuple(radio for radio in radios if radio is not self)
+
+    def send(self, t_s: float, content: object) -> None:
+        """Broadcast; whether it arrives is drawn from each receiver's own stream, whatever the distance."""
+        message = RadioMessage(self._name, t_s, content)
+        for peer in self._peers:
+            lost = peer._rng.random() < max(self.config.loss, peer.config.loss)
+            if self.works and peer.works and not lost and self._reaches(peer):
+                peer._coming.append((t_s + peer.config.delay_s, message))
+
+    def _reaches(self, peer: SimulatedRadio) -> bool:
+        reach_m = min(
+            math.inf if radio.config.range_m is None else radio.config.range_m for radio in (self, peer)
+        )
+        away_m = math.hypot(self._state[0] - peer._state[0], self._state[1] - peer._state[1])
+        return away_m <= reach_m
+
+    def read(self) -> RadioMessages:
+        """What has arrived since the last reading, in the order in which it was sent."""
+        self._t_s += self._period_s
+        arrived = []
+        while self._coming and self._coming[0][0] <= self._t_s + SLACK_S:
+            arrived.append(self._coming.popleft()[1])
+        return RadioMessages(tuple(arrived) if self.works else ())
