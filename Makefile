@@ -17,20 +17,22 @@ MINUTES ?= 10
 
 PIP := $(PY) -m pip --disable-pip-version-check --no-input
 # What the environment was made from: another lock, another pyproject or a moved folder renews it.
+CORE_FINGERPRINT = { pwd; cat requirements-core.lock pyproject.toml | cksum; }
+CORE_STAMP := $(VENV)/.core-made-from
 FINGERPRINT = { pwd; cat requirements.lock pyproject.toml | cksum; }
 STAMP := $(VENV)/.made-from
 BENCH_STAMP := $(VENV)/.bench-made-from
 
-.PHONY: help setup demo test fuzz check format format-check lint types contracts locks api examples bench lock clean
+.PHONY: help core setup demo test fuzz check format format-check lint types contracts locks api examples bench lock clean
 
 help:  ## this list
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/  make \1|\2/p' Makefile | awk -F'|' '{ printf "%-20s %s\n", $$1, $$2 }'
 
-setup:  ## make .venv from the hashed lock, with the pilotage command in it
+core:  ## make .venv with the pilotage command in it and nothing that only its developers need
 	@set -e; \
-	[ -x $(PY) ] && [ "$$(cat $(STAMP) 2>/dev/null)" = "$$($(FINGERPRINT))" ] && exit 0; \
+	[ -x $(PY) ] && [ "$$(cat $(CORE_STAMP) 2>/dev/null)" = "$$($(CORE_FINGERPRINT))" ] && exit 0; \
 	if ! $(PY) -m pip --version >/dev/null 2>&1 || \
-	  { [ -f $(STAMP) ] && [ "$$(head -n 1 $(STAMP))" != "$$(pwd)" ]; }; then \
+	  { [ -f $(CORE_STAMP) ] && [ "$$(head -n 1 $(CORE_STAMP))" != "$$(pwd)" ]; }; then \
 	  found=; old=; \
 	  for candidate in $(PYTHON); do \
 	    command -v "$$candidate" >/dev/null 2>&1 || continue; \
@@ -44,14 +46,22 @@ setup:  ## make .venv from the hashed lock, with the pilotage command in it
 	  echo "making .venv with $$("$$found" -V)"; \
 	  "$$found" -m venv --clear $(VENV); \
 	fi; \
-	rm -f $(STAMP); \
-	echo "installing the lock (about 200 MB to fetch the first time)"; \
-	$(PIP) install --quiet --require-hashes -r requirements.lock; \
+	rm -f $(CORE_STAMP); \
+	echo "installing the core's lock (about 180 MB to fetch the first time)"; \
+	$(PIP) install --quiet --require-hashes -r requirements-core.lock; \
 	$(PIP) install --quiet --no-deps --no-build-isolation --editable .; \
-	$(FINGERPRINT) > $(STAMP); \
+	$(CORE_FINGERPRINT) > $(CORE_STAMP); \
 	echo "ready: $(VENV)/bin/pilotage"
 
-demo: setup  ## run the night watch and name the report to open
+setup: core  ## the same with all extras and the tools of tests, types and docs
+	@set -e; \
+	[ "$$(cat $(STAMP) 2>/dev/null)" = "$$($(FINGERPRINT))" ] && exit 0; \
+	rm -f $(STAMP); \
+	echo "installing the rest of the lock (about 350 MB to fetch the first time)"; \
+	$(PIP) install --quiet --require-hashes -r requirements.lock; \
+	$(FINGERPRINT) > $(STAMP)
+
+demo: core  ## run the night watch and name the report to open
 	@$(PY) -m pilotage.cli.main run $(MISSION) $(ARGS)
 	@echo "open the report named above in any browser; it needs no network"
 
@@ -81,7 +91,7 @@ contracts: setup
 
 # A lock names packages and hashes, never where they were fetched from.
 locks:
-	@! grep -nE '://|--(extra-)?index-url|--find-links' requirements.lock requirements-bench.lock
+	@! grep -nE '://|--(extra-)?index-url|--find-links' requirements-core.lock requirements.lock requirements-bench.lock
 
 api: setup  ## write docs/api anew from the docstrings
 	@$(PY) docs/make_api.py
@@ -103,9 +113,10 @@ bench: setup  ## compare with the peers: installs them, prints a table of ratios
 
 COMPILE = $(UV) pip compile --quiet --universal --python-version 3.11 --generate-hashes --no-header --no-annotate
 
-lock:  ## resolve both locks again (UPGRADE=--upgrade takes newer versions); needs uv
+lock:  ## resolve the locks again (UPGRADE=--upgrade takes newer versions); needs uv
 	@command -v $(UV) >/dev/null || { echo "make lock: needs uv; name it by UV=..." >&2; exit 2; }
-	@$(COMPILE) $(UPGRADE) --extra dev --extra vision --extra cluster --extra ros --extra gym pyproject.toml -o requirements.lock
+	@$(COMPILE) $(UPGRADE) --extra dev --extra docs --extra vision --extra cluster --extra ros --extra rerun --extra gym pyproject.toml -o requirements.lock
+	@echo hatchling | $(COMPILE) --constraint requirements.lock pyproject.toml - -o requirements-core.lock
 	@$(COMPILE) $(UPGRADE) --extra bench --constraint requirements.lock pyproject.toml -o requirements-bench.lock
 	@$(MAKE) locks
 

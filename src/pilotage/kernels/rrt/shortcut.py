@@ -39,12 +39,13 @@ PATTERN = np.array(
 
 class Rules(NamedTuple):
     """What a curve has to keep to: turning radius, clearance, least step of checks, whether the goal's
-    heading is free."""
+    heading is free; and what a length of the path's own pieces costs against a curve's."""
 
     radius: float
     clearance: float
     min_step: float
     goal_heading_free: bool
+    own_cost: float = 1.0
 
 
 @kernel
@@ -101,7 +102,7 @@ def best_chain(samples: FloatArray, s: FloatArray, space: Space, rules: Rules) -
     own = np.zeros(m, np.bool_)
     for j in range(1, m):
         # The path's own piece is always there; a curve as long as it is preferred.
-        best = cost[j - 1] + (s[j] - s[j - 1]) + 1e-6
+        best = cost[j - 1] + rules.own_cost * (s[j] - s[j - 1]) + 1e-6
         before[j], own[j] = j - 1, True
         x, y, th = samples[j, 0], samples[j, 1], samples[j, 2]
         free = rules.goal_heading_free and j == m - 1

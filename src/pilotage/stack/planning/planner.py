@@ -2,16 +2,23 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import Protocol
 
 import numpy as np
+from numpy.typing import ArrayLike
 
+from pilotage.core.errors import InputError
 from pilotage.core.registry import Registry
 from pilotage.core.types import FloatArray, Goal, Pose2
 from pilotage.maps.distance_field import DistanceField
 from pilotage.models.footprint import Footprint
+
+SPACING_M = 0.05
+"""Between the states of a path, at most."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,6 +41,30 @@ class Path:
     waypoints: FloatArray
     length_m: float
     turning_radius_m: float
+
+    @staticmethod
+    def through(corners_m: Sequence[ArrayLike] | FloatArray, last_heading_rad: float | None = None) -> Path:
+        """Straight lines through corners (N, 2), the first the start and the last the goal.
+
+        Every state looks along its line, the last one along ``last_heading_rad`` where it is given.
+        """
+        corners = np.array(corners_m, dtype=np.float64).reshape(-1, 2)
+        moves = np.diff(corners, axis=0)
+        lengths = np.hypot(moves[:, 0], moves[:, 1])
+        if not lengths.sum() > 0.0:
+            raise InputError(f"path: expected two corners or more that lie apart, found {len(corners)}")
+        kept = np.append(True, lengths > 0.0)
+        corners, moves, lengths = corners[kept], moves[kept[1:]], lengths[kept[1:]]
+        counts = np.ceil(lengths / SPACING_M).astype(np.int64)
+        line = np.repeat(np.arange(len(moves)), counts)
+        ends = np.cumsum(counts)
+        share = (np.arange(len(line)) - (ends - counts)[line]) / counts[line]
+        places = np.vstack([corners[line] + share[:, None] * moves[line], corners[-1:]])
+        headings = np.arctan2(moves[:, 1], moves[:, 0])[np.append(line, len(moves) - 1)]
+        states = np.column_stack([places, headings])
+        if last_heading_rad is not None:
+            states[-1, 2] = last_heading_rad
+        return Path(states, states[np.append(0, ends)], float(lengths.sum()), 0.0)
 
 
 class PlanStatus(StrEnum):
@@ -85,14 +116,15 @@ class PlanResult:
     given
         Whether the path was prescribed rather than searched for: no shortest path is held against it.
     first_solution_s, planning_time_s
-        Wall time until the first valid solution and until the end; nan where there was none.
+        Wall time until the first valid solution and until the end; nan where there was none, or nobody
+        looked at the clock.
     """
 
     status: PlanStatus
     reason: str
     path: Path | None
-    first_solution_s: float
-    planning_time_s: float
+    first_solution_s: float = math.nan
+    planning_time_s: float = math.nan
     iterations: int = 0
     tree_edges_m: FloatArray = field(default_factory=_no_edges)
     given: bool = False

@@ -23,6 +23,8 @@ from pilotage.stack.planning.planner import SMOOTHERS, Path, PlanRequest
 
 LEAST_RADIUS_M = 1e-3
 """Stands for turning on the spot, so that every path is made of Dubins curves."""
+OWN_COST = 100.0
+"""What a metre of a path that the robot cannot drive costs against one of a curve that it can."""
 
 
 class NoSmootherConfig(Config):
@@ -62,6 +64,9 @@ class ShortcutSmoother:
     The result keeps the path's turning radius and the clearance, checked every centimetre, and is never
     longer than the input: where nothing better is found, the input comes back with evenly spaced
     waypoints. It does not leave the way around obstacles that the input takes, unless a shortcut does.
+
+    A path with tighter corners than the robot can drive (lines of a planner that knows nothing of turning
+    circles) is replaced by curves that it can, wherever there is room for them; that may be longer.
     """
 
     def __init__(self, config: ShortcutSmootherConfig) -> None:
@@ -70,23 +75,28 @@ class ShortcutSmoother:
     def smooth(self, path: Path, request: PlanRequest, clearance_m: float) -> Path:
         """Return a path from the same start to the same goal that is valid and no longer than ``path``."""
         space = space_for(request.field, clearance_m)
-        radius_m = max(path.turning_radius_m, LEAST_RADIUS_M)
+        tight = path.turning_radius_m < request.least_turning_radius_m
+        radius_m = max(path.turning_radius_m, request.least_turning_radius_m, LEAST_RADIUS_M)
         step = least_step(CHECK_SPACING_M * 5.0, clearance_m, radius_m)
         extra = skin(step, clearance_m, radius_m)
         for state in (path.states[0], path.states[-1]):
             extra = min(extra, max(0.0, float(slack_at(state[0], state[1], space, clearance_m))))
-        rules = shortcut.Rules(radius_m, clearance_m + extra, step, request.goal.theta_rad is None)
+        heading_free = request.goal.theta_rad is None
+        own_cost = OWN_COST if tight else 1.0
+        rules = shortcut.Rules(radius_m, clearance_m + extra, step, heading_free, own_cost)
         best = _Chain.of(path)
-        for _ in range(self._config.rounds):
+        for number in range(self._config.rounds):
             shorter = self._round(best, space, rules)
-            if not (shorter.length_m < best.length_m and shorter.is_valid(space, clearance_m)):
+            better = shorter.length_m < best.length_m or (tight and number == 0)
+            if not (better and shorter.is_valid(space, clearance_m)):
                 break
             gain_m = best.length_m - shorter.length_m
             best = shorter
-            if gain_m < 1e-4 * best.length_m:
+            if gain_m < 1e-4 * best.length_m and not (tight and number == 0):
                 break
+        drivable_m = path.turning_radius_m if best.own else radius_m
         waypoints = spaced_waypoints(best.states, self._config.waypoint_spacing_m)
-        return Path(best.states, waypoints, best.length_m, path.turning_radius_m)
+        return Path(best.states, waypoints, best.length_m, drivable_m if tight else path.turning_radius_m)
 
     def _round(self, chain: _Chain, space: Space, rules: shortcut.Rules) -> _Chain:
         """One pass of shortcuts and tightening."""
@@ -108,13 +118,13 @@ class ShortcutSmoother:
 class _Chain:
     """A dense path and its parts that are checked at a finer spacing than its states."""
 
-    def __init__(self, states: FloatArray, length_m: float, fine: FloatArray) -> None:
-        self.states, self.length_m, self._fine = states, length_m, fine
+    def __init__(self, states: FloatArray, length_m: float, fine: FloatArray, own: bool) -> None:
+        self.states, self.length_m, self._fine, self.own = states, length_m, fine, own
 
     @staticmethod
     def of(path: Path) -> _Chain:
         """The input as it is."""
-        return _Chain(path.states, path.length_m, path.states)
+        return _Chain(path.states, path.length_m, path.states, True)
 
     @staticmethod
     def through(
@@ -148,7 +158,7 @@ class _Chain:
         if not rules.goal_heading_free:
             states[-1, 2] = old.states[-1, 2]
         states[:, 2] = wrap_array_to_pi(states[:, 2])
-        return _Chain(states, length_m, np.concatenate(fine))
+        return _Chain(states, length_m, np.concatenate(fine), bool(kept.any()) and old.own)
 
     def is_valid(self, space: Space, clearance_m: float) -> bool:
         """Whether every centimetre keeps the clearance."""

@@ -74,7 +74,7 @@ class GoalNavigator:
         least_m = robot.radius_m + config.guard.margin_m
         rng = robot.streams.stream("planner")
         turns = robot.motion.least_turning_radius_m == 0.0
-        plan = GlobalPlan(parts.planner, parts.smoother, chart, rng, journal, least_m, can_turn_first=turns)
+        plan = GlobalPlan(parts.planner, parts.smoother, chart, rng, journal, least_m, robot, turns)
         self._context = Context(
             config, robot, task, parts, own_map, plan, parts.local_planner, parts.controller, journal
         )
