@@ -11,7 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pilotage.core.errors import InputError
-from pilotage.evaluation.barn import BarnRun, barn_metric, summarize, time_bound_s
+from pilotage.core.types import FloatArray
+from pilotage.evaluation.barn import BarnRun, barn_metric, lane_within, summarize, time_bound_s
 from pilotage.logs.barn import read_barn
 from pilotage.logs.people import read_people
 
@@ -126,14 +127,15 @@ def test_damaged_tracks_are_one_line(tmp_path: Path, text: str, words: str) -> N
 
 def test_the_time_bound_is_the_straight_way_in_an_empty_lane() -> None:
     sides = np.array([[x, y, 0.075] for x in (-2.0, 2.0) for y in np.arange(0.0, 10.0, 0.15)])
-    bound = time_bound_s(sides, (0.0, 0.0), (0.0, 10.0), 1.0, 0.2, 2.0, 3.0)
-    assert bound == pytest.approx(9.0 / 2.0 + 2.0 / 6.0)
-    post = np.vstack([sides, [[0.0, 5.0, 0.5]]])
-    longer = time_bound_s(post, (0.0, 0.0), (0.0, 10.0), 1.0, 0.2, 2.0, 3.0)
-    assert bound is not None
-    assert longer is not None
-    assert longer > bound
-    short = time_bound_s(sides, (0.0, 0.0), (0.0, 1.2), 1.0, 0.2, 2.0, 3.0)
-    assert short == pytest.approx((2.0 * 0.2 / 3.0) ** 0.5)
-    shut = np.vstack([sides, [[x, 5.0, 0.3] for x in np.arange(-1.6, 1.7, 0.2)]])
-    assert time_bound_s(shut, (0.0, 0.0), (0.0, 10.0), 1.0, 0.2, 2.0, 3.0) is None
+
+    def bound(posts: FloatArray, goal_y: float = 10.0) -> float | None:
+        lane = lane_within(posts, -1.0, goal_y + 1.0)
+        return time_bound_s(lane, (0.0, 0.0), (0.0, goal_y), 1.0, 0.2, 2.0, 3.0)
+
+    straight = bound(sides)
+    assert straight == pytest.approx(9.0 / 2.0 + 2.0 / 6.0)
+    around = bound(np.vstack([sides, [[0.0, 5.0, 0.5]]]))
+    assert around is not None
+    assert around > 4.84
+    assert bound(sides, 1.2) == pytest.approx((2.0 * 0.2 / 3.0) ** 0.5)
+    assert bound(np.vstack([sides, [[x, 5.0, 0.3] for x in np.arange(-1.6, 1.7, 0.2)]])) is None

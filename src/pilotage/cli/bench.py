@@ -9,12 +9,13 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from pilotage.cli.options import Json, Overrides, Seed, parse_out
+from pilotage.cli.options import Json, Overrides, Plugins, Seed, parse_out
 from pilotage.cli.output import print_columns, print_json, print_line, stdout_for_json
 from pilotage.core.errors import InputError
 
 if TYPE_CHECKING:
     from pilotage.experiments.barn_benchmark import BarnAnswer
+    from pilotage.experiments.controller_benchmark import CourseAnswer
 
 bench = typer.Typer(
     name="bench",
@@ -44,6 +45,7 @@ def barn(
     ] = None,
     seed: Seed = None,
     overrides: Overrides = None,
+    plugin: Plugins = None,
     out: Annotated[
         Path, typer.Option(metavar="DIR", parser=parse_out, help="Folder for the rows and the page.")
     ] = Path("runs/bench-barn"),
@@ -53,6 +55,7 @@ def barn(
     json: Json = False,
 ) -> int:
     """Drive the BARN courses: first contact fails, 100 s are the limit, within 1 m of the goal is there."""
+    del plugin  # loaded by now
     from pilotage.experiments.barn_benchmark import BarnRequest, bench_barn, first_worlds, summary_values
     from pilotage.experiments.barn_files import write_barn
     from pilotage.logs.barn import read_barn
@@ -74,6 +77,72 @@ def barn(
         print_json(summary_values(answer))
     else:
         _print_table(answer)
+        print_line(f"report: {page}")
+    return 0
+
+
+@bench.command()
+def controllers(
+    families: Annotated[
+        list[str] | None,
+        typer.Argument(
+            metavar="[FAMILY|MAP|TRACKS]...",
+            help="doors, corridor, crowd, bottleneck-0.36 ... bottleneck-0.60, a map's file, or a .txt of "
+            "people's tracks; default: all that need no file.",
+        ),
+    ] = None,
+    controller: Annotated[
+        list[str] | None,
+        typer.Option(metavar="NAME", help="A local controller; repeatable. Default: gap-horizon and dwa."),
+    ] = None,
+    courses: Annotated[int, typer.Option(metavar="N", min=1, max=10_000, help="Courses of each family.")] = 5,
+    trials: Annotated[int, typer.Option(metavar="N", min=1, max=10_000, help="Runs on each course.")] = 2,
+    workers: Annotated[
+        int | None, typer.Option(metavar="N", min=1, help="Processes on this machine; default: all cores.")
+    ] = None,
+    seed: Seed = None,
+    overrides: Overrides = None,
+    plugin: Plugins = None,
+    out: Annotated[
+        Path, typer.Option(metavar="DIR", parser=parse_out, help="Folder for the rows and the page.")
+    ] = Path("runs/bench-controllers"),
+    replays: Annotated[
+        int, typer.Option(metavar="N", min=0, max=100, help="Worst runs of each controller with a replay.")
+    ] = 3,
+    json: Json = False,
+) -> int:
+    """Drive local controllers through doors, corridors, narrow openings, maps and among people."""
+    del plugin  # loaded by now
+    from pilotage.experiments.controller_benchmark import (
+        CourseRequest,
+        answer_values,
+        bench_controllers,
+        write_answer,
+    )
+    from pilotage.experiments.course_families import DRAWN
+    from pilotage.report.barn.controllers import ControllersPage, write_controllers_report
+    from pilotage.report.page import write_report
+
+    names, kinds = tuple(controller or ("gap-horizon", "dwa")), tuple(families or DRAWN)
+    for given, what in ((names, "--controller"), (kinds, "FAMILY")):
+        if len(set(given)) < len(given):
+            raise InputError(f"{what}: expected every name once, found one twice")
+    request = CourseRequest(
+        kinds, names, courses, trials, workers or os.cpu_count() or 1, seed or 0, tuple(overrides or ())
+    )
+    with stdout_for_json(json):
+        answer = bench_controllers(request, _show if sys.stderr.isatty() else None)
+        made = write_answer(answer, out, replays)
+        links = {key: write_report(run_dir).relative_to(out).as_posix() for key, run_dir in made.items()}
+        page = write_controllers_report(out, ControllersPage(answer.runs, answer.without_way, links))
+    for family, count in answer.without_way.items():
+        print_line(
+            f"{family}: {count} of {courses} courses without a way for this robot, not driven", sys.stderr
+        )
+    if json:
+        print_json(answer_values(answer))
+    else:
+        _print_courses(answer)
         print_line(f"report: {page}")
     return 0
 
@@ -127,4 +196,40 @@ def _print_table(answer: BarnAnswer) -> None:
                 str(found.worlds),
             )
         )
+    print_columns(rows)
+
+
+def _print_courses(answer: CourseAnswer) -> None:
+    from pilotage.evaluation.courses import summarize_courses
+    from pilotage.experiments.controller_benchmark import by_family
+
+    rows = [
+        (
+            "controller",
+            "family",
+            "success",
+            "collision",
+            "timeout",
+            "time_s",
+            "over_bound",
+            "people_hit",
+            "runs",
+        )
+    ]
+    for name, runs in answer.runs.items():
+        for family, part in {**by_family(runs), "all": list(runs)}.items():
+            found = summarize_courses(part)
+            rows.append(
+                (
+                    name,
+                    Path(family).name,
+                    f"{found.success:.4f}",
+                    f"{found.collision:.4f}",
+                    f"{found.timeout:.4f}",
+                    f"{found.time_s:.2f}",
+                    f"{found.over_bound:.3f}",
+                    str(found.people_collisions),
+                    str(found.trials),
+                )
+            )
     print_columns(rows)

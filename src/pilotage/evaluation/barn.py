@@ -24,7 +24,10 @@ SIDE_M = 0.35
 
 @dataclass(frozen=True, slots=True)
 class BarnRun:
-    """One run on one course; exactly one of success, collision and timeout is true."""
+    """One run on one course; exactly one of success, collision and timeout is true.
+
+    ``bound_s`` is the time that no robot of these limits undercuts; NaN where nobody worked it out.
+    """
 
     world: int
     trial: int
@@ -33,6 +36,7 @@ class BarnRun:
     timeout: bool
     time_s: float
     optimal_time_s: float
+    bound_s: float = math.nan
 
     @property
     def metric(self) -> float:
@@ -51,6 +55,7 @@ class BarnSummary:
     collision: float
     timeout: float
     time_s: float
+    over_bound: float
     trials: int
     worlds: int
 
@@ -74,7 +79,7 @@ def barn_metric(success: bool, time_s: float, optimal_time_s: float) -> float:
 
 
 def time_bound_s(
-    circles_m: FloatArray,
+    world: SegmentMap,
     start_xy: tuple[float, float],
     goal_xy: tuple[float, float],
     tolerance_m: float,
@@ -82,33 +87,44 @@ def time_bound_s(
     speed_m_s: float,
     acceleration_m_s2: float,
 ) -> float | None:
-    """Time that no robot of these limits undercuts on a lane along y, though it knew the course.
+    """Time that no robot of these limits undercuts, though it knew the course.
 
     The exact shortest path of the footprint's inner disc, less the tolerance about the goal, from rest with
-    full acceleration to full speed. Turning takes no time and corners pass through posts there, and the posts
-    within ``SIDE_M`` of the lane's sides are left out: all of that only lowers the bound.
+    full acceleration to full speed. Turning takes no time and corners pass through walls there: both only
+    lower the bound.
 
     Returns
     -------
     Seconds; None where the disc has no way.
     """
-    left, right = float(circles_m[:, 0].min()), float(circles_m[:, 0].max())
-    low, high = min(start_xy[1], goal_xy[1]) - 1.0, max(start_xy[1], goal_xy[1]) + 1.0
-    x, y = circles_m[:, 0], circles_m[:, 1]
-    inside = (x > left + SIDE_M) & (x < right - SIDE_M) & (y > low) & (y < high)
-    world = SegmentMap(np.zeros((0, 4)), circles_m[inside], (left, low, right, high))
     path = shortest_path(world, start_xy, goal_xy, inner_radius_m)
     if path is None:
         return None
-    length = max(path.length_m - tolerance_m, 0.0)
+    return least_time_s(path.length_m - tolerance_m, speed_m_s, acceleration_m_s2)
+
+
+def least_time_s(length_m: float, speed_m_s: float, acceleration_m_s2: float) -> float:
+    """Time over a length from rest at full acceleration and speed, without braking at its end."""
+    length = max(length_m, 0.0)
     speeding_m = 0.5 * speed_m_s**2 / acceleration_m_s2
     if length <= speeding_m:
         return math.sqrt(2.0 * length / acceleration_m_s2)
     return length / speed_m_s + 0.5 * speed_m_s / acceleration_m_s2
 
 
+def lane_within(circles_m: FloatArray, low_y: float, high_y: float) -> SegmentMap:
+    """The posts inside a lane along y, for its bound: those of its sides and beyond its ends are left out.
+
+    Within ``SIDE_M`` of the sides no robot passes; without these posts the exact path is soon found.
+    """
+    x, y = circles_m[:, 0], circles_m[:, 1]
+    left, right = float(x.min()), float(x.max())
+    inside = (x > left + SIDE_M) & (x < right - SIDE_M) & (y > low_y) & (y < high_y)
+    return SegmentMap(np.zeros((0, 4)), circles_m[inside], (left, low_y, right, high_y))
+
+
 def summarize(runs: Sequence[BarnRun]) -> BarnSummary:
-    """Put runs into numbers; the mean time is that of the runs that succeeded, NaN without any.
+    """Put runs into numbers; mean times are those of the runs that succeeded, NaN without any.
 
     Raises
     ------
@@ -121,6 +137,7 @@ def summarize(runs: Sequence[BarnRun]) -> BarnSummary:
     by_world = np.array([np.mean([run.metric for run in runs if run.world == world]) for world in worlds])
     low, high = bootstrap_mean(by_world)
     times = [run.time_s for run in runs if run.success]
+    ratios = [run.time_s / run.bound_s for run in runs if run.success and math.isfinite(run.bound_s)]
     return BarnSummary(
         float(np.mean([run.metric for run in runs])),
         low,
@@ -129,6 +146,7 @@ def summarize(runs: Sequence[BarnRun]) -> BarnSummary:
         float(np.mean([run.collision for run in runs])),
         float(np.mean([run.timeout for run in runs])),
         float(np.mean(times)) if times else math.nan,
+        float(np.mean(ratios)) if ratios else math.nan,
         len(runs),
         len(worlds),
     )

@@ -3,24 +3,23 @@
 from __future__ import annotations
 
 import math
-import multiprocessing
-import signal
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
-from concurrent.futures.process import BrokenProcessPool
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache, partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from pilotage.core.errors import InputError
-from pilotage.evaluation.barn import BarnRun, summarize
+from pilotage.core.plugins import named_plugins
+from pilotage.evaluation.barn import BarnRun, lane_within, summarize, time_bound_s
 from pilotage.experiments.barn_ways import bounds_of, has_way
 from pilotage.experiments.build.build import build
 from pilotage.experiments.build.robots import footprint_of
 from pilotage.experiments.loop import run_loop
 from pilotage.experiments.mission import mission_of, read_mission
+from pilotage.experiments.run_pool import all_done
 from pilotage.logs.barn import (
     GOAL_AHEAD_M,
     GOAL_TOLERANCE_M,
@@ -92,7 +91,7 @@ def bench_barn(request: BarnRequest, on_run: OnRun | None = None) -> BarnAnswer:
     """
     if not request.worlds:
         raise InputError("bench barn: expected one world or more, found none")
-    base = read_mission(MISSION)
+    base = course_base()
     for controller in request.controllers:
         course_mission(request, base, request.worlds[0], 0, controller)
     robot = mission_of(base, request.overrides).robot
@@ -110,8 +109,11 @@ def bench_barn(request: BarnRequest, on_run: OnRun | None = None) -> BarnAnswer:
         for controller in request.controllers
     ]
     done: dict[str, list[BarnRun]] = {controller: [] for controller in request.controllers}
-    for number, (controller, run) in enumerate(_driven(request, base, jobs), start=1):
-        done[controller].append(run)
+    # Without the courses, which each job brings its own of.
+    slim = replace(request, worlds=())
+    drive = partial(drive_world, slim, base)
+    for number, (job, run) in enumerate(all_done(drive, jobs, request.workers, "bench barn"), start=1):
+        done[job[2]].append(run)
         if on_run is not None:
             on_run(number, len(jobs))
     drove = {world.number for world in open_worlds}
@@ -122,31 +124,9 @@ def bench_barn(request: BarnRequest, on_run: OnRun | None = None) -> BarnAnswer:
     )
 
 
-Job = tuple[BarnWorld, int, str]
-
-
-def _driven(request: BarnRequest, base: Values, jobs: Sequence[Job]) -> Iterator[tuple[str, BarnRun]]:
-    """Every run with its controller, as they come in."""
-    if request.workers == 1:
-        for world, trial, controller in jobs:
-            yield controller, drive_world(request, base, world, trial, controller)
-        return
-    pool = ProcessPoolExecutor(
-        min(request.workers, len(jobs)), multiprocessing.get_context("spawn"), _leave_ctrl_c_to_the_parent
-    )
-    slim = BarnRequest((), request.controllers, request.trials, 1, request.seed, request.overrides)
-    try:
-        waiting = {pool.submit(drive_world, slim, base, *job): job[2] for job in jobs}
-        for future in as_completed(waiting):
-            yield waiting[future], future.result()
-    except BrokenProcessPool:
-        raise InputError("bench barn: a worker died; take fewer --workers, or more memory") from None
-    finally:
-        pool.shutdown(cancel_futures=True)
-
-
-def _leave_ctrl_c_to_the_parent() -> None:
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+def course_base() -> dict[str, Any]:
+    """What courses are put into, with the plugins that are loaded here: workers load them as well."""
+    return {**read_mission(MISSION), "plugins": list(named_plugins())}
 
 
 def course_mission(
@@ -198,7 +178,20 @@ def drive_world(request: BarnRequest, base: Values, world: BarnWorld, trial: int
     success = not collided and away_m <= goal.tolerance_m
     timeout = not (success or collided)
     time_s = TIME_LIMIT_S if timeout else finished.duration_s
-    return BarnRun(world.number, trial, success, collided, timeout, time_s, world.optimal_time_s)
+    robot = experiment.team[0].known
+    limits = robot.motion.top_speed_m_s, robot.motion.braking_m_s2
+    bound_s = _bound_s(world.circles_m.tobytes(), robot.footprint.inner_radius_m, *limits)
+    return BarnRun(world.number, trial, success, collided, timeout, time_s, world.optimal_time_s, bound_s)
+
+
+@lru_cache(maxsize=512)
+def _bound_s(circles: bytes, inner_radius_m: float, speed_m_s: float, acceleration_m_s2: float) -> float:
+    """What no robot of these limits undercuts on a course; NaN where its inner disc has no way."""
+    x, y, _ = START
+    lane = lane_within(np.frombuffer(circles).reshape(-1, 3), y - 1.0, y + GOAL_AHEAD_M + 1.0)
+    goal = (x, y + GOAL_AHEAD_M)
+    bound = time_bound_s(lane, (x, y), goal, GOAL_TOLERANCE_M, inner_radius_m, speed_m_s, acceleration_m_s2)
+    return math.nan if bound is None else bound
 
 
 def published_runs(folder: Path, worlds: Sequence[BarnWorld]) -> dict[str, tuple[BarnRun, ...]]:
@@ -245,7 +238,7 @@ def first_worlds(worlds: Sequence[BarnWorld], count: int | None) -> tuple[BarnWo
 
 def replay_missions(answer: BarnAnswer, controller: str, count: int) -> list[tuple[BarnRun, Mission]]:
     """The worst runs of a controller as missions: each drives as it did."""
-    base = read_mission(MISSION)
+    base = course_base()
     worlds = {world.number: world for world in answer.request.worlds}
     worst = sorted(answer.runs[controller], key=lambda run: (run.metric, -run.time_s))[:count]
     return [

@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import json
 import math
 from pathlib import Path
 
 from pilotage.core.whole_file import write_whole
 from pilotage.experiments.barn_benchmark import BarnAnswer, replay_missions, summary_values
+from pilotage.experiments.result_rows import write_rows
 from pilotage.experiments.run import run_mission
 
-RUNS, SUMMARY, REPLAYS = "runs.csv", "summary.json", "replays"
+SUMMARY, REPLAYS = "summary.json", "replays"
 COLUMNS = (
     "controller",
     "world",
@@ -22,6 +21,7 @@ COLUMNS = (
     "timeout",
     "time_s",
     "optimal_time_s",
+    "bound_s",
     "metric",
 )
 
@@ -34,22 +34,30 @@ def write_barn(answer: BarnAnswer, folder: Path, replays: int) -> dict[tuple[str
     Run folders by controller, world and trial.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(COLUMNS)
-    for name, runs in answer.runs.items():
-        for run in runs:
-            flags = int(run.success), int(run.collision), int(run.timeout)
-            times = f"{run.time_s:.6g}", f"{run.optimal_time_s:.6g}", f"{run.metric:.6g}"
-            writer.writerow([name, run.world, run.trial, *flags, *times])
-    write_whole(folder / RUNS, text.getvalue())
+    rows = [
+        (
+            name,
+            run.world,
+            run.trial,
+            int(run.success),
+            int(run.collision),
+            int(run.timeout),
+            run.time_s,
+            run.optimal_time_s,
+            run.bound_s,
+            run.metric,
+        )
+        for name, runs in answer.runs.items()
+        for run in runs
+    ]
+    write_rows(folder, COLUMNS, rows)
     values = {
         "controllers": list(answer.request.controllers),
         "trials": answer.request.trials,
         "seed": answer.request.seed,
         "overrides": list(answer.request.overrides),
         "without_way": list(answer.without_way),
-        "result": _finite(summary_values(answer)),
+        "result": finite(summary_values(answer)),
     }
     write_whole(folder / SUMMARY, json.dumps(values, indent=1, allow_nan=False) + "\n")
     made: dict[tuple[str, int, int], Path] = {}
@@ -61,8 +69,8 @@ def write_barn(answer: BarnAnswer, folder: Path, replays: int) -> dict[tuple[str
     return made
 
 
-def _finite(value: object) -> object:
+def finite(value: object) -> object:
     """The same with None for what JSON has no number for: the time of runs of which none succeeded."""
     if isinstance(value, dict):
-        return {key: _finite(item) for key, item in value.items()}
+        return {key: finite(item) for key, item in value.items()}
     return None if isinstance(value, float) and not math.isfinite(value) else value

@@ -30,6 +30,7 @@ HEAD = (
     "collision",
     "timeout",
     "time",
+    "over bound",
     "runs",
     "courses",
 )
@@ -111,8 +112,8 @@ def barn_page(page: BarnPage) -> str:
         tiles=tiles(
             [
                 ("metric", f"{found.metric:.3f}"),
-                ("success", _percent(found.success)),
-                ("collisions", _percent(found.collision)),
+                ("success", percent(found.success)),
+                ("collisions", percent(found.collision)),
                 ("mean time", f"{found.time_s:.1f} s"),
             ]
         ),
@@ -123,7 +124,7 @@ def barn_page(page: BarnPage) -> str:
 
 
 def _controllers(runs: Runs) -> str:
-    return _section("controllers", "Controllers", _table(HEAD, [_row(name, runs[name]) for name in runs]))
+    return section("controllers", "Controllers", table(HEAD, [_row(name, runs[name]) for name in runs]))
 
 
 def _row(name: str, runs: Sequence[BarnRun]) -> list[str]:
@@ -133,11 +134,12 @@ def _row(name: str, runs: Sequence[BarnRun]) -> list[str]:
         name,
         f"{found.metric:.4f}",
         f"{found.metric_low:.4f} to {found.metric_high:.4f}",
-        _percent(found.success),
-        f"{_percent(low)} to {_percent(high)}",
-        _percent(found.collision),
-        _percent(found.timeout),
+        percent(found.success),
+        f"{percent(low)} to {percent(high)}",
+        percent(found.collision),
+        percent(found.timeout),
         f"{found.time_s:.2f} s",
+        f"{found.over_bound:.3f}" if math.isfinite(found.over_bound) else "–",
         str(found.trials),
         str(found.worlds),
     ]
@@ -156,7 +158,7 @@ def _pairs(runs: Runs) -> str:
     names = list(runs)
     if len(names) < 2:
         text = '<p class="absent">One controller only; name several to compare them on the same courses.</p>'
-        return _section("pairs", "On the same courses", text)
+        return section("pairs", "On the same courses", text)
     worlds = sorted({run.world for member in runs.values() for run in member})
     rows = []
     for name in names[1:]:
@@ -173,7 +175,7 @@ def _pairs(runs: Runs) -> str:
                 ]
             )
     head = ("what", "mean difference", "95 %", "p (Wilcoxon)", "courses")
-    return _section("pairs", "On the same courses", _table(head, rows))
+    return section("pairs", "On the same courses", table(head, rows))
 
 
 def _worst(page: BarnPage) -> str:
@@ -188,7 +190,7 @@ def _worst(page: BarnPage) -> str:
             rows.append("".join(_cell(text) for text in cells) + f"<td>{replay}</td>")
     head = ("controller", "course", "trial", "outcome", "time", "metric", "")
     body = "".join(f"<tr>{row}</tr>" for row in rows)
-    return _section(
+    return section(
         "worst", "Worst courses", f'<div class="wide"><table>{_head(head)}<tbody>{body}</tbody></table></div>'
     )
 
@@ -197,7 +199,7 @@ def _published(page: BarnPage) -> str:
     title = "Published results of another simulator"
     if not page.published:
         text = '<p class="absent">No published_*.csv lies beside the courses.</p>'
-        return _section("published", title, text)
+        return section("published", title, text)
     rows = []
     for name, runs in page.published.items():
         rows.append([f"{name} (Gazebo)", *_row(name, runs)[1:]])
@@ -210,14 +212,16 @@ def _published(page: BarnPage) -> str:
         "<p>Driven in Gazebo by others, with robots set to their own speeds: a yardstick, not a victory. "
         "Another simulator has other noise, delays and contacts.</p>"
     )
-    return _section("published", title, note + _table(HEAD, rows))
+    return section("published", title, note + table(HEAD, rows))
 
 
-def _section(slug: str, title: str, body: str) -> str:
+def section(slug: str, title: str, body: str) -> str:
+    """One section with its heading."""
     return f'<section id="{slug}"><h2><a href="#{slug}">{escape(title)}</a></h2>{body}</section>'
 
 
-def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """A table of plain text."""
     body = "".join(f"<tr>{''.join(_cell(text) for text in row)}</tr>" for row in rows)
     return f'<div class="wide"><table>{_head(head)}<tbody>{body}</tbody></table></div>'
 
@@ -231,5 +235,6 @@ def _cell(text: str) -> str:
     return f"<td>{escape(text)}</td>"
 
 
-def _percent(share: float) -> str:
+def percent(share: float) -> str:
+    """A share in percent, one digit after the point."""
     return f"{100.0 * share:.1f} %"

@@ -1,0 +1,254 @@
+"""Kinds of courses for local controllers: drawn ones, places of any map, crossings among people."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.ndimage import label
+
+from pilotage.core.errors import InputError
+from pilotage.core.types import FloatArray
+from pilotage.evaluation.barn import lane_within, least_time_s, time_bound_s
+from pilotage.experiments.build.charts import load_chart
+from pilotage.kernels.control.pose_search import CLOSED, passage
+from pilotage.logs.people import read_people
+from pilotage.maps.courses import make_course
+from pilotage.maps.segment_map import SegmentMap, box_segments
+from pilotage.models.footprint import Footprint
+from pilotage.models.motion.motion import MotionConfig
+
+DOORS, CORRIDOR, CROWD = "doors", "corridor", "crowd"
+BOTTLENECKS_M = (0.36, 0.40, 0.44, 0.46, 0.48, 0.50, 0.55, 0.60)
+DRAWN = (DOORS, CORRIDOR, CROWD, *(f"bottleneck-{width:.2f}" for width in BOTTLENECKS_M))
+"""Families that need no file."""
+TOLERANCE_M = 0.5
+CROSSING_M = 6.0
+"""A crossing goes so far to either side of the middle of where people walk."""
+HALL_M = 9.0
+CLEAR_M = 0.05
+"""Room around the robot, however it stands, at start and goal on a map."""
+APART_M = (2.5, 12.0)
+TRIES = 1000
+CELL_M = 0.04
+
+
+@dataclass(frozen=True, slots=True)
+class Course:
+    """One course.
+
+    Attributes
+    ----------
+    family, number
+        Its kind, and which of it.
+    settings
+        By dotted key, what is set in the mission ``barn-course``.
+    bound_s
+        Least time of a robot that knows the course.
+    """
+
+    family: str
+    number: int
+    settings: Mapping[str, Any]
+    bound_s: float
+    people: tuple[Mapping[str, Any], ...] = field(default=())
+
+
+@dataclass(frozen=True, slots=True)
+class Driver:
+    """What of the robot the courses depend on."""
+
+    footprint: Footprint
+    outline: FloatArray
+    motion: MotionConfig
+
+
+def make_course_of(family: str, number: int, seed: int, driver: Driver) -> Course | None:
+    """Draw a course; None where the robot has no way through it.
+
+    Raises
+    ------
+    InputError
+        Where a file is not what it should be.
+    """
+    rng = np.random.default_rng([seed, number, *family.encode()])
+    if family == DOORS:
+        return _walled(family, number, *_doors(rng), driver)
+    if family == CORRIDOR:
+        return _walled(family, number, *_corridor(rng), driver)
+    if family == CROWD:
+        return _crowd(number, rng, driver)
+    if family.startswith("bottleneck-"):
+        return _bottleneck(family, number, float(family.rsplit("-", 1)[1]), rng, driver)
+    if family.endswith(".txt"):
+        return _crossing(family, number, rng, driver)
+    return _on_map(family, number, rng, driver)
+
+
+def _places(start: tuple[float, float, float], goal: tuple[float, float]) -> dict[str, Any]:
+    return {
+        "world.start": dict(zip(("x_m", "y_m", "theta_rad"), start, strict=True)),
+        "world.goal": {"x_m": goal[0], "y_m": goal[1], "tolerance_m": TOLERANCE_M},
+    }
+
+
+def _walled(
+    family: str,
+    number: int,
+    walls: FloatArray,
+    start: tuple[float, float, float],
+    goal: tuple[float, float],
+    driver: Driver,
+    people: tuple[Mapping[str, Any], ...] = (),
+) -> Course:
+    """A course of straight walls."""
+    low, high = walls.reshape(-1, 2).min(axis=0) - 0.5, walls.reshape(-1, 2).max(axis=0) + 0.5
+    bounds = (float(low[0]), float(low[1]), float(high[0]), float(high[1]))
+    floor = SegmentMap(walls, np.zeros((0, 3)), bounds)
+    drawn = {
+        "map": f"{family}-{number}",
+        "bounds_m": list(bounds),
+        "walls_m": walls.tolist(),
+        "circles_m": [],
+    }
+    bound = _bound_s(floor, start, goal, driver)
+    return Course(family, number, {"world.map": drawn, **_places(start, goal)}, bound, people)
+
+
+def _bound_s(
+    floor: SegmentMap, start: tuple[float, float, float], goal: tuple[float, float], driver: Driver
+) -> float:
+    """Least time by the exact shortest path; where there is none on the floor, by the straight line."""
+    motion, inner = driver.motion, driver.footprint.inner_radius_m
+    limits = motion.top_speed_m_s, motion.braking_m_s2
+    bound = time_bound_s(floor, start[:2], goal, TOLERANCE_M, inner, *limits)
+    if bound is None:
+        return least_time_s(math.hypot(goal[0] - start[0], goal[1] - start[1]) - TOLERANCE_M, *limits)
+    return bound
+
+
+def _hall(width: float, depth: float) -> list[list[float]]:
+    return [[0, 0, width, 0], [width, 0, width, depth], [width, depth, 0, depth], [0, depth, 0, 0]]
+
+
+def _doors(rng: np.random.Generator) -> tuple[FloatArray, tuple[float, float, float], tuple[float, float]]:
+    """Four rooms in a row, a door of 0.7 to 1.0 m somewhere in each wall between."""
+    width, depth = 5.0, 3.0
+    walls = _hall(width, 4 * depth)
+    for k in range(1, 4):
+        opening, left = rng.uniform(0.7, 1.0), rng.uniform(0.4, width - 1.4)
+        walls += [[0, k * depth, left, k * depth], [left + opening, k * depth, width, k * depth]]
+    return np.array(walls, dtype=float), (2.5, 0.8, 0.5 * math.pi), (2.5, 4 * depth - 0.8)
+
+
+def _corridor(rng: np.random.Generator) -> tuple[FloatArray, tuple[float, float, float], tuple[float, float]]:
+    """A corridor of 0.7 to 1.1 m with four bends at right angles, left and right by turns."""
+    half = 0.5 * rng.uniform(0.7, 1.1)
+    legs = rng.uniform(2.0, 3.5, 5)
+    points, direction, turn = [np.zeros(2)], np.array([0.0, 1.0]), float(rng.choice([-1.0, 1.0]))
+    for leg in legs:
+        points.append(points[-1] + leg * direction)
+        direction = turn * np.array([-direction[1], direction[0]])
+        turn = -turn
+    middle = np.array(points)
+    steps = np.diff(middle, axis=0)
+    along = steps / np.hypot(*steps.T)[:, None]
+    across = np.column_stack([-along[:, 1], along[:, 0]])
+    ends = np.vstack([middle[0] - half * along[0], middle[1:-1], middle[-1] + half * along[-1]])
+    # At a bend both legs' offsets meet in one corner.
+    offset = np.vstack([across[:1], across[:-1] + across[1:], across[-1:]]) * half
+    left, right = ends + offset, ends - offset
+    rows = [np.hstack([side[:-1], side[1:]]) for side in (left, right)]
+    caps = np.array([[*left[0], *right[0]], [*left[-1], *right[-1]]])
+    goal = middle[-1] - 0.2 * along[-1]
+    return np.vstack([*rows, caps]), (0.0, 0.0, 0.5 * math.pi), (float(goal[0]), float(goal[1]))
+
+
+def _crowd(number: int, rng: np.random.Generator, driver: Driver) -> Course:
+    """Across a hall with four pillars in which twelve people walk between its sides."""
+    walls = _hall(12.0, 12.0)
+    for x, y in ((4.0, 4.0), (8.0, 4.0), (4.0, 8.0), (8.0, 8.0)):
+        walls += box_segments(x, y, 0.4, 0.4, float(rng.uniform(0.0, 1.5))).tolist()
+    doors = [[0.8, 6.0], [11.2, 6.0], [6.0, 0.8], [6.0, 11.2], [0.8, 0.8], [11.2, 11.2]]
+    people = ({"name": "social-force", "count": 12, "doors_m": doors},)
+    start = (float(rng.uniform(2.0, 10.0)), 1.5, 0.5 * math.pi)
+    goal = (float(rng.uniform(2.0, 10.0)), 10.5)
+    return _walled(CROWD, number, np.array(walls, dtype=float), start, goal, driver, people)
+
+
+def _bottleneck(
+    family: str, number: int, width_m: float, rng: np.random.Generator, driver: Driver
+) -> Course | None:
+    """Barriers whose only opening is so wide; None where a search over all poses finds no way."""
+    made = make_course(width_m, rng)
+    x, y = made.goal_xy_m
+    low, high = np.array([-2.5, -1.2]), np.array([2.5, y + 0.6])
+    status, _ = passage(
+        np.array(made.start), x, y, TOLERANCE_M, np.ascontiguousarray(driver.outline), made.circles_m, low,
+        high, CELL_M, 0.0,
+    )  # fmt: skip
+    if status == CLOSED:
+        return None
+    drawn = {
+        "map": f"{family}-{number}",
+        "bounds_m": [-4.5, -3.0, 4.5, y + 2.0],
+        "walls_m": [],
+        "circles_m": made.circles_m.tolist(),
+    }
+    bound = _bound_s(lane_within(made.circles_m, -0.9, y + 1.0), made.start, (x, y), driver)
+    return Course(family, number, {"world.map": drawn, **_places(made.start, (x, y))}, bound)
+
+
+def _crossing(file: str, number: int, rng: np.random.Generator, driver: Driver) -> Course:
+    """Across the middle of where recorded people walk, in any direction, at a time when somebody is there."""
+    tracks = read_people(Path(file))
+    middle = np.median(tracks.places_xy_m, axis=0)
+    for _ in range(TRIES):
+        angle, begins_s = rng.uniform(-math.pi, math.pi), rng.uniform(0.0, max(tracks.duration_s - 20.0, 1.0))
+        away = CROSSING_M * np.array([math.cos(angle), math.sin(angle)])
+        _, places = tracks.at(begins_s)
+        near = np.hypot(*(places - (middle - away)).T)
+        if near.size and near.min() > 1.5 + driver.footprint.radius_m:
+            break
+    else:
+        raise InputError(
+            f"{file}: expected a time at which people leave room for a robot to start, found none"
+        )
+    corner = middle - HALL_M
+    walls = np.array(_hall(2 * HALL_M, 2 * HALL_M)) + np.tile(corner, 2)
+    begin, goal = middle - away, middle + away
+    people = ({"name": "track", "file": str(Path(file).absolute()), "begins_s": float(begins_s)},)
+    start = (float(begin[0]), float(begin[1]), float(angle))
+    return _walled(file, number, walls, start, (float(goal[0]), float(goal[1])), driver, people)
+
+
+def _on_map(file: str, number: int, rng: np.random.Generator, driver: Driver) -> Course:
+    """From one place to another on a map that the robot is not told of."""
+    chart = load_chart(file)
+    field = chart.field
+    regions, _ = label(field.distance_m > driver.footprint.radius_m + CLEAR_M)
+    sizes = np.bincount(regions.ravel())
+    sizes[0] = 0
+    cells = np.argwhere(regions == int(sizes.argmax()))
+    if not sizes.max() or not len(cells):
+        raise InputError(f"{file}: expected a map with room for the robot, found none")
+    x0, y0 = field.origin_xy_m
+    places = np.array([x0, y0]) + field.resolution_m * cells[:, ::-1]
+    for _ in range(TRIES):
+        start, goal = places[rng.integers(len(places), size=2)]
+        if APART_M[0] <= math.hypot(*(goal - start)) <= APART_M[1]:
+            break
+    else:
+        raise InputError(f"{file}: expected two places {APART_M[0]:g} to {APART_M[1]:g} m apart, found none")
+    heading = math.atan2(goal[1] - start[1], goal[0] - start[0])
+    begin = (float(start[0]), float(start[1]), heading)
+    end = (float(goal[0]), float(goal[1]))
+    motion = driver.motion
+    # Grids have too many sides for the exact path: the straight line is a bound as well.
+    away = math.hypot(*(goal - start)) - TOLERANCE_M
+    bound = least_time_s(float(away), motion.top_speed_m_s, motion.braking_m_s2)
+    return Course(file, number, {"world.map": str(Path(file).absolute()), **_places(begin, end)}, bound)

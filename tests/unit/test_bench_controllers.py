@@ -1,0 +1,144 @@
+"""``pilotage bench controllers``: courses of many kinds, their bounds, what is counted and left."""
+
+from __future__ import annotations
+
+import csv
+import json
+import math
+import sqlite3
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pilotage.cli.main import main
+from pilotage.evaluation.courses import CourseRun, summarize_courses
+from pilotage.experiments.course_families import Course, Driver, make_course_of
+from pilotage.maps.segment_map import SegmentMap
+from pilotage.models.footprint import Footprint
+from pilotage.models.motion.differential_drive import DifferentialDriveConfig
+
+JACKAL = np.array([[0.254, 0.215], [-0.254, 0.215], [-0.254, -0.215], [0.254, -0.215]])
+DRIVER = Driver(Footprint.polygon(JACKAL), JACKAL, DifferentialDriveConfig(max_speed_m_s=2.0))
+STRAIGHT = "stack.navigator={name: open-loop, speed_m_s: 1.0, turn_rate_rad_s: 0.0, duration_s: 90.0}"
+PLUGIN = """
+from pilotage.core.config import Config
+from pilotage.core.types import Twist
+from pilotage.stack.control.local.role import LOCAL_CONTROLLERS
+
+class CarefulConfig(Config):
+    '''Nothing to say.'''
+
+@LOCAL_CONTROLLERS.add("careful", CarefulConfig)
+class Careful:
+    '''Stays where it is.'''
+    status = "waiting"
+    def __init__(self, config, generator): pass
+    def step(self, view): return Twist(0.0, 0.0)
+"""
+
+
+def drawn(family: str, number: int = 0, seed: int = 1) -> Course:
+    course = make_course_of(family, number, seed, DRIVER)
+    assert course is not None
+    return course
+
+
+def bench(out: Path, *more: str) -> int:
+    common = ("--courses", "1", "--trials", "1", "--workers", "1", "--replays", "0", "--json")
+    return main(["bench", "controllers", *common, "--out", str(out), *more])
+
+
+@pytest.mark.parametrize("family", ["doors", "corridor", "crowd"])
+def test_courses_have_room_where_they_begin_and_end_and_a_bound(family: str) -> None:
+    for number in range(8):
+        course = drawn(family, number)
+        world = course.settings["world.map"]
+        floor = SegmentMap(np.array(world["walls_m"]), np.zeros((0, 3)), tuple(world["bounds_m"]))
+        for key in ("world.start", "world.goal"):
+            place = course.settings[key]
+            assert floor.distance_m(place["x_m"], place["y_m"]) > 0.3, key
+        away = math.hypot(
+            *(course.settings["world.goal"][k] - course.settings["world.start"][k] for k in ("x_m", "y_m"))
+        )
+        assert course.bound_s > (away - 0.5) / 2.0
+    assert drawn(family, 3).settings == drawn(family, 3).settings
+    assert drawn(family, 3).settings != drawn(family, 3, seed=2).settings
+
+
+def test_openings_narrower_than_the_robot_have_no_way() -> None:
+    assert make_course_of("bottleneck-0.36", 0, 1, DRIVER) is None
+    assert drawn("bottleneck-0.60").bound_s > 3.0
+
+
+def test_a_crossing_begins_where_nobody_stands(tmp_path: Path) -> None:
+    path = tmp_path / "tracks.txt"
+    path.write_text("".join(f"{10 * k}\t1\t{0.1 * k:.2f}\t0.0\n" for k in range(200)))
+    course = drawn(str(path))
+    assert course.people[0]["begins_s"] <= 60.0
+    start, goal = course.settings["world.start"], course.settings["world.goal"]
+    assert math.hypot(start["x_m"] - goal["x_m"], start["y_m"] - goal["y_m"]) == pytest.approx(12.0)
+
+
+def test_numbers_of_runs() -> None:
+    runs = [
+        CourseRun("doors", 0, 0, True, False, False, 12.0, 10.0, 6.0, 0, 1, 0.2, 0.1),
+        CourseRun("doors", 0, 1, False, True, False, 3.0, 10.0, 7.0, 1, 0, 0.0, 0.3),
+        CourseRun("doors", 1, 0, True, False, False, 8.0, 5.0),
+    ]
+    found = summarize_courses(runs)
+    assert (found.success, found.collision, found.trials, found.courses) == (2 / 3, 1 / 3, 3, 2)
+    assert found.over_bound == pytest.approx(0.5 * (1.2 + 1.6))
+    assert found.time_lost == pytest.approx(1.0)
+    assert (found.people_collisions, found.people_touches, found.closest_m) == (1, 1, 0.0)
+    assert found.near_share == pytest.approx(0.2)
+
+
+def test_it_drives_judges_and_writes(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """A plugin's controller that stands, among walkers; and one that drives ahead into what comes."""
+    plugin, out = tmp_path / "careful.py", tmp_path / "out"
+    plugin.write_text(PLUGIN)
+    limit = ("--set", "robot.motion.max_speed_m_s=1.0")
+    assert (
+        bench(out, "crowd", "bottleneck-0.36", "--plugin", str(plugin), "--controller", "careful", *limit)
+        == 0
+    )
+    said = capsys.readouterr()
+    assert "bottleneck-0.36: 1 of 1 courses without a way" in said.err
+    answer = json.loads(said.out)
+    assert answer["without_way"] == {"bottleneck-0.36": 1}
+    found = answer["controllers"]["careful"]
+    assert (found["timeout"], found["people_collisions"], found["trials"]) == (1.0, 0, 1)
+    assert found["families"]["crowd"]["near_share"] >= 0.0
+    with (out / "runs.csv").open() as file:
+        row = next(csv.DictReader(file))
+    base = sqlite3.connect(out / "runs.sqlite")
+    assert base.execute("SELECT family, timeout, time_s FROM runs").fetchall() == [("crowd", 1, 100.0)]
+    base.close()
+    assert (row["family"], row["timeout"], row["empty_s"]) == ("crowd", "1", "")
+    page = (out / "report.html").read_text()
+    assert "time within 0.5 m" in page
+
+    assert bench(out, "doors", "--controller", "dwa", "--replays", "1", "--set", STRAIGHT) == 0
+    assert json.loads(capsys.readouterr().out)["controllers"]["dwa"]["collision"] == 1.0
+    assert len(list((out / "replays").glob("*/report.html"))) == 1
+    assert 'href="replays/doors-0-0-dwa' in (out / "report.html").read_text()
+
+
+@pytest.mark.parametrize(
+    ("more", "words"),
+    [
+        (("nowhere.yaml",), "expected a map or tracks of people, or one of doors"),
+        (("doors", "doors"), "found one twice"),
+        (("doors", "--controller", "dwaa"), "did you mean 'dwa'"),
+        (("bottleneck-0.36",), "found the robot too wide"),
+    ],
+)
+def test_bad_input_is_one_line(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], more: tuple[str, ...], words: str
+) -> None:
+    assert bench(tmp_path / "out", *more) == 2
+    said = capsys.readouterr()
+    assert words in said.err
+    assert len(said.err.splitlines()) == 1
+    assert not (tmp_path / "out").exists()
