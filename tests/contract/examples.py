@@ -356,13 +356,11 @@ EXAMPLES: dict[tuple[str, str], Example] = {
         {"beams": 90},
         FILTER_NUMBERS | {"kld_error", "kld_probability", "spread"},
     ),
-    ("heading_filter", "encoder-gyro"): Example(
+    ("heading", "encoder-gyro"): Example(heading_filter_follows, {"process_var": 0.1}, SCALAR_FILTER_NUMBERS),
+    ("heading", "encoder-magnetometer"): Example(
         heading_filter_follows, {"process_var": 0.1}, SCALAR_FILTER_NUMBERS
     ),
-    ("heading_filter", "encoder-magnetometer"): Example(
-        heading_filter_follows, {"process_var": 0.1}, SCALAR_FILTER_NUMBERS
-    ),
-    ("heading_filter", "gyro-bias"): Example(
+    ("heading", "gyro-bias"): Example(
         heading_filter_follows, {"gate": 0.9999}, pure_numbers=frozenset({"gate"})
     ),
     ("localizer", "ekf-walls-report"): Example(

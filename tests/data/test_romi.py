@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+from collections import defaultdict
 from pathlib import Path
 
 import numpy as np
@@ -45,20 +47,74 @@ def test_the_true_map_has_the_published_number_of_cells() -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "features", "of", "free_of"),
+    ("name", "features", "of", "free", "free_of"),
     [
-        ("WithoutSensorFusion_WithoutObstacleAvoidance", 11, 75, 285),
-        ("WithSensorFusion_WithoutObstacleAvoidance_V2", 25, 76, 292),
-        ("WithoutSensorFusion_WithObstacleAvoidance", 9, 81, 287),
-        ("WithSensorFusion_WithObstacleAvoidance", 16, 70, 268),
-        ("Base", 10, 24, 68),
+        ("WithoutSensorFusion_WithoutObstacleAvoidance", 11, 75, 234, 285),
+        ("WithSensorFusion_WithoutObstacleAvoidance_V2", 25, 76, 240, 292),
+        ("WithoutSensorFusion_WithObstacleAvoidance", 9, 81, 228, 287),
+        ("WithSensorFusion_WithObstacleAvoidance", 16, 70, 220, 268),
+        ("Base", 10, 24, 54, 68),
     ],
 )
-def test_the_printed_maps_score_as_published(name: str, features: int, of: int, free_of: int) -> None:
+def test_the_printed_maps_score_as_published(
+    name: str, features: int, of: int, free: int, free_of: int
+) -> None:
+    """Features, and how many free cells there are, to the cell; of free cells right see below."""
     printed = read_cell_map(DATA / "robot_maps" / f"{name}.txt")
     score = score_cell_map(printed, read_true_map(DATA / "map.yaml"))
     assert (score.features.correct, score.features.of) == (features, of)
-    assert score.free.of == free_of
+    assert (score.free.correct, score.free.of) == (free, free_of)
+
+
+PUBLISHED_FREE = (232, 239, 224, 213, 54)
+MAPS = (
+    "WithoutSensorFusion_WithoutObstacleAvoidance",
+    "WithSensorFusion_WithoutObstacleAvoidance_V2",
+    "WithoutSensorFusion_WithObstacleAvoidance",
+    "WithSensorFusion_WithObstacleAvoidance",
+    "Base",
+)
+
+
+def test_no_true_map_nearly_ours_gives_the_published_free_cells() -> None:
+    """The report counts 2, 1, 4 and 7 free cells less as right, and the same features.
+
+    It would take further features in its true map, on cells where no robot printed the right letter (its
+    feature counts would be higher too). No straight run of up to nine cells does (a box has eight to a
+    side), nor do two together: a box or tape drawn a little larger is not what makes the difference.
+    """
+    truth = read_true_map(DATA / "map.yaml")
+    maps = [read_cell_map(DATA / "robot_maps" / f"{name}.txt") for name in MAPS]
+    right = np.array([score_cell_map(printed, truth).free.correct for printed in maps])
+    missing = right - np.array(PUBLISHED_FREE)
+    assert missing.tolist() == [2, 1, 4, 7, 0]
+    open_floor = ~truth.cells.holds(CellState.OBSTACLE, CellState.LINE)
+    free = np.array([m.holds(CellState.VISITED, CellState.EXPLORED, CellState.BORDER) for m in maps])
+    letters = {
+        letter: np.any([m.holds(letter) for m in maps], axis=0)
+        for letter in (CellState.OBSTACLE, CellState.LINE)
+    }
+    runs: dict[tuple[int, ...], list[frozenset[tuple[int, int]]]] = defaultdict(list)
+    runs[(0, 0, 0, 0, 0)].append(frozenset())
+    rows, columns = open_floor.shape
+    for (row, column), (down, along), printed_right in itertools.product(
+        np.ndindex(rows, columns), ((0, 1), (1, 0)), letters.values()
+    ):
+        allowed = open_floor & ~printed_right
+        cells: frozenset[tuple[int, int]] = frozenset()
+        for step in range(9):
+            r, c = row + step * down, column + step * along
+            if not (r < rows and c < columns and allowed[r, c]):
+                break
+            cells |= {(r, c)}
+            lost = sum(free[:, y, x].astype(np.int64) for y, x in cells)
+            if (lost > missing).any():
+                break
+            runs[tuple(lost.tolist())].append(cells)
+    assert len(runs) > 5
+    for change, one in runs.items():
+        rest = tuple(int(m) - x for m, x in zip(missing, change, strict=True))
+        assert not any(a.isdisjoint(b) for a in one for b in runs.get(rest, ()))
 
 
 def test_the_film_is_tracked() -> None:

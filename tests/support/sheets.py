@@ -110,6 +110,13 @@ def sheet_knowledge(**changes: Any) -> SheetKnowledge:
 
 
 @dataclass(frozen=True)
+class NoParts:
+    """A mission's parts that name nothing an explorer takes."""
+
+    heading: None = None
+
+
+@dataclass(frozen=True)
 class ToldOfSheet:
     """What an explorer is told before it starts: the sheet's extent and where it stands; and its journal."""
 
@@ -124,4 +131,4 @@ class ToldOfSheet:
         robot = RobotKnowledge(Footprint.disc(RADIUS_M), WheelDriveConfig(), self.sensors, DT_S, self.streams)
         task = TaskKnowledge(Belief(self.start, np.zeros((3, 3))), time_limit_s=600.0)
         chart = sheet_chart(self.sheet).extent_only()
-        return factory(config, robot, chart, task, None, self.journal)
+        return factory(config, robot, chart, task, NoParts(), self.journal)

@@ -26,6 +26,7 @@ from pilotage.stack.interface import StackStatus
 from support.missions import explore
 
 REPORT = "stack.navigator.name=surround-check"
+COMPASS, MAGNETOMETER = "robot.sensors.compass=magnetometer", "stack.navigator.magnetometer=true"
 
 
 def metrics(name: str, *overrides: str, seed: int = 0) -> dict[str, object]:
@@ -209,3 +210,44 @@ def test_exploring_needs_a_sheet() -> None:
     elsewhere = ("world.map=museum", "world.start={x_m: 1, y_m: 1}")
     with pytest.raises(InputError, match=r"expected a sheet with cells as world\.map, found 'museum'"):
         build(load_mission("romi-explore", elsewhere))
+
+
+@pytest.mark.parametrize(
+    "chosen",
+    [
+        ("stack.heading={name: encoder-gyro, process_var: 0.05, measurement_var: 0.5}",),
+        ("stack.heading.name=gyro-bias",),
+        ("stack.heading={name: encoder-magnetometer, measurement_var: 4.0}", COMPASS, MAGNETOMETER),
+        ("stack.navigator.field={repulsion_mm: 100.0, trigger_front_m: 0.2}",),
+    ],
+)
+def test_a_mission_chooses_heading_filter_and_field(chosen: tuple[str, ...]) -> None:
+    """Each drives, and the choice makes a difference to what the robot believes."""
+    short = (REPORT, "stack.navigator.avoid=always", "run.time_limit_s=25")
+    plain, other = (
+        simulate(load_mission("romi-explore", (*short, *more), 2)).finished.robots[0].trace
+        for more in ((), chosen)
+    )
+    assert plain["est_theta_rad"].shape == other["est_theta_rad"].shape
+    assert not np.array_equal(plain["est_theta_rad"], other["est_theta_rad"])
+
+
+@pytest.mark.parametrize(
+    ("overrides", "says"),
+    [
+        (("stack.heading.name=gyro-bias",), "a navigator that takes a heading filter"),
+        ((REPORT, "stack.heading.name=gyro-bais"), "gyro-bias"),
+        ((REPORT, "stack.heading.name=encoder-magnetometer"), "magnetometer"),
+        ((REPORT, "stack.heading.name=gyro-bias", "stack.navigator.fusion=false"), "fusion"),
+        ((REPORT, "stack.heading={name: encoder-gyro, process_var: -1}"), "process_var"),
+        ((REPORT, "stack.navigator.field.repulsion_mm=-1"), "repulsion_mm"),
+    ],
+)
+def test_heading_filters_that_cannot_be_are_refused(
+    overrides: tuple[str, ...], says: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    settings = [word for one in overrides for word in ("--set", one)]
+    assert main(["run", "romi-explore", *settings, "--json"]) == 2
+    told = capsys.readouterr().err.strip()
+    assert says in told
+    assert "\n" not in told

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pilotage.core.angles import wrap_to_pi
+from pilotage.core.errors import InputError
 from pilotage.core.random import RandomStreams
 from pilotage.core.types import Pose2, WheelSpeeds
 from pilotage.maps.cell_map import CellMap, CellState, grown
@@ -17,10 +19,18 @@ from pilotage.missions.explorer import FirmwareConfig
 from pilotage.sensors.infrared import InfraredConfig
 from pilotage.sensors.magnetometer import MagnetometerConfig
 from pilotage.sensors.readings import InfraredReading, LineReading, Readings
-from pilotage.stack.control.potential_field import PotentialField
+from pilotage.stack.control.potential_field import PotentialField, PotentialFieldConfig
 from pilotage.stack.control.wheel_pursuit import pursue, wheel_speeds
 from pilotage.stack.exploration.surround_check import SurroundCheck, SurroundCheckConfig
 from pilotage.stack.interface import StackStatus
+from pilotage.stack.localization.gyro_bias import GyroBiasConfig, GyroBiasFilter
+from pilotage.stack.localization.heading_filter import HeadingEstimate, HeadingFilter
+from pilotage.stack.localization.heading_report import (
+    EncoderGyroConfig,
+    EncoderGyroFilter,
+    EncoderMagnetometerConfig,
+    EncoderMagnetometerFilter,
+)
 from pilotage.stack.localization.wheel_pose import WheelPose
 from pilotage.stack.mapping.cell_marks import CellMarks
 from support.sheets import START, ToldOfSheet, sheet_knowledge, sheet_sensors, sheet_simulator
@@ -142,7 +152,7 @@ def test_wheel_speeds_stay_within_their_limit_and_keep_the_curve(v: float, w: fl
 
 def test_the_field_turns_away_from_what_is_near_and_is_silent_otherwise() -> None:
     knowledge = sheet_knowledge()
-    field = PotentialField(knowledge.sensors_of(InfraredConfig), knowledge.drive)
+    field = PotentialField(PotentialFieldConfig(), knowledge.sensors_of(InfraredConfig), knowledge.drive)
     pose = Pose2(0.0, 0.0, 0.0)
     field.sense(beam(0.2, name="ir_front"))
     assert field.command(pose, 1.0, 0.0) is None
@@ -166,3 +176,55 @@ def test_the_explorer_looks_north_first_and_says_when_nothing_is_left() -> None:
     explorer._goal = None
     explorer._choose(1.0)
     assert explorer.status == (StackStatus.ARRIVED, "no explored cell is left to visit")
+
+
+def turned_by(heading: HeadingFilter | None, seconds: float = 60.0, **changes: Any) -> float:
+    """Heading error in the end of a minute of turns and rests."""
+    sensors = sheet_sensors() | {
+        "compass": MagnetometerConfig(hard_iron_ut=(0.0, 0.0), soft_iron_ratio=1.0, disturbance_ut=0.0)
+    }
+    pose = WheelPose(sheet_knowledge(sensors=sensors, **changes), heading)
+    sim = sheet_simulator(sensors, RandomStreams(5))
+    for step in range(round(100 * seconds)):
+        moving = step > 120 and step % 1000 < 800
+        found = pose.step(sim.step(WheelSpeeds(-1.0, 1.0) if moving else WheelSpeeds(0.0, 0.0)))
+    return abs(wrap_to_pi(found.theta_rad - sim.truth.theta_rad))
+
+
+def test_each_heading_filter_can_be_chosen() -> None:
+    at_start = HeadingEstimate(START.theta_rad, 1e-6)
+    encoders = turned_by(None, fusion=False)
+    by_default = turned_by(None)
+    assert turned_by(EncoderGyroFilter(EncoderGyroConfig(), at_start)) == by_default
+    trusting = EncoderGyroFilter(EncoderGyroConfig(process_var=50.0, measurement_var=0.01), at_start)
+    assert turned_by(trusting) < by_default < encoders
+    assert turned_by(GyroBiasFilter(GyroBiasConfig(), at_start)) < 0.5 * by_default
+    compass = EncoderMagnetometerFilter(EncoderMagnetometerConfig(), at_start)
+    assert turned_by(compass, magnetometer=True) < 0.5 * encoders
+
+
+def test_a_heading_filter_that_would_never_be_asked_is_refused() -> None:
+    at_start = HeadingEstimate(START.theta_rad, 1e-6)
+    compass = EncoderMagnetometerFilter(EncoderMagnetometerConfig(), at_start)
+    with pytest.raises(InputError, match=r"stack.navigator.fusion on"):
+        WheelPose(sheet_knowledge(fusion=False), compass)
+    with pytest.raises(InputError, match=r"stack.navigator.magnetometer on"):
+        WheelPose(sheet_knowledge(), compass)
+
+
+def test_the_fields_gains_and_ranges_decide() -> None:
+    """A side sensor pushes within its range only, and by its gain against the goal's."""
+    knowledge, pose = sheet_knowledge(), Pose2(0.0, 0.0, 0.0)
+
+    def command(**changes: float) -> WheelSpeeds | None:
+        sensors = knowledge.sensors_of(InfraredConfig)
+        field = PotentialField(PotentialFieldConfig(**changes), sensors, knowledge.drive)
+        field.sense(beam(0.05, name="ir_left"))
+        return field.command(pose, 1.0, 0.0)
+
+    assert command(trigger_side_m=0.04) is None
+    strong, weak = command(), command(repulsion_mm=1.0)
+    assert strong is not None
+    assert weak is not None
+    assert strong.left_rad_s > strong.right_rad_s + 1.0
+    assert weak.left_rad_s == pytest.approx(weak.right_rad_s, abs=0.2)

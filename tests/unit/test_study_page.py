@@ -101,6 +101,18 @@ def two_settings(shift_m: float) -> StudyTable:
     return made_up(cells, ("path_length_m",), value, baseline=0)
 
 
+def test_the_page_counts_why_trials_ended_by_setting() -> None:
+    view = two_settings(0.0)
+    assert 'id="endings"' not in study_page(view)
+    ended = tuple(
+        "stuck" if c == 1 and t < 7 else "complete" for c, t in zip(view.cell, view.trial, strict=True)
+    )
+    page = study_page(replace(view, ended=ended))
+    table = page[page.index('<section id="endings">') :].split("</section>")[0]
+    rows = re.findall(r'<th scope="row">(\w+)</th><td[^>]*>(\d*)</td><td[^>]*>(\d*)</td>', table)
+    assert rows == [("plain", "20", ""), ("new", "13", "7")]
+
+
 def test_a_better_setting_is_named_with_its_gain() -> None:
     view = two_settings(-0.5)
     text = answer(view, view.judged()).replace("\u00a0", " ")

@@ -28,7 +28,7 @@ ROLES: dict[str, Registry[Any]] = {
     "people": PEOPLE,
     "navigator": NAVIGATORS,
     "localizer": LOCALIZERS,
-    "heading_filter": HEADING_FILTERS,
+    "heading": HEADING_FILTERS,
     "planner": PLANNERS,
     "smoother": SMOOTHERS,
     "local_planner": LOCAL_PLANNERS,

@@ -10,7 +10,9 @@ class FirmwareConfig(Config):
     """The faults of the real robot's firmware, off by default; for the study of its mapping error."""
 
     truncated_wheel_speed: bool = False
-    """Wheel speeds enter the position as whole numbers of rad/s."""
+    """Wheel speeds enter the pose as whole numbers of rad/s."""
+    truncated_turn: bool = True
+    """So does what they turn by; False: whole numbers enter the path alone."""
     pose_period_s: NonNegative = 0.0
     """The pose is brought up to date this often, by the wheel speeds of that moment; 0: at every step."""
     lines_at_centre: bool = False

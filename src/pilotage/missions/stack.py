@@ -27,6 +27,8 @@ class StackConfig(Config):
     initial: InitialConfig = InitialConfig()
     navigator: ComponentChoice
     localizer: ComponentChoice | None = None
+    heading: ComponentChoice | None = None
+    """Of a robot that dead-reckons on a sheet by its wheels; None: the exploration report's."""
     planner: ComponentChoice | None = None
     smoother: ComponentChoice | None = None
     local_planner: ComponentChoice | None = None

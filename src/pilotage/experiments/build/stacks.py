@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from pilotage.core.angles import wrap_to_pi
+from pilotage.core.errors import InputError
 from pilotage.core.random import RandomStreams
 from pilotage.core.types import Goal, Pose2
 from pilotage.experiments.build.charts import load_chart
@@ -24,7 +25,9 @@ from pilotage.stack.control.reactive import REACTIVES
 from pilotage.stack.interface import NAVIGATORS, Belief, Stack
 from pilotage.stack.journal import Journal
 from pilotage.stack.knowledge import RobotKnowledge, TaskKnowledge
+from pilotage.stack.localization.heading_filter import HEADING_FILTERS, HeadingEstimate, HeadingFilter
 from pilotage.stack.localization.localizer import LOCALIZERS, Localizer
+from pilotage.stack.localization.wheel_pose import START_VAR_RAD2
 from pilotage.stack.mapping.mapper import MAPPERS
 from pilotage.stack.navigator.navigator import Parts
 from pilotage.stack.planning.local_planner import LOCAL_PLANNERS
@@ -102,12 +105,28 @@ def build_stack(
         local_controller=optional_component(
             LOCAL_CONTROLLERS, config.local_controller, "local_controller", robot.streams.stream("controller")
         ),
+        heading=_heading(config, task),
     )
     if truth is not None:
         parts = with_oracles(parts, oracles, truth, robot)
     stack = build_component(NAVIGATORS, config.navigator, "navigator", robot, chart, task, parts, journal)
     watched = parts.localizer
     return WatchedStack(stack, watched.watched) if isinstance(watched, WatchedLocalizer) else stack
+
+
+def _heading(config: StackConfig, task: TaskKnowledge) -> HeadingFilter | None:
+    """The mission's heading filter, for a navigator that drives by its wheels."""
+    if config.heading is None:
+        return None
+    navigator = config.navigator.name
+    if "heading" not in getattr(NAVIGATORS.entry(navigator).factory, "TAKES", ()):
+        takers = [e.name for e in NAVIGATORS if "heading" in getattr(e.factory, "TAKES", ())]
+        raise InputError(
+            f"stack.heading: expected a navigator that takes a heading filter ({', '.join(takers)}), "
+            f"found '{navigator}'"
+        )
+    at_start = HeadingEstimate(task.initial.pose.theta_rad, START_VAR_RAD2)
+    return build_component(HEADING_FILTERS, config.heading, "heading", at_start)
 
 
 def _localizer(

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from pilotage.core.whole_file import draft_of
+from pilotage.evaluation.endings import ending_of
 from pilotage.experiments.studies.database import DATABASE, CorruptDatabaseError
 from pilotage.experiments.studies.rows import flat, read_rows, salvage
 from pilotage.experiments.studies.study import Study, load_study
@@ -87,5 +88,7 @@ def _record(row: Mapping[str, Any], study: Study) -> dict[str, Any]:
         **({} if cell is None else {f"factor.{name}": value for name, value in cell.values.items()}),
         **flat(row["metrics"]),
         **flat(row["timings"]),
+        "ended": ending_of(row["metrics"]),
+        "ended_because": str(row["metrics"].get("reason", "")),
         "seed": row["seed"],  # a whole number, also where the run's own metrics tell it as another
     }

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from pilotage.core.types import FloatArray, IntArray
+from pilotage.evaluation.endings import ending_of
 from pilotage.evaluation.judge import SUCCESS, Judgement, judge
 from pilotage.evaluation.metric import Aspect
 from pilotage.evaluation.metrics import METRICS
@@ -51,6 +52,8 @@ class StudyTable:
         Rows that failed.
     waiting
         How many are still to run.
+    ended
+        Why each trial that is done ended, as ``evaluation.endings`` counts it.
     """
 
     study: Study
@@ -62,6 +65,7 @@ class StudyTable:
     values: Mapping[str, FloatArray]
     broken: tuple[Broken, ...]
     waiting: int
+    ended: tuple[str, ...] = ()
 
     @property
     def given(self) -> list[str]:
@@ -203,4 +207,5 @@ def read_study(folder: Path) -> StudyTable:
         values,
         broken,
         waiting,
+        tuple(ending_of(row["metrics"]) for row in done),
     )

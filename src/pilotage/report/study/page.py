@@ -27,6 +27,7 @@ from pilotage.report.study.settings_figures import settings_figures
 from pilotage.report.study.tables import (
     cells_table,
     consistency_table,
+    endings_table,
     failures_table,
 )
 from pilotage.report.style import drawing_style
@@ -54,6 +55,7 @@ def study_page(
         ("cells", "Every setting", cells_table(table, judgement)),
         ("comparisons", "Comparisons", comparisons_table(table, judgement)),
         ("consistency", "Consistency", consistency_table(table)),
+        ("endings", "Why trials ended", endings_table(table)),
         ("trials", "The median and the worst trial", examples_section(examples)),
         ("failures", "Trials that broke", failures_table(table)),
         ("again", "To run it again", _again(table)),

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Sequence
+
+import numpy as np
 
 from pilotage.evaluation.intervals import COVERAGE, Summary
 from pilotage.evaluation.judge import Judgement, Rate
@@ -156,6 +159,26 @@ def _pooled(entry: Pooled) -> str:
     band = f"{scale.write(entry.low, digits)} to {scale.write(entry.high, digits)}"
     below = f"<br><span class='range'>{band}</span>" if math.isfinite(entry.low) else ""
     return f'<td class="value plain">{scale.write(entry.mean, digits)}{below}</td><td>{entry.verdict}</td>'
+
+
+def endings_table(table: StudyTable) -> str:
+    """How many trials of each setting ended why; empty where all ended alike."""
+    kinds = [kind for kind, _ in Counter(table.ended).most_common()]
+    if len(kinds) < 2:
+        return ""
+    head = "".join(f'<th scope="col" class="value">{escape(kind) or "not said"}</th>' for kind in kinds)
+    rows = []
+    for cell in table.cells:
+        found = Counter(table.ended[i] for i in np.flatnonzero(table.cell == cell.index))
+        counts = "".join(f'<td class="value plain">{found[kind] or ""}</td>' for kind in kinds)
+        rows.append(f'<tr><th scope="row">{escape(cell.name)}</th>{counts}</tr>')
+    return (
+        '<section id="endings"><h2><a href="#endings">Why trials ended</a></h2>'
+        "<p>Counted over the trials of each setting; in <code>trials.csv</code> the column "
+        "<code>ended</code>, and in <code>ended_because</code> each trial&#x27;s own words.</p>"
+        f'<div class="wide" tabindex="0"><table class="cells"><thead><tr><th scope="col">setting</th>{head}'
+        f"</tr></thead><tbody>{''.join(rows)}</tbody></table></div></section>"
+    )
 
 
 def failures_table(table: StudyTable) -> str:

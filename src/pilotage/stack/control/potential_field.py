@@ -6,18 +6,29 @@ import math
 from collections.abc import Mapping
 
 from pilotage.core.angles import wrap_to_pi
+from pilotage.core.config import Config
 from pilotage.core.types import Pose2, WheelSpeeds
 from pilotage.models.motion.wheel_drive import WheelDriveConfig
 from pilotage.sensors.infrared import InfraredConfig
 from pilotage.sensors.readings import InfraredReading, Readings
+from pilotage.sensors.sensor import NonNegative
 from pilotage.stack.control.wheel_pursuit import TURN_FIRST_RAD, turn, wheel_speeds
 
-ATTRACTION, REPULSION = 0.01, 10_000.0
-"""Forces in units of millimetres: attraction times mm, repulsion over mm."""
-TRIGGER_FRONT_M, TRIGGER_SIDE_M = 0.12, 0.15
-FRONT_RAD = 0.5
-"""A sensor that looks less than this aside is a front sensor."""
 MM = 1000.0
+
+
+class PotentialFieldConfig(Config):
+    """Gains and ranges, the report's own; forces have no unit, lengths enter them in millimetres."""
+
+    attraction_per_mm: NonNegative = 0.01
+    """Times the distance to the goal."""
+    repulsion_mm: NonNegative = 10_000.0
+    """Over the distance to what a sensor sees."""
+    trigger_front_m: NonNegative = 0.12
+    trigger_side_m: NonNegative = 0.15
+    """Nearer than this a sensor pushes; what a sensor never sees so near never does."""
+    front_rad: NonNegative = 0.5
+    """A sensor that looks less than this aside is a front sensor."""
 
 
 class PotentialField:
@@ -29,8 +40,10 @@ class PotentialField:
     and in corners.
     """
 
-    def __init__(self, sensors: Mapping[str, InfraredConfig], drive: WheelDriveConfig) -> None:
-        self._sensors = dict(sensors)
+    def __init__(
+        self, config: PotentialFieldConfig, sensors: Mapping[str, InfraredConfig], drive: WheelDriveConfig
+    ) -> None:
+        self._config, self._sensors = config, dict(sensors)
         self._drive = drive
         self._ranges: dict[str, float] = {}
 
@@ -50,13 +63,13 @@ class PotentialField:
         """The command along the force; None where nothing is near."""
         if not self.triggered:
             return None
-        fx = ATTRACTION * MM * (x_m - pose.x_m)
-        fy = ATTRACTION * MM * (y_m - pose.y_m)
+        fx = self._config.attraction_per_mm * MM * (x_m - pose.x_m)
+        fy = self._config.attraction_per_mm * MM * (y_m - pose.y_m)
         for name, config in self._sensors.items():
             if self._too_near(name):
                 theta = pose.theta_rad + config.mount.theta_rad
                 arm = math.hypot(config.mount.x_m, config.mount.y_m)
-                push = REPULSION / (MM * (arm + self._ranges[name]))
+                push = self._config.repulsion_mm / (MM * (arm + self._ranges[name]))
                 fx -= push * math.cos(theta)
                 fy -= push * math.sin(theta)
         off = wrap_to_pi(math.atan2(fy, fx) - pose.theta_rad)
@@ -66,5 +79,6 @@ class PotentialField:
         return wheel_speeds(half * math.cos(off), 3.0 * off, self._drive)
 
     def _too_near(self, name: str) -> bool:
-        aside = abs(self._sensors[name].mount.theta_rad) > FRONT_RAD
-        return self._ranges.get(name, math.inf) < (TRIGGER_SIDE_M if aside else TRIGGER_FRONT_M)
+        config = self._config
+        aside = abs(self._sensors[name].mount.theta_rad) > config.front_rad
+        return self._ranges.get(name, math.inf) < (config.trigger_side_m if aside else config.trigger_front_m)

@@ -8,6 +8,7 @@ from typing import Protocol
 from pilotage.core.types import BoolArray
 from pilotage.maps.cell_map import CellMap
 from pilotage.stack.journal import Journal
+from pilotage.stack.localization.heading_filter import HeadingFilter
 
 
 @dataclass(frozen=True, slots=True)
@@ -17,6 +18,15 @@ class LeftCell:
     row: int
     column: int
     reason: str
+
+
+class ExplorerParts(Protocol):
+    """What an explorer takes of a mission's parts; it brings the rest."""
+
+    @property
+    def heading(self) -> HeadingFilter | None:
+        """The heading filter; None: the exploration report's."""
+        ...
 
 
 class Explorer(Protocol):

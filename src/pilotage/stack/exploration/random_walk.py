@@ -12,7 +12,7 @@ from pilotage.sensors.infrared import InfraredConfig
 from pilotage.sensors.line_sensor import LineSensorConfig
 from pilotage.sensors.readings import InfraredReading, Readings
 from pilotage.sensors.sensor import Positive
-from pilotage.stack.exploration.explorer import LeftCell, offer
+from pilotage.stack.exploration.explorer import ExplorerParts, LeftCell, offer
 from pilotage.stack.interface import NAVIGATORS, Belief, StackStatus
 from pilotage.stack.journal import Journal
 from pilotage.stack.knowledge import RobotKnowledge, SheetKnowledge, TaskKnowledge
@@ -38,7 +38,7 @@ class RandomWalk:
     edge. One front sensor and both line sensors are used, as in the report.
     """
 
-    TAKES: ClassVar = frozenset({"pose", "plan"})
+    TAKES: ClassVar = frozenset({"pose", "plan", "heading"})
 
     def __init__(
         self,
@@ -46,10 +46,9 @@ class RandomWalk:
         robot: RobotKnowledge,
         chart: WorldMap,
         task: TaskKnowledge,
-        parts: object,
+        parts: ExplorerParts,
         journal: Journal,
     ) -> None:
-        del parts  # it brings its own
         knowledge = SheetKnowledge.of(robot, chart, task, config, "random-walk")
         self._journal = journal
         offer(journal, self)
@@ -61,7 +60,7 @@ class RandomWalk:
         used = {self._front, *knowledge.sensors_of(LineSensorConfig)}
         self._used = frozenset(name for name in used if name is not None)
         self._rng = knowledge.streams.stream("explorer")
-        self._pose = WheelPose(knowledge)
+        self._pose = WheelPose(knowledge, parts.heading)
         self._marks = CellMarks(knowledge)
         self._turn_every = max(1, round(config.turn_every_s / knowledge.dt_s))
         self._steps = 0

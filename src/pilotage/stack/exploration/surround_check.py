@@ -16,9 +16,9 @@ from pilotage.missions.explorer import ExplorerConfig
 from pilotage.sensors.infrared import InfraredConfig
 from pilotage.sensors.readings import Readings
 from pilotage.sensors.sensor import Positive
-from pilotage.stack.control.potential_field import PotentialField
+from pilotage.stack.control.potential_field import PotentialField, PotentialFieldConfig
 from pilotage.stack.control.wheel_pursuit import pursue, turn
-from pilotage.stack.exploration.explorer import LeftCell, offer
+from pilotage.stack.exploration.explorer import ExplorerParts, LeftCell, offer
 from pilotage.stack.interface import NAVIGATORS, Belief, StackStatus
 from pilotage.stack.journal import Journal
 from pilotage.stack.knowledge import RobotKnowledge, SheetKnowledge, TaskKnowledge
@@ -43,6 +43,7 @@ class SurroundCheckConfig(ExplorerConfig):
     """The outermost cells, which it neither visits nor explores. All its printed maps keep 3 cells away from
     the edge: pose errors take it over the edge much less often, and a third of the map stays unknown."""
     avoid: Literal["far-hops", "always"] = "far-hops"
+    field: PotentialFieldConfig = PotentialFieldConfig()
     give_up_s: Positive = 60.0
     """Stuck where no cell was new for so long."""
 
@@ -58,7 +59,7 @@ class SurroundCheck:
     Fails by its pose, and where the nearest explored cell is behind a box.
     """
 
-    TAKES: ClassVar = frozenset({"pose", "plan"})
+    TAKES: ClassVar = frozenset({"pose", "plan", "heading"})
 
     def __init__(
         self,
@@ -66,10 +67,9 @@ class SurroundCheck:
         robot: RobotKnowledge,
         chart: WorldMap,
         task: TaskKnowledge,
-        parts: object,
+        parts: ExplorerParts,
         journal: Journal,
     ) -> None:
-        del parts  # it brings its own
         knowledge = SheetKnowledge.of(robot, chart, task, config, "surround-check")
         self._journal = journal
         offer(journal, self)
@@ -78,10 +78,10 @@ class SurroundCheck:
         self._drive = knowledge.drive
         self._dt_s = knowledge.dt_s
         self._plan_every = max(1, round(config.planning_period_s / knowledge.dt_s))
-        self._pose = WheelPose(knowledge)
+        self._pose = WheelPose(knowledge, parts.heading)
         self._marks = CellMarks(knowledge, config.margin_cells)
         infrared = knowledge.sensors_of(InfraredConfig)
-        self._field = PotentialField(infrared, knowledge.drive) if knowledge.avoidance else None
+        self._field = PotentialField(config.field, infrared, knowledge.drive) if knowledge.avoidance else None
         self._always = config.avoid == "always"
         self._goal: tuple[int, int] | None = None
         self._facing: float | None = None

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import ClassVar
+
 from pydantic import Field
 
 from pilotage.core.chi_square import chi_square_quantile
@@ -29,6 +31,8 @@ class GyroBiasFilter:
 
     Fails where the body turns while the wheels rest (pushed, carried): the turn is taken for bias.
     """
+
+    USES: ClassVar = frozenset({"gyroscope", "magnetometer"})
 
     def __init__(self, config: GyroBiasConfig, initial: HeadingEstimate) -> None:
         self._account = HeadingAccount(config.errors, initial)

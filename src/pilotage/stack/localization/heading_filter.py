@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol
+from typing import ClassVar, Protocol
 
 from pilotage.core.config import Config
 from pilotage.core.registry import Registry
@@ -19,7 +19,15 @@ class HeadingEstimate:
 
 
 class HeadingFilter(Protocol):
-    """Estimates the heading. Built as ``cls(config, initial)``."""
+    """Estimates the heading. Built as ``cls(config, initial)``.
+
+    Attributes
+    ----------
+    USES
+        ``gyroscope``, ``magnetometer``: what it makes use of beside the encoders.
+    """
+
+    USES: ClassVar[frozenset[str]]
 
     @property
     def estimate(self) -> HeadingEstimate:
@@ -72,4 +80,4 @@ class HeadingErrors(Config):
     """The report's R of 11, read as squared degrees."""
 
 
-HEADING_FILTERS: Registry[HeadingFilter] = Registry("heading_filter", "pilotage.stack.localization")
+HEADING_FILTERS: Registry[HeadingFilter] = Registry("heading", "pilotage.stack.localization")

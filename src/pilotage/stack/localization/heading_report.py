@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import ClassVar
+
 from pilotage.core.config import Config
 from pilotage.kernels.filters import heading
 from pilotage.sensors.sensor import NonNegative, Positive
@@ -38,6 +40,8 @@ class EncoderGyroFilter:
     Fails slowly: of a gyroscope's bias b it turns by K b dt at every step, also at rest; the variance
     knows, because the bias is considered though not estimated (Schmidt's consider filter).
     """
+
+    USES: ClassVar = frozenset({"gyroscope"})
 
     def __init__(self, config: EncoderGyroConfig, initial: HeadingEstimate) -> None:
         self._account = HeadingAccount(config.errors, initial)
@@ -83,6 +87,8 @@ class EncoderMagnetometerFilter:
 
     Fails where iron bends the field, as its authors found: every reading is believed.
     """
+
+    USES: ClassVar = frozenset({"magnetometer"})
 
     def __init__(self, config: EncoderMagnetometerConfig, initial: HeadingEstimate) -> None:
         self._account = HeadingAccount(config.errors, initial)

@@ -15,7 +15,7 @@ from pilotage.sensors.readings import EncoderCounts, GyroscopeRates, MagneticFie
 from pilotage.sensors.wheel_encoders import WheelEncodersConfig
 from pilotage.stack.interface import Belief
 from pilotage.stack.knowledge import SheetKnowledge
-from pilotage.stack.localization.heading_filter import HeadingErrors, HeadingEstimate
+from pilotage.stack.localization.heading_filter import HeadingErrors, HeadingEstimate, HeadingFilter
 from pilotage.stack.localization.heading_report import (
     EncoderGyroConfig,
     EncoderGyroFilter,
@@ -25,6 +25,10 @@ from pilotage.stack.localization.heading_report import (
 
 ALIGN_S = 1.0
 """The gyroscope's bias is its mean over the first moments, in which the robot stands still."""
+START_VAR_RAD2 = 1e-6
+"""Of the heading at the start, which it is told."""
+RESTING_S = 0.2
+"""Wheels that gave no count for so long stand still."""
 DISTANCE_VAR_PER_M = 4.0e-4
 """Variance of the distance over a metre: 2 % of slip and the like."""
 LEAST_VAR = 1e-8
@@ -34,29 +38,48 @@ LEAST_VAR = 1e-8
 class WheelPose:
     """Position from encoders along the heading (exploration report, ch. 2.2), with the firmware's faults.
 
+    Parameters
+    ----------
+    chosen
+        The mission's heading filter; None: the report's of encoders and gyroscope. Without fusion the
+        heading is the encoders' alone and there is nothing to choose.
+
     Raises
     ------
     InputError
-        Where fusion is asked for and the robot has no gyroscope.
+        Where a sensor is missing that the filter uses, or a filter is chosen that would never be asked.
     """
 
-    def __init__(self, knowledge: SheetKnowledge) -> None:
+    def __init__(self, knowledge: SheetKnowledge, chosen: HeadingFilter | None = None) -> None:
         drive, firmware = knowledge.drive, knowledge.firmware
+        if chosen is not None and not knowledge.fusion:
+            raise InputError(
+                "stack.heading: expected stack.navigator.fusion on, found it off: no filter runs"
+            )
+        if chosen is not None and "gyroscope" not in chosen.USES and not knowledge.magnetometer:
+            raise InputError("stack.heading: this filter needs stack.navigator.magnetometer on, found it off")
+        at_start = HeadingEstimate(knowledge.start.theta_rad, START_VAR_RAD2)
+        self._heading = chosen or EncoderGyroFilter(EncoderGyroConfig(errors=HeadingErrors()), at_start)
+        uses = self._heading.USES if knowledge.fusion else frozenset()
         ((self._encoders, encoders),) = knowledge.sensors_of(WheelEncodersConfig).items()
         gyros = list(knowledge.sensors_of(GyroscopeConfig))
-        if knowledge.fusion and not gyros:
+        if "gyroscope" in uses and not gyros:
             raise InputError("stack.fusion: expected a gyroscope among robot.sensors, found none")
-        self._gyro = gyros[0] if knowledge.fusion else None
+        self._gyro = gyros[0] if "gyroscope" in uses else None
         self._rad_per_count = 2.0 * math.pi / encoders.counts_per_turn
         self._radius, self._separation = drive.wheel_radius_m, drive.wheel_separation_m
         self._compass = _Compass(knowledge) if knowledge.magnetometer else None
-        self._truncated = firmware.truncated_wheel_speed
+        # The report's second filter follows a filter that makes nothing of the magnetometer.
+        self._follows = None
+        if self._compass is not None and "magnetometer" not in uses:
+            config = EncoderMagnetometerConfig(errors=HeadingErrors())
+            self._follows = EncoderMagnetometerFilter(config, at_start)
+        self._truncated, self._truncated_turn = firmware.truncated_wheel_speed, firmware.truncated_turn
         self._late_steps = max(1, round(firmware.pose_period_s / knowledge.dt_s))
         self._dt_s = knowledge.dt_s
         self._pose, self._given = knowledge.start, knowledge.given.pose
-        config = EncoderGyroConfig(errors=HeadingErrors())
-        self._heading = EncoderGyroFilter(config, HeadingEstimate(knowledge.start.theta_rad, 1e-6))
         self._bias_sum, self._bias_count = 0.0, 0
+        self._rest_steps, self._last_rad = 0, knowledge.start.theta_rad
         self._steps = 0
         self._cov = _Covariance()
 
@@ -103,24 +126,33 @@ class WheelPose:
             )
         # A late update knows the wheel speeds of the last period only.
         late = self._late_steps
-        left, right = self._turned(counts.left), self._turned(counts.right)
-        self._move(late * left, late * right, rate, late * self._dt_s)
+        left = float(counts.left.sum()) * self._rad_per_count
+        right = float(counts.right.sum()) * self._rad_per_count
+        whole = (left, right)
+        if self._truncated:
+            whole = self._in_whole_rad_s(counts.left), self._in_whole_rad_s(counts.right)
+            left, right = whole if self._truncated_turn else (left, right)
+        self._rest_steps = 0 if counts.left.any() or counts.right.any() else self._rest_steps + late
+        turn = late * self._radius * (right - left) / self._separation
+        self._move(0.5 * late * self._radius * sum(whole), turn, rate, late * self._dt_s)
         return self._pose
 
-    def _turned(self, counts: np.ndarray[tuple[int], np.dtype[np.int64]]) -> float:
-        """Angle of a wheel in this period; in the firmware, by whole rad/s (truncated towards zero)."""
-        if not self._truncated:
-            return float(counts.sum()) * self._rad_per_count
+    def _in_whole_rad_s(self, counts: np.ndarray[tuple[int], np.dtype[np.int64]]) -> float:
+        """Angle of a wheel in this period as the firmware has it: speeds truncated towards zero."""
         sample_s = self._dt_s / counts.size
         return float(np.trunc(counts * self._rad_per_count / sample_s).sum()) * sample_s
 
-    def _move(self, left_rad: float, right_rad: float, rate: float | None, dt_s: float) -> None:
-        distance = 0.5 * self._radius * (left_rad + right_rad)
-        turn = self._radius * (right_rad - left_rad) / self._separation
+    def _move(self, distance: float, turn: float, rate: float | None, dt_s: float) -> None:
         before = self._pose.theta_rad
-        estimate = self._heading.step(turn, rate, dt_s, resting=False)
-        if self._compass is not None:
-            estimate = self._compass.correct(estimate, dt_s)
+        measured = None if self._compass is None else self._compass.taken()
+        resting = self._rest_steps * self._dt_s >= RESTING_S
+        own = None if self._follows is not None else measured
+        estimate = self._heading.step(turn, rate, dt_s, resting, own)
+        if self._follows is not None:
+            # The first filter predicts, the magnetometer corrects.
+            turned = wrap_to_pi(estimate.heading_rad - self._last_rad)
+            self._last_rad = estimate.heading_rad
+            estimate = self._follows.step(turned, None, dt_s, False, measured)
         theta = before + 0.5 * wrap_to_pi(estimate.heading_rad - before)
         c, s = math.cos(theta), math.sin(theta)
         self._pose = Pose2(self._pose.x_m + distance * c, self._pose.y_m + distance * s, estimate.heading_rad)
@@ -129,7 +161,7 @@ class WheelPose:
 
 
 class _Compass:
-    """The report's second filter: the heading of the first predicts, the magnetometer corrects.
+    """Headings by the magnetometer, each told once.
 
     The first reading stands for the start's heading. Iron, on the robot and in the floor, is not
     calibrated away: what that does is why the report left the sensor out of its experiments.
@@ -142,27 +174,22 @@ class _Compass:
                 f"stack.magnetometer: expected one magnetometer among robot.sensors, found {len(found)}"
             )
         ((self._name, _),) = found.items()
-        self._start_rad = self._last_rad = knowledge.start.theta_rad
-        self._filter = EncoderMagnetometerFilter(
-            EncoderMagnetometerConfig(errors=HeadingErrors()), HeadingEstimate(self._start_rad, 1e-6)
-        )
+        self._start_rad = knowledge.start.theta_rad
         self._first: float | None = None
         self._measured: float | None = None
 
     def look(self, readings: Readings) -> None:
-        """Keep a reading until the next correction."""
+        """Keep a reading until it is taken."""
         field = readings.by_sensor.get(self._name)
         if isinstance(field, MagneticField):
             raw = -math.atan2(field.y_ut, field.x_ut)
             self._first = raw if self._first is None else self._first
             self._measured = wrap_to_pi(self._start_rad + raw - self._first)
 
-    def correct(self, estimate: HeadingEstimate, dt_s: float) -> HeadingEstimate:
-        """Turn as the first filter turned, then correct by what was read."""
-        turn = wrap_to_pi(estimate.heading_rad - self._last_rad)
-        self._last_rad = estimate.heading_rad
+    def taken(self) -> float | None:
+        """The latest heading; None until there is a new one."""
         measured, self._measured = self._measured, None
-        return self._filter.step(turn, None, dt_s, resting=False, magnetometer_heading_rad=measured)
+        return measured
 
 
 class _Covariance:

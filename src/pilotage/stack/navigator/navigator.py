@@ -9,6 +9,7 @@ from pilotage.stack.control.controller import Controller
 from pilotage.stack.control.escape import Escape
 from pilotage.stack.control.local.role import LocalController
 from pilotage.stack.control.reactive import Reactive
+from pilotage.stack.localization.heading_filter import HeadingFilter
 from pilotage.stack.localization.localizer import Localizer
 from pilotage.stack.mapping.mapper import Mapper
 from pilotage.stack.planning.local_planner import LocalPlanner
@@ -28,6 +29,7 @@ class Parts:
     mapper: Mapper | None
     escape: Escape | None
     local_controller: LocalController | None = None
+    heading: HeadingFilter | None = None
 
 
 def localizer_of(parts: Parts, needed_by: str) -> Localizer:
