@@ -183,7 +183,7 @@ def square(robot: Mapping[str, float], fusion: bool, seed: int) -> list[float]:
             corners.pop(0)
             if not corners:
                 break
-        command = pursue(pose, *corners[0], drive)  # type: ignore[assignment]
+        command = pursue(pose, *corners[0], drive)
     return film_summary(np.array(ends)) if len(ends) == 5 else [math.nan] * 3
 
 

@@ -107,7 +107,7 @@ def test_no_true_map_nearly_ours_gives_the_published_free_cells() -> None:
             if not (r < rows and c < columns and allowed[r, c]):
                 break
             cells |= {(r, c)}
-            lost = sum(free[:, y, x].astype(np.int64) for y, x in cells)
+            lost = np.array([np.count_nonzero([one[cell] for cell in cells]) for one in free])
             if (lost > missing).any():
                 break
             runs[tuple(lost.tolist())].append(cells)

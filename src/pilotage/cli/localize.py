@@ -19,8 +19,15 @@ NAMED = 5
 
 
 def localize(
-    log: Annotated[Path, typer.Argument(metavar="LOG", help="A MRCLAM folder or an AER1513 MATLAB file.")],
-    form: Annotated[str, typer.Option("--format", metavar="mrclam|aer1513", help="Format of the recording.")],
+    log: Annotated[
+        Path,
+        typer.Argument(
+            metavar="LOG", help="A MRCLAM folder, an AER1513 MATLAB file, or a CSV of a rover's stops."
+        ),
+    ],
+    form: Annotated[
+        str, typer.Option("--format", metavar="mrclam|aer1513|stops", help="Format of the recording.")
+    ],
     robot: Annotated[
         int | None, typer.Option("--robot", metavar="N", help="mrclam: which robot, 1 to 5.")
     ] = None,

@@ -26,7 +26,7 @@ KINDS = ("odometry", "range", "heading", "commands")
 def localize(
     log: FilePath,
     *,
-    format: Literal["mrclam", "aer1513"],  # noqa: A002 - as the command line calls it
+    format: Literal["mrclam", "aer1513", "stops"],  # noqa: A002 - as the command line calls it
     robot: int | None = None,
     localizer: str = "ekf-gauss-markov",
     max_range_m: float | None = None,
@@ -38,7 +38,8 @@ def localize(
     Parameters
     ----------
     log
-        A MRCLAM folder or an AER1513 MATLAB file.
+        A MRCLAM folder, an AER1513 MATLAB file, or a CSV of a rover's stops (dead reckoning, each stretch
+        by what the others taught).
     robot
         mrclam: which of its robots, 1 to 5.
     localizer

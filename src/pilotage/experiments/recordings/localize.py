@@ -22,6 +22,7 @@ from pilotage.experiments.mission import read_parameters
 from pilotage.experiments.recorder import BELIEF_COLUMNS, TRUTH_COLUMNS
 from pilotage.experiments.recordings.drive import RecordedDrive, RecordedSource, aer1513_drive, mrclam_drive
 from pilotage.experiments.recordings.parameters import shipped_parameters
+from pilotage.experiments.recordings.stops import localize_stops
 from pilotage.experiments.source import stepped
 from pilotage.experiments.values import apply_override, merge
 from pilotage.maps.segment_map import SegmentMap
@@ -37,7 +38,7 @@ from pilotage.stack.journal import Journal
 from pilotage.stack.knowledge import RobotKnowledge
 from pilotage.stack.localization.localizer import LOCALIZERS, Localizer
 
-FORMATS = ("mrclam", "aer1513")
+FORMATS = ("mrclam", "aer1513", "stops")
 START_STDS = (0.05, 0.05, 0.03)
 """Metres, metres and radians of the start, whose mean is the true pose."""
 DEFAULT = "ekf-gauss-markov"
@@ -83,7 +84,14 @@ def localize_log(
     overrides: Sequence[str] = (),
     max_range_m: float | None = None,
 ) -> LocalizedLog:
-    """Run a localizer over a recording and write its run folder."""
+    """Run a localizer over a recording and write its run folder; a rover's stops have one of their own."""
+    if form == "stops":
+        if robot is not None or max_range_m is not None or overrides or localizer != DEFAULT:
+            raise InputError(
+                "localize: --format stops takes no --robot, --localizer, --max-range or --set: it learns "
+                "from the log itself"
+            )
+        return LocalizedLog(*localize_stops(log, out), [])
     drive = read_drive(log, form, robot, max_range_m)
     shipped, learned_from = shipped_parameters(drive, localizer, form)
     parameters = with_overrides(localizer, shipped, overrides)
