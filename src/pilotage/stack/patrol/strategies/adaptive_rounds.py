@@ -33,8 +33,8 @@ class AdaptiveRoundsConfig(Config):
     sharing_cost: NonNegative = 0.03
     slack: Positive = Field(default=0.05, le=0.5)
     silent_s: Positive = 30.0
-    silent_ratio: Positive = 4.0
-    """A robot is given up when silent for ``silent_s`` and so many times its longest silence before."""
+    silent_ratio: Positive = 8.0
+    """A robot is given up when its last word is so old, and so many times as old as it usually is."""
 
 
 def best_plan(setting: PatrolSetting, robots: int, config: AdaptiveRoundsConfig) -> Plan:
@@ -66,8 +66,6 @@ class AdaptiveRoundsStrategy:
         team = setting.team_size
         self._team = frozenset(range(team))
         self._heard_s = np.full(team, setting.begin_s)
-        self._silence_s = np.zeros(team)
-        self._times_heard = np.zeros(team, dtype=np.int64)
         self._plan = best_plan(setting, team, config)
         groups = self._seats(dict(enumerate(setting.starts.tolist())))
         self._round = self._plan.rounds[groups[setting.robot]]
@@ -76,6 +74,10 @@ class AdaptiveRoundsStrategy:
         slot = slots[mates.index(setting.robot)]
         self._place = slot.place
         self._leaves_s = slot.leaves_s if len(mates) > 1 else setting.begin_s
+        # Sums of the silences between words, and of half their squares (their quotient is a word's mean
+        # age), fading over half a tour; as if there had been one of that length.
+        self._memory_s = max(0.5 * Round.best(setting.graph).length_m / setting.speed_m_s, 1.0)
+        self._gaps_s = np.tile([self._memory_s, 0.5 * self._memory_s**2], (team, 1))
         self._phase_s = setting.begin_s
         self._is_on_round, self._waited_s = False, 0.0
         self._last_wait_s: float | None = None
@@ -103,26 +105,31 @@ class AdaptiveRoundsStrategy:
         return np.array([_key(self._round), self._round.at_m[before], self._phase_s])
 
     def _listen(self, knowledge: PatrolKnowledge) -> None:
-        """Note who is heard, how often, and who has fallen silent; plan anew where that changes the team."""
-        now_s, config = knowledge.now_s, self._config
-        # Before it is known how often somebody is heard, as long as half a round.
-        patience_s = 0.5 * self._round.length_m / self._setting.speed_m_s
-        team = {knowledge.robot}
+        """Note who is heard and how often; plan anew where somebody has fallen silent or is back."""
+        now_s = knowledge.now_s
         for robot, state in enumerate(knowledge.states):
-            if robot == knowledge.robot:
-                continue
-            if state is not None and state.t_s > self._heard_s[robot]:
-                self._silence_s[robot] = max(self._silence_s[robot], state.t_s - self._heard_s[robot])
+            if robot != knowledge.robot and state is not None and state.t_s > self._heard_s[robot]:
+                gap_s = state.t_s - self._heard_s[robot]
+                kept = math.exp(-gap_s / self._memory_s)
+                self._gaps_s[robot] = kept * self._gaps_s[robot] + [gap_s, 0.5 * gap_s**2]
                 self._heard_s[robot] = state.t_s
-                self._times_heard[robot] += 1
-            known = config.silent_ratio * self._silence_s[robot]
-            limit_s = max(config.silent_s, known if self._times_heard[robot] > 3 else patience_s)
-            if now_s - self._heard_s[robot] <= limit_s and (state is None or state.on_duty):
-                team.add(robot)
+        heard = np.array([state is not None for state in knowledge.states])
+        heard[knowledge.robot] = False
+        limit_s = self._config.silent_ratio * self._gaps_s[:, 1] / self._gaps_s[:, 0]
+        # Of a robot that was never heard silence tells something only where all others are heard readily.
+        readily = heard.any() and limit_s[heard].max() <= 2.0 * self._config.silent_s
+        limit_s[~heard] = limit_s[heard].max() if readily else math.inf
+        silent = now_s - self._heard_s > np.maximum(limit_s, self._config.silent_s)
+        silent[knowledge.robot] = False
+        team = [
+            robot
+            for robot, state in enumerate(knowledge.states)
+            if not silent[robot] and (state is None or state.on_duty or robot == knowledge.robot)
+        ]
         if frozenset(team) != self._team:
             self._team = frozenset(team)
-            self._plan = best_plan(self._setting, len(team), config)
-            groups = self._seats({robot: self._place_of(knowledge, robot) for robot in sorted(team)})
+            self._plan = best_plan(self._setting, len(team), self._config)
+            groups = self._seats({robot: self._place_of(knowledge, robot) for robot in team})
             self._join(self._plan.rounds[groups[knowledge.robot]], knowledge)
 
     def _seats(self, places: dict[int, int]) -> dict[int, int]:
