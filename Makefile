@@ -93,8 +93,9 @@ contracts: setup
 locks:
 	@! grep -nE '://|--(extra-)?index-url|--find-links' requirements-core.lock requirements.lock requirements-bench.lock
 
-api: setup  ## write docs/api anew from the docstrings
+api: setup  ## write docs/api anew from the docstrings, docs/reports.md from its tables
 	@$(PY) docs/make_api.py
+	@$(PY) docs/make_reports.py
 
 examples: setup  ## run the examples alone
 	@$(PY) -m pytest tests/unit/test_examples.py $(ARGS)

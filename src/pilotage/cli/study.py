@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from pilotage.cli.options import Json, Overrides, Plugins, parse_out
-from pilotage.cli.output import print_json, print_line, stdout_for_json
+from pilotage.cli.output import print_columns, print_json, print_line, stdout_for_json
 from pilotage.cli.stopped import INTERRUPTED, TERMINATED, Terminated
 from pilotage.cli.study_line import StudyLine
 from pilotage.core.errors import InputError
@@ -62,8 +62,12 @@ Quiet = Annotated[bool, typer.Option("--quiet", help="Show neither progress nor 
 
 def study(
     name: Annotated[
-        str, typer.Argument(metavar="NAME|FILE|DIR", help="A shipped study, a YAML file, a study's folder.")
-    ],
+        str | None,
+        typer.Argument(metavar="NAME|FILE|DIR", help="A shipped study, a YAML file, a study's folder."),
+    ] = None,
+    shipped: Annotated[
+        bool, typer.Option("--list", help="List the studies, and what reproduces the reports.")
+    ] = False,
     trials: Trials = None,
     workers: WorkerCount = None,
     dask: Dask = None,
@@ -81,6 +85,10 @@ def study(
     from pilotage.experiments.studies.options import StudyOptions
     from pilotage.experiments.studies.study import is_study_folder, load_study
 
+    if shipped:
+        return _list(json)
+    if name is None:
+        raise InputError("expected the name of a study, a file or a folder, found none; --list names them")
     options = StudyOptions(workers, dask, resume, retry_failed, trial_timeout, worker_memory)
     changes: dict[str, Any] = {} if trials is None else {"trials": trials}
     loaded = load_study(name, changes)
@@ -136,6 +144,22 @@ class Show:
     json: bool
     report: bool
     quiet: bool
+
+
+def _list(json: bool) -> int:
+    """The shipped studies, then every table and figure of the reports with its command."""
+    from pilotage.experiments.reproduced import reproduced
+    from pilotage.experiments.studies.study import load_study, shipped_studies
+
+    studies = {name: load_study(name, {}).definition.question for name in shipped_studies()}
+    rows = reproduced()
+    if json:
+        print_json({"studies": studies, "reports": [asdict(row) for row in rows]})
+        return 0
+    print_columns(list(studies.items()))
+    print()
+    print_columns([(row.report, row.item, row.command, row.shows) for row in rows])
+    return 0
 
 
 def run_and_tell(loaded: Study, folder: Path, options: StudyOptions, show: Show) -> int:

@@ -1,0 +1,40 @@
+"""What of the three reports is reproduced by which command: one row a table or figure."""
+
+from __future__ import annotations
+
+import csv
+from dataclasses import dataclass
+from importlib import resources
+
+FOLDER = resources.files("pilotage.missions") / "reports"
+
+
+@dataclass(frozen=True, slots=True)
+class Reproduced:
+    """One table or figure of a report.
+
+    Attributes
+    ----------
+    report, item, shows
+        Whose it is, its number, what it shows.
+    command
+        What reproduces it: a command of ``pilotage``, or a file of the project.
+    remark
+        Where to look in what that gives; may be empty.
+    """
+
+    report: str
+    item: str
+    shows: str
+    command: str
+    remark: str
+
+
+def reproduced() -> list[Reproduced]:
+    """Every row, report by report."""
+    files = sorted((file for file in FOLDER.iterdir() if file.name.endswith(".csv")), key=lambda f: f.name)
+    return [
+        Reproduced(file.name.removesuffix(".csv"), row["item"], row["shows"], row["command"], row["remark"])
+        for file in files
+        for row in csv.DictReader(file.read_text(encoding="utf-8").splitlines())
+    ]
