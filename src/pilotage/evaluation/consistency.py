@@ -11,6 +11,8 @@ from pilotage.core.chi_square import chi_square_quantile
 from pilotage.core.types import FloatArray
 
 RESAMPLES = 1000
+SINGULAR = 1e-12
+"""Least eigenvalue of the correlations, which are 1 on their diagonal; below, it is what rounding left."""
 BOOTSTRAP_SEED = 20240607
 """Fixed: the band of a run must not change from one evaluation to the next."""
 
@@ -36,12 +38,18 @@ def nees(truth: FloatArray, estimate: FloatArray, cov: FloatArray) -> FloatArray
 
     Returns
     -------
-    (N,) values with mean 3 for a consistent filter; nan where the covariance is singular.
+    (N,) values with mean 3 for a consistent filter; nan where the covariance is singular to rounding, as in
+    the first steps after a start that is known exactly: it says nothing of errors across what it spans.
     """
     error = truth - estimate
     error[:, 2] = wrap_array_to_pi(error[:, 2])
     out = np.full(truth.shape[0], np.nan)
-    regular = np.linalg.det(cov) > 0.0
+    std = np.sqrt(np.maximum(np.einsum("nii->ni", cov), 0.0))
+    spread = np.isfinite(cov).all(axis=(1, 2)) & (std > 0.0).all(axis=1)
+    # Units would decide what is small: correlations have none.
+    correlation = cov[spread] / (std[spread, :, None] * std[spread, None, :])
+    regular = spread.copy()
+    regular[spread] = np.linalg.eigvalsh(correlation)[:, 0] > SINGULAR
     if regular.any():
         solved = np.linalg.solve(cov[regular], error[regular][:, :, None])[:, :, 0]
         out[regular] = np.einsum("ni,ni->n", error[regular], solved)

@@ -83,17 +83,19 @@ def driving_metrics(run: FinishedRun, robot: RobotRun) -> tuple[dict[str, object
 
 
 def shortest_for(run: FinishedRun, robot: RobotRun) -> ShortestPath | None:
-    """Exact shortest path to hold against the first plan; None where there is nothing to compare."""
-    goal, plans = robot.goal, robot.plans
-    if goal is None or not plans or plans[0].given or not robot.stack.initial.known:
+    """Exact shortest path between the ends of the first plan; None where there is nothing to compare.
+
+    The plan begins where the robot believed to be: from elsewhere the shortest path could be the longer one.
+    """
+    plans = robot.plans
+    if not plans or plans[0].given or not robot.stack.initial.known:
         return None
     if run.chart.geometry is None and run.chart.grid is not None and run.chart.grid.cells.size > MOST_CELLS:
         return None
     if run.chart.walls.segments_m.shape[0] > MOST_SEGMENTS:
         return None
-    return shortest_path(
-        run.chart.walls, (robot.start.x_m, robot.start.y_m), (goal.x_m, goal.y_m), plans[0].clearance_m
-    )
+    (x0, y0), (x1, y1) = plans[0].states[0, :2].tolist(), plans[0].states[-1, :2].tolist()
+    return shortest_path(run.chart.walls, (x0, y0), (x1, y1), plans[0].clearance_m)
 
 
 def planning_metrics(run: FinishedRun, robot: RobotRun, shortest: ShortestPath | None) -> dict[str, object]:

@@ -74,6 +74,8 @@ class FinishedRun:
         The world's map as it was drawn.
     obstacle_segments_m, obstacle_circles_m, obstacle_polygons_m
         What stood there beside it.
+    trap_pockets_m
+        The inside of each trap among it, (4, 2).
     events
         In order, of all robots.
     steps, duration_s, loop_s
@@ -87,6 +89,7 @@ class FinishedRun:
     obstacle_segments_m: FloatArray
     obstacle_circles_m: FloatArray
     obstacle_polygons_m: Sequence[FloatArray]
+    trap_pockets_m: Sequence[FloatArray]
     robots: tuple[RobotRun, ...]
     events: list[Event]
     steps: int

@@ -10,7 +10,7 @@ from pilotage.missions.mission import Mission
 
 
 def has(mission: Mission) -> frozenset[str]:
-    """A goal, a planner, an estimate, walls, ground, clearance, people: as far as the mission's text says."""
+    """A goal, a planner, an estimate, walls, ground, clearance, people, traps: as the mission's text says."""
     found = set()
     if any(mission.goal_of(robot) is not None for robot in mission.members):
         found.add("goal")
@@ -25,6 +25,8 @@ def has(mission: Mission) -> frozenset[str]:
         found.add("clearance")  # of what is driven, or of a path over cells
     if mission.world.people:
         found.add("people")
+    if any(obstacle.kind == "u-trap" for obstacle in mission.world.obstacles):
+        found.add("trap")
     source = mission.world.map
     if isinstance(source, str) and source not in shipped_maps():
         found |= {"walls", "ground"}  # a file may hold either

@@ -104,6 +104,7 @@ def run_loop(experiment: Experiment, on_progress: OnProgress | None = None) -> R
         placed.segments_m,
         placed.circles_m,
         placed.polygons_m,
+        placed.pockets_m,
         tuple(_robot_run(experiment, index, recorder) for index, recorder in enumerate(recorders)),
         sorted(events, key=lambda event: event.t_s),
         step,

@@ -48,6 +48,8 @@ class TrapObstacle(Config):
     depth_m: tuple[Positive, Positive] = (2.0, 2.5)
     thickness_m: Positive = 0.2
     along: tuple[NonNegative, NonNegative] = (0.15, 0.85)
+    head_on: bool = False
+    """Only where the plan leads straight in through the mouth: whoever follows it cannot help entering."""
 
 
 Obstacle = Annotated[

@@ -40,6 +40,8 @@ def headline(metrics: Mapping[str, Any]) -> str:
     after = f" after {quantities.duration(duration)}" if duration > 0.0 else ""
     if success is None:
         answer = f"Ended{after}"
+    elif success and duration == 0.0 and math.isfinite(number(metrics.get("planned_length_m"))):
+        return f"Planned, and nobody drove: {_planned(metrics)}."
     elif success:
         goal = number(metrics.get("goal_error_m"))
         where = "Reached the goal" if math.isfinite(goal) else "Done"
@@ -71,8 +73,6 @@ def headline(metrics: Mapping[str, Any]) -> str:
                 f"of {quantities.length(shortest)}"
             )
         details.append(text)
-    elif success and math.isfinite(planned):
-        details.append(_planned(metrics, planned))
     return f"{answer}; {'; '.join(details)}." if details else f"{answer}."
 
 
@@ -102,10 +102,16 @@ def _team_headline(metrics: Mapping[str, Any]) -> str:
     return f"{answer}; {'; '.join(details)}." if details else f"{answer}."
 
 
-def _planned(metrics: Mapping[str, Any], planned_m: float) -> str:
+def _planned(metrics: Mapping[str, Any]) -> str:
     """A path that was planned and not driven."""
+    planned, shortest = number(metrics.get("planned_length_m")), number(metrics.get("shortest_length_m"))
     took, travel = number(metrics.get("planning_time_s")), number(metrics.get("travel_time_s"))
-    text = f"a way of {quantities.length(planned_m)}"
+    text = f"a path of {quantities.length(planned)}"
+    if shortest > 0.0:
+        text += (
+            f", {quantities.significant(planned / shortest, 4)} times the shortest possible path of "
+            f"{quantities.length(shortest)},"
+        )
     if math.isfinite(took):
-        text += f" planned in {quantities.duration(took)}"
+        text += f" found in {quantities.duration(took)}"
     return text + (f", {quantities.duration(travel)} of driving" if math.isfinite(travel) else "")

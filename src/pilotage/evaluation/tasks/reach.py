@@ -6,10 +6,12 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import ClassVar
 
+import numpy as np
+
 from pilotage.core.angles import wrap_to_pi
 from pilotage.core.config import Config
 from pilotage.core.errors import InputError
-from pilotage.core.types import Event, Pose2
+from pilotage.core.types import Event, FloatArray, Pose2
 from pilotage.evaluation.cell_plans import route_metrics, route_of
 from pilotage.evaluation.driving import driving_metrics, header, planning_metrics, poses, shortest_for
 from pilotage.evaluation.finished import FinishedRun, RobotRun, Verdict
@@ -101,6 +103,9 @@ class ReachTask:
         truth = poses(robot.trace, "true")
         if not run.chart.open_ground:
             metrics["hall_offset_m"] = hall_offset_m(truth, run.chart.walls)
+        if run.trap_pockets_m:
+            entered = sum(_comes_into(truth, pocket) for pocket in run.trap_pockets_m)
+            metrics |= {"traps_entered": entered, "traps_avoided": len(run.trap_pockets_m) - entered}
         last = self.goals[-1] if self.goals else robot.goal
         assert last is not None, "refused at the build"
         away_m = math.hypot(truth[-1, 0] - last.x_m, truth[-1, 1] - last.y_m)
@@ -127,3 +132,11 @@ def _is_there(goal: GoalConfig, pose: Pose2) -> bool:
         math.hypot(pose.x_m - goal.x_m, pose.y_m - goal.y_m) <= goal.tolerance_m
         and turned <= goal.tolerance_rad
     )
+
+
+def _comes_into(truth: FloatArray, pocket: FloatArray) -> bool:
+    """Whether any of (N, 3) true poses lies in a convex outline (K, 2)."""
+    sides = np.roll(pocket, -1, axis=0) - pocket
+    away = truth[:, None, :2] - pocket
+    turns = sides[:, 0] * away[:, :, 1] - sides[:, 1] * away[:, :, 0]
+    return bool(((turns >= 0.0).all(axis=1) | (turns <= 0.0).all(axis=1)).any())

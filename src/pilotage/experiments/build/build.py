@@ -274,7 +274,7 @@ def _obstacles(
 ) -> Obstacles:
     """What is on no map; what lies across a path lies across the first robot's."""
     if not mission.world.obstacles:
-        return Obstacles(np.zeros((0, 4)), np.zeros((0, 3)), [])
+        return Obstacles.none()
     robot = mission.members[0]
     start, goal = mission.start_of(robot), mission.goal_of(robot)
     assert start is not None, "settled above"

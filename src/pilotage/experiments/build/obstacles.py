@@ -25,6 +25,9 @@ from pilotage.missions.world import (
 MAX_DRAWS = 2000
 ENDS_CLEAR_M = 2.5
 """An obstacle drawn by the seed keeps this far from start and goal."""
+HEAD_ON_M = 0.2
+"""A plan that leads straight in keeps the body this far from the sides, from a metre before the mouth on."""
+BEFORE_MOUTH_M = 1.0
 PASSAGE_M = 0.5
 """A way around must remain at this clearance."""
 
@@ -39,11 +42,19 @@ class Obstacles:
         (K, 4) and (L, 3).
     polygons_m
         One (4, 2) outline a box, for pictures.
+    pockets_m
+        One (4, 2) outline for the inside of each trap.
     """
 
     segments_m: FloatArray
     circles_m: FloatArray
     polygons_m: list[FloatArray]
+    pockets_m: list[FloatArray]
+
+    @classmethod
+    def none(cls) -> Obstacles:
+        """Nothing stands there."""
+        return cls(np.zeros((0, 4)), np.zeros((0, 3)), [], [])
 
 
 def place_obstacles(
@@ -67,28 +78,34 @@ def place_obstacles(
     InputError
         If a fixed obstacle stands on the start, or no place is found for one that the seed draws.
     """
-    placed = Obstacles(np.zeros((0, 4)), np.zeros((0, 3)), [])
+    placed = Obstacles.none()
     for index, obstacle in enumerate(obstacles):
         where = f"world.obstacles.{index}"
         if isinstance(obstacle, CircleObstacle):
             circle = np.array([[*obstacle.centre_m, obstacle.radius_m]])
-            placed = _with(placed, [], circle)
+            placed = _with(placed, circle=circle)
         elif isinstance(obstacle, BoxObstacle):
-            placed = _with(placed, [_box_between(obstacle, where)], None)
+            placed = _with(placed, [_box_between(obstacle, where)])
         elif planned is not None and planned.shape[0] > 1:
-            boxes = _draw_across(obstacle, world, placed, start, goal, planned, rng, where)
-            placed = _with(placed, boxes, None)
+            drawn = _draw_across(obstacle, world, placed, start, goal, planned, body_radius_m, rng, where)
+            placed = _with(placed, *drawn)
         clear = plane.distance_to_nearest(start.x_m, start.y_m, placed.segments_m, placed.circles_m)
         if clear < body_radius_m:
             raise InputError(f"{where}: expected the start to be free, found the obstacle standing on it")
     return placed
 
 
-def _with(placed: Obstacles, boxes: Sequence[FloatArray], circle: FloatArray | None) -> Obstacles:
+def _with(
+    placed: Obstacles,
+    boxes: Sequence[FloatArray] = (),
+    pockets: Sequence[FloatArray] = (),
+    circle: FloatArray | None = None,
+) -> Obstacles:
     return Obstacles(
         np.concatenate([placed.segments_m, *boxes]),
         placed.circles_m if circle is None else np.concatenate([placed.circles_m, circle]),
         [*placed.polygons_m, *(box[:, :2] for box in boxes)],
+        [*placed.pockets_m, *pockets],
     )
 
 
@@ -110,16 +127,21 @@ def _draw_across(
     start: Pose2,
     goal: Goal | None,
     planned: FloatArray,
+    body_radius_m: float,
     rng: np.random.Generator,
     where: str,
-) -> list[FloatArray]:
-    """Draw places along the path until one is free of walls and leaves a way around."""
+) -> tuple[list[FloatArray], list[FloatArray]]:
+    """Boxes and pockets at the first place drawn along the path that is free and leaves a way around."""
     before = world.with_obstacles(placed.segments_m, placed.circles_m)
     for _ in range(MAX_DRAWS):
         index = int(rng.uniform(*obstacle.along) * (planned.shape[0] - 1))
         x, y, theta = planned[index]
+        pockets: list[FloatArray] = []
         if isinstance(obstacle, TrapObstacle):
-            boxes = _trap(obstacle, x, y, theta, rng)
+            boxes, pocket = _trap(obstacle, x, y, theta, rng)
+            pockets = [pocket]
+            if obstacle.head_on and not _leads_in(planned[: index + 1], pocket, body_radius_m):
+                continue
         else:
             length = rng.uniform(*obstacle.length_m)
             # The box's own middle is a little off the path, so that either side may be the nearer one.
@@ -140,7 +162,7 @@ def _draw_across(
         if not _free_of_walls(sides, before):
             continue
         if goal is None or _passable(before.with_obstacles(sides, np.zeros((0, 3))), start, goal):
-            return boxes
+            return boxes, pockets
     raise InputError(
         f"{where}: expected room for a {obstacle.kind} across the planned path with a way around it, "
         f"found none in {MAX_DRAWS} draws; make it smaller"
@@ -149,8 +171,8 @@ def _draw_across(
 
 def _trap(
     obstacle: TrapObstacle, x: float, y: float, theta: float, rng: np.random.Generator
-) -> list[FloatArray]:
-    """Three boxes: a back across the path at (x, y), and two sides towards the coming robot."""
+) -> tuple[list[FloatArray], FloatArray]:
+    """Three boxes, a back across the path at (x, y) and two sides towards the robot; and their inside."""
     width, depth = rng.uniform(*obstacle.width_m), rng.uniform(*obstacle.depth_m)
     thick = obstacle.thickness_m
     c, s = math.cos(theta), math.sin(theta)
@@ -162,7 +184,21 @@ def _trap(
         boxes.append(
             box_segments(x + c * along - s * across, y + s * along + c * across, depth, thick, theta)
         )
-    return boxes
+    return boxes, box_segments(x - c * depth / 2, y - s * depth / 2, depth, width, theta)[:, :2]
+
+
+def _leads_in(before: FloatArray, pocket: FloatArray, body_radius_m: float) -> bool:
+    """Whether a path (N, 3) that ends at a trap's back comes straight in between its sides."""
+    middle, theta = pocket.mean(axis=0), before[-1, 2]
+    axis = np.array([math.cos(theta), math.sin(theta)])
+    away = before[:, :2] - middle
+    along, across = away @ axis, away @ np.array([-axis[1], axis[0]])
+    corners = pocket - middle
+    depth, width = np.ptp(corners @ axis), np.ptp(corners @ np.array([-axis[1], axis[0]]))
+    outside = np.flatnonzero(along < -depth / 2 - BEFORE_MOUTH_M)
+    if outside.size == 0:
+        return False
+    return bool(np.abs(across[outside[-1] :]).max() < width / 2 - body_radius_m - HEAD_ON_M)
 
 
 def _distance_to_hull(x: float, y: float, sides: FloatArray) -> float:
