@@ -64,7 +64,7 @@ def test_checked_curves_are_free_but_for_the_skin(
 ) -> None:
     radius = 0.5
     word, l0, l1, l2 = dubins.shortest(*a, *b, radius)
-    step = least_step(0.5, 0.3, radius)
+    step = least_step(0.3, radius)
     states = dubins.sample(*a, radius, word, l0, l1, l2, 0.005)
     true = distances_to_nearest(np.ascontiguousarray(states[:, :2]), CROWD.segments_m, CROWD.circles_m)
     inside = ((states[:, :2] >= 0.0) & (states[:, :2] <= 16.0)).all()

@@ -88,7 +88,7 @@ NO_BOUND = rrt_samples.Bound(np.zeros((1, 1)), 0.0, 0.0, 1.0)
 def bare_search(query: PlanRequest) -> tuple[rrt_tree.Tree, Any, rrt_samples.Search]:
     space = space_for(query.field, CLEARANCE_M)
     search = rrt_samples.Search(
-        0.5, 1.5, CLEARANCE_M, least_step(0.5, CLEARANCE_M, 0.5), 0.05, 0.0, 0.8, 0.6, 3.7, False
+        0.5, 1.5, CLEARANCE_M, least_step(CLEARANCE_M, 0.5), 0.05, 0.0, 0.8, 0.6, 3.7, False
     )
     goal = np.array([query.goal.x_m, query.goal.y_m, query.goal.theta_rad or 0.0])
     tree = rrt_tree.make_tree(query.start.as_array(), goal, query.field.bounds_m, 1.5, 20_000)

@@ -110,6 +110,9 @@ def planning_metrics(run: FinishedRun, robot: RobotRun, shortest: ShortestPath |
         "planned_clearance_m": clearance_m(plan.states, run.chart.walls, robot.footprint.radius_m),
         "smoothness": smoothness(plan.waypoints[:, :2]),
     }
+    if plan.first_waypoints is not None:
+        metrics["first_length_m"] = plan.first_length_m
+        metrics["first_smoothness"] = smoothness(plan.first_waypoints[:, :2])
     if shortest is not None:
         metrics["shortest_length_m"] = shortest.length_m
     return metrics

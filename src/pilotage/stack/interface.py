@@ -69,7 +69,8 @@ class StackStatus(StrEnum):
 @dataclass(frozen=True, slots=True)
 class PlannedPath:
     """A plan as it was adopted, for the record: when, its states (N, 3), waypoints (W, 3), tree (E, 4),
-    the clearance it was made at, whether it was prescribed, and how long it took."""
+    the clearance it was made at, whether it was prescribed, how long it took, and of the planner's first
+    solution, before smoothing, waypoints (V, 3) and length where there is one."""
 
     t_s: float
     states: FloatArray
@@ -80,6 +81,8 @@ class PlannedPath:
     given: bool
     planning_time_s: float
     first_solution_s: float
+    first_waypoints: FloatArray | None = None
+    first_length_m: float = math.nan
 
 
 class Stack(Protocol):

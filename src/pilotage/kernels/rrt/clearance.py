@@ -245,9 +245,9 @@ def first_blocked(states: FloatArray, space: Space, clearance: float) -> int:
     return -1
 
 
-def least_step(validation: float, clearance: float, radius: float) -> float:
-    """Step that is small enough for a check to see every wall, and not larger than asked."""
-    return min(validation, max(0.005, min(clearance, max(radius, 0.05)) / 10.0))
+def least_step(clearance: float, radius: float) -> float:
+    """Step that is small enough for a check to see every wall."""
+    return max(0.005, min(clearance, max(radius, 0.05)) / 10.0)
 
 
 def skin(step: float, clearance: float, radius: float) -> float:

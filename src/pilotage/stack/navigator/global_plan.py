@@ -148,6 +148,8 @@ class GlobalPlan:
                 result.given,
                 planning_s,
                 first,
+                None if result.first is None else result.first.waypoints,
+                math.nan if result.first is None else result.first.length_m,
             )
         )
 

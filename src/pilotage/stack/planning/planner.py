@@ -118,6 +118,8 @@ class PlanResult:
     first_solution_s, planning_time_s
         Wall time until the first valid solution and until the end; nan where there was none, or nobody
         looked at the clock.
+    first
+        The first valid solution as it was found, of planners that go on from it; None of others.
     """
 
     status: PlanStatus
@@ -128,6 +130,7 @@ class PlanResult:
     iterations: int = 0
     tree_edges_m: FloatArray = field(default_factory=_no_edges)
     given: bool = False
+    first: Path | None = None
 
 
 class Planner(Protocol):

@@ -45,16 +45,17 @@ NO_GUIDE = np.zeros((0, 3))
 class RrtStarDubinsConfig(Config):
     """Settings of RRT*-Dubins.
 
-    ``validation_distance_m`` is the largest spacing between checked states along an edge; the check goes
-    finer by itself where an obstacle could hide in between, and the finished path is checked every
-    centimetre. ``guide_bias`` is the share of samples near a rough path found on the distance field, later
-    near the incumbent: 0 is plain RRT*. With ``stop`` 'first' the search ends at the first solution (the
-    report's way), with 'optimize' after ``iterations``. A time budget makes the result depend on the
+    ``validation_distance_m`` is the largest spacing between states that are checked along an edge, but for
+    stretches that the distance to obstacles proves free; null: as fine as an obstacle could hide in between.
+    The finished path is checked every centimetre either way: an edge that fails is cut, and the search goes
+    on (decision 0050). ``guide_bias`` is the share of samples near a rough path found on the distance field,
+    later near the incumbent: 0 is plain RRT*. With ``stop`` 'first' the search ends at the first solution,
+    as the report's does, with 'optimize' after ``iterations``. A time budget makes the result depend on the
     machine; without one the same seed gives the same path.
     """
 
     turning_radius_m: float = Field(0.5, gt=0.0, le=100.0)
-    validation_distance_m: float = Field(0.5, gt=0.0, le=100.0)
+    validation_distance_m: float | None = Field(None, gt=0.0, le=100.0)
     max_connection_distance_m: float = Field(1.5, gt=0.0, le=1000.0)
     clearance_m: float = Field(0.46, ge=0.0, le=100.0)
     goal_bias: float = Field(0.05, ge=0.0, le=1.0)
@@ -119,6 +120,7 @@ class RrtStarDubinsPlanner:
         if rrt_star.try_goal(tree, rrt_tree.START, space, search):
             rrt_tree.join_goal(tree)
         first_s, checked_cost = math.nan, math.inf
+        first: Path | None = None
         best: Path | None = None
         done = 0
         while True:
@@ -129,7 +131,7 @@ class RrtStarDubinsPlanner:
                     rrt_tree.cut(tree, failing)
                     continue
                 if best is None:
-                    first_s = time.perf_counter() - began
+                    first_s, first = time.perf_counter() - began, path
                 best, checked_cost = path, cost
                 if config.guide_bias > 0.0:
                     guide_path = path.states[:: max(1, round(0.25 / STATE_SPACING_M))].copy()
@@ -150,7 +152,7 @@ class RrtStarDubinsPlanner:
                 reason += f", time budget {config.time_budget_s:g} s"
             return PlanResult(PlanStatus.NO_PATH, reason, None, math.nan, elapsed, done, edges)
         reason = f"{best.length_m:.2f} m after {done} iterations"
-        return PlanResult(PlanStatus.FOUND, reason, best, first_s, elapsed, done, edges)
+        return PlanResult(PlanStatus.FOUND, reason, best, first_s, elapsed, done, edges, first=first)
 
     def _direct(self, request: PlanRequest, space: Space, clearance_m: float) -> Path | None:
         """The shortest Dubins curve to the goal where it is free: no tree finds a better path."""
@@ -170,10 +172,15 @@ class RrtStarDubinsPlanner:
         return Path(states, waypoints, l0 + l1 + l2, radius_m)
 
     def _search(self, request: PlanRequest, space: Space, clearance_m: float) -> rrt_samples.Search:
-        """Settings for the kernel; edges keep a little more clearance for what checks may step over."""
+        """Settings for the kernel; edges keep a little more clearance for what fine checks may step over.
+
+        What coarser ones, asked for by ``validation_distance_m``, step over, the finished path's check sees.
+        """
         config = self._config
-        step = least_step(config.validation_distance_m, clearance_m, config.turning_radius_m)
+        step = least_step(clearance_m, config.turning_radius_m)
         extra = skin(step, clearance_m, config.turning_radius_m)
+        if config.validation_distance_m is not None:
+            step, extra = config.validation_distance_m, 0.0
         for x, y in ((request.start.x_m, request.start.y_m), (request.goal.x_m, request.goal.y_m)):
             # Where an end touches the clearance's edge there is no room for more.
             extra = min(extra, max(0.0, float(slack_at(x, y, space, clearance_m))))

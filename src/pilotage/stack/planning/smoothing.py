@@ -48,10 +48,11 @@ class ShortcutSmootherConfig(Config):
 
     ``sample_spacing_m`` is the spacing of the states between which shortcuts are tried (wider on paths
     of more than ``max_samples`` of them: their number decides the time), ``rounds`` the most repetitions,
-    ``waypoint_spacing_m`` the spacing of the waypoints handed to the local planner.
+    ``waypoint_spacing_m`` the spacing of the waypoints handed to the local planner; null: at most that of the
+    planner's own, so that an edge stays no longer than the planner connects.
     """
 
-    waypoint_spacing_m: float = Field(1.5, gt=0.0, le=1000.0)
+    waypoint_spacing_m: float | None = Field(1.5, gt=0.0, le=1000.0)
     sample_spacing_m: float = Field(0.3, ge=0.01, le=100.0)
     max_samples: int = Field(400, ge=10, le=10_000)
     rounds: int = Field(3, ge=1, le=50)
@@ -77,7 +78,7 @@ class ShortcutSmoother:
         space = space_for(request.field, clearance_m)
         tight = path.turning_radius_m < request.least_turning_radius_m
         radius_m = max(path.turning_radius_m, request.least_turning_radius_m, LEAST_RADIUS_M)
-        step = least_step(CHECK_SPACING_M * 5.0, clearance_m, radius_m)
+        step = min(CHECK_SPACING_M * 5.0, least_step(clearance_m, radius_m))
         extra = skin(step, clearance_m, radius_m)
         for state in (path.states[0], path.states[-1]):
             extra = min(extra, max(0.0, float(slack_at(state[0], state[1], space, clearance_m))))
@@ -95,8 +96,15 @@ class ShortcutSmoother:
             if gain_m < 1e-4 * best.length_m and not (tight and number == 0):
                 break
         drivable_m = path.turning_radius_m if best.own else radius_m
-        waypoints = spaced_waypoints(best.states, self._config.waypoint_spacing_m)
+        waypoints = spaced_waypoints(best.states, self._spacing_m(path, best.length_m))
         return Path(best.states, waypoints, best.length_m, drivable_m if tight else path.turning_radius_m)
+
+    def _spacing_m(self, path: Path, length_m: float) -> float:
+        """Of the waypoints along a path of some length."""
+        if self._config.waypoint_spacing_m is not None:
+            return self._config.waypoint_spacing_m
+        longest_m = float(np.hypot(*np.diff(path.waypoints[:, :2], axis=0).T).max(initial=0.0))
+        return length_m / max(1, math.ceil(length_m / longest_m - 1e-9)) if longest_m > 0.0 else math.inf
 
     def _round(self, chain: _Chain, space: Space, rules: shortcut.Rules) -> _Chain:
         """One pass of shortcuts and tightening."""
