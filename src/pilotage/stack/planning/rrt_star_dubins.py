@@ -103,7 +103,9 @@ class RrtStarDubinsPlanner:
         direct = self._direct(request, space, clearance_m)
         if direct is not None:
             took = time.perf_counter() - began
-            return PlanResult(PlanStatus.FOUND, f"{direct.length_m:.2f} m directly", direct, took, took)
+            return PlanResult(
+                PlanStatus.FOUND, f"{direct.length_m:.2f} m directly", direct, took, took, first=direct
+            )
         guide_path, bound, proof = _look_around(request, space, clearance_m, config)
         if proof is not None:
             return failure(PlanStatus.NO_PATH, proof, time.perf_counter() - began)
