@@ -6,7 +6,7 @@ import csv
 from dataclasses import dataclass
 from importlib import resources
 
-FOLDER = resources.files("pilotage.missions") / "reports"
+SHIPPED = resources.files("pilotage.missions") / "reports"
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,9 +32,9 @@ class Reproduced:
 
 def reproduced() -> list[Reproduced]:
     """Every row, report by report."""
-    files = sorted((file for file in FOLDER.iterdir() if file.name.endswith(".csv")), key=lambda f: f.name)
+    names = sorted(file.name.removesuffix(".csv") for file in SHIPPED.iterdir() if file.name.endswith(".csv"))
     return [
-        Reproduced(file.name.removesuffix(".csv"), row["item"], row["shows"], row["command"], row["remark"])
-        for file in files
-        for row in csv.DictReader(file.read_text(encoding="utf-8").splitlines())
+        Reproduced(name, row["item"], row["shows"], row["command"], row["remark"])
+        for name in names
+        for row in csv.DictReader((SHIPPED / f"{name}.csv").read_text(encoding="utf-8").splitlines())
     ]
