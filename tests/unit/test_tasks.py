@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from pilotage.core.errors import InputError
-from pilotage.evaluation.tasks.follow import _cross_track_m, _passed
+from pilotage.evaluation.tasks.follow import _cross_track_m
+from pilotage.evaluation.visits import visited_in_order
 from pilotage.experiments.build.build import build
 from pilotage.experiments.mission import mission_of
 from pilotage.experiments.run import run_mission
@@ -61,8 +62,8 @@ def test_routes_that_cannot_be_are_refused(values: dict[str, Any], told: str) ->
 
 def test_points_count_in_their_order_only() -> None:
     there_and_back = np.column_stack([np.r_[0:5:0.1, 5:0:-0.1], np.zeros(100)])
-    assert _passed(there_and_back, np.array([[4.0, 0.0], [1.0, 0.0]]), 0.1) == 2
-    assert _passed(there_and_back[:50], np.array([[4.0, 0.0], [1.0, 0.0]]), 0.1) == 1
+    assert len(visited_in_order(there_and_back, np.array([[4.0, 0.0], [1.0, 0.0]]), [0.1, 0.1])) == 2
+    assert len(visited_in_order(there_and_back[:50], np.array([[4.0, 0.0], [1.0, 0.0]]), [0.1, 0.1])) == 1
 
 
 def test_the_distance_from_a_route_is_that_from_its_nearest_piece() -> None:

@@ -14,6 +14,7 @@ from pilotage.models.footprint import Footprint
 from pilotage.models.motion.motion import MotionConfig
 from pilotage.sim.people.crowd import Encounters
 from pilotage.stack.interface import PlannedPath, StackStatus
+from pilotage.stack.planning.rounds import Rounds
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,6 +25,8 @@ class RobotRun:
     ----------
     start, goal, stack
         The true start, where it was to go, and what ran on it.
+    goals, rounds
+        All its goals in the order in which it was to visit them; of an order that it chose, how good it is.
     trace
         Columns by name, one value a recorded step.
     units
@@ -43,6 +46,8 @@ class RobotRun:
     motion: MotionConfig
     start: Pose2
     goal: GoalConfig | None
+    goals: tuple[GoalConfig, ...]
+    rounds: Rounds | None
     stack: StackConfig
     trace: dict[str, FloatArray]
     units: Mapping[str, str]

@@ -25,6 +25,10 @@ def has(mission: Mission) -> frozenset[str]:
         found.add("clearance")  # of what is driven, or of a path over cells
     if mission.world.people:
         found.add("people")
+    if mission.task.parameters.get("goals"):
+        found.add("goals")
+        if mission.task.parameters.get("order") == "best":
+            found.add("rounds")
     if any(obstacle.kind == "u-trap" for obstacle in mission.world.obstacles):
         found.add("trap")
     source = mission.world.map

@@ -102,13 +102,13 @@ def _drawn_walls(chart: WorldMap) -> FloatArray:
 
 
 def _outline(robot: RobotRun) -> RobotOutline:
-    goal, start, footprint = robot.goal, robot.start, robot.footprint
+    start, footprint = robot.start, robot.footprint
     return RobotOutline(
         name=robot.name,
         radius_m=footprint.radius_m,
         polygon_m=footprint.points_m,
         start=(start.x_m, start.y_m, start.theta_rad),
-        goals=() if goal is None else ((goal.x_m, goal.y_m, goal.theta_rad),),
+        goals=tuple((goal.x_m, goal.y_m, goal.theta_rad) for goal in robot.goals),
     )
 
 
@@ -118,7 +118,7 @@ def _plans(robot: RobotRun, verdict: Verdict) -> Plans:
     shortest = verdict.extras.get(f"{robot.name}/shortest_path")
     return Plans(
         tuple(
-            Plan(p.states, p.waypoints, p.tree_edges_m, p.t_s, p.length_m, p.planning_time_s)
+            Plan(p.states, p.waypoints, p.tree_edges_m, p.t_s, p.length_m, p.planning_time_s, p.clearance_m)
             for p in robot.plans
         ),
         np.zeros((0, 2)) if mapped is None else np.asarray(mapped)[:, :2],

@@ -134,6 +134,8 @@ def _robot_run(experiment: Experiment, index: int, recorder: Recorder) -> RobotR
         member.known.motion,
         Pose2(start.x_m, start.y_m, wrap_to_pi(start.theta_rad)),
         mission.goal_of(member.config),
+        member.goals,
+        member.rounds,
         member.stack_config,
         recorder.trace(),
         journal.units,

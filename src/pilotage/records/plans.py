@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -25,7 +26,8 @@ def _no_points() -> FloatArray:
 class Plan:
     """One answer of the planner: the path (N, 3), its waypoints (W, 3) and the search tree (E, 4).
 
-    A planner without headings gives (N, 2). The tree's rows are x0, y0, x1, y1 of its edges.
+    A planner without headings gives (N, 2). The tree's rows are x0, y0, x1, y1 of its edges. The clearance is
+    what it keeps from obstacles; nan where unknown.
     """
 
     path: FloatArray
@@ -34,6 +36,7 @@ class Plan:
     t_s: float
     length_m: float
     planning_time_s: float
+    clearance_m: float = math.nan
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,6 +59,7 @@ def write_plans(folder: Path, plans: Plans) -> None:
         arrays[f"t_{i}"] = np.array(plan.t_s)
         arrays[f"length_{i}"] = np.array(plan.length_m)
         arrays[f"planning_time_{i}"] = np.array(plan.planning_time_s)
+        arrays[f"clearance_{i}"] = np.array(plan.clearance_m)
     arrays["shortest_path"] = plans.shortest_path_m
     write_arrays(folder / PLANS_FILE, arrays)
 
@@ -93,6 +97,7 @@ def _plan(arrays: Arrays, i: int) -> Plan:
         t_s=arrays.scalar(f"t_{i}", np.nan),
         length_m=arrays.scalar(f"length_{i}", np.nan),
         planning_time_s=arrays.scalar(f"planning_time_{i}", np.nan),
+        clearance_m=arrays.scalar(f"clearance_{i}", np.nan),
     )
 
 

@@ -14,6 +14,7 @@ from pilotage.report.figures.control import control_figure
 from pilotage.report.figures.covariance import covariance_figure
 from pilotage.report.figures.gauss_markov import gauss_markov_figure
 from pilotage.report.figures.map import map_figure
+from pilotage.report.figures.plan import plan_figure
 from pilotage.report.figures.pose_error import pose_error_figure
 from pilotage.report.figures.terrain_estimate import drive_figure, rover_error_figure, uncertainty_figure
 from pilotage.report.figures.terrain_map import (
@@ -53,7 +54,7 @@ ON_A_SHEET: tuple[Draw, ...] = (
     accuracy_figure,
     printed_figure,
 )
-ON_A_MAP: tuple[Draw, ...] = (map_figure, close_ups_figure, timeline_figure)
+ON_A_MAP: tuple[Draw, ...] = (map_figure, plan_figure, close_ups_figure, timeline_figure)
 OF_THE_DRIVE: tuple[Draw, ...] = (
     pose_error_figure,
     covariance_figure,

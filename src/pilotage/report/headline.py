@@ -66,7 +66,11 @@ def headline(metrics: Mapping[str, Any]) -> str:
     shortest = number(metrics.get("shortest_length_m"))
     if math.isfinite(driven):
         text = f"{quantities.length(driven)} driven"
-        if math.isfinite(planned) and shortest > 0.0:
+        several = number(metrics.get("goals_given"))
+        if several > 1.0:
+            visited = quantities.count(number(metrics.get("goals_visited")))
+            text += f", {visited} of {quantities.count(several)} goals visited"
+        elif math.isfinite(planned) and shortest > 0.0:
             text += (
                 f" on a plan of {quantities.length(planned)}, "
                 f"{quantities.significant(planned / shortest, 4)} times the shortest possible path "

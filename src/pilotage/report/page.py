@@ -26,6 +26,9 @@ from pilotage.report.markup import (
 from pilotage.report.metrics_table import metric_rows
 from pilotage.report.replay.section import SLUG, TITLE, replay_section, script_source, style
 from pilotage.report.replay.team import team_scene
+from pilotage.report.rounds import SLUG as ROUNDS_SLUG
+from pilotage.report.rounds import TITLE as ROUNDS_TITLE
+from pilotage.report.rounds import rounds_section
 from pilotage.report.style import drawing_style
 from pilotage.report.team import SLUG as TEAM_SLUG
 from pilotage.report.team import TITLE as TEAM_TITLE
@@ -89,6 +92,9 @@ def run_page(run: RunData, damaged: Sequence[str] = (), team: Sequence[RunData] 
         sections.append(figure_section(drawn, figure))
         entries.append((figure.slug, figure.title))
         # What happened explains the map and the numbers; the numbers come before their curves.
+        if figure.slug == "map" and (made := rounds_section(run.metrics)):
+            sections.append(made)
+            entries.append((ROUNDS_SLUG, ROUNDS_TITLE))
         if figure.slug == explained:
             sections += [events_section(run.events), metrics_section(metric_rows(run.metrics))]
             entries += [("events", "Events"), ("metrics", "Numbers")]

@@ -14,6 +14,7 @@ from pilotage.evaluation.driving import driving_metrics, header, poses
 from pilotage.evaluation.finished import FinishedRun, RobotRun, Verdict
 from pilotage.evaluation.tasks.task import TASKS, TaskSetting
 from pilotage.evaluation.tasks.watched import WatchedTask
+from pilotage.evaluation.visits import visited_in_order
 from pilotage.missions.places import GoalConfig, Point
 from pilotage.sensors.sensor import Positive
 
@@ -57,7 +58,8 @@ class FollowTask(WatchedTask):
         passed = 0
         if robot.trace["t_s"].shape[0]:
             truth_xy_m = poses(robot.trace, "true")[:, :2]
-            passed = _passed(truth_xy_m, self._points_m, self._tolerance_m)
+            tolerances_m = [self._tolerance_m] * len(self._points_m)
+            passed = len(visited_in_order(truth_xy_m, self._points_m, tolerances_m))
             corners = np.vstack([[robot.start.x_m, robot.start.y_m], self._points_m])
             away_m = _cross_track_m(truth_xy_m, corners)
             metrics["route_error_rmse_m"] = math.sqrt(float(np.mean(away_m**2)))
@@ -71,17 +73,6 @@ class FollowTask(WatchedTask):
                 f"the robot says it arrived, but came not within {self._tolerance_m:g} m of ({x:g}, {y:g})"
             )
         return Verdict(metrics, ({"nees": nees},), {})
-
-
-def _passed(xy_m: FloatArray, points_m: FloatArray, tolerance_m: float) -> int:
-    """How many of the points (P, 2) the positions (N, 2) come near to, one after the other."""
-    at = 0
-    for k, point in enumerate(points_m):
-        near = np.flatnonzero(np.hypot(*(xy_m[at:] - point).T) <= tolerance_m)
-        if not near.size:
-            return k
-        at += int(near[0])
-    return len(points_m)
 
 
 def _cross_track_m(xy_m: FloatArray, corners_m: FloatArray) -> FloatArray:

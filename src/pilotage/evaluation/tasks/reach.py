@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import ClassVar
+from typing import ClassVar, Literal
 
 import numpy as np
 
@@ -16,6 +16,7 @@ from pilotage.evaluation.cell_plans import route_metrics, route_of
 from pilotage.evaluation.driving import driving_metrics, header, planning_metrics, poses, shortest_for
 from pilotage.evaluation.finished import FinishedRun, RobotRun, Verdict
 from pilotage.evaluation.halls import hall_offset_m
+from pilotage.evaluation.rounds import rounds_metrics, visited_steps
 from pilotage.evaluation.tasks.collisions import CollisionWatch
 from pilotage.evaluation.tasks.task import TASKS, Attempt, TaskSetting, all_ended
 from pilotage.evaluation.tasks.team import verdict
@@ -24,9 +25,14 @@ from pilotage.missions.places import GoalConfig
 
 
 class ReachConfig(Config):
-    """Further goals after ``world.goal``, to be reached in this order."""
+    """Further goals after ``world.goal``, to be reached in this order or in the best one.
+
+    In the best order the robot begins with any of ``goals`` and ends at ``world.goal``, if there is one: at
+    its start, where it is to come back. The order is the robot's own, by its map (``stack.planning.rounds``).
+    """
 
     goals: tuple[GoalConfig, ...] = ()
+    order: Literal["given", "best"] = "given"
     ends_there: bool = False
     """Over as soon as every robot truly is at its last goal, as a referee sees it; else when they say so."""
 
@@ -47,7 +53,11 @@ class ReachTask:
         for robot in mission.members:
             if mission.goal_of(robot) is None and not config.goals:
                 raise InputError("task 'reach': expected world.goal, found none")
-        self.columns, self.goals = {}, config.goals
+        if config.order == "best" and config.ends_there:
+            raise InputError(
+                "task.ends_there: expected task.order 'given', found 'best', in which robots choose the last"
+            )
+        self.columns, self.goals, self.any_order = {}, config.goals, config.order == "best"
         self._ends_there = config.ends_there
         self._last = [
             config.goals[-1] if config.goals else mission.goal_of(robot) for robot in mission.members
@@ -106,8 +116,7 @@ class ReachTask:
         if run.trap_pockets_m:
             entered = sum(_comes_into(truth, pocket) for pocket in run.trap_pockets_m)
             metrics |= {"traps_entered": entered, "traps_avoided": len(run.trap_pockets_m) - entered}
-        last = self.goals[-1] if self.goals else robot.goal
-        assert last is not None, "refused at the build"
+        last = robot.goals[-1]
         away_m = math.hypot(truth[-1, 0] - last.x_m, truth[-1, 1] - last.y_m)
         metrics["goal_error_m"] = away_m
         reached = away_m <= last.tolerance_m
@@ -115,11 +124,21 @@ class ReachTask:
             turned = wrap_to_pi(truth[-1, 2] - last.theta_rad)
             metrics["goal_error_rad"] = turned
             reached = reached and abs(turned) <= last.tolerance_rad
+        missed: GoalConfig | None = None
+        if len(robot.goals) > 1:
+            metrics |= rounds_metrics(robot)
+            visited = len(visited_steps(robot))
+            missed = robot.goals[visited] if visited < len(robot.goals) else None
         contacts = so_far.get("hazard_contacts", 0)
         done = robot.arrived or (self._ends_there and run.ending == THERE)
-        metrics["success"] = done and robot.collisions == 0 and reached and not contacts
+        metrics["success"] = done and robot.collisions == 0 and reached and missed is None and not contacts
         if robot.arrived and not reached:
             metrics["reason"] = f"the robot says it arrived, but stands {away_m:.2f} m from its goal"
+        elif robot.arrived and missed is not None:
+            metrics["reason"] = (
+                f"the robot says it arrived, but came not within {missed.tolerance_m:g} m of "
+                f"({missed.x_m:g}, {missed.y_m:g})"
+            )
         elif contacts:
             metrics["reason"] = f"{contacts} of {run.steps} steps end on a hazard"
         return metrics

@@ -15,7 +15,7 @@ from pilotage.experiments.build.charts import chart_of
 from pilotage.experiments.build.obstacles import Obstacles, place_obstacles
 from pilotage.experiments.build.places import check_place, pose_of, settle_places
 from pilotage.experiments.build.robots import footprint_of, motion_of, sensors_of
-from pilotage.experiments.build.stacks import build_stack, first_belief, goal_of, told
+from pilotage.experiments.build.stacks import build_stack, first_belief, goal_of, rounds_of, told
 from pilotage.experiments.oracles.drive import faithful
 from pilotage.experiments.oracles.ideal_sensors import ideal_sensors
 from pilotage.experiments.oracles.truth import Truth
@@ -30,6 +30,7 @@ from pilotage.sim.worlds.world import World
 from pilotage.stack.interface import Stack, StackStatus
 from pilotage.stack.journal import Journal
 from pilotage.stack.knowledge import RobotKnowledge, TaskKnowledge
+from pilotage.stack.planning.rounds import Rounds
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,6 +43,8 @@ class Member:
         As the mission has them.
     known
         Its own data sheet.
+    goals, rounds
+        Its goals in the order in which it is to visit them, and how it chose that order where it was free to.
     """
 
     config: RobotConfig
@@ -49,6 +52,8 @@ class Member:
     known: RobotKnowledge
     stack: Stack
     journal: Journal
+    goals: tuple[GoalConfig, ...]
+    rounds: Rounds | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -148,12 +153,16 @@ def build(mission: Mission) -> Experiment:
     sheets = [_data_sheet(mission, index, streams) for index in range(len(mission.members))]
     _check_places(mission, chart, sheets)
     task = _task(mission, chart, sheets)
+    for number, place in enumerate(task.goals):
+        where = f"task '{mission.task.name}', goal {number}"
+        for sheet in sheets:
+            check_place(where, place.x_m, place.y_m, sheet.footprint, chart)
     oracles = frozenset(mission.run.oracles)
     nothing = np.zeros((0, 4)), np.zeros((0, 3))
     truths = [_truth(mission, index, chart, *nothing) for index in range(len(sheets))]
     blind = oracles - {"mapper", "planner", "explorer"}
     team = [
-        _member(mission, index, chart, sheet, truths[index], blind, task.goals)
+        _member(mission, index, chart, sheet, truths[index], blind, task)
         for index, sheet in enumerate(sheets)
     ]
     obstacles = _obstacles(mission, chart, sheets, team, streams)
@@ -162,7 +171,7 @@ def build(mission: Mission) -> Experiment:
         placed = obstacles.segments_m, obstacles.circles_m
         truths = [_truth(mission, index, chart, *placed) for index in range(len(sheets))]
         team = [
-            _member(mission, index, chart, sheet, truths[index], oracles, task.goals)
+            _member(mission, index, chart, sheet, truths[index], oracles, task)
             for index, sheet in enumerate(sheets)
         ]
     if not task.drives:
@@ -244,16 +253,23 @@ def _member(
     sheet: RobotKnowledge,
     truth: Truth,
     oracles: frozenset[str],
-    further: tuple[GoalConfig, ...],
+    whole: Task,
 ) -> Member:
     robot = mission.members[index]
     config = mission.stack_of(robot)
     goal = mission.goal_of(robot)
     own = told(config, chart)
     knowing = bool(oracles & {"initial", "explorer"})
+    initial = first_belief(config.initial, truth.start, own, sheet.streams, knowing)
+    goals = tuple(place for place in (goal, *whole.goals) if place is not None)
+    rounds = None
+    if getattr(whole, "any_order", False) and len(goals) > 1:
+        goals = goals if goal is None else (*whole.goals, goal)
+        rounds = rounds_of(config, sheet, own, initial, goals, goal is not None)
+        goals = tuple(goals[place] for place in rounds.order)
     task = TaskKnowledge(
-        initial=first_belief(config.initial, truth.start, own, sheet.streams, knowing),
-        goals=tuple(goal_of(place) for place in (goal, *further) if place is not None),
+        initial=initial,
+        goals=tuple(map(goal_of, goals)),
         goal_tolerance_m=np.inf if goal is None else goal.tolerance_m,
         time_limit_s=mission.run.time_limit_s,
         pose_given=truth.tell_pose if "localizer" in oracles else None,
@@ -262,7 +278,7 @@ def _member(
         own = chart
     journal = Journal()
     stack = build_stack(config, sheet, own, task, journal, truth, oracles)
-    return Member(robot, config, sheet, stack, journal)
+    return Member(robot, config, sheet, stack, journal, goals, rounds)
 
 
 def _obstacles(

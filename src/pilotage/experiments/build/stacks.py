@@ -22,7 +22,7 @@ from pilotage.stack.control.controller import CONTROLLERS
 from pilotage.stack.control.escape import ESCAPES
 from pilotage.stack.control.local.role import LOCAL_CONTROLLERS
 from pilotage.stack.control.reactive import REACTIVES
-from pilotage.stack.interface import NAVIGATORS, Belief, Stack
+from pilotage.stack.interface import NAVIGATORS, Belief, BeliefStatus, Stack
 from pilotage.stack.journal import Journal
 from pilotage.stack.knowledge import RobotKnowledge, TaskKnowledge
 from pilotage.stack.localization.heading_filter import HEADING_FILTERS, HeadingEstimate, HeadingFilter
@@ -32,6 +32,7 @@ from pilotage.stack.mapping.mapper import MAPPERS
 from pilotage.stack.navigator.navigator import Parts
 from pilotage.stack.planning.local_planner import LOCAL_PLANNERS
 from pilotage.stack.planning.planner import PLANNERS, SMOOTHERS
+from pilotage.stack.planning.rounds import Rounds, best_rounds
 
 
 def told(stack: StackConfig, chart: WorldMap) -> WorldMap:
@@ -65,6 +66,28 @@ def goal_of(goal: GoalConfig) -> Goal:
     """The goal that a mission file says."""
     theta = None if goal.theta_rad is None else wrap_to_pi(goal.theta_rad)
     return Goal(goal.x_m, goal.y_m, theta)
+
+
+def rounds_of(
+    config: StackConfig,
+    robot: RobotKnowledge,
+    chart: WorldMap,
+    initial: Belief,
+    goals: tuple[GoalConfig, ...],
+    ends_at_last: bool,
+) -> Rounds:
+    """The order in which a robot visits goals that it may visit in any, by its own map and planner.
+
+    Raises
+    ------
+    InputError
+        Where a goal cannot be reached.
+    """
+    planner = optional_component(PLANNERS, config.planner, "planner")
+    clearance_m = robot.radius_m if planner is None else max(planner.clearance_m, robot.radius_m)
+    start = None if initial.status is BeliefStatus.LOST else initial.pose
+    rng = robot.streams.stream("rounds")
+    return best_rounds(chart, start, tuple(map(goal_of, goals)), ends_at_last, clearance_m, rng)
 
 
 def build_stack(

@@ -6,7 +6,9 @@ import math
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.colors import to_rgba
 from matplotlib.transforms import Affine2D
+from scipy import ndimage
 
 from pilotage.core.types import FloatArray, IntArray
 from pilotage.maps.occupancy_grid import OCCUPIED_FROM, UNKNOWN, OccupancyGrid
@@ -70,6 +72,26 @@ def draw_grid(
         zorder=0.2,
     )
     picture.set_gid("layer-grid")
+    axes.set_xlim(limits[0])
+    axes.set_ylim(limits[1])
+
+
+def draw_grown_grid(axes: Axes, grid: OccupancyGrid, by_m: float, colour: str) -> None:
+    """Draw what lies within ``by_m`` of occupied or unknown cells."""
+    classes, (width, height) = cell_classes(grid)
+    cell_m = width / classes.shape[1]
+    away_m = cell_m * (ndimage.distance_transform_edt(classes == FREE_CELL) - 0.5)
+    picture = np.zeros((*classes.shape, 4))
+    picture[away_m < by_m] = to_rgba(colour)
+    limits = axes.get_xlim(), axes.get_ylim()
+    drawn = axes.imshow(
+        picture,
+        extent=(0.0, width, 0.0, height),
+        interpolation="none",
+        transform=_to_map(grid) + axes.transData,
+        zorder=0.1,
+    )
+    drawn.set_gid("layer-grown")
     axes.set_xlim(limits[0])
     axes.set_ylim(limits[1])
 

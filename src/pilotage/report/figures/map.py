@@ -119,7 +119,7 @@ def _keys(run: RunData, magnification: int) -> tuple[Key, ...]:
         (trace.has("est_x_m"), Key("estimated path", VERMILLION, "dash", "estimated")),
         (trace.has("ref_x_m"), Key("reference", GREEN, "line", "reference")),
         (bool(run.plans), Key("first plan", SKY, "band", "plan")),
-        (len(run.plans) > 1, Key(f"replans ({len(run.plans) - 1})", PURPLE, "band", "replans")),
+        (len(run.plans) > 1, Key(f"{_later(run)} ({len(run.plans) - 1})", PURPLE, "band", "replans")),
         (len(run.shortest_path_m) > 1, Key("exact shortest path", BLACK, "dot", "shortest")),
         (any(len(plan.tree) for plan in run.plans), Key("search tree", layers.TREE_COLOUR, "line", "tree")),
         (world.has_obstacles, Key("unexpected obstacles", ORANGE, "band", "obstacles", 1.0)),
@@ -132,6 +132,11 @@ def _keys(run: RunData, magnification: int) -> tuple[Key, ...]:
         (has_unknown(run.grid), Key("grid: unknown", UNKNOWN_COLOUR, "band", opacity=1.0)),
     )
     return tuple(key for there, key in candidates if there)
+
+
+def _later(run: RunData) -> str:
+    """What the plans after the first are called."""
+    return "later plans" if len(run.outline.goals) > 1 else "replans"
 
 
 def _caption(run: RunData, limits: Limits, magnification: int) -> str:

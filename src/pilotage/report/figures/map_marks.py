@@ -50,8 +50,9 @@ def draw_robot(axes: Axes, run: RunData, placer: LabelPlacer, points_per_m: floa
     if start is not None:
         layers.draw_body(axes, *start, radius, BLUE, filled=False, polygon_m=polygon)
         names.append(("start", start[0], start[1]))
-    for x, y, _ in outline.goals[:-1]:
+    for number, (x, y, _) in enumerate(outline.goals[:-1], start=1):
         axes.plot([x], [y], marker="x", color=GREEN, markersize=7.0, markeredgewidth=1.6, zorder=9.5)
+        names.append((f"{number}", x, y))
     if goal is not None:
         x, y, theta = goal
         axes.plot([x], [y], marker="X", color=GREEN, markersize=9.0, markeredgecolor="white", zorder=9.5)
