@@ -20,6 +20,8 @@ from pilotage.experiments.build.robots import footprint_of
 from pilotage.experiments.mission import load_mission
 from pilotage.kernels.geometry import plane
 from pilotage.maps.distance_field import DistanceField
+from pilotage.maps.occupancy_grid import OccupancyGrid
+from pilotage.maps.rasterize import rasterized
 from pilotage.maps.world_map import WorldMap
 from pilotage.missions.mission import Mission
 from pilotage.models.footprint import Footprint
@@ -44,6 +46,16 @@ CHECK_SLACK_M = 0.01
 """A path counts as invalid below the clearance less this; it covers a lookup grid of a centimetre."""
 
 ROUTE = "museum-route"
+LIKE_THE_PEER = (
+    *(f"robot.sensors.{name}=null" for name in ("beacons", "front", "left", "right")),
+    "stack.mapper=null",
+    "stack.localizer=dead-reckoning",
+    "run.oracles=[localizer]",
+)
+"""The route with scanner and control alone, on the truth: what a step of IR-SIM does."""
+
+CELL_M = 0.05
+"""Of the museum as a grid map."""
 POSE_SPACING_M = 1.0
 MANY_ITERATIONS = 5_000_000
 
@@ -102,6 +114,11 @@ class Museum:
     def floor(self) -> WorldMap:
         """Walls and landmarks."""
         return load_chart("museum")
+
+    @cached_property
+    def grid(self) -> OccupancyGrid:
+        """The same floor as cells, as a ROS map has it."""
+        return rasterized(self.floor.walls, CELL_M)
 
     @cached_property
     def field(self) -> DistanceField:
@@ -195,8 +212,9 @@ class Museum:
 
     # Scans
 
-    def scanner(self, range_var_m2: float | None = None) -> Simulator:
+    def scanner(self, range_var_m2: float | None = None, *, on_grid: bool = False) -> Simulator:
         """A robot with the missions' scanner alone, its noise changed where asked for."""
+        floor = WorldMap("cells", self.floor.bounds_m, grid=self.grid) if on_grid else self.floor
         config = LidarConfig() if range_var_m2 is None else LidarConfig(range_var_m2=range_var_m2)
         robot = RobotSpec(
             "robot",
@@ -206,7 +224,7 @@ class Museum:
             self.poses[0],
             RandomStreams(0),
         )
-        return Simulator(World.of(self.floor), [robot], self.mission.run.dt_s)
+        return Simulator(World.of(floor), [robot], self.mission.run.dt_s)
 
     def scans_per_s(self, scanner: Simulator, rounds: int = 15) -> float:
         """Scan at every pose, ``rounds`` times over; the step that a scan belongs to counts, too."""
@@ -216,9 +234,9 @@ class Museum:
                 self._scan_at(scanner, pose)
         return rounds * len(self.poses) / (time.perf_counter() - begin)
 
-    def exact_ranges(self) -> FloatArray:
+    def exact_ranges(self, *, on_grid: bool = False) -> FloatArray:
         """(poses, beams) ranges without noise, to be held against the peer's."""
-        scanner = self.scanner(range_var_m2=0.0)
+        scanner = self.scanner(range_var_m2=0.0, on_grid=on_grid)
         return np.array([self._scan_at(scanner, pose) for pose in self.poses])
 
     @staticmethod
@@ -230,13 +248,14 @@ class Museum:
 
     # Closed loop
 
-    def loop_steps(self, seed: int) -> tuple[int, float]:
+    def loop_steps(self, seed: int, *, like_the_peer: bool = False) -> tuple[int, float]:
         """Drive the route once; return the steps and the seconds that the stepping took.
 
         Every step simulates the body, collisions, odometry, scanner, beacons and three ultrasonic cones,
         and runs the robot's stack: EKF, local planner, path follower, map of obstacles, guard.
+        ``like_the_peer`` leaves scanner, odometry and control on the truth.
         """
-        experiment = build(load_mission(ROUTE, seed=seed))
+        experiment = build(load_mission(ROUTE, LIKE_THE_PEER if like_the_peer else (), seed=seed))
         simulator, stack = experiment.simulator, experiment.team[0].stack
         command: Command = STOP
         steps = 0

@@ -27,6 +27,7 @@ from importlib.metadata import PackageNotFoundError, version
 
 import numpy as np
 from benchmarks.museum import (
+    CELL_M,
     CLEARANCE_M,
     CONNECTION_M,
     CONTROLS,
@@ -48,13 +49,14 @@ from pilotage import __version__
 from pilotage.sensors.lidar import LidarConfig
 
 FIRST, SCANS, STEPS = "first Dubins path", "LiDAR scans", "closed-loop steps"
+CELL_SCANS, LIKE_STEPS = "LiDAR scans on a grid map", "closed-loop steps, scan and control alone"
 SIMULATION = "simulation"
 PACKAGES = ("ompl", "ir-sim", "numpy", "numba", "shapely")
-FIRST_BAR, EASY_BAR, LENGTH_BAR, SCAN_BAR, LOOP_BAR = 20.0, 1.0, 1.0, 50.0, 25.0
+FIRST_BAR, EASY_BAR, LENGTH_BAR, SCAN_BAR, LOOP_BAR, CELL_BAR = 20.0, 1.0, 1.0, 50.0, 25.0, 15.0
 SEEDS_A_TURN = 5
 """pilotage plans this often in its turn: it is done in milliseconds."""
 
-SCAN_TURNS, LOOP_TURNS = 41, 7
+SCAN_TURNS, CELL_TURNS, LOOP_TURNS = 41, 7, 7
 FILE_WIDTH = 150
 
 
@@ -251,42 +253,50 @@ def compare_simulation(museum: Museum) -> Comparison:
     try:
         irsim = IrsimPeer(museum)
     except ImportError:
-        missing = [(SIMULATION, SCANS, "1/s", SCAN_BAR), (SIMULATION, STEPS, "1/s", LOOP_BAR)]
-        return _missing(missing, "IR-SIM")
-    rows = [_scan_row(museum, irsim), _loop_row(museum, irsim)]
-    apart_m = float(np.abs(museum.exact_ranges() - irsim.exact_ranges()).max())
+        bars = {SCANS: SCAN_BAR, CELL_SCANS: CELL_BAR, STEPS: LOOP_BAR, LIKE_STEPS: LOOP_BAR}
+        return _missing([(SIMULATION, what, "1/s", bar) for what, bar in bars.items()], "IR-SIM")
+    rows = [
+        *(_scan_row(museum, irsim, on_grid) for on_grid in (False, True)),
+        *(_loop_row(museum, irsim, alike) for alike in (False, True)),
+    ]
+    apart_m, cells_apart_m = (
+        float(np.abs(museum.exact_ranges(on_grid=on_grid) - irsim.exact_ranges(on_grid=on_grid)).max())
+        for on_grid in (False, True)
+    )
     scanner = LidarConfig()
     notes = [
         f"scans: {scanner.beams} beams over {math.degrees(scanner.field_of_view_rad):g} degrees, "
         f"{scanner.max_range_m:g} m, at {len(museum.poses)} poses of the route; "
-        f"without noise the two sides differ by {apart_m:.1g} m at most",
+        f"without noise the two sides differ by {apart_m:.1g} m at most, "
+        f"on cells of {CELL_M:g} m by {cells_apart_m:.1g} m",
         f"closed loop: {museum.route_length_m:.0f} m of programmed route, steps of "
         f"{museum.mission.run.dt_s:g} s; pilotage with all sensors and its whole stack, on its own estimate; "
-        "IR-SIM with the scanner alone, dashing from corner to corner on the truth",
+        "IR-SIM with the scanner alone, dashing from corner to corner on the truth, like pilotage in the row "
+        "of scan and control alone",
     ]
     return Comparison(rows, notes)
 
 
-def _scan_row(museum: Museum, irsim: IrsimPeer) -> Row:
-    scanner = museum.scanner()
+def _scan_row(museum: Museum, irsim: IrsimPeer, on_grid: bool) -> Row:
+    scanner = museum.scanner(on_grid=on_grid)
     museum.scans_per_s(scanner)
-    irsim.scans_per_s()
+    irsim.scans_per_s(on_grid=on_grid)
     ours, theirs = [], []
-    for _ in range(SCAN_TURNS):
+    for _ in range(CELL_TURNS if on_grid else SCAN_TURNS):
         ours.append(museum.scans_per_s(scanner))
-        theirs.append(irsim.scans_per_s())
-    return _rate_row(SCANS, ours, theirs, SCAN_BAR)
+        theirs.append(irsim.scans_per_s(on_grid=on_grid))
+    return _rate_row(*((CELL_SCANS, ours, theirs, CELL_BAR) if on_grid else (SCANS, ours, theirs, SCAN_BAR)))
 
 
-def _loop_row(museum: Museum, irsim: IrsimPeer) -> Row:
-    steps, _ = museum.loop_steps(0)
+def _loop_row(museum: Museum, irsim: IrsimPeer, alike: bool) -> Row:
+    steps, _ = museum.loop_steps(0, like_the_peer=alike)
     ours, theirs = [], []
     for turn in range(LOOP_TURNS):
-        taken, took = museum.loop_steps(turn)
+        taken, took = museum.loop_steps(turn, like_the_peer=alike)
         ours.append(taken / took)
         taken, took = irsim.loop_steps(turn, steps)
         theirs.append(taken / took)
-    return _rate_row(STEPS, ours, theirs, LOOP_BAR)
+    return _rate_row(LIKE_STEPS if alike else STEPS, ours, theirs, LOOP_BAR)
 
 
 def _rate_row(what: str, ours: list[float], theirs: list[float], bar: float | None) -> Row:
