@@ -14,6 +14,7 @@ from contract.local_examples import LOCAL_EXAMPLES, navigator_drives_by_the_lase
 from contract.patrol_examples import STRATEGY_NUMBERS, strategy_patrols
 from contract.people_examples import people_walk
 from contract.rover_examples import (
+    chains_legs,
     dead_reckoning_follows_the_bend,
     drives_over_cells,
     moves_to_a_pose,
@@ -408,6 +409,21 @@ EXAMPLES: dict[tuple[str, str], Example] = {
     ),
     ("navigator", "pose"): Example(moves_to_a_pose, {"arrival_m": 0.01}),
     ("navigator", "curve"): Example(drives_over_cells, {"speed_m_s": 0.5}),
+    ("navigator", "chain"): Example(
+        chains_legs,
+        {
+            "legs": [
+                {
+                    "name": "pose",
+                    "rho_gain_per_s": 0.02,
+                    "alpha_gain_per_s": 0.05,
+                    "beta_gain_per_s": -0.02,
+                    "arrival_m": 0.3,
+                },
+                {"name": "curve", "speed_m_s": 0.5},
+            ]
+        },
+    ),
     ("controller", "kanayama"): Example(controller_turns_to_the_reference),
     ("navigator", "random-walk"): Example(explorer_explores),
     ("navigator", "frontier"): Example(

@@ -159,3 +159,22 @@ def drives_over_cells(factory: Any, config: Any) -> None:
     assert sim.bodies[0].collisions == 0
     assert [event.kind for event in journal.events] == ["plan", "arrived"]
     assert len(journal.plans) == 1
+
+
+def chains_legs(factory: Any, config: Any) -> None:
+    """To a pose among cells, then over the cells to the goal; each leg says that it arrived."""
+    cells = np.zeros((12, 16), dtype=np.int8)
+    cells[3:, 8] = 100
+    chart = WorldMap("cells", (0.0, 0.0, 32.0, 24.0), grid=OccupancyGrid(cells, 2.0, Pose2(0.0, 0.0, 0.0)))
+    spec = RobotSpec("rover", BODY, MOTION, {}, Pose2(3.0, 11.0, -1.5), RandomStreams(0))
+    sim = simulator(spec, chart, DT_S)
+    robot = knowledge()
+    controller = KanayamaController(KanayamaConfig(along_per_s=0.1, length_m=3.0), robot)
+    parts = Parts(_Truth(sim), AstarPlanner(GridSearchConfig()), None, None, controller, None, None, None)
+    goals = (Goal(9.0, 7.0, 0.0), Goal(27.0, 5.0))
+    task = TaskKnowledge(parts.localizer.belief, goals, 0.5)  # type: ignore[union-attr]
+    journal = Journal()
+    end = _driven(factory(config, robot, chart, task, parts, journal), sim, 3000)
+    assert math.hypot(end.x_m - 27.0, end.y_m - 5.0) < 1.0
+    assert [event.kind for event in journal.events] == ["arrived", "plan", "arrived"]
+    assert journal.plans[0].t_s == journal.events[0].t_s > 0.0

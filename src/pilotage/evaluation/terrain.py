@@ -83,6 +83,8 @@ def terrain_metrics(
     metrics["final_position_error_m"] = float(math.hypot(error[0], error[1]))
     inside = in_ellipse(truth, estimate, covs, run.mission.run.ellipse_probability)
     metrics["ellipse_coverage"] = float(inside.mean())
+    metrics["final_in_ellipse"] = bool(inside[-1])
+    metrics["final_believed_error_m"] = float(math.sqrt(covs[-1, 0, 0] + covs[-1, 1, 1]))
     # Not a number where nobody listened: before the first reading, and where the truth stood in.
     seen = np.nan_to_num(trace.get("beacons_seen", np.zeros(len(truth)))).astype(np.int64)
     step_m = np.diff(np.concatenate([[0.0], columns["distance_m"]]))

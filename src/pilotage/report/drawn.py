@@ -16,6 +16,7 @@ from pilotage.report.figures.gauss_markov import gauss_markov_figure
 from pilotage.report.figures.map import map_figure
 from pilotage.report.figures.plan import plan_figure
 from pilotage.report.figures.pose_error import pose_error_figure
+from pilotage.report.figures.terrain_curve import curve_figure
 from pilotage.report.figures.terrain_estimate import drive_figure, rover_error_figure, uncertainty_figure
 from pilotage.report.figures.terrain_map import (
     close_up_figure,
@@ -41,6 +42,7 @@ ON_TERRAIN: tuple[Draw, ...] = (
     terrain_map_figure,
     close_up_figure,
     hazard_map_figure,
+    curve_figure,
     looked_at_figure,
     drive_figure,
     rover_error_figure,

@@ -36,8 +36,8 @@ def terrain_map_figure(run: RunData) -> Illustration:
         return Illustration(slug, title, "", _NOTHING)
     if pictures.ground is None:
         return Illustration(slug, title, "", "The ground was given as hazards only; see below.")
-    figure, axes = _ground_axes(pictures)
-    _show(axes, pictures, _tinted(pictures.ground, pictures.hazards, ORANGE, 0.45))
+    figure, axes = ground_axes(pictures)
+    show_ground(axes, pictures, tinted(pictures.ground, pictures.hazards, ORANGE, 0.45))
     drawn = _path(axes, run, pictures, SKY)
     limit = pictures.slope_limit_deg
     steep = f"steeper than {limit:g}°" if math.isfinite(limit) else "hazards"
@@ -53,7 +53,7 @@ def close_up_figure(run: RunData) -> Illustration:
     pictures = run.terrain
     if pictures is None or not run.trace.has("true_x_m", "est_x_m"):
         return Illustration(slug, title, "", "The mission has no estimator.")
-    unit = _unit(pictures)
+    unit = unit_of(pictures)
     shown = np.column_stack([run.trace[name] for name in ("true_x_m", "true_y_m")]) / unit
     estimate = np.column_stack([run.trace[name] for name in ("est_x_m", "est_y_m")]) / unit
     both = np.vstack([shown, estimate])
@@ -62,9 +62,9 @@ def close_up_figure(run: RunData) -> Illustration:
         return Illustration(slug, title, "", "No pose of the run is known.")
     margin = MARGIN * max(float(np.ptp(both, axis=0).max()), 1.0 / unit)
     low, high = both.min(axis=0) - margin, both.max(axis=0) + margin
-    figure, axes = _ground_axes(pictures, low, high)
+    figure, axes = ground_axes(pictures, low, high)
     ground = pictures.hazards if pictures.ground is None else pictures.ground
-    _show(axes, pictures, _tinted(ground, pictures.hazards, ORANGE, 0.45))
+    show_ground(axes, pictures, tinted(ground, pictures.hazards, ORANGE, 0.45))
     keys = _path(axes, run, pictures, SKY)
     alt = "The path, its estimate and the ellipses from near"
     caption = f"Ellipses stand at equal distances along the path. {ellipses_told(run)}".rstrip()
@@ -77,8 +77,8 @@ def hazard_map_figure(run: RunData) -> Illustration:
     pictures = run.terrain
     if pictures is None:
         return Illustration(slug, title, "", _NOTHING)
-    figure, axes = _ground_axes(pictures)
-    _show(axes, pictures, np.repeat(pictures.hazards[..., None], 3, axis=2))
+    figure, axes = ground_axes(pictures)
+    show_ground(axes, pictures, np.repeat(pictures.hazards[..., None], 3, axis=2))
     drawn = _path(axes, run, pictures, SKY if run.trace.has("est_x_m") else VERMILLION)
     alt = "Map of the hazards, white, with the path"
     share = quantities.share(float(pictures.hazards.mean()) / 255.0)
@@ -92,9 +92,9 @@ def looked_at_figure(run: RunData) -> Illustration:
     pictures = run.terrain
     if pictures is None or pictures.looked_at is None:
         return Illustration(slug, title, "", "The planner does not tell what it looked at.")
-    figure, axes = _ground_axes(pictures)
+    figure, axes = ground_axes(pictures)
     grey = (255 - (pictures.hazards.astype(np.uint16) * 90) // 255).astype(np.uint8)
-    _show(axes, pictures, _tinted(grey, _spread(pictures.looked_at), BLUE, 1.0))
+    show_ground(axes, pictures, tinted(grey, _spread(pictures.looked_at), BLUE, 1.0))
     _path(axes, run, pictures)
     expansions = quantities.count(number(run.metrics.get("expansions")))
     alt = "Map of the cells that the search queued"
@@ -118,7 +118,7 @@ def _told(run: RunData) -> str:
     return f"The path is {quantities.length(planned)} long and has {nodes} nodes."
 
 
-def _ground_axes(
+def ground_axes(
     pictures: TerrainPictures, low: FloatArray | None = None, high: FloatArray | None = None
 ) -> tuple[Figure, Axes]:
     """Axes to scale around a part of the map or all of it, in kilometres where it is large."""
@@ -134,13 +134,13 @@ def _ground_axes(
     axes.set_xlim(low[0], high[0])
     axes.set_ylim(low[1], high[1])
     axes.grid(visible=False)
-    unit = _unit(pictures)
+    unit = unit_of(pictures)
     axes.set_xlabel(f"x [{'km' if unit > 1.0 else 'm'}]", labelpad=2.0)
     axes.set_ylabel(f"y [{'km' if unit > 1.0 else 'm'}]", labelpad=2.0)
     return figure, axes
 
 
-def _unit(pictures: TerrainPictures) -> float:
+def unit_of(pictures: TerrainPictures) -> float:
     """Metres of the axes' unit."""
     return 1000.0 if pictures.size_m.max() >= 5000.0 else 1.0
 
@@ -153,11 +153,11 @@ def _corners(pictures: TerrainPictures) -> FloatArray:
 
 def _to_map(pictures: TerrainPictures) -> Affine2D:
     x, y, turned = pictures.origin
-    unit = _unit(pictures)
+    unit = unit_of(pictures)
     return Affine2D().rotate(turned).translate(x, y).scale(1.0 / unit)
 
 
-def _show(axes: Axes, pictures: TerrainPictures, rgb: Rgb) -> None:
+def show_ground(axes: Axes, pictures: TerrainPictures, rgb: Rgb) -> None:
     width, height = pictures.size_m
     limits = axes.get_xlim(), axes.get_ylim()
     axes.imshow(
@@ -174,7 +174,7 @@ def _show(axes: Axes, pictures: TerrainPictures, rgb: Rgb) -> None:
 
 def _path(axes: Axes, run: RunData, pictures: TerrainPictures, colour: str = VERMILLION) -> list[Key]:
     """Draw the path, planned or true, with its estimate where there is one; return what was drawn."""
-    unit = _unit(pictures)
+    unit = unit_of(pictures)
     dark = [Stroke(linewidth=3.4, foreground="#12212f"), Normal()]
     driven = run.trace.has("true_x_m", "true_y_m")
     names = ("true_x_m", "true_y_m") if driven else ("path_x_m", "path_y_m")
@@ -184,7 +184,7 @@ def _path(axes: Axes, run: RunData, pictures: TerrainPictures, colour: str = VER
         axes.plot(*points.T, color=colour, linewidth=1.8, path_effects=dark, zorder=5)
     if run.trace.has("est_x_m", "ellipse_major_m"):
         keys += estimate_layers(axes, run, pictures.landmarks, unit)
-    for name, place, dot in (("start", pictures.start, GREEN), ("goal", pictures.goal, VERMILLION)):
+    for name, place, dot in _places(run, pictures):
         x, y = place / unit
         axes.plot([x], [y], "o", color=dot, markersize=8.0, markeredgecolor="white", zorder=6)
         axes.annotate(
@@ -202,7 +202,16 @@ def _path(axes: Axes, run: RunData, pictures: TerrainPictures, colour: str = VER
     return keys
 
 
-def _tinted(grey: Picture, share: Picture, colour: str, strength: float) -> Rgb:
+def _places(run: RunData, pictures: TerrainPictures) -> list[tuple[str, FloatArray, str]]:
+    """The start, and every goal in order."""
+    told = run.world.robots[0].goals if run.world.robots else ()
+    goals = [("goal", pictures.goal, VERMILLION)]
+    if len(told) > 1:
+        goals = [(f"goal {n}", np.array(goal[:2]), VERMILLION) for n, goal in enumerate(told, start=1)]
+    return [("start", pictures.start, GREEN), *goals]
+
+
+def tinted(grey: Picture, share: Picture, colour: str, strength: float) -> Rgb:
     """A grey picture mixed with a colour by the share of marked cells."""
     tint = np.array([int(colour[i : i + 2], 16) for i in (1, 3, 5)], dtype=np.float32)
     part = share.astype(np.float32)[..., None] * np.float32(strength / 255.0)
