@@ -61,7 +61,7 @@ def test_courses_have_room_where_they_begin_and_end_and_a_bound(family: str) -> 
         away = math.hypot(
             *(course.settings["world.goal"][k] - course.settings["world.start"][k] for k in ("x_m", "y_m"))
         )
-        assert course.bound_s > (away - 0.5) / 2.0
+        assert course.bound_s > (away - 1.0) / 2.0
     assert drawn(family, 3).settings == drawn(family, 3).settings
     assert drawn(family, 3).settings != drawn(family, 3, seed=2).settings
 

@@ -26,7 +26,7 @@ DOORS, CORRIDOR, CROWD = "doors", "corridor", "crowd"
 BOTTLENECKS_M = (0.36, 0.40, 0.44, 0.46, 0.48, 0.50, 0.55, 0.60)
 DRAWN = (DOORS, CORRIDOR, CROWD, *(f"bottleneck-{width:.2f}" for width in BOTTLENECKS_M))
 """Families that need no file."""
-TOLERANCE_M = 0.5
+TOLERANCE_M = 1.0
 CROSSING_M = 6.0
 """A crossing goes so far to either side of the middle of where people walk."""
 HALL_M = 9.0

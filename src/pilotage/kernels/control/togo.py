@@ -14,6 +14,10 @@ BUCKETS = 1 << 14
 BUCKET_S = 0.005
 """Times that differ by less settle in any order: the error is a share of a bucket a cell."""
 UNREACHED_S = 1e4
+EDGE = 2
+OPEN, SETTLED, SHUT = np.uint8(0), np.uint8(1), np.uint8(2)
+STEP_ROW = (0, 1, 0, -1, 1, 1, -1, -1, 1, 2, 2, 1, -1, -2, -2, -1)
+STEP_COLUMN = (1, 0, -1, 0, 1, -1, 1, -1, 2, 1, -1, -2, -2, -1, 1, 2)
 BLOCKED_EXTRA_S = 2.0
 """What a blocked cell gets above its best neighbour, so that a field interpolated there leads out."""
 
@@ -95,137 +99,129 @@ def time_to_go(
     than their best neighbour.
     """
     m = speed.shape[0]
-    togo = np.full((m, m), np.inf)
-    flat = togo.reshape(-1)
-    pace = np.empty(m * m)
-    for i in range(m * m):
-        v = speed.flat[i]
-        pace[i] = 1.0 / v if v > 0.0 else np.inf
+    # Two more cells all around that are blocked: no move has to be looked at for leaving the grid.
+    wide = m + 2 * EDGE
+    flat = np.full(wide * wide, np.inf)
+    pace = np.full(wide * wide, np.inf)
+    state = np.full(wide * wide, SHUT)
+    for r in range(m):
+        for c in range(m):
+            if speed[r, c] > 0.0:
+                i = (r + EDGE) * wide + c + EDGE
+                pace[i] = 1.0 / speed[r, c]
+                state[i] = OPEN
+    column = math.floor((goal_x - x0) / coarse)
+    row = math.floor((goal_y - y0) / coarse)
+    inside = 0 <= row < m and 0 <= column < m
+    lowest = np.inf
+    for r in range(max(0, row - 3) if inside else 0, min(m, row + 4) if inside else m):
+        for c in range(max(0, column - 3) if inside else 0, min(m, column + 4) if inside else m):
+            i = (r + EDGE) * wide + c + EDGE
+            # The goal's surroundings are seeds, so that a post right on it does not hide it; or the edge.
+            if state[i] == SHUT or not (inside or r == 0 or c == 0 or r == m - 1 or c == m - 1):
+                continue
+            dx, dy = x0 + (c + 0.5) * coarse - goal_x, y0 + (r + 0.5) * coarse - goal_y
+            flat[i] = math.sqrt(dx * dx + dy * dy) * (pace[i] if inside else 1.0 / fast)
+            lowest = min(lowest, flat[i])
+    togo = np.full((m, m), UNREACHED_S)
+    if lowest == np.inf:
+        return togo
     head = np.full(BUCKETS, np.int32(-1))
     # A cell may stand in several buckets: entries are appended, stale ones are skipped.
     room = 24 * m * m
     entry_cell = np.empty(room, np.int32)
     entry_next = np.empty(room, np.int32)
     entries = 0
-    column = math.floor((goal_x - x0) / coarse)
-    row = math.floor((goal_y - y0) / coarse)
-    inside = 0 <= row < m and 0 <= column < m
-    if inside:
-        # The goal's surroundings are seeds, so that a post right on it does not hide it.
-        for r in range(max(0, row - 3), min(m, row + 4)):
-            for c in range(max(0, column - 3), min(m, column + 4)):
-                if pace[r * m + c] < np.inf:
-                    dx, dy = x0 + (c + 0.5) * coarse - goal_x, y0 + (r + 0.5) * coarse - goal_y
-                    flat[r * m + c] = math.sqrt(dx * dx + dy * dy) * pace[r * m + c]
-    else:
-        for r in range(m):
-            for c in range(m):
-                if (r == 0 or c == 0 or r == m - 1 or c == m - 1) and pace[r * m + c] < np.inf:
-                    dx, dy = x0 + (c + 0.5) * coarse - goal_x, y0 + (r + 0.5) * coarse - goal_y
-                    flat[r * m + c] = math.sqrt(dx * dx + dy * dy) / fast
-    lowest = np.inf
-    for i in range(m * m):
-        lowest = min(lowest, flat[i])
-    if lowest == np.inf:
-        togo[:, :] = UNREACHED_S
-        return togo
     span = BUCKETS * BUCKET_S
+    per_s = 1.0 / BUCKET_S
     waiting = 0
-    # Seeds beyond the buckets' span come in when the front gets there: sort them into the queue by rounds.
-    late = np.zeros(m * m, np.bool_)
-    n_late = 0
-    for i in range(m * m):
-        if flat[i] < np.inf:
-            if flat[i] - lowest < 0.5 * span:
-                b = int(flat[i] / BUCKET_S) & (BUCKETS - 1)
-                entry_cell[entries], entry_next[entries] = i, head[b]
-                head[b] = entries
-                entries += 1
-                waiting += 1
-            else:
-                late[i] = True
-                n_late += 1
-    step_r = np.array([0, 1, 0, -1, 1, 1, -1, -1, 1, 2, 2, 1, -1, -2, -2, -1])
-    step_c = np.array([1, 0, -1, 0, 1, -1, 1, -1, 2, 1, -1, -2, -2, -1, 1, 2])
+    for i in range(wide * wide):
+        # Seeds farther off than the buckets reach are left to their neighbours' moves.
+        if flat[i] < np.inf and flat[i] - lowest < 0.5 * span:
+            b = int(flat[i] * per_s) & (BUCKETS - 1)
+            entry_cell[entries], entry_next[entries] = i, head[b]
+            head[b] = entries
+            entries += 1
+            waiting += 1
+    # Straight moves, diagonal ones, and knight's; the latter two with the cells that they pass between.
+    step = np.empty(16, np.int64)
+    one, other = np.empty(16, np.int64), np.empty(16, np.int64)
     length = np.empty(16)
     for k in range(16):
-        length[k] = coarse * math.sqrt(step_r[k] ** 2 + step_c[k] ** 2)
-    done = np.zeros(m * m, np.bool_)
-    tick = int(lowest / BUCKET_S)
+        dr, dc = STEP_ROW[k], STEP_COLUMN[k]
+        step[k] = dr * wide + dc
+        length[k] = coarse * math.sqrt(dr * dr + dc * dc)
+        if abs(dr) == 2:
+            one[k], other[k] = (dr // 2) * wide, (dr // 2) * wide + dc
+        elif abs(dc) == 2:
+            one[k], other[k] = dc // 2, dr * wide + dc // 2
+        else:
+            one[k], other[k] = dc, dr * wide
+    tick = int(lowest * per_s)
     idle = 0
     ends = np.inf
     home = -1
     column, row = math.floor((robot_x - x0) / coarse), math.floor((robot_y - y0) / coarse)
     if 0 <= row < m and 0 <= column < m:
-        home = row * m + column
+        home = (row + EDGE) * wide + column + EDGE
     while waiting > 0 and idle <= BUCKETS:
         b = tick & (BUCKETS - 1)
-        if head[b] < 0:
+        entry = head[b]
+        if entry < 0:
             tick += 1
             idle += 1
             continue
         idle = 0
-        entry = head[b]
         head[b] = entry_next[entry]
         waiting -= 1
-        i = entry_cell[entry]
-        if done[i] or int(flat[i] / BUCKET_S) > tick:
-            continue
-        done[i] = True
-        if i == home:
-            ends = flat[i] + beyond_s
-        if flat[i] > ends:
-            break
-        r, c = i // m, i % m
+        i = int(entry_cell[entry])
         here = flat[i]
+        if state[i] != OPEN or int(here * per_s) > tick:
+            continue
+        state[i] = SETTLED
+        if i == home:
+            ends = here + beyond_s
+        if here > ends:
+            break
+        mine = pace[i]
         for k in range(16):
-            rr, cc = r + step_r[k], c + step_c[k]
-            if not (0 <= rr < m and 0 <= cc < m):
-                continue
-            j = rr * m + cc
-            if done[j] or pace[j] == np.inf:
+            j = i + step[k]
+            if state[j] != OPEN:
                 continue
             if k >= 8:
-                # A knight's move passes between two cells: both have to be free.
-                hr, hc = step_r[k], step_c[k]
-                if abs(hr) == 2:
-                    a, d = (r + hr // 2) * m + c, (r + hr // 2) * m + cc
-                else:
-                    a, d = r * m + c + hc // 2, rr * m + c + hc // 2
-                if pace[a] == np.inf or pace[d] == np.inf:
-                    continue
-                cost = length[k] * 0.25 * (pace[i] + pace[j] + pace[a] + pace[d])
-            elif k >= 4:
-                if pace[r * m + cc] == np.inf or pace[rr * m + c] == np.inf:
-                    continue
-                cost = length[k] * 0.5 * (pace[i] + pace[j])
+                # Both cells that it passes between have to be free: else this is infinite.
+                cost = 0.25 * length[k] * (mine + pace[j] + pace[i + one[k]] + pace[i + other[k]])
             else:
-                cost = length[k] * 0.5 * (pace[i] + pace[j])
+                if k >= 4 and (state[i + one[k]] == SHUT or state[i + other[k]] == SHUT):
+                    continue
+                cost = 0.5 * length[k] * (mine + pace[j])
             there = here + cost
             if there < flat[j] and cost < span and entries < room:
                 flat[j] = there
-                to = int(there / BUCKET_S) & (BUCKETS - 1)
+                to = int(there * per_s) & (BUCKETS - 1)
                 entry_cell[entries], entry_next[entries] = j, head[to]
                 head[to] = entries
                 entries += 1
                 waiting += 1
     for r in range(m):
         for c in range(m):
-            i = r * m + c
-            if done[i]:
-                continue
-            if pace[i] < np.inf and flat[i] < np.inf:
-                flat[i] = min(flat[i], ends)
-                continue
-            if pace[i] < np.inf and ends < np.inf:
-                flat[i] = ends
+            i = (r + EDGE) * wide + c + EDGE
+            if state[i] == SETTLED:
+                togo[r, c] = flat[i]
+            elif state[i] == OPEN:
+                if ends < np.inf:
+                    togo[r, c] = min(flat[i], ends)
+                elif flat[i] < np.inf:
+                    togo[r, c] = flat[i]
+            if togo[r, c] < UNREACHED_S:
                 continue
             best = np.inf
-            for rr in range(max(0, r - 1), min(m, r + 2)):
-                for cc in range(max(0, c - 1), min(m, c + 2)):
-                    if done[rr * m + cc]:
-                        best = min(best, flat[rr * m + cc])
-            flat[i] = best + BLOCKED_EXTRA_S if best < np.inf else UNREACHED_S
+            for up in range(-wide, wide + 1, wide):
+                for j in range(i + up - 1, i + up + 2):
+                    if state[j] == SETTLED:
+                        best = min(best, flat[j])
+            if best < np.inf:
+                togo[r, c] = best + BLOCKED_EXTRA_S
     return togo
 
 

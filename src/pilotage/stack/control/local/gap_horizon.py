@@ -27,6 +27,8 @@ TRIED_M = 0.3
 Share = Field(default=0.65, gt=0.0, le=1.0)
 SPEEDS = (1.0, 0.7, 0.45, 0.25)
 LOOKS = ((0.3, 0.1), (0.45, 0.3))
+DODGES = np.array([(v, w) for v in (-0.5, 0.6, 1.2) for w in (-2.0, 0.0, 2.0)])
+"""Speeds and turn rates held for a whole plan."""
 
 
 class GapHorizonConfig(Config):
@@ -36,6 +38,8 @@ class GapHorizonConfig(Config):
     horizon_s: Positive = 1.6
     step_s: Positive = 0.1
     rollouts: int = Field(default=192, ge=8, le=20000)
+    resample_steps: int = Field(default=2, ge=1, le=100)
+    """New samples are drawn every so many steps; between them the last plan goes on, checked as ever."""
     speed_std_m_s: Positive = 0.5
     turn_std_rad_s: Positive = 1.0
     temperature_s: Positive = 0.05
@@ -91,6 +95,7 @@ class GapHorizon:
         )
         self._commands = np.empty((config.rollouts, self._steps, 2))
         self._plan: FloatArray | None = None
+        self._since_sampled = config.resample_steps
         self._keep_turning = True
         self._status = "waiting"
         self.scene: Scene | None = None
@@ -215,13 +220,20 @@ class GapHorizon:
                     )
                 )
         plans.append(np.zeros((self._steps, 2)))
-        movers = scene.movers.foretold(scene.delay_s + config.step_s, config.step_s, self._steps)
+        movers = scene.movers.foretold(scene.delay_s + config.step_s, config.step_s, self._steps, sure=False)
+        if movers.shape[1]:
+            # Out of the way of whoever comes: what pursuit of the path does not think of.
+            plans += [np.tile(dodge, (self._steps, 1)) for dodge in DODGES]
         costs = [
             rollout_cost(
                 scene.start, plan, config.step_s, scene.drive, scene.body, scene.ground, movers, price
             )
             for plan in plans
         ]
+        self._since_sampled += 1
+        if self._since_sampled < config.resample_steps and self._plan is not None:
+            return plans, np.array(costs)
+        self._since_sampled = 0
         mean = plans[int(np.argmin(costs))]
         sampled = rollout_costs(
             scene.start,

@@ -93,7 +93,7 @@ class Mppi:
             scene.drive,
             scene.body,
             scene.ground,
-            scene.movers.foretold(scene.delay_s + config.step_s, config.step_s, self._steps),
+            scene.movers.foretold(scene.delay_s + config.step_s, config.step_s, self._steps, sure=False),
             price,
             self._commands,
         )

@@ -30,7 +30,9 @@ class MoversConfig(Config):
     stands_m: Positive = 0.15
     radius_m: Positive = 0.25
     deviations: NonNegative = 1.0
-    """The disc grows by so many standard deviations of the foretold place."""
+    """The disc grows by so many standard deviations of the foretold place, where a command is checked."""
+    plan_deviations: NonNegative = 0.3
+    """The same where plans are priced: by all that a body may do no plan would get past it."""
 
 
 class Movers:
@@ -90,8 +92,11 @@ class Movers:
         enough: BoolArray = self.tracks[:, kernels.READINGS] >= self._config.readings
         return enough
 
-    def foretold(self, first_s: float, step_s: float, steps: int) -> FloatArray:
-        """Discs (steps, M, 3) at ``first_s`` from now and every ``step_s`` after."""
+    def foretold(self, first_s: float, step_s: float, steps: int, *, sure: bool = True) -> FloatArray:
+        """Discs (steps, M, 3) at ``first_s`` from now and every ``step_s`` after.
+
+        ``sure``: as wide as for the check of a command, else as for the price of a plan.
+        """
         config = self._config
         discs: FloatArray = kernels.foretold(
             np.ascontiguousarray(self.tracks[self._count()]),
@@ -99,7 +104,7 @@ class Movers:
             step_s,
             steps,
             config.radius_m,
-            config.deviations,
+            config.deviations if sure else config.plan_deviations,
             config.acceleration_std_m_s2,
         )
         return discs

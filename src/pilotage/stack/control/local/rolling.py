@@ -42,7 +42,7 @@ class RollingConfig(Config):
     cell_m: float = Field(default=0.05, ge=0.02, le=0.2)
     reach_m: Positive = 5.0
     """Farther than this the laser does not add to the grid."""
-    replan_steps: int = Field(default=2, ge=1, le=100)
+    replan_steps: int = Field(default=4, ge=1, le=100)
     """The time to go is worked out anew every so many steps, and when the grid rolls."""
     match: bool = True
     match_reach_m: Positive = 0.2

@@ -6,7 +6,7 @@ import numpy as np
 
 from pilotage.core.types import FloatArray
 
-STEPS_KEPT = 64
+STEPS_KEPT = 16
 """Noise for so many steps is drawn beforehand; each step takes a random stretch of it."""
 KEEP = 0.8
 """Of a command's noise goes on in the next command: independent noise would average out in the motion."""
