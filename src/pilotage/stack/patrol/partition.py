@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -16,9 +18,11 @@ MOST_MOVES = 1000
 """Of a tour's local search."""
 MOST_STEPS = 200
 """Of the partition's."""
-SOFT_MAX = 8.0
+SOFT_MAX = 16.0
 """Shares are levelled by this power of their lengths: nearly the longest alone, but shorter ones count."""
 BEGINNINGS = 8
+NEIGHBOURS = 8
+"""A vertex changes to shares of so many nearest ones."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -44,30 +48,32 @@ def even_sizes(robots: int, groups: int) -> tuple[int, ...]:
     return tuple(robots // groups + (k < robots % groups) for k in range(groups))
 
 
-@lru_cache(maxsize=128)
-def partition(graph: PatrolGraph, sizes: tuple[int, ...]) -> Plan:
+@lru_cache(maxsize=256)
+def partition(graph: PatrolGraph, sizes: tuple[int, ...], mean_weight: float = 0.0) -> Plan:
     """Walks for groups of robots such that the longest, per robot, is short; the same for whoever asks.
 
     The best tour of all vertices is cut into pieces as long as the groups are large (Frederickson, Hecht and
-    Kim 1978), at several beginnings; then vertices change or swap shares while that levels them. No bound is
-    known of how far it is from the best.
+    Kim 1978), at several beginnings; then vertices change or swap shares while that levels them. No bound
+    is known of how far it is from the best.
 
     Parameters
     ----------
     sizes
         Robots of each group; at most as many groups as vertices.
+    mean_weight
+        What the mean idleness counts beside the worst.
     """
     order = Round.best(graph).stops
     order = order[np.sort(np.unique(order, return_index=True)[1])]
     groups = len(sizes)
     if groups == 1:
         return _plan(graph, [set(order.tolist())], sizes)
-    lengths: dict[frozenset[int], float] = {}
+    search = _Levelling(graph, sizes, mean_weight)
     best: tuple[float, list[set[int]]] | None = None
     count = len(order)
     for begin in sorted({round(k * count / BEGINNINGS) % count for k in range(BEGINNINGS)}):
         shares = _cut(graph, np.roll(order, -begin), sizes)
-        cost = _level(graph, shares, sizes, lengths)
+        cost = search.run(shares)
         if best is None or cost < best[0] * (1.0 - 1e-9):
             best = cost, shares
     assert best is not None
@@ -109,52 +115,69 @@ def _cut(graph: PatrolGraph, order: IntArray, sizes: tuple[int, ...]) -> list[se
     return [set(piece.tolist()) for piece in np.split(order, cuts)]
 
 
-def _level(
-    graph: PatrolGraph, shares: list[set[int]], sizes: tuple[int, ...], lengths: dict[frozenset[int], float]
-) -> float:
-    """Move and swap vertices between shares, in place, while that levels them; the longest walk per robot."""
+class _Levelling:
+    """Moves vertices between shares, and swaps them, while that lowers the cost."""
 
-    def cost(share: set[int] | frozenset[int], group: int) -> float:
+    def __init__(self, graph: PatrolGraph, sizes: tuple[int, ...], mean_weight: float) -> None:
+        self._graph, self._sizes, self._mean_weight = graph, np.array(sizes), mean_weight
+        self._near = np.argsort(graph.shortest_m, axis=1, kind="stable")[:, 1 : 1 + NEIGHBOURS]
+        self._lengths: dict[frozenset[int], float] = {}
+
+    def run(self, shares: list[set[int]]) -> float:
+        """Change the shares in place; returns their cost, in metres."""
+        lengths = np.array([self._length(share) for share in shares])
+        counts = np.array([len(share) for share in shares])
+        for _ in range(MOST_STEPS):
+            now = self._cost(lengths, counts)
+            best = now * (1.0 - 1e-6)
+            change: tuple[int, int, set[int], set[int]] | None = None
+            owner = {vertex: group for group, share in enumerate(shares) for vertex in share}
+            # Without the mean only the longest share need give something away.
+            givers = range(len(shares)) if self._mean_weight else [int(np.argmax(lengths / self._sizes))]
+            for one in givers:
+                for other, mine, theirs in self._changes(one, shares, owner):
+                    new = lengths.copy()
+                    new[one], new[other] = self._length(mine), self._length(theirs)
+                    number = counts.copy()
+                    number[one], number[other] = len(mine), len(theirs)
+                    cost = self._cost(new, number)
+                    if cost < best:
+                        best, change = cost, (one, other, mine, theirs)
+            if change is None:
+                break
+            one, other, shares[one], shares[other] = change
+            for group in (one, other):
+                lengths[group], counts[group] = self._length(shares[group]), len(shares[group])
+        return self._cost(lengths, counts)
+
+    def _changes(
+        self, one: int, shares: list[set[int]], owner: dict[int, int]
+    ) -> Iterator[tuple[int, set[int], set[int]]]:
+        """Another group, and what the two shares would be: a vertex given, or swapped for one near to it."""
+        for vertex in sorted(shares[one]):
+            without = shares[one] - {vertex}
+            given = set()
+            for near in self._near[vertex].tolist():
+                other = owner[near]
+                if other == one:
+                    continue
+                if without and other not in given:
+                    given.add(other)
+                    yield other, without, shares[other] | {vertex}
+                yield other, without | {near}, (shares[other] - {near}) | {vertex}
+
+    def _cost(self, lengths: FloatArray, counts: IntArray) -> float:
+        each = lengths / self._sizes
+        longest = max(float(each.max()), 1e-9)
+        soft = longest * math.pow(float(((each / longest) ** SOFT_MAX).sum()), 1.0 / SOFT_MAX)
+        mean = 0.5 * float((each * counts).sum()) / len(self._graph)
+        return soft + self._mean_weight * mean
+
+    def _length(self, share: set[int]) -> float:
         key = frozenset(share)
-        if key not in lengths:
-            lengths[key] = _length(graph.shortest_m, key)
-        return lengths[key] / sizes[group]
-
-    costs = np.array([cost(share, group) for group, share in enumerate(shares)])
-    near = np.argsort(graph.shortest_m, axis=1, kind="stable")[:, 1:9]
-    owner = {vertex: group for group, share in enumerate(shares) for vertex in share}
-    for _ in range(MOST_STEPS):
-        scale = max(float(costs.max()), 1e-9)
-        now = float(((costs / scale) ** SOFT_MAX).sum())
-        best: tuple[float, int, int, set[int], set[int]] | None = None
-        worst = int(np.argmax(costs))
-        for vertex in sorted(shares[worst]):
-            without = shares[worst] - {vertex}
-            if not without:
-                continue
-            beside = {owner[other]: other for other in reversed(near[vertex].tolist())}
-            for group in sorted(beside.keys() - {worst}):
-                pairs = [(without, shares[group] | {vertex})]
-                pairs += [
-                    (without | {other}, (shares[group] - {other}) | {vertex})
-                    for other in near[vertex].tolist()
-                    if owner[other] == group
-                ]
-                for mine, theirs in pairs:
-                    if not theirs:
-                        continue
-                    pair = cost(mine, worst), cost(theirs, group)
-                    rest = now - sum((costs[[worst, group]] / scale) ** SOFT_MAX)
-                    new = rest + (pair[0] / scale) ** SOFT_MAX + (pair[1] / scale) ** SOFT_MAX
-                    if new < (now if best is None else best[0]) - 1e-9:
-                        best = new, worst, group, mine, theirs
-        if best is None:
-            break
-        _, one, other_group, shares[one], shares[other_group] = best
-        for group in (one, other_group):
-            costs[group] = cost(shares[group], group)
-            owner.update(dict.fromkeys(shares[group], group))
-    return float(costs.max())
+        if key not in self._lengths:
+            self._lengths[key] = _length(self._graph.shortest_m, key)
+        return self._lengths[key]
 
 
 def _length(shortest_m: FloatArray, share: frozenset[int]) -> float:

@@ -30,7 +30,7 @@ class AdaptiveRoundsConfig(Config):
     """
 
     mean_weight: NonNegative = 2.0
-    sharing_cost: NonNegative = 0.03
+    sharing_cost: NonNegative = 0.05
     slack: Positive = Field(default=0.05, le=0.5)
     silent_s: Positive = 30.0
     silent_ratio: Positive = 8.0
@@ -41,7 +41,14 @@ def best_plan(setting: PatrolSetting, robots: int, config: AdaptiveRoundsConfig)
     """The cheapest plan for so many robots: one round for all, one for each, and what lies between."""
     graph = setting.graph
     most = min(robots, len(graph))
-    plans = [partition(graph, even_sizes(robots, groups)) for groups in range(1, most + 1)]
+    # What lies between is much alike: a few numbers of groups stand for all.
+    numbers = {1, 2, 3, robots // 2, robots - 1, robots}
+    plans = [
+        partition(graph, even_sizes(robots, groups), weight)
+        for groups in sorted(numbers)
+        for weight in sorted({0.0, config.mean_weight})
+        if 1 <= groups <= most
+    ]
 
     def cost(plan: Plan) -> float:
         # By the longest of the rounds, each as it is shared: those of one robot need not keep apart.
