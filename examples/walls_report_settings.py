@@ -1,9 +1,11 @@
 """The night-watch report's figures 15 to 19 beside ours: its wall filter in its four settings, on one drive.
 
-The robot drives the museum's route once, localized by ``ekf-walls``. Every other filter listens to the same
-readings, so that what differs is the filter alone. Says how far each is off and how many lines it took; draws
+The robot drives the report's route by the clock; every filter listens to the same readings, so that what
+differs is the filter alone. Says how far each is off and how many lines it took; draws
 ``walls_report_settings.png``: the paths, the position's error, the heading's error with its own 2-sigma
-band, and the share of the lines that were taken. The first argument may give another seed.
+band, and the share of the lines that were taken; and ``walls_report_errors.png``: the report's error matrix
+of one moment, a row for each line that was seen and a column for each of the 32 walls. The first argument may
+give another seed.
 """
 
 import sys
@@ -21,7 +23,7 @@ from pilotage.experiments.mission import load_mission
 
 SETTINGS = {15: (0.0039, 0.01), 16: (0.1, 0.5), 17: (1.0, 1.0), 18: (2.0, 5.0)}
 """Threshold of the Mahalanobis distance and variance of a wall's distance, by the report's figure."""
-TAKEN_OVER_S = 2.0
+TAKEN_OVER_S, NO_ERROR, ASTRAY_M = 2.0, 99.0, 1.0
 
 
 @dataclass
@@ -47,25 +49,24 @@ class Listener:
 
 def listeners(seed: int) -> list[Listener]:
     """Ours first, then the report's four."""
-    ours = Listener("ours: ekf-walls", build(load_mission("museum-walls", [], seed)))
-    theirs = []
+    settings = {"ours: ekf-walls": ["stack.localizer.name=ekf-walls"]}
     for number, (threshold, variance) in SETTINGS.items():
-        overrides = [
-            "stack.localizer.name=ekf-walls-report",
+        settings[f"report fig. {number}: {threshold:g} and {variance:g} m²"] = [
             f"stack.localizer.threshold_chi2={threshold}",
             f"stack.localizer.distance_var_m2={variance}",
         ]
-        title = f"report fig. {number}: {threshold:g} and {variance:g} m²"
-        theirs.append(Listener(title, build(load_mission("museum-walls", overrides, seed))))
-    return [ours, *theirs]
+    return [
+        Listener(title, build(load_mission("museum-walls-report", overrides, seed)))
+        for title, overrides in settings.items()
+    ]
 
 
 def drive(filters: list[Listener]) -> tuple[FloatArray, FloatArray]:
-    """Drive by the first filter, let all listen; returns times (N,) and true poses (N, 3)."""
+    """Drive the route, let all listen; returns times (N,) and true poses (N, 3)."""
     simulator, driver = filters[0].experiment.simulator, filters[0].experiment.team[0].stack
     times, truth = [], []
     command: Command = STOP
-    while driver.status[0] == "running" and not simulator.bodies[0].collisions:
+    while driver.status[0] == "running":
         (readings,) = simulator.step([command])
         command = driver.step(readings)
         for listener in filters[1:]:
@@ -83,13 +84,14 @@ def draw(columns: list[Axes], listener: Listener, t_s: FloatArray, truth: FloatA
     off = poses - truth
     distance = np.hypot(off[:, 0], off[:, 1])
     heading = wrap_array_to_pi(off[:, 2])
-    way, position, turned, lines = columns
+    path, position, turned, lines = columns
     walls = listener.experiment.chart.walls.segments_m.reshape(-1, 2, 2)
-    way.add_collection(LineCollection(list(walls), colors="black", linewidths=0.8))
-    way.plot(*truth[:, :2].T, color="#0072B2", linewidth=2.5, label="true")
-    way.plot(*poses[:, :2].T, "--", color="#D55E00", linewidth=1.2, label="estimated")
-    way.set(xlim=(-2, 30), ylim=(-2, 20), aspect="equal", title=listener.title)
+    path.add_collection(LineCollection(list(walls), colors="black", linewidths=0.8))
+    path.plot(*truth[:, :2].T, color="#0072B2", linewidth=2.5, label="true")
+    path.plot(*poses[:, :2].T, "--", color="#D55E00", linewidth=1.2, label="estimated")
+    path.set(xlim=(-2, 30), ylim=(-2, 20), aspect="equal", title=listener.title)
     position.semilogy(t_s, np.maximum(distance, 1e-5), color="#D55E00")
+    position.axhline(ASTRAY_M, color="grey", linewidth=0.6)
     position.set(ylim=(1e-4, 1e2), ylabel="position error [m]")
     band = 2.0 * np.sqrt(np.array(listener.heading_vars))
     turned.fill_between(t_s, -band, band, color="#cbd5df", label="its own 2 sigma")
@@ -103,8 +105,26 @@ def draw(columns: list[Axes], listener: Listener, t_s: FloatArray, truth: FloatA
     lines.fill_between(t_s, share, color="#009E73")
     lines.set(ylim=(0, 1), ylabel="share of lines taken", xlabel="time [s]")
     taken = sum(listener.taken) / max(sum(listener.seen), 1.0)
+    astray = np.flatnonzero(distance > ASTRAY_M)
+    tracked = f"{t_s[astray[0]]:.1f}" if astray.size else "to the end"
     rmse = np.sqrt(np.mean(distance[20:] ** 2))
-    return f"{listener.title:32s} {rmse:9.4f} {distance[20:].max():9.4f} {taken:8.0%}"
+    return f"{listener.title:32s} {tracked:>11s} {rmse:9.4f} {distance[20:].max():9.4f} {taken:8.0%}"
+
+
+def draw_errors(axes: Axes, errors_m: FloatArray) -> None:
+    """The error matrix as a picture; where no wall lies on the same side it stays grey."""
+    shown = np.ma.masked_greater_equal(np.abs(errors_m), NO_ERROR)
+    axes.set_facecolor("#d3d9df")
+    picture = axes.imshow(shown, cmap="viridis_r", aspect="auto", vmin=0.0, vmax=20.0)
+    for row, values in enumerate(shown):
+        for column in np.flatnonzero(~np.ma.getmaskarray(values)).tolist():
+            colour = "white" if values[column] > 8.0 else "black"
+            axes.text(
+                column, row, f"{values[column]:.2g}", ha="center", va="center", fontsize=6, color=colour
+            )
+    axes.set(xlabel="wall of the map", ylabel="line seen", title="error matrix of one moment [m]")
+    axes.set_xticks(range(0, errors_m.shape[1], 2), [str(k + 1) for k in range(0, errors_m.shape[1], 2)])
+    axes.figure.colorbar(picture, ax=axes, label="|seen - expected| [m]")
 
 
 def main() -> None:
@@ -112,14 +132,21 @@ def main() -> None:
     filters = listeners(int(sys.argv[1]) if len(sys.argv) > 1 else 0)
     t_s, truth = drive(filters)
     figure, axes = plt.subplots(4, len(filters), figsize=(4 * len(filters), 12))
-    print(f"{'threshold and variance':32s} {'RMSE [m]':>9s} {'max [m]':>9s} {'taken':>8s}")
+    print(
+        f"{'threshold and variance':32s} {'tracked [s]':>11s} {'RMSE [m]':>9s} {'max [m]':>9s} {'taken':>8s}"
+    )
     for listener, columns in zip(filters, axes.T, strict=True):
         print(draw(list(columns), listener, t_s, truth))
     axes[0, 0].legend(loc="upper left", fontsize=8)
     axes[2, 0].legend(loc="upper right", fontsize=8)
     figure.tight_layout()
     figure.savefig("walls_report_settings.png", dpi=100)
-    print("drawn: walls_report_settings.png")
+    errors_m = filters[1].experiment.team[0].journal.results()["error_matrix_m"]
+    figure, alone = plt.subplots(figsize=(12, 4))
+    draw_errors(alone, np.asarray(errors_m))
+    figure.tight_layout()
+    figure.savefig("walls_report_errors.png", dpi=100)
+    print("drawn: walls_report_settings.png, walls_report_errors.png")
 
 
 if __name__ == "__main__":

@@ -17,6 +17,8 @@ from pilotage.evaluation.split_errors import split_errors
 
 WRONG_M, WRONG_RAD = 0.5, 0.1
 """A pose farther from the truth than this is wrong."""
+ASTRAY_M = 1.0
+"""An estimate that was this far off has lost track, though it may come back."""
 MOST_CELLS = 4_000_000
 MOST_SEGMENTS = 400
 """Beyond so many walls no exact shortest path is worked out: its tangent graph grows with their square."""
@@ -75,6 +77,8 @@ def driving_metrics(run: FinishedRun, robot: RobotRun) -> tuple[dict[str, object
         if np.isfinite(met.closest_m):
             metrics["people_closest_m"] = met.closest_m
     metrics |= pose_errors(truth, estimate, counted).metrics()
+    astray = np.flatnonzero(pose_errors(truth, estimate).distance_m > ASTRAY_M)
+    metrics["tracked_s"] = float(trace["t_s"][astray[0] if astray.size else -1])
     # Where nothing is solid, everywhere is open and no place narrow.
     if counted.any() and np.isfinite(trace["clearance_m"]).any():
         metrics |= split_errors(trace, pose_errors(truth, estimate).distance_m, counted)

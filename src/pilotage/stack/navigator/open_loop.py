@@ -1,6 +1,8 @@
-"""The open-loop navigator: one constant command for a given time, as calibration runs need it."""
+"""The open-loop navigator: commands by the clock, as calibration runs and programmed routes need them."""
 
 from __future__ import annotations
+
+import numpy as np
 
 from pilotage.core.config import Config
 from pilotage.core.types import STOP, Twist
@@ -13,19 +15,31 @@ from pilotage.stack.knowledge import RobotKnowledge, TaskKnowledge
 from pilotage.stack.navigator.navigator import Parts, localizer_of
 
 
+class TimedCommand(Config):
+    """A command and how long it holds."""
+
+    duration_s: Positive
+    speed_m_s: float = 0.0
+    turn_rate_rad_s: float = 0.0
+
+
 class OpenLoopConfig(Config):
-    """The command and how long it holds; both speeds 0 stand still and listen."""
+    """The command and how long it holds; both speeds 0 stand still and listen.
+
+    With a ``program`` its commands follow one another instead.
+    """
 
     speed_m_s: float = 0.0
     turn_rate_rad_s: float = 0.0
     duration_s: Positive = 50.0
+    program: tuple[TimedCommand, ...] = ()
 
 
 @NAVIGATORS.add("open-loop", OpenLoopConfig)
 class OpenLoopNavigator:
-    """Commands the same speeds whatever the sensors say; localizes meanwhile, looks at nothing.
+    """Commands speeds by the clock whatever the sensors say; localizes meanwhile, looks at nothing.
 
-    Arrives when the command has been carried out for ``duration_s``. It does not stop for a wall.
+    Arrives when the last command has been carried out for its time. It does not stop for a wall.
     """
 
     def __init__(
@@ -37,8 +51,17 @@ class OpenLoopNavigator:
         parts: Parts,
         journal: Journal,
     ) -> None:
-        self._command = Twist(config.speed_m_s, config.turn_rate_rad_s)
-        self._steps_left = max(1, round(config.duration_s / robot.dt_s))
+        alone = TimedCommand(
+            duration_s=config.duration_s,
+            speed_m_s=config.speed_m_s,
+            turn_rate_rad_s=config.turn_rate_rad_s,
+        )
+        legs = config.program or (alone,)
+        self._commands = [Twist(leg.speed_m_s, leg.turn_rate_rad_s) for leg in legs]
+        # Rounded where they end, so that rounding does not add up.
+        ends_s = np.cumsum([leg.duration_s for leg in legs])
+        self._ends = [max(1, round(end_s / robot.dt_s)) for end_s in ends_s.tolist()]
+        self._steps = self._leg = 0
         self._localizer = localizer_of(parts, "open-loop")
         self._status, self._reason = StackStatus.RUNNING, ""
         self._journal = journal
@@ -54,11 +77,13 @@ class OpenLoopNavigator:
         return self._status, self._reason
 
     def step(self, readings: Readings) -> Twist:
-        """Localize; command the same again, or stop."""
+        """Localize; command what the clock says, or stop."""
         self._localizer.step(readings)
-        if self._steps_left > 0:
-            self._steps_left -= 1
-            return self._command
+        while self._leg < len(self._ends) and self._steps >= self._ends[self._leg]:
+            self._leg += 1
+        if self._leg < len(self._ends):
+            self._steps += 1
+            return self._commands[self._leg]
         if self._status is StackStatus.RUNNING:
             self._status, self._reason = StackStatus.ARRIVED, "the command was carried out to its end"
             self._journal.say(readings.t_s, "arrived", self._reason)
