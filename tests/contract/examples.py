@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from contract.fault_examples import fault_befalls
 from contract.local_examples import LOCAL_EXAMPLES, navigator_drives_by_the_laser
 from contract.patrol_examples import STRATEGY_NUMBERS, strategy_patrols
 from contract.people_examples import people_walk
@@ -316,6 +317,12 @@ def navigator_plans(factory: Any, config: Any) -> None:
 
 SCALAR_FILTER_NUMBERS = frozenset({"process_var", "measurement_var", "initial_var"})
 
+
+def fault(parameters: dict[str, Any]) -> Example:
+    """A fault of some sensor."""
+    return Example(fault_befalls, {"sensor": "lidar", **parameters}, frozenset({"share"}))
+
+
 EXAMPLES: dict[tuple[str, str], Example] = {
     ("sensor", "wheel-odometry"): Example(
         sensor_reads, pure_numbers=frozenset({"distance_scale", "angle_scale"})
@@ -433,6 +440,14 @@ EXAMPLES: dict[tuple[str, str], Example] = {
         explorer_explores, {"margin_cells": 1}, pure_numbers=frozenset({"far_cells"})
     ),
     **{("strategy", name): Example(strategy_patrols, {}, pure) for name, pure in STRATEGY_NUMBERS.items()},
+    ("fault", "drop"): fault({}),
+    ("fault", "gap"): fault({"length_s": 3.0}),
+    ("fault", "delay"): fault({}),
+    ("fault", "repeat"): fault({"share": 0.3}),
+    ("fault", "shuffle"): fault({}),
+    ("fault", "swap-identities"): fault({"share": 0.3}),
+    ("fault", "outliers"): fault({}),
+    ("fault", "bias-step"): fault({"by_m": 0.2, "by_rad": 0.1}),
     ("people", "track"): Example(
         people_walk, {"file": str(pathlib.Path(__file__).parent.parent / "support" / "walkers.txt")}
     ),

@@ -8,11 +8,13 @@ import numpy as np
 
 from pilotage.core.angles import wrap_array_to_pi
 from pilotage.core.chi_square import chi_square_quantile
-from pilotage.core.types import FloatArray
+from pilotage.core.types import BoolArray, FloatArray
 
 RESAMPLES = 1000
 SINGULAR = 1e-12
 """Least eigenvalue of the correlations, which are 1 on their diagonal; below, it is what rounding left."""
+SURE = 0.999
+"""Share of the true positions that a consistent filter's ellipse of ``longest_outside_s`` holds."""
 BOOTSTRAP_SEED = 20240607
 """Fixed: the band of a run must not change from one evaluation to the next."""
 
@@ -54,6 +56,35 @@ def nees(truth: FloatArray, estimate: FloatArray, cov: FloatArray) -> FloatArray
         solved = np.linalg.solve(cov[regular], error[regular][:, :, None])[:, :, 0]
         out[regular] = np.einsum("ni,ni->n", error[regular], solved)
     return out
+
+
+def longest_outside_s(
+    t_s: FloatArray, truth: FloatArray, estimate: FloatArray, cov: FloatArray, claimed: BoolArray
+) -> float:
+    """The longest time in which a filter that claims to know its position is surely wrong about it.
+
+    Parameters
+    ----------
+    t_s
+        (N,) rising times.
+    truth, estimate, cov
+        (N, 3), (N, 3) and (N, 3, 3); of the position's ellipse that holds ``SURE`` of the true positions.
+    claimed
+        (N,) where it claims so.
+    """
+    error = (truth - estimate)[:, :2, None]
+    spread = cov[:, :2, :2]
+    regular = np.linalg.det(spread) > 0.0
+    distance = np.where(np.hypot(error[:, 0, 0], error[:, 1, 0]) > 0.0, np.inf, 0.0)
+    solved = np.linalg.solve(spread[regular], error[regular])
+    distance[regular] = np.einsum("nij,nij->n", error[regular], solved)
+    wrong = np.concatenate([[False], claimed & (distance > chi_square_quantile(SURE, 2)), [False]])
+    turns = np.flatnonzero(wrong[1:] != wrong[:-1])
+    if not turns.size:
+        return 0.0
+    begins, ends = turns[::2], turns[1::2] - 1
+    before = np.concatenate([[0.0], t_s])[begins]
+    return float((t_s[ends] - before).max())
 
 
 def nees_metrics(values: FloatArray) -> dict[str, object]:

@@ -7,8 +7,9 @@ from collections.abc import Mapping
 import numpy as np
 
 from pilotage.core.angles import wrap_array_to_pi
+from pilotage.core.chi_square import chi_square_quantile
 from pilotage.core.types import BoolArray, FloatArray
-from pilotage.evaluation.consistency import nees, nees_metrics, nis_metrics
+from pilotage.evaluation.consistency import SURE, longest_outside_s, nees, nees_metrics, nis_metrics
 from pilotage.evaluation.finished import FinishedRun, RobotRun
 from pilotage.evaluation.plan_quality import clearance_m, smoothness
 from pilotage.evaluation.pose_errors import pose_errors
@@ -83,7 +84,11 @@ def driving_metrics(run: FinishedRun, robot: RobotRun) -> tuple[dict[str, object
     if counted.any() and np.isfinite(trace["clearance_m"]).any():
         metrics |= split_errors(trace, pose_errors(truth, estimate).distance_m, counted)
     metrics |= _consistency(trace, values, counted)
-    return metrics | _recovery(run, robot, truth, estimate), values
+    claimed = trace["localized"] > 0.5 if "localized" in trace else np.ones(len(values), dtype=np.bool_)
+    metrics["silently_wrong_s"] = longest_outside_s(
+        trace["t_s"], truth, estimate, covariances(trace), claimed
+    )
+    return metrics | _recovery(run, robot, truth, estimate, values), values
 
 
 def shortest_for(run: FinishedRun, robot: RobotRun) -> ShortestPath | None:
@@ -146,7 +151,7 @@ def _consistency(
 
 
 def _recovery(
-    run: FinishedRun, robot: RobotRun, truth: FloatArray, estimate: FloatArray
+    run: FinishedRun, robot: RobotRun, truth: FloatArray, estimate: FloatArray, values: FloatArray
 ) -> dict[str, object]:
     """How long a robot that can be lost was lost, and how long it was wrong without knowing."""
     trace, known = robot.trace, robot.stack.initial.known
@@ -156,6 +161,8 @@ def _recovery(
     error = estimate - truth
     wrong = np.hypot(error[:, 0], error[:, 1]) > WRONG_M
     wrong |= np.abs(wrap_array_to_pi(error[:, 2])) > WRONG_RAD
+    # Far off and honest about it is not unawares; a singular covariance is.
+    wrong &= ~(values <= chi_square_quantile(SURE, 3))
     # One that never says so although it is wrong is the worst case of all.
     wrong_for_good = wrong & (trace["t_s"] > run.mission.run.settle_s)
     if claimed.all() and known and not wrong_for_good.any():

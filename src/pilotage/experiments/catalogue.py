@@ -93,6 +93,7 @@ def mission_schema() -> dict[str, Any]:
     robot = definitions["RobotConfig"]["properties"]
     robot["sensors"]["additionalProperties"] = choices["sensor"]
     robot["motion"] = choices["motion"]
+    robot["faults"]["items"] = choices["fault"]
     definitions["WorldConfig"]["properties"]["people"]["items"] = {
         "anyOf": [choices["people"], {"type": "string"}]
     }

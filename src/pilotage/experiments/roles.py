@@ -8,6 +8,7 @@ from pilotage.core.registry import Registry
 from pilotage.evaluation.tasks.task import TASKS
 from pilotage.models.motion.motion import MOTIONS
 from pilotage.sensors.sensor import SENSORS
+from pilotage.sim.faults.fault import FAULTS
 from pilotage.sim.people.people import PEOPLE
 from pilotage.stack.control.controller import CONTROLLERS
 from pilotage.stack.control.escape import ESCAPES
@@ -25,6 +26,7 @@ ROLES: dict[str, Registry[Any]] = {
     "task": TASKS,
     "motion": MOTIONS,
     "sensor": SENSORS,
+    "fault": FAULTS,
     "people": PEOPLE,
     "navigator": NAVIGATORS,
     "localizer": LOCALIZERS,
@@ -39,4 +41,4 @@ ROLES: dict[str, Registry[Any]] = {
     "escape": ESCAPES,
     "strategy": STRATEGIES,
 }
-"""Roles by their key under ``stack``; a task, a motion, sensors and people stand elsewhere in a mission."""
+"""Roles by their key under ``stack``; task, motion, sensors, faults, people stand elsewhere in a mission."""

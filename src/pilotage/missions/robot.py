@@ -58,6 +58,9 @@ class RobotConfig(Config):
     """Parameters of the motion that are not as the data sheet says; the robot does not know of them."""
     sensors: dict[str, ComponentChoice] = Field(default_factory=dict)
     """By names of the mission's own; null takes one off that was there before."""
+    faults: tuple[ComponentChoice, ...] = ()
+    """What becomes of the sensors' readings on their way to the stack, one after the other; the robot is
+    not told."""
     start: PoseConfig | None = None
     goal: GoalConfig | None = None
     stack: StackConfig | None = None

@@ -18,6 +18,7 @@ from pilotage.sensors.readings import Reading, Readings
 from pilotage.sensors.sensor import SensorConfig
 from pilotage.sim.bodies.body import APART_M, Body
 from pilotage.sim.bodies.motion import SIMULATED_MOTIONS
+from pilotage.sim.faults.fault import Faults
 from pilotage.sim.people.crowd import Crowd
 from pilotage.sim.people.people import People
 from pilotage.sim.sensing.radio import SimulatedRadio
@@ -31,7 +32,7 @@ class RobotSpec:
     """One robot: what it is, what it carries, where it begins, and the streams that its noise comes from.
 
     Sensors are named as in the mission; the name keys the noise stream, so switching one sensor off leaves
-    what the others draw unchanged.
+    what the others draw unchanged. Faults stand between them and who reads them.
     """
 
     name: str
@@ -40,6 +41,7 @@ class RobotSpec:
     sensors: Mapping[str, SensorConfig]
     start: Pose2
     streams: RandomStreams
+    faults: Faults | None = None
 
 
 class Simulator:
@@ -112,6 +114,7 @@ class Simulator:
             observe for seat in seats if (observe := getattr(seat.sensor, "observe", None)) is not None
         ]
         self._alone, self._together = _grouped(seats, robots)
+        self._faults = [(row, robot.faults) for row, robot in enumerate(robots) if robot.faults is not None]
 
     @property
     def t_s(self) -> float:
@@ -147,6 +150,8 @@ class Simulator:
                 for (row, name), reading in zip(group.seats, group.read(), strict=True):
                     if reading is not None:
                         said[row][name] = reading
+        for row, faults in self._faults:
+            said[row] = faults.pass_on(t_s, said[row])
         return [Readings(t_s, by_sensor) for by_sensor in said]
 
     def transmit(self, row: int, contents: Sequence[object]) -> None:

@@ -9,12 +9,12 @@ import numpy as np
 
 from pilotage.core.errors import InputError
 from pilotage.core.random import RandomStreams
-from pilotage.core.types import FloatArray
+from pilotage.core.types import FloatArray, IntArray
 from pilotage.evaluation.tasks.task import TASKS, Task, TaskSetting
 from pilotage.experiments.build.charts import chart_of
 from pilotage.experiments.build.obstacles import Obstacles, place_obstacles
 from pilotage.experiments.build.places import check_place, pose_of, settle_places
-from pilotage.experiments.build.robots import footprint_of, motion_of, sensors_of
+from pilotage.experiments.build.robots import faults_of, footprint_of, motion_of, sensors_of
 from pilotage.experiments.build.stacks import build_stack, first_belief, goal_of, rounds_of, told
 from pilotage.experiments.oracles.drive import faithful
 from pilotage.experiments.oracles.ideal_sensors import ideal_sensors
@@ -119,7 +119,9 @@ def _simulator(
         assert start is not None, "settled above"
         own = f"robots.{index}" if mission.robots else "world"
         world.check_place(f"{own}.start", sheet.footprint, pose_of(start))
-    robots = [_spec(mission, index, sheet, oracles) for index, sheet in enumerate(sheets)]
+    robots = [
+        _spec(mission, index, sheet, oracles, chart.landmarks.ids) for index, sheet in enumerate(sheets)
+    ]
     return Simulator(world, robots, mission.run.dt_s, _people(mission, world, robots))
 
 
@@ -306,12 +308,15 @@ def _obstacles(
     )
 
 
-def _spec(mission: Mission, index: int, sheet: RobotKnowledge, oracles: frozenset[str]) -> RobotSpec:
+def _spec(
+    mission: Mission, index: int, sheet: RobotKnowledge, oracles: frozenset[str], landmarks: IntArray
+) -> RobotSpec:
     """The robot as it truly is: with the faults that it has, or without those that an oracle takes away."""
     robot = mission.members[index]
     start = mission.start_of(robot)
     assert start is not None, "settled above"
-    truly = motion_of(robot, f"robots.{index}" if mission.robots else "robot", truly=True)
+    where = f"robots.{index}" if mission.robots else "robot"
+    truly = motion_of(robot, where, truly=True)
     return RobotSpec(
         sheet.name,
         sheet.footprint,
@@ -319,4 +324,5 @@ def _spec(mission: Mission, index: int, sheet: RobotKnowledge, oracles: frozense
         ideal_sensors(sheet.sensors) if "sensors" in oracles else sheet.sensors,
         pose_of(start),
         sheet.streams,
+        None if "sensors" in oracles else faults_of(robot, landmarks, sheet.streams, where),
     )

@@ -19,6 +19,7 @@ from pilotage.stack.journal import Journal
 from pilotage.stack.knowledge import RobotKnowledge
 from pilotage.stack.localization.localizer import LOCALIZERS, require_initial_pose
 from pilotage.stack.localization.odometry_prediction import OdometryNoise, OdometryPrediction
+from pilotage.stack.localization.odometry_watch import OdometryWatch, increment_of
 
 
 class DeadReckoningConfig(Config):
@@ -55,6 +56,7 @@ class DeadReckoningLocalizer:
         self._prediction = OdometryPrediction(
             sensor, config.odometry, config.odometry_var_scale, config.odometry_model
         )
+        self._watch = OdometryWatch(robot, sensor)
         self.belief = initial
         self._pose = initial.pose.as_array()
         self._cov = initial.cov.copy()
@@ -62,12 +64,14 @@ class DeadReckoningLocalizer:
 
     def step(self, readings: Readings) -> Belief:
         """Move by the odometry increment, if there is one."""
-        odometry = readings.by_sensor.get(self._odometry)
-        if isinstance(odometry, OdometryIncrement):
+        odometry = increment_of(readings.by_sensor.get(self._odometry))
+        if odometry is not None:
             if self._second:
                 self._move_by_moments(odometry)
             else:
                 self._prediction.move(self._pose, self._cov, odometry)
+        widened = self._watch.widen(self._cov, readings.t_s, odometry)
+        if odometry is not None or widened:
             self.belief = Belief(Pose2.from_array(self._pose), self._told())
         return self.belief
 

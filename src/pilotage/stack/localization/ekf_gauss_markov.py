@@ -17,7 +17,7 @@ from pilotage.models.odometry import OdometryModel
 from pilotage.sensors.beacon import BeaconConfig
 from pilotage.sensors.readings import BeaconReadings, OdometryIncrement, Readings
 from pilotage.sensors.wheel_odometry import WheelOdometryConfig
-from pilotage.stack.interface import Belief
+from pilotage.stack.interface import Belief, BeliefStatus
 from pilotage.stack.journal import Journal
 from pilotage.stack.knowledge import RobotKnowledge
 from pilotage.stack.localization.gauss_markov_config import (
@@ -25,10 +25,12 @@ from pilotage.stack.localization.gauss_markov_config import (
     GaussMarkovError,
     LandmarkError,
 )
-from pilotage.stack.localization.landmark_filter import MEASUREMENT_DOF, MOST_HEADING_VAR, SIGHTING_COLUMNS
+from pilotage.stack.localization.landmark_filter import MEASUREMENT_DOF, SIGHTING_COLUMNS
 from pilotage.stack.localization.localizer import LOCALIZERS, require_initial_pose
 from pilotage.stack.localization.odometry_prediction import OdometryPrediction
+from pilotage.stack.localization.odometry_watch import MOST_HEADING_VAR, OdometryWatch
 from pilotage.stack.localization.recent_sightings import RecentSightings
+from pilotage.stack.localization.self_check import SelfCheck
 
 NAME = "ekf-gauss-markov"
 
@@ -142,6 +144,10 @@ class EkfGaussMarkovLocalizer:
         self._motion = np.zeros(2)
         self._rejections = self.recoveries = 0
         self._recovered_s, self._doubt = -math.inf, 1.0
+        top = robot.motion.top_speed_m_s, robot.motion.top_turn_rate_rad_s
+        unlogged = config.unlogged_speed_m_s, config.unlogged_turn_rate_rad_s
+        self._unlogged = tuple(most if own is None else own for own, most in zip(unlogged, top, strict=True))
+        self._watch, self._check = OdometryWatch(robot, odometry), SelfCheck()
         self.belief = initial
         self._telemetry = journal.channel(COLUMNS)
 
@@ -150,6 +156,9 @@ class EkfGaussMarkovLocalizer:
         last = readings.t_s - self._dt_s if self._t_s is None else self._t_s
         self._t_s = readings.t_s
         odometry = readings.by_sensor.get(self._odometry)
+        if isinstance(odometry, OdometryIncrement):
+            # What is missing is told below; here speaks what came and cannot be.
+            self._watch.widen(self._cov, readings.t_s, odometry)
         if isinstance(odometry, OdometryIncrement) and readings.t_s > last:
             self._pending.append((last, readings.t_s, odometry.distance_m, odometry.angle_rad))
         self._move(last, readings.t_s)
@@ -158,8 +167,15 @@ class EkfGaussMarkovLocalizer:
             self._update(seen)
         else:
             self._tell(0, 0, 0.0)
-        self.belief = Belief(Pose2.from_array(self._state), self._cov[:3, :3].copy())
+        status = BeliefStatus.LOST if self._lost else BeliefStatus.LOCALIZED
+        self.belief = Belief(Pose2.from_array(self._state), self._cov[:3, :3].copy(), status)
         return self.belief
+
+    @property
+    def _lost(self) -> bool:
+        """Whether the filter has reason not to be believed, or knows its heading too little to go on."""
+        blind = bool(self._cov[2, 2] > self._config.fix_heading_std_rad**2)
+        return blind or self._check.lost(self._t_s or 0.0)
 
     def _move(self, begin_s: float, end_s: float) -> None:
         """Predict from ``begin_s`` to ``end_s`` by the increments that act in between."""
@@ -191,8 +207,8 @@ class EkfGaussMarkovLocalizer:
         self._recent.forget()
         growth = (2.0 * self._unlogged_s + dt_s) * dt_s
         self._unlogged_s += dt_s
-        place = self._config.unlogged_speed_m_s**2 * growth
-        heading = self._config.unlogged_turn_rate_rad_s**2 * growth
+        place = self._unlogged[0] ** 2 * growth
+        heading = self._unlogged[1] ** 2 * growth
         heading = min(heading, max(MOST_HEADING_VAR - self._cov[2, 2], 0.0))
         gauss_markov.inflate(self._cov, 1.0, np.array([place, place, heading]))
 
@@ -246,6 +262,8 @@ class EkfGaussMarkovLocalizer:
             nis,
             outcome,
         )
+        total = float(nis[outcome == OUTCOME_ACCEPTED].sum())
+        self._check.tell(self._t_s or 0.0, int((outcome >= 0).sum()), used, total, used * self._expected_nis)
         for result in outcome:
             if result == OUTCOME_ACCEPTED:
                 self._rejections = max(0, self._rejections - 1)
@@ -258,7 +276,7 @@ class EkfGaussMarkovLocalizer:
             self._doubt_the_drive()
             # Three landmarks that agree on a place have a word against the filter; two may be mistaken.
             self._begin_anew(least_landmarks=3)
-        self._tell(count, used, float(nis[outcome == OUTCOME_ACCEPTED].sum()))
+        self._tell(count, used, total)
 
     def _doubt_the_drive(self) -> None:
         """Recovery after recovery: the drive is another than expected, so its errors may be larger.
@@ -319,6 +337,7 @@ class EkfGaussMarkovLocalizer:
             nis if accepted else math.nan,
             MEASUREMENT_DOF * accepted,
             accepted * self._expected_nis if accepted else math.nan,
+            0.0 if self._lost else 1.0,
             self.recoveries,
             *errors,
         )

@@ -22,9 +22,11 @@ from pilotage.stack.journal import Journal
 from pilotage.stack.knowledge import RobotKnowledge
 from pilotage.stack.localization.localizer import LOCALIZERS, require_initial_pose
 from pilotage.stack.localization.odometry_prediction import OdometryNoise, OdometryPrediction
+from pilotage.stack.localization.odometry_watch import LINEAR_RAD, OdometryWatch, increment_of
 from pilotage.stack.localization.recovery import Recovery, RecoveryConfig
+from pilotage.stack.localization.self_check import SelfCheck
 from pilotage.stack.localization.wall_correction import correct
-from pilotage.stack.localization.wall_matching import LINE_DOF, WallMatcher, WallMatchingConfig
+from pilotage.stack.localization.wall_matching import AMBIGUOUS, LINE_DOF, WallMatcher, WallMatchingConfig
 from pilotage.stack.localization.wall_update import WallUpdate
 from pilotage.stack.perception.lines import DetectedLines, LineExtractionConfig, LineExtractor
 
@@ -39,6 +41,9 @@ COLUMNS = {
 }
 """Lines seen and matched; NIS of the accepted together, its degrees of freedom and its mean; whether the
 robot knows where it is, and how many poses it may have."""
+
+MOST_REFUSED = 0.25
+"""Share of the lines beside walls; those of a right belief are refused in one of a thousand cases."""
 
 
 class EkfWallsConfig(Config):
@@ -114,6 +119,7 @@ class EkfWallsLocalizer:
             )
         gates = self._matcher.joint_gates
         self._expected_nis = [0.0, *(gated_mean(gates[k], LINE_DOF * k) for k in range(1, len(gates)))]
+        self._watch, self._check, self._t_s = OdometryWatch(robot, odometry), SelfCheck(MOST_REFUSED), 0.0
         self._pose = initial.pose.as_array()
         self._cov = initial.cov.copy()
         self.belief = initial
@@ -124,22 +130,39 @@ class EkfWallsLocalizer:
 
     def step(self, readings: Readings) -> Belief:
         """Predict by the odometry increment, then update by the lines of the scan."""
-        odometry = readings.by_sensor.get(self._odometry)
-        if isinstance(odometry, OdometryIncrement):
+        self._t_s = readings.t_s
+        odometry = increment_of(readings.by_sensor.get(self._odometry))
+        if odometry is not None:
             self._move(odometry)
+        self._watch.widen(self._cov, readings.t_s, odometry)
         seen, used, nis = 0, 0, 0.0
         scan = readings.by_sensor.get(self._lidar)
         if isinstance(scan, LidarScan):
             lines = self._extractor.extract(scan.ranges_m)
             lines.covs[:] *= self._var_scale
+            self._lost |= self._recovery is not None and self._blind
             if self._lost:
                 self._find(lines, scan.ranges_m)
             else:
                 used, nis = self._update(lines, scan.ranges_m)
             seen = len(lines)
         self._tell(seen, used, nis)
-        self.belief = self._unknown if self._lost else Belief(Pose2.from_array(self._pose), self._cov.copy())
+        if self._lost:
+            self.belief = self._unknown
+        else:
+            status = BeliefStatus.LOST if self._unsure else BeliefStatus.LOCALIZED
+            self.belief = Belief(Pose2.from_array(self._pose), self._cov.copy(), status)
         return self.belief
+
+    @property
+    def _blind(self) -> bool:
+        """Whether the heading is known too little for lines to be matched."""
+        return bool(self._cov[2, 2] > LINEAR_RAD**2)
+
+    @property
+    def _unsure(self) -> bool:
+        """Whether the belief, which is not given up yet, is not to be relied on."""
+        return self._blind or self._check.lost(self._t_s)
 
     def _move(self, odometry: OdometryIncrement) -> None:
         if not self._lost:
@@ -152,6 +175,10 @@ class EkfWallsLocalizer:
         pose, cov = self._pose.copy(), self._cov.copy()
         matches, total = correct(self._pose, self._cov, self._mount, lines, self._matcher)
         self._journal.update = WallUpdate(pose, cov, self._pose.copy(), lines, matches, self._matcher)
+        # Lines beside no wall at all are of what is on no map; those that may be several walls say nothing.
+        placed = matches.walls[np.isfinite(matches.distances)]
+        known = int((placed != AMBIGUOUS).sum())
+        self._check.tell(self._t_s, known, matches.count, total, self._expected_nis[matches.count])
         if self._recovery is not None:
             self._lost = self._recovery.gives_up(self._pose, self._cov, ranges_m, matches)
         return matches.count, total
@@ -179,6 +206,6 @@ class EkfWallsLocalizer:
             nis,
             LINE_DOF * accepted,
             expected,
-            0.0 if self._lost else 1.0,
+            0.0 if self._lost or self._unsure else 1.0,
             0.0 if self._recovery is None else self._recovery.hypotheses,
         )

@@ -82,9 +82,9 @@ class EkfGaussMarkovConfig(Config):
     """Of a camera that measures depth, beside where its bearings say it looks."""
     landmark_range_error: LandmarkError = LandmarkError(std=0.002, time_constant_s=30.0)
     landmark_bearing_error: LandmarkError = LandmarkError(std=0.0, time_constant_s=30.0)
-    unlogged_speed_m_s: NonNegative = 0.05
-    unlogged_turn_rate_rad_s: NonNegative = 0.2
-    """Standard deviations of what the robot may do while its odometry says nothing."""
+    unlogged_speed_m_s: NonNegative | None = None
+    unlogged_turn_rate_rad_s: NonNegative | None = None
+    """Standard deviations of what the robot may do while its odometry says nothing; None: its top speeds."""
     fix_heading_std_rad: float = Field(default=0.8, gt=0.0)
     """Beyond this the slopes mean nothing: the pose is fitted anew to the landmarks of the last seconds."""
     recovery_rejections: int = Field(default=3, ge=2)

@@ -10,20 +10,24 @@ from pydantic import Field
 from pilotage.core.chi_square import chi_square_quantile, gated_mean
 from pilotage.core.config import Config
 from pilotage.core.errors import InputError
-from pilotage.core.types import FloatArray, Pose2
+from pilotage.core.types import FloatArray, IntArray, Pose2
 from pilotage.kernels.filters import rover_filter
 from pilotage.kernels.filters.invariant import moments
 from pilotage.maps.world_map import WorldMap
 from pilotage.models.odometry import OdometryModel, chord
 from pilotage.sensors.beacon import BeaconConfig
-from pilotage.sensors.readings import BeaconReadings, OdometryIncrement, Readings
+from pilotage.sensors.readings import BeaconReadings, Readings
 from pilotage.sensors.sensor import Positive
 from pilotage.sensors.wheel_odometry import WheelOdometryConfig
-from pilotage.stack.interface import Belief
+from pilotage.stack.interface import Belief, BeliefStatus
 from pilotage.stack.journal import Journal
 from pilotage.stack.knowledge import RobotKnowledge
+from pilotage.stack.localization.beacon_fix import fix_from_beacons
+from pilotage.stack.localization.landmark_filter import SIGHTING_COLUMNS
 from pilotage.stack.localization.localizer import LOCALIZERS, require_initial_pose
 from pilotage.stack.localization.odometry_prediction import OdometryNoise, OdometryPrediction
+from pilotage.stack.localization.odometry_watch import LINEAR_RAD, OdometryWatch, increment_of
+from pilotage.stack.localization.self_check import SelfCheck
 
 NAME = "invariant-ekf-landmarks"
 NOTHING = np.zeros(0, dtype=np.int64), np.zeros(0), np.zeros(0)
@@ -73,30 +77,35 @@ class InvariantEkfLocalizer:
         self._ids = np.ascontiguousarray(chart.landmarks.ids[order])
         self._points = np.ascontiguousarray(chart.landmarks.points_xy_m[order])
         self._R = config.measurement_var_scale * np.diag([seer.range_var_m2, seer.bearing_var_rad2])
+        self._gate_probability = config.gate
         self._gate = chi_square_quantile(config.gate, 2)
         self._expected_nis = gated_mean(self._gate, 2)
         self._pose, self._cov = initial.pose.as_array(), initial.cov.copy()
         self._mean: FloatArray = np.empty(3)
         self._spread: FloatArray = np.empty((3, 3))
         self._refused = np.zeros(1, dtype=np.int64)
+        self._watch, self._check = OdometryWatch(robot, odometry), SelfCheck()
         self.belief = initial
-        self._channel = journal.channel(
-            {"beacons_seen": "1", "beacons_accepted": "1", "nis": "1", "nis_dof": "1", "nis_expected": "1"}
-        )
+        self._channel = journal.channel(SIGHTING_COLUMNS)
 
     def step(self, readings: Readings) -> Belief:
         """Predict by the odometry increment, then update by every landmark seen."""
-        odometry = readings.by_sensor.get(self._odometry)
-        if isinstance(odometry, OdometryIncrement):
+        odometry = increment_of(readings.by_sensor.get(self._odometry))
+        if odometry is not None:
             chord_m, aside_rad = chord(odometry.distance_m, odometry.angle_rad)
             variances = self._prediction.variances(odometry)
             rover_filter.predict(
                 self._pose, self._cov, chord_m, aside_rad, odometry.angle_rad, *variances, True
             )
+        # The error is told at the pose's own place, where these add up as they do in x, y and theta.
+        self._watch.widen(self._cov, readings.t_s, odometry)
         seen = readings.by_sensor.get(self._seer)
         ids, ranges, bearings = NOTHING
         if isinstance(seen, BeaconReadings):
             ids, ranges, bearings = seen.ids, seen.ranges_m, seen.bearings_rad
+            if self._cov[2, 2] > LINEAR_RAD**2:
+                self._begin_anew(ids, ranges, bearings)
+                ids, ranges, bearings = NOTHING
         accepted, nis = rover_filter.update(
             self._pose,
             self._cov,
@@ -110,13 +119,26 @@ class InvariantEkfLocalizer:
             True,
             self._refused,
         )
+        known = int(np.isin(ids, self._ids).sum()) if len(ids) else 0
+        self._check.tell(readings.t_s, known, accepted, nis, accepted * self._expected_nis)
         moments(self._pose, self._cov, self._mean, self._spread)
-        self.belief = Belief(Pose2.from_array(self._mean), self._spread.copy())
+        lost = self._check.lost(readings.t_s) or self._cov[2, 2] > LINEAR_RAD**2
+        status = BeliefStatus.LOST if lost else BeliefStatus.LOCALIZED
+        self.belief = Belief(Pose2.from_array(self._mean), self._spread.copy(), status)
         self._channel.tell(
             float(len(ids)),
             float(accepted),
             nis if accepted else math.nan,
             2.0 * accepted,
             accepted * self._expected_nis if accepted else math.nan,
+            0.0 if lost else 1.0,
         )
         return self.belief
+
+    def _begin_anew(self, ids: IntArray, ranges_m: FloatArray, bearings_rad: FloatArray) -> None:
+        """Take the pose that the sightings agree on, if they do: no iteration mends an unknown heading."""
+        known = np.isin(ids, self._ids)
+        points = self._points[np.searchsorted(self._ids, ids[known])]
+        fix = fix_from_beacons(points, ranges_m[known], bearings_rad[known], np.zeros(3), self._R)
+        if fix is not None and fix.chi2 <= chi_square_quantile(self._gate_probability, fix.dof):
+            self._pose, self._cov = fix.pose, fix.cov

@@ -16,15 +16,22 @@ from pilotage.kernels.filters import sighting
 from pilotage.maps.world_map import WorldMap
 from pilotage.models.odometry import OdometryModel
 from pilotage.sensors.beacon import BeaconConfig
-from pilotage.sensors.readings import BeaconReadings, OdometryIncrement, Readings
+from pilotage.sensors.readings import BeaconReadings, Readings
 from pilotage.sensors.sensor import Positive
 from pilotage.sensors.wheel_odometry import WheelOdometryConfig
-from pilotage.stack.interface import Belief
+from pilotage.stack.interface import Belief, BeliefStatus
 from pilotage.stack.journal import Journal
 from pilotage.stack.knowledge import RobotKnowledge
 from pilotage.stack.localization.beacon_fix import fix_from_beacons
 from pilotage.stack.localization.localizer import require_initial_pose
 from pilotage.stack.localization.odometry_prediction import OdometryNoise, OdometryPrediction, Predict
+from pilotage.stack.localization.odometry_watch import (
+    LINEAR_RAD,
+    MOST_HEADING_VAR,
+    OdometryWatch,
+    increment_of,
+)
+from pilotage.stack.localization.self_check import SelfCheck
 
 MEASUREMENT_DOF = 2
 """Range and bearing."""
@@ -34,12 +41,12 @@ SIGHTING_COLUMNS = {
     "nis": "1",
     "nis_dof": "1",
     "nis_expected": "1",
+    "localized": "1",
 }
-"""Beacons seen and accepted; NIS summed over the accepted, its degrees of freedom and its mean."""
+"""Beacons seen and accepted; NIS summed over the accepted, its degrees of freedom and its mean; whether the
+robot holds itself for localized."""
 WIDENING = 2.0
 """A filter in doubt multiplies the pose's standard deviations by this at every sighting until one passes."""
-MOST_HEADING_VAR = math.pi**2 / 3.0
-"""Of a heading of which nothing is known."""
 
 
 class LandmarkFilterConfig(Config):
@@ -112,6 +119,7 @@ class LandmarkFilter:
         self._gate = chi_square_quantile(config.gate, MEASUREMENT_DOF)
         self._expected_nis = gated_mean(self._gate, MEASUREMENT_DOF)
         self._doubt_after, self._rejected = config.doubt_after, 0
+        self._watch, self._check, self._t_s = OdometryWatch(robot, odometry), SelfCheck(), 0.0
         self._pose = initial.pose.as_array()
         self._cov = initial.cov.copy()
         self.belief = initial
@@ -119,20 +127,36 @@ class LandmarkFilter:
 
     def step(self, readings: Readings) -> Belief:
         """Predict by the odometry increment, then update by every beacon seen."""
-        odometry = readings.by_sensor.get(self._odometry)
-        if isinstance(odometry, OdometryIncrement):
+        self._t_s = readings.t_s
+        odometry = increment_of(readings.by_sensor.get(self._odometry))
+        if odometry is not None:
             self._prediction.move(self._pose, self._cov, odometry)
+        self._watch.widen(self._cov, readings.t_s, odometry)
         seen = readings.by_sensor.get(self._beacons)
         if isinstance(seen, BeaconReadings):
             self._update(seen)
         else:
             self._tell(0, 0, 0.0)
         # A filter may estimate more than the pose, which comes first.
-        self.belief = Belief(Pose2.from_array(self._pose), self._cov[:3, :3].copy())
+        status = BeliefStatus.LOST if self._lost else BeliefStatus.LOCALIZED
+        self.belief = Belief(Pose2.from_array(self._pose), self._cov[:3, :3].copy(), status)
         return self.belief
+
+    @property
+    def _lost(self) -> bool:
+        """Whether the filter has reason not to be believed, or knows its heading too little to go on."""
+        return self._check.lost(self._t_s) or self._blind
+
+    @property
+    def _blind(self) -> bool:
+        return bool(self._cov[2, 2] > LINEAR_RAD**2)
 
     def _update(self, seen: BeaconReadings) -> None:
         count = seen.ids.shape[0]
+        if self._blind:
+            self._begin_anew(seen, np.isin(seen.ids, self._ids))
+            self._tell(count, 0, 0.0)
+            return
         nis = np.empty(count)
         outcome = np.empty(count, dtype=np.int64)
         used = self._update_kernel(
@@ -149,13 +173,14 @@ class LandmarkFilter:
             nis,
             outcome,
         )
+        known = outcome != sighting.OUTCOME_UNKNOWN
+        accepted = nis if used == count else nis[outcome == sighting.OUTCOME_ACCEPTED]
+        total = float(accepted.sum())
+        self._check.tell(self._t_s, int(known.sum()), used, total, used * self._expected_nis)
+        self._tell(count, used, total)
         if used:
-            accepted = nis if used == count else nis[outcome == sighting.OUTCOME_ACCEPTED]
-            self._tell(count, used, float(accepted.sum()))
             self._rejected = 0
             return
-        self._tell(count, 0, 0.0)
-        known = outcome != sighting.OUTCOME_UNKNOWN
         if known.any():
             self._rejected += 1
             if self._doubt_after is not None and self._rejected >= self._doubt_after:
@@ -163,6 +188,16 @@ class LandmarkFilter:
 
     def _doubt(self, seen: BeaconReadings, known: BoolArray) -> None:
         """Begin anew where the beacons agree on a pose, else believe the old one less."""
+        self._check.alarm(self._t_s)
+        if self._begin_anew(seen, known):
+            return
+        stds = np.ones(self._pose.shape[0])
+        stds[:3] = WIDENING
+        stds[2] = min(WIDENING, math.sqrt(MOST_HEADING_VAR / max(float(self._cov[2, 2]), 1e-12)))
+        self._cov *= np.outer(stds, stds)  # correlations stay as they are
+
+    def _begin_anew(self, seen: BeaconReadings, known: BoolArray) -> bool:
+        """Take the pose that the beacons agree on, if they do."""
         points = self._points[np.searchsorted(self._ids, seen.ids[known])]
         bearings = seen.bearings_rad[known] - self._bearing_offset_rad
         fix = fix_from_beacons(points, seen.ranges_m[known], bearings, self._mount, self._R)
@@ -171,11 +206,8 @@ class LandmarkFilter:
             self._cov[:3, :], self._cov[:, :3] = 0.0, 0.0
             self._cov[:3, :3] = fix.cov
             self._rejected = 0
-            return
-        stds = np.ones(self._pose.shape[0])
-        stds[:3] = WIDENING
-        stds[2] = min(WIDENING, math.sqrt(MOST_HEADING_VAR / max(float(self._cov[2, 2]), 1e-12)))
-        self._cov *= np.outer(stds, stds)  # correlations stay as they are
+            return True
+        return False
 
     @property
     def _bearing_offset_rad(self) -> float:
@@ -187,4 +219,5 @@ class LandmarkFilter:
         expected = accepted * self._expected_nis
         if accepted == 0:
             nis = expected = math.nan
-        self._telemetry.tell(seen, accepted, nis, MEASUREMENT_DOF * accepted, expected)
+        localized = 0.0 if self._lost else 1.0
+        self._telemetry.tell(seen, accepted, nis, MEASUREMENT_DOF * accepted, expected, localized)

@@ -10,6 +10,7 @@ import numpy as np
 from pydantic import Field, model_validator
 from scipy.special import ndtri
 
+from pilotage.core.angles import wrap_array_to_pi, wrap_to_pi
 from pilotage.core.config import Config
 from pilotage.core.errors import InputError
 from pilotage.core.types import FloatArray, Pose2
@@ -21,16 +22,29 @@ from pilotage.sensors.lidar import LidarConfig
 from pilotage.sensors.readings import LidarScan, OdometryIncrement, Readings
 from pilotage.sensors.sensor import NonNegative, Positive
 from pilotage.sensors.wheel_odometry import WheelOdometryConfig
-from pilotage.stack.interface import Belief
+from pilotage.stack.interface import Belief, BeliefStatus
 from pilotage.stack.journal import Journal
 from pilotage.stack.knowledge import RobotKnowledge
 from pilotage.stack.localization.localizer import LOCALIZERS, require_initial_pose
 from pilotage.stack.localization.odometry_prediction import OdometryNoise, OdometryPrediction
+from pilotage.stack.localization.odometry_watch import (
+    LINEAR_RAD,
+    MOST_HEADING_VAR,
+    OdometryWatch,
+    increment_of,
+)
+from pilotage.stack.localization.self_check import SelfCheck
 
 WALL_STD_M, GRID_SHARE = 0.01, 1.0 / 3.0
 NAME = "particle-filter"
-COLUMNS = {"particles": "1", "effective_particles": "1", "scan_parts": "1"}
-"""Size of the cloud, how much of it was effective, and how many parts the scan was let in by."""
+COLUMNS = {"particles": "1", "effective_particles": "1", "scan_parts": "1", "localized": "1"}
+"""Size of the cloud, how much of it was effective, how many parts the scan was let in by, and whether the
+robot holds itself for localized."""
+POSE_DOF = 3.0
+AT_WALL_STDS, MOST_BESIDE = 3, 0.25
+"""A beam so near to a wall ends at it; a belief of which a larger share of beams end beside one is wrong."""
+LEAST_AT_WALL, UNEXPLAINED_SCANS = 0.15, 10
+"""A crowd may hide the walls for a while; more scans that show fewer of them speak against the belief."""
 TABLE_PER_STD, TABLE_STDS = 50, 12
 """The table of a beam's density: entries per standard deviation, and how many of these."""
 FLOOR = np.diag([1e-12, 1e-12, 1e-12])
@@ -114,6 +128,9 @@ class ParticleFilterLocalizer:
         self._prediction = OdometryPrediction(
             odometry, config.odometry, config.odometry_var_scale, config.odometry_model
         )
+        self._watch, self._check = OdometryWatch(robot, odometry), SelfCheck(MOST_BESIDE)
+        self._blind = bool(initial.cov[2, 2] > LINEAR_RAD**2)
+        self._unexplained = 0
         self._field = _field_of(config, chart)
         self._picked = np.unique(np.linspace(0, lidar.beams - 1, min(config.beams, lidar.beams)).astype(int))
         angles = lidar.beam_angles_rad()[self._picked] + lidar.mount.theta_rad
@@ -136,17 +153,27 @@ class ParticleFilterLocalizer:
 
     def step(self, readings: Readings) -> Belief:
         """Move the cloud by the odometry increment, then weigh it by the scan."""
-        odometry = readings.by_sensor.get(self._odometry)
-        if isinstance(odometry, OdometryIncrement):
+        odometry = increment_of(readings.by_sensor.get(self._odometry))
+        if odometry is not None:
             self._move(odometry)
+        self._spread(*self._watch.variances(readings.t_s, odometry))
         scan = readings.by_sensor.get(self._lidar)
-        moments = self._weigh(scan.ranges_m) if isinstance(scan, LidarScan) else None
+        moments = None
+        if isinstance(scan, LidarScan) and not self._blind:
+            prior = self._unweighted()
+            moments = self._weigh(scan.ranges_m)
+            if moments is not None:
+                self._judge(prior, moments[0], scan.ranges_m, readings.t_s)
         if moments is None:
             self._rounds, self._effective = 0, float(self._poses.shape[0])
-            moments = _moments(self._poses, np.full(self._poses.shape[0], 1.0 / self._poses.shape[0]))
+            moments = self._unweighted()
         mean, cov = moments
-        self.belief = Belief(Pose2.from_array(mean), cov)
-        self._telemetry.tell(self._poses.shape[0], self._effective, self._rounds)
+        self._blind = bool(cov[2, 2] > LINEAR_RAD**2)
+        lost = self._blind or self._check.lost(readings.t_s)
+        self.belief = Belief(
+            Pose2.from_array(mean), cov, BeliefStatus.LOST if lost else BeliefStatus.LOCALIZED
+        )
+        self._telemetry.tell(self._poses.shape[0], self._effective, self._rounds, 0.0 if lost else 1.0)
         return self.belief
 
     def _move(self, odometry: OdometryIncrement) -> None:
@@ -161,17 +188,22 @@ class ParticleFilterLocalizer:
             self._prediction.exact,
         )
 
+    def _spread(self, place_m2: float, heading_rad2: float) -> None:
+        """Move the particles apart by what the odometry has not told."""
+        if place_m2 > 0.0 or heading_rad2 > 0.0:
+            stds = np.sqrt([place_m2, place_m2, min(heading_rad2, MOST_HEADING_VAR)])
+            self._poses += stds * self._rng.standard_normal(self._poses.shape)
+            self._poses[:, 2] = wrap_array_to_pi(self._poses[:, 2])
+
     def _weigh(self, ranges_m: FloatArray) -> tuple[FloatArray, FloatArray] | None:
         """Weigh and resample the cloud; returns the weighted mean and covariance, None for an empty scan."""
-        ranges = ranges_m[self._picked]
-        seen = ranges < self._max_range  # neither beyond reach nor NaN
-        if not seen.any():
+        points = self._points_of(ranges_m)
+        if not len(points):
             return None
-        points = self._mount_xy + ranges[seen, None] * self._directions[seen]
         remaining, self._rounds = 1.0, 0
         while True:
             self._rounds += 1
-            likelihoods = self._log_likelihoods(points)
+            likelihoods = self._log_likelihoods(points, self._poses)
             part = remaining
             if self._rounds < self._config.most_rounds:
                 enough = self._config.effective_share * self._poses.shape[0]
@@ -184,11 +216,42 @@ class ParticleFilterLocalizer:
             if remaining <= 0.0:
                 return moments
 
-    def _log_likelihoods(self, points: FloatArray) -> FloatArray:
-        out = np.empty(self._poses.shape[0])
+    def _unweighted(self) -> tuple[FloatArray, FloatArray]:
+        """Mean and covariance of the cloud as it is."""
+        return _moments(self._poses, np.full(self._poses.shape[0], 1.0 / self._poses.shape[0]))
+
+    def _points_of(self, ranges_m: FloatArray) -> FloatArray:
+        """(K, 2) where the picked beams ended, in the robot's frame."""
+        ranges = ranges_m[self._picked]
+        seen = ranges < self._max_range  # neither beyond reach nor NaN
+        points: FloatArray = self._mount_xy + ranges[seen, None] * self._directions[seen]
+        return points
+
+    def _judge(
+        self, prior: tuple[FloatArray, FloatArray], mean: FloatArray, ranges_m: FloatArray, t_s: float
+    ) -> None:
+        """Hold the scan against the belief before it, and beam by beam against the one after it.
+
+        The step from the one mean to the other is at most as large as the first was uncertain. A beam that
+        ends far from any wall may have hit what is on no map; many that end beside one, not at it, say that
+        the pose is off, and so does a scan of which next to nothing is at a wall.
+        """
+        points, pose = self._points_of(ranges_m), mean[None]
+        beams = np.array([self._log_likelihoods(point[None], pose)[0] for point in points])
+        at_wall = int((beams >= self._table[AT_WALL_STDS * TABLE_PER_STD]).sum())
+        beside = int((beams > self._table[-2]).sum())
+        step = mean - prior[0]
+        step[2] = wrap_to_pi(float(step[2]))
+        self._check.tell(t_s, beside, at_wall, float(step @ np.linalg.solve(prior[1], step)), POSE_DOF)
+        self._unexplained = self._unexplained + 1 if at_wall < LEAST_AT_WALL * len(points) else 0
+        if self._unexplained >= UNEXPLAINED_SCANS:
+            self._check.alarm(t_s)
+
+    def _log_likelihoods(self, points: FloatArray, poses: FloatArray) -> FloatArray:
+        out = np.empty(poses.shape[0])
         field = self._field
         particles.log_likelihoods(
-            self._poses,
+            poses,
             points,
             field.index,
             *field.origin_xy_m,

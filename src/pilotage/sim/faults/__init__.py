@@ -1,0 +1,1 @@
+"""What may go wrong between a sensor and the robot's stack."""

@@ -1,0 +1,61 @@
+"""A filter's doubt of itself: readings that it refuses or that fit worse than they should."""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+
+WINDOW = 30
+"""Updates that are looked back at."""
+LEAST_SEEN = 10
+"""Readings, fewer of which say nothing."""
+REFUSED_SHARE = 0.5
+"""Who refuses more than this is wrong as likely as its readings are."""
+NIS_EXCESS, NIS_SIGMAS = 0.5, 6.0
+"""NIS of the accepted over what is expected, less 1: a model is never exact, and chance has its share."""
+HOLD_S, MOST_HOLD_S = 3.0, 60.0
+"""How long all has to be well before it is believed again; doubled each time that it was not for long."""
+SOON_S = 30.0
+
+
+class SelfCheck:
+    """Watches a filter's own readings and says when it is not to be believed.
+
+    The NIS stays in its band as long as model, readings and belief agree (Bar-Shalom et al. 2001, section
+    5.4.2). It cannot see what no reading contradicts: an error that all landmarks in sight share is taken
+    for motion until others come into sight. Who had to begin anew is therefore believed later each time.
+    """
+
+    def __init__(self, refused_share: float = REFUSED_SHARE) -> None:
+        self._used_share = 1.0 - refused_share
+        self._updates: deque[tuple[float, ...]] = deque()
+        self._sums = [0.0, 0.0, 0.0, 0.0]
+        self._hold_s, self._until_s = HOLD_S, -math.inf
+
+    def tell(self, t_s: float, seen: int, accepted: int, nis: float, expected: float) -> None:
+        """One update: readings of known things, those accepted, their NIS summed, and its mean."""
+        if seen == 0:
+            return
+        update = (float(seen), float(accepted), nis, expected)
+        self._updates.append(update)
+        gone = self._updates.popleft() if len(self._updates) > WINDOW else (0.0, 0.0, 0.0, 0.0)
+        for k in range(4):
+            self._sums[k] += update[k] - gone[k]
+        all_seen, used, total, mean = self._sums
+        if all_seen < LEAST_SEEN:
+            return
+        # The NIS of a two-dimensional reading has mean 2 and variance 4.
+        excess = max(NIS_EXCESS, NIS_SIGMAS / math.sqrt(max(used, 1.0)))
+        if used < self._used_share * all_seen or total > (1.0 + excess) * mean:
+            self.alarm(t_s)
+
+    def alarm(self, t_s: float) -> None:
+        """The filter is wrong, or has had to give up its pose or its certainty."""
+        if t_s >= self._until_s:
+            soon = t_s < self._until_s + SOON_S
+            self._hold_s = min(2.0 * self._hold_s, MOST_HOLD_S) if soon else HOLD_S
+        self._until_s = t_s + self._hold_s
+
+    def lost(self, t_s: float) -> bool:
+        """Whether the filter is not to be believed now."""
+        return t_s < self._until_s

@@ -1,0 +1,207 @@
+"""Faults of sensors: what they do to the stream, in a mission, and to nobody else."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from pilotage.core.errors import InputError
+from pilotage.core.types import STOP
+from pilotage.experiments.build.build import build
+from pilotage.experiments.loop import run_loop, simulate
+from pilotage.experiments.mission import load_mission
+from pilotage.experiments.run import judge
+from pilotage.sensors.readings import BeaconReadings, LidarScan, OdometryIncrement, Readings
+from pilotage.sensors.wheel_odometry import WheelOdometryConfig
+from pilotage.sim.faults.fault import Faults, FaultSetting, arrived
+from pilotage.sim.faults.late import Delay, DelayConfig, Repeat, RepeatConfig, Shuffle, ShuffleConfig
+from pilotage.sim.faults.lost import Drop, DropConfig, Gap, GapConfig
+from pilotage.sim.faults.wrong import BiasStep, BiasStepConfig, SwapIdentities, SwapIdentitiesConfig
+from pilotage.stack.interface import Belief, BeliefStatus
+from pilotage.stack.localization.ekf_landmarks import EkfLandmarkLocalizer
+from pilotage.stack.localization.landmark_filter import LandmarkFilterConfig
+from pilotage.stack.localization.odometry_watch import OdometryWatch
+from pilotage.stack.localization.self_check import HOLD_S, SelfCheck
+from support.robots import BEACONS, told_of
+
+STEPS = 2000
+
+
+def setting() -> FaultSetting:
+    return FaultSetting(np.random.default_rng(1), BEACONS.ids, "robot.faults.0")
+
+
+def odometry(step: int) -> OdometryIncrement:
+    return OdometryIncrement(float(step), 0.0)
+
+
+class TestStreams:
+    def test_a_share_is_dropped(self) -> None:
+        drop = Drop(DropConfig(sensor="odometry", share=0.3), setting())
+        kept = sum(len(drop.pass_on(0.1 * k, (odometry(k),))) for k in range(STEPS))
+        # 4 sigma of a binomial: a false alarm in some 16,000 seeds.
+        assert abs(kept - 0.7 * STEPS) < 4.0 * np.sqrt(0.21 * STEPS)
+
+    def test_a_gap_has_its_length(self) -> None:
+        faults = Faults(
+            [(config := GapConfig(sensor="odometry", from_s=1.0, length_s=2.0), Gap(config, setting()))]
+        )
+        came = [round(0.1 * k, 1) for k in range(50) if faults.pass_on(0.1 * k, {"odometry": odometry(k)})]
+        assert max(t for t in came if t < 2.0) == 0.9
+        assert min(t for t in came if t > 2.0) == 3.0
+
+    def test_what_is_late_comes_whole_and_not_too_late(self) -> None:
+        delay = Delay(DelayConfig(sensor="odometry", most_s=0.25), setting())
+        came = [(k, one) for k in range(100) for one in delay.pass_on(0.1 * k, (odometry(k),))]
+        late = [k - int(one.distance_m) for k, one in came if isinstance(one, OdometryIncrement)]
+        assert min(late) >= 0
+        assert max(late) == 3  # steps of 0.1 s
+        assert len(came) >= 97
+        order = [one.distance_m for _, one in came if isinstance(one, OdometryIncrement)]
+        assert order != sorted(order)
+
+    def test_what_is_shuffled_keeps_every_reading(self) -> None:
+        shuffle = Shuffle(ShuffleConfig(sensor="odometry", window=4), setting())
+        came = [one for k in range(100) for one in shuffle.pass_on(0.1 * k, (odometry(k),))]
+        order = [int(one.distance_m) for one in came if isinstance(one, OdometryIncrement)]
+        assert order != sorted(order)
+        assert sorted(order[:96]) == list(range(96))
+
+    def test_readings_of_one_step_arrive_as_one(self) -> None:
+        repeat = Repeat(RepeatConfig(sensor="odometry", share=1.0), setting())
+        twice = repeat.pass_on(0.1, (OdometryIncrement(0.1, 0.2, 0.3),))
+        assert arrived(twice) == OdometryIncrement(0.2, 0.4, 0.6)
+        seen = BeaconReadings(np.array([1]), np.array([2.0]), np.array([0.5]))
+        merged = arrived([seen, seen])
+        assert isinstance(merged, BeaconReadings)
+        assert merged.ids.tolist() == [1, 1]
+        first, last = LidarScan(np.ones(3)), LidarScan(np.zeros(3))
+        assert arrived([first, last]) is last
+
+    def test_identities_are_swapped_for_others_of_the_map(self) -> None:
+        swap = SwapIdentities(SwapIdentitiesConfig(sensor="beacons", share=1.0), setting())
+        ids = BEACONS.ids[:2].copy()
+        seen = BeaconReadings(ids, np.array([2.0, 3.0]), np.array([0.5, 0.6]))
+        (told,) = swap.pass_on(0.1, (seen,))
+        assert isinstance(told, BeaconReadings)
+        assert (told.ids != ids).all()
+        assert np.isin(told.ids, BEACONS.ids).all()
+        assert seen.ids.tolist() == BEACONS.ids[:2].tolist()
+
+    def test_a_bias_begins_when_it_is_told_to(self) -> None:
+        config = BiasStepConfig(sensor="odometry", from_s=1.0, by_m=0.5)
+        faults = Faults([(config, BiasStep(config, setting()))])
+        assert faults.pass_on(0.9, {"odometry": odometry(1)})["odometry"] == odometry(1)
+        assert faults.pass_on(1.0, {"odometry": odometry(1)})["odometry"] == OdometryIncrement(1.5, 0.0)
+
+
+class TestMissions:
+    SHORT = ("run.time_limit_s=8", "run.oracles=[driver]")
+
+    def test_a_fault_of_one_sensor_leaves_what_others_draw(self) -> None:
+        def last_readings(*settings: str) -> Readings:
+            built = build(load_mission("museum-route", [*self.SHORT, *settings], 3))
+            return [built.simulator.step([STOP]) for _ in range(20)][-1][0]
+
+        plain = last_readings()
+        off = last_readings("robot.faults=[{name: bias-step, sensor: beacons, by_m: 1.0}]")
+        assert repr(plain.by_sensor["odometry"]) == repr(off.by_sensor["odometry"])
+        before, after = plain.by_sensor["beacons"], off.by_sensor["beacons"]
+        assert isinstance(before, BeaconReadings)
+        assert isinstance(after, BeaconReadings)
+        assert after.ranges_m == pytest.approx(before.ranges_m + 1.0)
+
+    def test_the_same_seed_gives_the_same_faults(self) -> None:
+        fault = "robot.faults=[{name: drop, sensor: odometry}, {name: outliers, sensor: beacons}]"
+        mission = load_mission("museum-route", [*self.SHORT, fault], 4)
+        one, other = (simulate(mission).finished.robots[0].trace for _ in range(2))
+        assert all(one[name].tobytes() == other[name].tobytes() for name in one)
+
+    @pytest.mark.parametrize(
+        ("faults", "words"),
+        [
+            (
+                "[{name: drop, sensor: odometer}]",
+                "robot.faults.0.sensor: unknown sensor 'odometer'; did you mean 'odometry'?",
+            ),
+            ("[{name: dropp, sensor: odometry}]", "unknown fault 'dropp'; did you mean 'drop'?"),
+            ("[{name: drop}]", "robot.faults.0"),
+            ("[{name: drop, sensor: odometry, share: 2}]", "robot.faults.0.share"),
+        ],
+    )
+    def test_wrong_faults_are_refused(self, faults: str, words: str) -> None:
+        with pytest.raises(InputError) as caught:
+            build(load_mission("museum-route", [f"robot.faults={faults}"], 0))
+        assert words in str(caught.value)
+        assert "\n" not in str(caught.value)
+
+
+class TestWatching:
+    def test_silence_widens_by_what_could_be_driven(self) -> None:
+        robot = told_of().robot
+        watch = OdometryWatch(robot, WheelOdometryConfig(rate_hz=10.0))
+        top = robot.motion.top_speed_m_s
+        place = 0.0
+        for k in range(1, 31):
+            said = OdometryIncrement(0.05, 0.0) if k <= 10 else None
+            more, _ = watch.variances(0.1 * k, said)
+            assert (more == 0.0) == (k <= 10)
+            place += more
+        assert place == pytest.approx((top * 2.0) ** 2)
+
+    def test_an_increment_beyond_the_top_speed_is_as_uncertain_as_it_is_long(self) -> None:
+        robot = told_of().robot
+        watch = OdometryWatch(robot, WheelOdometryConfig(rate_hz=10.0))
+        far = 3.0 * robot.motion.top_speed_m_s * 0.1
+        assert watch.variances(0.1, OdometryIncrement(0.05, 0.0)) == (0.0, 0.0)
+        assert watch.variances(0.2, OdometryIncrement(far, 0.0))[0] == pytest.approx(far**2)
+
+    def test_a_filter_is_believed_later_each_time_that_it_was_wrong(self) -> None:
+        check, t_s, waits = SelfCheck(), 0.0, []
+        for _ in range(3):
+            check.alarm(t_s)
+            begin = t_s
+            while check.lost(t_s):
+                t_s += 0.1
+            waits.append(t_s - begin)
+        assert waits == pytest.approx([HOLD_S, 2 * HOLD_S, 4 * HOLD_S], abs=0.11)
+
+    def test_readings_in_their_band_say_nothing(self) -> None:
+        """Of chi-square NIS: 6 sigma of the sum over the window, a false alarm in some 1e9 updates."""
+        rng, check = np.random.default_rng(2), SelfCheck()
+        for k in range(5000):
+            check.tell(0.1 * k, 4, 4, float(rng.chisquare(8)), 8.0)
+            assert not check.lost(0.1 * k)
+        for k in range(5000, 5030):
+            check.tell(0.1 * k, 4, 4, 2.0 * float(rng.chisquare(8)), 8.0)
+        assert check.lost(503.0)
+
+
+@pytest.mark.parametrize(
+    ("localizer", "faults"),
+    [
+        ("ekf-landmarks", "{name: bias-step, sensor: beacons, from_s: 30, by_m: 0.3}"),
+        ("invariant-ekf-landmarks", "{name: shuffle, sensor: odometry}, {name: shuffle, sensor: beacons}"),
+        ("ekf-walls", "{name: shuffle, sensor: odometry}, {name: shuffle, sensor: lidar}"),
+    ],
+)
+def test_bad_readings_make_no_filter_silently_wrong(
+    localizer: str, faults: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """And without its check of itself it is: this test can fail."""
+    settings = ["run.oracles=[driver]", "stack.mapper=null", f"stack.localizer={{name: {localizer}}}"]
+
+    def silently_wrong_s() -> float:
+        experiment = build(load_mission("museum-route", [*settings, f"robot.faults=[{faults}]"], 0))
+        return float(str(judge(experiment, run_loop(experiment)).metrics["silently_wrong_s"]))
+
+    assert silently_wrong_s() <= 5.0
+    monkeypatch.setattr(SelfCheck, "lost", lambda *_: False)
+    assert silently_wrong_s() > 5.0
+
+
+def test_a_filter_that_knows_no_heading_says_so_until_beacons_agree() -> None:
+    told = told_of()
+    vague = Belief(told.initial.pose, np.diag([4.0, 4.0, 1.0]))
+    localizer = EkfLandmarkLocalizer(LandmarkFilterConfig(), told.robot, told.chart, vague, told.journal)
+    assert localizer.step(Readings(0.1, {})).status is BeliefStatus.LOST
