@@ -21,6 +21,7 @@ from pilotage.experiments.run import run_mission
 from pilotage.maps.cell_map_text import read_cell_map
 from pilotage.maps.ros_map import read_ros_map
 from pilotage.maps.true_cells import SheetFile
+from pilotage.report.sheet.side_by_side import write_side_by_side
 from pilotage.sim.bodies.wheel_drive import WheelDrive
 from pilotage.stack.interface import StackStatus
 from support.missions import explore
@@ -251,3 +252,22 @@ def test_heading_filters_that_cannot_be_are_refused(
     told = capsys.readouterr().err.strip()
     assert says in told
     assert "\n" not in told
+
+
+def test_runs_side_by_side_have_a_panel_each(tmp_path: Path) -> None:
+    folders = {}
+    for name, fusion in (("with fusion", "on"), ("without", "off")):
+        mission = load_mission(
+            "romi-explore", (REPORT, f"stack.navigator.fusion={fusion}", "run.time_limit_s=6")
+        )
+        folder = run_mission(mission, out=tmp_path).run_dir
+        assert folder is not None
+        folders[name] = folder
+    page = write_side_by_side(folders, tmp_path / "both.html").read_text()
+    assert all(f'id="{slug}"' in page for slug in ("paths", "visits", "features"))
+    assert "with fusion: time limit of 6 s reached; without:" in page
+    museum = run_mission(load_mission("museum-1", ("run.time_limit_s=1",)), out=tmp_path).run_dir
+    assert museum is not None
+    with pytest.raises(InputError, match="a run on a sheet"):
+        write_side_by_side({"museum": museum}, tmp_path / "none.html")
+    assert not (tmp_path / "none.html").exists()

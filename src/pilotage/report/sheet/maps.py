@@ -5,9 +5,11 @@ from __future__ import annotations
 from collections import Counter
 
 import numpy as np
+from matplotlib.axes import Axes
 
 from pilotage.core.types import BoolArray
 from pilotage.maps.cell_map import FEATURES, CellState
+from pilotage.records.cells import SheetData
 from pilotage.records.numbers import number
 from pilotage.records.run_data import RunData
 from pilotage.report import quantities
@@ -28,6 +30,14 @@ _STATES = (
 _REASON_COLOURS = (VERMILLION, BLUE, ORANGE, PURPLE, GREEN)
 
 
+ACCURACY_KEYS = (
+    Key("right", BLUE, "band", layer="right", opacity=1.0),
+    Key("there, but not on the map", _LIGHT, "band", layer="missed", opacity=1.0),
+    Key("on the map, but not there", ORANGE, "band", layer="wrong", opacity=0.75),
+    Key("the wrong letter", VERMILLION, "band", layer="letter", opacity=0.75),
+)
+
+
 def accuracy_figure(run: RunData) -> Illustration:
     """Visited cells and features: what is right, what was missed, what is wrong."""
     slug, title = "accuracy", "What the robot's map got right"
@@ -35,25 +45,8 @@ def accuracy_figure(run: RunData) -> Illustration:
     if sheet is None:
         return Illustration(slug, title, "", "The run left no cells.npz.")
     figure, (left, right) = sheet_panels(sheet, ["visited cells", "features"])
-    both = sheet.visited & sheet.own_visited
-    fill_cells(left, sheet, both, BLUE, "right")
-    fill_cells(left, sheet, sheet.visited & ~both, _LIGHT, "missed")
-    fill_cells(left, sheet, sheet.own_visited & ~both, ORANGE, "wrong", 0.75)
-    mapped, real = _features(sheet.states), _features(sheet.true_states)
-    correct = mapped & (sheet.states == sheet.true_states)
-    fill_cells(right, sheet, correct, BLUE, "right")
-    fill_cells(right, sheet, real & ~correct, _LIGHT, "missed")
-    fill_cells(right, sheet, mapped & ~correct & ~real, ORANGE, "wrong", 0.75)
-    fill_cells(right, sheet, mapped & ~correct & real, VERMILLION, "letter", 0.75)
-    for axes in (left, right):
-        draw_grid(axes, sheet)
-        draw_things(axes, sheet, filled=False)
-    keys = (
-        Key("right", BLUE, "band", layer="right", opacity=1.0),
-        Key("there, but not on the map", _LIGHT, "band", layer="missed", opacity=1.0),
-        Key("on the map, but not there", ORANGE, "band", layer="wrong", opacity=0.75),
-        Key("the wrong letter", VERMILLION, "band", layer="letter", opacity=0.75),
-    )
+    draw_visits(left, sheet)
+    draw_features(right, sheet)
     shares = [
         f"{name} {quantities.share(number(run.metrics.get(key)))}"
         for key, name in (
@@ -68,7 +61,29 @@ def accuracy_figure(run: RunData) -> Illustration:
         "not overwrite. Right: its OBSTACLE and LINE cells against the true ones. " + ", ".join(shares) + "."
     )
     alt = "Two maps of cells: visited and feature cells that the robot's map has right, missed and wrong"
-    return Illustration(slug, title, alt, caption, render(figure, slug, alt), keys)
+    return Illustration(slug, title, alt, caption, render(figure, slug, alt), ACCURACY_KEYS)
+
+
+def draw_visits(axes: Axes, sheet: SheetData) -> None:
+    """Cells that the robot was in, against its own visited layer."""
+    both = sheet.visited & sheet.own_visited
+    fill_cells(axes, sheet, both, BLUE, "right")
+    fill_cells(axes, sheet, sheet.visited & ~both, _LIGHT, "missed")
+    fill_cells(axes, sheet, sheet.own_visited & ~both, ORANGE, "wrong", 0.75)
+    draw_grid(axes, sheet)
+    draw_things(axes, sheet, filled=False)
+
+
+def draw_features(axes: Axes, sheet: SheetData) -> None:
+    """Its OBSTACLE and LINE cells against the true ones."""
+    mapped, real = _features(sheet.states), _features(sheet.true_states)
+    correct = mapped & (sheet.states == sheet.true_states)
+    fill_cells(axes, sheet, correct, BLUE, "right")
+    fill_cells(axes, sheet, real & ~correct, _LIGHT, "missed")
+    fill_cells(axes, sheet, mapped & ~correct & ~real, ORANGE, "wrong", 0.75)
+    fill_cells(axes, sheet, mapped & ~correct & real, VERMILLION, "letter", 0.75)
+    draw_grid(axes, sheet)
+    draw_things(axes, sheet, filled=False)
 
 
 def printed_figure(run: RunData) -> Illustration:

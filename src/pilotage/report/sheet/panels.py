@@ -21,20 +21,28 @@ MARGIN_SHARE = 0.04
 """Of the sheet's longer side, around it: the body may reach over the edge."""
 
 
-def sheet_panels(sheet: SheetData, titles: Sequence[str]) -> tuple[Figure, list[Axes]]:
-    """Panels side by side, each the whole sheet to scale."""
+def sheet_panels(
+    sheet: SheetData, titles: Sequence[str], columns: int | None = None
+) -> tuple[Figure, list[Axes]]:
+    """Panels side by side, so many in a row (None: all), each the whole sheet to scale."""
+    columns = len(titles) if columns is None else columns
+    rows = -(-len(titles) // columns)
     width, height = sheet.size_m
     margin = MARGIN_SHARE * max(width, height)
     across, up = width + 2.0 * margin, height + 2.0 * margin
-    room = (WIDTH_PT - _LEFT_PT - _RIGHT_PT - _GAP_PT * (len(titles) - 1)) / len(titles)
+    room = (WIDTH_PT - _LEFT_PT - _RIGHT_PT - _GAP_PT * (columns - 1)) / columns
     scale = min(room / across, _MOST_HEIGHT_PT / up)
     high = scale * up
-    total = high + _TOP_PT + _BOTTOM_PT
+    each = high + _TOP_PT + _BOTTOM_PT
+    total = rows * each
     figure = Figure(figsize=(WIDTH_PT / 72.0, total / 72.0))
     panels = []
     for index, title in enumerate(titles):
-        left = _LEFT_PT + index * (room + _GAP_PT) + 0.5 * (room - scale * across)
-        axes = figure.add_axes((left / WIDTH_PT, _BOTTOM_PT / total, scale * across / WIDTH_PT, high / total))
+        row, column = divmod(index, columns)
+        left = _LEFT_PT + column * (room + _GAP_PT) + 0.5 * (room - scale * across)
+        bottom = _BOTTOM_PT + (rows - 1 - row) * each
+        place = (left / WIDTH_PT, bottom / total, scale * across / WIDTH_PT, high / total)
+        axes = figure.add_axes(place)
         axes.set_title(title)
         axes.set_xlim(-margin, width + margin)
         axes.set_ylim(-margin, height + margin)

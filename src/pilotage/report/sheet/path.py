@@ -6,7 +6,9 @@ import math
 from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
 
+from pilotage.records.cells import SheetData
 from pilotage.records.numbers import number
 from pilotage.records.run_data import RunData
 from pilotage.report import quantities
@@ -35,6 +37,15 @@ DONE_SHARE = 0.95
 _CELLS = "#d6e9f5"
 
 
+PATH_KEYS = (
+    Key("true path", BLUE, layer="true"),
+    Key("where it believed to be", VERMILLION, "dash", layer="estimated"),
+    Key("cells truly visited", _CELLS, "band", layer="visited", opacity=1.0),
+    Key("start", GREEN, "spot"),
+    Key("end", ORANGE, "spot"),
+)
+
+
 def path_figure(run: RunData) -> Illustration:
     """The true path and the believed one over the sheet, with the cells truly visited."""
     slug, title = "sheet-path", "The path over the sheet"
@@ -42,6 +53,25 @@ def path_figure(run: RunData) -> Illustration:
     if sheet is None:
         return Illustration(slug, title, "", "The run left no cells.npz.")
     figure, (axes,) = sheet_panels(sheet, [""])
+    draw_path(axes, run, sheet)
+    trace = run.trace
+    for count, event in enumerate(run.events, start=1):
+        kind, place = event_kind(event.kind), place_at(run, event.t_s)
+        if kind.on_map and place is not None:
+            badge(axes, *place, str(count), kind.colour)
+    overhang = trace["overhang_m"]
+    over = float(np.nanmax(overhang)) if trace.has("overhang_m") else math.nan
+    caption = (
+        f"The robot's centre was in {int(sheet.visited.sum())} of {sheet.visited.size} cells. The sheet has "
+        "no walls at its edge: a centre that leaves it ends the run."
+        + (f" The body reached up to {quantities.length(over)} over the edge." if over > 0.0 else "")
+    )
+    alt = f"Sheet with boxes and tapes and the true and believed path of the run {run.name}"
+    return Illustration(slug, title, alt, caption, render(figure, slug, alt), PATH_KEYS)
+
+
+def draw_path(axes: Axes, run: RunData, sheet: SheetData) -> None:
+    """The true path over the cells visited, the believed one, where it began and ended."""
     fill_cells(axes, sheet, sheet.visited, _CELLS, "visited", z=0.3)
     draw_grid(axes, sheet)
     draw_things(axes, sheet)
@@ -53,26 +83,6 @@ def path_figure(run: RunData) -> Illustration:
         if trace.steps:
             x, y, theta = (float(trace[f"true_{axis}"][index]) for axis in ("x_m", "y_m", "theta_rad"))
             layers.draw_body(axes, x, y, theta, sheet.robot_radius_m, colour, opacity=0.6)
-    for count, event in enumerate(run.events, start=1):
-        kind, place = event_kind(event.kind), place_at(run, event.t_s)
-        if kind.on_map and place is not None:
-            badge(axes, *place, str(count), kind.colour)
-    keys = (
-        Key("true path", BLUE, layer="true"),
-        Key("where it believed to be", VERMILLION, "dash", layer="estimated"),
-        Key("cells truly visited", _CELLS, "band", layer="visited", opacity=1.0),
-        Key("start", GREEN, "spot"),
-        Key("end", ORANGE, "spot"),
-    )
-    overhang = trace["overhang_m"]
-    over = float(np.nanmax(overhang)) if trace.has("overhang_m") else math.nan
-    caption = (
-        f"The robot's centre was in {int(sheet.visited.sum())} of {sheet.visited.size} cells. The sheet has "
-        "no walls at its edge: a centre that leaves it ends the run."
-        + (f" The body reached up to {quantities.length(over)} over the edge." if over > 0.0 else "")
-    )
-    alt = f"Sheet with boxes and tapes and the true and believed path of the run {run.name}"
-    return Illustration(slug, title, alt, caption, render(figure, slug, alt), keys)
 
 
 def coverage_figure(run: RunData) -> Illustration:
