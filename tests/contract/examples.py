@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from contract.exploring_examples import explores_the_floor
 from contract.fault_examples import fault_befalls
 from contract.local_examples import LOCAL_EXAMPLES, navigator_drives_by_the_laser
 from contract.patrol_examples import STRATEGY_NUMBERS, strategy_patrols
@@ -47,6 +48,9 @@ from pilotage.stack.planning.rrt_star_dubins import RrtStarDubinsConfig, RrtStar
 from support import worlds
 from support.robots import ROOM, sensors, told_of
 
+SLAM_NUMBERS = frozenset(
+    {"least_score", "least_agreement", "least_overlap", "most_ambiguity", "gate_probability"}
+)
 START, GOAL = Pose2(2.0, 2.0, 0.0), Goal(8.0, 6.0)
 NO_CIRCLES = ROOM.circles_m
 WALLS = NearWalls(ROOM.segments_m)
@@ -391,6 +395,8 @@ EXAMPLES: dict[tuple[str, str], Example] = {
     ("escape", "back-out"): Example(escape_ends),
     ("navigator", "goal"): Example(navigator_arrives),
     ("navigator", "maneuver"): Example(navigator_maneuvers, {}, frozenset({"acceleration_share"})),
+    ("localizer", "slam"): Example(localizer_follows, {"trajectory": "scanner"}, SLAM_NUMBERS),
+    ("navigator", "floor-frontier"): Example(explores_the_floor, pure_numbers=frozenset({"length_gain"})),
     ("navigator", "local"): Example(navigator_drives_by_the_laser, {"arrival_m": 0.25}),
     **{
         ("local_controller", name): Example(works, {}, pure) for name, (works, pure) in LOCAL_EXAMPLES.items()
@@ -461,5 +467,5 @@ EXAMPLES: dict[tuple[str, str], Example] = {
     ("task", "drive"): Example(task_runs("drive")),
     ("task", "follow"): Example(task_runs("follow"), {"points_m": ((4.0, 4.0), (7.0, 4.0))}),
     ("task", "localize"): Example(task_runs("localize")),
-    ("task", "explore"): Example(task_runs("explore"), {"blocked_s": 2.0}),
+    ("task", "explore"): Example(task_runs("explore"), {"blocked_s": 2.0}, frozenset({"least_mapped"})),
 }

@@ -14,9 +14,10 @@ from pilotage.models.footprint import Footprint
 from pilotage.models.motion.bicycle import BicycleConfig
 from pilotage.models.motion.differential_drive import DifferentialDriveConfig
 from pilotage.sensors.readings import LidarScan, OdometryIncrement, Reading, Readings
+from pilotage.stack.control.local.drive import limits_of, outline_of
 from pilotage.stack.control.local.role import LocalView
 from pilotage.stack.interface import Belief, StackStatus
-from pilotage.stack.navigator.local import LocalConfig, LocalNavigator, limits_of, outline_of
+from pilotage.stack.navigator.local import LocalConfig, LocalNavigator
 from pilotage.stack.navigator.navigator import Parts
 from support.robots import Told, told_of
 
@@ -117,7 +118,7 @@ def test_limits_are_those_of_the_data_sheet() -> None:
             delay_s=0.1,
         ),
     )
-    limits = limits_of(robot, LocalConfig(reverse_m_s=4.0))
+    limits = limits_of(robot, 4.0, "the test")
     assert (limits.speed_m_s, limits.reverse_m_s, limits.delay_s) == (1.5, 1.5, 0.1)
     assert (limits.acceleration_m_s2, limits.deceleration_m_s2) == (1.2, 1.2)
     assert (limits.turn_rate_rad_s, limits.turn_acceleration_rad_s2) == (3.0, 5.0)

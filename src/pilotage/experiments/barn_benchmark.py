@@ -29,7 +29,7 @@ from pilotage.logs.barn import (
     read_published,
 )
 from pilotage.missions.mission import Mission
-from pilotage.stack.navigator.local import outline_of
+from pilotage.stack.control.local.drive import outline_of
 
 MISSION = "barn-course"
 """What the courses are put into: robot, sensors, stack, and how it is judged."""

@@ -24,8 +24,8 @@ from pilotage.experiments.result_rows import write_rows
 from pilotage.experiments.run import run_mission
 from pilotage.experiments.run_pool import all_done
 from pilotage.missions.mission import Mission
+from pilotage.stack.control.local.drive import outline_of
 from pilotage.stack.control.local.role import LOCAL_CONTROLLERS
-from pilotage.stack.navigator.local import outline_of
 
 TIME_LIMIT_S = 100.0
 AMONG_PEOPLE: Mapping[str, Any] = {"ground.movers.enabled": True, "ground.fade_hits": 60}

@@ -12,6 +12,7 @@ from pilotage.experiments.loop import Run
 from pilotage.experiments.pictures import is_large, terrain_pictures
 from pilotage.experiments.resolve import resolved_yaml
 from pilotage.maps.cell_map import CellMap
+from pilotage.maps.occupancy_grid import OccupancyGrid
 from pilotage.maps.true_cells import true_map
 from pilotage.maps.world_map import WorldMap
 from pilotage.records.cells import SheetData
@@ -48,6 +49,7 @@ def files_of(run: Run, verdict: Verdict, metrics: Mapping[str, object]) -> RunFi
                 sightings=run.sightings[index].seen(),
                 updates=tuple(run.albums[index].pictures()),
                 cells=_cells(finished, robot, world, verdict),
+                own_map=_own_map(robot),
             )
             for index, robot in enumerate(finished.robots)
         ),
@@ -124,6 +126,12 @@ def _plans(robot: RobotRun, verdict: Verdict) -> Plans:
         np.zeros((0, 2)) if mapped is None else np.asarray(mapped)[:, :2],
         np.zeros((0, 2)) if shortest is None else shortest,
     )
+
+
+def _own_map(robot: RobotRun) -> OccupancyGrid | None:
+    """The map that a robot made of a floor."""
+    grid = robot.results.get("grid")
+    return grid if isinstance(grid, OccupancyGrid) else None
 
 
 def _cells(run: FinishedRun, robot: RobotRun, world: World, verdict: Verdict) -> SheetData | None:

@@ -12,6 +12,7 @@ from pathlib import Path
 
 from pilotage.core.types import Event
 from pilotage.maps.occupancy_grid import OccupancyGrid
+from pilotage.maps.ros_map import RosMap, write_ros_map
 from pilotage.records.cells import SheetData, write_cells
 from pilotage.records.events import write_events
 from pilotage.records.grid import write_grid
@@ -35,6 +36,7 @@ class RobotFiles:
     sightings: Sightings | None = None
     updates: tuple[KeptUpdate, ...] = ()
     cells: SheetData | None = None
+    own_map: OccupancyGrid | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,6 +109,8 @@ def write_robot(folder: Path, files: RobotFiles) -> None:
     write_updates(folder, files.updates)
     if files.cells is not None:
         write_cells(folder, files.cells)
+    if files.own_map is not None:
+        write_ros_map(folder / "map.yaml", RosMap.of(files.own_map, "map.pgm"))
 
 
 @contextmanager

@@ -17,7 +17,15 @@ DECISIVE: dict[str, tuple[str, ...]] = {
     "drive": (*_POSE, *_DRIVEN),
     "localize": (*_POSE, "final_position_error_m", *_DRIVEN),
     "plan": ("planned_length_m", "travel_time_s", "smoothness", "planned_clearance_m", "min_clearance_m"),
-    "explore": ("coverage_reachable", "feature_precision", "position_rmse_m", "duration_s", "collisions"),
+    "explore": (
+        "coverage_reachable",
+        "floor_mapped",
+        "feature_precision",
+        "wall_rms_m",
+        "position_rmse_m",
+        "duration_s",
+        "collisions",
+    ),
 }
 """By task, the metrics that judge its runs beside success, what matters most first."""
 

@@ -9,12 +9,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from pilotage.core.types import FloatArray
+from pilotage.kernels.slam.frames import composed
 from pilotage.logs.laser_log import LaserLog
 from pilotage.models.pose_graph_solver import Loss, Start, optimize
 from pilotage.stack.mapping.slam.closures import (
     LARGE_SLIP,
+    NEIGHBOURHOOD,
     USUAL_SLIP,
     Closure,
+    Slip,
     Verdict,
     candidates,
     judge,
@@ -23,9 +26,9 @@ from pilotage.stack.mapping.slam.closures import (
 )
 from pilotage.stack.mapping.slam.clouds import Clouds, cloud_of
 from pilotage.stack.mapping.slam.config import SlamConfig
-from pilotage.stack.mapping.slam.local_matching import LocalTrack
 from pilotage.stack.mapping.slam.refinement import neighbours, pair_edges
 from pilotage.stack.mapping.slam.submaps import Submaps
+from pilotage.stack.mapping.slam.tracker import LocalTrack
 from pilotage.stack.mapping.slam.uncertainty import (
     Edges,
     edge_information,
@@ -96,45 +99,95 @@ def solved(edges: Edges, poses: FloatArray, scale: float, slipped: bool = False)
     return Solved(solution.graph.poses, edges, solution.weights, solution.objective)
 
 
-def closed(track: LocalTrack, config: SlamConfig, on_round: OnRound) -> tuple[Solved, list[Closure], Submaps]:
+class LoopCloser:
+    """The graph of a track that may still grow, closed round by round.
+
+    Attributes
+    ----------
+    state
+        The graph after the last round.
+    closures
+        All candidates that were searched, with their verdicts.
+    submaps
+        Of the track so far.
+    """
+
+    def __init__(self, config: SlamConfig) -> None:
+        self.submaps = Submaps(config)
+        self.closures: list[Closure] = []
+        self._config = config
+        self._closing: Edges | None = None
+        self._searched: dict[tuple[int, int], float] = {}
+        self._accepted: set[tuple[int, int]] = set()
+        self._slipped = False
+        self.state: Solved
+
+    def grow(self, track: LocalTrack, ended: bool = True) -> None:
+        """Take in what the track has become; one that has not ended has no last submap yet."""
+        local = track.poses[track.keyframes]
+        own = track_edges(track)
+        if self._closing is None:
+            poses = local.copy()
+        else:
+            known = self.state.poses[: len(local)]
+            self._closing = self._closing.chosen(np.maximum(self._closing.i, self._closing.j) < len(local))
+            ahead = relative_poses(np.repeat(local[len(known) - 1 : len(known)], len(local), axis=0), local)
+            added = [composed(known[-1], step) for step in ahead[len(known) :]]
+            poses = np.concatenate([known, np.array(added).reshape(-1, 3)])
+            own = own.and_more(self._closing)
+        self.submaps.grow(track.clouds, local, track.breaks, ended)
+        self.state = solved(own, poses, ROBUST_STDS, self._slipped)
+
+    def close(self, window_m: float, slip: Slip) -> tuple[int, int]:
+        """Search what may overlap within a window and solve; how many were searched, and how many closed."""
+        state, submaps = self.state, self.submaps
+        joint = joint_covariance(state.edges, state.poses, state.weights, submaps.references)
+        places = state.poses[submaps.references]
+        if slip is LARGE_SLIP:
+            self._searched = dict.fromkeys(self._searched, np.inf)
+        closed_often = Counter(later for _, later in self._accepted)
+        found = [
+            c
+            for c in candidates(places, submaps.pieces, joint, window_m, self._searched, slip)
+            if (c.earlier, c.later) not in self._accepted
+            and not (slip is LARGE_SLIP and closed_often[c.later] >= ATTACHED)
+        ]
+        judged, edges = judge(submaps, places, joint, found, self._config, slip)
+        for closure in judged:
+            pair = closure.candidate.earlier, closure.candidate.later
+            self._searched[pair] = closure.candidate.half_m
+            if closure.verdict is Verdict.ACCEPTED:
+                self._accepted.add(pair)
+        self.closures += judged
+        if len(edges):
+            self._slipped |= slip is LARGE_SLIP
+            self._closing = edges if self._closing is None else self._closing.and_more(edges)
+            self.state = solved(state.edges.and_more(edges), state.poses, ROBUST_STDS, self._slipped)
+        return len(found), len(edges)
+
+    def look_again(self) -> None:
+        """Search the latest submaps' candidates anew that only lacked another to second them."""
+        recent = len(self.submaps) - NEIGHBOURHOOD
+        for closure in self.closures:
+            pair = closure.candidate.earlier, closure.candidate.later
+            if closure.verdict is Verdict.ALONE and pair[1] >= recent:
+                self._searched.pop(pair, None)
+
+
+def closed(track: LocalTrack, config: SlamConfig, on_round: OnRound) -> LoopCloser:
     """Close loops, from the nearly certain to the wide ones, the graph being solved after each round.
 
     In the end stretches that lie beside others and were not closed are looked at again: there the front end
     may have slipped by more than it knows.
     """
-    local = track.poses[track.keyframes].copy()
-    submaps = Submaps(track.clouds, local, config)
-    state = solved(track_edges(track), local, ROBUST_STDS)
-    closures: list[Closure] = []
-    searched: dict[tuple[int, int], float] = {}
-    accepted: dict[tuple[int, int], int] = {}
+    closer = LoopCloser(config)
+    closer.grow(track)
     rounds = [(window_m, USUAL_SLIP) for window_m in config.search_windows_m]
     rounds += [(SECOND_LOOK_M, LARGE_SLIP)] * SECOND_LOOKS
-    slipped = False
     for number, (window_m, slip) in enumerate(rounds, start=1):
-        joint = joint_covariance(state.edges, state.poses, state.weights, submaps.references)
-        places = state.poses[submaps.references]
-        if slip is LARGE_SLIP:
-            searched = dict.fromkeys(searched, np.inf)
-        closed_often = Counter(later for _, later in accepted)
-        found = [
-            c
-            for c in candidates(places, joint, window_m, searched, slip)
-            if (c.earlier, c.later) not in accepted
-            and not (slip is LARGE_SLIP and closed_often[c.later] >= ATTACHED)
-        ]
-        judged, edges = judge(submaps, places, joint, found, config, slip)
-        for closure in judged:
-            pair = closure.candidate.earlier, closure.candidate.later
-            searched[pair] = closure.candidate.half_m
-            if closure.verdict is Verdict.ACCEPTED:
-                accepted[pair] = number
-        closures += judged
-        if len(edges):
-            slipped |= slip is LARGE_SLIP
-            state = solved(state.edges.and_more(edges), state.poses, ROBUST_STDS, slipped)
-        on_round(f"round {number}: {len(found)} searched, {len(edges)} closed")
-    return state, closures, submaps
+        searched, count = closer.close(window_m, slip)
+        on_round(f"round {number}: {searched} searched, {count} closed")
+    return closer
 
 
 def refined(

@@ -30,6 +30,8 @@ MOST_PER_LATER, MOST_PER_EARLIER = 3, 6
 CLOSURE_STD_M = 0.1
 CLOSURE_FLOOR = 4.0 * np.diag([0.004**2, 0.004**2, 0.0015**2])
 WIDE_M = 2.0
+SECONDING, AGREEING = 0.65, 0.9
+"""Share of the least score, and agreement of the walls, with which a match may second another."""
 NEIGHBOURHOOD = 8
 """A wide search must be seconded by closures of submaps at most so far along the path, on both sides."""
 
@@ -116,18 +118,31 @@ def spread(covariance: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 
 def candidates(
-    poses: FloatArray, joint: FloatArray, window_m: float, searched: dict[tuple[int, int], float], slip: Slip
+    poses: FloatArray,
+    pieces: IntArray,
+    joint: FloatArray,
+    window_m: float,
+    searched: dict[tuple[int, int], float],
+    slip: Slip,
 ) -> list[Candidate]:
-    """Pairs of submaps, reference poses (C, 3), that may overlap and whose window is no larger than given."""
-    first, second = np.triu_indices(poses.shape[0], LEAST_APART)
+    """Pairs of submaps that may overlap and whose window is no larger than given.
+
+    Parameters
+    ----------
+    poses, pieces
+        (C, 3) of their reference keyframes, and (C,) which piece of the track each belongs to.
+    """
+    first, second = np.triu_indices(poses.shape[0], 1)
+    torn = pieces[first] != pieces[second]
     distance = np.hypot(*(poses[first, :2] - poses[second, :2]).T)
-    near = distance < NEAR_M + min(window_m, 2.0)
-    first, second, distance = first[near], second[near], distance[near]
+    near = (distance < NEAR_M + min(window_m, 2.0)) & (torn | (second - first >= LEAST_APART))
+    first, second, distance, torn = first[near], second[near], distance[near], torn[near]
     if first.size == 0:
         return []
     std_m, std_rad = spread(relative_covariances(joint, poses, first, second))
     half_m = WINDOW_STDS * std_m + slip.shift_m
-    half_rad = np.minimum(WINDOW_STDS * std_rad + slip.turn_rad, MOST_TURN_RAD)
+    most_rad = np.where(torn, np.pi, MOST_TURN_RAD)
+    half_rad = np.minimum(WINDOW_STDS * std_rad + slip.turn_rad, most_rad)
     wanted = (half_m <= window_m) & (distance < NEAR_M + np.minimum(half_m, 2.0))
     of_later: dict[int, int] = {}
     of_earlier: dict[int, int] = {}
@@ -169,10 +184,15 @@ def judge(
         closures.append(
             _alone(c, match(submaps, c.earlier, c.later, predicted, c.half_m, c.half_rad), config)
         )
+    pieces = submaps.pieces
+    across = [
+        int(pieces[closure.candidate.later] - pieces[closure.candidate.earlier]) for closure in closures
+    ]
     sound = [k for k, closure in enumerate(closures) if closure.verdict is Verdict.ACCEPTED]
-    edges = _edges([closures[k] for k in sound])
+    weak = [k for k, closure in enumerate(closures) if across[k] and _may_second(closure, config)]
+    edges = _edges([closures[k] for k in sound + weak])
     if not sound:
-        return closures, edges
+        return closures, edges.chosen(np.zeros(len(weak), np.bool_))
     chi_square, consistent = _joint_test(edges, poses, joint, config.gate_probability, slip)
     gate = chi_square_quantile(config.gate_probability, 3)
     fits = chi_square <= gate
@@ -180,7 +200,8 @@ def judge(
     support = _support(edges, clique & fits)
     for n, k in enumerate(sound):
         closure = replace(closures[k], chi_square=float(chi_square[n]), support=int(support[n]))
-        wide = closure.candidate.half_m > WIDE_M
+        # Beside a break the window is wide because the heading is open, not because the place is.
+        wide = closure.candidate.half_m > WIDE_M and across[k] != 1
         needed = config.least_support - 1 + (1 if wide else 0) + slip.support
         if not fits[n]:
             verdict = Verdict.AGAINST_GRAPH
@@ -191,6 +212,7 @@ def judge(
         else:
             verdict = Verdict.ACCEPTED
         closures[k] = replace(closure, verdict=verdict)
+    edges = edges.chosen(np.arange(len(edges)) < len(sound))
     taken = np.array([closures[k].verdict is Verdict.ACCEPTED for k in sound])
     edges = edges.chosen(taken)
     references = submaps.references
@@ -212,6 +234,17 @@ def _alone(candidate: Candidate, found: Match, config: SlamConfig) -> Closure:
     else:
         verdict = Verdict.ACCEPTED
     return Closure(candidate, found, np.nan, 0, verdict)
+
+
+def _may_second(closure: Closure, config: SlamConfig) -> bool:
+    """Whether a match across a break, too weak to count itself, may speak for another."""
+    found = closure.match
+    return (
+        closure.verdict is Verdict.LOW_SCORE
+        and found.score >= SECONDING * config.least_score
+        and found.agreement >= AGREEING
+        and found.second <= config.most_ambiguity * found.score
+    )
 
 
 def _edges(closures: list[Closure]) -> Edges:

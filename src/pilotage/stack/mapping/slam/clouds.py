@@ -47,6 +47,12 @@ def cloud_of(log: LaserLog, scan: int, max_range_m: float, spacing: float = 1.0)
     step = float(log.angle_step_rad[scan])
     angles = log.first_angle_rad[scan] + step * np.arange(beams)
     middle = log.first_angle_rad[scan] + 0.5 * step * (beams - 1)
-    angles = middle + spacing * (angles - middle)
-    points, hit = scan_points(log.ranges_m[scan, :beams], angles, _NO_MOUNT, _LEAST_RANGE_M, max_range_m)
-    return np.asarray(scan_lines(points, hit, 0.0, 0.0, step))
+    return cloud_of_beams(log.ranges_m[scan, :beams], middle + spacing * (angles - middle), step, max_range_m)
+
+
+def cloud_of_beams(
+    ranges_m: FloatArray, angles_rad: FloatArray, step_rad: float, max_range_m: float
+) -> FloatArray:
+    """Points (K, 6) of ranges (B,), infinite or NaN where nothing was hit, in their directions (B,)."""
+    points, hit = scan_points(ranges_m, angles_rad, _NO_MOUNT, _LEAST_RANGE_M, max_range_m)
+    return np.asarray(scan_lines(points, hit, 0.0, 0.0, step_rad))

@@ -6,9 +6,9 @@ import numpy as np
 
 from pilotage.core.errors import InputError
 from pilotage.core.types import FloatArray, Pose2
-from pilotage.kernels.slam.occupancy import add_scan
+from pilotage.kernels.slam.occupancy import OddsArray, add_scan
 from pilotage.logs.laser_log import LaserLog
-from pilotage.maps.occupancy_grid import FREE, OCCUPIED, UNKNOWN, OccupancyGrid
+from pilotage.maps.occupancy_grid import FREE, OCCUPIED, UNKNOWN, OccupancyArray, OccupancyGrid
 
 HIT_ODDS, MISS_ODDS, MOST_ODDS = 0.85, 0.25, 6.0
 SEEN_ODDS = 0.2
@@ -50,10 +50,18 @@ def drawn_map(
             MISS_ODDS,
             MOST_ODDS,
         )
-    cells = np.where(odds > SEEN_ODDS, OCCUPIED, np.where(odds < -SEEN_ODDS, FREE, UNKNOWN)).astype(np.int8)
-    return OccupancyGrid(
-        np.ascontiguousarray(cells[::-1]), resolution_m, Pose2(float(low[0]), float(low[1]), 0.0)
-    )
+    return grid_of(odds, resolution_m, low)
+
+
+def grid_of(odds: OddsArray, resolution_m: float, corner_xy_m: FloatArray) -> OccupancyGrid:
+    """Occupancy of log-odds (rows, columns), row 0 with the least y, from a lower-left corner (2,)."""
+    corner = Pose2(float(corner_xy_m[0]), float(corner_xy_m[1]), 0.0)
+    return OccupancyGrid(np.ascontiguousarray(states_of(odds)[::-1]), resolution_m, corner)
+
+
+def states_of(odds: OddsArray) -> OccupancyArray:
+    """Cells that are occupied, free or unknown, in the order of the log-odds."""
+    return np.where(odds > SEEN_ODDS, OCCUPIED, np.where(odds < -SEEN_ODDS, FREE, UNKNOWN)).astype(np.int8)
 
 
 def _bounds(log: LaserLog, poses: FloatArray, max_range_m: float) -> tuple[FloatArray, FloatArray]:

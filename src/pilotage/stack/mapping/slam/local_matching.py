@@ -1,12 +1,11 @@
-"""The front end: every scan aligned with the keyframes just before it.
+"""Every scan aligned with the keyframes just before it.
 
-Drift is all that is left to the graph. A guess of the motion starts the alignment; where none leads to a fit
+A guess of the motion starts the alignment; where none leads to a fit
 as good as usual, the neighbourhood is searched by branch and bound.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -17,97 +16,158 @@ from pilotage.kernels.slam.branch_bound import search_window
 from pilotage.kernels.slam.buckets import sort_into_buckets
 from pilotage.kernels.slam.frames import between, carried, composed
 from pilotage.kernels.slam.match_grid import ScoreArray, max_pyramid, score_grid
-from pilotage.logs.laser_log import LaserLog
-from pilotage.stack.mapping.slam.clouds import Clouds, cloud_of
 from pilotage.stack.mapping.slam.config import SlamConfig
-from pilotage.stack.mapping.slam.odometry import MotionGuess, distance, scanner_odometry, smoothed_times
+from pilotage.stack.mapping.slam.odometry import MotionGuess, distance
 
 BUCKET_M = 0.25
 START_REACH_M, REACH_M, SCALE_M = 0.4, 0.2, 0.05
 PRIOR = np.diag([2.0, 2.0, 20.0])
 """Holds the pose at the guess where the scan leaves it open, in squared residuals. More would pull every
 scan a little towards an odometry whose errors all have one sign."""
-GOOD, POOR = 0.92, 0.75
-"""Fit over its running mean from which no further guess is tried, and below which there is a search."""
+GOOD, POOR, NONE = 0.92, 0.75, 0.3
+"""Fit over its running mean from which no further guess is tried, below which there is a search, and below
+which it is no fit at all: what hangs by so few points hangs by chance."""
+SPLIT = 0.1
+"""Guesses farther apart than this are all tried: where the robot begins to turn, the first one fits nowhere
+or, worse, somewhere else."""
 SEARCH_RANGE_M, SEARCH_CELL_M, SEARCH_STD_M, SEARCH_STEP_RAD = 12.0, 0.05, 0.07, 0.02
 SEARCH_BUDGET = 200_000
+LEAST_FOUND, FOUND, ALIKE = 40, 0.8, 0.8
+"""Points and share of the usual fit that finding a place all round takes, and the share of its score from
+which a second place speaks against it,"""
+OTHER_PLACE = np.array([0.5, 0.35])
+"""where it is so far away and turned."""
+MOST_GAP_S = 2.5
+"""The search window grows with the time since the last fit, up to this."""
 SEARCH_KEYFRAMES, SEARCH_LEVELS = 8, 4
 BETTER_POOR, BETTER_GOOD = 1.1, 1.03
 """By how much a place that was searched must fit better than the guesses."""
 OFF_M, OFF_ERRORS = 0.05, 10.0
 """A match this far from all guesses, and so many of their usual errors more, counts half."""
-SLIP_SHARE, SLIP_M = 0.15, 0.4
-"""A match as far as SLIP_M from its guess may be off by as much; a nearer one by that share and less."""
 
-OnScan = Callable[[int], None]
+
+Reference = tuple[FloatArray, IntArray, FloatArray]
+"""Points in buckets, as ``align`` takes them."""
 
 
 @dataclass(frozen=True, slots=True)
-class LocalTrack:
-    """What the front end leaves.
+class Fit:
+    """Where a scan lies.
 
     Attributes
     ----------
-    poses
-        (N, 3) of the scanner at each scan, in the frame of the first; drifting.
-    keyframes
-        (K,) scans that became keyframes, and ``owner`` (N,) the last keyframe of each scan.
-    clouds
-        Of the keyframes.
-    hessians
-        (K, 3, 3) of each keyframe's alignment with those before it, in ``poses``' frame.
-    slips
-        (K, 2) variances of position and heading since the keyframe before, by how far guesses and
-        matches were apart.
-    fits
-        (N,) sum of weights of the aligned points over all points.
-    searched, lost
-        How many scans needed a search, and how many could not be aligned (their pose is the guess).
+    value
+        Sum of weights of the aligned points over all points, less where it is far from all guesses.
+    pose, hessian, start
+        (3,), (3, 3) of the alignment, and (3,) where it began.
+    rms_m
+        Root mean square of the weighted residuals.
+    off
+        Distance from the nearest credible guess.
     """
 
-    poses: FloatArray
-    keyframes: IntArray
-    owner: IntArray
-    clouds: Clouds
-    hessians: FloatArray
-    slips: FloatArray
-    fits: FloatArray
-    searched: int
-    lost: int
-
-
-@dataclass(frozen=True, slots=True)
-class _Fit:
     value: float
     pose: FloatArray
     hessian: FloatArray
     start: FloatArray
+    rms_m: float
     off: float = 0.0
 
 
+@dataclass(frozen=True, slots=True)
+class Aside:
+    """Keyframes that the track tore from: their scores as ``_surroundings`` has them, and their points."""
+
+    pyramid: ScoreArray
+    margin: int
+    corner_xy_m: FloatArray
+    reference: Reference | None
+
+
 class LocalMatcher:
-    """Aligns scans with the last keyframes, one after the other."""
+    """Aligns scans with the last keyframes, one after the other.
+
+    Attributes
+    ----------
+    searched, lost
+        How many scans needed a search, and how many fitted nowhere.
+    rms_m
+        Running mean of the residuals.
+    """
 
     def __init__(self, config: SlamConfig) -> None:
         self._config = config
         self._guess = MotionGuess()
         self._local: list[FloatArray] = []
         self._usual = 0.6
-        self._reference: tuple[FloatArray, IntArray, FloatArray] | None = None
+        self._reference: Reference | None = None
         self._around: tuple[ScoreArray, int, FloatArray] | None = None
+        self._lost_s = 0.0
         self.searched = 0
         self.lost = 0
+        self.rms_m = SCALE_M
 
     def add_keyframe(self, cloud: FloatArray, pose: FloatArray) -> None:
         """Let a scan lend its points to those that follow."""
         self._local = [*self._local, carried(cloud, pose)][-self._config.local_keyframes :]
+        self._refer()
+
+    def _refer(self) -> None:
         box, starts, _, points = sort_into_buckets(np.concatenate(self._local), BUCKET_M)
         self._reference = box, starts, points
         self._around = None
 
+    def set_aside(self) -> Aside | None:
+        """Begin anew without keyframes; what they were is handed out, to be found again."""
+        seen = bool(self._local) and len(self._local[-1]) > 0
+        around = self._surroundings(self._local[-1][0, :2]) if seen else None
+        out = None if around is None else Aside(*around, self._reference)
+        self._local, self._reference, self._around = [], None, None
+        self._guess.velocity = np.zeros(3)
+        return out
+
+    def find(self, aside: Aside, cloud: FloatArray, centre: FloatArray, half_m: float) -> Fit | None:
+        """Look for a scan all round in what was set aside; None where it fits nowhere, or in two places."""
+        near = cloud[np.hypot(cloud[:, 0], cloud[:, 1]) < SEARCH_RANGE_M]
+        if near.shape[0] < LEAST_FOUND:
+            return None
+        points = np.ascontiguousarray(near[::2, :2])
+        turns = np.arange(-np.pi, np.pi, SEARCH_STEP_RAD)
+
+        def search(least: float, away: FloatArray) -> FloatArray:
+            best, _ = search_window(
+                aside.pyramid,
+                aside.margin,
+                aside.corner_xy_m[0],
+                aside.corner_xy_m[1],
+                SEARCH_CELL_M,
+                points,
+                centre,
+                half_m,
+                turns,
+                least,
+                away,
+                SEARCH_BUDGET,
+            )
+            return np.asarray(best)
+
+        best = search(0.3, np.array([0.0, 0.0, 0.0, -1.0, 0.0]))
+        if not np.isfinite(best[3]):
+            return None
+        if np.isfinite(search(ALIKE * float(best[3]), np.concatenate([best[:3], OTHER_PLACE]))[3]):
+            return None
+        fit = self._align(cloud, best[:3].copy(), 0.3, aside.reference)
+        return fit if fit is not None and fit.value >= FOUND * self._usual else None
+
+    def carry(self, moved: FloatArray) -> None:
+        """Move the keyframes by a motion (3,) of the map."""
+        self._local = [carried(cloud, moved) for cloud in self._local]
+        self._around = None
+        self._refer()
+
     def match(
         self, cloud: FloatArray, last: FloatArray, step: FloatArray | None, dt_s: float, gap_s: float
-    ) -> _Fit | None:
+    ) -> Fit | None:
         """Align a scan; None where it cannot be.
 
         Parameters
@@ -119,26 +179,33 @@ class LocalMatcher:
         dt_s, gap_s
             Smoothed and stamped time since.
         """
-        best: _Fit | None = None
+        best: Fit | None = None
         credible = self._guess.credible(step, dt_s)
-        for motion in self._guess.guesses(step, dt_s):
+        motions = self._guess.guesses(step, dt_s)
+        split = max(distance(motions[0], motion) for motion in motions) > SPLIT
+        for motion in motions:
             fit = self._plausible(self._align(cloud, composed(last, motion), START_REACH_M), last, credible)
             if fit is not None and (best is None or fit.value > 1.03 * best.value + 0.005):
                 best = fit
-            if best is not None and best.value > GOOD * self._usual:
+            if not split and best is not None and best.value > GOOD * self._usual:
                 break
         poor = best is None or best.value < POOR * self._usual
         if poor or step is None:
             # Without odometry a scan may slide along a corridor and still fit: look around every time.
             self.searched += 1
-            around = self._search(cloud, last, min(max(dt_s, gap_s, 0.2), 2.0))
-            found = self._plausible(around, last, credible)
-            better = BETTER_POOR if poor else BETTER_GOOD
-            if found is not None and (best is None or found.value > better * best.value + 0.01):
-                best = found
-        if best is None:
+            gap_s = min(max(dt_s, gap_s, 0.2) + self._lost_s, MOST_GAP_S)
+            centres = [last, composed(last, motions[0])] if poor and split else [last]
+            for centre in centres:
+                found = self._plausible(self._search(cloud, centre, gap_s), last, credible)
+                better = BETTER_POOR if poor else BETTER_GOOD
+                if found is not None and (best is None or found.value > better * best.value + 0.01):
+                    best = found
+        if best is None or best.value < NONE * self._usual:
             self.lost += 1
+            self._lost_s += dt_s
             return None
+        self._lost_s = 0.0
+        self.rms_m += 0.05 * (best.rms_m - self.rms_m)
         self._usual += 0.02 * (best.value - self._usual)
         self._guess.learn(step, between(last, best.pose), dt_s)
         return best
@@ -147,7 +214,7 @@ class LocalMatcher:
         """Pose by the most trusted guess alone."""
         return np.asarray(composed(last, self._guess.guesses(step, dt_s)[0]))
 
-    def _plausible(self, fit: _Fit | None, last: FloatArray, guesses: list[FloatArray]) -> _Fit | None:
+    def _plausible(self, fit: Fit | None, last: FloatArray, guesses: list[FloatArray]) -> Fit | None:
         """Lower a fit's value by how far it is from all credible guesses, in units of their usual error."""
         if fit is None:
             return None
@@ -156,18 +223,19 @@ class LocalMatcher:
         scale = OFF_M + OFF_ERRORS * self._guess.least_error
         return replace(fit, value=fit.value / (1.0 + (off / scale) ** 2), off=off)
 
-    def _align(self, cloud: FloatArray, start: FloatArray, reach_m: float) -> _Fit | None:
-        if self._reference is None or cloud.shape[0] == 0:
+    def _align(
+        self, cloud: FloatArray, start: FloatArray, reach_m: float, reference: Reference | None = None
+    ) -> Fit | None:
+        reference = reference or self._reference
+        if reference is None or cloud.shape[0] == 0:
             return None
-        pose, hessian, fit, status = align(
-            cloud, start, PRIOR, reach_m, REACH_M, SCALE_M, 25, *self._reference
-        )
+        pose, hessian, fit, status = align(cloud, start, PRIOR, reach_m, REACH_M, SCALE_M, 25, *reference)
         if status == TOO_FEW:
             return None
         pose[2] = (pose[2] + np.pi) % (2.0 * np.pi) - np.pi
-        return _Fit(float(fit[1]) / cloud.shape[0], pose, hessian, start)
+        return Fit(float(fit[1]) / cloud.shape[0], pose, hessian, start, float(fit[0]))
 
-    def _search(self, cloud: FloatArray, last: FloatArray, gap_s: float) -> _Fit | None:
+    def _search(self, cloud: FloatArray, last: FloatArray, gap_s: float) -> Fit | None:
         """Search the neighbourhood of the last pose, the wider the longer ago it was."""
         near = cloud[np.hypot(cloud[:, 0], cloud[:, 1]) < SEARCH_RANGE_M]
         if self._around is None:
@@ -209,64 +277,3 @@ class LocalMatcher:
             0.0,
         )
         return (*max_pyramid(grid, SEARCH_LEVELS), low)
-
-
-def track(log: LaserLog, config: SlamConfig, on_scan: OnScan | None = None) -> LocalTrack:
-    """Run the front end over a log."""
-    count = len(log)
-    odometry = scanner_odometry(log, config.use_odometry)
-    times = smoothed_times(log.t_s)
-    matcher = LocalMatcher(config)
-    poses, fits = np.zeros((count, 3)), np.zeros(count)
-    owner = np.zeros(count, np.int64)
-    keyframes: list[int] = []
-    clouds: list[FloatArray] = []
-    hessians: list[FloatArray] = []
-    slips: list[FloatArray] = []
-    slip = np.zeros(2)
-    for i in range(count):
-        cloud = cloud_of(log, i, config.max_range_m)
-        hessian = np.zeros((3, 3))
-        if i > 0:
-            step = None if odometry is None else between(odometry[i - 1], odometry[i])
-            dt_s = max(1e-3, float(times[i] - times[i - 1]))
-            fit = matcher.match(cloud, poses[i - 1], step, dt_s, float(log.t_s[i] - log.t_s[i - 1]))
-            if fit is None:
-                poses[i] = matcher.fallback(poses[i - 1], step, dt_s)
-                slip += [0.05**2, 0.05**2]
-            else:
-                poses[i], hessian, fits[i] = fit.pose, fit.hessian, fit.value
-                slip += _slip(between(fit.start, fit.pose))
-        if i == 0 or _is_new(between(poses[keyframes[-1]], poses[i]), config):
-            keyframes.append(i)
-            clouds.append(cloud)
-            hessians.append(hessian)
-            slips.append(slip)
-            slip = np.zeros(2)
-            matcher.add_keyframe(cloud, poses[i])
-        owner[i] = len(keyframes) - 1
-        if on_scan is not None:
-            on_scan(i)
-    return LocalTrack(
-        poses,
-        np.array(keyframes, np.int64),
-        owner,
-        Clouds.of(clouds),
-        np.array(hessians),
-        np.array(slips),
-        fits,
-        matcher.searched,
-        matcher.lost,
-    )
-
-
-def _slip(off: FloatArray) -> FloatArray:
-    """Variances (2,) of position and heading of a match by how far (3,) it is from its guess."""
-    far = np.array([float(np.hypot(off[0], off[1])), abs(float(off[2]))])
-    return np.asarray((SLIP_SHARE * far) ** 2 + (far * far / np.array([SLIP_M, 0.5 * SLIP_M])) ** 2)
-
-
-def _is_new(motion: FloatArray, config: SlamConfig) -> bool:
-    """Whether a scan is far enough from the last keyframe to become one."""
-    far = float(np.hypot(motion[0], motion[1])) > config.keyframe_distance_m
-    return far or abs(float(motion[2])) > config.keyframe_turn_rad

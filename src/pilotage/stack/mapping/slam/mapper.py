@@ -19,11 +19,11 @@ from pilotage.stack.mapping.slam.back_end import (
 )
 from pilotage.stack.mapping.slam.config import SlamConfig
 from pilotage.stack.mapping.slam.drawing import drawn_map
-from pilotage.stack.mapping.slam.local_matching import LocalTrack, track
 from pilotage.stack.mapping.slam.odometry import scanner_odometry
 from pilotage.stack.mapping.slam.result import SlamResult
 from pilotage.stack.mapping.slam.scan_covariances import ScanCovariances
 from pilotage.stack.mapping.slam.scan_poses import scan_poses
+from pilotage.stack.mapping.slam.tracker import LocalTrack, track
 from pilotage.stack.mapping.slam.uncertainty import relative_poses
 
 LEAST_SCANS = 2
@@ -50,7 +50,8 @@ def map_log(log: LaserLog, config: SlamConfig, on_stage: OnStage | None = None) 
         )
     if local.keyframes.size < 2:
         return _standing(log, config, local)
-    state, closures, submaps = closed(local, config, lambda text: say(text, 1.0))
+    closer = closed(local, config, lambda text: say(text, 1.0))
+    state, closures, submaps = closer.state, closer.closures, closer.submaps
     say("refining", 1.0)
     spacing = 1.0
     clouds = local.clouds

@@ -6,7 +6,7 @@ import numpy as np
 
 from pilotage.core.types import FloatArray
 from pilotage.kernels.slam.frames import between, composed
-from pilotage.stack.mapping.slam.local_matching import LocalTrack
+from pilotage.stack.mapping.slam.tracker import LocalTrack
 from pilotage.stack.mapping.slam.uncertainty import relative_poses
 
 

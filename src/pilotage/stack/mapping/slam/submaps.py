@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import OrderedDict
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -26,11 +27,15 @@ KEPT_PYRAMIDS, KEPT_SUBMAPS = 8, 120
 
 @dataclass(frozen=True, slots=True)
 class Extent:
-    """Keyframes ``first`` to ``last`` of a submap; its frame is that of keyframe ``reference``."""
+    """Keyframes ``first`` to ``last`` of a submap, whose frame is that of keyframe ``reference``.
+
+    ``piece`` counts the breaks of the track before it.
+    """
 
     first: int
     last: int
     reference: int
+    piece: int = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,19 +56,24 @@ class Submap:
     fine: FloatArray
 
 
-def extents(poses: FloatArray, length_m: float) -> list[Extent]:
-    """Cut the path of keyframes (K, 3) into stretches that overlap by half."""
+def extents(poses: FloatArray, length_m: float, breaks: IntArray) -> list[Extent]:
+    """Cut the path of keyframes (K, 3) into stretches that overlap by half, none of them across a break."""
     moved = relative_poses(poses[:-1], poses[1:])
     steps = np.hypot(moved[:, 0], moved[:, 1]) + TURN_AS_PATH_M * np.abs(moved[:, 2])
     path = np.concatenate([[0.0], np.cumsum(steps)])
-    count = poses.shape[0]
-    cuts = [0]
-    while cuts[-1] < count - 1:
-        after = int(np.searchsorted(path, path[cuts[-1]] + 0.5 * length_m))
-        cuts.append(min(max(after, cuts[-1] + 1), count - 1))
-    if len(cuts) < 3:
-        return [Extent(0, count - 1, (count - 1) // 2)]
-    return [Extent(first, last, (first + last) // 2) for first, last in zip(cuts[:-2], cuts[2:], strict=True)]
+    bounds = [0, *breaks.tolist(), poses.shape[0]]
+    out = []
+    for piece, (start, end) in enumerate(pairwise(bounds)):
+        cuts = [start]
+        while cuts[-1] < end - 1:
+            after = int(np.searchsorted(path, path[cuts[-1]] + 0.5 * length_m))
+            cuts.append(min(max(after, cuts[-1] + 1), end - 1))
+        if len(cuts) < 3:
+            out.append(Extent(start, end - 1, (start + end - 1) // 2, piece))
+        else:
+            both = zip(cuts[:-2], cuts[2:], strict=True)
+            out += [Extent(first, last, (first + last) // 2, piece) for first, last in both]
+    return out
 
 
 def thinned(points: FloatArray, cell_m: float) -> FloatArray:
@@ -76,14 +86,35 @@ def thinned(points: FloatArray, cell_m: float) -> FloatArray:
 class Submaps:
     """All submaps of a track, drawn when they are asked for; what was not used lately is forgotten."""
 
-    def __init__(self, clouds: Clouds, local: FloatArray, config: SlamConfig) -> None:
-        self.extents = extents(local, config.submap_length_m)
-        self.references: IntArray = np.array([extent.reference for extent in self.extents], np.int64)
+    def __init__(self, config: SlamConfig) -> None:
+        self.extents: list[Extent] = []
+        self.references: IntArray = np.zeros(0, np.int64)
+        self.pieces: IntArray = np.zeros(0, np.int64)
         self.cell_m = config.search_cell_m
-        self._clouds = clouds
-        self._local = local
+        self._length_m = config.submap_length_m
+        self._clouds, self._local = Clouds.of([]), np.zeros((0, 3))
         self._drawn: OrderedDict[int, Submap] = OrderedDict()
         self._pyramids: OrderedDict[int, tuple[ScoreArray, int]] = OrderedDict()
+
+    def grow(self, clouds: Clouds, local: FloatArray, breaks: IntArray, ended: bool = True) -> None:
+        """Cut a track that has grown; what is drawn of it stays, for the front end moves no keyframe.
+
+        Parameters
+        ----------
+        clouds, local, breaks
+            Of all keyframes, their poses (K, 3) by the front end, and where it broke.
+        ended
+            Whether the last submap, which may be a short one, counts already.
+        """
+        before = self.extents
+        self.extents = extents(local, self._length_m, breaks)[: None if ended else -1]
+        for index, extent in enumerate(before):
+            if index >= len(self.extents) or self.extents[index] != extent:
+                self._drawn.pop(index, None)
+                self._pyramids.pop(index, None)
+        self.references = np.array([extent.reference for extent in self.extents], np.int64)
+        self.pieces = np.array([extent.piece for extent in self.extents], np.int64)
+        self._clouds, self._local = clouds, local
 
     def __len__(self) -> int:
         return len(self.extents)

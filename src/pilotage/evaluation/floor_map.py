@@ -1,0 +1,58 @@
+"""How much of a floor a map shows, and how far its walls are from the true ones."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy import ndimage
+
+from pilotage.core.types import FloatArray, Pose2
+from pilotage.maps.nearest_obstacles import NearestObstacles
+from pilotage.maps.occupancy_grid import FREE, OCCUPIED, OccupancyGrid
+from pilotage.maps.world_map import WorldMap
+
+LATTICE_M = 0.05
+BESIDE_M = 0.05
+"""Floor nearer to a wall than this shares a cell with it: it does not count."""
+
+
+def reachable_floor(chart: WorldMap, radius_m: float, start: Pose2) -> FloatArray:
+    """Points (N, 2) of a lattice that a disc can cover somewhere on its ways from a start."""
+    xmin, ymin, xmax, ymax = chart.bounds_m
+    x = np.arange(xmin + 0.5 * LATTICE_M, xmax, LATTICE_M)
+    y = np.arange(ymin + 0.5 * LATTICE_M, ymax, LATTICE_M)
+    points = np.stack(np.meshgrid(x, y), axis=2).reshape(-1, 2)
+    distance = chart.field.at(points).reshape(y.size, x.size)
+    labels, _ = ndimage.label(distance >= radius_m)
+    row = min(max(int((start.y_m - ymin) / LATTICE_M), 0), y.size - 1)
+    column = min(max(int((start.x_m - xmin) / LATTICE_M), 0), x.size - 1)
+    if labels[row, column] == 0:
+        return np.zeros((0, 2))
+    stands = labels == labels[row, column]
+    away = ndimage.distance_transform_edt(~stands, sampling=LATTICE_M)
+    covered = (away <= radius_m) & (distance >= BESIDE_M)
+    return np.asarray(points[covered.ravel()])
+
+
+def floor_map_metrics(
+    grid: OccupancyGrid, chart: WorldMap, radius_m: float, start: Pose2
+) -> dict[str, object]:
+    """Share of the reachable floor that is free on the map, and how far its walls are from the true ones.
+
+    The map's frame must be the world's. A wall of the map is an occupied cell; its error is the distance of
+    its middle from the nearest wall, so that half a cell's side of it are the grid's own.
+    """
+    floor = reachable_floor(chart, radius_m, start)
+    metrics: dict[str, object] = {}
+    if len(floor):
+        cells = grid.cells_at(floor)
+        inside = ((cells >= 0) & (cells < [grid.rows, grid.columns])).all(axis=1)
+        free = np.zeros(len(floor), np.bool_)
+        free[inside] = grid.cells[cells[inside, 0], cells[inside, 1]] == FREE
+        metrics["floor_mapped"] = float(free.mean())
+        metrics["floor_area_m2"] = len(floor) * LATTICE_M**2
+    walls = np.argwhere(grid.cells == OCCUPIED)
+    if len(walls):
+        off = NearestObstacles.from_map(chart.walls).at(grid.centres_m(walls))
+        metrics["wall_rms_m"] = float(np.sqrt((off**2).mean()))
+        metrics["wall_max_m"] = float(off.max())
+    return metrics

@@ -1,0 +1,141 @@
+"""Driving to a point by a local controller, wherever a localizer has it."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from pilotage.core.errors import InputError
+from pilotage.core.types import STOP, FloatArray, Pose2, Twist
+from pilotage.kernels.geometry.motion import exact_arc
+from pilotage.models.footprint import Footprint
+from pilotage.sensors.lidar import LidarConfig
+from pilotage.sensors.readings import LidarScan, OdometryIncrement, Readings
+from pilotage.sensors.wheel_odometry import WheelOdometryConfig
+from pilotage.stack.control.local.role import LocalController, LocalLimits, LocalView
+from pilotage.stack.knowledge import RobotKnowledge
+
+DISC_CORNERS = 16
+"""Of the polygon around a disc."""
+
+
+class LocalDrive:
+    """Hands laser, odometry and goal to a local controller; between two scans its last command stands.
+
+    The controller sees poses that are integrated from the odometry alone, which drift but do not jump. The
+    goal is placed anew in them where the localizer's correction moves it farther than ``shift_m``.
+    """
+
+    def __init__(
+        self,
+        controller: LocalController,
+        robot: RobotKnowledge,
+        start: Pose2,
+        *,
+        reverse_m_s: float,
+        shift_m: float = 0.1,
+        needed_by: str,
+        goal_xy_m: tuple[float, float] = (math.nan, math.nan),
+    ) -> None:
+        self._controller, self._shift_m = controller, shift_m
+        self._lidar, self._scanner = robot.one_sensor(LidarConfig, needed_by)
+        self._odometry, _ = robot.one_sensor(WheelOdometryConfig, needed_by)
+        self._limits = limits_of(robot, reverse_m_s, needed_by)
+        self._outline = outline_of(robot.footprint)
+        self._angles = self._scanner.beam_angles_rad()
+        mount = self._scanner.mount
+        self._mount = Pose2(mount.x_m, mount.y_m, mount.theta_rad)
+        # In its own frame of the odometry it begins where it believes to be: a goal is there as on the map.
+        self._pose, self._goal_there = start, goal_xy_m
+        self._twist, self._command, self._moved_s = STOP, STOP, 0.0
+
+    @property
+    def status(self) -> str:
+        """What the controller does, in a word."""
+        return self._controller.status
+
+    def move(self, readings: Readings) -> None:
+        """Integrate the odometry, and take the speeds from it; to be called at every step."""
+        odometry = readings.by_sensor.get(self._odometry)
+        if not isinstance(odometry, OdometryIncrement):
+            return
+        elapsed_s = readings.t_s - self._moved_s
+        if elapsed_s > 0.0:
+            self._twist = Twist(odometry.distance_m / elapsed_s, odometry.angle_rad / elapsed_s)
+        self._moved_s = readings.t_s
+        pose = self._pose
+        self._pose = Pose2(
+            *exact_arc(pose.x_m, pose.y_m, pose.theta_rad, odometry.distance_m, odometry.angle_rad)
+        )
+
+    def toward(
+        self, goal_xy_m: tuple[float, float], belief: Pose2, readings: Readings, tolerance_m: float
+    ) -> Twist:
+        """The command to a goal in the map, as the robot believes to stand there."""
+        scan = readings.by_sensor.get(self._lidar)
+        if isinstance(scan, LidarScan):
+            self._place(goal_xy_m, belief)
+            self._command = self._controller.step(self._view(readings.t_s, scan.ranges_m, tolerance_m))
+        return self._command
+
+    def _place(self, goal_xy_m: tuple[float, float], belief: Pose2) -> None:
+        """Place the goal in the odometry's frame as it lies from where the robot believes to be."""
+        dx, dy = goal_xy_m[0] - belief.x_m, goal_xy_m[1] - belief.y_m
+        turn = self._pose.theta_rad - belief.theta_rad
+        c, s = math.cos(turn), math.sin(turn)
+        there = self._pose.x_m + c * dx - s * dy, self._pose.y_m + s * dx + c * dy
+        moved_m = math.hypot(there[0] - self._goal_there[0], there[1] - self._goal_there[1])
+        if not moved_m <= self._shift_m:
+            self._goal_there = there
+
+    def _view(self, t_s: float, ranges_m: FloatArray, tolerance_m: float) -> LocalView:
+        return LocalView(
+            t_s=t_s,
+            pose=self._pose,
+            twist=self._twist,
+            ranges_m=ranges_m,
+            beam_angles_rad=self._angles,
+            mount=self._mount,
+            max_range_m=self._scanner.max_range_m,
+            goal_xy_m=self._goal_there,
+            limits=self._limits,
+            footprint_xy_m=self._outline,
+            goal_tolerance_m=tolerance_m,
+        )
+
+
+def limits_of(robot: RobotKnowledge, reverse_m_s: float, needed_by: str) -> LocalLimits:
+    """A controller's limits from a motion's data sheet; what changes at once does so within a step.
+
+    Raises
+    ------
+    InputError
+        Where the robot cannot turn on the spot.
+    """
+    motion = robot.motion
+    if motion.least_turning_radius_m > 0.0:
+        raise InputError(
+            f"{needed_by}: expected a robot that turns on the spot, found a turning radius of "
+            f"{motion.least_turning_radius_m:.2f} m; take robot.motion.name: differential-drive"
+        )
+    speed, rate = motion.top_speed_m_s, motion.top_turn_rate_rad_s
+    acceleration = min(motion.braking_m_s2, speed / robot.dt_s)
+    return LocalLimits(
+        speed_m_s=speed,
+        reverse_m_s=min(reverse_m_s, speed),
+        acceleration_m_s2=acceleration,
+        deceleration_m_s2=acceleration,
+        turn_rate_rad_s=rate,
+        turn_acceleration_rad_s2=min(motion.turn_acceleration_rad_s2, rate / robot.dt_s),
+        delay_s=motion.delay_s,
+    )
+
+
+def outline_of(footprint: Footprint) -> FloatArray:
+    """(K, 2) corners of the outline; of a disc those of a polygon around it."""
+    if not footprint.is_disc:
+        return footprint.points_m
+    angles = 2.0 * np.pi * np.arange(DISC_CORNERS) / DISC_CORNERS
+    radius = footprint.radius_m / math.cos(math.pi / DISC_CORNERS)
+    return radius * np.column_stack([np.cos(angles), np.sin(angles)])

@@ -1,0 +1,190 @@
+"""Where a floor that was seen in part goes on: frontiers of the seen, what they cost to get to, and paths."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+
+from pilotage.core.types import BoolArray, FloatArray, IntArray
+from pilotage.kernels.grids.distance import squared_distance
+from pilotage.kernels.grids.travel_cost import travel_costs
+from pilotage.maps.occupancy_grid import FREE, OCCUPIED, OccupancyArray
+
+Scalar = TypeVar("Scalar", bound=np.generic)
+
+COARSE = 2
+"""Cells of the map along the side of a cell that is planned on."""
+NEAR_M, NEAR_COST = 0.35, 2.0
+"""Within so much of the least clearance a metre costs up to so many more."""
+VIEW_M = 1.2
+"""A frontier is looked at from within this distance of its middle."""
+VIEWS = 40
+AROUND = np.ones((3, 3), np.bool_)
+JOIN_M = 0.5
+"""From a place without room the nearest one with room is this near."""
+
+
+@dataclass(frozen=True, slots=True)
+class Frontier:
+    """Seen floor beside unseen.
+
+    Attributes
+    ----------
+    middle_xy_m
+        (2,) the cell of it that is nearest to its centroid.
+    length_m
+        How many cells it has, as a length.
+    view
+        The cell to look at it from, -1 where none is reached, and ``cost_m`` what it costs to get there.
+    """
+
+    middle_xy_m: FloatArray
+    length_m: float
+    view: int
+    cost_m: float
+
+
+class SeenFloor:
+    """A map in cells as it is now, with what it costs to get from one place to any other.
+
+    Frontiers are free cells beside unseen ones (Yamauchi, 1997), in groups that touch. Paths keep the
+    clearance to what is occupied and lead over free cells only.
+    """
+
+    def __init__(
+        self,
+        states: OccupancyArray,
+        corner_xy_m: FloatArray,
+        resolution_m: float,
+        clearance_m: float,
+        here_xy_m: FloatArray,
+    ) -> None:
+        rows, columns = (size - size % COARSE for size in states.shape)
+        self.cell_m = COARSE * resolution_m
+        self._corner = corner_xy_m
+        occupied = np.ascontiguousarray(states[:rows, :columns] == OCCUPIED)
+        away = np.full((rows, columns), np.inf)
+        if occupied.any():
+            away = resolution_m * np.sqrt(squared_distance(occupied))
+        self.distance_m: FloatArray = _blocks(away).min(axis=2)
+        seen: BoolArray = np.asarray(_blocks(states[:rows, :columns] == FREE).any(axis=2), np.bool_)
+        self._solid: BoolArray = np.asarray(_blocks(occupied).any(axis=2), np.bool_)
+        self._free: BoolArray = seen & ~self._solid
+        self._unseen: BoolArray = ~seen & ~self._solid
+        room = self.distance_m - clearance_m
+        factor = 1.0 + NEAR_COST * np.clip(1.0 - room / NEAR_M, 0.0, 1.0)
+        factor[(room < 0.0) | ~self._free] = np.inf
+        self._factor = factor
+        self._start = self._nearest_with_room(here_xy_m)
+        self.cost_m, self._parent = travel_costs(factor, self._start, self.cell_m, self.cell_m)
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Rows and columns of the cells that are planned on."""
+        rows, columns = self._free.shape
+        return rows, columns
+
+    def cell_of(self, xy_m: FloatArray) -> tuple[int, int]:
+        """Row and column of a point (2,), kept within the map."""
+        column, row = np.floor((xy_m - self._corner) / self.cell_m).astype(np.int64).tolist()
+        rows, columns = self._free.shape
+        return min(max(row, 0), rows - 1), min(max(column, 0), columns - 1)
+
+    def point_of(self, cell: int) -> FloatArray:
+        """Middle (2,) of a cell by its number."""
+        row, column = divmod(cell, self._free.shape[1])
+        return self._corner + self.cell_m * np.array([column + 0.5, row + 0.5])
+
+    def cost_to(self, xy_m: FloatArray) -> float:
+        """What it costs to get to a point, or to the nearest place with room beside it."""
+        return float(self.cost_m[self._nearest_with_room(xy_m)])
+
+    def frontiers(self, least_length_m: float) -> list[Frontier]:
+        """All frontiers of at least a length, the cheapest to look at first; those out of reach last."""
+        beside = ndimage.binary_dilation(self._unseen, AROUND)
+        labels, count = ndimage.label(self._free & beside, AROUND)
+        if count == 0:
+            return []
+        rows, columns = np.nonzero(labels)
+        group = labels[rows, columns]
+        order = np.argsort(group, kind="stable")
+        cuts = np.searchsorted(group[order], np.arange(1, count + 2))
+        out = []
+        for k in range(count):
+            members = order[cuts[k] : cuts[k + 1]]
+            if members.size * self.cell_m < least_length_m:
+                continue
+            out.append(self._frontier(rows[members], columns[members]))
+        return sorted(out, key=lambda frontier: frontier.cost_m)
+
+    def path_to(self, xy_m: FloatArray) -> FloatArray:
+        """(N, 2) from here to a point or the nearest place with room beside it; empty where none leads."""
+        return self.path(self._nearest_with_room(xy_m))
+
+    def path(self, cell: int) -> FloatArray:
+        """(N, 2) middles of the cells from here to one; empty where no path leads."""
+        if cell < 0 or not np.isfinite(self.cost_m[cell]):
+            return np.zeros((0, 2))
+        cells = [cell]
+        while cells[-1] != self._start and len(cells) < self.cost_m.size:
+            cells.append(int(self._parent[cells[-1]]))
+        columns = self._free.shape[1]
+        at = np.array(cells[::-1])
+        return self._corner + self.cell_m * (np.stack([at % columns, at // columns], axis=1) + 0.5)
+
+    def _frontier(self, rows: IntArray, columns: IntArray) -> Frontier:
+        length_m = rows.size * self.cell_m
+        off = np.hypot(rows - rows.mean(), columns - columns.mean())
+        middle = int(rows[off.argmin()]), int(columns[off.argmin()])
+        view = self._view_of(middle)
+        cost_m = float(self.cost_m[view]) if view >= 0 else math.inf
+        xy_m = self._corner + self.cell_m * (np.array([middle[1], middle[0]]) + 0.5)
+        return Frontier(xy_m, length_m, view, cost_m)
+
+    def _view_of(self, middle: tuple[int, int]) -> int:
+        """The cheapest cell near a frontier from which it is seen; -1 where there is none."""
+        reach = round(VIEW_M / self.cell_m)
+        rows, columns = self._free.shape
+        r0, r1 = max(0, middle[0] - reach), min(rows, middle[0] + reach + 1)
+        c0, c1 = max(0, middle[1] - reach), min(columns, middle[1] + reach + 1)
+        cost = self.cost_m.reshape(rows, columns)[r0:r1, c0:c1]
+        row, column = np.nonzero(np.isfinite(cost))
+        for k in np.argsort(cost[row, column], kind="stable")[:VIEWS].tolist():
+            cell = r0 + int(row[k]), c0 + int(column[k])
+            if self._sees(cell, middle):
+                return int(cell[0] * columns + cell[1])
+        return -1
+
+    def _sees(self, a: tuple[int, int], b: tuple[int, int]) -> bool:
+        """Whether nothing solid is on the line between two cells."""
+        count = 2 * max(abs(a[0] - b[0]), abs(a[1] - b[1])) + 1
+        rows = np.rint(np.linspace(a[0], b[0], count)).astype(np.int64)
+        columns = np.rint(np.linspace(a[1], b[1], count)).astype(np.int64)
+        return not self._solid[rows, columns].any()
+
+    def _nearest_with_room(self, xy_m: FloatArray) -> int:
+        """Number of the cell of a point, or of the nearest one with room where it has none."""
+        row, column = self.cell_of(xy_m)
+        rows, columns = self._free.shape
+        if np.isfinite(self._factor[row, column]):
+            return int(row * columns + column)
+        reach = round(JOIN_M / self.cell_m)
+        r0, r1 = max(0, row - reach), min(rows, row + reach + 1)
+        c0, c1 = max(0, column - reach), min(columns, column + reach + 1)
+        r, c = np.nonzero(np.isfinite(self._factor[r0:r1, c0:c1]))
+        if r.size == 0:
+            return int(row * columns + column)
+        k = int(np.hypot(r + r0 - row, c + c0 - column).argmin())
+        return int((r[k] + r0) * columns + c[k] + c0)
+
+
+def _blocks(cells: NDArray[Scalar]) -> NDArray[Scalar]:
+    """(rows, columns, COARSE squared) the cells of each coarser one."""
+    rows, columns = cells.shape
+    shaped = cells.reshape(rows // COARSE, COARSE, columns // COARSE, COARSE)
+    return shaped.transpose(0, 2, 1, 3).reshape(rows // COARSE, columns // COARSE, COARSE * COARSE)

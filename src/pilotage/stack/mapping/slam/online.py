@@ -1,0 +1,151 @@
+"""The mapper while the robot drives: scan by scan, loops closed as soon as a stretch of path is complete."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pilotage.core.types import FloatArray
+from pilotage.kernels.slam.frames import between, composed
+from pilotage.stack.mapping.slam.back_end import LoopCloser, Solved, refined, track_edges
+from pilotage.stack.mapping.slam.closures import USUAL_SLIP
+from pilotage.stack.mapping.slam.config import SlamConfig
+from pilotage.stack.mapping.slam.scan_covariances import SHARED_EDGES
+from pilotage.stack.mapping.slam.submaps import TURN_AS_PATH_M
+from pilotage.stack.mapping.slam.tracker import Tracker
+from pilotage.stack.mapping.slam.uncertainty import joint_covariance
+
+WINDOWS_M = (1.0, 2.0, 4.0)
+"""Half a search window's side at most, round by round, each time."""
+SCAN_COV = np.diag([0.005**2, 0.005**2, 0.002**2])
+"""What a scan's place beside the last keyframe is unsure by."""
+USUAL_RMS_M, LEAST_SHARE = 0.008, 0.003
+LOST_SCANS = 10
+"""So many scans in a row that fit nowhere: lost."""
+
+
+class OnlineSlam:
+    """Poses of the scanner in the frame of its first scan, and how sure they are.
+
+    Attributes
+    ----------
+    keyframe_poses
+        (K, 3) by the last optimization.
+    accepted
+        How many closures count.
+    covariance
+        (3, 3) of the last keyframe's pose.
+    """
+
+    def __init__(self, config: SlamConfig) -> None:
+        self._config = config
+        self._tracker = Tracker(config)
+        self._closer = LoopCloser(config)
+        self._path_m, self._lost_before, self._lost_run, self._healed = 0.0, 0, 0, 0
+        self.keyframe_poses = np.zeros((0, 3))
+        self.covariance = np.zeros((3, 3))
+        self.accepted = 0
+
+    @property
+    def pose(self) -> FloatArray:
+        """(3,) of the last scan."""
+        ahead = between(self._tracker.keyframe_pose, self._tracker.pose)
+        return np.asarray(composed(self.keyframe_poses[-1], ahead))
+
+    @property
+    def pose_covariance(self) -> FloatArray:
+        """(3, 3) of the last scan's pose.
+
+        The graph's covariances are those of scans with residuals as in an office of many things; a scanner
+        whose scans fit better is the surer for it.
+        """
+        share = min(max((self._tracker.rms_m / USUAL_RMS_M) ** 2, LEAST_SHARE), 1.0)
+        own = carried_covariance(self.covariance, self.keyframe_poses[-1], self.pose)
+        return share * own + SCAN_COV
+
+    @property
+    def lost(self) -> bool:
+        """Whether the last scans fitted nowhere."""
+        return self._lost_run >= LOST_SCANS
+
+    def add(self, cloud: FloatArray, step: FloatArray | None, dt_s: float) -> bool:
+        """Take in a scan; True where it became a keyframe, whose poses may all have moved.
+
+        Parameters
+        ----------
+        cloud
+            (K, 6) of ``clouds``.
+        step
+            (3,) motion of the scanner since the last scan by the odometry; None without.
+        dt_s
+            Time since the last scan.
+        """
+        known = len(self.keyframe_poses)
+        new = self._tracker.add(cloud, step, max(dt_s, 1e-3), dt_s)
+        lost = self._tracker.lost
+        self._lost_run = self._lost_run + 1 if lost > self._lost_before else 0
+        self._lost_before = lost
+        if self._tracker.healed > self._healed:
+            self._healed = self._tracker.healed
+            self.close()
+        if not new:
+            return False
+        if known == 0:
+            self.keyframe_poses = np.zeros((1, 3))
+            return True
+        self.keyframe_poses = self.keyframe_poses[: self._tracker.keyframes - 1]
+        self._extend()
+        if self._path_m >= 0.5 * self._config.submap_length_m:
+            self._path_m = 0.0
+            self.close()
+        return True
+
+    def close(self, ended: bool = False) -> int:
+        """Look for loops now; how many closed.
+
+        Parameters
+        ----------
+        ended
+            With the stretch of path that is not complete yet.
+        """
+        closer = self._closer
+        closer.grow(self._tracker.track(), ended)
+        if len(closer.submaps) == 0:
+            return 0
+        closer.look_again()
+        count = sum(closer.close(window_m, USUAL_SLIP)[1] for window_m in WINDOWS_M)
+        self.accepted += count
+        self._take(closer.state)
+        return count
+
+    def refine(self) -> None:
+        """Align all keyframes that see the same walls: the last word on the map."""
+        track = self._tracker.track()
+        if len(self.keyframe_poses) < 2:
+            return
+        self.close(ended=True)
+        self._take(refined(track.clouds, self._closer.state, track_edges(track), self._closer.submaps))
+
+    def _take(self, state: Solved) -> None:
+        self.keyframe_poses = state.poses.copy()
+        last = np.array([len(state.poses) - 1])
+        self.covariance = SHARED_EDGES * joint_covariance(state.edges, state.poses, state.weights, last)
+
+    def _extend(self) -> None:
+        """Hang the new keyframe on the one before."""
+        step = self._tracker.last_step()
+        moved = between(step.poses[0], step.poses[1])
+        here = self.keyframe_poses[-1]
+        pose = composed(here, moved)
+        self._path_m += float(np.hypot(moved[0], moved[1])) + TURN_AS_PATH_M * abs(float(moved[2]))
+        own = SHARED_EDGES * np.linalg.inv(track_edges(step).information[0])
+        c, s = np.cos(pose[2]), np.sin(pose[2])
+        turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+        self.covariance = carried_covariance(self.covariance, here, pose) + turn @ own @ turn.T
+        self.keyframe_poses = np.concatenate([self.keyframe_poses, pose[None]])
+
+
+def carried_covariance(covariance: FloatArray, pose: FloatArray, to: FloatArray) -> FloatArray:
+    """Covariance (3, 3) of a pose in the map, seen at another that hangs on it rigidly."""
+    lever = np.eye(3)
+    lever[0, 2], lever[1, 2] = -(to[1] - pose[1]), to[0] - pose[0]
+    return np.asarray(lever @ covariance @ lever.T)

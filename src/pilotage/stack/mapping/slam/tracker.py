@@ -1,0 +1,273 @@
+"""The front end: scans become a track of keyframes, and drift is all it leaves to the graph."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from pilotage.core.types import FloatArray, IntArray
+from pilotage.kernels.slam.frames import between, composed
+from pilotage.logs.laser_log import LaserLog
+from pilotage.stack.mapping.slam.clouds import Clouds, cloud_of
+from pilotage.stack.mapping.slam.config import SlamConfig
+from pilotage.stack.mapping.slam.local_matching import Aside, LocalMatcher
+from pilotage.stack.mapping.slam.odometry import scanner_odometry, smoothed_times
+
+SLIP_SHARE, SLIP_M = 0.15, 0.4
+"""A match as far as SLIP_M from its guess may be off by as much; a nearer one by that share and less."""
+
+BREAK_SLIP = np.array([0.2**2, 0.3**2])
+BLIND_BREAK_SLIP = np.array([0.5**2, 0.8**2])
+HEALED_SLIP = np.array([0.05**2, 0.02**2])
+"""Variances of position and heading where the track broke, with odometry and without, and where it was
+joined again."""
+GUESSED_SCANS, GUESS_SLIP = 3, np.array([0.05**2, 0.05**2])
+"""So many scans in a row may hang by the odometry alone before the track breaks, and what each adds."""
+RIGID = 1e4 * np.eye(3)
+"""Hessian of a break: its slip alone counts."""
+HEAL_SCANS, HEAL_KEYFRAMES = 10, 24
+"""A scan after a break is looked for in what was before: each of the first ones, then keyframes."""
+HEAL_M, HEAL_M_PER_KEYFRAME, HEAL_MOST_M = 0.8, 0.1, 2.5
+AGREE_M, AGREE_RAD = 0.2, 0.1
+"""Two scans must be found, the second one from another place, and agree."""
+SHORT = 5
+"""A piece of fewer keyframes that breaks off again is no piece: its keyframes are dropped."""
+
+OnScan = Callable[[int], None]
+
+
+@dataclass(frozen=True, slots=True)
+class LocalTrack:
+    """What the front end leaves.
+
+    Attributes
+    ----------
+    poses
+        (N, 3) of the scanner at each scan, in the frame of the first; drifting.
+    keyframes
+        (K,) scans that became keyframes, and ``owner`` (N,) the last keyframe of each scan.
+    clouds
+        Of the keyframes.
+    hessians
+        (K, 3, 3) of each keyframe's alignment with those before it, in ``poses``' frame.
+    slips
+        (K, 2) variances of position and heading since the keyframe before, by how far guesses and
+        matches were apart.
+    breaks
+        (B,) which keyframes begin a new piece: their scans fitted nowhere near the one before, and where
+        they lie beside it is a guess.
+    searched, lost
+        How many scans needed a search, and how many could not be aligned (their pose is the guess).
+    """
+
+    poses: FloatArray
+    keyframes: IntArray
+    owner: IntArray
+    clouds: Clouds
+    hessians: FloatArray
+    slips: FloatArray
+    breaks: IntArray
+    searched: int
+    lost: int
+
+
+@dataclass(frozen=True, slots=True)
+class _Torn:
+    """A break that may still be joined: what was before, the keyframe and the scan at which the piece began.
+
+    ``candidate`` is where a scan was, and by which motion (3,) the piece would have to be moved by it.
+    """
+
+    aside: Aside
+    keyframe: int
+    scan: int
+    candidate: tuple[FloatArray, FloatArray] | None = None
+
+
+class Tracker:
+    """Places scans one after the other; the track so far is at hand at any time.
+
+    Where a scan fits nowhere the track breaks: what follows is a piece of its own, whose scans are looked for
+    in what was before until two of them agree where it lies.
+
+    Attributes
+    ----------
+    healed
+        How many breaks were joined so.
+    """
+
+    def __init__(self, config: SlamConfig) -> None:
+        self._config = config
+        self._matcher = LocalMatcher(config)
+        self._poses: list[FloatArray] = []
+        self._owner: list[int] = []
+        self._keyframes: list[int] = []
+        self._clouds: list[FloatArray] = []
+        self._hessians: list[FloatArray] = []
+        self._slips: list[FloatArray] = []
+        self._breaks: list[int] = []
+        self._slip = np.zeros(2)
+        self._torn: _Torn | None = None
+        self._lost_run = 0
+        self.healed = 0
+
+    def add(self, cloud: FloatArray, step: FloatArray | None, dt_s: float, gap_s: float) -> bool:
+        """Place the next scan (K, 6); True where it became a keyframe. As ``LocalMatcher.match``."""
+        hessian, broken = np.zeros((3, 3)), False
+        if not self._poses:
+            pose = np.zeros(3)
+        else:
+            last = self._poses[-1]
+            fit = self._matcher.match(cloud, last, step, dt_s, gap_s)
+            self._lost_run = 0 if fit is not None else self._lost_run + 1
+            if fit is None:
+                pose, hessian = self._matcher.fallback(last, step, dt_s), RIGID
+                broken = step is None or self._lost_run > GUESSED_SCANS
+                self._slip += BLIND_BREAK_SLIP if step is None else BREAK_SLIP if broken else GUESS_SLIP
+                if broken:
+                    self._tear()
+            else:
+                pose, hessian = fit.pose, fit.hessian
+                self._slip += _slip(between(fit.start, fit.pose))
+        new = not self._poses or _is_new(between(self._poses[self._keyframes[-1]], pose), self._config)
+        self._poses.append(pose)
+        new = new and not (self._lost_run and not broken)
+        if new or broken:
+            self._keyframes.append(len(self._poses) - 1)
+            self._clouds.append(cloud)
+            self._hessians.append(hessian)
+            self._slips.append(self._slip)
+            self._slip = np.zeros(2)
+            self._matcher.add_keyframe(cloud, pose)
+        self._owner.append(len(self._keyframes) - 1)
+        if self._torn is not None and not broken:
+            self._heal(self._torn, cloud, new)
+        return new or broken
+
+    def _tear(self) -> None:
+        """Begin a new piece; one that has hardly begun is dropped."""
+        torn, count = self._torn, len(self._keyframes)
+        aside = self._matcher.set_aside()
+        if torn is not None and count - torn.keyframe < SHORT:
+            self._slip = self._slip + np.sum(self._slips[torn.keyframe :], axis=0)
+            for kept in (self._keyframes, self._clouds, self._hessians, self._slips):
+                del kept[torn.keyframe :]
+            self._owner = [min(owner, torn.keyframe - 1) for owner in self._owner]
+            self._torn = replace(torn, scan=len(self._poses), candidate=None)
+        else:
+            self._breaks.append(count)
+            self._torn = None if aside is None else _Torn(aside, count, len(self._poses))
+
+    def _heal(self, torn: _Torn, cloud: FloatArray, new: bool) -> None:
+        """Look for a scan in what was before the break; where two agree, move the piece to where they are."""
+        keyframes = len(self._keyframes) - torn.keyframe
+        if keyframes > HEAL_KEYFRAMES:
+            self._torn = None
+            return
+        if not new and len(self._poses) - torn.scan > HEAL_SCANS:
+            return
+        pose = self._poses[-1]
+        half_m = min(HEAL_M + HEAL_M_PER_KEYFRAME * keyframes, HEAL_MOST_M)
+        fit = self._matcher.find(torn.aside, cloud, pose, half_m)
+        if fit is None:
+            return
+        moved = composed(fit.pose, between(pose, np.zeros(3)))
+        if torn.candidate is None or not _is_new(between(torn.candidate[0], pose), self._config):
+            if torn.candidate is None:
+                self._torn = replace(torn, candidate=(pose, moved))
+            return
+        off = between(composed(torn.candidate[1], pose), fit.pose)
+        if np.hypot(off[0], off[1]) > AGREE_M or abs(off[2]) > AGREE_RAD:
+            self._torn = replace(torn, candidate=(pose, moved))
+            return
+        for k in range(torn.scan, len(self._poses)):
+            self._poses[k] = np.asarray(composed(moved, self._poses[k]))
+        self._matcher.carry(moved)
+        self._hessians[torn.keyframe], self._slips[torn.keyframe] = fit.hessian, HEALED_SLIP.copy()
+        self._breaks.remove(torn.keyframe)
+        self._torn = None
+        self.healed += 1
+
+    @property
+    def pose(self) -> FloatArray:
+        """(3,) of the last scan, in the frame of the first."""
+        return self._poses[-1]
+
+    @property
+    def keyframe_pose(self) -> FloatArray:
+        """(3,) of the last keyframe."""
+        return self._poses[self._keyframes[-1]]
+
+    @property
+    def rms_m(self) -> float:
+        """Running mean of the residuals of the alignments."""
+        return self._matcher.rms_m
+
+    @property
+    def keyframes(self) -> int:
+        """How many there are; a break may drop some of the last ones."""
+        return len(self._keyframes)
+
+    @property
+    def lost(self) -> int:
+        """How many scans could not be aligned."""
+        return self._matcher.lost
+
+    def last_step(self) -> LocalTrack:
+        """Return the last two keyframes alone, without their points."""
+        pair = self._keyframes[-2:]
+        return LocalTrack(
+            np.array([self._poses[k] for k in pair]),
+            np.arange(2),
+            np.arange(2),
+            Clouds.of([]),
+            np.array(self._hessians[-2:]),
+            np.array(self._slips[-2:]),
+            np.zeros(0, np.int64),
+            0,
+            0,
+        )
+
+    def track(self) -> LocalTrack:
+        """Everything so far."""
+        return LocalTrack(
+            np.array(self._poses).reshape(-1, 3),
+            np.array(self._keyframes, np.int64),
+            np.array(self._owner, np.int64),
+            Clouds.of(self._clouds),
+            np.array(self._hessians).reshape(-1, 3, 3),
+            np.array(self._slips).reshape(-1, 2),
+            np.array(self._breaks, np.int64),
+            self._matcher.searched,
+            self._matcher.lost,
+        )
+
+
+def track(log: LaserLog, config: SlamConfig, on_scan: OnScan | None = None) -> LocalTrack:
+    """Run the front end over a log."""
+    odometry = scanner_odometry(log, config.use_odometry)
+    times = smoothed_times(log.t_s)
+    tracker = Tracker(config)
+    for i in range(len(log)):
+        before = max(0, i - 1)
+        step = None if odometry is None else between(odometry[before], odometry[i])
+        dt_s = max(1e-3, float(times[i] - times[before]))
+        gap_s = float(log.t_s[i] - log.t_s[before])
+        tracker.add(cloud_of(log, i, config.max_range_m), step, dt_s, gap_s)
+        if on_scan is not None:
+            on_scan(i)
+    return tracker.track()
+
+
+def _slip(off: FloatArray) -> FloatArray:
+    """Variances (2,) of position and heading of a match by how far (3,) it is from its guess."""
+    far = np.array([float(np.hypot(off[0], off[1])), abs(float(off[2]))])
+    return np.asarray((SLIP_SHARE * far) ** 2 + (far * far / np.array([SLIP_M, 0.5 * SLIP_M])) ** 2)
+
+
+def _is_new(motion: FloatArray, config: SlamConfig) -> bool:
+    """Whether a scan is far enough from the last keyframe to become one."""
+    far = float(np.hypot(motion[0], motion[1])) > config.keyframe_distance_m
+    return far or abs(float(motion[2])) > config.keyframe_turn_rad

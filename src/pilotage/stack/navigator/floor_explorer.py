@@ -1,0 +1,358 @@
+"""The navigator that explores a floor: from frontier to frontier, and back to where it began."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from enum import StrEnum
+
+import numpy as np
+
+from pilotage.core.config import Config
+from pilotage.core.errors import InputError
+from pilotage.core.types import STOP, FloatArray, Pose2, Twist
+from pilotage.maps.world_map import WorldMap
+from pilotage.sensors.lidar import LidarConfig
+from pilotage.sensors.readings import LidarScan, Readings
+from pilotage.sensors.sensor import NonNegative, Positive
+from pilotage.stack.control.local.drive import LocalDrive
+from pilotage.stack.exploration.floor_frontiers import Frontier, SeenFloor
+from pilotage.stack.interface import NAVIGATORS, Belief, BeliefStatus, StackStatus
+from pilotage.stack.journal import Journal
+from pilotage.stack.knowledge import RobotKnowledge, TaskKnowledge
+from pilotage.stack.localization.localizer import Localizer
+from pilotage.stack.mapping.scan_grid import ScanGrid, echoes
+from pilotage.stack.navigator.navigator import Parts, localizer_of
+
+AHEAD_M = 2.5
+"""The local controller is led by a point so far ahead on the path."""
+STALL_M = 0.3
+SAME_M = 0.6
+"""A frontier this near to one that was given up is that one."""
+RETURNS = 4
+"""How often it checks, with loops closed anew, that it truly stands where it began."""
+
+
+class Doing(StrEnum):
+    """What it is about."""
+
+    EXPLORE = "explore"
+    CLOSE = "close"
+    RETURN = "return"
+    DONE = "done"
+
+
+class FloorExplorerConfig(Config):
+    """What is worth going to, when to close a loop, and when it is done."""
+
+    clearance_m: NonNegative = 0.06
+    """Beside the robot's radius, of the paths that it plans."""
+    least_frontier_m: Positive = 0.4
+    look_m: Positive = 0.35
+    """A frontier is looked at from this near to where it is best seen."""
+    replan_s: Positive = 1.0
+    switch_m: NonNegative = 2.0
+    """Another frontier must be nearer by this before it is gone to instead."""
+    turn_cost_m_per_rad: NonNegative = 0.4
+    length_gain: NonNegative = 0.3
+    """A metre of frontier is worth so many metres of path."""
+    unsure_m: Positive = 1.0
+    """Standard deviation of its position from which it goes back to close a loop first."""
+    stall_s: Positive = 15.0
+    arrival_m: Positive = 0.04
+    """How near to the start it has to believe to be in the end."""
+    resolution_m: Positive = 0.05
+    keyframe_m: Positive = 0.25
+    keyframe_rad: Positive = 0.2
+    """How far apart the scans of its map are, where the localizer makes none."""
+    reverse_m_s: NonNegative = 0.3
+
+
+@dataclass(slots=True)
+class Target:
+    """A place to go to, why, and the path there."""
+
+    xy_m: FloatArray
+    frontier_xy_m: FloatArray
+    score: float
+    path: FloatArray
+
+
+@NAVIGATORS.add("floor-frontier", FloorExplorerConfig)
+class FloorExplorer:
+    """Explores a floor with a laser scanner until no frontier is left that it can look at.
+
+    Goes to the nearest frontier (Yamauchi, 1997), long ones a little sooner; paths are planned over seen free
+    floor, and driven by the local controller, which sees what is near by itself. Where its position becomes
+    unsure it goes back to the place that it knows best, for the localizer to close a loop there (active
+    loop closing: Stachniss, Haehnel and Burgard, 2004). In the end it returns to its start.
+
+    The map is the localizer's where that makes one (``slam``), else it is drawn from scans at the poses that
+    the localizer tells; with the oracle ``localizer`` that is exploration with a perfect pose. Frontiers that
+    were looked at and stayed, or cannot be reached, are left, and said.
+    """
+
+    def __init__(
+        self,
+        config: FloorExplorerConfig,
+        robot: RobotKnowledge,
+        chart: WorldMap,
+        task: TaskKnowledge,
+        parts: Parts,
+        journal: Journal,
+    ) -> None:
+        del chart  # it knows nothing of the floor
+        if parts.local_controller is None:
+            raise InputError("navigator 'floor-frontier': expected stack.local_controller, found none")
+        self._config, self._journal = config, journal
+        self._localizer: Localizer = localizer_of(parts, "floor-frontier")
+        self._lidar, self._scanner = robot.one_sensor(LidarConfig, "navigator 'floor-frontier'")
+        self._drive = LocalDrive(
+            parts.local_controller,
+            robot,
+            task.initial.pose,
+            reverse_m_s=config.reverse_m_s,
+            needed_by="navigator 'floor-frontier'",
+        )
+        self._clearance_m = robot.radius_m + config.clearance_m
+        own = getattr(self._localizer, "scan_grid", None)
+        self._draws = own is None
+        self._grid: ScanGrid = ScanGrid(self._scanner, config.resolution_m) if own is None else own
+        mount = self._scanner.mount
+        self._mount = Pose2(mount.x_m, mount.y_m, mount.theta_rad)
+        start = task.initial.pose
+        self._start = np.array([start.x_m, start.y_m])
+        self._doing, self._target = Doing.EXPLORE, None
+        self._left: list[FloatArray] = []
+        self._sure_m, self._checked = 0.0, 0
+        self._planned_s, self._moved_s, self._moved_from = -math.inf, 0.0, self._start
+        self._status, self._reason = StackStatus.RUNNING, ""
+        self._frontiers = 0
+        journal.result("grid", self._grid.grid)
+        journal.counts |= {"frontiers_seen": 0, "frontiers_left": 0, "loops_sought": 0}
+        self._channel = journal.channel(
+            {"goal_x_m": "m", "goal_y_m": "m", "frontiers": "1", "position_std_m": "m"}, first=True
+        )
+
+    _target: Target | None
+
+    @property
+    def belief(self) -> Belief:
+        """The localizer's belief."""
+        return self._localizer.belief
+
+    @property
+    def status(self) -> tuple[StackStatus, str]:
+        """Arrived where it is back, and why it explores no more."""
+        return self._status, self._reason
+
+    def step(self, readings: Readings) -> Twist:
+        """Localize, look whether there is something better to do, and drive."""
+        belief = self._localizer.step(readings)
+        self._drive.move(readings)
+        if self._draws:
+            self._draw(readings, belief.pose)
+        if self._status is not StackStatus.RUNNING or not len(self._grid.poses):
+            return STOP
+        here = np.array([belief.pose.x_m, belief.pose.y_m])
+        if readings.t_s - self._planned_s >= self._config.replan_s or self._there(here):
+            self._planned_s = readings.t_s
+            self._decide(readings.t_s, belief, here)
+        target = self._target
+        goal = (math.nan, math.nan) if target is None else (float(target.xy_m[0]), float(target.xy_m[1]))
+        self._channel.tell(*goal, float(self._frontiers), _std_m(belief))
+        if target is None or belief.status is BeliefStatus.LOST:
+            return STOP
+        tolerance_m = 0.5 * self._arrival_m()
+        return self._drive.toward(self._led_to(target.path, here), belief.pose, readings, tolerance_m)
+
+    def _draw(self, readings: Readings, pose: Pose2) -> None:
+        """Put a scan on the own map where the robot has moved since the last one."""
+        scan = readings.by_sensor.get(self._lidar)
+        if not isinstance(scan, LidarScan):
+            return
+        at = pose.compose(self._mount).as_array()
+        if len(self._grid.poses):
+            off = at - self._grid.poses[-1]
+            turn = abs((off[2] + math.pi) % (2.0 * math.pi) - math.pi)
+            if np.hypot(off[0], off[1]) < self._config.keyframe_m and turn < self._config.keyframe_rad:
+                return
+        self._grid.add(echoes(scan.ranges_m, self._scanner), at)
+
+    # --- deciding -----------------------------------------------------------------------------------
+
+    def _arrival_m(self) -> float:
+        return self._config.arrival_m if self._doing is Doing.RETURN else self._config.look_m
+
+    def _there(self, here: FloatArray) -> bool:
+        target = self._target
+        return target is not None and float(np.hypot(*(target.xy_m - here))) < self._arrival_m()
+
+    def _decide(self, t_s: float, belief: Belief, here: FloatArray) -> None:
+        """Choose what to do, and where to go for it."""
+        floor = SeenFloor(
+            self._grid.states, self._grid.corner_xy_m, self._grid.resolution_m, self._clearance_m, here
+        )
+        self._watch(t_s, here)
+        if self._doing is Doing.RETURN:
+            self._come_back(t_s, floor, here)
+            return
+        found = self._worth_it(floor, belief, here)
+        self._frontiers = len(found)
+        if self._doing is Doing.CLOSE and self._still_unsure(belief, here):
+            self._go(floor, self._target)
+        elif _std_m(belief) > self._config.unsure_m + self._sure_m and self._go_closing(t_s, floor, here):
+            self._journal.count("loops_sought")
+        elif found:
+            self._go_exploring(floor, found, here)
+        else:
+            self._set_out_home(t_s, floor, here)
+
+    def _worth_it(self, floor: SeenFloor, belief: Belief, here: FloatArray) -> list[Target]:
+        """Frontiers within reach that were not given up, the best first."""
+        config, out = self._config, []
+        if self._target is not None and self._doing is Doing.EXPLORE and self._there(here):
+            # It has been looked at: what is still unseen of it stays so.
+            self._give_up(self._target.frontier_xy_m)
+            self._journal.count("frontiers_seen")
+        for frontier in floor.frontiers(config.least_frontier_m):
+            if frontier.view < 0 or self._is_left(frontier):
+                continue
+            xy_m = floor.point_of(frontier.view)
+            bearing = math.atan2(xy_m[1] - here[1], xy_m[0] - here[0]) - belief.pose.theta_rad
+            turn = abs((bearing + math.pi) % (2.0 * math.pi) - math.pi)
+            score = frontier.cost_m + config.turn_cost_m_per_rad * turn
+            score -= config.length_gain * min(frontier.length_m, 4.0)
+            out.append(Target(xy_m, frontier.middle_xy_m, score, np.zeros((0, 2))))
+        return sorted(out, key=lambda target: target.score)
+
+    def _is_left(self, frontier: Frontier) -> bool:
+        return any(float(np.hypot(*(frontier.middle_xy_m - place))) < SAME_M for place in self._left)
+
+    def _give_up(self, frontier_xy_m: FloatArray) -> None:
+        self._left.append(frontier_xy_m)
+
+    def _go_exploring(self, floor: SeenFloor, found: list[Target], here: FloatArray) -> None:
+        """To the best frontier, or on to the one it is under way to while that is about as good."""
+        best, now = found[0], self._target
+        if now is not None and self._doing is Doing.EXPLORE and not self._there(here):
+            away = [float(np.hypot(*(other.frontier_xy_m - now.frontier_xy_m))) for other in found]
+            same = found[int(np.argmin(away))]
+            if min(away) < 2.0 * SAME_M and same.score < best.score + self._config.switch_m:
+                best = same
+        self._doing = Doing.EXPLORE
+        self._go(floor, best)
+
+    def _go(self, floor: SeenFloor, target: Target | None) -> None:
+        """Take the path to a target; without one the target is given up."""
+        self._target = target
+        if target is None:
+            return
+        target.path = floor.path_to(target.xy_m)
+        if len(target.path) == 0:
+            self._give_up(target.frontier_xy_m)
+            self._target = None
+
+    # --- closing loops ------------------------------------------------------------------------------
+
+    def _still_unsure(self, belief: Belief, here: FloatArray) -> bool:
+        """Whether to go on to where a loop may close."""
+        if self._target is None or _std_m(belief) < 0.5 * (self._config.unsure_m + self._sure_m):
+            return False
+        if not self._there(here):
+            return True
+        # It is there: what it is unsure by now cannot be helped.
+        self._sure_m = _std_m(belief)
+        return False
+
+    def _go_closing(self, t_s: float, floor: SeenFloor, here: FloatArray) -> bool:
+        """Set out for the place of an early scan; False where none is within reach."""
+        poses = self._grid.poses
+        early = poses[: max(1, len(poses) // 2), :2]
+        costs = np.array([floor.cost_to(place) for place in early])
+        far = np.hypot(*(early - here).T) > 1.0
+        if not (np.isfinite(costs) & far).any():
+            return False
+        place = early[int(np.where(far, costs, np.inf).argmin())]
+        self._doing = Doing.CLOSE
+        self._go(floor, Target(place, place, 0.0, np.zeros((0, 2))))
+        self._journal.say(
+            t_s, "close", f"unsure of its place: back to ({place[0]:.1f}, {place[1]:.1f}) for a loop"
+        )
+        return self._target is not None
+
+    def _watch(self, t_s: float, here: FloatArray) -> None:
+        """Give up a target that it gets no nearer to."""
+        if float(np.hypot(*(here - self._moved_from))) > STALL_M:
+            self._moved_from, self._moved_s = here, t_s
+        elif t_s - self._moved_s > self._config.stall_s:
+            self._moved_s = t_s
+            if self._target is not None and self._doing is not Doing.RETURN:
+                self._journal.say(t_s, "stall", "it gets no nearer: this frontier is given up")
+                self._give_up(self._target.frontier_xy_m)
+                self._target = None
+            elif self._doing is Doing.RETURN:
+                self._fail(t_s, "stuck on its way back to the start")
+
+    # --- coming back --------------------------------------------------------------------------------
+
+    def _set_out_home(self, t_s: float, floor: SeenFloor, here: FloatArray) -> None:
+        left = [f for f in floor.frontiers(self._config.least_frontier_m) if f.view < 0 or self._is_left(f)]
+        unreached = sum(1 for frontier in left if frontier.view < 0)
+        self._journal.counts["frontiers_left"] = len(left)
+        self._journal.say(
+            t_s,
+            "explored",
+            f"no frontier is left to look at; {unreached} of those that stay are out of reach, "
+            f"{len(left) - unreached} were looked at",
+        )
+        self._doing = Doing.RETURN
+        self._come_back(t_s, floor, here)
+
+    def _come_back(self, t_s: float, floor: SeenFloor, here: FloatArray) -> None:
+        """Drive to the start; there, look for loops once more before believing it."""
+        off_m = float(np.hypot(*(self._start - here)))
+        if off_m >= self._config.arrival_m:
+            path = floor.path_to(self._start)
+            if len(path) == 0 and off_m > 1.0:
+                self._fail(t_s, "no path over the floor that it has seen leads back to the start")
+                return
+            self._target = Target(
+                self._start, self._start, 0.0, np.concatenate([path[:-1], self._start[None]])
+            )
+            return
+        close_loops = getattr(self._localizer, "close_loops", None)
+        if close_loops is not None and self._checked < RETURNS:
+            self._checked += 1
+            close_loops()
+            pose = self._localizer.belief.pose
+            if math.hypot(pose.x_m - self._start[0], pose.y_m - self._start[1]) >= self._config.arrival_m:
+                return
+        refine = getattr(self._localizer, "refine", None)
+        if refine is not None:
+            refine()
+        left = self._journal.counts["frontiers_left"]
+        self._end(t_s, StackStatus.ARRIVED, f"explored, {left} frontiers left, back at the start")
+
+    def _fail(self, t_s: float, why: str) -> None:
+        self._end(t_s, StackStatus.FAILED, why)
+
+    def _end(self, t_s: float, status: StackStatus, why: str) -> None:
+        self._doing, self._target = Doing.DONE, None
+        self._status, self._reason = status, why
+        self._journal.say(t_s, str(status), why)
+
+    # --- driving ------------------------------------------------------------------------------------
+
+    def _led_to(self, path: FloatArray, here: FloatArray) -> tuple[float, float]:
+        """A point on the path some metres ahead of where the robot is nearest to it."""
+        nearest = int(np.hypot(*(path - here).T).argmin())
+        steps = np.hypot(*np.diff(path[nearest:], axis=0).T)
+        k = nearest + int(np.searchsorted(np.cumsum(steps), AHEAD_M))
+        point = path[min(k, len(path) - 1)]
+        return float(point[0]), float(point[1])
+
+
+def _std_m(belief: Belief) -> float:
+    """Greatest standard deviation of the position."""
+    return math.sqrt(max(float(np.linalg.eigvalsh(belief.cov[:2, :2])[-1]), 0.0))

@@ -1,0 +1,114 @@
+"""Frontiers of a seen floor, the grid that grows with scans, and what a map of a floor is judged by."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from pilotage.core.types import Pose2
+from pilotage.evaluation.floor_map import floor_map_metrics, reachable_floor
+from pilotage.experiments.mission import load_mission, mission_of
+from pilotage.experiments.run import run_mission
+from pilotage.kernels.slam.frames import composed
+from pilotage.maps.occupancy_grid import FREE, OCCUPIED, UNKNOWN, OccupancyGrid
+from pilotage.maps.world_map import WorldMap
+from pilotage.sensors.lidar import LidarConfig
+from pilotage.stack.exploration.floor_frontiers import SeenFloor
+from pilotage.stack.mapping.scan_grid import ScanGrid, echoes
+from support.laser_rooms import furnished, ranges
+from support.missions import MISSIONS
+from support.robots import ROOM
+
+HERE = np.array([1.0, 1.0])
+
+
+def floor_of(states: np.ndarray, here: np.ndarray = HERE) -> SeenFloor:
+    return SeenFloor(states.astype(np.int8), np.zeros(2), 0.05, 0.3, here)
+
+
+def half_seen() -> np.ndarray:
+    """A room of 8 x 4 m, its right half unseen."""
+    states = np.full((80, 160), FREE)
+    states[:, 80:] = UNKNOWN
+    states[[0, 1, -2, -1], :] = OCCUPIED
+    states[:, [0, 1]] = OCCUPIED
+    return states
+
+
+def test_the_seen_ends_at_one_frontier() -> None:
+    floor = floor_of(half_seen())
+    (frontier,) = floor.frontiers(0.4)
+    assert frontier.middle_xy_m == pytest.approx([3.95, 2.0], abs=0.15)
+    assert frontier.length_m == pytest.approx(3.8, abs=0.3)
+    assert np.hypot(*(floor.point_of(frontier.view) - frontier.middle_xy_m)) <= 1.75
+    path = floor.path(frontier.view)
+    assert np.hypot(*(path[0] - HERE)) < 0.1
+    assert np.hypot(*np.diff(path, axis=0).T).max() < 0.15
+    assert frontier.cost_m >= np.hypot(*np.diff(path, axis=0).T).sum() - 1e-9
+
+
+def test_what_is_behind_a_wall_is_out_of_reach() -> None:
+    states = half_seen()
+    states[:, 50:52] = OCCUPIED
+    (frontier,) = floor_of(states).frontiers(0.4)
+    assert frontier.view == -1
+    assert floor_of(states).path_to(np.array([3.5, 2.0])).shape == (0, 2)
+
+
+def test_ways_keep_their_clearance() -> None:
+    states = half_seen()
+    states[0:50, 40:42] = OCCUPIED
+    floor = floor_of(states)
+    path = floor.path_to(np.array([3.3, 1.0]))
+    rows, columns = np.array([floor.cell_of(point) for point in path]).T
+    assert floor.distance_m[rows, columns].min() >= 0.3
+    assert path[:, 1].max() > 2.5
+
+
+def test_a_grid_grows_and_follows_its_poses() -> None:
+    scanner = LidarConfig(beams=180, max_range_m=12.0)
+    walls, angles = furnished(), LidarConfig(beams=180).beam_angles_rad()
+    grid = ScanGrid(scanner, 0.05)
+    assert grid.grid().cells.size == 1
+    poses = np.array([[2.0, 3.5, 0.2], [8.0, 2.0, 2.0]])
+    for pose in poses:
+        seen = ranges(walls, pose, angles)
+        grid.add(echoes(np.where(np.isfinite(seen), seen, 12.0), scanner), pose)
+    there = np.array([30.0, -20.0, 1.0])
+    grid.move(np.array([composed(there, pose) for pose in poses]))
+    moved = grid.grid()
+    inner = composed(there, np.array([5.0, 5.5, 0.0]))
+    assert moved.cells[moved.cell_at(inner[0], inner[1])] == FREE
+    grid.move(poses)
+    back = grid.grid()
+    assert back.cells[back.cell_at(5.0, 5.5)] == FREE
+    assert back.cells[back.cell_at(inner[0], inner[1])] != FREE
+    grid.keep(1)
+    assert len(grid.poses) == 1
+
+
+def test_a_true_map_has_all_of_the_floor_and_a_shifted_one_its_shift() -> None:
+    chart = WorldMap("room", ROOM.bounds_m, ROOM)
+    assert len(reachable_floor(chart, 0.3, Pose2(2.0, 2.0, 0.0))) * 0.05**2 == pytest.approx(79.0, abs=1.5)
+    cells = np.full((168, 208), FREE, np.int8)
+    cells[[3, 4, 163, 164], 4:204] = OCCUPIED
+    grid = OccupancyGrid(cells, 0.05, Pose2(-0.2, -0.2, 0.0))
+    metrics = floor_map_metrics(grid, chart, 0.3, Pose2(2.0, 2.0, 0.0))
+    assert metrics["floor_mapped"] == 1.0
+    assert metrics["wall_rms_m"] == pytest.approx(0.025, abs=1e-4)
+    shifted = OccupancyGrid(cells, 0.05, Pose2(-0.2, 0.1, 0.0))
+    assert float(str(floor_map_metrics(shifted, chart, 0.3, Pose2(2.0, 2.0, 0.0))["wall_rms_m"])) > 0.2
+
+
+def test_an_unknown_floor_is_explored_and_mapped() -> None:
+    """The mission's stack in a small building: all of it, nothing touched, back, and a map left."""
+    room = mission_of(MISSIONS["reach"]).world.model_dump(mode="json")
+    unknown = load_mission("museum-unknown", (), 1)
+    values = unknown.model_dump(mode="json") | {"mission": "two-rooms"}
+    values["world"] = room | {"start": {"x_m": 2.0, "y_m": 2.0, "theta_rad": 0.0}, "goal": None}
+    metrics = run_mission(mission_of(values), save=False).metrics
+    assert metrics["success"] is True, metrics["reason"]
+    assert metrics["collisions"] == 0
+    assert float(str(metrics["floor_mapped"])) > 0.99
+    assert float(str(metrics["wall_rms_m"])) < 0.03
+    assert float(str(metrics["return_error_m"])) < 0.1
