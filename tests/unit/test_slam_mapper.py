@@ -11,13 +11,15 @@ import pytest
 
 from pilotage.cli.main import main
 from pilotage.core.errors import InputError
+from pilotage.core.types import FloatArray
 from pilotage.experiments.slam import read_slam_config
 from pilotage.kernels.slam.frames import between
+from pilotage.logs.laser_log import LaserLog
 from pilotage.stack.mapping.slam.closures import Verdict
 from pilotage.stack.mapping.slam.config import SlamConfig
 from pilotage.stack.mapping.slam.mapper import map_log
 from pilotage.stack.mapping.slam.result import SlamResult
-from support.laser_rooms import along, furnished, recording
+from support.laser_rooms import along, furnished, recording, room
 
 ROUND = [(1.5, 1.2), (5.0, 1.2), (5.0, 4.0), (8.5, 5.8), (5.0, 6.0), (2.0, 4.0), (1.5, 1.2), (4.0, 1.2)]
 
@@ -77,6 +79,44 @@ def test_a_robot_that_stands_is_mapped_with_a_word() -> None:
     result = map_log(log, SlamConfig())
     assert any("hardly moved" in text for text in result.warnings)
     assert result.poses.shape == (12, 3)
+
+
+def carried_away(odometry: bool) -> tuple[LaserLog, FloatArray]:
+    """A robot that somebody lifts from one room into a quite different one while its wheels stand."""
+    other = np.array([*room(40.0, 0.0, 52.0, 3.0), (44.0, 0.0, 44.0, 1.8), (47.0, 3.0, 48.5, 1.2)])
+    walls = np.concatenate([furnished(), other])
+    first = along([(1.5, 1.2), (5.0, 1.2), (5.0, 4.0), (2.0, 4.0)])
+    second = along([(41.0, 2.0), (43.0, 2.3), (46.0, 2.4)])
+    path = np.concatenate([first, second])
+    log = recording(walls, path, np.random.default_rng(6))
+    assert log.odometry is not None
+    told = log.odometry.copy()
+    told[len(first) :, :2] += told[len(first) - 1, :2] - told[len(first), :2]
+    return replace(log, odometry=told if odometry else None), path
+
+
+@pytest.mark.parametrize("odometry", [True, False])
+def test_a_robot_that_is_carried_away_is_noticed(odometry: bool) -> None:
+    log, path = carried_away(odometry)
+    result = map_log(log, SlamConfig())
+    (torn,) = [text for text in result.warnings if "the track breaks" in text]
+    assert "nothing joins it" in torn
+    assert result.poses.shape == path.shape
+    at = float(torn.split(" at ")[1].split(" s:")[0])
+    moved = np.hypot(*np.diff(path[:, :2], axis=0).T)
+    assert abs(at - float(log.t_s[int(moved.argmax()) + 1])) < 1.0
+
+
+def test_a_stretch_of_blind_scans_does_not_cost_the_map() -> None:
+    """The scanner is covered for three scans while the robot turns: the odometry bridges them."""
+    path = along(ROUND)
+    log = recording(furnished(), path, np.random.default_rng(7))
+    ranges_m = log.ranges_m.copy()
+    ranges_m[60:63] = np.nan
+    result = map_log(replace(log, ranges_m=ranges_m), SlamConfig())
+    assert result.lost == 3
+    assert not any("the track breaks" in text for text in result.warnings)
+    assert rms_m(result, path) < 0.04
 
 
 def test_too_little_to_map_is_refused() -> None:

@@ -11,12 +11,14 @@ from pilotage.core.types import FloatArray
 from pilotage.logs.laser_log import LaserLog
 from pilotage.models.pose_graph import PoseGraph
 from pilotage.stack.mapping.slam.back_end import (
+    LoopCloser,
     beam_spacing,
     closed,
     keyframe_clouds,
     refined,
     track_edges,
 )
+from pilotage.stack.mapping.slam.closures import Verdict
 from pilotage.stack.mapping.slam.config import SlamConfig
 from pilotage.stack.mapping.slam.drawing import drawn_map
 from pilotage.stack.mapping.slam.odometry import scanner_odometry
@@ -79,7 +81,7 @@ def map_log(log: LaserLog, config: SlamConfig, on_stage: OnStage | None = None) 
         turn,
         local.searched,
         local.lost,
-        _warnings(log, local),
+        (*_warnings(log, local), *_torn(log, local, closer)),
     )
 
 
@@ -123,6 +125,25 @@ def _odometry_scales(log: LaserLog, poses: FloatArray, config: SlamConfig) -> tu
         square = float(told[:, axis] @ told[:, axis])
         scales.append(float(true[:, axis] @ told[:, axis]) / square if square > 0.0 else float("nan"))
     return scales[0], scales[1]
+
+
+def _torn(log: LaserLog, local: LocalTrack, closer: LoopCloser) -> list[str]:
+    """Where the track broke for good, and whether closures join what follows to what was before."""
+    extents = closer.submaps.extents
+    pairs = [
+        (extents[closure.candidate.earlier].piece, extents[closure.candidate.later].piece)
+        for closure in closer.closures
+        if closure.verdict is Verdict.ACCEPTED
+    ]
+    out = []
+    for number, keyframe in enumerate(local.breaks.tolist(), start=1):
+        count = sum(first < number <= second for first, second in pairs)
+        told = f"{count} closures join it" if count else "nothing joins it, where it lies is a guess"
+        t_s = float(log.t_s[local.keyframes[keyframe]])
+        out.append(
+            f"the track breaks at {t_s:.1f} s: the scan fits nowhere near (was the robot carried?); {told}"
+        )
+    return out
 
 
 def _warnings(log: LaserLog, local: LocalTrack) -> tuple[str, ...]:
