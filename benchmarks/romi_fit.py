@@ -41,8 +41,8 @@ from pilotage.experiments.mission import load_mission
 from pilotage.maps.cell_map import CellMap, CellState, TrueCellMap
 from pilotage.maps.cell_map_text import read_cell_map
 from pilotage.maps.true_cells import read_true_map, true_map
+from pilotage.replicas.surround_check import SurroundCheck
 from pilotage.stack.control.wheel_pursuit import pursue
-from pilotage.stack.exploration.surround_check import SurroundCheck
 
 DATA = Path(__file__).resolve().parents[2] / "shared" / "data" / "romi"
 CONFIGURATIONS: dict[str, tuple[str, bool, bool]] = {

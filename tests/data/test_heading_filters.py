@@ -12,9 +12,9 @@ from pilotage.calibration.magnetometer import calibrate_turned
 from pilotage.core.angles import wrap_array_to_pi, wrap_to_pi
 from pilotage.core.types import FloatArray
 from pilotage.logs.heading_csv import HeadingLog, find_heading_logs, read_heading_log
+from pilotage.replicas.heading_report import EncoderGyroConfig, EncoderGyroFilter
 from pilotage.stack.localization.gyro_bias import GyroBiasConfig, GyroBiasFilter
 from pilotage.stack.localization.heading_filter import HeadingErrors, HeadingEstimate, HeadingFilter
-from pilotage.stack.localization.heading_report import EncoderGyroConfig, EncoderGyroFilter
 from support.recordings import recording
 
 START = HeadingEstimate(0.0, 1e-6)

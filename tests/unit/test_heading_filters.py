@@ -13,14 +13,14 @@ from pilotage.core.angles import wrap_to_pi
 from pilotage.core.errors import InputError
 from pilotage.core.types import FloatArray
 from pilotage.kernels.filters import heading
-from pilotage.stack.localization.gyro_bias import GyroBiasConfig, GyroBiasFilter
-from pilotage.stack.localization.heading_filter import HeadingErrors, HeadingEstimate
-from pilotage.stack.localization.heading_report import (
+from pilotage.replicas.heading_report import (
     EncoderGyroConfig,
     EncoderGyroFilter,
     EncoderMagnetometerConfig,
     EncoderMagnetometerFilter,
 )
+from pilotage.stack.localization.gyro_bias import GyroBiasConfig, GyroBiasFilter
+from pilotage.stack.localization.heading_filter import HeadingErrors, HeadingEstimate
 
 START = HeadingEstimate(0.0, 1e-4)
 small = st.floats(1e-7, 1e-2)

@@ -16,23 +16,23 @@ from pilotage.core.random import RandomStreams
 from pilotage.core.types import Pose2, WheelSpeeds
 from pilotage.maps.cell_map import CellMap, CellState, grown
 from pilotage.missions.explorer import FirmwareConfig
-from pilotage.sensors.infrared import InfraredConfig
-from pilotage.sensors.magnetometer import MagnetometerConfig
-from pilotage.sensors.readings import InfraredReading, LineReading, Readings
-from pilotage.stack.control.potential_field import PotentialField, PotentialFieldConfig
-from pilotage.stack.control.wheel_pursuit import pursue, wheel_speeds
-from pilotage.stack.exploration.surround_check import SurroundCheck, SurroundCheckConfig
-from pilotage.stack.interface import StackStatus
-from pilotage.stack.localization.gyro_bias import GyroBiasConfig, GyroBiasFilter
-from pilotage.stack.localization.heading_filter import HeadingEstimate, HeadingFilter
-from pilotage.stack.localization.heading_report import (
+from pilotage.replicas.cell_marks import CellMarks
+from pilotage.replicas.heading_report import (
     EncoderGyroConfig,
     EncoderGyroFilter,
     EncoderMagnetometerConfig,
     EncoderMagnetometerFilter,
 )
-from pilotage.stack.localization.wheel_pose import WheelPose
-from pilotage.stack.mapping.cell_marks import CellMarks
+from pilotage.replicas.potential_field import PotentialField, PotentialFieldConfig
+from pilotage.replicas.surround_check import SurroundCheck, SurroundCheckConfig
+from pilotage.replicas.wheel_pose import WheelPose
+from pilotage.sensors.infrared import InfraredConfig
+from pilotage.sensors.magnetometer import MagnetometerConfig
+from pilotage.sensors.readings import InfraredReading, LineReading, Readings
+from pilotage.stack.control.wheel_pursuit import pursue, wheel_speeds
+from pilotage.stack.interface import StackStatus
+from pilotage.stack.localization.gyro_bias import GyroBiasConfig, GyroBiasFilter
+from pilotage.stack.localization.heading_filter import HeadingEstimate, HeadingFilter
 from support.sheets import START, ToldOfSheet, sheet_knowledge, sheet_sensors, sheet_simulator
 
 OBSTACLE, LINE, BORDER = CellState.OBSTACLE, CellState.LINE, CellState.BORDER

@@ -17,6 +17,8 @@ from pilotage.kernels.bodies import wheels
 from pilotage.kernels.geometry import boxes
 from pilotage.maps.true_cells import SheetFile
 from pilotage.models.motion.wheel_drive import WheelDriveConfig, WheelErrorsConfig
+from pilotage.replicas.random_walk import RandomWalk, RandomWalkConfig
+from pilotage.replicas.surround_check import SurroundCheck, SurroundCheckConfig
 from pilotage.sensors.gyroscope import GyroscopeConfig
 from pilotage.sensors.infrared import InfraredConfig
 from pilotage.sensors.readings import EncoderCounts, GyroscopeRates, InfraredReading, LineReading
@@ -24,8 +26,6 @@ from pilotage.sensors.wheel_encoders import WheelEncodersConfig
 from pilotage.sim.bodies.wheel_drive import true_wheels
 from pilotage.stack.exploration.frontier import FrontierExplorer
 from pilotage.stack.exploration.frontier_config import FrontierConfig
-from pilotage.stack.exploration.random_walk import RandomWalk, RandomWalkConfig
-from pilotage.stack.exploration.surround_check import SurroundCheck, SurroundCheckConfig
 from support.sheets import OnSheet, ToldOfSheet, sheet_sensors, sheet_simulator
 
 EXACT = WheelErrorsConfig(

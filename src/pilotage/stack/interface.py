@@ -106,6 +106,8 @@ class Stack(Protocol):
         ...
 
 
-NAVIGATORS: Registry[Stack] = Registry("navigator", "pilotage.stack.navigator", "pilotage.stack.exploration")
+NAVIGATORS: Registry[Stack] = Registry(
+    "navigator", "pilotage.stack.navigator", "pilotage.stack.exploration", "pilotage.replicas"
+)
 """Whole stacks; built as ``cls(config, robot, chart, task, parts, journal)``: a ``RobotKnowledge``, a
 ``WorldMap``, a ``TaskKnowledge``, the ``Parts`` that the mission names, and the ``Journal`` to write into."""

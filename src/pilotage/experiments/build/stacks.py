@@ -18,6 +18,7 @@ from pilotage.experiments.oracles.truth import Truth
 from pilotage.maps.world_map import WorldMap
 from pilotage.missions.places import GoalConfig
 from pilotage.missions.stack import InitialConfig, StackConfig
+from pilotage.replicas.wheel_pose import START_VAR_RAD2
 from pilotage.stack.control.controller import CONTROLLERS
 from pilotage.stack.control.escape import ESCAPES
 from pilotage.stack.control.local.role import LOCAL_CONTROLLERS
@@ -27,7 +28,6 @@ from pilotage.stack.journal import Journal
 from pilotage.stack.knowledge import RobotKnowledge, TaskKnowledge
 from pilotage.stack.localization.heading_filter import HEADING_FILTERS, HeadingEstimate, HeadingFilter
 from pilotage.stack.localization.localizer import LOCALIZERS, Localizer
-from pilotage.stack.localization.wheel_pose import START_VAR_RAD2
 from pilotage.stack.mapping.mapper import MAPPERS
 from pilotage.stack.navigator.navigator import Parts
 from pilotage.stack.planning.local_planner import LOCAL_PLANNERS

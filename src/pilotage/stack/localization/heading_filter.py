@@ -80,4 +80,6 @@ class HeadingErrors(Config):
     """The report's R of 11, read as squared degrees."""
 
 
-HEADING_FILTERS: Registry[HeadingFilter] = Registry("heading", "pilotage.stack.localization")
+HEADING_FILTERS: Registry[HeadingFilter] = Registry(
+    "heading", "pilotage.stack.localization", "pilotage.replicas"
+)

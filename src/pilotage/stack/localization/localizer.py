@@ -47,4 +47,4 @@ def require_initial_pose(initial: Belief, name: str) -> None:
         )
 
 
-LOCALIZERS: Registry[Localizer] = Registry("localizer", "pilotage.stack.localization")
+LOCALIZERS: Registry[Localizer] = Registry("localizer", "pilotage.stack.localization", "pilotage.replicas")

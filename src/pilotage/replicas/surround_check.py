@@ -13,17 +13,17 @@ from pilotage.core.types import STANDSTILL, BoolArray, WheelSpeeds
 from pilotage.maps.cell_map import CellMap, CellState
 from pilotage.maps.world_map import WorldMap
 from pilotage.missions.explorer import ExplorerConfig
+from pilotage.replicas.cell_marks import CellMarks
+from pilotage.replicas.potential_field import PotentialField, PotentialFieldConfig
+from pilotage.replicas.wheel_pose import WheelPose
 from pilotage.sensors.infrared import InfraredConfig
 from pilotage.sensors.readings import Readings
 from pilotage.sensors.sensor import Positive
-from pilotage.stack.control.potential_field import PotentialField, PotentialFieldConfig
 from pilotage.stack.control.wheel_pursuit import pursue, turn
 from pilotage.stack.exploration.explorer import ExplorerParts, LeftCell, offer
 from pilotage.stack.interface import NAVIGATORS, Belief, StackStatus
 from pilotage.stack.journal import Journal
 from pilotage.stack.knowledge import RobotKnowledge, SheetKnowledge, TaskKnowledge
-from pilotage.stack.localization.wheel_pose import WheelPose
-from pilotage.stack.mapping.cell_marks import CellMarks
 
 AROUND = ((1, 0), (-1, 0), (0, 1), (0, -1))
 """North, south, east, west, in the report's order: (rows, columns)."""

@@ -8,6 +8,8 @@ from pilotage.core.types import STANDSTILL, BoolArray, WheelSpeeds
 from pilotage.maps.cell_map import CellMap
 from pilotage.maps.world_map import WorldMap
 from pilotage.missions.explorer import ExplorerConfig
+from pilotage.replicas.cell_marks import CellMarks
+from pilotage.replicas.wheel_pose import WheelPose
 from pilotage.sensors.infrared import InfraredConfig
 from pilotage.sensors.line_sensor import LineSensorConfig
 from pilotage.sensors.readings import InfraredReading, Readings
@@ -16,8 +18,6 @@ from pilotage.stack.exploration.explorer import ExplorerParts, LeftCell, offer
 from pilotage.stack.interface import NAVIGATORS, Belief, StackStatus
 from pilotage.stack.journal import Journal
 from pilotage.stack.knowledge import RobotKnowledge, SheetKnowledge, TaskKnowledge
-from pilotage.stack.localization.wheel_pose import WheelPose
-from pilotage.stack.mapping.cell_marks import CellMarks
 
 
 class RandomWalkConfig(ExplorerConfig):

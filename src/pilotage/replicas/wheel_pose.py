@@ -9,6 +9,12 @@ import numpy as np
 from pilotage.core.angles import wrap_to_pi
 from pilotage.core.errors import InputError
 from pilotage.core.types import FloatArray, Pose2
+from pilotage.replicas.heading_report import (
+    EncoderGyroConfig,
+    EncoderGyroFilter,
+    EncoderMagnetometerConfig,
+    EncoderMagnetometerFilter,
+)
 from pilotage.sensors.gyroscope import GyroscopeConfig
 from pilotage.sensors.magnetometer import MagnetometerConfig
 from pilotage.sensors.readings import EncoderCounts, GyroscopeRates, MagneticField, Readings
@@ -16,12 +22,6 @@ from pilotage.sensors.wheel_encoders import WheelEncodersConfig
 from pilotage.stack.interface import Belief
 from pilotage.stack.knowledge import SheetKnowledge
 from pilotage.stack.localization.heading_filter import HeadingErrors, HeadingEstimate, HeadingFilter
-from pilotage.stack.localization.heading_report import (
-    EncoderGyroConfig,
-    EncoderGyroFilter,
-    EncoderMagnetometerConfig,
-    EncoderMagnetometerFilter,
-)
 
 ALIGN_S = 1.0
 """The gyroscope's bias is its mean over the first moments, in which the robot stands still."""
