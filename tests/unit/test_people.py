@@ -70,7 +70,7 @@ def test_a_robot_that_drives_into_somebody_is_stopped_and_to_blame() -> None:
 
 
 def test_touches_between_two_steps_count() -> None:
-    """Both cross each other's path within one step: apart before and after, a collision between."""
+    """He runs into its side within one step: apart before and after, a touch between."""
     sim = among([Walker(lambda t: (1.0, 12.0 * t - 7.8))], footprint=CAR)
     for _ in range(14):
         sim.step([ON])
@@ -78,13 +78,23 @@ def test_touches_between_two_steps_count() -> None:
         here = sim.crowd.places_m[0]
         assert abs(here[1]) > 0.5  # never beside the robot at the end of a step
     assert sim.bodies[0].pose.x_m > 1.0
-    assert met(sim).collisions == sim.bodies[0].collisions == 1
+    assert (met(sim).collisions, met(sim).touches) == (0, 1)
+    assert met(sim).closest_m < 1e-3
 
 
-def test_who_runs_into_a_moving_robot_counts_as_hit_by_it() -> None:
+def test_who_overtakes_a_robot_through_it_is_not_hit_by_it() -> None:
+    """Its own motion widens the gap from behind; then he is inside it, and in front he is gone."""
     sim = among([Walker(lambda t: (-3.0 + 2.0 * t, 0.0))])
     for _ in range(60):
         sim.step([Twist(0.2, 0.0)])
+    assert (met(sim).collisions, met(sim).touches, sim.bodies[0].collisions) == (0, 1, 0)
+    assert sim.bodies[0].driven_m > 1.0
+
+
+def test_a_robot_that_backs_into_somebody_who_comes_is_to_blame() -> None:
+    sim = among([Walker(lambda t: (-3.0 + 1.0 * t, 0.0))])
+    for _ in range(40):
+        sim.step([Twist(-0.3, 0.0)])
     assert met(sim).collisions == sim.bodies[0].collisions == 1
 
 

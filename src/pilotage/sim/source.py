@@ -91,6 +91,7 @@ class Simulator:
         self._check_apart()
         if self.crowd is not None:
             self.crowd.walk_to(0.0, self._traffic)
+            self.crowd.arrive(self._traffic)
         self._meeting = (
             states,
             np.concatenate([*(shape.points_m for shape in shapes), np.zeros((0, 2))]),
@@ -164,6 +165,8 @@ class Simulator:
     def _meet(self) -> None:
         """Who ran into whom."""
         bodies = self.bodies
+        if self.crowd is not None:
+            self.crowd.arrive(self._traffic)
         marked = drive.meet_others(*self._meeting)
         if self.crowd is not None:
             self.crowd.meet()

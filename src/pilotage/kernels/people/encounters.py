@@ -25,15 +25,48 @@ from pilotage.kernels.bodies.outline import outline_clearance
 from pilotage.kernels.jit import kernel
 
 CAUSED, SUFFERED, CLOSEST, NEAR, STEPS = range(5)
-"""Columns of the tally: touches by a robot that moved, and of one that stood; least distance (m); steps that
-ended within ``NEAR_M`` of somebody; steps."""
+"""Columns of the tally: touches that the robot's own motion brought about, and others; least distance (m);
+steps that ended within ``NEAR_M`` of somebody; steps."""
 TALLY_SIZE = 5
 NEAR_M = 0.5
 """Nearer than this people feel uneasy (the intimate distance of Hall 1966)."""
-STANDS_M_S, STANDS_RAD_S = 0.02, 0.05
-"""Slower than this a robot stands."""
-APART, STOOD, HIT = 0, 1, 2
-"""How a robot is with a person: apart; touched by one while it stood; it drove into one."""
+CLOSES_M_S = 0.02
+"""A robot whose own motion closes a gap no faster than this does not drive into anybody."""
+BEFORE = 0.02
+"""Share of a step over which that is measured, up to the touch."""
+APART, WALKED_INTO, HIT = 0, 1, 2
+"""How a robot is with a person: apart; that one walked into it; it drove into that one."""
+
+
+@kernel
+def solid_people(
+    states: FloatArray,
+    corners: FloatArray,
+    first: IntArray,
+    radii: FloatArray,
+    people: FloatArray,
+    radius: FloatArray,
+    between: IntArray,
+) -> FloatArray:
+    """Places (P, 2) of those whom robots cannot drive through; NaN for who has walked into one of them.
+
+    Robots are where they were before the step, people where they are after it; see ``meet_people``.
+    """
+    out = people.copy()
+    disc, no_sides = np.empty((1, 3)), np.empty((0, 4))
+    for p in range(people.shape[0]):
+        disc[0, 0], disc[0, 1], disc[0, 2] = people[p, 0], people[p, 1], radius[p]
+        for r in range(states.shape[0]):
+            x, y, theta = states[r, X], states[r, Y], states[r, THETA]
+            away = math.hypot(people[p, 0] - x, people[p, 1] - y) - radii[r] - radius[p]
+            if not away < 0.0:
+                continue
+            shape = corners[first[r] : first[r + 1]]
+            c, s = math.cos(theta), math.sin(theta)
+            inside = outline_clearance(x, y, c, s, shape, radii[r], no_sides, disc) < 0.0
+            if between[r, p] == WALKED_INTO or (inside and between[r, p] == APART):
+                out[p, 0] = out[p, 1] = math.nan
+    return out
 
 
 @kernel
@@ -72,12 +105,11 @@ def meet_people(
     -------
     Whether a robot drove into somebody.
     """
-    anew = False
+    hit = False
     disc, no_sides = np.empty((1, 3)), np.empty((0, 4))
     for r in range(states.shape[0]):
         state, shape = states[r], corners[first[r] : first[r + 1]]
         distance, lateral, angle = state[DISTANCE], state[LATERAL], state[ANGLE]
-        moves = math.hypot(distance, lateral) > dt * STANDS_M_S or abs(angle) > dt * STANDS_RAD_S
         reach = math.hypot(distance, lateral) + radii[r] * abs(angle)
         nearest = math.inf
         for p in range(people.shape[0]):
@@ -86,14 +118,15 @@ def meet_people(
                 between[r, p] = APART
                 continue
             x0, y0 = people_before[p, 0], people_before[p, 1]
-            if math.isnan(x0):
+            appears = math.isnan(x0)
+            if appears:
                 x0, y0 = x, y
             walked = math.hypot(x - x0, y - y0)
             far = math.hypot(x - before[r, 0], y - before[r, 1]) - radii[r] - radius[p]
             if far > reach + walked and far - reach > max(NEAR_M, tally[r, CLOSEST]):
                 between[r, p] = APART
                 continue
-            part, touched = 0.0, False
+            part, touched, closing = 0.0, False, 0.0
             while True:
                 px, py, theta = turned_part(
                     before[r, 0], before[r, 1], before[r, 2], distance, lateral, angle, part
@@ -104,7 +137,14 @@ def meet_people(
                     px, py, math.cos(theta), math.sin(theta), shape, radii[r], no_sides, disc
                 )
                 tally[r, CLOSEST] = min(tally[r, CLOSEST], clear)
-                touched = touched or clear < CONTACT_M
+                if clear < CONTACT_M:
+                    touched = True
+                    # The person held where it is: what the robot alone did to the gap just before.
+                    px, py, theta = turned_part(
+                        before[r, 0], before[r, 1], before[r, 2], distance, lateral, angle, part - BEFORE
+                    )
+                    c, s = math.cos(theta), math.sin(theta)
+                    closing = outline_clearance(px, py, c, s, shape, radii[r], no_sides, disc) - clear
                 if part >= 1.0 or touched or reach + walked == 0.0:
                     break
                 part = min(1.0, part + max(clear, GRAZE_M) / (reach + walked))
@@ -115,17 +155,18 @@ def meet_people(
             if not touched:
                 between[r, p] = APART
                 continue
-            drove = state[BLOCKER] > 0.0 or (moves and between[r, p] == APART)
+            anew = between[r, p] == APART and not appears
+            drove = state[BLOCKER] > 0.0 or (anew and closing > CLOSES_M_S * BEFORE * dt)
             if drove and between[r, p] != HIT:
                 between[r, p] = HIT
-                anew = True
+                hit = True
                 tally[r, CAUSED] += 1.0
                 if state[TOUCHING] == 0.0:
                     state[COLLISIONS] += 1.0
                     state[TOUCHING] = 1.0
             elif between[r, p] == APART:
-                between[r, p] = STOOD
+                between[r, p] = WALKED_INTO
                 tally[r, SUFFERED] += 1.0
         tally[r, STEPS] += 1.0
         tally[r, NEAR] += 1.0 if nearest < NEAR_M else 0.0
-    return anew
+    return hit

@@ -32,7 +32,7 @@ HEAD = (
 PEOPLE_HEAD = (
     "controller",
     "hit people",
-    "touched standing",
+    "walked into it",
     "closest",
     "time within 0.5 m",
     "time lost",

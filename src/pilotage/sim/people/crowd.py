@@ -21,7 +21,7 @@ class Encounters:
     Attributes
     ----------
     collisions, touches
-        How often it drove into somebody, and how often somebody walked into it while it stood.
+        How often it drove into somebody, and how often somebody walked into it.
     closest_m
         Least distance from its edge to theirs, swept over the steps; inf where nobody was ever there.
     near_share
@@ -70,6 +70,21 @@ class Crowd:
         for plan, first in zip(self._plans, self._first[:-1].tolist(), strict=True):
             places = plan.step(t_s, Around(robots, seen, first))
             self.places_m[first : first + len(plan.radius_m)] = places
+        # Who walks into a robot goes through it: it is not held by those whom it did not drive into.
+        traffic.put_people(
+            encounters.solid_people(
+                self._states,
+                self._corners,
+                self._corner_of,
+                self._radii,
+                self.places_m,
+                self.radius_m,
+                self._between,
+            )
+        )
+
+    def arrive(self, traffic: Traffic) -> None:
+        """Put everybody where they are, now that the robots have moved as well: for all that is seen."""
         traffic.put_people(self.places_m)
 
     def meet(self) -> None:

@@ -14,6 +14,8 @@ from pilotage.logs.people import RADIUS_M, read_people
 from pilotage.sensors.sensor import NonNegative, Positive
 from pilotage.sim.people.people import PEOPLE, Around, PeopleSetting
 
+CLEAR_M = 1.0
+"""Recordings begin in the midst of things: who would appear nearer to a robot than this comes later."""
 APART_S = 1.0
 """Who comes so long after another one has left may take the place of its row."""
 
@@ -44,11 +46,16 @@ class TrackPeople:
         self._tracks, self._begins_s = tracks, config.begins_s
         self._moved = np.array(config.moved_by_m)
         self._slot = tracks.slots(APART_S)
+        self._there = np.zeros(int(self._slot.max()) + 1, dtype=np.bool_)
         self.radius_m: FloatArray = np.full(int(self._slot.max()) + 1, config.radius_m)
 
-    def step(self, t_s: float, around: Around) -> FloatArray:  # noqa: ARG002
+    def step(self, t_s: float, around: Around) -> FloatArray:
         """Where they were then."""
         out = np.full((len(self.radius_m), 2), np.nan)
         rows, places = self._tracks.at(self._begins_s + t_s)
         out[self._slot[rows]] = places + self._moved
+        for x, y, _, radius in around.robots_m.tolist():
+            near = np.hypot(out[:, 0] - x, out[:, 1] - y) < radius + self.radius_m + CLEAR_M
+            out[near & ~self._there] = np.nan
+        self._there = np.isfinite(out[:, 0])
         return out

@@ -26,13 +26,16 @@ class MoversConfig(Config):
     gate_std: Positive = 4.0
     most_missed: int = Field(default=8, ge=0, le=1000)
     readings: int = Field(default=4, ge=2, le=1000)
-    stands_readings: int = Field(default=30, ge=2, le=1000)
+    stands_readings: int = Field(default=200, ge=2, le=1000)
+    """So often read in one place it is a thing that stands, by which the odometry may be corrected."""
     stands_m: Positive = 0.15
     radius_m: Positive = 0.25
     deviations: NonNegative = 1.0
     """The disc grows by so many standard deviations of the foretold place, where a command is checked."""
     plan_deviations: NonNegative = 0.3
     """The same where plans are priced: by all that a body may do no plan would get past it."""
+    lost_std_m: Positive = 1.0
+    """Behind the robot, where its laser does not look, a track goes on unseen until its place is so vague."""
 
 
 class Movers:
@@ -48,8 +51,11 @@ class Movers:
         in_base: FloatArray,
         pose: FloatArray,
         dt_s: float,
+        field_rad: tuple[float, float],
     ) -> tuple[BoolArray, BoolArray]:
         """Take the scan's points (N, 2), base frame, in the order of the beams; tell which are on tracks.
+
+        ``field_rad``: directions of the first and the last beam in the base frame.
 
         Returns (N,) points of bodies that count, which the obstacle grid shall not keep, and (N,) those that
         the odometry may be corrected by: of wide things, and of narrow ones that have stood for long.
@@ -64,6 +70,7 @@ class Movers:
         centres, of_point = kernels.scan_clusters(
             x, y, points, config.gap_m, config.widest_m, config.least_points
         )
+        self._keep_unseen(float(x), float(y), float(pose[2]), field_rad)
         self.tracks, of_centre = kernels.track_step(
             self.tracks,
             centres,
@@ -87,6 +94,16 @@ class Movers:
         ]
         return on_track, still
 
+    def _keep_unseen(self, x_m: float, y_m: float, theta_rad: float, field_rad: tuple[float, float]) -> None:
+        """Readings cannot be missed where no beam goes."""
+        tracks, config = self.tracks, self._config
+        first, last = field_rad
+        bearing = np.arctan2(tracks[:, kernels.Y] - y_m, tracks[:, kernels.X] - x_m) - theta_rad
+        unseen = np.mod(bearing - first, 2.0 * np.pi) > last - first
+        kept = unseen & (tracks[:, kernels.PP] < config.lost_std_m**2)
+        kept &= tracks[:, kernels.READINGS] >= config.readings
+        tracks[kept, kernels.MISSED] = np.minimum(tracks[kept, kernels.MISSED], config.most_missed - 1)
+
     def _count(self) -> BoolArray:
         """Which tracks have been read often enough."""
         enough: BoolArray = self.tracks[:, kernels.READINGS] >= self._config.readings
@@ -95,11 +112,13 @@ class Movers:
     def foretold(self, first_s: float, step_s: float, steps: int, *, sure: bool = True) -> FloatArray:
         """Discs (steps, M, 3) at ``first_s`` from now and every ``step_s`` after.
 
-        ``sure``: as wide as for the check of a command, else as for the price of a plan.
+        ``sure``: as wide as for the check of a command, and of whatever may yet prove to move; else as for
+        the price of a plan.
         """
         config = self._config
+        tracks = self.tracks if sure else self.tracks[self._count()]
         discs: FloatArray = kernels.foretold(
-            np.ascontiguousarray(self.tracks[self._count()]),
+            np.ascontiguousarray(tracks),
             first_s,
             step_s,
             steps,

@@ -30,6 +30,8 @@ INSIDE_M = 0.05
 """A point so deep inside the footprint is a mistake or was a body that walked through."""
 BLIND_SHARE = 0.5
 """With more than this share of its ranges 0 the laser is covered."""
+MANY_SHARE = 0.125
+"""Where somebody may move, so many beams have to end near at things that stand to correct the odometry."""
 BEYOND_S = 6.0
 """The time to go is worked out so far past the robot: no plan goes back farther."""
 Scalar = TypeVar("Scalar", bound=np.generic)
@@ -162,11 +164,18 @@ class RollingGround:
             view.mount.x_m, view.mount.y_m, view.mount.theta_rad, ranges, first, step, view.max_range_m
         )
         on_track, steady = self._movers.update(
-            (view.mount.x_m, view.mount.y_m), in_base, self._pose, self._dt_s
+            (view.mount.x_m, view.mount.y_m),
+            in_base,
+            self._pose,
+            self._dt_s,
+            (view.mount.theta_rad + float(angles[0]), view.mount.theta_rad + float(angles[-1])),
         )
         still = np.ascontiguousarray(in_base[~on_track])
-        if self._config.match and not first_view:
-            self._match(view, np.ascontiguousarray(in_base[steady]))
+        # Somebody is inside the robot's own outline: such a scan shows him, and not where the robot is.
+        covered = bool((np.hypot(in_base[:, 0], in_base[:, 1]) < body.inner_m).any())
+        things = np.ascontiguousarray(in_base[steady])
+        if self._config.match and not first_view and not covered and self._are_many(things, angles.size):
+            self._match(view, things)
         self._odometry = view.pose
         if self._goal_given != view.goal_xy_m:
             self._goal_given = view.goal_xy_m
@@ -196,6 +205,13 @@ class RollingGround:
             self._movers,
             blind,
         )
+
+    def _are_many(self, points: FloatArray, beams: int) -> bool:
+        """Whether enough is near that stands: in the open the few points left may be a group that walks."""
+        if not self._config.movers.enabled:
+            return True
+        near = np.hypot(points[:, 0], points[:, 1]) < self._config.reach_m
+        return bool(near.sum() >= MANY_SHARE * beams)
 
     def _take_body(self, view: LocalView) -> Body:
         if self._body is None or view.footprint_xy_m is not self._footprint:
