@@ -45,7 +45,11 @@ class Attempt:
 
 
 class Task(Protocol):
-    """Built as ``cls(config, setting)``; refuses a mission that lacks what it needs."""
+    """Built as ``cls(config, setting)``; refuses a mission that lacks what it needs.
+
+    Where it has a true ``any_order`` as well, each robot visits the goals in the order that is best by its
+    own map, and its own goal last.
+    """
 
     columns: Mapping[str, str]
     """The task's own columns of the trace with their units, one set a robot."""
