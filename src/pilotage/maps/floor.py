@@ -11,8 +11,11 @@ from scipy import ndimage
 
 from pilotage.core.errors import InputError
 from pilotage.core.types import BoolArray, FloatArray, IntArray
+from pilotage.kernels.arrays import ByteArray
+from pilotage.kernels.grids.theta import line_of_sight
 from pilotage.kernels.grids.travel_cost import travel_costs
-from pilotage.kernels.patrol.pull import pulled_length
+from pilotage.kernels.patrol.pull import pulled_corners
+from pilotage.maps.distance_field import DistanceField
 from pilotage.maps.world_map import WorldMap
 
 MOST_CELLS = 400_000
@@ -59,28 +62,40 @@ class Floor:
         InputError
             Where the robot fits nowhere, or not at the place.
         """
-        xmin, ymin, xmax, ymax = world.bounds_m
+        return Floor.of_field(
+            world.field, world.bounds_m, radius_m, cell_m, inside_xy_m, f"map '{world.name}'"
+        )
+
+    @staticmethod
+    def of_field(
+        field: DistanceField,
+        bounds_m: tuple[float, float, float, float],
+        radius_m: float,
+        cell_m: float = 0.1,
+        inside_xy_m: tuple[float, float] | None = None,
+        where: str = "map",
+    ) -> Floor:
+        """Lay cells over distances to walls; as ``of``."""
+        xmin, ymin, xmax, ymax = bounds_m
         area_m2 = (xmax - xmin) * (ymax - ymin)
         cell_m = max(cell_m, math.sqrt(area_m2 / MOST_CELLS))
         rows, columns = math.ceil((ymax - ymin) / cell_m), math.ceil((xmax - xmin) / cell_m)
         x = xmin + (np.arange(columns) + 0.5) * cell_m
         y = ymin + (np.arange(rows) + 0.5) * cell_m
         points = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
-        clearance = world.field.at(points).reshape(rows, columns)
+        clearance = field.at(points).reshape(rows, columns)
         # What lies past the bounds is no floor, though the field calls it as near as their edge.
         clearance[:, x > xmax] = clearance[y > ymax, :] = -1.0
         fits = clearance >= radius_m
         pieces, _ = ndimage.label(fits)
         floor = Floor((xmin, ymin), cell_m, radius_m, clearance, fits)
         if inside_xy_m is not None:
-            row, column = floor._snapped(np.array(inside_xy_m), "the place inside")
+            row, column = floor.nearest_cell(np.array(inside_xy_m), "the place inside")
             piece = pieces[row, column]
         else:
             sizes = np.bincount(pieces.ravel())
             if len(sizes) < 2:
-                raise InputError(
-                    f"map '{world.name}': expected floor for a robot of radius {radius_m:g} m, found none"
-                )
+                raise InputError(f"{where}: expected floor for a robot of radius {radius_m:g} m, found none")
             piece = 1 + int(np.argmax(sizes[1:]))
         return Floor((xmin, ymin), cell_m, radius_m, clearance, pieces == piece)
 
@@ -93,8 +108,7 @@ class Floor:
     @cached_property
     def swept(self) -> BoolArray:
         """(rows, columns) cells that the robot's body can cover, from somewhere where its centre can be."""
-        away_m = self.cell_m * ndimage.distance_transform_edt(~self.reachable)
-        return np.asarray((away_m <= self.radius_m) & (self.clearance_m > 0.0))
+        return sweepable(self, 2.0 * self.radius_m)
 
     def cell_of(self, point_xy_m: FloatArray) -> tuple[int, int]:
         """Row and column of the cell that a point lies in, clipped to the floor."""
@@ -103,8 +117,8 @@ class Floor:
         column = math.floor((float(point_xy_m[0]) - self.origin_xy_m[0]) / self.cell_m)
         return min(max(row, 0), rows - 1), min(max(column, 0), columns - 1)
 
-    def _snapped(self, point_xy_m: FloatArray, what: str) -> tuple[int, int]:
-        """The reachable cell nearest to a point; InputError where none is near."""
+    def nearest_cell(self, point_xy_m: FloatArray, what: str = "place") -> tuple[int, int]:
+        """The reachable cell nearest to a point, row and column; InputError where none is near."""
         row, column = self.cell_of(point_xy_m)
         x, y = float(point_xy_m[0]), float(point_xy_m[1])
         reach = math.ceil(SNAP_M / self.cell_m)
@@ -130,9 +144,51 @@ class Floor:
 
     def costs_from(self, point_xy_m: FloatArray, what: str = "place") -> tuple[FloatArray, IntArray]:
         """Cells of path, by neighbours, from a place to each cell, and each one's predecessor, both flat."""
-        row, column = self._snapped(point_xy_m, what)
+        row, column = self.nearest_cell(point_xy_m, what)
         factor = np.where(self.reachable, 1.0, np.inf)
         return travel_costs(factor, row * factor.shape[1] + column, 1.0, 1.0)
+
+    def coarser(self) -> Floor:
+        """The same floor in cells of twice the side, each reachable where any of its four is."""
+        rows, columns = (2 * math.ceil(size / 2) for size in self.reachable.shape)
+        pad = [(0, rows - self.reachable.shape[0]), (0, columns - self.reachable.shape[1])]
+        fine = np.pad(self.reachable, pad).reshape(rows // 2, 2, columns // 2, 2)
+        clearance = np.pad(self.clearance_m, pad, constant_values=-1.0).reshape(fine.shape)
+        return Floor(
+            self.origin_xy_m,
+            2.0 * self.cell_m,
+            self.radius_m,
+            clearance.max(axis=(1, 3)),
+            np.asarray(fine.any(axis=(1, 3))),
+        )
+
+    def is_clear(self, a_xy_m: FloatArray, b_xy_m: FloatArray) -> bool:
+        """Whether the straight line between two places' cells stays in reachable ones."""
+        states, stride = self._states
+        (ra, ca), (rb, cb) = self.nearest_cell(a_xy_m), self.nearest_cell(b_xy_m)
+        ends = (ra + 1) * stride + ca + 1, (rb + 1) * stride + cb + 1
+        return bool(line_of_sight(states, stride, *ends, False))
+
+    def path_m(self, parent: IntArray, end_xy_m: FloatArray, what: str = "place") -> FloatArray:
+        """(K, 2) corners of the path from a place to where ``costs_from`` was asked, pulled tight.
+
+        Raises
+        ------
+        InputError
+            Where the place is off the reachable floor.
+        """
+        columns = self.reachable.shape[1]
+        row, column = self.nearest_cell(end_xy_m, what)
+        corners = pulled_corners(*self._states, parent, columns, row * columns + column)
+        x0, y0 = self.origin_xy_m
+        return np.column_stack(
+            [x0 + (corners % columns + 0.5) * self.cell_m, y0 + (corners // columns + 0.5) * self.cell_m]
+        )
+
+    @cached_property
+    def _states(self) -> tuple[ByteArray, int]:
+        padded = np.pad(np.where(self.reachable, 0, 128).astype(np.uint8), 1, constant_values=128)
+        return padded.ravel(), padded.shape[1]
 
     def lengths_m(self, places_xy_m: FloatArray, wanted: BoolArray, what: str = "place") -> FloatArray:
         """(P, P) lengths of collision-free paths between places (P, 2) where ``wanted`` (P, P), else inf.
@@ -145,8 +201,8 @@ class Floor:
             Where a place is off the reachable floor.
         """
         count, columns = len(places_xy_m), self.reachable.shape[1]
-        padded = np.pad(np.where(self.reachable, 0, 128).astype(np.uint8), 1, constant_values=128)
-        cells = [self._snapped(place, f"{what} {k}") for k, place in enumerate(places_xy_m)]
+        states = self._states
+        cells = [self.nearest_cell(place, f"{what} {k}") for k, place in enumerate(places_xy_m)]
         out = np.full((count, count), np.inf)
         np.fill_diagonal(out, 0.0)
         for a in range(count):
@@ -156,7 +212,15 @@ class Floor:
             _, parent = self.costs_from(places_xy_m[a], f"{what} {a}")
             for b in others:
                 end = cells[b][0] * columns + cells[b][1]
-                pulled = self.cell_m * pulled_length(padded.ravel(), padded.shape[1], parent, columns, end)
+                corners = pulled_corners(*states, parent, columns, end)
+                steps = np.diff(np.column_stack([corners // columns, corners % columns]), axis=0)
+                pulled = self.cell_m * float(np.hypot(*steps.T).sum())
                 straight = float(np.hypot(*(places_xy_m[a] - places_xy_m[b])))
                 out[a, b] = out[b, a] = max(pulled, straight)
         return out
+
+
+def sweepable(floor: Floor, width_m: float) -> BoolArray:
+    """(rows, columns) cells that a pass of a width can sweep from where the robot's centre can be."""
+    away_m = floor.cell_m * ndimage.distance_transform_edt(~floor.reachable)
+    return np.asarray((away_m <= 0.5 * width_m) & (floor.clearance_m > 0.0))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import math
+import numpy as np
 
 from pilotage.kernels.arrays import ByteArray, IntArray
 from pilotage.kernels.grids.theta import line_of_sight
@@ -10,8 +10,8 @@ from pilotage.kernels.jit import kernel
 
 
 @kernel
-def pulled_length(states: ByteArray, stride: int, parent: IntArray, columns: int, end: int) -> float:
-    """Length, in cells, of the path from ``end`` back to the root of a tree of predecessors, pulled tight.
+def pulled_corners(states: ByteArray, stride: int, parent: IntArray, columns: int, end: int) -> IntArray:
+    """Corners (K,) of the path from ``end`` back to the root of a tree of predecessors, pulled tight.
 
     From each corner it goes straight to the last cell of the path in sight, so it stays in free cells; some
     per cent longer than the shortest where the path bends often.
@@ -23,25 +23,23 @@ def pulled_length(states: ByteArray, stride: int, parent: IntArray, columns: int
     parent
         (rows * columns,) as from ``travel_costs``.
     """
-    length = 0.0
-    corner = end
-    for _ in range(parent.shape[0]):
-        if parent[corner] < 0:
-            return length
+    corners = np.empty(parent.shape[0], np.int64)
+    corners[0] = end
+    count = 1
+    while parent[corners[count - 1]] >= 0 and count < parent.shape[0]:
+        corner = corners[count - 1]
         onward, tried = parent[corner], parent[corner]
         for _ in range(parent.shape[0]):
             tried = parent[tried]
             if tried < 0:
                 break
-            if not line_of_sight(
-                states, stride, _padded(corner, columns, stride), _padded(tried, columns, stride), False
-            ):
+            ends = _padded(corner, columns, stride), _padded(tried, columns, stride)
+            if not line_of_sight(states, stride, ends[0], ends[1], False):
                 break
             onward = tried
-        rows = corner // columns - onward // columns
-        length += math.hypot(rows, corner % columns - onward % columns)
-        corner = onward
-    return math.nan
+        corners[count] = onward
+        count += 1
+    return corners[:count].copy()
 
 
 @kernel

@@ -78,7 +78,7 @@ def plan_over_nodes(
     middle = np.array([x0, y0]) + found.cells[:, ::-1] * request.field.resolution_m
     line = np.concatenate([ends[:1], middle, ends[1:]])
     line = line[np.concatenate([[True], np.any(np.diff(line, axis=0) != 0.0, axis=1)])]
-    path = _path(line, request, waypoint_spacing_m)
+    path = path_of_line(line, request, waypoint_spacing_m)
     took = time.perf_counter() - began
     reason = f"{path.length_m:.2f} m after {found.expansions} expansions"
     return PlanResult(PlanStatus.FOUND, reason, path, took, took, found.expansions)
@@ -103,7 +103,7 @@ def _joints(
                 yield r, c
 
 
-def _path(line: FloatArray, request: PlanRequest, waypoint_spacing_m: float) -> Path:
+def path_of_line(line: FloatArray, request: PlanRequest, waypoint_spacing_m: float) -> Path:
     """A polyline (N, 2) as a path that turns on the spot."""
     states = _states(line, STATE_SPACING_M)
     if len(line) == 1:

@@ -1,0 +1,186 @@
+"""Sweeps the whole floor in parallel lines, as a cleaning robot does."""
+
+from __future__ import annotations
+
+import math
+import time
+
+import numpy as np
+from pydantic import Field
+from scipy import ndimage
+
+from pilotage.core.config import Config
+from pilotage.core.errors import InputError
+from pilotage.core.types import BoolArray, FloatArray
+from pilotage.kernels.patrol.swept import mark_swept
+from pilotage.kernels.tours.entries import anneal_entries
+from pilotage.maps.floor import Floor, sweepable
+from pilotage.sensors.sensor import Positive
+from pilotage.stack.planning.driving_space import clearance_of, failure
+from pilotage.stack.planning.field_search import path_of_line
+from pilotage.stack.planning.planner import PLANNERS, PlanRequest, PlanResult, PlanStatus
+from pilotage.stack.planning.sweep_lines import sweep_cell_m, sweep_lines
+
+TRIES_A_CELL = 3000
+"""Changes that are tried to the order of cells."""
+DETOUR_ROUNDS = 6
+
+
+class BoustrophedonConfig(Config):
+    """The width that a pass sweeps, and the clearance that the robot's centre keeps."""
+
+    width_m: Positive = 0.5
+    clearance_m: float = Field(default=0.3, ge=0.0, le=100.0)
+    waypoint_spacing_m: Positive = 1.5
+
+
+@PLANNERS.add("boustrophedon", BoustrophedonConfig)
+class BoustrophedonPlanner:
+    """From the start over the whole reachable floor to the goal, in lines as far apart as a pass is wide.
+
+    The floor is cut into cells where lines split and join; cells are put in a good order; what lines leave
+    out is swept by detours. Of both directions the shorter path is taken. Swept is all of the floor where
+    the robot's centre can be, by cells of an eighth of the width. Of the rim along walls that only its body
+    reaches, the corners between the ends of lines are left (some 4 % of the floor): loops along all walls
+    would sweep them for a path a tenth longer.
+    """
+
+    def __init__(self, config: BoustrophedonConfig) -> None:
+        self._config = config
+
+    @property
+    def clearance_m(self) -> float:
+        """Distance that it keeps from obstacles where a request names none."""
+        return self._config.clearance_m
+
+    def plan(self, request: PlanRequest) -> PlanResult:
+        """Sweep all that can be reached from the start, and end at the goal."""
+        began = time.perf_counter()
+        clearance_m, width_m = clearance_of(request, self._config.clearance_m), self._config.width_m
+        start, goal = ((place.x_m, place.y_m) for place in (request.start, request.goal))
+        field, cell_m = request.field, sweep_cell_m(request.field.bounds_m, width_m)
+        try:
+            floor = Floor.of_field(field, field.bounds_m, clearance_m, cell_m, start)
+            # A straight line through cells' middles comes half a diagonal nearer to walls than these are.
+            inner_m = clearance_m + math.sqrt(0.5) * floor.cell_m
+            inner = Floor.of_field(field, field.bounds_m, inner_m, cell_m, start)
+            lines = [_swept_by(floor, inner, width_m, along_y, start, goal) for along_y in (False, True)]
+        except InputError as error:
+            return failure(PlanStatus.NO_PATH, str(error), time.perf_counter() - began)
+        path = path_of_line(min(lines, key=_length_m), request, self._config.waypoint_spacing_m)
+        took = time.perf_counter() - began
+        area_m2 = np.count_nonzero(sweepable(floor, width_m)) * floor.cell_m**2
+        ratio = path.length_m * width_m / area_m2
+        reason = f"{path.length_m:.1f} m for {area_m2:.1f} m2, {ratio:.3f} of area over width"
+        return PlanResult(PlanStatus.FOUND, reason, path, took, took)
+
+
+def _swept_by(
+    floor: Floor,
+    inner: Floor,
+    width_m: float,
+    along_y: bool,
+    start: tuple[float, float],
+    goal: tuple[float, float],
+) -> FloatArray:
+    """(N, 2) the path from start to goal that sweeps everything, by lines in one direction."""
+    cells = [_variants(lines) for lines in sweep_lines(inner, width_m, along_y)]
+    path = np.array([start])
+    ordered = _ordered(inner, cells, np.array(start), np.array(goal))
+    for place in np.concatenate([*ordered, np.array([goal])]):
+        path = np.vstack([path, _joined(inner, path[-1], place)[1:]])
+    for _ in range(DETOUR_ROUNDS):
+        missing = floor.reachable & ~_covered(floor, path, width_m)
+        places = _places_for(inner, path, missing, width_m)
+        if len(places) == 0:
+            break
+        path = _with_detours(inner, path, places)
+    return path
+
+
+def _variants(lines: list[FloatArray]) -> list[FloatArray]:
+    """A cell's lines as one polyline (2 L, 2), from either end of the first and of the last line."""
+    return [
+        np.concatenate([one[::-1] if (k % 2 == 1) != turned else one for k, one in enumerate(order)])
+        for order in (lines, lines[::-1])
+        for turned in (False, True)
+    ]
+
+
+def _length_m(line: FloatArray) -> float:
+    return float(np.hypot(*np.diff(line, axis=0).T).sum())
+
+
+def _ordered(
+    floor: Floor, cells: list[list[FloatArray]], start: FloatArray, goal: FloatArray
+) -> list[FloatArray]:
+    """Polylines of the cells in a good order, each from its best end."""
+    ends = np.array([[variant[0], variant[-1]] for cell in cells for variant in cell]).reshape(-1, 2)
+    away_m = _away_m(floor.coarser(), np.vstack([ends, start, goal]))
+    draws = np.random.default_rng(0).random((TRIES_A_CELL * len(cells), 5))  # the same floor, the same path
+    order, which = anneal_entries(away_m, len(cells), 4, draws, 2.0)
+    return [cells[cell][which[cell]] for cell in order]
+
+
+def _away_m(floor: Floor, places: FloatArray) -> FloatArray:
+    """(P, P) lengths of paths over neighbouring cells."""
+    columns = floor.reachable.shape[1]
+    at = np.array([row * columns + column for row, column in (floor.nearest_cell(p) for p in places)])
+    unique, first, index = np.unique(at, return_index=True, return_inverse=True)
+    table = np.array([floor.cell_m * floor.costs_from(places[k])[0][unique] for k in first])
+    return np.asarray(table[np.ix_(index, index)])
+
+
+def _joined(floor: Floor, here: FloatArray, there: FloatArray) -> FloatArray:
+    """(K, 2) a path between two places: straight where nothing is in the way."""
+    if floor.is_clear(here, there):
+        return np.array([here, there])
+    _, parent = floor.costs_from(there)
+    corners = floor.path_m(parent, here)
+    return np.vstack([here, corners[1:-1], there])
+
+
+def _covered(floor: Floor, path: FloatArray, width_m: float) -> BoolArray:
+    covered = np.zeros_like(floor.reachable)
+    mark_swept(np.ascontiguousarray(path), 0.5 * width_m, *floor.origin_xy_m, floor.cell_m, covered)
+    return covered
+
+
+def _places_for(floor: Floor, path: FloatArray, missing: BoolArray, width_m: float) -> FloatArray:
+    """(K, 2) places for the centre that together sweep what is missing, piece by piece, near to the path."""
+    on_path = np.zeros_like(missing)
+    mark_swept(np.ascontiguousarray(path), 0.71 * floor.cell_m, *floor.origin_xy_m, floor.cell_m, on_path)
+    away_m = floor.cell_m * ndimage.distance_transform_edt(~on_path)
+    reach = math.ceil(0.5 * width_m / floor.cell_m)
+    pieces, _ = ndimage.label(missing, structure=np.ones((3, 3)))
+    x0, y0 = floor.origin_xy_m
+    found = []
+    for piece, (rows, columns) in enumerate(ndimage.find_objects(pieces), start=1):
+        low = np.maximum(0, [rows.start - reach, columns.start - reach])
+        window = slice(low[0], rows.stop + reach), slice(low[1], columns.stop + reach)
+        left = np.argwhere(pieces[window] == piece)
+        stand = np.argwhere(floor.reachable[window])
+        near = ((stand[:, None] - left[None]) ** 2).sum(axis=2) * floor.cell_m**2 <= (0.5 * width_m) ** 2
+        worth = 1.0 / (0.25 * width_m + away_m[window][tuple(stand.T)])
+        while near.any():
+            # What is swept by a metre of detour.
+            best = int(np.argmax(near.sum(axis=1) * worth))
+            row, column = stand[best] + low
+            found.append([x0 + (column + 0.5) * floor.cell_m, y0 + (row + 0.5) * floor.cell_m])
+            near[:, near[best]] = False
+    return np.array(found).reshape(-1, 2)
+
+
+def _with_detours(floor: Floor, path: FloatArray, places: FloatArray) -> FloatArray:
+    """The path by way of further places: there and back from where it comes nearest to each in sight."""
+    for place in places:
+        a, step = path[:-1], np.diff(path, axis=0)
+        share = ((place - a) * step).sum(axis=1) / np.maximum((step**2).sum(axis=1), 1e-12)
+        foot = a + np.clip(share, 0.0, 1.0)[:, None] * step
+        there_m = np.hypot(*(foot - place).T)
+        near = np.argsort(there_m, kind="stable")[:30].tolist()
+        seen = next((k for k in near if floor.is_clear(foot[k], place)), None)
+        k = near[0] if seen is None else seen
+        out = _joined(floor, a[k], place) if seen is None else np.vstack([foot[k], place])
+        path = np.insert(path, k + 1, np.vstack([out, out[-2::-1]]), axis=0)
+    return path
