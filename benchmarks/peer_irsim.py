@@ -46,11 +46,11 @@ class IrsimPeer:
         Where IR-SIM is not installed.
     """
 
-    def __init__(self, museum: Museum) -> None:
+    def __init__(self, museum: Museum, scanner: LidarConfig | None = None) -> None:
         # On import it tries window systems, and says so on standard output where there is none.
         with contextlib.redirect_stdout(io.StringIO()):
             self._irsim: Any = importlib.import_module("irsim")
-        self._museum = museum
+        self._museum, self._scanner = museum, scanner or LidarConfig()
         self._scanning = self._environment(noisy=True)
         self._scanning_cells = self._environment(noisy=True, on_grid=True)
 
@@ -107,7 +107,7 @@ class IrsimPeer:
 
     def _world(self, noisy: bool) -> dict[str, Any]:
         """IR-SIM's description of the museum, from pilotage's mission."""
-        mission, scanner = self._museum.mission, LidarConfig()
+        mission, scanner = self._museum.mission, self._scanner
         start, motion = mission.world.start, motion_of(mission.robot, "robot")
         assert start is not None
         xmin, ymin, xmax, ymax = self._museum.floor.walls.bounds_m

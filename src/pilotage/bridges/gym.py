@@ -16,10 +16,10 @@ def register() -> None:
     """Tell Gymnasium of every shipped mission; those without a goal are refused when they are made."""
     import gymnasium
 
-    place = "pilotage.bridges.gym_env:MissionEnv"
+    place, many = "pilotage.bridges.gym_env:MissionEnv", "pilotage.bridges.gym_vector:MissionVectorEnv"
     files = (resources.files("pilotage.missions") / "files").iterdir()
     names = sorted(entry.name.removesuffix(".yaml") for entry in files if entry.name.endswith(".yaml"))
     known = {f"pilotage/{name}-{VERSION}": {"mission": name} for name in names}
     for key, options in {**known, OWN: {}}.items():
         if key not in gymnasium.registry:
-            gymnasium.register(id=key, entry_point=place, kwargs=options)
+            gymnasium.register(id=key, entry_point=place, vector_entry_point=many, kwargs=options)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import Any, SupportsFloat, TypeAlias
 
 import gymnasium
@@ -14,8 +15,10 @@ from pilotage.core.angles import wrap_to_pi
 from pilotage.core.errors import InputError
 from pilotage.core.types import Twist
 from pilotage.experiments.build.robots import motion_of, sensors_of
-from pilotage.face.missions import MissionLike, as_mission
+from pilotage.face.missions import MissionLike, load
 from pilotage.face.stepping import Simulation, make
+from pilotage.missions.mission import Mission
+from pilotage.missions.places import GoalConfig
 from pilotage.sensors.lidar import LidarConfig
 from pilotage.sensors.readings import LidarScan, OdometryIncrement, Readings, UltrasonicReading
 from pilotage.sensors.ultrasonic import UltrasonicConfig
@@ -51,7 +54,7 @@ class MissionEnv(gymnasium.Env[Any, Any]):
 
     Parameters
     ----------
-    mission
+    mission, set
         What ``pilotage.load`` takes.
 
     Raises
@@ -62,16 +65,13 @@ class MissionEnv(gymnasium.Env[Any, Any]):
 
     metadata: dict[str, Any] = {"render_modes": []}  # noqa: RUF012 - as Gymnasium declares it
 
-    def __init__(self, mission: MissionLike) -> None:
-        self.mission = as_mission(mission)
-        if self.mission.robots:
-            raise InputError(
-                f"gymnasium: expected a mission with one robot, found {len(self.mission.robots)}"
-            )
-        goal = self.mission.goal_of(self.mission.members[0])
-        if goal is None:
-            raise InputError(f"gymnasium: expected a mission with world.goal, found '{self.mission.mission}'")
-        self._goal = goal
+    def __init__(
+        self,
+        mission: MissionLike,
+        set: Mapping[str, Any] | None = None,  # noqa: A002 - as the command line calls it
+    ) -> None:
+        self.mission = load(mission, set=set)
+        self._goal = goal_of(self.mission)
         robot = self.mission.members[0]
         motion = motion_of(robot, "robot")
         self._top = motion.top_speed_m_s, motion.top_turn_rate_rad_s
@@ -155,6 +155,22 @@ class MissionEnv(gymnasium.Env[Any, Any]):
         """Take a reading within its bounds."""
         box = self._within[name]
         self._seen[name] = np.clip(np.asarray(values, dtype=np.float32), box.low, box.high)
+
+
+def goal_of(mission: Mission) -> GoalConfig:
+    """The goal of a mission that can be an environment.
+
+    Raises
+    ------
+    InputError
+        Where it has several robots or no goal.
+    """
+    if mission.robots:
+        raise InputError(f"gymnasium: expected a mission with one robot, found {len(mission.robots)}")
+    goal = mission.goal_of(mission.members[0])
+    if goal is None:
+        raise InputError(f"gymnasium: expected a mission with world.goal, found '{mission.mission}'")
+    return goal
 
 
 def _both(most: Any) -> tuple[Array, Array]:

@@ -19,7 +19,7 @@ import numba
 import numpy as np
 from numba.cpython.unsafe import numbers as _bits
 
-__all__ = ["cache_is_cold", "kernel", "leading_zeros", "trailing_zeros"]
+__all__ = ["cache_is_cold", "kernel", "kernel_without_lock", "leading_zeros", "trailing_zeros"]
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -103,3 +103,10 @@ def kernel(function: F) -> F:
     folder = _folder_of(Path(function.__code__.co_filename))
     setattr(numba.config, "CACHE_DIR", str(folder))  # noqa: B010 - numba's stub lacks the name
     return cast(F, numba.njit(cache=True, error_model="numpy")(function))
+
+
+def kernel_without_lock(function: F) -> F:
+    """As ``kernel``; other threads of Python run meanwhile, so that each core may step its share."""
+    folder = _folder_of(Path(function.__code__.co_filename))
+    setattr(numba.config, "CACHE_DIR", str(folder))  # noqa: B010 - numba's stub lacks the name
+    return cast(F, numba.njit(cache=True, error_model="numpy", nogil=True)(function))
