@@ -23,7 +23,7 @@ FINGERPRINT = { pwd; cat requirements.lock pyproject.toml | cksum; }
 STAMP := $(VENV)/.made-from
 BENCH_STAMP := $(VENV)/.bench-made-from
 
-.PHONY: help core setup demo test fuzz check format format-check lint types contracts locks api examples bench lock clean claims
+.PHONY: help core setup demo test fuzz check format format-check lint types contracts locks api docs examples bench lock clean claims
 
 help:  ## this list
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/  make \1|\2/p' Makefile | awk -F'|' '{ printf "%-20s %s\n", $$1, $$2 }'
@@ -99,6 +99,9 @@ api: setup  ## write docs/api anew from the docstrings, docs/reports.md from its
 
 claims: setup  ## measure what README and docs claim, write docs/claims.json and their numbers (ARGS=NAME: one of docs/claims.yaml)
 	@$(PY) docs/make_claims.py $(ARGS)
+
+docs: setup  ## build the site into build/site: executes the notebooks, drives the gallery's missions; no network
+	@$(PY) docs/make_site.py $(ARGS)
 
 examples: setup  ## run the examples alone
 	@$(PY) -m pytest tests/unit/test_examples.py $(ARGS)

@@ -1,0 +1,106 @@
+"""The documentation site builds strictly, its links lead somewhere, and it asks nothing of the network."""
+
+from __future__ import annotations
+
+import ast
+import importlib.util
+import json
+import sys
+from html.parser import HTMLParser
+from pathlib import Path
+from types import ModuleType
+from urllib.parse import unquote
+
+import pytest
+
+pytest.importorskip("mkdocs", reason="needs the extra 'docs'")
+pytest.importorskip("material", reason="needs the extra 'docs'")
+DOCS = Path(__file__).parents[2] / "docs"
+
+
+class Page(HTMLParser):
+    """What a page leads to, what it loads, and the places in it."""
+
+    def __init__(self, path: Path) -> None:
+        super().__init__()
+        self.links: list[str] = []
+        self.loaded: list[str] = []
+        self.places: set[str] = set()
+        self.feed(path.read_text(encoding="utf-8"))
+
+    def handle_starttag(self, tag: str, attributes: list[tuple[str, str | None]]) -> None:
+        found = {key: value or "" for key, value in attributes}
+        self.places |= {found[key] for key in ("id", "name") if key in found}
+        if tag == "a" and "href" in found:
+            self.links.append(found["href"])
+        elif tag == "link" and found.get("rel") not in ("canonical", "next", "prev"):
+            self.loaded.append(found.get("href", ""))
+        elif "src" in found:
+            self.loaded.append(found["src"])
+
+
+@pytest.fixture(scope="module")
+def maker() -> ModuleType:
+    spec = importlib.util.spec_from_file_location("make_site", DOCS / "make_site.py")
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules["make_site"] = module
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.fixture(scope="module")
+def site(maker: ModuleType, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    built = maker.build(tmp_path_factory.mktemp("build"), quick=True)
+    assert isinstance(built, Path)
+    return built
+
+
+def test_no_link_is_dead_and_nothing_is_fetched(site: Path) -> None:
+    pages = {path: Page(path) for path in site.rglob("*.html")}
+    assert len(pages) > 60
+    dead, fetched = [], []
+    for path, page in pages.items():
+        for target in (*page.links, *page.loaded):
+            if target.startswith(("http:", "https:", "//")):
+                continue
+            name, _, anchor = target.partition("#")
+            if target.startswith(("data:", "mailto:", "javascript:")) or (path.name == "404.html"):
+                continue
+            place = (path.parent / unquote(name)).resolve() if name else path
+            there = place.is_file() and (
+                not anchor or place not in pages or unquote(anchor) in pages[place].places
+            )
+            if not there and anchor != "__skip":
+                dead.append(f"{path.relative_to(site)}: {target}")
+        fetched += [f"{path.name}: {target}" for target in page.loaded if target.startswith(("http", "//"))]
+    assert dead == []
+    assert fetched == []
+
+
+def test_every_page_is_in_it(site: Path, maker: ModuleType) -> None:
+    for place in maker.pages().values():
+        assert (site / place.with_suffix(".html")).is_file(), place
+    for folder in ("gallery", "notebooks", "decisions", "api"):
+        assert (site / folder / "index.html").is_file()
+
+
+def test_the_gallery_shows_shipped_missions(maker: ModuleType) -> None:
+    shipped = {path.stem for path in (DOCS.parent / "src/pilotage/missions/files").glob("*.yaml")}
+    assert {name for name, _ in maker.GALLERY} <= shipped
+
+
+@pytest.mark.parametrize("path", sorted((DOCS / "notebooks").glob("*.ipynb")), ids=lambda path: path.stem)
+def test_notebooks_are_stored_without_outputs(path: Path) -> None:
+    """They are executed by ``make docs``, which CI runs; here they are looked at."""
+    book = json.loads(path.read_text(encoding="utf-8"))
+    assert "".join(book["cells"][0]["source"]).startswith("# ")
+    for cell in book["cells"]:
+        if cell["cell_type"] == "code":
+            assert (cell["outputs"], cell["execution_count"]) == ([], None)
+            ast.parse("".join(cell["source"]))
+
+
+def test_there_are_five_notebooks() -> None:
+    assert len(list((DOCS / "notebooks").glob("*.ipynb"))) == 5
