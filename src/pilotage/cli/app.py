@@ -14,6 +14,7 @@ from pilotage.cli.components import components
 from pilotage.cli.draw import draw, vectorize
 from pilotage.cli.evaluate import evaluate
 from pilotage.cli.export import export
+from pilotage.cli.live import drive, serve
 from pilotage.cli.localize import localize
 from pilotage.cli.map_score import map_score
 from pilotage.cli.missions import missions
@@ -54,6 +55,8 @@ COMMANDS = (
     vectorize,
     report,
     export,
+    serve,
+    drive,
     new,
     missions,
     components,

@@ -1,0 +1,153 @@
+"""Live topics of real ROS 2: another process drives our robot, and our stack drives another's."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import pilotage as pl
+from pilotage.bridges.ros import messages as ros
+from pilotage.bridges.ros.driving import _increment, _ranges
+from pilotage.bridges.ros.serving import moved
+from pilotage.cli.main import main
+from pilotage.sensors.lidar import LidarConfig
+from pilotage.sensors.readings import OdometryIncrement
+
+STRANGER = Path(__file__).parents[1] / "support" / "ros" / "route_driver.py"
+RUN = "import sys; from pilotage.cli.main import main; sys.exit(main(sys.argv[1:]))"
+EXACT = [f"robot.sensors.odometry.{key}=0" for key in ("distance_var_m2_per_m", "angle_var_rad2_per_rad")]
+WALL_S = float(os.environ.get("PILOTAGE_ROS_SECONDS", "12"))
+"""Of each drive; 60 is what is promised, and takes as long."""
+
+
+@pytest.fixture
+def domain(monkeypatch: pytest.MonkeyPatch) -> str:
+    """A domain of its own, so that two test runs do not hear each other."""
+    pytest.importorskip("rclpy", reason="needs the extra 'ros2'")
+    number = str(1 + os.getpid() % 100)
+    monkeypatch.setenv("ROS_DOMAIN_ID", number)
+    monkeypatch.setenv("ROS_LOCALHOST_ONLY", "1")
+    return number
+
+
+def process(*words: str) -> subprocess.Popen[str]:
+    return subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+
+
+def answer(running: subprocess.Popen[str], code: int = 0) -> dict[str, object]:
+    out, err = running.communicate(timeout=20.0 * WALL_S + 200.0)
+    assert running.returncode == code, err
+    told = json.loads(out.splitlines()[-1])
+    assert isinstance(told, dict)
+    return told
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("domain")
+@pytest.mark.parametrize("speed", [1.0, 5.0])
+def test_another_process_drives_the_museum_route(speed: float) -> None:
+    mission = pl.load("museum-route")
+    start = mission.world.start
+    assert start is not None
+    points = mission.stack.planner.model_dump()["points_m"]  # type: ignore[union-attr]
+    frame = [start.x_m, start.y_m, start.theta_rad]
+    stranger = process(sys.executable, str(STRANGER), json.dumps(points), json.dumps(frame))
+    time.sleep(2.0)
+    words = ("serve", "museum-route", "--speed", str(speed), "--duration", str(speed * WALL_S), "--json")
+    served = process(sys.executable, "-c", RUN, *words, *(w for key in EXACT for w in ("--set", key)))
+    ours, theirs = answer(served), answer(stranger)
+    topics = theirs["topics"]
+    assert isinstance(topics, dict)
+    for topic in ("/odom", "/scan", "/clock"):
+        count, first, last = topics[topic]
+        # From the first that was heard on, not one is missing; the very first ones pass before both have met.
+        assert last == pytest.approx(speed * WALL_S)
+        assert count == round((last - first) / 0.1) + 1
+    assert ours["received"] == {"/cmd_vel": theirs["sent"]}
+    assert ours["collisions"] == 0
+    passed = theirs["passed"]
+    assert isinstance(passed, int)
+    assert passed >= min(len(points), 1 + speed * WALL_S // 45)
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("domain")
+def test_our_stack_drives_over_topics() -> None:
+    """The walls' filter and its planner in one process, the world in another: as good as in one."""
+    drives = process(
+        sys.executable, "-c", RUN, "drive", "museum-walls", "--ros2", "--duration", "20", "--json"
+    )
+    time.sleep(6.0)
+    served = process(
+        sys.executable, "-c", RUN, "serve", "museum-walls", "--speed", "2", "--duration", "26", "--json"
+    )
+    ours, theirs = answer(drives, 1), answer(served)
+    assert "time limit of 20 s" in str(ours["reason"])
+    assert theirs["collisions"] == 0
+    believed, end = ours["believed"], theirs["end"]
+    assert isinstance(believed, dict)
+    assert isinstance(end, dict)
+    # It rolls on until the last command is heard, or is too old.
+    assert math.hypot(believed["x_m"] - end["x_m"], believed["y_m"] - end["y_m"]) < 0.4
+    assert math.hypot(end["x_m"] - 1.0, end["y_m"] - 1.0) > 3.0
+
+
+def test_increments_survive_the_way_through_poses() -> None:
+    rng = np.random.default_rng(0)
+    for values in rng.uniform(-0.3, 0.3, (50, 3)):
+        increment = OdometryIncrement(*map(float, values))
+        before = pl.Pose2(*map(float, rng.uniform(-2.0, 2.0, 3)))
+        back = _increment(before, before.compose(moved(increment)))
+        assert (back.distance_m, back.angle_rad, back.lateral_m) == pytest.approx(tuple(values))
+
+
+def test_scans_of_other_beams_are_taken_by_the_nearest() -> None:
+    class Message:
+        angle_min, angle_increment = -1.0, 0.01
+        ranges = [float(k) for k in range(201)]  # noqa: RUF012
+
+    sheet = LidarConfig(beams=21, field_of_view_rad=2.0, max_range_m=150.0)
+    assert _ranges(Message, sheet).tolist() == [min(10.0 * k, 150.0) for k in range(21)]
+    wide = LidarConfig(beams=3, field_of_view_rad=4.0, max_range_m=150.0)
+    assert _ranges(Message, wide).tolist() == [150.0, 100.0, 150.0]
+
+
+def test_times_are_whole_nanoseconds() -> None:
+    assert ros.stamp(1.1 * 3) == {"sec": 3, "nanosec": 300_000_000}
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (["drive", "museum-walls"], "expected --ros2"),
+        (["serve", "museum-route", "--duration", "-1"], "--duration: expected seconds above 0"),
+        (["serve", "museum-route", "--speed", "0"], "--speed: expected a number above 0"),
+        (["serve", "musem-route"], "did you mean 'museum-route'"),
+    ],
+)
+def test_what_cannot_be_served_is_one_line(
+    words: list[str], told: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(words) == 2
+    said = capsys.readouterr()
+    assert (said.out, said.err.count("\n")) == ("", 1)
+    assert told in said.err
+
+
+@pytest.mark.parametrize("words", [["serve", "museum-route"], ["drive", "museum-walls", "--ros2"]])
+def test_without_ros_the_remedy_is_said(
+    words: list[str], monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setitem(sys.modules, "rclpy", None)
+    assert main(words) == 2
+    said = capsys.readouterr()
+    assert said.err.count("\n") == 1
+    assert "pip install pilotage[ros2]" in said.err
