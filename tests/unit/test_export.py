@@ -194,3 +194,32 @@ def test_the_command_says_where(run: pl.Run, capsys: pytest.CaptureFixture[str])
     assert main(["export", str(run.folder), "--to", "csv"]) == 0
     assert capsys.readouterr().out.strip() == str(run.folder / "trace.csv")
     assert set(FORMS) == {"mcap", "rosbag", "rerun", "tum", "csv"}
+
+
+@pytest.mark.parametrize(
+    ("topics", "told"),
+    [
+        (["/laser"], "expected the topic /laser, found /cmd_vel (geometry_msgs/msg/Twist, "),
+        (
+            ["/scan", "/trace"],
+            "topic /trace: expected sensor_msgs/msg/LaserScan or nav_msgs/msg/Odometry, found ",
+        ),
+    ],
+)
+def test_a_wrong_topic_is_told_with_what_there_is(
+    topics: list[str], told: str, bags: dict[str, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = [word for topic in topics for word in ("--topic", topic)]
+    assert main(["slam", str(bags["run.mcap"]), *words, "--out", str(tmp_path / "runs")]) == 2
+    said = capsys.readouterr()
+    assert (said.out, said.err.count("\n")) == ("", 1)
+    assert told in said.err
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_topics_are_what_their_types_say(run: pl.Run, bags: dict[str, Path]) -> None:
+    by_default, by_truth = read_bag(bags["run.mcap"]), read_bag(bags["run.mcap"], topics=["truth", "/scan"])
+    assert by_default.odometry is not None
+    assert by_truth.odometry is not None
+    assert by_truth.odometry[-1, 0] == pytest.approx(run.trace["true_x_m"][-1])
+    assert by_default.odometry[-1, 0] != pytest.approx(by_truth.odometry[-1, 0])

@@ -32,6 +32,10 @@ def slam(
     config: Annotated[
         Path | None, typer.Option("--config", metavar="FILE", help="YAML file with the few parameters.")
     ] = None,
+    topics: Annotated[
+        list[str] | None,
+        typer.Option("--topic", metavar="NAME", help="A bag's scans or odometry by name; repeatable."),
+    ] = None,
     out: Out = Path("runs"),
     report: Annotated[bool, typer.Option(help="Write report.html into the run folder.")] = True,
     json: Json = False,
@@ -42,7 +46,7 @@ def slam(
 
     settings = read_slam_config(config)
     with stdout_for_json(json), _stages(not quiet) as on_stage:
-        run = slam_log(log, out, settings, on_stage)
+        run = slam_log(log, out, settings, on_stage, topics or ())
         page: Path | None = None
         if report:
             from pilotage.report.slam.page import write_slam_report

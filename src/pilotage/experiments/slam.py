@@ -7,7 +7,7 @@ import shutil
 import tempfile
 import time
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -42,14 +42,14 @@ class SlamRun:
     warnings: tuple[str, ...]
 
 
-def read_recording(path: Path) -> LaserLog:
+def read_recording(path: Path, topics: Sequence[str] = ()) -> LaserLog:
     """Read a bag or a CARMEN log; InputError also for a run folder, which holds no raw scans."""
     if (path / "mission.yaml").is_file():
         raise InputError(
             f"{path}: expected a bag or a CARMEN log, found a run folder, which holds no raw scans; "
             "export the run as a bag and map that"
         )
-    return read_laser_log(path)
+    return read_laser_log(path, topics=topics)
 
 
 def read_slam_config(path: Path | None) -> SlamConfig:
@@ -65,7 +65,13 @@ def read_slam_config(path: Path | None) -> SlamConfig:
     return validate(SlamConfig, read_yaml(path, "a YAML file of SLAM's settings") or {}, str(path))
 
 
-def slam_log(path: Path, out: Path, config: SlamConfig, on_stage: OnStage | None = None) -> SlamRun:
+def slam_log(
+    path: Path,
+    out: Path,
+    config: SlamConfig,
+    on_stage: OnStage | None = None,
+    topics: Sequence[str] = (),
+) -> SlamRun:
     """Map a recording and write its run folder under ``out``.
 
     Raises
@@ -74,7 +80,7 @@ def slam_log(path: Path, out: Path, config: SlamConfig, on_stage: OnStage | None
         What of the log cannot be used.
     """
     began = time.perf_counter()
-    log = read_recording(path)
+    log = read_recording(path, topics)
     read = time.perf_counter()
     matched = [read]
 

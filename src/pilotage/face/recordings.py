@@ -109,7 +109,13 @@ class MappedLog:
         return write_slam_report(self.folder)
 
 
-def slam(log: FilePath, *, config: FilePath | None = None, out: FilePath = "runs") -> MappedLog:
+def slam(
+    log: FilePath,
+    *,
+    config: FilePath | None = None,
+    topics: Sequence[str] = (),
+    out: FilePath = "runs",
+) -> MappedLog:
     """Map a recording of a building that nobody has mapped.
 
     Parameters
@@ -118,6 +124,8 @@ def slam(log: FilePath, *, config: FilePath | None = None, out: FilePath = "runs
         A ROS bag, an MCAP file or a CARMEN log with scans and odometry.
     config
         A YAML file of the few parameters; None: as shipped.
+    topics
+        A bag's scans and odometry by name, where the usual ones are not meant.
 
     Raises
     ------
@@ -127,7 +135,7 @@ def slam(log: FilePath, *, config: FilePath | None = None, out: FilePath = "runs
     from pilotage.experiments.slam import read_slam_config, slam_log
 
     settings = read_slam_config(None if config is None else Path(config))
-    run = slam_log(Path(log), Path(out), settings)
+    run = slam_log(Path(log), Path(out), settings, topics=topics)
     trajectory = read_trajectory(run.run_dir / "trajectory.tum", TrajectoryFormat.TUM)
     return MappedLog(run.run_dir, Metrics(run.metrics), trajectory, run.warnings)
 

@@ -32,7 +32,12 @@ USUAL_TOPICS = ("/scan", "/odom")
 """Taken before others of the same type."""
 
 
-def read_bag(path: Path, scan_topic: str | None = None, odometry_topic: str | None = None) -> LaserLog:
+def read_bag(
+    path: Path,
+    scan_topic: str | None = None,
+    odometry_topic: str | None = None,
+    topics: Sequence[str] = (),
+) -> LaserLog:
     """Read the scans and the odometry of a bag.
 
     A bag that is cut or damaged is read as far as it goes; the log's ``warnings`` say so.
@@ -44,6 +49,8 @@ def read_bag(path: Path, scan_topic: str | None = None, odometry_topic: str | No
     scan_topic, odometry_topic
         By default the only ones of their types; of several, ``/scan`` and ``/odom``, else those with most
         messages.
+    topics
+        The same by name alone: each is what its type says.
 
     Raises
     ------
@@ -54,7 +61,7 @@ def read_bag(path: Path, scan_topic: str | None = None, odometry_topic: str | No
     with ExitStack() as stack:
         bag = open_whole(path, stack)
         if bag is not None:
-            picked = _pick(bag, path, scan_topic, odometry_topic)
+            picked = _pick(bag, path, *_named(bag, path, topics, scan_topic, odometry_topic))
             try:
                 return _collect(bag, path, picked)
             except InputError:
@@ -62,7 +69,7 @@ def read_bag(path: Path, scan_topic: str | None = None, odometry_topic: str | No
             except Exception:  # the library fails in many ways on a damaged part
                 bag = None
     bag = open_damaged(path)
-    return _collect(bag, path, _pick(bag, path, scan_topic, odometry_topic))
+    return _collect(bag, path, _pick(bag, path, *_named(bag, path, topics, scan_topic, odometry_topic)))
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,6 +78,27 @@ class _Picked:
     odometry: str | None
     transforms: tuple[str, ...]
     warnings: tuple[str, ...]
+
+
+def _named(
+    bag: OpenBag, path: Path, topics: Sequence[str], scan: str | None, odometry: str | None
+) -> tuple[str | None, str | None]:
+    """Which of the topics asked for is which, by their types."""
+    types = {"/" + topic.name.lstrip("/"): topic.msgtype for topic in bag.topics if topic.count}
+    for asked in topics:
+        wanted = "/" + asked.lstrip("/")
+        msgtype = types.get(wanted)
+        if msgtype is None:
+            raise InputError(f"{path}: expected the topic {wanted}, {_holds(bag.topics)}")
+        if msgtype == SCAN_TYPE:
+            scan = wanted
+        elif msgtype == ODOMETRY_TYPE:
+            odometry = wanted
+        else:
+            raise InputError(
+                f"{path}: topic {wanted}: expected {SCAN_TYPE} or {ODOMETRY_TYPE}, found {msgtype}"
+            )
+    return scan, odometry
 
 
 def _pick(bag: OpenBag, path: Path, scan_topic: str | None, odometry_topic: str | None) -> _Picked:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 from pilotage.core.errors import InputError
@@ -10,7 +11,12 @@ from pilotage.logs.bags import read_bag
 from pilotage.logs.laser_log import LaserLog, read_carmen_scans
 
 
-def read_laser_log(path: Path, scan_topic: str | None = None, odometry_topic: str | None = None) -> LaserLog:
+def read_laser_log(
+    path: Path,
+    scan_topic: str | None = None,
+    odometry_topic: str | None = None,
+    topics: Sequence[str] = (),
+) -> LaserLog:
     """Read a ROS 1 bag, a ROS 2 bag, an MCAP file or a CARMEN log (plain or gzipped).
 
     Raises
@@ -21,8 +27,8 @@ def read_laser_log(path: Path, scan_topic: str | None = None, odometry_topic: st
     if not path.exists():
         raise InputError(f"{path}: expected a recording, found no such file")
     if path.is_dir() or is_bag(path):
-        return read_bag(path, scan_topic, odometry_topic)
-    if scan_topic is not None or odometry_topic is not None:
+        return read_bag(path, scan_topic, odometry_topic, topics)
+    if scan_topic is not None or odometry_topic is not None or topics:
         raise InputError(
             f"{path}: expected a bag where topics are named, found none: CARMEN logs have no topics"
         )
