@@ -85,7 +85,7 @@ def rewritten(page: Path, places: dict[Path, Path]) -> str:
             place = Path("decisions/index.md")
         elif path in places:
             place = places[path]
-        elif path.is_relative_to(DOCS) and path.is_file():
+        elif path.is_relative_to(DOCS / "images") and path.is_file():
             place = path.relative_to(DOCS)
         else:
             return words
