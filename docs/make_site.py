@@ -22,6 +22,7 @@ LINK = re.compile(r"(!?)\[((?:[^\[\]]|\[[^\]]*\])*)\]\(([^)\s]+)\)")
 GALLERY = (
     ("museum-1", 0),
     ("museum-concave", 3),
+    ("museum-rounds", 0),
     ("museum-hall", 1),
     ("museum-walls", 0),
     ("museum-kidnap", 0),
@@ -175,7 +176,7 @@ def _gallery(folder: Path, missions: tuple[tuple[str, int], ...]) -> str:
         place = f"{name}.html"
         folder.mkdir(parents=True, exist_ok=True)
         run.report(folder / place)
-        _write(folder / f"{name}.svg", _picture(run.folder))
+        _write(folder / f"{name}.svg", picture(run.folder))
         word = "success" if run.success else html.escape(run.reason)
         told = html.escape(run.mission.description)
         cards.append(
@@ -186,13 +187,16 @@ def _gallery(folder: Path, missions: tuple[tuple[str, int], ...]) -> str:
     return f'# Gallery\n\n{text}\n<div class="gallery">{"".join(cards)}</div>\n'
 
 
-def _picture(folder: Path) -> str:
+def picture(folder: Path) -> str:
+    """A run's map as a file of its own."""
     from pilotage.records.run_data import read_run
     from pilotage.report.drawn import map_of
     from pilotage.report.style import drawing_style
 
     with drawing_style():
-        return map_of(read_run(folder)).svg
+        drawn = map_of(read_run(folder)).svg
+    # Inside a page a drawing needs no name space; as a file it does.
+    return drawn.replace("<svg ", '<svg xmlns="http://www.w3.org/2000/svg" ', 1)
 
 
 def _write(path: Path, text: str) -> None:
