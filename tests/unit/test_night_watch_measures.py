@@ -10,6 +10,7 @@ import pytest
 from pilotage.core.types import FloatArray
 from pilotage.evaluation.consistency import nees
 from pilotage.evaluation.halls import hall_offset_m
+from pilotage.experiments.build.obstacles import _leads_in
 from pilotage.experiments.mission import load_mission
 from pilotage.experiments.run import run_mission
 from pilotage.maps.segment_map import SegmentMap
@@ -85,3 +86,16 @@ def test_a_plan_that_nobody_drives_says_so() -> None:
     metrics = run_mission(load_mission("museum-plan", ["stack.planner.stop=first"], 0), save=False).metrics
     assert "goal_error_m" not in metrics
     assert headline(metrics).startswith("Planned, and nobody drove: a path of ")
+
+
+def test_a_head_on_trap_is_refused_where_the_path_turns_into_it() -> None:
+    """A pocket of 3 m by 2 m with its back at x = 10; the path comes straight in, or from the side."""
+    pocket = np.array([[8.0, -1.5], [10.0, -1.5], [10.0, 1.5], [8.0, 1.5]])
+    straight = along(0.0, 0.0, 0.0, 10.0)
+    assert _leads_in(straight, pocket, 0.3)
+    assert _leads_in(along(0.9, 0.0, 0.0, 10.0), pocket, 0.3)
+    assert not _leads_in(along(1.1, 0.0, 0.0, 10.0), pocket, 0.3), "too near a side for the body"
+    from_the_side = straight.copy()
+    from_the_side[straight[:, 0] < 8.5, 1] = 8.5 - straight[straight[:, 0] < 8.5, 0]
+    assert not _leads_in(from_the_side, pocket, 0.3)
+    assert not _leads_in(straight[straight[:, 0] > 7.5], pocket, 0.3), "it begins at the mouth"
