@@ -13,7 +13,7 @@ import pytest
 from contract.exploring_examples import explores_the_floor
 from contract.fault_examples import fault_befalls
 from contract.local_examples import LOCAL_EXAMPLES, navigator_drives_by_the_laser
-from contract.patrol_examples import STRATEGY_NUMBERS, strategy_patrols
+from contract.patrol_examples import STRATEGY_NUMBERS, navigator_patrols, strategy_patrols
 from contract.people_examples import people_walk
 from contract.rover_examples import (
     chains_legs,
@@ -446,6 +446,8 @@ EXAMPLES: dict[tuple[str, str], Example] = {
     ("navigator", "surround-check"): Example(
         explorer_explores, {"margin_cells": 1}, pure_numbers=frozenset({"far_cells"})
     ),
+    ("task", "patrol"): Example(task_runs("patrol"), {"duration_s": 20.0}),
+    ("navigator", "patrol"): Example(navigator_patrols, {"yield_s": 6.0}),
     **{("strategy", name): Example(strategy_patrols, {}, pure) for name, pure in STRATEGY_NUMBERS.items()},
     ("fault", "drop"): fault({}),
     ("fault", "gap"): fault({"length_s": 3.0}),

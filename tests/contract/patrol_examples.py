@@ -1,4 +1,4 @@
-"""Examples of patrol strategies: a small team on a small graph."""
+"""Examples of patrol strategies, a small team on a small graph, and of the navigator."""
 
 from __future__ import annotations
 
@@ -7,8 +7,13 @@ from typing import Any
 
 import numpy as np
 
+from pilotage.experiments.build.build import build
 from pilotage.experiments.graph_patrol import GraphPatrol, Radio, patrol
+from pilotage.experiments.loop import run_loop
+from pilotage.experiments.mission import mission_of
+from pilotage.stack.interface import StackStatus
 from pilotage.stack.patrol.graph import PatrolGraph
+from support.missions import MISSIONS
 
 STRATEGY_NUMBERS: dict[str, frozenset[str]] = {
     **dict.fromkeys(
@@ -29,6 +34,19 @@ def lattice(columns: int = 4, rows: int = 3, side_m: float = 2.0) -> PatrolGraph
     edges = np.where(apart <= side_m + 1e-9, apart, math.inf)
     edges[0, -1] = edges[-1, 0] = 3.0 * side_m
     return PatrolGraph.of(xy, edges)
+
+
+def navigator_patrols(factory: Any, config: Any) -> None:
+    """Two in one room visit its vertices by turns and keep clear of each other."""
+    values = {**MISSIONS["patrol"]}
+    values["stack"] = {**values["stack"], "navigator": {"name": "patrol", **config.model_dump(mode="json")}}
+    experiment = build(mission_of(values))
+    assert all(type(member.stack) is factory for member in experiment.team)
+    finished = run_loop(experiment).finished
+    metrics = experiment.task.judge(finished).metrics
+    assert metrics["collisions"] == 0
+    assert all(robot.driven_m > 3.0 for robot in finished.robots)
+    assert all(robot.status is StackStatus.RUNNING for robot in finished.robots)
 
 
 def strategy_patrols(factory: Any, config: Any) -> None:

@@ -112,6 +112,26 @@ def explore() -> dict[str, Any]:
     }
 
 
+def patrol() -> dict[str, Any]:
+    """Two robots in the room, localized by its walls."""
+    robot = {
+        "footprint": {"radius_m": 0.3},
+        "sensors": {
+            "odometry": {"name": "wheel-odometry"},
+            "lidar": {"name": "lidar", "rate_hz": 5.0, "beams": 180, "field_of_view_rad": 6.283185307179586},
+        },
+    }
+    return {
+        "mission": "round-the-room",
+        "world": {"map": ROOM_MAP},
+        "robot": robot,
+        "team": {"size": 2, "strategy": "conscientious-reactive", "radio": {}},
+        "task": {"name": "patrol", "duration_s": 20.0},
+        "stack": {"initial": SMALL_VAR, "navigator": "patrol", "localizer": "ekf-walls"},
+        "run": {"time_limit_s": 20.0},
+    }
+
+
 MISSIONS: dict[str, dict[str, Any]] = {
     "reach": reach(),
     "plan": plan(),
@@ -119,4 +139,5 @@ MISSIONS: dict[str, dict[str, Any]] = {
     "follow": {**follow(), "task": {"name": "follow", "points_m": [[4.0, 4.0], [7.0, 4.0]]}},
     "localize": localize(),
     "explore": explore(),
+    "patrol": patrol(),
 }

@@ -13,6 +13,7 @@ from pilotage.core.types import Event, Pose2
 from pilotage.evaluation.finished import FinishedRun, RobotRun
 from pilotage.evaluation.tasks.task import Attempt, all_ended
 from pilotage.experiments.build.build import Experiment, Member, build
+from pilotage.experiments.disturbances import Disturbances
 from pilotage.experiments.people_trail import PeopleTrail
 from pilotage.experiments.progress import EVERY_S, OnProgress, Progress, metres
 from pilotage.experiments.recorder import Recorder
@@ -20,8 +21,6 @@ from pilotage.experiments.sightings import Sightings
 from pilotage.experiments.source import stepped
 from pilotage.experiments.update_album import UpdateAlbum
 from pilotage.missions.mission import Mission
-from pilotage.missions.places import Kidnap
-from pilotage.sim.source import Simulator
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,12 +62,12 @@ def run_loop(experiment: Experiment, on_progress: OnProgress | None = None) -> R
     planned_s = sum(member.journal.planning_time_s for member in team)
     every = max(1, round(mission.run.record_every_s / mission.run.dt_s))
     limit = math.ceil(mission.run.time_limit_s / mission.run.dt_s) if task.drives else 0
-    kidnaps = sorted(mission.world.kidnaps, key=lambda kidnap: kidnap.at_s)
+    disturbances = Disturbances(mission, source)
     ending = "" if not task.drives or all_ended(attempts) else None
     begin = last_told = time.perf_counter()
     step = 0
     stacks = [member.stack for member in team] if ending is None and limit > 0 else []
-    _carry_whose_time_has_come(source, kidnaps, events)
+    events += disturbances.due()
     for readings, commands in stepped(source, stacks) if stacks else ():
         step += 1
         for index, member in enumerate(team):
@@ -91,7 +90,7 @@ def run_loop(experiment: Experiment, on_progress: OnProgress | None = None) -> R
             trail.record(source.t_s)
         if ending is not None or step >= limit:
             break
-        _carry_whose_time_has_come(source, kidnaps, events)
+        events += disturbances.due()
     loop_s = time.perf_counter() - begin
     planning_s = sum(member.journal.planning_time_s for member in team) - planned_s
     if ending is None:
@@ -148,23 +147,6 @@ def _robot_run(experiment: Experiment, index: int, recorder: Recorder) -> RobotR
         body.collisions,
         body.driven_m,
         None if crowd is None else crowd.encounters(index),
-    )
-
-
-def _carry_whose_time_has_come(source: Simulator, kidnaps: list[Kidnap], events: list[Event]) -> None:
-    while kidnaps and source.t_s >= kidnaps[0].at_s:
-        events.append(carry(source, kidnaps.pop(0)))
-
-
-def carry(source: Simulator, kidnap: Kidnap) -> Event:
-    """Carry a robot elsewhere; nobody tells it."""
-    assert kidnap.to is not None, "settled by the build"
-    to = Pose2(kidnap.to.x_m, kidnap.to.y_m, wrap_to_pi(kidnap.to.theta_rad))
-    source.bodies[kidnap.robot].carry_to(to)
-    return Event(
-        source.t_s,
-        "kidnap",
-        f"the robot is carried to ({to.x_m:.2f}, {to.y_m:.2f}) and not told",
     )
 
 

@@ -36,6 +36,10 @@ def resolved_values(mission: Mission, chart: WorldMap | None = None) -> dict[str
     people = values["world"]["people"]
     for index, choice in enumerate(people):
         people[index] = _resolved("people", choice, f"world.people.{index}")
+    if values["team"]["strategy"] is not None:
+        values["team"]["strategy"] = _resolved("strategy", values["team"]["strategy"], "team.strategy")
+    if values["team"]["radio"] is not None:
+        values["team"]["radio"] = _resolved("sensor", values["team"]["radio"], "team.radio")
     _resolve_stack(values["stack"], "stack")
     _resolve_robot(values["robot"], "robot")
     for index, robot in enumerate(values["robots"]):

@@ -58,7 +58,7 @@ class UpdateAlbum:
     ) -> None:
         """Keep the ``most`` highest scores above 0 that are apart from each other."""
         near = [k for k, picture in enumerate(kept) if t_s - picture.t_s < APART_S]
-        rivals = near or ([] if len(kept) < most else [int(np.argmin([p.score for p in kept]))])
+        rivals = near or ([] if len(kept) < most else [min(range(len(kept)), key=lambda k: kept[k].score)])
         if score <= max((kept[k].score for k in rivals), default=0.0):
             return
         kept[:] = [picture for k, picture in enumerate(kept) if k not in rivals]

@@ -9,7 +9,7 @@ from typing import overload
 from pilotage.core.errors import InputError
 from pilotage.core.types import STOP, Command, Pose2, Twist, WheelSpeeds
 from pilotage.experiments.build.build import Source, build_source
-from pilotage.experiments.loop import carry
+from pilotage.experiments.disturbances import carry
 from pilotage.face.missions import MissionLike, as_mission
 from pilotage.maps.world_map import WorldMap
 from pilotage.missions.mission import Mission

@@ -103,6 +103,9 @@ class Mission(Config):
                 f"team.size: expected {len(self.robots)}, as many as robots lists, or no robots, "
                 f"found {self.team.size}"
             )
+        for failure in self.team.failures:
+            if failure.robot >= len(self.members):
+                raise ValueError(f"team.failures: there is no robot {failure.robot} of {len(self.members)}")
         for kidnap in self.world.kidnaps:
             if kidnap.robot >= len(self.members):
                 raise ValueError(f"world.kidnaps: there is no robot {kidnap.robot} of {len(self.members)}")

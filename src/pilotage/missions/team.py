@@ -3,18 +3,28 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 from pydantic import Field, model_validator
 
 from pilotage.core.config import Config
 from pilotage.missions.choice import ComponentChoice, by_default
 from pilotage.missions.places import PoseConfig
-from pilotage.sensors.sensor import Positive
+from pilotage.sensors.sensor import NonNegative, Positive
 
 LARGEST_TEAM = 64
 RADIO = "radio"
 """What a team's radio is called among a robot's sensors."""
+
+
+class Failure(Config):
+    """Something of a robot breaks: it stops for good and says nothing, or its radio alone."""
+
+    robot: int = Field(ge=0)
+    at_s: NonNegative
+    kind: Literal["stop", "radio"] = "stop"
+    for_s: Positive | None = None
+    """Mended after so long; None: never."""
 
 
 class TeamConfig(Config):
@@ -31,6 +41,8 @@ class TeamConfig(Config):
     starts: tuple[PoseConfig, ...] = ()
     spacing_m: Positive = 1.5
     """At least so far apart are starting places that are drawn, middle to middle."""
+
+    failures: tuple[Failure, ...] = ()
 
     @model_validator(mode="after")
     def _a_place_for_each(self) -> TeamConfig:

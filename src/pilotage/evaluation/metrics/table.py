@@ -12,6 +12,14 @@ from pilotage.evaluation.metric import Aspect, Clock, Direction, Metric
 _POSE = ("position_rmse_m", "heading_rmse_rad")
 _DRIVEN = ("duration_s", "path_length_m", "min_clearance_m")
 DECISIVE: dict[str, tuple[str, ...]] = {
+    "patrol": (
+        "idleness_worst_s",
+        "idleness_mean_s",
+        "coverage_age_worst_s",
+        "collisions",
+        "deadlocks",
+        "position_rmse_m",
+    ),
     "reach": (*_POSE, *_DRIVEN),
     "follow": (*_POSE, *_DRIVEN),
     "drive": (*_POSE, *_DRIVEN),

@@ -49,6 +49,9 @@ class Task(Protocol):
 
     Where it has a true ``any_order`` as well, each robot visits the goals in the order that is best by its
     own map, and its own goal last.
+
+    One with places that a team shares out has ``patrol`` besides, a ``PatrolSite``, of which every robot is
+    told. One that is about a certain floor has a static method ``about(config)``: a place on it, or None.
     """
 
     columns: Mapping[str, str]

@@ -16,6 +16,7 @@ from pilotage.experiments.build.obstacles import Obstacles, place_obstacles
 from pilotage.experiments.build.places import check_place, pose_of, settle_places
 from pilotage.experiments.build.robots import faults_of, footprint_of, motion_of, sensors_of
 from pilotage.experiments.build.stacks import build_stack, first_belief, goal_of, rounds_of, told
+from pilotage.experiments.components import build_component
 from pilotage.experiments.oracles.drive import faithful
 from pilotage.experiments.oracles.ideal_sensors import ideal_sensors
 from pilotage.experiments.oracles.truth import Truth
@@ -30,6 +31,8 @@ from pilotage.sim.worlds.world import World
 from pilotage.stack.interface import Stack, StackStatus
 from pilotage.stack.journal import Journal
 from pilotage.stack.knowledge import RobotKnowledge, TaskKnowledge
+from pilotage.stack.patrol.strategy import STRATEGIES, PatrolSetting
+from pilotage.stack.patrol.task import PatrolSite, PatrolTask
 from pilotage.stack.planning.rounds import Rounds
 
 
@@ -100,7 +103,7 @@ def build_source(mission: Mission) -> Source:
         built = build(mission)
         return Source(built.mission, built.chart, built.obstacles, built.simulator)
     chart = chart_of(mission.world)
-    mission = settle_places(mission, chart)
+    mission = settle_places(mission, chart, _about(mission))
     streams = RandomStreams(mission.run.seed)
     sheets = [_data_sheet(mission, index, streams) for index in range(len(mission.members))]
     _check_places(mission, chart, sheets)
@@ -150,7 +153,7 @@ def build(mission: Mission) -> Experiment:
         Where the mission asks for something that does not exist or cannot be.
     """
     chart = chart_of(mission.world)
-    mission = settle_places(mission, chart)
+    mission = settle_places(mission, chart, _about(mission))
     streams = RandomStreams(mission.run.seed)
     sheets = [_data_sheet(mission, index, streams) for index in range(len(mission.members))]
     _check_places(mission, chart, sheets)
@@ -233,6 +236,16 @@ def _check_ended(mission: Mission, team: Sequence[Member]) -> None:
             )
 
 
+def _about(mission: Mission) -> tuple[float, float] | None:
+    """A place on the floor that the task is about; None where it is about none in particular."""
+    choice = mission.task
+    about = getattr(TASKS.entry(choice.name).factory, "about", None)
+    if about is None:
+        return None
+    place: tuple[float, float] | None = about(TASKS.configure(choice.name, choice.parameters, "task"))
+    return place
+
+
 def _task(mission: Mission, chart: WorldMap, sheets: Sequence[RobotKnowledge]) -> Task:
     choice = mission.task
     config = TASKS.configure(choice.name, choice.parameters, "task")
@@ -279,8 +292,30 @@ def _member(
     if "mapper" in oracles and config.map == "none":
         own = chart
     journal = Journal()
-    stack = build_stack(config, sheet, own, task, journal, truth, oracles)
+    share = _share(mission, index, sheet, whole)
+    stack = build_stack(config, sheet, own, task, journal, truth, oracles, share)
     return Member(robot, config, sheet, stack, journal, goals, rounds)
+
+
+def _share(mission: Mission, index: int, sheet: RobotKnowledge, whole: Task) -> PatrolTask | None:
+    """A robot's share of a task that has places to visit for all of the team."""
+    site: PatrolSite | None = getattr(whole, "patrol", None)
+    if site is None:
+        return None
+    starts = np.array([_nearest(mission, k, site) for k in range(len(mission.members))])
+    setting = PatrolSetting(
+        site.graph, index, starts, sheet.motion.top_speed_m_s, sheet.streams.stream("strategy")
+    )
+    assert mission.team.strategy is not None, "the task looked"
+    strategy = build_component(STRATEGIES, mission.team.strategy, "strategy", setting)
+    return PatrolTask(site.graph, site.visit_m, index, starts, strategy)
+
+
+def _nearest(mission: Mission, index: int, site: PatrolSite) -> int:
+    """The vertex nearest to a robot's start."""
+    start = mission.start_of(mission.members[index])
+    assert start is not None, "settled above"
+    return site.graph.nearest(start.x_m, start.y_m)
 
 
 def _obstacles(

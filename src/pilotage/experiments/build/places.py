@@ -49,10 +49,13 @@ def start_pose(mission: Mission, index: int, chart: WorldMap) -> PoseConfig:
     return PoseConfig(x_m=x, y_m=y, theta_rad=wrap_to_pi(theta))
 
 
-def settle_places(mission: Mission, chart: WorldMap) -> Mission:
-    """Return the mission with all its places known, so that it can be recorded and run again as it is."""
+def settle_places(mission: Mission, chart: WorldMap, about: tuple[float, float] | None = None) -> Mission:
+    """Return the mission with all its places known, so that it can be recorded and run again as it is.
+
+    A team's starts are drawn on the floor of the place that the task is ``about``, if it is about one.
+    """
     if mission.team.size is not None:
-        mission = _with_drawn_starts(mission, chart)
+        mission = _with_drawn_starts(mission, chart, about)
     world = mission.world
     given = [start_pose(mission, index, chart) for index in range(len(mission.members))]
     if world.random_start is None and all(kidnap.to is not None for kidnap in world.kidnaps):
@@ -83,10 +86,10 @@ def _started(mission: Mission, starts: Sequence[PoseConfig]) -> Mission:
     return mission.model_copy(update={"robots": robots})
 
 
-def _with_drawn_starts(mission: Mission, chart: WorldMap) -> Mission:
+def _with_drawn_starts(mission: Mission, chart: WorldMap, about: tuple[float, float] | None) -> Mission:
     """The mission with a place for every robot that has none: drawn in turn, apart from those before.
 
-    They are places that ``world.start`` is connected to, or on the largest floor of the map without it.
+    They are places that ``world.start`` is connected to, or what the task is about, or on the largest floor.
 
     Raises
     ------
@@ -94,6 +97,9 @@ def _with_drawn_starts(mission: Mission, chart: WorldMap) -> Mission:
         Where the floor has no room for so many.
     """
     rng = RandomStreams(mission.run.seed).stream("starts")
+    near = mission.world.start
+    if near is None and about is not None:
+        near = PoseConfig(x_m=about[0], y_m=about[1])
     spacing_m = mission.team.spacing_m
     placed: list[PoseConfig] = [robot.start for robot in mission.robots if robot.start is not None]
     robots: list[RobotConfig] = []
@@ -103,7 +109,7 @@ def _with_drawn_starts(mission: Mission, chart: WorldMap) -> Mission:
         if start is None:
             clear_m = footprint_of(robot, f"robots.{index}").radius_m + ROOM_M
             if clear_m not in floors:
-                floors[clear_m] = OpenFloor(chart, clear_m, mission.world.start)
+                floors[clear_m] = OpenFloor(chart, clear_m, near)
             start = floors[clear_m].draw(rng, placed, spacing_m)
             if start is None:
                 raise InputError(

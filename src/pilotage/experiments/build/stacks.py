@@ -30,6 +30,7 @@ from pilotage.stack.localization.heading_filter import HEADING_FILTERS, HeadingE
 from pilotage.stack.localization.localizer import LOCALIZERS, Localizer
 from pilotage.stack.mapping.mapper import MAPPERS
 from pilotage.stack.navigator.navigator import Parts
+from pilotage.stack.patrol.task import PatrolTask
 from pilotage.stack.planning.local_planner import LOCAL_PLANNERS
 from pilotage.stack.planning.planner import PLANNERS, SMOOTHERS
 from pilotage.stack.planning.rounds import Rounds, best_rounds
@@ -98,6 +99,7 @@ def build_stack(
     journal: Journal,
     truth: Truth | None = None,
     oracles: frozenset[str] = frozenset(),
+    patrol: PatrolTask | None = None,
 ) -> Stack:
     """Build what runs on a robot; it plans while it is built.
 
@@ -107,6 +109,8 @@ def build_stack(
         The robot's own map.
     truth, oracles
         Which of its modules know the truth, and the truth; none as a rule.
+    patrol
+        Its share of a patrol.
 
     Raises
     ------
@@ -129,6 +133,7 @@ def build_stack(
             LOCAL_CONTROLLERS, config.local_controller, "local_controller", robot.streams.stream("controller")
         ),
         heading=_heading(config, task),
+        patrol=patrol,
     )
     if truth is not None:
         parts = with_oracles(parts, oracles, truth, robot)

@@ -25,6 +25,8 @@ class Body:
     ----------
     name
         The robot's.
+    stopped
+        Whether it stands whatever it is commanded, because something of it broke.
     table, row, state
         (R, drive.STATE_SIZE) what the kernels keep of all bodies, and this one's row of it; see
         ``kernels.bodies.drive``.
@@ -48,6 +50,7 @@ class Body:
         delay_steps: int = 0,
     ) -> None:
         self.name, self.footprint, self.motion, self.world = name, footprint, motion, world
+        self.stopped = False
         self.table, self.row, self.owns = table, row, owns
         self.state, self.own = table[row], owns[row]
         own = self.own
@@ -109,6 +112,8 @@ class Body:
 
     def step(self, command: Command) -> None:
         """Drive one step, by the command that takes effect now."""
+        if self.stopped:
+            command = STOP
         motion = self.motion
         if self._under_way is not None:
             self._under_way.append(command)

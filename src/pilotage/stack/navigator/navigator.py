@@ -12,13 +12,14 @@ from pilotage.stack.control.reactive import Reactive
 from pilotage.stack.localization.heading_filter import HeadingFilter
 from pilotage.stack.localization.localizer import Localizer
 from pilotage.stack.mapping.mapper import Mapper
+from pilotage.stack.patrol.task import PatrolTask
 from pilotage.stack.planning.local_planner import LocalPlanner
 from pilotage.stack.planning.planner import Planner, Smoother
 
 
 @dataclass(frozen=True, slots=True)
 class Parts:
-    """The components of a mission's stack; None where the mission does without."""
+    """The components of a mission's stack, and its share of a patrol; None where the mission does without."""
 
     localizer: Localizer | None
     planner: Planner | None
@@ -30,6 +31,7 @@ class Parts:
     escape: Escape | None
     local_controller: LocalController | None = None
     heading: HeadingFilter | None = None
+    patrol: PatrolTask | None = None
 
 
 def localizer_of(parts: Parts, needed_by: str) -> Localizer:

@@ -1,0 +1,91 @@
+"""Coverage of a floor by laser: how long ago each cell of it was last seen."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from scipy.ndimage import label
+
+from pilotage.core.types import FloatArray, Pose2
+from pilotage.kernels.scans.seen_cells import mark_seen
+from pilotage.maps.world_map import WorldMap
+from pilotage.sensors.lidar import LidarConfig
+from pilotage.sim.bodies.body import Body
+
+MOST_CELLS = 40_000
+
+
+class FloorAges:
+    """Cells of the floor that is connected to a place, and when each was last in some robot's view.
+
+    Attributes
+    ----------
+    cells_xy_m, cell_m
+        (K, 2) their middles, and the length of their sides.
+    seen_s
+        (K,) when each was last seen; 0 for one that never was.
+    """
+
+    def __init__(self, chart: WorldMap, place_xy_m: FloatArray, cell_m: float) -> None:
+        xmin, ymin, xmax, ymax = chart.bounds_m
+        cell_m = max(cell_m, math.sqrt((xmax - xmin) * (ymax - ymin) / MOST_CELLS))
+        xs = np.arange(xmin + 0.5 * cell_m, xmax, cell_m)
+        ys = np.arange(ymin + 0.5 * cell_m, ymax, cell_m)
+        grid = np.stack(np.meshgrid(xs, ys), axis=-1)
+        # A cell that a wall runs through is no floor of one side of it.
+        open_floor = chart.field.at(grid.reshape(-1, 2)).reshape(grid.shape[:2]) > 0.5 * cell_m
+        regions, _ = label(open_floor)
+        free = grid[regions > 0]
+        nearest = int(np.argmin(np.hypot(*(free - place_xy_m).T))) if len(free) else 0
+        home = regions[regions > 0][nearest] if len(free) else 1
+        self.cells_xy_m: FloatArray = np.ascontiguousarray(grid[regions == home])
+        self.cell_m = cell_m
+        self.seen_s: FloatArray = np.zeros(len(self.cells_xy_m))
+        self._ages: list[tuple[float, float, float]] = []
+        self._sum_s = np.zeros(len(self.cells_xy_m))
+
+    def look(self, t_s: float, body: Body, lidar: LidarConfig) -> None:
+        """What one robot sees now."""
+        mount = lidar.mount
+        pose = body.pose.compose(Pose2(mount.x_m, mount.y_m, mount.theta_rad))
+        angles = lidar.beam_angles_rad()
+        ranges = body.world.scan(pose.as_array()[None, :], angles, lidar.max_range_m, body.own[None, :])[0]
+        first = pose.theta_rad + float(angles[0])
+        mark_seen(
+            self.seen_s,
+            self.cells_xy_m,
+            pose.x_m,
+            pose.y_m,
+            first,
+            max(lidar.beam_step_rad, 1e-9),
+            ranges,
+            lidar.max_range_m,
+            self.cell_m * math.sqrt(0.5),
+            t_s,
+        )
+
+    def sample(self, t_s: float, window_s: float) -> None:
+        """Count the ages of this moment."""
+        age = t_s - self.seen_s
+        self._sum_s += age
+        self._ages.append((float((age <= window_s).mean()), float(age.mean()), float(age.max())))
+
+    def series(self) -> FloatArray:
+        """(S, 3) of every sample: share seen within the window, mean and largest age."""
+        return np.array(self._ages, dtype=np.float64).reshape(-1, 3)
+
+    def mean_s(self) -> FloatArray:
+        """(K,) mean age of each cell."""
+        return self._sum_s / max(len(self._ages), 1)
+
+    def metrics(self, first_sample: int) -> dict[str, object]:
+        """Means over the samples from one on, when the first window has passed; the largest age of all."""
+        table = self.series()[first_sample:]
+        if not len(table):
+            return {}
+        return {
+            "coverage_fraction": float(table[:, 0].mean()),
+            "coverage_age_mean_s": float(table[:, 1].mean()),
+            "coverage_age_worst_s": float(table[:, 2].max()),
+        }

@@ -1,0 +1,228 @@
+"""The task of patrolling: a team visits the places of a graph, again and again, for a given time."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import ClassVar
+
+import numpy as np
+
+from pilotage.core.config import Config
+from pilotage.core.errors import InputError
+from pilotage.core.types import Event, FloatArray
+from pilotage.evaluation.driving import driving_metrics, header
+from pilotage.evaluation.finished import FinishedRun, RobotRun, Verdict
+from pilotage.evaluation.floor_ages import FloorAges
+from pilotage.evaluation.patrol_visits import VisitLog
+from pilotage.evaluation.tasks.task import TASKS, Attempt, TaskSetting
+from pilotage.evaluation.tasks.team import verdict
+from pilotage.maps.floor import Floor
+from pilotage.missions.places import GoalConfig
+from pilotage.sensors.lidar import LidarConfig
+from pilotage.sensors.sensor import SENSORS, NonNegative, Positive
+from pilotage.stack.interface import BeliefStatus
+from pilotage.stack.patrol.derive import DerivationConfig, derive_graph
+from pilotage.stack.patrol.graph import PatrolGraph
+from pilotage.stack.patrol.graph_file import on_floor, read_patrol_graph
+from pilotage.stack.patrol.task import PatrolSite
+from pilotage.stack.patrol.tours import Round, idleness_bound_s
+
+VISITS_EVERY_S, LOOK_EVERY_S = 0.2, 1.0
+STUCK_M = 1.0
+CELL_M = 0.5
+
+
+class PatrolConfig(Config):
+    """How long, over which places, and what counts as a visit."""
+
+    duration_s: Positive = 3600.0
+    graph: str | None = None
+    """A ``.graph`` file; without one a graph is derived from the map."""
+    derive: DerivationConfig = DerivationConfig()
+    visit_m: Positive = 1.0
+    """A place is visited by a robot whose centre is this near."""
+    stuck_s: Positive = 60.0
+    """A robot on duty that stays within a metre for longer, though nothing told it to wait, is deadlocked."""
+    warm_s: NonNegative = 300.0
+    """Idleness and coverage count from then on, or from a quarter of the duration if that is earlier."""
+    window_s: Positive = 60.0
+    """Of the floor the share that was seen within so long is ``coverage_fraction``."""
+
+
+@TASKS.add("patrol", PatrolConfig)
+class PatrolTask:
+    """Done when its time is over; a success if nobody touched anything and nobody was deadlocked.
+
+    All places count as visited, and the floor as seen, when it begins.
+    """
+
+    columns: Mapping[str, str]
+    goals: tuple[GoalConfig, ...]
+    drives: ClassVar[bool] = True
+
+    def __init__(self, config: PatrolConfig, setting: TaskSetting) -> None:
+        mission = setting.mission
+        if mission.team.strategy is None:
+            raise InputError(
+                "task 'patrol': expected team.strategy, found none; take one of 'components strategy'"
+            )
+        self._config, self._names = config, [robot.name for robot in mission.members]
+        graph = site_graph(config, setting)
+        self.patrol = PatrolSite(graph, config.visit_m)
+        self.columns, self.goals = {}, ()
+        self.events: list[Event] = []
+        self._visits = VisitLog(graph.vertices_xy_m, config.visit_m, len(self._names))
+        self._lidars = [_lidar(setting, index) for index in range(len(self._names))]
+        self._floor = FloorAges(setting.chart, graph.vertices_xy_m[0], CELL_M)
+        self._warm_s = min(config.warm_s, 0.25 * min(config.duration_s, mission.run.time_limit_s))
+        self._failed: frozenset[str] = frozenset()
+        dt_s = mission.run.dt_s
+        self._visits_every, self._look_every = (
+            max(1, round(VISITS_EVERY_S / dt_s)),
+            max(1, round(LOOK_EVERY_S / dt_s)),
+        )
+        self._step = 0
+        self._contacts = [0] * len(self._names)
+        self._anchors = [(math.nan, math.nan, 0.0)] * len(self._names)
+        self.deadlocks: dict[int, float] = {}
+        self._series: list[tuple[float, float, float]] = []
+
+    @staticmethod
+    def about(config: PatrolConfig) -> tuple[float, float] | None:
+        """The first vertex of a graph that is given."""
+        if config.graph is None:
+            return None
+        x, y = read_patrol_graph(Path(config.graph)).vertices_xy_m[0].tolist()
+        return x, y
+
+    def step(self, t_s: float, attempts: Sequence[Attempt]) -> str | None:
+        """Look at everybody; over when the time is."""
+        self._step += 1
+        places = np.array([attempt.body.state[:2] for attempt in attempts])
+        if self._step % self._visits_every == 0:
+            self._visits.add(t_s, places)
+        if self._step % self._look_every == 0:
+            self._look(t_s, attempts)
+        for index, attempt in enumerate(attempts):
+            if attempt.body.collisions > self._contacts[index]:
+                self._contacts[index] = attempt.body.collisions
+                self.events.append(
+                    Event(t_s, "collision", f"{self._names[index]}: the body touched something")
+                )
+        return "the patrol's time is over" if t_s >= self._config.duration_s - 1e-6 else None
+
+    def _look(self, t_s: float, attempts: Sequence[Attempt]) -> None:
+        """What the lasers have in view, how idle the places are, and who does not get on."""
+        for index, attempt in enumerate(attempts):
+            lidar = self._lidars[index]
+            if lidar is not None:
+                self._floor.look(t_s, attempt.body, lidar)
+            self._watch(index, t_s, attempt)
+        self._failed = frozenset(
+            attempt.body.name
+            for attempt in attempts
+            if attempt.body.stopped or attempt.stack.belief.status is BeliefStatus.LOST
+        )
+        self._floor.sample(t_s, self._config.window_s)
+        idle = t_s - self._visits.last_s
+        self._series.append((t_s, float(idle.mean()), float(idle.max())))
+
+    def _watch(self, index: int, t_s: float, attempt: Attempt) -> None:
+        """Note who stays where he is although nothing tells him to wait."""
+        x, y = attempt.body.state[:2].tolist()
+        ax, ay, since_s = self._anchors[index]
+        excused = attempt.body.stopped or bool(attempt.stack.status[1])
+        if excused or not math.hypot(x - ax, y - ay) <= STUCK_M:
+            self._anchors[index] = x, y, t_s
+        elif t_s - since_s > self._config.stuck_s and index not in self.deadlocks:
+            self.deadlocks[index] = since_s
+            name = self._names[index]
+            self.events.append(
+                Event(t_s, "deadlock", f"{name}: has not left ({x:.1f}, {y:.1f}) for {t_s - since_s:.0f} s")
+            )
+
+    def row(self, index: int) -> tuple[float, ...]:  # noqa: ARG002
+        """Nothing beyond what every trace has."""
+        return ()
+
+    def progress(self, attempts: Sequence[Attempt]) -> tuple[tuple[str, str], ...]:  # noqa: ARG002
+        """Idleness now."""
+        if not self._series:
+            return ()
+        _, mean_s, worst_s = self._series[-1]
+        return ("idleness", f"{mean_s:.0f} s"), ("worst", f"{worst_s:.0f} s")
+
+    def judge(self, run: FinishedRun) -> Verdict:
+        """Idleness, coverage and safety of the team, driving and consistency of each."""
+        judged = verdict([self._judged(run, robot, k) for k, robot in enumerate(run.robots)], run)
+        speed_m_s = float(np.mean([robot.motion.top_speed_m_s for robot in run.robots]))
+        strategy = run.mission.team.strategy
+        graph = self.patrol.graph
+        metrics = judged.metrics
+        metrics |= {
+            "team_size": len(run.robots),
+            "strategy": "" if strategy is None else strategy.name,
+            "vertices": len(graph),
+            "deadlocks": len(self.deadlocks),
+        }
+        idle, visits_min = self._visits.idleness(run.duration_s, self._warm_s)
+        metrics |= {
+            "idleness_mean_s": idle.mean_s,
+            "idleness_worst_s": idle.worst_s,
+            "idleness_std_s": idle.std_s,
+            "visits_min": visits_min,
+            "robots_failed": len(self._failed),
+        }
+        metrics["idleness_bound_s"] = idleness_bound_s(graph, len(run.robots), speed_m_s)
+        metrics |= self._floor.metrics(math.ceil(self._warm_s / LOOK_EVERY_S))
+        return Verdict(metrics, judged.columns, {**judged.extras, **self._arrays(run)})
+
+    def _judged(self, run: FinishedRun, robot: RobotRun, index: int) -> Verdict:
+        metrics = header(run, robot)
+        driven, nees = driving_metrics(run, robot)
+        metrics |= driven
+        if robot.collisions:
+            metrics["reason"] = f"touched something, {robot.collisions} times in all"
+        elif index in self.deadlocks:
+            metrics["reason"] = f"deadlocked from {self.deadlocks[index]:.0f} s on"
+        metrics["success"] = robot.collisions == 0 and index not in self.deadlocks
+        return Verdict(metrics, ({"nees": nees},), {})
+
+    def _arrays(self, run: FinishedRun) -> dict[str, FloatArray]:
+        """What the page draws."""
+        graph, visits = self.patrol.graph, self._visits
+        rows, columns = np.nonzero(np.triu(np.isfinite(graph.edges_m), 1))
+        series = np.column_stack([np.array(self._series).reshape(-1, 3), self._floor.series()])
+        return {
+            "patrol/vertices_xy_m": graph.vertices_xy_m,
+            "patrol/edges": np.column_stack([rows, columns]).astype(np.float64),
+            "patrol/tour": Round.best(graph).stops.astype(np.float64),
+            "patrol/visits": visits.arrivals(),
+            "patrol/idleness_s": visits.idleness(run.duration_s, self._warm_s)[0].vertex_mean_s,
+            "patrol/series": series,
+            "patrol/cells_xy_m": self._floor.cells_xy_m,
+            "patrol/age_s": self._floor.mean_s(),
+            "patrol/last_seen_s": self._floor.seen_s,
+        }
+
+
+def site_graph(config: PatrolConfig, setting: TaskSetting) -> PatrolGraph:
+    """The graph of a file, its edges measured on the map, or one that is derived from the map."""
+    radius_m = max(footprint.radius_m for footprint in setting.footprints)
+    start = setting.mission.start_of(setting.mission.members[0])
+    inside = None if start is None else (start.x_m, start.y_m)
+    floor = Floor.of(setting.chart, radius_m, inside_xy_m=inside)
+    if config.graph is None:
+        return derive_graph(setting.chart, floor, config.derive).graph
+    return on_floor(read_patrol_graph(Path(config.graph)), floor, config.graph)
+
+
+def _lidar(setting: TaskSetting, index: int) -> LidarConfig | None:
+    """A robot's scanner."""
+    for choice in setting.mission.members[index].sensors.values():
+        if choice.name == "lidar":
+            config = SENSORS.configure(choice.name, choice.parameters, "lidar")
+            return config if isinstance(config, LidarConfig) else None
+    return None

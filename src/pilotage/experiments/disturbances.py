@@ -1,0 +1,83 @@
+"""What a mission does to its robots on a schedule: carried elsewhere, stopped, silenced."""
+
+from __future__ import annotations
+
+import math
+
+from pilotage.core.angles import wrap_to_pi
+from pilotage.core.types import Event, Pose2
+from pilotage.missions.mission import Mission
+from pilotage.missions.places import Kidnap
+from pilotage.missions.team import Failure
+from pilotage.sim.source import Simulator
+
+
+class Disturbances:
+    """Carries out kidnaps and failures when they are due."""
+
+    def __init__(self, mission: Mission, source: Simulator) -> None:
+        self._source = source
+        self._names = [robot.name for robot in mission.members]
+        self._kidnaps = sorted(mission.world.kidnaps, key=lambda kidnap: kidnap.at_s)
+        failures = mission.team.failures
+        # Repairs come before what fails at the same time.
+        self._changes = sorted(
+            [(failure.at_s, 1, failure) for failure in failures]
+            + [
+                (failure.at_s + failure.for_s, 0, failure)
+                for failure in failures
+                if failure.for_s is not None
+            ],
+            key=lambda change: change[:2],
+        )
+        self._wrong: dict[str, list[int]] = {"stop": [], "radio": []}
+
+    def due(self) -> list[Event]:
+        """Carry out what is due now."""
+        events = []
+        now_s = self._source.t_s
+        while self._kidnaps and now_s >= self._kidnaps[0].at_s and self._has_room(self._kidnaps[0]):
+            events.append(carry(self._source, self._kidnaps.pop(0)))
+        while self._changes and now_s >= self._changes[0][0]:
+            _, broken, failure = self._changes.pop(0)
+            events.append(self._change(failure, broken=bool(broken)))
+        return events
+
+    def _has_room(self, kidnap: Kidnap) -> bool:
+        """Whether nobody stands there: a robot is not put down on another one, but a little later."""
+        bodies, to = self._source.bodies, kidnap.to
+        assert to is not None, "settled by the build"
+        own = bodies[kidnap.robot]
+        return all(
+            math.hypot(body.pose.x_m - to.x_m, body.pose.y_m - to.y_m)
+            > body.footprint.radius_m + own.footprint.radius_m
+            for body in bodies
+            if body is not own
+        )
+
+    def _change(self, failure: Failure, *, broken: bool) -> Event:
+        """A failure begins or is over; several of one kind may overlap."""
+        wrong, robot = self._wrong[failure.kind], failure.robot
+        if broken:
+            wrong.append(robot)
+        else:
+            wrong.remove(robot)
+        self._source.bodies[robot].stopped = robot in self._wrong["stop"]
+        radio = self._source.radios.get(robot)
+        if radio is not None:
+            radio.works = not (robot in self._wrong["stop"] or robot in self._wrong["radio"])
+        what = {"stop": "stops and says nothing", "radio": "has no radio"}[failure.kind]
+        text = f"{self._names[robot]}: {what}" if broken else f"{self._names[robot]}: is mended"
+        return Event(self._source.t_s, "failure" if broken else "repair", text)
+
+
+def carry(source: Simulator, kidnap: Kidnap) -> Event:
+    """Carry a robot elsewhere; nobody tells it."""
+    assert kidnap.to is not None, "settled by the build"
+    to = Pose2(kidnap.to.x_m, kidnap.to.y_m, wrap_to_pi(kidnap.to.theta_rad))
+    source.bodies[kidnap.robot].carry_to(to)
+    return Event(
+        source.t_s,
+        "kidnap",
+        f"the robot is carried to ({to.x_m:.2f}, {to.y_m:.2f}) and not told",
+    )

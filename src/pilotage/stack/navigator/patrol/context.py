@@ -1,0 +1,402 @@
+"""What all states of the patrol navigator share: senses, the field to follow, what is known of the patrol."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from pilotage.core.types import STOP, FloatArray, Pose2, Twist
+from pilotage.kernels.control import eikonal, voronoi_window
+from pilotage.kernels.lines import clustering
+from pilotage.maps.world_map import WorldMap
+from pilotage.sensors.lidar import LidarConfig
+from pilotage.sensors.radio import RadioConfig
+from pilotage.sensors.readings import LidarScan, OdometryIncrement, RadioMessages, Readings
+from pilotage.sensors.wheel_odometry import WheelOdometryConfig
+from pilotage.stack.interface import Belief
+from pilotage.stack.journal import Journal
+from pilotage.stack.knowledge import RobotKnowledge
+from pilotage.stack.navigator.patrol.config import Mode, PatrolNavigatorConfig
+from pilotage.stack.patrol.messages import PatrolMemory
+from pilotage.stack.patrol.roadmap import STEP_M, roadmap_of
+from pilotage.stack.patrol.task import PatrolTask
+from pilotage.stack.patrol.word import TeamWord
+
+NO_FIELD: FloatArray = np.zeros((1, 1))
+NO_POINTS: FloatArray = np.zeros((0, 2))
+SECTORS = 72
+NEAR_M = 1.6
+"""Returns beyond this distance from the axle are out of the way of one decision."""
+LATENCY_S = 0.05
+SIGMAS = 3.0
+DETOUR_SLACK_S = 1.0
+NO_DETOUR_S = 6.0
+"""A detour that takes longer than this is none: it waits instead."""
+LANE_AHEAD_M, MERGE_S = 2.0, 1.0
+"""A passage is as wide as its narrowest place so far ahead; the last part of a way leads to the middle."""
+RECEDES_M_S = 0.1
+"""Who goes ahead through a passage at this speed is followed."""
+SPEED_SHARE = 0.2
+"""Weight of the newest edge in the speed made good."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Passage:
+    """Somebody in a passage with room for one.
+
+    Attributes
+    ----------
+    inside
+        Whether the robot itself is in it.
+    mouth_m, other_m
+        How far ahead it begins, and the other is.
+    beyond_m
+        From the other to the passage's far end.
+    recedes
+        Whether the other goes ahead.
+    mouth_xy_m, outwards
+        (2,) where it begins, and the direction out of it there.
+    """
+
+    inside: bool
+    mouth_m: float
+    other_m: float
+    beyond_m: float
+    recedes: bool
+    mouth_xy_m: FloatArray
+    outwards: FloatArray
+
+
+class Context:
+    """The parts that the states drive with, and what the record wants to know.
+
+    Attributes
+    ----------
+    t_s, pose
+        Of this step.
+    hop, target, came_from
+        The vertex that it drives to now, the one that the strategy named, and the one that it was at last.
+    near, strange
+        (K, 2) and (M, 2) returns of the last scan, base frame: what is near, and what is on no map.
+    mates
+        The last word of each team mate that was heard, by number, and when it was sent.
+    """
+
+    def __init__(
+        self,
+        config: PatrolNavigatorConfig,
+        robot: RobotKnowledge,
+        chart: WorldMap,
+        task: PatrolTask,
+        start: Pose2,
+        journal: Journal,
+    ) -> None:
+        self.config, self.task, self.journal = config, task, journal
+        self.name, self.dt_s = robot.name, robot.dt_s
+        self._lidar, lidar = robot.one_sensor(LidarConfig, "navigator 'patrol'")
+        self._odometry, _ = robot.one_sensor(WheelOdometryConfig, "navigator 'patrol'")
+        self._radio = next(iter(robot.sensors_of(RadioConfig)), None)
+        self._directions = clustering.beam_directions(
+            float(lidar.beam_angles_rad()[0]), lidar.beam_step_rad, lidar.beams
+        )
+        self._mount = np.array([lidar.mount.x_m, lidar.mount.y_m, lidar.mount.theta_rad])
+        self._known = chart.wall_field
+        motion, radius = robot.motion, robot.radius_m
+        period_s = max(1.0 / lidar.rate_hz, robot.dt_s)
+        speed = motion.top_speed_m_s
+        braking = min(motion.braking_m_s2, speed / robot.dt_s)
+        turn_rate = motion.top_turn_rate_rad_s
+        turning = min(motion.turn_acceleration_rad_s2, turn_rate / robot.dt_s)
+        self._limits = np.array([speed, braking, braking, turn_rate, turning, period_s])
+        self._safety = np.array([period_s + LATENCY_S, radius, config.margin_m, config.gap_m])
+        self._clearance_m = radius + config.plan_margin_m
+        self.radius_m, self.speed_m_s = radius, speed
+        # Half the width of what has room for two.
+        self._pass_m = 2.0 * radius + config.plan_margin_m + 0.5 * config.gap_m
+        self._met: tuple[float, FloatArray] | None = None
+        self._receding = 0.0
+        self.roadmap = roadmap_of(
+            chart,
+            task.graph.vertices_xy_m,
+            self._clearance_m,
+            speed,
+            config.spacing_m,
+            0.5 * task.visit_m,
+            config.lane_m,
+        )
+        self.rng = robot.streams.stream("patrol")
+        at = task.graph.nearest(start.x_m, start.y_m)
+        self.memory = PatrolMemory(len(task.graph), task.robot, len(task.starts), at, speed)
+        self.hop = self.target = self.came_from = at
+        self._left_s = 0.0
+        self.t_s, self.pose, self.cov = 0.0, start, np.zeros((3, 3))
+        self.near, self.strange = NO_POINTS, NO_POINTS
+        self.fresh = False
+        self._twist, self._command = STOP, STOP
+        self.mates: dict[int, tuple[float, TeamWord]] = {}
+        self.mode, self.blocked, self.to_go_s = Mode.DRIVE, False, math.nan
+        self._next_word_s = float(self.rng.uniform(0.0, config.message_period_s))
+
+    # --- sensing ------------------------------------------------------------------------------------
+
+    def sense(self, readings: Readings, belief: Belief, *, lost: bool) -> None:
+        """Take in one step's readings."""
+        self.t_s, self.pose, self.cov = readings.t_s, belief.pose, belief.cov
+        odometry = readings.by_sensor.get(self._odometry)
+        if isinstance(odometry, OdometryIncrement):
+            self._twist = Twist(odometry.distance_m / self.dt_s, odometry.angle_rad / self.dt_s)
+        said = None if self._radio is None else readings.by_sensor.get(self._radio)
+        if isinstance(said, RadioMessages):
+            for message in said.messages:
+                if isinstance(message.content, TeamWord):
+                    self.memory.receive(message.content.news)
+                    self.mates[message.content.news.sender] = message.sent_s, message.content
+        scan = readings.by_sensor.get(self._lidar)
+        self.fresh = isinstance(scan, LidarScan)
+        if isinstance(scan, LidarScan):
+            known = NO_FIELD if lost else self._known.distance_m
+            spread_m = SIGMAS * math.sqrt(max(belief.cov[0, 0], belief.cov[1, 1]))
+            self.near, self.strange = voronoi_window.scan_returns(
+                scan.ranges_m,
+                self._directions,
+                self._mount,
+                belief.pose.as_array(),
+                NEAR_M,
+                self.config.look_m,
+                self.config.tolerance_m + spread_m,
+                SIGMAS * math.sqrt(belief.cov[2, 2]),
+                known,
+                *self._known.origin_xy_m,
+                self._known.resolution_m,
+                SECTORS,
+            )
+
+    def talk(self, *, lost: bool) -> None:
+        """Broadcast, where it is time to."""
+        if self._radio is None or self.t_s < self._next_word_s:
+            return
+        self._next_word_s += self.config.message_period_s
+        x, y = (math.nan, math.nan) if lost else (self.pose.x_m, self.pose.y_m)
+        self.memory.update(self.t_s, words=self.task.strategy.words(self.memory.knowledge(self.t_s)))
+        self.journal.outbox.append(TeamWord(x, y, self.blocked, self.memory.message(self.t_s)))
+
+    # --- the patrol ---------------------------------------------------------------------------------
+
+    def away_m(self, vertex: int) -> float:
+        """Distance from a vertex as the crow flies."""
+        x, y = self.task.graph.vertices_xy_m[vertex]
+        return math.hypot(self.pose.x_m - float(x), self.pose.y_m - float(y))
+
+    def visit(self, vertex: int) -> None:
+        """It is there."""
+        edge_m = float(self.task.graph.edges_m[self.came_from, vertex])
+        took_s = self.t_s - self._left_s
+        if vertex != self.came_from and math.isfinite(edge_m) and took_s > 0.0:
+            old = self.memory.own.speed_m_s
+            new = (1.0 - SPEED_SHARE) * old + SPEED_SHARE * min(edge_m / took_s, self.speed_m_s)
+            self.memory.update(self.t_s, speed_m_s=new)
+        self.came_from, self._left_s = vertex, self.t_s
+        self.memory.visit(vertex, self.t_s)
+
+    def ask(self) -> bool:
+        """Let the strategy say where to go; False where it says to wait."""
+        graph, at = self.task.graph, self.came_from
+        target = int(self.task.strategy.next_vertex(self.memory.knowledge(self.t_s)))
+        self.target = target
+        length_m = float(graph.shortest_m[at, target])
+        self.memory.bound(target, self.t_s, self.t_s + length_m / max(self.memory.own.speed_m_s, 1e-3))
+        if target == at:
+            return False
+        self.hop = int(graph.next_hop[at, target])
+        return True
+
+    # --- driving ------------------------------------------------------------------------------------
+
+    def lead(self, vertex: int) -> Twist:
+        """The command that leads to a vertex."""
+        return self.descend(self.roadmap.time_s(vertex))
+
+    def descend(self, time: FloatArray) -> Twist:
+        """The command that leads down a field of the roadmap; between two scans the last one stands."""
+        if not self.fresh:
+            return self._command
+        roadmap, pose = self.roadmap, self.pose
+        (x0, y0), spacing = roadmap.origin_xy_m, roadmap.spacing_m
+        self.to_go_s = eikonal.value_at(pose.x_m, pose.y_m, time, x0, y0, spacing, 0.0)
+        way = roadmap.way(pose.x_m, pose.y_m, time, LANE_AHEAD_M)
+        room_m = float(way[:, 2].min()) if len(way) else 0.0
+        lane_m = min(self.config.lane_m, max(0.0, room_m - self._clearance_m))
+        lane_m *= min(1.0, self.to_go_s / MERGE_S)
+        self.blocked = False
+        beside = voronoi_window.within(self.strange, self.config.watch_m)
+        if beside.shape[0]:
+            seen = self._on_map(beside)
+            dx, dy = eikonal.descent(pose.x_m, pose.y_m, time, x0, y0, spacing)
+            # Who follows the field is the point to the left of the robot: so must be what it goes around.
+            seen += lane_m * np.array([-dy, dx])
+            time, x0, y0, around_s = eikonal.detour(
+                time,
+                roadmap.slowness,
+                x0,
+                y0,
+                spacing,
+                pose.x_m,
+                pose.y_m,
+                self.config.watch_m,
+                seen,
+                self._clearance_m + 0.5 * self.config.gap_m,
+                DETOUR_SLACK_S,
+            )
+            self.blocked = not around_s < self.to_go_s + NO_DETOUR_S
+        window = self.config.window
+        v, w, _ = voronoi_window.choose(
+            self._twist.v_m_s,
+            self._twist.w_rad_s,
+            pose.as_array(),
+            self._limits,
+            self._safety,
+            self.near,
+            self.strange,
+            time,
+            x0,
+            y0,
+            spacing,
+            lane_m,
+            window.horizon_s,
+            window.heading_s_per_rad,
+            window.near_cost_s,
+            window.soft_m,
+            window.speeds,
+            window.turns,
+        )
+        self._command = Twist(v, w)
+        return self._command
+
+    def careful(self, command: Twist) -> Twist:
+        """A command slowed down until its braking ends clear of everything, all of which may move."""
+        if not self.fresh:
+            return self._command
+        reaction, radius, margin, gap = self._safety.tolist()
+        v = command.v_m_s
+        for _ in range(4):
+            faster = max(v, 0.5 * (v + self._twist.v_m_s))
+            if voronoi_window.stop_is_clear(
+                faster, command.w_rad_s, reaction, self._limits[2], radius, margin, self.near, self.near, gap
+            ):
+                break
+            v *= 0.5
+        else:
+            v = 0.0
+        self._command = Twist(v, command.w_rad_s)
+        return self._command
+
+    @property
+    def moving_m_s(self) -> float:
+        """By the odometry."""
+        return abs(self._twist.v_m_s)
+
+    def stand(self) -> Twist:
+        """Stop."""
+        self._command = STOP
+        return STOP
+
+    def _on_map(self, points: FloatArray) -> FloatArray:
+        """Points (M, 2) of the base frame on the map."""
+        c, s = math.cos(self.pose.theta_rad), math.sin(self.pose.theta_rad)
+        return np.asarray(points @ np.array([[c, s], [-s, c]]) + np.array([self.pose.x_m, self.pose.y_m]))
+
+    def passage(self, vertex: int) -> Passage | None:
+        """Somebody in a passage for one on the way to a vertex; None where there is nobody."""
+        if not self.strange.shape[0]:
+            self._met = None
+            return None
+        time = self.roadmap.time_s(vertex)
+        way = self.roadmap.way(self.pose.x_m, self.pose.y_m, time, 3.0 * self.config.look_m)
+        narrow = way[:, 2] < self._pass_m
+        if not narrow.any():
+            self._met = None
+            return None
+        first = int(np.argmax(narrow))
+        wide_again = np.flatnonzero(~narrow[first:])
+        last = first + int(wide_again[0]) if wide_again.size else len(way)
+        met = eikonal.first_met(way[first:last], self._on_map(self.strange), self.radius_m + 0.1)
+        if met < 0:
+            self._met = None
+            return None
+        there = way[first + met, :2]
+        recedes = False
+        if self._met is not None and self.t_s > self._met[0]:
+            away = there - np.array([self.pose.x_m, self.pose.y_m])
+            moved = float((there - self._met[1]) @ away) / max(float(np.hypot(*away)), 1e-6)
+            self._receding = 0.7 * self._receding + 0.3 * moved / (self.t_s - self._met[0])
+            recedes = self._receding > RECEDES_M_S
+        else:
+            self._receding = 0.0
+        self._met = self.t_s, there
+        return Passage(
+            inside=first == 0,
+            mouth_m=STEP_M * first,
+            other_m=STEP_M * (first + met),
+            beyond_m=STEP_M * (last - first - met),
+            recedes=recedes,
+            mouth_xy_m=way[first, :2],
+            outwards=way[first, :2] - way[min(first + 2, len(way) - 1), :2],
+        )
+
+    def retreat(self) -> tuple[float, FloatArray | None]:
+        """From inside a passage: how far it is back to its mouth, and the field to a place aside of it."""
+        vertex = self.way_out()
+        if vertex < 0:
+            return math.inf, None
+        time = self.roadmap.time_s(vertex)
+        way = self.roadmap.way(self.pose.x_m, self.pose.y_m, time, 3.0 * self.config.look_m)
+        wide = np.flatnonzero(way[:, 2] >= self._pass_m)
+        if not wide.size:
+            return math.inf, None
+        mouth = int(wide[0])
+        field = self.aside(way[mouth, :2], way[mouth, :2] - way[max(mouth - 2, 0), :2])
+        return STEP_M * mouth, time if field is None else field
+
+    def aside(self, mouth_xy_m: FloatArray, outwards: FloatArray) -> FloatArray | None:
+        """The field to a place aside of a passage's mouth."""
+        return self.roadmap.aside(mouth_xy_m, outwards, self._pass_m)
+
+    def way_out(self) -> int:
+        """The vertex near by that leads away best from what is in the way; -1 where there is none."""
+        graph, roadmap, pose = self.task.graph, self.roadmap, self.pose
+        around = {self.came_from, self.hop, *graph.neighbours(self.came_from).tolist()}
+        around |= set(graph.neighbours(self.hop).tolist())
+        seen = self.strange
+        bearings = self._on_map(seen) - np.array([pose.x_m, pose.y_m])
+        bearings /= np.hypot(*bearings.T)[:, None]
+        best, least = -1, math.inf
+        for vertex in sorted(around):
+            if self.away_m(vertex) <= 0.5 * self.task.visit_m:
+                continue
+            time = roadmap.time_s(vertex)
+            direction = eikonal.descent(pose.x_m, pose.y_m, time, *roadmap.origin_xy_m, roadmap.spacing_m)
+            toward = float(np.max(bearings @ np.array(direction), initial=0.0))
+            cost = 3.0 * toward + float(self.rng.random())
+            if cost < least:
+                best, least = vertex, cost
+        return best
+
+    def crowded(self, reach_m: float) -> bool:
+        """Whether something that may move is so near to the body's edge."""
+        return bool((np.hypot(*self.strange.T) < reach_m + self.radius_m).any())
+
+    def waits_for(self) -> bool:
+        """Whether a mate with a smaller number, that is blocked and near, is to go first."""
+        return any(
+            number < self.task.robot
+            and self.t_s - sent_s < 3.0 * self.config.message_period_s
+            and word.blocked
+            and math.hypot(word.x_m - self.pose.x_m, word.y_m - self.pose.y_m) < self.config.watch_m
+            for number, (sent_s, word) in self.mates.items()
+        )
+
+    def say(self, kind: str, text: str) -> None:
+        """Tell that something happened."""
+        self.journal.say(self.t_s, kind, text)

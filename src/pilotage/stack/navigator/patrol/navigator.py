@@ -1,0 +1,94 @@
+"""The patrol navigator's plug: localize, listen, step the state that the robot is in, talk."""
+
+from __future__ import annotations
+
+from pilotage.core.errors import InputError
+from pilotage.core.types import Twist
+from pilotage.maps.world_map import WorldMap
+from pilotage.sensors.readings import Readings
+from pilotage.stack.interface import NAVIGATORS, Belief, BeliefStatus, StackStatus
+from pilotage.stack.journal import Journal
+from pilotage.stack.knowledge import RobotKnowledge, TaskKnowledge
+from pilotage.stack.navigator.goal.wandering import Wandering
+from pilotage.stack.navigator.navigator import Parts, localizer_of
+from pilotage.stack.navigator.patrol.config import PatrolNavigatorConfig
+from pilotage.stack.navigator.patrol.context import Context
+from pilotage.stack.navigator.patrol.states import Lost, State, Waiting, resume
+
+COLUMNS = {"mode": "1", "hop": "1", "target": "1", "time_to_go_s": "s", "blocked": "1", "strangers": "1"}
+
+
+@NAVIGATORS.add("patrol", PatrolNavigatorConfig)
+class PatrolNavigator:
+    """Drives from vertex to vertex of a patrol graph as its strategy says, among team mates and strangers.
+
+    The time to go to every vertex is worked out once (an eikonal equation over the map) and followed by a
+    dynamic window (Fox et al. 1997, Brock and Khatib 1999), to the right of the middle where there is room
+    for two. What is on no map and near is gone around on the same field, worked out anew in a small window.
+    Every command can be braked in the robot's own half of the distance to what may move (buffered Voronoi
+    cells, Zhou et al. 2017): laser alone, whether anybody talks or not. Who does not get on gives way, with
+    a radio the one with the larger number first.
+
+    A robot of any shape is driven as the disc around it, and has to turn on the spot. Fails where the scanner
+    does not see all round.
+    """
+
+    def __init__(
+        self,
+        config: PatrolNavigatorConfig,
+        robot: RobotKnowledge,
+        chart: WorldMap,
+        task: TaskKnowledge,
+        parts: Parts,
+        journal: Journal,
+    ) -> None:
+        if parts.patrol is None:
+            raise InputError("navigator 'patrol': expected task 'patrol', found another")
+        if robot.motion.least_turning_radius_m > 0.0:
+            raise InputError(
+                "navigator 'patrol': expected a robot that turns on the spot, found a turning radius of "
+                f"{robot.motion.least_turning_radius_m:.2f} m; take robot.motion.name: differential-drive"
+            )
+        self._localizer = localizer_of(parts, "patrol")
+        self._telemetry = journal.channel(COLUMNS, first=True)
+        journal.counts |= {"gave_way": 0}
+        self._context = Context(config, robot, chart, parts.patrol, task.initial.pose, journal)
+        self._wandering = Wandering(config.wander, robot, self._localizer)
+        self._state: State | None = None
+
+    @property
+    def belief(self) -> Belief:
+        """The localizer's belief."""
+        return self._localizer.belief
+
+    @property
+    def status(self) -> tuple[StackStatus, str]:
+        """A patrol has no end of its own; whether it waits because its strategy says so."""
+        return StackStatus.RUNNING, "waits" if isinstance(self._state, Waiting) else ""
+
+    def step(self, readings: Readings) -> Twist:
+        """One control step."""
+        belief, context = self._localizer.step(readings), self._context
+        lost = belief.status is BeliefStatus.LOST
+        context.sense(readings, belief, lost=lost)
+        state = self._state
+        if lost and not isinstance(state, Lost):
+            context.say("lost", "the robot does not know where it is: wandering until it does")
+            context.memory.update(context.t_s, on_duty=False)
+            state = Lost(context, self._wandering)
+        elif not lost and isinstance(state, Lost):
+            context.say("found", "the robot knows where it is and goes on")
+            context.memory.update(context.t_s, on_duty=True)
+            context.came_from = context.task.graph.nearest(belief.pose.x_m, belief.pose.y_m)
+            state = None
+        self._state, command = resume(context) if state is None else state.step(readings)
+        context.talk(lost=lost)
+        self._telemetry.tell(
+            context.mode,
+            context.hop,
+            context.target,
+            context.to_go_s,
+            context.blocked,
+            len(context.strange),
+        )
+        return command

@@ -1,0 +1,262 @@
+"""The states of a robot on patrol, and the transitions between them."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple, Protocol
+
+from pilotage.core.types import FloatArray, Twist
+from pilotage.sensors.readings import Readings
+from pilotage.stack.navigator.goal.wandering import Wandering
+from pilotage.stack.navigator.patrol.config import Mode
+from pilotage.stack.navigator.patrol.context import Context, Passage
+from pilotage.stack.navigator.progress import StallWatch
+
+PROGRESS_S = 0.4
+"""So much nearer in time to go counts as getting on."""
+MOUTH_M = 1.5
+"""So far before a passage it stands aside."""
+THERE_S, SETTLED_S = 0.3, 8.0
+FACING_M, AT_REST_M_S, TIE_M = 2.0, 0.05, 0.5
+"""Two in a passage settle who backs out at rest, this near to each other; what differs by less is a tie."""
+ASIDE_M = 0.6
+"""Something this near that may move wants to pass somebody who waits."""
+
+
+class State(Protocol):
+    """What the robot is about; it holds nothing but what this state alone needs."""
+
+    def step(self, readings: Readings) -> Move:
+        """One control step: the command, and the state that the next step begins in."""
+        ...
+
+
+class Move(NamedTuple):
+    """The outcome of a step, or of a transition."""
+
+    state: State
+    command: Twist
+
+
+@dataclass(frozen=True, slots=True)
+class Driving:
+    """Drives to the next vertex of its path, asks at each where to go on."""
+
+    context: Context
+    watch: StallWatch
+
+    def step(self, readings: Readings) -> Move:
+        """Follow the field; give way where it does not get on."""
+        del readings
+        context = self.context
+        context.mode = Mode.DRIVE
+        away_m, visit_m = context.away_m(context.hop), context.task.visit_m
+        if away_m <= 0.5 * visit_m or (context.blocked and away_m <= 0.9 * visit_m):
+            return arrive(context)
+        if context.fresh:
+            passage = context.passage(context.hop)
+            met = None if passage is None else meet(context, passage, context.t_s)
+            if met is not None:
+                return met
+        command = context.lead(context.hop)
+        if self.watch.stalled(context.to_go_s, context.t_s):
+            return give_way(context)
+        return Move(self, command)
+
+
+@dataclass(frozen=True, slots=True)
+class Waiting:
+    """Stands at a vertex because its strategy says so; makes room for who wants to pass."""
+
+    context: Context
+    since_s: float
+
+    def step(self, readings: Readings) -> Move:
+        """Ask again from time to time."""
+        del readings
+        context = self.context
+        context.mode, context.blocked = Mode.WAIT, False
+        context.memory.visit(context.came_from, context.t_s)
+        if context.t_s - self.since_s >= context.config.ask_s:
+            if context.ask():
+                return Move(set_out(context), context.stand())
+            if context.waits_for() or context.crowded(ASIDE_M):
+                return give_way(context)
+            return Move(Waiting(context, context.t_s), context.stand())
+        return Move(self, context.stand())
+
+
+@dataclass(frozen=True, slots=True)
+class Yielding:
+    """Drives elsewhere for a while, out of somebody's way."""
+
+    context: Context
+    vertex: int
+    until_s: float
+
+    def step(self, readings: Readings) -> Move:
+        """Follow the field to another vertex, then go on with the patrol."""
+        del readings
+        context = self.context
+        context.mode = Mode.YIELD
+        if context.t_s >= self.until_s:
+            return resume(context)
+        if context.away_m(self.vertex) <= 0.5 * context.task.visit_m:
+            context.visit(self.vertex)
+            return resume(context)
+        return Move(self, context.lead(self.vertex))
+
+
+@dataclass(frozen=True, slots=True)
+class Holding:
+    """Waits inside a passage for one until somebody has backed out of it.
+
+    Attributes
+    ----------
+    since_s
+        When it began to.
+    """
+
+    context: Context
+    since_s: float
+
+    def step(self, readings: Readings) -> Move:
+        """Stand until the passage is free, or for long enough."""
+        del readings
+        context = self.context
+        context.mode, context.blocked = Mode.HOLD, True
+        if context.away_m(context.hop) <= 0.9 * context.task.visit_m:
+            return arrive(context)
+        if context.t_s - self.since_s > context.config.hold_s:
+            return give_way(context)
+        if not context.fresh:
+            return Move(self, context.stand())
+        passage = context.passage(context.hop)
+        met = None if passage is None else meet(context, passage, self.since_s)
+        if met is not None:
+            return met
+        state = set_out(context)
+        return Move(state, context.lead(context.hop))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class StandingAside:
+    """Drives to a place beside a passage for one and stands there until whoever is in it is out.
+
+    Attributes
+    ----------
+    time
+        Field of the roadmap that leads there.
+    """
+
+    context: Context
+    time: FloatArray
+    since_s: float
+
+    def step(self, readings: Readings) -> Move:
+        """Go there; then look whether the passage is free."""
+        del readings
+        context = self.context
+        context.mode = Mode.YIELD
+        command = context.descend(self.time)
+        waited_s = context.t_s - self.since_s
+        if waited_s > context.config.hold_s:
+            return resume(context)
+        at_rest = waited_s > SETTLED_S and context.moving_m_s < AT_REST_M_S
+        if not context.fresh or (context.to_go_s > THERE_S and not at_rest):
+            return Move(self, command)
+        passage = context.passage(context.hop)
+        if passage is not None and not passage.recedes:
+            return Move(self, context.stand())
+        return resume(context)
+
+
+@dataclass(frozen=True, slots=True)
+class Lost:
+    """Does not know where it is: keeps clear of everything and looks around."""
+
+    context: Context
+    wandering: Wandering
+
+    def step(self, readings: Readings) -> Move:
+        """Wander."""
+        self.context.mode = Mode.LOST
+        return Move(self, self.context.careful(self.wandering.step(readings)))
+
+
+def patience_s(context: Context) -> float:
+    """How long it stands for; with a radio who has the smaller number is the more patient."""
+    config = context.config
+    return config.patience_s * (1.0 + float(context.rng.random()) + (0.0 if context.waits_for() else 1.0))
+
+
+def set_out(context: Context) -> Driving:
+    """On to the hop."""
+    watch = StallWatch(PROGRESS_S, patience_s(context))
+    watch.restart(context.t_s)
+    return Driving(context, watch)
+
+
+def arrive(context: Context) -> Move:
+    """At a vertex: told, and the strategy asked."""
+    context.visit(context.hop)
+    return resume(context)
+
+
+def resume(context: Context) -> Move:
+    """Where to now."""
+    if not context.ask():
+        return Move(Waiting(context, context.t_s), context.stand())
+    state = set_out(context)
+    return Move(state, context.lead(context.hop))
+
+
+def give_way(context: Context) -> Move:
+    """Drive to a vertex near by, away from what is in the way; wait a little where there is none."""
+    vertex = context.way_out()
+    if vertex < 0:
+        return Move(Waiting(context, context.t_s), context.stand())
+    context.journal.count("gave_way")
+    context.say("give-way", f"no progress towards vertex {context.hop}: makes room towards vertex {vertex}")
+    until_s = context.t_s + context.config.yield_s * (0.5 + float(context.rng.random()))
+    return Move(Yielding(context, vertex, until_s), context.lead(vertex))
+
+
+def backs_out(context: Context, passage: Passage, own_m: float) -> bool:
+    """Whether, of two in a passage for one, this robot goes back: who has less far to, by what both can see.
+
+    Where it is as far for both the one with the larger number does, if they talk; else chance decides.
+    """
+    if abs(own_m - passage.beyond_m) > TIE_M:
+        return own_m < passage.beyond_m
+    near = [
+        number
+        for number, (sent_s, word) in context.mates.items()
+        if context.t_s - sent_s < 3.0 * context.config.message_period_s
+        and math.hypot(word.x_m - context.pose.x_m, word.y_m - context.pose.y_m) < 2.0 * passage.other_m
+    ]
+    if near:
+        return min(near) < context.task.robot
+    return bool(context.rng.random() < 0.5)
+
+
+def meet(context: Context, passage: Passage, since_s: float) -> Move | None:
+    """Somebody is in a passage for one ahead: stand aside, or settle who backs out; None to drive on."""
+    if passage.recedes:
+        return None
+    if not passage.inside:
+        if passage.mouth_m > MOUTH_M:
+            return None
+        field = context.aside(passage.mouth_xy_m, passage.outwards)
+        if field is None:
+            return Move(Holding(context, since_s), context.stand())
+        return Move(StandingAside(context, field, since_s), context.descend(field))
+    if passage.other_m > FACING_M or context.moving_m_s > AT_REST_M_S:
+        return None
+    own_m, field = context.retreat()
+    if field is None or not backs_out(context, passage, own_m):
+        return Move(Holding(context, since_s), context.stand())
+    context.journal.count("gave_way")
+    context.say("back-out", "met somebody where there is room for one: back, and aside")
+    return Move(StandingAside(context, field, context.t_s), context.descend(field))

@@ -1,0 +1,152 @@
+"""The time to go to every vertex of a patrol graph, worked out once for all robots of one size."""
+
+from __future__ import annotations
+
+import math
+from weakref import WeakKeyDictionary
+
+import numpy as np
+from scipy.ndimage import label, maximum_filter
+
+from pilotage.core.errors import InputError
+from pilotage.core.types import FloatArray
+from pilotage.kernels.control import eikonal
+from pilotage.maps.world_map import WorldMap
+
+EASY_M, TIGHT_FACTOR = 0.5, 1.0
+"""Nearer to walls than this, beyond the body, a metre takes longer: twice as long where it just fits."""
+STEP_M, ASIDE_REACH_M = 0.25, 5.0
+SEED_NODES = 1.5
+
+
+class Roadmap:
+    """Fields over a grid of nodes.
+
+    Attributes
+    ----------
+    slowness
+        (rows, columns) seconds a metre; infinite where the body does not fit.
+    origin_xy_m, spacing_m
+        Of the nodes; row 0 has the lowest y.
+    vertices_xy_m
+        (V, 2) places to visit.
+
+    Raises
+    ------
+    InputError
+        Where a vertex leaves no room for the body, or the body cannot drive from one to the others.
+    """
+
+    def __init__(
+        self,
+        chart: WorldMap,
+        vertices_xy_m: FloatArray,
+        clearance_m: float,
+        speed_m_s: float,
+        spacing_m: float,
+        near_m: float,
+        lane_m: float,
+    ) -> None:
+        self.vertices_xy_m, self.spacing_m = vertices_xy_m, spacing_m
+        xmin, ymin, xmax, ymax = chart.bounds_m
+        self.origin_xy_m = (xmin, ymin)
+        xs = np.arange(xmin, xmax + 0.5 * spacing_m, spacing_m)
+        ys = np.arange(ymin, ymax + 0.5 * spacing_m, spacing_m)
+        grid = np.stack(np.meshgrid(xs, ys), axis=-1)
+        distance = chart.field.at(grid.reshape(-1, 2)).reshape(grid.shape[:2])
+        free = distance >= clearance_m
+        tight = np.clip(1.0 - (distance - clearance_m) / EASY_M, 0.0, 1.0)
+        self.slowness: FloatArray = np.where(free, (1.0 + TIGHT_FACTOR * tight**2) / speed_m_s, np.inf)
+        # Who keeps to one side is so far from where the passage is widest.
+        size = 2 * math.ceil(lane_m / spacing_m) + 1
+        self._room_m: FloatArray = maximum_filter(distance, size=size)
+        self._fields: dict[int, FloatArray] = {}
+        self._seeds = [self._seed(k, near_m, clearance_m) for k in range(len(vertices_xy_m))]
+        regions, _ = label(free, structure=np.ones((3, 3)))
+        of_vertex = [int(regions[seed]) for seed in self._seeds]
+        apart = [k for k, region in enumerate(of_vertex) if region != of_vertex[0]]
+        if apart:
+            raise InputError(
+                f"patrol graph: expected paths with {clearance_m:.2f} m to each side, found none from "
+                f"vertex 0 to {len(apart)} of {len(of_vertex)} vertices (vertex {apart[0]} is the first)"
+            )
+
+    def _seed(self, vertex: int, near_m: float, clearance_m: float) -> tuple[int, int]:
+        """The free node nearest to a vertex."""
+        x, y = self.vertices_xy_m[vertex]
+        rows, columns = np.nonzero(np.isfinite(self.slowness))
+        away = np.hypot(
+            self.origin_xy_m[0] + columns * self.spacing_m - x,
+            self.origin_xy_m[1] + rows * self.spacing_m - y,
+        )
+        best = int(np.argmin(away)) if away.size else -1
+        if best < 0 or away[best] > near_m:
+            raise InputError(
+                f"patrol graph: expected {clearance_m:.2f} m of room around vertex {vertex} at "
+                f"({x:g}, {y:g}), found a wall; move it or take a smaller robot"
+            )
+        return int(rows[best]), int(columns[best])
+
+    def time_s(self, vertex: int) -> FloatArray:
+        """(rows, columns) time to go to a vertex; worked out when first asked for."""
+        if vertex not in self._fields:
+            field = np.full(self.slowness.shape, np.inf)
+            field[self._seeds[vertex]] = 0.0
+            eikonal.sweep_down(field, self.slowness, self.spacing_m)
+            self._fields[vertex] = field
+        return self._fields[vertex]
+
+    def aside(self, mouth_xy_m: FloatArray, outwards: FloatArray, pass_m: float) -> FloatArray | None:
+        """(rows, columns) time to a place beside a passage's mouth, off its axis, that has room for two.
+
+        None where there is none within ``ASIDE_REACH_M``.
+
+        Parameters
+        ----------
+        mouth_xy_m, outwards
+            (2,) where the passage ends and the direction in which it does.
+        pass_m
+            Half the width of what has room for two, and the distance to keep from the axis.
+        """
+        # Not close to a wall: there it would take long to come to, and away from.
+        rows, columns = np.nonzero((self._room_m >= pass_m) & (self.slowness < 1.2 * self.slowness.min()))
+        offset = np.column_stack([columns, rows]) * self.spacing_m + np.array(self.origin_xy_m) - mouth_xy_m
+        axis = outwards / max(float(np.hypot(*outwards)), 1e-9)
+        ahead = offset @ axis
+        off = np.abs(offset @ np.array([-axis[1], axis[0]]))
+        away = np.hypot(*offset.T)
+        fit = (ahead > 0.0) & (off >= 1.3 * pass_m) & (away <= ASIDE_REACH_M)
+        if not fit.any():
+            return None
+        best = int(np.argmin(np.where(fit, away, np.inf)))
+        field = np.full(self.slowness.shape, np.inf)
+        field[rows[best], columns[best]] = 0.0
+        eikonal.sweep_down(field, self.slowness, self.spacing_m)
+        return field
+
+    def way(self, x_m: float, y_m: float, time_s: FloatArray, reach_m: float) -> FloatArray:
+        """(N, 3) places every ``STEP_M`` down a field, and half the width of the passage at each."""
+        steps = math.ceil(reach_m / STEP_M)
+        return eikonal.way_down(
+            x_m, y_m, time_s, self._room_m, *self.origin_xy_m, self.spacing_m, STEP_M, steps
+        )
+
+
+_SHARED: WeakKeyDictionary[WorldMap, dict[tuple[object, ...], Roadmap]] = WeakKeyDictionary()
+
+
+def roadmap_of(
+    chart: WorldMap,
+    vertices_xy_m: FloatArray,
+    clearance_m: float,
+    speed_m_s: float,
+    spacing_m: float,
+    near_m: float,
+    lane_m: float,
+) -> Roadmap:
+    """The roadmap of a map; robots that are told the same map and graph work it out once."""
+    known = _SHARED.setdefault(chart, {})
+    key = (vertices_xy_m.tobytes(), clearance_m, speed_m_s, spacing_m, near_m, lane_m)
+    if key not in known:
+        known[key] = Roadmap(chart, *(vertices_xy_m, clearance_m, speed_m_s, spacing_m, near_m, lane_m))
+    return known[key]

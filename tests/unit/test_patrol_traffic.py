@@ -1,0 +1,161 @@
+"""Robots on patrol among each other: they stop in time, pass each other, and get out of a passage for one."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from pilotage.core.errors import InputError
+from pilotage.experiments.build.build import build
+from pilotage.experiments.loop import run_loop
+from pilotage.experiments.mission import load_mission, mission_of, read_mission
+from pilotage.kernels.control import eikonal, voronoi_window
+
+NOBODY = np.zeros((0, 2))
+
+
+def corridor(width_m: float, size: int, duration_s: float, **team: Any) -> dict[str, Any]:
+    """Two rooms with a corridor of 8 m between them."""
+    low, high = 3.0 - 0.5 * width_m, 3.0 + 0.5 * width_m
+    walls = [[0, 0, 4, 0], [0, 0, 0, 6], [0, 6, 4, 6], [4, 0, 4, low], [4, high, 4, 6], [4, low, 12, low]]
+    walls += [
+        [4, high, 12, high],
+        [12, 0, 12, low],
+        [12, high, 12, 6],
+        [12, 0, 16, 0],
+        [16, 0, 16, 6],
+        [12, 6, 16, 6],
+    ]
+    values = read_mission("museum-patrol")
+    values["world"] = {"map": {"map": "corridor", "bounds_m": [0, 0, 16, 6], "walls_m": walls}}
+    values["task"] = {"name": "patrol", "duration_s": duration_s, "derive": {"reach_m": 4.0}}
+    values["team"] = {"size": size, "strategy": "cyclic", "radio": {}, **team}
+    values["run"]["time_limit_s"] = duration_s
+    return values
+
+
+def judged(values: dict[str, Any], seed: int) -> dict[str, Any]:
+    experiment = build(mission_of(values, seed=seed))
+    return experiment.task.judge(run_loop(experiment).finished).metrics
+
+
+class TestTimeToGo:
+    def test_on_open_floor_it_is_the_distance_in_every_direction(self) -> None:
+        time = np.full((81, 81), np.inf)
+        time[40, 40] = 0.0
+        eikonal.sweep_down(time, np.full(time.shape, 2.0), 0.1)
+        rows, columns = np.mgrid[:81, :81]
+        exact = 0.2 * np.hypot(rows - 40, columns - 40)
+        # First order, from above; steps between neighbouring cells would be off by 8 %.
+        assert (time >= exact - 1e-9).all()
+        assert (time - exact <= 0.05 * exact + 0.1).all()
+        assert (time - exact)[exact > 8.0].max() <= 0.04 * 8.0
+
+    def test_it_leads_around_a_wall(self) -> None:
+        slowness = np.ones((41, 41))
+        slowness[:36, 20] = np.inf
+        time = np.full((41, 41), np.inf)
+        time[5, 35] = 0.0
+        eikonal.sweep_down(time, slowness, 0.1)
+        around = math.hypot(1.5, 3.1) + math.hypot(1.5, 3.1)
+        assert time[5, 5] == pytest.approx(around, rel=0.06)
+        _, dy = eikonal.descent(1.5, 1.5, time, 0.0, 0.0, 0.1)
+        assert dy > 0.7
+
+    def test_a_disc_that_fills_the_only_door_leaves_no_way(self) -> None:
+        slowness = np.ones((41, 61))
+        slowness[:17, 30] = slowness[24:, 30] = np.inf
+        time = np.full(slowness.shape, np.inf)
+        time[20, 55] = 0.0
+        eikonal.sweep_down(time, slowness, 0.1)
+        for middle, leads_on in (((3.0, 2.0), False), ((3.0, 3.5), True)):
+            *_, here = eikonal.detour(
+                time, slowness, 0.0, 0.0, 0.1, 2.0, 2.0, 2.0, np.array([middle]), 0.4, 0.5
+            )
+            assert math.isfinite(here) is leads_on
+
+
+class TestStopping:
+    @settings(max_examples=200, deadline=None)
+    @given(
+        gap=st.floats(0.05, 4.0),
+        bearing=st.floats(-1.5, 1.5),
+        first=st.floats(0.0, 1.5),
+        second=st.floats(0.0, 1.5),
+    )
+    def test_two_that_both_may_go_on_come_to_rest_apart(
+        self, gap: float, bearing: float, first: float, second: float
+    ) -> None:
+        """Each knows only where the other's surface is, and drives straight at it as fast as it may."""
+        radius, reaction, braking = 0.3, 0.25, 2.0
+        away = gap + radius  # from an axle to the other's nearest point
+        seen = away * np.array([[math.cos(bearing), math.sin(bearing)]])
+        come = 0.0
+        for speed in (first, second):
+            clear = voronoi_window.stop_is_clear(
+                speed, 0.0, reaction, braking, radius, 0.04, NOBODY, seen, 0.1
+            )
+            if clear:
+                come += max(0.0, (speed * reaction + 0.5 * speed**2 / braking) * math.cos(bearing))
+        assert come <= max(gap - 0.1, 0.0) + 1e-3
+
+    def test_turning_on_the_spot_is_free_and_backing_off_is(self) -> None:
+        touching = np.array([[0.31, 0.0]])
+        assert voronoi_window.stop_is_clear(0.0, 2.0, 0.25, 2.0, 0.3, 0.04, touching, touching, 0.1)
+        assert not voronoi_window.stop_is_clear(0.2, 0.0, 0.25, 2.0, 0.3, 0.04, touching, NOBODY, 0.1)
+        assert not voronoi_window.stop_is_clear(0.2, 0.0, 0.25, 2.0, 0.3, 0.04, NOBODY, touching, 0.1)
+        assert voronoi_window.stop_is_clear(-0.2, 0.0, 0.25, 2.0, 0.3, 0.04, touching, touching, 0.1)
+
+
+class TestPassages:
+    @pytest.mark.parametrize("radio", [{}, None])
+    def test_two_who_meet_where_there_is_room_for_one_settle_it(self, radio: dict[str, Any] | None) -> None:
+        metrics = judged(corridor(0.9, 2, 200.0, radio=radio), seed=0)
+        assert metrics["success"], metrics["reason"]
+        assert metrics["collisions"] == metrics["deadlocks"] == 0
+        assert metrics["gave_way"] > 0
+
+    def test_a_robot_that_died_in_the_passage_is_not_run_into(self) -> None:
+        failures = [{"robot": 0, "at_s": 12.0}, {"robot": 1, "kind": "radio", "at_s": 1.0}]
+        metrics = judged(corridor(1.5, 2, 90.0, failures=failures), seed=1)
+        assert metrics["collisions"] == 0
+        assert metrics["robots_failed"] == 1
+
+
+class TestMuseum:
+    def test_eight_patrol_without_a_touch_and_twice_the_same(self) -> None:
+        short = ["team.size=8", "task.duration_s=40", "run.time_limit_s=40"]
+        runs = []
+        for _ in range(2):
+            experiment = build(load_mission("museum-patrol", short, seed=5))
+            finished = run_loop(experiment).finished
+            runs.append((finished, experiment.task.judge(finished).metrics))
+        metrics = runs[0][1]
+        assert metrics["success"], metrics["reason"]
+        assert metrics["team_size"] == 8
+        assert metrics["strategy"] == "cyclic"
+        assert 0.0 < float(str(metrics["idleness_mean_s"])) < float(str(metrics["idleness_worst_s"])) <= 40.0
+        assert 0.9 < float(str(metrics["coverage_fraction"])) <= 1.0
+        for one, other in zip(runs[0][0].robots, runs[1][0].robots, strict=True):
+            for name, values in one.trace.items():
+                assert np.array_equal(values, other.trace[name], equal_nan=True), name
+
+    @pytest.mark.parametrize(
+        ("overrides", "told"),
+        [
+            (["team.strategy=null"], r"task 'patrol': expected team\.strategy, found none"),
+            (["team.strategy=cyclc"], "unknown strategy 'cyclc'; did you mean 'cyclic'"),
+            (["task.graph=nowhere.graph"], r"nowhere\.graph"),
+            (["team.failures=[{robot: 9, at_s: 1}]"], r"team\.failures: there is no robot 9 of 4"),
+            (["robot.motion=bicycle"], "expected a robot that turns on the spot"),
+        ],
+    )
+    def test_what_cannot_be_is_refused_in_one_line(self, overrides: list[str], told: str) -> None:
+        with pytest.raises(InputError, match=told) as caught:
+            build(load_mission("museum-patrol", overrides))
+        assert "\n" not in str(caught.value)
