@@ -16,6 +16,7 @@ from pilotage.maps.occupancy_grid import OccupancyGrid
 from pilotage.maps.true_cells import true_map
 from pilotage.maps.world_map import WorldMap
 from pilotage.records.cells import SheetData
+from pilotage.records.patrol import PatrolRecord
 from pilotage.records.plans import Plan, Plans
 from pilotage.records.run_folder import RobotFiles, RunFiles
 from pilotage.records.trace import merged, trace_of
@@ -43,6 +44,7 @@ def files_of(run: Run, verdict: Verdict, metrics: Mapping[str, object]) -> RunFi
         terrain=terrain_pictures(finished, run.sightings[0].seen()),
         grid=grid,
         people=run.people.tracks(),
+        patrol=_patrol(verdict),
         robots=tuple(
             RobotFiles(
                 plans=_plans(robot, verdict),
@@ -54,6 +56,19 @@ def files_of(run: Run, verdict: Verdict, metrics: Mapping[str, object]) -> RunFi
             for index, robot in enumerate(finished.robots)
         ),
     )
+
+
+def _patrol(verdict: Verdict) -> PatrolRecord | None:
+    """What the task of patrolling saw."""
+    told = {
+        name.removeprefix("patrol/"): array
+        for name, array in verdict.extras.items()
+        if name.startswith("patrol/")
+    }
+    if not told:
+        return None
+    whole = {name: told[name].astype(np.int64) for name in ("edges", "tour")}
+    return PatrolRecord(**{**told, **whole, "cell_m": float(told["cell_m"])})  # type: ignore[arg-type]
 
 
 def _joined(trace: Mapping[str, FloatArray], columns: Mapping[str, FloatArray]) -> dict[str, FloatArray]:

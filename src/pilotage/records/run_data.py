@@ -20,6 +20,7 @@ from pilotage.records.localizer import read_localizer
 from pilotage.records.metrics import METRICS_FILE, read_metrics
 from pilotage.records.mission import read_mission
 from pilotage.records.numbers import FARTHEST_M, number
+from pilotage.records.patrol import PatrolRecord, read_patrol
 from pilotage.records.people import PeopleTracks, read_people_tracks
 from pilotage.records.plans import Plan, Plans, read_plans
 from pilotage.records.run_folder import robot_folder
@@ -65,6 +66,7 @@ class RunData:
     terrain: TerrainPictures | None = None
     grid: OccupancyGrid | None = None
     people: PeopleTracks = field(default_factory=PeopleTracks)
+    patrol: PatrolRecord | None = None
     localizer_text: str = ""
     robot: int = 0
     robots: tuple[str, ...] = ()
@@ -166,6 +168,7 @@ def read_run(folder: Path, *, robot: int = 0, on_damage: OnDamage | None = None)
         terrain=part(read_terrain, None),
         grid=part(read_grid_layer, None),
         people=part(read_people_tracks, PeopleTracks()),
+        patrol=part(read_patrol, None),
         localizer_text=part(read_localizer, ""),
         robot=robot,
         robots=trace.robots,

@@ -19,6 +19,7 @@ from pilotage.records.grid import write_grid
 from pilotage.records.localizer import write_localizer
 from pilotage.records.metrics import write_metrics
 from pilotage.records.mission import write_mission
+from pilotage.records.patrol import PatrolRecord, write_patrol
 from pilotage.records.people import PeopleTracks, write_people
 from pilotage.records.plans import Plans, write_plans
 from pilotage.records.scans import Sightings, write_sightings
@@ -49,7 +50,7 @@ class RunFiles:
         Every run has them.
     mission_text, localizer_text
         YAML: the mission in full, or for a recorded log its localizer; '' leaves the file out.
-    world, terrain, grid, people
+    world, terrain, grid, people, patrol
         None leaves the file out.
     robots
         One a robot, in the order of the trace's; the first one's files lie in the run folder itself, those of
@@ -65,6 +66,7 @@ class RunFiles:
     terrain: TerrainPictures | None = None
     grid: OccupancyGrid | None = None
     people: PeopleTracks | None = None
+    patrol: PatrolRecord | None = None
     robots: tuple[RobotFiles, ...] = ()
 
 
@@ -93,6 +95,8 @@ def write_run(out: Path, name: str, files: RunFiles) -> Path:
             write_grid(draft, files.grid)
         if files.people is not None:
             write_people(draft, files.people)
+        if files.patrol is not None:
+            write_patrol(draft, files.patrol)
         for robot, told in enumerate(files.robots):
             write_robot(robot_folder(draft, robot), told)
         write_metrics(draft, {**files.metrics, "run_dir": str(out / name)})

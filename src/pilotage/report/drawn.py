@@ -14,6 +14,7 @@ from pilotage.report.figures.control import control_figure
 from pilotage.report.figures.covariance import covariance_figure
 from pilotage.report.figures.gauss_markov import gauss_markov_figure
 from pilotage.report.figures.map import map_figure
+from pilotage.report.figures.patrol import patrol_figures
 from pilotage.report.figures.plan import plan_figure
 from pilotage.report.figures.pose_error import pose_error_figure
 from pilotage.report.figures.terrain_curve import curve_figure
@@ -77,6 +78,7 @@ def figures_of(run: RunData) -> list[Illustration]:
     else:
         draws = ON_A_MAP + OF_THE_DRIVE
     figures = [draw(run) for draw in (*draws, *((updates_figure,) if run.updates else ()))]
+    figures[1:1] = patrol_figures(run)
     return [figure for figure in figures if figure.svg] or figures[:1]
 
 

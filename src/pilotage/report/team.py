@@ -63,6 +63,10 @@ def team_tiles(metrics: Mapping[str, Any]) -> list[tuple[str, str]]:
         ("worst position error", "position_max_m", quantities.length),
         ("least clearance", "min_clearance_m", quantities.length),
         ("collisions", "collisions", quantities.count),
+        ("mean idleness", "idleness_mean_s", quantities.duration),
+        ("worst idleness", "idleness_worst_s", quantities.duration),
+        ("cyclic reference", "idleness_bound_s", quantities.duration),
+        ("floor seen lately", "coverage_fraction", quantities.share),
     )
     known = [(name, write(number(metrics.get(key)))) for name, key, write in entries]
     told = [(name, text) for name, text in known if text != quantities.NOTHING]

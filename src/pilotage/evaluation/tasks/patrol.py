@@ -203,6 +203,7 @@ class PatrolTask:
             "patrol/idleness_s": visits.idleness(run.duration_s, self._warm_s)[0].vertex_mean_s,
             "patrol/series": series,
             "patrol/cells_xy_m": self._floor.cells_xy_m,
+            "patrol/cell_m": np.array(self._floor.cell_m),
             "patrol/age_s": self._floor.mean_s(),
             "patrol/last_seen_s": self._floor.seen_s,
         }

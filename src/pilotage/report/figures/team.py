@@ -12,6 +12,7 @@ from pilotage.records.run_data import RunData
 from pilotage.report.figures import layers, map_marks
 from pilotage.report.figures.grid import OCCUPIED_COLOUR, UNKNOWN_COLOUR, draw_grid, has_unknown
 from pilotage.report.figures.map_view import map_axes, view_limits
+from pilotage.report.figures.patrol import patrol_figures
 from pilotage.report.figures.placing import LabelPlacer
 from pilotage.report.style import (
     GREEN,
@@ -37,7 +38,7 @@ MOST_KEYS = 24
 
 def team_figures(team: Sequence[RunData]) -> list[Illustration]:
     """Draw what there is to draw of a team."""
-    figures = [team_map_figure(team), team_series_figure(team)]
+    figures = [team_map_figure(team), *patrol_figures(team[0]), team_series_figure(team)]
     return [figure for figure in figures if figure.svg] or figures[:1]
 
 
