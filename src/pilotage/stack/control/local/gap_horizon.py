@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 from pydantic import Field
@@ -59,6 +60,9 @@ class GapHorizonConfig(Config):
     """Share of the data sheet's braking and turning that is relied on."""
     people_cost: NonNegative = 1.5
     comfort_m: Positive = 0.5
+    calm_m: NonNegative = 2.5
+    calm_m_s: Positive = 1.4
+    """With a moving body so near it drives no faster: behind one there may be another, whom nobody sees."""
     stuck_s: Positive = 2.0
     stuck_m: Positive = 0.15
     """Where it came no farther than this in that time, it tries the narrowest place ahead straight; where it
@@ -118,6 +122,9 @@ class GapHorizon:
 
     def _decide(self, view: LocalView, scene: Scene) -> Twist:
         config = self._config
+        if scene.movers.nearest_m(float(scene.pose[0]), float(scene.pose[1])) < config.calm_m:
+            calm = scene.drive._replace(speed=min(scene.drive.speed, config.calm_m_s))
+            scene = replace(scene, drive=calm)
         if self._must_stand(scene):
             self._plan = None
             return STOP
