@@ -180,8 +180,15 @@ def test_a_trial_that_the_machine_broke_is_tried_once_more(tmp_path: Path) -> No
     assert rows[0]["attempts"] == 2
 
 
-def test_a_trial_that_crashes_does_not_take_the_study_with_it(tmp_path: Path) -> None:
+def test_a_trial_that_crashes_does_not_take_the_study_with_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     study = small(factors=[{"key": "world.goal.x_m", "values": [20.0, -5.0]}], trials=2)
+    with pytest.raises(InputError, match=r"cell 'x_m=-5': world\.goal: expected a place on the map"):
+        run_study(study, tmp_path / "study", ONE)
+    assert not (tmp_path / "study").exists()
+    # As where only some seeds cannot be built.
+    monkeypatch.setattr("pilotage.experiments.studies.engine.check_worlds", lambda _: None)
     counts = run_study(study, tmp_path / "study", ONE)
     assert (counts.done, counts.failed) == (2, 2)
     table = read_study(tmp_path / "study")

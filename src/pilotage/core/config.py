@@ -116,6 +116,15 @@ def describe(error: ValidationError, model: type[BaseModel], where: str) -> str:
         return f"{place}: unknown key; {hint}"
     if first["type"] == "missing":
         return f"{place}: missing; it has to be given"
+    known = _choices_of(first)
+    if known:
+        key, found = first.get("ctx", {}).get("discriminator", ""), first["input"]
+        if key:
+            place = f"{place}.{key.strip(chr(39))}" if place else key.strip(chr(39))
+            found = first["ctx"]["tag"]
+        close = nearest(str(found), known)
+        hint = f"did you mean '{close}'?" if close else "known: " + ", ".join(known)
+        return f"{place}: unknown value {_show(found)}; {hint}"
     message = first["msg"].removeprefix("Value error, ")
     message = message[:1].lower() + message[1:]
     # A file knows mappings and lists, not Python's classes.
@@ -125,6 +134,16 @@ def describe(error: ValidationError, model: type[BaseModel], where: str) -> str:
     if place and ", found " not in message:
         message += f", found {_show(first['input'])}"
     return f"{place}: {message}" if place else message
+
+
+def _choices_of(error: Mapping[str, Any]) -> list[str]:
+    """The texts among which a value had to be, where a text stood that is none of them."""
+    context = error.get("ctx", {})
+    if error["type"] == "union_tag_invalid":
+        return re.findall(r"'([^']+)'", str(context["expected_tags"]))
+    if error["type"] in {"literal_error", "enum"} and isinstance(error["input"], str):
+        return re.findall(r"'([^']+)'", str(context["expected"]))
+    return []
 
 
 def _fields_at(model: type[BaseModel], path: list[str]) -> list[str]:

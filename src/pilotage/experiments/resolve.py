@@ -80,6 +80,8 @@ def _resolve_robot(robot: dict[str, Any], where: str) -> None:
     _resolved("motion", truly, f"{where}.true_motion")
     for name, choice in robot["sensors"].items():
         robot["sensors"][name] = _resolved("sensor", choice, f"{where}.sensors.{name}")
+    for index, fault in enumerate(robot["faults"]):
+        robot["faults"][index] = _resolved("fault", fault, f"{where}.faults.{index}")
     if robot["stack"] is not None:
         _resolve_stack(robot["stack"], f"{where}.stack")
 

@@ -46,7 +46,8 @@ class Footprint:
         Raises
         ------
         InputError
-            If it has fewer than three corners, crosses itself, or does not enclose the origin.
+            If it has fewer than three corners or all on one line, crosses itself, or does not enclose the
+            origin.
         """
         points = np.ascontiguousarray(points_m, dtype=np.float64).reshape(-1, 2)
         if points.shape[0] < 3:
@@ -54,6 +55,8 @@ class Footprint:
         following = np.roll(points, -1, axis=0)
         if (np.hypot(*(following - points).T) < 1e-9).any():
             raise InputError(f"{where}: expected neighbouring corners apart, found the same point twice")
+        if _on_one_line(points):
+            raise InputError(f"{where}: expected corners around an area, found all of them on one line")
         if _crosses_itself(points, following):
             raise InputError(f"{where}: expected a simple polygon, found sides that cross each other")
         area = 0.5 * float(np.sum(points[:, 0] * following[:, 1] - following[:, 0] * points[:, 1]))
@@ -76,6 +79,13 @@ class Footprint:
             return self.points_m.copy()
         angle = 2.0 * math.pi * np.arange(corners) / corners
         return self.radius_m * np.column_stack([np.cos(angle), np.sin(angle)])
+
+
+def _on_one_line(points: FloatArray) -> bool:
+    """Whether no corner lies off the line through the others, to within rounding."""
+    off = points - points.mean(axis=0)
+    singular = np.linalg.svd(off, compute_uv=False)
+    return bool(singular[1] <= 1e-12 * singular[0])
 
 
 def _encloses_origin(points: FloatArray, following: FloatArray) -> bool:

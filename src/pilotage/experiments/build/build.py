@@ -122,6 +122,9 @@ def _simulator(
         assert start is not None, "settled above"
         own = f"robots.{index}" if mission.robots else "world"
         world.check_place(f"{own}.start", sheet.footprint, pose_of(start))
+    for number, kidnap in enumerate(mission.world.kidnaps):
+        assert kidnap.to is not None, "settled above"
+        world.check_place(f"world.kidnaps.{number}.to", sheets[kidnap.robot].footprint, pose_of(kidnap.to))
     robots = [
         _spec(mission, index, sheet, oracles, chart.landmarks.ids) for index, sheet in enumerate(sheets)
     ]

@@ -37,6 +37,10 @@ PLAIN = MarkingsConfig()
 MapSource = str | MapFile | SheetFile | CraterMap | ImagesMap | ElevationMap | GridMap
 
 
+ROS_KEYS = frozenset({"resolution", "origin", "negate", "occupied_thresh", "free_thresh"})
+"""What a ROS map's file says beside its image; no other map has them."""
+
+
 def shipped_maps() -> list[str]:
     """Names of the maps that come with pilotage."""
     return sorted(
@@ -153,6 +157,11 @@ def _named(source: str, markings: MarkingsConfig) -> WorldMap:
         return load_chart(ElevationMap(name="elevation", file=source))
     if suffix in {".yaml", ".yml"}:
         values = parse_yaml(read_text(path), str(path))
+        if "image" not in values and ROS_KEYS & values.keys():
+            raise InputError(
+                f"{path}: image: missing; a ROS map names its image beside "
+                f"{', '.join(sorted(ROS_KEYS & values.keys()))}"
+            )
         return _grid(path) if "image" in values else _of_values(values, str(path), markings)
     if suffix in GRID_SUFFIXES:
         return _grid(path)

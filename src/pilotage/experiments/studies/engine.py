@@ -14,6 +14,7 @@ from pathlib import Path
 from pilotage.core.errors import InputError, nearest
 from pilotage.core.whole_file import write_whole
 from pilotage.evaluation.metrics import METRICS
+from pilotage.experiments.build.build import build_source
 from pilotage.experiments.given import has
 from pilotage.experiments.mission import mission_of
 from pilotage.experiments.studies.dask_workers import DaskWorkers
@@ -83,6 +84,8 @@ def run_study(
     check_metric_names(study)
     if options.resume and not folder.is_dir():
         raise InputError(f"{folder}: expected a study that was begun, found none; leave --resume out")
+    if not (folder / DATABASE).is_file():
+        check_worlds(study)
     try:
         counts = _run(study, folder, options, listener)
         check_metrics(study, folder)
@@ -93,6 +96,28 @@ def run_study(
             raise
         raise StudyStoppedError(f"{folder}: the disk is full; make room and go on with --resume") from None
     return counts
+
+
+def check_worlds(study: Study) -> None:
+    """Build a world and its robots with every value that a factor or configuration has, each at least once.
+
+    Raises
+    ------
+    InputError
+        With the cell's name: every one of its trials would fail.
+    """
+    seen: set[str] = set()
+    for cell in study.cells:
+        values = {f"{name}={value!r}" for name, value in cell.values.items()}
+        if values and values <= seen:
+            continue
+        seen |= values
+        try:
+            build_source(
+                mission_of(study.base, (*cell.overrides, f"run.seed={study.definition.seeds.first}"))
+            )
+        except InputError as error:
+            raise InputError(f"cell '{cell.name}': {error}") from None
 
 
 def _run(study: Study, folder: Path, options: StudyOptions, listener: Listener) -> Counts:

@@ -1,0 +1,51 @@
+"""What was refused in words that help nobody, or not at all: now the sentence says what is wrong."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from pilotage.core.errors import InputError
+from pilotage.experiments.build.build import build_source
+from pilotage.experiments.mission import load_mission
+from pilotage.experiments.studies.engine import run_study
+from pilotage.experiments.studies.sweep import sweep_study
+
+BOX = "{kind: bx, from_m: [1, 2], to_m: [3, 4]}"
+LINE = "{points_m: [[-1, 0], [1, 0], [2, 0]]}"
+WALL = "{kind: box, from_m: [4, 4], to_m: [5, 4]}"
+
+
+@pytest.mark.parametrize(
+    ("settings", "words"),
+    [
+        ([f"world.obstacles=[{BOX}]"], "world.obstacles.0.kind: unknown value 'bx'; did you mean 'box'?"),
+        ([f"robot.footprint={LINE}"], "found all of them on one line"),
+        (
+            [f"world.obstacles=[{WALL}]", "world.kidnaps=[{at_s: 5, to: {x_m: 4.5, y_m: 4}}]"],
+            "world.kidnaps.0.to: expected room for the robot's footprint",
+        ),
+        (["robot.faults=[{name: drop, sensor: lidar, share: 3}]"], "robot.faults.0.share"),
+    ],
+)
+def test_missions(settings: list[str], words: str) -> None:
+    with pytest.raises(InputError) as caught:
+        build_source(load_mission("museum-1", ["world.obstacles=[]", *settings], 0))
+    assert words in str(caught.value)
+
+
+def test_a_ros_map_without_its_image_says_so(tmp_path: Path) -> None:
+    path = tmp_path / "hall.yaml"
+    path.write_text("resolution: 0.05\norigin: [0, 0, 0]\nnegate: 0\n")
+    with pytest.raises(InputError, match="image: missing; a ROS map names its image"):
+        build_source(load_mission("museum-1", [f"world.map={path}"], 0))
+
+
+def test_values_of_a_sweep_that_cannot_be_built_are_told_before_the_first_trial(tmp_path: Path) -> None:
+    study = sweep_study("museum-plan", ["robot.sensors.lidar.rate_hz=10,7"], [], 2, [])
+    with pytest.raises(
+        InputError, match=r"cell 'rate_hz=7': robot\.sensors\.lidar\.rate_hz: expected a whole"
+    ):
+        run_study(study, tmp_path / "sweep")
+    assert not (tmp_path / "sweep").exists()
