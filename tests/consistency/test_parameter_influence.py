@@ -36,10 +36,11 @@ class Influence:
 
 @cache
 def influence(mission: str, *overrides: str) -> Influence:
-    """Drive ``SEEDS`` times."""
+    """Drive ``SEEDS`` times, by the truth: a filter that says it is lost does not change what it is shown."""
     normalized, squared, nis, expected, seen, accepted = [], [], 0.0, 0.0, 0.0, 0.0
     for seed in range(SEEDS):
-        settings = [f"run.time_limit_s={LIMIT_S}", *(f"stack.localizer.{entry}" for entry in overrides)]
+        settings = ["run.oracles=[driver]", f"run.time_limit_s={LIMIT_S}"]
+        settings += [f"stack.localizer.{entry}" for entry in overrides]
         trace = simulate(load_mission(mission, settings, seed)).finished.robots[0].trace
         truth, estimate = poses(trace, "true"), poses(trace, "est")
         normalized.append(nees(truth, estimate, covariances(trace))[SETTLE:].mean())
@@ -102,4 +103,4 @@ class TestInfluence:
         assert right.nees < less.nees < strict.nees
         assert right.rmse_m < less.rmse_m < strict.rmse_m
         assert strict.nees > 5.0
-        assert strict.accepted < 0.45
+        assert strict.accepted < 0.47  # half of them, were it right about itself

@@ -147,7 +147,7 @@ class EkfGaussMarkovLocalizer:
         top = robot.motion.top_speed_m_s, robot.motion.top_turn_rate_rad_s
         unlogged = config.unlogged_speed_m_s, config.unlogged_turn_rate_rad_s
         self._unlogged = tuple(most if own is None else own for own, most in zip(unlogged, top, strict=True))
-        self._watch, self._check = OdometryWatch(robot, odometry), SelfCheck()
+        self._watch, self._check = OdometryWatch(robot, odometry), SelfCheck(config.gate)
         self.belief = initial
         self._telemetry = journal.channel(COLUMNS)
 

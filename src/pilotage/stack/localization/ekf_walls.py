@@ -119,7 +119,11 @@ class EkfWallsLocalizer:
             )
         gates = self._matcher.joint_gates
         self._expected_nis = [0.0, *(gated_mean(gates[k], LINE_DOF * k) for k in range(1, len(gates)))]
-        self._watch, self._check, self._t_s = OdometryWatch(robot, odometry), SelfCheck(MOST_REFUSED), 0.0
+        self._watch, self._check, self._t_s = (
+            OdometryWatch(robot, odometry),
+            SelfCheck(config.gate, MOST_REFUSED),
+            0.0,
+        )
         self._pose = initial.pose.as_array()
         self._cov = initial.cov.copy()
         self.belief = initial

@@ -84,7 +84,7 @@ class InvariantEkfLocalizer:
         self._mean: FloatArray = np.empty(3)
         self._spread: FloatArray = np.empty((3, 3))
         self._refused = np.zeros(1, dtype=np.int64)
-        self._watch, self._check = OdometryWatch(robot, odometry), SelfCheck()
+        self._watch, self._check = OdometryWatch(robot, odometry), SelfCheck(config.gate)
         self.belief = initial
         self._channel = journal.channel(SIGHTING_COLUMNS)
 

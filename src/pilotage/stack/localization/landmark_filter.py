@@ -119,7 +119,7 @@ class LandmarkFilter:
         self._gate = chi_square_quantile(config.gate, MEASUREMENT_DOF)
         self._expected_nis = gated_mean(self._gate, MEASUREMENT_DOF)
         self._doubt_after, self._rejected = config.doubt_after, 0
-        self._watch, self._check, self._t_s = OdometryWatch(robot, odometry), SelfCheck(), 0.0
+        self._watch, self._check, self._t_s = OdometryWatch(robot, odometry), SelfCheck(config.gate), 0.0
         self._pose = initial.pose.as_array()
         self._cov = initial.cov.copy()
         self.belief = initial

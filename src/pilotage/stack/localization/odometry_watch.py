@@ -46,6 +46,7 @@ class OdometryWatch:
             square = since_s**2 - self._widened_s**2
             self._widened_s = since_s
             return self._top_m_s**2 * square, self._turn_rad_s**2 * square
+        since_s = max(since_s, self._period_s)
         self._last_s, self._widened_s = t_s, 0.0
         far = math.hypot(odometry.distance_m, odometry.lateral_m) > TOO_FAST * self._top_m_s * since_s
         spun = abs(odometry.angle_rad) > TOO_FAST * self._turn_rad_s / TURN_SHARE * since_s

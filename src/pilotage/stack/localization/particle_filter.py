@@ -128,7 +128,7 @@ class ParticleFilterLocalizer:
         self._prediction = OdometryPrediction(
             odometry, config.odometry, config.odometry_var_scale, config.odometry_model
         )
-        self._watch, self._check = OdometryWatch(robot, odometry), SelfCheck(MOST_BESIDE)
+        self._watch, self._check = OdometryWatch(robot, odometry), SelfCheck(refused_share=MOST_BESIDE)
         self._blind = bool(initial.cov[2, 2] > LINEAR_RAD**2)
         self._unexplained = 0
         self._field = _field_of(config, chart)

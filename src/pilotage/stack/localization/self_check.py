@@ -10,7 +10,7 @@ WINDOW = 30
 LEAST_SEEN = 10
 """Readings, fewer of which say nothing."""
 REFUSED_SHARE = 0.5
-"""Who refuses more than this is wrong as likely as its readings are."""
+"""Who refuses more than this of what its gate should let through is wrong as likely as its readings are."""
 NIS_EXCESS, NIS_SIGMAS = 0.5, 6.0
 """NIS of the accepted over what is expected, less 1: a model is never exact, and chance has its share."""
 HOLD_S, MOST_HOLD_S = 3.0, 60.0
@@ -26,8 +26,8 @@ class SelfCheck:
     for motion until others come into sight. Who had to begin anew is therefore believed later each time.
     """
 
-    def __init__(self, refused_share: float = REFUSED_SHARE) -> None:
-        self._used_share = 1.0 - refused_share
+    def __init__(self, gate: float = 1.0, refused_share: float = REFUSED_SHARE) -> None:
+        self._used_share = (1.0 - refused_share) * gate
         self._updates: deque[tuple[float, ...]] = deque()
         self._sums = [0.0, 0.0, 0.0, 0.0]
         self._hold_s, self._until_s = HOLD_S, -math.inf
