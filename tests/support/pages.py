@@ -12,6 +12,7 @@ from pilotage.report import write_report
 
 FIGURES = (
     "map",
+    "plan-picture",
     "close-ups",
     "timeline",
     "pose-error",

@@ -28,6 +28,7 @@ PROPERTIES = {
     "mount",
     "field_of_view_rad",
     "max_range_m",
+    "range_m",
     "min_range_m",
     "reliable_range_m",
     "beams",

@@ -17,12 +17,13 @@ from pilotage.experiments.update_album import UpdateAlbum
 from pilotage.records.run_data import read_run
 from pilotage.report import write_report
 from pilotage.report.figures.layers import _cut_where_carried, true_path
-from pilotage.sensors.readings import LidarScan, Readings
+from pilotage.sensors.readings import LidarScan, OdometryIncrement, Readings
 from pilotage.stack.interface import ExplainableUpdate, LineVerdict, ScanUpdate
 from pilotage.stack.localization.ekf_walls import EkfWallsConfig, EkfWallsLocalizer
 from support.robots import ROOM, told_of
 from support.walls import scan_of
 
+STILL = OdometryIncrement(0.0, 0.0)
 TRUE = Pose2(3.0, 4.2, 0.3)
 
 
@@ -31,12 +32,12 @@ def explained(belief: Pose2, world: object = ROOM) -> ScanUpdate:
     told = told_of(start=belief, variances=(1e-4, 1e-4, 1e-4))
     localizer = told.localizer(EkfWallsLocalizer, EkfWallsConfig(recovery=None))
     ranges = scan_of(world, TRUE, np.random.default_rng(0))  # type: ignore[arg-type]
-    localizer.step(Readings(0.1, {"lidar": LidarScan(ranges)}))
+    localizer.step(Readings(0.1, {"odometry": STILL, "lidar": LidarScan(ranges)}))
     assert told.journal.update is not None
     update = told.journal.update.explained()
     assert told.journal.update.left_out == sum(v is not LineVerdict.ACCEPTED for v in update.verdicts)
     told.journal.update = None
-    localizer.step(Readings(0.2, {}))
+    localizer.step(Readings(0.2, {"odometry": STILL}))
     assert told.journal.update is None, "a step without a scan has no update"
     return update
 

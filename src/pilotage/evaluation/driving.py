@@ -37,6 +37,13 @@ def covariances(trace: Mapping[str, FloatArray]) -> FloatArray:
     return np.array([[xx, xy, xt], [xy, yy, yt], [xt, yt, tt]]).transpose(2, 0, 1)
 
 
+def claimed_at(trace: Mapping[str, FloatArray]) -> BoolArray:
+    """(N,) at which steps the robot holds itself for localized; where it says nothing of it, it does."""
+    if "localized" not in trace:
+        return np.ones(len(trace["t_s"]), dtype=np.bool_)
+    return np.asarray(~(trace["localized"] <= 0.5), dtype=np.bool_)
+
+
 def header(run: FinishedRun, robot: RobotRun) -> dict[str, object]:
     """What every run's object begins with."""
     return {
@@ -84,7 +91,7 @@ def driving_metrics(run: FinishedRun, robot: RobotRun) -> tuple[dict[str, object
     if counted.any() and np.isfinite(trace["clearance_m"]).any():
         metrics |= split_errors(trace, pose_errors(truth, estimate).distance_m, counted)
     metrics |= _consistency(trace, values, counted)
-    claimed = trace["localized"] > 0.5 if "localized" in trace else np.ones(len(values), dtype=np.bool_)
+    claimed = claimed_at(trace)
     metrics["silently_wrong_s"] = longest_outside_s(
         trace["t_s"], truth, estimate, covariances(trace), claimed
     )
@@ -130,8 +137,7 @@ def planning_metrics(run: FinishedRun, robot: RobotRun, shortest: ShortestPath |
 def _counted(settle_s: float, trace: Mapping[str, FloatArray]) -> BoolArray:
     """(N,) at which steps errors count."""
     counted = trace["t_s"] > settle_s
-    if "localized" in trace:
-        counted &= trace["localized"] > 0.5
+    counted &= claimed_at(trace)
     return np.asarray(counted, dtype=np.bool_)
 
 
@@ -157,7 +163,7 @@ def _recovery(
     trace, known = robot.trace, robot.stack.initial.known
     if "localized" not in trace:
         return {}
-    claimed, dt_s = trace["localized"] > 0.5, run.mission.run.dt_s
+    claimed, dt_s = claimed_at(trace), run.mission.run.dt_s
     error = estimate - truth
     wrong = np.hypot(error[:, 0], error[:, 1]) > WRONG_M
     wrong |= np.abs(wrap_array_to_pi(error[:, 2])) > WRONG_RAD

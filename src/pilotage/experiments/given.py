@@ -23,6 +23,8 @@ def has(mission: Mission) -> frozenset[str]:
     over_cells = any(stack.navigator.name == "curve" for stack in stacks)
     if mission.task.name != "plan" or over_cells:
         found.add("clearance")  # of what is driven, or of a path over cells
+    if mission.task.name == "explore" and any(stack.navigator.name == "floor-frontier" for stack in stacks):
+        found.add("unknown-floor")
     if mission.world.people:
         found.add("people")
     if mission.task.parameters.get("goals"):

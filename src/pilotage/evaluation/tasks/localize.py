@@ -6,7 +6,7 @@ import numpy as np
 
 from pilotage.core.angles import wrap_array_to_pi
 from pilotage.core.config import Config
-from pilotage.evaluation.driving import WRONG_M, WRONG_RAD, driving_metrics, header, poses
+from pilotage.evaluation.driving import WRONG_M, WRONG_RAD, claimed_at, driving_metrics, header, poses
 from pilotage.evaluation.finished import FinishedRun, RobotRun, Verdict
 from pilotage.evaluation.tasks.task import TASKS, TaskSetting
 from pilotage.evaluation.tasks.watched import WatchedTask
@@ -43,8 +43,7 @@ class LocalizeTask(WatchedTask):
             error = poses(trace, "est") - poses(trace, "true")
             right = np.hypot(error[:, 0], error[:, 1]) <= self._config.tolerance_m
             right &= np.abs(wrap_array_to_pi(error[:, 2])) <= self._config.tolerance_rad
-            if "localized" in trace:
-                right &= trace["localized"] > 0.5
+            right &= claimed_at(trace)
         since = len(right) - int(np.argmin(right[::-1])) if not right.all() else 0
         knows = bool(right.size and right[-1])
         if knows:

@@ -19,6 +19,7 @@ from pilotage.sensors.infrared import InfraredConfig
 from pilotage.sensors.lidar import LidarConfig
 from pilotage.sensors.line_sensor import LineSensorConfig
 from pilotage.sensors.magnetometer import MagnetometerConfig
+from pilotage.sensors.radio import RadioConfig
 from pilotage.sensors.sensor import SensorConfig
 from pilotage.sensors.ultrasonic import UltrasonicConfig
 from pilotage.sensors.wheel_encoders import WheelEncodersConfig
@@ -38,6 +39,7 @@ FAULTS: Mapping[type[SensorConfig], Mapping[str, Any]] = {
     },
     BeaconConfig: {"range_var_m2": 0.0, "bearing_var_rad2": 0.0, "bearing_offset_rad": 0.0},
     LidarConfig: {"range_var_m2": 0.0},
+    RadioConfig: {"loss": 0.0, "delay_s": 0.0},
     UltrasonicConfig: {"range_var_m2": 0.0},
     WheelEncodersConfig: {},
     GyroscopeConfig: {
