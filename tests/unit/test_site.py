@@ -93,7 +93,7 @@ def test_the_gallery_shows_shipped_missions(maker: ModuleType) -> None:
 
 @pytest.mark.parametrize("path", sorted((DOCS / "notebooks").glob("*.ipynb")), ids=lambda path: path.stem)
 def test_notebooks_are_stored_without_outputs(path: Path) -> None:
-    """They are executed by ``make docs``, which CI runs; here they are looked at."""
+    """They are executed by ``make docs``; here they are looked at."""
     book = json.loads(path.read_text(encoding="utf-8"))
     assert "".join(book["cells"][0]["source"]).startswith("# ")
     for cell in book["cells"]:
