@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import os
+import sys
+from collections.abc import Iterator
 
+import pytest
 from hypothesis import settings
 
 # No test opens a window, and figures look the same on every machine.
@@ -12,3 +15,20 @@ os.environ["MPLBACKEND"] = "Agg"
 # Drawn examples are the same at every run and for every worker; compiling a kernel may take its time.
 settings.register_profile("pilotage", derandomize=True, deadline=None)
 settings.load_profile("pilotage")
+
+
+@pytest.fixture(autouse=True)
+def _registered_for_one_test_only() -> Iterator[None]:
+    """What a test brings in by a plugin leaves with it: other tests look at all that is registered."""
+    roles = sys.modules.get("pilotage.experiments.roles")
+    registries = [] if roles is None else list(roles.ROLES.values())
+    before = [set(registry._entries) for registry in registries]
+    yield
+    if roles is None:
+        roles = sys.modules.get("pilotage.experiments.roles")
+        registries = [] if roles is None else list(roles.ROLES.values())
+        before = [set() for _ in registries]
+    for registry, names in zip(registries, before, strict=True):
+        for name in set(registry._entries) - names:
+            if not registry._entries[name].factory.__module__.startswith("pilotage."):
+                del registry._entries[name]

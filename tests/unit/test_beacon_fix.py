@@ -79,6 +79,9 @@ def test_a_start_four_sigma_off_is_mended(name: str) -> None:
     # Seed 302 draws a heading 4.1 standard deviations off: every beacon is gated away.
     overrides = [f"stack.localizer.name={name}", "run.time_limit_s=5"]
     assert last_error_m("museum-2", overrides, 302) < 0.05
+    # Driven by the truth: a robot that says that it is lost would stand and look around instead.
+    never = [*overrides, "run.oracles=[driver]", "stack.localizer.doubt_after=null"]
+    assert last_error_m("museum-2", never, 302) > 0.5
 
 
 def test_a_carried_robot_finds_itself_by_its_beacons() -> None:

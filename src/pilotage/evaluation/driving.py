@@ -95,7 +95,7 @@ def driving_metrics(run: FinishedRun, robot: RobotRun) -> tuple[dict[str, object
     metrics["silently_wrong_s"] = longest_outside_s(
         trace["t_s"], truth, estimate, covariances(trace), claimed
     )
-    return metrics | _recovery(run, robot, truth, estimate, values), values
+    return metrics | _recovery(run, robot, truth, estimate), values
 
 
 def shortest_for(run: FinishedRun, robot: RobotRun) -> ShortestPath | None:
@@ -157,7 +157,7 @@ def _consistency(
 
 
 def _recovery(
-    run: FinishedRun, robot: RobotRun, truth: FloatArray, estimate: FloatArray, values: FloatArray
+    run: FinishedRun, robot: RobotRun, truth: FloatArray, estimate: FloatArray
 ) -> dict[str, object]:
     """How long a robot that can be lost was lost, and how long it was wrong without knowing."""
     trace, known = robot.trace, robot.stack.initial.known
@@ -167,8 +167,6 @@ def _recovery(
     error = estimate - truth
     wrong = np.hypot(error[:, 0], error[:, 1]) > WRONG_M
     wrong |= np.abs(wrap_array_to_pi(error[:, 2])) > WRONG_RAD
-    # Far off and honest about it is not unawares; a singular covariance is.
-    wrong &= ~(values <= chi_square_quantile(SURE, 3))
     # One that never says so although it is wrong is the worst case of all.
     wrong_for_good = wrong & (trace["t_s"] > run.mission.run.settle_s)
     if claimed.all() and known and not wrong_for_good.any():
