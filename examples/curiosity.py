@@ -39,9 +39,9 @@ def load(folder: Path) -> tuple[ElevationModel, FloatArray, float]:
     return elevation, driven, float(traverse["totalMetres"])
 
 
-def told(name: str, way_m: FloatArray, ground: ElevationModel) -> Relief:
-    """Length, climb and steepest slope, every 100 m on the same elevation for both ways."""
-    profile = relief(ground, way_m, 100.0)
+def told(name: str, path_m: FloatArray, ground: ElevationModel) -> Relief:
+    """Length, climb and steepest slope, every 100 m on the same elevation for both paths."""
+    profile = relief(ground, path_m, 100.0)
     steepest = np.rad2deg(profile.steepest_rad)
     climbs = f"climbs {profile.climb_m:4.0f} m"
     print(f"{name:8s} {profile.s_m[-1] / 1000.0:5.1f} km, {climbs}, steepest {steepest:4.1f} deg")
@@ -58,8 +58,8 @@ space = GridSpace(grid.blocked(), ground.cost_factors(SLOPE_THAT_DOUBLES_DEG))
 path = space.shortest(grid.cell_at(*driven[0]), grid.cell_at(*driven[-1]))
 assert path is not None
 planned = np.concatenate([driven[:1], grid.centres_m(path.cells)[1:-1], driven[-1:]])
-ways = {"driven": (driven, "tab:orange"), "planned": (planned, "tab:blue")}
-profiles = {name: told(name, way_m, ground) for name, (way_m, _) in ways.items()}
+paths = {"driven": (driven, "tab:orange"), "planned": (planned, "tab:blue")}
+profiles = {name: told(name, path_m, ground) for name, (path_m, _) in paths.items()}
 print(f"The rover's odometer says {odometer_m / 1000.0:.1f} km: it turned and slipped between its stops.")
 
 figure, (axes, along) = plt.subplots(1, 2, figsize=(11, 8), width_ratios=(3, 2), layout="constrained")
@@ -76,9 +76,9 @@ x, y = (np.linspace(extent[k], extent[k + 1], n) for k, n in ((0, grid.columns),
 axes.contour(
     x, y[::-1], ground.elevation_m, np.arange(-5000, 3000, 100), colors="k", linewidths=0.3, alpha=0.5
 )
-for name, (way_m, colour) in ways.items():
-    axes.plot(*(way_m.T / 1000.0), color="white", linewidth=3.5)
-    axes.plot(*(way_m.T / 1000.0), color=colour, linewidth=1.8, label=name)
+for name, (path_m, colour) in paths.items():
+    axes.plot(*(path_m.T / 1000.0), color="white", linewidth=3.5)
+    axes.plot(*(path_m.T / 1000.0), color=colour, linewidth=1.8, label=name)
     along.plot(profiles[name].s_m / 1000.0, profiles[name].elevation_m, color=colour, label=name)
 for place, name in ((driven[0], "Bradbury Landing"), (driven[-1], "today")):
     axes.plot(*(place / 1000.0), "o", color="black", markeredgecolor="white")
@@ -92,7 +92,7 @@ for place, name in ((driven[0], "Bradbury Landing"), (driven[-1], "today")):
 axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), xlabel="east, km", ylabel="north, km")
 axes.set_title("Gale Crater by MOLA; contours every 100 m")
 figure.colorbar(heights, ax=axes, label="height, m", shrink=0.7)
-along.set(xlabel="distance along the way, km", ylabel="height, m", title="Heights along both ways")
+along.set(xlabel="distance along the way, km", ylabel="height, m", title="Heights along both paths")
 along.legend()
 along.grid(alpha=0.3)
 figure.savefig("curiosity.png", dpi=120)

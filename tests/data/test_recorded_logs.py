@@ -17,7 +17,7 @@ def test_the_night_watch_logs_were_reset_before_every_row(name: str) -> None:
     steps = read_odometry_csv(recording(f"apolo_odometry/{name}.csv"))
     assert steps.form is OdometryForm.RESET
     assert len(steps) == 500
-    moved = steps.turn_rad if name == "theta" else steps.way_m
+    moved = steps.turn_rad if name == "theta" else steps.arc_m
     np.testing.assert_allclose(moved, 0.1, atol=1e-8)
 
 

@@ -8,17 +8,17 @@ from pilotage.core.types import FloatArray
 from pilotage.logs.odometry_steps import OdometryForm, OdometrySteps, arc_ends
 
 
-def drive(way_m: FloatArray, turn_rad: FloatArray, heading_rad: float = 0.0) -> tuple[FloatArray, FloatArray]:
+def drive(arc_m: FloatArray, turn_rad: FloatArray, heading_rad: float = 0.0) -> tuple[FloatArray, FloatArray]:
     """True poses (N, 3) before and after each step."""
-    poses = np.zeros((way_m.shape[0] + 1, 3))
+    poses = np.zeros((arc_m.shape[0] + 1, 3))
     poses[0, 2] = heading_rad
-    for i in range(way_m.shape[0]):
-        poses[i + 1] = arc_ends(poses[i : i + 1], way_m[i : i + 1], turn_rad[i : i + 1])[0]
+    for i in range(arc_m.shape[0]):
+        poses[i + 1] = arc_ends(poses[i : i + 1], arc_m[i : i + 1], turn_rad[i : i + 1])[0]
     return poses[:-1], poses[1:]
 
 
 def log(
-    way_m: FloatArray,
+    arc_m: FloatArray,
     turn_rad: FloatArray,
     distance_error_m: FloatArray,
     angle_error_rad: FloatArray,
@@ -27,10 +27,10 @@ def log(
     heading_rad: float = 0.0,
 ) -> OdometrySteps:
     """A log whose odometry errs by so much in each step."""
-    start, truth = drive(way_m, turn_rad, heading_rad)
-    claimed = arc_ends(start, way_m + distance_error_m, turn_rad + angle_error_rad)
+    start, truth = drive(arc_m, turn_rad, heading_rad)
+    claimed = arc_ends(start, arc_m + distance_error_m, turn_rad + angle_error_rad)
     return OdometrySteps(
-        name, OdometryForm.INCREMENTS, 0.1 * np.arange(1, way_m.shape[0] + 1), start, truth, claimed
+        name, OdometryForm.INCREMENTS, 0.1 * np.arange(1, arc_m.shape[0] + 1), start, truth, claimed
     )
 
 

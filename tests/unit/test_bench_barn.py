@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from pilotage.cli.main import main
-from pilotage.experiments.barn_ways import has_way
+from pilotage.experiments.barn_bounds import has_way
 from pilotage.logs.barn import START, BarnWorld, path_clearance_m
 
 KEYS = {"metric", "success", "collision", "timeout", "time_s", "trials", "worlds"}

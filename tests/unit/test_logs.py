@@ -38,7 +38,7 @@ def test_odometry_that_was_reset_keeps_every_row(tmp_path: Path) -> None:
     steps = read_odometry_csv(write_csv(tmp_path / "x.csv", COLUMNS, odometry_rows()))
     assert steps.form is OdometryForm.RESET
     assert len(steps) == 20
-    np.testing.assert_allclose(steps.way_m, 0.1)
+    np.testing.assert_allclose(steps.arc_m, 0.1)
     np.testing.assert_allclose(arc_lengths(steps.start, steps.claimed) - 0.1, 0.01 * (-1.0) ** np.arange(20))
 
 
@@ -56,7 +56,7 @@ def test_odometry_that_was_never_reset_is_recognized(tmp_path: Path) -> None:
 def test_columns_may_stand_in_any_order(tmp_path: Path) -> None:
     order = tuple(reversed(COLUMNS))
     rows = [list(reversed(row)) for row in odometry_rows()]
-    np.testing.assert_allclose(read_odometry_csv(write_csv(tmp_path / "x.csv", order, rows)).way_m, 0.1)
+    np.testing.assert_allclose(read_odometry_csv(write_csv(tmp_path / "x.csv", order, rows)).arc_m, 0.1)
 
 
 def spoil_nan(rows: list[list[float]]) -> None:
@@ -139,7 +139,7 @@ def test_a_run_folder_gives_the_motion_between_its_readings(tmp_path: Path) -> N
     )
     steps = read_run_odometry(folder)
     assert len(steps) == 4
-    np.testing.assert_allclose(steps.way_m, 0.2)
+    np.testing.assert_allclose(steps.arc_m, 0.2)
     np.testing.assert_allclose(steps.claimed[:, 0] - steps.start[:, 0], 0.21)
 
 

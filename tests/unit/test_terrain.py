@@ -209,8 +209,8 @@ class TestCraterTerrain:
         assert 20.0 < away_m.min() < 100.0
         second = space.shortest(cells[1], cells[2])
         assert second is not None
-        for way_m in (first, grid.centres_m(second.cells[::5])):
-            assert stretches_without(terrain.landmarks.points_xy_m, way_m) >= 3
+        for path_m in (first, grid.centres_m(second.cells[::5])):
+            assert stretches_without(terrain.landmarks.points_xy_m, path_m) >= 3
 
 
 def along(corners_m: FloatArray) -> FloatArray:
@@ -219,10 +219,10 @@ def along(corners_m: FloatArray) -> FloatArray:
     return np.asarray(CubicSpline(s, corners_m)(np.linspace(0.0, s[-1], 120 * len(s))))
 
 
-def stretches_without(marks_m: FloatArray, way_m: FloatArray) -> int:
+def stretches_without(marks_m: FloatArray, path_m: FloatArray) -> int:
     """How many stretches of over 1 km have no landmark within 500 m."""
-    away_m = np.hypot(*(way_m[:, None] - marks_m[None]).transpose(2, 0, 1)).min(axis=1)
-    s_m = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(way_m, axis=0).T))])
+    away_m = np.hypot(*(path_m[:, None] - marks_m[None]).transpose(2, 0, 1)).min(axis=1)
+    s_m = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(path_m, axis=0).T))])
     seen_m = s_m[away_m < 500.0]
     return int(np.count_nonzero(np.diff(seen_m) > 1000.0))
 

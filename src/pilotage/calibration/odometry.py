@@ -137,7 +137,7 @@ def calibrate_odometry(logs: Sequence[OdometrySteps]) -> OdometryCalibration:
     if not any(log.distance_m.std() > NO_NOISE and log.angle_rad.std() > NO_NOISE for log in used):
         warnings.append("no log shows distance and angle errors at once: their covariance is zero in each")
     warnings += _offset_warnings(distance, angle)
-    moving = np.concatenate([np.abs(log.steps.way_m[_moves(log.steps)]) for log in used])
+    moving = np.concatenate([np.abs(log.steps.arc_m[_moves(log.steps)]) for log in used])
     turning = np.concatenate([np.abs(log.steps.turn_rad[_turns(log.steps)]) for log in used])
     return OdometryCalibration(
         logs=errors,
@@ -162,7 +162,7 @@ def calibrate_odometry(logs: Sequence[OdometrySteps]) -> OdometryCalibration:
 
 
 def _moves(log: OdometrySteps) -> BoolArray:
-    return np.abs(log.way_m) > MOVES_M
+    return np.abs(log.arc_m) > MOVES_M
 
 
 def _turns(log: OdometrySteps) -> BoolArray:
@@ -183,7 +183,7 @@ def _log_errors(log: OdometrySteps, axis_rad: float | None, used: bool) -> LogEr
     else:
         step = log.claimed[:, :2] - log.start[:, :2]
         claimed = step @ np.array([np.cos(axis_rad), np.sin(axis_rad)])
-    distance = np.asarray(claimed - log.way_m)
+    distance = np.asarray(claimed - log.arc_m)
     angle = wrap_array_to_pi(log.claimed_turn_rad - log.turn_rad)
     return LogErrors(
         log,
@@ -201,20 +201,20 @@ def _distance_model(used: Sequence[LogErrors]) -> ErrorModel | None:
     seen = [log for log in used if log.distance_m.std() > NO_NOISE]
     if not seen:
         return None
-    way = np.concatenate([log.steps.way_m for log in seen])
+    arc = np.concatenate([log.steps.arc_m for log in seen])
     turn = np.concatenate([log.steps.turn_rad for log in seen])
-    X = np.column_stack([way, np.ones_like(way)])
-    return fit_error(_all(seen, "distance_m"), X, _motion(way, turn))
+    X = np.column_stack([arc, np.ones_like(arc)])
+    return fit_error(_all(seen, "distance_m"), X, _motion(arc, turn))
 
 
 def _angle_model(used: Sequence[LogErrors]) -> ErrorModel | None:
     seen = [log for log in used if log.angle_rad.std() > NO_NOISE]
     if not seen:
         return None
-    way = np.concatenate([log.steps.way_m for log in seen])
+    arc = np.concatenate([log.steps.arc_m for log in seen])
     turn = np.concatenate([log.steps.turn_rad for log in seen])
-    X = np.column_stack([turn, way, np.ones_like(way)])
-    return fit_error(_all(seen, "angle_rad"), X, _motion(turn, way))
+    X = np.column_stack([turn, arc, np.ones_like(arc)])
+    return fit_error(_all(seen, "angle_rad"), X, _motion(turn, arc))
 
 
 def _motion(first: FloatArray, second: FloatArray) -> FloatArray:
@@ -259,8 +259,8 @@ def _heading_offset(used: Sequence[LogErrors]) -> Estimate | None:
         steps, moves = log.steps, _moves(log.steps)
         step, middle = steps.claimed[:, :2] - steps.start[:, :2], steps.middle_heading_rad
         left = -step[:, 0] * np.sin(middle) + step[:, 1] * np.cos(middle)
-        left = left - 0.5 * steps.way_m * log.angle_rad  # an arc's chord turns by half of the turn's error
-        angles.append(left[moves] / steps.way_m[moves])
+        left = left - 0.5 * steps.arc_m * log.angle_rad  # an arc's chord turns by half of the turn's error
+        angles.append(left[moves] / steps.arc_m[moves])
     values = np.concatenate([np.zeros(0), *angles])
     return mean_estimate(values) if values.size > 2 and values.std() > 1e-7 else None
 

@@ -7,9 +7,8 @@ from collections.abc import Mapping
 import numpy as np
 
 from pilotage.core.angles import wrap_array_to_pi
-from pilotage.core.chi_square import chi_square_quantile
 from pilotage.core.types import BoolArray, FloatArray
-from pilotage.evaluation.consistency import SURE, longest_outside_s, nees, nees_metrics, nis_metrics
+from pilotage.evaluation.consistency import longest_outside_s, nees, nees_metrics, nis_metrics
 from pilotage.evaluation.finished import FinishedRun, RobotRun
 from pilotage.evaluation.plan_quality import clearance_m, smoothness
 from pilotage.evaluation.pose_errors import pose_errors

@@ -68,7 +68,7 @@ class OdometrySteps:
         return np.asarray(self.start[:, 2] + 0.5 * self.turn_rad)
 
     @property
-    def way_m(self) -> FloatArray:
+    def arc_m(self) -> FloatArray:
         """(N,) true distance along the arc, negative backwards."""
         return arc_lengths(self.start, self.truth)
 
@@ -85,10 +85,10 @@ def arc_lengths(start: FloatArray, end: FloatArray) -> FloatArray:
     return np.asarray(chord / np.sinc(turn / (2.0 * np.pi)))
 
 
-def arc_ends(start: FloatArray, way_m: FloatArray, turn_rad: FloatArray) -> FloatArray:
-    """Poses (N, 3) after driving arcs of ``way_m`` (N,) that turn by ``turn_rad`` (N,) from ``start``."""
+def arc_ends(start: FloatArray, arc_m: FloatArray, turn_rad: FloatArray) -> FloatArray:
+    """Poses (N, 3) after driving arcs of ``arc_m`` (N,) that turn by ``turn_rad`` (N,) from ``start``."""
     middle = start[:, 2] + 0.5 * turn_rad
-    chord = way_m * np.sinc(turn_rad / (2.0 * np.pi))
+    chord = arc_m * np.sinc(turn_rad / (2.0 * np.pi))
     return np.column_stack(
         [
             start[:, 0] + chord * np.cos(middle),

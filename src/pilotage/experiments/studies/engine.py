@@ -81,7 +81,7 @@ def run_study(
         Passed on, with all finished rows written and the claims given back.
     """
     options, listener = options or StudyOptions(), listener or Listener()
-    check_metric_names(study)
+    check_asked(study)
     if options.resume and not folder.is_dir():
         raise InputError(f"{folder}: expected a study that was begun, found none; leave --resume out")
     if not (folder / DATABASE).is_file():
@@ -208,7 +208,7 @@ def _undisturbed() -> Iterator[None]:
         signal.signal(signal.SIGINT, before)
 
 
-def check_metric_names(study: Study) -> None:
+def check_asked(study: Study) -> None:
     """Refuse a metric that no trial of the study can give.
 
     Raises

@@ -40,7 +40,7 @@ MOST = 3
 PATH_S = 30.0
 _LEFT_PT, _RIGHT_PT, _TOP_PT, _BOTTOM_PT, _GAP_PT = 24.0, 4.0, 20.0, 22.0, 28.0
 # What went wrong is worth more than what went well.
-_TELLING = ("collision", "failed", "stuck", "escape", "avoid-start", "replan", "hall")
+_SHOWN_EVENTS = ("collision", "failed", "stuck", "escape", "avoid-start", "replan", "hall")
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,7 +100,7 @@ def _moments(run: RunData, path: FloatArray) -> list[Moment]:
     trace = run.trace
     found: list[Moment] = []
     kinds = {event.kind for event in run.events}
-    telling = next((kind for kind in _TELLING if kind in kinds), None)
+    telling = next((kind for kind in _SHOWN_EVENTS if kind in kinds), None)
     for number, event in enumerate(run.events, start=1):
         if event.kind == telling and math.isfinite(event.t_s):
             step = min(int(np.searchsorted(trace.t_s, event.t_s)), trace.steps - 1)
