@@ -11,12 +11,36 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from pilotage.core.errors import InputError
+from pilotage.core.types import FloatArray
 from pilotage.experiments.build.build import build
 from pilotage.experiments.loop import run_loop
 from pilotage.experiments.mission import load_mission, mission_of, read_mission
 from pilotage.kernels.control import eikonal, voronoi_window
 
 NOBODY = np.zeros((0, 2))
+
+REACTION, BRAKING = 0.25, 2.0
+NO_MAP = np.zeros((1, 1))
+
+
+def stops(
+    v: float,
+    w: float,
+    near: FloatArray,
+    strange: FloatArray,
+    *,
+    turning: float | None = None,
+    known: FloatArray = NO_MAP,
+) -> bool:
+    """Whether one that drives at v, and turns at w or at another rate yet, may be told (v, w)."""
+    limits = np.array([1.5, 2.0, BRAKING, 2.0, 8.0, 0.2])
+    safety = np.array([REACTION, 0.3, 0.04, 0.1])
+    now = w if turning is None else turning
+    return bool(
+        voronoi_window.stop_is_clear(
+            v, now, v, w, limits, safety, near, strange, np.zeros(3), known, -2.0, -2.0, 0.1
+        )
+    )
 
 
 def corridor(width_m: float, size: int, duration_s: float, **team: Any) -> dict[str, Any]:
@@ -92,24 +116,41 @@ class TestStopping:
         self, gap: float, bearing: float, first: float, second: float
     ) -> None:
         """Each knows only where the other's surface is, and drives straight at it as fast as it may."""
-        radius, reaction, braking = 0.3, 0.25, 2.0
-        away = gap + radius  # from an axle to the other's nearest point
+        away = gap + 0.3  # from an axle to the other's nearest point
         seen = away * np.array([[math.cos(bearing), math.sin(bearing)]])
         come = 0.0
         for speed in (first, second):
-            clear = voronoi_window.stop_is_clear(
-                speed, 0.0, reaction, braking, radius, 0.04, NOBODY, seen, 0.1
-            )
-            if clear:
-                come += max(0.0, (speed * reaction + 0.5 * speed**2 / braking) * math.cos(bearing))
+            if stops(speed, 0.0, NOBODY, seen):
+                come += max(0.0, (speed * REACTION + 0.5 * speed**2 / BRAKING) * math.cos(bearing))
         assert come <= max(gap - 0.1, 0.0) + 1e-3
 
     def test_turning_on_the_spot_is_free_and_backing_off_is(self) -> None:
         touching = np.array([[0.31, 0.0]])
-        assert voronoi_window.stop_is_clear(0.0, 2.0, 0.25, 2.0, 0.3, 0.04, touching, touching, 0.1)
-        assert not voronoi_window.stop_is_clear(0.2, 0.0, 0.25, 2.0, 0.3, 0.04, touching, NOBODY, 0.1)
-        assert not voronoi_window.stop_is_clear(0.2, 0.0, 0.25, 2.0, 0.3, 0.04, NOBODY, touching, 0.1)
-        assert voronoi_window.stop_is_clear(-0.2, 0.0, 0.25, 2.0, 0.3, 0.04, touching, touching, 0.1)
+        assert stops(0.0, 2.0, touching, touching)
+        assert not stops(0.2, 0.0, touching, NOBODY)
+        assert not stops(0.2, 0.0, NOBODY, touching)
+        assert stops(-0.2, 0.0, touching, touching)
+
+    def test_who_is_nearer_than_the_margin_may_slide_along_a_wall_and_not_come_nearer(self) -> None:
+        wall = np.column_stack([np.linspace(-1.0, 1.0, 81), np.full(81, 0.32)])
+        assert stops(0.5, 0.0, wall, NOBODY)
+        assert not stops(0.5, 0.3, wall, NOBODY)
+        assert stops(0.5, -0.3, wall, NOBODY)
+
+    def test_what_the_ramp_of_the_turn_rate_sweeps_counts(self) -> None:
+        """From a hard turn to the right, told to go straight, it still comes further to the right."""
+        beside = np.array([[0.45, -0.39]])
+        assert stops(1.0, 0.0, beside, NOBODY)
+        assert not stops(1.0, 0.0, beside, NOBODY, turning=-2.0)
+
+    @pytest.mark.parametrize(("y_m", "clear"), [(0.5, True), (0.33, False)])
+    def test_a_wall_seen_end_on_is_known_from_the_map(self, y_m: float, clear: bool) -> None:
+        """A wall of no width, from (0.4, y) to the right, returns nothing to who looks along it."""
+        rows, columns = np.mgrid[:41, :41]
+        x, y = 0.1 * columns - 2.0, 0.1 * rows - 2.0
+        field = np.hypot(np.minimum(x - 0.4, 0.0), y - y_m)
+        assert stops(1.0, 0.0, NOBODY, NOBODY)
+        assert stops(1.0, 0.0, NOBODY, NOBODY, known=field) is clear
 
 
 class TestPassages:
@@ -138,7 +179,7 @@ class TestMuseum:
         metrics = runs[0][1]
         assert metrics["success"], metrics["reason"]
         assert metrics["team_size"] == 8
-        assert metrics["strategy"] == "cyclic"
+        assert metrics["strategy"] == "adaptive-rounds"
         assert 0.0 < float(str(metrics["idleness_mean_s"])) < float(str(metrics["idleness_worst_s"])) <= 40.0
         assert 0.9 < float(str(metrics["coverage_fraction"])) <= 1.0
         for one, other in zip(runs[0][0].robots, runs[1][0].robots, strict=True):

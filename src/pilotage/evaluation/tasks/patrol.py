@@ -44,7 +44,8 @@ class PatrolConfig(Config):
     visit_m: Positive = 1.0
     """A place is visited by a robot whose centre is this near."""
     stuck_s: Positive = 60.0
-    """A robot on duty that stays within a metre for longer, though nothing told it to wait, is deadlocked."""
+    """A robot on duty that stays within a metre for longer is deadlocked: if nothing told it to wait, and it
+    does not go from one place to visit to another there."""
     warm_s: NonNegative = 300.0
     """Idleness and coverage count from then on, or from a quarter of the duration if that is earlier."""
     window_s: Positive = 60.0
@@ -86,6 +87,7 @@ class PatrolTask:
         self._step = 0
         self._contacts = [0] * len(self._names)
         self._anchors = [(math.nan, math.nan, 0.0)] * len(self._names)
+        self._places = [-1] * len(self._names)
         self.deadlocks: dict[int, float] = {}
         self._series: list[tuple[float, float, float]] = []
 
@@ -134,6 +136,10 @@ class PatrolTask:
         x, y = attempt.body.state[:2].tolist()
         ax, ay, since_s = self._anchors[index]
         excused = attempt.body.stopped or bool(attempt.stack.status[1])
+        place = self._visits.nearest(x, y)
+        if place != self._places[index]:
+            # Rounds may be shorter than a metre.
+            excused, self._places[index] = True, place
         if excused or not math.hypot(x - ax, y - ay) <= STUCK_M:
             self._anchors[index] = x, y, t_s
         elif t_s - since_s > self._config.stuck_s and index not in self.deadlocks:

@@ -12,7 +12,8 @@ from pilotage.kernels.geometry.field import interpolate_at
 from pilotage.kernels.geometry.motion import exact_arc, wrap
 from pilotage.kernels.jit import kernel
 
-ARC_STEP_M = 0.08
+ROLL_S, LOOK_M, MOST_STEPS = 0.05, 0.05, 200
+"""A command is followed in steps of time, and looked at after so many metres; braking takes 10 s at most."""
 FREE, HELD = 0, 1
 
 
@@ -85,43 +86,79 @@ def scan_returns(
 
 @kernel
 def stop_is_clear(
+    v0: float,
+    w0: float,
     v: float,
     w: float,
-    reaction_s: float,
-    deceleration: float,
-    radius: float,
-    margin: float,
+    limits: FloatArray,
+    safety: FloatArray,
     near: FloatArray,
     strange: FloatArray,
-    gap: float,
+    pose: FloatArray,
+    known: FloatArray,
+    known_x0: float,
+    known_y0: float,
+    resolution: float,
 ) -> bool:
-    """Whether a disc that goes on for ``reaction_s`` and then brakes comes to rest clear of everything.
+    """Whether a disc told (v, w), and to stop after its reaction time, comes to rest clear of everything.
 
-    From returns of what stands it keeps ``margin``; of what may move, the half of the distance between both
-    that is its own, less half of ``gap`` (the buffered Voronoi cell of Zhou et al. 2017, with distances to
-    what is seen instead of to middles): two that both do so never touch, whatever each of them decides.
-    Where it is nearer than that already it may move only away. Turning on the spot is always free.
+    Its speeds follow what it is told as fast as its limits let them, so whoever asks this of every command
+    can always stop by the last of them. From returns of what stands it keeps the margin; of what may move,
+    the half of the distance between both that is its own, less half of the gap (the buffered Voronoi cell
+    of Zhou et al. 2017, with distances to what is seen instead of to middles): two that both do so never
+    touch, whatever each of them decides. Where it is nearer than that already it may move only away.
+    Turning on the spot is always free.
 
     Parameters
     ----------
+    v0, w0
+        What it has now.
+    limits
+        Top speed, acceleration, deceleration, top turn rate, turn acceleration, period of the decision.
+    safety
+        Reaction time, radius, margin, gap.
     near, strange
         (K, 2) and (M, 2) returns, base frame; the latter of what may move.
+    pose, known
+        Where it is on its map, and the map's distance field: a thin wall seen end on returns nothing. (1, 1)
+        for a robot that does not know where it is.
     """
-    length = abs(v) * reaction_s + 0.5 * v * v / deceleration
-    if length < 1e-4:
-        return True
-    turned = length * w / v if abs(v) > 1e-6 else 0.0
-    if v < 0.0:
-        length = -length
-    steps = max(1, math.ceil(abs(length) / ARC_STEP_M))
+    acceleration, deceleration, turning = limits[1], limits[2], limits[4]
+    reaction, radius, margin, gap = safety[0], safety[1], safety[2], safety[3]
+    # Who is nearer than the margin already may slide along, and come no nearer.
     apart = (radius + margin) * (radius + margin)
-    for k in range(1, steps + 1):
-        x, y, _ = exact_arc(0.0, 0.0, 0.0, length * k / steps, turned * k / steps)
+    for i in range(near.shape[0]):
+        apart = min(apart, near[i, 0] * near[i, 0] + near[i, 1] * near[i, 1])
+    clearance = np.inf
+    if known.shape[0] > 1:
+        here = interpolate_at(pose[0], pose[1], known, known_x0, known_y0, resolution)
+        clearance = min(radius + margin, here) - 1e-3
+    cp, sp = math.cos(pose[2]), math.sin(pose[2])
+    x = y = theta = since = 0.0
+    told = max(1, round(reaction / ROLL_S))
+    steps = told + min(MOST_STEPS, math.ceil(max(abs(v0), abs(v)) / (deceleration * ROLL_S)))
+    for k in range(steps + 1):
+        if k < told:
+            faster = acceleration if v * v0 >= 0.0 and abs(v) > abs(v0) else deceleration
+            new_v, new_w = toward(v0, v, faster * ROLL_S), toward(w0, w, turning * ROLL_S)
+        else:
+            new_v, new_w = toward(v0, 0.0, deceleration * ROLL_S), toward(w0, 0.0, turning * ROLL_S)
+        length, middle = 0.5 * (v0 + new_v) * ROLL_S, theta + 0.25 * (w0 + new_w) * ROLL_S
+        x += length * math.cos(middle)
+        y += length * math.sin(middle)
+        theta += 0.5 * (w0 + new_w) * ROLL_S
+        v0, w0 = new_v, new_w
+        since += abs(length)
+        if since < (LOOK_M if k < steps and v0 != 0.0 else 1e-4):
+            continue
+        since = 0.0
+        if clearance < np.inf:
+            mx, my = pose[0] + cp * x - sp * y, pose[1] + sp * x + cp * y
+            if interpolate_at(mx, my, known, known_x0, known_y0, resolution) < clearance:
+                return False
         for i in range(near.shape[0]):
             px, py = near[i, 0], near[i, 1]
-            squared = (px - x) * (px - x) + (py - y) * (py - y)
-            # Nearer than the margin, and nearer than where it stands.
-            if squared < apart and squared < px * px + py * py - 1e-5:
+            if (px - x) * (px - x) + (py - y) * (py - y) < apart - 1e-5:
                 return False
         for i in range(strange.shape[0]):
             px, py = strange[i, 0], strange[i, 1]
@@ -129,6 +166,12 @@ def stop_is_clear(
             if (x * px + y * py) > away * (max(0.5 * (away - radius - gap), 0.0) + 1e-6):
                 return False
     return True
+
+
+@kernel
+def toward(current: float, wanted: float, change: float) -> float:
+    """What ``current`` becomes on its way to ``wanted``, by at most ``change``."""
+    return min(max(wanted, current - change), current + change)
 
 
 @kernel
@@ -156,6 +199,10 @@ def choose(
     x0: float,
     y0: float,
     spacing: float,
+    known: FloatArray,
+    known_x0: float,
+    known_y0: float,
+    resolution: float,
     lane_m: float,
     horizon_s: float,
     heading_cost: float,
@@ -174,6 +221,8 @@ def choose(
         Reaction time, radius, margin, gap; see ``stop_is_clear``.
     time
         Time to go (rows, columns), infinite where no place is.
+    known
+        As ``stop_is_clear``.
     lane_m
         The point so far to the left of the robot follows the field: the robot keeps to the right of it.
 
@@ -207,9 +256,8 @@ def choose(
         v = low_v + (high_v - low_v) * i / (speeds - 1)
         for j in range(turns):
             w = low_w + (high_w - low_w) * j / (turns - 1)
-            # Until it has come to v it drives on at what it has.
             if not stop_is_clear(
-                max(v, 0.5 * (v + v0)), w, reaction, deceleration, radius, margin, hard, moving, gap
+                v0, w0, v, w, limits, safety, hard, moving, pose, known, known_x0, known_y0, resolution
             ):
                 continue
             x, y, theta = exact_arc(0.0, 0.0, 0.0, v * horizon_s, w * horizon_s)

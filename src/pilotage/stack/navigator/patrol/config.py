@@ -38,9 +38,9 @@ class PatrolNavigatorConfig(Config):
 
     spacing_m: Positive = 0.15
     """Of the nodes that the time to go is worked out on."""
-    plan_margin_m: NonNegative = 0.06
+    plan_margin_m: NonNegative = 0.08
     """Beyond the body, of the places that it plans through."""
-    margin_m: NonNegative = 0.04
+    margin_m: NonNegative = 0.06
     """Beyond the body, of where its braking ends."""
     gap_m: NonNegative = 0.10
     """What two that may move leave between them."""

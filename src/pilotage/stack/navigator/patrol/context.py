@@ -156,7 +156,6 @@ class Context:
         scan = readings.by_sensor.get(self._lidar)
         self.fresh = isinstance(scan, LidarScan)
         if isinstance(scan, LidarScan):
-            known = NO_FIELD if lost else self._known.distance_m
             spread_m = SIGMAS * math.sqrt(max(belief.cov[0, 0], belief.cov[1, 1]))
             self.near, self.strange = voronoi_window.scan_returns(
                 scan.ranges_m,
@@ -167,11 +166,14 @@ class Context:
                 self.config.look_m,
                 self.config.tolerance_m + spread_m,
                 SIGMAS * math.sqrt(belief.cov[2, 2]),
-                known,
-                *self._known.origin_xy_m,
-                self._known.resolution_m,
+                *self._field(lost=lost),
                 SECTORS,
             )
+
+    def _field(self, *, lost: bool) -> tuple[FloatArray, float, float, float]:
+        """Distances on its map, their origin and resolution; none where it does not know where it is."""
+        x0, y0 = self._known.origin_xy_m
+        return NO_FIELD if lost else self._known.distance_m, x0, y0, self._known.resolution_m
 
     def talk(self, *, lost: bool) -> None:
         """Broadcast, where it is time to."""
@@ -208,7 +210,9 @@ class Context:
         length_m = float(graph.shortest_m[at, target])
         self.memory.bound(target, self.t_s, self.t_s + length_m / max(self.memory.own.speed_m_s, 1e-3))
         if target == at:
-            return False
+            # It may have begun beside it, or made room for somebody.
+            self.hop = at
+            return self.away_m(at) > self.task.visit_m
         self.hop = int(graph.next_hop[at, target])
         return True
 
@@ -231,27 +235,36 @@ class Context:
         lane_m *= min(1.0, self.to_go_s / MERGE_S)
         self.blocked = False
         beside = voronoi_window.within(self.strange, self.config.watch_m)
-        if beside.shape[0]:
-            seen = self._on_map(beside)
+        seen = self._on_map(beside)
+        v, w, held = self._choose(time, seen, lane_m)
+        if held and lane_m > 0.0:
+            # Beside a corner the lane may lead into it; the middle does not.
+            v, w, held = self._choose(time, seen, 0.0)
+        self._command = Twist(v, w)
+        return self._command
+
+    def _choose(self, time: FloatArray, seen_xy_m: FloatArray, lane_m: float) -> tuple[float, float, bool]:
+        """Speed, turn rate, and whether it stays where it is: down a field, around what was seen (M, 2)."""
+        pose, window = self.pose, self.config.window
+        (x0, y0), spacing = self.roadmap.origin_xy_m, self.roadmap.spacing_m
+        if len(seen_xy_m):
             dx, dy = eikonal.descent(pose.x_m, pose.y_m, time, x0, y0, spacing)
-            # Who follows the field is the point to the left of the robot: so must be what it goes around.
-            seen += lane_m * np.array([-dy, dx])
             time, x0, y0, around_s = eikonal.detour(
                 time,
-                roadmap.slowness,
+                self.roadmap.slowness,
                 x0,
                 y0,
                 spacing,
                 pose.x_m,
                 pose.y_m,
                 self.config.watch_m,
-                seen,
+                # Who follows the field is the point to the left of the robot: so must be what it goes around.
+                seen_xy_m + lane_m * np.array([-dy, dx]),
                 self._clearance_m + 0.5 * self.config.gap_m,
                 DETOUR_SLACK_S,
             )
             self.blocked = not around_s < self.to_go_s + NO_DETOUR_S
-        window = self.config.window
-        v, w, _ = voronoi_window.choose(
+        v, w, status = voronoi_window.choose(
             self._twist.v_m_s,
             self._twist.w_rad_s,
             pose.as_array(),
@@ -263,6 +276,7 @@ class Context:
             x0,
             y0,
             spacing,
+            *self._field(lost=False),
             lane_m,
             window.horizon_s,
             window.heading_s_per_rad,
@@ -271,19 +285,25 @@ class Context:
             window.speeds,
             window.turns,
         )
-        self._command = Twist(v, w)
-        return self._command
+        return v, w, status == voronoi_window.HELD
 
     def careful(self, command: Twist) -> Twist:
         """A command slowed down until its braking ends clear of everything, all of which may move."""
         if not self.fresh:
             return self._command
-        reaction, radius, margin, gap = self._safety.tolist()
-        v = command.v_m_s
+        v, now = command.v_m_s, self._twist
         for _ in range(4):
-            faster = max(v, 0.5 * (v + self._twist.v_m_s))
             if voronoi_window.stop_is_clear(
-                faster, command.w_rad_s, reaction, self._limits[2], radius, margin, self.near, self.near, gap
+                now.v_m_s,
+                now.w_rad_s,
+                v,
+                command.w_rad_s,
+                self._limits,
+                self._safety,
+                self.near,
+                self.near,
+                self.pose.as_array(),
+                *self._field(lost=True),
             ):
                 break
             v *= 0.5
