@@ -461,6 +461,7 @@ EXAMPLES: dict[tuple[str, str], Example] = {
         people_walk, {"file": str(pathlib.Path(__file__).parent.parent / "support" / "walkers.txt")}
     ),
     ("people", "social-force"): Example(people_walk, {"count": 6}),
+    ("people", "intruder"): Example(people_walk, {"enters_from_s": 0.0, "enters_until_s": 0.5}),
     ("motion", "differential-drive"): Example(motion_moves),
     ("motion", "wheel-drive"): Example(motion_moves, {"max_wheel_speed_rad_s": 20.0}),
     ("motion", "bicycle"): Example(motion_moves, {"wheelbase_m": 0.5}),

@@ -59,7 +59,7 @@ def test_a_mission_resolves_to_a_file_that_loads_as_itself(tmp_path: Path) -> No
             assert again.stack.navigator.parameters["arrival_m"] == 0.15
         lidar = again.robot.sensors.get("lidar")
         if lidar is not None and lidar.name == "lidar":
-            beams = {"car-park": 720, "barn-course": 720, "museum-patrol": 240}
+            beams = {"car-park": 720, "barn-course": 720, "museum-patrol": 240, "museum-intruder": 240}
             assert lidar.parameters["beams"] == beams.get(name, 539)
 
 

@@ -28,17 +28,18 @@ def stops(
     w: float,
     near: FloatArray,
     strange: FloatArray,
+    people: FloatArray = NOBODY,
     *,
     turning: float | None = None,
     known: FloatArray = NO_MAP,
 ) -> bool:
     """Whether one that drives at v, and turns at w or at another rate yet, may be told (v, w)."""
     limits = np.array([1.5, 2.0, BRAKING, 2.0, 8.0, 0.2])
-    safety = np.array([REACTION, 0.3, 0.04, 0.1])
+    safety = np.array([REACTION, 0.3, 0.04, 0.1, 1.4])
     now = w if turning is None else turning
     return bool(
         voronoi_window.stop_is_clear(
-            v, now, v, w, limits, safety, near, strange, np.zeros(3), known, -2.0, -2.0, 0.1
+            v, now, v, w, limits, safety, near, strange, people, np.zeros(3), known, -2.0, -2.0, 0.1
         )
     )
 
@@ -166,6 +167,13 @@ class TestPassages:
         metrics = judged(corridor(1.5, 2, 90.0, failures=failures), seed=1)
         assert metrics["collisions"] == 0
         assert metrics["robots_failed"] == 1
+
+    def test_who_gives_way_to_nobody_has_all_the_room_he_may_take(self) -> None:
+        """Coming at 1.4 m/s while the robot stops from 1 m/s he takes 1 m; half of a mate's room is less."""
+        ahead = np.array([[1.8, 0.0]])
+        assert stops(1.0, 0.0, NOBODY, ahead)
+        assert not stops(1.0, 0.0, NOBODY, ahead, ahead)
+        assert stops(1.0, 0.0, NOBODY, 1.25 * ahead, 1.25 * ahead)
 
 
 class TestMuseum:

@@ -15,6 +15,7 @@ from pilotage.core.types import Event, FloatArray
 from pilotage.evaluation.driving import driving_metrics, header
 from pilotage.evaluation.finished import FinishedRun, RobotRun, Verdict
 from pilotage.evaluation.floor_ages import FloorAges
+from pilotage.evaluation.guard_log import GuardLog
 from pilotage.evaluation.patrol_visits import VisitLog
 from pilotage.evaluation.tasks.task import TASKS, Attempt, TaskSetting
 from pilotage.evaluation.tasks.team import verdict
@@ -84,6 +85,7 @@ class PatrolTask:
             max(1, round(VISITS_EVERY_S / dt_s)),
             max(1, round(LOOK_EVERY_S / dt_s)),
         )
+        self._guards = GuardLog(len(self._names))
         self._step = 0
         self._contacts = [0] * len(self._names)
         self._anchors = [(math.nan, math.nan, 0.0)] * len(self._names)
@@ -107,6 +109,7 @@ class PatrolTask:
             self._visits.add(t_s, places)
         if self._step % self._look_every == 0:
             self._look(t_s, attempts)
+        self._guards.step(t_s, attempts)
         for index, attempt in enumerate(attempts):
             if attempt.body.collisions > self._contacts[index]:
                 self._contacts[index] = attempt.body.collisions
@@ -182,6 +185,7 @@ class PatrolTask:
             "robots_failed": len(self._failed),
         }
         metrics["idleness_bound_s"] = idleness_bound_s(graph, len(run.robots), speed_m_s)
+        metrics |= self._guards.metrics(somebody=bool(run.mission.world.people))
         metrics |= self._floor.metrics(math.ceil(self._warm_s / LOOK_EVERY_S))
         return Verdict(metrics, judged.columns, {**judged.extras, **self._arrays(run)})
 

@@ -94,6 +94,7 @@ def stop_is_clear(
     safety: FloatArray,
     near: FloatArray,
     strange: FloatArray,
+    people: FloatArray,
     pose: FloatArray,
     known: FloatArray,
     known_x0: float,
@@ -116,9 +117,10 @@ def stop_is_clear(
     limits
         Top speed, acceleration, deceleration, top turn rate, turn acceleration, period of the decision.
     safety
-        Reaction time, radius, margin, gap.
-    near, strange
-        (K, 2) and (M, 2) returns, base frame; the latter of what may move.
+        Reaction time, radius, margin, gap, and the speed at which people may come.
+    near, strange, people
+        (K, 2), (M, 2) and (P, 2) returns, base frame; the second of what may move, the third of those who
+        give way to nobody: they may come on all the while.
     pose, known
         Where it is on its map, and the map's distance field: a thin wall seen end on returns nothing. (1, 1)
         for a robot that does not know where it is.
@@ -165,6 +167,12 @@ def stop_is_clear(
             away = math.sqrt(px * px + py * py)
             if (x * px + y * py) > away * (max(0.5 * (away - radius - gap), 0.0) + 1e-6):
                 return False
+        come = safety[4] * min(k + 1, steps) * ROLL_S
+        for i in range(people.shape[0]):
+            px, py = people[i, 0], people[i, 1]
+            away = math.sqrt(px * px + py * py)
+            if (x * px + y * py) > away * (max(away - radius - gap - come, 0.0) + 1e-6):
+                return False
     return True
 
 
@@ -195,6 +203,7 @@ def choose(
     safety: FloatArray,
     near: FloatArray,
     strange: FloatArray,
+    people: FloatArray,
     time: FloatArray,
     x0: float,
     y0: float,
@@ -217,8 +226,8 @@ def choose(
     ----------
     limits
         Top speed, acceleration, deceleration, top turn rate, turn acceleration, period of the decision.
-    safety
-        Reaction time, radius, margin, gap; see ``stop_is_clear``.
+    safety, near, strange, people
+        As ``stop_is_clear``.
     time
         Time to go (rows, columns), infinite where no place is.
     known
@@ -250,6 +259,7 @@ def choose(
     longest = high_v * reaction + 0.5 * high_v * high_v / deceleration
     hard = within(near, longest + radius + margin)
     moving = within(strange, 2.0 * longest + radius + gap)
+    coming = within(people, longest + radius + gap + safety[4] * (reaction + high_v / deceleration))
     beside = within(near, high_v * horizon_s + radius + soft_m)
     cp, sp = math.cos(pose[2]), math.sin(pose[2])
     for i in range(speeds):
@@ -257,7 +267,20 @@ def choose(
         for j in range(turns):
             w = low_w + (high_w - low_w) * j / (turns - 1)
             if not stop_is_clear(
-                v0, w0, v, w, limits, safety, hard, moving, pose, known, known_x0, known_y0, resolution
+                v0,
+                w0,
+                v,
+                w,
+                limits,
+                safety,
+                hard,
+                moving,
+                coming,
+                pose,
+                known,
+                known_x0,
+                known_y0,
+                resolution,
             ):
                 continue
             x, y, theta = exact_arc(0.0, 0.0, 0.0, v * horizon_s, w * horizon_s)

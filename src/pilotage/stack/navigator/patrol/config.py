@@ -9,6 +9,7 @@ from pydantic import Field
 from pilotage.core.config import Config
 from pilotage.sensors.sensor import NonNegative, Positive
 from pilotage.stack.control.wander import WanderConfig
+from pilotage.stack.patrol.watch import WatchConfig
 
 
 class Mode(IntEnum):
@@ -62,3 +63,4 @@ class PatrolNavigatorConfig(Config):
     """While it waits its strategy is asked so often."""
     window: WindowConfig = WindowConfig()
     wander: WanderConfig = WanderConfig()
+    watch: WatchConfig = WatchConfig()

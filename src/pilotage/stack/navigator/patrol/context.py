@@ -22,6 +22,7 @@ from pilotage.stack.navigator.patrol.config import Mode, PatrolNavigatorConfig
 from pilotage.stack.patrol.messages import PatrolMemory
 from pilotage.stack.patrol.roadmap import STEP_M, roadmap_of
 from pilotage.stack.patrol.task import PatrolTask
+from pilotage.stack.patrol.watch import IntruderWatch
 from pilotage.stack.patrol.word import TeamWord
 
 NO_FIELD: FloatArray = np.zeros((1, 1))
@@ -38,6 +39,8 @@ LANE_AHEAD_M, MERGE_S = 2.0, 1.0
 """A passage is as wide as its narrowest place so far ahead; the last part of a way leads to the middle."""
 RECEDES_M_S = 0.1
 """Who goes ahead through a passage at this speed is followed."""
+PEOPLE_M_S = 1.4
+"""Who is no mate may come on at a walk, and gives way to nobody."""
 SPEED_SHARE = 0.2
 """Weight of the newest edge in the speed made good."""
 
@@ -80,6 +83,10 @@ class Context:
         The vertex that it drives to now, the one that the strategy named, and the one that it was at last.
     near, strange
         (K, 2) and (M, 2) returns of the last scan, base frame: what is near, and what is on no map.
+    people
+        (P, 2) those of ``strange`` that are of no mate.
+    alarm
+        When and where it last saw an intruder; NaN before.
     mates
         The last word of each team mate that was heard, by number, and when it was sent.
     """
@@ -110,7 +117,7 @@ class Context:
         turn_rate = motion.top_turn_rate_rad_s
         turning = min(motion.turn_acceleration_rad_s2, turn_rate / robot.dt_s)
         self._limits = np.array([speed, braking, braking, turn_rate, turning, period_s])
-        self._safety = np.array([period_s + LATENCY_S, radius, config.margin_m, config.gap_m])
+        self._safety = np.array([period_s + LATENCY_S, radius, config.margin_m, config.gap_m, PEOPLE_M_S])
         self._clearance_m = radius + config.plan_margin_m
         self.radius_m, self.speed_m_s = radius, speed
         # Half the width of what has room for two.
@@ -132,11 +139,13 @@ class Context:
         self.hop = self.target = self.came_from = at
         self._left_s = 0.0
         self.t_s, self.pose, self.cov = 0.0, start, np.zeros((3, 3))
-        self.near, self.strange = NO_POINTS, NO_POINTS
+        self.near = self.strange = self.people = NO_POINTS
         self.fresh = False
         self._twist, self._command = STOP, STOP
         self.mates: dict[int, tuple[float, TeamWord]] = {}
         self.mode, self.blocked, self.to_go_s = Mode.DRIVE, False, math.nan
+        self._watch = IntruderWatch(config.watch)
+        self.alarm = (math.nan, math.nan, math.nan)
         self._next_word_s = float(self.rng.uniform(0.0, config.message_period_s))
 
     # --- sensing ------------------------------------------------------------------------------------
@@ -169,6 +178,25 @@ class Context:
                 *self._field(lost=lost),
                 SECTORS,
             )
+            self.people = self._strangers()
+            for x, y in self._watch.step(self._on_map(self.people)):
+                self.journal.count("alarms")
+                self.alarm = self.t_s, x, y
+                text = f"somebody at ({x:.1f}, {y:.1f}) who is neither on the map nor of the team"
+                self.say("intruder", text)
+
+    def _strangers(self) -> FloatArray:
+        """(P, 2) returns, base frame, that are of no mate; none while one is not heard: it may be it."""
+        words = list(self.mates.values())
+        if len(words) < len(self.task.starts) - 1 or not len(self.strange):
+            return NO_POINTS
+        there = self._on_map(self.strange)
+        nobody = np.ones(len(there), dtype=np.bool_)
+        for sent_s, word in words:
+            away = np.hypot(there[:, 0] - word.x_m, there[:, 1] - word.y_m)
+            # A mate that is lost may be anywhere, and is near to nothing that is NaN.
+            nobody &= away > self.config.watch.mate_m + self.speed_m_s * (self.t_s - sent_s)
+        return np.ascontiguousarray(self.strange[nobody])
 
     def _field(self, *, lost: bool) -> tuple[FloatArray, float, float, float]:
         """Distances on its map, their origin and resolution; none where it does not know where it is."""
@@ -272,6 +300,7 @@ class Context:
             self._safety,
             self.near,
             self.strange,
+            self.people,
             time,
             x0,
             y0,
@@ -302,6 +331,7 @@ class Context:
                 self._safety,
                 self.near,
                 self.near,
+                NO_POINTS,
                 self.pose.as_array(),
                 *self._field(lost=True),
             ):

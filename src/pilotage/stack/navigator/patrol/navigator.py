@@ -15,7 +15,17 @@ from pilotage.stack.navigator.patrol.config import PatrolNavigatorConfig
 from pilotage.stack.navigator.patrol.context import Context
 from pilotage.stack.navigator.patrol.states import Lost, State, Waiting, resume
 
-COLUMNS = {"mode": "1", "hop": "1", "target": "1", "time_to_go_s": "s", "blocked": "1", "strangers": "1"}
+COLUMNS = {
+    "mode": "1",
+    "hop": "1",
+    "target": "1",
+    "time_to_go_s": "s",
+    "blocked": "1",
+    "strangers": "1",
+    "alarm_t_s": "s",
+    "alarm_x_m": "m",
+    "alarm_y_m": "m",
+}
 
 
 @NAVIGATORS.add("patrol", PatrolNavigatorConfig)
@@ -51,7 +61,7 @@ class PatrolNavigator:
             )
         self._localizer = localizer_of(parts, "patrol")
         self._telemetry = journal.channel(COLUMNS, first=True)
-        journal.counts |= {"gave_way": 0}
+        journal.counts |= {"gave_way": 0, "alarms": 0}
         self._context = Context(config, robot, chart, parts.patrol, task.initial.pose, journal)
         self._wandering = Wandering(config.wander, robot, self._localizer)
         self._state: State | None = None
@@ -90,5 +100,6 @@ class PatrolNavigator:
             context.to_go_s,
             context.blocked,
             len(context.strange),
+            *context.alarm,
         )
         return command

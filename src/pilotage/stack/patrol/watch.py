@@ -1,0 +1,59 @@
+"""What a guard is for: somebody who is neither on the map nor a team mate."""
+
+from __future__ import annotations
+
+import math
+
+from pydantic import Field
+
+from pilotage.core.config import Config
+from pilotage.core.types import FloatArray
+from pilotage.kernels.scans.loose_clusters import loose_clusters
+from pilotage.sensors.sensor import NonNegative, Positive
+
+
+class WatchConfig(Config):
+    """When returns of something strange are somebody."""
+
+    gap_m: Positive = 0.4
+    widest_m: Positive = 1.0
+    points: int = Field(default=2, ge=1, le=1000)
+    """So many returns at least."""
+    scans: int = Field(default=5, ge=1, le=1000)
+    """Seen in so many scans in a row."""
+    follows_m: Positive = 0.6
+    """From one scan to the next it moves no farther."""
+    mate_m: NonNegative = 0.6
+    """What is this near to where a mate says it is, farther by what it may have driven since, is the mate.
+
+    Of a mate that was not heard for long that is everything: a broken radio makes no false alarm, and a team
+    without radios raises none.
+    """
+
+
+class IntruderWatch:
+    """Follows strange clusters from scan to scan."""
+
+    def __init__(self, config: WatchConfig) -> None:
+        self._config = config
+        self._tracks: list[tuple[float, float, int]] = []
+
+    def step(self, strange_xy_m: FloatArray) -> list[tuple[float, float]]:
+        """Take in a scan's returns (M, 2), map frame, of what is on no map and no mate.
+
+        Returns
+        -------
+        Where somebody now is for sure who was not before.
+        """
+        config = self._config
+        found, tracks = [], []
+        for x, y in loose_clusters(strange_xy_m, config.gap_m, config.widest_m, config.points).tolist():
+            before = [
+                count for px, py, count in self._tracks if math.hypot(x - px, y - py) <= config.follows_m
+            ]
+            count = max(before, default=0) + 1
+            if count == config.scans:
+                found.append((x, y))
+            tracks.append((x, y, count))
+        self._tracks = tracks
+        return found

@@ -1,0 +1,98 @@
+"""Somebody comes in among guards: he is seen for what he is, and nobody else is."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+from pilotage.core.errors import InputError
+from pilotage.experiments.build.build import build
+from pilotage.experiments.loop import run_loop
+from pilotage.experiments.mission import load_mission
+from pilotage.kernels.scans.loose_clusters import loose_clusters
+from pilotage.sim.people.intruder import Intruder, IntruderConfig
+from pilotage.sim.people.people import Around, PeopleSetting
+from pilotage.sim.worlds.world import World
+from pilotage.stack.patrol.watch import IntruderWatch, WatchConfig
+from support.worlds import ROOM_MAP
+
+ROBOTS = np.array([[2.0, 2.0, 0.0, 0.3]])
+
+
+def judged(seed: int, duration_s: float, *overrides: str) -> dict[str, Any]:
+    times = [f"task.duration_s={duration_s}", f"run.time_limit_s={duration_s}"]
+    experiment = build(load_mission("museum-intruder", [*times, *overrides], seed=seed))
+    return experiment.task.judge(run_loop(experiment).finished).metrics
+
+
+def walked(plan: str, steps: int, robots: np.ndarray[Any, Any] = ROBOTS) -> np.ndarray[Any, Any]:
+    """(T, 2) where he was, a robot standing."""
+    config = IntruderConfig.model_validate({"plan": plan, "enters_from_s": 0, "enters_until_s": 0})
+    world = World.of(ROOM_MAP)
+    intruder = Intruder(config, PeopleSetting(world, robots, 0.1, np.random.default_rng(3), "world.people.0"))
+    around = Around(robots, np.full((1, 3), np.nan), 0)
+    return np.vstack([intruder.step(0.1 * k, around) for k in range(steps)])
+
+
+class TestWalking:
+    def test_nobody_walks_into_a_robot(self) -> None:
+        # Wherever he goes in this room, robots stand about.
+        robots = np.array(
+            [[2.0, 2.0, 0.0, 0.3], [4.0, 3.0, 0.0, 0.3], [6.0, 4.5, 0.0, 0.3], [3.0, 5.0, 0.0, 0.3]]
+        )
+        places = walked("random", 3000, robots)
+        away = np.hypot(*(places[:, None] - robots[None, :, :2]).transpose(2, 0, 1)) - 0.3 - 0.25
+        assert away.min() > 0.05
+        assert np.hypot(*np.diff(places, axis=0).T).sum() > 30.0
+
+    def test_an_evasive_one_keeps_farther_away(self) -> None:
+        away = {
+            plan: np.hypot(*(walked(plan, 1500) - ROBOTS[0, :2]).T).mean() for plan in ("random", "evasive")
+        }
+        assert away["evasive"] > 1.2 * away["random"]
+
+    def test_he_cannot_come_in_before_the_first_time_that_he_may(self) -> None:
+        config = IntruderConfig(enters_from_s=20.0, enters_until_s=10.0)
+        setting = PeopleSetting(World.of(ROOM_MAP), ROBOTS, 0.1, np.random.default_rng(0), "world.people.0")
+        with pytest.raises(InputError, match=r"enters_until_s: expected 20 s or more, found 10"):
+            Intruder(config, setting)
+
+
+class TestWatching:
+    def test_points_that_hang_together_are_one_and_a_wall_is_none(self) -> None:
+        person = np.column_stack([np.linspace(1.0, 1.3, 5), np.full(5, 2.0)])
+        other = person + np.array([2.0, 0.0])
+        wall = np.column_stack([np.linspace(5.0, 8.0, 20), np.full(20, 2.0)])
+        speck = np.array([[12.0, 2.0]])
+        found = loose_clusters(np.vstack([person, other, wall, speck]), 0.4, 1.0, 2)
+        assert found == pytest.approx(np.array([[1.15, 2.0], [3.15, 2.0]]))
+
+    def test_the_alarm_is_raised_once_for_who_is_seen_again_and_again(self) -> None:
+        watch = IntruderWatch(WatchConfig(scans=3))
+        said = [watch.step(np.array([[0.2 * k, 1.0], [0.2 * k + 0.1, 1.0]])) for k in range(8)]
+        assert [len(one) for one in said] == [0, 0, 1, 0, 0, 0, 0, 0]
+        # Somebody who is now here and now there is two, and neither for long.
+        assert not any(watch.step(np.array([[5.0 * (k % 2), 1.0], [5.0 * (k % 2), 1.1]])) for k in range(9))
+
+
+class TestMuseum:
+    def test_he_is_detected_and_not_touched(self) -> None:
+        come = "world.people=[{name: intruder, enters_from_s: 5, enters_until_s: 10}]"
+        metrics = judged(2, 60.0, come)
+        assert metrics["detected"]
+        assert 0.0 < metrics["detection_time_s"] < 55.0
+        assert metrics["false_alarms"] == metrics["collisions"] == metrics["people_touches"] == 0
+        assert metrics["alarms"] > 0
+
+    def test_a_team_alone_raises_no_alarm_and_one_without_radios_never(self) -> None:
+        metrics = judged(2, 40.0, "world.people=[]")
+        assert metrics["false_alarms"] == metrics["alarms"] == 0
+        assert "detected" not in metrics
+        come = "world.people=[{name: intruder, enters_from_s: 5, enters_until_s: 10}]"
+        silent = judged(2, 40.0, come, "team.radio=null")
+        assert not silent["detected"]
+        assert silent["detection_time_s"] is None or math.isnan(silent["detection_time_s"])
+        assert silent["false_alarms"] == silent["collisions"] == 0
