@@ -17,8 +17,10 @@ from pilotage.kernels.control.footprint import (
     points_clearance,
     polygon_distance,
 )
-from pilotage.kernels.control.ground import Ground, believed, clearance_m, nearest_cells, sure_clearance
+from pilotage.kernels.control.ground import Ground, clearance_m, sure_clearance
+from pilotage.kernels.control.ground_update import believed
 from pilotage.kernels.geometry.motion import exact_arc
+from pilotage.kernels.grids.distance import nearest_marked
 from pilotage.stack.control.local.body import make_body
 
 JACKAL = np.array([[0.254, 0.215], [-0.254, 0.215], [-0.254, -0.215], [0.254, -0.215]])
@@ -48,7 +50,8 @@ def ground_of(points: FloatArray) -> Ground:
         mean[row * n + column] = x, y
     half = n // 2
     far, none = np.full((half, half), 9.0), np.zeros((half, half))
-    return Ground(hits, mean, nearest_cells(believed(hits)), far, none, -2.0, -2.0, 0.05, 0.1, 20.0, 10.0)
+    nearest = nearest_marked(believed(hits) > 0)
+    return Ground(hits, mean, nearest, far, none, -2.0, -2.0, 0.05, 0.1, 20.0, 10.0)
 
 
 @given(COORDINATE, COORDINATE, st.sampled_from([0, 1]))

@@ -242,6 +242,11 @@ def test_distances_are_exact(mask: BoolArray) -> None:
     if mask.any():
         expected = np.rint(ndimage.distance_transform_edt(~mask) ** 2)
         assert (grid_distance.squared_distance(mask) == expected).all()
+        for cells in (1, 3):
+            near = grid_distance.near_distance(mask, cells)
+            within = expected <= cells * cells
+            assert (near[within] == expected[within]).all()
+            assert (near[~within] > cells * cells).all()
 
 
 @given(arrays(np.bool_, (8,)))

@@ -11,14 +11,16 @@ from hypothesis import strategies as st
 
 from pilotage.core.types import FloatArray
 from pilotage.kernels.control.band import path_time, speed_profile
-from pilotage.kernels.control.commands_sent import drive_out, limit_errors, scaled
+from pilotage.kernels.control.commands_sent import drive_out, limit_errors
 from pilotage.kernels.control.dynamic_window import choose_in_window, window
-from pilotage.kernels.control.ground import Ground, believed, nearest_cells
+from pilotage.kernels.control.ground import Ground
+from pilotage.kernels.control.ground_update import believed, evenly_spaced, rolled
 from pilotage.kernels.control.match import match_scan
 from pilotage.kernels.control.motion_limits import Drive, advance, approach, command_is_safe
 from pilotage.kernels.control.movers import COLUMNS, VX, VY, X, Y, foretold, scan_clusters, track_step
 from pilotage.kernels.control.rollouts import weighted_mean
 from pilotage.kernels.control.togo import UNREACHED_S, descent_path, time_to_go
+from pilotage.kernels.grids.distance import nearest_marked
 from pilotage.stack.control.local.body import make_body
 
 JACKAL = np.array([[0.254, 0.215], [-0.254, 0.215], [-0.254, -0.215], [0.254, -0.215]])
@@ -40,7 +42,37 @@ def ground_of(points: FloatArray, togo: FloatArray | None = None) -> Ground:
     half = n // 2
     far = np.full((half, half), 9.0)
     field = np.zeros((half, half)) if togo is None else togo
-    return Ground(hits, mean, nearest_cells(believed(hits)), far, field, -4.0, -4.0, 0.05, 0.1, 20.0, 10.0)
+    nearest = nearest_marked(believed(hits) > 0)
+    return Ground(hits, mean, nearest, far, field, -4.0, -4.0, 0.05, 0.1, 20.0, 10.0)
+
+
+@pytest.mark.parametrize(("rows", "columns"), [(0, 3), (2, -1), (-5, 4), (9, 0)])
+def test_what_is_known_moves_with_the_window(rows: int, columns: int) -> None:
+    """Hits with their means and seen cells lie where they did; what comes in is empty."""
+    rng = np.random.default_rng(4)
+    m, n = 8, 16
+    hits = rng.integers(0, 3, (n, n)).astype(np.uint8)
+    mean, seen = rng.normal(size=(n * n, 2)), rng.random((m, m)) < 0.5
+    before = hits.copy(), mean.copy(), seen.copy()
+    rolled(hits, mean, seen, rows, columns)
+    for r, c in np.ndindex(n, n):
+        was_r, was_c = r + 2 * rows, c + 2 * columns
+        held = int(before[0][was_r, was_c]) if 0 <= was_r < n and 0 <= was_c < n else 0
+        assert hits[r, c] == held
+        if held:
+            assert (mean[r * n + c] == before[1][was_r * n + was_c]).all()
+    for r, c in np.ndindex(m, m):
+        inside = 0 <= r + rows < m and 0 <= c + columns < m
+        assert seen[r, c] == (inside and before[2][r + rows, c + columns])
+
+
+def test_beams_are_evenly_spaced_or_not() -> None:
+    even = np.linspace(-2.0, 2.0, 50)
+    assert evenly_spaced(even)
+    assert not evenly_spaced(even[::-1].copy())
+    assert not evenly_spaced(np.zeros(3))
+    even[20] += 1e-3
+    assert not evenly_spaced(even)
 
 
 @given(st.lists(st.tuples(st.integers(0, 14), st.integers(0, 11)), max_size=12))
@@ -48,7 +80,7 @@ def test_nearest_cell_is_the_nearest(marked: list[tuple[int, int]]) -> None:
     grid = np.zeros((15, 12), dtype=np.bool_)
     for row, column in marked:
         grid[row, column] = True
-    found = nearest_cells(grid)
+    found = nearest_marked(grid)
     rows, columns = np.nonzero(grid)
     for row in range(15):
         for column in range(12):
@@ -104,7 +136,7 @@ def test_a_command_called_safe_can_be_braked_from(v: float, w: float, seed: int)
     ground = ground_of(points)
     kept = ground.mean[ground.hits.reshape(-1) > 0]
     body = make_body(JACKAL)
-    worse = Drive(*scaled(DRIVE, 0.7))
+    worse = DRIVE.scaled(0.7)
     start = np.array([0.0, 0.0, 0.0, v, w])
     safe, _ = command_is_safe(start, v, w, 0.1, 0.05, True, DRIVE, worse, body, ground, NOBODY, 0.03, 0.0)
     if not safe:
@@ -199,7 +231,7 @@ def test_the_true_limits_explain_the_answers_best() -> None:
     sent = np.array([[0.0, 2.0, 1.0]])
     hypotheses = np.array([[1.0, 1.0], [0.7, 1.0], [0.5, 1.0]])
     before = np.zeros(5)
-    after = drive_out(before, 0.1, 0.2, 0.1, sent, Drive(*scaled(DRIVE, 0.7)))
+    after = drive_out(before, 0.1, 0.2, 0.1, sent, DRIVE.scaled(0.7))
     errors = limit_errors(before, after, 0.1, 0.2, 0.1, sent, DRIVE, hypotheses, 0.03, 0.06)
     assert int(np.argmin(errors)) == 1
 

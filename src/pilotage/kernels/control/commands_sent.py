@@ -14,19 +14,6 @@ EPSILON_S = 1e-9
 
 
 @kernel
-def scaled(drive: Drive, share: float) -> Drive:
-    """The limits with every acceleration multiplied by ``share``."""
-    return Drive(
-        drive.speed,
-        drive.reverse,
-        drive.acceleration * share,
-        drive.deceleration * share,
-        drive.turn_rate,
-        drive.turn_acceleration * share,
-    )
-
-
-@kernel
 def drive_out(
     state: FloatArray, begin: float, end: float, delay: float, sent: FloatArray, drive: Drive
 ) -> FloatArray:
@@ -82,7 +69,15 @@ def limit_errors(
     """
     out = np.empty(hypotheses.shape[0])
     for h in range(hypotheses.shape[0]):
-        limits = scaled(drive, hypotheses[h, 0])
+        share = hypotheses[h, 0]
+        limits = Drive(
+            drive.speed,
+            drive.reverse,
+            drive.acceleration * share,
+            drive.deceleration * share,
+            drive.turn_rate,
+            drive.turn_acceleration * share,
+        )
         there = drive_out(before, begin, end, delay * hypotheses[h, 1], sent, limits)
         dv, dw = (there[3] - after[3]) / speed_std, (there[4] - after[4]) / turn_std
         out[h] = dv * dv + dw * dw

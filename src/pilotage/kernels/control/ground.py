@@ -1,7 +1,8 @@
 """A rolling grid of what the laser saw: obstacle cells with the mean of their hits, and ground seen free.
 
 Two square grids share one lower left corner: fine cells for obstacles, and coarse ones, twice as wide, for
-what has been seen at all and for the time to go. Rows go up in y, columns in x.
+what has been seen at all and for the time to go. Rows go up in y, columns in x. Here they are asked;
+``ground_update`` fills them.
 """
 
 from __future__ import annotations
@@ -9,22 +10,13 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
-from pilotage.kernels.arrays import BoolArray, ByteArray, FloatArray
+from pilotage.kernels.arrays import ByteArray, FloatArray
 from pilotage.kernels.control.footprint import Body, polygon_distance
+from pilotage.kernels.grids.distance import CellIndex
 from pilotage.kernels.jit import kernel
-
-CellIndex = NDArray[np.int32]
 
 FAR_M = 30.0
 """Stands for "nothing near": farther than any grid here is wide."""
-MOST_HITS = 60
-"""Hits are counted so far; the mean goes on moving with this weight."""
-SCATTER = 0.12
-"""A cell with less than this share of its neighbour's hits is that neighbour's range noise."""
-NONE = -1
 DOUBT_CELLS = 3.0
 """Two diagonals: half a one for the query in its cell and for each point in its own, there and back."""
 
@@ -40,7 +32,8 @@ class Ground(NamedTuple):
     nearest
         (n, n) flat index of the obstacle cell nearest to each fine cell; -1 where there is none at all.
     unseen_m
-        (m, m) distance from a coarse cell's centre to that of the nearest one not seen yet.
+        (m, m) distance from a coarse cell's centre to that of the nearest one not seen yet; where that is
+        above the body's outer radius just any such.
     togo_s
         (m, m) time to go to the goal from a coarse cell.
     x0_m, y0_m, cell_m, coarse_m
@@ -60,246 +53,6 @@ class Ground(NamedTuple):
     coarse_m: float
     per_cell: float
     per_coarse: float
-
-
-@kernel
-def scan_points(
-    x: float, y: float, theta: float, ranges: FloatArray, first: float, step: float, max_range: float
-) -> FloatArray:
-    """End points (N, 2) of the beams that hit something, seen from the sensor's pose."""
-    out = np.empty((ranges.shape[0], 2))
-    count = 0
-    for k in range(ranges.shape[0]):
-        if 0.0 < ranges[k] < max_range:
-            angle = theta + first + k * step
-            out[count, 0] = x + ranges[k] * math.cos(angle)
-            out[count, 1] = y + ranges[k] * math.sin(angle)
-            count += 1
-    return out[:count]
-
-
-@kernel
-def add_points(
-    hits: ByteArray, mean: FloatArray, points: FloatArray, x0: float, y0: float, cell: float
-) -> None:
-    """Count points (N, 2) in the cells they fall into and move the cells' means; in place."""
-    n = hits.shape[0]
-    for i in range(points.shape[0]):
-        column = math.floor((points[i, 0] - x0) / cell)
-        row = math.floor((points[i, 1] - y0) / cell)
-        if not (0 <= row < n and 0 <= column < n):
-            continue
-        if hits[row, column] < MOST_HITS:
-            hits[row, column] += np.uint8(1)
-        share = 1.0 / hits[row, column]
-        mean[row * n + column, 0] += share * (points[i, 0] - mean[row * n + column, 0])
-        mean[row * n + column, 1] += share * (points[i, 1] - mean[row * n + column, 1])
-
-
-@kernel
-def clear_passed(
-    hits: ByteArray,
-    mean: FloatArray,
-    x: float,
-    y: float,
-    theta: float,
-    ranges: FloatArray,
-    first: float,
-    step: float,
-    max_range: float,
-    cell: float,
-    behind: float,
-    fade: int,
-) -> None:
-    """Take ``fade`` hits from every cell that all beams towards it pass by more than ``behind``; in place.
-
-    Something that was there has gone. A cell seen edge-on keeps its hits: one of the beams towards it still
-    ends near it.
-    """
-    n = hits.shape[0]
-    beams = ranges.shape[0]
-    for row in range(n):
-        for column in range(n):
-            if hits[row, column] == 0:
-                continue
-            dx, dy = mean[row * n + column, 0] - x, mean[row * n + column, 1] - y
-            distance = math.sqrt(dx * dx + dy * dy)
-            if distance < cell or distance + behind >= max_range:
-                continue
-            angle = (math.atan2(dy, dx) - theta - first) % (2.0 * math.pi)
-            half = cell / distance / step
-            low, high = math.ceil(angle / step - half), math.floor(angle / step + half)
-            if low < 0 or high >= beams or low > high:
-                continue
-            gone = True
-            for k in range(low, high + 1):
-                if ranges[k] < distance + behind:
-                    gone = False
-                    break
-            if gone:
-                hits[row, column] = np.uint8(max(0, int(hits[row, column]) - fade))
-
-
-@kernel
-def clear_inside(
-    hits: ByteArray,
-    mean: FloatArray,
-    x: float,
-    y: float,
-    theta: float,
-    polygon: FloatArray,
-    depth: float,
-    x0: float,
-    y0: float,
-    cell: float,
-) -> None:
-    """Empty the cells whose mean lies deeper than ``depth`` inside the footprint; in place."""
-    n = hits.shape[0]
-    reach = 0.0
-    for k in range(polygon.shape[0]):
-        reach = max(reach, math.hypot(polygon[k, 0], polygon[k, 1]))
-    c, s = math.cos(theta), math.sin(theta)
-    for row in range(
-        max(0, math.floor((y - reach - y0) / cell)), min(n, math.floor((y + reach - y0) / cell) + 1)
-    ):
-        for column in range(
-            max(0, math.floor((x - reach - x0) / cell)), min(n, math.floor((x + reach - x0) / cell) + 1)
-        ):
-            if hits[row, column] == 0:
-                continue
-            dx, dy = mean[row * n + column, 0] - x, mean[row * n + column, 1] - y
-            if polygon_distance(c * dx + s * dy, c * dy - s * dx, polygon) < -depth:
-                hits[row, column] = np.uint8(0)
-
-
-@kernel
-def believed(hits: ByteArray) -> BoolArray:
-    """Which fine cells (n, n) hold an obstacle and not only the range noise of a neighbour's."""
-    n = hits.shape[0]
-    out = np.zeros((n, n), np.bool_)
-    for row in range(n):
-        for column in range(n):
-            if hits[row, column] == 0:
-                continue
-            most = 0
-            for r in range(max(0, row - 1), min(n, row + 2)):
-                for c in range(max(0, column - 1), min(n, column + 2)):
-                    most = max(most, int(hits[r, c]))
-            out[row, column] = hits[row, column] >= SCATTER * most
-    return out
-
-
-@kernel
-def nearest_cells(marked: BoolArray) -> CellIndex:
-    """Flat index (n, n) of the marked cell nearest to each cell's centre, -1 without any.
-
-    The two passes of Meijster, Roerdink and Hesselink (2000), which keep here who is nearest.
-    """
-    rows, columns = marked.shape
-    far = rows + columns + 1
-    site_row = np.empty((rows, columns), np.int32)
-    away = np.empty((rows, columns), np.int32)
-    # Row after row, so that memory is read in order.
-    for row in range(rows):
-        for column in range(columns):
-            if marked[row, column]:
-                site_row[row, column], away[row, column] = row, 0
-            elif row > 0 and away[row - 1, column] < far:
-                site_row[row, column] = site_row[row - 1, column]
-                away[row, column] = away[row - 1, column] + 1
-            else:
-                site_row[row, column], away[row, column] = -1, far
-    for row in range(rows - 2, -1, -1):
-        for column in range(columns):
-            if away[row + 1, column] + 1 < away[row, column]:
-                away[row, column] = away[row + 1, column] + 1
-                site_row[row, column] = site_row[row + 1, column]
-    out = np.full((rows, columns), np.int32(NONE))
-    site = np.empty(columns, np.int64)
-    begins = np.empty(columns, np.int64)
-    for row in range(rows):
-        last = -1
-        for column in range(columns):
-            mine = np.int64(away[row, column])
-            if mine >= far:
-                continue
-            begin = np.int64(0)
-            while last >= 0:
-                other = site[last]
-                theirs = np.int64(away[row, other])
-                rise = column * column - other * other + mine * mine - theirs * theirs
-                begin = rise // (2 * (column - other)) + 1
-                if begin > begins[last]:
-                    break
-                last -= 1
-            if last < 0:
-                last = 0
-                site[0], begins[0] = column, 0
-            elif begin < columns:
-                last += 1
-                site[last], begins[last] = column, begin
-        until = columns
-        for k in range(last, -1, -1):
-            source = site[k]
-            for column in range(max(begins[k], 0), until):
-                out[row, column] = site_row[row, source] * columns + source
-            until = min(until, max(begins[k], 0))
-    return out
-
-
-@kernel
-def mark_seen(
-    seen: BoolArray,
-    x: float,
-    y: float,
-    theta: float,
-    ranges: FloatArray,
-    first: float,
-    step: float,
-    x0: float,
-    y0: float,
-    coarse: float,
-    reach: float,
-) -> None:
-    """Mark the coarse cells (m, m) whose centre both beams beside it reach; in place.
-
-    Between beams that are farther apart than an obstacle is wide nothing is known: ``reach`` ends there.
-    """
-    m = seen.shape[0]
-    beams = ranges.shape[0]
-    slack = 0.5 * coarse
-    r0 = max(0, math.floor((y - reach - y0) / coarse))
-    r1 = min(m, math.ceil((y + reach - y0) / coarse))
-    c0 = max(0, math.floor((x - reach - x0) / coarse))
-    c1 = min(m, math.ceil((x + reach - x0) / coarse))
-    for row in range(r0, r1):
-        dy = y0 + (row + 0.5) * coarse - y
-        for column in range(c0, c1):
-            if seen[row, column]:
-                continue
-            dx = x0 + (column + 0.5) * coarse - x
-            distance = math.sqrt(dx * dx + dy * dy)
-            if distance > reach:
-                continue
-            at = ((math.atan2(dy, dx) - theta - first) % (2.0 * math.pi)) / step
-            low = math.floor(at)
-            if low + 1 >= beams:
-                continue
-            if min(ranges[low], ranges[low + 1]) > distance - slack:
-                seen[row, column] = True
-
-
-@kernel
-def mark_disc(
-    seen: BoolArray, x: float, y: float, radius: float, x0: float, y0: float, coarse: float
-) -> None:
-    """Mark the coarse cells whose centre lies in a disc; in place."""
-    m = seen.shape[0]
-    for row in range(m):
-        for column in range(m):
-            dx, dy = x0 + (column + 0.5) * coarse - x, y0 + (row + 0.5) * coarse - y
-            if dx * dx + dy * dy <= radius * radius:
-                seen[row, column] = True
 
 
 @kernel

@@ -30,6 +30,17 @@ class Drive(NamedTuple):
     turn_rate: float
     turn_acceleration: float
 
+    def scaled(self, share: float) -> Drive:
+        """The limits with every acceleration multiplied by ``share``; not for kernels."""
+        return Drive(
+            self.speed,
+            self.reverse,
+            self.acceleration * share,
+            self.deceleration * share,
+            self.turn_rate,
+            self.turn_acceleration * share,
+        )
+
 
 @kernel
 def approach(value: float, wanted: float, up: float, down: float) -> float:

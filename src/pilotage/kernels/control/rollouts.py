@@ -138,6 +138,38 @@ def rollout_cost(
 
 
 @kernel
+def plan_costs(
+    start: FloatArray,
+    plans: FloatArray,
+    dt: float,
+    drive: Drive,
+    body: Body,
+    ground: Ground,
+    movers: FloatArray,
+    price: Price,
+) -> FloatArray:
+    """Costs (K,) of plans (K, N, 2), each as ``rollout_cost`` has it."""
+    costs = np.empty(plans.shape[0])
+    for i in range(plans.shape[0]):
+        costs[i] = rollout_cost(start, plans[i], dt, drive, body, ground, movers, price)
+    return costs
+
+
+@kernel
+def later(plan: FloatArray, steps: float) -> FloatArray:
+    """A plan (N, 2) as it is ``steps`` of its own steps later; the last command is held."""
+    last = plan.shape[0] - 1
+    out = np.empty_like(plan)
+    for k in range(last + 1):
+        at = min(k + steps, float(last))
+        low = math.floor(at)
+        part = at - low
+        for axis in range(2):
+            out[k, axis] = (1.0 - part) * plan[low, axis] + part * plan[min(low + 1, last), axis]
+    return out
+
+
+@kernel
 def rollout_costs(
     start: FloatArray,
     mean: FloatArray,
@@ -179,6 +211,24 @@ def weighted_mean(commands: FloatArray, costs: FloatArray, temperature: float) -
 
 
 @kernel
+def pursuits(
+    start: FloatArray,
+    path: FloatArray,
+    looks: FloatArray,
+    speeds: FloatArray,
+    turn_in_place: float,
+    dt: float,
+    drive: Drive,
+    out: FloatArray,
+) -> None:
+    """``follow_path`` with every look (L, 2) at every speed (S,): fills ``out`` (S * L, N, 2)."""
+    for i in range(out.shape[0]):
+        look = looks[i % looks.shape[0]]
+        speed = speeds[i // looks.shape[0]]
+        out[i] = follow_path(start, path, look[0], look[1], speed, turn_in_place, out.shape[1], dt, drive)
+
+
+@kernel
 def follow_path(
     start: FloatArray,
     path: FloatArray,
@@ -195,7 +245,7 @@ def follow_path(
     Looks ``look_m`` + ``look_s`` * v ahead; slows with the bearing of the point ahead and turns on the spot
     where that is above ``turn_in_place`` radians.
     """
-    out = np.zeros((steps, 2))
+    out = np.empty((steps, 2))
     x, y, theta, v, w = start[0], start[1], start[2], start[3], start[4]
     at = 0
     last = path.shape[0] - 1

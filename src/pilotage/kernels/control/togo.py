@@ -7,7 +7,8 @@ import math
 import numpy as np
 
 from pilotage.kernels.arrays import BoolArray, FloatArray
-from pilotage.kernels.control.ground import FAR_M, NONE, CellIndex
+from pilotage.kernels.control.ground import FAR_M
+from pilotage.kernels.grids.distance import NONE, CellIndex
 from pilotage.kernels.jit import kernel
 
 BUCKETS = 1 << 14

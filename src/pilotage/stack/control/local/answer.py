@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from pilotage.core.types import FloatArray
-from pilotage.kernels.control.commands_sent import drive_out, limit_errors, scaled
+from pilotage.kernels.control.commands_sent import drive_out, limit_errors
 from pilotage.kernels.control.motion_limits import Drive
 
 SHARES = (1.15, 1.0, 0.9, 0.8, 0.7, 0.6, 0.5)
@@ -19,6 +19,8 @@ MOST_ERROR = 25.0
 PRIOR = 4.0
 """Cost of a hypothesis per unit that it is off the data sheet."""
 KEPT_S = 2.0
+ROOM = 256
+"""Commands that the list has room for before those still wanted are moved to its begin."""
 
 
 class Answer:
@@ -30,31 +32,37 @@ class Answer:
     """
 
     def __init__(self) -> None:
-        self._sent: list[tuple[float, float, float]] = []
+        self._room = np.empty((ROOM, 3))
+        self._sent = self._room[:0]
+        """(N, 3) time, speed and turn rate: a part of the room."""
+        self._begin = 0
         self._hypotheses = np.array([(share, delay) for share in SHARES for delay in DELAYS])
-        self._costs = PRIOR * (np.abs(self._hypotheses[:, 0] - 1.0) + np.abs(self._hypotheses[:, 1] - 1.0))
+        self._prior = PRIOR * np.abs(self._hypotheses - 1.0).sum(axis=1)
+        self._costs = self._prior
+        self._choose()
         self._before: tuple[float, FloatArray] | None = None
 
-    @property
-    def share(self) -> float:
-        """Of the data sheet's accelerations, as it seems."""
-        return float(self._hypotheses[int(np.argmin(self._costs)), 0])
-
-    @property
-    def delay_factor(self) -> float:
-        """Of the data sheet's delay, as it seems."""
-        return float(self._hypotheses[int(np.argmin(self._costs)), 1])
+    def _choose(self) -> None:
+        """``share`` of the data sheet's accelerations, ``delay_factor`` of its delay, as they seem."""
+        self.share, self.delay_factor = self._hypotheses[int(np.argmin(self._costs))].tolist()
 
     def sent(self, t_s: float, v_m_s: float, w_rad_s: float) -> None:
         """Remember a command."""
-        self._sent.append((t_s, v_m_s, w_rad_s))
+        end = self._begin + len(self._sent)
+        if end == len(self._room):
+            if self._begin < len(self._room) // 2:
+                self._room = np.concatenate([self._room, np.empty((len(self._room), 3))])
+            self._room[: len(self._sent)] = self._sent.copy()
+            self._begin, end = 0, len(self._sent)
+        self._room[end] = t_s, v_m_s, w_rad_s
         # One older than that which acts now is enough.
-        while len(self._sent) > 2 and self._sent[1][0] < t_s - KEPT_S:
-            self._sent.pop(0)
+        while end - self._begin > 1 and self._room[self._begin + 1, 0] < t_s - KEPT_S:
+            self._begin += 1
+        self._sent = self._room[self._begin : end + 1]
 
     def learn(self, t_s: float, state: FloatArray, delay_s: float, drive: Drive) -> None:
         """Weigh the hypotheses by a measured state (5,)."""
-        if self._before is not None and self._sent:
+        if self._before is not None and len(self._sent):
             then_s, before = self._before
             errors = limit_errors(
                 before,
@@ -62,24 +70,25 @@ class Answer:
                 then_s,
                 t_s,
                 delay_s,
-                np.array(self._sent),
+                self._sent,
                 drive,
                 self._hypotheses,
                 SPEED_STD,
                 TURN_STD,
             )
-            prior = PRIOR * np.abs(self._hypotheses - 1.0).sum(axis=1)
+            prior = self._prior
             self._costs = prior + FORGET * (self._costs - prior) + np.minimum(errors, MOST_ERROR)
+            self._choose()
         self._before = (t_s, state)
 
     def likely(self, drive: Drive) -> Drive:
         """The limits that explain the answers best, never above the data sheet's."""
-        return Drive(*scaled(drive, min(self.share, 1.0)))
+        return drive.scaled(min(self.share, 1.0))
 
     def after_delay(self, t_s: float, state: FloatArray, delay_s: float, drive: Drive) -> FloatArray:
         """State (5,) when a command given now takes effect: those under way are driven out first."""
         delay = delay_s * self.delay_factor
-        if delay <= 0.0 or not self._sent:
+        if delay <= 0.0 or not len(self._sent):
             return state
-        out: FloatArray = drive_out(state, t_s, t_s + delay, delay, np.array(self._sent), drive)
+        out: FloatArray = drive_out(state, t_s, t_s + delay, delay, self._sent, drive)
         return out

@@ -11,23 +11,29 @@ from pydantic import Field
 from pilotage.core.config import Config
 from pilotage.core.types import STOP, FloatArray, Twist
 from pilotage.kernels.control.band import path_distances
-from pilotage.kernels.control.commands_sent import scaled
 from pilotage.kernels.control.motion_limits import Drive, command_is_safe
 from pilotage.kernels.control.movers import movers_clearance
-from pilotage.kernels.control.rollouts import Price, follow_path, rollout_cost, rollout_costs, weighted_mean
+from pilotage.kernels.control.rollouts import (
+    Price,
+    later,
+    plan_costs,
+    pursuits,
+    rollout_costs,
+    weighted_mean,
+)
 from pilotage.kernels.control.togo import UNREACHED_S, togo_at
 from pilotage.sensors.sensor import NonNegative, Positive
 from pilotage.stack.control.local.narrow_passage import NarrowPassage, find_narrow_passage
 from pilotage.stack.control.local.role import LOCAL_CONTROLLERS, LocalView
 from pilotage.stack.control.local.rolling import RollingConfig, RollingGround, Scene
 from pilotage.stack.control.local.rolling_step import rolling_step, what_it_does
-from pilotage.stack.control.local.sampling import NoiseBank, later
+from pilotage.stack.control.local.sampling import NoiseBank
 
 TRIED_M = 0.3
 """Two narrow places nearer to each other than this are one."""
 Share = Field(default=0.65, gt=0.0, le=1.0)
-SPEEDS = (1.0, 0.7, 0.45, 0.25)
-LOOKS = ((0.3, 0.1), (0.45, 0.3))
+SPEEDS = np.array([1.0, 0.7, 0.45, 0.25])
+LOOKS = np.array([[0.3, 0.1], [0.45, 0.3]])
 DODGES = np.array([(v, w) for v in (-0.5, 0.6, 1.2) for w in (-2.0, 0.0, 2.0)])
 """Speeds and turn rates held for a whole plan."""
 
@@ -98,6 +104,8 @@ class GapHorizon:
             generator, config.rollouts, self._steps, config.speed_std_m_s, config.turn_std_rad_s
         )
         self._commands = np.empty((config.rollouts, self._steps, 2))
+        most = 1 + len(SPEEDS) * len(LOOKS) + 1 + len(DODGES) + 2
+        self._candidates = np.empty((most, self._steps, 2))
         self._plan: FloatArray | None = None
         self._since_sampled = config.resample_steps
         self._keep_turning = True
@@ -157,7 +165,7 @@ class GapHorizon:
         for i in np.argsort(costs)[:6]:
             command = self._checked(scene, plans[i][0])
             if command is not None:
-                self._plan = plans[i]
+                self._plan = plans[i].copy()
                 return command
         best = plans[int(np.argmin(costs))]
         for share in (0.6, 0.3, 0.0):
@@ -205,65 +213,36 @@ class GapHorizon:
             return
         self._ground.close(float(ahead[narrow, 0]), float(ahead[narrow, 1]), float(away[narrow]) + 0.05)
 
-    def _plans(self, scene: Scene, price: Price) -> tuple[list[FloatArray], FloatArray]:
-        """All plans worth a look with their costs."""
+    def _plans(self, scene: Scene, price: Price) -> tuple[FloatArray, FloatArray]:
+        """All plans (K, N, 2) worth a look with their costs, until the next call."""
         config = self._config
-        plans: list[FloatArray] = []
+        plans, count = self._candidates, 0
         if self._plan is not None:
-            plans.append(later(self._plan, scene.dt_s / config.step_s))
-        for speed in SPEEDS:
-            for look_m, look_s in LOOKS:
-                plans.append(
-                    follow_path(
-                        scene.start,
-                        scene.path,
-                        look_m,
-                        look_s,
-                        speed * scene.drive.speed,
-                        1.0,
-                        self._steps,
-                        config.step_s,
-                        scene.drive,
-                    )
-                )
-        plans.append(np.zeros((self._steps, 2)))
+            plans[0] = later(self._plan, scene.dt_s / config.step_s)
+            count = 1
+        chased = plans[count : count + len(SPEEDS) * len(LOOKS)]
+        speeds = SPEEDS * scene.drive.speed
+        pursuits(scene.start, scene.path, LOOKS, speeds, 1.0, config.step_s, scene.drive, chased)
+        count += len(chased)
+        plans[count] = 0.0
+        count += 1
         movers = scene.movers.foretold(scene.delay_s + config.step_s, config.step_s, self._steps, sure=False)
         if movers.shape[1]:
             # Out of the way of whoever comes: what pursuit of the path does not think of.
-            plans += [np.tile(dodge, (self._steps, 1)) for dodge in DODGES]
-        costs = [
-            rollout_cost(
-                scene.start, plan, config.step_s, scene.drive, scene.body, scene.ground, movers, price
-            )
-            for plan in plans
-        ]
+            plans[count : count + len(DODGES)] = DODGES[:, None]
+            count += len(DODGES)
+        fixed = config.step_s, scene.drive, scene.body, scene.ground, movers, price
+        costs = plan_costs(scene.start, plans[:count], *fixed)
         self._since_sampled += 1
         if self._since_sampled < config.resample_steps and self._plan is not None:
-            return plans, np.array(costs)
+            return plans[:count], costs
         self._since_sampled = 0
         mean = plans[int(np.argmin(costs))]
-        sampled = rollout_costs(
-            scene.start,
-            mean,
-            self._noise.draw(),
-            config.step_s,
-            scene.drive,
-            scene.body,
-            scene.ground,
-            movers,
-            price,
-            self._commands,
-        )
-        plans.append(self._commands[int(np.argmin(sampled))].copy())
-        costs.append(float(sampled.min()))
-        blended = weighted_mean(self._commands, sampled, config.temperature_s)
-        plans.append(blended)
-        costs.append(
-            rollout_cost(
-                scene.start, blended, config.step_s, scene.drive, scene.body, scene.ground, movers, price
-            )
-        )
-        return plans, np.array(costs)
+        sampled = rollout_costs(scene.start, mean, self._noise.draw(), *fixed, self._commands)
+        more = plans[count : count + 2]
+        more[0] = self._commands[int(np.argmin(sampled))]
+        more[1] = weighted_mean(self._commands, sampled, config.temperature_s)
+        return plans[: count + 2], np.append(costs, plan_costs(scene.start, more, *fixed))
 
     def _must_stand(self, scene: Scene) -> bool:
         """Whether a robot at rest has somebody so near that it had better not start."""
@@ -281,7 +260,7 @@ class GapHorizon:
     def _worse(self, scene: Scene) -> Drive:
         """Limits that are relied on: worse than the data sheet's, and than those that seem likely."""
         share = min(self._config.brake_trust, 0.9 * scene.drive.deceleration / scene.sheet.deceleration)
-        return Drive(*scaled(scene.sheet, share))
+        return scene.sheet.scaled(share)
 
     def _checked(self, scene: Scene, first: FloatArray) -> Twist | None:
         """The command if it can be held for a step and braked from without touching anything."""

@@ -7,12 +7,12 @@ from pydantic import Field
 
 from pilotage.core.config import Config
 from pilotage.core.types import Twist
-from pilotage.kernels.control.rollouts import Price, rollout_costs, weighted_mean
+from pilotage.kernels.control.rollouts import Price, later, rollout_costs, weighted_mean
 from pilotage.sensors.sensor import NonNegative, Positive
 from pilotage.stack.control.local.role import LOCAL_CONTROLLERS, LocalView
 from pilotage.stack.control.local.rolling import RollingConfig, RollingGround, Scene
 from pilotage.stack.control.local.rolling_step import rolling_step, what_it_does
-from pilotage.stack.control.local.sampling import NoiseBank, later
+from pilotage.stack.control.local.sampling import NoiseBank
 
 
 class MppiConfig(Config):

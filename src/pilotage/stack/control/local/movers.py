@@ -55,14 +55,14 @@ class Movers:
     ) -> tuple[BoolArray, BoolArray]:
         """Take the scan's points (N, 2), base frame, in the order of the beams; tell which are on tracks.
 
+        Not to be called where ``enabled`` is not set.
+
         ``field_rad``: directions of the first and the last beam in the base frame.
 
         Returns (N,) points of bodies that count, which the obstacle grid shall not keep, and (N,) those that
         the odometry may be corrected by: of wide things, and of narrow ones that have stood for long.
         """
         config = self._config
-        if not config.enabled:
-            return np.zeros(in_base.shape[0], dtype=np.bool_), np.ones(in_base.shape[0], dtype=np.bool_)
         c, s = math.cos(pose[2]), math.sin(pose[2])
         turn = np.array([[c, s], [-s, c]])
         points = pose[:2] + in_base @ turn
@@ -116,6 +116,8 @@ class Movers:
         the price of a plan.
         """
         config = self._config
+        if not self.tracks.shape[0]:
+            return np.zeros((steps, 0, 3))
         tracks = self.tracks if sure else self.tracks[self._count()]
         discs: FloatArray = kernels.foretold(
             np.ascontiguousarray(tracks),
@@ -130,6 +132,8 @@ class Movers:
 
     def nearest_m(self, x_m: float, y_m: float) -> float:
         """Distance from a point to the nearest body's edge; inf without any."""
+        if not self.tracks.shape[0]:
+            return math.inf
         bodies = self.tracks[self._count()]
         if not bodies.shape[0]:
             return math.inf

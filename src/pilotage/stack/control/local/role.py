@@ -6,11 +6,10 @@ import math
 from dataclasses import dataclass
 from typing import Protocol
 
-import numpy as np
-
 from pilotage.core.errors import InputError
 from pilotage.core.registry import Registry
 from pilotage.core.types import FloatArray, Pose2, Twist
+from pilotage.kernels.control.ground_update import evenly_spaced
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,8 +101,7 @@ class LocalView:
                 f"scan: expected as many ranges as beam angles, two or more, found {self.ranges_m.shape} "
                 f"and {angles.shape}"
             )
-        step = (angles[-1] - angles[0]) / (angles.shape[0] - 1)
-        if not (step > 0.0 and np.all(np.abs(np.diff(angles) - step) < 1e-3 * step + 1e-9)):
+        if not evenly_spaced(angles):
             raise InputError("scan: expected beam angles that increase evenly; resample the scan")
 
 

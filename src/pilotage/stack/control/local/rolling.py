@@ -4,22 +4,18 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
 from pilotage.core.config import Config
 from pilotage.core.errors import InputError
 from pilotage.core.types import FloatArray, Pose2, Twist
-from pilotage.kernels.control import ground as kernels
-from pilotage.kernels.control import match, togo
+from pilotage.kernels.control import ground_update, match, togo
 from pilotage.kernels.control.footprint import Body
 from pilotage.kernels.control.ground import Ground
 from pilotage.kernels.control.motion_limits import Drive
 from pilotage.kernels.geometry.motion import wrap
-from pilotage.kernels.grids.distance import squared_distance
 from pilotage.sensors.sensor import Positive
 from pilotage.stack.control.local.answer import Answer
 from pilotage.stack.control.local.body import make_body
@@ -34,7 +30,6 @@ MANY_SHARE = 0.125
 """Where somebody may move, so many beams have to end near at things that stand to correct the odometry."""
 BEYOND_S = 6.0
 """The time to go is worked out so far past the robot: no plan goes back farther."""
-Scalar = TypeVar("Scalar", bound=np.generic)
 
 
 class RollingConfig(Config):
@@ -130,6 +125,7 @@ class RollingGround:
         self._movers = Movers(config.movers)
         self._body: Body | None = None
         self._footprint: FloatArray | None = None
+        self._limits: LocalLimits | None = None
         self.partners = 0
 
     def sent(self, t_s: float, command: Twist) -> None:
@@ -150,37 +146,61 @@ class RollingGround:
             self._dt_s = min(max(view.t_s - self._t_s, 1e-3), 0.5)
         self._t_s = view.t_s
         body = self._take_body(view)
-        drive = drive_of(view.limits)
-        ranges = np.where(np.isfinite(view.ranges_m), view.ranges_m, view.max_range_m)
-        blind = bool(np.mean(ranges <= 0.0) > BLIND_SHARE)
-        ranges = np.where(ranges <= 0.0, view.max_range_m, ranges)
+        drive = self._take_limits(view.limits)
+        ranges, silent = ground_update.cleaned_ranges(view.ranges_m, view.max_range_m)
+        blind = silent > BLIND_SHARE * ranges.shape[0]
         angles = view.beam_angles_rad
         first = float(angles[0])
         step = float(angles[-1] - angles[0]) / (angles.shape[0] - 1)
         first_view = self._odometry is None
         self._predict(view)
-        rolled = self._roll(first_view)
-        in_base = kernels.scan_points(
+        predicted = self._pose
+        in_base, least_m = ground_update.scan_points(
             view.mount.x_m, view.mount.y_m, view.mount.theta_rad, ranges, first, step, view.max_range_m
         )
-        on_track, steady = self._movers.update(
-            (view.mount.x_m, view.mount.y_m),
-            in_base,
-            self._pose,
-            self._dt_s,
-            (view.mount.theta_rad + float(angles[0]), view.mount.theta_rad + float(angles[-1])),
-        )
-        still = np.ascontiguousarray(in_base[~on_track])
+        still = things = in_base
+        if self._config.movers.enabled:
+            on_track, steady = self._movers.update(
+                (view.mount.x_m, view.mount.y_m),
+                in_base,
+                self._pose,
+                self._dt_s,
+                (view.mount.theta_rad + float(angles[0]), view.mount.theta_rad + float(angles[-1])),
+            )
+            still, things = in_base[~on_track], in_base[steady]
         # Somebody is inside the robot's own outline: such a scan shows him, and not where the robot is.
-        covered = bool((np.hypot(in_base[:, 0], in_base[:, 1]) < body.inner_m).any())
-        things = np.ascontiguousarray(in_base[steady])
+        covered = least_m < body.inner_m
         if self._config.match and not first_view and not covered and self._are_many(things, angles.size):
             self._match(view, things)
         self._odometry = view.pose
         if self._goal_given != view.goal_xy_m:
             self._goal_given = view.goal_xy_m
             self._goal = _moved(view.goal_xy_m, view.pose, self._pose)
-        self._insert(view, ranges, first, step, body, first_view, still)
+        # Not before the scan is matched: it is to the last ground, whose means roll as well.
+        rolled = self._roll(predicted, first_view)
+        if first_view:
+            # Where the robot stands at first it may turn: the laser does not see the ground under it.
+            (x, y), radius = self._pose[:2], body.outer_m + self._coarse_m
+            ground_update.mark_disc(self._seen, x, y, radius, *self._corner_m, self._coarse_m)
+        config, mount = self._config, view.mount
+        ground_update.insert_scan(
+            self._hits,
+            self._mean,
+            self._seen,
+            self._pose,
+            mount.as_array(),
+            ranges,
+            first,
+            step,
+            view.max_range_m,
+            config.reach_m,
+            still,
+            body.polygon,
+            INSIDE_M,
+            config.fade_hits,
+            *self._corner_m,
+            self._cell_m,
+        )
         ground = self._ground(body, drive, rolled, avoid)
         state = np.array([*self._pose, view.twist.v_m_s, view.twist.w_rad_s])
         self._answer.learn(view.t_s, state, view.limits.delay_s, drive)
@@ -218,6 +238,11 @@ class RollingGround:
             self._body, self._footprint = make_body(view.footprint_xy_m), view.footprint_xy_m
         return self._body
 
+    def _take_limits(self, limits: LocalLimits) -> Drive:
+        if limits is not self._limits:
+            self._limits, self._sheet = limits, drive_of(limits)
+        return self._sheet
+
     def _predict(self, view: LocalView) -> None:
         """Move the corrected pose by what the odometry moved."""
         before = self._odometry
@@ -231,12 +256,12 @@ class RollingGround:
             ]
         )
 
-    def _roll(self, first_view: bool) -> bool:
-        """Shift the grids by whole coarse cells, so that the robot stays near their middle."""
+    def _roll(self, pose: FloatArray, first_view: bool) -> bool:
+        """Shift the grids by whole coarse cells, so that a robot at ``pose`` stays near their middle."""
         half_m = 0.5 * self._cells * self._cell_m
         wanted = (
-            math.floor((self._pose[0] - half_m) / self._coarse_m),
-            math.floor((self._pose[1] - half_m) / self._coarse_m),
+            math.floor((pose[0] - half_m) / self._coarse_m),
+            math.floor((pose[1] - half_m) / self._coarse_m),
         )
         dc, dr = wanted[0] - self._corner[0], wanted[1] - self._corner[1]
         if first_view:
@@ -244,10 +269,7 @@ class RollingGround:
             return True
         if max(abs(dc), abs(dr)) * self._coarse_m < 0.5:
             return False
-        self._hits = _shifted(self._hits, 2 * dr, 2 * dc)
-        square = (self._cells, self._cells, 2)
-        self._mean = _shifted(self._mean.reshape(square), 2 * dr, 2 * dc).reshape(-1, 2)
-        self._seen = _shifted(self._seen, dr, dc)
+        ground_update.rolled(self._hits, self._mean, self._seen, dr, dc)
         self._corner = wanted
         return True
 
@@ -272,84 +294,15 @@ class RollingGround:
         )
         self._pose = np.array([x, y, wrap(theta)])
 
-    def _insert(
-        self,
-        view: LocalView,
-        ranges: FloatArray,
-        first: float,
-        step: float,
-        body: Body,
-        first_view: bool,
-        still: FloatArray,
-    ) -> None:
-        config = self._config
-        c, s = math.cos(self._pose[2]), math.sin(self._pose[2])
-        x = self._pose[0] + c * view.mount.x_m - s * view.mount.y_m
-        y = self._pose[1] + s * view.mount.x_m + c * view.mount.y_m
-        theta = self._pose[2] + view.mount.theta_rad
-        x0, y0 = self._corner[0] * self._coarse_m, self._corner[1] * self._coarse_m
-        near = still[np.hypot(still[:, 0] - view.mount.x_m, still[:, 1] - view.mount.y_m) < config.reach_m]
-        points = self._pose[:2] + near @ np.array([[c, s], [-s, c]])
-        if config.fade_hits:
-            kernels.clear_passed(
-                self._hits,
-                self._mean,
-                x,
-                y,
-                theta,
-                ranges,
-                first,
-                step,
-                view.max_range_m,
-                self._cell_m,
-                0.2,
-                config.fade_hits,
-            )
-        kernels.add_points(self._hits, self._mean, points, x0, y0, self._cell_m)
-        kernels.clear_inside(
-            self._hits,
-            self._mean,
-            self._pose[0],
-            self._pose[1],
-            self._pose[2],
-            body.polygon,
-            INSIDE_M,
-            x0,
-            y0,
-            self._cell_m,
-        )
-        kernels.mark_seen(
-            self._seen,
-            x,
-            y,
-            theta,
-            ranges,
-            first,
-            step,
-            x0,
-            y0,
-            self._coarse_m,
-            config.reach_m,
-        )
-        if first_view:
-            # Where the robot stands at first it may turn: the laser does not see the ground under it.
-            kernels.mark_disc(
-                self._seen,
-                self._pose[0],
-                self._pose[1],
-                body.outer_m + self._coarse_m,
-                x0,
-                y0,
-                self._coarse_m,
-            )
+    @property
+    def _corner_m(self) -> tuple[float, float]:
+        """Lower left corner of both grids."""
+        return self._corner[0] * self._coarse_m, self._corner[1] * self._coarse_m
 
     def _ground(self, body: Body, drive: Drive, rolled: bool, avoid: FloatArray | None) -> Ground:
         config = self._config
-        x0, y0 = self._corner[0] * self._coarse_m, self._corner[1] * self._coarse_m
-        marked = kernels.believed(self._hits)
-        shown = np.where(marked, self._hits, np.uint8(0))
-        nearest = kernels.nearest_cells(marked)
-        unseen = self._coarse_m * np.sqrt(squared_distance(~self._seen).astype(np.float64))
+        x0, y0 = self._corner_m
+        shown, nearest, unseen = ground_update.looked_at(self._hits, self._seen, self._coarse_m, body.outer_m)
         self._since_plan += 1
         if rolled or self._since_plan >= config.replan_steps:
             self._since_plan = 0
@@ -388,7 +341,7 @@ class RollingGround:
 
     def _time_to_go(self, discs: FloatArray | None, body: Body, drive: Drive) -> FloatArray:
         config = self._config
-        x0, y0 = self._corner[0] * self._coarse_m, self._corner[1] * self._coarse_m
+        x0, y0 = self._corner_m
         clearance = self._clearance
         if self._closed:
             clearance = _beside(clearance, np.array(self._closed), x0, y0, self._coarse_m)
@@ -440,17 +393,6 @@ def _moved(point: tuple[float, float], seen_from: Pose2, now: FloatArray) -> Flo
     c, s = math.cos(turn), math.sin(turn)
     dx, dy = point[0] - seen_from.x_m, point[1] - seen_from.y_m
     return np.array([now[0] + c * dx - s * dy, now[1] + s * dx + c * dy])
-
-
-def _shifted(array: NDArray[Scalar], rows: int, columns: int) -> NDArray[Scalar]:
-    """Move the window over an array: what comes in is 0."""
-    out = np.zeros_like(array)
-    n, m = array.shape[:2]
-    if abs(rows) < n and abs(columns) < m:
-        out[max(0, -rows) : n - max(0, rows), max(0, -columns) : m - max(0, columns)] = array[
-            max(0, rows) : n + min(0, rows), max(0, columns) : m + min(0, columns)
-        ]
-    return out
 
 
 def _beside(clearance: FloatArray, discs: FloatArray, x0: float, y0: float, coarse: float) -> FloatArray:

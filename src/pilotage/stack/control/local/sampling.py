@@ -1,4 +1,4 @@
-"""Noise for sampled plans, drawn once, and plans carried from one step to the next."""
+"""Noise for sampled plans, drawn once."""
 
 from __future__ import annotations
 
@@ -42,12 +42,3 @@ def _hanging_together(noise: FloatArray) -> FloatArray:
     for k in range(1, noise.shape[1]):
         out[:, k] = KEEP * out[:, k - 1] + np.sqrt(1.0 - KEEP**2) * noise[:, k]
     return out
-
-
-def later(plan: FloatArray, steps: float) -> FloatArray:
-    """A plan (N, 2) as it is ``steps`` of its own steps later; the last command is held."""
-    at = np.minimum(np.arange(plan.shape[0]) + steps, plan.shape[0] - 1.0)
-    low = np.floor(at).astype(np.int64)
-    high = np.minimum(low + 1, plan.shape[0] - 1)
-    part = (at - low)[:, None]
-    return np.ascontiguousarray((1.0 - part) * plan[low] + part * plan[high])

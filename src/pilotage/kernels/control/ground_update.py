@@ -1,0 +1,357 @@
+"""What one scan changes on the rolling grid of ``ground``: hits and their means, cells that are seen."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from pilotage.kernels.arrays import BoolArray, ByteArray, FloatArray, IntArray
+from pilotage.kernels.control.footprint import polygon_distance
+from pilotage.kernels.geometry.motion import TWO_PI
+from pilotage.kernels.grids.distance import CellIndex, near_distance, nearest_marked
+from pilotage.kernels.jit import kernel
+
+MOST_HITS = 60
+"""Hits are counted so far; the mean goes on moving with this weight."""
+SCATTER = 0.12
+"""A cell with less than this share of its neighbour's hits is that neighbour's range noise."""
+BEHIND_M = 0.2
+"""A beam that ends so far behind a cell's hits has passed them by."""
+
+
+@kernel
+def evenly_spaced(angles: FloatArray) -> bool:
+    """Whether directions (N,), two or more, increase by steps that are equal to a thousandth."""
+    step = (angles[-1] - angles[0]) / (angles.shape[0] - 1)
+    if not step > 0.0:
+        return False
+    for k in range(1, angles.shape[0]):
+        if not abs(angles[k] - angles[k - 1] - step) < 1e-3 * step + 1e-9:
+            return False
+    return True
+
+
+@kernel
+def cleaned_ranges(ranges: FloatArray, max_range: float) -> tuple[FloatArray, int]:
+    """Ranges (N,) with ``max_range`` where there is none, and how many of them were 0 or less."""
+    out = ranges.copy()
+    silent = 0
+    for k in range(out.shape[0]):
+        if not math.isfinite(out[k]):
+            out[k] = max_range
+        elif out[k] <= 0.0:
+            out[k] = max_range
+            silent += 1
+    return out, silent
+
+
+@kernel
+def scan_points(
+    x: float, y: float, theta: float, ranges: FloatArray, first: float, step: float, max_range: float
+) -> tuple[FloatArray, float]:
+    """End points (N, 2) of the beams that hit something, seen from the sensor's pose.
+
+    Returns them, and the distance of the nearest one from the origin; inf without any.
+    """
+    out = np.empty((ranges.shape[0], 2))
+    count = 0
+    least = math.inf
+    for k in range(ranges.shape[0]):
+        if 0.0 < ranges[k] < max_range:
+            angle = theta + first + k * step
+            px, py = x + ranges[k] * math.cos(angle), y + ranges[k] * math.sin(angle)
+            out[count, 0], out[count, 1] = px, py
+            least = min(least, px * px + py * py)
+            count += 1
+    return out[:count], math.sqrt(least)
+
+
+@kernel
+def insert_scan(
+    hits: ByteArray,
+    mean: FloatArray,
+    seen: BoolArray,
+    pose: FloatArray,
+    mount: FloatArray,
+    ranges: FloatArray,
+    first: float,
+    step: float,
+    max_range: float,
+    reach: float,
+    in_base: FloatArray,
+    polygon: FloatArray,
+    inside: float,
+    fade: int,
+    x0: float,
+    y0: float,
+    cell: float,
+) -> None:
+    """Take a scan into the grids; in place.
+
+    Parameters
+    ----------
+    pose, mount
+        (3,) of the base, and of the laser on it.
+    in_base
+        (N, 2) points that the scan ends at and the grid shall keep, those within ``reach`` of the laser.
+    inside
+        Hits deeper than this inside the footprint are forgotten.
+    fade
+        Hits that a cell loses where the laser sees past it; 0 for none.
+    """
+    c, s = math.cos(pose[2]), math.sin(pose[2])
+    x = pose[0] + c * mount[0] - s * mount[1]
+    y = pose[1] + s * mount[0] + c * mount[1]
+    theta = pose[2] + mount[2]
+    if fade > 0:
+        _clear_passed(hits, mean, x, y, theta, ranges, first, step, max_range, cell, fade)
+    _add_points(hits, mean, in_base, pose[0], pose[1], c, s, mount[0], mount[1], reach, x0, y0, cell)
+    _clear_inside(hits, mean, pose[0], pose[1], c, s, polygon, inside, x0, y0, cell)
+    _mark_seen(seen, x, y, theta, ranges, first, step, x0, y0, 2.0 * cell, reach)
+
+
+@kernel
+def looked_at(
+    hits: ByteArray, seen: BoolArray, coarse: float, outer: float
+) -> tuple[ByteArray, CellIndex, FloatArray]:
+    """What ``Ground`` keeps of the grids for a body of radius ``outer``: hits, nearest and unseen_m."""
+    shown = believed(hits)
+    squared = near_distance(~seen, math.ceil(outer / coarse))
+    unseen = np.empty(seen.shape)
+    for row in range(seen.shape[0]):
+        for column in range(seen.shape[1]):
+            unseen[row, column] = coarse * math.sqrt(float(squared[row, column]))
+    return shown, nearest_marked(shown > 0), unseen
+
+
+@kernel
+def rolled(hits: ByteArray, mean: FloatArray, seen: BoolArray, rows: int, columns: int) -> None:
+    """Move the window over both grids by so many coarse cells: what comes in is empty; in place.
+
+    Means are moved where there are hits: without any a mean says nothing.
+    """
+    n, m = hits.shape[0], seen.shape[0]
+    flat = hits.reshape(-1)
+    held = _occupied(hits)
+    kept = mean[held]
+    counts = flat[held]
+    flat[:] = 0
+    for k in range(held.shape[0]):
+        row, column = held[k] // n - 2 * rows, held[k] % n - 2 * columns
+        if 0 <= row < n and 0 <= column < n:
+            hits[row, column] = counts[k]
+            mean[row * n + column] = kept[k]
+    before = seen.copy()
+    seen[:] = False
+    for row in range(max(0, -rows), min(m, m - rows)):
+        for column in range(max(0, -columns), min(m, m - columns)):
+            seen[row, column] = before[row + rows, column + columns]
+
+
+@kernel
+def believed(hits: ByteArray) -> ByteArray:
+    """Hits (n, n) of the cells that hold an obstacle and not only the range noise of a neighbour's."""
+    n, m = hits.shape
+    out = np.zeros((n, m), np.uint8)
+    for i in _occupied(hits):
+        row, column = i // m, i % m
+        most = 0
+        for r in range(max(0, row - 1), min(n, row + 2)):
+            for c in range(max(0, column - 1), min(m, column + 2)):
+                most = max(most, int(hits[r, c]))
+        if hits[row, column] >= SCATTER * most:
+            out[row, column] = hits[row, column]
+    return out
+
+
+@kernel
+def mark_disc(
+    seen: BoolArray, x: float, y: float, radius: float, x0: float, y0: float, coarse: float
+) -> None:
+    """Mark the coarse cells whose centre lies in a disc; in place."""
+    m = seen.shape[0]
+    for row in range(m):
+        for column in range(m):
+            dx, dy = x0 + (column + 0.5) * coarse - x, y0 + (row + 0.5) * coarse - y
+            if dx * dx + dy * dy <= radius * radius:
+                seen[row, column] = True
+
+
+@kernel
+def _occupied(hits: ByteArray) -> IntArray:
+    """Flat indices of the cells with hits, in order. Most have none: looked at four by four."""
+    flat = hits.reshape(-1)
+    whole = flat.shape[0] // 4
+    words = flat[: 4 * whole].view(np.uint32)
+    out = np.empty(flat.shape[0], np.int64)
+    count = 0
+    for word in range(whole):
+        if words[word] != 0:
+            for i in range(4 * word, 4 * word + 4):
+                if flat[i] != 0:
+                    out[count] = i
+                    count += 1
+    for i in range(4 * whole, flat.shape[0]):
+        if flat[i] != 0:
+            out[count] = i
+            count += 1
+    return out[:count]
+
+
+@kernel
+def _turned(angle: float) -> float:
+    """An angle as one within [0, 2 pi): the modulo costs as much as the arc tangent before it."""
+    if 0.0 <= angle < TWO_PI:
+        return angle
+    if -TWO_PI <= angle < 0.0:
+        return angle + TWO_PI
+    if TWO_PI <= angle < 2.0 * TWO_PI:
+        return angle - TWO_PI
+    return angle % TWO_PI
+
+
+@kernel
+def _clear_passed(
+    hits: ByteArray,
+    mean: FloatArray,
+    x: float,
+    y: float,
+    theta: float,
+    ranges: FloatArray,
+    first: float,
+    step: float,
+    max_range: float,
+    cell: float,
+    fade: int,
+) -> None:
+    """Take ``fade`` hits from every cell that all beams towards it pass by; in place.
+
+    Something that was there has gone. A cell seen edge-on keeps its hits: one of the beams towards it still
+    ends near it.
+    """
+    flat = hits.reshape(-1)
+    beams = ranges.shape[0]
+    for i in _occupied(hits):
+        dx, dy = mean[i, 0] - x, mean[i, 1] - y
+        distance = math.sqrt(dx * dx + dy * dy)
+        if distance < cell or distance + BEHIND_M >= max_range:
+            continue
+        angle = _turned(math.atan2(dy, dx) - theta - first)
+        half = cell / distance / step
+        low, high = math.ceil(angle / step - half), math.floor(angle / step + half)
+        if low < 0 or high >= beams or low > high:
+            continue
+        gone = True
+        for k in range(low, high + 1):
+            if ranges[k] < distance + BEHIND_M:
+                gone = False
+                break
+        if gone:
+            flat[i] = np.uint8(max(0, int(flat[i]) - fade))
+
+
+@kernel
+def _add_points(
+    hits: ByteArray,
+    mean: FloatArray,
+    in_base: FloatArray,
+    x: float,
+    y: float,
+    c: float,
+    s: float,
+    from_x: float,
+    from_y: float,
+    reach: float,
+    x0: float,
+    y0: float,
+    cell: float,
+) -> None:
+    """Count points (N, 2) of the base's frame in the cells they fall into, move the means; in place."""
+    n = hits.shape[0]
+    for i in range(in_base.shape[0]):
+        px, py = in_base[i, 0], in_base[i, 1]
+        if not math.hypot(px - from_x, py - from_y) < reach:
+            continue
+        there_x, there_y = x + (c * px - s * py), y + (s * px + c * py)
+        column, row = math.floor((there_x - x0) / cell), math.floor((there_y - y0) / cell)
+        if not (0 <= row < n and 0 <= column < n):
+            continue
+        if hits[row, column] == 0:
+            mean[row * n + column, 0], mean[row * n + column, 1] = there_x, there_y
+        if hits[row, column] < MOST_HITS:
+            hits[row, column] += np.uint8(1)
+        share = 1.0 / hits[row, column]
+        mean[row * n + column, 0] += share * (there_x - mean[row * n + column, 0])
+        mean[row * n + column, 1] += share * (there_y - mean[row * n + column, 1])
+
+
+@kernel
+def _clear_inside(
+    hits: ByteArray,
+    mean: FloatArray,
+    x: float,
+    y: float,
+    c: float,
+    s: float,
+    polygon: FloatArray,
+    depth: float,
+    x0: float,
+    y0: float,
+    cell: float,
+) -> None:
+    """Empty the cells whose mean lies deeper than ``depth`` inside the footprint; in place."""
+    n = hits.shape[0]
+    reach = 0.0
+    for k in range(polygon.shape[0]):
+        reach = max(reach, math.hypot(polygon[k, 0], polygon[k, 1]))
+    for row in range(
+        max(0, math.floor((y - reach - y0) / cell)), min(n, math.floor((y + reach - y0) / cell) + 1)
+    ):
+        for column in range(
+            max(0, math.floor((x - reach - x0) / cell)), min(n, math.floor((x + reach - x0) / cell) + 1)
+        ):
+            if hits[row, column] == 0:
+                continue
+            dx, dy = mean[row * n + column, 0] - x, mean[row * n + column, 1] - y
+            if polygon_distance(c * dx + s * dy, c * dy - s * dx, polygon) < -depth:
+                hits[row, column] = np.uint8(0)
+
+
+@kernel
+def _mark_seen(
+    seen: BoolArray,
+    x: float,
+    y: float,
+    theta: float,
+    ranges: FloatArray,
+    first: float,
+    step: float,
+    x0: float,
+    y0: float,
+    coarse: float,
+    reach: float,
+) -> None:
+    """Mark the coarse cells (m, m) whose centre both beams beside it reach; in place.
+
+    Between beams that are farther apart than an obstacle is wide nothing is known: ``reach`` ends there.
+    """
+    m = seen.shape[0]
+    beams = ranges.shape[0]
+    slack = 0.5 * coarse
+    r0 = max(0, math.floor((y - reach - y0) / coarse))
+    r1 = min(m, math.ceil((y + reach - y0) / coarse))
+    c0 = max(0, math.floor((x - reach - x0) / coarse))
+    c1 = min(m, math.ceil((x + reach - x0) / coarse))
+    for row in range(r0, r1):
+        dy = y0 + (row + 0.5) * coarse - y
+        for column in range(c0, c1):
+            if seen[row, column]:
+                continue
+            dx = x0 + (column + 0.5) * coarse - x
+            distance = math.sqrt(dx * dx + dy * dy)
+            if distance > reach:
+                continue
+            low = math.floor(_turned(math.atan2(dy, dx) - theta - first) / step)
+            if low + 1 < beams and min(ranges[low], ranges[low + 1]) > distance - slack:
+                seen[row, column] = True
