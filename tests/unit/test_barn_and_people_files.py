@@ -12,7 +12,8 @@ from hypothesis import strategies as st
 
 from pilotage.core.errors import InputError
 from pilotage.core.types import FloatArray
-from pilotage.evaluation.barn import BarnRun, barn_metric, lane_within, summarize, time_bound_s
+from pilotage.evaluation.barn import BarnRun, barn_metric, lane_within, summarize
+from pilotage.evaluation.least_time import time_bound_s
 from pilotage.logs.barn import read_barn
 from pilotage.logs.people import read_people
 

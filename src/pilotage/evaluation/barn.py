@@ -11,7 +11,6 @@ import numpy as np
 from pilotage.core.errors import InputError
 from pilotage.core.types import FloatArray
 from pilotage.evaluation.intervals import bootstrap_mean
-from pilotage.evaluation.shortest_path import shortest_path
 from pilotage.maps.segment_map import SegmentMap
 
 BEST = 2.0
@@ -76,40 +75,6 @@ def barn_metric(success: bool, time_s: float, optimal_time_s: float) -> float:
     if not success:
         return 0.0
     return optimal_time_s / min(max(time_s, BEST * optimal_time_s), WORST * optimal_time_s)
-
-
-def time_bound_s(
-    world: SegmentMap,
-    start_xy: tuple[float, float],
-    goal_xy: tuple[float, float],
-    tolerance_m: float,
-    inner_radius_m: float,
-    speed_m_s: float,
-    acceleration_m_s2: float,
-) -> float | None:
-    """Time that no robot of these limits undercuts, though it knew the course.
-
-    The exact shortest path of the footprint's inner disc, less the tolerance about the goal, from rest with
-    full acceleration to full speed. Turning takes no time and corners pass through walls there: both only
-    lower the bound.
-
-    Returns
-    -------
-    Seconds; None where the disc has no way.
-    """
-    path = shortest_path(world, start_xy, goal_xy, inner_radius_m)
-    if path is None:
-        return None
-    return least_time_s(path.length_m - tolerance_m, speed_m_s, acceleration_m_s2)
-
-
-def least_time_s(length_m: float, speed_m_s: float, acceleration_m_s2: float) -> float:
-    """Time over a length from rest at full acceleration and speed, without braking at its end."""
-    length = max(length_m, 0.0)
-    speeding_m = 0.5 * speed_m_s**2 / acceleration_m_s2
-    if length <= speeding_m:
-        return math.sqrt(2.0 * length / acceleration_m_s2)
-    return length / speed_m_s + 0.5 * speed_m_s / acceleration_m_s2
 
 
 def lane_within(circles_m: FloatArray, low_y: float, high_y: float) -> SegmentMap:

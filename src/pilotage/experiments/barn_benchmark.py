@@ -13,7 +13,8 @@ import numpy as np
 
 from pilotage.core.errors import InputError
 from pilotage.core.plugins import named_plugins
-from pilotage.evaluation.barn import BarnRun, lane_within, summarize, time_bound_s
+from pilotage.evaluation.barn import BarnRun, lane_within, summarize
+from pilotage.evaluation.least_time import time_bound_s
 from pilotage.experiments.barn_bounds import bounds_of, has_way
 from pilotage.experiments.build.build import build
 from pilotage.experiments.build.robots import footprint_of

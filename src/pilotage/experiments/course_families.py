@@ -13,7 +13,8 @@ from scipy.ndimage import label
 
 from pilotage.core.errors import InputError
 from pilotage.core.types import FloatArray
-from pilotage.evaluation.barn import lane_within, least_time_s, time_bound_s
+from pilotage.evaluation.barn import lane_within
+from pilotage.evaluation.least_time import least_time_s, time_bound_s
 from pilotage.experiments.build.charts import load_chart
 from pilotage.kernels.control.pose_search import CLOSED, passage
 from pilotage.logs.people import read_people

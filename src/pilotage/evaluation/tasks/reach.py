@@ -16,6 +16,7 @@ from pilotage.evaluation.cell_plans import route_metrics, route_of
 from pilotage.evaluation.driving import driving_metrics, header, planning_metrics, poses, shortest_for
 from pilotage.evaluation.finished import FinishedRun, RobotRun, Verdict
 from pilotage.evaluation.halls import hall_offset_m
+from pilotage.evaluation.least_time import least_drive_metrics
 from pilotage.evaluation.rounds import rounds_metrics, visited_steps
 from pilotage.evaluation.tasks.collisions import CollisionWatch
 from pilotage.evaluation.tasks.task import TASKS, Attempt, TaskSetting, all_ended
@@ -97,6 +98,7 @@ class ReachTask:
             planning_metrics(run, robot, shortest) if route is None else route_metrics(run, robot, route)
         )
         driven, nees = driving_metrics(run, robot)
+        metrics |= least_drive_metrics(run, robot)
         extras = {} if shortest is None else {f"{robot.name}/shortest_path": shortest.points_xy_m}
         metrics |= driven
         columns = {"nees": nees}

@@ -1,4 +1,4 @@
-"""The navigator that drives to its goal by what the laser shows: no map, no plan."""
+"""The navigator that drives to its goal by what the laser shows, along a plan where there is a planner."""
 
 from __future__ import annotations
 
@@ -19,6 +19,10 @@ from pilotage.stack.knowledge import RobotKnowledge, TaskKnowledge
 from pilotage.stack.localization.dead_reckoning import DeadReckoningConfig, DeadReckoningLocalizer
 from pilotage.stack.localization.localizer import Localizer
 from pilotage.stack.navigator.navigator import Parts
+from pilotage.stack.navigator.plan_ahead import PlanAhead, PlanAheadConfig
+
+PASSING_M = 0.05
+"""A point on the plan is no place to stop at: only this near is it reached."""
 
 
 class LocalConfig(Config):
@@ -30,6 +34,8 @@ class LocalConfig(Config):
     """How near it has to believe to be; None: the goal's tolerance."""
     shift_m: Positive = 0.1
     """The goal is placed anew in the odometry's frame where the localizer's correction moves it farther."""
+    plan: PlanAheadConfig = PlanAheadConfig()
+    """How the stack's planner leads, if it has one."""
 
 
 @NAVIGATORS.add("local", LocalConfig)
@@ -38,8 +44,10 @@ class LocalNavigator:
 
     The controller sees poses that are integrated from the odometry alone, which drift but do not jump.
     Without a localizer the belief is dead reckoned; with one the goal stays where the localizer has it.
-    Between two scans the last command stands. Fails where the robot cannot turn on the spot: the
-    controllers reckon with it.
+    With a planner the controller is led along its plan on the robot's own map, to which a mapper adds what
+    it sees; without, it heads for the goal itself, which fails where the way leads far around. Between two
+    scans the last command stands. Fails where the robot cannot turn on the spot: the controllers reckon
+    with it.
     """
 
     def __init__(
@@ -69,6 +77,19 @@ class LocalNavigator:
         self._localizer: Localizer = parts.localizer or DeadReckoningLocalizer(
             DeadReckoningConfig(), robot, chart, task.initial, journal
         )
+        self._plan: PlanAhead | None = None
+        if parts.planner is not None:
+            self._plan = PlanAhead(
+                config.plan,
+                robot,
+                chart,
+                task.goal,
+                parts.planner,
+                parts.smoother,
+                parts.mapper,
+                self._localizer.belief,
+                journal,
+            )
         self._tolerance_m = min(config.arrival_m or math.inf, task.goal_tolerance_m)
         self._status, self._reason, self._word = StackStatus.RUNNING, "", ""
         self._channel = journal.channel({"distance_to_go_m": "m"}, first=True)
@@ -85,20 +106,36 @@ class LocalNavigator:
 
     def step(self, readings: Readings) -> Twist:
         """Localize, move the odometry's pose on, and ask the controller where there is a scan."""
-        belief = self._localizer.step(readings).pose
+        belief = self._localizer.step(readings)
+        pose = belief.pose
         self._drive.move(readings)
-        self._channel.tell(math.hypot(self._goal_xy_m[0] - belief.x_m, self._goal_xy_m[1] - belief.y_m))
+        away_m = math.hypot(self._goal_xy_m[0] - pose.x_m, self._goal_xy_m[1] - pose.y_m)
         if self._status is not StackStatus.RUNNING:
+            self._channel.tell(away_m)
             return STOP
-        command = self._drive.toward(self._goal_xy_m, belief, readings, self._tolerance_m)
-        self._tell(readings.t_s)
+        point, tolerance_m = self._goal_xy_m, self._tolerance_m
+        if self._plan is not None:
+            point = self._plan.lead(readings, belief)
+            away_m = self._plan.to_go_m
+            if self._plan.failure:
+                self._end(readings.t_s, StackStatus.FAILED, self._plan.failure)
+                return STOP
+        self._channel.tell(away_m)
+        led = point != self._goal_xy_m
+        command = self._drive.toward(
+            point, pose, readings, min(PASSING_M, tolerance_m) if led else tolerance_m
+        )
+        self._tell(readings.t_s, led=led)
         return STOP if self._status is not StackStatus.RUNNING else command
 
-    def _tell(self, t_s: float) -> None:
+    def _tell(self, t_s: float, *, led: bool) -> None:
         word = self._drive.status
-        if word == "arrived":
-            self._status, self._reason = StackStatus.ARRIVED, f"within {self._tolerance_m:g} m of the goal"
-            self._journal.say(t_s, "arrived", self._reason)
+        if word == "arrived" and not led:
+            self._end(t_s, StackStatus.ARRIVED, f"within {self._tolerance_m:g} m of the goal")
         elif word == "closed" and word != self._word:
             self._journal.count("closed")
         self._word = word
+
+    def _end(self, t_s: float, status: StackStatus, why: str) -> None:
+        self._status, self._reason = status, why
+        self._journal.say(t_s, str(status), why)

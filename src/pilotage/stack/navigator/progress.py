@@ -65,6 +65,11 @@ class PathProgress:
         )
         return self.length_m - self.at_m
 
+    def index(self, ahead_m: float) -> int:
+        """Of the first state at least so far ahead of the robot (the last one at the end)."""
+        index = int(np.searchsorted(self._along_m, self.at_m + ahead_m))
+        return min(index, len(self._along_m) - 1)
+
     @property
     def heading_rad(self) -> float:
         """Of the path where the robot is."""

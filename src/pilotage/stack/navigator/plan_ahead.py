@@ -1,0 +1,137 @@
+"""A plan on the robot's own map that leads a local controller: made anew where what is seen blocks it."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from pydantic import Field
+
+from pilotage.core.config import Config
+from pilotage.core.types import FloatArray, Goal, Pose2
+from pilotage.kernels.geometry import plane
+from pilotage.maps.world_map import WorldMap
+from pilotage.sensors.readings import Readings
+from pilotage.sensors.sensor import NonNegative, Positive
+from pilotage.stack.interface import Belief, BeliefStatus
+from pilotage.stack.journal import Journal
+from pilotage.stack.knowledge import RobotKnowledge
+from pilotage.stack.mapping.mapper import Mapper
+from pilotage.stack.navigator.global_plan import GlobalPlan
+from pilotage.stack.navigator.own_map import OwnMap
+from pilotage.stack.navigator.progress import StallWatch
+from pilotage.stack.planning.planner import Planner, Smoother
+
+
+class PlanAheadConfig(Config):
+    """How far ahead the plan leads, and when it is made anew."""
+
+    lead_m: Positive = 3.5
+    """The local controller heads for the plan's point so far ahead."""
+    watch_margin_m: NonNegative = 0.03
+    """Anything newly mapped nearer to the plan ahead than the body's radius plus this makes a new one."""
+    every_s: NonNegative = 0.5
+    """No two new plans are made in less time."""
+    fallback_margins_m: tuple[Positive, ...] = (0.10, 0.06, 0.02)
+    """Where there is no plan at the planner's clearance: the body's radius plus these."""
+    stall_s: Positive = 10.0
+    stall_progress_m: Positive = 0.5
+    most_stalls: int = Field(default=6, ge=0)
+    """So often it plans anew where it got no farther before it gives up."""
+
+
+class PlanAhead:
+    """Keeps a plan to one goal and says where on it to head for.
+
+    The plan holds whatever the map and the mapper have; what only the controller sees it does not know of.
+    Where no plan is found the last one leads on: the way may open, or the controller find it.
+    """
+
+    def __init__(
+        self,
+        config: PlanAheadConfig,
+        robot: RobotKnowledge,
+        chart: WorldMap,
+        goal: Goal,
+        planner: Planner,
+        smoother: Smoother | None,
+        mapper: Mapper | None,
+        initial: Belief,
+        journal: Journal,
+    ) -> None:
+        self._config, self._goal, self._mapper, self._journal = config, goal, mapper, journal
+        self._radius_m = robot.radius_m
+        self._own_map = own_map = OwnMap(chart, mapper)
+        rng = robot.streams.stream("planner")
+        self._plan = GlobalPlan(planner, smoother, chart, rng, journal, robot.radius_m, robot)
+        self._stall = StallWatch(config.stall_progress_m, config.stall_s)
+        self._stalls, self._planned_s, self._known = 0, -math.inf, 0
+        self._path: FloatArray = np.zeros((0, 2))
+        self.to_go_m = math.inf
+        self.failure = ""
+        journal.result("mapped_circles_m", lambda: own_map.found_circles_m)
+        journal.counts["replans"] = 0
+        if initial.status is not BeliefStatus.LOST:
+            self._make(0.0, initial.pose, "plan")
+
+    def lead(self, readings: Readings, belief: Belief) -> tuple[float, float]:
+        """The point to head for, by the plan as it is now; ``failure`` says why it gave up."""
+        pose, t_s = belief.pose, readings.t_s
+        if self._mapper is not None:
+            self._mapper.step(readings, belief)
+        if self._plan.progress is None:
+            self._make(t_s, pose, "plan")
+        else:
+            self.to_go_m = self._plan.progress.update(pose)
+            if self._stall.stalled(self.to_go_m, t_s):
+                self._stalls += 1
+                if self._stalls > self._config.most_stalls:
+                    self.failure = f"stuck: no progress on {self._stalls} plans"
+                self._make(t_s, pose, f"no progress for {self._config.stall_s:g} s")
+            elif t_s - self._planned_s >= self._config.every_s and self._is_blocked():
+                self._make(t_s, pose, "a mapped obstacle stands on the plan")
+        if self._plan.progress is None:
+            self.failure = self.failure or "no plan leads to the goal"
+            return pose.x_m, pose.y_m
+        return self._point_ahead()
+
+    def _is_blocked(self) -> bool:
+        """Whether what was mapped since the last plan comes too near to the path ahead."""
+        found = self._own_map.found_circles_m
+        new = found[self._known :]
+        self._known = len(found)
+        if not len(new):
+            return False
+        ahead = self._path[self._index() :]
+        least_m = self._radius_m + self._config.watch_margin_m
+        return float(plane.least_distance(np.ascontiguousarray(ahead), plane.NO_SEGMENTS, new)) < least_m
+
+    def _make(self, t_s: float, pose: Pose2, why: str) -> None:
+        """Plan from here, at the planner's own clearance or at less."""
+        own = self._plan.clearance_m
+        asked = [own, *(self._radius_m + m for m in self._config.fallback_margins_m)]
+        found = self._own_map.found_circles_m
+        first = self._plan.progress is None
+        result = self._plan.make(t_s, pose, self._goal, found, [c for c in asked if c <= own])
+        self._planned_s, self._known = t_s, len(found)
+        if not first:
+            self._journal.count("replans")
+        if result.path is None:
+            self._journal.say(t_s, "no-plan", f"{why}: {result.status}, {result.reason}")
+            return
+        assert self._plan.path is not None
+        self._path = np.ascontiguousarray(self._plan.path.states[:, :2])
+        self._stall.restart(t_s)
+        self.to_go_m = self._plan.path.length_m
+        self._journal.say(t_s, "plan" if first else "replan", f"{why}: {self.to_go_m:.2f} m to go")
+
+    def _index(self, ahead_m: float = 0.0) -> int:
+        """Of the path's state so far ahead of the robot."""
+        assert self._plan.progress is not None
+        return self._plan.progress.index(ahead_m)
+
+    def _point_ahead(self) -> tuple[float, float]:
+        if self.to_go_m <= self._config.lead_m:
+            return self._goal.x_m, self._goal.y_m
+        x, y = self._path[self._index(self._config.lead_m)]
+        return float(x), float(y)

@@ -1,0 +1,87 @@
+"""Navigator `local` along a plan: around what is on no map, and what it says where there is none."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import pytest
+
+from pilotage.evaluation.least_time import least_time_s
+from pilotage.evaluation.shortest_path import shortest_path
+from pilotage.experiments.mission import load_mission, mission_of, read_mission
+from pilotage.experiments.run import run_mission
+from pilotage.maps.segment_map import SegmentMap, box_segments
+from pilotage.missions.mission import Mission
+
+WALLS = [[0, 0, 8, 0], [8, 0, 8, 6], [8, 6, 0, 6], [0, 6, 0, 0], [4, 0, 4, 4.4]]
+ROOMS = {
+    "map": "two-rooms",
+    "bounds_m": [0, 0, 8, 6],
+    "walls_m": WALLS,
+}
+BOX = {"kind": "box", "from_m": [1.8, 3.2], "to_m": [3.0, 2.0], "thickness_m": 0.2}
+
+
+def mission(obstacles: Sequence[object] = (BOX,), **more: object) -> Mission:
+    settings = {
+        "world.map": ROOMS,
+        "world.start": {"x_m": 1.0, "y_m": 1.0, "theta_rad": 0.0},
+        "world.goal": {"x_m": 7.0, "y_m": 1.0},
+        "world.obstacles": list(obstacles),
+        "stack.localizer": {"name": "dead-reckoning"},
+        "stack.initial": {"x_var_m2": 1e-8, "y_var_m2": 1e-8, "theta_var_rad2": 1e-8},
+        "robot.sensors.beacons": None,
+        "run.time_limit_s": 60.0,
+        **more,
+    }
+    return mission_of(read_mission("museum-1-fast"), (), 0, settings)
+
+
+def driven(mission: Mission) -> dict[str, Any]:
+    return dict(run_mission(mission, save=False).metrics)
+
+
+def test_it_drives_around_what_is_on_no_map_and_is_held_against_the_least() -> None:
+    metrics = driven(mission())
+    assert metrics["success"], metrics["reason"]
+    box = box_segments(2.4, 2.6, 1.2 * math.sqrt(2.0), 0.2, -0.25 * math.pi)
+    world = SegmentMap(np.vstack([np.array(WALLS), box]), np.zeros((0, 3)), (0.0, 0.0, 8.0, 6.0))
+    assert world.distance_m(2.4, 2.6) < 0.2  # it stands on the straight path
+    least = shortest_path(world, (1.0, 1.0), (7.0, 1.0), 0.3)
+    assert least is not None
+    assert metrics["least_length_m"] == pytest.approx(least.length_m - 0.3)
+    assert metrics["least_time_s"] == pytest.approx(least_time_s(metrics["least_length_m"], 1.0, 2.0))
+    assert metrics["driven_over_least"] < 1.15
+    assert 1.0 <= metrics["time_over_least"] < 1.35
+
+
+def test_without_a_plan_it_ends_and_says_so() -> None:
+    closed = {**ROOMS, "walls_m": [*WALLS, [4, 4.4, 4, 6]]}
+    metrics = driven(mission((), **{"world.map": closed}))
+    assert not metrics["success"]
+    assert metrics["reason"] == "no plan leads to the goal"
+    assert "least_length_m" not in metrics
+
+
+def test_where_the_way_is_shut_by_what_it_finds_it_gives_up_and_says_so() -> None:
+    shut = {"kind": "box", "from_m": [4.0, 4.4], "to_m": [4.0, 6.0], "thickness_m": 0.2}
+    more = {
+        "stack.navigator": {"name": "local", "plan": {"stall_s": 2.0, "most_stalls": 1}},
+        "run.time_limit_s": 90.0,
+    }
+    metrics = driven(mission((shut,), **more))
+    assert not metrics["success"]
+    assert metrics["reason"] == "stuck: no progress on 2 plans"
+    assert metrics["collisions"] == 0
+
+
+def test_the_museum_is_driven_past_a_trap_near_the_least() -> None:
+    metrics = driven(load_mission("museum-concave-fast", [], 0))
+    assert metrics["success"], metrics["reason"]
+    assert metrics["replans"] > 0
+    assert metrics["driven_over_least"] < 1.10
+    assert metrics["time_over_least"] < 1.20
+    assert math.isfinite(metrics["least_time_s"])
