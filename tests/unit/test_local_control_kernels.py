@@ -17,7 +17,17 @@ from pilotage.kernels.control.ground import Ground
 from pilotage.kernels.control.ground_update import believed, evenly_spaced, rolled
 from pilotage.kernels.control.match import match_scan
 from pilotage.kernels.control.motion_limits import Drive, advance, approach, command_is_safe
-from pilotage.kernels.control.movers import COLUMNS, VX, VY, X, Y, foretold, scan_clusters, track_step
+from pilotage.kernels.control.movers import (
+    COLUMNS,
+    VX,
+    VY,
+    X,
+    Y,
+    closes_in,
+    foretold,
+    scan_clusters,
+    track_step,
+)
 from pilotage.kernels.control.rollouts import weighted_mean
 from pilotage.kernels.control.togo import UNREACHED_S, descent_path, time_to_go
 from pilotage.kernels.grids.distance import nearest_marked
@@ -138,7 +148,9 @@ def test_a_command_called_safe_can_be_braked_from(v: float, w: float, seed: int)
     body = make_body(JACKAL)
     worse = DRIVE.scaled(0.7)
     start = np.array([0.0, 0.0, 0.0, v, w])
-    safe, _ = command_is_safe(start, v, w, 0.1, 0.05, True, DRIVE, worse, body, ground, NOBODY, 0.03, 0.0)
+    safe, _ = command_is_safe(
+        start, v, w, 0.1, 0.05, True, DRIVE, worse, body, ground, NOBODY, 0.03, 0.0, 0.05
+    )
     if not safe:
         return
     from pilotage.kernels.control.footprint import points_clearance
@@ -262,3 +274,46 @@ def test_clusters_end_at_gaps_and_wide_ones_are_none() -> None:
     assert np.all(of_point[:40] == -1)
     assert np.all(of_point[40:] == 0)
     assert math.hypot(*centres[0]) > math.hypot(2.0, 1.65)
+
+
+def seen_discs(*discs: tuple[float, float]) -> FloatArray:
+    """(N, 2) returns of a laser at the origin, counter-clockwise, of discs of 0.25 m radius."""
+    points = []
+    for angle in np.arange(-0.8, 0.8, 0.0065):
+        c, s = math.cos(angle), math.sin(angle)
+        ranges = []
+        for x, y in discs:
+            along, beside = c * x + s * y, c * y - s * x
+            if abs(beside) < 0.25:
+                ranges.append(along - math.sqrt(0.25**2 - beside**2))
+        if ranges:
+            points.append((min(ranges) * c, min(ranges) * s))
+    return np.array(points)
+
+
+def test_two_people_side_by_side_are_two_and_a_corner_is_nobody() -> None:
+    pair = [(2.5, -0.27), (2.6, 0.27)]
+    centres, of_point = scan_clusters(0.0, 0.0, seen_discs(*pair), 0.22, 0.8, 3)
+    assert centres.shape == (2, 2)
+    assert np.abs(centres - np.array(pair)).max() < 0.1
+    assert set(of_point.tolist()) == {0, 1}
+    y = np.linspace(-0.6, 0.6, 30)
+    for x in (3.0 - np.abs(y), 3.0 + np.abs(y), np.full(30, 3.0)):  # corners of both kinds, and a wall
+        assert scan_clusters(0.0, 0.0, np.column_stack([x, y]), 0.22, 0.8, 3)[0].shape == (0, 2)
+
+
+def test_who_drives_away_from_somebody_who_comes_closes_no_gap() -> None:
+    body = make_body(np.array([[0.3, 0.2], [-0.3, 0.2], [-0.3, -0.2], [0.3, -0.2]]))
+
+    def closes(after: tuple[float, float, float], x: float, y: float) -> bool:
+        return bool(
+            closes_in((0.0, 0.0, 0.0), after, body.polygon, body.outer_m, np.array([[x, y, 0.25]]), 0.05)
+        )
+
+    assert closes((0.05, 0.0, 0.0), 0.58, 0.0)
+    assert not closes((0.05, 0.0, 0.0), 0.8, 0.0)  # far enough away
+    assert not closes((0.05, 0.0, 0.0), -0.5, 0.0)  # from behind, even where he overlaps
+    assert not closes((0.0, 0.0, 0.0), 0.5, 0.0)  # it stands
+    assert closes((0.0, 0.0, 0.3), -0.6, 0.0)  # a corner swings towards him
+    both = np.array([[0.58, 0.0, 0.25], [-0.5, 0.0, 0.25]])
+    assert closes_in((0.0, 0.0, 0.0), (0.05, 0.0, 0.0), body.polygon, body.outer_m, both, 0.05)

@@ -8,7 +8,7 @@ from typing import NamedTuple
 from pilotage.kernels.arrays import FloatArray
 from pilotage.kernels.control.footprint import Body
 from pilotage.kernels.control.ground import Ground, clearance_of, seen_under, sure_clearance
-from pilotage.kernels.control.movers import movers_clearance
+from pilotage.kernels.control.movers import closes_in
 from pilotage.kernels.geometry.motion import exact_arc
 from pilotage.kernels.jit import kernel
 
@@ -120,6 +120,7 @@ def command_is_safe(
     movers: FloatArray,
     margin: float,
     margin_s: float,
+    movers_margin: float,
 ) -> tuple[bool, float]:
     """Whether a command, held and then followed by braking to rest, touches nothing that has been seen.
 
@@ -134,9 +135,9 @@ def command_is_safe(
     keep_turning
         Brake along the arc (curvature kept) instead of straightening.
     movers
-        (N, M, 3) moving discs at the end of each ``dt``, the last ones staying; while the robot moves it must
-        not come nearer than ``margin`` to them.
-    margin, margin_s
+        (N, M, 3) moving discs at the end of each ``dt``, the last ones staying; the robot's own motion must
+        not bring it nearer to one that is within ``movers_margin`` and ``margin_s`` times the speed.
+    margin, margin_s, movers_margin
         Clearance to keep, and how much more per m/s. Where there is less at the start, it must not shrink by
         more than a millimetre.
 
@@ -171,6 +172,7 @@ def command_is_safe(
         held = math.ceil(hold / dt - 1e-9)
         curvature = 0.0
         for k in range(400):
+            before = x, y, theta
             if k < held:
                 x, y, theta, v, w = advance(x, y, theta, v, w, cv, cw, dt, limits)
                 curvature = w / v if abs(v) > 0.05 else 0.0
@@ -189,7 +191,8 @@ def command_is_safe(
                 return False, least
             if movers.shape[1] > 0 and (v != 0.0 or w != 0.0):
                 at = min(k, movers.shape[0] - 1)
-                if movers_clearance(x, y, theta, polygon, outer, movers[at], margin) < margin:
+                keep = movers_margin + margin_s * abs(v)
+                if closes_in(before, (x, y, theta), polygon, outer, movers[at], keep):
                     return False, least
             if k >= held and v == 0.0 and w == 0.0:
                 break

@@ -15,6 +15,10 @@ from pilotage.kernels.jit import kernel
 X, Y, VX, VY, PP, PV, VV, READINGS, MISSED, X0, Y0 = range(11)
 COLUMNS = 11
 UNUSED = -1
+NOTCH_M = 0.08
+"""Two people side by side, of 0.25 m radius, leave a notch twice as deep between them."""
+CLOSES_M = 1e-4
+"""Of rounding: less is no motion towards anybody."""
 SHIFT_M = 0.18
 """Mean of what a laser sees of a body of 0.25 m radius lies so far in front of its middle."""
 
@@ -26,8 +30,8 @@ def scan_clusters(
     """Centres (C, 2) of the clusters of scan points (N, 2) in the order of the beams, and each point's (N,).
 
     A cluster ends where two points are farther apart than ``gap``; those wider than ``widest`` or of fewer
-    than ``least`` points are none (-1). A centre is shifted away from the sensor at x, y by what a round body
-    hides.
+    than ``least`` points are none (-1), but for one of up to twice the width with a notch in it: two bodies
+    side by side. A centre is shifted away from the sensor at x, y by what a round body hides.
     """
     count = points.shape[0]
     centres = np.empty((count, 2))
@@ -41,22 +45,60 @@ def scan_clusters(
             joined = dx * dx + dy * dy <= gap * gap
         if joined:
             continue
-        last = k - 1
-        width = math.hypot(points[last, 0] - points[begin, 0], points[last, 1] - points[begin, 1])
-        if width <= widest and k - begin >= least:
+        width = math.hypot(points[k - 1, 0] - points[begin, 0], points[k - 1, 1] - points[begin, 1])
+        cut = k
+        if widest < width <= 2.0 * widest:
+            cut = _notch(points, begin, k)
+        for first, end in ((begin, cut), (cut, k)):
+            if end - first < least:
+                continue
+            last = end - 1
+            width = math.hypot(points[last, 0] - points[first, 0], points[last, 1] - points[first, 1])
+            if width > widest:
+                continue
             mx, my = 0.0, 0.0
-            for i in range(begin, k):
+            for i in range(first, end):
                 mx += points[i, 0]
                 my += points[i, 1]
                 of_point[i] = found
-            mx /= k - begin
-            my /= k - begin
+            mx /= end - first
+            my /= end - first
             away = max(math.hypot(mx - x, my - y), 1e-6)
             centres[found, 0] = mx + SHIFT_M * (mx - x) / away
             centres[found, 1] = my + SHIFT_M * (my - y) / away
             found += 1
         begin = k
     return centres[:found], of_point
+
+
+@kernel
+def _notch(points: FloatArray, begin: int, end: int) -> int:
+    """Where to cut a cluster that two round bodies make: the deepest point behind both their fronts.
+
+    A front is the point that sticks out most to the sensor's side of the cluster's chord, on either side of
+    the cut. ``end`` where nothing is as deep as ``NOTCH_M``: a wall has no notch, and a corner no fronts.
+    """
+    ax, ay = points[begin, 0], points[begin, 1]
+    bx, by = points[end - 1, 0], points[end - 1, 1]
+    length = math.hypot(bx - ax, by - ay)
+    # Beams run counter-clockwise: the sensor is on the left of the chord from the first to the last point.
+    nx, ny = -(by - ay) / length, (bx - ax) / length
+    best, at = NOTCH_M, end
+    total = end - begin
+    right = np.empty(total)
+    most = -math.inf
+    for i in range(end - 1, begin - 1, -1):
+        most = max(most, (points[i, 0] - ax) * nx + (points[i, 1] - ay) * ny)
+        right[i - begin] = most
+    left = -math.inf
+    for i in range(begin, end):
+        here = (points[i, 0] - ax) * nx + (points[i, 1] - ay) * ny
+        left = max(left, here)
+        front = min(left, right[i - begin])
+        depth = front - here
+        if depth > best and front > 0.5 * NOTCH_M:
+            best, at = depth, i
+    return at
 
 
 @kernel
@@ -177,3 +219,34 @@ def movers_clearance(
             continue
         best = min(best, polygon_distance(c * dx + s * dy, c * dy - s * dx, polygon) - movers[i, 2])
     return best
+
+
+@kernel
+def closes_in(
+    before: tuple[float, float, float],
+    after: tuple[float, float, float],
+    polygon: FloatArray,
+    outer: float,
+    movers: FloatArray,
+    keep: float,
+) -> bool:
+    """Whether a footprint's own motion brings it nearer to one of the discs (M, 3) that is within ``keep``.
+
+    The discs stand while it moves, from pose to pose: who drives away from somebody who comes closes no gap.
+    """
+    x, y, theta = after
+    c, s = math.cos(theta), math.sin(theta)
+    for i in range(movers.shape[0]):
+        dx, dy = movers[i, 0] - x, movers[i, 1] - y
+        reach = movers[i, 2] + keep
+        if math.sqrt(dx * dx + dy * dy) - outer >= reach:
+            continue
+        away = polygon_distance(c * dx + s * dy, c * dy - s * dx, polygon)
+        if away >= reach:
+            continue
+        x0, y0, theta0 = before
+        c0, s0 = math.cos(theta0), math.sin(theta0)
+        dx, dy = movers[i, 0] - x0, movers[i, 1] - y0
+        if away < polygon_distance(c0 * dx + s0 * dy, c0 * dy - s0 * dx, polygon) - CLOSES_M:
+            return True
+    return False

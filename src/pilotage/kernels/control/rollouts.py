@@ -11,7 +11,7 @@ from pilotage.kernels.arrays import FloatArray
 from pilotage.kernels.control.footprint import Body
 from pilotage.kernels.control.ground import Ground, clearance_of, seen_under
 from pilotage.kernels.control.motion_limits import Drive, advance, braking_is_free
-from pilotage.kernels.control.movers import movers_clearance
+from pilotage.kernels.control.movers import closes_in, movers_clearance
 from pilotage.kernels.control.togo import togo_at
 from pilotage.kernels.geometry.motion import wrap
 from pilotage.kernels.jit import kernel
@@ -96,7 +96,7 @@ def rollout_cost(
     )
     seen = seen_under(x, y, theta, outer, discs, unseen, x0, y0, coarse, per_coarse)
     for k in range(steps):
-        before = w
+        before, there = w, (x, y, theta)
         x, y, theta, v, w = advance(x, y, theta, v, w, commands[k, 0], commands[k, 1], dt, drive)
         need = price.margin + price.margin_s * abs(v)
         here = clearance_of(
@@ -117,7 +117,11 @@ def rollout_cost(
             cost += dt * price.near * lack * lack * (0.2 + abs(v) / drive.speed)
         if movers.shape[1] > 0:
             away = movers_clearance(x, y, theta, polygon, outer, movers[k], price.comfort)
-            if away < price.margin and (k + 1) * dt <= CERTAIN_S and (v != 0.0 or w != 0.0):
+            if (
+                away < price.margin
+                and (k + 1) * dt <= CERTAIN_S
+                and closes_in(there, (x, y, theta), polygon, outer, movers[k], price.margin)
+            ):
                 return _hit_cost(k / steps, x, y, ground)
             if away < price.comfort:
                 cost += dt * price.people * min((price.comfort - away) / price.comfort, 2.0)

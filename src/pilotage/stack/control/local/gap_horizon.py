@@ -64,6 +64,10 @@ class GapHorizonConfig(Config):
     no_stop_s: NonNegative = 30.0
     brake_trust: float = Share
     """Share of the data sheet's braking and turning that is relied on."""
+    people_margin_m: NonNegative = 0.05
+    """To where a moving body is foretold, in a command's last check: the robot brings itself no nearer."""
+    people_hold_s: NonNegative = 0.3
+    """Near people a command that speeds up has to be good for so long before the braking begins."""
     people_cost: NonNegative = 1.5
     comfort_m: Positive = 0.5
     calm_m: NonNegative = 2.5
@@ -130,7 +134,7 @@ class GapHorizon:
 
     def _decide(self, view: LocalView, scene: Scene) -> Twist:
         config = self._config
-        if scene.movers.nearest_m(float(scene.pose[0]), float(scene.pose[1])) < config.calm_m:
+        if self._people_are_near(scene):
             calm = scene.drive._replace(speed=min(scene.drive.speed, config.calm_m_s))
             scene = replace(scene, drive=calm)
         if self._must_stand(scene):
@@ -176,7 +180,8 @@ class GapHorizon:
         self._plan = None
         curvature = scene.start[4] / scene.start[3] if abs(scene.start[3]) > 0.05 else 0.0
         slower = max(abs(scene.start[3]) - scene.drive.deceleration * scene.dt_s, 0.0)
-        return Twist(0.0, curvature * math.copysign(slower, scene.start[3]) if self._keep_turning else 0.0)
+        turns = self._keep_turning and not self._people_are_near(scene)
+        return Twist(0.0, curvature * math.copysign(slower, scene.start[3]) if turns else 0.0)
 
     def _watch(self, view: LocalView, scene: Scene) -> None:
         """Where the robot is stuck: try the narrowest place straight, or close it; reopen where all is."""
@@ -244,6 +249,9 @@ class GapHorizon:
         more[1] = weighted_mean(self._commands, sampled, config.temperature_s)
         return plans[: count + 2], np.append(costs, plan_costs(scene.start, more, *fixed))
 
+    def _people_are_near(self, scene: Scene) -> bool:
+        return scene.movers.nearest_m(float(scene.pose[0]), float(scene.pose[1])) < self._config.calm_m
+
     def _must_stand(self, scene: Scene) -> bool:
         """Whether a robot at rest has somebody so near that it had better not start."""
         if abs(scene.start[3]) > 0.05 or abs(scene.start[4]) > 0.1:
@@ -265,12 +273,15 @@ class GapHorizon:
     def _checked(self, scene: Scene, first: FloatArray) -> Twist | None:
         """The command if it can be held for a step and braked from without touching anything."""
         config = self._config
+        hold_s = scene.dt_s
+        if abs(first[0]) > abs(scene.start[3]) and self._people_are_near(scene):
+            hold_s = max(hold_s, config.people_hold_s)
         for keep_turning in (True, False):
             safe, _ = command_is_safe(
                 scene.start,
                 float(first[0]),
                 float(first[1]),
-                scene.dt_s,
+                hold_s,
                 config.check_step_s,
                 keep_turning,
                 scene.drive,
@@ -280,6 +291,7 @@ class GapHorizon:
                 scene.movers.foretold(scene.delay_s + config.check_step_s, config.check_step_s, 30),
                 config.least_margin_m,
                 config.least_margin_s,
+                config.people_margin_m,
             )
             if safe:
                 self._keep_turning = keep_turning

@@ -30,7 +30,7 @@ class MoversConfig(Config):
     """So often read in one place it is a thing that stands, by which the odometry may be corrected."""
     stands_m: Positive = 0.15
     radius_m: Positive = 0.25
-    deviations: NonNegative = 1.0
+    deviations: NonNegative = 2.0
     """The disc grows by so many standard deviations of the foretold place, where a command is checked."""
     plan_deviations: NonNegative = 0.3
     """The same where plans are priced: by all that a body may do no plan would get past it."""
