@@ -35,7 +35,6 @@ if TYPE_CHECKING:
     from pilotage.face.recordings import evaluate as evaluate
     from pilotage.face.recordings import localize as localize
     from pilotage.face.recordings import slam as slam
-    from pilotage.face.recordings import track as track
     from pilotage.face.runs import Run as Run
     from pilotage.face.runs import open_run as open_run
     from pilotage.face.runs import run as run
@@ -43,6 +42,7 @@ if TYPE_CHECKING:
     from pilotage.face.stepping import make as make
     from pilotage.face.studies import Study as Study
     from pilotage.face.studies import study as study
+    from pilotage.face.tracking import track as track
     from pilotage.missions.mission import Mission as Mission
 
 _PLACES = {
@@ -59,7 +59,7 @@ _PLACES = {
     "calibrate": "face.recordings",
     "evaluate": "face.recordings",
     "export": "bridges.export",
-    "track": "face.recordings",
+    "track": "face.tracking",
     "Mission": "missions.mission",
     "Run": "face.runs",
     "Simulation": "face.stepping",

@@ -43,9 +43,9 @@ class AllanDeviation:
     def angle_random_walk_rad_sqrt_s(self) -> Estimate | None:
         """White rate noise: the deviation times sqrt(tau) where its slope is -1/2, nearest to 1 s.
 
-        IEEE 952-1997, C.1.1. None where the slope is never near -1/2.
+        IEEE 952-1997, C.1.1. None where the slope is never near -1/2, or the readings are all the same.
         """
-        if self.tau_s.shape[0] < 3:
+        if self.tau_s.shape[0] < 3 or not (self.deviation_rad_s > 0.0).all():
             return None
         slope = np.gradient(np.log(self.deviation_rad_s), np.log(self.tau_s))
         white = np.flatnonzero(np.abs(slope + 0.5) < SLOPE_TOLERANCE)

@@ -56,6 +56,14 @@ def calibrate(
         bool,
         typer.Option("--leave-one-out", help="commands: also write a set without each recording in turn."),
     ] = False,
+    topics: Annotated[
+        list[str] | None,
+        typer.Option("--topic", metavar="NAME", help="Of bags: what is calibrated; default the usual one."),
+    ] = None,
+    truth: Annotated[
+        str | None,
+        typer.Option(metavar="TOPIC", help="odometry, of bags: the true poses; /tf:PARENT:CHILD too."),
+    ] = None,
     report: Annotated[bool, typer.Option(help="Write report.html into the calibration's folder.")] = True,
     json: Json = False,
 ) -> int:
@@ -72,6 +80,10 @@ def calibrate(
         )
     if what != "odometry" and (sensor is not None or wheel_base is not None):
         raise InputError("calibrate: --sensor and --wheel-base are for 'calibrate odometry'")
+    if truth is not None and what != "odometry":
+        raise InputError("calibrate: --truth is for 'calibrate odometry'")
+    if topics and (what == "commands" or not logs):
+        raise InputError("calibrate: --topic is for bags with odometry, ranges or headings")
     if axis is not None and what != "heading":
         raise InputError("calibrate: --axis is for 'calibrate heading'")
     if axis is not None and axis not in AXES:
@@ -90,11 +102,15 @@ def calibrate(
                 seed=seed or 0,
                 wheel_base_m=wheel_base,
                 sensor=sensor or "odometry",
+                topics=topics or (),
+                truth=truth,
             )
         elif what == "range":
-            result = lab.range_from(places, out, overrides=overrides or (), seed=seed or 0)
+            result = lab.range_from(
+                places, out, overrides=overrides or (), seed=seed or 0, topics=topics or ()
+            )
         elif what == "heading":
-            result = lab.heading_from(places, out, axis=axis or "z")
+            result = lab.heading_from(places, out, axis=axis or "z", topics=topics or ())
         else:
             from pilotage.experiments.calibrate_commands import commands_from
 

@@ -12,7 +12,9 @@ import typer
 
 from pilotage.cli.options import Json, Out, Overrides, Plugins
 from pilotage.cli.output import print_columns, print_json, print_line, stdout_for_json
+from pilotage.cli.plan import parse_pose
 from pilotage.core.errors import InputError, unknown_name
+from pilotage.core.types import Pose2
 
 NAMED = 5
 """Rows of a log that were left out and are named; the others are counted."""
@@ -22,18 +24,63 @@ def localize(
     log: Annotated[
         Path,
         typer.Argument(
-            metavar="LOG", help="A MRCLAM folder, an AER1513 MATLAB file, or a CSV of a rover's stops."
+            metavar="LOG",
+            help="A ROS bag, MCAP file or CARMEN log; a MRCLAM folder, an AER1513 MATLAB file, a CSV of a "
+            "rover's stops.",
         ),
     ],
     form: Annotated[
-        str, typer.Option("--format", metavar="mrclam|aer1513|stops", help="Format of the recording.")
-    ],
+        str | None,
+        typer.Option(
+            "--format",
+            metavar="bag|mrclam|aer1513|stops",
+            help="Format of the recording; default as it looks.",
+        ),
+    ] = None,
+    map_: Annotated[
+        str | None,
+        typer.Option("--map", metavar="MAP", help="bag: a shipped map's name or a file, to localize in."),
+    ] = None,
+    landmarks: Annotated[
+        Path | None,
+        typer.Option("--landmarks", metavar="CSV", help="bag: a table id, x_m, y_m of landmarks."),
+    ] = None,
+    start: Annotated[
+        str | None,
+        typer.Option(metavar="X,Y,TH", help="bag: where the robot was; default where the truth says."),
+    ] = None,
+    topics: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--topic",
+            metavar="NAME",
+            help="bag: scans, odometry, velocities, gyroscope or landmarks by name; repeatable.",
+        ),
+    ] = None,
+    truth: Annotated[
+        str | None,
+        typer.Option(
+            metavar="TOPIC|FILE", help="bag: true poses in the map: a topic, /tf:PARENT:CHILD or a TUM file."
+        ),
+    ] = None,
+    from_s: Annotated[
+        float, typer.Option("--from", metavar="S", help="bag: begin so many seconds after its first reading.")
+    ] = 0.0,
+    to_s: Annotated[
+        float | None,
+        typer.Option("--to", metavar="S", help="bag: end so many seconds after its first reading."),
+    ] = None,
     robot: Annotated[
         int | None, typer.Option("--robot", metavar="N", help="mrclam: which robot, 1 to 5.")
     ] = None,
     localizer: Annotated[
-        str, typer.Option(metavar="NAME", help="A registered localizer that knows its landmarks.")
-    ] = "ekf-gauss-markov",
+        str | None,
+        typer.Option(
+            metavar="NAME",
+            help="A registered localizer; default particle-filter on scans, ekf-landmarks on a bag's "
+            "landmarks, else ekf-gauss-markov.",
+        ),
+    ] = None,
     max_range: Annotated[
         float | None, typer.Option(metavar="M", help="aer1513: leave out readings beyond, in metres.")
     ] = None,
@@ -43,13 +90,25 @@ def localize(
     json: Json = False,
     plugin: Plugins = None,  # noqa: ARG001 - loaded while the options are read
 ) -> int:
-    """Run a localizer over a recording and score it against its truth."""
-    from pilotage.experiments.recordings.localize import FORMATS, localize_log
+    """Run a localizer over a recording and score it, against its truth where that is known."""
+    from pilotage.experiments.recordings.localize import FORMATS, Setting, localize_log
 
-    if form not in FORMATS:
+    if form is not None and form not in FORMATS:
         raise unknown_name("--format", form, FORMATS)
     if max_range is not None and not (math.isfinite(max_range) and max_range > 0.0):
         raise InputError(f"--max-range: expected metres above 0, found {max_range:g}")
+    for name, value in (("--from", from_s), ("--to", to_s)):
+        if value is not None and not (math.isfinite(value) and value >= 0.0):
+            raise InputError(f"{name}: expected seconds of at least 0, found {value:g}")
+    setting = Setting(
+        map_,
+        landmarks,
+        None if start is None else _pose(start),
+        tuple(topics or ()),
+        truth,
+        from_s,
+        math.inf if to_s is None else to_s,
+    )
     with stdout_for_json(json):
         result = localize_log(
             log,
@@ -59,6 +118,7 @@ def localize(
             localizer=localizer,
             overrides=overrides or (),
             max_range_m=max_range,
+            setting=setting,
         )
         page: Path | None = None
         if report:
@@ -75,6 +135,13 @@ def localize(
         rows = [(key, _text(value)) for key, value in result.metrics.items()]
         print_columns([*rows, ("report", str(page))] if page is not None else rows)
     return 0 if result.metrics["success"] else 1
+
+
+def _pose(text: str) -> Pose2:
+    values = parse_pose(text, "--start")
+    if len(values) != 3:
+        raise InputError(f"--start: expected X,Y,TH in metres and radians, found '{text}'")
+    return Pose2(*values)
 
 
 def _text(value: object) -> str:

@@ -40,7 +40,7 @@ def _gate(trace: Mapping[str, FloatArray]) -> dict[str, object]:
     if "nis" not in trace:
         return {}
     found = nis_metrics(trace["nis"], trace["nis_expected"])
-    seen = trace["beacons_seen"].sum()
+    seen = trace["beacons_seen"].sum() if "beacons_seen" in trace else 0.0
     if seen > 0.0:
         found["accepted_fraction"] = float(trace["beacons_accepted"].sum() / seen)
         found["readings"] = int(seen)

@@ -16,6 +16,8 @@ from pilotage.calibration.steady import SteadyReadings, calibrate_steady
 from pilotage.core.errors import InputError
 from pilotage.core.types import FloatArray
 from pilotage.experiments.calibration_runs import drive_odometry_runs, listen_in_the_room
+from pilotage.logs.bag_calibration import headings_of_bag, odometry_of_bag, steady_of_bag
+from pilotage.logs.bag_messages import is_bag
 from pilotage.logs.heading_csv import DRIVE_SUFFIX, find_heading_logs, read_heading_log
 from pilotage.logs.odometry_csv import read_odometry_csv
 from pilotage.logs.odometry_steps import OdometrySteps
@@ -43,13 +45,15 @@ def odometry_from(
     seed: int = 0,
     wheel_base_m: float | None = None,
     sensor: str = "odometry",
+    topics: Sequence[str] = (),
+    truth: str | None = None,
 ) -> CalibrationResult:
-    """Calibrate odometry from CSV files, folders of them and run folders, or drive the runs first."""
+    """Calibrate odometry from bags, CSV files, folders of them and run folders, or drive the runs first."""
     given = None
     if not places:
         folders, given = drive_odometry_runs(overrides, seed, out)
         places = folders
-    logs = _unique([log for place in places for log in _odometry_logs(place)])
+    logs = _unique([log for place in places for log in _odometry_logs(place, topics, truth)])
     found = calibrate_odometry(logs)
     answer = {"calibration": "odometry", "simulated": given is not None}
     answer |= odometry_summary(found, wheel_base_m)
@@ -60,14 +64,19 @@ def odometry_from(
 
 
 def range_from(
-    places: Sequence[Path], out: Path, *, overrides: Sequence[str] = (), seed: int = 0
+    places: Sequence[Path],
+    out: Path,
+    *,
+    overrides: Sequence[str] = (),
+    seed: int = 0,
+    topics: Sequence[str] = (),
 ) -> CalibrationResult:
-    """Calibrate range sensors from CSV files of readings at rest, or listen in the room first."""
+    """Calibrate range sensors from bags and CSV files of readings at rest, or listen in the room first."""
     if places:
         series = [
             SteadyReadings(path.stem, column.quantity, column.unit, column.values)
             for path in places
-            for column in read_steady_csv(path)
+            for column in (steady_of_bag(path, topics) if _a_bag(path, topics) else read_steady_csv(path))
         ]
     else:
         series = listen_in_the_room(overrides, seed)
@@ -84,15 +93,19 @@ def range_from(
     return write_calibration(out, answer, data, {})
 
 
-def heading_from(places: Sequence[Path], out: Path, *, axis: str = "z") -> CalibrationResult:
-    """Calibrate gyroscopes and magnetometers from their logs."""
+def heading_from(
+    places: Sequence[Path], out: Path, *, axis: str = "z", topics: Sequence[str] = ()
+) -> CalibrationResult:
+    """Calibrate gyroscopes and magnetometers from their logs and from bags."""
     if not places:
         raise InputError(
             "calibrate heading: expected gyroscope or magnetometer logs; "
             "the simulated robot has no such sensor"
         )
-    paths = [path for place in places for path in find_heading_logs(place)]
+    bags = [place for place in places if _a_bag(place, topics)]
+    paths = [path for place in places if place not in bags for path in find_heading_logs(place)]
     logs = [read_heading_log(path) for path in paths if path.suffix != DRIVE_SUFFIX]
+    logs += [log for bag in bags for log in headings_of_bag(bag, topics)]
     drives = [read_reckoning_mat(path) for path in paths if path.suffix == DRIVE_SUFFIX]
     found = calibrate_heading(logs, axis, drives)
     answer = {"calibration": "heading", "simulated": False, **found.as_dict()}
@@ -104,8 +117,19 @@ def heading_from(places: Sequence[Path], out: Path, *, axis: str = "z") -> Calib
     return write_calibration(out, answer, data, {})
 
 
-def _odometry_logs(place: Path) -> list[OdometrySteps]:
-    """Read a CSV file, a run folder, or all CSV files of a folder."""
+def _a_bag(place: Path, topics: Sequence[str]) -> bool:
+    """Whether a recording is a bag; InputError where topics are asked of one that is none."""
+    if place.exists() and is_bag(place):
+        return True
+    if topics:
+        raise InputError(f"{place}: expected a bag where topics are named, found none")
+    return False
+
+
+def _odometry_logs(place: Path, topics: Sequence[str], truth: str | None) -> list[OdometrySteps]:
+    """Read a bag, a CSV file, a run folder, or all CSV files of a folder."""
+    if _a_bag(place, [*topics, *([truth] if truth else [])]):
+        return [odometry_of_bag(place, topics, truth)]
     if not place.is_dir():
         return [read_odometry_csv(place)]
     files = sorted(place.glob("*.csv"))

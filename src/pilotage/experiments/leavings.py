@@ -32,9 +32,7 @@ def files_of(run: Run, verdict: Verdict, metrics: Mapping[str, object]) -> RunFi
         for robot, columns in zip(finished.robots, verdict.columns, strict=True)
     }
     single = len(traces) == 1
-    grid, chart = None, finished.chart
-    if chart.grid is not None and chart.geometry is None and not is_large(chart.grid):
-        grid = chart.grid
+    chart = finished.chart
     return RunFiles(
         trace=trace_of(next(iter(traces.values()))) if single else merged(traces),
         metrics=metrics,
@@ -42,7 +40,7 @@ def files_of(run: Run, verdict: Verdict, metrics: Mapping[str, object]) -> RunFi
         mission_text=resolved_yaml(finished.mission, chart),
         world=world,
         terrain=terrain_pictures(finished, run.sightings[0].seen()),
-        grid=grid,
+        grid=drawn_grid(chart),
         people=run.people.tracks(),
         patrol=_patrol(verdict),
         robots=tuple(
@@ -96,7 +94,7 @@ def _world(run: FinishedRun) -> World:
             tape_width_m=markings.tape_width_m,
             cells=sheet.cells,
         )
-    known = _drawn_walls(chart)
+    known = drawn_walls(chart)
     return World(
         segments_m=known,
         circles_m=np.zeros((0, 3)) if chart.geometry is None else chart.geometry.circles_m,
@@ -109,13 +107,20 @@ def _world(run: FinishedRun) -> World:
     )
 
 
-def _drawn_walls(chart: WorldMap) -> FloatArray:
+def drawn_walls(chart: WorldMap) -> FloatArray:
     """Walls as segments; a grid is drawn as a grid, beyond some size as a picture."""
     if chart.geometry is not None:
         return chart.geometry.segments_m
     if chart.grid is not None and is_large(chart.grid):
         return np.zeros((0, 4))
     return chart.walls.segments_m
+
+
+def drawn_grid(chart: WorldMap) -> OccupancyGrid | None:
+    """The grid that is drawn as one."""
+    if chart.grid is None or chart.geometry is not None or is_large(chart.grid):
+        return None
+    return chart.grid
 
 
 def _outline(robot: RobotRun) -> RobotOutline:

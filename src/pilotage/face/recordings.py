@@ -1,8 +1,9 @@
-"""Recordings: localized, mapped, calibrated from, judged; and a robot tracked on film."""
+"""Recordings: localized, mapped, calibrated from, judged."""
 
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from os import PathLike
@@ -12,7 +13,7 @@ from typing import Any, Literal, TypeAlias
 import numpy as np
 
 from pilotage.core.errors import InputError, unknown_name
-from pilotage.core.types import FloatArray
+from pilotage.core.types import FloatArray, Pose2
 from pilotage.evaluation.trajectory import TrajectoryErrors, trajectory_errors
 from pilotage.face.metrics import Metrics
 from pilotage.face.runs import Run
@@ -26,24 +27,45 @@ KINDS = ("odometry", "range", "heading", "commands")
 def localize(
     log: FilePath,
     *,
-    format: Literal["mrclam", "aer1513", "stops"],  # noqa: A002 - as the command line calls it
+    map: FilePath | None = None,  # noqa: A002 - the word for it
+    landmarks: FilePath | None = None,
+    start: Sequence[float] | FloatArray | None = None,
+    topics: Sequence[str] = (),
+    truth: FilePath | None = None,
+    from_s: float = 0.0,
+    to_s: float = math.inf,
+    format: Literal["bag", "mrclam", "aer1513", "stops"] | None = None,  # noqa: A002 - as the command line calls it
     robot: int | None = None,
-    localizer: str = "ekf-gauss-markov",
+    localizer: str | None = None,
     max_range_m: float | None = None,
     set: Mapping[str, Any] | None = None,  # noqa: A002 - as the command line calls it
     out: FilePath = "runs",
 ) -> Run:
-    """Run a localizer over a recording with truth, and judge it.
+    """Run a localizer over a recording, and judge it where the truth is known.
 
     Parameters
     ----------
     log
-        A MRCLAM folder, an AER1513 MATLAB file, or a CSV of a rover's stops (dead reckoning, each stretch
-        by what the others taught).
+        A ROS 1 or 2 bag, an MCAP file or a CARMEN log; a MRCLAM folder, an AER1513 MATLAB file, or a CSV of a
+        rover's stops (dead reckoning, each stretch by what the others taught).
+    map, landmarks
+        bag: what to localize in: a shipped map's name or a map file, for scans; a table id, x_m, y_m.
+    start
+        bag: x, y, theta at the first reading; None: where the truth says.
+    topics
+        bag: scans, odometry, velocities, gyroscope or landmarks by name, where the usual ones are not meant.
+    truth
+        bag: true poses in the map: a topic, ``/tf:PARENT:CHILD``, or a TUM file. Without any the run is
+        judged by what the localizer holds of itself.
+    from_s, to_s
+        bag: the part that counts, in seconds after its first reading.
+    format
+        None: as it looks.
     robot
         mrclam: which of its robots, 1 to 5.
     localizer
-        A registered localizer that knows its landmarks.
+        A registered localizer; None: ``particle-filter`` on scans, ``ekf-landmarks`` on a bag's landmarks,
+        else ``ekf-gauss-markov``.
     max_range_m
         aer1513: readings beyond are left out.
     set
@@ -52,18 +74,29 @@ def localize(
     Returns
     -------
     Run
-        With the same metrics, trace and report as a simulated one.
+        With the same metrics, trace and report as a simulated one; ``trajectory.tum`` in its folder is the
+        path by the recording's clock, as long as the localizer held itself for localized.
 
     Raises
     ------
     InputError
-        Where the recording is not what it should be.
+        Where the recording is not what it should be; of a bag without what is needed the message tells what
+        it holds.
     """
-    from pilotage.experiments.recordings.localize import FORMATS, localize_log
+    from pilotage.experiments.recordings.localize import FORMATS, Setting, localize_log
 
-    if format not in FORMATS:
+    if format is not None and format not in FORMATS:
         raise unknown_name("format", format, FORMATS)
     overrides = [f"{key}={json.dumps(value)}" for key, value in (set or {}).items()]
+    setting = Setting(
+        None if map is None else str(map),
+        None if landmarks is None else Path(landmarks),
+        None if start is None else Pose2.from_array(np.asarray(start, dtype=np.float64)),
+        tuple(topics),
+        None if truth is None else str(truth),
+        from_s,
+        to_s,
+    )
     result = localize_log(
         Path(log),
         Path(out),
@@ -72,6 +105,7 @@ def localize(
         localizer=localizer,
         overrides=overrides,
         max_range_m=max_range_m,
+        setting=setting,
     )
     return Run(result.run_dir)
 
@@ -187,6 +221,8 @@ def calibrate(
     axis: Literal["x", "y", "z"] = "z",
     robots: Sequence[int] = (),
     leave_one_out: bool = False,
+    topics: Sequence[str] = (),
+    truth: str | None = None,
     out: FilePath = "runs",
 ) -> Calibration:
     """Estimate a sensor's or a drive's noise and systematic errors.
@@ -205,6 +241,8 @@ def calibrate(
         heading: the axis that the robot turns about.
     robots, leave_one_out
         commands: from these robots of the recordings only; a set without each recording in turn besides.
+    topics, truth
+        Of bags: what is calibrated, where the usual one is not meant; odometry: the topic of the truth.
 
     Raises
     ------
@@ -220,12 +258,19 @@ def calibrate(
     target = Path(out)
     if what == "odometry":
         result = lab.odometry_from(
-            places, target, overrides=set, seed=seed, wheel_base_m=wheel_base_m, sensor=sensor
+            places,
+            target,
+            overrides=set,
+            seed=seed,
+            wheel_base_m=wheel_base_m,
+            sensor=sensor,
+            topics=topics,
+            truth=truth,
         )
     elif what == "range":
-        result = lab.range_from(places, target, overrides=set, seed=seed)
+        result = lab.range_from(places, target, overrides=set, seed=seed, topics=topics)
     elif what == "heading":
-        result = lab.heading_from(places, target, axis=axis)
+        result = lab.heading_from(places, target, axis=axis, topics=topics)
     else:
         from pilotage.experiments.calibrate_commands import commands_from
 
@@ -269,17 +314,22 @@ def evaluate(
     format: str | None = None,  # noqa: A002 - as the command line calls it
     align: bool = False,
     scale: bool = False,
+    topics: Sequence[str] = (),
 ) -> Evaluation:
     """Say how far an estimated trajectory is from its reference: absolute and relative errors.
 
     Parameters
     ----------
     estimate, reference
-        Files of one format, or arrays: (N, 3) x, y, theta of the same moments, or (N, 4) with times first.
+        Files of one format, bags, or arrays: (N, 3) x, y, theta of the same moments, or (N, 4) with times
+        first.
     format
         Of the files, ``tum`` or ``kitti``; None: told by their columns.
     align, scale
         Rotate and shift the estimate first; correct its scale first.
+    topics
+        Of bags: the poses of each one in turn (``/tf:PARENT:CHILD`` for transforms), where the usual are not
+        meant. A bag may be judged against another file with times, or against itself by two topics.
 
     Raises
     ------
@@ -302,7 +352,7 @@ def evaluate(
         return Evaluation(trajectory_errors(found, true, align=align, scale=scale), "arrays")
     paths = Path(str(estimate)), Path(str(reference))
     form = judged_format(paths[0], paths[1], format)
-    found, true = (read_trajectory(path, form) for path in paths)
+    found, true = _read_both(paths, form, topics)
     if found.t_s is None and len(found) != len(true):
         short, full = paths if len(found) < len(true) else paths[::-1]
         raise InputError(
@@ -325,13 +375,42 @@ def judged_format(estimate: Path, reference: Path, told: str | None) -> Trajecto
         if told not in names:
             raise unknown_name("--format", told, names)
         return TrajectoryFormat(told)
-    formats = [guess_format(path) for path in (estimate, reference)]
+    formats = [
+        TrajectoryFormat.TUM if _is_bag(path) else guess_format(path) for path in (estimate, reference)
+    ]
     if formats[0] is not formats[1]:
         raise InputError(
             "evaluate: expected both files in one format, found by their columns "
             f"{estimate} as {formats[0]} and {reference} as {formats[1]}"
         )
     return formats[0]
+
+
+def _is_bag(path: Path) -> bool:
+    from pilotage.logs.bag_messages import is_bag
+
+    return path.exists() and is_bag(path)
+
+
+def _read_both(
+    paths: tuple[Path, Path], form: TrajectoryFormat, topics: Sequence[str]
+) -> tuple[Trajectory3, Trajectory3]:
+    """Files of a format, or topics of bags: each bag takes the next one."""
+    from pilotage.logs.bag_series import trajectory_of_bag
+
+    bags = [path for path in paths if _is_bag(path)]
+    if len(topics) > len(bags):
+        raise InputError(f"evaluate: expected a topic for each bag, found {len(topics)} for {len(bags)}")
+    if bags and form is not TrajectoryFormat.TUM:
+        raise InputError("evaluate: expected files with times beside a bag, found --format kitti")
+    if len(bags) == 2 and bags[0] == bags[1] and len(topics) < 2:
+        raise InputError(f"{bags[0]}: expected two topics of the one bag, found {len(topics)}")
+    left = iter(topics)
+    first, second = (
+        trajectory_of_bag(path, next(left, None)) if path in bags else read_trajectory(path, form)
+        for path in paths
+    )
+    return first, second
 
 
 def _of_array(name: str, values: Any) -> Trajectory3:
@@ -348,86 +427,3 @@ def _of_array(name: str, values: Any) -> Trajectory3:
     c, s, zero, one = np.cos(theta), np.sin(theta), np.zeros(len(poses)), np.ones(len(poses))
     turns = np.stack([c, -s, zero, s, c, zero, zero, zero, one], axis=1).reshape(-1, 3, 3)
     return Trajectory3(t_s, np.column_stack([x, y, zero]), turns)
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Tracked:
-    """A robot's path on a square map, from a film.
-
-    Attributes
-    ----------
-    answer
-        Everything, by its JSON key: corners, grid, visited cells, path.
-    path
-        (N, 3) time in s, x and y in m.
-    written
-        Files that were written.
-    """
-
-    answer: Mapping[str, Any] = field(repr=False)
-    path: FloatArray
-    written: tuple[Path, ...] = ()
-
-    @property
-    def visited_cells(self) -> int:
-        """How many cells the robot's centre was in."""
-        return int(self.answer["visited_count"])
-
-
-def track(
-    video: FilePath,
-    *,
-    corners: str | None = None,
-    hsv: str | None = None,
-    grid: int = 25,
-    size_m: float = 1.8,
-    radius_m: float | None = None,
-    height_m: float = 0.0,
-    out: FilePath | None = None,
-) -> Tracked:
-    """Track a robot on a square map through a film; needs the extra ``vision``.
-
-    Parameters
-    ----------
-    video
-        A film by a fixed camera that sees the map.
-    corners
-        The map's corners in pixels, ``X,Y,X,Y,X,Y,X,Y`` from its origin counter-clockwise; None: found.
-    hsv
-        The robot's colour, ``H0,S0,V0,H1,S1,V1``; None: learned.
-    grid, size_m
-        Cells along a side, and the side's length.
-    radius_m, height_m
-        Of the robot's coloured disc: its radius (None: learned) and how high it is over the floor.
-    out
-        Folder for JSON, CSV, the map's picture and text maps; None: nothing is written.
-
-    Raises
-    ------
-    InputError
-        Where the file is no film, or no map is in it.
-    """
-    from pilotage.tracking.output import write_track
-    from pilotage.tracking.robot_colour import parse_hsv
-    from pilotage.tracking.scene import TrackOptions, learn_scene
-    from pilotage.tracking.sheet import parse_corners
-    from pilotage.tracking.track import follow
-
-    options = TrackOptions(
-        None if corners is None else parse_corners(corners),
-        None if hsv is None else parse_hsv(hsv),
-        grid,
-        size_m,
-        radius_m,
-        height_m,
-    )
-    film = Path(video)
-    found = follow(film, learn_scene(film, options))
-    written: tuple[Path, ...] = ()
-    if out is not None:
-        folder = Path(out)
-        folder.mkdir(parents=True, exist_ok=True)
-        written = tuple(write_track(folder, found))
-    answer = found.as_dict()
-    rows = [(entry["t_s"], entry["x_m"], entry["y_m"]) for entry in answer["path"]]
-    return Tracked(answer, np.array(rows, dtype=np.float64).reshape(-1, 3), written)

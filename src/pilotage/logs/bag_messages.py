@@ -10,7 +10,7 @@ from collections.abc import Callable, Collection, Iterator
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import Any, TypeAlias, TypeVar
 
 from pilotage.core.errors import InputError
 from pilotage.core.files import opened
@@ -20,6 +20,7 @@ from pilotage.logs.salvage.pieces import unpack
 from pilotage.logs.salvage.walk import salvage_file, salvaged_messages
 
 ZSTD = b"\x28\xb5\x2f\xfd"
+T = TypeVar("T")
 Message: TypeAlias = tuple[str, int, Any]
 """Topic, time of receipt in nanoseconds, and the message as ``rosbags`` deserializes it."""
 
@@ -75,6 +76,26 @@ def _storage_files(folder: Path) -> list[Path]:
     files = [path for path in folder.iterdir() if path.suffix in {".db3", ".mcap"} and path.is_file()]
     # rosbag2 numbers its files without leading zeros: name_2 comes before name_10.
     return sorted(files, key=lambda path: (len(path.name), path.name))
+
+
+def read_through(path: Path, read: Callable[[OpenBag], T]) -> T:
+    """Read a bag by ``rosbags``; one that is cut or damaged as far as it goes.
+
+    Raises
+    ------
+    InputError
+        Where ``rosbags`` is missing, the path is no bag, or ``read`` cannot use what the bag holds.
+    """
+    with ExitStack() as stack:
+        bag = open_whole(path, stack)
+        if bag is not None:
+            try:
+                return read(bag)
+            except InputError:
+                raise
+            except Exception:  # the library fails in many ways on a damaged part
+                bag = None
+    return read(open_damaged(path))
 
 
 def open_whole(path: Path, stack: ExitStack) -> OpenBag | None:

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from contextlib import ExitStack
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -18,18 +17,20 @@ import numpy as np
 
 from pilotage.core.errors import InputError
 from pilotage.core.types import FloatArray
-from pilotage.logs.bag_messages import OpenBag, Topic, open_damaged, open_whole
+from pilotage.logs.bag_messages import OpenBag, read_through
+from pilotage.logs.bag_topics import Kind, holds, pick, sorted_out
 from pilotage.logs.laser_log import LaserLog, RawScan, assemble
 from pilotage.logs.scanner_mount import TransformTree, frame_name, mount_of
 
-SCAN_TYPE = "sensor_msgs/msg/LaserScan"
 ODOMETRY_TYPE = "nav_msgs/msg/Odometry"
+USUAL_TRUTH = ("/truth", "/ground_truth", "/ground_truth/odom", "/base_pose_ground_truth")
+"""What a motion capture or a simulator usually calls what the robot does not know."""
+SCANS = Kind("laser scans", ("sensor_msgs/msg/LaserScan",), ("/scan",))
+ODOMETRY = Kind("odometry", (ODOMETRY_TYPE,), ("/odom",), never=USUAL_TRUTH)
 TRANSFORM_TYPES = frozenset({"tf2_msgs/msg/TFMessage", "tf/msg/tfMessage"})
 USUAL_BASES = ("base_footprint", "base_link")
 USUAL_ODOMETRY_FRAMES = ("odom", "odom_combined")
 """Frames of REP 105, for odometry that was recorded as transforms only."""
-USUAL_TOPICS = ("/scan", "/odom")
-"""Taken before others of the same type."""
 
 
 def read_bag(
@@ -58,18 +59,12 @@ def read_bag(
         Where ``rosbags`` is missing, the path is no bag, or the topics are not in it; the message then
         tells what it holds.
     """
-    with ExitStack() as stack:
-        bag = open_whole(path, stack)
-        if bag is not None:
-            picked = _pick(bag, path, *_named(bag, path, topics, scan_topic, odometry_topic))
-            try:
-                return _collect(bag, path, picked)
-            except InputError:
-                raise
-            except Exception:  # the library fails in many ways on a damaged part
-                bag = None
-    bag = open_damaged(path)
-    return _collect(bag, path, _pick(bag, path, *_named(bag, path, topics, scan_topic, odometry_topic)))
+
+    def read(bag: OpenBag) -> LaserLog:
+        scan, odometry = sorted_out(bag, path, topics, (SCANS, ODOMETRY))
+        return _collect(bag, path, _pick(bag, path, scan_topic or scan, odometry_topic or odometry))
+
+    return read_through(path, read)
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,57 +75,14 @@ class _Picked:
     warnings: tuple[str, ...]
 
 
-def _named(
-    bag: OpenBag, path: Path, topics: Sequence[str], scan: str | None, odometry: str | None
-) -> tuple[str | None, str | None]:
-    """Which of the topics asked for is which, by their types."""
-    types = {"/" + topic.name.lstrip("/"): topic.msgtype for topic in bag.topics if topic.count}
-    for asked in topics:
-        wanted = "/" + asked.lstrip("/")
-        msgtype = types.get(wanted)
-        if msgtype is None:
-            raise InputError(f"{path}: expected the topic {wanted}, {_holds(bag.topics)}")
-        if msgtype == SCAN_TYPE:
-            scan = wanted
-        elif msgtype == ODOMETRY_TYPE:
-            odometry = wanted
-        else:
-            raise InputError(
-                f"{path}: topic {wanted}: expected {SCAN_TYPE} or {ODOMETRY_TYPE}, found {msgtype}"
-            )
-    return scan, odometry
-
-
 def _pick(bag: OpenBag, path: Path, scan_topic: str | None, odometry_topic: str | None) -> _Picked:
     said = list(bag.warnings)
-    scan = _topic(bag, path, SCAN_TYPE, "laser scans", scan_topic, said)
+    scan = pick(bag, path, SCANS, scan_topic, said)
     if scan is None:
-        raise InputError(f"{path}: expected a topic of {SCAN_TYPE}, {_holds(bag.topics)}")
-    odometry = _topic(bag, path, ODOMETRY_TYPE, "odometry", odometry_topic, said)
+        raise InputError(f"{path}: expected a topic of {SCANS}, {holds(bag.topics)}")
+    odometry = pick(bag, path, ODOMETRY, odometry_topic, said)
     transforms = tuple(topic.name for topic in bag.topics if topic.msgtype in TRANSFORM_TYPES)
     return _Picked(scan, odometry, transforms, tuple(said))
-
-
-def _topic(
-    bag: OpenBag, path: Path, msgtype: str, what: str, asked: str | None, said: list[str]
-) -> str | None:
-    fitting = [topic for topic in bag.topics if topic.msgtype == msgtype and topic.count]
-    if asked is not None:
-        wanted = "/" + asked.lstrip("/")
-        if not any("/" + topic.name.lstrip("/") == wanted for topic in fitting):
-            raise InputError(f"{path}: expected the topic {wanted} of {msgtype}, {_holds(bag.topics)}")
-        return next(topic.name for topic in fitting if "/" + topic.name.lstrip("/") == wanted)
-    if not fitting:
-        return None
-    best = max(fitting, key=lambda topic: (topic.name in USUAL_TOPICS, topic.count))
-    if len(fitting) > 1:
-        others = ", ".join(topic.name for topic in fitting if topic is not best)
-        said.append(f"{what} are taken from {best.name} (also there: {others})")
-    return best.name
-
-
-def _holds(topics: Sequence[Topic]) -> str:
-    return "found " + (", ".join(map(str, topics)) if topics else "no topics")
 
 
 @dataclass(slots=True)
@@ -207,7 +159,7 @@ def _add_scan(found: _Collected, message: Any, time_ns: int) -> None:
 def _add_odometry(found: _Collected, message: Any, time_ns: int) -> None:
     found.base_frame = found.base_frame or frame_name(message.child_frame_id)
     point, turn = message.pose.pose.position, message.pose.pose.orientation
-    row = float(point.x), float(point.y), _heading(turn)
+    row = float(point.x), float(point.y), heading_of(turn)
     found.odometry_t_s.append(_stamp_s(found, message.header, time_ns))
     found.odometry.append(row)
 
@@ -223,12 +175,12 @@ def _add_transforms(found: _Collected, message: Any, time_ns: int) -> None:
                     _stamp_s(found, transform.header, time_ns),
                     float(shift.x),
                     float(shift.y),
-                    _heading(turn),
+                    heading_of(turn),
                 )
             )
 
 
-def _heading(turn: Any) -> float:
+def heading_of(turn: Any) -> float:
     """Heading of a quaternion; NaN for one that is none, so that the reading is left out."""
     x, y, z, w = float(turn.x), float(turn.y), float(turn.z), float(turn.w)
     if not math.isfinite(x + y + z + w) or abs(x) + abs(y) + abs(z) + abs(w) < 1e-6:

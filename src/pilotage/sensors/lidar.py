@@ -32,3 +32,22 @@ class LidarConfig(SensorConfig):
         """Directions (N,) of the beams in the sensor's frame."""
         first = -self.field_of_view_rad / 2.0 if self.beams > 1 else 0.0
         return first + self.beam_step_rad * np.arange(self.beams, dtype=np.float64)
+
+    def along_own_beams(self, ranges_m: FloatArray, first_angle_rad: float, step_rad: float) -> FloatArray:
+        """Another scan (K,) along this sheet's beams, each from the nearest one of its own.
+
+        A beam that nothing was measured along is nan; one that met nothing reads ``max_range_m``.
+
+        Parameters
+        ----------
+        first_angle_rad, step_rad
+            Direction of the scan's first beam in this sensor's frame, and the angle between two of its beams.
+        """
+        out = np.full(self.beams, np.nan)
+        if not len(ranges_m):
+            return out
+        nearest = np.rint((self.beam_angles_rad() - first_angle_rad) / (step_rad or 1.0)).astype(np.int64)
+        there = (nearest >= 0) & (nearest < len(ranges_m))
+        found = np.asarray(ranges_m[nearest[there]], dtype=np.float64)
+        out[there] = np.where(found >= 0.0, np.minimum(found, self.max_range_m), np.nan)
+        return out

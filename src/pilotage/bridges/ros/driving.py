@@ -155,12 +155,5 @@ def _increment(before: Pose2, now: Pose2) -> OdometryIncrement:
 def _ranges(message: Any, sheet: LidarConfig) -> FloatArray:
     """The message's ranges along the data sheet's beams, each from the nearest of its own."""
     ranges = np.asarray(message.ranges, dtype=np.float64)
-    out = np.full(sheet.beams, sheet.max_range_m)
-    if len(ranges) == 0:
-        return out
-    step = message.angle_increment or 1.0
-    nearest = np.rint((sheet.beam_angles_rad() - message.angle_min) / step).astype(np.int64)
-    known = (nearest >= 0) & (nearest < len(ranges))
-    found = ranges[nearest[known]]
-    out[known] = np.where(np.isfinite(found), np.clip(found, 0.0, sheet.max_range_m), sheet.max_range_m)
-    return out
+    found = sheet.along_own_beams(ranges, message.angle_min, message.angle_increment)
+    return np.where(np.isnan(found), sheet.max_range_m, found)

@@ -9,19 +9,22 @@ from pathlib import Path
 import numpy as np
 
 from pilotage.core.errors import InputError
-from pilotage.core.types import BoolArray, Command, FloatArray, IntArray
+from pilotage.core.types import BoolArray, Command, FloatArray, IntArray, Pose2
 from pilotage.logs.aer1513 import read_aer1513
 from pilotage.logs.mrclam import TRUTH_GAP_S, MrclamLog, read_mrclam
 from pilotage.maps.landmarks import Landmarks
+from pilotage.maps.world_map import WorldMap
+from pilotage.models.motion.differential_drive import DifferentialDriveConfig
 from pilotage.sensors.beacon import BeaconConfig
-from pilotage.sensors.readings import BeaconReadings, OdometryIncrement, Reading, Readings
+from pilotage.sensors.readings import BeaconReadings, LidarScan, OdometryIncrement, Reading, Readings
 from pilotage.sensors.sensor import Mount, SensorConfig
 from pilotage.sensors.wheel_odometry import WheelOdometryConfig
 
-ODOMETRY, BEACONS = "odometry", "beacons"
+ODOMETRY, BEACONS, LIDAR = "odometry", "beacons", "lidar"
 SCORE_HZ = 10.0
 HOLD_S = 0.5
 """A command is held no longer than this where the next one is missing."""
+USUAL_MOTION = DifferentialDriveConfig()
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,13 +42,25 @@ class RecordedDrive:
     truth
         (K, 3), nan where it is not known.
     scored
-        (K,) the steps of the 10 Hz grid.
+        (K,) the steps that the trace keeps: of the 10 Hz grid, or of a laser's scans.
     begin_s
         The log's clock at the begin.
     misread, stale
         File and line of readings of unknown barcodes, and of an outdated first row of odometry: left out.
     rate_var
         Variances per second of the odometry's distance (m^2) and angle (rad^2), where the log gives them.
+    sideways_m
+        (K,) as ``distance_m``, to the left; None where the base cannot.
+    scans, scan_at
+        (S, B) ranges, and (K,) which of them came at a step (-1: none); None without a laser.
+    chart
+        The robot's map; None: landmarks alone.
+    start
+        Where the robot is told that it begins; None: at the truth.
+    motion
+        How fast it may be, by what is known of it.
+    warnings
+        What was missing, damaged or put right, a sentence each.
     """
 
     name: str
@@ -67,15 +82,25 @@ class RecordedDrive:
     misread: tuple[str, ...]
     rate_var: tuple[float, float] | None = None
     stale: tuple[str, ...] = ()
+    sideways_m: FloatArray | None = None
+    scans: FloatArray | None = None
+    scan_at: IntArray | None = None
+    chart: WorldMap | None = None
+    start: Pose2 | None = None
+    motion: DifferentialDriveConfig = USUAL_MOTION
+    warnings: tuple[str, ...] = ()
 
     def readings_at(self, k: int) -> Readings:
         """What was sensed at step ``k``, as the robot's plug takes it."""
         said: dict[str, Reading] = {}
         if np.isfinite(self.distance_m[k]):
-            said[ODOMETRY] = OdometryIncrement(float(self.distance_m[k]), float(self.angle_rad[k]))
+            aside_m = 0.0 if self.sideways_m is None else float(self.sideways_m[k])
+            said[ODOMETRY] = OdometryIncrement(float(self.distance_m[k]), float(self.angle_rad[k]), aside_m)
         rows = slice(int(self.first[k]), int(self.first[k + 1]))
         if rows.stop > rows.start:
             said[BEACONS] = BeaconReadings(self.ids[rows], self.ranges_m[rows], self.bearings_rad[rows])
+        if self.scans is not None and self.scan_at is not None and self.scan_at[k] >= 0:
+            said[LIDAR] = LidarScan(self.scans[self.scan_at[k]])
         return Readings(float(self.t_s[k]), said)
 
 

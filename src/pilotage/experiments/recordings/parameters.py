@@ -25,10 +25,11 @@ def shipped_parameters(drive: RecordedDrive, localizer: str, form: str) -> tuple
 
     Never learned from the recording itself: the first set wins that has not seen it.
     """
+    if form == "bag":
+        return dict(_shipped(form).get(localizer, {})), []
     if localizer != LEARNED:
         return {}, []
-    text = (resources.files("pilotage.experiments.recordings") / f"{form}.yaml").read_text(encoding="utf-8")
-    content = load_yaml(text, f"{form}.yaml")
+    content = _shipped(form)
     if form == "aer1513":
         return _by_data_sheet(drive, content), []
     for chosen in content["sets"]:
@@ -36,6 +37,12 @@ def shipped_parameters(drive: RecordedDrive, localizer: str, form: str) -> tuple
             names = [f"{source['recording']} robot {source['robot']}" for source in chosen["learned_from"]]
             return merge(content["common"], chosen["parameters"]), names
     return dict(content["common"]), []
+
+
+def _shipped(form: str) -> dict[str, Any]:
+    text = (resources.files("pilotage.experiments.recordings") / f"{form}.yaml").read_text(encoding="utf-8")
+    content: dict[str, Any] = load_yaml(text, f"{form}.yaml")
+    return content
 
 
 def _by_data_sheet(drive: RecordedDrive, common: dict[str, Any]) -> dict[str, Any]:

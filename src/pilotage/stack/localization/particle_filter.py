@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 from pydantic import Field, model_validator
+from scipy.ndimage import binary_dilation
 from scipy.special import ndtri
 
 from pilotage.core.angles import wrap_array_to_pi, wrap_to_pi
@@ -16,6 +17,7 @@ from pilotage.core.errors import InputError
 from pilotage.core.types import FloatArray, Pose2
 from pilotage.kernels.filters import particles
 from pilotage.maps.nearest_obstacles import NearestObstacles
+from pilotage.maps.occupancy_grid import FREE, UNKNOWN, OccupancyGrid
 from pilotage.maps.world_map import WorldMap
 from pilotage.models.odometry import OdometryModel
 from pilotage.sensors.lidar import LidarConfig
@@ -45,6 +47,10 @@ AT_WALL_STDS, MOST_BESIDE = 3, 0.25
 """A beam so near to a wall ends at it; a belief of which a larger share of beams end beside one is wrong."""
 LEAST_AT_WALL, UNEXPLAINED_SCANS = 0.15, 10
 """A crowd may hide the walls for a while; more scans that show fewer of them speak against the belief."""
+LEAST_MAPPED = 0.5
+"""Share of a scan that has to end where the map says anything."""
+BESIDE_CELLS = 2
+"""A beam that ends so few cells beyond the known ones may have hit the wall before them."""
 TABLE_PER_STD, TABLE_STDS = 50, 12
 """The table of a beam's density: entries per standard deviation, and how many of these."""
 FLOOR = np.diag([1e-12, 1e-12, 1e-12])
@@ -131,7 +137,7 @@ class ParticleFilterLocalizer:
         self._watch, self._check = OdometryWatch(robot, odometry), SelfCheck(refused_share=MOST_BESIDE)
         self._blind = bool(initial.cov[2, 2] > LINEAR_RAD**2)
         self._unexplained = 0
-        self._field = _field_of(config, chart)
+        self._field, self._known = _field_of(config, chart), _known_of(chart)
         self._picked = np.unique(np.linspace(0, lidar.beams - 1, min(config.beams, lidar.beams)).astype(int))
         angles = lidar.beam_angles_rad()[self._picked] + lidar.mount.theta_rad
         self._directions = np.column_stack([np.cos(angles), np.sin(angles)])
@@ -161,9 +167,10 @@ class ParticleFilterLocalizer:
         moments = None
         if isinstance(scan, LidarScan) and not self._blind:
             prior = self._unweighted()
-            moments = self._weigh(scan.ranges_m)
+            points = self._mapped(self._points_of(scan.ranges_m), prior[0])
+            moments = self._weigh(points)
             if moments is not None:
-                self._judge(prior, moments[0], scan.ranges_m, readings.t_s)
+                self._judge(prior, moments[0], points, readings.t_s)
         if moments is None:
             self._rounds, self._effective = 0, float(self._poses.shape[0])
             moments = self._unweighted()
@@ -195,9 +202,9 @@ class ParticleFilterLocalizer:
             self._poses += stds * self._rng.standard_normal(self._poses.shape)
             self._poses[:, 2] = wrap_array_to_pi(self._poses[:, 2])
 
-    def _weigh(self, ranges_m: FloatArray) -> tuple[FloatArray, FloatArray] | None:
-        """Weigh and resample the cloud; returns the weighted mean and covariance, None for an empty scan."""
-        points = self._points_of(ranges_m)
+    def _weigh(self, points: FloatArray) -> tuple[FloatArray, FloatArray] | None:
+        """Weigh and resample the cloud by a scan's end points (K, 2) in the robot's frame; returns the
+        weighted mean and covariance, None for an empty scan."""
         if not len(points):
             return None
         remaining, self._rounds = 1.0, 0
@@ -227,8 +234,23 @@ class ParticleFilterLocalizer:
         points: FloatArray = self._mount_xy + ranges[seen, None] * self._directions[seen]
         return points
 
+    def _mapped(self, points: FloatArray, mean: FloatArray) -> FloatArray:
+        """Those of a scan's end points that lie where the map says anything, as seen from the mean.
+
+        What ends in unknown cells would speak for whatever pose puts it beside a known wall instead; a scan
+        of which most does so says nothing.
+        """
+        if self._known is None or not len(points):
+            return points
+        c, s = math.cos(mean[2]), math.sin(mean[2])
+        cells = self._known.cells_at(mean[:2] + points @ np.array([[c, s], [-s, c]]))
+        inside = ((cells >= 0) & (cells < self._known.cells.shape)).all(axis=1)
+        cells[~inside] = 0
+        mapped = inside & (self._known.cells[cells[:, 0], cells[:, 1]] >= 0)
+        return np.ascontiguousarray(points[mapped & (mapped.mean() >= LEAST_MAPPED)])
+
     def _judge(
-        self, prior: tuple[FloatArray, FloatArray], mean: FloatArray, ranges_m: FloatArray, t_s: float
+        self, prior: tuple[FloatArray, FloatArray], mean: FloatArray, points: FloatArray, t_s: float
     ) -> None:
         """Hold the scan against the belief before it, and beam by beam against the one after it.
 
@@ -236,7 +258,7 @@ class ParticleFilterLocalizer:
         ends far from any wall may have hit what is on no map; many that end beside one, not at it, say that
         the pose is off, and so does a scan of which next to nothing is at a wall.
         """
-        points, pose = self._points_of(ranges_m), mean[None]
+        pose = mean[None]
         beams = np.array([self._log_likelihoods(point[None], pose)[0] for point in points])
         at_wall = int((beams >= self._table[AT_WALL_STDS * TABLE_PER_STD]).sum())
         beside = int((beams > self._table[-2]).sum())
@@ -291,6 +313,16 @@ def _field_of(config: MclConfig, chart: WorldMap) -> NearestObstacles:
             f"'{chart.name}'; see stack.map"
         )
     return NearestObstacles.from_map(walls, config.resolution_m)
+
+
+def _known_of(chart: WorldMap) -> OccupancyGrid | None:
+    """The grid with what lies right beside its known cells taken for known; None where all is."""
+    if chart.geometry is not None or chart.grid is None or not (chart.grid.cells < 0).any():
+        return None
+    near = binary_dilation(chart.grid.cells >= 0, iterations=BESIDE_CELLS)
+    return OccupancyGrid(
+        np.where(near, FREE, UNKNOWN).astype(np.int8), chart.grid.resolution_m, chart.grid.origin
+    )
 
 
 def _field_std_m(config: MclConfig, chart: WorldMap) -> float:

@@ -1,0 +1,143 @@
+"""What a calibration takes from a bag: odometry beside the truth, gyroscopes, magnetometers, ranges."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from pilotage.core.errors import InputError
+from pilotage.logs.bag_series import (
+    FIELDS,
+    RANGES,
+    RATES,
+    TRUTH,
+    has,
+    headings,
+    read_poses,
+    read_series,
+    topic_of,
+)
+from pilotage.logs.bag_topics import Kind
+from pilotage.logs.bags import ODOMETRY, SCANS, read_bag
+from pilotage.logs.heading_csv import HeadingLog, HeadingSensor
+from pilotage.logs.laser_log import interpolate_poses
+from pilotage.logs.odometry_steps import OdometryForm, OdometrySteps, carried_over
+from pilotage.logs.steady_csv import LEAST_ROWS, Column
+
+STEP_S = 0.1
+"""Odometry that comes more often is taken so far apart: its steps are then beyond the truth's rounding."""
+TRUTH_GAP_S = 0.5
+"""A step over a longer gap of the truth says nothing."""
+MOST_BEAMS = 8
+LARGEST_WAY_M = 0.02
+"""A robot that stands does not go farther by its odometry."""
+
+
+def odometry_of_bag(path: Path, topics: Sequence[str] = (), truth: str | None = None) -> OdometrySteps:
+    """Odometry beside the true poses of the same bag.
+
+    Parameters
+    ----------
+    topics
+        The odometry (``nav_msgs/Odometry``); by default the usual one.
+    truth
+        The topic of the true poses, or ``/tf:PARENT:CHILD``; by default one of the usual names.
+
+    Raises
+    ------
+    InputError
+        Where the bag has not both; the message tells what it holds.
+    """
+    if len(topics) > 1:
+        raise InputError(f"{path}: expected one topic of odometry, found {len(topics)}")
+    claimed = read_poses(path, topics[0] if topics else None, ODOMETRY)
+    true = read_poses(path, truth, TRUTH)
+    if true.topic == claimed.topic:
+        raise InputError(f"{path}: expected --truth TOPIC beside the odometry {claimed.topic}, found none")
+    t_s, apart = [], -np.inf
+    for t in claimed.t_s[(claimed.t_s >= true.t_s[0]) & (claimed.t_s <= true.t_s[-1])]:
+        if t - apart >= STEP_S - 1e-6:
+            t_s.append(t)
+            apart = t
+    at = np.array(t_s)
+    if len(at) < LEAST_ROWS:
+        raise InputError(
+            f"{path}: expected {LEAST_ROWS} or more readings of {claimed.topic} and {true.topic} at the same "
+            f"time, found {len(at)}"
+        )
+    read = interpolate_poses(claimed.t_s, headings(claimed.values), at)
+    known = interpolate_poses(true.t_s, headings(true.values), at)
+    nearest = np.searchsorted(true.t_s, at, side="right").clip(1, len(true.t_s) - 1)
+    dense = true.t_s[nearest] - true.t_s[nearest - 1] <= TRUTH_GAP_S
+    whole = dense[1:] & dense[:-1]
+    moved = carried_over(known[:-1], read[:-1], read[1:])
+    return OdometrySteps(
+        path.stem,
+        OdometryForm.CUMULATIVE,
+        at[1:][whole],
+        known[:-1][whole],
+        known[1:][whole],
+        moved[whole],
+    )
+
+
+def headings_of_bag(path: Path, topics: Sequence[str] = ()) -> list[HeadingLog]:
+    """Gyroscopes (``sensor_msgs/Imu``) and magnetometers (``MagneticField``): the usual ones, or those named.
+
+    Raises
+    ------
+    InputError
+        Where the bag has none; the message tells what it holds.
+    """
+    kinds = ((RATES, HeadingSensor.GYROSCOPE), (FIELDS, HeadingSensor.MAGNETOMETER))
+    chosen: list[tuple[Kind, HeadingSensor, str | None]]
+    if topics:
+        asked = [topic_of(path, topic) for topic in topics]
+        for name, msgtype in asked:
+            if not any(msgtype in kind.types for kind, _ in kinds):
+                raise InputError(f"{path}: topic {name}: expected {RATES} or {FIELDS}, found {msgtype}")
+        chosen = [(k, s, n) for n, msgtype in asked for k, s in kinds if msgtype in k.types]
+    else:
+        chosen = [(kind, sensor, None) for kind, sensor in kinds if has(path, kind)]
+    if not chosen:
+        read_series(path, RATES)  # tells what the bag holds
+    series = [(sensor, read_series(path, kind, name)) for kind, sensor, name in chosen]
+    return [
+        HeadingLog(path.stem, sensor, s.t_s - s.t_s[0], s.values, f"{path} {s.topic}") for sensor, s in series
+    ]
+
+
+def steady_of_bag(path: Path, topics: Sequence[str] = ()) -> list[Column]:
+    """Ranges at rest: a ``sensor_msgs/Range``, or a few beams of a laser that always hit something.
+
+    Raises
+    ------
+    InputError
+        Where the bag has neither, or no beam always hits; the message tells what it holds.
+    """
+    if len(topics) > 1:
+        raise InputError(f"{path}: expected one topic of ranges or scans, found {len(topics)}")
+    asked = topic_of(path, topics[0]) if topics else None
+    if has(path, ODOMETRY):
+        driven = headings(read_poses(path, None, ODOMETRY).values)[:, :2]
+        way_m = float(np.hypot(*(driven - driven[0]).T).max())
+        if way_m > LARGEST_WAY_M:
+            raise InputError(f"{path}: expected a robot that stands still, found one that went {way_m:.2f} m")
+    if asked is not None and asked[1] not in (*RANGES.types, *SCANS.types):
+        raise InputError(f"{path}: topic {asked[0]}: expected {RANGES} or {SCANS}, found {asked[1]}")
+    if (asked is None and has(path, SCANS)) or (asked is not None and asked[1] in SCANS.types):
+        log = read_bag(path, None if asked is None else asked[0])
+        always = np.flatnonzero(np.isfinite(log.ranges_m).all(axis=0))
+        if len(log) < LEAST_ROWS or not always.size:
+            raise InputError(
+                f"{path}: expected {LEAST_ROWS} or more scans with a beam that always hits something, found "
+                f"{len(log)} scans and {always.size} such beams"
+            )
+        beams = np.unique(always[np.linspace(0, always.size - 1, MOST_BEAMS).astype(int)])
+        return [Column(f"beam_{beam}", "m", log.ranges_m[:, beam].copy()) for beam in beams]
+    found = read_series(path, RANGES, None if asked is None else asked[0])
+    if len(found.t_s) < LEAST_ROWS:
+        raise InputError(f"{path}: expected {LEAST_ROWS} or more ranges, found {len(found.t_s)}")
+    return [Column("range", "m", found.values[:, 0].copy())]

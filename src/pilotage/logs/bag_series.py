@@ -1,0 +1,339 @@
+"""What a bag says of one kind, as columns: poses, velocities, turn rates, magnetic fields, ranges, landmarks.
+
+Times are those of the messages' headers, of receipt where they have none (a plain ``Twist``) or a driver left
+them 0. Landmarks are read from any list of detections that names what was seen and says where it is: those of
+``vision_msgs``, ``apriltag_ros``, ``aruco_msgs``, ``ros2_aruco_interfaces`` and ``fiducial_msgs``.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, TypeAlias
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from pilotage.core.errors import InputError
+from pilotage.core.types import FloatArray
+from pilotage.logs.bag_messages import OpenBag, read_through
+from pilotage.logs.bag_topics import Kind, full_name, holds, pick
+from pilotage.logs.bags import ODOMETRY, ODOMETRY_TYPE, TRANSFORM_TYPES, USUAL_TRUTH
+from pilotage.logs.scanner_mount import TransformTree, frame_name
+from pilotage.logs.trajectories import Trajectory3
+
+GAUSS_PER_TESLA = 1e4
+Rows: TypeAlias = Iterator[tuple[Any, tuple[float, ...]]]
+"""Header, or None for the time of receipt, and one row of numbers."""
+
+POSES = Kind(
+    "poses",
+    (
+        ODOMETRY_TYPE,
+        "geometry_msgs/msg/PoseStamped",
+        "geometry_msgs/msg/PoseWithCovarianceStamped",
+        "geometry_msgs/msg/TransformStamped",
+        "nav_msgs/msg/Path",
+    ),
+    ("/pose", "/amcl_pose", "/odom"),
+    never=USUAL_TRUTH,
+)
+"""x, y, z in metres and the quaternion x, y, z, w."""
+TRUTH = Kind("true poses", POSES.types, USUAL_TRUTH, by_name_only=True)
+TWISTS = Kind(
+    "velocities",
+    (
+        "geometry_msgs/msg/TwistStamped",
+        "geometry_msgs/msg/TwistWithCovarianceStamped",
+        "geometry_msgs/msg/Twist",
+    ),
+    ("/cmd_vel",),
+)
+"""Forward in m/s, turn rate in rad/s, to the left in m/s."""
+RATES = Kind("turn rates", ("sensor_msgs/msg/Imu",), ("/imu", "/imu/data"))
+"""About x, y, z in rad/s."""
+FIELDS = Kind("magnetic fields", ("sensor_msgs/msg/MagneticField",), ("/imu/mag", "/mag"))
+"""Along x, y, z in gauss."""
+RANGES = Kind("ranges", ("sensor_msgs/msg/Range",))
+"""Metres."""
+LANDMARKS = Kind(
+    "landmarks",
+    (
+        "vision_msgs/msg/Detection3DArray",
+        "apriltag_ros/msg/AprilTagDetectionArray",
+        "aruco_msgs/msg/MarkerArray",
+        "ros2_aruco_interfaces/msg/ArucoMarkers",
+        "fiducial_msgs/msg/FiducialTransformArray",
+    ),
+)
+"""Identity, and x, y, z in metres in the sensor's frame."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Series:
+    """What one topic says, in the order of time.
+
+    Attributes
+    ----------
+    topic, frame
+        Its name, and the frame of its first message; '' without one.
+    t_s, values
+        (N,) seconds and (N, C) as its kind has them.
+    warnings
+        What was chosen or passed over.
+    """
+
+    topic: str
+    frame: str
+    t_s: FloatArray
+    values: FloatArray
+    warnings: tuple[str, ...] = ()
+
+
+def read_series(path: Path, kind: Kind, topic: str | None = None) -> Series:
+    """Read one topic of a bag; of messages with the same time the later counts, but for landmarks.
+
+    Raises
+    ------
+    InputError
+        Where ``rosbags`` is missing, the path is no bag, or it holds no such topic; the message tells what
+        it holds.
+    """
+
+    def read(bag: OpenBag) -> Series:
+        said = list(bag.warnings)
+        name = pick(bag, path, kind, topic, said)
+        if name is None:
+            wanted = str(kind) if kind.by_name_only else f"a topic of {kind}"
+            raise InputError(f"{path}: expected {wanted}, {holds(bag.topics)}")
+        return _series(bag, path, kind, name, said)
+
+    return read_through(path, read)
+
+
+def has(path: Path, kind: Kind) -> bool:
+    """Whether a bag holds a topic of a kind."""
+    return read_through(path, lambda bag: pick(bag, path, kind, None, []) is not None)
+
+
+def topic_of(path: Path, topic: str) -> tuple[str, str]:
+    """Name and type of a topic of a bag; InputError, telling what it holds, where it is not in it."""
+
+    def read(bag: OpenBag) -> tuple[str, str]:
+        found = next((t for t in bag.topics if full_name(t.name) == full_name(topic) and t.count), None)
+        if found is None:
+            raise InputError(f"{path}: expected the topic {full_name(topic)}, {holds(bag.topics)}")
+        return found.name, found.msgtype
+
+    return read_through(path, read)
+
+
+def read_poses(path: Path, topic: str | None = None, kind: Kind = POSES) -> Series:
+    """Poses (N, 7) of a topic, or of two frames of the transforms: ``/tf:map:base_link``.
+
+    Raises
+    ------
+    InputError
+        As ``read_series``; also where no transforms lead from the one frame to the other.
+    """
+    name, *frames = (topic or "").split(":")
+    if not frames:
+        return read_series(path, kind, topic)
+    if len(frames) != 2 or not all(frames):
+        raise InputError(f"{path}: topic {topic}: expected /tf:PARENT:CHILD for a pose out of the transforms")
+
+    def read(bag: OpenBag) -> Series:
+        names = {t.name for t in bag.topics if t.msgtype in TRANSFORM_TYPES}
+        if full_name(name) not in {full_name(known) for known in names}:
+            raise InputError(f"{path}: expected transforms in {full_name(name)}, {holds(bag.topics)}")
+        return _of_transforms(bag, path, names, frame_name(frames[0]), frame_name(frames[1]))
+
+    return read_through(path, read)
+
+
+def trajectory_of_bag(path: Path, topic: str | None = None) -> Trajectory3:
+    """A topic of poses, or two frames of the transforms, as a path in space.
+
+    Raises
+    ------
+    InputError
+        As ``read_poses``.
+    """
+    found = read_poses(path, topic)
+    turns = np.asarray(Rotation.from_quat(found.values[:, 3:]).as_matrix(), dtype=np.float64)
+    return Trajectory3(found.t_s, found.values[:, :3].copy(), turns)
+
+
+def headings(poses: FloatArray) -> FloatArray:
+    """Planar poses (N, 3) of poses in space (N, 7)."""
+    x, y, z, w = poses[:, 3:].T
+    turn = np.arctan2(2.0 * (w * z + x * y), w * w + x * x - y * y - z * z)
+    return np.column_stack([poses[:, :2], turn])
+
+
+def mount_matrix(path: Path, base: str, sensor: str) -> FloatArray | None:
+    """(4, 4) pose of a sensor's frame in the robot's by a bag's transforms; None where none lead there."""
+
+    def read(bag: OpenBag) -> FloatArray | None:
+        tree = TransformTree()
+        names = {topic.name for topic in bag.topics if topic.msgtype in TRANSFORM_TYPES}
+        for _, _, message in bag.messages(names):
+            for transform in getattr(message, "transforms", ()):
+                tree.add(transform)
+        found = tree.chain(frame_name(base), frame_name(sensor))
+        return None if found is None else found[0]
+
+    return read_through(path, read)
+
+
+def _series(bag: OpenBag, path: Path, kind: Kind, name: str, said: list[str]) -> Series:
+    rows_of = _ROWS[kind.what]
+    times: list[float] = []
+    rows: list[tuple[float, ...]] = []
+    frame, damaged = "", 0
+    for _, time_ns, message in bag.messages({name}):
+        try:
+            for header, row in rows_of(message):
+                times.append(_seconds(header, time_ns))
+                rows.append(row)
+                frame = frame or ("" if header is None else frame_name(header.frame_id))
+        except (AttributeError, TypeError, ValueError, OverflowError, IndexError):
+            damaged += 1  # None, or what a damaged definition made of it
+    if damaged:
+        said.append(f"{damaged} messages of {name} that cannot be read were passed over")
+    t_s, values = np.array(times), np.array(rows, dtype=np.float64)
+    fine = np.isfinite(t_s) if not rows else np.isfinite(t_s) & np.isfinite(values).all(axis=1)
+    if not fine.any():
+        raise InputError(f"{path}: expected {kind.what} in {name}, found none that can be read")
+    t_s, values = t_s[fine], values[fine]
+    order = np.argsort(t_s, kind="stable")
+    t_s, values = t_s[order], values[order]
+    if kind is not LANDMARKS:
+        last = np.append(np.diff(t_s) > 0.0, True)
+        t_s, values = t_s[last], values[last]
+    return Series(full_name(name), frame, t_s, values, tuple(said))
+
+
+def _seconds(header: Any, time_ns: int) -> float:
+    if header is None or (header.stamp.sec == 0 and header.stamp.nanosec == 0):
+        return time_ns * 1e-9
+    return float(header.stamp.sec) + 1e-9 * float(header.stamp.nanosec)
+
+
+def _of_transforms(bag: OpenBag, path: Path, names: set[str], parent: str, child: str) -> Series:
+    """The pose at each time that one of the transforms between the two frames is told anew."""
+    tree, times, rows = TransformTree(), [], []
+    for _, time_ns, message in bag.messages(names):
+        for transform in getattr(message, "transforms", ()):
+            moved = frame_name(transform.child_frame_id)
+            tree.parents.pop(moved, None)
+            tree.moved.discard(moved)
+            tree.add(transform)
+            found = tree.chain(parent, child)
+            if found is None or not _lies_between(tree, moved, child, parent):
+                continue
+            matrix = found[0]
+            half = 0.5 * math.atan2(matrix[1, 0], matrix[0, 0])
+            times.append(_seconds(transform.header, time_ns))
+            rows.append((*matrix[:3, 3].tolist(), 0.0, 0.0, math.sin(half), math.cos(half)))
+    if not rows:
+        frames = ", ".join(sorted({*tree.parents, *(known for known, _ in tree.parents.values())})) or "none"
+        raise InputError(
+            f"{path}: expected transforms from '{parent}' to '{child}', found the frames {frames}"
+        )
+    t_s, values = np.array(times), np.array(rows)
+    order = np.argsort(t_s, kind="stable")
+    t_s, values = t_s[order], values[order]
+    last = np.append(np.diff(t_s) > 0.0, True)
+    return Series(f"/tf:{parent}:{child}", parent, t_s[last], values[last])
+
+
+def _lies_between(tree: TransformTree, moved: str, child: str, parent: str) -> bool:
+    """Whether a transform's frame is on the way from one frame to the other."""
+    for frame in (child, parent):
+        seen: set[str] = set()
+        while frame in tree.parents and frame not in seen:
+            if frame == moved:
+                return True
+            seen.add(frame)
+            frame = tree.parents[frame][0]
+    return False
+
+
+def _pose_rows(message: Any) -> Rows:
+    for one in getattr(message, "poses", (message,)):
+        header = message.header if _unstamped(one) else one.header
+        if hasattr(one, "transform"):
+            place, turn = one.transform.translation, one.transform.rotation
+        else:
+            pose = one.pose.pose if hasattr(one.pose, "pose") else one.pose
+            place, turn = pose.position, pose.orientation
+        numbers = tuple(float(v) for v in (place.x, place.y, place.z, turn.x, turn.y, turn.z, turn.w))
+        size = math.hypot(*numbers[3:])
+        yield header, numbers if size > 1e-6 else (math.nan,) * 7
+
+
+def _unstamped(message: Any) -> bool:
+    return bool(message.header.stamp.sec == 0 and message.header.stamp.nanosec == 0)
+
+
+def _twist_rows(message: Any) -> Rows:
+    twist = message
+    while hasattr(twist, "twist"):
+        twist = twist.twist
+    yield (
+        getattr(message, "header", None),
+        (float(twist.linear.x), float(twist.angular.z), float(twist.linear.y)),
+    )
+
+
+def _rate_rows(message: Any) -> Rows:
+    rate = message.angular_velocity
+    yield message.header, (float(rate.x), float(rate.y), float(rate.z))
+
+
+def _field_rows(message: Any) -> Rows:
+    field = message.magnetic_field
+    yield message.header, tuple(GAUSS_PER_TESLA * float(v) for v in (field.x, field.y, field.z))
+
+
+def _range_rows(message: Any) -> Rows:
+    yield message.header, (float(message.range),)
+
+
+def _landmark_rows(message: Any) -> Rows:
+    """Identity and place of whatever a list of detections calls them."""
+    if hasattr(message, "marker_ids"):
+        seen = [(i, pose.position) for i, pose in zip(message.marker_ids, message.poses, strict=True)]
+    elif hasattr(message, "transforms"):
+        seen = [(one.fiducial_id, one.transform.translation) for one in message.transforms]
+    elif hasattr(message, "markers"):
+        seen = [(one.id, one.pose.pose.position) for one in message.markers]
+    else:
+        seen = [_detected(one) for one in message.detections]
+    for identity, place in seen:
+        yield message.header, (float(identity), float(place.x), float(place.y), float(place.z))
+
+
+def _detected(one: Any) -> tuple[Any, Any]:
+    """A detection of ``apriltag_ros``, or of ``vision_msgs`` by its likeliest hypothesis."""
+    if not hasattr(one, "results"):
+        return np.atleast_1d(one.id)[0], one.pose.pose.pose.position
+    best = one.results[0]
+    hypothesis = getattr(best, "hypothesis", best)
+    named = getattr(hypothesis, "class_id", getattr(hypothesis, "id", "")) or one.id
+    return named, best.pose.pose.position
+
+
+_ROWS: dict[str, Callable[[Any], Rows]] = {
+    POSES.what: _pose_rows,
+    TRUTH.what: _pose_rows,
+    ODOMETRY.what: _pose_rows,
+    TWISTS.what: _twist_rows,
+    RATES.what: _rate_rows,
+    FIELDS.what: _field_rows,
+    RANGES.what: _range_rows,
+    LANDMARKS.what: _landmark_rows,
+}
