@@ -1,93 +1,188 @@
-"""The rover in Gale Crater over many seeds: ellipses, errors, consistency (the third task's table).
+"""The rover's estimators over many runs: do their 95 % ellipses hold the truth 95 % of the time?
 
-``python -m benchmarks.gale [RUNS]``: RUNS of dead reckoning (300 by default), a third of them of the filter.
+``python -m benchmarks.gale [--runs 1000] [--reckoned 4000] [--json OUT]``: each task's drive once by truth,
+then the estimators' kernels along it with noise of their own a run (the study ``gale-estimation`` runs whole
+missions instead, fewer times). A run's steps share their error: intervals come from the runs.
 """
 
 from __future__ import annotations
 
+import argparse
+import json
+import math
 import sys
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.spatial import cKDTree
 
-from pilotage.core.types import FloatArray
-from pilotage.evaluation.consistency import nees
-from pilotage.evaluation.driving import covariances, poses
-from pilotage.evaluation.rover_metrics import in_ellipse, stretches_without
-from pilotage.experiments.loop import simulate
+from pilotage.core.chi_square import chi_square_quantile
+from pilotage.core.types import FloatArray, IntArray
+from pilotage.evaluation.driving import poses
+from pilotage.evaluation.rover_metrics import stretches_without
+from pilotage.experiments.build.build import build
+from pilotage.experiments.loop import run_loop
 from pilotage.experiments.mission import load_mission
+from pilotage.kernels.filters import rover_filter, rover_odometry
+from pilotage.kernels.geometry.motion import wrap
+from pilotage.kernels.jit import kernel
 
-EVERY = 50
+DRIVES = {"third task": "gale-ekf", "optional task": "gale-astar-ekf"}
+INITIAL = np.diag([36.0, 36.0, math.radians(1.0) ** 2])
+NOISE = np.diag([0.01, 1.9038589e-5])
+DISTANCE_VAR_M2_PER_M, TURN_VAR_RAD2_PER_M, REACH_M = 4.0e-5, 1.9038589e-6, 500.0
+GATE = chi_square_quantile(0.9999, 2)
 
 
 @dataclass(frozen=True, slots=True)
-class Sample:
-    """Over runs: share of steps in the ellipse, final errors, NEES every so often, mean NIS."""
+class Drive:
+    """True poses (T, 3), landmarks, and which are in reach: rows ``seen[first[k] : first[k + 1]]``."""
 
-    covered: FloatArray
-    final_m: FloatArray
-    nees: FloatArray
-    nis: FloatArray
-    stretches: int
+    truth: FloatArray
+    ids: IntArray
+    points: FloatArray
+    seen: IntArray
+    first: IntArray
 
 
-def sample(name: str, runs: int, *overrides: str) -> Sample:
-    """The same drive, by the truth and watched, with many seeds."""
-    covered, final, consistency, nis, stretches = [], [], [], [], 0
+def driven(name: str) -> Drive:
+    """A mission's drive by the truth; its landmarks by id."""
+    experiment = build(load_mission(name, ["run.oracles=[driver]"], 0))
+    landmarks = experiment.chart.landmarks
+    truth = poses(run_loop(experiment, None).finished.robots[0].trace, "true")
+    order = np.argsort(landmarks.ids)
+    points = np.ascontiguousarray(landmarks.points_xy_m[order])
+    tree = cKDTree(points)
+    near = [[]] + [sorted(tree.query_ball_point(place, REACH_M)) for place in truth[1:, :2]]
+    first = np.concatenate([[0], np.cumsum([len(rows) for rows in near])])
+    seen = np.array([row for rows in near for row in rows], dtype=np.int64)
+    return Drive(truth, np.ascontiguousarray(landmarks.ids[order]), points, seen, first)
+
+
+@kernel
+def run(
+    truth: FloatArray,
+    start: FloatArray,
+    odometry: FloatArray,
+    ids: IntArray,
+    points: FloatArray,
+    seen: IntArray,
+    first: IntArray,
+    sighted: FloatArray,
+    initial: FloatArray,
+    R: FloatArray,
+    gate: float,
+    reckon: bool,
+) -> FloatArray:
+    """(T, 2) squared Mahalanobis distance of the position, and of the pose, of one run.
+
+    ``start`` (3,) errors, ``odometry`` (T, 2) and ``sighted`` (S, 2) noise of unit variance.
+    """
+    steps = truth.shape[0]
+    out = np.empty((steps, 2))
+    mean, cov, anchor = truth[0].copy(), initial.copy(), np.full(1, -1, dtype=np.int64)
+    for i in range(3):
+        mean[i] += start[i] * math.sqrt(initial[i, i])
+    refused, sums = np.zeros(1, dtype=np.int64), np.zeros(rover_odometry.SUMS, dtype=np.complex128)
+    pose, spread, error = mean.copy(), cov.copy(), np.empty(3)
+    for k in range(steps):
+        if k > 0:
+            dx, dy = truth[k, 0] - truth[k - 1, 0], truth[k, 1] - truth[k - 1, 1]
+            turn, distance = wrap(truth[k, 2] - truth[k - 1, 2]), math.hypot(dx, dy)
+            aside = wrap(math.atan2(dy, dx) - truth[k - 1, 2]) if distance > 0.0 else 0.0
+            q_distance, q_turn = DISTANCE_VAR_M2_PER_M * distance, TURN_VAR_RAD2_PER_M * distance
+            turned = math.sqrt(q_turn) * odometry[k, 1]
+            said = distance + math.sqrt(q_distance) * odometry[k, 0]
+            increment = (said, aside + 0.5 * turned, turn + turned, q_distance, q_turn)
+            if reckon:
+                rover_odometry.predict_second_order(mean, cov, sums, *increment)
+            else:
+                rover_filter.predict(mean, cov, anchor, *increment)
+        a, b = first[k], first[k + 1]
+        if not reckon:
+            ranges, bearings = np.empty(b - a), np.empty(b - a)
+            for j in range(a, b):
+                dx, dy = points[seen[j], 0] - truth[k, 0], points[seen[j], 1] - truth[k, 1]
+                ranges[j - a] = math.hypot(dx, dy) + math.sqrt(R[0, 0]) * sighted[j, 0]
+                direction = math.atan2(dy, dx) - truth[k, 2]
+                bearings[j - a] = wrap(direction + math.sqrt(R[1, 1]) * sighted[j, 1])
+            rover_filter.update(
+                mean, cov, anchor, ids[seen[a:b]], ranges, bearings, ids, points, R, gate, refused
+            )
+            rover_filter.moments(mean, cov, anchor, points, pose, spread)
+        else:
+            pose[:], spread[:, :] = mean, cov
+        for i in range(3):
+            error[i] = truth[k, i] - pose[i]
+        error[2] = wrap(error[2])
+        xx, xy, yy = spread[0, 0], spread[0, 1], spread[1, 1]
+        x, y = error[0], error[1]
+        out[k, 0] = (yy * x * x - 2.0 * xy * x * y + xx * y * y) / (xx * yy - xy * xy)
+        out[k, 1] = error @ np.linalg.solve(spread, error)
+    return out
+
+
+def judged(drive: Drive, runs: int, reckon: bool) -> dict[str, dict[str, float]]:
+    """Over runs: share of the steps in the 95 % ellipse, and mean NEES of pose and position."""
+    inside, position, pose = np.empty(runs), np.empty(runs), np.empty(runs)
     for seed in range(runs):
-        mission = load_mission(name, ["run.oracles=[driver]", *overrides], seed)
-        trace = simulate(mission).finished.robots[0].trace
-        truth, estimate, covs = poses(trace, "true"), poses(trace, "est"), covariances(trace)
-        covered.append(in_ellipse(truth, estimate, covs, 0.95).mean())
-        final.append(np.hypot(*(estimate[-1, :2] - truth[-1, :2])))
-        consistency.append(nees(truth, estimate, covs))
-        if "nis" in trace:
-            nis.append(np.nansum(trace["nis"]) / np.nansum(trace["nis_expected"]))
-        step_m = np.concatenate([[0.0], np.hypot(*np.diff(truth[:, :2], axis=0).T)])
-        seen = np.nan_to_num(trace.get("beacons_seen", np.zeros(len(truth)))).astype(np.int64)
-        stretches = len(stretches_without(seen, step_m))
-    # The drives differ by nothing, so their lengths may differ by a step at most.
-    steps = min(len(series) for series in consistency)
-    return Sample(
-        np.array(covered),
-        np.array(final),
-        np.array([series[:steps:EVERY] for series in consistency]),
-        np.array(nis),
-        stretches,
-    )
-
-
-def main() -> None:
-    """Print the table."""
-    runs = int(sys.argv[1]) if len(sys.argv) > 1 else 300
-    few = max(runs // 3, 10)
-    reckoned = {
-        order: sample("gale-dead-reckoning", runs, f"stack.localizer.covariance={order}")
-        for order in ("second-order", "first-order")
-    }
-    for order, found in reckoned.items():
-        error = found.covered.std() / np.sqrt(runs)
-        print(
-            f"dead reckoning, {order}: truth in its 95 % ellipse {100 * found.covered.mean():.2f} % of the "
-            f"time (+- {100 * error:.2f}, {runs} runs); mean NEES {found.nees.mean():.2f}"
+        rng = np.random.default_rng(seed)
+        found = run(
+            drive.truth,
+            rng.standard_normal(3),
+            rng.standard_normal((len(drive.truth), 2)),
+            drive.ids,
+            drive.points,
+            drive.seen,
+            drive.first,
+            rng.standard_normal((len(drive.seen), 2)),
+            INITIAL,
+            NOISE,
+            GATE,
+            reckon,
         )
-    found = sample("gale-ekf", few)
-    low, high = (float(chi2.ppf(share, 3 * few)) / few for share in (0.0005, 0.9995))
-    mean = found.nees.mean(axis=0)
-    print(
-        f"EKF: median error at the end {np.median(found.final_m):.2f} m, dead reckoning "
-        f"{np.median(reckoned['second-order'].final_m):.0f} m; "
-        f"stretches over 1 km without landmarks: {found.stretches}"
-    )
-    inside = 100 * ((mean > low) & (mean < high)).mean()
-    print(
-        f"EKF, {few} runs: mean NEES {found.nees.mean():.3f}, {inside:.1f} "
-        f"% of the steps in the pointwise 99.9 % band {low:.2f} to {high:.2f}; "
-        f"NIS per degree of freedom {found.nis.mean():.4f}; "
-        f"truth in its ellipse {100 * found.covered.mean():.1f} %"
-    )
+        inside[seed] = (found[:, 0] <= chi_square_quantile(0.95, 2)).mean()
+        position[seed], pose[seed] = found.mean(axis=0)
+    return {
+        name: {
+            "value": float(values.mean()),
+            "low": float(values.mean() - 1.96 * values.std() / math.sqrt(runs)),
+            "high": float(values.mean() + 1.96 * values.std() / math.sqrt(runs)),
+            "n": runs,
+        }
+        for name, values in (("in ellipse", inside), ("position NEES", position), ("NEES", pose))
+    }
+
+
+def main() -> int:
+    """Measure and print; write the values where a file is named."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("--runs", type=int, default=1000)
+    parser.add_argument("--reckoned", type=int, default=4000, help="runs of dead reckoning, which are cheap")
+    parser.add_argument("--json", type=Path)
+    options = parser.parse_args()
+    values: dict[str, dict[str, float]] = {}
+    for task, name in DRIVES.items():
+        drive = driven(name)
+        step_m = np.concatenate([[0.0], np.hypot(*np.diff(drive.truth[:, :2], axis=0).T)])
+        blind = stretches_without(np.diff(drive.first), step_m)
+        longest = max((float(step_m[a : b + 1].sum()) for a, b in blind), default=0.0)
+        values[f"{task} :: blind stretches over 1 km"] = {"value": len(blind)}
+        values[f"{task} :: longest blind stretch"] = {"value": longest}
+        for filter_, runs, reckon in (
+            ("EKF", options.runs, False),
+            ("dead reckoning", options.reckoned, True),
+        ):
+            for key, value in judged(drive, runs, reckon).items():
+                values[f"{task} :: {filter_} :: {key}"] = value
+    for key, value in values.items():
+        interval = f" ({value['low']:.4f} to {value['high']:.4f}, {value['n']} runs)" if "n" in value else ""
+        sys.stdout.write(f"{key}: {value['value']:.4f}{interval}\n")
+    if options.json is not None:
+        options.json.write_text(json.dumps(values), encoding="utf-8")
+    return 0
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())

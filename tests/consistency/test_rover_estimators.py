@@ -20,8 +20,7 @@ from pilotage.core.random import RandomStreams
 from pilotage.core.types import FloatArray, IntArray, Pose2
 from pilotage.evaluation.consistency import nees
 from pilotage.evaluation.rover_metrics import in_ellipse
-from pilotage.kernels.filters import rover_filter, rover_odometry
-from pilotage.kernels.filters.invariant import moments
+from pilotage.kernels.filters import ekf, rover_filter, rover_odometry
 from pilotage.maps.landmarks import Landmarks
 from pilotage.maps.world_map import WorldMap
 from pilotage.models.footprint import Footprint
@@ -90,17 +89,21 @@ def sighted(seed: int) -> Iterator[tuple[IntArray, FloatArray, FloatArray]]:
 def filtered(seed: int, second_order: bool, claimed: float) -> FloatArray:
     """(4,) NEES of one run at the steps ``AT``; ``claimed`` scales the odometry variances it believes."""
     pose, said = drawn(seed)
-    cov, refused = np.diag(INITIAL), np.zeros(1, dtype=np.int64)
+    cov, refused, anchor = np.diag(INITIAL), np.zeros(1, dtype=np.int64), np.full(1, -1, dtype=np.int64)
     q_distance, q_turn = claimed * STEP_M * DISTANCE_VAR_M2_PER_M, claimed * STEP_M * TURN_VAR_RAD2_PER_M
     mean, spread = np.empty(3), np.empty((3, 3))
+    nis, outcome = np.empty(len(IDS)), np.empty(len(IDS), dtype=np.int64)
     found = []
     for k, ((distance, turn), seen) in enumerate(zip(said.tolist(), sighted(seed), strict=True)):
-        rover_filter.predict(pose, cov, distance, 0.0, turn, q_distance, q_turn, second_order)
-        if len(seen[0]):
-            rover_filter.update(pose, cov, *seen, IDS, POINTS, NOISE, GATE, second_order, refused)
+        if second_order:
+            rover_filter.predict(pose, cov, anchor, distance, 0.0, turn, q_distance, q_turn)
+            rover_filter.update(pose, cov, anchor, *seen, IDS, POINTS, NOISE, GATE, refused)
+        else:
+            rover_odometry.predict_first_order(pose, cov, distance, 0.0, turn, q_distance, q_turn)
+            ekf.update_range_bearings(pose, cov, *seen, IDS, POINTS, np.zeros(3), NOISE, GATE, nis, outcome)
         if k in AT:
             if second_order:
-                moments(pose, cov, mean, spread)
+                rover_filter.moments(pose, cov, anchor, POINTS, mean, spread)
             else:
                 mean, spread = pose.copy(), cov.copy()
             truth = TRUTH[k + 1 : k + 2].copy()
@@ -185,7 +188,7 @@ def test_the_localizers_are_these_kernels() -> None:
     pose, cov, alone, alone_cov = TRUTH[0].copy(), np.diag(INITIAL), TRUTH[0].copy(), np.diag(INITIAL)
     mean, spread = np.empty(3), np.empty((3, 3))
     sums = np.zeros(rover_odometry.SUMS, dtype=np.complex128)
-    refused = np.zeros(1, dtype=np.int64)
+    refused, anchor = np.zeros(1, dtype=np.int64), np.full(1, -1, dtype=np.int64)
     ids, ranges, bearings = IDS[:1], np.array([260.0]), np.array([-0.9])
     # A hundred seconds a step: what the drive could not have done would be believed less.
     for step, turn in enumerate((0.02, -0.01, 0.0), start=1):
@@ -195,9 +198,9 @@ def test_the_localizers_are_these_kernels() -> None:
         )
         distance, aside = chord(4.0, turn)
         noise = STEP_M * DISTANCE_VAR_M2_PER_M, STEP_M * TURN_VAR_RAD2_PER_M
-        rover_filter.predict(pose, cov, distance, aside, turn, *noise, True)
-        rover_filter.update(pose, cov, ids, ranges, bearings, IDS, POINTS, NOISE, GATE, True, refused)
-        moments(pose, cov, mean, spread)
+        rover_filter.predict(pose, cov, anchor, distance, aside, turn, *noise)
+        rover_filter.update(pose, cov, anchor, ids, ranges, bearings, IDS, POINTS, NOISE, GATE, refused)
+        rover_filter.moments(pose, cov, anchor, POINTS, mean, spread)
         rover_odometry.predict_second_order(alone, alone_cov, sums, distance, aside, turn, *noise)
         belief, reckoned_ = filter_.step(readings), reckoning.step(readings)
         np.testing.assert_allclose(belief.pose.as_array(), mean, rtol=1e-12)

@@ -31,7 +31,8 @@ CLUSTER_POINTS = 10
 MAX_RANGE_M = 19.9
 INLIER_M = 0.1
 SIDE_MARGIN_M = 0.5
-ITERATIONS = 60
+SCAN_OFFSET_RAD = -0.0147
+"""Its scan is turned by 2.37525 rad, not half the field of view: no wall stands along y exactly."""
 UNIFORMS = 2048
 COLUMNS = {"lines_seen": "1", "lines_accepted": "1", "nis": "1", "nis_dof": "1", "nis_expected": "1"}
 """Lines matched and accepted; NIS of the accepted together, its degrees of freedom and its mean."""
@@ -45,6 +46,8 @@ class EkfWallsReportConfig(Config):
     of its program (0.05 s). ``heading`` is what the scan is turned by: its program takes the simulator's true
     one, which a robot here has where a compass without errors tells it. ``initial_var`` stands for the
     variances of the start in m^2 and rad^2; its program begins at the true pose and yet with 0.01 each.
+    The ``jacobian`` as printed, A / sqrt(A^2 + B^2), has the wrong sign on one side of every wall; signed, it
+    is the distance's slope.
     """
 
     threshold_chi2: Positive = 0.0039
@@ -53,6 +56,7 @@ class EkfWallsReportConfig(Config):
     odometry_angle_var_rad2: NonNegative = 1.955e-4
     heading: Literal["believed", "compass"] = "believed"
     initial_var: Positive | None = None
+    jacobian: Literal["printed", "signed"] = "printed"
 
 
 @LOCALIZERS.add("ekf-walls-report", EkfWallsReportConfig)
@@ -60,9 +64,9 @@ class EkfWallsReportLocalizer:
     """Extended Kalman filter on distances to infinite walls (night-watch report 3.2, equations 5 to 9).
 
     All distances of a scan pass one gate together, or none does. Fails, as the report says: the heading is
-    never measured, corners pass for walls, distances meet the wrong wall of a line that goes on, the
-    Jacobian's sign is right on one side of a wall only, and the threshold of one degree of freedom lets
-    through next to nothing. Use ``ekf-walls``.
+    never measured, corners pass for walls, distances meet the wrong wall of a line that goes on, and the
+    threshold of one degree of freedom lets through next to nothing. Worst is the Jacobian's sign: with more
+    walls on its wrong side than on the other, every correction makes the error larger. Use ``ekf-walls``.
     """
 
     def __init__(
@@ -88,6 +92,7 @@ class EkfWallsReportLocalizer:
         self._Q = np.diag([config.odometry_distance_var_m2, config.odometry_angle_var_rad2])
         self._R = config.distance_var_m2
         self._threshold = config.threshold_chi2
+        self._signed = config.jacobian == "signed"
         self._rng = robot.streams.stream("ekf-walls-report")
         self._pose = initial.pose.as_array()
         self._cov = initial.cov.copy() if config.initial_var is None else config.initial_var * np.eye(3)
@@ -116,17 +121,21 @@ class EkfWallsReportLocalizer:
         clusters = clustering.scan_clusters(
             ranges_m, points, self._step, self._max_range, CUTOFF_M, CLUSTER_POINTS
         )
+        c, s = math.cos(heading_rad + SCAN_OFFSET_RAD), math.sin(heading_rad + SCAN_OFFSET_RAD)
+        turned = np.ascontiguousarray(points @ np.array([[c, s], [-s, c]]))
         feet = infinite_lines.cluster_lines(
-            points, clusters, INLIER_M, CLUSTER_POINTS, ITERATIONS, self._rng.random(UNIFORMS)
+            turned, clusters, INLIER_M, CLUSTER_POINTS, self._rng.random(UNIFORMS)
         )
         x, y = float(self._pose[0]), float(self._pose[1])
-        errors = infinite_lines.error_matrix(x, y, heading_rad, feet, self._lines, SIDE_MARGIN_M)
+        errors = infinite_lines.error_matrix(x, y, feet, self._lines, SIDE_MARGIN_M)
         self._keep(errors)
         best = np.abs(errors).argmin(axis=1) if errors.size else np.zeros(0, np.int64)
         rows = np.flatnonzero(np.abs(errors[np.arange(len(best)), best]) < infinite_lines.NO_ERROR)
         innovation = errors[rows, best[rows]]
         H = np.zeros((len(rows), 3))
         H[:, :2] = self._lines[best[rows], :2]
+        if self._signed:
+            H[:, :2] *= np.sign(self._lines[best[rows]] @ (x, y, 1.0))[:, None]
         S = H @ self._cov @ H.T + self._R * np.eye(len(rows))
         nis = float(innovation @ np.linalg.solve(S, innovation)) if len(rows) else math.inf
         passed = nis < self._threshold

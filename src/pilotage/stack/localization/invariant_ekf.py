@@ -1,4 +1,4 @@
-"""The EKF on landmarks whose error is one of the map frame: honest over kilometres without a landmark."""
+"""The EKF on landmarks whose error is invariant: honest over kilometres without a landmark and after."""
 
 from __future__ import annotations
 
@@ -12,7 +12,6 @@ from pilotage.core.config import Config
 from pilotage.core.errors import InputError
 from pilotage.core.types import FloatArray, IntArray, Pose2
 from pilotage.kernels.filters import rover_filter
-from pilotage.kernels.filters.invariant import moments
 from pilotage.maps.world_map import WorldMap
 from pilotage.models.odometry import OdometryModel, chord
 from pilotage.sensors.beacon import BeaconConfig
@@ -26,7 +25,12 @@ from pilotage.stack.localization.beacon_fix import fix_from_beacons
 from pilotage.stack.localization.landmark_filter import SIGHTING_COLUMNS
 from pilotage.stack.localization.localizer import LOCALIZERS, require_initial_pose
 from pilotage.stack.localization.odometry_prediction import OdometryNoise, OdometryPrediction
-from pilotage.stack.localization.odometry_watch import LINEAR_RAD, OdometryWatch, increment_of
+from pilotage.stack.localization.odometry_watch import (
+    LINEAR_RAD,
+    OdometryWatch,
+    add_variances,
+    increment_of,
+)
 from pilotage.stack.localization.self_check import SelfCheck
 
 NAME = "invariant-ekf-landmarks"
@@ -47,12 +51,12 @@ class InvariantEkfConfig(Config):
 class InvariantEkfLocalizer:
     """Odometry moves the belief exactly, sightings correct it by an iterated update (rover report 4.3).
 
-    The error is the right-invariant one on SE(2) (Barrau and Bonnabel 2017): after a kilometre without
-    landmarks the first bearing is far from linear in x and y. Sightings refused five times in a row make it
-    less sure, so that it comes back.
+    Between landmarks the error is the right-invariant one on SE(2) (Barrau and Bonnabel 2017), in which
+    odometry is exact; while one is in sight, range, bearing and direction about it, in which sightings are
+    (``kernels.filters.polar``). Sightings refused five times in a row make it less sure, so that it comes
+    back.
 
-    The sensor sits in the base's origin. Fails slowly beyond some 2 km without a landmark (heading uncertain
-    by more than 3 degrees): its covariance is then too small for a while.
+    The sensor sits in the base's origin. Fails where it drives over a landmark: it has no bearing there.
     """
 
     def __init__(
@@ -80,7 +84,8 @@ class InvariantEkfLocalizer:
         self._gate_probability = config.gate
         self._gate = chi_square_quantile(config.gate, 2)
         self._expected_nis = gated_mean(self._gate, 2)
-        self._pose, self._cov = initial.pose.as_array(), initial.cov.copy()
+        self._state, self._cov = initial.pose.as_array(), initial.cov.copy()
+        self._anchor = np.full(1, -1, dtype=np.int64)
         self._mean: FloatArray = np.empty(3)
         self._spread: FloatArray = np.empty((3, 3))
         self._refused = np.zeros(1, dtype=np.int64)
@@ -95,20 +100,24 @@ class InvariantEkfLocalizer:
             chord_m, aside_rad = chord(odometry.distance_m, odometry.angle_rad)
             variances = self._prediction.variances(odometry)
             rover_filter.predict(
-                self._pose, self._cov, chord_m, aside_rad, odometry.angle_rad, *variances, True
+                self._state, self._cov, self._anchor, chord_m, aside_rad, odometry.angle_rad, *variances
             )
-        # The error is told at the pose's own place, where these add up as they do in x, y and theta.
-        self._watch.widen(self._cov, readings.t_s, odometry)
+        place, heading = self._watch.variances(readings.t_s, odometry)
+        if place > 0.0 or heading > 0.0:
+            # The map frame's error is told at the pose's own place, where these add up as in x, y and theta.
+            rover_filter.leave_anchor(self._state, self._cov, self._anchor, self._points)
+            add_variances(self._cov, place, heading)
         seen = readings.by_sensor.get(self._seer)
         ids, ranges, bearings = NOTHING
         if isinstance(seen, BeaconReadings):
             ids, ranges, bearings = seen.ids, seen.ranges_m, seen.bearings_rad
-            if self._cov[2, 2] > LINEAR_RAD**2:
+            if self._anchor[0] < 0 and self._cov[2, 2] > LINEAR_RAD**2:
                 self._begin_anew(ids, ranges, bearings)
                 ids, ranges, bearings = NOTHING
         accepted, nis = rover_filter.update(
-            self._pose,
+            self._state,
             self._cov,
+            self._anchor,
             ids,
             ranges,
             bearings,
@@ -116,13 +125,12 @@ class InvariantEkfLocalizer:
             self._points,
             self._R,
             self._gate,
-            True,
             self._refused,
         )
         known = int(np.isin(ids, self._ids).sum()) if len(ids) else 0
         self._check.tell(readings.t_s, known, accepted, nis, accepted * self._expected_nis)
-        moments(self._pose, self._cov, self._mean, self._spread)
-        lost = self._check.lost(readings.t_s) or self._cov[2, 2] > LINEAR_RAD**2
+        rover_filter.moments(self._state, self._cov, self._anchor, self._points, self._mean, self._spread)
+        lost = self._check.lost(readings.t_s) or self._spread[2, 2] > LINEAR_RAD**2
         status = BeliefStatus.LOST if lost else BeliefStatus.LOCALIZED
         self.belief = Belief(Pose2.from_array(self._mean), self._spread.copy(), status)
         self._channel.tell(
@@ -141,4 +149,4 @@ class InvariantEkfLocalizer:
         points = self._points[np.searchsorted(self._ids, ids[known])]
         fix = fix_from_beacons(points, ranges_m[known], bearings_rad[known], np.zeros(3), self._R)
         if fix is not None and fix.chi2 <= chi_square_quantile(self._gate_probability, fix.dof):
-            self._pose, self._cov = fix.pose, fix.cov
+            self._state, self._cov, self._anchor[0] = fix.pose, fix.cov, -1

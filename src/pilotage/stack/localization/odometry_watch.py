@@ -62,10 +62,15 @@ class OdometryWatch:
         place, heading = self.variances(t_s, odometry)
         if place == 0.0 and heading == 0.0:
             return False
-        cov[0, 0] += place
-        cov[1, 1] += place
-        cov[2, 2] += min(heading, max(MOST_HEADING_VAR - float(cov[2, 2]), 0.0))
+        add_variances(cov, place, heading)
         return True
+
+
+def add_variances(cov: FloatArray, place: float, heading: float) -> None:
+    """Add to the variances of each coordinate (m^2) and the heading (rad^2), first in ``cov`` (N, N)."""
+    cov[0, 0] += place
+    cov[1, 1] += place
+    cov[2, 2] += min(heading, max(MOST_HEADING_VAR - float(cov[2, 2]), 0.0))
 
 
 def increment_of(reading: object) -> OdometryIncrement | None:
