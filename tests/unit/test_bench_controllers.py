@@ -13,6 +13,8 @@ import pytest
 
 from pilotage.cli.main import main
 from pilotage.evaluation.courses import CourseRun, summarize_courses
+from pilotage.experiments.barn_benchmark import course_base
+from pilotage.experiments.controller_benchmark import CourseRequest, drive_course
 from pilotage.experiments.course_families import Course, Driver, make_course_of
 from pilotage.maps.segment_map import SegmentMap
 from pilotage.models.footprint import Footprint
@@ -66,9 +68,43 @@ def test_courses_have_room_where_they_begin_and_end_and_a_bound(family: str) -> 
     assert drawn(family, 3).settings != drawn(family, 3, seed=2).settings
 
 
-def test_openings_narrower_than_the_robot_have_no_way() -> None:
-    assert make_course_of("bottleneck-0.36", 0, 1, DRIVER) is None
+def test_openings_narrower_than_the_robot_have_no_way_and_all_others_have_one() -> None:
+    """The body is 0.43 m wide: what can be driven straight is never called closed."""
+    assert make_course_of("bottleneck-0.40", 0, 1, DRIVER) is None
+    for number in range(4):
+        assert drawn("bottleneck-0.44", number).bound_s > 3.0
     assert drawn("bottleneck-0.60").bound_s > 3.0
+
+
+def test_openings_little_wider_than_the_robot_are_driven_through() -> None:
+    """1.5 cm of room on either side, under a laser noise of 1 cm."""
+    request = CourseRequest(("bottleneck-0.46",), ("gap-horizon",))
+    run = drive_course(request, course_base(), drawn("bottleneck-0.46"), 0, "gap-horizon")
+    assert run.success, run
+
+
+def rooms(path: Path, opening_m: float) -> str:
+    """A ROS map of two rooms of 3 m by 3 m with an opening between, 5 cm a cell; its file's name."""
+    cells = np.full((66, 130), 254, dtype=np.uint8)
+    cells[[0, 1, -1, -2]] = cells[:, [0, 1, 64, 65, -1, -2]] = 0
+    cells[33 - round(opening_m / 0.1) : 33 + round(opening_m / 0.1), 64:66] = 254
+    (path / "rooms.pgm").write_bytes(b"P5 130 66 255\n" + cells.tobytes())
+    text = "image: rooms.pgm\nresolution: 0.05\norigin: [0, 0, 0]\nnegate: 0\n"
+    (path / "rooms.yaml").write_text(text + "occupied_thresh: 0.65\nfree_thresh: 0.2\n")
+    return str(path / "rooms.yaml")
+
+
+@pytest.mark.parametrize(("opening_m", "crosses"), [(0.3, False), (0.6, True)])
+def test_on_a_map_ways_lead_through_what_the_outline_fits(
+    tmp_path: Path, opening_m: float, crosses: bool
+) -> None:
+    """The disc around the robot, 0.67 m wide, fits through neither."""
+    file = rooms(tmp_path, opening_m)
+    found = set()
+    for number in range(12):
+        places = drawn(file, number).settings
+        found.add((places["world.start"]["x_m"] < 3.25) != (places["world.goal"]["x_m"] < 3.25))
+    assert (True in found) == crosses
 
 
 def test_a_crossing_begins_where_nobody_stands(tmp_path: Path) -> None:

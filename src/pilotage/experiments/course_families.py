@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -16,9 +17,12 @@ from pilotage.core.types import FloatArray
 from pilotage.evaluation.barn import lane_within
 from pilotage.evaluation.least_time import least_time_s, time_bound_s
 from pilotage.experiments.build.charts import load_chart
-from pilotage.kernels.control.pose_search import CLOSED, passage
+from pilotage.kernels.bodies.outline import outline_clearance
+from pilotage.kernels.control.pose_search import CLOSED, FOUND, passage
 from pilotage.logs.people import read_people
-from pilotage.maps.courses import make_course
+from pilotage.maps.courses import Course as LaneCourse
+from pilotage.maps.courses import make_course, straight_way
+from pilotage.maps.distance_field import DistanceField
 from pilotage.maps.segment_map import SegmentMap, box_segments
 from pilotage.models.footprint import Footprint
 from pilotage.models.motion.motion import MotionConfig
@@ -34,7 +38,11 @@ HALL_M = 9.0
 CLEAR_M = 0.05
 """Room around the robot, however it stands, at start and goal on a map."""
 APART_M = (2.5, 12.0)
+STEP_M = 0.01
+AROUND_M = 3.0
 TRIES = 1000
+SEARCHES = 20
+MOST_CELLS = 200_000
 CELL_M = 0.04
 
 
@@ -184,16 +192,21 @@ def _crowd(number: int, rng: np.random.Generator, driver: Driver) -> Course:
 def _bottleneck(
     family: str, number: int, width_m: float, rng: np.random.Generator, driver: Driver
 ) -> Course | None:
-    """Barriers whose only opening is so wide; None where a search over all poses finds no way."""
+    """Barriers whose only opening is so wide; None where a robot that knows the course finds no way.
+
+    Such a robot drives the straight way through the middle of each opening and turns on the spot at its
+    corners; where that does not fit, another way is searched for over poses.
+    """
     made = make_course(width_m, rng)
     x, y = made.goal_xy_m
     low, high = np.array([-2.5, -1.2]), np.array([2.5, y + 0.6])
-    status, _ = passage(
-        np.array(made.start), x, y, TOLERANCE_M, np.ascontiguousarray(driver.outline), made.circles_m, low,
-        high, CELL_M, 0.0,
-    )  # fmt: skip
-    if status == CLOSED:
-        return None
+    if not _drives_straight(made, driver):
+        status, _ = passage(
+            np.array(made.start), x, y, TOLERANCE_M, np.ascontiguousarray(driver.outline),
+            made.circles_m, low, high, CELL_M, 0.0,
+        )  # fmt: skip
+        if status == CLOSED:
+            return None
     drawn = {
         "map": f"{family}-{number}",
         "bounds_m": [-4.5, -3.0, 4.5, y + 2.0],
@@ -202,6 +215,31 @@ def _bottleneck(
     }
     bound = _bound_s(lane_within(made.circles_m, -0.9, y + 1.0), made.start, (x, y), driver)
     return Course(family, number, {"world.map": drawn, **_places(made.start, (x, y))}, bound)
+
+
+def _drives_straight(made: LaneCourse, driver: Driver) -> bool:
+    """Whether the outline touches nothing on the straight way through the openings' middles."""
+    corners = straight_way(made.openings, made.goal_xy_m)
+    outline, sides = np.ascontiguousarray(driver.outline), np.empty((0, 4))
+    for here, there in itertools.pairwise(corners):
+        length, angle = math.hypot(*(there - here)), math.atan2(*(there - here)[::-1])
+        c, s = math.cos(angle), math.sin(angle)
+        to_corner = np.hypot(*(made.circles_m[:, :2] - here).T) - made.circles_m[:, 2]
+        if to_corner.min() < driver.footprint.radius_m:
+            return False
+        near = made.circles_m[_beside(made.circles_m, here, there) < driver.footprint.radius_m]
+        for along in np.arange(0.0, length, STEP_M):
+            x, y = here[0] + along * c, here[1] + along * s
+            if near.size and outline_clearance(x, y, c, s, outline, 0.0, sides, near) <= 0.0:
+                return False
+    return True
+
+
+def _beside(circles_m: FloatArray, here: FloatArray, there: FloatArray) -> FloatArray:
+    """(N,) distances of discs from a straight piece."""
+    step = there - here
+    t = np.clip((circles_m[:, :2] - here) @ step / float(step @ step), 0.0, 1.0)
+    return np.asarray(np.hypot(*(here + t[:, None] * step - circles_m[:, :2]).T) - circles_m[:, 2])
 
 
 def _crossing(file: str, number: int, rng: np.random.Generator, driver: Driver) -> Course:
@@ -227,24 +265,58 @@ def _crossing(file: str, number: int, rng: np.random.Generator, driver: Driver) 
     return _walled(file, number, walls, start, (float(goal[0]), float(goal[1])), driver, people)
 
 
+def _two_places(
+    file: str, field: DistanceField, rng: np.random.Generator, driver: Driver
+) -> tuple[FloatArray, FloatArray]:
+    """Two places where the robot may stand and turn, with a way between: a wide one, or one found over poses.
+
+    Raises
+    ------
+    InputError
+        Where there are none.
+    """
+    shape, spacing = driver.footprint, field.resolution_m
+    wide, _ = label(field.distance_m > shape.radius_m)
+    narrow, _ = label(field.distance_m > shape.inner_radius_m)
+    cells = np.argwhere(field.distance_m > shape.radius_m + CLEAR_M)
+    if not len(cells):
+        raise InputError(f"{file}: expected a map with room for the robot, found none")
+    solid = np.array(field.origin_xy_m) + spacing * np.argwhere(field.distance_m <= 0.5 * spacing)[:, ::-1]
+    searched = 0
+    for _ in range(TRIES):
+        one, other = (tuple(cell) for cell in cells[rng.integers(len(cells), size=2)])
+        start, goal = (np.array(field.origin_xy_m) + spacing * np.array(cell[::-1]) for cell in (one, other))
+        if not APART_M[0] <= math.hypot(*(goal - start)) <= APART_M[1] or narrow[one] != narrow[other]:
+            continue
+        if wide[one] == wide[other]:
+            return start, goal
+        searched += 1
+        if searched <= SEARCHES and _has_passage(start, goal, solid, spacing, driver):
+            return start, goal
+    raise InputError(
+        f"{file}: expected two places {APART_M[0]:g} to {APART_M[1]:g} m apart with a way between, found none"
+    )
+
+
+def _has_passage(
+    start: FloatArray, goal: FloatArray, solid: FloatArray, spacing_m: float, driver: Driver
+) -> bool:
+    """Whether the outline gets through between solid nodes (N, 2), no farther around than ``AROUND_M``."""
+    low, high = np.minimum(start, goal) - AROUND_M, np.maximum(start, goal) + AROUND_M
+    near = solid[((solid > low - 1.0) & (solid < high + 1.0)).all(axis=1)]
+    discs = np.column_stack([near, np.full(len(near), spacing_m / math.sqrt(2.0))])
+    heading = math.atan2(goal[1] - start[1], goal[0] - start[0])
+    status, _ = passage(
+        np.array([*start, heading]), goal[0], goal[1], TOLERANCE_M, np.ascontiguousarray(driver.outline),
+        discs, low, high, max(CELL_M, math.sqrt(float(np.prod(high - low)) / MOST_CELLS)), 0.0,
+    )  # fmt: skip
+    return bool(status == FOUND)
+
+
 def _on_map(file: str, number: int, rng: np.random.Generator, driver: Driver) -> Course:
     """From one place to another on a map that the robot is not told of."""
     chart = load_chart(file)
-    field = chart.field
-    regions, _ = label(field.distance_m > driver.footprint.radius_m + CLEAR_M)
-    sizes = np.bincount(regions.ravel())
-    sizes[0] = 0
-    cells = np.argwhere(regions == int(sizes.argmax()))
-    if not sizes.max() or not len(cells):
-        raise InputError(f"{file}: expected a map with room for the robot, found none")
-    x0, y0 = field.origin_xy_m
-    places = np.array([x0, y0]) + field.resolution_m * cells[:, ::-1]
-    for _ in range(TRIES):
-        start, goal = places[rng.integers(len(places), size=2)]
-        if APART_M[0] <= math.hypot(*(goal - start)) <= APART_M[1]:
-            break
-    else:
-        raise InputError(f"{file}: expected two places {APART_M[0]:g} to {APART_M[1]:g} m apart, found none")
+    start, goal = _two_places(file, chart.field, rng, driver)
     heading = math.atan2(goal[1] - start[1], goal[0] - start[0])
     begin = (float(start[0]), float(start[1]), heading)
     end = (float(goal[0]), float(goal[1]))

@@ -84,13 +84,13 @@ def make_course(
         circles += _wall(tuple(middle - edge), tuple(left)) + _wall(tuple(middle + edge), tuple(right))
         openings.append([middle[0], middle[1], math.atan2(along[0], -along[1])])
     goal = (0.0, length + 1.0)
-    ways = _ways(np.array(openings), goal)
+    way = straight_way(np.array(openings), goal)
     loose: list[list[float]] = []
     for _ in range(TRIES):
         if len(loose) == posts:
             break
         place = generator.uniform([-half, 0.8], [half, length])
-        if _distance_to_way(place, ways) > 0.55 + RADIUS_M:
+        if _distance_to_way(place, way) > 0.55 + RADIUS_M:
             loose.append([float(place[0]), float(place[1]), RADIUS_M])
     return Course(
         np.array(circles + loose), (0.0, 0.0, 0.5 * math.pi), goal, bottleneck_m, np.array(openings)
@@ -107,8 +107,8 @@ def _wall(begin: tuple[float, ...], end: tuple[float, ...]) -> list[list[float]]
     ]
 
 
-def _ways(openings: FloatArray, goal: tuple[float, float]) -> FloatArray:
-    """Corners of the way from the start through each opening, straight at it, to the goal."""
+def straight_way(openings: FloatArray, goal: tuple[float, float]) -> FloatArray:
+    """(K, 2) corners of the way from the start straight through each of the openings (B, 3) to the goal."""
     corners = [[0.0, 0.0]]
     for x, y, direction in openings:
         ahead = 0.5 * np.array([math.cos(direction), math.sin(direction)])

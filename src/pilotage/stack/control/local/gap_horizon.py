@@ -56,6 +56,8 @@ class GapHorizonConfig(Config):
     least_margin_m: NonNegative = 0.01
     least_margin_s: NonNegative = 0.015
     """The same in the last check of a command."""
+    passage_margin_m: NonNegative = 0.004
+    """The same in a gap that is driven straight and slowly, its axis measured again and again."""
     soft_m: Positive = 0.15
     near_cost: NonNegative = 1.0
     heading_s_per_rad: NonNegative = 0.25
@@ -142,8 +144,10 @@ class GapHorizon:
             return STOP
         if self._passage is not None:
             self._passage, wanted = self._passage.step(scene, view.t_s)
-            for share in (1.0, 0.5):
-                command = self._checked(scene, share * np.array([wanted.v_m_s, wanted.w_rad_s]))
+            for share in (1.0, 0.5, 0.25):
+                command = self._checked(
+                    scene, share * np.array([wanted.v_m_s, wanted.w_rad_s]), config.passage_margin_m
+                )
                 if command is not None:
                     if abs(command.v_m_s) + abs(command.w_rad_s) > 0.02:
                         self._moved_s = view.t_s
@@ -196,20 +200,23 @@ class GapHorizon:
             return
         self._since = (view.t_s, x, y)
         self._plan = None
+        if self._passage is not None:
+            self._passage, self._moved_s = self._passage.again(view.t_s), view.t_s
+            if self._passage is not None:
+                return
         here = togo_at(x, y, scene.ground.togo_s, scene.ground.x0_m, scene.ground.y0_m, scene.ground.coarse_m)
         if here >= UNREACHED_S:
             self._tried = []
             self._passage = None
             self._ground.open_all()
             return
-        found = None if self._passage else find_narrow_passage(scene, config.close_ahead_m, view.t_s)
+        found = find_narrow_passage(scene, config.close_ahead_m, view.t_s)
         if found and all(math.hypot(found.x_m - a, found.y_m - b) > TRIED_M for a, b in self._tried):
             # Straight through it first; where that fails as well it is closed.
             self._tried.append((found.x_m, found.y_m))
             self._passage = found
             self._moved_s = view.t_s
             return
-        self._passage = None
         ahead = np.ascontiguousarray(scene.path[: max(3, round(config.close_ahead_m / 0.1))])
         away = path_distances(ahead, scene.ground)
         narrow = int(np.argmin(away))
@@ -270,9 +277,10 @@ class GapHorizon:
         share = min(self._config.brake_trust, 0.9 * scene.drive.deceleration / scene.sheet.deceleration)
         return scene.sheet.scaled(share)
 
-    def _checked(self, scene: Scene, first: FloatArray) -> Twist | None:
+    def _checked(self, scene: Scene, first: FloatArray, margin_m: float | None = None) -> Twist | None:
         """The command if it can be held for a step and braked from without touching anything."""
         config = self._config
+        margin_m = config.least_margin_m if margin_m is None else margin_m
         hold_s = scene.dt_s
         if abs(first[0]) > abs(scene.start[3]) and self._people_are_near(scene):
             hold_s = max(hold_s, config.people_hold_s)
@@ -289,7 +297,7 @@ class GapHorizon:
                 scene.body,
                 scene.ground,
                 scene.movers.foretold(scene.delay_s + config.check_step_s, config.check_step_s, 30),
-                config.least_margin_m,
+                margin_m,
                 config.least_margin_s,
                 config.people_margin_m,
             )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -13,41 +13,62 @@ from pilotage.kernels.geometry.motion import wrap
 from pilotage.stack.control.local.rolling import Scene
 
 BEFORE_M = 0.6
-BEYOND_M = 0.5
+BEYOND_M = 0.35
 NEAR_M = 0.06
-STRAIGHT_RAD = 0.03
+STRAIGHT_RAD = 0.02
 SLOW_M_S = 0.35
+SLOWER_M_S = 0.15
+ROOM_M = 0.03
+"""With less room than this on either side it drives at the slower speed."""
+LEAST_ROOM_M = 0.006
+"""With less than this on either side, as far as can be measured, it does not go in."""
+LOOK_M = 0.1
 SIDES_M = 0.8
-LONGEST_S = 20.0
+ALONG_M = 0.35
+"""Points so far before and behind the narrowest place are those that it has to pass between."""
+TURNS_RAD = np.linspace(-0.25, 0.25, 51)
+LONGEST_S = 25.0
+TRIES = 3
 
 
 @dataclass(frozen=True, slots=True)
 class NarrowPassage:
-    """A gap's middle, the direction through it, and how far the manoeuvre has come.
+    """A gap's middle, the direction through it, its width, and how far the manoeuvre has come.
 
     Stages: 0 drives to the point before the gap, backwards if that lies behind; 1 turns towards the gap;
-    2 drives along its axis until beyond.
+    2 drives along its axis until beyond. The axis is measured anew until the robot is in the gap.
     """
 
     x_m: float
     y_m: float
     direction_rad: float
+    width_m: float
     stage: int
     begun_s: float
+    tries: int = 1
+
+    def again(self, t_s: float) -> NarrowPassage | None:
+        """Once more from before the gap; None where it has been tried often enough."""
+        return None if self.tries >= TRIES else replace(self, stage=0, begun_s=t_s, tries=self.tries + 1)
 
     def step(self, scene: Scene, t_s: float) -> tuple[NarrowPassage | None, Twist]:
         """The next command; None for itself when it is through or has taken too long."""
-        x, y, theta = float(scene.start[0]), float(scene.start[1]), float(scene.start[2])
-        c, s = math.cos(self.direction_rad), math.sin(self.direction_rad)
-        along = c * (x - self.x_m) + s * (y - self.y_m)
-        across = c * (y - self.y_m) - s * (x - self.x_m)
+        along, _ = self._place(float(scene.start[0]), float(scene.start[1]))
         if t_s - self.begun_s > LONGEST_S or along > BEYOND_M:
             return None, Twist(0.0, 0.0)
+        if along < -scene.body.inner_m:
+            return self._measured(scene).command(scene)
+        return self.command(scene)
+
+    def command(self, scene: Scene) -> tuple[NarrowPassage, Twist]:
+        """What to do at this stage."""
+        x, y, theta = float(scene.start[0]), float(scene.start[1]), float(scene.start[2])
+        c, s = math.cos(self.direction_rad), math.sin(self.direction_rad)
         if self.stage == 0:
             tx, ty = self.x_m - BEFORE_M * c, self.y_m - BEFORE_M * s
             away = math.hypot(tx - x, ty - y)
             if away < NEAR_M:
-                return self._at(1), Twist(0.0, 0.0)
+                return replace(self, stage=1), Twist(0.0, 0.0)
             bearing = wrap(math.atan2(ty - y, tx - x) - theta)
             backwards = abs(bearing) > 0.5 * math.pi
             off = wrap(bearing - math.pi) if backwards else bearing
@@ -58,22 +79,37 @@ class NarrowPassage:
             return self, Twist(-speed if backwards else speed, turn)
         if self.stage == 1:
             off = wrap(self.direction_rad - theta)
-            if abs(off) < STRAIGHT_RAD and abs(scene.start[4]) < 0.2:
-                return self._at(2), Twist(0.0, 0.0)
+            if abs(off) < STRAIGHT_RAD and abs(scene.start[4]) < 0.1:
+                return replace(self, stage=2), Twist(0.0, 0.0)
             return self, Twist(0.0, _limited(3.0 * off, scene.drive.turn_rate))
+        along, across = self._place(x, y)
+        too_narrow = self.width_m < 2.0 * (scene.body.inner_m + LEAST_ROOM_M)
+        if too_narrow and -scene.body.outer_m - LOOK_M < along < -scene.body.inner_m:
+            return self, Twist(0.0, 0.0)
         # Steers back onto the axis: a heading that falls with the distance to it.
         wanted = self.direction_rad - math.atan2(across, 0.25)
-        return self, Twist(SLOW_M_S, _limited(4.0 * wrap(wanted - theta), 1.0))
+        tight = 0.5 * self.width_m - scene.body.inner_m < ROOM_M
+        return self, Twist(SLOWER_M_S if tight else SLOW_M_S, _limited(4.0 * wrap(wanted - theta), 1.0))
 
-    def _at(self, stage: int) -> NarrowPassage:
-        return NarrowPassage(self.x_m, self.y_m, self.direction_rad, stage, self.begun_s)
+    def _place(self, x: float, y: float) -> tuple[float, float]:
+        """Along the axis from the gap's middle, and across it to the left."""
+        c, s = math.cos(self.direction_rad), math.sin(self.direction_rad)
+        return c * (x - self.x_m) + s * (y - self.y_m), c * (y - self.y_m) - s * (x - self.x_m)
+
+    def _measured(self, scene: Scene) -> NarrowPassage:
+        """The same with the axis as the points are now."""
+        found = _widest_strip(scene, np.array([self.x_m, self.y_m]), self.direction_rad)
+        if found is None:
+            return self
+        x, y, direction, width = found
+        return replace(self, x_m=x, y_m=y, direction_rad=direction, width_m=width)
 
 
 def find_narrow_passage(scene: Scene, ahead_m: float, t_s: float) -> NarrowPassage | None:
     """The narrowest place of the way ahead, if a footprint has to stand straight to pass it.
 
-    Its sides are the nearest obstacle points to the left and the right of the way there; the axis is square
-    to the line between them. None where the way is wide or one side is open.
+    Its axis is that of the widest strip between the points to the left and to the right of the way there.
+    None where the way is wide or one side is open.
     """
     path = np.ascontiguousarray(scene.path[: max(3, round(ahead_m / 0.1))])
     if path.shape[0] < 3:
@@ -82,26 +118,61 @@ def find_narrow_passage(scene: Scene, ahead_m: float, t_s: float) -> NarrowPassa
     at = min(max(int(np.argmin(away)), 1), path.shape[0] - 2)
     if away[at] > scene.body.outer_m + 0.03:
         return None
-    tangent = path[at + 1] - path[at - 1]
-    sides = _sides(scene, path[at], tangent / max(float(np.hypot(*tangent)), 1e-9))
+    place, tangent = path[at], path[at + 1] - path[at - 1]
+    sides = _sides(scene, place, tangent / max(float(np.hypot(*tangent)), 1e-9))
     if sides is None:
         return None
     left, right = sides
-    middle = 0.5 * (left + right)
     width = left - right
-    # Square to the line between the sides, left on the left.
+    # Square to the line between the sides, left on the left; from there the widest strip.
     direction = math.atan2(-width[0], width[1])
-    return NarrowPassage(float(middle[0]), float(middle[1]), direction, 0, t_s)
+    middle = 0.5 * (left + right)
+    found = _widest_strip(scene, middle, direction)
+    if found is None:
+        found = float(middle[0]), float(middle[1]), direction, float(np.hypot(*width))
+    return NarrowPassage(*found, 0, t_s)
+
+
+def _widest_strip(
+    scene: Scene, middle: FloatArray, direction_rad: float
+) -> tuple[float, float, float, float] | None:
+    """Middle x, y, direction and width of the widest straight strip without a point in it, through a gap.
+
+    Directions up to a quarter of a radian to either side are tried. None where one side is open.
+    """
+    offset = _points(scene, middle) - middle
+    best: tuple[float, float, float, float] | None = None
+    for turn in TURNS_RAD:
+        c, s = math.cos(direction_rad + turn), math.sin(direction_rad + turn)
+        along, across = offset @ np.array([c, s]), offset @ np.array([-s, c])
+        beside = across[np.abs(along) < ALONG_M]
+        left, right = beside[beside > 0.0], beside[beside <= 0.0]
+        if not (left.size and right.size):
+            continue
+        low, high = float(right.max()), float(left.min())
+        if best is None or high - low > best[3]:
+            to_middle = 0.5 * (low + high)
+            best = (
+                float(middle[0] - s * to_middle),
+                float(middle[1] + c * to_middle),
+                direction_rad + float(turn),
+                high - low,
+            )
+    return best
+
+
+def _points(scene: Scene, place: FloatArray) -> FloatArray:
+    """(N, 2) obstacle points near a place."""
+    n = scene.ground.hits.shape[0]
+    rows, columns = np.nonzero(scene.ground.hits)
+    points = scene.ground.mean[rows * n + columns]
+    return np.asarray(points[np.hypot(*(points - place).T) < SIDES_M])
 
 
 def _sides(scene: Scene, place: FloatArray, tangent: FloatArray) -> tuple[FloatArray, FloatArray] | None:
     """The nearest pair of obstacle points across a place, one on either side of the way."""
-    n = scene.ground.hits.shape[0]
-    rows, columns = np.nonzero(scene.ground.hits)
-    points = scene.ground.mean[rows * n + columns]
+    points = _points(scene, place)
     offset = points - place
-    near = np.hypot(offset[:, 0], offset[:, 1]) < SIDES_M
-    points, offset = points[near], offset[near]
     across = tangent[0] * offset[:, 1] - tangent[1] * offset[:, 0]
     left, right = points[across > 0.02], points[across < -0.02]
     if not (left.shape[0] and right.shape[0]):
