@@ -14,7 +14,7 @@ from pilotage.kernels.control.band import path_time, speed_profile
 from pilotage.kernels.control.commands_sent import drive_out, limit_errors
 from pilotage.kernels.control.dynamic_window import choose_in_window, window
 from pilotage.kernels.control.ground import Ground
-from pilotage.kernels.control.ground_update import believed, evenly_spaced, rolled
+from pilotage.kernels.control.ground_update import believed, evenly_spaced, insert_scan, rolled, sectors
 from pilotage.kernels.control.match import match_scan
 from pilotage.kernels.control.motion_limits import Drive, advance, approach, command_is_safe
 from pilotage.kernels.control.movers import (
@@ -74,6 +74,35 @@ def test_what_is_known_moves_with_the_window(rows: int, columns: int) -> None:
     for r, c in np.ndindex(m, m):
         inside = 0 <= r + rows < m and 0 <= c + columns < m
         assert seen[r, c] == (inside and before[2][r + rows, c + columns])
+
+
+@pytest.mark.parametrize(("beams", "view_rad"), [(37, 1.0), (181, 4.7), (720, 2.0 * math.pi), (4, 6.2)])
+def test_sectors_leave_out_only_what_no_beam_reaches(beams: int, view_rad: float) -> None:
+    """Cells are cleared and seen as they are where every cell is held against its own beams."""
+    rng = np.random.default_rng(beams)
+    step = view_rad / (beams - 1)
+    culled = sectors(beams, step)
+    every = np.array([np.zeros(culled.shape[1]), np.full(culled.shape[1], beams - 1)], dtype=np.int64)
+    body = make_body(np.array([[0.2, 0.2], [-0.2, 0.2], [-0.2, -0.2], [0.2, -0.2]]))
+    for _ in range(5):
+        hits = rng.integers(0, 8, (60, 60)).astype(np.uint8)
+        mean = np.stack(np.meshgrid(np.arange(60.0), np.arange(60.0)), axis=-1).reshape(-1, 2) * 0.1 - 2.95
+        seen = np.zeros((30, 30), np.bool_)
+        pose = rng.uniform(-1.0, 1.0, 3) * [1.0, 1.0, math.pi]
+        ranges = rng.uniform(0.1, 4.0, beams)
+        outcomes = []
+        for of_sectors in (culled, every):
+            left, known = hits.copy(), seen.copy()
+            mount, points, first = np.array([0.1, 0.05, 0.4]), np.zeros((0, 2)), -0.5 * view_rad
+            insert_scan(
+                left, mean, known, pose, mount, ranges, of_sectors, first, step, 9.0, 4.0,
+                points, body.polygon, 0.05, 3, -3.0, -3.0, 0.1,
+            )  # fmt: skip
+            outcomes.append((left, known))
+        assert (outcomes[0][0] == outcomes[1][0]).all()
+        assert (outcomes[0][1] == outcomes[1][1]).all()
+        assert (outcomes[0][0] < hits).any()
+        assert outcomes[0][1].any()
 
 
 def test_beams_are_evenly_spaced_or_not() -> None:

@@ -16,6 +16,8 @@ MOST_HITS = 60
 """Hits are counted so far; the mean goes on moving with this weight."""
 SCATTER = 0.12
 """A cell with less than this share of its neighbour's hits is that neighbour's range noise."""
+SECTORS = 1024
+"""Around the laser: a cell beyond the longest range in its sector is asked for no beam, nor for an angle."""
 BEHIND_M = 0.2
 """A beam that ends so far behind a cell's hits has passed them by."""
 
@@ -68,6 +70,44 @@ def scan_points(
 
 
 @kernel
+def sectors(beams: int, step: float) -> IntArray:
+    """First and last beam (2, ``SECTORS``) that may be beside a direction of each sector around the laser.
+
+    Sectors are equal in ``_sector``'s measure, from the first beam on; behind the field of view the last one
+    is below the first.
+    """
+    out = np.empty((2, SECTORS), np.int64)
+    for i in range(SECTORS):
+        for end in range(2):
+            p = 4.0 * (i + end) / SECTORS
+            u, v = (1.0 - p, 1.0 - abs(1.0 - p)) if p <= 2.0 else (p - 3.0, abs(p - 3.0) - 1.0)
+            angle = math.atan2(v, u)
+            if angle < 0.0 or (end == 1 and angle == 0.0):
+                angle += TWO_PI
+            # One more on either side for rounding.
+            at = math.floor(angle / step)
+            out[end, i] = max(at - 1, 0) if end == 0 else min(at + 2, beams - 1)
+    return out
+
+
+@kernel
+def _sector(u: float, v: float) -> int:
+    """Which sector the direction (u, v) is in: of a measure that rises with the angle and needs none."""
+    share = u / (abs(u) + abs(v))
+    return min(int((1.0 - share if v >= 0.0 else 3.0 + share) * (0.25 * SECTORS)), SECTORS - 1)
+
+
+@kernel
+def _farthest(ranges: FloatArray, of_sectors: IntArray) -> FloatArray:
+    """The longest range (``SECTORS``,) in each sector; -1 where there are no beams."""
+    out = np.full(SECTORS, -1.0)
+    for i in range(SECTORS):
+        for k in range(of_sectors[0, i], of_sectors[1, i] + 1):
+            out[i] = max(out[i], ranges[k])
+    return out
+
+
+@kernel
 def insert_scan(
     hits: ByteArray,
     mean: FloatArray,
@@ -75,6 +115,7 @@ def insert_scan(
     pose: FloatArray,
     mount: FloatArray,
     ranges: FloatArray,
+    of_sectors: IntArray,
     first: float,
     step: float,
     max_range: float,
@@ -93,6 +134,8 @@ def insert_scan(
     ----------
     pose, mount
         (3,) of the base, and of the laser on it.
+    of_sectors
+        (2, ``SECTORS``) as ``sectors`` has it.
     in_base
         (N, 2) points that the scan ends at and the grid shall keep, those within ``reach`` of the laser.
     inside
@@ -104,11 +147,12 @@ def insert_scan(
     x = pose[0] + c * mount[0] - s * mount[1]
     y = pose[1] + s * mount[0] + c * mount[1]
     theta = pose[2] + mount[2]
+    far = _farthest(ranges, of_sectors)
     if fade > 0:
-        _clear_passed(hits, mean, x, y, theta, ranges, first, step, max_range, cell, fade)
+        _clear_passed(hits, mean, x, y, theta, ranges, far, first, step, max_range, cell, fade)
     _add_points(hits, mean, in_base, pose[0], pose[1], c, s, mount[0], mount[1], reach, x0, y0, cell)
     _clear_inside(hits, mean, pose[0], pose[1], c, s, polygon, inside, x0, y0, cell)
-    _mark_seen(seen, x, y, theta, ranges, first, step, x0, y0, 2.0 * cell, reach)
+    _mark_seen(seen, x, y, theta, ranges, far, first, step, x0, y0, 2.0 * cell, reach)
 
 
 @kernel
@@ -219,6 +263,7 @@ def _clear_passed(
     y: float,
     theta: float,
     ranges: FloatArray,
+    far: FloatArray,
     first: float,
     step: float,
     max_range: float,
@@ -232,10 +277,13 @@ def _clear_passed(
     """
     flat = hits.reshape(-1)
     beams = ranges.shape[0]
+    c, s = math.cos(theta + first), math.sin(theta + first)
     for i in _occupied(hits):
         dx, dy = mean[i, 0] - x, mean[i, 1] - y
         distance = math.sqrt(dx * dx + dy * dy)
         if distance < cell or distance + BEHIND_M >= max_range:
+            continue
+        if far[_sector(c * dx + s * dy, c * dy - s * dx)] < distance + BEHIND_M:
             continue
         angle = _turned(math.atan2(dy, dx) - theta - first)
         half = cell / distance / step
@@ -325,6 +373,7 @@ def _mark_seen(
     y: float,
     theta: float,
     ranges: FloatArray,
+    far: FloatArray,
     first: float,
     step: float,
     x0: float,
@@ -343,6 +392,7 @@ def _mark_seen(
     r1 = min(m, math.ceil((y + reach - y0) / coarse))
     c0 = max(0, math.floor((x - reach - x0) / coarse))
     c1 = min(m, math.ceil((x + reach - x0) / coarse))
+    c, s = math.cos(theta + first), math.sin(theta + first)
     for row in range(r0, r1):
         dy = y0 + (row + 0.5) * coarse - y
         for column in range(c0, c1):
@@ -351,6 +401,8 @@ def _mark_seen(
             dx = x0 + (column + 0.5) * coarse - x
             distance = math.sqrt(dx * dx + dy * dy)
             if distance > reach:
+                continue
+            if far[_sector(c * dx + s * dy, c * dy - s * dx)] <= distance - slack:
                 continue
             low = math.floor(_turned(math.atan2(dy, dx) - theta - first) / step)
             if low + 1 < beams and min(ranges[low], ranges[low + 1]) > distance - slack:

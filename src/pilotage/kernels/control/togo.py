@@ -147,7 +147,7 @@ def time_to_go(
     # Straight moves, diagonal ones, and knight's; the latter two with the cells that they pass between.
     step = np.empty(16, np.int64)
     one, other = np.empty(16, np.int64), np.empty(16, np.int64)
-    length = np.empty(16)
+    length, near = np.empty(16), np.empty(16)
     for k in range(16):
         dr, dc = STEP_ROW[k], STEP_COLUMN[k]
         step[k] = dr * wide + dc
@@ -185,19 +185,18 @@ def time_to_go(
         if here > ends:
             break
         mine = pace[i]
+        # No later than a settled cell's time, infinite for one that is shut: neither has to be asked for.
+        for k in range(8):
+            near[k] = here + 0.5 * length[k] * (mine + pace[i + step[k]])
+        for k in range(8, 16):
+            cost = 0.25 * length[k] * (mine + pace[i + step[k]] + pace[i + one[k]] + pace[i + other[k]])
+            near[k] = here + cost
         for k in range(16):
-            j = i + step[k]
-            if state[j] != OPEN:
-                continue
-            if k >= 8:
-                # Both cells that it passes between have to be free: else this is infinite.
-                cost = 0.25 * length[k] * (mine + pace[j] + pace[i + one[k]] + pace[i + other[k]])
-            else:
-                if k >= 4 and (state[i + one[k]] == SHUT or state[i + other[k]] == SHUT):
+            j, there = i + step[k], near[k]
+            if there < flat[j] and there - here < span and entries < room:
+                # Both cells that it passes between have to be free.
+                if 4 <= k < 8 and pace[i + one[k]] + pace[i + other[k]] == np.inf:
                     continue
-                cost = 0.5 * length[k] * (mine + pace[j])
-            there = here + cost
-            if there < flat[j] and cost < span and entries < room:
                 flat[j] = there
                 to = int(there * per_s) & (BUCKETS - 1)
                 entry_cell[entries], entry_next[entries] = j, head[to]

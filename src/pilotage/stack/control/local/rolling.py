@@ -10,7 +10,7 @@ from pydantic import Field
 
 from pilotage.core.config import Config
 from pilotage.core.errors import InputError
-from pilotage.core.types import FloatArray, Pose2, Twist
+from pilotage.core.types import FloatArray, IntArray, Pose2, Twist
 from pilotage.kernels.control import ground_update, match, togo
 from pilotage.kernels.control.footprint import Body
 from pilotage.kernels.control.ground import Ground
@@ -126,6 +126,7 @@ class RollingGround:
         self._body: Body | None = None
         self._footprint: FloatArray | None = None
         self._limits: LocalLimits | None = None
+        self._laser = (0, 0.0)
         self.partners = 0
 
     def sent(self, t_s: float, command: Twist) -> None:
@@ -190,6 +191,7 @@ class RollingGround:
             self._pose,
             mount.as_array(),
             ranges,
+            self._take_sectors(angles.shape[0], step),
             first,
             step,
             view.max_range_m,
@@ -237,6 +239,11 @@ class RollingGround:
         if self._body is None or view.footprint_xy_m is not self._footprint:
             self._body, self._footprint = make_body(view.footprint_xy_m), view.footprint_xy_m
         return self._body
+
+    def _take_sectors(self, beams: int, step: float) -> IntArray:
+        if self._laser != (beams, step):
+            self._laser, self._sectors = (beams, step), ground_update.sectors(beams, step)
+        return self._sectors
 
     def _take_limits(self, limits: LocalLimits) -> Drive:
         if limits is not self._limits:
