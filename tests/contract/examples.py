@@ -447,6 +447,7 @@ EXAMPLES: dict[tuple[str, str], Example] = {
         explorer_explores, {"margin_cells": 1}, pure_numbers=frozenset({"far_cells"})
     ),
     ("task", "patrol"): Example(task_runs("patrol"), {"duration_s": 20.0}),
+    ("task", "sweep-floor"): Example(task_runs("sweep-floor"), {}, frozenset({"least"})),
     ("navigator", "patrol"): Example(navigator_patrols, {"yield_s": 6.0}),
     **{("strategy", name): Example(strategy_patrols, {}, pure) for name, pure in STRATEGY_NUMBERS.items()},
     ("fault", "drop"): fault({}),

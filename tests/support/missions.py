@@ -132,6 +132,29 @@ def patrol() -> dict[str, Any]:
     }
 
 
+def sweep() -> dict[str, Any]:
+    """A small room, swept in lines."""
+    room = [[0, 0, 4, 0], [4, 0, 4, 3], [4, 3, 0, 3], [0, 3, 0, 0]]
+    alone = {key: value for key, value in patrol().items() if key != "team"}
+    return {
+        **alone,
+        "mission": "sweep-the-room",
+        "world": {
+            "map": {"map": "room", "bounds_m": [0, 0, 4, 3], "walls_m": room},
+            "start": {"x_m": 1.0, "y_m": 1.0, "theta_rad": 0.0},
+        },
+        "task": "sweep-floor",
+        "stack": {
+            "initial": SMALL_VAR,
+            "navigator": {"name": "maneuver", "speed_m_s": 0.8},
+            "planner": {"name": "boustrophedon", "width_m": 0.6, "clearance_m": 0.3},
+            "smoother": "none",
+            "localizer": "ekf-walls",
+        },
+        "run": {"time_limit_s": 300.0},
+    }
+
+
 MISSIONS: dict[str, dict[str, Any]] = {
     "reach": reach(),
     "plan": plan(),
@@ -140,4 +163,5 @@ MISSIONS: dict[str, dict[str, Any]] = {
     "localize": localize(),
     "explore": explore(),
     "patrol": patrol(),
+    "sweep-floor": sweep(),
 }

@@ -5,15 +5,21 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from pilotage.core.errors import InputError
 from pilotage.core.types import FloatArray, Goal, Pose2
+from pilotage.experiments.build.build import build
+from pilotage.experiments.loop import run_loop
+from pilotage.experiments.mission import mission_of
 from pilotage.kernels.patrol.swept import mark_swept
 from pilotage.kernels.tours.entries import anneal_entries, entries_cost
 from pilotage.maps.floor import Floor
 from pilotage.maps.segment_map import SegmentMap, box_segments
 from pilotage.maps.world_map import WorldMap
+from pilotage.stack.navigator.timed_path import with_turns
 from pilotage.stack.planning.boustrophedon import BoustrophedonConfig, BoustrophedonPlanner
 from pilotage.stack.planning.planner import PlanRequest, PlanResult
 from pilotage.stack.planning.sweep_lines import sweep_cell_m
+from support.missions import MISSIONS
 
 ROOM = [[0, 0, 10, 0], [10, 0, 10, 8], [10, 8, 0, 8], [0, 8, 0, 0]]
 FLOORS = {
@@ -79,3 +85,46 @@ def test_things_in_a_row_are_visited_one_after_the_other() -> None:
     assert mixed[order].tolist() == list(range(7))
     assert not which.any()
     assert entries_cost(away, order, which, 2) == pytest.approx(8.0)
+
+
+class TestTask:
+    def test_a_room_is_swept_and_the_robot_comes_back(self) -> None:
+        experiment = build(mission_of(MISSIONS["sweep-floor"], seed=0))
+        run = run_loop(experiment).finished
+        metrics = experiment.task.judge(run).metrics
+        assert metrics["success"], metrics["reason"]
+        assert metrics["collisions"] == 0
+        assert len(run.robots[0].plans) == 1
+        assert float(str(metrics["swept_fraction"])) >= 0.9999
+        assert float(str(metrics["sweep_ratio"])) < 1.2
+        end = run.robots[0].trace
+        assert np.hypot(end["true_x_m"][-1] - 1.0, end["true_y_m"][-1] - 1.0) < 0.1
+
+    def test_who_leaves_some_of_it_has_not_swept_the_floor(self) -> None:
+        values = {**MISSIONS["sweep-floor"], "task": {"name": "sweep-floor", "width_m": 0.4}}
+        experiment = build(mission_of(values, seed=0))
+        metrics = experiment.task.judge(run_loop(experiment).finished).metrics
+        assert not metrics["success"]
+        assert str(metrics["reason"]).startswith("swept ")
+
+    def test_a_team_is_refused(self) -> None:
+        values = {**MISSIONS["sweep-floor"], "team": {"size": 2}}
+        with pytest.raises(InputError, match="task 'sweep-floor': expected one robot, found 2"):
+            build(mission_of(values))
+
+
+def test_at_corners_it_turns_first_by_the_shorter_way() -> None:
+    leg = np.linspace(0.0, 1.0, 11)
+    there = np.column_stack([leg, np.zeros(11), np.zeros(11)])
+    up = np.column_stack([np.ones(11), leg, np.full(11, 0.5 * np.pi)])
+    back = np.column_stack([np.ones(11), leg[::-1], np.full(11, -0.5 * np.pi)])
+    rows = with_turns(np.vstack([there[:-1], up[:-1], back]), np.pi / 2, 1.0, 0.5, 1.0, 0.1)
+    stands = rows[:, 3] == 0.0
+    turns = np.flatnonzero(np.diff(np.concatenate([[False], stands & (rows[:, 4] != 0.0)]).astype(int)) == 1)
+    assert len(turns) == 3  # before the first leg, at the corner, and before the way back
+    turned = [0.1 * rows[k:][: int(np.argmin(rows[k:, 4] != 0.0)), 4].sum() for k in turns]
+    assert np.abs(turned) == pytest.approx([np.pi / 2, np.pi / 2, np.pi])
+    assert turned[:2] == pytest.approx([-np.pi / 2, np.pi / 2])
+    # Nobody jumps, nobody is too fast, and it ends where the path does.
+    assert np.hypot(*np.diff(rows[:, :2], axis=0).T).max() <= 0.5 * 0.1 + 1e-9
+    assert rows[-1, :3] == pytest.approx([1.0, 0.0, -np.pi / 2])

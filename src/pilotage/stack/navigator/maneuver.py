@@ -7,6 +7,7 @@ import math
 import numpy as np
 from pydantic import Field
 
+from pilotage.core.angles import wrap_to_pi
 from pilotage.core.config import Config
 from pilotage.core.errors import InputError
 from pilotage.core.types import STOP, FloatArray, Pose2, Twist
@@ -20,9 +21,11 @@ from pilotage.stack.journal import Journal
 from pilotage.stack.knowledge import RobotKnowledge, TaskKnowledge
 from pilotage.stack.navigator.global_plan import GlobalPlan
 from pilotage.stack.navigator.navigator import Parts, localizer_of
-from pilotage.stack.navigator.timed_path import laid_out
+from pilotage.stack.navigator.timed_path import laid_out, with_turns
 
 MOST_REPLANS = 8
+HEADING_PER_S = 3.0
+"""A heading error dies out in so much of a second's inverse while it turns on the spot."""
 
 
 class ManeuverConfig(Config):
@@ -31,6 +34,8 @@ class ManeuverConfig(Config):
     speed_m_s: Positive = 0.5
     acceleration_share: float = Field(default=0.4, gt=0.0, le=1.0)
     """Of the motion's braking, in the speed profile."""
+    turn_share: float = Field(default=0.5, gt=0.0, le=1.0)
+    """Of the top turn rate, for turns on the spot at a path's corners."""
     pause_s: float = Field(default=0.8, ge=0.0)
     """At each change of direction: the wheels turn meanwhile."""
     astray_m: Positive = 0.25
@@ -42,6 +47,8 @@ class ManeuverConfig(Config):
 @NAVIGATORS.add("maneuver", ManeuverConfig)
 class ManeuverNavigator:
     """Follows a plan with its changes of direction by a speed profile; the plan is made on the true outline.
+
+    A robot that turns on the spot does so at the path's corners, so that it drives the very lines of a sweep.
 
     It looks at no obstacle that is not on its map. Where it cannot keep up with the plan it plans anew.
     """
@@ -83,14 +90,14 @@ class ManeuverNavigator:
         braking = self._robot.motion.braking_m_s2
         acceleration = self._config.acceleration_share * (braking if math.isfinite(braking) else 2.0)
         speed = min(self._config.speed_m_s, self._robot.motion.top_speed_m_s)
-        self._references = laid_out(
-            result.path.states,
-            speed,
-            acceleration,
-            self._robot.motion.curvature_rate_per_m_s,
-            self._config.pause_s,
-            self._robot.dt_s,
-        )
+        states, dt_s, motion = result.path.states, self._robot.dt_s, self._robot.motion
+        if motion.least_turning_radius_m == 0.0:
+            rate = self._config.turn_share * motion.top_turn_rate_rad_s
+            heading = self.belief.pose.theta_rad
+            self._references = with_turns(states, heading, rate, speed, acceleration, dt_s)
+        else:
+            rate = motion.curvature_rate_per_m_s
+            self._references = laid_out(states, speed, acceleration, rate, self._config.pause_s, dt_s)
         self._index = 0
         self._controller.reset()
         self._journal.say(t_s, "plan" if t_s == 0.0 else "replan", result.reason)
@@ -120,7 +127,8 @@ class ManeuverNavigator:
         if math.hypot(x - pose.x_m, y - pose.y_m) > self._config.astray_m:
             return self._astray(readings.t_s)
         if v == 0.0:
-            return Twist(0.0, w)
+            turns = self._robot.motion.least_turning_radius_m == 0.0
+            return Twist(0.0, w + HEADING_PER_S * wrap_to_pi(theta - pose.theta_rad) if turns else w)
         control = self._controller.step(pose, Pose2(x, y, theta), Twist(v, w))
         # The way back along the path is the other direction's: a piece is driven in its own only.
         forward = max(control.twist.v_m_s, 0.0) if v > 0.0 else min(control.twist.v_m_s, 0.0)

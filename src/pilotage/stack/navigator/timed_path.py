@@ -15,6 +15,55 @@ ABRUPT_PER_M = 0.05
 TRANSITION_M = 0.10
 """The path driven meanwhile is held below this: with half of it the curvature is wrong."""
 CREEP_M_S = 0.03
+SHARP_RAD = 0.3
+"""From one state to the next: a path that turns more than this has a corner there."""
+SETTLES_S = 0.3
+
+
+def with_turns(
+    states: FloatArray,
+    theta_rad: float,
+    turn_rate_rad_s: float,
+    speed_m_s: float,
+    acceleration_m_s2: float,
+    dt_s: float,
+) -> FloatArray:
+    """(N, 5) as ``laid_out``, for who turns on the spot: at corners it stops, turns, and goes on.
+
+    Parameters
+    ----------
+    theta_rad
+        Its heading before the path.
+    """
+    corners = np.flatnonzero(np.abs(wrap_array_to_pi(np.diff(states[:, 2]))) > SHARP_RAD) + 1
+    rows: list[FloatArray] = []
+    for first, last in pairwise([0, *corners.tolist(), len(states) - 1]):
+        if last == first:
+            continue
+        piece = states[first : last + 1].copy()
+        piece[-1, 2] = piece[-2, 2]
+        moves = np.any(np.diff(piece[:, :2], axis=0) != 0.0, axis=1)
+        piece = piece[np.concatenate([[True], moves])]
+        if len(piece) < 2:
+            continue
+        rows.append(_turn(piece[0], theta_rad, turn_rate_rad_s, dt_s))
+        rows.append(laid_out(piece, speed_m_s, acceleration_m_s2, math.inf, 0.0, dt_s))
+        theta_rad = float(piece[-1, 2])
+    rows.append(_turn(states[-1], theta_rad, turn_rate_rad_s, dt_s))
+    return np.vstack(rows)
+
+
+def _turn(state: FloatArray, theta_rad: float, rate_rad_s: float, dt_s: float) -> FloatArray:
+    """Rows of a turn on the spot from a heading to that of a state, and of settling there."""
+    angle = wrap_to_pi(float(state[2]) - theta_rad)
+    count = math.ceil(abs(angle) / (rate_rad_s * dt_s) - 1e-9)
+    settles = math.ceil(SETTLES_S / dt_s) if count else 0
+    rows = np.zeros((count + settles, 5))
+    rows[:, 0], rows[:, 1] = state[0], state[1]
+    share = np.minimum(np.arange(1, len(rows) + 1) / max(count, 1), 1.0)
+    rows[:, 2] = wrap_array_to_pi(theta_rad + share * angle)
+    rows[:count, 4] = angle / (max(count, 1) * dt_s)
+    return rows
 
 
 def laid_out(

@@ -63,8 +63,10 @@ class BoustrophedonPlanner:
             floor = Floor.of_field(field, field.bounds_m, clearance_m, cell_m, start)
             # A straight line through cells' middles comes half a diagonal nearer to walls than these are.
             inner_m = clearance_m + math.sqrt(0.5) * floor.cell_m
+            # And where the floor ends in a cell whose middle lies beyond, it has a share of it.
+            whole = Floor.of_field(field, field.bounds_m, clearance_m - 0.4 * floor.cell_m, cell_m, start)
             inner = Floor.of_field(field, field.bounds_m, inner_m, cell_m, start)
-            lines = [_swept_by(floor, inner, width_m, along_y, start, goal) for along_y in (False, True)]
+            lines = [_swept_by(whole, inner, width_m, along_y, start, goal) for along_y in (False, True)]
         except InputError as error:
             return failure(PlanStatus.NO_PATH, str(error), time.perf_counter() - began)
         path = path_of_line(min(lines, key=_length_m), request, self._config.waypoint_spacing_m)

@@ -1,0 +1,93 @@
+"""The cleaning robot's task: all of the floor that it can reach swept, and not much twice."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from pydantic import Field
+
+from pilotage.core.config import Config
+from pilotage.core.errors import InputError
+from pilotage.core.types import BoolArray
+from pilotage.evaluation.driving import driving_metrics, header
+from pilotage.evaluation.finished import FinishedRun, RobotRun, Verdict
+from pilotage.evaluation.tasks.task import TASKS, Attempt, TaskSetting
+from pilotage.evaluation.tasks.watched import WatchedTask
+from pilotage.kernels.patrol.swept import mark_swept
+from pilotage.maps.floor import Floor, sweepable
+from pilotage.missions.places import GoalConfig
+from pilotage.sensors.sensor import Positive
+
+CELLS_A_WIDTH = 12
+BACK_M = 0.5
+
+
+class SweepConfig(Config):
+    """How wide a pass sweeps, and how much of the floor it takes."""
+
+    width_m: Positive | None = None
+    """None: as wide as the body."""
+    least: float = Field(default=0.9999, gt=0.0, le=1.0)
+    """Share of the floor where the robot's centre can be that has to be swept for a success: plans are of
+    cells too, and miss a few of these by millimetres."""
+
+
+@TASKS.add("sweep-floor", SweepConfig)
+class SweepTask(WatchedTask):
+    """Done when the robot says that it is: back at its start, or at the goal.
+
+    A success if it truly swept the floor: cells, twelve to a pass, whose middles came within half a width of
+    the centre's true path. Asked for are all cells where the centre can be; what the pass reaches beyond, the
+    rim along walls, is told besides. A second robot would have nothing left to do.
+    """
+
+    def __init__(self, config: SweepConfig, setting: TaskSetting) -> None:
+        mission = setting.mission
+        if len(mission.members) != 1:
+            raise InputError(f"task 'sweep-floor': expected one robot, found {len(mission.members)}")
+        robot, radius_m = mission.members[0], setting.footprints[0].radius_m
+        start = mission.start_of(robot)
+        assert start is not None, "settled by the build"
+        back = GoalConfig(x_m=start.x_m, y_m=start.y_m, tolerance_m=BACK_M)
+        super().__init__((back,) if mission.goal_of(robot) is None else ())
+        self._config, self._width_m = config, config.width_m or 2.0 * radius_m
+        cell_m = self._width_m / CELLS_A_WIDTH
+        self._floor = Floor.of(setting.chart, radius_m, cell_m, (start.x_m, start.y_m))
+        self._swept: BoolArray = np.zeros_like(self._floor.reachable)
+        self._last = np.array([start.x_m, start.y_m])
+
+    def step(self, t_s: float, attempts: Sequence[Attempt]) -> str | None:
+        """Sweep on."""
+        here = attempts[0].body.state[:2].copy()
+        line = np.array([self._last, here])
+        mark_swept(line, 0.5 * self._width_m, *self._floor.origin_xy_m, self._floor.cell_m, self._swept)
+        self._last = here
+        return super().step(t_s, attempts)
+
+    def progress(self, attempts: Sequence[Attempt]) -> tuple[tuple[str, str], ...]:  # noqa: ARG002
+        """How much is swept."""
+        return (("swept", f"{100.0 * self._share(self._floor.reachable):.1f} %"),)
+
+    def _share(self, cells: BoolArray) -> float:
+        return int(np.count_nonzero(cells & self._swept)) / max(int(np.count_nonzero(cells)), 1)
+
+    def judge_robot(self, run: FinishedRun, robot: RobotRun) -> Verdict:
+        """Swept shares, and the path's length over area by width."""
+        metrics = header(run, robot)
+        driven, nees = driving_metrics(run, robot)
+        metrics |= driven
+        floor, swept = self._floor, self._share(self._floor.reachable)
+        within_reach = sweepable(floor, self._width_m)
+        area_m2 = np.count_nonzero(within_reach) * floor.cell_m**2
+        metrics |= {
+            "swept_fraction": swept,
+            "swept_rim_fraction": self._share(within_reach & ~floor.reachable),
+            "sweep_ratio": float(robot.driven_m * self._width_m / area_m2),
+        }
+        metrics["success"] = robot.arrived and robot.collisions == 0 and swept >= self._config.least
+        if robot.arrived and swept < self._config.least:
+            metrics["reason"] = (
+                f"swept {100.0 * swept:.2f} % of the floor, not {100.0 * self._config.least:g} %"
+            )
+        return Verdict(metrics, ({"nees": nees},), {})
