@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import re
 from pathlib import Path
 
 import pytest
@@ -24,6 +25,10 @@ ROOMS = (
     "report",
     "bridges",
     "face",
+    "stack",
+    "sim",
+    "replicas",
+    "cli",
 )
 METHODS = frozenset({"open", "read_text", "read_bytes"})
 """Of paths and modules alike."""
@@ -62,6 +67,8 @@ ALLOWED = {
     ("tracking/opencv.py", "*.open"): "the null device, to keep a library silent",
     ("experiments/calibrate_commands.py", "json.loads"): "of what json.dumps just wrote",
     ("logs/salvage/sqlite.py", "sqlite3.connect"): "in memory, of bytes that came through the door",
+    ("cli/main.py", "*.open"): "the null device, where a stream was closed",
+    ("cli/study_page.py", "*.read_text"): "the page that was just written",
     ("report/slam/folder.py", "np.loadtxt"): "of text that came through the door",
     ("report/markup.py", "*.read_text"): "the page's own style sheet",
     ("report/replay/section.py", "*.read_text"): "the player's own script and style sheet",
@@ -129,6 +136,18 @@ def test_no_reader_opens_a_file_by_itself(room: str) -> None:
             if (name, call) not in ALLOWED:
                 by_themselves.append(f"{name}:{line}: {call}")
     assert not by_themselves, "read it through pilotage.core.files: " + ", ".join(by_themselves)
+
+
+def test_only_one_place_decides_what_a_whole_number_is() -> None:
+    """``"²".isdigit()`` is true, and ``int`` refuses it and more than 4,300 digits with a traceback."""
+    asked = re.compile(r"\.is(?:digit|decimal|numeric)\(")
+    found = [path for path in SOURCE.rglob("*.py") if asked.search(path.read_text(encoding="utf-8"))]
+    told = {path.relative_to(SOURCE).as_posix() for path in found}
+    assert told == {
+        "core/whole_number.py",
+        "maps/memory.py",  # what the system says of its memory
+        "records/world.py",  # of identities that were numbers
+    }
 
 
 def test_the_exceptions_are_still_there() -> None:

@@ -6,11 +6,15 @@ from pathlib import Path
 
 import pytest
 
+from pilotage.cli.options import parse_seed
 from pilotage.core.errors import InputError
+from pilotage.core.whole_number import whole_number
 from pilotage.experiments.build.build import build_source
 from pilotage.experiments.mission import load_mission
 from pilotage.experiments.studies.engine import run_study
+from pilotage.experiments.studies.replay import parse_row
 from pilotage.experiments.studies.sweep import sweep_study
+from pilotage.tracking.robot_colour import parse_hsv
 
 BOX = "{kind: bx, from_m: [1, 2], to_m: [3, 4]}"
 LINE = "{points_m: [[-1, 0], [1, 0], [2, 0]]}"
@@ -49,3 +53,22 @@ def test_values_of_a_sweep_that_cannot_be_built_are_told_before_the_first_trial(
     ):
         run_study(study, tmp_path / "sweep")
     assert not (tmp_path / "sweep").exists()
+
+
+@pytest.mark.parametrize("digits", ["²", "١٢", "9" * 5000, "1_0", "-1", ""])
+def test_what_looks_like_a_whole_number_and_is_none(digits: str, tmp_path: Path) -> None:
+    assert whole_number(digits) is None
+    for refused, words in (
+        (lambda: parse_row(f"{tmp_path}:{digits}"), "expected STUDY:ROW"),
+        (lambda: parse_seed(digits), "expected a whole number"),
+        (lambda: parse_hsv(f"1,2,3,4,5,{digits}"), "six whole numbers"),
+    ):
+        with pytest.raises(InputError, match=words):
+            refused()
+
+
+def test_a_landmark_beyond_all_integers_is_refused(tmp_path: Path) -> None:
+    table = tmp_path / "landmarks.csv"
+    table.write_text(f"id,x_m,y_m\n1{'0' * 400},1,2\n")
+    with pytest.raises(InputError, match="line 2: expected an id within"):
+        build_source(load_mission("museum-1", [f"world.landmarks={table}"], 0))

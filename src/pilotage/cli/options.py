@@ -9,9 +9,9 @@ from typing import Annotated, TypeAlias
 import typer
 
 from pilotage.core.errors import InputError
+from pilotage.core.whole_number import whole_number
 
 LARGEST_SEED = 2**63 - 1
-MOST_DIGITS = 30
 
 
 def parse_seed(text: str) -> int:
@@ -22,8 +22,8 @@ def parse_seed(text: str) -> int:
     InputError
         If it is not a whole number >= 0.
     """
-    seed = int(text) if text.isascii() and text.isdigit() and len(text) <= MOST_DIGITS else -1
-    if not 0 <= seed <= LARGEST_SEED:
+    seed = whole_number(text, len(str(LARGEST_SEED)))
+    if seed is None or seed > LARGEST_SEED:
         raise InputError(f"--seed: expected a whole number >= 0 and < 2^63, found '{text}'")
     return seed
 

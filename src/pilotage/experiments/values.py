@@ -10,12 +10,10 @@ from typing import Any
 from pilotage.core.errors import InputError, nearest
 from pilotage.core.files import read_values_text
 from pilotage.core.limits import DEPTH
+from pilotage.core.whole_number import whole_number
 from pilotage.core.yaml_text import load_yaml
 from pilotage.missions.choice import EXCLUSIVE
 from pilotage.missions.mission import TOP_KEYS
-
-MOST_DIGITS = 9
-"""No list is longer than a whole number of so many digits says."""
 
 
 def read_text(path: Path) -> str:
@@ -171,6 +169,7 @@ def _put(place: Any, part: str, value: Any, told: str) -> None:
 
 
 def _index(place: list[Any], part: str, told: str) -> int:
-    if not (part.isascii() and part.isdigit() and len(part) <= MOST_DIGITS and int(part) < len(place)):
+    index = whole_number(part)
+    if index is None or index >= len(place):
         raise InputError(f"{told}: expected an index from 0 to {len(place) - 1}, found '{part}'")
-    return int(part)
+    return index

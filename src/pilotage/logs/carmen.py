@@ -23,13 +23,12 @@ import numpy as np
 
 from pilotage.core.errors import InputError
 from pilotage.core.types import FloatArray
+from pilotage.core.whole_number import whole_number
 from pilotage.logs.text import read_lines
 
 LARGEST = 1e12
 """Beyond any metre, radian or second of a log."""
 LEAST_BEAMS = 2
-MOST_DIGITS = 9
-"""A whole number with more is no count of beams."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -150,9 +149,10 @@ def _robotlaser(words: list[str], where: str) -> _Scan:
 def _count(words: list[str], index: int, where: str) -> int:
     """Read a whole number of values."""
     found = words[index] if len(words) > index else "the end of the line"
-    if not (found.isascii() and found.isdigit() and len(found) <= MOST_DIGITS):
+    count = whole_number(found)
+    if count is None:
         raise InputError(f"{where}: {words[0]}: expected a number of values, found {found}")
-    return int(found)
+    return count
 
 
 def _expect(words: list[str], least: int, where: str) -> None:

@@ -15,6 +15,7 @@ import numpy as np
 from pilotage.core.errors import InputError
 from pilotage.core.types import FloatArray, IntArray
 from pilotage.core.whole_file import write_whole
+from pilotage.core.whole_number import whole_number
 from pilotage.kernels.slam.spanning_tree import spanning_tree_poses
 from pilotage.logs.text import read_text
 from pilotage.models.pose_graph import LARGEST, PoseGraph, is_information
@@ -144,9 +145,10 @@ def _text(values: FloatArray) -> str:
 
 
 def _id(word: str, where: str) -> int:
-    if not (word.isascii() and word.isdigit()) or len(word) > 18:
+    number = whole_number(word)
+    if number is None:
         raise InputError(f"{where}: expected the number of a vertex, found '{word}'")
-    return int(word)
+    return number
 
 
 def _floats(words: list[str], where: str) -> list[float]:

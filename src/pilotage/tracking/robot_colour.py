@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pilotage.core.errors import InputError
+from pilotage.core.whole_number import whole_number
 from pilotage.tracking.background import Background
 from pilotage.tracking.film import Image
 from pilotage.tracking.opencv import opencv
@@ -50,7 +51,7 @@ def parse_hsv(text: str) -> HsvRange:
         If these are not six whole numbers in range; H0 may be above H1 (red wraps), S0 and V0 may not.
     """
     parts = text.split(",")
-    values = [int(part) for part in parts if part.strip().isdigit()]
+    values = [number for number in (whole_number(part.strip()) for part in parts) if number is not None]
     if len(parts) != 6 or len(values) != 6:
         raise InputError(f"--hsv: expected H0,S0,V0,H1,S1,V1 as six whole numbers, found '{text}'")
     h0, s0, v0, h1, s1, v1 = values

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import math
 from dataclasses import replace
 from importlib import resources
@@ -21,6 +20,7 @@ from pilotage.maps.elevation_file import read_elevation
 from pilotage.maps.grid_file import GRID_SUFFIXES, read_grid
 from pilotage.maps.grid_image import read_grey, read_hazard_image
 from pilotage.maps.landmark_image import read_landmark_image
+from pilotage.maps.landmark_table import read_landmark_table
 from pilotage.maps.landmarks import Landmarks
 from pilotage.maps.map_file import LandmarkMap, MapFile, build_map, parse_map
 from pilotage.maps.markings import FloorMarkings
@@ -116,31 +116,6 @@ def bounds_of(grid: OccupancyGrid) -> tuple[float, float, float, float]:
     (xmin, ymin), (xmax, ymax) = corners.min(axis=0), corners.max(axis=0)
     x0, y0 = grid.origin.x_m, grid.origin.y_m
     return x0 + float(xmin), y0 + float(ymin), x0 + float(xmax), y0 + float(ymax)
-
-
-def read_landmark_table(path: Path) -> Landmarks:
-    """Read a CSV file with the columns id, x_m, y_m.
-
-    Raises
-    ------
-    InputError
-        File and line of what is wrong.
-    """
-    rows = csv.DictReader(read_text(path).removeprefix("\ufeff").splitlines())
-    missing = [name for name in ("id", "x_m", "y_m") if name not in (rows.fieldnames or ())]
-    if missing:
-        raise InputError(f"{path} line 1: expected the columns id, x_m, y_m, found no {missing[0]}")
-    entries = []
-    for row in rows:
-        try:
-            entry = int(row["id"]), float(row["x_m"]), float(row["y_m"])
-        except (TypeError, ValueError):
-            raise InputError(f"{path} line {rows.line_num}: expected a whole id and two numbers") from None
-        if not (math.isfinite(entry[1]) and math.isfinite(entry[2])):
-            raise InputError(f"{path} line {rows.line_num}: expected finite numbers")
-        entries.append(entry)
-    table = np.array(entries).reshape(-1, 3)
-    return Landmarks(table[:, 0].astype(np.int64), table[:, 1:])
 
 
 def _named(source: str, markings: MarkingsConfig) -> WorldMap:

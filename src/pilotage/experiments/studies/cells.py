@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from pilotage.core.errors import InputError, nearest
+from pilotage.core.whole_number import whole_number
 from pilotage.experiments.studies.definition import CONFIGURATION, Configuration, StudyDefinition
 from pilotage.experiments.studies.factors import Factor
 
@@ -173,9 +174,10 @@ def _check_key(key: str, resolved: Mapping[str, Any], where: str) -> Any:
                 raise InputError(f"{where} '{key}': unknown key '{part}'; {hint}")
             place = place[part]
         elif isinstance(place, list | tuple):
-            if not part.isdigit() or int(part) >= len(place):
+            index = whole_number(part)
+            if index is None or index >= len(place):
                 raise InputError(f"{where} '{key}': expected an index below {len(place)}, found '{part}'")
-            place = place[int(part)]
+            place = place[index]
         elif place is None:
             return None  # an optional section that the mission does without: its model checks the rest
         else:

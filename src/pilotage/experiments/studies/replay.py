@@ -6,6 +6,7 @@ import json
 from pathlib import Path
 
 from pilotage.core.errors import InputError
+from pilotage.core.whole_number import whole_number
 from pilotage.experiments.studies.database import DATABASE
 from pilotage.experiments.studies.rows import read_essence
 from pilotage.experiments.studies.study import Study, changes_told, differences, load_study
@@ -24,11 +25,12 @@ def parse_row(text: str) -> tuple[Path, int]:
         If the text is not of that form, or there is no such folder.
     """
     name, colon, row = text.rpartition(":")
-    if not colon or not row.isdigit() or not name:
+    number = whole_number(row)
+    if not colon or number is None or not name:
         raise InputError(f"--from '{text}': expected STUDY:ROW such as museum-noise:17")
     for folder in (Path(name), STUDIES / name):
         if folder.is_dir():
-            return folder, int(row)
+            return folder, number
     raise InputError(f"--from '{text}': expected a study's folder or its name under {STUDIES}, found neither")
 
 

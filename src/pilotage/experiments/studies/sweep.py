@@ -11,6 +11,7 @@ from typing import Any
 
 from pilotage.core.config import validate
 from pilotage.core.errors import InputError
+from pilotage.core.whole_number import whole_number
 from pilotage.core.yaml_text import load_yaml
 from pilotage.experiments.mission import read_parameters
 from pilotage.experiments.studies.definition import StudyDefinition
@@ -113,12 +114,13 @@ def parse_vary(text: str) -> dict[str, Any]:
 
 
 def _log_range(text: str, start: str, stop: str, count: str) -> dict[str, float | int]:
-    if not count.strip().isdigit():
+    number = whole_number(count.strip())
+    if number is None:
         raise InputError(f"--vary '{text}': expected a whole number of values as COUNT, found '{count}'")
     first, last = float(start), float(stop)
     if not (0.0 < first < math.inf and 0.0 < last < math.inf):
         raise InputError(f"--vary '{text}': expected finite numbers above 0")
-    return {"start": first, "stop": last, "count": int(count)}
+    return {"start": first, "stop": last, "count": number}
 
 
 def _number(value: Any) -> Any:

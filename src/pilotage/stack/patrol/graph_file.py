@@ -11,6 +11,7 @@ import numpy as np
 from pilotage.core.errors import InputError
 from pilotage.core.files import read_text
 from pilotage.core.limits import limit, too_large
+from pilotage.core.whole_number import whole_number
 from pilotage.maps.floor import Floor
 from pilotage.stack.patrol.graph import PatrolGraph
 
@@ -110,6 +111,7 @@ def _number(words: _Words, path: Path, what: str) -> float:
 
 def _whole(words: _Words, path: Path, what: str, least: int) -> int:
     place, word = _word(words, path, what)
-    if not (word.isascii() and word.isdigit() and len(word) < 10 and int(word) >= least):
+    number = whole_number(word)
+    if number is None or number < least:
         raise InputError(f"{path}: word {place}: expected {what}, found '{word[:20]}'")
-    return int(word)
+    return number
