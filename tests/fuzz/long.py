@@ -34,12 +34,15 @@ FOUND = Path("fuzz-found")
 GUIDED_SHARE = 0.25
 OPTIONS_SHARE = 0.15
 SHOWN_OF_A_KIND = 3
+SLOWEST_S = 10.0
+"""Processor time that a case may take here; the tests, which run on machines of any speed, allow more."""
 
 
 def main() -> int:
     """Fuzz; 1 where anything broke."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--minutes", type=float, default=10.0)
+    parser.add_argument("--cases", type=int, default=None, help="no more than so many")
     parser.add_argument("--seed", type=int, default=None, help="else by the clock")
     parser.add_argument("--only", default="", help="uses whose name holds this")
     parser.add_argument("--again", type=Path, help="a folder of fuzz-found")
@@ -47,23 +50,26 @@ def main() -> int:
     if asked.again is not None:
         return again(asked.again)
     seed = int(time.time()) if asked.seed is None else asked.seed
-    guided = importlib.util.find_spec("atheris") is not None and not asked.only
+    guided = importlib.util.find_spec("atheris") is not None and not (asked.only or asked.cases)
     end = time.monotonic() + 60.0 * asked.minutes * (1.0 - GUIDED_SHARE if guided else 1.0)
     targets = (*TARGETS, *FILM_TARGETS)
-    broken = drawn(seed, end, [target for target in targets if asked.only in target.name], not asked.only)
+    chosen = [target for target in targets if asked.only in target.name]
+    broken = drawn(seed, end, asked.cases, chosen, not asked.only)
     if guided:
         broken += coverage_guided(60.0 * asked.minutes * GUIDED_SHARE / len(READERS))
     return 1 if broken else 0
 
 
-def drawn(seed: int, end: float, targets: list[Target], with_words: bool) -> int:
+def drawn(seed: int, end: float, most: int | None, targets: list[Target], with_words: bool) -> int:
     """Damaged inputs and words until the time is over; returns how many broke something."""
     codes: Counter[int] = Counter()
     kinds: Counter[str] = Counter()
-    number = 0
+    number, slowest_s, largest_mb = 0, 0.0, 0.0
     with tempfile.TemporaryDirectory(prefix="pilotage-fuzz-") as place:
         healthy, case = Healthy(Path(place) / "healthy"), Path(place) / "case"
-        while time.monotonic() < end:
+        for target in targets:  # what is compiled or imported once is not the damage's doing
+            run(target.words, healthy.copy(target, case))
+        while time.monotonic() < end and number != most:
             rng = random.Random(f"{seed}-{number}")
             target = targets[number % len(targets)]
             words: tuple[str, ...] = target.words
@@ -76,7 +82,9 @@ def drawn(seed: int, end: float, targets: list[Target], with_words: bool) -> int
                 what = damaged_case(target, healthy, case, rng)
             outcome = run(words, case)
             codes[outcome.code] += 1
-            for fault in outcome.faults()[:1]:
+            slowest_s, largest_mb = max(slowest_s, outcome.cpu_s), max(largest_mb, outcome.grown_mb)
+            slow = [f"{outcome.cpu_s:.0f} s of processor time"] if outcome.cpu_s > SLOWEST_S else []
+            for fault in (outcome.faults() + slow)[:1]:
                 kind = f"{words[0]}: {fault[-80:]}"
                 kinds[kind] += 1
                 if kinds[kind] <= SHOWN_OF_A_KIND:
@@ -84,7 +92,8 @@ def drawn(seed: int, end: float, targets: list[Target], with_words: bool) -> int
                     keep(case, f"{seed}-{number}", words, outcome)
             number += 1
     told = ", ".join(f"{count} with {code}" for code, count in sorted(codes.items()))
-    print(f"seed {seed}: {number} cases ({told}), {sum(kinds.values())} broke something", flush=True)
+    worst = f"the slowest took {slowest_s:.1f} s, the largest {largest_mb:.0f} MB"
+    print(f"seed {seed}: {number} cases ({told}), {worst}; {sum(kinds.values())} broke something", flush=True)
     return sum(kinds.values())
 
 

@@ -7,6 +7,7 @@ import io
 import os
 import signal
 import sys
+import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -34,6 +35,7 @@ class Outcome:
     out: str
     err: str
     grown_mb: float
+    cpu_s: float
     new: tuple[str, ...]
     """Files and folders that were not there before, below the working folder."""
 
@@ -49,8 +51,10 @@ class Outcome:
                 found.append(f"{len(lines)} lines on standard error: {self.err[-400:]!r}")
             elif not lines[0].startswith("pilotage: ") or len(lines[0]) > LONGEST_LINE:
                 found.append(f"a line of {len(lines[0])} characters: {lines[0][:200]!r}")
-            if self.new:
-                found.append(f"left behind: {', '.join(self.new[:5])}")
+            # The rows of a damaged study are told of, with where they are now.
+            left = [name for name in self.new if not (name.endswith("-salvaged.csv") and name in self.err)]
+            if left:
+                found.append(f"left behind: {', '.join(left[:5])}")
         if any("Warning" in line for line in lines):
             found.append(f"a warning: {self.err[:300]!r}")
         for name, text in (("output", self.out), ("error", self.err)):
@@ -71,7 +75,7 @@ def run(words: Sequence[str], folder: Path) -> Outcome:
     here = Path.cwd()
     out, err = _Stream(), _Stream()
     _forget_peak()
-    held = _peak_mb()
+    held, begun_s = _peak_mb(), time.process_time()
     os.chdir(folder)
     try:
         with _limited(), contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
@@ -85,8 +89,9 @@ def run(words: Sequence[str], folder: Path) -> Outcome:
                 err.write(f"SystemExit {stop.code}")
     finally:
         os.chdir(here)
+    taken_s = time.process_time() - begun_s
     new = tuple(sorted(set(_below(folder)) - before))
-    return Outcome(code, out.getvalue(), err.getvalue(), max(0.0, _peak_mb() - held), new)
+    return Outcome(code, out.getvalue(), err.getvalue(), max(0.0, _peak_mb() - held), taken_s, new)
 
 
 class _Stream(io.StringIO):

@@ -1,0 +1,137 @@
+"""What pilotage left: runs and studies, reported on, exported, gone on with."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from support.fuzz_targets import recordings
+from support.fuzz_targets.missions import write_floor
+from support.fuzz_targets.target import QUICK, SHORT, Target, write_yaml
+from support.outcome import run
+
+
+def _run_folder(folder: Path) -> None:
+    write_floor(folder)
+    assert run(("run", "mission.yaml", *QUICK), folder).code in (0, 1)
+    (made,) = (folder / "out").iterdir()
+    made.rename(folder / "run")
+
+
+def _study(folder: Path) -> None:
+    definition = {
+        "study": "fuzzed",
+        "mission": "museum-plan",
+        "trials": 1,
+        "set": {"stack.planner.iterations": 100},
+        "factors": [{"key": "stack.planner.turning_radius_m", "values": [0.3, 0.5]}],
+    }
+    write_yaml(folder / "study.yaml", definition)
+
+
+def _study_folder(folder: Path) -> None:
+    _study(folder)
+    assert run((*STUDY, "--workers", "1"), folder).code == 0
+    (made,) = (folder / "studies").iterdir()
+    made.rename(folder / "done")
+
+
+def _slam_folder(folder: Path) -> None:
+    BY_WRITER["slam carmen"].write(folder)
+    assert run(BY_WRITER["slam carmen"].words, folder).code == 0
+    (made,) = (folder / "out").iterdir()
+    made.rename(folder / "mapped")
+
+
+def _calibrated(folder: Path) -> None:
+    target = BY_WRITER["calibrate odometry"]
+    target.write(folder)
+    assert run(target.words, folder).code == 0
+    (made,) = (folder / "out").iterdir()
+    made.rename(folder / "calibrated")
+
+
+BY_WRITER = {target.name: target for target in recordings.TARGETS}
+STUDY = ("study", "study.yaml", "--no-report", "--quiet")
+RUN_FILES = ("metrics.json", "events.jsonl", "world.json", "mission.yaml", "trace.parquet", "scans.npz")
+SLAM_FILES = (
+    *(
+        "metrics.json",
+        "closures.json",
+        "covariances.npz",
+        "trajectory.tum",
+        "before.tum",
+        "map.pgm",
+        "keyframes.npz",
+    ),
+    *("map.yaml", "config.yaml"),
+)
+TARGETS: tuple[Target, ...] = (
+    Target(
+        "report run",
+        _run_folder,
+        ("report", "run"),
+        ("run/metrics.json", "run/events.jsonl", "run/world.json", "run/mission.yaml"),
+        True,
+        goes_on=True,
+    ),
+    Target(
+        "report run arrays",
+        _run_folder,
+        ("report", "run"),
+        ("run/trace.parquet", "run/scans.npz"),
+        goes_on=True,
+    ),
+    Target(
+        "study",
+        _study,
+        ("study", "study.yaml", "--workers", "1", "--no-report", "--quiet"),
+        ("study.yaml",),
+        True,
+    ),
+    *(
+        Target(
+            f"export {to}",
+            _run_folder,
+            ("export", "run", "--to", to, "--out", name),
+            tuple(f"run/{file}" for file in RUN_FILES),
+            goes_on=True,
+        )
+        for to, name in (
+            ("mcap", "a.mcap"),
+            ("rosbag", "a.bag"),
+            ("csv", "a.csv"),
+            ("tum", "tum"),
+            ("rerun", "a.rrd"),
+        )
+    ),
+    Target(
+        "report slam",
+        _slam_folder,
+        ("report", "mapped"),
+        tuple(f"mapped/{file}" for file in SLAM_FILES),
+        goes_on=True,
+    ),
+    Target(
+        "report calibration",
+        _calibrated,
+        ("report", "calibrated"),
+        ("calibrated/calibration.json", "calibrated/data.npz"),
+        True,
+        goes_on=True,
+    ),
+    Target("report study", _study_folder, ("report", "done"), ("done/study.yaml",), True),
+    Target("report study rows", _study_folder, ("report", "done"), ("done/trials.sqlite",)),
+    Target(
+        "study on",
+        _study_folder,
+        ("study", "done", "--resume", "--no-report", "--quiet"),
+        ("done/study.yaml", "done/trials.sqlite"),
+    ),
+    Target(
+        "run from",
+        _study_folder,
+        ("run", "--from", "done:1", *SHORT),
+        ("done/study.yaml", "done/trials.sqlite"),
+        goes_on=True,
+    ),
+)
