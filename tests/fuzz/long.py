@@ -1,5 +1,5 @@
 # ruff: noqa: T201 - a command of its own, it prints
-"""The long run of ``make fuzz``: damaged inputs over all commands, and readers guided by coverage.
+"""The long run of ``make fuzz``: damaged inputs over all commands, SIGKILLs, and readers guided by coverage.
 
 What breaks something is kept in ``fuzz-found/`` with its seed and words; ``--again FOLDER`` tries it once
 more. A quarter of the time goes to ``fuzz.guided``, reader by reader, where atheris is installed.
@@ -21,6 +21,7 @@ from collections import Counter
 from pathlib import Path
 
 from fuzz.guided import READERS, seed_of
+from fuzz.kills import kill_all
 from support import damage
 from support.fuzz_targets import BY_NAME, FILM_TARGETS, OPTIONS, TARGETS, Target
 from support.fuzzing import Healthy, damaged_case
@@ -34,6 +35,7 @@ FOUND = Path("fuzz-found")
 GUIDED_SHARE = 0.25
 OPTIONS_SHARE = 0.15
 SHOWN_OF_A_KIND = 3
+KILLS = 15
 SLOWEST_S = 10.0
 """Processor time that a case may take here; the tests, which run on machines of any speed, allow more."""
 
@@ -55,6 +57,10 @@ def main() -> int:
     targets = (*TARGETS, *FILM_TARGETS)
     chosen = [target for target in targets if asked.only in target.name]
     broken = drawn(seed, end, asked.cases, chosen, not asked.only)
+    if not (asked.only or asked.cases):
+        cut = kill_all(KILLS, seed)
+        print("\n".join([*cut, f"{KILLS} kills, {len(cut)} things not whole"]), flush=True)
+        broken += len(cut)
     if guided:
         broken += coverage_guided(60.0 * asked.minutes * GUIDED_SHARE / len(READERS))
     return 1 if broken else 0

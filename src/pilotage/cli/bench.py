@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -14,6 +15,7 @@ from pilotage.cli.output import print_columns, print_json, print_line, stdout_fo
 from pilotage.core.errors import InputError
 
 if TYPE_CHECKING:
+    from pilotage.evaluation.barn import BarnRun
     from pilotage.experiments.barn_benchmark import BarnAnswer
     from pilotage.experiments.controller_benchmark import CourseAnswer
 
@@ -56,7 +58,13 @@ def barn(
 ) -> int:
     """Drive the BARN courses: first contact fails, 100 s are the limit, within 1 m of the goal is there."""
     del plugin  # loaded by now
-    from pilotage.experiments.barn_benchmark import BarnRequest, bench_barn, first_worlds, summary_values
+    from pilotage.experiments.barn_benchmark import (
+        BarnRequest,
+        bench_barn,
+        first_worlds,
+        published_runs,
+        summary_values,
+    )
     from pilotage.experiments.barn_files import write_barn
     from pilotage.logs.barn import read_barn
 
@@ -64,13 +72,14 @@ def barn(
     if len(set(names)) < len(names):
         raise InputError("--controller: expected every name once, found one twice")
     courses = first_worlds(read_barn(worlds), count)
+    published = published_runs(worlds, courses)  # what is damaged is told before anything is driven
     request = BarnRequest(
         courses, names, trials, workers or os.cpu_count() or 1, seed or 0, tuple(overrides or ())
     )
     with stdout_for_json(json):
         answer = bench_barn(request, _show if sys.stderr.isatty() else None)
         replayed = write_barn(answer, out, replays)
-        page = _write_page(answer, worlds, out, replayed)
+        page = _write_page(answer, published, out, replayed)
     for number in answer.without_way:
         print_line(f"world {number}: no way through for this robot, not driven", sys.stderr)
     if json:
@@ -154,9 +163,11 @@ def _show(done: int, total: int) -> None:
 
 
 def _write_page(
-    answer: BarnAnswer, folder: Path, out: Path, replayed: dict[tuple[str, int, int], Path]
+    answer: BarnAnswer,
+    published: Mapping[str, Sequence[BarnRun]],
+    out: Path,
+    replayed: dict[tuple[str, int, int], Path],
 ) -> Path:
-    from pilotage.experiments.barn_benchmark import published_runs
     from pilotage.logs.barn import path_clearance_m
     from pilotage.report.barn.page import BarnPage, write_barn_report
     from pilotage.report.page import write_report
@@ -170,7 +181,7 @@ def _write_page(
     courses = answer.request.worlds
     page = BarnPage(
         answer.runs,
-        published_runs(folder, courses),
+        published,
         {world.number: path_clearance_m(world) for world in courses},
         answer.without_way,
         links,

@@ -40,6 +40,9 @@ def _slam_folder(folder: Path) -> None:
     assert run(BY_WRITER["slam carmen"].words, folder).code == 0
     (made,) = (folder / "out").iterdir()
     made.rename(folder / "mapped")
+    t_s = [row.split()[0] for row in (folder / "mapped" / "trajectory.tum").read_text().splitlines()]
+    rows = [f"{a} {b} 0.4 0.0 0 0 0 0.0\n" for a, b in zip(t_s[:-5:3], t_s[5::3], strict=False)]
+    (folder / "true.relations").write_text("".join(rows))
 
 
 def _calibrated(folder: Path) -> None:
@@ -53,18 +56,6 @@ def _calibrated(folder: Path) -> None:
 BY_WRITER = {target.name: target for target in recordings.TARGETS}
 STUDY = ("study", "study.yaml", "--no-report", "--quiet")
 RUN_FILES = ("metrics.json", "events.jsonl", "world.json", "mission.yaml", "trace.parquet", "scans.npz")
-SLAM_FILES = (
-    *(
-        "metrics.json",
-        "closures.json",
-        "covariances.npz",
-        "trajectory.tum",
-        "before.tum",
-        "map.pgm",
-        "keyframes.npz",
-    ),
-    *("map.yaml", "config.yaml"),
-)
 TARGETS: tuple[Target, ...] = (
     Target(
         "report run",
@@ -105,11 +96,23 @@ TARGETS: tuple[Target, ...] = (
         )
     ),
     Target(
-        "report slam",
+        "evaluate slam",
         _slam_folder,
-        ("report", "mapped"),
-        tuple(f"mapped/{file}" for file in SLAM_FILES),
+        ("evaluate", "mapped/trajectory.tum", "mapped/before.tum"),
+        ("mapped/trajectory.tum", "mapped/before.tum"),
+    ),
+    Target(
+        "evaluate slam relations",
+        _slam_folder,
+        ("evaluate", "mapped/trajectory.tum", "true.relations", "--relations"),
+        ("mapped/keyframes.npz", "mapped/covariances.npz", "true.relations"),
         goes_on=True,
+    ),
+    Target(
+        "plan slam",
+        _slam_folder,
+        ("plan", "mapped/map.yaml", "--start", "0.5,0", "--goal", "1.5,0"),
+        ("mapped/map.yaml", "mapped/map.pgm"),
     ),
     Target(
         "report calibration",

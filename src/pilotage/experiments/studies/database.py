@@ -14,6 +14,7 @@ from contextlib import closing, contextmanager, suppress
 from pathlib import Path
 
 from pilotage.core.errors import InputError, PilotageError
+from pilotage.core.files import require_file
 
 DATABASE = "trials.sqlite"
 BUSY_S = 60.0
@@ -83,6 +84,8 @@ def connect(path: Path) -> sqlite3.Connection:
     StudyStoppedError
         Where the disk is full.
     """
+    if path.exists():
+        require_file(path, "a study's database")
     with telling(path):
         database = sqlite3.connect(path, timeout=BUSY_S, isolation_level=None)
         try:

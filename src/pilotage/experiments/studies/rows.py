@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from pilotage.core.errors import InputError
+from pilotage.core.files import require_file
 from pilotage.core.json_text import load_json
 from pilotage.experiments.studies.database import BUSY_S, LONGEST, checksum, foreign_tables
 
@@ -114,6 +115,7 @@ def reader(path: Path, *, forgiving: bool = False) -> Iterator[sqlite3.Connectio
     sqlite3.DatabaseError
         Where it is no database, or one whose tables are not a study's: a view could compute for ever.
     """
+    require_file(path, "a study's database")  # SQLite would wait for ever for who writes a pipe
     place = path.absolute().as_uri()
     database = sqlite3.connect(f"{place}?mode=ro", uri=True, timeout=BUSY_S)
     try:
