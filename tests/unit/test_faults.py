@@ -21,7 +21,7 @@ from pilotage.stack.interface import Belief, BeliefStatus
 from pilotage.stack.localization.ekf_landmarks import EkfLandmarkLocalizer
 from pilotage.stack.localization.landmark_filter import LandmarkFilterConfig
 from pilotage.stack.localization.odometry_watch import OdometryWatch
-from pilotage.stack.localization.self_check import HOLD_S, SelfCheck
+from pilotage.stack.localization.self_check import HOLD_S, ExplainedShare, SelfCheck
 from support.robots import BEACONS, told_of
 
 STEPS = 2000
@@ -176,6 +176,18 @@ class TestWatching:
             check.tell(0.1 * k, 4, 4, 2.0 * float(rng.chisquare(8)), 8.0)
         assert check.lost(503.0)
 
+    def test_a_place_that_only_looks_alike_explains_less_than_usual(self) -> None:
+        rng, explained = np.random.default_rng(3), ExplainedShare()
+
+        def tell(share: float, trusted: bool, scans: int) -> list[bool]:
+            return [explained.tell(float(rng.binomial(60, share)) / 60.0, trusted) for _ in range(scans)]
+
+        assert all(tell(0.9, True, 300))
+        assert not any(tell(0.05, False, 30)[5:])
+        assert not any(tell(0.68, False, 200)[5:])
+        assert all(tell(0.9, False, 60)[40:])
+        assert all(tell(0.6, False, 3000)[2500:])  # the surroundings have changed for good
+
 
 @pytest.mark.parametrize(
     ("localizer", "faults"),
@@ -183,6 +195,11 @@ class TestWatching:
         ("ekf-landmarks", "{name: bias-step, sensor: beacons, from_s: 30, by_m: 0.3}"),
         ("invariant-ekf-landmarks", "{name: shuffle, sensor: odometry}, {name: shuffle, sensor: beacons}"),
         ("ekf-walls", "{name: shuffle, sensor: odometry}, {name: shuffle, sensor: lidar}"),
+        (
+            "particle-filter",
+            "{name: outliers, sensor: lidar, share: 0.1}, "
+            "{name: outliers, sensor: odometry, share: 0.02, most_m: 0.5, most_rad: 0.5}",
+        ),
     ],
 )
 def test_bad_readings_make_no_filter_silently_wrong(

@@ -35,7 +35,7 @@ from pilotage.stack.localization.odometry_watch import (
     OdometryWatch,
     increment_of,
 )
-from pilotage.stack.localization.self_check import SelfCheck
+from pilotage.stack.localization.self_check import ExplainedShare, SelfCheck
 
 WALL_STD_M, GRID_SHARE = 0.01, 1.0 / 3.0
 NAME = "particle-filter"
@@ -51,6 +51,8 @@ LEAST_MAPPED = 0.5
 """Share of a scan that has to end where the map says anything."""
 BESIDE_CELLS = 2
 """A beam that ends so few cells beyond the known ones may have hit the wall before them."""
+UNSURE_M = 0.1
+"""A cloud wider than this (standard deviation) may settle at another place that looks alike."""
 TABLE_PER_STD, TABLE_STDS = 50, 12
 """The table of a beam's density: entries per standard deviation, and how many of these."""
 FLOOR = np.diag([1e-12, 1e-12, 1e-12])
@@ -136,7 +138,8 @@ class ParticleFilterLocalizer:
         )
         self._watch, self._check = OdometryWatch(robot, odometry), SelfCheck(refused_share=MOST_BESIDE)
         self._blind = bool(initial.cov[2, 2] > LINEAR_RAD**2)
-        self._unexplained = 0
+        self._unexplained, self._found = 0, True
+        self._explained, self._sharp = ExplainedShare(), ExplainedShare()
         self._field, self._known = _field_of(config, chart), _known_of(chart)
         self._picked = np.unique(np.linspace(0, lidar.beams - 1, min(config.beams, lidar.beams)).astype(int))
         angles = lidar.beam_angles_rad()[self._picked] + lidar.mount.theta_rad
@@ -256,7 +259,9 @@ class ParticleFilterLocalizer:
 
         The step from the one mean to the other is at most as large as the first was uncertain. A beam that
         ends far from any wall may have hit what is on no map; many that end beside one, not at it, say that
-        the pose is off, and so does a scan of which next to nothing is at a wall.
+        the pose is off, and so does a scan of which next to nothing is at a wall. Where the cloud was wide or
+        the robot lost, it may have settled at a place that only looks alike: it is believed again when the
+        scans fit as well as they used to; and so it is where more beams than usual end beside a wall.
         """
         pose = mean[None]
         beams = np.array([self._log_likelihoods(point[None], pose)[0] for point in points])
@@ -267,6 +272,16 @@ class ParticleFilterLocalizer:
         self._check.tell(t_s, beside, at_wall, float(step @ np.linalg.solve(prior[1], step)), POSE_DOF)
         self._unexplained = self._unexplained + 1 if at_wall < LEAST_AT_WALL * len(points) else 0
         if self._unexplained >= UNEXPLAINED_SCANS:
+            self._check.alarm(t_s)
+        if self._check.lost(t_s) or prior[1][0, 0] + prior[1][1, 1] > UNSURE_M**2:
+            self._found = False
+        as_usual = self._explained.tell(at_wall / len(points), self._found)
+        if as_usual:
+            self._found = True
+        elif not self._found:
+            self._check.alarm(t_s)
+        # Crowds do not change which share of what ends about a wall ends at it; a wrong pose does.
+        if beside and not self._sharp.tell(at_wall / beside, self._found):
             self._check.alarm(t_s)
 
     def _log_likelihoods(self, points: FloatArray, poses: FloatArray) -> FloatArray:

@@ -16,6 +16,10 @@ NIS_EXCESS, NIS_SIGMAS = 0.5, 6.0
 HOLD_S, MOST_HOLD_S = 3.0, 60.0
 """How long all has to be well before it is believed again; doubled each time that it was not for long."""
 SOON_S = 30.0
+RECENT, USUAL, FORGOTTEN = 0.1, 0.02, 0.002
+"""What a new scan counts in the two means, and in the long one while the robot does not trust its place."""
+KEPT = 0.9
+"""Of the usual share, what a place must explain that the robot has just found."""
 
 
 class SelfCheck:
@@ -44,8 +48,8 @@ class SelfCheck:
         all_seen, used, total, mean = self._sums
         if all_seen < LEAST_SEEN:
             return
-        # The NIS of a two-dimensional reading has mean 2 and variance 4.
-        excess = max(NIS_EXCESS, NIS_SIGMAS / math.sqrt(max(used, 1.0)))
+        # Chi-square values add up to one of as many degrees of freedom as their mean, of twice the variance.
+        excess = max(NIS_EXCESS, NIS_SIGMAS * math.sqrt(2.0 / max(mean, 1.0)))
         if used < self._used_share * all_seen or total > (1.0 + excess) * mean:
             self.alarm(t_s)
 
@@ -59,3 +63,23 @@ class SelfCheck:
     def lost(self, t_s: float) -> bool:
         """Whether the filter is not to be believed now."""
         return t_s < self._until_s
+
+
+class ExplainedShare:
+    """Compares the share of a scan that the map explains with what is usual where the robot is.
+
+    A short and a long mean, as augmented Monte-Carlo localization keeps them of the likelihood (Thrun et al.
+    2005, table 8.3). A place that only looks like the true one explains less of the scans, if seldom little.
+    Where the surroundings have truly changed, the long mean follows within some minutes.
+    """
+
+    def __init__(self) -> None:
+        self._recent, self._usual = math.nan, math.nan
+
+    def tell(self, share: float, trusted: bool) -> bool:
+        """One scan; returns whether the last ones fit as well as usual."""
+        if math.isnan(self._usual):
+            self._recent = self._usual = share
+        self._recent += RECENT * (share - self._recent)
+        self._usual += (USUAL if trusted else FORGOTTEN) * (self._recent - self._usual)
+        return self._recent >= KEPT * self._usual
