@@ -6,8 +6,9 @@ import math
 
 import numpy as np
 
-from pilotage.kernels.arrays import FloatArray, IntArray
+from pilotage.kernels.arrays import BoolArray, FloatArray, IntArray
 from pilotage.kernels.geometry.field import interpolate_at
+from pilotage.kernels.geometry.motion import wrap
 from pilotage.kernels.jit import kernel
 
 
@@ -77,3 +78,44 @@ def confirm_cells(
             means[count, 1] = sums[row, col, 1] / threshold
             count += 1
     return means[:count].copy()
+
+
+@kernel
+def seen_through(
+    discs: FloatArray,
+    ranges: FloatArray,
+    x: float,
+    y: float,
+    first: float,
+    step: float,
+    reach: float,
+    beyond: float,
+    spread: float,
+    spread_rad: float,
+) -> BoolArray:
+    """Which discs (N, 3) within ``reach`` the beams show not to be there, (N,).
+
+    Every beam that could have met the disc, which may lie off by ``spread`` and ``spread_rad`` about the
+    sensor at (x, y), ends more than ``beyond`` behind it. One that no beam could have met may still be there.
+    """
+    out = np.zeros(discs.shape[0], np.bool_)
+    for i in range(discs.shape[0]):
+        dx, dy = discs[i, 0] - x, discs[i, 1] - y
+        away = math.hypot(dx, dy)
+        around = discs[i, 2] + spread
+        if away > reach or away <= around:
+            continue
+        off = wrap(math.atan2(dy, dx) - first)
+        if off < 0.0:
+            off += 2.0 * math.pi
+        half = math.asin(around / away) + spread_rad
+        low, high = math.ceil((off - half) / step), math.floor((off + half) / step)
+        if low < 0 or high >= ranges.shape[0] or high < low:
+            continue
+        gone = True
+        for k in range(low, high + 1):
+            if ranges[k] <= away + beyond:
+                gone = False
+                break
+        out[i] = gone
+    return out

@@ -8,7 +8,7 @@ import numpy as np
 from pydantic import Field
 
 from pilotage.core.config import Config
-from pilotage.core.types import FloatArray
+from pilotage.core.types import FloatArray, IntArray
 from pilotage.kernels.scans import unexpected
 from pilotage.maps.world_map import WorldMap
 from pilotage.sensors.lidar import LidarConfig
@@ -28,6 +28,10 @@ class ObstacleLayerConfig(Config):
     disc_m: Positive = 0.03
     """Radius of the disc that a believed cell puts on the map, around the mean of its hits."""
     hits: int = Field(default=3, ge=1, le=1000)
+    forget_scans: int = Field(default=3, ge=0, le=1000)
+    """What so many scans in a row see through is forgotten: it went away; 0 keeps everything for ever."""
+    forget_beyond_m: Positive = 0.3
+    """Seen through: every beam that could have met it ends at least so far behind it."""
     sigmas: Positive = 3.0
     """The tolerance grows with the pose's uncertainty by this many standard deviations."""
 
@@ -36,8 +40,9 @@ class ObstacleLayerConfig(Config):
 class ObstacleLayer:
     """Cells of a grid over the known map, each turned into a disc around its hits once it is believed.
 
-    What it learns it keeps: an obstacle that goes away stays on the map. Points within the tolerance of
-    a known wall are taken for the wall, so an obstacle flush with a wall is seen only where it stands out.
+    What it learns it keeps until its beams go through where that stood: somebody who walks on is forgotten,
+    an obstacle that went away out of sight stays on the map. Points within the tolerance of a known wall are
+    taken for the wall, so an obstacle flush with a wall is seen only where it stands out.
     """
 
     def __init__(self, config: ObstacleLayerConfig, robot: RobotKnowledge, chart: WorldMap) -> None:
@@ -53,6 +58,8 @@ class ObstacleLayer:
         self._hits = np.zeros(shape, dtype=np.int64)
         self._sums = np.zeros((*shape, 2))
         self._origin = (xmin, ymin)
+        self._passed: IntArray = np.zeros(0, dtype=np.int64)
+        self._range_m = lidar.max_range_m
         self.circles_m: FloatArray = np.zeros((0, 3))
 
     def step(self, readings: Readings, belief: Belief) -> bool:
@@ -62,16 +69,22 @@ class ObstacleLayer:
             return False
         pose, cov, config = belief.pose, belief.cov, self._config
         c, s = math.cos(pose.theta_rad), math.sin(pose.theta_rad)
+        x = pose.x_m + c * self._mount.x_m - s * self._mount.y_m
+        y = pose.y_m + s * self._mount.x_m + c * self._mount.y_m
+        first = pose.theta_rad + self._mount.theta_rad + self._first
         spread_m = config.sigmas * math.sqrt(max(cov[0, 0], cov[1, 1]))
+        spread_rad = config.sigmas * math.sqrt(cov[2, 2])
+        if config.forget_scans and len(self.circles_m):
+            self._forget(scan.ranges_m, x, y, first, spread_m, spread_rad)
         points = unexpected.unexplained_points(
             scan.ranges_m,
-            pose.x_m + c * self._mount.x_m - s * self._mount.y_m,
-            pose.y_m + s * self._mount.x_m + c * self._mount.y_m,
-            pose.theta_rad + self._mount.theta_rad + self._first,
+            x,
+            y,
+            first,
             self._step,
             self._reach_m,
             config.tolerance_m + spread_m,
-            config.sigmas * math.sqrt(cov[2, 2]),
+            spread_rad,
             self._known.distance_m,
             *self._known.origin_xy_m,
             self._known.resolution_m,
@@ -85,4 +98,25 @@ class ObstacleLayer:
             return False
         discs = np.column_stack([means, np.full(means.shape[0], config.disc_m)])
         self.circles_m = np.concatenate([self.circles_m, discs])
+        self._passed = np.append(self._passed, np.zeros(len(discs), dtype=np.int64))
         return True
+
+    def _forget(
+        self, ranges_m: FloatArray, x: float, y: float, first: float, spread_m: float, spread_rad: float
+    ) -> None:
+        """Take off the map what has been seen through often enough; it may be found there again."""
+        config = self._config
+        ranges_m = np.where(ranges_m > 0.0, np.minimum(ranges_m, self._range_m), 0.0)
+        through = unexpected.seen_through(
+            self.circles_m, ranges_m, x, y, first, self._step, self._reach_m, config.forget_beyond_m,
+            spread_m, spread_rad,
+        )  # fmt: skip
+        self._passed = np.where(through, self._passed + 1, 0)
+        gone = self._passed >= config.forget_scans
+        if not gone.any():
+            return
+        # A disc lies at the mean of its cell's points, so in its cell.
+        columns, rows = ((self.circles_m[gone, :2] - self._origin) / config.cell_m).astype(np.int64).T
+        self._hits[rows, columns] = 0
+        self._sums[rows, columns] = 0.0
+        self.circles_m, self._passed = self.circles_m[~gone], self._passed[~gone]
