@@ -8,7 +8,7 @@ import math
 import numpy as np
 
 from pilotage.core.types import FloatArray, Goal, Pose2
-from pilotage.kernels.geometry.plane import distances_to_nearest
+from pilotage.kernels.geometry.plane import distance_to_nearest
 from pilotage.kernels.rrt import dubins
 from pilotage.maps.distance_field import DistanceField
 from pilotage.maps.segment_map import SegmentMap
@@ -101,6 +101,11 @@ def request(
     """A query on a floor that the robot knows."""
     field = DistanceField.from_map(world)
     return PlanRequest(Pose2(*start), Goal(*goal), field, np.random.default_rng(seed), clearance_m)
+
+
+def distances_to_nearest(points: FloatArray, segments: FloatArray, circles: FloatArray) -> FloatArray:
+    """Distances (K,) of points (K, 2) from the nearest of all walls and discs."""
+    return np.array([distance_to_nearest(x, y, segments, circles) for x, y in points.tolist()])
 
 
 def check_drivable(path: Path, world: SegmentMap, clearance_m: float, radius_m: float) -> None:

@@ -34,7 +34,8 @@ def scan_of(
     if rng is None:
         return ranges
     normals = rng.standard_normal(lidar.beams)
-    return rays.add_range_noise(ranges, normals, math.sqrt(lidar.range_var_m2), lidar.max_range_m)
+    noisy = np.clip(ranges + math.sqrt(lidar.range_var_m2) * normals, 0.0, lidar.max_range_m)
+    return np.where(ranges < lidar.max_range_m, noisy, lidar.max_range_m)
 
 
 def extractor(seed: int = 0, lidar: LidarConfig = LIDAR, **changes: float) -> LineExtractor:

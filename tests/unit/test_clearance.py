@@ -8,13 +8,12 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pilotage.kernels.geometry.plane import distances_to_nearest
 from pilotage.kernels.rrt import dubins, guide, guide_moves
 from pilotage.kernels.rrt.clearance import curve_is_free, exact_distance, least_step, skin, slack_at
 from pilotage.maps.distance_field import DistanceField
 from pilotage.maps.segment_map import SegmentMap
 from pilotage.stack.planning.driving_space import space_for
-from support.planning_worlds import CLEARANCE_M, MUSEUM, NO_WALLS, discs, rooms
+from support.planning_worlds import CLEARANCE_M, MUSEUM, NO_WALLS, discs, distances_to_nearest, rooms
 
 CROWD = discs(3)
 CROWD_SPACE = space_for(DistanceField.from_map(CROWD), 0.3)

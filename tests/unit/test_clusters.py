@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 
 from pilotage.core.types import Pose2
 from pilotage.experiments.build.charts import load_chart
-from pilotage.kernels.lines.clustering import beam_directions
+from pilotage.kernels.lines.clustering import DROPPED, beam_directions, scan_clusters
 from pilotage.sensors.lidar import LidarConfig
-from pilotage.stack.perception.clusters import DROPPED, linkage_clusters, window_clusters
+from support.linkage import linkage_clusters
 from support.walls import scan_of
 
 MUSEUM = load_chart("museum").walls
@@ -36,7 +36,7 @@ def test_window_and_tree_agree_on_any_scan(
     ranges = rng.uniform(0.0, reach, beams)
     angles = lidar.beam_angles_rad()
     points = beam_directions(float(angles[0]), lidar.beam_step_rad, beams) * ranges[:, None]
-    fast = window_clusters(ranges, points, lidar.beam_step_rad, 19.9, cutoff, least)
+    fast = scan_clusters(ranges, points, lidar.beam_step_rad, 19.9, cutoff, least)
     assert (fast == linkage_clusters(ranges, points, 19.9, cutoff, least)).all()
 
 
@@ -48,19 +48,19 @@ def test_window_and_tree_agree_in_the_museum() -> None:
         x, y, theta = rng.uniform([0.3, 0.3, -3.1], [39.7, 24.7, 3.1])
         ranges = scan_of(MUSEUM, Pose2(x, y, theta), rng)
         points = directions * ranges[:, None]
-        fast = window_clusters(ranges, points, lidar.beam_step_rad, 19.9, 0.5, 10)
+        fast = scan_clusters(ranges, points, lidar.beam_step_rad, 19.9, 0.5, 10)
         assert (fast == linkage_clusters(ranges, points, 19.9, 0.5, 10)).all()
 
 
 def test_far_readings_and_small_clusters_are_dropped() -> None:
     ranges = np.array([1.0, 1.0, 1.0, 19.95, 5.0, 5.0])
     points = beam_directions(0.0, 0.01, 6) * ranges[:, None]
-    labels = window_clusters(ranges, points, 0.01, 19.9, 0.5, 3)
+    labels = scan_clusters(ranges, points, 0.01, 19.9, 0.5, 3)
     assert labels.tolist() == [0, 0, 0, DROPPED, DROPPED, DROPPED]
 
 
 def test_a_scan_without_returns_has_no_clusters() -> None:
     ranges = np.full(9, 20.0)
     points = beam_directions(0.0, 0.01, 9) * ranges[:, None]
-    assert (window_clusters(ranges, points, 0.01, 19.9, 0.5, 1) == DROPPED).all()
+    assert (scan_clusters(ranges, points, 0.01, 19.9, 0.5, 1) == DROPPED).all()
     assert (linkage_clusters(ranges, points, 19.9, 0.5, 1) == DROPPED).all()

@@ -9,7 +9,7 @@ import pytest
 
 from pilotage.core.types import BoolArray, FloatArray
 from pilotage.evaluation.floor_seen import floor_seen, guard_bound
-from pilotage.kernels.geometry.plane import sees
+from pilotage.kernels.scans.sight import hidden
 from pilotage.maps.floor import Floor
 from pilotage.maps.segment_map import SegmentMap
 from pilotage.maps.world_map import WorldMap
@@ -34,7 +34,7 @@ def in_view(pose: FloatArray, reach_m: float, half_view_rad: float, margin_rad: 
         out[k] = (
             away <= reach_m
             and abs(turned) <= half_view_rad - margin_rad
-            and all(sees(x, y, *end, ROOMS.segments_m, ROOMS.circles_m) for end in ends)
+            and not any(hidden(x, y, *end, ROOMS.segments_m, ROOMS.circles_m) for end in ends)
         )
     return out
 

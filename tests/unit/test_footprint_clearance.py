@@ -14,7 +14,6 @@ from pilotage.core.types import FloatArray
 from pilotage.kernels.control.footprint import (
     discs_clearance,
     first_contact,
-    points_clearance,
     polygon_distance,
 )
 from pilotage.kernels.control.ground import Ground, clearance_m, sure_clearance
@@ -69,9 +68,9 @@ def test_clearance_of_points_is_the_least_of_all(
     c, s = math.cos(theta), math.sin(theta)
     own = (points - [x, y]) @ np.array([[c, -s], [s, c]])
     least = min(float(polygon_distance(px, py, JACKAL)) for px, py in own)
-    assert points_clearance(x, y, theta, JACKAL, points) == pytest.approx(least, abs=1e-12)
-    discs = np.column_stack([points, np.full(points.shape[0], 0.075)])
-    assert discs_clearance(x, y, theta, JACKAL, discs) == pytest.approx(least - 0.075, abs=1e-12)
+    for radius in (0.0, 0.075):
+        discs = np.column_stack([points, np.full(points.shape[0], radius)])
+        assert discs_clearance(x, y, theta, JACKAL, discs) == pytest.approx(least - radius, abs=1e-12)
 
 
 @given(
@@ -87,7 +86,7 @@ def test_grid_never_calls_near_what_is_far_nor_far_what_is_near(
     ground = ground_of(np.array(places))
     kept = ground.mean[ground.hits.reshape(-1) > 0]
     body = make_body(JACKAL)
-    exact = points_clearance(x, y, theta, JACKAL, kept)
+    exact = discs_clearance(x, y, theta, JACKAL, np.insert(kept, 2, 0.0, axis=1))
     found = clearance_m(x, y, theta, body, ground, enough)
     sure = sure_clearance(
         x,

@@ -13,6 +13,7 @@ from pilotage.core.types import FloatArray
 from pilotage.kernels.control.band import path_time, speed_profile
 from pilotage.kernels.control.commands_sent import drive_out, limit_errors
 from pilotage.kernels.control.dynamic_window import choose_in_window, window
+from pilotage.kernels.control.footprint import discs_clearance
 from pilotage.kernels.control.ground import Ground
 from pilotage.kernels.control.ground_update import believed, evenly_spaced, insert_scan, rolled, sectors
 from pilotage.kernels.control.match import match_scan
@@ -182,15 +183,14 @@ def test_a_command_called_safe_can_be_braked_from(v: float, w: float, seed: int)
     )
     if not safe:
         return
-    from pilotage.kernels.control.footprint import points_clearance
-
+    posts = np.insert(kept, 2, 0.0, axis=1)
     for limits in (DRIVE, worse):
         x, y, theta, nv, nw = start
         for k in range(2000):
             slower = approach(nv, 0.0, 0.0, limits.deceleration * 0.01)
             cv, cw = (v, w) if k < 10 else (0.0, w / v * slower)
             x, y, theta, nv, nw = advance(x, y, theta, nv, nw, cv, cw, 0.01, limits)
-            assert points_clearance(x, y, theta, JACKAL, kept) > 0.0
+            assert discs_clearance(x, y, theta, JACKAL, posts) > 0.0
             if nv == 0.0:
                 break
 

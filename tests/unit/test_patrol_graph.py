@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from contract.patrol_examples import lattice
 from pilotage.core.errors import InputError
 from pilotage.evaluation.shortest_path import shortest_path
-from pilotage.kernels.geometry.plane import sees
+from pilotage.kernels.scans.sight import hidden
 from pilotage.maps.floor import Floor
 from pilotage.maps.occupancy_grid import OccupancyGrid
 from pilotage.maps.segment_map import SegmentMap
@@ -158,7 +158,7 @@ def test_every_point_of_a_derived_floor_is_seen_from_a_vertex() -> None:
     viewpoints = graph.vertices_xy_m[: derived.viewpoints]
     for x, y in derived.points_xy_m:
         assert any(
-            math.hypot(x - vx, y - vy) <= 5.0 and sees(vx, vy, x, y, ROOMS.segments_m, ROOMS.circles_m)
+            math.hypot(x - vx, y - vy) <= 5.0 and not hidden(vx, vy, x, y, ROOMS.segments_m, ROOMS.circles_m)
             for vx, vy in viewpoints
         )
     assert all(ROOMS.distance_m(x, y) >= 0.25 for x, y in graph.vertices_xy_m)

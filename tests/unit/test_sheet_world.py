@@ -7,14 +7,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from pilotage.core.errors import InputError
 from pilotage.core.random import RandomStreams
 from pilotage.core.types import Pose2, WheelSpeeds
 from pilotage.kernels.bodies import wheels
-from pilotage.kernels.geometry import boxes
 from pilotage.maps.true_cells import SheetFile
 from pilotage.models.motion.wheel_drive import WheelDriveConfig, WheelErrorsConfig
 from pilotage.replicas.random_walk import RandomWalk, RandomWalkConfig
@@ -31,35 +28,8 @@ from support.sheets import OnSheet, ToldOfSheet, sheet_sensors, sheet_simulator
 EXACT = WheelErrorsConfig(
     radius_difference=0.0, separation_error=(0.0, 0.0), slip=(0.0, 0.0), slip_std_m_sqrt_m=0.0
 )
-BOXES = np.array([[0.2, 0.1, 0.5, 0.4], [0.45, 0.35, 0.9, 0.6]])
 EMPTY = SheetFile(size_m=(4.0, 4.0), cells=(10, 10))
 MIDDLE = Pose2(2.0, 2.0, 0.0)
-
-coordinate = st.floats(-0.2, 1.2)
-
-
-@given(coordinate, coordinate, st.floats(-math.pi, math.pi))
-def test_a_beam_ends_where_the_first_box_begins(x: float, y: float, theta: float) -> None:
-    """Against a march along the beam in steps of half a millimetre."""
-    found = boxes.beam_range(x, y, theta, BOXES, 0.8)
-    along = np.arange(0.0, 0.8, 5e-4)
-    points = np.column_stack([x + along * math.cos(theta), y + along * math.sin(theta)])
-    inside = np.array([boxes.distance_to_boxes(px, py, BOXES) == 0.0 for px, py in points])
-    marched = along[inside.argmax()] if inside.any() else 0.8
-    # A march may step over a corner that the beam cuts.
-    assert found <= marched + 1e-9
-    if found < 0.8:
-        end = boxes.distance_to_boxes(x + found * math.cos(theta), y + found * math.sin(theta), BOXES)
-        assert end < 1e-9
-    if inside.any():
-        assert marched - found < 5e-3 or found == 0.0 or not inside[: int(found / 5e-4)].any()
-
-
-@given(coordinate, coordinate)
-def test_distance_to_boxes_is_the_least_over_their_points(x: float, y: float) -> None:
-    found = boxes.distance_to_boxes(x, y, BOXES)
-    each = [math.hypot(x - min(max(x, x0), x1), y - min(max(y, y0), y1)) for x0, y0, x1, y1 in BOXES.tolist()]
-    assert found == pytest.approx(min(each), abs=1e-12)
 
 
 def drive_for(sim: OnSheet, command: WheelSpeeds, seconds: float) -> np.ndarray:

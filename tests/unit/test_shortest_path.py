@@ -12,9 +12,8 @@ from hypothesis import strategies as st
 
 from pilotage.core.errors import InputError
 from pilotage.evaluation.shortest_path import ShortestPath, shortest_path
-from pilotage.kernels.geometry.plane import distances_to_nearest
 from pilotage.maps.segment_map import SegmentMap
-from support.planning_worlds import CLEARANCE_M, MUSEUM, NO_WALLS, discs, rooms
+from support.planning_worlds import CLEARANCE_M, MUSEUM, NO_WALLS, discs, distances_to_nearest, rooms
 
 NO_CIRCLES = np.zeros((0, 3))
 FAR = (-100.0, -100.0, 100.0, 100.0)

@@ -18,10 +18,9 @@ from pilotage.core.types import FloatArray, Pose2
 from pilotage.maps.crater_terrain import CraterTerrainConfig, crater_terrain
 from pilotage.maps.elevation import ElevationModel
 from pilotage.maps.elevation_file import read_elevation
-from pilotage.maps.grid_image import read_grey, read_hazard_image
-from pilotage.maps.landmark_image import read_landmark_image
+from pilotage.maps.grid_image import read_grey, read_hazard_image, write_grey, write_hazard_image
+from pilotage.maps.landmark_image import read_landmark_image, write_landmark_image
 from pilotage.maps.occupancy_grid import squared_distances
-from pilotage.maps.terrain_images import write_terrain_images
 from pilotage.stack.planning.grid_space import GridSpace
 
 SMALL = CraterTerrainConfig(
@@ -176,8 +175,12 @@ class TestCraterTerrain:
 
     def test_images_hold_what_was_made(self, tmp_path: Path) -> None:
         terrain = crater_terrain(SMALL)
-        ground, obstacles, marks = write_terrain_images(tmp_path / "mars", terrain)
-        assert (read_grey(ground)[0] == terrain.elevation.shaded()).all()
+        ground, obstacles, marks = (tmp_path / f"{name}.png" for name in ("ground", "obstacles", "marks"))
+        shaded = terrain.elevation.shaded()
+        write_grey(ground, shaded)
+        write_hazard_image(obstacles, terrain.hazards)
+        write_landmark_image(marks, shaded, terrain.hazards, terrain.landmarks)
+        assert (read_grey(ground)[0] == shaded).all()
         origin = terrain.hazards.origin
         assert (read_hazard_image(obstacles, 200.0, origin).cells == terrain.hazards.cells).all()
         found = read_landmark_image(marks, 200.0, origin).points_xy_m

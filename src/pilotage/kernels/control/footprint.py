@@ -61,17 +61,6 @@ def polygon_distance(px: float, py: float, polygon: FloatArray) -> float:
 
 
 @kernel
-def points_clearance(x: float, y: float, theta: float, polygon: FloatArray, points: FloatArray) -> float:
-    """Least signed distance from a footprint at a pose to points (N, 2); inf without points."""
-    c, s = math.cos(theta), math.sin(theta)
-    best = math.inf
-    for i in range(points.shape[0]):
-        dx, dy = points[i, 0] - x, points[i, 1] - y
-        best = min(best, polygon_distance(c * dx + s * dy, c * dy - s * dx, polygon))
-    return best
-
-
-@kernel
 def discs_clearance(x: float, y: float, theta: float, polygon: FloatArray, discs: FloatArray) -> float:
     """Least signed distance from a footprint at a pose to discs (N, 3): x, y, radius; inf without any."""
     c, s = math.cos(theta), math.sin(theta)

@@ -43,15 +43,6 @@ def distance_to_nearest(px: float, py: float, segments: FloatArray, circles: Flo
 
 
 @kernel
-def distances_to_nearest(points: FloatArray, segments: FloatArray, circles: FloatArray) -> FloatArray:
-    """``distance_to_nearest`` for points (K, 2); returns (K,)."""
-    out = np.empty(points.shape[0])
-    for k in range(points.shape[0]):
-        out[k] = distance_to_nearest(points[k, 0], points[k, 1], segments, circles)
-    return out
-
-
-@kernel
 def segments_cross(
     ax: float, ay: float, bx: float, by: float, cx: float, cy: float, dx: float, dy: float
 ) -> bool:
@@ -65,18 +56,6 @@ def segments_cross(
     t = (qx * sy - qy * sx) / cross
     u = (qx * ry - qy * rx) / cross
     return 0.0 <= t <= 1.0 and 0.0 <= u <= 1.0
-
-
-@kernel
-def sees(ax: float, ay: float, bx: float, by: float, segments: FloatArray, circles: FloatArray) -> bool:
-    """Whether the straight line from A to B meets none of (S, 4) segments and (C, 3) circles."""
-    for i in range(segments.shape[0]):
-        if segments_cross(ax, ay, bx, by, segments[i, 0], segments[i, 1], segments[i, 2], segments[i, 3]):
-            return False
-    for i in range(circles.shape[0]):
-        if point_segment_distance(circles[i, 0], circles[i, 1], ax, ay, bx, by) <= circles[i, 2]:
-            return False
-    return True
 
 
 @kernel

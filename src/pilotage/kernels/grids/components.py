@@ -11,7 +11,6 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pilotage.kernels.arrays import ByteArray, IntArray, UintArray
 from pilotage.kernels.grids.moves import doubled, is_blocked, signed
@@ -109,29 +108,6 @@ def component_of(runs: Runs, stride: int, cell: int) -> int:
     if low == runs.row_start[row + 1] or signed(runs.begin[low]) > cell:
         return -1
     return int(runs.component[low])
-
-
-@kernel
-def component_sizes(runs: Runs) -> IntArray:
-    """Cells of each component, at the index of its first run; 0 at all others."""
-    sizes = np.zeros(runs.component.shape[0], np.int64)
-    for run in range(sizes.shape[0]):
-        sizes[runs.component[run]] += signed(runs.end[run]) - signed(runs.begin[run])
-    return sizes
-
-
-@kernel
-def component_mask(runs: Runs, stride: int, component: int) -> NDArray[np.bool_]:
-    """(rows, columns) without the frame: which cells belong to a component."""
-    rows = runs.row_start.shape[0] - 1
-    out = np.zeros((rows - 2, stride - 2), np.bool_)
-    for row in range(1, rows - 1):
-        first = row * stride + 1
-        for run in range(runs.row_start[row], runs.row_start[row + 1]):
-            if runs.component[run] == component:
-                for cell in range(runs.begin[run], runs.end[run]):
-                    out[row - 1, cell - first] = True
-    return out
 
 
 @kernel

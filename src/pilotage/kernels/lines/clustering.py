@@ -1,4 +1,4 @@
-"""Single-linkage clusters of an angle-ordered scan without the matrix of all distances."""
+"""Single-linkage clusters of an angle-ordered scan (night-watch report 3.2.1) without all distances."""
 
 from __future__ import annotations
 

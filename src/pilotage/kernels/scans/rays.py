@@ -1,15 +1,13 @@
-"""What range sensors would read among segments and circles: laser fans, cones, lines of sight."""
+"""What range sensors would read among segments and circles: laser fans and cones."""
 
 from __future__ import annotations
 
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pilotage.kernels.arrays import FloatArray
-from pilotage.kernels.geometry.motion import TWO_PI, wrap
-from pilotage.kernels.geometry.plane import sees
+from pilotage.kernels.geometry.motion import TWO_PI
 from pilotage.kernels.jit import kernel
 
 BEAM_SLACK = 1e-9
@@ -144,18 +142,6 @@ def narrow_fan(
 
 
 @kernel
-def add_range_noise(ranges: FloatArray, normals: FloatArray, std: float, max_range: float) -> FloatArray:
-    """Ranges (N,) + std * normals (N,), kept in [0, max_range]; one without a hit stays at ``max_range``."""
-    out = np.empty_like(ranges)
-    for k in range(ranges.shape[0]):
-        if ranges[k] >= max_range:
-            out[k] = max_range
-        else:
-            out[k] = min(max(ranges[k] + std * normals[k], 0.0), max_range)
-    return out
-
-
-@kernel
 def cone_range(
     x: float, y: float, theta: float, half_width: float, segments: FloatArray, circles: FloatArray
 ) -> float:
@@ -204,40 +190,3 @@ def cone_range(
             if along > 0.0 and rest >= 0.0:
                 best = min(best, max(along - math.sqrt(rest), 0.0))
     return best
-
-
-@kernel
-def visible_points(
-    x: float,
-    y: float,
-    theta: float,
-    half_view: float,
-    max_range: float,
-    points: FloatArray,
-    segments: FloatArray,
-    circles: FloatArray,
-    ranges: FloatArray,
-    bearings: FloatArray,
-    index: NDArray[np.int64],
-) -> int:
-    """Find the points (M, 2) in view; fill range, bearing and index of each and return their number.
-
-    ``half_view`` is half the field of view (pi sees all around); obstacles hide what is behind them.
-    """
-    count = 0
-    for i in range(points.shape[0]):
-        dx, dy = points[i, 0] - x, points[i, 1] - y
-        distance = math.hypot(dx, dy)
-        if distance > max_range or distance <= SIGHT_MARGIN_M:
-            continue
-        bearing = wrap(math.atan2(dy, dx) - theta)
-        if abs(bearing) > half_view:
-            continue
-        keep = 1.0 - SIGHT_MARGIN_M / distance
-        if not sees(x, y, x + keep * dx, y + keep * dy, segments, circles):
-            continue
-        ranges[count] = distance
-        bearings[count] = bearing
-        index[count] = i
-        count += 1
-    return count

@@ -20,7 +20,7 @@ from pilotage.kernels.scans.trace import grid_beam
 
 @kernel
 def hidden(ax: float, ay: float, bx: float, by: float, segments: FloatArray, circles: FloatArray) -> bool:
-    """Whether a segment or circle is in the way from A to B; touching counts, as in ``plane.sees``."""
+    """Whether a segment or circle is in the way from A to B; touching counts."""
     rx, ry = bx - ax, by - ay
     for i in range(segments.shape[0]):
         sx, sy = segments[i, 2] - segments[i, 0], segments[i, 3] - segments[i, 1]

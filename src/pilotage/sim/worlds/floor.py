@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from pilotage.kernels.geometry import boxes
+from pilotage.kernels.geometry.plane import NO_CIRCLES, distance_to_nearest
 from pilotage.maps.markings import FloorMarkings
 
 
@@ -17,7 +17,7 @@ class FloorLayer:
     def is_dark(self, x_m: float, y_m: float, blur_m: float = 0.0) -> bool:
         """Whether the floor is dark there; tapes and the dark floor reach ``blur_m`` farther than they do."""
         marks = self.markings
-        tapes = boxes.distance_to_lines(x_m, y_m, marks.tapes_m)
+        tapes = distance_to_nearest(x_m, y_m, marks.tapes_m, NO_CIRCLES)
         if tapes <= 0.5 * marks.tape_width_m + blur_m:
             return True
         width, height = marks.size_m

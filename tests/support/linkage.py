@@ -1,4 +1,4 @@
-"""Scans cut into clusters of neighbouring points: single linkage, by the tree and by the window."""
+"""Single linkage by the whole tree: what the fast clusters of a scan are held against."""
 
 from __future__ import annotations
 
@@ -6,25 +6,7 @@ import numpy as np
 from scipy.cluster.hierarchy import fcluster, linkage
 
 from pilotage.core.types import FloatArray, IntArray
-from pilotage.kernels.lines import clustering
-
-DROPPED = clustering.DROPPED
-"""Label of a reading that is no return, or whose cluster is too small."""
-
-
-def window_clusters(
-    ranges_m: FloatArray,
-    points_xy_m: FloatArray,
-    step_rad: float,
-    max_range_m: float,
-    cutoff_m: float,
-    least_points: int,
-) -> IntArray:
-    """Cluster an angle-ordered scan by comparing each point only with those that can be near it.
-
-    The same labels (N,) as ``linkage_clusters`` in a small part of its time; see the kernel for why.
-    """
-    return clustering.scan_clusters(ranges_m, points_xy_m, step_rad, max_range_m, cutoff_m, least_points)
+from pilotage.kernels.lines.clustering import DROPPED
 
 
 def linkage_clusters(
