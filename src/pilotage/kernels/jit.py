@@ -2,6 +2,7 @@
 
 numba's own cache does not notice an edited callee in another module, so each kernel module's cache folder is
 keyed to a digest of its source, of all kernel modules that it imports, and of the numba and numpy versions.
+Clones and installations of one source share it; of processes that need a function at once one compiles.
 """
 
 from __future__ import annotations
@@ -10,16 +11,28 @@ import hashlib
 import os
 import re
 import tempfile
+import time
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
-from typing import Any, TypeVar, cast
+from typing import IO, Any, TypeVar, cast
 
 import numba
 import numpy as np
+from numba.core.caching import (
+    CompileResultCacheImpl,
+    FunctionCache,
+    _CacheLocator,
+    _SourceFileBackedLocatorMixin,
+)
 from numba.cpython.unsafe import numbers as _bits
 
 __all__ = ["cache_is_cold", "kernel", "kernel_without_lock", "leading_zeros", "trailing_zeros"]
+
+try:
+    import fcntl
+except ImportError:  # not there on Windows: every process compiles for itself
+    fcntl = None  # type: ignore[assignment]
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -30,6 +43,8 @@ trailing_zeros = cast(Callable[[np.uint64], int], _bits.trailing_zeros)
 
 
 _ROOT = Path(__file__).parent
+_PATIENCE_S, _LOOK_S = 120.0, 0.02
+"""How long another process may take to compile a function, and how often it is looked whether it has."""
 _IMPORTS = re.compile(r"^from pilotage\.kernels(?:\.([\w.]+))? import ([^\n(]+|\([^)]*\))", re.MULTILINE)
 
 
@@ -97,16 +112,83 @@ def cache_is_cold() -> bool:
     return next(_folder_of(_ROOT / "geometry" / "plane.py").rglob("*.nbi"), None) is None
 
 
+class _Locator(_SourceFileBackedLocatorMixin, _CacheLocator):
+    """The folder of a module's digest, wherever the module lies: clones and installations share it."""
+
+    def __init__(self, py_func: Callable[..., Any], py_file: str) -> None:
+        self._py_file, self._lineno = py_file, py_func.__code__.co_firstlineno
+
+    def get_cache_path(self) -> str:
+        return str(_folder_of(Path(self._py_file)))
+
+
+class _Compiled(CompileResultCacheImpl):
+    def __init__(self, py_func: Callable[..., Any]) -> None:
+        self._locator_classes = [_Locator]
+        super().__init__(py_func)  # type: ignore[no-untyped-call]
+
+
+class _Cache(FunctionCache):
+    """numba's own cache, in which a function that another process compiles just now is waited for.
+
+    Workers that begin together would each compile the same; two that save at once could mix their files up.
+    """
+
+    _impl_class = _Compiled
+    _lock: IO[bytes] | None = None
+
+    def load_overload(self, sig: object, target_context: object) -> object:
+        """From the disk; None where this process is to compile it."""
+        found = super().load_overload(sig, target_context)  # type: ignore[no-untyped-call]
+        if found is None and self._lock is None and fcntl is not None:
+            self._lock = self._wait()
+            found = super().load_overload(sig, target_context)  # type: ignore[no-untyped-call]
+            if found is not None:
+                self._release()
+        return found
+
+    def save_overload(self, sig: object, data: object) -> None:
+        """Write it and let the others go on."""
+        try:
+            super().save_overload(sig, data)  # type: ignore[no-untyped-call]
+        finally:
+            self._release()
+
+    def _wait(self) -> IO[bytes] | None:
+        """The lock of this function, held; None where nobody gives it free in time or it cannot be taken."""
+        path = Path(self.cache_path) / f"{self._impl.filename_base}.lock"
+        until = time.monotonic() + _PATIENCE_S
+        try:
+            file = path.open("ab")
+        except OSError:
+            return None
+        while time.monotonic() < until:
+            try:
+                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except OSError:
+                time.sleep(_LOOK_S)
+            else:
+                return file
+        file.close()
+        return None
+
+    def _release(self) -> None:
+        if self._lock is not None:
+            self._lock.close()
+            self._lock = None
+
+
 def kernel(function: F) -> F:
     """Compile ``function`` with numba: cached, no fast-math, no parallel threads, errors as in numpy."""
-    # numba takes the cache's folder when a function is decorated.
-    folder = _folder_of(Path(function.__code__.co_filename))
-    setattr(numba.config, "CACHE_DIR", str(folder))  # noqa: B010 - numba's stub lacks the name
-    return cast(F, numba.njit(cache=True, error_model="numpy")(function))
+    return _cached(numba.njit(error_model="numpy")(function), function)
 
 
 def kernel_without_lock(function: F) -> F:
     """As ``kernel``; other threads of Python run meanwhile, so that each core may step its share."""
-    folder = _folder_of(Path(function.__code__.co_filename))
-    setattr(numba.config, "CACHE_DIR", str(folder))  # noqa: B010 - numba's stub lacks the name
-    return cast(F, numba.njit(cache=True, error_model="numpy", nogil=True)(function))
+    return _cached(numba.njit(error_model="numpy", nogil=True)(function), function)
+
+
+def _cached(dispatcher: Any, function: F) -> F:
+    if hasattr(dispatcher, "_cache"):  # a plain function where NUMBA_DISABLE_JIT is set
+        dispatcher._cache = _Cache(function)  # type: ignore[no-untyped-call]
+    return cast(F, dispatcher)

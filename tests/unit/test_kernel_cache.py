@@ -1,0 +1,42 @@
+"""Compiled kernels: one process compiles, the others that need them wait, wherever their files lie."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+TOY = """
+from pilotage.kernels.jit import kernel
+
+@kernel
+def twice(x):
+    return 2 * x
+
+if __name__ == "__main__":
+    assert twice(21) == 42
+    print(sum(twice.stats.cache_misses.values()), sum(twice.stats.cache_hits.values()))
+"""
+
+
+def test_of_processes_that_begin_together_one_compiles(tmp_path: Path) -> None:
+    """In two clones of the same source: the cache knows what is in a file, not where it lies."""
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path), "PILOTAGE_CACHE_DIR": str(tmp_path)}
+    children = []
+    for clone in ("one", "two"):
+        (tmp_path / clone).mkdir()
+        (tmp_path / clone / "toy.py").write_text(TOY)
+        words = [sys.executable, str(tmp_path / clone / "toy.py")]
+        children.append(subprocess.Popen(words, stdout=subprocess.PIPE, text=True, env=environment))
+    told = sorted(child.communicate()[0].split() for child in children)
+    assert told == [["0", "1"], ["1", "0"]]
+    (tmp_path / "one" / "toy.py").write_text(TOY.replace("2 *", "1 * 2 *"))
+    again = subprocess.run(
+        [sys.executable, str(tmp_path / "one" / "toy.py")],
+        stdout=subprocess.PIPE,
+        text=True,
+        env=environment,
+        check=True,
+    )
+    assert again.stdout.split() == ["1", "0"]  # another source is compiled anew
