@@ -1,6 +1,6 @@
 """The rover's estimators over many runs: do their 95 % ellipses hold the truth 95 % of the time?
 
-``python -m benchmarks.gale [--runs 1000] [--reckoned 4000] [--json OUT]``: each task's drive once by truth,
+``python -m benchmarks.gale [--runs 1000] [--reckoned 3000] [--json OUT]``: each task's drive once by truth,
 then the estimators' kernels along it with noise of their own a run (the study ``gale-estimation`` runs whole
 missions instead, fewer times). A run's steps share their error: intervals come from the runs.
 """
@@ -159,7 +159,7 @@ def main() -> int:
     """Measure and print; write the values where a file is named."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--runs", type=int, default=1000)
-    parser.add_argument("--reckoned", type=int, default=4000, help="runs of dead reckoning, which are cheap")
+    parser.add_argument("--reckoned", type=int, default=3000, help="runs of dead reckoning, which are cheap")
     parser.add_argument("--json", type=Path)
     options = parser.parse_args()
     values: dict[str, dict[str, float]] = {}

@@ -119,6 +119,24 @@ def adopt() -> None:
     GIVEN.write_text(json.dumps(found, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
 
 
+def written(claims: Mapping[str, Any]) -> str:
+    """docs/claims.json: a value a line, so that a diff shows what changed."""
+    sources = []
+    for name, claim in claims.items():
+        said = [
+            f" {json.dumps(key)}: {json.dumps(claim[key], ensure_ascii=False)}"
+            for key in claim
+            if key != "values"
+        ]
+        values = [
+            f"  {json.dumps(key, ensure_ascii=False)}: {json.dumps(value)}"
+            for key, value in claim["values"].items()
+        ]
+        lines = [*said, ' "values": {\n' + ",\n".join(values) + "\n }"]
+        sources.append(json.dumps(name) + ": {\n" + ",\n".join(lines) + "\n}")
+    return "{\n" + ",\n".join(sources) + "\n}\n"
+
+
 def measure(name: str, entry: Mapping[str, Any], workers: int) -> dict[str, Any]:
     """Run what is registered and collect its values."""
     with tempfile.TemporaryDirectory() as folder:
@@ -238,10 +256,7 @@ def main() -> int:
             if name not in registry:
                 raise ClaimError(f"'{name}' is not registered in docs/claims.yaml: {', '.join(registry)}")
             claims[name] = measure(name, registry[name], options.workers)
-            text = json.dumps(
-                {key: claims[key] for key in registry if key in claims}, indent=1, ensure_ascii=False
-            )
-            CLAIMS.write_text(text + "\n", encoding="utf-8")
+            CLAIMS.write_text(written({key: claims[key] for key in registry if key in claims}), "utf-8")
         for page in PAGES:
             page.write_text(quoted(page.read_text(encoding="utf-8"), claims), encoding="utf-8")
     except ClaimError as error:
