@@ -23,7 +23,7 @@ FINGERPRINT = { pwd; cat requirements.lock pyproject.toml | cksum; }
 STAMP := $(VENV)/.made-from
 BENCH_STAMP := $(VENV)/.bench-made-from
 
-.PHONY: help core setup demo test fuzz check format format-check lint types contracts locks api docs examples bench lock clean claims
+.PHONY: help core setup demo test fuzz check format format-check lint types contracts locks api docs notebooks examples bench lock clean claims
 
 help:  ## this list
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/  make \1|\2/p' Makefile | awk -F'|' '{ printf "%-20s %s\n", $$1, $$2 }'
@@ -102,6 +102,9 @@ claims: setup  ## measure what README and docs claim, write docs/claims.json and
 
 docs: setup  ## build the site into build/site: executes the notebooks, drives the gallery's missions; no network
 	@$(PY) docs/make_site.py $(ARGS)
+
+notebooks: setup  ## execute the five notebooks and stop at the first error
+	@$(PY) docs/make_site.py --notebooks
 
 examples: setup  ## run the examples alone
 	@$(PY) -m pytest tests/unit/test_examples.py $(ARGS)

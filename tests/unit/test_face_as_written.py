@@ -11,6 +11,7 @@ import pytest
 
 from pilotage.maps.occupancy_grid import OccupancyGrid
 from pilotage.maps.ros_map import RosMap, write_ros_map
+from support.films import FilmScript, render_film
 
 SCRIPT = """
 import pilotage as pl
@@ -32,10 +33,21 @@ print(pl.plan("map.yaml", start, goal).path.shape)
 print(pl.plan("map.yaml", start, goal, planner="theta-star", clearance_m=0.2).path.shape)
 short = pl.load(mission, set={"run.time_limit_s": 3.0})
 print(pl.study(short, vary={"stack.localizer.gate": [0.9, 0.99]}, trials=2, workers=2).table())
+ranges = [2.0] * 90
 filter = pl.filters.EkfLandmarks(landmarks=[[4.0, 0.0], [0.0, 3.0]])
 print(filter.predict(0.5, 0.0).update([0, 1], [3.5, 3.04], [0.0, 1.737]).mean)
+log = pl.export(run, "mcap", "run.mcap")
+print(pl.localize(log, map="museum").success)
+print(pl.calibrate("odometry", log)["distance_scale"])
+print(pl.evaluate(log, log, topics=["/pose", "/truth"])["ate_rmse_m"])
+print(pl.track("film.avi").visited_cells)
+print(pl.lines.extract(ranges, field_of_view_rad=1.5))
 print("all of it")
 """
+
+
+pytest.importorskip("cv2", reason="needs the extra 'vision'")
+pytest.importorskip("rosbags", reason="needs the extra 'ros'")
 
 
 @pytest.mark.slow
@@ -44,6 +56,7 @@ def test_the_lines_run_as_written(tmp_path: Path) -> None:
     cells[:, 0] = cells[:, -1] = cells[0] = cells[-1] = True
     cells[12:, 30] = True
     write_ros_map(tmp_path / "map.yaml", RosMap.of(OccupancyGrid.of(cells, 0.1), "map.pgm"))
+    render_film(tmp_path / "film.avi", FilmScript())
     (tmp_path / "lines.py").write_text(SCRIPT)
     done = subprocess.run(
         [sys.executable, "-W", "error", "lines.py"],

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, TypeAlias
 
 import typer
 
@@ -11,6 +11,10 @@ from pilotage.cli.options import Json
 from pilotage.cli.output import print_columns, print_json, print_line
 
 MAP_HELP = "A shipped map's name or a file: walls, a sheet, a ROS map, MovingAI, an image, heights."
+Resolution: TypeAlias = Annotated[
+    float | None,
+    typer.Option(metavar="M", help="Metres a cell of a file that does not say, such as an image."),
+]
 
 
 def draw(
@@ -18,12 +22,13 @@ def draw(
     out: Annotated[
         Path | None, typer.Option(metavar="FILE.png", help="The picture; default the map's name, .png.")
     ] = None,
+    resolution: Resolution = None,
     json: Json = False,
 ) -> None:
     """Draw a map as it is understood, and say what it has."""
     from pilotage.face.maps import draw as drawn_by
 
-    drawn = drawn_by(map_, out)
+    drawn = drawn_by(map_, out, resolution_m=resolution)
     answer = {**drawn.layers, "picture": str(drawn.path)}
     if json:
         print_json(answer)
@@ -40,13 +45,14 @@ def vectorize(
         float,
         typer.Option(metavar="M", help="How far a wall may lie from the cells: 0 keeps their staircases."),
     ] = 0.0,
+    resolution: Resolution = None,
     json: Json = False,
 ) -> None:
     """Make a map of walls from a map of cells, so that a filter on walls works on it."""
     from pilotage.experiments.build.charts import load_chart
     from pilotage.face.maps import vectorize as vectorized_by
 
-    path = vectorized_by(map_, out, tolerance_m=tolerance)
+    path = vectorized_by(map_, out, tolerance_m=tolerance, resolution_m=resolution)
     walls = len(load_chart(str(path)).walls.segments_m)
     if json:
         print_json({"map": str(path), "walls": walls})

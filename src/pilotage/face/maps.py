@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from os import PathLike
@@ -13,6 +14,7 @@ from pilotage.experiments.build.charts import load_chart
 from pilotage.maps.occupancy_grid import OCCUPIED_FROM
 from pilotage.maps.vectorize import wall_segments, write_wall_map
 from pilotage.maps.world_map import WorldMap
+from pilotage.missions.map_choice import GridMap
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,7 +33,12 @@ class Drawn:
     layers: Mapping[str, Any]
 
 
-def draw(map: str | PathLike[str], out: str | PathLike[str] | None = None) -> Drawn:  # noqa: A002 - its word
+def draw(
+    map: str | PathLike[str],  # noqa: A002 - the word for it
+    out: str | PathLike[str] | None = None,
+    *,
+    resolution_m: float | None = None,
+) -> Drawn:
     """Draw a map as it is understood: walls, cells, heights, tapes, landmarks and bounds.
 
     Parameters
@@ -40,6 +47,8 @@ def draw(map: str | PathLike[str], out: str | PathLike[str] | None = None) -> Dr
         A shipped map's name or a file of any format that ``plan`` and missions take.
     out
         A PNG file; None: the map's name in the working folder.
+    resolution_m
+        Metres a cell of a file that does not say, such as an image.
 
     Raises
     ------
@@ -55,7 +64,7 @@ def draw(map: str | PathLike[str], out: str | PathLike[str] | None = None) -> Dr
     """
     from pilotage.report.map_picture import draw_map
 
-    chart = load_chart(str(map))
+    chart = _chart(map, resolution_m)
     path = Path(f"{Path(map).stem}.png") if out is None else Path(out)
     if path.suffix.lower() != ".png":
         raise InputError(f"--out: expected a PNG file, found '{path}'")
@@ -72,6 +81,7 @@ def vectorize(
     out: str | PathLike[str] | None = None,
     *,
     tolerance_m: float = 0.0,
+    resolution_m: float | None = None,
 ) -> Path:
     """Make a map of walls from a map of cells, so that what needs walls works on it.
 
@@ -84,13 +94,15 @@ def vectorize(
     tolerance_m
         How far a wall may lie from the cells' outline: 0 keeps the staircases of slanted walls, a cell's side
         makes them straight.
+    resolution_m
+        Metres a cell of a file that does not say, such as an image.
 
     Raises
     ------
     InputError
         Where the map has no cells, or too many walls come of them.
     """
-    chart = load_chart(str(map))
+    chart = _chart(map, resolution_m)
     if chart.grid is None or chart.geometry is not None:
         raise InputError(f"vectorize: expected a map of cells, found '{map}', which has walls already")
     path = Path(f"{Path(map).stem}-walls.yaml") if out is None else Path(out)
@@ -104,6 +116,14 @@ def vectorize(
     name = "".join(c if c.isalnum() or c in "-_" else "-" for c in path.stem)
     write_wall_map(path, f"'{name}'", segments, chart.bounds_m, Path(map).name)
     return path
+
+
+def _chart(map: str | PathLike[str], resolution_m: float | None) -> WorldMap:  # noqa: A002 - the word for it
+    if resolution_m is None:
+        return load_chart(str(map))
+    if not 0.0 < resolution_m < math.inf:
+        raise InputError(f"--resolution: expected metres above 0, found {resolution_m:g}")
+    return load_chart(GridMap(name="grid", file=str(map), resolution_m=resolution_m))
 
 
 def layers_of(chart: WorldMap) -> dict[str, Any]:

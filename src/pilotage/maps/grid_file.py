@@ -49,7 +49,12 @@ def read_grid(path: Path, resolution_m: float | None = None, origin: Pose2 | Non
         )
     if suffix in IMAGES:
         if resolution_m is None:
-            raise InputError(f"{path}: expected a resolution in metres a pixel for an image, found none")
+            raise InputError(
+                f"{path}: expected a resolution in metres a pixel for an image (white is an obstacle), found "
+                "none: plan --set map.resolution_m=0.05, draw --resolution 0.05, in a mission world.map: "
+                f"{{name: grid, file: {path.name}, resolution_m: 0.05}}; dark walls on white: a ROS map's "
+                "YAML with image, resolution and origin"
+            )
         return read_hazard_image(path, resolution_m, place)
     raise InputError(f"{path}: expected a grid map ({', '.join(sorted(GRID_SUFFIXES))}), found '{suffix}'")
 
