@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
+from PIL import Image
 
 import pilotage as pl
 from pilotage.cli.main import BAD_INPUT, main
@@ -73,9 +74,14 @@ def test_a_map_is_drawn_as_it_is_understood(name: str, tmp_path: Path) -> None:
 
 
 def test_what_cannot_be_drawn_is_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    Image.fromarray(np.where(room(), 255, 0).astype(np.uint8)).save(tmp_path / "plan.png")
+    image = pl.draw(tmp_path / "plan.png", tmp_path / "drawn.png", resolution_m=0.1)
+    assert image.layers["occupied_cells"] == int(room().sum())
     for words, message in (
         (["draw", "musem"], "did you mean 'museum'"),
         (["draw", "museum", "--out", str(tmp_path / "x.jpg")], "expected a PNG file"),
+        (["draw", str(tmp_path / "plan.png")], "draw --resolution 0.05, in a mission world.map"),
+        (["draw", str(tmp_path / "plan.png"), "--resolution", "-1"], "--resolution: expected metres above 0"),
         (["draw", "museum", "--out", str(tmp_path / "none" / "x.png")], "expected a folder"),
         (["vectorize", "museum"], "has walls already"),
         (["vectorize", str(ros_map(tmp_path, room())), "--out", str(tmp_path / "w.png")], "YAML file"),

@@ -26,7 +26,9 @@ def opencv() -> Any:
     try:
         return importlib.import_module("cv2")
     except ImportError:
-        raise InputError("tracking needs OpenCV, which is not installed: install pilotage[vision]") from None
+        raise InputError(
+            "tracking needs OpenCV, which is not installed: pip install pilotage[vision]"
+        ) from None
 
 
 @contextmanager
