@@ -19,6 +19,18 @@ OUTCOME_UNKNOWN = -1
 
 
 @kernel
+def summed_up(nis: FloatArray, outcome: IntArray) -> tuple[int, float]:
+    """How many of the sightings (N,) are of known landmarks, and the NIS of those accepted, summed."""
+    known, total = 0, 0.0
+    for k in range(nis.shape[0]):
+        if outcome[k] != OUTCOME_UNKNOWN:
+            known += 1
+        if outcome[k] == OUTCOME_ACCEPTED:
+            total += nis[k]
+    return known, total
+
+
+@kernel
 def landmark_index(known_ids: IntArray, landmark_id: int) -> int:
     """Where a landmark stands among ``known_ids`` (L,), which are sorted; -1 where it is unknown."""
     i = np.searchsorted(known_ids, landmark_id)

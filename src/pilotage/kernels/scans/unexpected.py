@@ -18,7 +18,7 @@ def unexplained_points(
     x: float,
     y: float,
     first: float,
-    step: float,
+    directions: FloatArray,
     reach: float,
     tolerance: float,
     tolerance_per_m: float,
@@ -30,17 +30,19 @@ def unexplained_points(
     """Endpoints (K, 2) of the beams shorter than ``reach`` that end farther from every known wall than
     ``tolerance + tolerance_per_m * range``.
 
-    Beam k looks along ``first + k * step`` in the map frame from (x, y); ``distance`` is the distance
-    field of the known map. A point outside the field counts as explained.
+    Beams look from (x, y) along ``directions`` (N, 2) seen from the first one, which looks along ``first`` in
+    the map frame; ``distance`` is the distance field of the known map. A point outside the field counts as
+    explained.
     """
     points = np.empty((ranges.shape[0], 2))
     count = 0
+    c, s = math.cos(first), math.sin(first)
     for k in range(ranges.shape[0]):
         r = ranges[k]
         if r >= reach:
             continue
-        angle = first + k * step
-        px, py = x + r * math.cos(angle), y + r * math.sin(angle)
+        ux, uy = directions[k, 0], directions[k, 1]
+        px, py = x + r * (c * ux - s * uy), y + r * (s * ux + c * uy)
         if interpolate_at(px, py, distance, x0, y0, resolution) > tolerance + tolerance_per_m * r:
             points[count, 0] = px
             points[count, 1] = py

@@ -173,18 +173,16 @@ class LandmarkFilter:
             nis,
             outcome,
         )
-        known = outcome != sighting.OUTCOME_UNKNOWN
-        accepted = nis if used == count else nis[outcome == sighting.OUTCOME_ACCEPTED]
-        total = float(accepted.sum())
-        self._check.tell(self._t_s, int(known.sum()), used, total, used * self._expected_nis)
+        known, total = sighting.summed_up(nis, outcome)
+        self._check.tell(self._t_s, known, used, total, used * self._expected_nis)
         self._tell(count, used, total)
         if used:
             self._rejected = 0
             return
-        if known.any():
+        if known:
             self._rejected += 1
             if self._doubt_after is not None and self._rejected >= self._doubt_after:
-                self._doubt(seen, known)
+                self._doubt(seen, outcome != sighting.OUTCOME_UNKNOWN)
 
     def _doubt(self, seen: BeaconReadings, known: BoolArray) -> None:
         """Begin anew where the beacons agree on a pose, else believe the old one less."""

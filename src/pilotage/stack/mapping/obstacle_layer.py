@@ -9,6 +9,7 @@ from pydantic import Field
 
 from pilotage.core.config import Config
 from pilotage.core.types import FloatArray, IntArray
+from pilotage.kernels.lines.clustering import beam_directions
 from pilotage.kernels.scans import unexpected
 from pilotage.maps.world_map import WorldMap
 from pilotage.sensors.lidar import LidarConfig
@@ -51,6 +52,7 @@ class ObstacleLayer:
         self._mount = lidar.mount
         self._first = float(lidar.beam_angles_rad()[0])
         self._step = lidar.beam_step_rad
+        self._directions = beam_directions(0.0, self._step, lidar.beams)
         self._reach_m = min(config.reach_m, lidar.max_range_m)
         self._known = chart.wall_field
         xmin, ymin, xmax, ymax = chart.bounds_m
@@ -81,7 +83,7 @@ class ObstacleLayer:
             x,
             y,
             first,
-            self._step,
+            self._directions,
             self._reach_m,
             config.tolerance_m + spread_m,
             spread_rad,
