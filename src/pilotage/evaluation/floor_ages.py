@@ -14,6 +14,8 @@ from pilotage.sensors.lidar import LidarConfig
 from pilotage.sim.bodies.body import Body
 
 MOST_CELLS = 40_000
+SPANS_S = (10.0, 30.0, 60.0)
+"""What the floor that was seen within is told of."""
 
 
 class FloorAges:
@@ -43,6 +45,7 @@ class FloorAges:
         self.cell_m = cell_m
         self.seen_s: FloatArray = np.zeros(len(self.cells_xy_m))
         self._ages: list[tuple[float, float, float]] = []
+        self._within: list[list[float]] = []
         self._sum_s = np.zeros(len(self.cells_xy_m))
 
     def look(self, t_s: float, body: Body, lidar: LidarConfig) -> None:
@@ -69,6 +72,7 @@ class FloorAges:
         """Count the ages of this moment."""
         age = t_s - self.seen_s
         self._sum_s += age
+        self._within.append([float((age <= span_s).mean()) for span_s in SPANS_S])
         self._ages.append((float((age <= window_s).mean()), float(age.mean()), float(age.max())))
 
     def series(self) -> FloatArray:
@@ -80,11 +84,13 @@ class FloorAges:
         return self._sum_s / max(len(self._ages), 1)
 
     def metrics(self, first_sample: int) -> dict[str, object]:
-        """Means over the samples from one on, when the first window has passed; the largest age of all."""
+        """Over the samples from one on: means, the largest age, and the least share seen within each span."""
         table = self.series()[first_sample:]
         if not len(table):
             return {}
+        least = np.min(self._within[first_sample:], axis=0)
         return {
+            **{f"seen_within_{span:g}_s": float(share) for span, share in zip(SPANS_S, least, strict=True)},
             "coverage_fraction": float(table[:, 0].mean()),
             "coverage_age_mean_s": float(table[:, 1].mean()),
             "coverage_age_worst_s": float(table[:, 2].max()),
