@@ -64,9 +64,8 @@ def test_where_one_factor_matters_the_others_are_not_blamed(paired: bool) -> Non
     assert alarms <= stats.binom.isf(0.001, STUDIES, 0.05)
 
 
-@pytest.mark.parametrize("levels", [2, 3, 5])
 @pytest.mark.parametrize("paired", [True, False])
-@pytest.mark.parametrize("shift", [0.5, 0.8, 1.1])
+@pytest.mark.parametrize(("levels", "shift"), [(2, 0.8), (3, 1.1), (5, 0.5), (5, 1.1)])
 def test_power_is_as_told_within_five_points(levels: int, paired: bool, shift: float) -> None:
     """Of 1000 studies of 25 trials each, of which 1.6 points are one standard error at most."""
     rng, trials, tests = np.random.default_rng(7), 25, 6

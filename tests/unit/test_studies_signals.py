@@ -26,7 +26,7 @@ from pilotage.cli.main import main
 if __name__ == "__main__":
     local_workers._work = hostile_trials.work
     sys.argv[1:] = ["sweep", "museum-plan", "--vary", "stack.planner.turning_radius_m=0.3,0.5,0.8",
-                    "--trials", "6", "--name", "x", "--no-report", *sys.argv[1:]]
+                    "--trials", "6", "--name", "x", "--no-report", "--quiet", *sys.argv[1:]]
     sys.exit(main())
 """
 
