@@ -14,7 +14,7 @@ from pilotage.cli.main import main
 from pilotage.experiments.barn_bounds import has_way
 from pilotage.logs.barn import START, BarnWorld, path_clearance_m
 
-KEYS = {"metric", "success", "collision", "timeout", "time_s", "trials", "worlds"}
+KEYS = {"metric", "success", "collision", "timeout", "time_s", "over_bound", "trials", "worlds"}
 JACKAL = np.array([[0.254, 0.215], [-0.254, 0.215], [-0.254, -0.215], [0.254, -0.215]])
 SIDES = [(x, y) for x in (-4.2, -0.3) for y in np.arange(1.0, 9.6, 0.14)]
 BOTTOM = [(x, 1.0) for x in np.arange(-4.2, -0.2, 0.14)]

@@ -155,7 +155,8 @@ def test_it_drives_judges_and_writes(tmp_path: Path, capsys: pytest.CaptureFixtu
     page = (out / "report.html").read_text()
     assert "time within 0.5 m" in page
 
-    assert bench(out, "doors", "--controller", "dwa", "--replays", "1", "--set", STRAIGHT) == 0
+    own = ("--set", "stack.local_controller.speeds=6")  # of dwa, not of the mission's own controller
+    assert bench(out, "doors", "--controller", "dwa", "--replays", "1", *own, "--set", STRAIGHT) == 0
     assert json.loads(capsys.readouterr().out)["controllers"]["dwa"]["collision"] == 1.0
     assert len(list((out / "replays").glob("*/report.html"))) == 1
     assert 'href="replays/doors-0-0-dwa' in (out / "report.html").read_text()
@@ -168,6 +169,7 @@ def test_it_drives_judges_and_writes(tmp_path: Path, capsys: pytest.CaptureFixtu
         (("doors", "doors"), "found one twice"),
         (("doors", "--controller", "dwaa"), "did you mean 'dwa'"),
         (("bottleneck-0.36",), "found the robot too wide"),
+        (("doors", "--set", "stack.local_controller.name=vfh"), "say --controller NAME"),
     ],
 )
 def test_bad_input_is_one_line(

@@ -95,7 +95,7 @@ def bench_barn(request: BarnRequest, on_run: OnRun | None = None) -> BarnAnswer:
     base = course_base()
     for controller in request.controllers:
         course_mission(request, base, request.worlds[0], 0, controller)
-    robot = mission_of(base, request.overrides).robot
+    robot = mission_of(base, led_by(request.controllers[0], request.overrides)).robot
     outline = outline_of(footprint_of(robot, "robot"))
     open_worlds = [world for world in request.worlds if has_way(world, outline)]
     if not open_worlds:
@@ -141,11 +141,11 @@ def course_mission(
         Where the controller or an override is not what it should be.
     """
     draw = np.random.default_rng([request.seed, world.number, trial])
-    mission = mission_of(base, request.overrides)
+    overrides = led_by(controller, request.overrides)
+    mission = mission_of(base, overrides)
     settings: dict[str, Any] = {
         "run.seed": int(draw.integers(0, 2**62)),
         "run.time_limit_s": TIME_LIMIT_S,
-        "stack.local_controller.name": controller,
         "world.start": dict(zip(("x_m", "y_m", "theta_rad"), START, strict=True)),
         "world.goal": {
             "x_m": START[0],
@@ -165,7 +165,22 @@ def course_mission(
                 scale = float(sensor.parameters.get(key, 1.0)) + std * float(draw.standard_normal())
                 settings[f"robot.sensors.{name}.{key}"] = scale
     settings["mission"] = f"barn-{world.number}-{trial}-{controller}"
-    return mission_of(base, request.overrides, settings=settings)
+    return mission_of(base, overrides, settings=settings)
+
+
+def led_by(controller: str, overrides: tuple[str, ...]) -> tuple[str, ...]:
+    """The overrides on top of a controller, whose parameters they may set.
+
+    Raises
+    ------
+    InputError
+        Where they name another one.
+    """
+    if any(text.startswith("stack.local_controller.name=") for text in overrides):
+        raise InputError(
+            "--set stack.local_controller.name: expected no name, found one; say --controller NAME"
+        )
+    return (f"stack.local_controller.name={controller}", *overrides)
 
 
 def drive_world(request: BarnRequest, base: Values, world: BarnWorld, trial: int, controller: str) -> BarnRun:
@@ -212,7 +227,7 @@ def published_runs(folder: Path, worlds: Sequence[BarnWorld]) -> dict[str, tuple
 
 
 def summary_values(answer: BarnAnswer) -> dict[str, Any]:
-    """``metric success collision timeout time_s trials worlds``; of several controllers these by name."""
+    """``metric success collision timeout time_s over_bound trials worlds``, of several by name."""
     summaries = {name: _summary(runs) for name, runs in answer.runs.items()}
     return summaries[answer.request.controllers[0]] if len(summaries) == 1 else summaries
 
@@ -225,6 +240,7 @@ def _summary(runs: Sequence[BarnRun]) -> dict[str, Any]:
         "collision": found.collision,
         "timeout": found.timeout,
         "time_s": found.time_s,
+        "over_bound": found.over_bound,
         "trials": found.trials,
         "worlds": found.worlds,
     }

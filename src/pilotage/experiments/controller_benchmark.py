@@ -13,7 +13,7 @@ import numpy as np
 
 from pilotage.core.errors import InputError
 from pilotage.evaluation.courses import CourseRun, summarize_courses
-from pilotage.experiments.barn_benchmark import course_base
+from pilotage.experiments.barn_benchmark import course_base, led_by
 from pilotage.experiments.barn_files import REPLAYS, SUMMARY, finite
 from pilotage.experiments.build.build import build
 from pilotage.experiments.build.robots import footprint_of, motion_of
@@ -98,7 +98,7 @@ def bench_controllers(
                 f"bench controllers: expected a map or tracks of people, or one of {', '.join(DRAWN)}, "
                 f"found '{family}'"
             )
-    robot = mission_of(base, request.overrides).robot
+    robot = mission_of(base, led_by(request.controllers[0], request.overrides)).robot
     footprint = footprint_of(robot, "robot")
     driver = Driver(footprint, outline_of(footprint), motion_of(robot, "robot"))
     courses: dict[tuple[str, int], Course] = {}
@@ -161,14 +161,13 @@ def course_run_mission(
         "mission": f"{name}-{course.number}-{trial}-{controller}"[-100:],
         "run.seed": int(draw.integers(0, 2**62)),
         "run.time_limit_s": TIME_LIMIT_S,
-        "stack.local_controller.name": controller,
         **course.settings,
         "world.people": [] if empty else list(course.people),
     }
     if course.people and "ground" in LOCAL_CONTROLLERS.entry(controller).config.model_fields:
         for key, value in AMONG_PEOPLE.items():
             settings[f"stack.local_controller.{key}"] = value
-    return mission_of(base, request.overrides, settings=settings)
+    return mission_of(base, led_by(controller, request.overrides), settings=settings)
 
 
 def drive_course(
