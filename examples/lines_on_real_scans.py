@@ -45,9 +45,10 @@ class Scan:
 
 def lines_of(log: CarmenLog) -> list[Scan]:
     """Extract the lines of every scan, at the poses that the log gives."""
-    beams, step = log.angles_rad.shape[0], float(log.angles_rad[1] - log.angles_rad[0])
+    angles = log.angles_rad(0)
+    beams, step = angles.size, float(log.angle_step_rad[0])
     # The library's fans are even about the x axis; this scanner's first beam looks a little farther right.
-    aside = float(log.angles_rad[0]) + 0.5 * step * (beams - 1)
+    aside = float(angles[0]) + 0.5 * step * (beams - 1)
     scanner = LidarConfig(beams=beams, field_of_view_rad=step * (beams - 1), range_var_m2=RANGE_STD_M**2)
     extractor = LineExtractor(EXTRACTION, scanner, scanner.range_var_m2, np.random.default_rng(0))
     scans = []

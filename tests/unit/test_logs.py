@@ -221,7 +221,7 @@ def test_carmen_scans_have_poses_and_angles(tmp_path: Path) -> None:
     np.testing.assert_array_equal(log.laser_poses[0], [0.1, 0.2, 0.3])
     np.testing.assert_array_equal(log.robot_poses[0], [1.1, 1.2, 1.3])
     np.testing.assert_array_equal(log.odometry, [[1.0, 2.0, 0.5]])
-    np.testing.assert_allclose(log.angles_rad, np.radians([-90, -45, 0, 45]))
+    np.testing.assert_allclose(log.angles_rad(0), np.radians([-90, -45, 0, 45]))
     assert log.backward_times == 1
 
 
@@ -231,17 +231,27 @@ def test_new_carmen_scans_say_their_angles(tmp_path: Path) -> None:
         "ROBOTLASER1 0 -1.5 3.0 1.5 80 0.01 0 3 1 2 3 0 0.1 0.2 0.3 1.1 1.2 1.3 0 0 0 0 0 7.5 host 7.6\n"
     )
     log = read_carmen(path)
-    np.testing.assert_allclose(log.angles_rad, [-1.5, 0.0, 1.5])
+    np.testing.assert_allclose(log.angles_rad(0), [-1.5, 0.0, 1.5])
     np.testing.assert_array_equal(log.robot_poses, [[1.1, 1.2, 1.3]])
     assert log.t_s[0] == 7.5
+
+
+def test_carmen_scans_may_change_their_size_lack_ranges_and_be_cut_short(tmp_path: Path) -> None:
+    path = tmp_path / "log"
+    shorter = CARMEN.replace("FLASER 4 1.0 2.0 3.0 5.0", "FLASER 3 nan inf 3.0")
+    path.write_text(shorter + CARMEN.splitlines()[3][:40])
+    log = read_carmen(path)
+    assert log.cut_short
+    np.testing.assert_array_equal(log.beams, [4, 3])
+    np.testing.assert_array_equal(log.ranges_m, [[1, 2, 3, 4], [np.nan, np.inf, 3, np.nan]])
+    np.testing.assert_allclose(log.angles_rad(1), np.radians([-90, 0, 90]))
 
 
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        (CARMEN[:-30], "line 5: FLASER: expected 15 words"),
-        (CARMEN.replace("5.0 0.1", "nan 0.1"), "line 5: expected finite numbers"),
-        (CARMEN.replace("FLASER 4 1.0 2.0 3.0 5.0", "FLASER 3 1.0 2.0 3.0"), "line 5: expected 4 beams"),
+        (CARMEN[:-30] + "\n", "line 5: FLASER: expected 15 words"),
+        (CARMEN.replace("5.0 0.1", "5.0 nan"), "line 5: expected finite numbers"),
         ("ODOM 1 2 0.5 0 0 0 10.0 host 10.0\n", "expected FLASER or ROBOTLASER1 lines"),
         ("FLASER four 1 2 3 4\n", "line 1: FLASER: expected a number of values, found four"),
     ],

@@ -160,6 +160,27 @@ def test_the_command_leaves_a_folder_and_a_page(tmp_path: Path, capsys: pytest.C
     assert main(["evaluate", str(folder / "trajectory.tum"), str(folder / "before.tum"), "--json"]) == 0
 
 
+def test_a_damaged_carmen_log_is_mapped_with_a_word(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """No ODOM lines, every third scan of half the beams, ranges that are no numbers, a last line cut."""
+    log = carmen_log(tmp_path / "lab.log")
+    lines = [line for line in log.read_text().splitlines(keepends=True) if line.startswith("FLASER")]
+    for k in range(0, len(lines), 3):
+        words = lines[k].split()
+        lines[k] = " ".join(["FLASER", "90", *words[2:182:2], *words[182:]]) + "\n"
+    for k in range(1, len(lines), 3):
+        lines[k] = lines[k].replace(lines[k].split()[40], "nan", 1)
+    log.write_text("".join(lines)[:-600])
+    assert main(["slam", str(log), "--out", str(tmp_path / "runs"), "--no-report", "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    said = " ".join(told["warnings"])
+    for part in ("number of beams changes", "not numbers", "cut short", "no ODOM lines"):
+        assert part in said
+    assert told["scans"] == len(lines) - 1
+    assert told["scans_lost"] == 0
+
+
 def test_bad_input_is_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     log = carmen_log(tmp_path / "lab.log")
     config = tmp_path / "slam.yaml"

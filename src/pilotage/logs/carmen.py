@@ -22,9 +22,9 @@ from pathlib import Path
 import numpy as np
 
 from pilotage.core.errors import InputError
-from pilotage.core.types import FloatArray
+from pilotage.core.types import FloatArray, IntArray
 from pilotage.core.whole_number import whole_number
-from pilotage.logs.text import read_lines
+from pilotage.logs.text import read_text
 
 LARGEST = 1e12
 """Beyond any metre, radian or second of a log."""
@@ -40,25 +40,37 @@ class CarmenLog:
     t_s
         (N,) times of the scans. Real logs were not always written in the order of time.
     ranges_m
-        (N, B) in beam order, counter-clockwise.
-    angles_rad
-        (B,) directions of the beams in the scanner's frame.
+        (N, B) in beam order, counter-clockwise, as they were logged; a row shorter than B ends in NaN.
+    beams
+        (N,) how many entries of each row are beams.
+    first_angle_rad, angle_step_rad
+        (N,) direction of the first beam in the scanner's frame, and the angle to the next one.
     laser_poses, robot_poses
         (N, 3) x, y, theta as the log gives them: corrected ones in a corrected log.
     odometry_t_s, odometry
         (M,) and (M, 3) of the ODOM lines.
     backward_times
         How many scans carry a time before that of the scan before.
+    cut_short
+        Whether the file ends within a line, which is left out then.
     """
 
     t_s: FloatArray
     ranges_m: FloatArray
-    angles_rad: FloatArray
+    beams: IntArray
+    first_angle_rad: FloatArray
+    angle_step_rad: FloatArray
     laser_poses: FloatArray
     robot_poses: FloatArray
     odometry_t_s: FloatArray
     odometry: FloatArray
     backward_times: int
+    cut_short: bool = False
+
+    def angles_rad(self, scan: int) -> FloatArray:
+        """Return (B,) the directions of a scan's beams in the scanner's frame; B its own number of them."""
+        count = np.arange(int(self.beams[scan]), dtype=np.float64)
+        return np.asarray(self.first_angle_rad[scan] + self.angle_step_rad[scan] * count)
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,46 +86,56 @@ class _Scan:
 def read_carmen(path: Path) -> CarmenLog:
     """Read a log.
 
+    Ranges that are no numbers are kept as NaN or infinity, scans may change their number of beams, and a last
+    line that the end of the file cuts is left out.
+
     Raises
     ------
     InputError
-        File and line of what is cut short or not finite, of a scan with another number of beams than the
-        ones before, or where there is no scan at all.
+        File and line of what is damaged elsewhere, or where there is no scan at all.
     """
     scans: list[_Scan] = []
     odometry: list[list[float]] = []
-    number = 0
-    for number, line in enumerate(read_lines(path), start=1):
+    text = read_text(path)
+    lines = text.splitlines()
+    cut_short = False
+    for number, line in enumerate(lines, start=1):
         words = line.split()
         if not words:
             continue
         where = f"{path} line {number}"
-        if words[0] in {"FLASER", "ROBOTLASER1"}:
-            scan = _flaser(words, where) if words[0] == "FLASER" else _robotlaser(words, where)
-            if scans and len(scan.ranges_m) != len(scans[0].ranges_m):
-                raise InputError(
-                    f"{where}: expected {len(scans[0].ranges_m)} beams as before, found {len(scan.ranges_m)}"
-                )
-            scans.append(scan)
-        elif words[0] == "ODOM":
-            _expect(words, 10, where)
-            odometry.append([*_floats(words[1:4], where), *_floats(words[7:8], where)])
+        try:
+            if words[0] in {"FLASER", "ROBOTLASER1"}:
+                scans.append(_flaser(words, where) if words[0] == "FLASER" else _robotlaser(words, where))
+            elif words[0] == "ODOM":
+                _expect(words, 10, where)
+                odometry.append([*_floats(words[1:4], where), *_floats(words[7:8], where)])
+        except InputError:
+            if number < len(lines) or text.endswith("\n") or not scans:
+                raise
+            cut_short = True
     if not scans:
         raise InputError(
-            f"{path} line {number + 1}: expected FLASER or ROBOTLASER1 lines, found the end of the file"
+            f"{path} line {len(lines) + 1}: expected FLASER or ROBOTLASER1 lines, found the end of the file"
         )
-    beams = len(scans[0].ranges_m)
+    beams = np.array([len(scan.ranges_m) for scan in scans], np.int64)
+    ranges_m = np.full((beams.size, int(beams.max())), np.nan)
+    for row, scan in enumerate(scans):
+        ranges_m[row, : beams[row]] = scan.ranges_m
     t_s = np.array([scan.t_s for scan in scans])
     poses = np.array(odometry).reshape(-1, 4)
     return CarmenLog(
         t_s,
-        np.array([scan.ranges_m for scan in scans]),
-        scans[0].first_rad + scans[0].step_rad * np.arange(beams, dtype=np.float64),
+        ranges_m,
+        beams,
+        np.array([scan.first_rad for scan in scans]),
+        np.array([scan.step_rad for scan in scans]),
         np.array([scan.laser for scan in scans]),
         np.array([scan.robot for scan in scans]),
         poses[:, 3].copy(),
         poses[:, :3].copy(),
         int(np.count_nonzero(np.diff(t_s) < 0.0)),
+        cut_short,
     )
 
 
@@ -122,16 +144,10 @@ def _flaser(words: list[str], where: str) -> _Scan:
     if beams < LEAST_BEAMS:
         raise InputError(f"{where}: FLASER: expected {LEAST_BEAMS} or more beams, found {beams}")
     _expect(words, beams + 11, where)
-    numbers = _floats(words[2 : beams + 9], where)
+    ranges = _floats(words[2 : beams + 2], where, finite=False)
+    numbers = _floats(words[beams + 2 : beams + 9], where)
     step = math.pi / (beams - 1 if beams % 2 else beams)
-    return _Scan(
-        numbers[-1],
-        array("d", numbers[:beams]),
-        -0.5 * math.pi,
-        step,
-        numbers[beams : beams + 3],
-        numbers[beams + 3 : -1],
-    )
+    return _Scan(numbers[6], array("d", ranges), -0.5 * math.pi, step, numbers[:3], numbers[3:6])
 
 
 def _robotlaser(words: list[str], where: str) -> _Scan:
@@ -141,9 +157,8 @@ def _robotlaser(words: list[str], where: str) -> _Scan:
     _expect(words, tail + 14, where)
     first, _, step = _floats(words[2:5], where)
     numbers = _floats(words[tail : tail + 12], where)
-    return _Scan(
-        numbers[11], array("d", _floats(words[9 : 9 + beams], where)), first, step, numbers[:3], numbers[3:6]
-    )
+    ranges = array("d", _floats(words[9 : 9 + beams], where, finite=False))
+    return _Scan(numbers[11], ranges, first, step, numbers[:3], numbers[3:6])
 
 
 def _count(words: list[str], index: int, where: str) -> int:
@@ -162,13 +177,14 @@ def _expect(words: list[str], least: int, where: str) -> None:
         )
 
 
-def _floats(words: list[str], where: str) -> list[float]:
+def _floats(words: list[str], where: str, finite: bool = True) -> list[float]:
     try:
         values = [float(word) for word in words]
     except ValueError as error:
         raise InputError(f"{where}: expected numbers, {error}") from None
-    if not all(math.isfinite(value) for value in values):
+    if finite and not all(math.isfinite(value) for value in values):
         raise InputError(f"{where}: expected finite numbers, found NaN or infinity")
-    if max(map(abs, values), default=0.0) > LARGEST:
-        raise InputError(f"{where}: expected numbers within {LARGEST:g}, found {max(values, key=abs):g}")
+    largest = max((abs(value) for value in values if math.isfinite(value)), default=0.0)
+    if largest > LARGEST:
+        raise InputError(f"{where}: expected numbers within {LARGEST:g}, found {largest:g}")
     return values

@@ -243,12 +243,23 @@ def laser_log_of_carmen(log: CarmenLog, name: str) -> LaserLog:
     Odometry is that of the ODOM lines, or the robot's poses of the scans where there are none. The mount is
     the median pose of the laser relative to the robot.
     """
-    step = float(log.angles_rad[1] - log.angles_rad[0]) if log.angles_rad.size > 1 else 0.0
     scans = [
-        RawScan(float(t), ranges, float(log.angles_rad[0]), step, CARMEN_RANGE_MIN_M, CARMEN_RANGE_MAX_M)
-        for t, ranges in zip(log.t_s, log.ranges_m, strict=True)
+        RawScan(
+            float(log.t_s[k]),
+            log.ranges_m[k, : log.beams[k]],
+            float(log.first_angle_rad[k]),
+            float(log.angle_step_rad[k]),
+            CARMEN_RANGE_MIN_M,
+            CARMEN_RANGE_MAX_M,
+        )
+        for k in range(log.t_s.size)
     ]
     said = []
+    if log.cut_short:
+        said.append("the file is cut short: its last line was left out")
+    nothing = sum(int(np.count_nonzero(np.isnan(scan.ranges_m))) for scan in scans)
+    if nothing:
+        said.append(f"{nothing} ranges are not numbers: no measurement")
     t_s, poses = log.odometry_t_s, log.odometry
     if t_s.size == 0:
         t_s, poses = log.t_s, log.robot_poses
