@@ -76,12 +76,8 @@ def track_edges(track: LocalTrack) -> Edges:
     turn[:, 0, 1], turn[:, 1, 0] = -s, s
     turn[:, 2, 2] = 1.0
     hessian = turn.transpose(0, 2, 1) @ track.hessians[1:] @ turn
-    slips = track.slips[1:]
-    floor = np.zeros((count - 1, 3, 3))
-    floor[:, 0, 0] = floor[:, 1, 1] = slips[:, 0]
-    floor[:, 2, 2] = slips[:, 1]
     k = np.arange(count - 1)
-    information = edge_information(hessian, relative[:, 2], TRACK_STD_M, TRACK_FLOOR + floor)
+    information = edge_information(hessian, relative[:, 2], TRACK_STD_M, TRACK_FLOOR + track.slips[1:])
     return Edges(k, k + 1, relative, information, np.zeros(count - 1, np.bool_))
 
 

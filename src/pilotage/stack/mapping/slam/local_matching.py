@@ -6,6 +6,7 @@ as good as usual, the neighbourhood is searched by branch and bound.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -32,6 +33,8 @@ SPLIT = 0.1
 or, worse, somewhere else."""
 SEARCH_RANGE_M, SEARCH_CELL_M, SEARCH_STD_M, SEARCH_STEP_RAD = 12.0, 0.05, 0.07, 0.02
 SEARCH_BUDGET = 200_000
+FAR, LEAST_FAR = 0.6, 0.12
+"""Share of the usual fit that a place far from all guesses takes, and what its distance must leave of it."""
 LEAST_FOUND, FOUND, ALIKE = 40, 0.8, 0.8
 """Points and share of the usual fit that finding a place all round takes, and the share of its score from
 which a second place speaks against it,"""
@@ -64,6 +67,10 @@ class Fit:
         Root mean square of the weighted residuals.
     off
         Distance from the nearest credible guess.
+    weight
+        Sum of the points' weights.
+    guess_error, by_odometry
+        Usual error of the most trusted guess, and whether that is the odometry.
     """
 
     value: float
@@ -72,6 +79,9 @@ class Fit:
     start: FloatArray
     rms_m: float
     off: float = 0.0
+    weight: float = 0.0
+    guess_error: float = 0.0
+    by_odometry: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -166,7 +176,13 @@ class LocalMatcher:
         self._refer()
 
     def match(
-        self, cloud: FloatArray, last: FloatArray, step: FloatArray | None, dt_s: float, gap_s: float
+        self,
+        cloud: FloatArray,
+        last: FloatArray,
+        step: FloatArray | None,
+        dt_s: float,
+        gap_s: float,
+        others: Sequence[FloatArray] = (),
     ) -> Fit | None:
         """Align a scan; None where it cannot be.
 
@@ -178,17 +194,20 @@ class LocalMatcher:
             (3,) motion since by the odometry, if there is any.
         dt_s, gap_s
             Smoothed and stamped time since.
+        others
+            (3,) each, what else the odometry may have meant: tried where the first fits less than well.
         """
         best: Fit | None = None
-        credible = self._guess.credible(step, dt_s)
+        credible = [*self._guess.credible(step, dt_s), *others]
         motions = self._guess.guesses(step, dt_s)
         split = max(distance(motions[0], motion) for motion in motions) > SPLIT
-        for motion in motions:
+        for number, motion in enumerate([*motions, *others]):
+            fits_well = best is not None and best.value > GOOD * self._usual
+            if fits_well and (number >= len(motions) or not split):
+                break
             fit = self._plausible(self._align(cloud, composed(last, motion), START_REACH_M), last, credible)
             if fit is not None and (best is None or fit.value > 1.03 * best.value + 0.005):
                 best = fit
-            if not split and best is not None and best.value > GOOD * self._usual:
-                break
         poor = best is None or best.value < POOR * self._usual
         if poor or step is None:
             # Without odometry a scan may slide along a corridor and still fit: look around every time.
@@ -196,19 +215,23 @@ class LocalMatcher:
             gap_s = min(max(dt_s, gap_s, 0.2) + self._lost_s, MOST_GAP_S)
             centres = [last, composed(last, motions[0])] if poor and split else [last]
             for centre in centres:
-                found = self._plausible(self._search(cloud, centre, gap_s), last, credible)
                 better = BETTER_POOR if poor else BETTER_GOOD
-                if found is not None and (best is None or found.value > better * best.value + 0.01):
-                    best = found
+                for fit in self._search(cloud, centre, gap_s, last, motions[0] if poor else None):
+                    found = self._plausible(fit, last, credible)
+                    if found is not None and (best is None or found.value > better * best.value + 0.01):
+                        best = found
         if best is None or best.value < NONE * self._usual:
+            best = self._far(cloud, last, motions[0], credible)
+        if best is None:
             self.lost += 1
             self._lost_s += dt_s
             return None
         self._lost_s = 0.0
         self.rms_m += 0.05 * (best.rms_m - self.rms_m)
         self._usual += 0.02 * (best.value - self._usual)
+        error, by_odometry = self._guess.least_error, step is not None and self._guess.odometry_leads
         self._guess.learn(step, between(last, best.pose), dt_s)
-        return best
+        return replace(best, guess_error=error, by_odometry=by_odometry)
 
     def fallback(self, last: FloatArray, step: FloatArray | None, dt_s: float) -> FloatArray:
         """Pose by the most trusted guess alone."""
@@ -233,15 +256,30 @@ class LocalMatcher:
         if status == TOO_FEW:
             return None
         pose[2] = (pose[2] + np.pi) % (2.0 * np.pi) - np.pi
-        return Fit(float(fit[1]) / cloud.shape[0], pose, hessian, start, float(fit[0]))
+        return Fit(float(fit[1]) / cloud.shape[0], pose, hessian, start, float(fit[0]), weight=float(fit[1]))
 
-    def _search(self, cloud: FloatArray, last: FloatArray, gap_s: float) -> Fit | None:
-        """Search the neighbourhood of the last pose, the wider the longer ago it was."""
+    def _far(
+        self, cloud: FloatArray, last: FloatArray, motion: FloatArray, credible: list[FloatArray]
+    ) -> Fit | None:
+        """Search as far as any gap would have it: the stamps of scans may lie about how long it was."""
+        fits = self._search(cloud, last, MOST_GAP_S, last, motion)
+        found = [self._plausible(fit, last, credible) for fit in fits if fit.value >= FAR * self._usual]
+        near = [fit for fit in found if fit is not None and fit.value >= LEAST_FAR * self._usual]
+        return max(near, key=lambda fit: fit.value, default=None)
+
+    def _search(
+        self, cloud: FloatArray, centre: FloatArray, gap_s: float, last: FloatArray, motion: FloatArray | None
+    ) -> list[Fit]:
+        """Search the neighbourhood of a pose, the wider the longer ago it was.
+
+        With a motion the heading found is tried with the guess's position too: along a corridor the best
+        score may lie anywhere, but no turn does.
+        """
         near = cloud[np.hypot(cloud[:, 0], cloud[:, 1]) < SEARCH_RANGE_M]
         if self._around is None:
-            self._around = self._surroundings(last)
+            self._around = self._surroundings(centre)
         if self._around is None or near.shape[0] < 10:
-            return None
+            return []
         pyramid, margin, low = self._around
         turns = round((0.3 + 0.8 * gap_s) / SEARCH_STEP_RAD)
         best, _ = search_window(
@@ -251,14 +289,21 @@ class LocalMatcher:
             low[1],
             SEARCH_CELL_M,
             np.ascontiguousarray(near[::2, :2]),
-            last,
+            centre,
             0.3 + 0.6 * gap_s,
             SEARCH_STEP_RAD * np.arange(-turns, turns + 1, dtype=np.float64),
             0.2,
             np.array([0.0, 0.0, 0.0, -1.0, 0.0]),
             SEARCH_BUDGET,
         )
-        return self._align(cloud, best[:3].copy(), 0.3) if np.isfinite(best[3]) else None
+        if not np.isfinite(best[3]):
+            return []
+        starts = [best[:3].copy()]
+        if motion is not None:
+            guess = composed(last, motion)
+            starts.append(np.array([guess[0], guess[1], best[2]]))
+        fits = [self._align(cloud, start, 0.3) for start in starts]
+        return [fit for fit in fits if fit is not None]
 
     def _surroundings(self, last: FloatArray) -> tuple[ScoreArray, int, FloatArray] | None:
         """Maxima of the score grid of the last keyframes' points around a pose, margin and corner."""

@@ -7,13 +7,15 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from pilotage.core.types import FloatArray, Pose2
-from pilotage.kernels.slam.frames import composed
+from pilotage.kernels.slam.frames import between, composed
 from pilotage.logs.laser_log import LaserLog
 
 _MEMORY = 0.02
 """Weight of the newest error in the running mean: fifty scans count."""
 _SMOOTHED = 4
 """Scans to either side over which stamps are averaged: loggers write them in bursts."""
+STAMP_OFF_S, OTHER_READING_M = 0.1, 0.08
+"""A stamp may be off by so much; readings nearer together (a radian as half a metre) are one guess."""
 CREDIBLE = 3.0
 """A guess is credible whose mean error is within this factor of the least."""
 
@@ -25,6 +27,58 @@ def scanner_odometry(log: LaserLog, used: bool) -> FloatArray | None:
         return None
     mount = mount_pose(log.mount)
     return np.array([composed(pose, mount) for pose in poses])
+
+
+class ScanMotions:
+    """Motions of the scanner between scans by the odometry of a log, whose stamps may be off.
+
+    Loggers stamp what they receive, in bursts, and late. The reading at a scan's stamp is the first guess;
+    those around it that tell of another place are others. Where a scan turns out to lie at one of them, the
+    next motion is counted from there.
+    """
+
+    def __init__(self, log: LaserLog, used: bool) -> None:
+        at_scans = scanner_odometry(log, used)
+        self._at_scans = at_scans
+        self._anchor = None if at_scans is None else at_scans[0]
+        self._readings = np.zeros((0, 3))
+        if at_scans is not None and log.odometry is not None and log.odometry_t_s is not None:
+            mount = mount_pose(log.mount)
+            self._readings = np.array([composed(pose, mount) for pose in log.odometry])
+            self._first = np.searchsorted(log.odometry_t_s, log.t_s - STAMP_OFF_S)
+            self._end = np.searchsorted(log.odometry_t_s, log.t_s + STAMP_OFF_S)
+
+    def of(self, scan: int) -> tuple[FloatArray | None, list[FloatArray]]:
+        """Return the motion (3,) since the last scan by the odometry, if any, and what else it may be."""
+        if self._at_scans is None or self._anchor is None:
+            return None, []
+        kept = [self._at_scans[scan]]
+        near = self._readings[self._first[scan] : self._end[scan]]
+        off = np.hypot(*(near[:, :2] - kept[0][:2]).T) + 0.5 * np.abs(_turn(near[:, 2] - kept[0][2]))
+        for reading in near[off > OTHER_READING_M]:
+            if min(_apart(reading, other) for other in kept) > OTHER_READING_M:
+                kept.append(reading)
+        return between(self._anchor, kept[0]), [between(self._anchor, reading) for reading in kept[1:]]
+
+    def learn(self, scan: int, motion: FloatArray, step: FloatArray | None, others: list[FloatArray]) -> None:
+        """Count the next motion from the reading that a match (3,) of this scan was nearest to."""
+        if step is None or self._at_scans is None or self._anchor is None:
+            return
+        best = min(others, key=lambda other: distance(other, motion), default=step)
+        usual = distance(step, motion)
+        if usual > OTHER_READING_M and distance(best, motion) < 0.5 * usual:
+            self._anchor = composed(self._anchor, best)
+        else:
+            self._anchor = self._at_scans[scan]
+
+
+def _turn(angle: FloatArray) -> FloatArray:
+    return np.asarray((angle + np.pi) % (2.0 * np.pi) - np.pi)
+
+
+def _apart(a: FloatArray, b: FloatArray) -> float:
+    """Distance of two poses (3,), a radian counting as half a metre."""
+    return distance(between(a, b), np.zeros(3))
 
 
 def mount_pose(mount: Pose2) -> FloatArray:
@@ -60,6 +114,11 @@ class MotionGuess:
     def least_error(self) -> float:
         """Running mean error of the most trusted guess."""
         return float(self.errors.min())
+
+    @property
+    def odometry_leads(self) -> bool:
+        """Whether the odometry was nearest lately."""
+        return int(self.errors.argmin()) == 0
 
     def guesses(self, step: FloatArray | None, dt_s: float) -> list[FloatArray]:
         """Return the motions (3,), the most trusted first."""

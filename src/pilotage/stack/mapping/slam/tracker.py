@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -13,18 +13,17 @@ from pilotage.logs.laser_log import LaserLog
 from pilotage.stack.mapping.slam.clouds import Clouds, cloud_of
 from pilotage.stack.mapping.slam.config import SlamConfig
 from pilotage.stack.mapping.slam.local_matching import Aside, LocalMatcher
-from pilotage.stack.mapping.slam.odometry import scanner_odometry, smoothed_times
+from pilotage.stack.mapping.slam.odometry import ScanMotions, smoothed_times
+from pilotage.stack.mapping.slam.slips import (
+    BLIND_BREAK_SLIP,
+    BREAK_SLIP,
+    GUESS_SLIP,
+    HEALED_SLIP,
+    Slips,
+)
 
-SLIP_SHARE, SLIP_M = 0.15, 0.4
-"""A match as far as SLIP_M from its guess may be off by as much; a nearer one by that share and less."""
-
-BREAK_SLIP = np.array([0.2**2, 0.3**2])
-BLIND_BREAK_SLIP = np.array([0.5**2, 0.8**2])
-HEALED_SLIP = np.array([0.05**2, 0.02**2])
-"""Variances of position and heading where the track broke, with odometry and without, and where it was
-joined again."""
-GUESSED_SCANS, GUESS_SLIP = 3, np.array([0.05**2, 0.05**2])
-"""So many scans in a row may hang by the odometry alone before the track breaks, and what each adds."""
+GUESSED_SCANS = 3
+"""So many scans in a row may hang by the odometry alone before the track breaks."""
 RIGID = 1e4 * np.eye(3)
 """Hessian of a break: its slip alone counts."""
 HEAL_SCANS, HEAL_KEYFRAMES = 10, 24
@@ -53,8 +52,7 @@ class LocalTrack:
     hessians
         (K, 3, 3) of each keyframe's alignment with those before it, in ``poses``' frame.
     slips
-        (K, 2) variances of position and heading since the keyframe before, by how far guesses and
-        matches were apart.
+        (K, 3, 3) covariances, in the scanner's frame, of what may have slipped since the keyframe before.
     breaks
         (B,) which keyframes begin a new piece: their scans fitted nowhere near the one before, and where
         they lie beside it is a guess.
@@ -108,29 +106,36 @@ class Tracker:
         self._hessians: list[FloatArray] = []
         self._slips: list[FloatArray] = []
         self._breaks: list[int] = []
-        self._slip = np.zeros(2)
+        self._slip = Slips()
         self._torn: _Torn | None = None
         self._lost_run = 0
         self.healed = 0
 
-    def add(self, cloud: FloatArray, step: FloatArray | None, dt_s: float, gap_s: float) -> bool:
+    def add(
+        self,
+        cloud: FloatArray,
+        step: FloatArray | None,
+        dt_s: float,
+        gap_s: float,
+        others: Sequence[FloatArray] = (),
+    ) -> bool:
         """Place the next scan (K, 6); True where it became a keyframe. As ``LocalMatcher.match``."""
         hessian, broken = np.zeros((3, 3)), False
         if not self._poses:
             pose = np.zeros(3)
         else:
             last = self._poses[-1]
-            fit = self._matcher.match(cloud, last, step, dt_s, gap_s)
+            fit = self._matcher.match(cloud, last, step, dt_s, gap_s, others)
             self._lost_run = 0 if fit is not None else self._lost_run + 1
             if fit is None:
                 pose, hessian = self._matcher.fallback(last, step, dt_s), RIGID
                 broken = step is None or self._lost_run > GUESSED_SCANS
-                self._slip += BLIND_BREAK_SLIP if step is None else BREAK_SLIP if broken else GUESS_SLIP
+                self._slip.add(BLIND_BREAK_SLIP if step is None else BREAK_SLIP if broken else GUESS_SLIP)
                 if broken:
                     self._tear()
             else:
                 pose, hessian = fit.pose, fit.hessian
-                self._slip += _slip(between(fit.start, fit.pose))
+                self._slip.matched(fit)
         new = not self._poses or _is_new(between(self._poses[self._keyframes[-1]], pose), self._config)
         self._poses.append(pose)
         new = new and not (self._lost_run and not broken)
@@ -138,8 +143,7 @@ class Tracker:
             self._keyframes.append(len(self._poses) - 1)
             self._clouds.append(cloud)
             self._hessians.append(hessian)
-            self._slips.append(self._slip)
-            self._slip = np.zeros(2)
+            self._slips.append(self._slip.taken())
             self._matcher.add_keyframe(cloud, pose)
         self._owner.append(len(self._keyframes) - 1)
         if self._torn is not None and not broken:
@@ -151,7 +155,7 @@ class Tracker:
         torn, count = self._torn, len(self._keyframes)
         aside = self._matcher.set_aside()
         if torn is not None and count - torn.keyframe < SHORT:
-            self._slip = self._slip + np.sum(self._slips[torn.keyframe :], axis=0)
+            self._slip.add(np.sum(self._slips[torn.keyframe :], axis=0))
             for kept in (self._keyframes, self._clouds, self._hessians, self._slips):
                 del kept[torn.keyframe :]
             self._owner = [min(owner, torn.keyframe - 1) for owner in self._owner]
@@ -238,7 +242,7 @@ class Tracker:
             np.array(self._owner, np.int64),
             Clouds.of(self._clouds),
             np.array(self._hessians).reshape(-1, 3, 3),
-            np.array(self._slips).reshape(-1, 2),
+            np.array(self._slips).reshape(-1, 3, 3),
             np.array(self._breaks, np.int64),
             self._matcher.searched,
             self._matcher.lost,
@@ -247,24 +251,20 @@ class Tracker:
 
 def track(log: LaserLog, config: SlamConfig, on_scan: OnScan | None = None) -> LocalTrack:
     """Run the front end over a log."""
-    odometry = scanner_odometry(log, config.use_odometry)
+    motions = ScanMotions(log, config.use_odometry)
     times = smoothed_times(log.t_s)
     tracker = Tracker(config)
     for i in range(len(log)):
         before = max(0, i - 1)
-        step = None if odometry is None else between(odometry[before], odometry[i])
+        step, others = motions.of(i)
         dt_s = max(1e-3, float(times[i] - times[before]))
         gap_s = float(log.t_s[i] - log.t_s[before])
-        tracker.add(cloud_of(log, i, config.max_range_m), step, dt_s, gap_s)
+        last = tracker.pose if i else np.zeros(3)
+        tracker.add(cloud_of(log, i, config.max_range_m), step, dt_s, gap_s, others)
+        motions.learn(i, between(last, tracker.pose), step, others)
         if on_scan is not None:
             on_scan(i)
     return tracker.track()
-
-
-def _slip(off: FloatArray) -> FloatArray:
-    """Variances (2,) of position and heading of a match by how far (3,) it is from its guess."""
-    far = np.array([float(np.hypot(off[0], off[1])), abs(float(off[2]))])
-    return np.asarray((SLIP_SHARE * far) ** 2 + (far * far / np.array([SLIP_M, 0.5 * SLIP_M])) ** 2)
 
 
 def _is_new(motion: FloatArray, config: SlamConfig) -> bool:

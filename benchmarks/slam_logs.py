@@ -1,0 +1,102 @@
+"""The mapper on recorded buildings, as they are and damaged: errors of the relations, NEES and speed.
+
+    python -m benchmarks.slam_logs ../shared/data/slam --log intel --damage none zero-odometry jitter
+
+Each FOLDER/NAME.bag goes with NAME.relations. Damages: ``zero-odometry`` (its poses are all zero), ``jitter``
+(the stamp of each scan moved by a normal error of 50 ms, the scans in the order of the moved stamps),
+``drop-scans`` (every tenth) and ``drop-beams`` (30 %). A trajectory is judged at the true stamps.
+"""
+
+from __future__ import annotations
+
+import argparse
+import tempfile
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from pilotage.core.types import BoolArray, FloatArray, IntArray
+from pilotage.evaluation.relations import relation_errors, relation_nees
+from pilotage.logs.laser_log import LaserLog
+from pilotage.logs.laser_recordings import read_laser_log
+from pilotage.logs.relations import read_relations
+from pilotage.logs.trajectories import read_tum, write_planar_tum
+from pilotage.stack.mapping.slam.closures import Verdict
+from pilotage.stack.mapping.slam.config import SlamConfig
+from pilotage.stack.mapping.slam.mapper import map_log
+
+DAMAGES = ("none", "zero-odometry", "jitter", "drop-scans", "drop-beams")
+JITTER_S, DROPPED_BEAMS = 0.05, 0.3
+
+
+def chosen(log: LaserLog, which: IntArray | BoolArray) -> LaserLog:
+    """Some of the scans, in another order."""
+    return replace(
+        log,
+        t_s=log.t_s[which],
+        ranges_m=log.ranges_m[which],
+        beams=log.beams[which],
+        first_angle_rad=log.first_angle_rad[which],
+        angle_step_rad=log.angle_step_rad[which],
+    )
+
+
+def damaged(log: LaserLog, damage: str, seed: int) -> tuple[LaserLog, FloatArray]:
+    """A damaged recording, and the true times of its scans."""
+    rng = np.random.default_rng(seed)
+    if damage == "zero-odometry" and log.odometry is not None:
+        return replace(log, odometry=np.zeros_like(log.odometry)), log.t_s
+    if damage == "jitter":
+        told = log.t_s + JITTER_S * rng.standard_normal(len(log))
+        order = np.argsort(told, kind="stable")
+        return replace(chosen(log, order), t_s=told[order]), log.t_s[order]
+    if damage == "drop-scans":
+        kept = np.arange(len(log)) % 10 != 9
+        return chosen(log, kept), log.t_s[kept]
+    if damage == "drop-beams":
+        ranges = np.where(rng.random(log.ranges_m.shape) < DROPPED_BEAMS, np.nan, log.ranges_m)
+        return replace(log, ranges_m=ranges), log.t_s
+    return log, log.t_s
+
+
+def measured(folder: Path, name: str, damage: str, seed: int) -> str:
+    """One line of numbers."""
+    log, true_s = damaged(read_laser_log(folder / f"{name}.bag"), damage, seed)
+    began = time.perf_counter()
+    result = map_log(log, SlamConfig())
+    took_s = time.perf_counter() - began
+    order = np.argsort(true_s, kind="stable")
+    # Two scans of one stamp keep theirs apart, as ``trajectory.tum`` has it.
+    stamps = true_s[order] + 1e-6 * np.arange(order.size) * np.append(False, np.diff(true_s[order]) <= 0.0)
+    with tempfile.TemporaryDirectory() as draft:
+        path = Path(draft) / "trajectory.tum"
+        write_planar_tum(path, stamps, result.poses[order])
+        errors = relation_errors(read_tum(path), read_relations(folder / f"{name}.relations"))
+    found = errors.summary()
+    nees = relation_nees(errors, result.known.relative(order[errors.first], order[errors.second]))
+    accepted = sum(closure.verdict is Verdict.ACCEPTED for closure in result.closures)
+    return (
+        f"{name} {damage}: {found['trans_mean_m']:.4f} m (most {found['trans_max_m']:.2f}), "
+        f"{found['rot_mean_deg']:.2f} deg, NEES {nees.mean():.2f} (median {np.median(nees):.2f}), "
+        f"{accepted} of {len(result.closures)} closures, {result.lost} scans lost, "
+        f"{(true_s.max() - true_s.min()) / took_s:.0f} x real time; {'; '.join(result.warnings)}"
+    )
+
+
+def main() -> None:
+    """Print a line a building and damage."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("folder", type=Path)
+    parser.add_argument("--log", nargs="+", default=["intel", "fr079"])
+    parser.add_argument("--damage", nargs="+", choices=DAMAGES, default=list(DAMAGES))
+    parser.add_argument("--seed", type=int, default=0)
+    asked = parser.parse_args()
+    for name in asked.log:
+        for damage in asked.damage:
+            print(measured(asked.folder, name, damage, asked.seed), flush=True)
+
+
+if __name__ == "__main__":
+    main()
