@@ -73,6 +73,11 @@ def test_another_process_drives_the_museum_route(speed: float) -> None:
         assert count == round((last - first) / 0.1) + 1
     assert ours["received"] == {"/cmd_vel": theirs["sent"]}
     assert ours["collisions"] == 0
+    silent, sent = ours["silent"], ours["sent"]
+    assert isinstance(silent, dict)
+    assert isinstance(sent, dict)
+    assert {*silent, *sent} == {"/clock", "/odom", "/scan", "/tf"}, "each is spoken, or named as silent"
+    assert set(silent) <= {"/tf"}
     passed = theirs["passed"]
     assert isinstance(passed, int)
     assert passed >= min(len(points), 1 + speed * WALL_S // 45)

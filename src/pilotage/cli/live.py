@@ -71,7 +71,11 @@ def _print(answer: Mapping[str, Any], json: bool) -> None:
     rows = []
     for key, value in answer.items():
         if isinstance(value, Mapping):
-            rows += [(f"{key} {inner}", f"{item:.6g}") for inner, item in value.items()]
+            rows += [(f"{key} {inner}", _text(item)) for inner, item in value.items()]
         else:
-            rows.append((key, f"{value:.6g}" if isinstance(value, float) else str(value)))
+            rows.append((key, _text(value)))
     print_columns(rows)
+
+
+def _text(value: Any) -> str:
+    return f"{value:.6g}" if isinstance(value, float) else str(value)

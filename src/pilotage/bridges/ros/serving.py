@@ -35,7 +35,7 @@ def serve(mission: Mission, speed: float = 1.0, duration_s: float | None = None)
     Returns
     -------
     Steps, messages sent and received by topic, late steps, collisions, and where the robot truly ended.
-    ``/tf`` is left out where ``tf2_msgs`` is not installed.
+    ``/tf`` is ``silent`` where ``tf2_msgs`` is not installed; ``/odom`` carries the same transform.
 
     Raises
     ------
@@ -52,10 +52,10 @@ def serve(mission: Mission, speed: float = 1.0, duration_s: float | None = None)
     heard: list[tuple[float, Twist]] = [(-math.inf, STOP)]
     late = steps = 0
     with ros_node("pilotage") as node:
-        for topic, msgtype in (("/clock", ros.CLOCK), ("/odom", ros.ODOMETRY), ("/tf", ros.TRANSFORMS)):
-            node.publishes(topic, msgtype)
+        topics = {"/clock": ros.CLOCK, "/odom": ros.ODOMETRY, "/tf": ros.TRANSFORMS}
         if sheet is not None:
-            node.publishes("/scan", ros.SCAN)
+            topics["/scan"] = ros.SCAN
+        silent = [topic for topic, msgtype in topics.items() if not node.publishes(topic, msgtype)]
 
         def hear(message: Any) -> None:
             heard[0] = steps * dt_s, Twist(message.linear.x, message.angular.z, message.linear.y)
@@ -99,6 +99,7 @@ def serve(mission: Mission, speed: float = 1.0, duration_s: float | None = None)
             "duration_s": readings.t_s,
             "late_steps": late,
             "sent": node.sent,
+            "silent": {topic: f"{topics[topic].split('/')[0]} is not installed" for topic in silent},
             "received": node.received,
             "collisions": sim.collisions[0],
             "end": {"x_m": sim.poses[0].x_m, "y_m": sim.poses[0].y_m, "theta_rad": sim.poses[0].theta_rad},
