@@ -221,7 +221,7 @@ class LocalMatcher:
                     if found is not None and (best is None or found.value > better * best.value + 0.01):
                         best = found
         if best is None or best.value < NONE * self._usual:
-            best = self._far(cloud, last, motions[0], credible)
+            best = self._far(cloud, last, motions[0], None if step is None else credible)
         if best is None:
             self.lost += 1
             self._lost_s += dt_s
@@ -259,11 +259,17 @@ class LocalMatcher:
         return Fit(float(fit[1]) / cloud.shape[0], pose, hessian, start, float(fit[0]), weight=float(fit[1]))
 
     def _far(
-        self, cloud: FloatArray, last: FloatArray, motion: FloatArray, credible: list[FloatArray]
+        self, cloud: FloatArray, last: FloatArray, motion: FloatArray, credible: list[FloatArray] | None
     ) -> Fit | None:
-        """Search as far as any gap would have it: the stamps of scans may lie about how long it was."""
+        """Search as far as any gap would have it: the stamps of scans may lie about how long it was.
+
+        ``credible`` are the guesses that speak against what is far from them; None where no odometry does.
+        """
         fits = self._search(cloud, last, MOST_GAP_S, last, motion)
-        found = [self._plausible(fit, last, credible) for fit in fits if fit.value >= FAR * self._usual]
+        fits = [fit for fit in fits if fit.value >= FAR * self._usual]
+        if credible is None:
+            return min(fits, key=lambda fit: distance(between(last, fit.pose), motion), default=None)
+        found = [self._plausible(fit, last, credible) for fit in fits]
         near = [fit for fit in found if fit is not None and fit.value >= LEAST_FAR * self._usual]
         return max(near, key=lambda fit: fit.value, default=None)
 
