@@ -66,26 +66,35 @@ def render_film(path: Path, script: FilmScript, codec: str = "MJPG") -> None:
     side = 900
     H = _to_image(script) @ np.diag([SIZE_M / side, -SIZE_M / side, 1.0])
     H = H @ np.array([[1.0, 0.0, 0.0], [0.0, 1.0, -float(side)], [0.0, 0.0, 1.0]])
+    zoom = np.array([[scale, 0.0, (scale - 1) / 2], [0.0, scale, (scale - 1) / 2], [0.0, 0.0, 1.0]])
+
+    def seen(image: NDArray[np.uint8]) -> NDArray[np.uint8]:
+        """From the camera; drawn large and made small, so that edges are smooth."""
+        big = cv2.warpPerspective(image, zoom @ H, (640 * scale, 360 * scale), flags=cv2.INTER_AREA)
+        return np.asarray(cv2.resize(big, (640, 360), interpolation=cv2.INTER_AREA))
+
+    bare = np.full((side, side, 3), (205, 210, 212), np.uint8)
+    _fill(cv2, bare, (0.2, 0.25, 0.7, 0.4), (30, 40, 200))
+    _fill(cv2, bare, (1.3, 1.5, 1.65, 1.62), (30, 40, 200))
+    tape = _pixels(np.array([[0.2, 1.3], [0.5, 1.5], [0.9, 1.5]]), side)
+    cv2.polylines(bare, [tape], False, (20, 20, 20), round(0.02 * side / SIZE_M))
+    on_sheet = seen(np.full((side, side), 255, np.uint8))[..., None] > 127
+    still = np.zeros(0, np.uint8)
     for number, (x, y) in enumerate(true_path_m(script)):
-        sheet = np.full((side, side, 3), (205, 210, 212), np.uint8)
-        _fill(cv2, sheet, (0.2, 0.25, 0.7, 0.4), (30, 40, 200))
-        _fill(cv2, sheet, (1.3, 1.5, 1.65, 1.62), (30, 40, 200))
-        tape = _pixels(np.array([[0.2, 1.3], [0.5, 1.5], [0.9, 1.5]]), side)
-        cv2.polylines(sheet, [tape], False, (20, 20, 20), round(0.02 * side / SIZE_M))
-        centre = _pixels(np.array([[x, y]]), side)[0]
-        cv2.circle(sheet, tuple(map(int, centre)), round(script.radius_m * side / SIZE_M), script.robot, -1)
-        # A board that hides a part of the disc beside its middle, and turns as the robot drives.
-        turn = 0.1 * min(number, script.frames - script.resting)
-        across, along = np.array([np.cos(turn), np.sin(turn)]), np.array([-np.sin(turn), np.cos(turn)])
-        r = script.radius_m
-        board = [a * across + b * along for a, b in ((0.1, -0.6), (0.8, -0.6), (0.8, 0.6), (0.1, 0.6))]
-        cv2.fillConvexPoly(sheet, _pixels(np.array([[x, y]]) + r * np.array(board), side), (25, 30, 25))
-        big = (640 * scale, 360 * scale)
-        zoom = np.array([[scale, 0.0, (scale - 1) / 2], [0.0, scale, (scale - 1) / 2], [0.0, 0.0, 1.0]])
-        seen = cv2.warpPerspective(sheet, zoom @ H, big, flags=cv2.INTER_AREA)
-        mask = cv2.warpPerspective(np.full((side, side), 255, np.uint8), zoom @ H, big)
-        seen, mask = (cv2.resize(image, (640, 360), interpolation=cv2.INTER_AREA) for image in (seen, mask))
-        picture = np.where(mask[..., None] > 127, seen, floor)
+        # Where the robot rests only light and noise change.
+        if number <= script.frames - script.resting or not len(still):
+            sheet = bare.copy()
+            centre = _pixels(np.array([[x, y]]), side)[0]
+            radius_px = round(script.radius_m * side / SIZE_M)
+            cv2.circle(sheet, tuple(map(int, centre)), radius_px, script.robot, -1)
+            # A board that hides a part of the disc beside its middle, and turns as the robot drives.
+            turn = 0.1 * min(number, script.frames - script.resting)
+            across, along = np.array([np.cos(turn), np.sin(turn)]), np.array([-np.sin(turn), np.cos(turn)])
+            r = script.radius_m
+            board = [a * across + b * along for a, b in ((0.1, -0.6), (0.8, -0.6), (0.8, 0.6), (0.1, 0.6))]
+            cv2.fillConvexPoly(sheet, _pixels(np.array([[x, y]]) + r * np.array(board), side), (25, 30, 25))
+            still = np.where(on_sheet, seen(sheet), floor)
+        picture = still.copy()
         if script.passer_by and number % 20 < 8:
             x0, y0 = (int(value) for value in script.corners_px[3])
             cv2.circle(picture, (x0 + 25, y0 + 5), 28, script.robot, -1)

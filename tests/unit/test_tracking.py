@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import json
 import sys
+import tempfile
+from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -33,10 +36,36 @@ from support.films import (
 cv2 = pytest.importorskip("cv2", reason="OpenCV is not installed (pilotage[vision])")
 
 
-def tracked(folder: Path, script: FilmScript, options: TrackOptions | None = None) -> Track:
-    film = folder / "film.avi"
-    render_film(film, script)
-    return follow(film, learn_scene(film, options or TrackOptions()))
+Filmed = Callable[[FilmScript], Path]
+
+
+@pytest.fixture(scope="module")
+def filmed(tmp_path_factory: pytest.TempPathFactory) -> Filmed:
+    """Each film is rendered once; who damages it takes a copy."""
+    folder = tmp_path_factory.mktemp("films")
+
+    @cache
+    def film(script: FilmScript) -> Path:
+        path = Path(tempfile.mkdtemp(dir=folder)) / "film.avi"
+        render_film(path, script)
+        return path
+
+    return film
+
+
+@pytest.fixture(scope="module")
+def tracked(filmed: Filmed) -> Callable[[FilmScript], Track]:
+    """What is found in each film with nothing given, once."""
+
+    @cache
+    def track(script: FilmScript) -> Track:
+        return with_options(filmed(script), TrackOptions())
+
+    return track
+
+
+def with_options(film: Path, options: TrackOptions) -> Track:
+    return follow(film, learn_scene(film, options))
 
 
 def errors_px(track: Track, script: FilmScript) -> np.ndarray:
@@ -56,8 +85,8 @@ def errors_px(track: Track, script: FilmScript) -> np.ndarray:
     ],
     ids=["tilted-blue", "above-green-noise", "side-red-light", "small-grey", "mostly-resting", "passer-by"],
 )
-def test_the_robot_is_found_where_it_is(script: FilmScript, tmp_path: Path) -> None:
-    track = tracked(tmp_path, script)
+def test_the_robot_is_found_where_it_is(script: FilmScript, tracked: Callable[[FilmScript], Track]) -> None:
+    track = tracked(script)
     corner_error = np.abs(track.scene.sheet.corners_px - np.array(script.corners_px)).max()
     assert len(track.path.frames) == track.frames == script.frames
     assert np.median(errors_px(track, script)) < 0.6
@@ -69,17 +98,17 @@ def test_the_robot_is_found_where_it_is(script: FilmScript, tmp_path: Path) -> N
     assert 0.3 < np.median(off_m) / (1.18 * np.median(track.path.std_m)) < 3.0
 
 
-def test_a_small_quick_robot_is_followed_from_near_to_far(tmp_path: Path) -> None:
+def test_a_small_quick_robot_is_followed_from_near_to_far(tracked: Callable[[FilmScript], Track]) -> None:
     # Three radii from frame to frame, and several times as many pixels near the camera as far from it.
     script = FilmScript(frames=20, radius_m=0.035)
-    track = tracked(tmp_path, script)
+    track = tracked(script)
     assert len(track.path.frames) == script.frames
     assert errors_px(track, script).max() < 2.0
 
 
-def test_marks_and_visited_cells_fall_into_their_cells(tmp_path: Path) -> None:
+def test_marks_and_visited_cells_fall_into_their_cells(tracked: Callable[[FilmScript], Track]) -> None:
     script = FilmScript(frames=40)
-    track = tracked(tmp_path, script)
+    track = tracked(script)
     boxes, lines = track.cells.holds(CellState.OBSTACLE), track.cells.holds(CellState.LINE)
     # Boxes of 0.5 x 0.15 and 0.35 x 0.12 m: rows 3 to 5 and 20 to 22, columns 2 to 9 and 18 to 22.
     assert boxes[4, 2:10].all()
@@ -94,28 +123,27 @@ def test_marks_and_visited_cells_fall_into_their_cells(tmp_path: Path) -> None:
     assert kinds == {"line", "obstacle"}
 
 
-def test_corners_and_colour_may_be_given(tmp_path: Path) -> None:
+def test_corners_and_colour_may_be_given(filmed: Filmed) -> None:
     script = FilmScript(frames=30)
     options = TrackOptions(np.array(script.corners_px), parse_hsv("100,80,40,125,255,255"), radius_m=0.09)
-    track = tracked(tmp_path, script, options)
+    track = with_options(filmed(script), options)
     assert np.array_equal(track.scene.sheet.corners_px, np.array(script.corners_px))
     assert np.median(errors_px(track, script)) < 0.6
 
 
-def test_a_robot_that_never_moves_is_found_by_its_given_colour(tmp_path: Path) -> None:
+def test_a_robot_that_never_moves_is_found_by_its_given_colour(filmed: Filmed) -> None:
     script = FilmScript(frames=20, resting=20)
-    track = tracked(tmp_path, script, TrackOptions(colour=parse_hsv("100,80,40,125,255,255")))
+    track = with_options(filmed(script), TrackOptions(colour=parse_hsv("100,80,40,125,255,255")))
     assert len(track.path.frames) == 20
     assert np.median(errors_px(track, script)) < 1.5
     with pytest.raises(InputError, match="nothing moves"):
-        learn_scene(tmp_path / "film.avi", TrackOptions())
+        learn_scene(filmed(script), TrackOptions())
 
 
 def test_the_command_writes_json_csv_pictures_and_a_film(
-    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+    filmed: Filmed, tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    film, out = tmp_path / "film.avi", tmp_path / "out"
-    render_film(film, FilmScript(frames=30))
+    film, out = filmed(FilmScript(frames=30)), tmp_path / "out"
     capfd.readouterr()
     assert main(["track", str(film), "--out", str(out), "--json"]) == 0
     captured = capfd.readouterr()
@@ -147,11 +175,10 @@ def test_the_command_writes_json_csv_pictures_and_a_film(
 
 
 def test_a_film_that_breaks_off_gives_what_there_was(
-    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+    filmed: Filmed, tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    film = tmp_path / "film.avi"
-    render_film(film, FilmScript(frames=40))
-    film.write_bytes(film.read_bytes()[: int(film.stat().st_size * 0.6)])
+    film, whole = tmp_path / "film.avi", filmed(FilmScript(frames=40)).read_bytes()
+    film.write_bytes(whole[: int(len(whole) * 0.6)])
     capfd.readouterr()
     assert main(["track", str(film), "--json"]) == 0
     captured = capfd.readouterr()
@@ -186,10 +213,9 @@ def test_a_photograph_gives_the_map_without_a_path(tmp_path: Path, capfd: pytest
     ],
 )
 def test_bad_options_leave_nothing_behind(
-    arguments: list[str], complaint: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+    arguments: list[str], complaint: str, filmed: Filmed, tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    film, out = tmp_path / "film.avi", tmp_path / "out"
-    render_film(film, FilmScript(frames=4))
+    film, out = filmed(FilmScript(frames=4)), tmp_path / "out"
     capfd.readouterr()
     assert main(["track", str(film), *arguments, "--out", str(out)]) == 2
     error = capfd.readouterr().err
