@@ -1,4 +1,4 @@
-"""What a mission does to its robots on a schedule: carried elsewhere, stopped, silenced."""
+"""What becomes of a mission's robots: carried elsewhere, stopped, silenced, run out of battery."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import math
 
 from pilotage.core.angles import wrap_to_pi
 from pilotage.core.types import Event, Pose2
+from pilotage.experiments.batteries import Batteries
 from pilotage.missions.mission import Mission
 from pilotage.missions.places import Kidnap
 from pilotage.missions.team import Failure
@@ -13,7 +14,7 @@ from pilotage.sim.source import Simulator
 
 
 class Disturbances:
-    """Carries out kidnaps and failures when they are due."""
+    """Carries out kidnaps and failures when they are due; an empty battery is a failure for good."""
 
     def __init__(self, mission: Mission, source: Simulator) -> None:
         self._source = source
@@ -30,6 +31,7 @@ class Disturbances:
             ],
             key=lambda change: change[:2],
         )
+        self._batteries = Batteries(mission, source)
         self._wrong: dict[str, list[int]] = {"stop": [], "radio": []}
 
     def due(self) -> list[Event]:
@@ -41,6 +43,10 @@ class Disturbances:
         while self._changes and now_s >= self._changes[0][0]:
             _, broken, failure = self._changes.pop(0)
             events.append(self._change(failure, broken=bool(broken)))
+        for robot in self._batteries.run_out():
+            self._change(Failure(robot=robot, at_s=now_s), broken=True)
+            text = f"{self._names[robot]}: its battery is empty, it stands and says nothing"
+            events.append(Event(now_s, "failure", text))
         return events
 
     def _has_room(self, kidnap: Kidnap) -> bool:

@@ -9,7 +9,7 @@ from pydantic import Field, field_validator, model_validator
 from pilotage.core.config import Config
 from pilotage.core.shown import visible
 from pilotage.missions.choice import ComponentChoice, by_default, laid_over
-from pilotage.missions.places import GoalConfig, PoseConfig
+from pilotage.missions.places import GoalConfig, Point, PoseConfig
 from pilotage.missions.robot import RobotConfig
 from pilotage.missions.stack import StackConfig
 from pilotage.missions.team import TeamConfig, with_team
@@ -103,6 +103,11 @@ class Mission(Config):
                 f"team.size: expected {len(self.robots)}, as many as robots lists, or no robots, "
                 f"found {self.team.size}"
             )
+        if 0 < len(self.team.stations) < len(self.members):
+            raise ValueError(
+                f"team.stations: expected one for each of {len(self.members)} robots, or none, "
+                f"found {len(self.team.stations)}"
+            )
         for failure in self.team.failures:
             if failure.robot >= len(self.members):
                 raise ValueError(f"team.failures: there is no robot {failure.robot} of {len(self.members)}")
@@ -119,6 +124,13 @@ class Mission(Config):
     def stack_of(self, robot: RobotConfig) -> StackConfig:
         """What runs on a robot: its own stack, else the common one."""
         return robot.stack or self.stack
+
+    def station_of(self, index: int) -> Point | None:
+        """Where a robot charges; None where it needs not to, or its start is still to be drawn."""
+        if self.team.battery is None or self.team.stations:
+            return self.team.stations[index] if self.team.stations else None
+        start = self.start_of(self.members[index])
+        return None if start is None else (start.x_m, start.y_m)
 
     def start_of(self, robot: RobotConfig) -> PoseConfig | None:
         """Where a robot begins: its own start, else the world's."""

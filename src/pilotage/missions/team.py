@@ -9,7 +9,7 @@ from pydantic import Field, model_validator
 
 from pilotage.core.config import Config
 from pilotage.missions.choice import ComponentChoice, by_default
-from pilotage.missions.places import PoseConfig
+from pilotage.missions.places import Point, PoseConfig
 from pilotage.sensors.sensor import NonNegative, Positive
 
 LARGEST_TEAM = 64
@@ -25,6 +25,15 @@ class Failure(Config):
     kind: Literal["stop", "radio"] = "stop"
     for_s: Positive | None = None
     """Mended after so long; None: never."""
+
+
+class BatteryConfig(Config):
+    """How far a robot drives on a full battery, and how long it stands at its station to fill it."""
+
+    range_m: Positive
+    charge_s: Positive
+    reserve_m: NonNegative = 10.0
+    """It sets out for its station while the range suffices for so much more: for who is in the way there."""
 
 
 class TeamConfig(Config):
@@ -43,6 +52,16 @@ class TeamConfig(Config):
     """At least so far apart are starting places that are drawn, middle to middle."""
 
     failures: tuple[Failure, ...] = ()
+    battery: BatteryConfig | None = None
+    """Of every robot; None: they drive for ever."""
+    stations: tuple[Point, ...] = ()
+    """Where each robot charges, in their order; none: where each begins."""
+
+    @model_validator(mode="after")
+    def _stations_for_batteries(self) -> TeamConfig:
+        if self.stations and self.battery is None:
+            raise ValueError("stations: expected team.battery beside them, found none")
+        return self
 
     @model_validator(mode="after")
     def _a_place_for_each(self) -> TeamConfig:

@@ -10,6 +10,7 @@ from pilotage.evaluation.finished import FinishedRun, Verdict
 
 SUMMED = frozenset(
     {
+        "charges",
         "collisions",
         "path_length_m",
         "attempts",

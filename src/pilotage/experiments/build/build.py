@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -32,7 +33,7 @@ from pilotage.stack.interface import Stack, StackStatus
 from pilotage.stack.journal import Journal
 from pilotage.stack.knowledge import RobotKnowledge, TaskKnowledge
 from pilotage.stack.patrol.strategy import STRATEGIES, PatrolSetting
-from pilotage.stack.patrol.task import PatrolSite, PatrolTask
+from pilotage.stack.patrol.task import PatrolSite, PatrolTask, Supply
 from pilotage.stack.planning.rounds import Rounds
 
 
@@ -227,6 +228,17 @@ def _check_places(mission: Mission, chart: WorldMap, sheets: Sequence[RobotKnowl
         assert kidnap.to is not None, "settled above"
         footprint = sheets[kidnap.robot].footprint
         check_place(f"world.kidnaps.{number}.to", kidnap.to.x_m, kidnap.to.y_m, footprint, chart)
+    stations = _stations(mission)
+    for index, (x, y) in enumerate(stations):
+        radius_m = sheets[index].radius_m
+        check_place(f"team.stations.{index}", x, y, sheets[index].footprint, chart)
+        for other in range(index):
+            apart = math.dist(stations[index], stations[other])
+            if apart < radius_m + sheets[other].radius_m:
+                raise InputError(
+                    f"team.stations.{index}: expected room for two robots beside team.stations.{other}, "
+                    f"found {apart:.2f} m between them; move one of them"
+                )
 
 
 def _check_ended(mission: Mission, team: Sequence[Member]) -> None:
@@ -304,6 +316,8 @@ def _share(mission: Mission, index: int, sheet: RobotKnowledge, whole: Task) -> 
     """A robot's share of a task that has places to visit for all of the team."""
     site: PatrolSite | None = getattr(whole, "patrol", None)
     if site is None:
+        if mission.team.battery is not None:
+            raise InputError(f"team.battery: expected task 'patrol', found '{mission.task.name}'")
         return None
     starts = np.array([_nearest(mission, k, site) for k in range(len(mission.members))])
     setting = PatrolSetting(
@@ -311,7 +325,21 @@ def _share(mission: Mission, index: int, sheet: RobotKnowledge, whole: Task) -> 
     )
     assert mission.team.strategy is not None, "the task looked"
     strategy = build_component(STRATEGIES, mission.team.strategy, "strategy", setting)
-    return PatrolTask(site.graph, site.visit_m, index, starts, strategy)
+    return PatrolTask(site.graph, site.visit_m, index, starts, strategy, _supply(mission))
+
+
+def _supply(mission: Mission) -> Supply | None:
+    """Where the team charges."""
+    battery, places = mission.team.battery, _stations(mission)
+    if battery is None:
+        return None
+    return Supply(np.array(places), battery.range_m, battery.reserve_m, battery.charge_s)
+
+
+def _stations(mission: Mission) -> list[tuple[float, float]]:
+    """Each robot's charging station; none where nobody charges."""
+    places = [mission.station_of(index) for index in range(len(mission.members))]
+    return [place for place in places if place is not None]
 
 
 def _nearest(mission: Mission, index: int, site: PatrolSite) -> int:

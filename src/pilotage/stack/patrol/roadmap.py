@@ -1,4 +1,4 @@
-"""The time to go to every vertex of a patrol graph, worked out once for all robots of one size."""
+"""The time to go to vertices and charging stations, worked out once for all robots of one size."""
 
 from __future__ import annotations
 
@@ -16,7 +16,8 @@ from pilotage.maps.world_map import WorldMap
 EASY_M, TIGHT_FACTOR = 0.5, 1.0
 """Nearer to walls than this, beyond the body, a metre takes longer: twice as long where it just fits."""
 STEP_M, ASIDE_REACH_M = 0.25, 5.0
-SEED_NODES = 1.5
+STATION_M = 0.4
+"""So far from a charging station the body may have to stand, for a wall beside it."""
 
 
 class Roadmap:
@@ -28,26 +29,28 @@ class Roadmap:
         (rows, columns) seconds a metre; infinite where the body does not fit.
     origin_xy_m, spacing_m
         Of the nodes; row 0 has the lowest y.
-    vertices_xy_m
-        (V, 2) places to visit.
+    places_xy_m
+        (V + N, 2) places to visit, then charging stations.
 
     Raises
     ------
     InputError
-        Where a vertex leaves no room for the body, or the body cannot drive from one to the others.
+        Where a place leaves no room for the body, or the body cannot drive from one to the others.
     """
 
     def __init__(
         self,
         chart: WorldMap,
         vertices_xy_m: FloatArray,
+        stations_xy_m: FloatArray,
         clearance_m: float,
         speed_m_s: float,
         spacing_m: float,
         near_m: float,
         lane_m: float,
     ) -> None:
-        self.vertices_xy_m, self.spacing_m = vertices_xy_m, spacing_m
+        self.places_xy_m: FloatArray = np.concatenate([vertices_xy_m, stations_xy_m])
+        self._vertices, self.spacing_m = len(vertices_xy_m), spacing_m
         xmin, ymin, xmax, ymax = chart.bounds_m
         self.origin_xy_m = (xmin, ymin)
         xs = np.arange(xmin, xmax + 0.5 * spacing_m, spacing_m)
@@ -61,19 +64,24 @@ class Roadmap:
         size = 2 * math.ceil(lane_m / spacing_m) + 1
         self._room_m: FloatArray = maximum_filter(distance, size=size)
         self._fields: dict[int, FloatArray] = {}
-        self._seeds = [self._seed(k, near_m, clearance_m) for k in range(len(vertices_xy_m))]
+        near = [near_m] * self._vertices + [STATION_M] * len(stations_xy_m)
+        self._seeds = [self._seed(k, within_m, clearance_m) for k, within_m in enumerate(near)]
         regions, _ = label(free, structure=np.ones((3, 3)))
-        of_vertex = [int(regions[seed]) for seed in self._seeds]
-        apart = [k for k, region in enumerate(of_vertex) if region != of_vertex[0]]
+        of_place = [int(regions[seed]) for seed in self._seeds]
+        apart = [k for k, region in enumerate(of_place) if region != of_place[0]]
         if apart:
             raise InputError(
                 f"patrol graph: expected paths with {clearance_m:.2f} m to each side, found none from "
-                f"vertex 0 to {len(apart)} of {len(of_vertex)} vertices (vertex {apart[0]} is the first)"
+                f"vertex 0 to {len(apart)} of {len(of_place)} places ({self._called(apart[0])} is the first)"
             )
 
-    def _seed(self, vertex: int, near_m: float, clearance_m: float) -> tuple[int, int]:
-        """The free node nearest to a vertex."""
-        x, y = self.vertices_xy_m[vertex]
+    def _called(self, place: int) -> str:
+        """A place as the mission calls it."""
+        return f"vertex {place}" if place < self._vertices else f"team.stations.{place - self._vertices}"
+
+    def _seed(self, place: int, near_m: float, clearance_m: float) -> tuple[int, int]:
+        """The free node nearest to a place."""
+        x, y = self.places_xy_m[place]
         rows, columns = np.nonzero(np.isfinite(self.slowness))
         away = np.hypot(
             self.origin_xy_m[0] + columns * self.spacing_m - x,
@@ -82,19 +90,24 @@ class Roadmap:
         best = int(np.argmin(away)) if away.size else -1
         if best < 0 or away[best] > near_m:
             raise InputError(
-                f"patrol graph: expected {clearance_m:.2f} m of room around vertex {vertex} at "
+                f"patrol graph: expected {clearance_m:.2f} m of room around {self._called(place)} at "
                 f"({x:g}, {y:g}), found a wall; move it or take a smaller robot"
             )
         return int(rows[best]), int(columns[best])
 
-    def time_s(self, vertex: int) -> FloatArray:
-        """(rows, columns) time to go to a vertex; worked out when first asked for."""
-        if vertex not in self._fields:
+    def longest_s(self, place: int) -> float:
+        """Time to a place from the vertex that is farthest from it."""
+        time = self.time_s(place)
+        return max(float(time[seed]) for seed in self._seeds[: self._vertices])
+
+    def time_s(self, place: int) -> FloatArray:
+        """(rows, columns) time to go to a place; worked out when first asked for."""
+        if place not in self._fields:
             field = np.full(self.slowness.shape, np.inf)
-            field[self._seeds[vertex]] = 0.0
+            field[self._seeds[place]] = 0.0
             eikonal.sweep_down(field, self.slowness, self.spacing_m)
-            self._fields[vertex] = field
-        return self._fields[vertex]
+            self._fields[place] = field
+        return self._fields[place]
 
     def aside(self, mouth_xy_m: FloatArray, outwards: FloatArray, pass_m: float) -> FloatArray | None:
         """(rows, columns) time to a place beside a passage's mouth, off its axis, that has room for two.
@@ -138,6 +151,7 @@ _SHARED: WeakKeyDictionary[WorldMap, dict[tuple[object, ...], Roadmap]] = WeakKe
 def roadmap_of(
     chart: WorldMap,
     vertices_xy_m: FloatArray,
+    stations_xy_m: FloatArray,
     clearance_m: float,
     speed_m_s: float,
     spacing_m: float,
@@ -146,7 +160,8 @@ def roadmap_of(
 ) -> Roadmap:
     """The roadmap of a map; robots that are told the same map and graph work it out once."""
     known = _SHARED.setdefault(chart, {})
-    key = (vertices_xy_m.tobytes(), clearance_m, speed_m_s, spacing_m, near_m, lane_m)
+    numbers = clearance_m, speed_m_s, spacing_m, near_m, lane_m
+    key = (vertices_xy_m.tobytes(), stations_xy_m.tobytes(), *numbers)
     if key not in known:
-        known[key] = Roadmap(chart, *(vertices_xy_m, clearance_m, speed_m_s, spacing_m, near_m, lane_m))
+        known[key] = Roadmap(chart, vertices_xy_m, stations_xy_m, *numbers)
     return known[key]

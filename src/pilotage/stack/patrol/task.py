@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from pilotage.core.types import IntArray
+from pilotage.core.types import FloatArray, IntArray
 from pilotage.stack.patrol.graph import PatrolGraph
 from pilotage.stack.patrol.strategy import Strategy
 
@@ -26,6 +26,26 @@ class PatrolSite:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class Supply:
+    """Where a team charges, and what a full battery is good for.
+
+    Attributes
+    ----------
+    stations_xy_m
+        (N, 2) one a robot.
+    range_m, reserve_m
+        What it drives on a full battery, and what it keeps of that beyond the path to its station.
+    charge_s
+        It stands there for so long.
+    """
+
+    stations_xy_m: FloatArray
+    range_m: float
+    reserve_m: float
+    charge_s: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class PatrolTask:
     """Its share of a patrol.
 
@@ -39,6 +59,8 @@ class PatrolTask:
         (N,) the vertex nearest to each robot's starting place.
     strategy
         Who says where to go next.
+    supply
+        None where it never has to charge.
     """
 
     graph: PatrolGraph
@@ -46,3 +68,4 @@ class PatrolTask:
     robot: int
     starts: IntArray
     strategy: Strategy
+    supply: Supply | None = None

@@ -18,6 +18,7 @@ from pilotage.sensors.wheel_odometry import WheelOdometryConfig
 from pilotage.stack.interface import Belief
 from pilotage.stack.journal import Journal
 from pilotage.stack.knowledge import RobotKnowledge
+from pilotage.stack.navigator.patrol.battery import DOCK_M, Battery
 from pilotage.stack.navigator.patrol.config import Mode, PatrolNavigatorConfig
 from pilotage.stack.patrol.messages import PatrolMemory
 from pilotage.stack.patrol.roadmap import STEP_M, roadmap_of
@@ -80,7 +81,8 @@ class Context:
     t_s, pose
         Of this step.
     hop, target, came_from
-        The vertex that it drives to now, the one that the strategy named, and the one that it was at last.
+        The vertex that it drives to now, the one that the strategy named, and the one that it was at last;
+        the first two are the number of its charging station in the roadmap while it is on its way there.
     near, strange
         (K, 2) and (M, 2) returns of the last scan, base frame: what is near, and what is on no map.
     people
@@ -89,6 +91,8 @@ class Context:
         When and where it last saw an intruder; NaN before.
     mates
         The last word of each team mate that was heard, by number, and when it was sent.
+    battery
+        What it reckons of its own; None where it never has to charge.
     """
 
     def __init__(
@@ -127,12 +131,17 @@ class Context:
         self.roadmap = roadmap_of(
             chart,
             task.graph.vertices_xy_m,
+            NO_POINTS if task.supply is None else task.supply.stations_xy_m,
             self._clearance_m,
             speed,
             config.spacing_m,
             0.5 * task.visit_m,
             config.lane_m,
         )
+        self.battery: Battery | None = None
+        if task.supply is not None:
+            station = len(task.graph) + task.robot
+            self.battery = Battery(task.supply, self.roadmap, station, speed)
         self.rng = robot.streams.stream("patrol")
         at = task.graph.nearest(start.x_m, start.y_m)
         self.memory = PatrolMemory(len(task.graph), task.robot, len(task.starts), at, speed)
@@ -156,6 +165,8 @@ class Context:
         odometry = readings.by_sensor.get(self._odometry)
         if isinstance(odometry, OdometryIncrement):
             self._twist = Twist(odometry.distance_m / self.dt_s, odometry.angle_rad / self.dt_s)
+            if self.battery is not None:
+                self.battery.spend(odometry.distance_m)
         said = None if self._radio is None else readings.by_sensor.get(self._radio)
         if isinstance(said, RadioMessages):
             for message in said.messages:
@@ -214,10 +225,38 @@ class Context:
 
     # --- the patrol ---------------------------------------------------------------------------------
 
-    def away_m(self, vertex: int) -> float:
-        """Distance from a vertex as the crow flies."""
-        x, y = self.task.graph.vertices_xy_m[vertex]
+    def away_m(self, place: int) -> float:
+        """Distance from a vertex or its station as the crow flies."""
+        x, y = self.roadmap.places_xy_m[place]
         return math.hypot(self.pose.x_m - float(x), self.pose.y_m - float(y))
+
+    @property
+    def homeward(self) -> bool:
+        """Whether it is on its way to its station."""
+        return self.battery is not None and self.battery.low
+
+    def arrived(self, *, blocked: bool) -> bool:
+        """Whether it is near enough to where it drives to; what blocks a vertex may be there in its place."""
+        if self.homeward:
+            return self.away_m(self.hop) <= DOCK_M
+        return self.away_m(self.hop) <= (0.9 if blocked else 0.5) * self.task.visit_m
+
+    def runs_low(self) -> bool:
+        """Whether it has to go to its station from now on; tells the others that its share is theirs."""
+        if self.battery is None or self.battery.low or not self.battery.check(self.pose):
+            return False
+        self.memory.update(self.t_s, on_duty=False)
+        self.say("battery", f"{self.battery.left_m:.0f} m are left: goes to its charging station")
+        return True
+
+    def charged(self) -> None:
+        """On duty again."""
+        assert self.battery is not None, "who has none does not charge"
+        self.battery.fill()
+        self.journal.count("charges")
+        self.say("charged", "the battery is full: goes on with the patrol")
+        self.memory.update(self.t_s, on_duty=True)
+        self.came_from, self._left_s = self.task.graph.nearest(self.pose.x_m, self.pose.y_m), self.t_s
 
     def visit(self, vertex: int) -> None:
         """It is there."""
@@ -231,7 +270,10 @@ class Context:
         self.memory.visit(vertex, self.t_s)
 
     def ask(self) -> bool:
-        """Let the strategy say where to go; False where it says to wait."""
+        """Let the strategy say where to go, or the battery; False where the strategy says to wait."""
+        if self.battery is not None and (self.homeward or self.runs_low()):
+            self.hop = self.target = self.battery.station
+            return True
         graph, at = self.task.graph, self.came_from
         target = int(self.task.strategy.next_vertex(self.memory.knowledge(self.t_s)))
         self.target = target
@@ -417,7 +459,10 @@ class Context:
         """The vertex near by that leads away best from what is in the way; -1 where there is none."""
         graph, roadmap, pose = self.task.graph, self.roadmap, self.pose
         around = {self.came_from, self.hop, *graph.neighbours(self.came_from).tolist()}
-        around |= set(graph.neighbours(self.hop).tolist())
+        if self.homeward:
+            around.discard(self.hop)
+        else:
+            around |= set(graph.neighbours(self.hop).tolist())
         seen = self.strange
         bearings = self._on_map(seen) - np.array([pose.x_m, pose.y_m])
         bearings /= np.hypot(*bearings.T)[:, None]

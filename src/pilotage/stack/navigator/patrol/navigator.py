@@ -13,7 +13,7 @@ from pilotage.stack.navigator.goal.wandering import Wandering
 from pilotage.stack.navigator.navigator import Parts, localizer_of
 from pilotage.stack.navigator.patrol.config import PatrolNavigatorConfig
 from pilotage.stack.navigator.patrol.context import Context
-from pilotage.stack.navigator.patrol.states import Lost, State, Waiting, resume
+from pilotage.stack.navigator.patrol.states import Charging, Lost, State, Waiting, resume
 
 COLUMNS = {
     "mode": "1",
@@ -37,7 +37,7 @@ class PatrolNavigator:
     for two. What is on no map and near is gone around on the same field, worked out anew in a small window.
     Every command can be braked in the robot's own half of the distance to what may move (buffered Voronoi
     cells, Zhou et al. 2017): laser alone, whether anybody talks or not. Who does not get on gives way, with
-    a radio the one with the larger number first.
+    a radio the one with the larger number first. One whose battery runs low goes to its station and charges.
 
     A robot of any shape is driven as the disc around it, and has to turn on the spot. Fails where the scanner
     does not see all round.
@@ -62,6 +62,8 @@ class PatrolNavigator:
         self._localizer = localizer_of(parts, "patrol")
         self._telemetry = journal.channel(COLUMNS, first=True)
         journal.counts |= {"gave_way": 0, "alarms": 0}
+        if parts.patrol.supply is not None:
+            journal.counts["charges"] = 0
         self._context = Context(config, robot, chart, parts.patrol, task.initial.pose, journal)
         self._wandering = Wandering(config.wander, robot, self._localizer)
         self._state: State | None = None
@@ -73,7 +75,9 @@ class PatrolNavigator:
 
     @property
     def status(self) -> tuple[StackStatus, str]:
-        """A patrol has no end of its own; whether it waits because its strategy says so."""
+        """A patrol has no end of its own; whether it waits because its strategy says so, or charges."""
+        if isinstance(self._state, Charging):
+            return StackStatus.RUNNING, "charges"
         return StackStatus.RUNNING, "waits" if isinstance(self._state, Waiting) else ""
 
     def step(self, readings: Readings) -> Twist:
@@ -88,7 +92,7 @@ class PatrolNavigator:
             state = Lost(context, self._wandering)
         elif not lost and isinstance(state, Lost):
             context.say("found", "the robot knows where it is and goes on")
-            context.memory.update(context.t_s, on_duty=True)
+            context.memory.update(context.t_s, on_duty=not context.homeward)
             context.came_from = context.task.graph.nearest(belief.pose.x_m, belief.pose.y_m)
             state = None
         self._state, command = resume(context) if state is None else state.step(readings)

@@ -9,6 +9,7 @@ from typing import NamedTuple, Protocol
 from pilotage.core.types import FloatArray, Twist
 from pilotage.sensors.readings import Readings
 from pilotage.stack.navigator.goal.wandering import Wandering
+from pilotage.stack.navigator.patrol.battery import DOCK_M, Battery
 from pilotage.stack.navigator.patrol.config import Mode
 from pilotage.stack.navigator.patrol.context import Context, Passage
 from pilotage.stack.navigator.progress import StallWatch
@@ -51,9 +52,10 @@ class Driving:
         del readings
         context = self.context
         context.mode = Mode.DRIVE
-        away_m, visit_m = context.away_m(context.hop), context.task.visit_m
-        if away_m <= 0.5 * visit_m or (context.blocked and away_m <= 0.9 * visit_m):
+        if context.arrived(blocked=context.blocked):
             return arrive(context)
+        if context.runs_low():
+            return resume(context)
         if context.fresh:
             passage = context.passage(context.hop)
             met = None if passage is None else meet(context, passage, context.t_s)
@@ -100,7 +102,7 @@ class Yielding:
         del readings
         context = self.context
         context.mode = Mode.YIELD
-        if context.t_s >= self.until_s:
+        if context.t_s >= self.until_s or context.runs_low():
             return resume(context)
         if context.away_m(self.vertex) <= 0.5 * context.task.visit_m:
             context.visit(self.vertex)
@@ -126,7 +128,7 @@ class Holding:
         del readings
         context = self.context
         context.mode, context.blocked = Mode.HOLD, True
-        if context.away_m(context.hop) <= 0.9 * context.task.visit_m:
+        if context.arrived(blocked=True):
             return arrive(context)
         if context.t_s - self.since_s > context.config.hold_s:
             return give_way(context)
@@ -173,6 +175,37 @@ class StandingAside:
 
 
 @dataclass(frozen=True, slots=True)
+class Charging:
+    """Stands at its station.
+
+    Attributes
+    ----------
+    since_s
+        When it came to rest there.
+    """
+
+    context: Context
+    battery: Battery
+    since_s: float
+
+    def step(self, readings: Readings) -> Move:
+        """Stand until the battery is full; there again where it was carried away."""
+        del readings
+        context = self.context
+        context.mode, context.blocked = Mode.CHARGE, False
+        if context.away_m(self.battery.station) > 2.0 * DOCK_M:
+            return resume(context)
+        if context.away_m(context.came_from) <= context.task.visit_m:
+            context.memory.visit(context.came_from, context.t_s)
+        if context.moving_m_s > AT_REST_M_S:
+            return Move(Charging(context, self.battery, context.t_s), context.stand())
+        if context.t_s - self.since_s >= self.battery.charge_s:
+            context.charged()
+            return resume(context)
+        return Move(self, context.stand())
+
+
+@dataclass(frozen=True, slots=True)
 class Lost:
     """Does not know where it is: keeps clear of everything and looks around."""
 
@@ -199,7 +232,10 @@ def set_out(context: Context) -> Driving:
 
 
 def arrive(context: Context) -> Move:
-    """At a vertex: told, and the strategy asked."""
+    """At a vertex: told, and the strategy asked; or at its station."""
+    battery = context.battery
+    if battery is not None and battery.low:
+        return Move(Charging(context, battery, context.t_s), context.stand())
     context.visit(context.hop)
     return resume(context)
 
