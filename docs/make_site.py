@@ -58,7 +58,8 @@ def build(folder: Path, *, quick: bool = False) -> Path:
         _write(source / place, rewritten(page, places))
     for picture in (DOCS / "images").iterdir():
         _copy(picture, source / "images" / picture.name)
-    _copy(DOCS / "site.css", source / "site.css")
+    for style in ("site.css", "narrow.css"):
+        _copy(DOCS / style, source / style)
     _write(source / "decisions" / "index.md", _decisions())
     _write(source / "notebooks" / "index.md", _notebooks(source / "notebooks", quick=quick))
     _write(source / "gallery" / "index.md", _gallery(source / "gallery", () if quick else GALLERY))
@@ -159,7 +160,11 @@ def _output(output: Any) -> Iterator[str]:
     if "text/html" in data:
         # One block without blank lines: Markdown would take what follows one for its own.
         body = re.sub(r"\n\s*\n", "\n", "".join(data["text/html"]))
-        yield f'<div class="output">{body}</div>\n'
+        # A data frame's own style is for notebooks; the site has one for all tables.
+        body = re.sub(r"<style scoped>.*?</style>", "", body, flags=re.DOTALL)
+        body = body.replace(' border="1" class="dataframe"', "")
+        if body:
+            yield f'<div class="output">{body}</div>\n'
     elif "image/png" in data:
         yield f'<img alt="figure" src="data:image/png;base64,{"".join(data["image/png"]).strip()}">\n'
     elif "text/plain" in data or (output.get("name") == "stdout"):
@@ -182,10 +187,19 @@ def _gallery(folder: Path, missions: tuple[tuple[str, int], ...]) -> str:
         told = html.escape(run.mission.description)
         cards.append(
             f'<a class="card" href="{place}"><img loading="lazy" src="{name}.svg" alt="{told}">'
-            f"<p><b>{name}</b>, seed {seed}: {told}. {word}, {run.metrics['duration_s']:.0f} s.</p></a>"
+            f"<p><b>{name}</b>, seed {seed}: {told}. {word}, {lasted(run.metrics['duration_s'])}.</p></a>"
         )
     text = "Every card is the page of a real run, with its replay; it needs no network.\n"
-    return f'# Gallery\n\n{text}\n<div class="gallery">{"".join(cards)}</div>\n'
+    head = "---\nhide: [toc, navigation]\n---\n\n# Gallery\n"
+    return f'{head}\n{text}\n<div class="gallery">{"".join(cards)}</div>\n'
+
+
+def lasted(duration_s: float) -> str:
+    """A duration as one says it: "96 s", "9.9 min", "93.9 h"."""
+    for unit, seconds in (("h", 3600.0), ("min", 60.0)):
+        if duration_s >= 2.0 * seconds:
+            return f"{duration_s / seconds:.1f} {unit}"
+    return f"{duration_s:.0f} s"
 
 
 def picture(folder: Path) -> str:
@@ -196,8 +210,14 @@ def picture(folder: Path) -> str:
 
     with drawing_style():
         drawn = map_of(read_run(folder)).svg
-    # Inside a page a drawing needs no name space; as a file it does.
-    return drawn.replace("<svg ", '<svg xmlns="http://www.w3.org/2000/svg" ', 1)
+    return as_file(drawn)
+
+
+def as_file(drawn: str) -> str:
+    """A drawing with what its page gives it elsewhere: name spaces, and the style of narrow ones."""
+    spaces = 'xmlns="http://www.w3.org/2000/svg" xmlns:xlink="http://www.w3.org/1999/xlink"'
+    style = (DOCS / "narrow.css").read_text(encoding="utf-8")
+    return drawn.replace("<svg ", f"<svg {spaces} ", 1).replace(">", f"><style>{style}</style>", 1)
 
 
 def _write(path: Path, text: str) -> None:
