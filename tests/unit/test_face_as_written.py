@@ -21,7 +21,7 @@ run = pl.run(mission)
 print(run.success, run.reason)
 print(run.metrics["position_rmse_m"])
 print(run.metrics.table())
-print(run.trace.to_arrow().num_rows)
+print(run.trace.to_arrow().num_rows, run.trace.to_pandas().shape)
 run.report("night.html"); run
 print(run.folder, pl.open_run(run.folder))
 sim = pl.make(mission)
@@ -34,6 +34,7 @@ print(pl.plan("map.yaml", start, goal, planner="theta-star", clearance_m=0.2).pa
 short = pl.load(mission, set={"run.time_limit_s": 3.0})
 print(pl.study(short, vary={"stack.localizer.gate": [0.9, 0.99]}, trials=2, workers=2).table())
 ranges = [2.0] * 90
+box = [[0, 0, 6, 0], [6, 0, 6, 4], [6, 4, 0, 4], [0, 4, 0, 0], [3, 0, 3, 2.5]]
 filter = pl.filters.EkfLandmarks(landmarks=[[4.0, 0.0], [0.0, 3.0]])
 print(filter.predict(0.5, 0.0).update([0, 1], [3.5, 3.04], [0.0, 1.737]).mean)
 log = pl.export(run, "mcap", "run.mcap")
@@ -42,12 +43,16 @@ print(pl.calibrate("odometry", log)["distance_scale"])
 print(pl.evaluate(log, log, topics=["/pose", "/truth"])["ate_rmse_m"])
 print(pl.track("film.avi").visited_cells)
 print(pl.lines.extract(ranges, field_of_view_rad=1.5))
+print(pl.planners.on_walls(box, (1, 1), (5, 1), planner="astar", clearance_m=0.3).status)
+print(pl.planners.on_cells([[False] * 9] * 9, (1, 1), (7, 7)).status)
+print(pl.draw(pl.vectorize("map.yaml"), "walls.png").layers["walls"])
 print("all of it")
 """
 
 
 pytest.importorskip("cv2", reason="needs the extra 'vision'")
 pytest.importorskip("rosbags", reason="needs the extra 'ros'")
+pytest.importorskip("pandas", reason="needs the extra 'dev'")
 
 
 @pytest.mark.slow

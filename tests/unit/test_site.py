@@ -10,8 +10,11 @@ from html.parser import HTMLParser
 from pathlib import Path
 from types import ModuleType
 from urllib.parse import unquote
+from xml.etree import ElementTree
 
 import pytest
+
+import pilotage as pl
 
 pytest.importorskip("mkdocs", reason="needs the extra 'docs'")
 pytest.importorskip("material", reason="needs the extra 'docs'")
@@ -100,6 +103,34 @@ def test_notebooks_are_stored_without_outputs(path: Path) -> None:
         if cell["cell_type"] == "code":
             assert (cell["outputs"], cell["execution_count"]) == ([], None)
             ast.parse("".join(cell["source"]))
+
+
+def test_a_drawing_is_a_file_of_its_own(maker: ModuleType) -> None:
+    """Browsers show nothing of one with a prefix without a name space, such as a shaded terrain's."""
+    drawn = '<svg viewBox="0 0 1 1"><image xlink:href="data:image/png;base64,AA=="/><text>x</text></svg>'
+    root = ElementTree.fromstring(maker.as_file(drawn))
+    assert root.tag == "{http://www.w3.org/2000/svg}svg"
+    assert [child.tag.rpartition("}")[2] for child in root] == ["style", "image", "text"]
+
+
+def test_durations_are_told_as_one_says_them(maker: ModuleType) -> None:
+    assert [maker.lasted(t) for t in (96.4, 594.0, 338150.0)] == ["96 s", "9.9 min", "93.9 h"]
+
+
+def test_the_whole_public_face_is_in_a_notebook() -> None:
+    shown = set()
+    for path in (DOCS / "notebooks").glob("*.ipynb"):
+        cells = json.loads(path.read_text(encoding="utf-8"))["cells"]
+        for cell in (cell for cell in cells if cell["cell_type"] == "code"):
+            for node in ast.walk(ast.parse("".join(cell["source"]))):
+                if isinstance(node, ast.Attribute):
+                    shown.add(node.attr)
+    results = {"Mission", "Plan", "Run", "Simulation", "Study"}  # what calls return
+    commands = {"WheelSpeeds"}  # taken as a Twist is
+    members = {"success", "reason", "metrics", "trace", "folder", "report", "table", "to_arrow", "to_pandas"}
+    parts = {"reset", "step", "truth", "path", "extract", "on_cells", "on_walls", "EkfLandmarks", "update"}
+    wanted = {name for name in pl.__all__ if not name.startswith("_")} - results - commands
+    assert (wanted | members | parts) - shown == set()
 
 
 def test_there_are_five_notebooks() -> None:
