@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from typing import Annotated
 
 import typer
@@ -83,6 +84,12 @@ def _options(
     """Take the options that stand before the command."""
 
 
+@cache
+def _commands() -> typer.core.TyperGroup:
+    """The commands with their options, read from their signatures once a process."""
+    return typer.main.get_group(app)
+
+
 def dispatch(arguments: list[str]) -> int:
     """Run the command that ``arguments`` name and return its exit code.
 
@@ -91,7 +98,7 @@ def dispatch(arguments: list[str]) -> int:
     InputError
         What cannot be parsed, in one line with the nearest right name.
     """
-    command = typer.main.get_command(app)
+    command = _commands()
     try:
         with command.make_context("pilotage", arguments or ["--help"]) as context:
             return int(command.invoke(context) or 0)
