@@ -1,6 +1,6 @@
 """The landmark EKF against filterpy on the same problem: five landmarks in sight at every step.
 
-    python -m benchmarks.ekf_peer
+    python -m benchmarks.ekf_peer [--json]
 
 Both filters predict by the exact arc and take the landmarks one after the other, linearized at the
 current estimate, with the same Jacobians; filterpy is given plain numpy functions, as its users write them.
@@ -9,6 +9,8 @@ Exit code 0 where the estimates agree to 1e-9 and ours takes at least 100 times 
 
 from __future__ import annotations
 
+import argparse
+import json
 import math
 import sys
 import time
@@ -115,6 +117,9 @@ def filterpys(peer: Any, increments: FloatArray, ranges: FloatArray, bearings: F
 
 def main() -> int:
     """Compare and print one line each."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n", 1)[0])
+    parser.add_argument("--json", action="store_true", help="one JSON object instead of the lines")
+    as_json = parser.parse_args().json
     try:
         from filterpy.kalman import ExtendedKalmanFilter
     except ImportError:
@@ -136,9 +141,15 @@ def main() -> int:
         error = poses - peers
         error[:, 2] = (error[:, 2] + math.pi) % (2 * math.pi) - math.pi
         gap = float(np.abs(error).max())
-        print(f"pilotage {own:12,.0f} steps/s   filterpy {other:8,.0f} steps/s   ratio {own / other:8,.0f}")
+        if not as_json:
+            print(
+                f"pilotage {own:12,.0f} steps/s   filterpy {other:8,.0f} steps/s   ratio {own / other:8,.0f}"
+            )
     ratio = float(np.median(ratios))
-    print(f"median ratio {ratio:,.0f} (bar {BAR:g}), largest difference {gap:.1e} (bar {AGREE:g})")
+    if as_json:
+        print(json.dumps({"ratio": ratio, "largest_difference": gap}))
+    else:
+        print(f"median ratio {ratio:,.0f} (bar {BAR:g}), largest difference {gap:.1e} (bar {AGREE:g})")
     return 0 if ratio >= BAR and gap <= AGREE else 1
 
 

@@ -1,6 +1,6 @@
 """Steps of many environments at once beside robot steps of IR-SIM, turn by turn in one run.
 
-    python -m benchmarks.vector_env [--envs 1024] [--turns 5]
+    python -m benchmarks.vector_env [--json] [--envs 1024] [--turns 5]
 
 Both sides scan 64 beams with noise among the museum's walls and drive the same disc; IR-SIM steps one robot
 along the route (see ``peer_irsim``). Rates are of wall time; beside ours stands the rate of processor time,
@@ -10,6 +10,7 @@ which a busy machine does not change. Exit code 1 where IR-SIM is missing or the
 from __future__ import annotations
 
 import argparse
+import json
 import statistics
 import sys
 import time
@@ -30,6 +31,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.split("\n", 1)[0])
     parser.add_argument("--envs", type=int, default=1024)
     parser.add_argument("--turns", type=int, default=5)
+    parser.add_argument("--json", action="store_true", help="one JSON object instead of the lines")
     asked = parser.parse_args()
     gym.register()
     env = gymnasium.make_vec(
@@ -58,8 +60,13 @@ def main() -> int:
         theirs.append(taken / took)
     ratio = statistics.median(a / b for a, b in zip(ours, theirs, strict=True))
     own, alone = statistics.median(ours), statistics.median(by_processor)
-    print(f"environment steps {own:,.0f} / s ({alone:,.0f} a processor second)")
-    print(f"IR-SIM robot steps {statistics.median(theirs):,.0f} / s; ratio {ratio:.0f}, bar {BAR:g}")
+    peer_rate = statistics.median(theirs)
+    if asked.json:
+        values = {"steps_per_s": own, "steps_per_processor_s": alone, "irsim_steps_per_s": peer_rate}
+        print(json.dumps(values | {"ratio": ratio}))
+    else:
+        print(f"environment steps {own:,.0f} / s ({alone:,.0f} a processor second)")
+        print(f"IR-SIM robot steps {peer_rate:,.0f} / s; ratio {ratio:.0f}, bar {BAR:g}")
     return 0 if ratio >= BAR else 1
 
 

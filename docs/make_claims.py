@@ -6,8 +6,8 @@
     python docs/make_claims.py --adopt                      # put those into docs/given.json, as open
 
 docs/claims.yaml registers what is measured, a line each: a study, or a command that writes values as JSON to
-the file in place of ``{json}``, or prints one JSON object of numbers. A page quotes a value by a comment
-right behind it, which no reader sees:
+the file in place of ``{json}``, or prints one JSON object of numbers, or of rows with a ratio each. A page
+quotes a value by a comment right behind it, which no reader sees:
 
     94.5<!--= gale :: dead reckoning :: ellipse :: %1 -->
 
@@ -164,7 +164,15 @@ def measure(name: str, entry: Mapping[str, Any], workers: int) -> dict[str, Any]
 
 
 def _told(metrics: Mapping[str, Any]) -> dict[str, Any]:
-    """One run's numbers, with their intervals where ``KEY_low`` and ``KEY_high`` stand beside."""
+    """One run's numbers, with their intervals where ``KEY_low`` and ``KEY_high`` stand beside; or ratios."""
+    if "rows" in metrics:
+        rows = [row for row in metrics["rows"] if row["ratio"] is not None]
+        return {
+            ", ".join(row[key] for key in ("subject", "what", "peer") if key in row): _numbers(
+                value=row["ratio"]
+            )
+            for row in rows
+        }
     numbers = {k: v for k, v in metrics.items() if isinstance(v, int | float) and not isinstance(v, bool)}
     found = {}
     for key, value in numbers.items():
