@@ -13,6 +13,7 @@ from pathlib import Path
 
 import pytest
 
+from pilotage.cli.main import main
 from pilotage.core import plugins
 
 ROOT = Path(__file__).parents[2]
@@ -91,9 +92,15 @@ def test_the_examples_run_from_outside(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("word", ["stroll", "beeline"])
-def test_without_them_the_mission_is_refused_in_one_line(word: str, tmp_path: Path) -> None:
-    program = FROM_OUTSIDE
-    done = run(tmp_path, program, *(["--set", "task=reach"] if word == "beeline" else []))
-    assert done.returncode == 2
-    assert done.stdout == ""
-    assert done.stderr.count("\n") == 1
+def test_without_them_the_mission_is_refused_in_one_line(
+    word: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """In this process: it registers nothing."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.delenv(plugins.VARIABLE, raising=False)
+    Path("a-stroll.yaml").write_text(MISSION)
+    words = ["--set", "task=reach"] if word == "beeline" else []
+    assert main(["run", "a-stroll.yaml", "--json", "--out", "runs", *words]) == 2
+    told = capsys.readouterr()
+    assert told.out == ""
+    assert told.err.count("\n") == 1

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -103,22 +104,30 @@ def test_the_album_keeps_the_telling_ones_and_stays_small() -> None:
     assert UpdateAlbum().arrays() == {}
 
 
-def test_a_run_keeps_them_and_its_report_shows_them(tmp_path: Path) -> None:
-    result = run_mission(load_mission("museum-walls", ["run.time_limit_s=15"], 1), out=tmp_path)
+@pytest.fixture(scope="module")
+def by_walls(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
+    """The folder of a run by walls, and its page."""
+    runs = tmp_path_factory.mktemp("runs")
+    result = run_mission(load_mission("museum-walls", ["run.time_limit_s=15"], 1), out=runs)
     assert result.run_dir is not None
-    run = read_run(result.run_dir)
+    return result.run_dir, write_report(result.run_dir).read_text()
+
+
+def test_a_run_keeps_them_and_its_report_shows_them(by_walls: tuple[Path, str], tmp_path: Path) -> None:
+    folder, page = by_walls
+    run = read_run(folder)
     assert 3 <= len(run.updates) <= 6
     assert run.updates[0].why == "first update"
     assert np.isfinite(run.updates[0].points_m).all()
     # The scan as the file has it, put where the robot was, lies on the walls of the museum.
     first = run.updates[0]
     assert first.points_m.shape == (539, 2)
-    page = write_report(result.run_dir).read_text()
     assert 'id="updates"' in page
     assert "beyond the gate" in page or "accepted" in page
-    (result.run_dir / "updates.npz").write_bytes(b"not an archive")
+    damaged = Path(shutil.copytree(folder, tmp_path / "damaged"))
+    (damaged / "updates.npz").write_bytes(b"not an archive")
     with pytest.raises(InputError, match=r"updates\.npz"):
-        read_run(result.run_dir)
+        read_run(damaged)
 
 
 def test_a_run_on_beacons_has_none(tmp_path: Path) -> None:
@@ -149,9 +158,7 @@ def test_the_record_costs_the_run_nothing_it_would_draw_differently() -> None:
     assert (traces[0]["est_x_m"] == traces[1]["est_x_m"]).all()
 
 
-def test_the_consistency_figure_counts_lines_where_there_are_no_beacons(tmp_path: Path) -> None:
-    result = run_mission(load_mission("museum-walls", ["run.time_limit_s=5"], 1), out=tmp_path)
-    assert result.run_dir is not None
-    page = write_report(result.run_dir).read_text()
+def test_the_consistency_figure_counts_lines_where_there_are_no_beacons(by_walls: tuple[Path, str]) -> None:
+    page = by_walls[1]
     assert "Lines seen and accepted" in page
     assert "Beacons seen and accepted" not in page
