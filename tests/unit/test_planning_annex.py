@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from pilotage.core.types import Goal, Pose2
+from pilotage.experiments.build.charts import load_chart
 from pilotage.experiments.mission import load_mission
 from pilotage.experiments.run import run_mission
 from pilotage.experiments.studies.study import load_study
@@ -12,6 +14,7 @@ from pilotage.kernels.rrt.clearance import curve_is_free
 from pilotage.maps.distance_field import DistanceField
 from pilotage.maps.segment_map import SegmentMap
 from pilotage.stack.planning.driving_space import space_for
+from pilotage.stack.planning.planner import PLANNERS, PlanRequest
 
 FIRST = ["stack.planner.stop=first", "stack.planner.iterations=100000"]
 
@@ -46,6 +49,23 @@ def test_validation_distance_changes_the_search_and_no_path_comes_too_near() -> 
         assert metrics["planned_clearance_m"] >= 0.16 - 1e-6  # type: ignore[operator]
         lengths.add(round(float(metrics["first_length_m"]), 6))  # type: ignore[arg-type]
     assert len(lengths) > 1
+
+
+def test_the_search_goes_on_where_an_edge_that_was_cut_leaves_it() -> None:
+    """Round corners, coarse checks join edges that cut them; the search begins again where they are cut."""
+    floor = load_chart("museum").walls
+    field = DistanceField.from_map(floor)
+    parameters = {"validation_distance_m": 0.5, "clearance_m": 0.46, "iterations": 5_000}
+    planner = PLANNERS.entry("rrt-star-dubins").factory(
+        PLANNERS.configure("rrt-star-dubins", parameters, "planner")
+    )
+    for seed in range(6):
+        for start, goal in (
+            (Pose2(1.0, 1.0, 0.0), Goal(2.0, 27.0)),
+            (Pose2(2.0, 37.0, 0.0), Goal(37.0, 10.0)),
+        ):
+            request = PlanRequest(start, goal, field, np.random.default_rng(seed))
+            assert planner.plan(request).path is not None
 
 
 @pytest.mark.parametrize("cell", range(0, 31, 6))

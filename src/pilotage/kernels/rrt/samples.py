@@ -125,3 +125,17 @@ def advance_guide(tree: Tree, guide: FloatArray, x: float, y: float, spread: flo
         if math.hypot(guide[k, 0] - x, guide[k, 1] - y) <= spread:
             tree.counts[PROGRESS] = k
             return
+
+
+@kernel
+def recede_guide(tree: Tree, guide: FloatArray, node: int) -> None:
+    """Go back along the guide to where ``node`` stands, as what the tree has beyond it is about to be cut.
+
+    Samples ahead of the tree's front would find nothing near that they could be joined to.
+    """
+    nearest, least = 0, math.inf
+    for k in range(guide.shape[0]):
+        away = math.hypot(guide[k, 0] - tree.pose[node, 0], guide[k, 1] - tree.pose[node, 1])
+        if away < least:
+            nearest, least = k, away
+    tree.counts[PROGRESS] = min(tree.counts[PROGRESS], nearest)

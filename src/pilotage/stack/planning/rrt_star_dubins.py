@@ -130,6 +130,7 @@ class RrtStarDubinsPlanner:
             if cost < checked_cost - 1e-9:
                 path, failing = _extract(tree, space, clearance_m, config.turning_radius_m)
                 if path is None:
+                    rrt_samples.recede_guide(tree, guide_path, int(tree.parent[failing]))
                     rrt_tree.cut(tree, failing)
                     continue
                 if best is None:
