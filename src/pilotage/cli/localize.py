@@ -14,7 +14,6 @@ from pilotage.cli.options import Json, Out, Overrides, Plugins
 from pilotage.cli.output import print_columns, print_json, print_line, stdout_for_json
 from pilotage.cli.plan import parse_pose
 from pilotage.core.errors import InputError, unknown_name
-from pilotage.core.types import Pose2
 
 NAMED = 5
 """Rows of a log that were left out and are named; the others are counted."""
@@ -91,6 +90,7 @@ def localize(
     plugin: Plugins = None,  # noqa: ARG001 - loaded while the options are read
 ) -> int:
     """Run a localizer over a recording and score it, against its truth where that is known."""
+    from pilotage.core.types import Pose2
     from pilotage.experiments.recordings.localize import FORMATS, Setting, localize_log
 
     if form is not None and form not in FORMATS:
@@ -103,7 +103,7 @@ def localize(
     setting = Setting(
         map_,
         landmarks,
-        None if start is None else _pose(start),
+        None if start is None else Pose2(*_start(start)),
         tuple(topics or ()),
         truth,
         from_s,
@@ -137,11 +137,11 @@ def localize(
     return 0 if result.metrics["success"] else 1
 
 
-def _pose(text: str) -> Pose2:
+def _start(text: str) -> tuple[float, ...]:
     values = parse_pose(text, "--start")
     if len(values) != 3:
         raise InputError(f"--start: expected X,Y,TH in metres and radians, found '{text}'")
-    return Pose2(*values)
+    return values
 
 
 def _text(value: object) -> str:
