@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import math
+import os
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -213,6 +214,23 @@ def test_a_folder_without_metadata(tmp_path: Path) -> None:
         path = write_ros2(tmp_path / storage.lower(), drive(), storage)
         (path / "metadata.yaml").unlink()
         assert len(read_bag(path)) == 30
+
+
+BOMB = "a0: &a0 [x, x]\n" + "".join(f"a{i}: &a{i} [*a{i - 1}, *a{i - 1}]\n" for i in range(1, 60))
+LISTED = "rosbag2_bagfile_information: {relative_file_paths: [a.db3, more.db3]}"
+
+
+@pytest.mark.parametrize("described", [None, BOMB, "- 1", LISTED])
+def test_a_description_that_would_hang_is_not_handed_to_the_library(
+    tmp_path: Path, described: str | None
+) -> None:
+    """A pipe that nobody writes into: in its place, or in the place of a file that it lists."""
+    path = write_ros2(tmp_path / "a", drive())
+    (path / "metadata.yaml").unlink()
+    os.mkfifo(path / ("metadata.yaml" if described is None else "more.db3"))
+    if described is not None:
+        (path / "metadata.yaml").write_text(described)
+    assert len(read_bag(path)) == 30
 
 
 def test_a_cut_bag_of_packed_messages(tmp_path: Path) -> None:

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any, TypeAlias, TypeVar
 
 from pilotage.core.errors import InputError
-from pilotage.core.files import opened
+from pilotage.core.files import opened, read_yaml
 from pilotage.logs.rosbags_extra import rosbags
 from pilotage.logs.salvage.found import MAGIC_OF, BagFormat, Salvage
 from pilotage.logs.salvage.pieces import unpack
@@ -78,6 +78,16 @@ def _storage_files(folder: Path) -> list[Path]:
     return sorted(files, key=lambda path: (len(path.name), path.name))
 
 
+def _sound(folder: Path) -> bool:
+    """Whether a folder's description reads within limits and names plain files: ``rosbags`` opens them."""
+    try:
+        described = read_yaml(folder / "metadata.yaml", "a bag's description")
+        names = described["rosbag2_bagfile_information"]["relative_file_paths"]
+        return all((folder / name).is_file() for name in names)
+    except (InputError, OSError, KeyError, TypeError, ValueError):
+        return False
+
+
 def read_through(path: Path, read: Callable[[OpenBag], T]) -> T:
     """Read a bag by ``rosbags``; one that is cut or damaged as far as it goes.
 
@@ -113,6 +123,8 @@ def open_whole(path: Path, stack: ExitStack) -> OpenBag | None:
         raise InputError(
             f"{path}: expected a ROS 1 bag, a ROS 2 bag (a folder or .db3) or MCAP, found none of them"
         )
+    if path.is_dir() and not _sound(path):
+        return None
     try:
         reader = highlevel.AnyReader([path], default_typestore=typesys.get_typestore(typesys.Stores.LATEST))
         stack.enter_context(reader)

@@ -63,14 +63,14 @@ TARGETS: tuple[Target, ...] = (
         ("report", "run"),
         ("run/metrics.json", "run/events.jsonl", "run/world.json", "run/mission.yaml"),
         True,
-        goes_on=True,
+        goes_on=(0,),
     ),
     Target(
         "report run arrays",
         _run_folder,
         ("report", "run"),
         ("run/trace.parquet", "run/scans.npz"),
-        goes_on=True,
+        goes_on=(0,),
     ),
     Target(
         "study",
@@ -85,7 +85,7 @@ TARGETS: tuple[Target, ...] = (
             _run_folder,
             ("export", "run", "--to", to, "--out", name),
             tuple(f"run/{file}" for file in RUN_FILES),
-            goes_on=True,
+            goes_on=(0,),
         )
         for to, name in (
             ("mcap", "a.mcap"),
@@ -106,7 +106,7 @@ TARGETS: tuple[Target, ...] = (
         _slam_folder,
         ("evaluate", "mapped/trajectory.tum", "true.relations", "--relations"),
         ("mapped/keyframes.npz", "mapped/covariances.npz", "true.relations"),
-        goes_on=True,
+        goes_on=(0,),
     ),
     Target(
         "plan slam",
@@ -120,7 +120,7 @@ TARGETS: tuple[Target, ...] = (
         ("report", "calibrated"),
         ("calibrated/calibration.json", "calibrated/data.npz"),
         True,
-        goes_on=True,
+        goes_on=(0,),
     ),
     Target("report study", _study_folder, ("report", "done"), ("done/study.yaml",), True),
     Target("report study rows", _study_folder, ("report", "done"), ("done/trials.sqlite",)),
@@ -135,6 +135,6 @@ TARGETS: tuple[Target, ...] = (
         _study_folder,
         ("run", "--from", "done:1", *SHORT),
         ("done/study.yaml", "done/trials.sqlite"),
-        goes_on=True,
+        goes_on=(0, 1),
     ),
 )

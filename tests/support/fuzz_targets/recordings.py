@@ -205,10 +205,10 @@ TARGETS: tuple[Target, ...] = (
     ),
     Target("slam carmen", _laser, _slam("lab.log"), ("lab.log",)),
     Target(
-        "slam settings", _laser, _slam("lab.log", "--config", "slam.yaml"), ("slam.yaml",), True, goes_on=True
+        "slam settings", _laser, _slam("lab.log", "--config", "slam.yaml"), ("slam.yaml",), True, goes_on=(0,)
     ),
     *(
-        Target(f"slam {form}", _bags, _slam(name), damaged, goes_on=True)
+        Target(f"slam {form}", _bags, _slam(name), damaged, goes_on=(0,))
         for form, (name, damaged) in BAGS.items()
     ),
 )

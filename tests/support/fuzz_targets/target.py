@@ -28,7 +28,8 @@ class Target:
     trees
         Whether they hold YAML or JSON.
     goes_on
-        Whether it does what is left to do where a file is missing or is no such file.
+        The exit codes, beside that of bad input, of a command that does what is left to do where a file is
+        no such file.
     """
 
     name: str
@@ -36,7 +37,7 @@ class Target:
     words: tuple[str, ...]
     files: tuple[str, ...]
     trees: bool = False
-    goes_on: bool = False
+    goes_on: tuple[int, ...] = ()
 
 
 def write_yaml(path: Path, values: object) -> None:
