@@ -17,6 +17,7 @@ from pilotage.evaluation.finished import FinishedRun, RobotRun, Verdict
 from pilotage.evaluation.floor_ages import FloorAges
 from pilotage.evaluation.guard_log import GuardLog
 from pilotage.evaluation.patrol_visits import VisitLog
+from pilotage.evaluation.stuck_watch import StuckWatch
 from pilotage.evaluation.tasks.task import TASKS, Attempt, TaskSetting
 from pilotage.evaluation.tasks.team import verdict
 from pilotage.maps.floor import Floor
@@ -31,7 +32,6 @@ from pilotage.stack.patrol.task import PatrolSite
 from pilotage.stack.patrol.tours import Round, idleness_bound_s
 
 VISITS_EVERY_S, LOOK_EVERY_S = 0.2, 1.0
-STUCK_M = 1.0
 CELL_M = 0.5
 
 
@@ -46,7 +46,7 @@ class PatrolConfig(Config):
     """A place is visited by a robot whose centre is this near."""
     stuck_s: Positive = 60.0
     """A robot on duty that stays within a metre for longer is deadlocked: if nothing told it to wait, and it
-    does not go from one place to visit to another there."""
+    does not go between places to visit that are nearer to each other than that."""
     warm_s: NonNegative = 300.0
     """Idleness and coverage count from then on, or from a quarter of the duration if that is earlier."""
     window_s: Positive = 60.0
@@ -88,9 +88,7 @@ class PatrolTask:
         self._guards = GuardLog(len(self._names))
         self._step = 0
         self._contacts = [0] * len(self._names)
-        self._anchors = [(math.nan, math.nan, 0.0)] * len(self._names)
-        self._places = [-1] * len(self._names)
-        self.deadlocks: dict[int, float] = {}
+        self._stuck = StuckWatch(graph.vertices_xy_m, len(self._names), config.stuck_s)
         self._series: list[tuple[float, float, float]] = []
 
     @staticmethod
@@ -137,19 +135,15 @@ class PatrolTask:
     def _watch(self, index: int, t_s: float, attempt: Attempt) -> None:
         """Note who stays where he is although nothing tells him to wait."""
         x, y = attempt.body.state[:2].tolist()
-        ax, ay, since_s = self._anchors[index]
-        excused = attempt.body.stopped or bool(attempt.stack.status[1])
-        place = self._visits.nearest(x, y)
-        if place != self._places[index]:
-            # Rounds may be shorter than a metre.
-            excused, self._places[index] = True, place
-        if excused or not math.hypot(x - ax, y - ay) <= STUCK_M:
-            self._anchors[index] = x, y, t_s
-        elif t_s - since_s > self._config.stuck_s and index not in self.deadlocks:
-            self.deadlocks[index] = since_s
-            name = self._names[index]
+        waits = attempt.body.stopped or bool(attempt.stack.status[1])
+        if self._stuck.look(index, t_s, (x, y), self._visits.nearest(x, y), waits=waits):
             self.events.append(
-                Event(t_s, "deadlock", f"{name}: has not left ({x:.1f}, {y:.1f}) for {t_s - since_s:.0f} s")
+                Event(
+                    t_s,
+                    "deadlock",
+                    f"{self._names[index]}: has not left ({x:.1f}, {y:.1f}) "
+                    f"for {t_s - self._stuck.since_s[index]:.0f} s",
+                )
             )
 
     def row(self, index: int) -> tuple[float, ...]:  # noqa: ARG002
@@ -174,7 +168,7 @@ class PatrolTask:
             "team_size": len(run.robots),
             "strategy": "" if strategy is None else strategy.name,
             "vertices": len(graph),
-            "deadlocks": len(self.deadlocks),
+            "deadlocks": len(self._stuck.since_s),
         }
         idle, visits_min = self._visits.idleness(run.duration_s, self._warm_s)
         metrics |= {
@@ -195,9 +189,9 @@ class PatrolTask:
         metrics |= driven
         if robot.collisions:
             metrics["reason"] = f"touched something, {robot.collisions} times in all"
-        elif index in self.deadlocks:
-            metrics["reason"] = f"deadlocked from {self.deadlocks[index]:.0f} s on"
-        metrics["success"] = robot.collisions == 0 and index not in self.deadlocks
+        elif index in self._stuck.since_s:
+            metrics["reason"] = f"deadlocked from {self._stuck.since_s[index]:.0f} s on"
+        metrics["success"] = robot.collisions == 0 and index not in self._stuck.since_s
         return Verdict(metrics, ({"nees": nees},), {})
 
     def _arrays(self, run: FinishedRun) -> dict[str, FloatArray]:
