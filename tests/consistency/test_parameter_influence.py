@@ -21,19 +21,18 @@ from pilotage.experiments.mission import load_mission
 
 SEEDS, LIMIT_S, SETTLE = 6, 25, 10
 FILTERS = {"museum-route": "beacons", "museum-walls": "lines"}
+UNDOUBTING = {"museum-route": ["doubt_after=null"], "museum-walls": []}
 """Missions, and what their filters call a measurement."""
 
 
 @dataclass(frozen=True)
 class Influence:
-    """Mean NEES, NIS over its expectation, position RMSE, share of measurements that passed the gate,
-    and of how many."""
+    """Mean NEES, NIS over its expectation, position RMSE, share of measurements that passed the gate."""
 
     nees: float
     nis: float
     rmse_m: float
     accepted: float
-    measured: float
 
 
 @cache
@@ -52,7 +51,7 @@ def influence(mission: str, *overrides: str) -> Influence:
         seen += float(trace[f"{FILTERS[mission]}_seen"][SETTLE:].sum())
         accepted += float(trace[f"{FILTERS[mission]}_accepted"][SETTLE:].sum())
     return Influence(
-        float(np.mean(normalized)), nis / expected, float(np.sqrt(np.mean(squared))), accepted / seen, seen
+        float(np.mean(normalized)), nis / expected, float(np.sqrt(np.mean(squared))), accepted / seen
     )
 
 
@@ -97,13 +96,13 @@ class TestInfluence:
 
     def test_a_strict_gate_makes_it_overconfident_until_it_takes_nothing(self, mission: str) -> None:
         # The report's filter in the extreme: it kept what agreed with it, and was sure of itself.
+        # It is asked not to doubt: by its own check it would find itself again, and take more.
         right, less, strict = (
             influence(mission),
             influence(mission, "gate=0.9"),
-            influence(mission, "gate=0.5"),
+            influence(mission, "gate=0.5", *UNDOUBTING[mission]),
         )
         assert right.nees < less.nees < strict.nees
         assert right.rmse_m < less.rmse_m < strict.rmse_m
         assert strict.nees > 5.0
-        # Half of them, were it right about itself: less by five standard errors, as all differences here.
-        assert strict.accepted < 0.5 - 5.0 * np.sqrt(0.25 / strict.measured)
+        assert strict.accepted < 0.45
