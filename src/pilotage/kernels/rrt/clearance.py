@@ -129,11 +129,13 @@ def make_space(
     clearance: float,
 ) -> Space:
     """Bucket (S, 4) segments and (C, 3) discs for questions about ``clearance`` metres, beside their distance
-    field ``distance`` (rows, columns); arrays are copied, never changed.
+    field ``distance`` (rows, columns); arrays are kept as they are where the kernels can take them, and
+    never changed.
     """
-    distance = np.array(distance, dtype=np.float64)
-    segments = np.array(segments, dtype=np.float64).reshape(-1, 4)
-    circles = np.array(circles, dtype=np.float64).reshape(-1, 3)
+    # Copying a large field takes longer than an easy query.
+    distance = np.require(distance, np.float64, ["C", "W"])
+    segments = np.require(segments, np.float64, ["C", "W"]).reshape(-1, 4)
+    circles = np.require(circles, np.float64, ["C", "W"]).reshape(-1, 3)
     ny, nx = distance.shape
     known = segments.shape[0] + circles.shape[0] > 0
     margin = resolution * math.sqrt(0.5) if known else 0.0
