@@ -22,6 +22,8 @@ from pilotage.face.missions import MissionLike, load
 from pilotage.kernels.bodies import drive, environments
 from pilotage.models.motion.differential_drive import DifferentialDriveConfig
 from pilotage.sensors.lidar import LidarConfig
+from pilotage.sim.sensing.lidar import fan_of
+from pilotage.sim.worlds.world import outline_of
 
 Observations = dict[str, NDArray[np.float32]]
 
@@ -95,8 +97,6 @@ class MissionVectorEnv(VectorEnv[Any, Any, Any]):
         limits = np.array([motion.max_speed_m_s, motion.max_turn_rate_rad_s, *changes])
         self._top = limits[:2].copy()
         self._beams, self._noisy = lidar.beams, lidar.range_var_m2 > 0.0
-        world, outline, angles = source.world, body.footprint, lidar.beam_angles_rad()
-        grid, traffic = world.grid, world.traffic
         mount = np.array([lidar.mount.x_m, lidar.mount.y_m, lidar.mount.theta_rad])
         steps = math.ceil(self.mission.run.time_limit_s / dt_s - 1e-9)
         self._fixed: tuple[Any, ...] = (
@@ -108,18 +108,11 @@ class MissionVectorEnv(VectorEnv[Any, Any, Any]):
             steps,
             np.array([A_STEP, HIT, REACHED]),
             mount,
-            float(angles[0]),
-            lidar.beam_step_rad,
-            np.cos(angles - angles[0]),
-            np.sin(angles - angles[0]),
-            lidar.max_range_m,
+            fan_of(lidar),
             math.sqrt(lidar.range_var_m2),
         )
-        self._solid: tuple[Any, ...] = (
-            *(outline.points_m, outline.radius_m, outline.inner_radius_m, world.segments_m, world.circles_m),
-            *(grid.jump, grid.outlines_m, grid.starts, grid.items, grid.frame),
-            *(traffic.segments_m, traffic.circles_m, body.own),
-        )
+        world = source.world
+        self._solid = (outline_of(body.footprint), world.fixed, world.traffic.others, body.own)
         self._states = np.zeros((num_envs, drive.STATE_SIZE))
         self._speeds, self._commands = np.zeros((num_envs, 2)), np.zeros((num_envs, 2))
         self._counts = np.zeros(num_envs, dtype=np.int64)

@@ -97,8 +97,7 @@ class Simulator:
             np.concatenate([*(shape.points_m for shape in shapes), np.zeros((0, 2))]),
             np.cumsum([0, *(len(shape.points_m) for shape in shapes)]),
             np.array([shape.radius_m for shape in shapes]),
-            self._traffic.segments_m,
-            self._traffic.circles_m,
+            self._traffic.others,
             own,
             self._traffic.first_person,
         )

@@ -1,4 +1,4 @@
-"""Clearance of an outline from all that is solid, handed over as in ``drive``; where on it a contact is."""
+"""Clearance of an outline from all that is solid (``geometry.solids``); where on it a contact is."""
 
 from __future__ import annotations
 
@@ -8,131 +8,56 @@ import numpy as np
 
 from pilotage.kernels.arrays import FloatArray, IntArray
 from pilotage.kernels.bodies.outline import outline_clearance
+from pilotage.kernels.geometry.solids import Fixed, Others, Outline, is_anybody, without
 from pilotage.kernels.jit import kernel
-from pilotage.kernels.scans.tiles import Cells, grid_clearance
+from pilotage.kernels.scans.tiles import grid_clearance
 
 
 @kernel
-def fixed_clearance(
-    x: float,
-    y: float,
-    theta: float,
-    corners: FloatArray,
-    radius: float,
-    inner: float,
-    segments: FloatArray,
-    circles: FloatArray,
-    jump: Cells,
-    outlines: FloatArray,
-    starts: IntArray,
-    items: IntArray,
-    frame: FloatArray,
-) -> float:
+def fixed_clearance(x: float, y: float, theta: float, outline: Outline, fixed: Fixed) -> float:
     """Clearance of an outline from walls and grid."""
     c, s = math.cos(theta), math.sin(theta)
-    best = outline_clearance(x, y, c, s, corners, radius, segments, circles)
-    return min(
-        best,
-        grid_clearance(x, y, c, s, corners, radius, inner, jump, outlines, starts, items, frame),
-    )
+    segments, circles, grid = fixed
+    best = outline_clearance(x, y, c, s, outline[0], outline[1], segments, circles)
+    return min(best, grid_clearance(x, y, c, s, outline, grid))
 
 
 @kernel
 def others_clearance(
-    x: float,
-    y: float,
-    theta: float,
-    corners: FloatArray,
-    radius: float,
-    others_segments: FloatArray,
-    others_circles: FloatArray,
-    own: IntArray,
+    x: float, y: float, theta: float, outline: Outline, others: Others, own: IntArray
 ) -> float:
     """Clearance of an outline from the other bodies."""
-    if others_segments.shape[0] + others_circles.shape[0] == 0:
+    if not is_anybody(others):
         return math.inf
     c, s = math.cos(theta), math.sin(theta)
-    best = math.inf
-    if own[2] >= 0:
-        before, after = others_circles[: own[2]], others_circles[own[2] + 1 :]
-        best = outline_clearance(x, y, c, s, corners, radius, others_segments, before)
-        return min(best, outline_clearance(x, y, c, s, corners, radius, others_segments[:0], after))
-    before, after = others_segments[: own[0]], others_segments[own[1] :]
-    best = outline_clearance(x, y, c, s, corners, radius, before, others_circles)
-    return min(best, outline_clearance(x, y, c, s, corners, radius, after, others_circles[:0]))
+    corners, radius, _ = outline
+    before, after = without(others, own)
+    best = outline_clearance(x, y, c, s, corners, radius, before[0], before[1])
+    return min(best, outline_clearance(x, y, c, s, corners, radius, after[0], after[1]))
 
 
 @kernel
 def all_clearance(
-    x: float,
-    y: float,
-    theta: float,
-    corners: FloatArray,
-    radius: float,
-    inner: float,
-    segments: FloatArray,
-    circles: FloatArray,
-    jump: Cells,
-    outlines: FloatArray,
-    starts: IntArray,
-    items: IntArray,
-    frame: FloatArray,
-    others_segments: FloatArray,
-    others_circles: FloatArray,
-    own: IntArray,
+    x: float, y: float, theta: float, outline: Outline, fixed: Fixed, others: Others, own: IntArray
 ) -> float:
     """Clearance of an outline from everything."""
-    fixed = fixed_clearance(
-        x, y, theta, corners, radius, inner, segments, circles, jump, outlines, starts, items, frame
+    return min(
+        fixed_clearance(x, y, theta, outline, fixed), others_clearance(x, y, theta, outline, others, own)
     )
-    return min(fixed, others_clearance(x, y, theta, corners, radius, others_segments, others_circles, own))
 
 
 @kernel
-def at_poses(
-    poses: FloatArray,
-    corners: FloatArray,
-    radius: float,
-    inner: float,
-    segments: FloatArray,
-    circles: FloatArray,
-    jump: Cells,
-    outlines: FloatArray,
-    starts: IntArray,
-    items: IntArray,
-    frame: FloatArray,
-    others_segments: FloatArray,
-    others_circles: FloatArray,
-    own: IntArray,
-) -> FloatArray:
-    """Clearance (N,) of an outline at poses (N, 3) from everything; see ``bodies.drive``."""
+def at_poses(poses: FloatArray, outline: Outline, fixed: Fixed, others: Others, own: IntArray) -> FloatArray:
+    """Clearance (N,) of an outline at poses (N, 3) from everything."""
     out = np.empty(poses.shape[0])
     for k in range(poses.shape[0]):
-        out[k] = all_clearance(
-            poses[k, 0], poses[k, 1], poses[k, 2], corners, radius, inner, segments, circles, jump, outlines,
-            starts, items, frame, others_segments, others_circles, own,
-        )  # fmt: skip
+        out[k] = all_clearance(poses[k, 0], poses[k, 1], poses[k, 2], outline, fixed, others, own)
     return out
 
 
 @kernel
 def contact_bearing(
-    x: float,
-    y: float,
-    theta: float,
-    corners: FloatArray,
-    radius: float,
-    inner: float,
-    segments: FloatArray,
-    circles: FloatArray,
-    jump: Cells,
-    outlines: FloatArray,
-    starts: IntArray,
-    items: IntArray,
-    frame: FloatArray,
-    others_segments: FloatArray,
-    others_circles: FloatArray,
-    own: IntArray,
+    x: float, y: float, theta: float, outline: Outline, fixed: Fixed, others: Others, own: IntArray
 ) -> float:
     """Where on the outline something is nearest, as a bearing from the axle in the base frame.
 
@@ -147,9 +72,12 @@ def contact_bearing(
             x + (sign if k < 2 else 0.0),
             y + (sign if 2 <= k < 4 else 0.0),
             theta + (sign if k >= 4 else 0.0),
-            corners, radius, inner, segments, circles, jump, outlines, starts, items, frame, others_segments,
-            others_circles, own,
-        )  # fmt: skip
+            outline,
+            fixed,
+            others,
+            own,
+        )
+    corners = outline[0]
     towards = math.atan2(d[3] - d[2], d[1] - d[0]) - theta
     if corners.shape[0] == 0:
         return towards

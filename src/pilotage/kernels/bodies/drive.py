@@ -1,9 +1,6 @@
 """A body that drives, and stops where its outline first touches something: between two steps as well.
 
-What is solid is handed over as arrays: walls as ``segments`` (N, 4) and ``circles`` (M, 3); a grid by its
-outlines in tiles (see ``scans.tiles``; empty without a grid); other bodies as ``others_segments`` and
-``others_circles``, of which the body's own rows, ``own`` (first side, one past the last, disc or -1), do
-not count.
+What is solid is handed over as in ``geometry.solids``.
 """
 
 from __future__ import annotations
@@ -13,8 +10,8 @@ import math
 from pilotage.kernels.arrays import FloatArray, IntArray
 from pilotage.kernels.bodies.clearances import all_clearance, fixed_clearance, others_clearance
 from pilotage.kernels.geometry.motion import chord_ratio, wrap
+from pilotage.kernels.geometry.solids import Fixed, Others, Outline, is_anybody
 from pilotage.kernels.jit import kernel
-from pilotage.kernels.scans.tiles import Cells
 
 (
     X,
@@ -67,18 +64,9 @@ def first_contact(
     lateral: float,
     angle: float,
     clearance: float,
-    corners: FloatArray,
-    radius: float,
-    inner: float,
-    segments: FloatArray,
-    circles: FloatArray,
-    jump: Cells,
-    outlines: FloatArray,
-    starts: IntArray,
-    items: IntArray,
-    frame: FloatArray,
-    others_segments: FloatArray,
-    others_circles: FloatArray,
+    outline: Outline,
+    fixed: Fixed,
+    others: Others,
     own: IntArray,
 ) -> float:
     """Part of a move that the outline can drive: 1 without a contact.
@@ -92,6 +80,7 @@ def first_contact(
     clearance
         At the start of the move.
     """
+    corners, radius, inner = outline
     reach = math.hypot(distance, lateral)
     if corners.shape[0] > 0:
         reach += radius * abs(angle)
@@ -103,10 +92,7 @@ def first_contact(
     for i in range(pieces):
         part = (i + 1) / pieces
         px, py, ptheta = turned_part(x, y, theta, distance, lateral, angle, part)
-        here = all_clearance(
-            px, py, ptheta, corners, radius, inner, segments, circles, jump, outlines, starts, items, frame,
-            others_segments, others_circles, own,
-        )  # fmt: skip
+        here = all_clearance(px, py, ptheta, outline, fixed, others, own)
         low, high = -1.0, part
         if here < -CONTACT_TOLERANCE_M and here < last_clearance:
             low = last
@@ -116,10 +102,7 @@ def first_contact(
             while at < part:
                 ahead = min(part, at + max(at_clearance, GRAZE_M) / reach)
                 px, py, ptheta = turned_part(x, y, theta, distance, lateral, angle, ahead)
-                there = all_clearance(
-                    px, py, ptheta, corners, radius, inner, segments, circles, jump, outlines, starts, items,
-                    frame, others_segments, others_circles, own,
-                )  # fmt: skip
+                there = all_clearance(px, py, ptheta, outline, fixed, others, own)
                 if there < -CONTACT_TOLERANCE_M and there < at_clearance:
                     low, high = at, ahead
                     break
@@ -128,10 +111,7 @@ def first_contact(
             for _ in range(BISECTIONS):
                 middle = 0.5 * (low + high)
                 px, py, ptheta = turned_part(x, y, theta, distance, lateral, angle, middle)
-                there = all_clearance(
-                    px, py, ptheta, corners, radius, inner, segments, circles, jump, outlines, starts, items,
-                    frame, others_segments, others_circles, own,
-                )  # fmt: skip
+                there = all_clearance(px, py, ptheta, outline, fixed, others, own)
                 if there < 0.0:
                     high = middle
                 else:
@@ -144,23 +124,23 @@ def first_contact(
 @kernel
 def place_outline(
     state: FloatArray,
-    corners: FloatArray,
-    others_segments: FloatArray,
-    others_circles: FloatArray,
+    outline: Outline,
+    others: Others,
     own: IntArray,
 ) -> None:
     """Write where a body's outline is into its own rows, for the others to meet."""
     x, y = state[X], state[Y]
+    corners, (sides, discs) = outline[0], others
     if own[2] >= 0:
-        others_circles[own[2], 0], others_circles[own[2], 1] = x, y
+        discs[own[2], 0], discs[own[2], 1] = x, y
         return
     c, s = math.cos(state[THETA]), math.sin(state[THETA])
     count = own[1] - own[0]
     for i in range(count):
         px, py = x + c * corners[i, 0] - s * corners[i, 1], y + s * corners[i, 0] + c * corners[i, 1]
         before = own[0] + (i - 1 if i > 0 else count - 1)
-        others_segments[own[0] + i, 0], others_segments[own[0] + i, 1] = px, py
-        others_segments[before, 2], others_segments[before, 3] = px, py
+        sides[own[0] + i, 0], sides[own[0] + i, 1] = px, py
+        sides[before, 2], sides[before, 3] = px, py
 
 
 @kernel
@@ -169,8 +149,7 @@ def meet_others(
     corners: FloatArray,
     first: IntArray,
     radii: FloatArray,
-    others_segments: FloatArray,
-    others_circles: FloatArray,
+    others: Others,
     own: IntArray,
     first_person: int,
 ) -> bool:
@@ -183,7 +162,7 @@ def meet_others(
     corners, first
         (K, 2) of all polygons, and (R + 1,) where each begins.
     first_person
-        Row of ``others_circles`` from which on they are people, who are counted elsewhere.
+        Row of the discs from which on they are people, who are counted elsewhere.
 
     Returns
     -------
@@ -192,17 +171,13 @@ def meet_others(
     marked = False
     for r in range(states.shape[0]):
         state = states[r]
-        shape = corners[first[r] : first[r + 1]]
-        others = others_clearance(
-            state[X], state[Y], state[THETA], shape, radii[r], others_segments, others_circles, own[r]
-        )
-        state[CLEARANCE] = min(state[FIXED_CLEARANCE], others)
-        if first_person < others_circles.shape[0] and others < CONTACT_M:
-            robots = others_circles[:first_person]
-            others = others_clearance(
-                state[X], state[Y], state[THETA], shape, radii[r], others_segments, robots, own[r]
-            )
-        if others < CONTACT_M and state[TOUCHING] == 0.0:
+        outline = (corners[first[r] : first[r + 1]], radii[r], 0.0)
+        gap = others_clearance(state[X], state[Y], state[THETA], outline, others, own[r])
+        state[CLEARANCE] = min(state[FIXED_CLEARANCE], gap)
+        if first_person < others[1].shape[0] and gap < CONTACT_M:
+            robots = (others[0], others[1][:first_person])
+            gap = others_clearance(state[X], state[Y], state[THETA], outline, robots, own[r])
+        if gap < CONTACT_M and state[TOUCHING] == 0.0:
             state[COLLISIONS] += 1.0
             state[TOUCHING] = 2.0
         marked = marked or state[BLOCKER] > 0.0 or state[TOUCHING] == 2.0
@@ -217,18 +192,9 @@ def drive(
     period: float,
     spins_on: bool,
     release: float,
-    corners: FloatArray,
-    radius: float,
-    inner: float,
-    segments: FloatArray,
-    circles: FloatArray,
-    jump: Cells,
-    outlines: FloatArray,
-    starts: IntArray,
-    items: IntArray,
-    frame: FloatArray,
-    others_segments: FloatArray,
-    others_circles: FloatArray,
+    outline: Outline,
+    fixed: Fixed,
+    others: Others,
     own: IntArray,
 ) -> bool:
     """Drive one step in place: (K, 3) moves at constant twist, each forward, to the left, turned.
@@ -253,36 +219,24 @@ def drive(
     count = moves.shape[0]
     rates[:] = 0.0
     x, y, theta = state[X], state[Y], state[THETA]
-    others = others_clearance(x, y, theta, corners, radius, others_segments, others_circles, own)
-    clearance = min(state[FIXED_CLEARANCE], others)
+    gap = others_clearance(x, y, theta, outline, others, own)
+    clearance = min(state[FIXED_CLEARANCE], gap)
     for k in range(count):
         distance, lateral, angle = moves[k, 0], moves[k, 1], moves[k, 2]
-        part = first_contact(
-            x, y, theta, distance, lateral, angle, clearance, corners, radius, inner, segments, circles, jump,
-            outlines, starts, items, frame, others_segments, others_circles, own,
-        )  # fmt: skip
+        part = first_contact(x, y, theta, distance, lateral, angle, clearance, outline, fixed, others, own)
         stopped = part < 1.0
         if stopped:
             ahead, ahead_y, ahead_theta = turned_part(x, y, theta, distance, lateral, angle, part)
             if spins_on:
                 distance, lateral, part = 0.0, 0.0, 1.0
-                if corners.shape[0] > 0:
-                    part = first_contact(
-                        x, y, theta, 0.0, 0.0, angle, clearance, corners, radius, inner, segments, circles,
-                        jump, outlines, starts, items, frame, others_segments, others_circles, own,
-                    )  # fmt: skip
-            near = others_clearance(
-                ahead, ahead_y, ahead_theta, corners, radius, others_segments, others_circles, own
-            )
-            if near < CONTACT_M:
+                if outline[0].shape[0] > 0:
+                    part = first_contact(x, y, theta, 0.0, 0.0, angle, clearance, outline, fixed, others, own)
+            if others_clearance(ahead, ahead_y, ahead_theta, outline, others, own) < CONTACT_M:
                 state[BLOCKER] = 1.0
         x, y, theta = turned_part(x, y, theta, distance, lateral, angle, part)
-        fixed = fixed_clearance(
-            x, y, theta, corners, radius, inner, segments, circles, jump, outlines, starts, items, frame
-        )
-        others = others_clearance(x, y, theta, corners, radius, others_segments, others_circles, own)
-        clearance = min(fixed, others)
-        state[FIXED_CLEARANCE] = fixed
+        state[FIXED_CLEARANCE] = fixed_clearance(x, y, theta, outline, fixed)
+        gap = others_clearance(x, y, theta, outline, others, own)
+        clearance = min(state[FIXED_CLEARANCE], gap)
         distance, lateral, angle = distance * part, lateral * part, angle * part
         state[DISTANCE] += distance
         state[LATERAL] += lateral
@@ -297,6 +251,6 @@ def drive(
         elif state[TOUCHING] == 1.0 and clearance >= release:
             state[TOUCHING] = 0.0
     state[X], state[Y], state[THETA], state[CLEARANCE] = x, y, theta, clearance
-    if others_segments.shape[0] + others_circles.shape[0] > 0:
-        place_outline(state, corners, others_segments, others_circles, own)
+    if is_anybody(others):
+        place_outline(state, outline, others, own)
     return bool(state[BLOCKED] > 0.0)

@@ -7,11 +7,11 @@ import math
 from pilotage.kernels.arrays import BoolArray, FloatArray, IntArray
 from pilotage.kernels.bodies.drive import COLLISIONS, THETA, X, Y, drive
 from pilotage.kernels.geometry.motion import wrap
+from pilotage.kernels.geometry.solids import Fixed, Others, Outline
 from pilotage.kernels.jit import kernel_without_lock
-from pilotage.kernels.scans.mounted import mounted
+from pilotage.kernels.scans.mounted import Fan, mounted
 from pilotage.kernels.scans.rays import narrow_fan
 from pilotage.kernels.scans.sweep import narrow_grid_fan
-from pilotage.kernels.scans.tiles import Cells
 
 
 @kernel_without_lock
@@ -31,25 +31,12 @@ def step_environments(
     most_steps: int,
     prices: FloatArray,
     mount: FloatArray,
-    first_beam: float,
-    beam_step: float,
-    cosines: FloatArray,
-    sines: FloatArray,
-    max_range: float,
+    fan: Fan,
     std: float,
     normals: FloatArray,
-    corners: FloatArray,
-    radius: float,
-    inner: float,
-    segments: FloatArray,
-    circles: FloatArray,
-    jump: Cells,
-    outlines: FloatArray,
-    starts: IntArray,
-    items: IntArray,
-    frame: FloatArray,
-    others_segments: FloatArray,
-    others_circles: FloatArray,
+    outline: Outline,
+    fixed: Fixed,
+    others: Others,
     own: IntArray,
     moves: FloatArray,
     rates: FloatArray,
@@ -82,6 +69,8 @@ def step_environments(
     to_go, ranges, reward, ended, late
         Out: (N, 2) distance and bearing of the goal, (N, beams), and (N,) each.
     """
+    first_beam, beam_step, cosines, sines, max_range = fan
+    segments, circles, grid = fixed
     for i in range(first, last):
         state = states[i]
         begun = over[i]
@@ -96,10 +85,7 @@ def step_environments(
                 now = speeds[i, k]
                 speeds[i, k] = min(max(wanted, now - limits[2 + k]), now + limits[2 + k])
             moves[0, 0], moves[0, 1], moves[0, 2] = speeds[i, 0] * dt, 0.0, speeds[i, 1] * dt
-            if drive(
-                state, moves, rates, dt, False, release, corners, radius, inner, segments, circles, jump,
-                outlines, starts, items, frame, others_segments, others_circles, own,
-            ):  # fmt: skip
+            if drive(state, moves, rates, dt, False, release, outline, fixed, others, own):
                 speeds[i] = 0.0
         counts[i] += 1
         row = ranges[i]
@@ -107,7 +93,7 @@ def step_environments(
         x, y, theta = mounted(state[X], state[Y], state[THETA], mount)
         theta += first_beam
         narrow_fan(row, x, y, theta, beam_step, cosines, sines, max_range, segments, circles)
-        narrow_grid_fan(row, x, y, theta, beam_step, cosines, sines, jump, outlines, starts, items, frame)
+        narrow_grid_fan(row, x, y, theta, beam_step, cosines, sines, grid)
         if std > 0.0:
             for k in range(row.shape[0]):
                 if row[k] < max_range:

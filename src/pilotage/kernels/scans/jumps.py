@@ -7,9 +7,9 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from pilotage.kernels.geometry.solids import Cells
 from pilotage.kernels.grids.distance import squared_distance
 from pilotage.kernels.jit import kernel
-from pilotage.kernels.scans.tiles import Cells
 
 FARTHEST = 254
 """In half cells; what is farther away is leapt to in several leaps."""

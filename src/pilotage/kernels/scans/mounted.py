@@ -1,15 +1,17 @@
 """What sensors on a body would read among all that is solid: fans, single beams, cones.
 
-What is solid is handed over as in ``bodies.drive``; ``mount`` is a sensor's pose on the body (3,).
+What is solid is handed over as in ``geometry.solids``; ``mount`` is a sensor's pose on the body (3,).
 """
 
 from __future__ import annotations
 
 import math
+from typing import TypeAlias
 
 import numpy as np
 
 from pilotage.kernels.arrays import FloatArray, IntArray
+from pilotage.kernels.geometry.solids import Fixed, Others, Tiles, is_anybody, without
 from pilotage.kernels.jit import kernel
 from pilotage.kernels.scans.rays import cone_range, narrow_fan
 from pilotage.kernels.scans.sweep import narrow_grid_fan
@@ -21,9 +23,12 @@ from pilotage.kernels.scans.tiles import (
     TILE,
     TILE_COLUMNS,
     TILE_ROWS,
-    Cells,
 )
 from pilotage.kernels.scans.trace import grid_beam
+
+Fan: TypeAlias = tuple[float, float, FloatArray, FloatArray, float]
+"""Beam k looks along ``first + k * step`` in the sensor's frame: first, step, cosines and sines of the
+directions from the first one (beams,), and the reach."""
 
 
 @kernel
@@ -38,40 +43,27 @@ def fans(
     poses: FloatArray,
     own: IntArray,
     mount: FloatArray,
-    first: float,
-    step: float,
-    cosines: FloatArray,
-    sines: FloatArray,
-    max_range: float,
-    segments: FloatArray,
-    circles: FloatArray,
-    jump: Cells,
-    outlines: FloatArray,
-    starts: IntArray,
-    items: IntArray,
-    frame: FloatArray,
-    others_segments: FloatArray,
-    others_circles: FloatArray,
+    fan: Fan,
+    fixed: Fixed,
+    others: Others,
 ) -> FloatArray:
     """Ranges (R, beams) of equal fans on bodies at poses (R, >= 3); ``own`` (R, 3) are their own rows.
 
-    Beam k looks along ``first + k * step`` in the sensor's frame; the table is of the directions from the
-    first one. ``max_range`` where nothing is hit.
+    The fan's reach where nothing is hit.
     """
+    first, step, cosines, sines, max_range = fan
+    segments, circles, grid = fixed
     out = np.full((poses.shape[0], cosines.shape[0]), max_range)
     for r in range(poses.shape[0]):
         ranges = out[r]
         x, y, theta = mounted(poses[r, 0], poses[r, 1], poses[r, 2], mount)
         theta += first
         narrow_fan(ranges, x, y, theta, step, cosines, sines, max_range, segments, circles)
-        narrow_grid_fan(ranges, x, y, theta, step, cosines, sines, jump, outlines, starts, items, frame)
-        if others_segments.shape[0] + others_circles.shape[0] > 0:
-            before, after = others_segments[: own[r, 0]], others_segments[own[r, 1] :]
-            near, far = others_circles, others_circles[:0]
-            if own[r, 2] >= 0:
-                near, far = others_circles[: own[r, 2]], others_circles[own[r, 2] + 1 :]
-            narrow_fan(ranges, x, y, theta, step, cosines, sines, max_range, before, near)
-            narrow_fan(ranges, x, y, theta, step, cosines, sines, max_range, after, far)
+        narrow_grid_fan(ranges, x, y, theta, step, cosines, sines, grid)
+        if is_anybody(others):
+            before, after = without(others, own[r])
+            narrow_fan(ranges, x, y, theta, step, cosines, sines, max_range, before[0], before[1])
+            narrow_fan(ranges, x, y, theta, step, cosines, sines, max_range, after[0], after[1])
     return out
 
 
@@ -83,21 +75,10 @@ def noisy_fans(
     normals: FloatArray,
     at: int,
     mount: FloatArray,
-    first: float,
-    step: float,
-    cosines: FloatArray,
-    sines: FloatArray,
-    max_range: float,
+    fan: Fan,
     std: float,
-    segments: FloatArray,
-    circles: FloatArray,
-    jump: Cells,
-    outlines: FloatArray,
-    starts: IntArray,
-    items: IntArray,
-    frame: FloatArray,
-    others_segments: FloatArray,
-    others_circles: FloatArray,
+    fixed: Fixed,
+    others: Others,
 ) -> FloatArray:
     """``fans`` of the bodies ``rows`` (R,) of a table, plus ``std`` times standard normals.
 
@@ -108,10 +89,7 @@ def noisy_fans(
     for r in range(rows.shape[0]):
         poses[r] = table[rows[r], :3]
         own_rows[r] = own[rows[r]]
-    out = fans(
-        poses, own_rows, mount, first, step, cosines, sines, max_range, segments, circles, jump, outlines,
-        starts, items, frame, others_segments, others_circles,
-    )  # fmt: skip
+    out, max_range = fans(poses, own_rows, mount, fan, fixed, others), fan[4]
     for r in range(out.shape[0]):
         for k in range(out.shape[1]):
             if out[r, k] < max_range:
@@ -156,23 +134,17 @@ def solid_beam(
     c: float,
     s: float,
     most: float,
-    segments: FloatArray,
-    circles: FloatArray,
-    jump: Cells,
-    frame: FloatArray,
-    others_segments: FloatArray,
-    others_circles: FloatArray,
+    fixed: Fixed,
+    others: Others,
     own: IntArray,
 ) -> float:
     """Length of a beam up to anything solid but the body with the rows ``own``; inf where none is nearer."""
-    best = min(beam(x, y, c, s, most, segments, circles), grid_beam(x, y, c, s, most, jump, frame))
-    if others_segments.shape[0] + others_circles.shape[0] > 0:
-        before, after = others_segments[: own[0]], others_segments[own[1] :]
-        near, far = others_circles, others_circles[:0]
-        if own[2] >= 0:
-            near, far = others_circles[: own[2]], others_circles[own[2] + 1 :]
-        best = min(best, beam(x, y, c, s, most, before, near))
-        best = min(best, beam(x, y, c, s, most, after, far))
+    segments, circles, grid = fixed
+    best = min(beam(x, y, c, s, most, segments, circles), grid_beam(x, y, c, s, most, grid))
+    if is_anybody(others):
+        before, after = without(others, own)
+        best = min(best, beam(x, y, c, s, most, before[0], before[1]))
+        best = min(best, beam(x, y, c, s, most, after[0], after[1]))
     return best
 
 
@@ -181,20 +153,13 @@ def beam_at(
     pose: FloatArray,
     mount: FloatArray,
     most: float,
-    segments: FloatArray,
-    circles: FloatArray,
-    jump: Cells,
-    frame: FloatArray,
-    others_segments: FloatArray,
-    others_circles: FloatArray,
+    fixed: Fixed,
+    others: Others,
     own: IntArray,
 ) -> float:
     """``solid_beam`` of a sensor on a body at ``pose`` (>= 3), along the mount's heading."""
     x, y, theta = mounted(pose[0], pose[1], pose[2], mount)
-    return solid_beam(
-        x, y, math.cos(theta), math.sin(theta), most, segments, circles, jump, frame, others_segments,
-        others_circles, own,
-    )  # fmt: skip
+    return solid_beam(x, y, math.cos(theta), math.sin(theta), most, fixed, others, own)
 
 
 @kernel
@@ -204,12 +169,10 @@ def tiles_in_cone(
     theta: float,
     half_width: float,
     reach: float,
-    outlines: FloatArray,
-    starts: IntArray,
-    items: IntArray,
-    frame: FloatArray,
+    grid: Tiles,
 ) -> float:
     """``rays.cone_range`` for a grid's outlines within ``reach``; inf for none."""
+    _, outlines, starts, items, frame = grid
     if outlines.shape[0] == 0:
         return math.inf
     dx, dy = x - frame[ORIGIN_X], y - frame[ORIGIN_Y]
@@ -241,15 +204,8 @@ def cones(
     rows: IntArray,
     own: IntArray,
     mounts: FloatArray,
-    segments: FloatArray,
-    circles: FloatArray,
-    jump: Cells,
-    outlines: FloatArray,
-    starts: IntArray,
-    items: IntArray,
-    frame: FloatArray,
-    others_segments: FloatArray,
-    others_circles: FloatArray,
+    fixed: Fixed,
+    others: Others,
     out: FloatArray,
 ) -> None:
     """Distance to the nearest return in each cone; inf for none.
@@ -263,20 +219,18 @@ def cones(
     out
         (K,) filled.
     """
+    segments, circles, grid = fixed
     for k in range(mounts.shape[0]):
         body = rows[k]
         x, y, theta = mounted(table[body, 0], table[body, 1], table[body, 2], mounts[k])
         half = mounts[k, 3]
         best = cone_range(x, y, theta, half, segments, circles)
-        if jump.shape[0] > 0:
-            best = min(best, tiles_in_cone(x, y, theta, half, mounts[k, 4], outlines, starts, items, frame))
-            if grid_beam(x, y, math.cos(theta), math.sin(theta), 0.0, jump, frame) == 0.0:
+        if grid[0].shape[0] > 0:
+            best = min(best, tiles_in_cone(x, y, theta, half, mounts[k, 4], grid))
+            if grid_beam(x, y, math.cos(theta), math.sin(theta), 0.0, grid) == 0.0:
                 best = 0.0
-        if others_segments.shape[0] + others_circles.shape[0] > 0:
-            before, after = others_segments[: own[body, 0]], others_segments[own[body, 1] :]
-            near, far = others_circles, others_circles[:0]
-            if own[body, 2] >= 0:
-                near, far = others_circles[: own[body, 2]], others_circles[own[body, 2] + 1 :]
-            best = min(best, cone_range(x, y, theta, half, before, near))
-            best = min(best, cone_range(x, y, theta, half, after, far))
+        if is_anybody(others):
+            before, after = without(others, own[body])
+            best = min(best, cone_range(x, y, theta, half, before[0], before[1]))
+            best = min(best, cone_range(x, y, theta, half, after[0], after[1]))
         out[k] = best

@@ -1,21 +1,26 @@
 """Which points a sensor on a body has in sight among all that is solid.
 
-What is solid is handed over as in ``bodies.drive``.
+What is solid is handed over as in ``geometry.solids``.
 """
 
 from __future__ import annotations
 
 import math
+from typing import TypeAlias
 
 import numpy as np
 
 from pilotage.kernels.arrays import FloatArray, IntArray
 from pilotage.kernels.geometry.motion import TWO_PI, wrap
+from pilotage.kernels.geometry.solids import Fixed, Others, is_anybody, without
 from pilotage.kernels.jit import kernel
 from pilotage.kernels.scans.mounted import mounted
 from pilotage.kernels.scans.rays import SIGHT_MARGIN_M
-from pilotage.kernels.scans.tiles import Cells
 from pilotage.kernels.scans.trace import grid_beam
+
+Sensor: TypeAlias = tuple[float, float, float, float, float]
+"""Half the field of view (pi sees all around), reach, standard deviations of range and bearing, offset of the
+bearing."""
 
 
 @kernel
@@ -47,19 +52,11 @@ def sightings(
     pose: FloatArray,
     normals: FloatArray,
     mount: FloatArray,
-    half_view: float,
-    max_range: float,
     points: FloatArray,
     ids: IntArray,
-    range_std: float,
-    bearing_std: float,
-    bearing_offset: float,
-    segments: FloatArray,
-    circles: FloatArray,
-    jump: Cells,
-    frame: FloatArray,
-    others_segments: FloatArray,
-    others_circles: FloatArray,
+    sensor: Sensor,
+    fixed: Fixed,
+    others: Others,
     own: IntArray,
     seen: IntArray,
     ranges: FloatArray,
@@ -73,9 +70,9 @@ def sightings(
     ----------
     normals
         (2, M) standard normals for range and bearing, one pair for each point, seen or not.
-    half_view
-        Half the field of view; pi sees all around.
     """
+    half_view, max_range, range_std, bearing_std, bearing_offset = sensor
+    segments, circles, grid = fixed
     x, y, theta = mounted(pose[0], pose[1], pose[2], mount)
     count = 0
     for i in range(points.shape[0]):
@@ -90,14 +87,11 @@ def sightings(
         ex, ey = x + keep * dx, y + keep * dy
         if hidden(x, y, ex, ey, segments, circles):
             continue
-        if grid_beam(x, y, dx / distance, dy / distance, keep * distance, jump, frame) < math.inf:
+        if grid_beam(x, y, dx / distance, dy / distance, keep * distance, grid) < math.inf:
             continue
-        if others_segments.shape[0] + others_circles.shape[0] > 0:
-            before, after = others_segments[: own[0]], others_segments[own[1] :]
-            near, far = others_circles, others_circles[:0]
-            if own[2] >= 0:
-                near, far = others_circles[: own[2]], others_circles[own[2] + 1 :]
-            if hidden(x, y, ex, ey, before, near) or hidden(x, y, ex, ey, after, far):
+        if is_anybody(others):
+            before, after = without(others, own)
+            if hidden(x, y, ex, ey, before[0], before[1]) or hidden(x, y, ex, ey, after[0], after[1]):
                 continue
         bearing = bearing + bearing_offset + bearing_std * normals[1, i]
         if bearing >= math.pi:
@@ -120,19 +114,11 @@ def all_sightings(
     at: int,
     counts: IntArray,
     mount: FloatArray,
-    half_view: float,
-    max_range: float,
     points: FloatArray,
     ids: IntArray,
-    range_std: float,
-    bearing_std: float,
-    bearing_offset: float,
-    segments: FloatArray,
-    circles: FloatArray,
-    jump: Cells,
-    frame: FloatArray,
-    others_segments: FloatArray,
-    others_circles: FloatArray,
+    sensor: Sensor,
+    fixed: Fixed,
+    others: Others,
 ) -> tuple[IntArray, FloatArray]:
     """``sightings`` from the bodies ``rows`` (R,) of a table: ids (R, M), ranges and bearings (2, R, M).
 
@@ -142,8 +128,7 @@ def all_sightings(
     seen, found = np.empty((rows.shape[0], count), dtype=np.int64), np.empty((2, rows.shape[0], count))
     for r in range(rows.shape[0]):
         counts[r] = sightings(
-            table[rows[r]], normals[r, at], mount, half_view, max_range, points, ids, range_std, bearing_std,
-            bearing_offset, segments, circles, jump, frame, others_segments, others_circles, own[rows[r]],
+            table[rows[r]], normals[r, at], mount, points, ids, sensor, fixed, others, own[rows[r]],
             seen[r], found[0, r], found[1, r],
         )  # fmt: skip
     return seen, found

@@ -11,8 +11,9 @@ import math
 
 import numpy as np
 
-from pilotage.kernels.arrays import FloatArray, IntArray
+from pilotage.kernels.arrays import FloatArray
 from pilotage.kernels.geometry.motion import TWO_PI
+from pilotage.kernels.geometry.solids import Tiles
 from pilotage.kernels.jit import kernel
 from pilotage.kernels.scans.tiles import (
     CELL,
@@ -23,7 +24,6 @@ from pilotage.kernels.scans.tiles import (
     TILE,
     TILE_COLUMNS,
     TILE_ROWS,
-    Cells,
     is_solid,
 )
 from pilotage.kernels.scans.trace import trace
@@ -118,16 +118,13 @@ def narrow_grid_fan(
     step: float,
     cosines: FloatArray,
     sines: FloatArray,
-    jump: Cells,
-    outlines: FloatArray,
-    starts: IntArray,
-    items: IntArray,
-    frame: FloatArray,
+    grid: Tiles,
 ) -> None:
     """Shorten the ``ranges`` of a fan, in place, where a grid's occupied cells are nearer.
 
     The fan is as in ``rays.table_fan_ranges``; a fan of one beam has the step 0.
     """
+    jump, outlines, starts, items, frame = grid
     if outlines.shape[0] == 0:
         return
     dx, dy = x - frame[ORIGIN_X], y - frame[ORIGIN_Y]

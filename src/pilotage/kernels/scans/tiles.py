@@ -15,12 +15,11 @@ from numpy.typing import NDArray
 from pilotage.kernels.arrays import FloatArray, IntArray
 from pilotage.kernels.bodies.outline import segment_clearance
 from pilotage.kernels.geometry.plane import point_segment_distance
+from pilotage.kernels.geometry.solids import Cells, Outline, Tiles
 from pilotage.kernels.jit import kernel
 
 ORIGIN_X, ORIGIN_Y, COSINE, SINE, CELL, TILE, TILE_COLUMNS, TILE_ROWS = range(8)
 """Entries of ``frame``."""
-
-Cells = NDArray[np.uint8]
 
 
 @kernel
@@ -109,13 +108,10 @@ def is_solid(px: float, py: float, jump: Cells, frame: FloatArray) -> bool:
 def nearest_outline(
     px: float,
     py: float,
-    limit: float,
-    outlines: FloatArray,
-    starts: IntArray,
-    items: IntArray,
-    frame: FloatArray,
+    grid: Tiles,
 ) -> float:
-    """Distance from a point to the nearest outline, exact where it is below ``limit``, else above it."""
+    """Distance from a point to the nearest outline."""
+    _, outlines, starts, items, frame = grid
     tile, columns, rows = frame[TILE], int(frame[TILE_COLUMNS]), int(frame[TILE_ROWS])
     # The nearest point of the tiled area: no tile is nearer to the point than to this one.
     cx = min(max(px, 0.0), columns * tile)
@@ -124,7 +120,7 @@ def nearest_outline(
     edge = min(min(cx - column * tile, (column + 1) * tile - cx), min(cy - row * tile, (row + 1) * tile - cy))
     best = math.inf
     for ring in range(max(columns, rows)):
-        if min(best, limit) <= (ring - 1) * tile + edge:
+        if best <= (ring - 1) * tile + edge:
             break
         for r in range(max(0, row - ring), min(rows - 1, row + ring) + 1):
             across = 1 if abs(r - row) == ring else max(1, 2 * ring)
@@ -146,25 +142,18 @@ def grid_clearance(
     y: float,
     c: float,
     s: float,
-    corners: FloatArray,
-    radius: float,
-    inner: float,
-    jump: Cells,
-    outlines: FloatArray,
-    starts: IntArray,
-    items: IntArray,
-    frame: FloatArray,
+    outline: Outline,
+    grid: Tiles,
 ) -> float:
-    """Least clearance of an outline from the occupied cells; see ``outline.outline_clearance``.
-
-    ``inner`` is the radius of the largest disc around the axle inside the outline.
-    """
+    """Least clearance of an outline from the occupied cells; see ``outline.outline_clearance``."""
+    corners, radius, inner = outline
+    jump, outlines, starts, items, frame = grid
     if outlines.shape[0] == 0:
         return math.inf
     dx, dy = x - frame[ORIGIN_X], y - frame[ORIGIN_Y]
     fc, fs = frame[COSINE], frame[SINE]
     px, py = fc * dx + fs * dy, fc * dy - fs * dx
-    away = nearest_outline(px, py, math.inf, outlines, starts, items, frame)
+    away = nearest_outline(px, py, grid)
     if is_solid(px, py, jump, frame):
         return -away - inner
     if corners.shape[0] == 0:

@@ -9,9 +9,9 @@ from __future__ import annotations
 
 import math
 
-from pilotage.kernels.arrays import FloatArray
+from pilotage.kernels.geometry.solids import Cells, Tiles
 from pilotage.kernels.jit import kernel
-from pilotage.kernels.scans.tiles import CELL, COSINE, ORIGIN_X, ORIGIN_Y, SINE, Cells
+from pilotage.kernels.scans.tiles import CELL, COSINE, ORIGIN_X, ORIGIN_Y, SINE
 
 OCCUPIED = 255
 
@@ -65,8 +65,9 @@ def trace(u: float, v: float, du: float, dv: float, begin: float, end: float, ju
 
 
 @kernel
-def grid_beam(x: float, y: float, c: float, s: float, most: float, jump: Cells, frame: FloatArray) -> float:
+def grid_beam(x: float, y: float, c: float, s: float, most: float, grid: Tiles) -> float:
     """Length of a beam along (c, s) in the map up to the first occupied cell; inf where none is nearer."""
+    jump, frame = grid[0], grid[4]
     if jump.shape[0] == 0:
         return math.inf
     cell = frame[CELL]

@@ -10,7 +10,7 @@ from pilotage.core.types import STOP, Command, FloatArray, IntArray, Pose2, Twis
 from pilotage.kernels.bodies import clearances, drive
 from pilotage.models.footprint import Footprint
 from pilotage.sim.bodies.motion import SimulatedMotion
-from pilotage.sim.worlds.world import World
+from pilotage.sim.worlds.world import World, outline_of
 
 COLLISIONS, TOUCHING, BLOCKED = drive.COLLISIONS, drive.TOUCHING, drive.BLOCKED
 
@@ -57,16 +57,9 @@ class Body:
         self.rates_rad_s: FloatArray = np.zeros(len(motion.moves))
         self._dt_s = dt_s
         self._under_way: deque[Command] | None = deque([STOP] * delay_steps) if delay_steps else None
-        outline = (footprint.points_m, footprint.radius_m, footprint.inner_radius_m)
-        walls, grid, traffic = (world.segments_m, world.circles_m), world.grid, world.traffic
-        cells = (grid.jump, grid.outlines_m, grid.starts, grid.items, grid.frame)
-        others = (traffic.segments_m, traffic.circles_m, own)
-        # What each kernel is handed, put together once: they take arrays, and many of them.
-        self._among_fixed = (*outline, *walls, *cells)
-        self._among_others = (*outline[:2], *others)
-        self._among_all = (*outline, *walls, *cells, *others)
-        self._step = (dt_s, motion.spins_on, motion.release_m, *outline, *walls, *cells, *others)
-        self._rows = (outline[0], *others)
+        self._outline, self._others = outline_of(footprint), world.traffic.others
+        self._among_all = (self._outline, world.fixed, self._others, own)
+        self._step = (dt_s, motion.spins_on, motion.release_m, *self._among_all)
         self.carry_to(start)
 
     @property
@@ -131,11 +124,12 @@ class Body:
         self.motion.stop()
         self.rates_rad_s[:] = 0.0
         x, y, theta = state[:3].tolist()
-        fixed = float(clearances.fixed_clearance(x, y, theta, *self._among_fixed))
+        fixed = float(clearances.fixed_clearance(x, y, theta, *self._among_all[:2]))
         state[drive.FIXED_CLEARANCE] = fixed
         if len(self.world.traffic.own):
-            drive.place_outline(state, *self._rows)
-        state[drive.CLEARANCE] = min(fixed, clearances.others_clearance(x, y, theta, *self._among_others))
+            drive.place_outline(state, self._outline, self._others, self.own)
+        gap = clearances.others_clearance(x, y, theta, self._outline, self._others, self.own)
+        state[drive.CLEARANCE] = min(fixed, gap)
 
     def run_into(self, now: bool) -> None:
         """Count that another body runs into this one, once until both are apart again."""
@@ -158,9 +152,4 @@ class Body:
         sides = traffic.segments_m[first:last]
         nobody = np.array([0, 0, -1], dtype=np.int64)
         x, y, theta = self.state[:3].tolist()
-        outline = self.footprint
-        return float(
-            clearances.others_clearance(
-                x, y, theta, outline.points_m, outline.radius_m, sides, circles, nobody
-            )
-        )
+        return float(clearances.others_clearance(x, y, theta, self._outline, (sides, circles), nobody))

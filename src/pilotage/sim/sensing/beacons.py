@@ -33,7 +33,7 @@ class SimulatedBeacons:
     def together(cls, sensors: Sequence[SimulatedBeacons]) -> Callable[[], list[BeaconReadings]]:
         """One call for the equal sensors of many robots."""
         config, world, body = sensors[0]._config, sensors[0]._carrier.world, sensors[0]._carrier.body
-        marks, traffic = world.landmarks, world.traffic
+        marks = world.landmarks
         blocks = max(1, BLOCK_NUMBERS // max(1, 2 * len(marks)))
         noise = NoiseBlocks([sensor._rng for sensor in sensors], blocks, (2, len(marks)))
         table, owns, values = body.table, body.owns, noise.values
@@ -42,19 +42,17 @@ class SimulatedBeacons:
         arguments = (
             counts,
             mount_of(config.mount),
-            0.5 * config.field_of_view_rad,
-            config.max_range_m,
             marks.points_xy_m,
             marks.ids,
-            math.sqrt(config.range_var_m2),
-            math.sqrt(config.bearing_var_rad2),
-            config.bearing_offset_rad,
-            world.segments_m,
-            world.circles_m,
-            world.grid.jump,
-            world.grid.frame,
-            traffic.segments_m,
-            traffic.circles_m,
+            (
+                0.5 * config.field_of_view_rad,
+                config.max_range_m,
+                math.sqrt(config.range_var_m2),
+                math.sqrt(config.bearing_var_rad2),
+                config.bearing_offset_rad,
+            ),
+            world.fixed,
+            world.traffic.others,
         )
 
         def read() -> list[BeaconReadings]:

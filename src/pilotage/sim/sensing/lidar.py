@@ -17,6 +17,14 @@ BLOCK = 16
 """Scans whose noise is drawn at once."""
 
 
+def fan_of(config: LidarConfig) -> mounted.Fan:
+    """A scanner's beams as the kernels take them."""
+    angles = config.beam_angles_rad()
+    from_first = angles - angles[0]
+    step_rad = config.beam_step_rad
+    return float(angles[0]), step_rad, np.cos(from_first), np.sin(from_first), config.max_range_m
+
+
 @SIMULATED_SENSORS.add(LidarConfig)
 class SimulatedLidar:
     """Scans among everything solid but its own robot."""
@@ -34,28 +42,15 @@ class SimulatedLidar:
     def together(cls, sensors: Sequence[SimulatedLidar]) -> Callable[[], list[LidarScan]]:
         """One call for the equal scanners of many robots."""
         config, world, body = sensors[0]._config, sensors[0]._carrier.world, sensors[0]._carrier.body
-        angles, grid, traffic = config.beam_angles_rad(), world.grid, world.traffic
-        from_first = angles - angles[0]
         noise = NoiseBlocks([sensor._rng for sensor in sensors], BLOCK, (config.beams,))
         table, owns, values = body.table, body.owns, noise.values
         rows = np.array([sensor._carrier.body.row for sensor in sensors])
         arguments = (
             mount_of(config.mount),
-            float(angles[0]),
-            config.beam_step_rad,
-            np.cos(from_first),
-            np.sin(from_first),
-            config.max_range_m,
+            fan_of(config),
             math.sqrt(config.range_var_m2),
-            world.segments_m,
-            world.circles_m,
-            grid.jump,
-            grid.outlines_m,
-            grid.starts,
-            grid.items,
-            grid.frame,
-            traffic.segments_m,
-            traffic.circles_m,
+            world.fixed,
+            world.traffic.others,
         )
 
         def read() -> list[LidarScan]:

@@ -39,22 +39,14 @@ class SimulatedUltrasonic:
     def together(cls, sensors: Sequence[SimulatedUltrasonic]) -> Callable[[], list[UltrasonicReading]]:
         """One call for the cones of all robots."""
         world, body = sensors[0]._carrier.world, sensors[0]._carrier.body
-        grid, traffic = world.grid, world.traffic
         found = np.empty(len(sensors))
         arguments = (
             body.table,
             np.array([sensor._carrier.body.row for sensor in sensors]),
             body.owns,
             np.array([sensor._mount for sensor in sensors]),
-            world.segments_m,
-            world.circles_m,
-            grid.jump,
-            grid.outlines_m,
-            grid.starts,
-            grid.items,
-            grid.frame,
-            traffic.segments_m,
-            traffic.circles_m,
+            world.fixed,
+            world.traffic.others,
             found,
         )
         tell = [sensor.tell for sensor in sensors]
@@ -80,19 +72,15 @@ class SimulatedInfrared:
 
     def __init__(self, config: InfraredConfig, carrier: Carrier, rng: np.random.Generator) -> None:
         carrier.world.check_solids(carrier.where, "infrared")
-        world, traffic = carrier.world, carrier.world.traffic
+        world = carrier.world
         self._config = config
         self._normals = Normals(rng)
         self._arguments = (
             carrier.body.state,
             mount_of(config.mount),
             config.max_range_m,
-            world.segments_m,
-            world.circles_m,
-            world.grid.jump,
-            world.grid.frame,
-            traffic.segments_m,
-            traffic.circles_m,
+            world.fixed,
+            world.traffic.others,
             carrier.body.own,
         )
 

@@ -6,10 +6,9 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pilotage.core.errors import InputError
-from pilotage.core.types import FloatArray, IntArray
+from pilotage.kernels.geometry.solids import Tiles
 from pilotage.kernels.grids.distance import FAR
 from pilotage.kernels.scans import jumps, tiles
 from pilotage.maps.memory import require_memory
@@ -24,27 +23,20 @@ class GridLayer:
 
     Attributes
     ----------
-    jump
-        (rows, columns), row 0 at the bottom: how far a beam may leap from each cell.
-    outlines_m
-        (N, 4) sides of the occupied cells, in the grid's own frame, the cells to their left.
-    starts, items
-        Which of them lie in each tile.
-    frame
-        Pose of the grid, sides of cells and tiles, columns and rows of tiles.
+    tiles
+        Jump (rows, columns), row 0 at the bottom: how far a beam may leap from each cell; outlines (N, 4):
+        sides of the occupied cells in metres, in the grid's own frame, the cells to their left; starts and
+        items: which of them lie in each tile; frame: pose of the grid, sides of cells and tiles, columns and
+        rows of tiles.
     """
 
-    jump: NDArray[np.uint8]
-    outlines_m: FloatArray
-    starts: IntArray
-    items: IntArray
-    frame: FloatArray
+    tiles: Tiles
 
     @staticmethod
     def none() -> GridLayer:
         """No cells."""
         nothing = np.zeros(0, dtype=np.int64)
-        return GridLayer(np.zeros((0, 0), np.uint8), np.zeros((0, 4)), nothing, nothing, np.ones(8))
+        return GridLayer((np.zeros((0, 0), np.uint8), np.zeros((0, 4)), nothing, nothing, np.ones(8)))
 
     @staticmethod
     def of(grid: OccupancyGrid) -> GridLayer:
@@ -71,4 +63,4 @@ class GridLayer:
         origin = grid.origin
         c, s = math.cos(origin.theta_rad), math.sin(origin.theta_rad)
         frame = np.array([origin.x_m, origin.y_m, c, s, grid.resolution_m, tile, columns, rows])
-        return GridLayer(jumps.leaps(occupied), sides, starts, items, frame)
+        return GridLayer((jumps.leaps(occupied), sides, starts, items, frame))

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from pilotage.core.types import FloatArray, IntArray
+from pilotage.kernels.geometry.solids import Others
 from pilotage.models.footprint import Footprint
 
 NOBODY: IntArray = np.array([0, 0, -1], dtype=np.int64)
@@ -22,8 +23,8 @@ class Traffic:
 
     Attributes
     ----------
-    segments_m, circles_m
-        Sides of the polygons and all discs, where they are now.
+    segments_m, circles_m, others
+        Sides of the polygons and all discs, where they are now; ``others`` holds both, as kernels take them.
     own
         (R, 3) rows of each robot: first side, one past the last, disc or -1.
     first_person
@@ -44,6 +45,7 @@ class Traffic:
         self.own: IntArray = np.array(own, dtype=np.int64).reshape(-1, 3)
         self.segments_m: FloatArray = np.zeros((sides, 4))
         self.circles_m: FloatArray = np.array(discs, dtype=np.float64).reshape(-1, 3)
+        self.others: Others = (self.segments_m, self.circles_m)
 
     @staticmethod
     def none() -> Traffic:

@@ -9,6 +9,7 @@ import numpy as np
 from pilotage.core.errors import InputError
 from pilotage.core.types import BoolArray, FloatArray, IntArray, Pose2
 from pilotage.kernels.bodies import clearances, drive
+from pilotage.kernels.geometry.solids import Fixed, Outline
 from pilotage.kernels.scans import mounted, sight
 from pilotage.maps.landmarks import Landmarks
 from pilotage.maps.world_map import WorldMap
@@ -20,6 +21,11 @@ from pilotage.sim.worlds.traffic import NOBODY, Traffic
 
 NO_SEGMENTS: FloatArray = np.zeros((0, 4))
 NO_CIRCLES: FloatArray = np.zeros((0, 3))
+
+
+def outline_of(footprint: Footprint) -> Outline:
+    """A footprint as the kernels take it."""
+    return footprint.points_m, footprint.radius_m, footprint.inner_radius_m
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -85,6 +91,11 @@ class World:
     def with_traffic(self, traffic: Traffic) -> World:
         """The same world with other moving bodies; the layers are shared."""
         return replace(self, traffic=traffic)
+
+    @property
+    def fixed(self) -> Fixed:
+        """What does not move, as the kernels take it."""
+        return self.segments_m, self.circles_m, self.grid.tiles
 
     @property
     def landmarks(self) -> Landmarks:
@@ -188,20 +199,9 @@ class World:
             places,
             np.tile(NOBODY, (len(places), 1)) if own is None else own,
             np.zeros(3),
-            float(angles_rad[0]),
-            step,
-            np.cos(from_first),
-            np.sin(from_first),
-            max_range_m,
-            self.segments_m,
-            self.circles_m,
-            self.grid.jump,
-            self.grid.outlines_m,
-            self.grid.starts,
-            self.grid.items,
-            self.grid.frame,
-            self.traffic.segments_m,
-            self.traffic.circles_m,
+            (float(angles_rad[0]), step, np.cos(from_first), np.sin(from_first), max_range_m),
+            self.fixed,
+            self.traffic.others,
         )
 
     def beam(self, poses: FloatArray, max_range_m: float, own: IntArray = NOBODY) -> FloatArray:
@@ -213,12 +213,8 @@ class World:
                     place,
                     np.zeros(3),
                     max_range_m,
-                    self.segments_m,
-                    self.circles_m,
-                    self.grid.jump,
-                    self.grid.frame,
-                    self.traffic.segments_m,
-                    self.traffic.circles_m,
+                    self.fixed,
+                    self.traffic.others,
                     own,
                 )
                 for place in places
@@ -240,15 +236,8 @@ class World:
             np.arange(count),
             np.tile(own, (count, 1)),
             np.tile([0.0, 0.0, 0.0, 0.5 * width_rad, max_range_m], (count, 1)),
-            self.segments_m,
-            self.circles_m,
-            self.grid.jump,
-            self.grid.outlines_m,
-            self.grid.starts,
-            self.grid.items,
-            self.grid.frame,
-            self.traffic.segments_m,
-            self.traffic.circles_m,
+            self.fixed,
+            self.traffic.others,
             out,
         )
         return out
@@ -260,18 +249,9 @@ class World:
         """
         return clearances.at_poses(
             np.ascontiguousarray(poses, dtype=np.float64).reshape(-1, 3),
-            footprint.points_m,
-            footprint.radius_m,
-            footprint.inner_radius_m,
-            self.segments_m,
-            self.circles_m,
-            self.grid.jump,
-            self.grid.outlines_m,
-            self.grid.starts,
-            self.grid.items,
-            self.grid.frame,
-            self.traffic.segments_m,
-            self.traffic.circles_m,
+            outline_of(footprint),
+            self.fixed,
+            self.traffic.others,
             own,
         )
 
@@ -296,18 +276,9 @@ class World:
             pose.theta_rad,
             *move,
             clear,
-            footprint.points_m,
-            footprint.radius_m,
-            footprint.inner_radius_m,
-            self.segments_m,
-            self.circles_m,
-            self.grid.jump,
-            self.grid.outlines_m,
-            self.grid.starts,
-            self.grid.items,
-            self.grid.frame,
-            self.traffic.segments_m,
-            self.traffic.circles_m,
+            outline_of(footprint),
+            self.fixed,
+            self.traffic.others,
             own,
         )
         return Pose2(*drive.turned_part(pose.x_m, pose.y_m, pose.theta_rad, *move, part)), float(part)
@@ -323,19 +294,11 @@ class World:
             pose.as_array(),
             nothing,
             np.zeros(3),
-            0.5 * field_of_view_rad,
-            max_range_m,
             marks.points_xy_m,
             marks.ids,
-            0.0,
-            0.0,
-            0.0,
-            self.segments_m,
-            self.circles_m,
-            self.grid.jump,
-            self.grid.frame,
-            self.traffic.segments_m,
-            self.traffic.circles_m,
+            (0.5 * field_of_view_rad, max_range_m, 0.0, 0.0, 0.0),
+            self.fixed,
+            self.traffic.others,
             own,
             ids,
             ranges,
