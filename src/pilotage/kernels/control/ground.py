@@ -116,7 +116,40 @@ def is_seen(x: float, y: float, theta: float, body: Body, ground: Ground) -> boo
 
 
 # Below the same with the arrays one by one: taking an array out of a tuple counts a reference and costs more
-# than the whole look-up. Loops take them out once.
+# than the whole look-up. Loops take them out once, and ask ``disc_clearance`` and ``disc_seen`` first: these
+# are short enough to be compiled into the loop, and mostly tell enough.
+
+
+@kernel
+def disc_clearance(
+    x: float,
+    y: float,
+    outer: float,
+    nearest: CellIndex,
+    mean: FloatArray,
+    x0: float,
+    y0: float,
+    per_cell: float,
+) -> float:
+    """What ``clearance_of`` begins with: clearance of the disc that covers the footprint."""
+    n = nearest.shape[0]
+    column, row = math.floor((x - x0) * per_cell), math.floor((y - y0) * per_cell)
+    if 0 <= row < n and 0 <= column < n:
+        at = nearest[row, column]
+        if at >= 0:
+            dx, dy = mean[at, 0] - x, mean[at, 1] - y
+            return math.sqrt(dx * dx + dy * dy) - outer
+    return FAR_M
+
+
+@kernel
+def disc_seen(
+    x: float, y: float, outer: float, unseen: FloatArray, x0: float, y0: float, per_coarse: float
+) -> bool:
+    """Whether the whole disc that covers the footprint has been seen."""
+    m = unseen.shape[0]
+    column, row = math.floor((x - x0) * per_coarse), math.floor((y - y0) * per_coarse)
+    return 0 <= row < m and 0 <= column < m and bool(unseen[row, column] >= outer)
 
 
 @kernel
@@ -138,13 +171,7 @@ def clearance_of(
 ) -> float:
     """``clearance_m`` for loops."""
     n = nearest.shape[0]
-    bound = FAR_M
-    column, row = math.floor((x - x0) * per_cell), math.floor((y - y0) * per_cell)
-    if 0 <= row < n and 0 <= column < n:
-        at = nearest[row, column]
-        if at >= 0:
-            dx, dy = mean[at, 0] - x, mean[at, 1] - y
-            bound = math.sqrt(dx * dx + dy * dy) - outer
+    bound: float = disc_clearance(x, y, outer, nearest, mean, x0, y0, per_cell)
     if bound >= enough:
         return bound
     c, s = math.cos(theta), math.sin(theta)

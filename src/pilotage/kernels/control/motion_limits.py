@@ -7,7 +7,14 @@ from typing import NamedTuple
 
 from pilotage.kernels.arrays import FloatArray
 from pilotage.kernels.control.footprint import Body
-from pilotage.kernels.control.ground import Ground, clearance_of, seen_under, sure_clearance
+from pilotage.kernels.control.ground import (
+    Ground,
+    clearance_of,
+    disc_clearance,
+    disc_seen,
+    seen_under,
+    sure_clearance,
+)
 from pilotage.kernels.control.movers import closes_in
 from pilotage.kernels.geometry.motion import exact_arc
 from pilotage.kernels.jit import kernel
@@ -94,13 +101,17 @@ def braking_is_free(
         share = k / steps
         px, py, ptheta = exact_arc(x, y, theta, sign * share * length, share * angle)
         if (
-            clearance_of(
+            disc_clearance(px, py, outer, nearest, mean, x0, y0, per_cell) < margin
+            and clearance_of(
                 px, py, ptheta, polygon, outer, discs, hits, nearest, mean, x0, y0, cell, per_cell, margin
             )
             < margin
         ):
             return False
-        if not seen_under(px, py, ptheta, outer, discs, unseen, x0, y0, coarse, per_coarse):
+        if not (
+            disc_seen(px, py, outer, unseen, x0, y0, per_coarse)
+            or seen_under(px, py, ptheta, outer, discs, unseen, x0, y0, coarse, per_coarse)
+        ):
             return False
     return True
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from pilotage.kernels.arrays import FloatArray
 from pilotage.kernels.control.footprint import Body
-from pilotage.kernels.control.ground import Ground, clearance_of, seen_under
+from pilotage.kernels.control.ground import Ground, clearance_of, disc_clearance, disc_seen, seen_under
 from pilotage.kernels.control.motion_limits import Drive, advance, braking_is_free
 from pilotage.kernels.control.movers import closes_in, movers_clearance
 from pilotage.kernels.control.togo import togo_at
@@ -99,17 +99,20 @@ def rollout_cost(
         before, there = w, (x, y, theta)
         x, y, theta, v, w = advance(x, y, theta, v, w, commands[k, 0], commands[k, 1], dt, drive)
         need = price.margin + price.margin_s * abs(v)
-        here = clearance_of(
-            x, y, theta, polygon, outer, discs, hits, nearest, mean, x0, y0, cell, per_cell, need
-        )
+        here = disc_clearance(x, y, outer, nearest, mean, x0, y0, per_cell)
+        if here < need:
+            here = clearance_of(
+                x, y, theta, polygon, outer, discs, hits, nearest, mean, x0, y0, cell, per_cell, need
+            )
         # From within the margin the way out is allowed, not the way in.
         if here < need and here < begin - 1e-3:
             return _hit_cost(k / steps, x, y, ground)
-        if not seen_under(x, y, theta, outer, discs, unseen, x0, y0, coarse, per_coarse):
-            if seen:
-                return _hit_cost(k / steps, x, y, ground)
-        else:
+        if disc_seen(x, y, outer, unseen, x0, y0, per_coarse) or seen_under(
+            x, y, theta, outer, discs, unseen, x0, y0, coarse, per_coarse
+        ):
             seen = True
+        elif seen:
+            return _hit_cost(k / steps, x, y, ground)
         begin = max(begin, here)
         cost += dt
         if here < price.soft:

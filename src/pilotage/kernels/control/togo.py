@@ -9,7 +9,7 @@ import numpy as np
 from pilotage.kernels.arrays import BoolArray, FloatArray
 from pilotage.kernels.control.ground import FAR_M
 from pilotage.kernels.grids.distance import NONE, CellIndex
-from pilotage.kernels.jit import kernel
+from pilotage.kernels.jit import kernel, trailing_zeros
 
 BUCKETS = 1 << 14
 BUCKET_S = 0.005
@@ -144,20 +144,13 @@ def time_to_go(
             head[b] = entries
             entries += 1
             waiting += 1
-    # Straight moves, diagonal ones, and knight's; the latter two with the cells that they pass between.
     step = np.empty(16, np.int64)
-    one, other = np.empty(16, np.int64), np.empty(16, np.int64)
-    length, near = np.empty(16), np.empty(16)
     for k in range(16):
-        dr, dc = STEP_ROW[k], STEP_COLUMN[k]
-        step[k] = dr * wide + dc
-        length[k] = coarse * math.sqrt(dr * dr + dc * dc)
-        if abs(dr) == 2:
-            one[k], other[k] = (dr // 2) * wide, (dr // 2) * wide + dc
-        elif abs(dc) == 2:
-            one[k], other[k] = dc // 2, dr * wide + dc // 2
-        else:
-            one[k], other[k] = dc, dr * wide
+        step[k] = STEP_ROW[k] * wide + STEP_COLUMN[k]
+    # Half the length of a straight move and of a diagonal one, a fourth of a knight's, for the two cells that
+    # it touches and the two that it passes between.
+    straight, diagonal, knight = 0.5 * coarse, math.sqrt(0.5) * coarse, 0.25 * math.sqrt(5.0) * coarse
+    near = np.empty(16)
     tick = int(lowest * per_s)
     idle = 0
     ends = np.inf
@@ -186,17 +179,33 @@ def time_to_go(
             break
         mine = pace[i]
         # No later than a settled cell's time, infinite for one that is shut: neither has to be asked for.
-        for k in range(8):
-            near[k] = here + 0.5 * length[k] * (mine + pace[i + step[k]])
-        for k in range(8, 16):
-            cost = 0.25 * length[k] * (mine + pace[i + step[k]] + pace[i + one[k]] + pace[i + other[k]])
-            near[k] = here + cost
+        up, down = i + wide, i - wide
+        e, n, w, s = pace[i + 1], pace[up], pace[i - 1], pace[down]
+        ne, nw, se, sw = pace[up + 1], pace[up - 1], pace[down + 1], pace[down - 1]
+        near[0], near[1] = here + straight * (mine + e), here + straight * (mine + n)
+        near[2], near[3] = here + straight * (mine + w), here + straight * (mine + s)
+        # Not a number, and so no less than anything, where a cell that a diagonal passes is shut.
+        near[4] = here + diagonal * (mine + ne) + 0.0 * (e + n)
+        near[5] = here + diagonal * (mine + nw) + 0.0 * (w + n)
+        near[6] = here + diagonal * (mine + se) + 0.0 * (e + s)
+        near[7] = here + diagonal * (mine + sw) + 0.0 * (w + s)
+        near[8] = here + knight * (mine + pace[up + 2] + e + ne)
+        near[9] = here + knight * (mine + pace[up + wide + 1] + n + ne)
+        near[10] = here + knight * (mine + pace[up + wide - 1] + n + nw)
+        near[11] = here + knight * (mine + pace[up - 2] + w + nw)
+        near[12] = here + knight * (mine + pace[down - 2] + w + sw)
+        near[13] = here + knight * (mine + pace[down - wide - 1] + s + sw)
+        near[14] = here + knight * (mine + pace[down - wide + 1] + s + se)
+        near[15] = here + knight * (mine + pace[down + 2] + e + se)
+        # First which are better, then those one by one: a branch a neighbour cannot be foretold.
+        better = np.uint64(0)
         for k in range(16):
+            better |= np.uint64(near[k] < flat[i + step[k]]) << np.uint64(k)
+        while better != np.uint64(0):
+            k = trailing_zeros(better)
+            better &= better - np.uint64(1)
             j, there = i + step[k], near[k]
-            if there < flat[j] and there - here < span and entries < room:
-                # Both cells that it passes between have to be free.
-                if 4 <= k < 8 and pace[i + one[k]] + pace[i + other[k]] == np.inf:
-                    continue
+            if there - here < span and entries < room:
                 flat[j] = there
                 to = int(there * per_s) & (BUCKETS - 1)
                 entry_cell[entries], entry_next[entries] = j, head[to]

@@ -28,6 +28,8 @@ BLIND_SHARE = 0.5
 """With more than this share of its ranges 0 the laser is covered."""
 MANY_SHARE = 0.125
 """Where somebody may move, so many beams have to end near at things that stand to correct the odometry."""
+ROLL_M, MOST_OFF_M = 0.5, 1.0
+"""The grids follow a robot so far from their middle: where the time to go is worked out, and at any time."""
 BEYOND_S = 6.0
 """The time to go is worked out so far past the robot: no plan goes back farther."""
 
@@ -264,7 +266,10 @@ class RollingGround:
         )
 
     def _roll(self, pose: FloatArray, first_view: bool) -> bool:
-        """Shift the grids by whole coarse cells, so that a robot at ``pose`` stays near their middle."""
+        """Shift the grids by whole coarse cells, so that a robot at ``pose`` stays near their middle.
+
+        As the time to go is due anew after it, it waits for when that is due in any case, if it can.
+        """
         half_m = 0.5 * self._cells * self._cell_m
         wanted = (
             math.floor((pose[0] - half_m) / self._coarse_m),
@@ -274,7 +279,8 @@ class RollingGround:
         if first_view:
             self._corner = wanted
             return True
-        if max(abs(dc), abs(dr)) * self._coarse_m < 0.5:
+        due = self._since_plan + 1 >= self._config.replan_steps
+        if max(abs(dc), abs(dr)) * self._coarse_m < (ROLL_M if due else MOST_OFF_M):
             return False
         ground_update.rolled(self._hits, self._mean, self._seen, dr, dc)
         self._corner = wanted
