@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from pilotage.core.types import Pose2
 from pilotage.kernels.geometry import plane
 from pilotage.maps.occupancy_grid import OccupancyGrid
-from pilotage.maps.outlines import outlines
+from pilotage.maps.outlines import outlines, rim_lines
 
 
 def drawn(seed: int, share: float, theta: float = 0.0, unknown: float = 0.0) -> OccupancyGrid:
@@ -78,3 +78,19 @@ def test_unknown_cells_are_walls_only_where_it_is_said() -> None:
     grid = drawn(3, 0.0, unknown=0.4)
     assert outlines(grid).shape == (0, 4)
     assert len(outlines(grid, unknown_is_solid=True)) > 10
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.integers(0, 10_000), st.floats(0.05, 0.9), st.floats(-3.1, 3.1))
+def test_middle_lines_run_through_the_cells_that_beams_can_reach(
+    seed: int, share: float, theta: float
+) -> None:
+    grid = drawn(seed, share, theta, unknown=0.1)
+    solid = np.pad(grid.blocked(unknown_is_free=True), 1)
+    lines = rim_lines(grid)
+    for row, column in np.argwhere(solid[1:-1, 1:-1]):
+        around = solid[row, column + 1] & solid[row + 2, column + 1]
+        around &= solid[row + 1, column] & solid[row + 1, column + 2]
+        x, y = grid.centres_m(np.array([[row, column]]))[0]
+        away = plane.distance_to_nearest(x, y, lines, plane.NO_CIRCLES)
+        assert (away > 0.1) if around else (away < 1e-9)

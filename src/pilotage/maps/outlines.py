@@ -31,7 +31,39 @@ def outlines(grid: OccupancyGrid, unknown_is_solid: bool = False) -> FloatArray:
             np.column_stack([upright[:, 0], upright[:, 1], upright[:, 0], upright[:, 2]]),
         ]
     ).astype(np.float64)
-    sides *= grid.resolution_m
+    return _in_map(sides, grid)
+
+
+def rim_lines(grid: OccupancyGrid) -> FloatArray:
+    """(N, 4) x0, y0, x1, y1 in the map frame: the middle lines of the occupied cells that beams can reach.
+
+    Those are the ones beside a cell that is not occupied. Each lies in the longer of the two rows, level or
+    upright, of such cells; one alone is a line of no length. All of a straight wall's cells is within half
+    a cell of them; of one that bends it is all but a fifth of a cell at the corners.
+    """
+    solid = grid.blocked(unknown_is_free=True)[::-1]
+    padded = np.pad(solid, 1)
+    buried = padded[1:-1, :-2] & padded[1:-1, 2:] & padded[:-2, 1:-1] & padded[2:, 1:-1]
+    rim = solid & ~buried
+    level, upright = _runs(rim), _runs(rim.T)
+    upright = upright[upright[:, 2] - upright[:, 1] > 1]
+    covered = np.zeros_like(rim)
+    for column, first, end in upright.tolist():
+        covered[first:end, column] = True
+    alone = level[:, 2] - level[:, 1] == 1
+    level = level[~(alone & covered[level[:, 0], level[:, 1]])]
+    lines = np.concatenate(
+        [
+            np.column_stack([level[:, 1], level[:, 0], level[:, 2] - 1, level[:, 0]]),
+            np.column_stack([upright[:, 0], upright[:, 1], upright[:, 0], upright[:, 2] - 1]),
+        ]
+    )
+    return _in_map(lines + 0.5, grid)
+
+
+def _in_map(sides: FloatArray, grid: OccupancyGrid) -> FloatArray:
+    """Segments (N, 4) in cells from the lower-left corner as segments in the map frame."""
+    sides = sides * grid.resolution_m
     c, s = math.cos(grid.origin.theta_rad), math.sin(grid.origin.theta_rad)
     turn = np.array([[c, s], [-s, c]])
     corner = np.array([grid.origin.x_m, grid.origin.y_m])

@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 from pydantic import Field, model_validator
-from scipy.ndimage import binary_dilation
 from scipy.special import ndtri
 
 from pilotage.core.angles import wrap_array_to_pi, wrap_to_pi
@@ -16,8 +15,6 @@ from pilotage.core.config import Config
 from pilotage.core.errors import InputError
 from pilotage.core.types import FloatArray, Pose2
 from pilotage.kernels.filters import particles
-from pilotage.maps.nearest_obstacles import NearestObstacles
-from pilotage.maps.occupancy_grid import FREE, UNKNOWN, OccupancyGrid
 from pilotage.maps.world_map import WorldMap
 from pilotage.models.odometry import OdometryModel
 from pilotage.sensors.lidar import LidarConfig
@@ -27,6 +24,7 @@ from pilotage.sensors.wheel_odometry import WheelOdometryConfig
 from pilotage.stack.interface import Belief, BeliefStatus
 from pilotage.stack.journal import Journal
 from pilotage.stack.knowledge import RobotKnowledge
+from pilotage.stack.localization.likelihood_field import LikelihoodField
 from pilotage.stack.localization.localizer import LOCALIZERS, require_initial_pose
 from pilotage.stack.localization.odometry_prediction import OdometryNoise, OdometryPrediction
 from pilotage.stack.localization.odometry_watch import (
@@ -37,24 +35,17 @@ from pilotage.stack.localization.odometry_watch import (
 )
 from pilotage.stack.localization.self_check import ExplainedShare, SelfCheck
 
-WALL_STD_M, GRID_SHARE = 0.01, 1.0 / 3.0
 NAME = "particle-filter"
 COLUMNS = {"particles": "1", "effective_particles": "1", "scan_parts": "1", "localized": "1"}
 """Size of the cloud, how much of it was effective, how many parts the scan was let in by, and whether the
 robot holds itself for localized."""
 POSE_DOF = 3.0
-AT_WALL_STDS, MOST_BESIDE = 3, 0.25
-"""A beam so near to a wall ends at it; a belief of which a larger share of beams end beside one is wrong."""
+MOST_BESIDE = 0.25
+"""A belief of which a larger share of beams end beside one is wrong."""
 LEAST_AT_WALL, UNEXPLAINED_SCANS = 0.15, 10
 """A crowd may hide the walls for a while; more scans that show fewer of them speak against the belief."""
-LEAST_MAPPED = 0.5
-"""Share of a scan that has to end where the map says anything."""
-BESIDE_CELLS = 2
-"""A beam that ends so few cells beyond the known ones may have hit the wall before them."""
 UNSURE_M = 0.1
 """A cloud wider than this (standard deviation) may settle at another place that looks alike."""
-TABLE_PER_STD, TABLE_STDS = 50, 12
-"""The table of a beam's density: entries per standard deviation, and how many of these."""
 FLOOR = np.diag([1e-12, 1e-12, 1e-12])
 """Added to the particles' covariance, which is singular where the start is exact and nothing has moved."""
 
@@ -87,7 +78,8 @@ class MclConfig(Config):
     """Readings beyond are left out."""
     range_var_m2: Positive | None = None
     field_std_m: NonNegative | None = None
-    """What the map is wrong by; added to the range's variance. None: 1 cm, of a grid a third of a cell."""
+    """What the map is wrong by; added to the range's variance. None: 6.5 mm, of a grid a third of a cell
+    beside the cell itself."""
     random_share: float = Field(default=0.05, gt=0.0, lt=1.0)
     """Share of readings that are no wall of the map."""
     measurement_var_scale: Positive = 1.0
@@ -111,9 +103,11 @@ class ParticleFilterLocalizer:
     a single particle alive; it is let in by parts, and the cloud is resampled and spread out between them.
 
     The field knows no direction: a wall seen aslant is taken to be as uncertain across as along the beam,
-    so the filter believes a little less than it could. Fails after a wrong start or when carried away
-    (particles are only where they once were), and where the belief is no single hump: the spreading keeps
-    mean and covariance, and would draw two humps together.
+    so the filter believes a little less than it could. Scans on cells err alike (``LikelihoodField.kept``):
+    the cloud is never much narrower than one scan alone would make it.
+
+    Fails after a wrong start or when carried away (particles are only where they once were), and where the
+    belief is no single hump: the spreading keeps mean and covariance, and would draw two humps together.
     """
 
     def __init__(
@@ -139,14 +133,24 @@ class ParticleFilterLocalizer:
         self._watch, self._check = OdometryWatch(robot, odometry), SelfCheck(refused_share=MOST_BESIDE)
         self._blind = bool(initial.cov[2, 2] > LINEAR_RAD**2)
         self._unexplained, self._found = 0, True
+        self._moved = (0.0, 0.0)
         self._explained, self._sharp = ExplainedShare(), ExplainedShare()
-        self._field, self._known = _field_of(config, chart), _known_of(chart)
+        range_var_m2 = lidar.range_var_m2 if config.range_var_m2 is None else config.range_var_m2
+        self._field = LikelihoodField(
+            chart,
+            resolution_m=config.resolution_m,
+            range_var_m2=config.measurement_var_scale * range_var_m2,
+            field_std_m=None
+            if config.field_std_m is None
+            else math.sqrt(config.measurement_var_scale) * config.field_std_m,
+            random_share=config.random_share,
+            reach_m=lidar.max_range_m,
+        )
         self._picked = np.unique(np.linspace(0, lidar.beams - 1, min(config.beams, lidar.beams)).astype(int))
         angles = lidar.beam_angles_rad()[self._picked] + lidar.mount.theta_rad
         self._directions = np.column_stack([np.cos(angles), np.sin(angles)])
         self._mount_xy = np.array([lidar.mount.x_m, lidar.mount.y_m])
         self._max_range = min(config.max_range_m, lidar.max_range_m)
-        self._table, self._table_step = _beam_density(config, lidar, _field_std_m(config, chart))
         self._rng = robot.streams.stream(NAME)
         self._quantile = float(ndtri(config.kld_probability))
         self._poses = _draw(initial, config.most_particles, self._rng)
@@ -170,7 +174,7 @@ class ParticleFilterLocalizer:
         moments = None
         if isinstance(scan, LidarScan) and not self._blind:
             prior = self._unweighted()
-            points = self._mapped(self._points_of(scan.ranges_m), prior[0])
+            points = self._field.mapped(self._points_of(scan.ranges_m), prior[0])
             moments = self._weigh(points)
             if moments is not None:
                 self._judge(prior, moments[0], points, readings.t_s)
@@ -187,6 +191,8 @@ class ParticleFilterLocalizer:
         return self.belief
 
     def _move(self, odometry: OdometryIncrement) -> None:
+        moved_m, turned_rad = self._moved
+        self._moved = (moved_m + abs(odometry.distance_m), turned_rad + abs(odometry.angle_rad))
         distance_var, angle_var = self._prediction.variances(odometry)
         particles.sample_motion(
             self._poses,
@@ -210,21 +216,27 @@ class ParticleFilterLocalizer:
         weighted mean and covariance, None for an empty scan."""
         if not len(points):
             return None
-        remaining, self._rounds = 1.0, 0
-        while True:
+        kept, self._rounds = self._field.kept(*self._moved), 0
+        self._moved = (0.0, 0.0)
+        growth, whole = 1.0 / kept if kept > 0.0 else 1.0, self._field.independent_share
+        remaining, narrowing = whole * (1.0 - kept), True
+        while narrowing:
             self._rounds += 1
-            likelihoods = self._log_likelihoods(points, self._poses)
-            part = remaining
+            likelihoods = self._field.log_likelihoods(points, self._poses)
+            part, narrowing = max(remaining, 0.0), False
             if self._rounds < self._config.most_rounds:
                 enough = self._config.effective_share * self._poses.shape[0]
-                part = particles.largest_exponent(likelihoods, remaining, enough)
+                most = whole if kept > 0.0 else remaining
+                narrowed = particles.largest_exponent(likelihoods, most, enough)
+                if narrowed < most:
+                    part, narrowing = narrowed, True
             remaining -= part
             self._effective = particles.effective_count(likelihoods, part)
             weights = particles.normalized(likelihoods, part)
             moments = _moments(self._poses, weights)
-            self._resample(weights, *moments)
-            if remaining <= 0.0:
-                return moments
+            self._resample(weights, *moments, growth)
+            growth = 1.0
+        return moments
 
     def _unweighted(self) -> tuple[FloatArray, FloatArray]:
         """Mean and covariance of the cloud as it is."""
@@ -236,21 +248,6 @@ class ParticleFilterLocalizer:
         seen = ranges < self._max_range  # neither beyond reach nor NaN
         points: FloatArray = self._mount_xy + ranges[seen, None] * self._directions[seen]
         return points
-
-    def _mapped(self, points: FloatArray, mean: FloatArray) -> FloatArray:
-        """Those of a scan's end points that lie where the map says anything, as seen from the mean.
-
-        What ends in unknown cells would speak for whatever pose puts it beside a known wall instead; a scan
-        of which most does so says nothing.
-        """
-        if self._known is None or not len(points):
-            return points
-        c, s = math.cos(mean[2]), math.sin(mean[2])
-        cells = self._known.cells_at(mean[:2] + points @ np.array([[c, s], [-s, c]]))
-        inside = ((cells >= 0) & (cells < self._known.cells.shape)).all(axis=1)
-        cells[~inside] = 0
-        mapped = inside & (self._known.cells[cells[:, 0], cells[:, 1]] >= 0)
-        return np.ascontiguousarray(points[mapped & (mapped.mean() >= LEAST_MAPPED)])
 
     def _judge(
         self, prior: tuple[FloatArray, FloatArray], mean: FloatArray, points: FloatArray, t_s: float
@@ -264,9 +261,9 @@ class ParticleFilterLocalizer:
         scans fit as well as they used to; and so it is where more beams than usual end beside a wall.
         """
         pose = mean[None]
-        beams = np.array([self._log_likelihoods(point[None], pose)[0] for point in points])
-        at_wall = int((beams >= self._table[AT_WALL_STDS * TABLE_PER_STD]).sum())
-        beside = int((beams > self._table[-2]).sum())
+        beams = np.array([self._field.log_likelihoods(point[None], pose)[0] for point in points])
+        at_wall = int((beams >= self._field.least_at_wall).sum())
+        beside = int((beams > self._field.least_beside).sum())
         step = mean - prior[0]
         step[2] = wrap_to_pi(float(step[2]))
         self._check.tell(t_s, beside, at_wall, float(step @ np.linalg.solve(prior[1], step)), POSE_DOF)
@@ -284,30 +281,14 @@ class ParticleFilterLocalizer:
         if beside and not self._sharp.tell(at_wall / beside, self._found):
             self._check.alarm(t_s)
 
-    def _log_likelihoods(self, points: FloatArray, poses: FloatArray) -> FloatArray:
-        out = np.empty(poses.shape[0])
-        field = self._field
-        particles.log_likelihoods(
-            poses,
-            points,
-            field.index,
-            *field.origin_xy_m,
-            field.resolution_m,
-            field.items,
-            self._table,
-            self._table_step,
-            out,
-        )
-        return out
-
-    def _resample(self, weights: FloatArray, mean: FloatArray, cov: FloatArray) -> None:
+    def _resample(self, weights: FloatArray, mean: FloatArray, cov: FloatArray, growth: float) -> None:
         config = self._config
         count = min(max(self._wanted, config.least_particles), config.most_particles)
         drawn = particles.low_variance_indices(weights, count, float(self._rng.random()))
         self._poses = self._poses[drawn]
         normals = self._rng.standard_normal((count, 3))
         root = np.asarray(np.linalg.cholesky(cov), dtype=np.float64)
-        particles.spread_out(self._poses, mean, root, config.spread, normals)
+        particles.spread_out(self._poses, mean, root, config.spread, growth, normals)
         bins = particles.occupied_bins(self._poses, config.bin_m, config.bin_rad)
         self._wanted = math.ceil(particles.kld_count(bins, config.kld_error, self._quantile))
 
@@ -317,50 +298,6 @@ def _moments(poses: FloatArray, weights: FloatArray) -> tuple[FloatArray, FloatA
     mean, cov = np.empty(3), np.empty((3, 3))
     particles.moments(poses, weights, mean, cov)
     return mean, cov + FLOOR
-
-
-def _field_of(config: MclConfig, chart: WorldMap) -> NearestObstacles:
-    """Distances from the walls; of a grid from the outlines of its occupied cells alone."""
-    walls = chart.walls
-    if walls.segments_m.shape[0] + walls.circles_m.shape[0] == 0:
-        raise InputError(
-            f"particle-filter: expected walls or blocked cells on the robot's map, found none on "
-            f"'{chart.name}'; see stack.map"
-        )
-    return NearestObstacles.from_map(walls, config.resolution_m)
-
-
-def _known_of(chart: WorldMap) -> OccupancyGrid | None:
-    """The grid with what lies right beside its known cells taken for known; None where all is."""
-    if chart.geometry is not None or chart.grid is None or not (chart.grid.cells < 0).any():
-        return None
-    near = binary_dilation(chart.grid.cells >= 0, iterations=BESIDE_CELLS)
-    return OccupancyGrid(
-        np.where(near, FREE, UNKNOWN).astype(np.int8), chart.grid.resolution_m, chart.grid.origin
-    )
-
-
-def _field_std_m(config: MclConfig, chart: WorldMap) -> float:
-    """What the map is wrong by; of cells about their uniform spread."""
-    if config.field_std_m is not None:
-        return config.field_std_m
-    if chart.geometry is None and chart.grid is not None:
-        return GRID_SHARE * chart.grid.resolution_m
-    return WALL_STD_M
-
-
-def _beam_density(config: MclConfig, lidar: LidarConfig, field_std_m: float) -> tuple[FloatArray, float]:
-    """Logarithm of a beam's density over its distance from the map, and the table's step."""
-    range_var = lidar.range_var_m2 if config.range_var_m2 is None else config.range_var_m2
-    std = math.sqrt(config.measurement_var_scale * (range_var + field_std_m**2))
-    if std == 0.0:
-        raise InputError(
-            f"{NAME}: a scanner without noise leaves the filter no measurement variance; "
-            "set stack.localizer.range_var_m2 or field_std_m above 0"
-        )
-    z = np.arange(TABLE_STDS * TABLE_PER_STD + 1) / TABLE_PER_STD
-    hit = (1.0 - config.random_share) * np.exp(-0.5 * z * z) / (std * math.sqrt(2.0 * math.pi))
-    return np.log(hit + config.random_share / lidar.max_range_m), std / TABLE_PER_STD
 
 
 def _draw(initial: Belief, count: int, rng: np.random.Generator) -> FloatArray:
