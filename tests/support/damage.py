@@ -10,12 +10,14 @@ import random
 import re
 import zlib
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 import yaml
 
 from pilotage.core.yaml_text import load_yaml
+from support.damage_forms import formed
 
 Content = bytes
 Change = Callable[[Content, random.Random], Content]
@@ -196,7 +198,8 @@ def values(data: Content, rng: random.Random) -> Content:
         except (KeyError, IndexError, TypeError):
             continue
     if data.lstrip()[:1] == b"{":
-        return json.dumps(tree).encode()
+        with suppress(TypeError):  # a key that an earlier damage made a list
+            return json.dumps(tree, default=str).encode()
     return yaml.safe_dump(tree, sort_keys=False, allow_unicode=rng.random() < 0.5).encode("utf-8", "replace")
 
 
@@ -268,7 +271,9 @@ def packed(data: Content, rng: random.Random) -> Content:
 
 
 BYTES: tuple[Change, ...] = (cut, flip, insert, remove, repeat, lines, number, number, word, whole, packed)
+BYTES += (formed,) * 8
 TREES: tuple[Change, ...] = (values, values, values, values, number, word, lines, cut, flip, whole)
+TREES += (formed,) * 6
 
 
 def damaged(data: Content, rng: random.Random, trees: bool = False) -> Content:

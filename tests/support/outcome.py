@@ -7,6 +7,7 @@ import io
 import os
 import signal
 import sys
+import tempfile
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -78,7 +79,12 @@ def run(words: Sequence[str], folder: Path) -> Outcome:
     held, begun_s = _peak_mb(), time.process_time()
     os.chdir(folder)
     try:
-        with _limited(), contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
+        with (
+            _beneath(err),
+            _limited(),
+            contextlib.redirect_stdout(out),
+            contextlib.redirect_stderr(err),
+        ):
             try:
                 code = main(list(words))
             except Hung as limit:
@@ -99,6 +105,22 @@ class _Stream(io.StringIO):
 
     def write(self, text: str) -> int:
         return super().write(text.encode("utf-8", "replace").decode("utf-8", "replace"))
+
+
+@contextlib.contextmanager
+def _beneath(err: io.StringIO) -> Iterator[None]:
+    """What libraries in C write to the process's own standard error is said as well."""
+    sys.stderr.flush()
+    kept = os.dup(2)
+    with tempfile.TemporaryFile() as file:
+        os.dup2(file.fileno(), 2)
+        try:
+            yield
+        finally:
+            os.dup2(kept, 2)
+            os.close(kept)
+            file.seek(0)
+            err.write(file.read(10_000).decode("utf-8", "replace"))
 
 
 @contextlib.contextmanager

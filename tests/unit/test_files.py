@@ -16,11 +16,12 @@ import pyarrow.parquet as pq
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from PIL import Image
 
 from pilotage.core import limits
 from pilotage.core.errors import InputError
 from pilotage.core.files import read_bytes, read_json, read_json_lines, read_text, read_yaml, require_file
-from pilotage.core.files.arrays import map_npy, read_npz, require_numbers
+from pilotage.core.files.arrays import map_npy, read_npy, read_npz, require_numbers
 from pilotage.core.files.images import opened_image
 from pilotage.core.files.parquet import read_parquet
 from pilotage.core.json_text import load_json
@@ -225,6 +226,43 @@ def test_arrays_take_no_more_than_their_files_hold(tmp_path: Path) -> None:
     for values, message in ((np.array([1.0, np.nan]), "found nan"), (np.array([1, -9]), "found -9")):
         with pytest.raises(InputError, match=message):
             require_numbers(values, 5.0, "x")
+
+
+def test_an_archive_is_packed_as_numpy_packs(tmp_path: Path) -> None:
+    path = tmp_path / "a.npz"
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_LZMA) as archive:
+        archive.writestr("a.npy", bytes(100))
+    with pytest.raises(InputError, match=r"a\.npy: expected it packed as NumPy does"):
+        read_npz(path)
+
+
+def test_an_array_outlives_its_file(tmp_path: Path) -> None:
+    """A map into a file that is cut short meanwhile would end the process."""
+    np.save(tmp_path / "a.npy", np.arange(20_000.0))
+    values = read_npy(tmp_path / "a.npy")
+    os.truncate(tmp_path / "a.npy", 200)
+    assert values.sum() == 20_000 * 19_999 / 2
+    with pytest.raises(InputError, match="cut short"):
+        read_npy(tmp_path / "a.npy")
+
+
+def test_a_library_in_c_says_nothing_of_a_damaged_picture(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """libtiff tells by itself of tags that it does not like."""
+    path = tmp_path / "a.tif"
+    Image.fromarray(np.zeros((9, 9), np.uint8)).save(path, compression="tiff_lzw")
+    whole = path.read_bytes()
+    said = set()
+    for at in range(8, len(whole)):
+        path.write_bytes(whole[:at] + b"\xff" + whole[at + 1 :])
+        try:
+            with opened_image(path) as image:
+                image.load()
+        except InputError as error:
+            said.add(str(error))
+    assert len(said) > 1
+    assert capfd.readouterr().err == ""
 
 
 def test_images_are_measured_by_their_header(tmp_path: Path) -> None:

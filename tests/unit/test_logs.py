@@ -197,6 +197,7 @@ def test_a_first_row_that_is_older_than_it_says_is_left_out_and_named(tmp_path: 
         ("Robot1_Groundtruth__dat", "1 0 0 0\n1 0 0 0\n", "Groundtruth.dat line 2: .* the same time again"),
         ("Barcodes__dat", "1 5\n2 5\n", "Barcodes.dat line 2: expected every barcode once"),
         ("Landmark_Groundtruth__dat", "6 0 0 0 0\n6 1 1 0 0\n", "line 2: expected every subject once"),
+        ("Landmark_Groundtruth__dat", "9e18 0 0 0 0\n1e19 0 0 0 0\n", "line 1: subject: expected a whole"),
         ("Robot1_Odometry__dat", "1 0 0\n2 0\n", "line 2: expected 3 columns .* cut short"),
     ],
 )

@@ -23,7 +23,7 @@ from pilotage.experiments.mission import load_mission, mission_of, shipped_missi
 from pilotage.experiments.resolve import resolved_yaml
 from pilotage.experiments.values import apply_override, merge, parse_override
 from pilotage.kernels.geometry import plane
-from pilotage.maps.map_file import MapFile
+from pilotage.maps.map_file import MapFile, parse_map
 from pilotage.missions.mission import Mission
 from pilotage.missions.world import AcrossPathObstacle, BoxObstacle, TrapObstacle
 from support.missions import reach
@@ -384,3 +384,9 @@ def test_a_sensor_is_taken_off_by_null() -> None:
     assert set(load_mission("museum-walls").robot.sensors) - set(mission.robot.sensors) == {"beacons"}
     with pytest.raises(InputError, match="expected one Beacon among"):
         build(load_mission("museum-1", ["robot.sensors.beacons=null"]))
+
+
+def test_an_identity_that_no_array_holds_is_refused() -> None:
+    landmark = {"id": 2**63, "x_m": 0.0, "y_m": 0.0}
+    with pytest.raises(InputError, match=r"id: expected a whole number below 2\^63"):
+        parse_map({"map": "m", "walls_m": [[0, 0, 1, 1]], "landmarks": [landmark]}, "m")

@@ -64,7 +64,6 @@ ALLOWED = {
     ("maps/elevation_file.py", "rasterio.open"): "GDAL reads GeoTIFF by itself, after require_file",
     ("tracking/film.py", "cv2.VideoCapture"): "FFmpeg reads films by itself, after require_file",
     ("logs/mat.py", "loadmat"): "of bytes that came through the door",
-    ("tracking/opencv.py", "*.open"): "the null device, to keep a library silent",
     ("experiments/calibrate_commands.py", "json.loads"): "of what json.dumps just wrote",
     ("logs/salvage/sqlite.py", "sqlite3.connect"): "in memory, of bytes that came through the door",
     ("cli/main.py", "*.open"): "the null device, where a stream was closed",

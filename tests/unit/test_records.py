@@ -255,6 +255,7 @@ def test_a_column_of_words_is_no_series(tmp_path: Path) -> None:
         ("plans.npz", b"PK but none"),
         ("world.json", b'{"segments_m": [[1, 2, 3, 1e300]]}'),
         ("events.jsonl", b'{"t_s": 1.0}\n'),
+        ("events.jsonl", b'{"t_s": "x", "kind": "a", "text": "b"}\n'),
         ("mission.yaml", b"a: [1, 2"),
     ],
 )

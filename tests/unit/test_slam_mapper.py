@@ -11,7 +11,9 @@ import pytest
 
 from pilotage.cli.main import main
 from pilotage.core.errors import InputError
+from pilotage.core.files.arrays import read_npz
 from pilotage.core.types import FloatArray
+from pilotage.evaluation.slam_consistency import read_scan_covariances
 from pilotage.experiments.slam import read_slam_config
 from pilotage.kernels.slam.frames import between
 from pilotage.logs.laser_log import LaserLog
@@ -158,6 +160,12 @@ def test_the_command_leaves_a_folder_and_a_page(tmp_path: Path, capsys: pytest.C
     page = (folder / "report.html").read_text()
     assert "://" not in page.replace("http://www.w3.org", "")
     assert main(["evaluate", str(folder / "trajectory.tum"), str(folder / "before.tum"), "--json"]) == 0
+    known = read_npz(folder / "covariances.npz")
+    assert read_scan_covariances(folder / "covariances.npz").owner.size == answer["scans"]
+    for name, other in (("poses", known["poses"][1:]), ("owner", known["owner"] + 999), ("graph_i", 0.5)):
+        np.savez(folder / "covariances.npz", **known | {name: np.asarray(other)})
+        with pytest.raises(InputError, match=name):
+            read_scan_covariances(folder / "covariances.npz")
 
 
 def test_a_damaged_carmen_log_is_mapped_with_a_word(

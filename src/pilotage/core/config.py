@@ -57,7 +57,7 @@ def _takes(annotation: Any, *kinds: type) -> bool:
     return annotation in kinds or any(_takes(part, *kinds) for part in getattr(annotation, "__args__", ()))
 
 
-SMALLEST, LARGEST, LARGEST_WHOLE = 1e-100, 1e15, 2**64
+SMALLEST, LARGEST, LARGEST_WHOLE = 1e-100, 1e15, 2**63 - 1
 """Sizes of the numbers in files: metres, radians, seconds, their variances and counts are far within."""
 
 ConfigT = TypeVar("ConfigT", bound=BaseModel)
@@ -94,7 +94,7 @@ def _out_of_range(value: Any, place: str) -> str | None:
             )
     elif isinstance(value, int):
         if abs(value) > LARGEST_WHOLE:
-            return f"{place}: expected a whole number within 2^64, found {str(value)[:30]}"
+            return f"{place}: expected a whole number below 2^63, found {str(value)[:30]}"
     elif isinstance(value, list | tuple):
         wrong = (_out_of_range(item, f"{place}.{i}") for i, item in enumerate(value))
         return next((text for text in wrong if text), None)

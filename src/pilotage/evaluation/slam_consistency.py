@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 
 from pilotage.core.errors import InputError
-from pilotage.core.files.arrays import read_npz
 from pilotage.evaluation.relations import RelationErrors, relation_nees
 from pilotage.models.pose_graph import PoseGraph
+from pilotage.records.arrays import read_arrays
 from pilotage.stack.mapping.slam.scan_covariances import ScanCovariances
 
 COVARIANCES_FILE = "covariances.npz"
@@ -41,15 +41,21 @@ def read_scan_covariances(path: Path) -> ScanCovariances:
     InputError
         Where the file is damaged or lacks something.
     """
-    file = read_npz(path, "covariances of 'pilotage slam'")
+    file = read_arrays(path)
+    if file is None:
+        raise InputError(f"{path}: expected covariances of 'pilotage slam', found none there")
     try:
         graph = PoseGraph(
-            file["graph_poses"],
-            file["graph_i"],
-            file["graph_j"],
-            file["graph_measurements"],
-            file["graph_information"],
+            file.floats("graph_poses", -1, 3),
+            file.ints("graph_i", -1),
+            file.ints("graph_j", -1),
+            file.floats("graph_measurements", -1, 3),
+            file.floats("graph_information", -1, 3, 3),
         )
-        return ScanCovariances(graph, file["graph_weights"], file["owner"], file["poses"])
-    except (ValueError, KeyError) as error:
+        owner = file.ints("owner", -1)
+        if owner.size and not (owner.min() >= 0 and owner.max() < len(graph)):
+            raise ValueError(f"owner: expected keyframes 0 to {len(graph) - 1}")
+        weights, poses = file.floats("graph_weights", graph.i.size), file.floats("poses", owner.size, 3)
+        return ScanCovariances(graph, weights, owner, poses)
+    except (ValueError, InputError) as error:
         raise InputError(f"{path}: expected covariances of 'pilotage slam', found {error}") from None

@@ -19,6 +19,7 @@ import numpy as np
 from pilotage.core.errors import InputError
 from pilotage.core.types import FloatArray, IntArray
 from pilotage.logs.text import Table, check_size, check_times, read_table
+from pilotage.maps.landmark_table import LARGEST_ID
 from pilotage.maps.landmarks import Landmarks
 
 LANDMARKS = "Landmark_Groundtruth.dat"
@@ -199,6 +200,6 @@ def _subjects(seen: Table, barcodes: dict[int, int], placed: set[int]) -> tuple[
 
 def _whole(table: Table, row: int, column: int, name: str) -> int:
     value = float(table.values[row, column])
-    if value != int(value):
+    if value != int(value) or abs(value) > LARGEST_ID:
         raise InputError(f"{table.place(row)}: {name}: expected a whole number, found {value:g}")
     return int(value)

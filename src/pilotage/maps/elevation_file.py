@@ -94,13 +94,14 @@ def _read_raw(path: Path, origin: Pose2) -> ElevationModel:
     column_m = _positive(side, "metresPerPixelLon", path)
     require_memory(12 * rows * columns, f"{path}: an elevation model of {columns} x {rows} cells")
     raw = path.parent / side["file"] if isinstance(side.get("file"), str) else path.with_suffix(".bin")
-    held = require_file(raw, f"the array of '{path}'")
+    data = read_bytes(raw, f"the array of '{path}'")
+    held = len(data)
     if held != rows * columns * dtype.itemsize:
         raise InputError(
             f"{raw}: expected {rows * columns * dtype.itemsize} bytes for {columns} x {rows} values, "
             f"found {held}; the file seems to be cut short or of another size"
         )
-    heights = np.frombuffer(read_bytes(raw), dtype=dtype).reshape(rows, columns).astype(np.float32)
+    heights = np.frombuffer(data, dtype=dtype).reshape(rows, columns).astype(np.float32)
     if "elevationMin" in side or "elevationMax" in side:
         low, high = _number(side, "elevationMin", path), _number(side, "elevationMax", path)
         whole = np.iinfo(dtype).max if dtype.kind in "iu" else 1.0

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from pilotage.core.errors import InputError
-from pilotage.core.files.arrays import map_npy
+from pilotage.core.files.arrays import read_npy
 from pilotage.core.types import Pose2
 from pilotage.maps.grid_image import read_hazard_image
 from pilotage.maps.memory import require_memory
@@ -61,9 +61,9 @@ def read_grid(path: Path, resolution_m: float | None = None, origin: Pose2 | Non
 
 def read_array(path: Path) -> np.ndarray[tuple[int, ...], np.dtype[np.generic]]:
     """Load a NumPy file without running anything that it may hold."""
-    mapped = map_npy(path, "a .npy file")
-    require_memory(2 * mapped.nbytes, f"array '{path}'")
-    return mapped
+    values = read_npy(path)
+    require_memory(2 * values.nbytes, f"array '{path}'")
+    return values
 
 
 def _whole(

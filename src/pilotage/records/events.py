@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
@@ -41,4 +42,7 @@ def _event(entry: Mapping[str, Any], path: Path) -> Event:
     if "t_s" not in entry or not isinstance(kind, str) or not isinstance(text, str):
         found = ", ".join(str(key) for key in entry) or "nothing in it"
         raise InputError(f"{path}: expected objects with t_s, kind and text, found one with {found}")
-    return Event(number(entry["t_s"]), clean_text(kind), clean_text(text))
+    t_s = number(entry["t_s"])
+    if not math.isfinite(t_s):
+        raise InputError(f"{path}: expected the time of every event in seconds, found one without")
+    return Event(t_s, clean_text(kind), clean_text(text))

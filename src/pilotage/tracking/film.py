@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 
 from pilotage.core.errors import InputError
 from pilotage.core.files import require_file
-from pilotage.tracking.opencv import hushed, opencv
+from pilotage.core.hushed import hushed
+from pilotage.tracking.opencv import opencv
 
 Image = NDArray[np.uint8]
 Advance = Callable[[int, int], None]

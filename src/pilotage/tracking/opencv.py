@@ -4,9 +4,6 @@ from __future__ import annotations
 
 import importlib
 import os
-import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
 from typing import Any
 
 from pilotage.core.errors import InputError
@@ -29,18 +26,3 @@ def opencv() -> Any:
         raise InputError(
             "tracking needs OpenCV, which is not installed: pip install pilotage[vision]"
         ) from None
-
-
-@contextmanager
-def hushed() -> Iterator[None]:
-    """Keep what the libraries below OpenCV print past every log level off standard error."""
-    sys.stderr.flush()
-    kept = os.dup(2)
-    nowhere = os.open(os.devnull, os.O_WRONLY)
-    try:
-        os.dup2(nowhere, 2)
-        yield
-    finally:
-        os.dup2(kept, 2)
-        os.close(kept)
-        os.close(nowhere)

@@ -11,10 +11,11 @@ from pathlib import Path
 from typing import Any
 
 from pilotage.core.errors import InputError
+from pilotage.core.hushed import hushed
 from pilotage.maps.cell_map_text import features_only, format_cell_map
 from pilotage.tracking.drawing import Annotator, top_view
 from pilotage.tracking.film import Image
-from pilotage.tracking.opencv import hushed, opencv
+from pilotage.tracking.opencv import opencv
 from pilotage.tracking.robot_finder import Sighting
 from pilotage.tracking.scene import Scene
 from pilotage.tracking.track import Track

@@ -25,6 +25,8 @@ _LONGEST_HEADER = 10_000
 _LONGEST_SIDE = 2**60
 _MOST_DIMENSIONS = 8
 _MOST_MEMBERS = 20_000
+_PACKINGS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
+"""NumPy's own two; others may take any amount of memory."""
 _DAMAGED = (zipfile.BadZipFile, zlib.error, EOFError, ValueError, KeyError, RuntimeError, OSError)
 
 
@@ -48,6 +50,12 @@ def map_npy(path: Path, what: str = "a .npy file") -> Array:
         return np.memmap(path, dtype, "r", at, shape, "F" if fortran else "C")
     except (OSError, ValueError) as error:
         raise InputError(f"{path}: expected a NumPy array, found: {error}") from None
+
+
+def read_npy(path: Path, what: str = "a .npy file") -> Array:
+    """Read a NumPy file; fails as ``map_npy``, but lives on where the file shrinks meanwhile."""
+    with opened(path, what, DATA_BYTES) as file:
+        return _array(file, require_file(path), str(path))
 
 
 def read_npz(path: Path, what: str = "an .npz file", most: int = DATA_BYTES) -> dict[str, Array]:
@@ -77,6 +85,9 @@ def _arrays(archive: zipfile.ZipFile, where: str, most: int) -> dict[str, Array]
     members = archive.infolist()
     if len(members) > _MOST_MEMBERS:
         raise too_large(where, _MOST_MEMBERS, len(members), "arrays")
+    odd = next((member for member in members if member.compress_type not in _PACKINGS), None)
+    if odd is not None:
+        raise InputError(f"{where}: {odd.filename}: expected it packed as NumPy does, found another packing")
     total = sum(member.file_size for member in members)
     if total > most:
         raise too_large(f"{where} (unpacked)", most, total)

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 from pilotage.core.errors import InputError
 from pilotage.core.files.plain import opened
+from pilotage.core.hushed import hushed
 from pilotage.core.limits import DATA_BYTES, limit, too_large
 
 if TYPE_CHECKING:
@@ -32,8 +33,8 @@ def opened_image(path: Path, what: str = "an image") -> Iterator[Image.Image]:
     from PIL import Image, UnidentifiedImageError
 
     where = f"image '{path}'"
-    with opened(path, what, DATA_BYTES) as file, warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # Pillow warns of damaged metadata; the pixels are what counts
+    with opened(path, what, DATA_BYTES) as file, warnings.catch_warnings(), hushed():
+        warnings.simplefilter("ignore")  # Pillow, and libtiff by itself, tell of damaged metadata
         # Pillow guards against large images by their pixels; here it is by their bytes, and told.
         guard, Image.MAX_IMAGE_PIXELS = Image.MAX_IMAGE_PIXELS, None
         try:

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from pilotage.core.angles import wrap_array_to_pi, wrap_to_pi
-from pilotage.core.types import FloatArray, Pose2
-from pilotage.models.range_bearing import range_bearing
+from pilotage.core.types import FloatArray
+from pilotage.kernels.filters import sighting
 
 LEAST_BEACONS = 2
 ITERATIONS = 10
@@ -48,15 +48,16 @@ def fix_from_beacons(
     c, s = np.cos(theta), np.sin(theta)
     middle = points_xy_m.mean(axis=0) - np.array([[c, -s], [s, c]]) @ seen.mean(axis=0)
     pose = np.array([middle[0], middle[1], wrap_to_pi(theta)])
-    weight = np.kron(np.eye(count), np.linalg.inv(R))
+    weight = np.linalg.inv(R)
     if _at_a_beacon(pose, points_xy_m, mount):
         return None
     for _ in range(ITERATIONS):
         off, H = _residuals(pose, points_xy_m, ranges_m, bearings_rad, mount)
-        information = H.T @ weight @ H
+        weighted = (weight @ H).reshape(-1, 3)
+        information = H.reshape(-1, 3).T @ weighted
         if not np.linalg.cond(information) < 1e12:
             return None
-        step = np.linalg.solve(information, H.T @ weight @ off)
+        step = np.linalg.solve(information, weighted.T @ off.ravel())
         pose = pose + step
         pose[2] = wrap_to_pi(float(pose[2]))
         if _at_a_beacon(pose, points_xy_m, mount):
@@ -64,8 +65,8 @@ def fix_from_beacons(
         if float(np.abs(step).max()) < 1e-9:
             break
     off, H = _residuals(pose, points_xy_m, ranges_m, bearings_rad, mount)
-    cov = np.asarray(np.linalg.inv(H.T @ weight @ H), dtype=np.float64)
-    return BeaconFix(pose, 0.5 * (cov + cov.T), float(off @ weight @ off), 2 * count - 3)
+    cov = np.asarray(np.linalg.inv(np.einsum("kij,il,klm->jm", H, weight, H)), dtype=np.float64)
+    return BeaconFix(pose, 0.5 * (cov + cov.T), float(np.sum((off @ weight) * off)), 2 * count - 3)
 
 
 def _at_a_beacon(pose: FloatArray, points: FloatArray, mount: FloatArray) -> bool:
@@ -77,8 +78,8 @@ def _at_a_beacon(pose: FloatArray, points: FloatArray, mount: FloatArray) -> boo
 def _residuals(
     pose: FloatArray, points: FloatArray, ranges: FloatArray, bearings: FloatArray, mount: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Measured less predicted (2 K,), range and bearing in turn, and the Jacobian (2 K, 3)."""
-    predicted = [range_bearing(Pose2.from_array(pose), point, mount) for point in points]
-    z = np.array([entry[0] for entry in predicted])
-    off = np.column_stack([ranges - z[:, 0], wrap_array_to_pi(bearings - z[:, 1])])
-    return off.ravel(), np.concatenate([entry[1] for entry in predicted])
+    """Measured less predicted (K, 2), range and bearing, and the Jacobian (K, 2, 3)."""
+    z, H = np.empty((points.shape[0], 2)), np.empty((points.shape[0], 2, 3))
+    for k, (x_m, y_m) in enumerate(points):
+        sighting.range_bearing(pose, x_m, y_m, mount, z[k], H[k])
+    return np.column_stack([ranges - z[:, 0], wrap_array_to_pi(bearings - z[:, 1])]), H
