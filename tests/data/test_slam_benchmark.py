@@ -20,6 +20,7 @@ pytest.importorskip("rosbags")
 @pytest.mark.parametrize(("name", "most_m"), [("fr079", 0.045), ("intel", 0.025)])
 def test_relations(name: str, most_m: float, tmp_path: Path) -> None:
     run = slam_log(recording(f"slam/{name}.bag"), tmp_path, SlamConfig())
+    assert run.run_dir is not None
     trajectory = run.run_dir / "trajectory.tum"
     errors = relation_errors(read_tum(trajectory), read_relations(recording(f"slam/{name}.relations")))
     found = errors.summary()

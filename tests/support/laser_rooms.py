@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 
@@ -72,6 +73,20 @@ def recording(
         t_s,
         odometry,
     )
+
+
+def write_carmen(path: Path, log: LaserLog) -> Path:
+    """Write a log with odometry as a CARMEN file."""
+    assert log.odometry is not None
+    lines = []
+    for k in range(len(log)):
+        x, y, a = log.odometry[k]
+        pose = f"{x:.5f} {y:.5f} {a:.5f}"
+        beams = " ".join(f"{min(r, 81.0):.3f}" for r in log.ranges_m[k])
+        lines.append(f"ODOM {pose} 0 0 0 {log.t_s[k]:.3f} host {log.t_s[k]:.3f}\n")
+        lines.append(f"FLASER {log.beams[k]} {beams} {pose} {pose} {log.t_s[k]:.3f} host {log.t_s[k]:.3f}\n")
+    path.write_text("".join(lines), encoding="utf-8")
+    return path
 
 
 def along(corners: list[tuple[float, float]], step_m: float = 0.08, turn_rad: float = 0.12) -> FloatArray:

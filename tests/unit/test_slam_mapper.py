@@ -21,7 +21,7 @@ from pilotage.stack.mapping.slam.closures import Verdict
 from pilotage.stack.mapping.slam.config import SlamConfig
 from pilotage.stack.mapping.slam.mapper import map_log
 from pilotage.stack.mapping.slam.result import SlamResult
-from support.laser_rooms import along, furnished, recording, room
+from support.laser_rooms import along, furnished, recording, room, write_carmen
 
 ROUND = [(1.5, 1.2), (5.0, 1.2), (5.0, 4.0), (8.5, 5.8), (5.0, 6.0), (2.0, 4.0), (1.5, 1.2), (4.0, 1.2)]
 
@@ -134,17 +134,7 @@ def test_too_little_to_map_is_refused() -> None:
 
 def carmen_log(path: Path) -> Path:
     route = along([(1.5, 1.2), (4.5, 1.2), (5.0, 4.0), (2.0, 4.0), (1.5, 1.2)])
-    log = recording(furnished(), route, np.random.default_rng(5))
-    assert log.odometry is not None
-    lines = []
-    for k in range(len(log)):
-        x, y, a = log.odometry[k]
-        pose = f"{x:.5f} {y:.5f} {a:.5f}"
-        beams = " ".join(f"{min(r, 81.0):.3f}" for r in log.ranges_m[k])
-        lines.append(f"ODOM {pose} 0 0 0 {log.t_s[k]:.3f} host {log.t_s[k]:.3f}\n")
-        lines.append(f"FLASER 180 {beams} {pose} {pose} {log.t_s[k]:.3f} host {log.t_s[k]:.3f}\n")
-    path.write_text("".join(lines), encoding="utf-8")
-    return path
+    return write_carmen(path, recording(furnished(), route, np.random.default_rng(5)))
 
 
 def test_the_command_leaves_a_folder_and_a_page(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -15,6 +15,7 @@ from pilotage.cli.output import print_columns, print_json, stdout_for_json
 
 _TOLD = (
     "log",
+    "reason",
     "scans",
     "duration_s",
     "path_length_m",
@@ -23,6 +24,13 @@ _TOLD = (
     "closures_accepted",
     "position_std_max_m",
     "beam_spacing",
+    "extends",
+    "stretches",
+    "stretches_agreeing",
+    "closures_joining",
+    "walls_agreement",
+    "keyframes_kept",
+    "keyframes_dropped",
     "times_real_time",
 )
 
@@ -36,6 +44,10 @@ def slam(
         list[str] | None,
         typer.Option("--topic", metavar="NAME", help="A bag's scans or odometry by name; repeatable."),
     ] = None,
+    extend: Annotated[
+        Path | None,
+        typer.Option(metavar="RUN", help="Extend the map of an earlier run; begin anywhere in it."),
+    ] = None,
     out: Out = Path("runs"),
     report: Annotated[bool, typer.Option(help="Write report.html into the run folder.")] = True,
     json: Json = False,
@@ -46,20 +58,23 @@ def slam(
 
     settings = read_slam_config(config)
     with stdout_for_json(json), _stages(not quiet) as on_stage:
-        run = slam_log(log, out, settings, on_stage, topics or ())
+        run = slam_log(log, out, settings, on_stage, topics or (), extend)
         page: Path | None = None
-        if report:
+        if report and run.run_dir is not None:
             from pilotage.report.slam.page import write_slam_report
 
             page = write_slam_report(run.run_dir)
-    metrics = {**run.metrics, "run_dir": str(run.run_dir)}
+    where = None if run.run_dir is None else str(run.run_dir)
+    metrics = {**run.metrics, "run_dir": where}
     if json:
         print_json(metrics)
     elif not quiet:
-        rows = [(key, _text(metrics[key])) for key in _TOLD]
+        rows = [(key, _text(metrics[key])) for key in _TOLD if key in metrics]
         rows += [("warning", str(text)) for text in run.warnings]
-        print_columns([*rows, ("report" if page else "run_dir", str(page or run.run_dir))])
-    return 0
+        if where is not None:
+            rows.append(("report" if page else "run_dir", str(page or where)))
+        print_columns(rows)
+    return 0 if run.metrics["success"] else 1
 
 
 def _text(value: object) -> str:

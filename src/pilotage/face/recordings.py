@@ -148,6 +148,7 @@ def slam(
     *,
     config: FilePath | None = None,
     topics: Sequence[str] = (),
+    extend: FilePath | None = None,
     out: FilePath = "runs",
 ) -> MappedLog:
     """Map a recording of a building that nobody has mapped.
@@ -160,16 +161,21 @@ def slam(
         A YAML file of the few parameters; None: as shipped.
     topics
         A bag's scans and odometry by name, where the usual ones are not meant.
+    extend
+        Folder of an earlier ``slam``: the recording, which may begin anywhere, is joined to its map.
 
     Raises
     ------
     InputError
-        What of the log cannot be used.
+        What of the log or of the earlier folder cannot be used, or why nothing joins the two.
     """
     from pilotage.experiments.slam import read_slam_config, slam_log
 
     settings = read_slam_config(None if config is None else Path(config))
-    run = slam_log(Path(log), Path(out), settings, topics=topics)
+    earlier = None if extend is None else Path(extend)
+    run = slam_log(Path(log), Path(out), settings, topics=topics, extend=earlier)
+    if run.run_dir is None:
+        raise InputError(f"{log}: {run.metrics['reason']}")
     trajectory = read_trajectory(run.run_dir / "trajectory.tum", TrajectoryFormat.TUM)
     return MappedLog(run.run_dir, Metrics(run.metrics), trajectory, run.warnings)
 

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
+
 from support.fuzz_targets import recordings
 from support.fuzz_targets.missions import write_floor
 from support.fuzz_targets.target import QUICK, SHORT, Target, write_yaml
+from support.laser_rooms import along, furnished, recording, write_carmen
 from support.outcome import run
 
 
@@ -43,6 +46,16 @@ def _slam_folder(folder: Path) -> None:
     t_s = [row.split()[0] for row in (folder / "mapped" / "trajectory.tum").read_text().splitlines()]
     rows = [f"{a} {b} 0.4 0.0 0 0 0 0.0\n" for a, b in zip(t_s[:-5:3], t_s[5::3], strict=False)]
     (folder / "true.relations").write_text("".join(rows))
+
+
+def _map_and_recording(folder: Path) -> None:
+    """A map, and a recording that goes round in it again."""
+    corners = [(1.5, 1.2), (5.0, 1.2), (5.0, 4.0), (2.0, 4.0), (1.5, 1.2)]
+    simulated = recording(furnished(), along(corners, 0.15, 0.2), np.random.default_rng(5), beams=91)
+    write_carmen(folder / "lab.log", simulated)
+    assert run(("slam", "lab.log", *SHORT), folder).code == 0
+    (made,) = (folder / "out").iterdir()
+    made.rename(folder / "mapped")
 
 
 def _calibrated(folder: Path) -> None:
@@ -107,6 +120,12 @@ TARGETS: tuple[Target, ...] = (
         ("evaluate", "mapped/trajectory.tum", "true.relations", "--relations"),
         ("mapped/keyframes.npz", "mapped/covariances.npz", "true.relations"),
         goes_on=(0,),
+    ),
+    Target(
+        "extend slam",
+        _map_and_recording,
+        ("slam", "lab.log", "--extend", "mapped", *SHORT),
+        ("mapped/keyframes.npz", "mapped/covariances.npz"),
     ),
     Target(
         "plan slam",

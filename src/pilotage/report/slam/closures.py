@@ -51,7 +51,7 @@ def closures_figure(data: SlamFolder) -> Illustration:
         )
         axes.set_title(f"{closure['number']}: {closure['verdict']}", fontsize=7.5)
         for number, colour in ((closure["earlier_submap"], BLUE), (closure["later_submap"], VERMILLION)):
-            points = data.submap(number, data.poses)
+            points = data.submap(number)
             if colour is VERMILLION:
                 points = placed(points, np.array(closure["relative"]))
             points = points[:: max(1, len(points) // POINTS)]
@@ -101,7 +101,7 @@ def closures_section(data: SlamFolder) -> str:
 def _row(c: dict[str, Any]) -> str:
     chi = "–" if c["chi_square"] is None else f"{c['chi_square']:.1f}"
     cells = (
-        f"{c['earlier_scan']} ↔ {c['later_scan']}",
+        f"{'earlier map' if c['earlier_scan'] is None else c['earlier_scan']} ↔ {c['later_scan']}",
         f"±{c['window_m']:.1f} m",
         f"{c['score']:.2f}",
         f"{c['second_score']:.2f}",

@@ -71,10 +71,14 @@ def map_figure(data: SlamFolder) -> Illustration:
 def before_after_figure(data: SlamFolder) -> Illustration:
     """Draw the keyframes' points at the poses of the front end alone, and at the last ones."""
     figure = Figure(figsize=(WIDTH_PT / 72.0, 0.5 * WIDTH_PT / 72.0))
-    for index, (title, poses) in enumerate((("before: matching alone", data.before), ("after", data.poses))):
+    both = (
+        ("before: matching alone", data.before, data.keyframe_before),
+        ("after", data.poses, data.keyframe_poses),
+    )
+    for index, (title, poses, keyframe_poses) in enumerate(both):
         axes = figure.add_axes((0.05 + 0.49 * index, 0.07, 0.44, 0.85))
         axes.set_title(title)
-        _dots(axes, _cloud(data, poses, len(data.keyframes)))
+        _dots(axes, _cloud(data, keyframe_poses, len(data.keyframes)))
         axes.plot(poses[:, 0], poses[:, 1], color=ORANGE if index == 0 else BLUE, linewidth=0.8)
         axes.set_aspect("equal", adjustable="datalim")
     end = data.poses[-1, :2] - data.before[-1, :2]
@@ -91,14 +95,14 @@ def before_after_figure(data: SlamFolder) -> Illustration:
 def growth_figure(data: SlamFolder) -> Illustration:
     """Draw the map after each quarter of the recording."""
     figure = Figure(figsize=(WIDTH_PT / 72.0, 0.27 * WIDTH_PT / 72.0))
-    everything = _cloud(data, data.poses, len(data.keyframes))
+    everything = _cloud(data, data.keyframe_poses, len(data.keyframes))
     low, high = everything.min(axis=0), everything.max(axis=0)
     for stage in range(1, STAGES + 1):
         axes = figure.add_axes((0.01 + 0.247 * (stage - 1), 0.02, 0.235, 0.84))
-        until = max(1, len(data.keyframes) * stage // STAGES)
+        until = data.since + max(1, (len(data.keyframes) - data.since) * stage // STAGES)
         scan = int(data.keyframes[until - 1])
         axes.set_title(f"after {data.t_s[scan] - data.t_s[0]:.0f} s")
-        _dots(axes, _cloud(data, data.poses, until))
+        _dots(axes, _cloud(data, data.keyframe_poses, until))
         axes.plot(data.poses[:scan, 0], data.poses[:scan, 1], color=BLUE, linewidth=0.6)
         axes.plot(*data.poses[scan, :2], marker="o", markersize=3.5, color=VERMILLION)
         axes.set_xlim(low[0], high[0])
@@ -106,7 +110,8 @@ def growth_figure(data: SlamFolder) -> Illustration:
         axes.set_aspect("equal", adjustable="box", anchor="C")
         axes.set_axis_off()
     alt = "The map after each quarter of the recording"
-    caption = "The map as it grew, with the path so far and where the robot was."
+    known = " The walls of the earlier map are there from the start." if data.since else ""
+    caption = f"The map as it grew, with the path so far and where the robot was.{known}"
     return Illustration("growth", "How the map grew", alt, caption, render(figure, "growth", alt))
 
 
@@ -152,15 +157,18 @@ def _square_axes(width_m: float, height_m: float) -> tuple[Figure, Axes]:
 
 def _closure_lines(data: SlamFolder, accepted: bool) -> list[FloatArray]:
     chosen = [c for c in data.closures if c["accepted"] is accepted]
-    return [data.poses[[c["earlier_scan"], c["later_scan"]], :2] for c in chosen]
+    return [
+        np.array([data.reference(c["earlier_submap"])[:2], data.reference(c["later_submap"])[:2]])
+        for c in chosen
+    ]
 
 
 def _cloud(data: SlamFolder, poses: FloatArray, until: int) -> FloatArray:
-    """Points (K, 2) of the first keyframes at given scan poses, thinned evenly."""
+    """Points (K, 2) of the first keyframes at given poses of theirs, thinned evenly."""
     clouds = []
     for k in range(until):
         cloud = data.points_xy_m[data.starts[k] : data.starts[k + 1]].astype(np.float64)
-        clouds.append(placed(cloud, poses[data.keyframes[k]]))
+        clouds.append(placed(cloud, poses[k]))
     points = np.concatenate(clouds) if clouds else np.zeros((0, 2))
     if not len(points):
         return np.zeros((1, 2))

@@ -29,12 +29,18 @@ MEANINGS = {
     "duration_s": "length of the recording",
     "path_length_m": "path of the scanner",
     "position_std_max_m": "largest standard deviation of a position, seen from the first scan",
+    "stretches": "stretches of the recording that were searched all over the earlier map",
+    "stretches_agreeing": "those that agree where the recording lies in it",
+    "walls_agreement": "share of its points on walls of the earlier map, of those where that one saw",
+    "keyframes_kept": "keyframes of the earlier map that are still in the graph",
+    "keyframes_dropped": "keyframes of the earlier map that later ones made superfluous",
     "beam_spacing": "true angle between beams over the one the log tells, as the closures have it",
     "odometry_scale": "path by the map over path by the odometry",
     "odometry_turn_scale": "turn by the map over turn by the odometry",
     "front_end_times_real_time": "how much faster than the recording the front end ran",
     "times_real_time": "the same of reading, mapping and drawing the map together",
 }
+OF_EXTENSIONS = ("stretches", "stretches_agreeing", "walls_agreement", "keyframes_kept", "keyframes_dropped")
 
 
 def write_slam_report(folder: Path) -> Path:
@@ -65,6 +71,8 @@ def slam_page(data: SlamFolder) -> str:
         f"{m['scans']} scans over {m['path_length_m']:.0f} m; {m['closures_accepted']} of "
         f"{m['closures_searched']} compared pairs of stretches closed a loop."
     )
+    if "extends" in m:
+        headline += f" Joined to {Path(m['extends']).name} by {m['closures_joining']} of them."
     return document(
         title=escape(f"Map of {m['log']}"),
         layers="".join(layer_rules(figure) for figure in figures),
@@ -94,6 +102,7 @@ def _numbers(m: dict[str, Any]) -> str:
         f'<tr><th scope="row">{escape(key.replace("_", " "))}</th><td class="value">{_text(m.get(key))}</td>'
         f"<td>{escape(meaning)}</td></tr>"
         for key, meaning in MEANINGS.items()
+        if key in m or key not in OF_EXTENSIONS
     )
     return (
         '<section id="numbers"><h2><a href="#numbers">Numbers</a></h2><table class="metrics"><thead><tr>'

@@ -27,7 +27,7 @@ from pilotage.stack.mapping.slam.closures import (
 from pilotage.stack.mapping.slam.clouds import Clouds, cloud_of
 from pilotage.stack.mapping.slam.config import SlamConfig
 from pilotage.stack.mapping.slam.refinement import neighbours, pair_edges
-from pilotage.stack.mapping.slam.submaps import Submaps
+from pilotage.stack.mapping.slam.submaps import Extent, Submaps
 from pilotage.stack.mapping.slam.tracker import LocalTrack
 from pilotage.stack.mapping.slam.uncertainty import (
     Edges,
@@ -47,9 +47,8 @@ SURE_M, SURE_RAD = 0.2, 0.05
 REFINEMENTS = 3
 SECOND_LOOK_M, SECOND_LOOKS, ATTACHED = 3.0, 3, 2
 """Largest window and number of the second looks, and closures with which a stretch is attached."""
-SPACINGS = (0.990, 0.995, 1.0)
-MOST_SPACING_OFF = 0.015
-LEAST_GAIN = 0.03
+SPACING_STEP, MOST_SPACING_OFF = 0.005, 0.015
+LEAST_GAIN = 0.05
 """Share by which the objective must fall before another spacing of the beams is believed."""
 
 OnRound = Callable[[str], None]
@@ -134,6 +133,19 @@ class LoopCloser:
         self.submaps.grow(track.clouds, local, track.breaks, ended)
         self.state = solved(own, poses, ROBUST_STDS, self._slipped)
 
+    def take_joined(self, clouds: Clouds, state: Solved, extents: list[Extent], since: int) -> None:
+        """Begin with two maps in one graph: closures are searched between them alone.
+
+        Parameters
+        ----------
+        extents, since
+            Submaps of both, and how many of them are the first map's.
+        """
+        self.submaps.lay(clouds, state.poses, extents)
+        self.state = state
+        for first, end in ((0, since), (since, len(extents))):
+            self._searched |= {(a, b): 0.0 for b in range(first, end) for a in range(first, b)}
+
     def close(self, window_m: float, slip: Slip) -> tuple[int, int]:
         """Search what may overlap within a window and solve; how many were searched, and how many closed."""
         state, submaps = self.state, self.submaps
@@ -186,20 +198,41 @@ def closed(track: LocalTrack, config: SlamConfig, on_round: OnRound) -> LoopClos
     return closer
 
 
+def weak_edges(track: LocalTrack) -> Edges:
+    """Return the front end's edges as they count beside refined ones."""
+    return track_edges(track).scaled(REFINED_TRACK)
+
+
 def refined(
-    clouds: Clouds, state: Solved, own: Edges, submaps: Submaps, rounds: int = REFINEMENTS, every: int = 1
+    clouds: Clouds,
+    state: Solved,
+    kept: Edges,
+    submaps: Submaps,
+    rounds: int = REFINEMENTS,
+    every: int = 1,
+    since: int = 0,
 ) -> Solved:
-    """Align keyframes with all their neighbours that are surely neighbours, and solve; several times."""
+    """Align keyframes with all their neighbours that are surely neighbours, and solve; several times.
+
+    Parameters
+    ----------
+    kept
+        Edges that count beside those of the alignments.
+    every
+        Of the pairs that are not along the path, one in so many is taken.
+    since
+        With it keyframes before it are aligned with those from it on alone.
+    """
     sure = _sure(state, submaps)
     for _ in range(rounds):
-        pairs = neighbours(state.poses)
+        pairs = neighbours(state.poses, since)
         owner = _owners(submaps, state.poses.shape[0])
         pairs = pairs[sure[owner[pairs[:, 0]], owner[pairs[:, 1]]]]
         if every > 1:
             along = pairs[:, 1] - pairs[:, 0] == 1
             pairs = pairs[along | (np.arange(pairs.shape[0]) % every == 0)]
         edges = pair_edges(clouds, state.poses, pairs)
-        state = solved(edges.and_more(own.scaled(REFINED_TRACK)), state.poses, REFINED_STDS)
+        state = solved(edges.and_more(kept), state.poses, REFINED_STDS)
     return state
 
 
@@ -211,18 +244,29 @@ def beam_spacing(
     Some drivers and converters tell a field of view that is one beam off. Where the robot turns, half a per
     cent of wrong spacing turns the map by degrees, which no alignment of single scans can notice.
     """
-    own = track_edges(track)
-    objectives = []
-    for spacing in SPACINGS:
-        clouds = keyframe_clouds(log, track, config, spacing)
-        objectives.append(refined(clouds, state, own, submaps, rounds=2, every=4).objective)
-    a, b, c = np.polyfit(np.array(SPACINGS) - 1.0, objectives, 2)
-    if a <= 0.0:
-        best = min(zip(objectives, SPACINGS, strict=True))[1] - 1.0
-    else:
-        best = float(np.clip(-0.5 * b / a, -MOST_SPACING_OFF, MOST_SPACING_OFF))
-    expected = a * best * best + b * best + c
-    return 1.0 + best if expected < (1.0 - LEAST_GAIN) * c else 1.0
+    own = weak_edges(track)
+    objectives: dict[int, float] = {}
+
+    def objective(steps: int) -> float:
+        if steps not in objectives:
+            clouds = keyframe_clouds(log, track, config, 1.0 + SPACING_STEP * steps)
+            objectives[steps] = refined(clouds, state, own, submaps, rounds=2, every=4).objective
+        return objectives[steps]
+
+    # Down to where both neighbours are higher: a parabola tells nothing of what lies beside its points.
+    best, most = 0, round(MOST_SPACING_OFF / SPACING_STEP)
+    while abs(best) < most:
+        lower = min((best - 1, best, best + 1), key=objective)
+        if lower == best:
+            break
+        best = lower
+    if abs(best) == most:
+        return 1.0
+    below, here, above = objective(best - 1), objective(best), objective(best + 1)
+    curvature = below - 2.0 * here + above
+    off = 0.5 * (below - above) / curvature if curvature > 0.0 else 0.0
+    expected = here - 0.5 * curvature * off * off
+    return 1.0 + SPACING_STEP * (best + off) if expected < (1.0 - LEAST_GAIN) * objective(0) else 1.0
 
 
 def keyframe_clouds(log: LaserLog, track: LocalTrack, config: SlamConfig, spacing: float) -> Clouds:

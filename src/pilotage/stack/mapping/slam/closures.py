@@ -97,6 +97,12 @@ class Closure:
     verdict: Verdict
 
 
+def moved(closure: Closure, by: int) -> Closure:
+    """Return a closure whose submaps are numbered on from so many others."""
+    c = closure.candidate
+    return replace(closure, candidate=replace(c, earlier=c.earlier + by, later=c.later + by))
+
+
 def relative_covariances(
     joint: FloatArray, poses: FloatArray, first: IntArray, second: IntArray
 ) -> FloatArray:
@@ -181,9 +187,8 @@ def judge(
     closures = []
     for c in found:
         predicted = relative_poses(poses[c.earlier][None], poses[c.later][None])[0]
-        closures.append(
-            _alone(c, match(submaps, c.earlier, c.later, predicted, c.half_m, c.half_rad), config)
-        )
+        found_match = match(submaps, c.earlier, c.later, predicted, c.half_m, c.half_rad)
+        closures.append(Closure(c, found_match, np.nan, 0, judged_alone(found_match, config)))
     pieces = submaps.pieces
     across = [
         int(pieces[closure.candidate.later] - pieces[closure.candidate.earlier]) for closure in closures
@@ -196,8 +201,8 @@ def judge(
     chi_square, consistent = _joint_test(edges, poses, joint, config.gate_probability, slip)
     gate = chi_square_quantile(config.gate_probability, 3)
     fits = chi_square <= gate
-    clique = _clique(consistent & fits[:, None] & fits[None, :], fits)
-    support = _support(edges, clique & fits)
+    taken = clique(consistent & fits[:, None] & fits[None, :], fits)
+    support = _support(edges, taken & fits)
     for n, k in enumerate(sound):
         closure = replace(closures[k], chi_square=float(chi_square[n]), support=int(support[n]))
         # Beside a break the window is wide because the heading is open, not because the place is.
@@ -205,7 +210,7 @@ def judge(
         needed = config.least_support - 1 + (1 if wide else 0) + slip.support
         if not fits[n]:
             verdict = Verdict.AGAINST_GRAPH
-        elif not clique[n]:
+        elif not taken[n]:
             verdict = Verdict.AGAINST_OTHERS
         elif support[n] < needed:
             verdict = Verdict.ALONE
@@ -213,27 +218,24 @@ def judge(
             verdict = Verdict.ACCEPTED
         closures[k] = replace(closure, verdict=verdict)
     edges = edges.chosen(np.arange(len(edges)) < len(sound))
-    taken = np.array([closures[k].verdict is Verdict.ACCEPTED for k in sound])
-    edges = edges.chosen(taken)
+    edges = edges.chosen(np.array([closures[k].verdict is Verdict.ACCEPTED for k in sound]))
     references = submaps.references
     return closures, replace(edges, i=references[edges.i], j=references[edges.j])
 
 
-def _alone(candidate: Candidate, found: Match, config: SlamConfig) -> Closure:
+def judged_alone(found: Match, config: SlamConfig) -> Verdict:
     """Judge a match by itself."""
     if found.score <= 0.0 or not found.aligned:
-        verdict = Verdict.NO_MATCH
-    elif found.score < config.least_score:
-        verdict = Verdict.LOW_SCORE
-    elif found.overlap < config.least_overlap:
-        verdict = Verdict.LITTLE_OVERLAP
-    elif found.agreement < config.least_agreement:
-        verdict = Verdict.WALLS_DISAGREE
-    elif found.second > config.most_ambiguity * found.score:
-        verdict = Verdict.AMBIGUOUS
-    else:
-        verdict = Verdict.ACCEPTED
-    return Closure(candidate, found, np.nan, 0, verdict)
+        return Verdict.NO_MATCH
+    if found.score < config.least_score:
+        return Verdict.LOW_SCORE
+    if found.overlap < config.least_overlap:
+        return Verdict.LITTLE_OVERLAP
+    if found.agreement < config.least_agreement:
+        return Verdict.WALLS_DISAGREE
+    if found.second > config.most_ambiguity * found.score:
+        return Verdict.AMBIGUOUS
+    return Verdict.ACCEPTED
 
 
 def _may_second(closure: Closure, config: SlamConfig) -> bool:
@@ -279,15 +281,15 @@ def _joint_test(
     covariance = (flat @ joint @ flat.T).reshape(count, 3, count, 3)
     covariance[k, :, k] += np.linalg.inv(edges.information)
     own = covariance[k, :, k]
-    alone = _squared(innovation, own)
-    chi_square = _squared(innovation, own + slip.covariance())
+    alone = squared(innovation, own)
+    chi_square = squared(innovation, own + slip.covariance())
     first, second = np.triu_indices(count, 1)
     both = np.empty((first.size, 6, 6))
     both[:, :3, :3], both[:, 3:, 3:] = own[first], own[second]
     both[:, :3, 3:] = covariance[first, :, second]
     both[:, 3:, :3] = both[:, :3, 3:].transpose(0, 2, 1)
     errors = np.concatenate([innovation[first], innovation[second]], axis=1)
-    together = _squared(errors, both)
+    together = squared(errors, both)
     given = together - np.minimum(alone[first], alone[second])
     agree = np.zeros((count, count), np.bool_)
     agreeing = given <= chi_square_quantile(probability, 3)
@@ -298,12 +300,12 @@ def _joint_test(
     return np.asarray(chi_square), agree
 
 
-def _squared(errors: FloatArray, covariance: FloatArray) -> FloatArray:
+def squared(errors: FloatArray, covariance: FloatArray) -> FloatArray:
     """Squared Mahalanobis distances (M,) of errors (M, n) under covariances (M, n, n)."""
     return np.asarray(np.einsum("ki,ki->k", errors, np.linalg.solve(covariance, errors[..., None])[..., 0]))
 
 
-def _clique(agree: BoolArray, fits: BoolArray) -> BoolArray:
+def clique(agree: BoolArray, fits: BoolArray) -> BoolArray:
     """A large set in which all agree: greedily, the one that agrees with most first."""
     degree = agree.sum(axis=1)
     taken = np.zeros(fits.size, np.bool_)

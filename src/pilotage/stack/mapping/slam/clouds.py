@@ -28,6 +28,11 @@ class Clouds:
         points = np.concatenate(clouds) if clouds else np.zeros((0, 6))
         return Clouds(np.ascontiguousarray(points), np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64))
 
+    def and_more(self, other: Clouds) -> Clouds:
+        """Return both one after the other."""
+        starts = np.concatenate([self.starts, self.starts[-1] + other.starts[1:]])
+        return Clouds(np.concatenate([self.points, other.points]), starts)
+
     def __len__(self) -> int:
         return int(self.starts.shape[0] - 1)
 

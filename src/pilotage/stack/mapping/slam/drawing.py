@@ -7,8 +7,8 @@ import numpy as np
 from pilotage.core.errors import InputError
 from pilotage.core.types import FloatArray, Pose2
 from pilotage.kernels.slam.occupancy import OddsArray, add_scan
-from pilotage.logs.laser_log import LaserLog
 from pilotage.maps.occupancy_grid import FREE, OCCUPIED, UNKNOWN, OccupancyArray, OccupancyGrid
+from pilotage.stack.mapping.slam.earlier_map import KeyframeScans
 
 HIT_ODDS, MISS_ODDS, MOST_ODDS = 0.85, 0.25, 6.0
 SEEN_ODDS = 0.2
@@ -17,34 +17,32 @@ MARGIN_M = 0.5
 
 
 def drawn_map(
-    log: LaserLog, poses: FloatArray, resolution_m: float, max_range_m: float, spacing: float
+    scans: KeyframeScans, poses: FloatArray, resolution_m: float, max_range_m: float
 ) -> OccupancyGrid:
-    """Draw all scans at the scanner's poses (N, 3).
+    """Draw scans taken with the scanner at poses (N, 3).
 
     Raises
     ------
     InputError
         Where the map would have more cells than fit into memory.
     """
-    low, high = _bounds(log, poses, max_range_m)
+    low, high = _bounds(scans, poses, max_range_m)
     columns, rows = (np.ceil((high - low) / resolution_m).astype(np.int64) + 1).tolist()
     if columns * rows > MOST_CELLS:
         raise InputError(
             f"map: expected at most {MOST_CELLS} cells, found {rows} x {columns}; take a coarser resolution_m"
         )
     odds = np.zeros((rows, columns), np.float32)
-    for i in range(len(log)):
-        beams, step = int(log.beams[i]), float(log.angle_step_rad[i])
-        first = float(log.first_angle_rad[i]) + 0.5 * step * (beams - 1) * (1.0 - spacing)
+    for i, pose in enumerate(poses):
         add_scan(
             odds,
             float(low[0]),
             float(low[1]),
             resolution_m,
-            poses[i],
-            log.ranges_m[i, :beams],
-            first,
-            step * spacing,
+            pose,
+            scans.ranges_m[i, : int(scans.beams[i])],
+            float(scans.first_angle_rad[i]),
+            float(scans.angle_step_rad[i]),
             max_range_m,
             HIT_ODDS,
             MISS_ODDS,
@@ -64,16 +62,16 @@ def states_of(odds: OddsArray) -> OccupancyArray:
     return np.where(odds > SEEN_ODDS, OCCUPIED, np.where(odds < -SEEN_ODDS, FREE, UNKNOWN)).astype(np.int8)
 
 
-def _bounds(log: LaserLog, poses: FloatArray, max_range_m: float) -> tuple[FloatArray, FloatArray]:
+def _bounds(scans: KeyframeScans, poses: FloatArray, max_range_m: float) -> tuple[FloatArray, FloatArray]:
     """Corners (2,) of what the hits cover."""
     low, high = poses[:, :2].min(axis=0), poses[:, :2].max(axis=0)
-    k = np.arange(log.ranges_m.shape[1])
-    for start in range(0, len(log), 512):
-        part = slice(start, min(start + 512, len(log)))
-        angle = log.first_angle_rad[part, None] + log.angle_step_rad[part, None] * k + poses[part, 2:3]
+    k = np.arange(scans.ranges_m.shape[1])
+    for start in range(0, len(poses), 512):
+        part = slice(start, min(start + 512, len(poses)))
+        angle = scans.first_angle_rad[part, None] + scans.angle_step_rad[part, None] * k + poses[part, 2:3]
         with np.errstate(invalid="ignore"):
-            hit = log.ranges_m[part] <= max_range_m
-        r = np.where(hit, log.ranges_m[part], 0.0)
+            hit = scans.ranges_m[part] <= max_range_m
+        r = np.where(hit, scans.ranges_m[part], 0.0)
         x, y = poses[part, 0:1] + r * np.cos(angle), poses[part, 1:2] + r * np.sin(angle)
         low = np.minimum(low, [x.min(), y.min()])
         high = np.maximum(high, [x.max(), y.max()])

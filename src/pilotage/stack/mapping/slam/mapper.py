@@ -3,26 +3,31 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 
 from pilotage.core.errors import InputError
 from pilotage.core.types import FloatArray
+from pilotage.kernels.slam.frames import between, composed
 from pilotage.logs.laser_log import LaserLog
 from pilotage.models.pose_graph import PoseGraph
 from pilotage.stack.mapping.slam.back_end import (
     LoopCloser,
+    Solved,
     beam_spacing,
     closed,
     keyframe_clouds,
     refined,
-    track_edges,
+    weak_edges,
 )
-from pilotage.stack.mapping.slam.closures import Verdict
+from pilotage.stack.mapping.slam.closures import Verdict, moved
+from pilotage.stack.mapping.slam.clouds import Clouds
 from pilotage.stack.mapping.slam.config import SlamConfig
 from pilotage.stack.mapping.slam.drawing import drawn_map
+from pilotage.stack.mapping.slam.earlier_map import keyframe_scans
 from pilotage.stack.mapping.slam.odometry import scanner_odometry
-from pilotage.stack.mapping.slam.result import SlamResult
+from pilotage.stack.mapping.slam.result import Joined, SlamResult
 from pilotage.stack.mapping.slam.scan_covariances import ScanCovariances
 from pilotage.stack.mapping.slam.scan_poses import scan_poses
 from pilotage.stack.mapping.slam.tracker import LocalTrack, track
@@ -31,6 +36,17 @@ from pilotage.stack.mapping.slam.uncertainty import relative_poses
 LEAST_SCANS = 2
 OnStage = Callable[[str, float], None]
 """Called with what is going on and the share of the recording that was matched."""
+
+
+@dataclass(frozen=True, slots=True)
+class Mapped:
+    """A recording whose graph is closed and refined: track, its closer, points, graph, spacing of beams."""
+
+    local: LocalTrack
+    closer: LoopCloser
+    clouds: Clouds
+    state: Solved
+    spacing: float
 
 
 def map_log(log: LaserLog, config: SlamConfig, on_stage: OnStage | None = None) -> SlamResult:
@@ -42,6 +58,16 @@ def map_log(log: LaserLog, config: SlamConfig, on_stage: OnStage | None = None) 
         Where the log has fewer than two scans or not one point to match.
     """
     say = on_stage or _silent
+    local = tracked(log, config, say)
+    if local.keyframes.size < 2:
+        return _standing(log, config, local)
+    done = mapped(log, local, config, say)
+    say("drawing", 1.0)
+    return result_of(log, config, done, done.state)
+
+
+def tracked(log: LaserLog, config: SlamConfig, say: OnStage) -> LocalTrack:
+    """Run the front end, or say why it cannot (InputError)."""
     if len(log) < LEAST_SCANS:
         raise InputError(f"{log.name}: expected at least {LEAST_SCANS} scans to map, found {len(log)}")
     count = len(log)
@@ -50,38 +76,67 @@ def map_log(log: LaserLog, config: SlamConfig, on_stage: OnStage | None = None) 
         raise InputError(
             f"{log.name}: expected ranges up to max_range_m {config.max_range_m:g}, found not one"
         )
-    if local.keyframes.size < 2:
-        return _standing(log, config, local)
+    return local
+
+
+def mapped(log: LaserLog, local: LocalTrack, config: SlamConfig, say: OnStage) -> Mapped:
+    """Close the loops of a track of two keyframes or more, and refine its graph."""
     closer = closed(local, config, lambda text: say(text, 1.0))
-    state, closures, submaps = closer.state, closer.closures, closer.submaps
+    state, submaps = closer.state, closer.submaps
     say("refining", 1.0)
     spacing = 1.0
     clouds = local.clouds
     if config.calibrate_beam_spacing and any(state.edges.closes):
         spacing = beam_spacing(log, local, state, submaps, config)
         clouds = keyframe_clouds(log, local, config, spacing) if spacing != 1.0 else clouds
-    state = refined(clouds, state, track_edges(local), submaps)
-    poses = scan_poses(local, state.poses)
-    say("drawing", 1.0)
-    grid = drawn_map(log, poses, config.resolution_m, config.max_range_m, spacing)
+    return Mapped(local, closer, clouds, refined(clouds, state, weak_edges(local), submaps), spacing)
+
+
+def result_of(
+    log: LaserLog, config: SlamConfig, done: Mapped, state: Solved, joined: Joined | None = None
+) -> SlamResult:
+    """Return everything that is known of a mapped recording.
+
+    Parameters
+    ----------
+    state, joined
+        The graph in the end; where it extends an earlier map that one's keyframes are its first.
+    """
+    local, closer = done.local, done.closer
+    since = 0 if joined is None else len(joined.earlier)
+    poses = scan_poses(local, state.poses[since:])
+    scans = keyframe_scans(log, np.arange(len(log)), done.spacing)
+    drawn_from, drawn_at = scans, poses
+    extents, closures = tuple(closer.submaps.extents), closer.closures
+    clouds, before = done.clouds, local.poses
+    warnings = (*_warnings(log, local), *_torn(log, local, closer))
+    if joined is not None:
+        drawn_from = joined.earlier.scans.and_more(scans)
+        drawn_at = np.concatenate([state.poses[:since], poses])
+        extents, clouds = joined.extents, joined.earlier.clouds.and_more(clouds)
+        closures = [*(moved(closure, joined.submaps) for closure in closures), *joined.closures]
+        before = np.array([composed(poses[0], between(before[0], pose)) for pose in before])
+        warnings += joined.warnings
     scale, turn = _odometry_scales(log, poses, config)
-    known = ScanCovariances(state.edges.graph(state.poses), state.weights, local.owner, poses)
+    known = ScanCovariances(state.edges.graph(state.poses), state.weights, since + local.owner, poses)
     return SlamResult(
         log.t_s,
         poses,
-        local.poses,
+        before,
         known,
         local.keyframes,
         tuple(closures),
-        tuple(submaps.extents),
+        extents,
         clouds,
-        grid,
-        spacing,
+        scans.chosen(local.keyframes),
+        drawn_map(drawn_from, drawn_at, config.resolution_m, config.max_range_m),
+        done.spacing,
         scale,
         turn,
         local.searched,
         local.lost,
-        (*_warnings(log, local), *_torn(log, local, closer)),
+        warnings,
+        joined,
     )
 
 
@@ -92,6 +147,7 @@ def _silent(text: str, share: float) -> None:
 def _standing(log: LaserLog, config: SlamConfig, local: LocalTrack) -> SlamResult:
     """A recording in which the robot never left its first keyframe."""
     none = np.zeros(0, np.int64)
+    scans = keyframe_scans(log, np.arange(len(log)), 1.0)
     graph = PoseGraph(np.zeros((1, 3)), none, none, np.zeros((0, 3)), np.zeros((0, 3, 3)))
     return SlamResult(
         log.t_s,
@@ -102,7 +158,8 @@ def _standing(log: LaserLog, config: SlamConfig, local: LocalTrack) -> SlamResul
         (),
         (),
         local.clouds,
-        drawn_map(log, local.poses, config.resolution_m, config.max_range_m, 1.0),
+        scans.chosen(local.keyframes),
+        drawn_map(scans, local.poses, config.resolution_m, config.max_range_m),
         1.0,
         float("nan"),
         float("nan"),

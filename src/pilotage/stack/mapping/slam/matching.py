@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -11,13 +11,14 @@ from pilotage.kernels.slam.align import TOO_FEW, align
 from pilotage.kernels.slam.branch_bound import search_window
 from pilotage.kernels.slam.buckets import sort_into_buckets
 from pilotage.kernels.slam.frames import between
+from pilotage.kernels.slam.match_grid import ScoreArray
 from pilotage.stack.mapping.slam.local_matching import BUCKET_M
 from pilotage.stack.mapping.slam.submaps import Submap, Submaps
 
 STEP_RAD = 0.02
 BUDGET = 400_000
 HIT_SCORE = 0.3
-LEAST_MEAN = 0.25
+LEAST_MEAN, RIVAL_SHARE = 0.25, 0.6
 SAME_PLACE_M, SAME_HEADING_RAD = 0.8, 0.35
 """A second answer nearer than this is the first one."""
 ALIGN_REACH_M, ALIGN_LAST_REACH_M, ALIGN_SCALE_M = 0.4, 0.15, 0.05
@@ -56,37 +57,68 @@ def match(
     submaps: Submaps, earlier: int, later: int, predicted: FloatArray, half_m: float, half_rad: float
 ) -> Match:
     """Search a submap in the window around where the graph has it on an earlier one."""
-    map_, moving = submaps[earlier], submaps[later]
-    pyramid, margin = submaps.pyramid(earlier)
+    pyramid = submaps.pyramid(earlier)
+    map_, moving, cell_m = submaps[earlier], submaps[later], submaps.cell_m
+    found, _ = laid(map_, pyramid, moving, cell_m, predicted, half_m, half_rad)
+    if found.score <= 0.0:
+        return found
+    agreement, overlap = lying(moving, cell_m, map_.fine, between(found.relative, np.zeros(3)))
+    return replace(found, agreement=min(found.agreement, agreement), overlap=min(found.overlap, overlap))
+
+
+def laid(
+    map_: Submap,
+    pyramid: tuple[ScoreArray, int],
+    moving: Submap,
+    cell_m: float,
+    predicted: FloatArray,
+    half_m: float,
+    half_rad: float,
+    least_score: float = LEAST_MEAN,
+    rival_share: float = RIVAL_SHARE,
+    budget: int = BUDGET,
+) -> tuple[Match, bool]:
+    """Search a submap in a window of a map.
+
+    Parameters
+    ----------
+    least_score, rival_share
+        Mean score a point from which a place is one, and share of the best one's from which another is told.
+
+    Returns
+    -------
+    The match, whose agreement and overlap are those of the submap's points on the map, and whether the budget
+    of nodes sufficed to look everywhere.
+    """
     turns = int(np.ceil(half_rad / STEP_RAD))
     points = np.ascontiguousarray(moving.coarse[:, :2])
     angles: FloatArray = STEP_RAD * np.arange(-turns, turns + 1, dtype=np.float64)
     corner = map_.corner_xy_m
 
-    def search(least: float, away: FloatArray) -> FloatArray:
-        best, _ = search_window(
-            pyramid,
-            margin,
+    def search(least: float, away: FloatArray) -> tuple[FloatArray, bool]:
+        best, nodes = search_window(
+            *pyramid,
             corner[0],
             corner[1],
-            submaps.cell_m,
+            cell_m,
             points,
             predicted,
             half_m,
             angles,
             least,
             away,
-            BUDGET,
+            budget,
         )
-        return np.asarray(best)
+        return np.asarray(best), nodes > budget
 
-    best = search(LEAST_MEAN, np.array([0.0, 0.0, 0.0, -1.0, 0.0]))
+    best, cut_short = search(least_score, np.array([0.0, 0.0, 0.0, -1.0, 0.0]))
     if not np.isfinite(best[3]):
-        return Match(predicted, np.zeros((3, 3)), 0.0, 0.0, 0.0, 0.0, False)
-    other = search(
-        max(LEAST_MEAN, 0.6 * float(best[3])),
+        return Match(predicted, np.zeros((3, 3)), 0.0, 0.0, 0.0, 0.0, False), not cut_short
+    other, again = search(
+        max(LEAST_MEAN, rival_share * float(best[3])),
         np.concatenate([best[:3], [SAME_PLACE_M, SAME_HEADING_RAD]]),
     )
+    second = float(other[3]) if np.isfinite(other[3]) else 0.0
     box, starts, _, reference = sort_into_buckets(map_.fine, BUCKET_M)
     pose, hessian, _, status = align(
         moving.fine,
@@ -101,20 +133,12 @@ def match(
         reference,
     )
     pose[2] = (pose[2] + np.pi) % (2.0 * np.pi) - np.pi
-    forth = _lying(map_, submaps.cell_m, moving.fine, pose)
-    back = _lying(moving, submaps.cell_m, map_.fine, between(pose, np.zeros(3)))
-    return Match(
-        pose,
-        hessian,
-        float(best[3]),
-        float(other[3]) if np.isfinite(other[3]) else 0.0,
-        min(forth[0], back[0]),
-        min(forth[1], back[1]),
-        status != TOO_FEW,
-    )
+    agreement, overlap = lying(map_, cell_m, moving.fine, pose)
+    found = Match(pose, hessian, float(best[3]), second, agreement, overlap, status != TOO_FEW)
+    return found, not (cut_short or again)
 
 
-def _lying(map_: Submap, cell_m: float, points: FloatArray, pose: FloatArray) -> tuple[float, float]:
+def lying(map_: Submap, cell_m: float, points: FloatArray, pose: FloatArray) -> tuple[float, float]:
     """Share of points on walls among those where the map saw, and the share of the latter of all."""
     c, s = np.cos(pose[2]), np.sin(pose[2])
     x = pose[0] + c * points[:, 0] - s * points[:, 1]

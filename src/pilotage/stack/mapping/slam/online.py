@@ -6,7 +6,7 @@ import numpy as np
 
 from pilotage.core.types import FloatArray
 from pilotage.kernels.slam.frames import between, composed
-from pilotage.stack.mapping.slam.back_end import LoopCloser, Solved, refined, track_edges
+from pilotage.stack.mapping.slam.back_end import LoopCloser, Solved, refined, track_edges, weak_edges
 from pilotage.stack.mapping.slam.closures import USUAL_SLIP
 from pilotage.stack.mapping.slam.config import SlamConfig
 from pilotage.stack.mapping.slam.scan_covariances import SHARED_EDGES
@@ -123,7 +123,7 @@ class OnlineSlam:
         if len(self.keyframe_poses) < 2:
             return
         self.close(ended=True)
-        self._take(refined(track.clouds, self._closer.state, track_edges(track), self._closer.submaps))
+        self._take(refined(track.clouds, self._closer.state, weak_edges(track), self._closer.submaps))
 
     def _take(self, state: Solved) -> None:
         self.keyframe_poses = state.poses.copy()

@@ -28,15 +28,18 @@ MOST_MOVED_M, MOST_MOVED_RAD = 0.35, 0.12
 PAIR_STD_M = 0.05
 
 
-def neighbours(poses: FloatArray) -> IntArray:
-    """Pairs (M, 2), earlier keyframe first and sorted by it, of keyframes (K, 3) that may see the same."""
+def neighbours(poses: FloatArray, since: int = 0) -> IntArray:
+    """Pairs (M, 2), earlier keyframe first and sorted by it, of keyframes (K, 3) that may see the same.
+
+    With ``since`` they are pairs of one before it with one from it on alone.
+    """
     count = poses.shape[0]
     tree = cKDTree(poses[:, :2])
-    pairs = [(i, i + ahead) for i in range(count) for ahead in ALONG if i + ahead < count]
+    pairs = [(i, i + ahead) for i in range(count) for ahead in ALONG if i + ahead < count and not since]
     around = tree.query_ball_point(poses[:, :2], RADIUS_M, return_sorted=True)
-    for i in range(count):
+    for i in range(since, count):
         near = np.asarray(around[i], np.int64)
-        near = near[near < i - LEAST_BEHIND]
+        near = near[near < (since or i - LEAST_BEHIND)]
         turn = np.abs((poses[near, 2] - poses[i, 2] + np.pi) % (2.0 * np.pi) - np.pi)
         near, turn = near[turn < MOST_TURN_RAD], turn[turn < MOST_TURN_RAD]
         if near.size == 0:

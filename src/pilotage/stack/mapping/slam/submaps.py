@@ -56,11 +56,16 @@ class Submap:
     fine: FloatArray
 
 
-def extents(poses: FloatArray, length_m: float, breaks: IntArray) -> list[Extent]:
-    """Cut the path of keyframes (K, 3) into stretches that overlap by half, none of them across a break."""
+def path_lengths(poses: FloatArray) -> FloatArray:
+    """(K,) path up to each of the keyframes (K, 3), turns counting as TURN_AS_PATH_M has it."""
     moved = relative_poses(poses[:-1], poses[1:])
     steps = np.hypot(moved[:, 0], moved[:, 1]) + TURN_AS_PATH_M * np.abs(moved[:, 2])
-    path = np.concatenate([[0.0], np.cumsum(steps)])
+    return np.concatenate([[0.0], np.cumsum(steps)])
+
+
+def extents(poses: FloatArray, length_m: float, breaks: IntArray) -> list[Extent]:
+    """Cut the path of keyframes (K, 3) into stretches that overlap by half, none of them across a break."""
+    path = path_lengths(poses)
     bounds = [0, *breaks.tolist(), poses.shape[0]]
     out = []
     for piece, (start, end) in enumerate(pairwise(bounds)):
@@ -81,6 +86,30 @@ def thinned(points: FloatArray, cell_m: float) -> FloatArray:
     cells = np.floor(points[:, :2] / cell_m).astype(np.int64)
     _, first = np.unique(cells[:, 0] * 4_000_037 + cells[:, 1], return_index=True)
     return np.ascontiguousarray(points[np.sort(first)])
+
+
+def drawn(clouds: Clouds, poses: FloatArray, chosen: IntArray, frame: FloatArray, cell_m: float) -> Submap:
+    """Draw some keyframes (C,), of all whose poses are (K, 3), in a frame (3,)."""
+    points = gathered(clouds.points, clouds.starts, chosen, poses, frame)
+    origins = relative_poses(np.repeat(frame[None], chosen.size, axis=0), poses[chosen])[:, :2]
+    counts = np.diff(clouds.starts)[chosen]
+    owner = np.repeat(np.arange(chosen.size), counts)
+    near = np.hypot(*(points[:, :2] - origins[owner]).T) < RANGE_M
+    points, counts = points[near], np.bincount(owner[near], minlength=chosen.size)
+    if points.shape[0] == 0:
+        empty = np.zeros((1, 1), np.float32)
+        return Submap(empty, origins[0], points, points)
+    low, high = points[:, :2].min(axis=0) - MARGIN_M, points[:, :2].max(axis=0) + MARGIN_M
+    grid = score_grid(
+        np.ascontiguousarray(points[:, :2]),
+        np.ascontiguousarray(origins),
+        counts,
+        np.concatenate([low, high]),
+        cell_m,
+        STD_M,
+        OPEN_SCORE,
+    )
+    return Submap(grid, low, thinned(points, 2.0 * cell_m), thinned(points, 0.05))
 
 
 class Submaps:
@@ -106,8 +135,11 @@ class Submaps:
         ended
             Whether the last submap, which may be a short one, counts already.
         """
-        before = self.extents
-        self.extents = extents(local, self._length_m, breaks)[: None if ended else -1]
+        self.lay(clouds, local, extents(local, self._length_m, breaks)[: None if ended else -1])
+
+    def lay(self, clouds: Clouds, local: FloatArray, extents: list[Extent]) -> None:
+        """Take submaps that are cut already, of keyframes at poses (K, 3)."""
+        before, self.extents = self.extents, extents
         for index, extent in enumerate(before):
             if index >= len(self.extents) or self.extents[index] != extent:
                 self._drawn.pop(index, None)
@@ -121,7 +153,10 @@ class Submaps:
 
     def __getitem__(self, index: int) -> Submap:
         if index not in self._drawn:
-            self._drawn[index] = self._draw(self.extents[index])
+            extent = self.extents[index]
+            chosen = np.arange(extent.first, extent.last + 1)
+            frame = self._local[extent.reference]
+            self._drawn[index] = drawn(self._clouds, self._local, chosen, frame, self.cell_m)
             while len(self._drawn) > KEPT_SUBMAPS:
                 self._drawn.popitem(last=False)
         self._drawn.move_to_end(index)
@@ -135,27 +170,3 @@ class Submaps:
                 self._pyramids.popitem(last=False)
         self._pyramids.move_to_end(index)
         return self._pyramids[index]
-
-    def _draw(self, extent: Extent) -> Submap:
-        chosen = np.arange(extent.first, extent.last + 1)
-        frame = self._local[extent.reference]
-        points = gathered(self._clouds.points, self._clouds.starts, chosen, self._local, frame)
-        origins = relative_poses(np.repeat(frame[None], chosen.size, axis=0), self._local[chosen])[:, :2]
-        counts = np.diff(self._clouds.starts)[chosen]
-        owner = np.repeat(np.arange(chosen.size), counts)
-        near = np.hypot(*(points[:, :2] - origins[owner]).T) < RANGE_M
-        points, counts = points[near], np.bincount(owner[near], minlength=chosen.size)
-        if points.shape[0] == 0:
-            empty = np.zeros((1, 1), np.float32)
-            return Submap(empty, origins[0], points, points)
-        low, high = points[:, :2].min(axis=0) - MARGIN_M, points[:, :2].max(axis=0) + MARGIN_M
-        grid = score_grid(
-            np.ascontiguousarray(points[:, :2]),
-            np.ascontiguousarray(origins),
-            counts,
-            np.concatenate([low, high]),
-            self.cell_m,
-            STD_M,
-            OPEN_SCORE,
-        )
-        return Submap(grid, low, thinned(points, 2.0 * self.cell_m), thinned(points, 0.05))

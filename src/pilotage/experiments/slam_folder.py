@@ -1,0 +1,201 @@
+"""The folder of ``pilotage slam``: written whole, and read again where a later recording extends its map."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import yaml
+
+from pilotage.core.errors import InputError
+from pilotage.core.files.arrays import read_npz, require_numbers
+from pilotage.core.types import FloatArray
+from pilotage.evaluation.slam_consistency import COVARIANCES_FILE, read_scan_covariances
+from pilotage.logs.g2o import write_g2o
+from pilotage.logs.laser_log import LaserLog
+from pilotage.maps.ros_map import RosMap, write_ros_map
+from pilotage.models.pose_graph import LARGEST
+from pilotage.records.metrics import clean
+from pilotage.records.run_folder import draft_folder
+from pilotage.stack.mapping.slam.closures import Closure, Verdict
+from pilotage.stack.mapping.slam.clouds import Clouds, cloud_of_beams
+from pilotage.stack.mapping.slam.config import SlamConfig
+from pilotage.stack.mapping.slam.earlier_map import EarlierMap, KeyframeScans
+from pilotage.stack.mapping.slam.result import SlamResult
+from pilotage.stack.mapping.slam.uncertainty import Edges
+
+KEYFRAMES_FILE = "keyframes.npz"
+
+
+def read_earlier_map(folder: Path, config: SlamConfig) -> EarlierMap:
+    """Read the map of a folder of ``pilotage slam``, to be extended.
+
+    Raises
+    ------
+    InputError
+        Where it is no such folder, or files are damaged, do not belong together or are of an older pilotage.
+    """
+    path = folder / KEYFRAMES_FILE
+    if not path.is_file() or not (folder / COVARIANCES_FILE).is_file():
+        raise InputError(f"{folder}: expected a folder of 'pilotage slam', found no {KEYFRAMES_FILE}")
+    known = read_scan_covariances(folder / COVARIANCES_FILE)
+    file = read_npz(path, "keyframes of 'pilotage slam'")
+    count = len(known.graph)
+    shapes = dict.fromkeys(("t_s", "beams", "first_angle_rad", "angle_step_rad"), (count,))
+    for name, shape in (shapes | {"ranges_m": (count, -1), "breaks": (-1,)}).items():
+        if name not in file:
+            raise InputError(
+                f"{path}: expected {name}, found none; map the recording anew with this pilotage"
+            )
+        found = file[name].shape
+        if len(found) != len(shape) or any(b not in (-1, a) for a, b in zip(found, shape, strict=True)):
+            raise InputError(f"{path}: expected {name} of {count} keyframes, found shape {found}")
+        if name != "ranges_m":
+            require_numbers(file[name], LARGEST * 10.0, f"{path}: {name}")
+    beams, breaks = file["beams"].astype(np.int64), file["breaks"].astype(np.int64)
+    if beams.size and not (beams.min() >= 0 and beams.max() <= file["ranges_m"].shape[1]):
+        raise InputError(f"{path}: expected at most {file['ranges_m'].shape[1]} beams, found other numbers")
+    if breaks.size and not (breaks.min() > 0 and breaks.max() < count and (np.diff(breaks) > 0).all()):
+        raise InputError(f"{path}: expected increasing breaks of {count} keyframes, found others")
+    scans = KeyframeScans(
+        file["t_s"].astype(np.float64),
+        file["ranges_m"].astype(np.float64),
+        beams,
+        file["first_angle_rad"].astype(np.float64),
+        file["angle_step_rad"].astype(np.float64),
+    )
+    clouds = [
+        cloud_of_beams(
+            scans.ranges_m[k, : beams[k]],
+            scans.first_angle_rad[k] + scans.angle_step_rad[k] * np.arange(beams[k]),
+            float(scans.angle_step_rad[k]),
+            config.max_range_m,
+        )
+        for k in range(count)
+    ]
+    graph = known.graph
+    weighted = graph.information * known.weights[:, None, None]
+    edges = Edges(graph.i, graph.j, graph.measurements, weighted, np.zeros(graph.i.size, np.bool_))
+    return EarlierMap(graph.poses, Clouds.of(clouds), scans, edges, breaks)
+
+
+def write_slam_folder(
+    final: Path, log: LaserLog, config: SlamConfig, result: SlamResult, metrics: dict[str, object]
+) -> None:
+    """Write the folder, whole or not at all."""
+    with draft_folder(final) as draft:
+        poses, before = _of_frame(log, config, result.poses), _of_frame(log, config, result.before)
+        (draft / "config.yaml").write_text(
+            yaml.safe_dump(config.model_dump(mode="json"), sort_keys=False), encoding="utf-8"
+        )
+        (draft / "trajectory.tum").write_text(_tum(log.t_s, poses), encoding="utf-8")
+        (draft / "before.tum").write_text(_tum(log.t_s, before), encoding="utf-8")
+        write_ros_map(draft / "map.yaml", RosMap.of(result.grid, "map.pgm"))
+        write_g2o(draft / "graph.g2o", result.known.graph)
+        _write_covariances(draft / COVARIANCES_FILE, log, result)
+        _write_keyframes(draft / KEYFRAMES_FILE, result)
+        t_s = result.keyframe_scans().t_s
+        closures = [_row(number, c, result, t_s) for number, c in enumerate(result.closures, start=1)]
+        (draft / "closures.json").write_text(json.dumps(clean(closures), indent=1) + "\n", encoding="utf-8")
+        metrics = metrics | {"run_dir": str(final)}
+        (draft / "metrics.json").write_text(json.dumps(clean(metrics), indent=2) + "\n", encoding="utf-8")
+
+
+def _of_frame(log: LaserLog, config: SlamConfig, poses: FloatArray) -> FloatArray:
+    """Poses (N, 3) of the frame that the trajectory is asked for in: the scanner's or the robot's."""
+    if config.trajectory == "scanner":
+        return poses
+    mount = log.mount.as_array()
+    c, s = np.cos(mount[2]), np.sin(mount[2])
+    back = np.array([-c * mount[0] - s * mount[1], s * mount[0] - c * mount[1], -mount[2]])
+    c_all, s_all = np.cos(poses[:, 2]), np.sin(poses[:, 2])
+    return np.stack(
+        [
+            poses[:, 0] + c_all * back[0] - s_all * back[1],
+            poses[:, 1] + s_all * back[0] + c_all * back[1],
+            poses[:, 2] + back[2],
+        ],
+        axis=1,
+    )
+
+
+def _tum(t_s: FloatArray, poses: FloatArray) -> str:
+    """Lines of TUM's format; two scans of one stamp keep theirs apart by a microsecond."""
+    lines = []
+    last = -np.inf
+    for t, (x, y, theta) in zip(t_s.tolist(), poses.tolist(), strict=True):
+        stamp = max(t, last + 1e-6)
+        last = stamp
+        lines.append(
+            f"{stamp:.6f} {x:.6f} {y:.6f} 0 0 0 {np.sin(0.5 * theta):.9f} {np.cos(0.5 * theta):.9f}\n"
+        )
+    return "".join(lines)
+
+
+def _write_covariances(path: Path, log: LaserLog, result: SlamResult) -> None:
+    """Covariances of the poses, and what those between any two of them are computed from."""
+    known = result.known
+    np.savez_compressed(
+        path,
+        t_s=log.t_s,
+        covariances=known.marginals(),
+        poses=known.poses,
+        owner=known.owner,
+        graph_poses=known.graph.poses,
+        graph_i=known.graph.i,
+        graph_j=known.graph.j,
+        graph_measurements=known.graph.measurements,
+        graph_information=known.graph.information,
+        graph_weights=known.weights,
+    )
+
+
+def _write_keyframes(path: Path, result: SlamResult) -> None:
+    """Keyframes of the graph: points, submaps, and what a later recording needs to extend the map."""
+    scans = result.keyframe_scans()
+    since = len(result.known.graph) - result.keyframes.size
+    before = result.known.graph.poses.copy()
+    before[since:] = result.before[result.keyframes]
+    np.savez_compressed(
+        path,
+        scans=np.concatenate([np.full(since, -1), result.keyframes]),
+        before=before,
+        points_xy_m=result.clouds.points[:, :2].astype(np.float32),
+        starts=result.clouds.starts,
+        extents=np.array([(e.first, e.last, e.reference) for e in result.extents]).reshape(-1, 3),
+        breaks=result.breaks(),
+        t_s=scans.t_s,
+        ranges_m=scans.ranges_m.astype(np.float32),
+        beams=scans.beams,
+        first_angle_rad=scans.first_angle_rad,
+        angle_step_rad=scans.angle_step_rad,
+    )
+
+
+def _row(number: int, closure: Closure, result: SlamResult, t_s: FloatArray) -> dict[str, object]:
+    """One closure for ``closures.json``; ``t_s`` (K,) of all keyframes."""
+    c, m = closure.candidate, closure.match
+    earlier, later = result.extents[c.earlier], result.extents[c.later]
+    since = len(result.known.graph) - result.keyframes.size
+    own = earlier.reference >= since
+    return {
+        "number": number,
+        "earlier_scan": int(result.keyframes[earlier.reference - since]) if own else None,
+        "later_scan": int(result.keyframes[later.reference - since]),
+        "earlier_t_s": float(t_s[earlier.reference]),
+        "later_t_s": float(t_s[later.reference]),
+        "earlier_submap": c.earlier,
+        "later_submap": c.later,
+        "window_m": c.half_m,
+        "window_rad": c.half_rad,
+        "relative": [float(value) for value in m.relative],
+        "score": m.score,
+        "second_score": m.second,
+        "agreement": m.agreement,
+        "overlap": m.overlap,
+        "chi_square": closure.chi_square,
+        "support": closure.support,
+        "accepted": closure.verdict is Verdict.ACCEPTED,
+        "verdict": str(closure.verdict),
+    }
