@@ -13,12 +13,12 @@ from scipy import ndimage
 from pilotage.core.types import BoolArray, FloatArray, IntArray
 from pilotage.kernels.grids.distance import squared_distance
 from pilotage.kernels.grids.travel_cost import travel_costs
-from pilotage.maps.occupancy_grid import FREE, OCCUPIED, OccupancyArray
+from pilotage.maps.occupancy_grid import FREE, OCCUPIED, UNKNOWN, OccupancyArray
 
 Scalar = TypeVar("Scalar", bound=np.generic)
 
-COARSE = 2
-"""Cells of the map along the side of a cell that is planned on."""
+COARSE, MARGIN = 2, 8
+"""Cells of the map along the side of a cell that is planned on, and around what is known of it."""
 NEAR_M, NEAR_COST = 0.35, 2.0
 """Within so much of the least clearance a metre costs up to so many more."""
 VIEW_M = 1.2
@@ -64,16 +64,17 @@ class SeenFloor:
         clearance_m: float,
         here_xy_m: FloatArray,
     ) -> None:
-        rows, columns = (size - size % COARSE for size in states.shape)
         self.cell_m = COARSE * resolution_m
-        self._corner = corner_xy_m
-        occupied = np.ascontiguousarray(states[:rows, :columns] == OCCUPIED)
-        away = np.full((rows, columns), np.inf)
+        rows, columns = _known_part(states)
+        self._corner = corner_xy_m + resolution_m * np.array([columns.start, rows.start])
+        states = states[rows, columns]
+        occupied = np.ascontiguousarray(states == OCCUPIED)
+        away = np.full(states.shape, np.inf)
         if occupied.any():
             away = resolution_m * np.sqrt(squared_distance(occupied))
-        self.distance_m: FloatArray = _blocks(away).min(axis=2)
-        seen: BoolArray = np.asarray(_blocks(states[:rows, :columns] == FREE).any(axis=2), np.bool_)
-        self._solid: BoolArray = np.asarray(_blocks(occupied).any(axis=2), np.bool_)
+        self.distance_m: FloatArray = _joined(np.minimum, away)
+        seen: BoolArray = _joined(np.logical_or, states == FREE)
+        self._solid: BoolArray = _joined(np.logical_or, occupied)
         self._free: BoolArray = seen & ~self._solid
         self._unseen: BoolArray = ~seen & ~self._solid
         room = self.distance_m - clearance_m
@@ -183,8 +184,23 @@ class SeenFloor:
         return int((r[k] + r0) * columns + c[k] + c0)
 
 
-def _blocks(cells: NDArray[Scalar]) -> NDArray[Scalar]:
-    """(rows, columns, COARSE squared) the cells of each coarser one."""
-    rows, columns = cells.shape
-    shaped = cells.reshape(rows // COARSE, COARSE, columns // COARSE, COARSE)
-    return shaped.transpose(0, 2, 1, 3).reshape(rows // COARSE, columns // COARSE, COARSE * COARSE)
+def _known_part(states: OccupancyArray) -> tuple[slice, slice]:
+    """Rows and columns of whole coarser cells that hold all that is known, with room around it."""
+    known = states != UNKNOWN
+    out = []
+    for axis, size in enumerate(states.shape):
+        at = np.flatnonzero(known.any(axis=1 - axis))
+        first, last = (at[0], at[-1]) if at.size else (0, size)
+        begin = max(0, int(first) - MARGIN) // COARSE * COARSE
+        end = min(size, int(last) + 1 + MARGIN)
+        out.append(slice(begin, end - (end - begin) % COARSE))
+    return out[0], out[1]
+
+
+def _joined(how: np.ufunc, cells: NDArray[Scalar]) -> NDArray[Scalar]:
+    """The cells of each coarser one, joined."""
+    parts = [cells[row::COARSE, column::COARSE] for row in range(COARSE) for column in range(COARSE)]
+    out = parts[0]
+    for part in parts[1:]:
+        out = how(out, part)
+    return np.ascontiguousarray(out)

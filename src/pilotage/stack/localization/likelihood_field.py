@@ -8,7 +8,7 @@ import numpy as np
 from scipy.ndimage import binary_dilation
 
 from pilotage.core.errors import InputError
-from pilotage.core.types import FloatArray
+from pilotage.core.types import BoolArray, FloatArray
 from pilotage.kernels.filters import particles
 from pilotage.maps.nearest_obstacles import NearestObstacles
 from pilotage.maps.occupancy_grid import FREE, UNKNOWN, OccupancyGrid
@@ -71,6 +71,7 @@ class LikelihoodField:
                 f"particle-filter: expected walls or blocked cells on the robot's map, found none on "
                 f"'{chart.name}'; see stack.map"
             )
+        self._half_m, self._bounds_m = half_m, chart.bounds_m
         self._nearest = NearestObstacles.from_map(walls, resolution_m)
         self._known = _known_of(chart)
         std_m = math.sqrt(range_var_m2 + (least_std_m if field_std_m is None else field_std_m) ** 2)
@@ -124,11 +125,23 @@ class LikelihoodField:
         if self._known is None or not len(points):
             return points
         c, s = math.cos(pose[2]), math.sin(pose[2])
-        cells = self._known.cells_at(pose[:2] + points @ np.array([[c, s], [-s, c]]))
+        mapped = self.known_at(pose[:2] + points @ np.array([[c, s], [-s, c]]))
+        return np.ascontiguousarray(points[mapped & (mapped.mean() >= LEAST_MAPPED)])
+
+    def known_at(self, points: FloatArray) -> BoolArray:
+        """(K,) whether the map says anything of points (K, 2) of the map frame."""
+        if self._known is None:
+            xmin, ymin, xmax, ymax = self._bounds_m
+            x, y = points[:, 0], points[:, 1]
+            return np.asarray((x >= xmin) & (x <= xmax) & (y >= ymin) & (y <= ymax))
+        cells = self._known.cells_at(points)
         inside = ((cells >= 0) & (cells < self._known.cells.shape)).all(axis=1)
         cells[~inside] = 0
-        mapped = inside & (self._known.cells[cells[:, 0], cells[:, 1]] >= 0)
-        return np.ascontiguousarray(points[mapped & (mapped.mean() >= LEAST_MAPPED)])
+        return np.asarray(inside & (self._known.cells[cells[:, 0], cells[:, 1]] >= 0))
+
+    def distances_m(self, points: FloatArray) -> FloatArray:
+        """(K,) from points (K, 2) of the map frame to the nearest wall or occupied cell."""
+        return np.maximum(self._nearest.at(points) - self._half_m, 0.0)
 
 
 def _known_of(chart: WorldMap) -> OccupancyGrid | None:

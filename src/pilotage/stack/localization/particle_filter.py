@@ -25,7 +25,7 @@ from pilotage.stack.interface import Belief, BeliefStatus
 from pilotage.stack.journal import Journal
 from pilotage.stack.knowledge import RobotKnowledge
 from pilotage.stack.localization.likelihood_field import LikelihoodField
-from pilotage.stack.localization.localizer import LOCALIZERS, require_initial_pose
+from pilotage.stack.localization.localizer import LOCALIZERS
 from pilotage.stack.localization.odometry_prediction import OdometryNoise, OdometryPrediction
 from pilotage.stack.localization.odometry_watch import (
     LINEAR_RAD,
@@ -33,6 +33,7 @@ from pilotage.stack.localization.odometry_watch import (
     OdometryWatch,
     increment_of,
 )
+from pilotage.stack.localization.relocalization import STDS, Relocalization
 from pilotage.stack.localization.self_check import ExplainedShare, SelfCheck
 
 NAME = "particle-filter"
@@ -82,6 +83,8 @@ class MclConfig(Config):
     beside the cell itself."""
     random_share: float = Field(default=0.05, gt=0.0, lt=1.0)
     """Share of readings that are no wall of the map."""
+    relocalize: bool = True
+    """Whether it searches the whole map while it is lost."""
     measurement_var_scale: Positive = 1.0
     odometry_model: OdometryModel = OdometryModel.EXACT_ARC
     odometry: OdometryNoise = OdometryNoise()
@@ -118,7 +121,6 @@ class ParticleFilterLocalizer:
         initial: Belief,
         journal: Journal,
     ) -> None:
-        require_initial_pose(initial, NAME)
         if config.most_particles < config.least_particles:
             raise InputError(
                 f"stack.localizer.most_particles: expected at least least_particles "
@@ -146,6 +148,7 @@ class ParticleFilterLocalizer:
             random_share=config.random_share,
             reach_m=lidar.max_range_m,
         )
+        self._relocalization = Relocalization(self._field, chart.bounds_m) if config.relocalize else None
         self._picked = np.unique(np.linspace(0, lidar.beams - 1, min(config.beams, lidar.beams)).astype(int))
         angles = lidar.beam_angles_rad()[self._picked] + lidar.mount.theta_rad
         self._directions = np.column_stack([np.cos(angles), np.sin(angles)])
@@ -166,33 +169,49 @@ class ParticleFilterLocalizer:
 
     def step(self, readings: Readings) -> Belief:
         """Move the cloud by the odometry increment, then weigh it by the scan."""
-        odometry = increment_of(readings.by_sensor.get(self._odometry))
+        odometry, t_s = increment_of(readings.by_sensor.get(self._odometry)), readings.t_s
         if odometry is not None:
             self._move(odometry)
-        self._spread(*self._watch.variances(readings.t_s, odometry))
+        self._spread(*self._watch.variances(t_s, odometry))
         scan = readings.by_sensor.get(self._lidar)
-        moments = None
-        if isinstance(scan, LidarScan) and not self._blind:
+        moments, seen = None, np.zeros((0, 2))
+        if isinstance(scan, LidarScan):
+            seen = self._points_of(scan.ranges_m)
             prior = self._unweighted()
-            points = self._field.mapped(self._points_of(scan.ranges_m), prior[0])
-            moments = self._weigh(points)
+            points = self._field.mapped(seen, prior[0])
+            moments = None if self._blind else self._weigh(points)
             if moments is not None:
-                self._judge(prior, moments[0], points, readings.t_s)
+                self._judge(prior, moments[0], points, t_s)
         if moments is None:
             self._rounds, self._effective = 0, float(self._poses.shape[0])
             moments = self._unweighted()
         mean, cov = moments
         self._blind = bool(cov[2, 2] > LINEAR_RAD**2)
-        lost = self._blind or self._check.lost(readings.t_s)
+        lost = self._blind or self._check.lost(t_s)
+        if self._relocalization is not None:
+            lost |= self._relocalization.trial is not None
+            self._relocalization.see(seen)
+            place = self._relocalization.begin(t_s, lost, mean)
+            if place is not None and place is not mean:
+                mean, cov = self._begin_at(place)
         self.belief = Belief(
             Pose2.from_array(mean), cov, BeliefStatus.LOST if lost else BeliefStatus.LOCALIZED
         )
         self._telemetry.tell(self._poses.shape[0], self._effective, self._rounds, 0.0 if lost else 1.0)
         return self.belief
 
+    def _begin_at(self, place: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """A new cloud around a place (3,) of the map."""
+        initial = Belief(Pose2.from_array(place), np.diag(STDS**2))
+        self._poses = _draw(initial, self._config.most_particles, self._rng)
+        self._wanted, self._blind = self._config.most_particles, False
+        return self._unweighted()
+
     def _move(self, odometry: OdometryIncrement) -> None:
         moved_m, turned_rad = self._moved
         self._moved = (moved_m + abs(odometry.distance_m), turned_rad + abs(odometry.angle_rad))
+        if self._relocalization is not None:
+            self._relocalization.move(odometry)
         distance_var, angle_var = self._prediction.variances(odometry)
         particles.sample_motion(
             self._poses,
@@ -207,6 +226,8 @@ class ParticleFilterLocalizer:
     def _spread(self, place_m2: float, heading_rad2: float) -> None:
         """Move the particles apart by what the odometry has not told."""
         if place_m2 > 0.0 or heading_rad2 > 0.0:
+            if self._relocalization is not None:
+                self._relocalization.forget()
             stds = np.sqrt([place_m2, place_m2, min(heading_rad2, MOST_HEADING_VAR)])
             self._poses += stds * self._rng.standard_normal(self._poses.shape)
             self._poses[:, 2] = wrap_array_to_pi(self._poses[:, 2])
@@ -270,9 +291,19 @@ class ParticleFilterLocalizer:
         self._unexplained = self._unexplained + 1 if at_wall < LEAST_AT_WALL * len(points) else 0
         if self._unexplained >= UNEXPLAINED_SCANS:
             self._check.alarm(t_s)
+        share = at_wall / len(points)
+        again = self._relocalization
+        passed = None if again is None else again.passed(share, self._explained.usual)
+        if passed:
+            # It has begun anew: what spoke against the place before says nothing of this one.
+            self._check, self._found = SelfCheck(refused_share=MOST_BESIDE), True
+            self._explained.begin_anew()
+            self._sharp.begin_anew()
+        elif passed is not None:
+            self._check.alarm(t_s)
         if self._check.lost(t_s) or prior[1][0, 0] + prior[1][1, 1] > UNSURE_M**2:
             self._found = False
-        as_usual = self._explained.tell(at_wall / len(points), self._found)
+        as_usual = self._explained.tell(share, self._found)
         if as_usual:
             self._found = True
         elif not self._found:

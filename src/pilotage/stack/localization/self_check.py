@@ -76,6 +76,15 @@ class ExplainedShare:
     def __init__(self) -> None:
         self._recent, self._usual = math.nan, math.nan
 
+    @property
+    def usual(self) -> float:
+        """Share that is usual; nan before the first scan."""
+        return self._usual
+
+    def begin_anew(self) -> None:
+        """Forget the last scans: they were seen from a place that was the wrong one."""
+        self._recent = self._usual
+
     def tell(self, share: float, trusted: bool) -> bool:
         """One scan; returns whether the last ones fit as well as usual."""
         if math.isnan(self._usual):

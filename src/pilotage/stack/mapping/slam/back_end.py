@@ -115,6 +115,7 @@ class LoopCloser:
         self._searched: dict[tuple[int, int], float] = {}
         self._accepted: set[tuple[int, int]] = set()
         self._slipped = False
+        self._joint: tuple[Solved, FloatArray] | None = None
         self.state: Solved
 
     def grow(self, track: LocalTrack, ended: bool = True) -> None:
@@ -149,7 +150,7 @@ class LoopCloser:
     def close(self, window_m: float, slip: Slip) -> tuple[int, int]:
         """Search what may overlap within a window and solve; how many were searched, and how many closed."""
         state, submaps = self.state, self.submaps
-        joint = joint_covariance(state.edges, state.poses, state.weights, submaps.references)
+        joint = self._joint_of_submaps()
         places = state.poses[submaps.references]
         if slip is LARGE_SLIP:
             self._searched = dict.fromkeys(self._searched, np.inf)
@@ -172,6 +173,14 @@ class LoopCloser:
             self._closing = edges if self._closing is None else self._closing.and_more(edges)
             self.state = solved(state.edges.and_more(edges), state.poses, ROBUST_STDS, self._slipped)
         return len(found), len(edges)
+
+    def _joint_of_submaps(self) -> FloatArray:
+        """(3 S, 3 S) covariance of the submaps' poses; computed anew only where the graph has changed."""
+        state, known = self.state, self._joint
+        if known is None or known[0] is not state or len(known[1]) != 3 * len(self.submaps):
+            out = joint_covariance(state.edges, state.poses, state.weights, self.submaps.references)
+            self._joint = known = state, out
+        return known[1]
 
     def look_again(self) -> None:
         """Search the latest submaps' candidates anew that only lacked another to second them."""

@@ -12,13 +12,14 @@ from pilotage.stack.mapping.slam.config import SlamConfig
 from pilotage.stack.mapping.slam.scan_covariances import SHARED_EDGES
 from pilotage.stack.mapping.slam.submaps import TURN_AS_PATH_M
 from pilotage.stack.mapping.slam.tracker import Tracker
-from pilotage.stack.mapping.slam.uncertainty import joint_covariance
+from pilotage.stack.mapping.slam.uncertainty import errors_of, joint_covariance
 
 WINDOWS_M = (1.0, 2.0, 4.0)
 """Half a search window's side at most, round by round, each time."""
 SCAN_COV = np.diag([0.005**2, 0.005**2, 0.002**2])
 """What a scan's place beside the last keyframe is unsure by."""
-USUAL_RMS_M, LEAST_SHARE = 0.008, 0.003
+USUAL_RMS_M, PRIOR_LOOPS, LEAST_FACTOR = 0.008, 2.0, 1e-4
+"""Residuals of scans in an office, how many closed loops they tell as much as, and the least factor."""
 LOST_SCANS = 10
 """So many scans in a row that fit nowhere: lost."""
 
@@ -40,6 +41,7 @@ class OnlineSlam:
         self._config = config
         self._tracker = Tracker(config)
         self._closer = LoopCloser(config)
+        self._misfit, self._loops = 0.0, 0
         self._path_m, self._lost_before, self._lost_run, self._healed = 0.0, 0, 0, 0
         self.keyframe_poses = np.zeros((0, 3))
         self.covariance = np.zeros((3, 3))
@@ -56,11 +58,14 @@ class OnlineSlam:
         """(3, 3) of the last scan's pose.
 
         The graph's covariances are those of scans with residuals as in an office of many things; a scanner
-        whose scans fit better is the surer for it.
+        whose scans fit better is the surer for it, and what the closed loops were off by says more the more
+        they are: the estimated variance factor of adjustment (Koch 1999, sect. 3.2.4), the residuals of the
+        scans being its prior.
         """
-        share = min(max((self._tracker.rms_m / USUAL_RMS_M) ** 2, LEAST_SHARE), 1.0)
         own = carried_covariance(self.covariance, self.keyframe_poses[-1], self.pose)
-        return share * own + SCAN_COV
+        prior = min((self._tracker.rms_m / USUAL_RMS_M) ** 2, 1.0)
+        factor = (PRIOR_LOOPS * prior + self._misfit) / (PRIOR_LOOPS + self._loops)
+        return max(factor, LEAST_FACTOR) * own + prior * SCAN_COV
 
     @property
     def lost(self) -> bool:
@@ -126,6 +131,11 @@ class OnlineSlam:
         self._take(refined(track.clouds, self._closer.state, weak_edges(track), self._closer.submaps))
 
     def _take(self, state: Solved) -> None:
+        """Put the keyframes where the graph has them; note what its edges are off by, a loop's in all."""
+        off = errors_of(state.edges, state.poses)
+        squares = np.einsum("mi,mij,mj->m", off, state.edges.information, off)
+        self._misfit = float((state.weights * squares).sum()) / 3.0
+        self._loops = int(state.edges.closes.sum())
         self.keyframe_poses = state.poses.copy()
         last = np.array([len(state.poses) - 1])
         self.covariance = SHARED_EDGES * joint_covariance(state.edges, state.poses, state.weights, last)

@@ -1,0 +1,107 @@
+"""Lost: the whole map is searched for where the last scans fit, and a place found is tried first."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pilotage.core.angles import wrap_to_pi
+from pilotage.core.types import FloatArray
+from pilotage.sensors.readings import OdometryIncrement
+from pilotage.stack.localization.likelihood_field import LikelihoodField
+from pilotage.stack.localization.scan_search import FEW_SCANS, MOST_SCANS, RecentScans, ScanSearch
+
+PATIENCE_S = 2.0
+"""A filter that doubts itself for a moment often comes round; lost for longer, it searches."""
+LEAST_SCANS = 3
+"""With fewer scans from different places most places look alike."""
+TRIAL_SCANS, TRIAL_M, TURN_AS_PATH_M = 15, 1.5, 0.5
+"""A place counts after so many scans and so much path from which it went on to fit,"""
+FITTING = 0.85
+"""by this share of what is usual; less, and it is given up."""
+LEAST_USUAL = 0.6
+"""What is usual at least: share of the beams on the map's walls."""
+SAME_M, SAME_RAD = 0.3, 0.15
+"""A place so near to where the cloud is needs no other cloud."""
+STDS = np.array([0.1, 0.1, 0.02])
+"""Of the cloud that begins at a place found."""
+
+
+@dataclass(slots=True)
+class Trial:
+    """A place that is being tried: scans, the sum of their shares at walls, and the path since."""
+
+    scans: int = 0
+    fitting: float = 0.0
+    path_m: float = 0.0
+
+
+class Relocalization:
+    """Says where to begin anew while the filter is lost, and when to believe it again.
+
+    Global localization as in Thrun et al. (2005, section 8.3) by an exact search instead of random particles:
+    the last dozen scans, joined by the odometry, must fit in one place of the map and in no second one; then
+    the filter follows that place, and is believed after 1.5 m of scans that fit as usual.
+
+    Attributes
+    ----------
+    trial
+        The place under trial; None where there is none.
+    """
+
+    def __init__(self, field: LikelihoodField, bounds_m: tuple[float, float, float, float]) -> None:
+        self._field, self._bounds_m = field, bounds_m
+        self._search: ScanSearch | None = None  # its scores are made when they are needed first
+        self._scans = RecentScans()
+        self._since_s: float | None = None
+        self._new = False
+        self.trial: Trial | None = None
+
+    def move(self, odometry: OdometryIncrement) -> None:
+        """Carry everything along."""
+        self._scans.move(odometry.distance_m, odometry.lateral_m, odometry.angle_rad)
+        if self.trial is not None:
+            self.trial.path_m += abs(odometry.distance_m) + TURN_AS_PATH_M * abs(odometry.angle_rad)
+
+    def see(self, points: FloatArray) -> None:
+        """Keep a scan's end points (K, 2), in the robot's frame, where it was taken from elsewhere."""
+        self._new = self._scans.see(points) or self._new
+
+    def forget(self) -> None:
+        """The odometry cannot be relied on: what was seen before joins nothing any more."""
+        self._scans.forget()
+
+    def begin(self, t_s: float, lost: bool, mean: FloatArray) -> FloatArray | None:
+        """A place (3,) to try, where one is found; the filter's own mean (3,) where that is the place."""
+        if not lost:
+            self._since_s = self.trial = None
+            return None
+        self._since_s = t_s if self._since_s is None else self._since_s
+        waits = self.trial is not None or not self._new or len(self._scans) < LEAST_SCANS
+        if waits or t_s - self._since_s < PATIENCE_S:
+            return None
+        self._new = False
+        if self._search is None:
+            self._search = ScanSearch(self._field, self._bounds_m)
+        place = self._search.best(self._scans.cloud(FEW_SCANS))
+        if place is not None and not place.alone and len(self._scans) > FEW_SCANS:
+            place = self._search.best(self._scans.cloud(MOST_SCANS))
+        if place is None or not place.alone:
+            return None
+        self.trial = Trial()
+        off = place.pose - mean
+        near = float(np.hypot(off[0], off[1])) < SAME_M and abs(wrap_to_pi(float(off[2]))) < SAME_RAD
+        return mean if near else place.pose
+
+    def passed(self, at_wall_share: float, usual: float) -> bool | None:
+        """One scan of a trial: whether the place has proved itself; None while that is open."""
+        trial = self.trial
+        if trial is None:
+            return None
+        trial.scans += 1
+        trial.fitting += at_wall_share
+        if trial.scans < TRIAL_SCANS or trial.path_m < TRIAL_M:
+            return None
+        self.trial = None
+        return trial.fitting / trial.scans >= FITTING * float(np.fmax(usual, LEAST_USUAL))

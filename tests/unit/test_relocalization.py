@@ -1,0 +1,118 @@
+"""Lost robots: scans joined by odometry, the whole map searched, a place tried before it is believed."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from pilotage.core.types import FloatArray
+from pilotage.experiments.loop import simulate
+from pilotage.experiments.mission import load_mission
+from pilotage.maps.rasterize import rasterized
+from pilotage.maps.segment_map import SegmentMap
+from pilotage.maps.world_map import WorldMap
+from pilotage.sensors.lidar import LidarConfig
+from pilotage.sensors.readings import OdometryIncrement
+from pilotage.stack.localization.likelihood_field import LikelihoodField
+from pilotage.stack.localization.relocalization import TRIAL_SCANS, Relocalization
+from pilotage.stack.localization.scan_search import RecentScans, ScanSearch
+from support.laser_rooms import furnished, ranges
+
+ANGLES = LidarConfig(beams=180).beam_angles_rad()
+BOUNDS_M = (0.0, 0.0, 12.0, 9.0)
+HALL = np.array([[0.0, 0.0, 12.0, 0.0], [12.0, 0.0, 12.0, 9.0], [12.0, 9.0, 0.0, 9.0], [0.0, 9.0, 0.0, 0.0]])
+
+
+def field_of(walls: FloatArray, cells: bool) -> tuple[LikelihoodField, tuple[float, float, float, float]]:
+    bounds_m = (
+        float(walls[:, [0, 2]].min()),
+        float(walls[:, [1, 3]].min()),
+        float(walls[:, [0, 2]].max()),
+        float(walls[:, [1, 3]].max()),
+    )
+    room = SegmentMap(walls, np.zeros((0, 3)), bounds_m)
+    grid = rasterized(room, 0.05) if cells else None
+    chart = WorldMap("room", bounds_m, None if cells else room, grid=grid)
+    field = LikelihoodField(
+        chart, resolution_m=0.05, range_var_m2=1e-5, field_std_m=None, random_share=0.05, reach_m=20.0
+    )
+    return field, bounds_m
+
+
+def seen_from(walls: FloatArray, pose: FloatArray) -> FloatArray:
+    found = ranges(walls, pose, ANGLES)
+    hit = np.isfinite(found)
+    return np.asarray(found[hit, None] * np.column_stack([np.cos(ANGLES[hit]), np.sin(ANGLES[hit])]))
+
+
+def test_scans_are_joined_by_the_odometry() -> None:
+    walls, recent = furnished(), RecentScans()
+    x, y, theta = 2.0, 3.5, 0.2
+    for _ in range(6):
+        recent.see(seen_from(walls, np.array([x, y, theta])))
+        recent.move(0.5, 0.0, 0.0)
+        x, y = x + 0.5 * math.cos(theta), y + 0.5 * math.sin(theta)
+    there = recent.cloud(6) @ np.array(
+        [[math.cos(theta), math.sin(theta)], [-math.sin(theta), math.cos(theta)]]
+    )
+    field, _ = field_of(walls, cells=False)
+    away = field.distances_m(there + np.array([x, y]))
+    assert away.max() < 0.05, "a node's nearest wall is not always a point's"
+    assert away.mean() < 1e-3
+
+
+@pytest.mark.parametrize("cells", [False, True])
+@pytest.mark.parametrize("pose", [(2.0, 3.5, 0.2), (8.0, 2.0, 2.0)])
+def test_the_place_is_found_on_walls_and_on_cells(cells: bool, pose: tuple[float, float, float]) -> None:
+    field, bounds_m = field_of(furnished(), cells)
+    place = ScanSearch(field, bounds_m).best(seen_from(furnished(), np.array(pose)))
+    assert place is not None
+    assert place.alone
+    assert np.hypot(*(place.pose[:2] - pose[:2])) < 0.15
+    assert abs(math.remainder(place.pose[2] - pose[2], math.tau)) < 0.02
+
+
+def test_two_places_that_look_alike_are_told_apart_by_nobody() -> None:
+    field, bounds_m = field_of(HALL, cells=False)
+    place = ScanSearch(field, bounds_m).best(seen_from(HALL, np.array([2.0, 3.0, 0.4])))
+    assert place is not None
+    assert not place.alone
+
+
+def test_scans_of_another_building_fit_nowhere() -> None:
+    field, bounds_m = field_of(furnished(), cells=False)
+    rng = np.random.default_rng(0)
+    assert ScanSearch(field, bounds_m).best(rng.uniform(-4.0, 4.0, (300, 2))) is None
+
+
+@pytest.mark.parametrize(("share", "passes"), [(0.9, True), (0.3, False)])
+def test_a_place_counts_after_a_trial(share: float, passes: bool) -> None:
+    walls, (field, bounds_m) = furnished(), field_of(furnished(), cells=False)
+    again, mean = Relocalization(field, bounds_m), np.zeros(3)
+    pose, found = np.array([2.0, 3.5, 0.2]), None
+    for k in range(6):
+        again.see(seen_from(walls, pose))
+        found = again.begin(1.0 * k, lost=True, mean=mean)
+        if found is not None:
+            break
+        again.move(OdometryIncrement(0.5, 0.0))
+        pose = pose + np.array([0.5 * math.cos(0.2), 0.5 * math.sin(0.2), 0.0])
+    assert found is not None
+    assert np.hypot(*(found - pose)[:2]) < 0.15
+    verdicts = []
+    for _ in range(2 * TRIAL_SCANS):
+        again.move(OdometryIncrement(0.1, 0.0))
+        verdicts.append(again.passed(share, 0.9))
+    assert [verdict for verdict in verdicts if verdict is not None] == [passes]
+    assert again.trial is None
+
+
+def test_a_robot_told_nothing_and_one_carried_away_find_themselves() -> None:
+    localizer = ("stack.localizer={name: particle-filter}",)
+    (lost,) = simulate(load_mission("museum-lost", localizer, 2)).finished.robots
+    assert lost.arrived, lost.reason
+    (carried,) = simulate(load_mission("museum-kidnap", localizer, 2)).finished.robots
+    assert carried.arrived, carried.reason
+    assert not carried.collisions
