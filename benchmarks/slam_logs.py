@@ -3,7 +3,8 @@
     python -m benchmarks.slam_logs ../shared/data/slam --log intel --damage none zero-odometry jitter
 
 Each FOLDER/NAME.bag goes with NAME.relations. Damages: ``zero-odometry`` (its poses are all zero), ``jitter``
-(the stamp of each scan moved by a normal error of 50 ms, the scans in the order of the moved stamps),
+(the stamp of each scan moved by a normal error of 50 ms, the messages in the order they were recorded),
+``jitter-sorted`` (the same, but the order of the file is lost: scans in that of the moved stamps),
 ``drop-scans`` (every tenth) and ``drop-beams`` (30 %). A trajectory is judged at the true stamps.
 """
 
@@ -19,7 +20,7 @@ import numpy as np
 
 from pilotage.core.types import BoolArray, FloatArray, IntArray
 from pilotage.evaluation.relations import relation_errors, relation_nees
-from pilotage.logs.laser_log import LaserLog
+from pilotage.logs.laser_log import LaserLog, RawScan, assemble
 from pilotage.logs.laser_recordings import read_laser_log
 from pilotage.logs.relations import read_relations
 from pilotage.logs.trajectories import read_tum, write_planar_tum
@@ -27,7 +28,7 @@ from pilotage.stack.mapping.slam.closures import Verdict
 from pilotage.stack.mapping.slam.config import SlamConfig
 from pilotage.stack.mapping.slam.mapper import map_log
 
-DAMAGES = ("none", "zero-odometry", "jitter", "drop-scans", "drop-beams")
+DAMAGES = ("none", "zero-odometry", "jitter", "jitter-sorted", "drop-scans", "drop-beams")
 JITTER_S, DROPPED_BEAMS = 0.05, 0.3
 
 
@@ -43,13 +44,35 @@ def chosen(log: LaserLog, which: IntArray | BoolArray) -> LaserLog:
     )
 
 
+def recorded(log: LaserLog, told_s: FloatArray) -> LaserLog:
+    """The log as it is read where its scans have other stamps (N,) in the same order of the file."""
+    times_s = np.zeros(0) if log.odometry_t_s is None else log.odometry_t_s
+    odometry = np.zeros((0, 3)) if log.odometry is None else log.odometry
+    before = np.searchsorted(times_s, log.t_s, side="right")
+    scans = [
+        RawScan(
+            float(told_s[k]),
+            log.ranges_m[k, : log.beams[k]],
+            float(log.first_angle_rad[k]),
+            float(log.angle_step_rad[k]),
+            log.range_min_m,
+            log.range_max_m,
+            int(before[k]),
+        )
+        for k in range(len(log))
+    ]
+    return assemble(log.name, scans, log.mount, False, times_s, odometry, log.warnings)
+
+
 def damaged(log: LaserLog, damage: str, seed: int) -> tuple[LaserLog, FloatArray]:
     """A damaged recording, and the true times of its scans."""
     rng = np.random.default_rng(seed)
     if damage == "zero-odometry" and log.odometry is not None:
         return replace(log, odometry=np.zeros_like(log.odometry)), log.t_s
-    if damage == "jitter":
+    if damage in ("jitter", "jitter-sorted"):
         told = log.t_s + JITTER_S * rng.standard_normal(len(log))
+        if damage == "jitter":
+            return recorded(log, told), np.sort(log.t_s)[np.argsort(told, kind="stable")]
         order = np.argsort(told, kind="stable")
         return replace(chosen(log, order), t_s=told[order]), log.t_s[order]
     if damage == "drop-scans":

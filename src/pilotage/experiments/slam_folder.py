@@ -89,11 +89,11 @@ def write_slam_folder(
         (draft / "config.yaml").write_text(
             yaml.safe_dump(config.model_dump(mode="json"), sort_keys=False), encoding="utf-8"
         )
-        (draft / "trajectory.tum").write_text(_tum(log.t_s, poses), encoding="utf-8")
-        (draft / "before.tum").write_text(_tum(log.t_s, before), encoding="utf-8")
+        (draft / "trajectory.tum").write_text(_tum(result.t_s, poses), encoding="utf-8")
+        (draft / "before.tum").write_text(_tum(result.t_s, before), encoding="utf-8")
         write_ros_map(draft / "map.yaml", RosMap.of(result.grid, "map.pgm"))
         write_g2o(draft / "graph.g2o", result.known.graph)
-        _write_covariances(draft / COVARIANCES_FILE, log, result)
+        _write_covariances(draft / COVARIANCES_FILE, result)
         _write_keyframes(draft / KEYFRAMES_FILE, result)
         t_s = result.keyframe_scans().t_s
         closures = [_row(number, c, result, t_s) for number, c in enumerate(result.closures, start=1)]
@@ -133,12 +133,12 @@ def _tum(t_s: FloatArray, poses: FloatArray) -> str:
     return "".join(lines)
 
 
-def _write_covariances(path: Path, log: LaserLog, result: SlamResult) -> None:
+def _write_covariances(path: Path, result: SlamResult) -> None:
     """Covariances of the poses, and what those between any two of them are computed from."""
     known = result.known
     np.savez_compressed(
         path,
-        t_s=log.t_s,
+        t_s=result.t_s,
         covariances=known.marginals(),
         poses=known.poses,
         owner=known.owner,

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -115,9 +115,10 @@ def _collect(bag: OpenBag, path: Path, picked: _Picked) -> LaserLog:
     mount = mount_of(found.tree, found.base_frame or _base(found), found.scan_frame)
     if not found.scans:
         raise InputError(f"{path}: expected laser scans in {picked.scan}, found none that can be read")
-    return assemble(
-        path.name, found.scans, mount.pose, mount.upside_down, t_s, poses, [*said, *mount.warnings]
-    )
+    scans = found.scans
+    if not found.odometry:  # that of transforms is read later: nothing is known of the order
+        scans = [replace(scan, readings_before=-1) for scan in scans]
+    return assemble(path.name, scans, mount.pose, mount.upside_down, t_s, poses, [*said, *mount.warnings])
 
 
 def _read(bag: OpenBag, picked: _Picked, names: set[str], found: _Collected) -> None:
@@ -152,6 +153,7 @@ def _add_scan(found: _Collected, message: Any, time_ns: int) -> None:
             float(message.angle_increment),
             float(message.range_min),
             float(message.range_max),
+            len(found.odometry),
         )
     )
 

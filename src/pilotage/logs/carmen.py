@@ -49,6 +49,8 @@ class CarmenLog:
         (N, 3) x, y, theta as the log gives them: corrected ones in a corrected log.
     odometry_t_s, odometry
         (M,) and (M, 3) of the ODOM lines.
+    readings_before
+        (N,) ODOM lines before each scan.
     backward_times
         How many scans carry a time before that of the scan before.
     cut_short
@@ -64,6 +66,7 @@ class CarmenLog:
     robot_poses: FloatArray
     odometry_t_s: FloatArray
     odometry: FloatArray
+    readings_before: IntArray
     backward_times: int
     cut_short: bool = False
 
@@ -95,6 +98,7 @@ def read_carmen(path: Path) -> CarmenLog:
         File and line of what is damaged elsewhere, or where there is no scan at all.
     """
     scans: list[_Scan] = []
+    readings_before: list[int] = []
     odometry: list[list[float]] = []
     text = read_text(path)
     lines = text.splitlines()
@@ -107,6 +111,7 @@ def read_carmen(path: Path) -> CarmenLog:
         try:
             if words[0] in {"FLASER", "ROBOTLASER1"}:
                 scans.append(_flaser(words, where) if words[0] == "FLASER" else _robotlaser(words, where))
+                readings_before.append(len(odometry))
             elif words[0] == "ODOM":
                 _expect(words, 10, where)
                 odometry.append([*_floats(words[1:4], where), *_floats(words[7:8], where)])
@@ -134,6 +139,7 @@ def read_carmen(path: Path) -> CarmenLog:
         np.array([scan.robot for scan in scans]),
         poses[:, 3].copy(),
         poses[:, :3].copy(),
+        np.array(readings_before, np.int64),
         int(np.count_nonzero(np.diff(t_s) < 0.0)),
         cut_short,
     )

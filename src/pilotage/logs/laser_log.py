@@ -8,7 +8,7 @@ had to put right is said in ``warnings``; nothing is dropped without a word.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -18,6 +18,7 @@ from pilotage.core.angles import wrap_array_to_pi
 from pilotage.core.errors import InputError
 from pilotage.core.types import FloatArray, IntArray, Pose2
 from pilotage.logs.carmen import CarmenLog, read_carmen
+from pilotage.logs.stamps import between_readings, increasing, keeps_order
 
 CARMEN_RANGE_MIN_M = 0.05
 CARMEN_RANGE_MAX_M = 80.0
@@ -28,7 +29,10 @@ LARGEST_MOUNT_SPREAD = 0.02
 
 @dataclass(frozen=True, slots=True)
 class RawScan:
-    """One scan as it was recorded: beam ``k`` looks along ``first_angle_rad + k * angle_step_rad``."""
+    """One scan as it was recorded: beam ``k`` looks along ``first_angle_rad + k * angle_step_rad``.
+
+    ``readings_before`` counts the readings of the odometry that were recorded before it; -1: unknown.
+    """
 
     t_s: float
     ranges_m: FloatArray
@@ -36,18 +40,19 @@ class RawScan:
     angle_step_rad: float
     range_min_m: float
     range_max_m: float
+    readings_before: int = -1
 
 
 @dataclass(frozen=True, slots=True)
 class LaserLog:
-    """Scans with odometry, in the order of time.
+    """Scans with odometry, in the order of time, or of the file where stamps that go back are wrong.
 
     Attributes
     ----------
     name
         The file's name, for messages.
     t_s
-        (N,) times of the scans, not decreasing.
+        (N,) times of the scans, not decreasing; put right where those of the log go back and are wrong.
     ranges_m
         (N, B); a row shorter than B ends in NaN. Within [range_min_m, range_max_m], or ``inf``: nothing
         within reach, or ``nan``: no measurement (or nearer than the scanner can tell).
@@ -66,6 +71,8 @@ class LaserLog:
         (M,) increasing times and (M, 3) poses x, y, theta as logged; None without odometry.
     warnings
         What was missing, damaged or put right, a sentence each.
+    stamps_s
+        (N,) the scans' times as the log has them, where they were put right.
     """
 
     name: str
@@ -81,6 +88,7 @@ class LaserLog:
     odometry_t_s: FloatArray | None
     odometry: FloatArray | None
     warnings: tuple[str, ...] = ()
+    stamps_s: FloatArray | None = None
 
     def __len__(self) -> int:
         return int(self.t_s.shape[0])
@@ -141,8 +149,8 @@ def assemble(
         said.append(f"{len(scans) - len(with_beams)} scans without beams, times or angles were left out")
     if not with_beams:
         raise InputError(f"{name}: expected laser scans, found {len(scans)} scans without a usable beam")
-    with_beams = [with_beams[k] for k in _by_time(np.array([s.t_s for s in with_beams]), "scans", said)]
-    t_s = np.array([scan.t_s for scan in with_beams])
+    no_times, poses, readings_s = _in_order(odometry_t_s, odometry, said)
+    with_beams, t_s, stamps_s = _ordered(with_beams, readings_s, said)
     beams = np.array([scan.ranges_m.size for scan in with_beams], dtype=np.int64)
     if beams.min() < beams.max():
         sizes = ", ".join(str(size) for size in np.unique(beams)[:8])
@@ -158,7 +166,6 @@ def assemble(
     sign = -1.0 if upside_down else 1.0
     range_min_m = float(np.median([scan.range_min_m for scan in with_beams]))
     range_max_m = float(np.median([scan.range_max_m for scan in with_beams]))
-    no_times, poses = _in_order(odometry_t_s, odometry, said)
     if no_times is None:
         said.append("no odometry")
     elif no_times[0] > t_s[0] + 1.0 or no_times[-1] < t_s[-1] - 1.0:
@@ -180,6 +187,7 @@ def assemble(
         no_times,
         poses,
         tuple(said),
+        stamps_s,
     )
 
 
@@ -197,39 +205,71 @@ def _three_kinds(ranges_m: FloatArray, least: float, most: float) -> FloatArray:
         return np.where((out < least) | (out <= 0.0), np.nan, out)
 
 
-def _by_time(t_s: FloatArray, what: str, said: list[str]) -> IntArray:
-    """Return the order of time; equal times stay in the order of the file."""
+def _ordered(
+    scans: list[RawScan], readings_s: FloatArray, said: list[str]
+) -> tuple[list[RawScan], FloatArray, FloatArray | None]:
+    """Scans in their order, their times, and the stamps where those are others."""
+    told_s = np.array([scan.t_s for scan in scans])
+    order = _by_time(told_s, "scans", said, lambda: _ranges(scans))
+    if order is not None:
+        return [scans[k] for k in order], told_s[order], None
+    before = np.array([scan.readings_before for scan in scans], np.int64)
+    return scans, increasing(between_readings(told_s, before, readings_s)), told_s
+
+
+def _ranges(scans: list[RawScan]) -> FloatArray:
+    """(N, B) of scans, beams beyond the shortest one's left out."""
+    beams = min(scan.ranges_m.size for scan in scans)
+    return np.array([scan.ranges_m[:beams] for scan in scans])
+
+
+def _by_time(
+    t_s: FloatArray, what: str, said: list[str], values: Callable[[], FloatArray]
+) -> IntArray | None:
+    """Return the order of time, equal times in that of the file; None where the file's order is right."""
     back = np.diff(t_s)
     wrong = np.flatnonzero(back < 0.0)
+    order = np.argsort(t_s, kind="stable")
     if wrong.size:
-        said.append(
-            f"{wrong.size} times of the {what} go back (by {-back.min():.3f} s at most): sorted by time"
-        )
-    same = int(np.count_nonzero(np.diff(np.sort(t_s)) == 0.0))
+        keep = keeps_order(values(), order)
+        done = "the order of the file counts" if keep else "sorted by time"
+        said.append(f"{wrong.size} times of the {what} go back (by {-back.min():.3f} s at most): {done}")
+        if keep:
+            return None
+    same = int(np.count_nonzero(np.diff(t_s[order]) == 0.0))
     if same:
         said.append(f"{same} of the {what} carry the time of the one before")
-    return np.argsort(t_s, kind="stable")
+    return order
 
 
 def _in_order(
     t_s: FloatArray, poses: FloatArray, said: list[str]
-) -> tuple[FloatArray, FloatArray] | tuple[None, None]:
-    """Odometry by increasing times, all finite; of two readings of a time the later counts."""
+) -> tuple[FloatArray | None, FloatArray | None, FloatArray]:
+    """Odometry by increasing times, all finite; of two readings of a time the later counts.
+
+    The third are the times of all readings in the order of the file, where that is the order of time.
+    """
     poses = poses.reshape(-1, 3)
     finite = np.isfinite(t_s) & np.isfinite(poses).all(axis=1)
     if not finite.all():
         said.append(f"{int(np.count_nonzero(~finite))} odometry readings that are not finite were left out")
+    count = np.cumsum(finite)
     t_s, poses = t_s[finite], poses[finite]
     if t_s.size == 0:
-        return None, None
+        return None, None, np.zeros(0)
     notes: list[str] = []
-    order = _by_time(t_s, "odometry", notes)
+    order = _by_time(t_s, "odometry", notes, lambda: poses[:, :2])
     said.extend(note for note in notes if "go back" in note)
-    t_s, poses = t_s[order], poses[order]
+    if order is None:
+        t_s = increasing(t_s)
+    else:
+        t_s, poses = t_s[order], poses[order]
+    in_file = order is None or bool((order == np.arange(order.size)).all())
+    readings_s = t_s[np.maximum(count - 1, 0)] if in_file else np.zeros(0)
     kept = np.append(np.diff(t_s) > 0.0, True)
     out = poses[kept]
     out[:, 2] = wrap_array_to_pi(out[:, 2])
-    return t_s[kept], out
+    return t_s[kept], out, readings_s
 
 
 def read_carmen_scans(path: Path) -> LaserLog:
@@ -251,6 +291,7 @@ def laser_log_of_carmen(log: CarmenLog, name: str) -> LaserLog:
             float(log.angle_step_rad[k]),
             CARMEN_RANGE_MIN_M,
             CARMEN_RANGE_MAX_M,
+            int(log.readings_before[k]) if log.odometry_t_s.size else k,
         )
         for k in range(log.t_s.size)
     ]

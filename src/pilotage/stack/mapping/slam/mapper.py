@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -119,7 +119,7 @@ def result_of(
         warnings += joined.warnings
     scale, turn = _odometry_scales(log, poses, config)
     known = ScanCovariances(state.edges.graph(state.poses), state.weights, since + local.owner, poses)
-    return SlamResult(
+    result = SlamResult(
         log.t_s,
         poses,
         before,
@@ -138,6 +138,22 @@ def result_of(
         warnings,
         joined,
     )
+    return result if log.stamps_s is None else by_stamps(result, log.stamps_s)
+
+
+def by_stamps(result: SlamResult, stamps_s: FloatArray) -> SlamResult:
+    """Return the scans with the stamps (N,) that the log gives them, in their order."""
+    order = np.argsort(stamps_s, kind="stable")
+    rank = np.argsort(order, kind="stable")
+    known = replace(result.known, owner=result.known.owner[order], poses=result.poses[order])
+    return replace(
+        result,
+        t_s=stamps_s[order],
+        poses=result.poses[order],
+        before=result.before[order],
+        known=known,
+        keyframes=rank[result.keyframes],
+    )
 
 
 def _silent(text: str, share: float) -> None:
@@ -149,7 +165,7 @@ def _standing(log: LaserLog, config: SlamConfig, local: LocalTrack) -> SlamResul
     none = np.zeros(0, np.int64)
     scans = keyframe_scans(log, np.arange(len(log)), 1.0)
     graph = PoseGraph(np.zeros((1, 3)), none, none, np.zeros((0, 3)), np.zeros((0, 3, 3)))
-    return SlamResult(
+    result = SlamResult(
         log.t_s,
         local.poses,
         local.poses,
@@ -167,6 +183,7 @@ def _standing(log: LaserLog, config: SlamConfig, local: LocalTrack) -> SlamResul
         local.lost,
         (*_warnings(log, local), "the robot hardly moved: one keyframe is all there is"),
     )
+    return result if log.stamps_s is None else by_stamps(result, log.stamps_s)
 
 
 def _odometry_scales(log: LaserLog, poses: FloatArray, config: SlamConfig) -> tuple[float, float]:
