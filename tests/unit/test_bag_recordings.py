@@ -355,3 +355,37 @@ def test_numbers_that_are_none_are_left_out(tmp_path: Path) -> None:
     write_mcap(tmp_path / "a.mcap", drive)
     with pytest.raises(InputError, match="found none that can be read"):
         read_series(tmp_path / "a.mcap", LANDMARKS)
+
+
+def commanded(told: bool = True) -> RunMessages:
+    """Three minutes of changing commands: taken at 0.9 and 1.1 of what they say, and 0.2 s late."""
+    out: list[Stamped] = []
+    at, start = Pose2(0.0, 0.0, 0.0), 1000.0
+    rng = np.random.default_rng(3)
+    sent = np.column_stack([rng.uniform(0.1, 0.5, 180), rng.uniform(-0.6, 0.6, 180)])
+    for k in range(3600):
+        t_s, now = start + 0.05 * k, ros.nanoseconds(start + 0.05 * k)
+        if k % 2 == 0 and told:
+            out.append(Stamped("/cmd_vel", now, ros.TWIST, ros.twist(*sent[k // 20].tolist())))
+        fields = ros.odometry(t_s, "odom", "base_link", at, ros.twist(0.0, 0.0))
+        out.append(Stamped("/odom", now, ros.ODOMETRY, fields))
+        v, w = sent[max(k - 4, 0) // 20] * [0.9, 1.1]
+        at = at.compose(Pose2(0.05 * float(v), 0.0, 0.05 * float(w)))
+    return RunMessages(out, {})
+
+
+@pytest.mark.parametrize("name", WRITERS)
+def test_what_a_base_makes_of_its_commands(tmp_path: Path, name: str) -> None:
+    WRITERS[name](tmp_path / name, commanded())
+    found = pl.calibrate("commands", [tmp_path / name], out=tmp_path)
+    for key, true, off in (("speed_gain", 0.9, 0.01), ("turn_gain", 1.1, 0.01), ("delay_s", 0.2, 0.026)):
+        assert found.answer[key]["value"] == pytest.approx(true, abs=off)
+    assert "range_scale" not in found.answer
+    assert (found.folder / "parameters.yaml").read_text().count("speed_gain") == 2
+
+
+def test_a_bag_without_commands_says_what_it_holds(tmp_path: Path) -> None:
+    write_ros1(tmp_path / "a.bag", commanded(told=False))
+    with pytest.raises(InputError, match=r"found /odom \(nav_msgs/msg/Odometry, 3600\)"):
+        dispatch(["calibrate", "commands", str(tmp_path / "a.bag"), "--out", str(tmp_path)])
+    assert [place.name for place in tmp_path.iterdir()] == ["a.bag"]

@@ -95,7 +95,7 @@ def test_sets_leave_each_recording_out(recordings: Path, tmp_path: Path, capsys:
     ("words", "said"),
     [
         (["--format", "mrclam"], "expected folders of recordings with truth"),
-        (["HERE"], "expected --format mrclam, found none"),
+        (["HERE"], "expected bags, or --format mrclam, found neither"),
         (["HERE", "--format", "mrclm"], "did you mean 'mrclam'?"),
         (["HERE", "--format", "mrclam", "--seed", "3"], "leave them out"),
         (["HERE", "--format", "mrclam", "--robot", "9"], "expected a robot from 1 to 5, found 9"),

@@ -45,8 +45,8 @@ class DriveCommands:
     Attributes
     ----------
     estimates
-        ``delay_s``, ``speed_gain``, ``speed_loss_per_rad_s``, ``turn_gain``, ``bend_rad_per_m``,
-        ``range_scale`` and ``depth_power``, by name.
+        ``delay_s``, ``speed_gain``, ``speed_loss_per_rad_s``, ``turn_gain``, ``bend_rad_per_m``, by
+        name; where landmarks were seen ``range_scale`` and ``depth_power`` too.
     windows, readings
         How many of them it rests on.
     rows
@@ -66,7 +66,7 @@ class DriveCommands:
 
     def parameters(self) -> dict[str, object]:
         """As parameters of the localizer ``ekf-gauss-markov``."""
-        return {
+        drive: dict[str, object] = {
             "commands": {
                 "delay_s": round(self["delay_s"], 3),
                 "speed_gain": round(self["speed_gain"], 4),
@@ -74,7 +74,11 @@ class DriveCommands:
                 "loss_up_to_rad_s": LOSS_UP_TO_RAD_S,
                 "turn_gain": round(self["turn_gain"], 4),
                 "bend_rad_per_m": round(self["bend_rad_per_m"], 4),
-            },
+            }
+        }
+        if "range_scale" not in self.estimates:
+            return drive
+        return drive | {
             "range_scale": round(self["range_scale"], 4),
             "depth_power": round(min(max(self["depth_power"], 0.0), 2.0), 3),
         }
@@ -92,40 +96,35 @@ def calibrate_commands(logs: Sequence[MrclamLog]) -> DriveCommands:
     rows = tuple(drive_rows(log, delay.value, number) for number, log in enumerate(logs))
     windows = np.concatenate([one.windows for one in rows])
     ratio, cosine = (np.concatenate([getattr(r, n) for r in rows]) for n in ("log_ratio", "log_cosine"))
-    if windows.shape[0] < MIN_WINDOWS or ratio.shape[0] < MIN_READINGS:
+    sees = any(len(log.landmarks.ids) for log in logs)
+    if windows.shape[0] < MIN_WINDOWS or (sees and ratio.shape[0] < MIN_READINGS):
+        seen = f" and {MIN_READINGS} readings of landmarks, found {windows.shape[0]} and {ratio.shape[0]}"
         raise InputError(
-            f"calibrate commands: expected {MIN_WINDOWS} windows of 2 s with truth and "
-            f"{MIN_READINGS} readings of landmarks, found {windows.shape[0]} and {ratio.shape[0]}"
+            f"calibrate commands: expected {MIN_WINDOWS} windows of 2 s with truth"
+            + (seen if sees else f", found {windows.shape[0]}")
         )
     claimed_v, claimed_w, lost, v, w = windows.T
     if np.ptp(claimed_v) < 1e-6 or np.ptp(claimed_w) < 1e-6:
         raise InputError("calibrate commands: expected commands that change, found the same all the time")
-    near = np.abs(ratio - np.median(ratio)) < MISREAD
     minutes = np.concatenate([one.minutes for one in rows])
-    reading_minutes = np.concatenate([one.reading_minutes for one in rows])
     speed = _fit(np.column_stack([claimed_v, -lost]), v, minutes)
     turn = _fit(np.column_stack([claimed_w, v]), w, minutes)
-    camera = _fit(
-        np.column_stack([np.ones(int(near.sum())), cosine[near]]), ratio[near], reading_minutes[near]
-    )
-    log_scale = camera[0]
-    return DriveCommands(
-        {
-            "delay_s": delay,
-            "speed_gain": speed[0],
-            "speed_loss_per_rad_s": speed[1],
-            "turn_gain": turn[0],
-            "bend_rad_per_m": turn[1],
-            "range_scale": Estimate(
-                *(float(np.exp(x)) for x in (log_scale.value, log_scale.low, log_scale.high))
-            ),
-            "depth_power": camera[1],
-        },
-        windows.shape[0],
-        int(near.sum()),
-        rows,
-        delay_cost,
-    )
+    estimates = {
+        "delay_s": delay,
+        "speed_gain": speed[0],
+        "speed_loss_per_rad_s": speed[1],
+        "turn_gain": turn[0],
+        "bend_rad_per_m": turn[1],
+    }
+    readings = 0
+    if sees:
+        near = np.abs(ratio - np.median(ratio)) < MISREAD
+        reading_minutes, readings = np.concatenate([one.reading_minutes for one in rows]), int(near.sum())
+        design = np.column_stack([np.ones(readings), cosine[near]])
+        log_scale, power = _fit(design, ratio[near], reading_minutes[near])
+        scale = (float(np.exp(x)) for x in (log_scale.value, log_scale.low, log_scale.high))
+        estimates |= {"range_scale": Estimate(*scale), "depth_power": power}
+    return DriveCommands(estimates, windows.shape[0], readings, rows, delay_cost)
 
 
 def _fit(design: FloatArray, target: FloatArray, minutes: IntArray) -> list[Estimate]:

@@ -46,7 +46,7 @@ def calibrate(
         typer.Option(metavar="x|y|z", help="heading: the axis that the robot turns about; default z."),
     ] = None,
     form: Annotated[
-        str | None, typer.Option("--format", metavar="mrclam", help="commands: format of the recordings.")
+        str | None, typer.Option("--format", metavar="mrclam|bag", help="commands: format of the recordings.")
     ] = None,
     robots: Annotated[
         list[int] | None,
@@ -62,7 +62,9 @@ def calibrate(
     ] = None,
     truth: Annotated[
         str | None,
-        typer.Option(metavar="TOPIC", help="odometry, of bags: the true poses; /tf:PARENT:CHILD too."),
+        typer.Option(
+            metavar="TOPIC", help="odometry, commands, of bags: the true poses; /tf:PARENT:CHILD too."
+        ),
     ] = None,
     report: Annotated[bool, typer.Option(help="Write report.html into the calibration's folder.")] = True,
     json: Json = False,
@@ -80,10 +82,10 @@ def calibrate(
         )
     if what != "odometry" and (sensor is not None or wheel_base is not None):
         raise InputError("calibrate: --sensor and --wheel-base are for 'calibrate odometry'")
-    if truth is not None and what != "odometry":
-        raise InputError("calibrate: --truth is for 'calibrate odometry'")
-    if topics and (what == "commands" or not logs):
-        raise InputError("calibrate: --topic is for bags with odometry, ranges or headings")
+    if truth is not None and what not in ("odometry", "commands"):
+        raise InputError("calibrate: --truth is for 'calibrate odometry' and 'calibrate commands'")
+    if topics and not logs:
+        raise InputError("calibrate: --topic is for bags")
     if axis is not None and what != "heading":
         raise InputError("calibrate: --axis is for 'calibrate heading'")
     if axis is not None and axis not in AXES:
@@ -114,7 +116,14 @@ def calibrate(
         else:
             from pilotage.experiments.calibrate_commands import commands_from
 
-            result = commands_from(places, out, robots=robots or (), leave_one_out=leave_one_out)
+            result = commands_from(
+                places,
+                out,
+                robots=robots or (),
+                leave_one_out=leave_one_out,
+                topics=topics or (),
+                truth=truth,
+            )
         answer: dict[str, Any] = dict(result.answer)
         if report:
             from pilotage.report import write_report
@@ -130,10 +139,13 @@ def calibrate(
 def _check_commands(logs: list[Path] | None, form: str | None, simulated: bool) -> None:
     if not logs:
         raise InputError("calibrate commands: expected folders of recordings with truth, found none")
-    if form is None:
-        raise InputError("calibrate commands: expected --format mrclam, found none")
-    if form != "mrclam":
-        raise unknown_name("--format", form, ("mrclam",))
+    from pilotage.logs.bag_messages import is_bag
+
+    bag = is_bag(logs[0])
+    if form is None and not bag:
+        raise InputError("calibrate commands: expected bags, or --format mrclam, found neither")
+    if form is not None and form != ("bag" if bag else "mrclam"):
+        raise unknown_name("--format", form, ("bag" if bag else "mrclam",))
     if simulated:
         raise InputError("calibrate commands: --set and --seed are for simulated runs; leave them out")
 

@@ -14,6 +14,8 @@ from pilotage.calibration.drive_summary import drive_summary
 from pilotage.core.errors import InputError
 from pilotage.core.types import FloatArray
 from pilotage.experiments.calibrate import CalibrationResult, write_calibration
+from pilotage.logs.bag_calibration import commands_of_bag
+from pilotage.logs.bag_messages import is_bag
 from pilotage.logs.mrclam import ROBOTS, MrclamLog, read_mrclam
 from pilotage.records.calibration import PARAMETER_FILE, SETS_FILE
 
@@ -21,19 +23,39 @@ LOCALIZER = "ekf-gauss-markov"
 
 
 def commands_from(
-    places: Sequence[Path], out: Path, *, robots: Sequence[int] = (), leave_one_out: bool = False
+    places: Sequence[Path],
+    out: Path,
+    *,
+    robots: Sequence[int] = (),
+    leave_one_out: bool = False,
+    topics: Sequence[str] = (),
+    truth: str | None = None,
 ) -> CalibrationResult:
-    """Calibrate from folders of MRCLAM recordings; without ``robots`` from all that are in them.
+    """Calibrate from bags, or folders of MRCLAM recordings; without ``robots`` from all that are in them.
 
     With ``leave_one_out`` a file of parameter sets is written too: one learned from all recordings, and one
     without each of them, so that none is ever run with parameters learned from itself.
     """
-    recordings = [(place, robot) for place in places for robot in _robots(place, robots)]
-    logs = [read_mrclam(place, robot) for place, robot in recordings]
+    bags = [is_bag(place) for place in places]
+    if any(bags):
+        if not all(bags) or robots:
+            other = f"--robot {robots[0]}" if robots else f"{places[bags.index(False)]} beside a bag"
+            raise InputError(f"calibrate commands: expected bags alone, found {other}")
+        recordings = [(place, 0) for place in places]
+        logs = [commands_of_bag(place, topics, truth) for place in places]
+    elif topics or truth is not None:
+        raise InputError("calibrate commands: --topic and --truth are for bags")
+    else:
+        recordings = [(place, robot) for place in places for robot in _robots(place, robots)]
+        logs = [read_mrclam(place, robot) for place, robot in recordings]
     _refuse_twice(recordings, logs)
     names = [_named(place, log) for (place, _), log in zip(recordings, logs, strict=True)]
     found = calibrate_commands(logs)
-    answer: dict[str, object] = {"calibration": "commands", "simulated": False, "format": "mrclam"}
+    answer: dict[str, object] = {
+        "calibration": "commands",
+        "simulated": False,
+        "format": "bag" if any(bags) else "mrclam",
+    }
     answer |= drive_summary(found, [(named, _alone(log)) for named, log in zip(names, logs, strict=True)])
     texts = {PARAMETER_FILE: _parameter_yaml(found, names)}
     if leave_one_out:
@@ -71,15 +93,15 @@ def _refuse_twice(recordings: Sequence[tuple[Path, int]], logs: Sequence[MrclamL
                 log.truth, other.truth
             ):
                 place, robot = recordings[i]
-                raise InputError(
-                    f"calibrate commands: expected different recordings, found {place} robot {robot} twice"
-                )
+                named = f"{place} robot {robot}" if robot else str(place)
+                raise InputError(f"calibrate commands: expected different recordings, found {named} twice")
 
 
 def _named(place: Path, log: MrclamLog) -> dict[str, object]:
     """Which recording it is; its begin tells it also from a copy under another name."""
     begin_s = max(float(log.truth_t_s[0]), float(log.odometry_t_s[0]))
-    return {"recording": place.resolve().name, "robot": log.robot, "begin_s": round(begin_s, 3)}
+    robot = {"robot": log.robot} if log.robot else {}
+    return {"recording": place.resolve().name, **robot, "begin_s": round(begin_s, 3)}
 
 
 def _alone(log: MrclamLog) -> DriveCommands | None:
@@ -95,11 +117,17 @@ def _parameter_yaml(found: DriveCommands, names: Sequence[dict[str, object]]) ->
         f"#   {name}: {e.value:.4g}, 95 %: {e.low:.4g} to {e.high:.4g}\n"
         for name, e in found.estimates.items()
     )
-    learned = ", ".join(f"{named['recording']} robot {named['robot']}" for named in names)
+    learned = ", ".join(
+        f"{named['recording']} robot {named['robot']}" if "robot" in named else str(named["recording"])
+        for named in names
+    )
+    use = (
+        "LOG --format mrclam --robot N" if "robot" in names[0] else f"BAG --localizer {LOCALIZER} --topic CMD"
+    )
     values = {"stack": {"localizer": {"name": LOCALIZER, **found.parameters()}}}
     return (
         "# Drive and camera as calibrated by 'pilotage calibrate commands'. Use it with another recording:\n"
-        "#   pilotage localize LOG --format mrclam --robot N --set @<this file>\n"
+        f"#   pilotage localize {use} --set @<this file>\n"
         f"# Learned from {learned}.\n{intervals}" + yaml.safe_dump(values, sort_keys=False)
     )
 

@@ -280,7 +280,9 @@ def calibrate(
     else:
         from pilotage.experiments.calibrate_commands import commands_from
 
-        result = commands_from(places, target, robots=robots, leave_one_out=leave_one_out)
+        result = commands_from(
+            places, target, robots=robots, leave_one_out=leave_one_out, topics=topics, truth=truth
+        )
     return Calibration(result.answer, result.folder)
 
 

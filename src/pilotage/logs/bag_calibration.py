@@ -13,6 +13,7 @@ from pilotage.logs.bag_series import (
     RANGES,
     RATES,
     TRUTH,
+    TWISTS,
     has,
     headings,
     read_poses,
@@ -23,13 +24,17 @@ from pilotage.logs.bag_topics import Kind
 from pilotage.logs.bags import ODOMETRY, SCANS, read_bag
 from pilotage.logs.heading_csv import HeadingLog, HeadingSensor
 from pilotage.logs.laser_log import interpolate_poses
+from pilotage.logs.mrclam import MrclamLog
 from pilotage.logs.odometry_steps import OdometryForm, OdometrySteps, carried_over
 from pilotage.logs.steady_csv import LEAST_ROWS, Column
+from pilotage.maps.world_map import NO_LANDMARKS
 
 STEP_S = 0.1
 """Odometry that comes more often is taken so far apart: its steps are then beyond the truth's rounding."""
 TRUTH_GAP_S = 0.5
 """A step over a longer gap of the truth says nothing."""
+COMMAND_HELD_S = 0.5
+"""A base stops when it has heard no command for so long."""
 MOST_BEAMS = 8
 LARGEST_WAY_M = 0.02
 """A robot that stands does not go farther by its odometry."""
@@ -80,6 +85,65 @@ def odometry_of_bag(path: Path, topics: Sequence[str] = (), truth: str | None = 
         known[:-1][whole],
         known[1:][whole],
         moved[whole],
+    )
+
+
+def commands_of_bag(path: Path, topics: Sequence[str] = (), truth: str | None = None) -> MrclamLog:
+    """Commanded velocities beside where the robot went: by the truth, where there is any, else the odometry.
+
+    A command holds until the next one, half a second at most, as bases take it. There are no landmarks.
+
+    Parameters
+    ----------
+    topics
+        The commands (``Twist``, ``TwistStamped``) and the odometry (``nav_msgs/Odometry``), in any order; by
+        default the usual ones.
+    truth
+        As ``odometry_of_bag`` has it.
+
+    Raises
+    ------
+    InputError
+        Where the bag has not both; the message tells what it holds.
+    """
+    told: dict[bool, str] = {}
+    for asked in topics:
+        name, msgtype = topic_of(path, asked)
+        if msgtype not in (*TWISTS.types, *ODOMETRY.types) or (msgtype in TWISTS.types) in told:
+            raise InputError(
+                f"{path}: topic {name}: expected one of commands ({TWISTS.types[-1]}) and one of odometry "
+                f"({ODOMETRY.types[0]}), found {msgtype}"
+            )
+        told[msgtype in TWISTS.types] = name
+    sent = read_series(path, TWISTS, told.get(True))
+    if truth is not None or (False not in told and has(path, TRUTH)):
+        went = read_poses(path, truth, TRUTH)
+    else:
+        went = read_poses(path, told.get(False), ODOMETRY)
+    if min(len(sent.t_s), len(went.t_s)) < LEAST_ROWS:
+        raise InputError(
+            f"{path}: expected {LEAST_ROWS} or more messages of {sent.topic} and of {went.topic}, found "
+            f"{len(sent.t_s)} and {len(went.t_s)}"
+        )
+    silent = np.flatnonzero(np.diff(sent.t_s) > COMMAND_HELD_S)
+    t_s = np.concatenate([sent.t_s, sent.t_s[silent] + COMMAND_HELD_S])
+    rates = np.concatenate([sent.values[:, :2], np.zeros((len(silent), 2))])
+    order = np.argsort(t_s, kind="stable")
+    wide = np.flatnonzero(np.diff(went.t_s) > TRUTH_GAP_S)
+    none = np.zeros(0)
+    return MrclamLog(
+        0,
+        t_s[order],
+        rates[order, 0],
+        rates[order, 1],
+        none,
+        none.astype(np.int64),
+        none,
+        none,
+        went.t_s,
+        headings(went.values),
+        np.column_stack([went.t_s[wide], went.t_s[wide + 1]]),
+        NO_LANDMARKS,
     )
 
 

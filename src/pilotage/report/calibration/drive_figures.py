@@ -31,7 +31,8 @@ _LABELS = {
 
 def drive_figures(data: CalibrationData) -> list[Illustration]:
     """Draw the drive, the camera, and each recording alone beside all together."""
-    return [_drive(data), _camera(data), *_recordings(data)]
+    camera = [_camera(data)] if "range_scale" in data.answer else []
+    return [_drive(data), *camera, *_recordings(data)]
 
 
 def _drive(data: CalibrationData) -> Illustration:
@@ -103,9 +104,10 @@ def _recordings(data: CalibrationData) -> list[Illustration]:
     logs = [log for log in data.answer["logs"] if log.get("alone")]
     if len(logs) < 2:
         return []
+    rest = tuple(name for name in _REST if name in data.answer)
     return [
         _alone(data, logs, "drive-by-recording", "The drive by recording", _DRIVE),
-        _alone(data, logs, "rest-by-recording", "Bend and camera by recording", _REST),
+        _alone(data, logs, "rest-by-recording", "Bend and camera by recording", rest),
     ]
 
 
@@ -115,7 +117,9 @@ def _alone(
     alt = (
         f"{', '.join(_LABELS[name] for name in names)} of each recording alone with its interval, and of all"
     )
-    figure, panels = panels_in_a_row([_LABELS[n] for n in names], ["robot"] * len(names), 150.0)
+    figure, panels = panels_in_a_row(
+        [_LABELS[n] for n in names], ["robot" if "robot" in logs[0] else "recording"] * len(names), 150.0
+    )
     at = np.arange(1.0, len(logs) + 1.0)
     for axes, name in zip(panels, names, strict=True):
         pooled = data.answer[name]
@@ -133,7 +137,7 @@ def _alone(
             capsize=3.0,
         )
         axes.set_xlim(0.5, len(logs) + 0.5)
-        axes.set_xticks(at, [str(log["robot"]) for log in logs])
+        axes.set_xticks(at, [str(log.get("robot", k)) for k, log in enumerate(logs, start=1)])
         axes.locator_params(axis="y", nbins=6)
     caption = (
         "Dots: fitted to one recording alone, with its 95 % interval over minutes. Line and band: all "
