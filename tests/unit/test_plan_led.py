@@ -78,6 +78,15 @@ def test_where_the_way_is_shut_by_what_it_finds_it_gives_up_and_says_so() -> Non
     assert metrics["collisions"] == 0
 
 
+def test_a_tight_passage_is_taken_where_a_wide_one_is_far() -> None:
+    """What it finds leaves 0.85 m of the way ahead: too little for its clearance, enough for its body."""
+    two = {**ROOMS, "walls_m": [*WALLS[:4], [4, 1.6, 4, 4.4]]}
+    box = {"kind": "box", "from_m": [4.0, 1.6], "to_m": [4.0, 0.85], "thickness_m": 0.2}
+    metrics = driven(mission((box,), **{"world.map": two}))
+    assert metrics["success"], metrics["reason"]
+    assert metrics["driven_over_least"] < 1.10
+
+
 def test_the_museum_is_driven_past_a_trap_near_the_least() -> None:
     metrics = driven(load_mission("museum-concave-fast", [], 0))
     assert metrics["success"], metrics["reason"]

@@ -76,19 +76,21 @@ class GlobalPlan:
         goal: Goal,
         mapped_m: FloatArray,
         clearances_m: Sequence[float],
+        detour_m: float = math.inf,
     ) -> PlanResult:
         """Plan on the map with what was found on it, at the first clearance that gives a path; adopt it.
 
+        One of the later clearances is taken where it saves more than ``detour_m``; none is tried for inf.
         Returns the last result; its path is None where no clearance gave one.
         """
         begin = time.perf_counter()
         field = with_circles(self._chart.field, mapped_m)
-        result = self._try(t_s, start, goal, field, clearances_m, begin)
+        result = self._try(t_s, start, goal, field, clearances_m, begin, detour_m)
         self.turns_first = False
         if result.status is PlanStatus.NO_PATH and result.iterations and self._can_turn_first:
             for heading_rad in _free_headings(field, start, clearances_m[-1]):
                 turned = Pose2(start.x_m, start.y_m, heading_rad)
-                other = self._try(t_s, turned, goal, field, clearances_m, begin)
+                other = self._try(t_s, turned, goal, field, clearances_m, begin, detour_m)
                 if other.path is not None:
                     result, self.turns_first = other, True
                     break
@@ -103,9 +105,10 @@ class GlobalPlan:
         field: DistanceField,
         clearances_m: Sequence[float],
         begin: float,
+        detour_m: float,
     ) -> PlanResult:
-        """Plan at the first clearance that gives a path."""
-        result: PlanResult | None = None
+        """Plan at the first clearance that gives a path, or at one that saves a detour."""
+        found: tuple[PlanResult, Path, float] | None = None
         for clearance_m in clearances_m:
             request = PlanRequest(start, goal, field, self._rng, clearance_m, *self._shape())
             result = self._planner.plan(request)
@@ -113,10 +116,14 @@ class GlobalPlan:
                 path = result.path
                 if self._smoother is not None:
                     path = self._smoother.smooth(path, request, clearance_m)
-                self._adopt(t_s, path, result, clearance_m, time.perf_counter() - begin, field.circles_m)
-                break
-        assert result is not None
-        return result
+                if found is None or path.length_m < found[1].length_m - detour_m:
+                    found = result, path, clearance_m
+                if detour_m == math.inf:
+                    break
+        if found is None:
+            return result
+        self._adopt(t_s, found[1], found[0], found[2], time.perf_counter() - begin, field.circles_m)
+        return found[0]
 
     def _shape(self) -> tuple[Footprint | None, float]:
         """Outline and tightest arc, where the robot is known."""

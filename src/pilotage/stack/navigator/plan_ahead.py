@@ -37,8 +37,10 @@ class PlanAheadConfig(Config):
     """Anything newly mapped nearer to the plan ahead than the body's radius plus this makes a new one."""
     every_s: NonNegative = 0.5
     """No two new plans are made in less time."""
-    fallback_margins_m: tuple[Positive, ...] = (0.10, 0.06, 0.02)
+    fallback_margins_m: tuple[NonNegative, ...] = (0.10, 0.06, 0.02, 0.0)
     """Where there is no plan at the planner's clearance: the body's radius plus these."""
+    detour_m: NonNegative = 1.0
+    """Nor does it go a longer way around for the sake of a greater clearance."""
     stall_s: Positive = 10.0
     stall_progress_m: Positive = 0.5
     most_stalls: int = Field(default=6, ge=0)
@@ -117,7 +119,8 @@ class PlanAhead:
         asked = [own, *(self._radius_m + m for m in self._config.fallback_margins_m)]
         found = self._own_map.found_circles_m
         first = self._plan.progress is None
-        result = self._plan.make(t_s, pose, self._goal, found, [c for c in asked if c <= own])
+        clearances_m = [c for c in asked if c <= own]
+        result = self._plan.make(t_s, pose, self._goal, found, clearances_m, self._config.detour_m)
         self._planned_s, self._known = t_s, found
         if not first:
             self._journal.count("replans")
