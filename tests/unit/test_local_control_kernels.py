@@ -282,17 +282,22 @@ def test_a_walker_is_tracked_and_foretold() -> None:
     rng = np.random.default_rng(2)
     for k in range(60):
         place = np.array([[0.05 * 1.2 * k, 1.0], [3.0, -2.0]]) + rng.normal(0.0, 0.03, (2, 2))
-        tracks, of_centre = track_step(tracks, place, 0.05, 0.08, 0.8, 4.0, 8)
+        tracks, of_centre = track_step(tracks, place, 0.05, 0.08, 0.8, 0.4, 4.0, 8)
         assert of_centre.shape == (2,)
     assert tracks.shape[0] == 2
     walker = tracks[int(np.argmax(np.abs(tracks[:, VX])))]
     assert walker[VX] == pytest.approx(1.2, abs=0.25)
     assert abs(walker[VY]) < 0.25
-    discs = foretold(tracks, 0.0, 0.5, 3, 0.25, 1.0, 0.8)
+    discs = foretold(tracks, 0.0, 0.5, 3, 0.25, 1.0, 0.8, 0.4)
     i = int(np.argmax(np.abs(tracks[:, VX])))
     assert discs[2, i, 0] == pytest.approx(walker[X] + walker[VX])
     assert discs[2, i, 1] == pytest.approx(walker[Y] + walker[VY])
     assert np.all(np.diff(discs[:, :, 2], axis=0) > 0.0)
+    # A runner with the same readings may turn and brake by more.
+    runner = walker.copy()
+    runner[VX] *= 4.0
+    both = foretold(np.array([walker, runner]), 1.0, 0.5, 1, 0.25, 1.0, 0.8, 0.4)[0, :, 2]
+    assert both[1] > both[0] + 0.3
 
 
 def test_clusters_end_at_gaps_and_wide_ones_are_none() -> None:
@@ -344,5 +349,7 @@ def test_who_drives_away_from_somebody_who_comes_closes_no_gap() -> None:
     assert not closes((0.05, 0.0, 0.0), -0.5, 0.0)  # from behind, even where he overlaps
     assert not closes((0.0, 0.0, 0.0), 0.5, 0.0)  # it stands
     assert closes((0.0, 0.0, 0.3), -0.6, 0.0)  # a corner swings towards him
+    assert closes((0.001, 0.0, 0.1), 0.0, 0.5)  # turning on the spot, all around it
+    assert not closes((0.1, 0.0, 0.1), -0.5, 0.0)  # a bend away from him
     both = np.array([[0.58, 0.0, 0.25], [-0.5, 0.0, 0.25]])
     assert closes_in((0.0, 0.0, 0.0), (0.05, 0.0, 0.0), body.polygon, body.outer_m, both, 0.05)

@@ -13,6 +13,8 @@ from pilotage.core.errors import InputError
 from pilotage.core.types import Pose2, Twist
 from pilotage.experiments.mission import mission_of, read_mission
 from pilotage.experiments.run import run_mission
+from pilotage.kernels.bodies.drive import STATE_SIZE
+from pilotage.kernels.people.encounters import APART, WALKED_INTO, solid_people
 from pilotage.maps.world_map import WorldMap
 from pilotage.records.people import PEOPLE_FILE, read_people_tracks
 from pilotage.records.run_data import read_run
@@ -89,6 +91,17 @@ def test_who_overtakes_a_robot_through_it_is_not_hit_by_it() -> None:
         sim.step([Twist(0.2, 0.0)])
     assert (met(sim).collisions, met(sim).touches, sim.bodies[0].collisions) == (0, 1, 0)
     assert sim.bodies[0].driven_m > 1.0
+
+
+def test_who_leaves_a_robot_is_not_in_its_way() -> None:
+    """Also in the step that takes a runner out of it: he is just ahead then, and would stop it."""
+    state = np.zeros((1, STATE_SIZE))
+    corners, first = np.asarray(CAR.points_m), np.array([0, len(CAR.points_m)])
+    ahead = np.array([[float(corners[:, 0].max()) + 0.3, 0.0]])
+    for between, passes in ((WALKED_INTO, True), (APART, False)):
+        radii, radius = np.array([CAR.radius_m]), np.array([0.25])
+        found = solid_people(state, corners, first, radii, ahead, radius, np.array([[between]]))
+        assert np.isnan(found).all() == passes
 
 
 def test_a_robot_that_backs_into_somebody_who_comes_is_to_blame() -> None:

@@ -8,6 +8,7 @@ import numpy as np
 
 from pilotage.kernels.arrays import FloatArray, IntArray
 from pilotage.kernels.control.footprint import polygon_distance
+from pilotage.kernels.geometry.motion import wrap
 from pilotage.kernels.jit import kernel
 
 # Columns of a track: place, velocity, variances (of place, place and velocity, velocity; alike in x and y),
@@ -102,26 +103,38 @@ def _notch(points: FloatArray, begin: int, end: int) -> int:
 
 
 @kernel
+def _acceleration_var(track: FloatArray, acceleration_std: float, turning_std: float) -> float:
+    """Variance of a body's acceleration: who is fast turns and brakes by more, in rad/s times the speed."""
+    vx, vy = track[VX], track[VY]
+    variance: float = max(
+        acceleration_std * acceleration_std, turning_std * turning_std * (vx * vx + vy * vy)
+    )
+    return variance
+
+
+@kernel
 def track_step(
     tracks: FloatArray,
     centres: FloatArray,
     dt: float,
     place_std: float,
     acceleration_std: float,
+    turning_std: float,
     gate: float,
     most_missed: int,
 ) -> tuple[FloatArray, IntArray]:
     """One step of all tracks (M, 11): predict, take the nearest centre (C, 2), begin and end tracks.
 
-    Constant velocity with white acceleration noise; nearest neighbour within the gate, the nearest pair first
-    (wrong where two bodies meet). Returns the tracks (M', 11) and the track of each centre (C,).
+    Constant velocity with white acceleration noise (``_acceleration_var``); nearest neighbour within the
+    gate, the nearest pair first (wrong where two bodies meet). Returns the tracks (M', 11) and the track of
+    each centre (C,).
     """
     m, c = tracks.shape[0], centres.shape[0]
     out = np.empty((m + c, COLUMNS))
-    q = acceleration_std * acceleration_std
     r = place_std * place_std
     moved = tracks.copy()
     for i in range(m):
+        q = _acceleration_var(tracks[i], acceleration_std, turning_std)
         moved[i, X] += dt * moved[i, VX]
         moved[i, Y] += dt * moved[i, VY]
         moved[i, PP] += 2.0 * dt * moved[i, PV] + dt * dt * moved[i, VV] + q * dt**4 / 4.0
@@ -188,6 +201,7 @@ def foretold(
     radius: float,
     deviations: float,
     acceleration_std: float,
+    turning_std: float,
 ) -> FloatArray:
     """Discs (steps, M, 3) x, y, radius where tracks (M, 11) will be at ``first``, ``first`` + dt, ...
 
@@ -195,10 +209,10 @@ def foretold(
     """
     m = tracks.shape[0]
     out = np.empty((steps, m, 3))
-    q = acceleration_std * acceleration_std
-    for k in range(steps):
-        t = first + k * dt
-        for i in range(m):
+    for i in range(m):
+        q = _acceleration_var(tracks[i], acceleration_std, turning_std)
+        for k in range(steps):
+            t = first + k * dt
             out[k, i, 0] = tracks[i, X] + t * tracks[i, VX]
             out[k, i, 1] = tracks[i, Y] + t * tracks[i, VY]
             variance = tracks[i, PP] + 2.0 * t * tracks[i, PV] + t * t * tracks[i, VV] + q * t**4 / 4.0
@@ -233,18 +247,22 @@ def closes_in(
     """Whether a footprint's own motion brings it nearer to one of the discs (M, 3) that is within ``keep``.
 
     The discs stand while it moves, from pose to pose: who drives away from somebody who comes closes no gap.
+    Who turns on the spot swings corners to all sides, and counts as the disc of radius ``outer``.
     """
     x, y, theta = after
+    x0, y0, theta0 = before
+    spins = abs(wrap(theta - theta0)) * outer > math.hypot(x - x0, y - y0)
     c, s = math.cos(theta), math.sin(theta)
     for i in range(movers.shape[0]):
         dx, dy = movers[i, 0] - x, movers[i, 1] - y
         reach = movers[i, 2] + keep
         if math.sqrt(dx * dx + dy * dy) - outer >= reach:
             continue
+        if spins:
+            return True
         away = polygon_distance(c * dx + s * dy, c * dy - s * dx, polygon)
         if away >= reach:
             continue
-        x0, y0, theta0 = before
         c0, s0 = math.cos(theta0), math.sin(theta0)
         dx, dy = movers[i, 0] - x0, movers[i, 1] - y0
         if away < polygon_distance(c0 * dx + s0 * dy, c0 * dy - s0 * dx, polygon) - CLOSES_M:

@@ -57,6 +57,10 @@ def solid_people(
     for p in range(people.shape[0]):
         disc[0, 0], disc[0, 1], disc[0, 2] = people[p, 0], people[p, 1], radius[p]
         for r in range(states.shape[0]):
+            if between[r, p] == WALKED_INTO:
+                # Until they are apart, also in the step in which this one leaves.
+                out[p, 0] = out[p, 1] = math.nan
+                continue
             x, y, theta = states[r, X], states[r, Y], states[r, THETA]
             away = math.hypot(people[p, 0] - x, people[p, 1] - y) - radii[r] - radius[p]
             if not away < 0.0:
@@ -64,7 +68,7 @@ def solid_people(
             shape = corners[first[r] : first[r + 1]]
             c, s = math.cos(theta), math.sin(theta)
             inside = outline_clearance(x, y, c, s, shape, radii[r], no_sides, disc) < 0.0
-            if between[r, p] == WALKED_INTO or (inside and between[r, p] == APART):
+            if inside and between[r, p] == APART:
                 out[p, 0] = out[p, 1] = math.nan
     return out
 

@@ -74,14 +74,19 @@ class GapHorizonConfig(Config):
     comfort_m: Positive = 0.5
     calm_m: NonNegative = 2.5
     calm_m_s: Positive = 1.4
-    """With a moving body so near it drives no faster: behind one there may be another, whom nobody sees."""
+    calm_rad_s: Positive = 2.0
+    """With a moving body so near it drives and turns no faster: behind one there may be another, whom nobody
+    sees, and corners that swing do not stop at once."""
     stuck_s: Positive = 2.0
     stuck_m: Positive = 0.15
     """Where it came no farther than this in that time, it tries the narrowest place ahead straight; where it
     has tried that, it closes the place and looks elsewhere."""
     close_ahead_m: Positive = 1.2
     stand_m: NonNegative = 0.1
-    """A robot at rest does not start with a moving body nearer than this."""
+    """A robot that does not drive does not start, nor turn, with a moving body nearer than this."""
+    unsure_m: NonNegative = 1.0
+    unsure_s: NonNegative = 0.5
+    """Nor, for so long, with one nearer than this of which it cannot tell yet where it goes."""
     check_step_s: Positive = 0.05
 
 
@@ -118,7 +123,7 @@ class GapHorizon:
         self._status = "waiting"
         self.scene: Scene | None = None
         self._passage: NarrowPassage | None = None
-        self._moved_s = 0.0
+        self._moved_s = self._drove_s = 0.0
         self._tried: list[tuple[float, float]] = []
         self._since: tuple[float, float, float] | None = None
 
@@ -137,9 +142,12 @@ class GapHorizon:
     def _decide(self, view: LocalView, scene: Scene) -> Twist:
         config = self._config
         if self._people_are_near(scene):
-            calm = scene.drive._replace(speed=min(scene.drive.speed, config.calm_m_s))
+            calm = scene.drive._replace(
+                speed=min(scene.drive.speed, config.calm_m_s),
+                turn_rate=min(scene.drive.turn_rate, config.calm_rad_s),
+            )
             scene = replace(scene, drive=calm)
-        if self._must_stand(scene):
+        if self._must_stand(scene, view.t_s):
             self._plan = None
             return STOP
         if self._passage is not None:
@@ -259,16 +267,21 @@ class GapHorizon:
     def _people_are_near(self, scene: Scene) -> bool:
         return scene.movers.nearest_m(float(scene.pose[0]), float(scene.pose[1])) < self._config.calm_m
 
-    def _must_stand(self, scene: Scene) -> bool:
-        """Whether a robot at rest has somebody so near that it had better not start."""
-        if abs(scene.start[3]) > 0.05 or abs(scene.start[4]) > 0.1:
+    def _must_stand(self, scene: Scene, t_s: float) -> bool:
+        """Whether a robot that does not drive has somebody so near that it had better not start."""
+        config, body = self._config, scene.body
+        if abs(scene.start[3]) > 0.05:
+            self._drove_s = t_s
             return False
         now = scene.movers.foretold(0.0, scene.dt_s, 1)[0]
         if not now.shape[0]:
             return False
         x, y, theta = scene.pose
-        body = scene.body
-        keep = self._config.stand_m
+        if t_s - self._drove_s < config.unsure_s:
+            unsure = np.hypot(now[:, 0] - x, now[:, 1] - y) - now[:, 2] - body.outer_m < config.unsure_m
+            if (unsure & scene.movers.unsure()).any():
+                return True
+        keep = config.stand_m
         near: float = movers_clearance(x, y, theta, body.polygon, body.outer_m, now, keep)
         return near < keep
 

@@ -23,6 +23,8 @@ class MoversConfig(Config):
     least_points: int = Field(default=3, ge=2, le=100)
     place_std_m: Positive = 0.08
     acceleration_std_m_s2: Positive = 0.8
+    turning_std_rad_s: NonNegative = 0.4
+    """Times its speed is the acceleration of a body that is faster than walkers are."""
     gate_std: Positive = 4.0
     most_missed: int = Field(default=8, ge=0, le=1000)
     readings: int = Field(default=4, ge=2, le=1000)
@@ -34,6 +36,8 @@ class MoversConfig(Config):
     """The disc grows by so many standard deviations of the foretold place, where a command is checked."""
     plan_deviations: NonNegative = 0.3
     """The same where plans are priced: by all that a body may do no plan would get past it."""
+    unsure_std_m_s: Positive = 0.4
+    """Whose velocity is told no better than this may yet go anywhere."""
     lost_std_m: Positive = 1.0
     """Behind the robot, where its laser does not look, a track goes on unseen until its place is so vague."""
 
@@ -77,6 +81,7 @@ class Movers:
             dt_s,
             config.place_std_m,
             config.acceleration_std_m_s2,
+            config.turning_std_rad_s,
             config.gate_std,
             config.most_missed,
         )
@@ -127,8 +132,14 @@ class Movers:
             config.radius_m,
             config.deviations if sure else config.plan_deviations,
             config.acceleration_std_m_s2,
+            config.turning_std_rad_s,
         )
         return discs
+
+    def unsure(self) -> BoolArray:
+        """Of which of all tracks it cannot be told yet where they go."""
+        unsure: BoolArray = self.tracks[:, kernels.VV] > self._config.unsure_std_m_s**2
+        return unsure
 
     def nearest_m(self, x_m: float, y_m: float) -> float:
         """Distance from a point to the nearest body's edge; inf without any."""

@@ -23,7 +23,8 @@ from pilotage.stack.control.local.movers import Movers, MoversConfig
 from pilotage.stack.control.local.role import LocalLimits, LocalView
 
 INSIDE_M = 0.05
-"""A point so deep inside the footprint is a mistake or was a body that walked through."""
+"""A point so deep inside the footprint is a mistake. Where people walk any inside is somebody who brushed
+past: behind the robot, where its laser does not look, it would shut the robot in for ever."""
 BLIND_SHARE = 0.5
 """With more than this share of its ranges 0 the laser is covered."""
 MANY_SHARE = 0.125
@@ -200,7 +201,7 @@ class RollingGround:
             config.reach_m,
             still,
             body.polygon,
-            INSIDE_M,
+            0.0 if config.movers.enabled else INSIDE_M,
             config.fade_hits,
             *self._corner_m,
             self._cell_m,
@@ -373,6 +374,9 @@ class RollingGround:
             drive.speed,
             config.unseen_share,
         )
+        # The robot is where it is: what was seen there, as somebody who brushed past, shall not shut it in.
+        row, column = (int((self._pose[1] - y0) / self._coarse_m), int((self._pose[0] - x0) / self._coarse_m))
+        speed[row, column] = max(speed[row, column], min(config.crawl_m_s, drive.speed))
         field: FloatArray = togo.time_to_go(
             speed,
             x0,
