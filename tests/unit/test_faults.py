@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from pilotage.core.chi_square import chi_square_quantile, gated_mean
 from pilotage.core.errors import InputError
 from pilotage.core.types import STOP
 from pilotage.experiments.build.build import build
@@ -21,7 +22,7 @@ from pilotage.stack.interface import Belief, BeliefStatus
 from pilotage.stack.localization.ekf_landmarks import EkfLandmarkLocalizer
 from pilotage.stack.localization.landmark_filter import LandmarkFilterConfig
 from pilotage.stack.localization.odometry_watch import OdometryWatch
-from pilotage.stack.localization.self_check import HOLD_S, ExplainedShare, SelfCheck
+from pilotage.stack.localization.self_check import HOLD_S, NOISE_SHARE, ExplainedShare, SelfCheck
 from support.robots import BEACONS, told_of
 
 STEPS = 2000
@@ -176,6 +177,34 @@ class TestWatching:
             check.tell(0.1 * k, 4, 4, 2.0 * float(rng.chisquare(8)), 8.0)
         assert check.lost(503.0)
 
+    @pytest.mark.parametrize("noise", [2.5, 10.0])
+    def test_who_is_only_wrong_about_its_noise_is_believed_after_some_windows(self, noise: float) -> None:
+        """White readings of more noise than believed, gated at 0.999; worse ones are noticed as ever."""
+        rng, gate = np.random.default_rng(4), chi_square_quantile(0.999, 2)
+        check = SelfCheck(0.999, noise_share=NOISE_SHARE)
+
+        def tell(t_s: float, factor: float) -> None:
+            nis = factor * rng.chisquare(2, 4)
+            used = nis <= gate
+            check.tell(t_s, 4, int(used.sum()), float(nis[used].sum()), used.sum() * gated_mean(gate, 2))
+
+        for k in range(1000):
+            tell(0.1 * k, noise)
+            assert check.lost(0.1 * k) or not 5.0 <= 0.1 * k <= 10.0
+            assert not check.lost(0.1 * k) or 0.1 * k < 30.0
+        for k in range(1000, 1030):
+            tell(0.1 * k, 5.0 * noise)
+        assert check.lost(103.0)
+
+    @pytest.mark.parametrize("shares", [(0.6, 0.6), (0.9, 0.2)], ids=["refuses too much", "is not the same"])
+    def test_what_no_noise_explains_is_never_its_own(self, shares: tuple[float, float]) -> None:
+        """A NIS of twice the expected belongs to a gate that lets 93 % through, at any time."""
+        check = SelfCheck(0.999, noise_share=NOISE_SHARE)
+        for k in range(1500):
+            used = round(20 * shares[k // 30 % 2])
+            check.tell(0.1 * k, 20, used, 2.0 * used * 1.98, used * 1.98)
+            assert check.lost(0.1 * k) or k < 30
+
     def test_a_place_that_only_looks_alike_explains_less_than_usual(self) -> None:
         rng, explained = np.random.default_rng(3), ExplainedShare()
 
@@ -215,6 +244,16 @@ def test_bad_readings_make_no_filter_silently_wrong(
     assert silently_wrong_s() <= 5.0
     monkeypatch.setattr(SelfCheck, "lost", lambda *_: False)
     assert silently_wrong_s() > 5.0
+
+
+@pytest.mark.parametrize("localizer", ["ekf-landmarks", "ekf-walls"])
+def test_a_robot_whose_sensor_is_three_times_noisier_than_its_sheet_says_arrives(localizer: str) -> None:
+    """In variance; it doubts itself at first, and does not look around for ever."""
+    settings = [f"stack.localizer={{name: {localizer}, measurement_var_scale: 0.3}}", "run.time_limit_s=120"]
+    experiment = build(load_mission("museum-route", settings, seed=5))
+    metrics = judge(experiment, run_loop(experiment)).metrics
+    assert metrics["success"], metrics["reason"]
+    assert float(str(metrics["position_rmse_m"])) < 0.02
 
 
 def test_a_filter_that_knows_no_heading_says_so_until_beacons_agree() -> None:

@@ -30,7 +30,7 @@ from pilotage.stack.localization.localizer import LOCALIZERS, require_initial_po
 from pilotage.stack.localization.odometry_prediction import OdometryPrediction
 from pilotage.stack.localization.odometry_watch import MOST_HEADING_VAR, OdometryWatch
 from pilotage.stack.localization.recent_sightings import RecentSightings
-from pilotage.stack.localization.self_check import SelfCheck
+from pilotage.stack.localization.self_check import NOISE_SHARE, SelfCheck
 
 NAME = "ekf-gauss-markov"
 
@@ -147,7 +147,10 @@ class EkfGaussMarkovLocalizer:
         top = robot.motion.top_speed_m_s, robot.motion.top_turn_rate_rad_s
         unlogged = config.unlogged_speed_m_s, config.unlogged_turn_rate_rad_s
         self._unlogged = tuple(most if own is None else own for own, most in zip(unlogged, top, strict=True))
-        self._watch, self._check = OdometryWatch(robot, odometry), SelfCheck(config.gate)
+        self._watch, self._check = (
+            OdometryWatch(robot, odometry),
+            SelfCheck(config.gate, noise_share=NOISE_SHARE),
+        )
         self.belief = initial
         self._telemetry = journal.channel(COLUMNS)
 

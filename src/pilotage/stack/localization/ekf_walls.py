@@ -44,6 +44,8 @@ robot knows where it is, and how many poses it may have."""
 
 MOST_REFUSED = 0.25
 """Share of the lines beside walls; those of a right belief are refused in one of a thousand cases."""
+LEAST_BY_NOISE = 0.5
+"""Of the lines that its noise lets through: all of a scan are refused that do not agree."""
 
 
 class EkfWallsConfig(Config):
@@ -121,7 +123,7 @@ class EkfWallsLocalizer:
         self._expected_nis = [0.0, *(gated_mean(gates[k], LINE_DOF * k) for k in range(1, len(gates)))]
         self._watch, self._check, self._t_s = (
             OdometryWatch(robot, odometry),
-            SelfCheck(config.gate, MOST_REFUSED),
+            SelfCheck(config.gate, MOST_REFUSED, noise_share=LEAST_BY_NOISE),
             0.0,
         )
         self._pose = initial.pose.as_array()

@@ -31,7 +31,7 @@ from pilotage.stack.localization.odometry_watch import (
     add_variances,
     increment_of,
 )
-from pilotage.stack.localization.self_check import SelfCheck
+from pilotage.stack.localization.self_check import NOISE_SHARE, SelfCheck
 
 NAME = "invariant-ekf-landmarks"
 NOTHING = np.zeros(0, dtype=np.int64), np.zeros(0), np.zeros(0)
@@ -89,7 +89,10 @@ class InvariantEkfLocalizer:
         self._mean: FloatArray = np.empty(3)
         self._spread: FloatArray = np.empty((3, 3))
         self._refused = np.zeros(1, dtype=np.int64)
-        self._watch, self._check = OdometryWatch(robot, odometry), SelfCheck(config.gate)
+        self._watch, self._check = (
+            OdometryWatch(robot, odometry),
+            SelfCheck(config.gate, noise_share=NOISE_SHARE),
+        )
         self.belief = initial
         self._channel = journal.channel(SIGHTING_COLUMNS)
 

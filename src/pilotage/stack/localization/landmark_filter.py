@@ -31,7 +31,7 @@ from pilotage.stack.localization.odometry_watch import (
     OdometryWatch,
     increment_of,
 )
-from pilotage.stack.localization.self_check import SelfCheck
+from pilotage.stack.localization.self_check import NOISE_SHARE, SelfCheck
 
 MEASUREMENT_DOF = 2
 """Range and bearing."""
@@ -119,7 +119,11 @@ class LandmarkFilter:
         self._gate = chi_square_quantile(config.gate, MEASUREMENT_DOF)
         self._expected_nis = gated_mean(self._gate, MEASUREMENT_DOF)
         self._doubt_after, self._rejected = config.doubt_after, 0
-        self._watch, self._check, self._t_s = OdometryWatch(robot, odometry), SelfCheck(config.gate), 0.0
+        self._watch, self._check, self._t_s = (
+            OdometryWatch(robot, odometry),
+            SelfCheck(config.gate, noise_share=NOISE_SHARE),
+            0.0,
+        )
         self._pose = initial.pose.as_array()
         self._cov = initial.cov.copy()
         self.belief = initial

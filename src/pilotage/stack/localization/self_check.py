@@ -5,14 +5,26 @@ from __future__ import annotations
 import math
 from collections import deque
 
+import numpy as np
+
+from pilotage.core.chi_square import chi_square_quantile, gated_mean
+from pilotage.core.types import FloatArray
+
 WINDOW = 30
 """Updates that are looked back at."""
 LEAST_SEEN = 10
 """Readings, fewer of which say nothing."""
-REFUSED_SHARE = 0.5
-"""Who refuses more than this of what its gate should let through is wrong as likely as its readings are."""
+REFUSED_SHARE, NOISE_SHARE = 0.5, 0.75
+"""Who refuses more than this of what its gate should let through is wrong as likely as its readings are; of
+what its noise would let through, had it more of that than it believes, at least so much must pass."""
 NIS_EXCESS, NIS_SIGMAS = 0.5, 6.0
-"""NIS of the accepted over what is expected, less 1: a model is never exact, and chance has its share."""
+"""NIS of the accepted over what is usual, less 1: a model is never exact, and chance has its share."""
+WINDOWS, MOST_WINDOWS = 5, 20
+"""Windows that must be alike to be its own, and until when it looks for such."""
+MOST_DISPERSION = 3.0
+"""Variance of the windows' shares over that of independent readings; lines of one scan are not quite."""
+MOST_NOISE = 15.0
+"""By how much more than it believes the variances may be."""
 HOLD_S, MOST_HOLD_S = 3.0, 60.0
 """How long all has to be well before it is believed again; doubled each time that it was not for long."""
 SOON_S = 30.0
@@ -26,14 +38,21 @@ class SelfCheck:
     """Watches a filter's own readings and says when it is not to be believed.
 
     The NIS stays in its band as long as model, readings and belief agree (Bar-Shalom et al. 2001, section
-    5.4.2). It cannot see what no reading contradicts: an error that all landmarks in sight share is taken
-    for motion until others come into sight. Who had to begin anew is therefore believed later each time.
+    5.4.2). Where it lies is learned in the first updates: a filter that is only wrong about its noise knows
+    its place nevertheless. It cannot see what no reading contradicts: an error that all landmarks in sight
+    share is taken for motion until others come into sight. Who had to begin anew is therefore believed later
+    each time.
     """
 
-    def __init__(self, gate: float = 1.0, refused_share: float = REFUSED_SHARE) -> None:
+    def __init__(
+        self, gate: float = 1.0, refused_share: float = REFUSED_SHARE, *, noise_share: float | None = None
+    ) -> None:
+        self._gate, self._noise_share = gate, noise_share
         self._used_share = (1.0 - refused_share) * gate
         self._updates: deque[tuple[float, ...]] = deque()
         self._sums = [0.0, 0.0, 0.0, 0.0]
+        self._windows: list[tuple[float, ...]] | None = None if noise_share is None else []
+        self._count, self._own_share, self._own_nis = 0, 1.0, 1.0
         self._hold_s, self._until_s = HOLD_S, -math.inf
 
     def tell(self, t_s: float, seen: int, accepted: int, nis: float, expected: float) -> None:
@@ -48,10 +67,31 @@ class SelfCheck:
         all_seen, used, total, mean = self._sums
         if all_seen < LEAST_SEEN:
             return
+        share, ratio = used / all_seen, total / mean if mean > 0.0 else 1.0
         # Chi-square values add up to one of as many degrees of freedom as their mean, of twice the variance.
         excess = max(NIS_EXCESS, NIS_SIGMAS * math.sqrt(2.0 / max(mean, 1.0)))
-        if used < self._used_share * all_seen or total > (1.0 + excess) * mean:
+        if share < self._used_share * self._own_share or ratio > (1.0 + excess) * self._own_nis:
             self.alarm(t_s)
+        self._count += 1
+        if self._windows is not None and self._count % WINDOW == 0:
+            self._windows.append((all_seen, used, total, mean))
+            self._learn(np.array(self._windows[-WINDOWS:]))
+
+    def _learn(self, windows: FloatArray) -> None:
+        """Take the last windows for the filter's own if they are alike; give up after some time."""
+        if len(windows) == WINDOWS:
+            seen, used = windows[:, 0], windows[:, 1]
+            share, nis = float(used.sum() / seen.sum()), float(windows[:, 2].sum() / windows[:, 3].sum())
+            chance = share * max(1.0 - share, 1.0 / float(seen.sum()))
+            dispersion = float((seen * (used / seen - share) ** 2).sum() / (chance * (WINDOWS - 1)))
+            explained = _share_by_noise(nis, self._gate)
+            assert self._noise_share is not None
+            if dispersion <= MOST_DISPERSION and share >= self._noise_share * explained:
+                self._windows = None
+                if nis > 1.0 + NIS_EXCESS:
+                    self._own_share, self._own_nis = share, nis
+        if self._count >= MOST_WINDOWS * WINDOW:
+            self._windows = None
 
     def alarm(self, t_s: float) -> None:
         """The filter is wrong, or has had to give up its pose or its certainty."""
@@ -63,6 +103,21 @@ class SelfCheck:
     def lost(self, t_s: float) -> bool:
         """Whether the filter is not to be believed now."""
         return t_s < self._until_s
+
+
+def _share_by_noise(nis: float, gate: float) -> float:
+    """What a gate of that probability lets through of readings whose noise, times a factor, brings this NIS.
+
+    NIS is over what is expected of the accepted; readings have two numbers each. With f the factor and
+    c = g / f, g the gate's chi-square, it is f E[x | x < c] / E[x | x < g]; 1 - exp(-c / 2) is let through.
+    """
+    most = chi_square_quantile(gate, 2)
+    low, high = 1.0, MOST_NOISE
+    for _ in range(40):
+        factor = 0.5 * (low + high)
+        found = factor * gated_mean(most / factor, 2) / gated_mean(most, 2)
+        low, high = (factor, high) if found < nis else (low, factor)
+    return 1.0 - math.exp(-0.5 * most / low)
 
 
 class ExplainedShare:
