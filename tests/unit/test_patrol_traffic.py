@@ -153,6 +153,23 @@ class TestStopping:
         assert stops(1.0, 0.0, NOBODY, NOBODY)
         assert stops(1.0, 0.0, NOBODY, NOBODY, known=field) is clear
 
+    @pytest.mark.parametrize("bearing", [-0.5, 0.5])
+    def test_who_came_to_rest_at_a_corner_that_its_field_cuts_turns_past_it(self, bearing: float) -> None:
+        """Straight on, where the time falls, the corner is too near; a little to the side it is not."""
+        limits, safety = np.array([1.0, 2.0, 2.0, 2.0, 8.0, 0.2]), np.array([REACTION, 0.3, 0.06, 0.1, 1.4])
+        corner = 0.361 * np.array([math.cos(bearing), math.sin(bearing)])
+        time = np.tile(6.0 - 0.1 * np.arange(61), (61, 1))
+        pose, v, w = np.zeros(3), 0.0, 0.0
+        for _ in range(25):
+            ahead = voronoi_window.rotated((corner - pose[:2])[None], -pose[2])
+            assert math.hypot(*ahead[0]) > 0.35
+            seen = (ahead, NOBODY, NOBODY, time, -2.0, -3.0, 0.1, NO_MAP, 0.0, 0.0, 0.1)
+            v, w, _ = voronoi_window.choose(
+                v, w, pose, limits, safety, *seen, 0.0, 0.9, 0.3, 0.5, 0.25, 6, 15
+            )
+            pose = pose + 0.2 * np.array([v * math.cos(pose[2] + 0.1 * w), v * math.sin(pose[2] + 0.1 * w), w])
+        assert pose[0] > 1.0
+
 
 class TestPassages:
     @pytest.mark.parametrize("radio", [{}, None])

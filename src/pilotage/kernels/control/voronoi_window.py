@@ -15,6 +15,8 @@ from pilotage.kernels.jit import kernel
 ROLL_S, LOOK_M, MOST_STEPS = 0.05, 0.05, 200
 """A command is followed in steps of time, and looked at after so many metres; braking takes 10 s at most."""
 FREE, HELD = 0, 1
+HEADINGS, AHEAD_M, GAIN_S = 24, 0.4, 0.1
+"""From a standstill so many headings are tried, for a place so far ahead that is nearer in time by so much."""
 
 
 @kernel
@@ -238,7 +240,8 @@ def choose(
     Returns
     -------
     v, w, status
-        HELD where nothing but standing or turning was clear.
+        HELD where nothing but standing or turning was clear. It turns where the field falls, or where the way
+        there cuts a corner to the nearest heading in which it may set out and comes nearer.
     """
     top, acceleration, deceleration, top_turn, turn_acceleration, period = (
         limits[0],
@@ -254,7 +257,8 @@ def choose(
         max(-top_turn, w0 - turn_acceleration * period),
         min(top_turn, w0 + turn_acceleration * period),
     )
-    best, best_v, best_w, status = np.inf, 0.0, 0.0, HELD
+    best, best_v, best_w = np.inf, 0.0, 0.0
+    moves, moves_v, moves_w = np.inf, 0.0, 0.0
     # What no braking from here can come near is not asked about.
     longest = high_v * reaction + 0.5 * high_v * high_v / deceleration
     hard = within(near, longest + radius + margin)
@@ -303,5 +307,97 @@ def choose(
             cost += near_cost * lack * lack
             if cost < best:
                 best, best_v, best_w = cost, v, w
-                status = FREE if v > 1e-3 else HELD
-    return best_v, best_w, status
+            if v > 1e-3 and cost < moves:
+                moves, moves_v, moves_w = cost, v, w
+    if best_v > 1e-3:
+        return best_v, best_w, FREE
+    turn = free_turn(
+        pose,
+        limits,
+        safety,
+        hard,
+        moving,
+        coming,
+        time,
+        x0,
+        y0,
+        spacing,
+        known,
+        known_x0,
+        known_y0,
+        resolution,
+        heading_cost,
+    )
+    if not abs(turn) < np.inf:
+        return best_v, best_w, HELD
+    if abs(turn) < math.pi / HEADINGS and moves < np.inf:
+        return moves_v, moves_w, FREE
+    # As fast as it can stop from there.
+    w = math.copysign(math.sqrt(2.0 * turn_acceleration * abs(turn)), turn)
+    return best_v, min(max(w, low_w), high_w), HELD
+
+
+@kernel
+def free_turn(
+    pose: FloatArray,
+    limits: FloatArray,
+    safety: FloatArray,
+    near: FloatArray,
+    strange: FloatArray,
+    people: FloatArray,
+    time: FloatArray,
+    x0: float,
+    y0: float,
+    spacing: float,
+    known: FloatArray,
+    known_x0: float,
+    known_y0: float,
+    resolution: float,
+    heading_cost: float,
+) -> float:
+    """The turn on the spot after which one that stands may set out and comes nearer; infinite without one.
+
+    Parameters
+    ----------
+    pose, limits, safety, near, strange, people, time, known
+        As ``choose``.
+    """
+    here = value_at(pose[0], pose[1], time, x0, y0, spacing, 0.0)
+    v = limits[1] * limits[5]
+    turned = pose.copy()
+    best, best_turn = np.inf, np.inf
+    for k in range(HEADINGS):
+        turn = wrap(2.0 * math.pi * k / HEADINGS)
+        turned[2] = wrap(pose[2] + turn)
+        x, y = pose[0] + AHEAD_M * math.cos(turned[2]), pose[1] + AHEAD_M * math.sin(turned[2])
+        cost = value_at(x, y, time, x0, y0, spacing, 2.0)
+        if not cost < here - GAIN_S or not cost + heading_cost * abs(turn) < best:
+            continue
+        if stop_is_clear(
+            0.0,
+            0.0,
+            v,
+            0.0,
+            limits,
+            safety,
+            rotated(near, -turn),
+            rotated(strange, -turn),
+            rotated(people, -turn),
+            turned,
+            known,
+            known_x0,
+            known_y0,
+            resolution,
+        ):
+            best, best_turn = cost + heading_cost * abs(turn), turn
+    return best_turn
+
+
+@kernel
+def rotated(points: FloatArray, angle: float) -> FloatArray:
+    """Points (K, 2) turned around the origin."""
+    c, s = math.cos(angle), math.sin(angle)
+    out = np.empty_like(points)
+    for k in range(points.shape[0]):
+        out[k, 0], out[k, 1] = c * points[k, 0] - s * points[k, 1], s * points[k, 0] + c * points[k, 1]
+    return out
