@@ -16,6 +16,7 @@ from pilotage.experiments.build.build import build
 from pilotage.experiments.loop import run_loop
 from pilotage.experiments.mission import load_mission, mission_of, read_mission
 from pilotage.kernels.control import eikonal, voronoi_window
+from pilotage.stack.navigator.patrol.still import StillWatch
 
 NOBODY = np.zeros((0, 2))
 
@@ -99,10 +100,41 @@ class TestTimeToGo:
         time[20, 55] = 0.0
         eikonal.sweep_down(time, slowness, 0.1)
         for middle, leads_on in (((3.0, 2.0), False), ((3.0, 3.5), True)):
-            *_, here = eikonal.detour(
-                time, slowness, 0.0, 0.0, 0.1, 2.0, 2.0, 2.0, np.array([middle]), 0.4, 0.5
-            )
+            discs = np.array([[*middle, 0.4]])
+            *_, here = eikonal.detour(time, slowness, 0.0, 0.0, 0.1, 2.0, 2.0, 2.0, discs, 0.5, 1.0)
             assert math.isfinite(here) is leads_on
+
+    def test_a_goal_that_somebody_stands_on_is_come_near_to(self) -> None:
+        slowness = np.ones((41, 61))
+        time = np.full(slowness.shape, np.inf)
+        time[20, 30] = 0.0
+        eikonal.sweep_down(time, slowness, 0.1)
+        discs = np.array([[3.0, 2.0, 0.7]])
+        around, x0, y0, here = eikonal.detour(time, slowness, 0.0, 0.0, 0.1, 1.5, 2.0, 2.0, discs, 0.5, 1.0)
+        assert here == pytest.approx(1.5, rel=0.1)
+        row, column = np.unravel_index(np.argmin(around), around.shape)
+        assert 0.7 <= math.hypot(x0 + 0.1 * column - 3.0, y0 + 0.1 * row - 2.0) + 1e-9 < 0.85
+
+
+class TestStanding:
+    def test_of_two_discs_their_near_sides_tell_the_middles(self) -> None:
+        angles = np.linspace(0.0, 2.0 * math.pi, 100)
+        rim = 0.3 * np.column_stack([np.cos(angles), np.sin(angles)])
+        middles = np.array([[2.0, 0.4], [1.5, -1.2]])
+        near = [m + rim[(rim @ m) < 0.0] for m in middles]
+        found = voronoi_window.bodies(np.concatenate(near), 0.3)
+        assert np.allclose(found, middles[::-1], atol=0.02) or np.allclose(found, middles, atol=0.02)
+
+    def test_who_moves_does_not_stand_and_who_hides_for_a_moment_does(self) -> None:
+        watch, parked = StillWatch(), np.array([3.0, 1.0])
+        for k in range(40):
+            t_s = 0.2 * k
+            seen = [np.array([0.5 * t_s, 0.0])]
+            if not 20 <= k < 25:
+                seen.append(parked + 0.02 * (-1) ** k)
+            found = watch.step(t_s, np.array(seen))
+            assert len(found) == (t_s >= 4.2 and len(seen) == 2)
+        assert np.allclose(found, parked, atol=0.03)
 
 
 class TestStopping:
@@ -167,7 +199,9 @@ class TestStopping:
             v, w, _ = voronoi_window.choose(
                 v, w, pose, limits, safety, *seen, 0.0, 0.9, 0.3, 0.5, 0.25, 6, 15
             )
-            pose = pose + 0.2 * np.array([v * math.cos(pose[2] + 0.1 * w), v * math.sin(pose[2] + 0.1 * w), w])
+            pose = pose + 0.2 * np.array(
+                [v * math.cos(pose[2] + 0.1 * w), v * math.sin(pose[2] + 0.1 * w), w]
+            )
         assert pose[0] > 1.0
 
 

@@ -124,9 +124,9 @@ def detour(
     x: float,
     y: float,
     half_m: float,
-    points: FloatArray,
-    radius: float,
+    discs: FloatArray,
     slack_s: float,
+    there_s: float,
 ) -> tuple[FloatArray, float, float, float]:
     """The time to go around a place once more, with discs in the way that are on no map.
 
@@ -136,10 +136,12 @@ def detour(
     ----------
     x, y, half_m
         Middle of the window and half its side.
-    points, radius
-        (M, 2) middles of the discs, map frame.
+    discs
+        (M, 3) middles of the discs, map frame, and their radii.
     slack_s
         Nodes of the rim that are farther from the goal than the middle by more than this do not lead on.
+    there_s
+        Nodes this near to the goal are as good as the goal, if that is under a disc.
 
     Returns
     -------
@@ -155,13 +157,15 @@ def detour(
         return np.full((2, 2), np.inf), x0, y0, np.inf
     old = value_at(x, y, time, x0, y0, spacing, 0.0)
     slow = slowness[r0:r1, c0:c1].copy()
-    for k in range(points.shape[0]):
-        px, py = (points[k, 0] - x0) / spacing - c0, (points[k, 1] - y0) / spacing - r0
-        reach = radius / spacing
+    covered = False
+    for k in range(discs.shape[0]):
+        px, py = (discs[k, 0] - x0) / spacing - c0, (discs[k, 1] - y0) / spacing - r0
+        reach = discs[k, 2] / spacing
         for r in range(max(0, math.ceil(py - reach)), min(r1 - r0, math.floor(py + reach) + 1)):
             for c in range(max(0, math.ceil(px - reach)), min(c1 - c0, math.floor(px + reach) + 1)):
                 if (r - py) * (r - py) + (c - px) * (c - px) <= reach * reach:
                     slow[r, c] = np.inf
+                    covered = covered or time[r0 + r, c0 + c] == 0.0
     new = np.full((r1 - r0, c1 - c0), np.inf)
     for r in range(r1 - r0):
         for c in range(c1 - c0):
@@ -169,7 +173,8 @@ def detour(
             if not (slow[r, c] < np.inf and value < np.inf):
                 continue
             rim = r == 0 or c == 0 or r == r1 - r0 - 1 or c == c1 - c0 - 1
-            if (rim and value < old + slack_s) or value <= 2.0 * slow[r, c] * spacing:
+            near_s = there_s if covered else 2.0 * slow[r, c] * spacing
+            if (rim and value < old + slack_s) or value <= near_s:
                 new[r, c] = value
     sweep_down(new, slow, spacing)
     left, low = x0 + c0 * spacing, y0 + r0 * spacing

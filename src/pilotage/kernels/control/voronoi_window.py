@@ -16,7 +16,7 @@ ROLL_S, LOOK_M, MOST_STEPS = 0.05, 0.05, 200
 """A command is followed in steps of time, and looked at after so many metres; braking takes 10 s at most."""
 FREE, HELD = 0, 1
 HEADINGS, AHEAD_M, GAIN_S = 24, 0.4, 0.1
-"""From a standstill so many headings are tried, for a place so far ahead that is nearer in time by so much."""
+"""From a standstill so many headings are tried, for a place so far ahead that is so much nearer in time."""
 
 
 @kernel
@@ -182,6 +182,33 @@ def stop_is_clear(
 def toward(current: float, wanted: float, change: float) -> float:
     """What ``current`` becomes on its way to ``wanted``, by at most ``change``."""
     return min(max(wanted, current - change), current + change)
+
+
+@kernel
+def bodies(points: FloatArray, radius: float) -> FloatArray:
+    """(K, 2) middles of discs that returns (M, 2) are of: a body's near side alone is seen.
+
+    Of the returns that no body explains yet the one nearest to the origin is straight before its middle.
+    """
+    open_ = np.ones(points.shape[0], dtype=np.bool_)
+    found = np.empty_like(points)
+    count = 0
+    while True:
+        nearest, least = -1, np.inf
+        for k in range(points.shape[0]):
+            away = math.hypot(points[k, 0], points[k, 1])
+            if open_[k] and away < least:
+                nearest, least = k, away
+        if nearest < 0:
+            return found[:count].copy()
+        behind = 1.0 + radius / max(least, 1e-6)
+        x, y = behind * points[nearest, 0], behind * points[nearest, 1]
+        found[count, 0], found[count, 1] = x, y
+        count += 1
+        open_[nearest] = False
+        for k in range(points.shape[0]):
+            if open_[k] and math.hypot(points[k, 0] - x, points[k, 1] - y) < 1.2 * radius:
+                open_[k] = False
 
 
 @kernel

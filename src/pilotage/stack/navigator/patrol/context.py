@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -20,6 +19,8 @@ from pilotage.stack.journal import Journal
 from pilotage.stack.knowledge import RobotKnowledge
 from pilotage.stack.navigator.patrol.battery import DOCK_M, Battery
 from pilotage.stack.navigator.patrol.config import Mode, PatrolNavigatorConfig
+from pilotage.stack.navigator.patrol.passage import Passage
+from pilotage.stack.navigator.patrol.still import StillWatch
 from pilotage.stack.patrol.messages import PatrolMemory
 from pilotage.stack.patrol.roadmap import STEP_M, roadmap_of
 from pilotage.stack.patrol.task import PatrolTask
@@ -36,6 +37,8 @@ SIGMAS = 3.0
 DETOUR_SLACK_S = 1.0
 NO_DETOUR_S = 6.0
 """A detour that takes longer than this is none: it waits instead."""
+THERE_RATIO = 1.0
+"""Where somebody stands on the place to visit, so much of ``visit_m`` away is as good, in time to go."""
 LANE_AHEAD_M, MERGE_S = 2.0, 1.0
 """A passage is as wide as its narrowest place so far ahead; the last part of a way leads to the middle."""
 RECEDES_M_S = 0.1
@@ -44,33 +47,6 @@ PEOPLE_M_S = 1.4
 """Who is no mate may come on at a walk, and gives way to nobody."""
 SPEED_SHARE = 0.2
 """Weight of the newest edge in the speed made good."""
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Passage:
-    """Somebody in a passage with room for one.
-
-    Attributes
-    ----------
-    inside
-        Whether the robot itself is in it.
-    mouth_m, other_m
-        How far ahead it begins, and the other is.
-    beyond_m
-        From the other to the passage's far end.
-    recedes
-        Whether the other goes ahead.
-    mouth_xy_m, outwards
-        (2,) where it begins, and the direction out of it there.
-    """
-
-    inside: bool
-    mouth_m: float
-    other_m: float
-    beyond_m: float
-    recedes: bool
-    mouth_xy_m: FloatArray
-    outwards: FloatArray
 
 
 class Context:
@@ -91,6 +67,8 @@ class Context:
         When and where it last saw an intruder; NaN before.
     mates
         The last word of each team mate that was heard, by number, and when it was sent.
+    taken
+        Whether somebody who does not go stands where it drives to.
     battery
         What it reckons of its own; None where it never has to charge.
     """
@@ -152,8 +130,9 @@ class Context:
         self.fresh = False
         self._twist, self._command = STOP, STOP
         self.mates: dict[int, tuple[float, TeamWord]] = {}
-        self.mode, self.blocked, self.to_go_s = Mode.DRIVE, False, math.nan
-        self._watch = IntruderWatch(config.watch)
+        self.mode, self.to_go_s = Mode.DRIVE, math.nan
+        self.blocked = self.taken = False
+        self._watch, self._still = IntruderWatch(config.watch), StillWatch()
         self.alarm = (math.nan, math.nan, math.nan)
         self._next_word_s = float(self.rng.uniform(0.0, config.message_period_s))
 
@@ -239,7 +218,7 @@ class Context:
         """Whether it is near enough to where it drives to; what blocks a vertex may be there in its place."""
         if self.homeward:
             return self.away_m(self.hop) <= DOCK_M
-        return self.away_m(self.hop) <= (0.9 if blocked else 0.5) * self.task.visit_m
+        return self.away_m(self.hop) <= (0.9 if blocked or self.taken else 0.5) * self.task.visit_m
 
     def runs_low(self) -> bool:
         """Whether it has to go to its station from now on; tells the others that its share is theirs."""
@@ -290,35 +269,47 @@ class Context:
 
     def lead(self, vertex: int) -> Twist:
         """The command that leads to a vertex."""
-        return self.descend(self.roadmap.time_s(vertex))
+        return self.descend(self.roadmap.time_s(vertex), self.roadmap.places_xy_m[vertex])
 
-    def descend(self, time: FloatArray) -> Twist:
-        """The command that leads down a field of the roadmap; between two scans the last one stands."""
-        if not self.fresh:
-            return self._command
+    def descend(self, time: FloatArray, at: FloatArray | None = None) -> Twist:
+        """The command that leads down a field of the roadmap, to a place (2,) to visit if it leads to one.
+
+        Between two scans the last command stands.
+        """
         roadmap, pose = self.roadmap, self.pose
         (x0, y0), spacing = roadmap.origin_xy_m, roadmap.spacing_m
+        # Also between scans: the way to another vertex is not measured by what was left to the last one.
         self.to_go_s = eikonal.value_at(pose.x_m, pose.y_m, time, x0, y0, spacing, 0.0)
+        if not self.fresh:
+            return self._command
         way = roadmap.way(pose.x_m, pose.y_m, time, LANE_AHEAD_M)
         room_m = float(way[:, 2].min()) if len(way) else 0.0
         lane_m = min(self.config.lane_m, max(0.0, room_m - self._clearance_m))
         lane_m *= min(1.0, self.to_go_s / MERGE_S)
-        self.blocked = False
+        self.blocked = self.taken = False
         beside = voronoi_window.within(self.strange, self.config.watch_m)
-        seen = self._on_map(beside)
-        v, w, held = self._choose(time, seen, lane_m)
+        around_m, body_m = self._clearance_m + 0.5 * self.config.gap_m, self._clearance_m + self.radius_m
+        discs = _discs(self._on_map(beside), around_m)
+        still = self._still.step(self.t_s, self._mute(beside))
+        if len(still):
+            discs = np.concatenate([discs, _discs(still, body_m)])
+            # Beside who stands where it wants to be it goes around him, on either side, and that will do.
+            self.taken = at is not None and bool(np.hypot(*(still - at).T).min() < body_m)
+            lane_m *= not self.taken
+        v, w, held = self._choose(time, discs, lane_m)
         if held and lane_m > 0.0:
             # Beside a corner the lane may lead into it; the middle does not.
-            v, w, held = self._choose(time, seen, 0.0)
+            v, w, held = self._choose(time, discs, 0.0)
         self._command = Twist(v, w)
         return self._command
 
-    def _choose(self, time: FloatArray, seen_xy_m: FloatArray, lane_m: float) -> tuple[float, float, bool]:
-        """Speed, turn rate, and whether it stays where it is: down a field, around what was seen (M, 2)."""
+    def _choose(self, time: FloatArray, discs: FloatArray, lane_m: float) -> tuple[float, float, bool]:
+        """Speed, turn rate, and whether it stays where it is: down a field, around discs (M, 3)."""
         pose, window = self.pose, self.config.window
         (x0, y0), spacing = self.roadmap.origin_xy_m, self.roadmap.spacing_m
-        if len(seen_xy_m):
+        if len(discs):
             dx, dy = eikonal.descent(pose.x_m, pose.y_m, time, x0, y0, spacing)
+            # Who follows the field is the point to the left of the robot: so must be what it goes around.
             time, x0, y0, around_s = eikonal.detour(
                 time,
                 self.roadmap.slowness,
@@ -328,10 +319,9 @@ class Context:
                 pose.x_m,
                 pose.y_m,
                 self.config.watch_m,
-                # Who follows the field is the point to the left of the robot: so must be what it goes around.
-                seen_xy_m + lane_m * np.array([-dy, dx]),
-                self._clearance_m + 0.5 * self.config.gap_m,
+                discs + lane_m * np.array([-dy, dx, 0.0]),
                 DETOUR_SLACK_S,
+                THERE_RATIO * self.task.visit_m / self.speed_m_s,
             )
             self.blocked = not around_s < self.to_go_s + NO_DETOUR_S
         v, w, status = voronoi_window.choose(
@@ -357,6 +347,16 @@ class Context:
             window.turns,
         )
         return v, w, status == voronoi_window.HELD
+
+    def _mute(self, beside: FloatArray) -> FloatArray:
+        """(K, 2) middles, map frame, of bodies among returns that no mate who talks says it is."""
+        # Whoever is met is as large as the robot itself; its near side alone is seen.
+        middles = self._on_map(voronoi_window.bodies(beside, self.radius_m))
+        for sent_s, word in self.mates.values():
+            if self.t_s - sent_s < 3.0 * self.config.message_period_s:
+                away = np.hypot(middles[:, 0] - word.x_m, middles[:, 1] - word.y_m)
+                middles = middles[~(away < self.radius_m + self.speed_m_s * (self.t_s - sent_s))]
+        return middles
 
     def careful(self, command: Twist) -> Twist:
         """A command slowed down until its braking ends clear of everything, all of which may move."""
@@ -495,3 +495,8 @@ class Context:
     def say(self, kind: str, text: str) -> None:
         """Tell that something happened."""
         self.journal.say(self.t_s, kind, text)
+
+
+def _discs(middles_xy_m: FloatArray, radius_m: float) -> FloatArray:
+    """(M, 3) discs of one radius."""
+    return np.column_stack([middles_xy_m, np.full(len(middles_xy_m), radius_m)])

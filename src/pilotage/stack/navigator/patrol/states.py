@@ -11,7 +11,8 @@ from pilotage.sensors.readings import Readings
 from pilotage.stack.navigator.goal.wandering import Wandering
 from pilotage.stack.navigator.patrol.battery import DOCK_M, Battery
 from pilotage.stack.navigator.patrol.config import Mode
-from pilotage.stack.navigator.patrol.context import Context, Passage
+from pilotage.stack.navigator.patrol.context import Context
+from pilotage.stack.navigator.patrol.passage import Passage
 from pilotage.stack.navigator.progress import StallWatch
 
 PROGRESS_S = 0.4

@@ -1,0 +1,33 @@
+"""Who stands in the way and says nothing: a mate that failed, a thing that nobody knows."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pilotage.core.types import FloatArray
+
+STILL_S, STILL_M = 4.0, 0.25
+"""Who stays within so far for so long stands."""
+GONE_S = 2.0
+"""Who was not seen for so long is forgotten."""
+
+
+class StillWatch:
+    """Follows middles of bodies from scan to scan."""
+
+    def __init__(self) -> None:
+        self._known: FloatArray = np.zeros((0, 4))
+
+    def step(self, t_s: float, middles_xy_m: FloatArray) -> FloatArray:
+        """(K, 2) those of the bodies seen now (M, 2), map frame, that have stood for long."""
+        known = self._known[t_s - self._known[:, 3] <= GONE_S]
+        rows = np.empty((len(middles_xy_m), 4))
+        fresh = np.ones(len(known), dtype=np.bool_)
+        for row, middle in zip(rows, middles_xy_m, strict=True):
+            row[:] = *middle, t_s, t_s
+            away = np.hypot(*(known[:, :2] - middle).T)
+            if away.size and away.min() < STILL_M:
+                row[:3] = known[int(np.argmin(away)), :3]
+            fresh &= away >= STILL_M
+        self._known = np.concatenate([rows, known[fresh]])
+        return np.asarray(rows[t_s - rows[:, 2] >= STILL_S, :2])
