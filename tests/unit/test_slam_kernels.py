@@ -188,3 +188,20 @@ def test_a_beam_clears_its_way_and_marks_its_end() -> None:
     assert (odds[5, 6:25] < 0.0).all()
     assert odds[5, 36:].max() <= 0.0
     assert (odds[:5] == 0.0).all()
+
+
+def test_lines_go_on_over_beams_that_are_missing() -> None:
+    """A wall of which a third of the beams is lost keeps its lines; an opening of three beams ends them."""
+    wall = np.array([(2.0, -3.0, 2.0, 3.0)])
+    measured = ranges(wall, np.zeros(3), ANGLES)
+    lost = np.where(np.random.default_rng(9).random(measured.size) < 0.33, np.inf, measured)
+    points, hit = scan_points(lost, ANGLES, MOUNT, 0.1, 25.0)
+    lines = scan_lines(points, hit, 0.0, 0.0, float(ANGLES[1] - ANGLES[0]))
+    assert (np.hypot(lines[:, 2], lines[:, 3]) > 0.5).mean() > 0.9
+    middle = measured.size // 2
+    few = np.full(measured.size, np.inf)
+    few[[middle - 3, middle - 2, middle + 2, middle + 3]] = measured[
+        [middle - 3, middle - 2, middle + 2, middle + 3]
+    ]
+    points, hit = scan_points(few, ANGLES, MOUNT, 0.1, 25.0)
+    assert not scan_lines(points, hit, 0.0, 0.0, float(ANGLES[1] - ANGLES[0]))[:, 2:4].any()

@@ -9,6 +9,7 @@ import numpy as np
 from pilotage.kernels.arrays import BoolArray, FloatArray
 from pilotage.kernels.jit import kernel
 
+_MOST_MISSED = 2
 _REACH = 4
 """Beams to either side that a point's line is fitted through, at most."""
 
@@ -49,7 +50,8 @@ def scan_lines(
     """Fit a line through the neighbours of every hit, by total least squares.
 
     Neighbours are the beams beside it up to the first gap: a hit further from the one before than a surface
-    seen at a grazing angle explains. The point itself is moved onto its line: that averages range errors.
+    seen at a grazing angle explains, or more than two beams in a row that hit nothing. The point itself is
+    moved onto its line: that averages range errors.
 
     Parameters
     ----------
@@ -73,17 +75,25 @@ def scan_lines(
         px, py = points[i, 0], points[i, 1]
         dx, dy = px - origin_x, py - origin_y
         r = math.sqrt(dx * dx + dy * dy)
-        gap = 0.06 + 4.0 * r * step_rad
+        grazing = 4.0 * r * step_rad
         n = 1.0
         sx = sy = sxx = sxy = syy = 0.0
         for side in range(2):
             step = 1 if side == 1 else -1
             lx, ly = px, py
+            missed = 0
             for m in range(1, _REACH + 1):
                 j = i + step * m
-                if j < 0 or j >= count or not hit[j]:
+                if j < 0 or j >= count:
                     break
+                if not hit[j]:
+                    missed += 1
+                    if missed > _MOST_MISSED:
+                        break
+                    continue
                 qx, qy = points[j, 0], points[j, 1]
+                gap = 0.06 + grazing * (1 + missed)
+                missed = 0
                 if (qx - lx) * (qx - lx) + (qy - ly) * (qy - ly) > gap * gap:
                     break
                 if (qx - px) * (qx - px) + (qy - py) * (qy - py) > 0.25 and n >= 4.0:
