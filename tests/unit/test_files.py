@@ -148,6 +148,11 @@ def test_yaml_that_hangs_or_swells_is_refused(text: str, message: str) -> None:
         load_yaml(text, "file")
 
 
+def test_yaml_counts_in_tens() -> None:
+    """In YAML 1.1 these were 5400 and 11420.5."""
+    assert load_yaml("[1:30:00, 3:10:20.5, 12]", "") == ["1:30:00", "3:10:20.5", 12]
+
+
 def test_yaml_says_what_it_said() -> None:
     text = "a: &a {x: 1, y: [1.5, ~, yes]}\nb: {<<: *a, x: 2}\nc: *a\n? d\n: |\n  long\n  text\n"
     y = [1.5, None, True]

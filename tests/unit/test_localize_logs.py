@@ -28,7 +28,8 @@ from support.laser_drives import laser_drive
         ("t", np.zeros((3000, 1)), "t row 2: the time does not increase"),
         ("v", np.full((3000, 1), np.nan), "v row 1: expected a finite number"),
         ("b", np.zeros((3000, 16)), "b: expected shape"),
-        ("r_var", 0.0, "r_var: expected a variance above 0"),
+        ("r_var", 0.0, "r_var: expected a variance of 1e-100 or more"),
+        ("b_var", 5e-324, "b_var: expected a variance of 1e-100 or more"),
     ],
 )
 def test_bad_arrays_are_named(tmp_path: Path, name: str, value: Any, said: str) -> None:

@@ -156,6 +156,8 @@ class _Composer:
         tag = event.tag
         if tag is None or tag == "!":
             tag = self._resolver.resolve(yaml.ScalarNode, event.value, event.implicit)
+        if tag in _NUMBERS and event.tag is None and ":" in event.value:  # YAML 1.1 counted in sixties
+            tag = "tag:yaml.org,2002:str"
         if tag in _NUMBERS and len(event.value) > NUMBER_LENGTH:
             raise _problem(f"a number of {len(event.value)} characters", event)
         return yaml.ScalarNode(tag, event.value, event.start_mark, event.end_mark, style=event.style)

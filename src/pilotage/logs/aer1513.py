@@ -14,6 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
+from pilotage.core.config import SMALLEST
 from pilotage.core.errors import InputError
 from pilotage.core.types import BoolArray, FloatArray
 from pilotage.logs.mat import load_mat
@@ -88,8 +89,8 @@ def read_aer1513(path: Path) -> Aer1513Log:
     ranges[unseen] = bearings[unseen] = np.nan
     ahead, *variances = (float(_finite(path, n, _shaped(path, content, n, (1,)))[0]) for n in NUMBERS)
     for name, value in zip(NUMBERS[1:], variances, strict=True):
-        if not value > 0.0:
-            raise InputError(f"{path}: {name}: expected a variance above 0, found {value:g}")
+        if not value >= SMALLEST:
+            raise InputError(f"{path}: {name}: expected a variance of {SMALLEST:g} or more, found {value:g}")
     truth = np.column_stack([series["x_true"], series["y_true"], series["th_true"]])
     return Aer1513Log(
         t_s, series["v"], series["om"], truth, known, ranges, bearings, points, ahead, *variances
