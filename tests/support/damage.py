@@ -8,6 +8,7 @@ import json
 import os
 import random
 import re
+import socket
 import zlib
 from collections.abc import Callable
 from contextlib import suppress
@@ -51,6 +52,18 @@ WORDS = (
     "'",
     '"',
     "\\ud800",
+    "a\nb",
+    "--",
+    "--help",
+    "/",
+    "/dev/full",
+    "/proc/self/mem",
+    "a\udcffb",
+    "mission.yaml/x",
+    "0:1:1e-9",
+    "[nan]",
+    "&a [*a]",
+    "é" * 130,
 )
 """In the place of a word."""
 
@@ -162,9 +175,9 @@ def word(data: Content, rng: random.Random) -> Content:
 def _instead(data: Content, pattern: bytes, text: str, rng: random.Random) -> Content:
     found = list(re.finditer(pattern, data))
     if not found:
-        return data + text.encode()
+        return data + text.encode("utf-8", "surrogatepass")
     place = rng.choice(found)
-    return data[: place.start()] + text.encode() + data[place.end() :]
+    return data[: place.start()] + text.encode("utf-8", "surrogatepass") + data[place.end() :]
 
 
 def values(data: Content, rng: random.Random) -> Content:
@@ -288,6 +301,16 @@ def _sparse(path: Path) -> None:
         file.truncate(3_000_000_000)
 
 
+def _socket(path: Path) -> None:
+    here = Path.cwd()
+    os.chdir(path.parent)  # a socket's whole path may have a hundred characters
+    try:
+        with socket.socket(socket.AF_UNIX) as made:
+            made.bind(path.name)
+    finally:
+        os.chdir(here)
+
+
 NO_FILES: dict[str, Callable[[Path], None]] = {
     "a pipe": os.mkfifo,
     "a folder": Path.mkdir,
@@ -295,6 +318,10 @@ NO_FILES: dict[str, Callable[[Path], None]] = {
     "noise without end": lambda path: path.symlink_to("/dev/urandom"),
     "a link to itself": lambda path: path.symlink_to(path),
     "a link to nothing": lambda path: path.symlink_to(path.parent / "nothing"),
+    "a link to a folder": lambda path: path.symlink_to(path.parent),
+    "memory": lambda path: path.symlink_to("/proc/self/mem"),
+    "a file of no size that has one": lambda path: path.symlink_to("/proc/self/maps"),
+    "a socket": _socket,
     "three billion zeros": _sparse,
     "nothing": lambda path: None,  # noqa: ARG005 - as all of these
 }

@@ -165,3 +165,14 @@ def test_a_terminal_that_lacks_a_character_shows_a_question_mark() -> None:
     )
     assert done.stdout == "?\n"
     assert done.stderr.startswith("pilotage: mission file '?.yaml'")
+
+
+def test_settings_of_others_libraries_break_nothing(tmp_path: Path) -> None:
+    done = subprocess.run(
+        [sys.executable, "-m", "pilotage.cli.main", "draw", "museum", "--out", str(tmp_path / "a.png")],
+        capture_output=True,
+        text=True,
+        check=False,
+        env={**os.environ, "MPLBACKEND": "none of these", "NUMBA_NUM_THREADS": "0"},
+    )
+    assert (done.returncode, done.stderr) == (0, "")

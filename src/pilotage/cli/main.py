@@ -36,6 +36,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     # Everything is imported inside, so that Ctrl-C during an import is one line as well.
     try:
         _steady_streams()
+        if arguments is None:
+            _steady_environment()
         with _ended_once(for_good=arguments is None):
             return _run(sys.argv[1:] if arguments is None else list(arguments))
     except Terminated:
@@ -86,6 +88,15 @@ def _steady_streams() -> None:
             setattr(sys, name, Path(os.devnull).open("w"))  # noqa: SIM115 - open until the process ends
         elif isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="replace")
+
+
+def _steady_environment() -> None:
+    """Pictures go to files, whatever was set for a notebook; a count of threads that is none ends Numba."""
+    from pilotage.core.whole_number import whole_number
+
+    os.environ["MPLBACKEND"] = "Agg"
+    if not whole_number(os.environ.get("NUMBA_NUM_THREADS", "1")):
+        del os.environ["NUMBA_NUM_THREADS"]
 
 
 def _run(arguments: list[str]) -> int:
