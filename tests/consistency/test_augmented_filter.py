@@ -20,6 +20,8 @@ from pilotage.experiments.mission import load_mission
 from pilotage.stack.localization.ekf_augmented import SystematicErrors
 
 RUNS, STEPS, SETTLE = 30, 300, 10
+FEW = 10
+"""Runs that are enough to find a wrong filter out; a right one passes on them, too."""
 PRIOR = SystematicErrors()
 STD = {
     "robot.sensors.odometry.distance_scale": PRIOR.distance_scale_var**0.5,
@@ -30,10 +32,10 @@ STD = {
 
 
 @cache
-def sample(name: str, *overrides: str) -> tuple[FloatArray, FloatArray]:
+def sample(name: str, *overrides: str, runs: int = RUNS) -> tuple[FloatArray, FloatArray]:
     """NEES of the pose (R, N), and the last errors of the four systematic ones in standard deviations."""
     rows, scores = [], []
-    for seed in range(RUNS):
+    for seed in range(runs):
         rng = np.random.default_rng([seed, 7])
         given = {key: float(rng.normal()) * std for key, std in STD.items()}
         keys = [f"{key}={value + ('scale' in key)!r}" for key, value in given.items()]
@@ -53,12 +55,13 @@ def sample(name: str, *overrides: str) -> tuple[FloatArray, FloatArray]:
 def is_consistent(values: FloatArray) -> bool:
     """Pointwise in the 99.9 % band for 95 % of the steps, and in the mean; false alarm about 2e-3."""
     means = values.mean(axis=1)
-    off = abs(means.mean() - 3.0) > 3.7 * means.std(ddof=1) / np.sqrt(RUNS)
+    off = abs(means.mean() - 3.0) > 3.7 * means.std(ddof=1) / np.sqrt(len(values))
     return not off and fraction_in_band(values, 3, 0.999) >= 0.95
 
 
 def test_the_poses_variance_is_that_of_its_errors() -> None:
     assert is_consistent(sample("ekf-augmented")[0])
+    assert is_consistent(sample("ekf-augmented")[0][:FEW])
 
 
 def test_the_systematic_errors_lie_in_their_intervals() -> None:
@@ -70,7 +73,7 @@ def test_the_systematic_errors_lie_in_their_intervals() -> None:
 
 
 def test_a_plain_filter_is_overconfident_there() -> None:
-    values = sample("ekf-landmarks")[0]
+    values = sample("ekf-landmarks", runs=FEW)[0]
     assert not is_consistent(values)
     assert values.mean() > 10.0
 
@@ -78,4 +81,6 @@ def test_a_plain_filter_is_overconfident_there() -> None:
 @pytest.mark.parametrize("key", ["measurement_var_scale", "odometry_var_scale"])
 @pytest.mark.parametrize("factor", ["0.5", "2"])
 def test_a_filter_that_is_wrong_by_a_factor_of_two_is_found_out(key: str, factor: str) -> None:
-    assert not is_consistent(sample("ekf-augmented", f"stack.localizer.{key}={factor}")[0])
+    # Odometry that is believed too little shows last: beacons are in sight all the time.
+    runs = RUNS if key == "odometry_var_scale" else FEW
+    assert not is_consistent(sample("ekf-augmented", f"stack.localizer.{key}={factor}", runs=runs)[0])

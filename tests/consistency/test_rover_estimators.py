@@ -8,7 +8,6 @@ dead reckoning hold the truth in 95 % +- 1.1 % at a step; bounds at 4 standard e
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 
 import numpy as np
 import pytest
@@ -21,6 +20,7 @@ from pilotage.core.types import FloatArray, IntArray, Pose2
 from pilotage.evaluation.consistency import nees
 from pilotage.evaluation.rover_metrics import in_ellipse
 from pilotage.kernels.filters import ekf, rover_filter, rover_odometry
+from pilotage.kernels.jit import kernel
 from pilotage.maps.landmarks import Landmarks
 from pilotage.maps.world_map import WorldMap
 from pilotage.models.footprint import Footprint
@@ -69,47 +69,88 @@ def drawn(seed: int, turn_noisier: float = 1.0) -> tuple[FloatArray, FloatArray]
     return start, said
 
 
-def sighted(seed: int) -> Iterator[tuple[IntArray, FloatArray, FloatArray]]:
-    """Ids, ranges and bearings of the landmarks within reach at the end of each step."""
+def sighted(seed: int) -> tuple[IntArray, IntArray, FloatArray, FloatArray]:
+    """Where each step's sightings end among all (N,), and all ids, ranges and bearings in turn."""
     rng = RandomStreams(seed).stream("sensor/lidar")
-    for x, y, theta in TRUTH[1:].tolist():
-        offsets = POINTS - (x, y)
-        away = np.hypot(offsets[:, 0], offsets[:, 1])
-        near = away <= REACH_M
-        count = int(near.sum())
-        ranges = away[near] + math.sqrt(RANGE_VAR_M2) * rng.standard_normal(count)
-        bearings = np.arctan2(offsets[near, 1], offsets[near, 0]) - theta
-        yield (
-            IDS[near],
-            ranges,
-            wrap_array_to_pi(bearings + math.sqrt(BEARING_VAR_RAD2) * rng.standard_normal(count)),
-        )
+    offsets = POINTS - TRUTH[1:, None, :2]
+    away = np.hypot(offsets[..., 0], offsets[..., 1])
+    steps, rows = np.nonzero(away <= REACH_M)
+    noise = np.empty((2, steps.size))
+    ends = np.cumsum(np.bincount(steps, minlength=STEPS))
+    for begin, end in zip(np.concatenate([[0], ends[:-1]]), ends, strict=True):
+        noise[0, begin:end] = rng.standard_normal(end - begin)
+        noise[1, begin:end] = rng.standard_normal(end - begin)
+    seen = offsets[steps, rows]
+    bearings = np.arctan2(seen[:, 1], seen[:, 0]) - TRUTH[1:, 2][steps]
+    return (
+        ends,
+        IDS[rows],
+        away[steps, rows] + math.sqrt(RANGE_VAR_M2) * noise[0],
+        wrap_array_to_pi(bearings + math.sqrt(BEARING_VAR_RAD2) * noise[1]),
+    )
+
+
+@kernel
+def follow(
+    second_order: bool,
+    pose: FloatArray,
+    said: FloatArray,
+    ends: IntArray,
+    ids: IntArray,
+    ranges: FloatArray,
+    bearings: FloatArray,
+    q: FloatArray,
+    start: FloatArray,
+    places: FloatArray,
+    noise: FloatArray,
+    gate: float,
+    poses: FloatArray,
+    covs: FloatArray,
+) -> None:
+    """Fill (N, 3) poses and (N, 3, 3) covariances after each step; ``q``: variances of distance and turn."""
+    cov, mean, spread = start.copy(), pose.copy(), start.copy()
+    refused, anchor = np.zeros(1, np.int64), np.full(1, -1)
+    known = np.arange(places.shape[0])
+    nis, outcome = np.empty(places.shape[0]), np.empty(places.shape[0], np.int64)
+    begin = 0
+    for k in range(said.shape[0]):
+        part = slice(begin, ends[k])
+        begin = ends[k]
+        if second_order:
+            rover_filter.predict(pose, cov, anchor, said[k, 0], 0.0, said[k, 1], q[0], q[1])
+            rover_filter.update(
+                pose,
+                cov,
+                anchor,
+                ids[part],
+                ranges[part],
+                bearings[part],
+                known,
+                places,
+                noise,
+                gate,
+                refused,
+            )
+            rover_filter.moments(pose, cov, anchor, places, mean, spread)
+            poses[k], covs[k] = mean, spread
+        else:
+            rover_odometry.predict_first_order(pose, cov, said[k, 0], 0.0, said[k, 1], q[0], q[1])
+            ekf.update_range_bearings(
+                *(pose, cov, ids[part], ranges[part], bearings[part], known, places, np.zeros(3)),
+                *(noise, gate, nis, outcome),
+            )
+            poses[k], covs[k] = pose, cov
 
 
 def filtered(seed: int, second_order: bool, claimed: float) -> FloatArray:
     """(4,) NEES of one run at the steps ``AT``; ``claimed`` scales the odometry variances it believes."""
     pose, said = drawn(seed)
-    cov, refused, anchor = np.diag(INITIAL), np.zeros(1, dtype=np.int64), np.full(1, -1, dtype=np.int64)
-    q_distance, q_turn = claimed * STEP_M * DISTANCE_VAR_M2_PER_M, claimed * STEP_M * TURN_VAR_RAD2_PER_M
-    mean, spread = np.empty(3), np.empty((3, 3))
-    nis, outcome = np.empty(len(IDS)), np.empty(len(IDS), dtype=np.int64)
-    found = []
-    for k, ((distance, turn), seen) in enumerate(zip(said.tolist(), sighted(seed), strict=True)):
-        if second_order:
-            rover_filter.predict(pose, cov, anchor, distance, 0.0, turn, q_distance, q_turn)
-            rover_filter.update(pose, cov, anchor, *seen, IDS, POINTS, NOISE, GATE, refused)
-        else:
-            rover_odometry.predict_first_order(pose, cov, distance, 0.0, turn, q_distance, q_turn)
-            ekf.update_range_bearings(pose, cov, *seen, IDS, POINTS, np.zeros(3), NOISE, GATE, nis, outcome)
-        if k in AT:
-            if second_order:
-                rover_filter.moments(pose, cov, anchor, POINTS, mean, spread)
-            else:
-                mean, spread = pose.copy(), cov.copy()
-            truth = TRUTH[k + 1 : k + 2].copy()
-            truth[:, 2] = wrap_array_to_pi(truth[:, 2])
-            found.append(float(nees(truth, mean[None].copy(), spread[None].copy())[0]))
-    return np.array(found)
+    q = claimed * STEP_M * np.array([DISTANCE_VAR_M2_PER_M, TURN_VAR_RAD2_PER_M])
+    poses, covs = np.empty((STEPS, 3)), np.empty((STEPS, 3, 3))
+    follow(second_order, pose, said, *sighted(seed), q, np.diag(INITIAL), POINTS, NOISE, GATE, poses, covs)
+    truth = TRUTH[1:][AT]
+    truth[:, 2] = wrap_array_to_pi(truth[:, 2])
+    return nees(truth, poses[AT], covs[AT])
 
 
 def mean_nees(second_order: bool = True, claimed: float = 1.0, runs: int = 60) -> FloatArray:
@@ -139,20 +180,28 @@ def test_the_first_order_filter_is_too_sure() -> None:
     assert not all(inside(mean_nees(second_order=False)))
 
 
+@kernel
+def reckon(
+    second_order: bool, pose: FloatArray, said: FloatArray, q: FloatArray, cov: FloatArray, out: FloatArray
+) -> None:
+    """Fill (N, 12): the poses and the covariances after each step, by odometry alone."""
+    sums = np.zeros(rover_odometry.SUMS, dtype=np.complex128)
+    for k in range(said.shape[0]):
+        if second_order:
+            rover_odometry.predict_second_order(pose, cov, sums, said[k, 0], 0.0, said[k, 1], q[0], q[1])
+        else:
+            rover_odometry.predict_first_order(pose, cov, said[k, 0], 0.0, said[k, 1], q[0], q[1])
+        out[k, :3], out[k, 3:] = pose, cov.ravel()
+
+
 def reckoned(seed: int, second_order: bool) -> tuple[FloatArray, FloatArray]:
     """(N, 3) poses and (N, 3, 3) covariances of one run by odometry alone, as the localizer tells them."""
     # Twice the turn noise, for a heading as uncertain as at the end of the report's 13 km.
     pose, said = drawn(seed, turn_noisier=2.0)
-    cov, sums = np.diag(INITIAL), np.zeros(rover_odometry.SUMS, dtype=np.complex128)
-    q_distance, q_turn = STEP_M * DISTANCE_VAR_M2_PER_M, 2.0 * STEP_M * TURN_VAR_RAD2_PER_M
-    poses, covs = np.empty((STEPS, 3)), np.empty((STEPS, 3, 3))
-    for k, (distance, turn) in enumerate(said.tolist()):
-        if second_order:
-            rover_odometry.predict_second_order(pose, cov, sums, distance, 0.0, turn, q_distance, q_turn)
-        else:
-            rover_odometry.predict_first_order(pose, cov, distance, 0.0, turn, q_distance, q_turn)
-        poses[k], covs[k] = pose, cov
-    return poses, covs
+    q = STEP_M * np.array([DISTANCE_VAR_M2_PER_M, 2.0 * TURN_VAR_RAD2_PER_M])
+    out = np.empty((STEPS, 12))
+    reckon(second_order, pose, said, q, np.diag(INITIAL), out)
+    return out[:, :3], out[:, 3:].reshape(-1, 3, 3)
 
 
 @pytest.mark.parametrize(("second_order", "low", "high"), [(True, 0.93, 0.97), (False, 0.80, 0.925)])
