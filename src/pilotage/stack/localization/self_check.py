@@ -79,7 +79,7 @@ class SelfCheck:
 
     def _learn(self, windows: FloatArray) -> None:
         """Take the last windows for the filter's own if they are alike; give up after some time."""
-        if len(windows) == WINDOWS:
+        if len(windows) == WINDOWS and windows[:, 1].any():
             seen, used = windows[:, 0], windows[:, 1]
             share, nis = float(used.sum() / seen.sum()), float(windows[:, 2].sum() / windows[:, 3].sum())
             chance = share * max(1.0 - share, 1.0 / float(seen.sum()))
