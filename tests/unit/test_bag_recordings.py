@@ -20,6 +20,7 @@ from pilotage.core.errors import InputError
 from pilotage.core.types import Pose2
 from pilotage.logs.bag_series import LANDMARKS, read_series
 from pilotage.maps.ros_map import RosMap, write_ros_map
+from support.command_bags import commanded
 
 pytest.importorskip("rosbags")
 
@@ -355,23 +356,6 @@ def test_numbers_that_are_none_are_left_out(tmp_path: Path) -> None:
     write_mcap(tmp_path / "a.mcap", drive)
     with pytest.raises(InputError, match="found none that can be read"):
         read_series(tmp_path / "a.mcap", LANDMARKS)
-
-
-def commanded(told: bool = True) -> RunMessages:
-    """Three minutes of changing commands: taken at 0.9 and 1.1 of what they say, and 0.2 s late."""
-    out: list[Stamped] = []
-    at, start = Pose2(0.0, 0.0, 0.0), 1000.0
-    rng = np.random.default_rng(3)
-    sent = np.column_stack([rng.uniform(0.1, 0.5, 180), rng.uniform(-0.6, 0.6, 180)])
-    for k in range(3600):
-        t_s, now = start + 0.05 * k, ros.nanoseconds(start + 0.05 * k)
-        if k % 2 == 0 and told:
-            out.append(Stamped("/cmd_vel", now, ros.TWIST, ros.twist(*sent[k // 20].tolist())))
-        fields = ros.odometry(t_s, "odom", "base_link", at, ros.twist(0.0, 0.0))
-        out.append(Stamped("/odom", now, ros.ODOMETRY, fields))
-        v, w = sent[max(k - 4, 0) // 20] * [0.9, 1.1]
-        at = at.compose(Pose2(0.05 * float(v), 0.0, 0.05 * float(w)))
-    return RunMessages(out, {})
 
 
 @pytest.mark.parametrize("name", WRITERS)

@@ -25,6 +25,8 @@ from pilotage.logs.scanner_mount import TransformTree, frame_name
 from pilotage.logs.trajectories import Trajectory3
 
 GAUSS_PER_TESLA = 1e4
+LARGE_QUATERNION = 1e6
+"""A damaged one, whose squares may be beyond all numbers."""
 Rows: TypeAlias = Iterator[tuple[Any, tuple[float, ...]]]
 """Header, or None for the time of receipt, and one row of numbers."""
 
@@ -168,7 +170,8 @@ def trajectory_of_bag(path: Path, topic: str | None = None) -> Trajectory3:
 
 def headings(poses: FloatArray) -> FloatArray:
     """Planar poses (N, 3) of poses in space (N, 7)."""
-    x, y, z, w = poses[:, 3:].T
+    largest = np.abs(poses[:, 3:]).max(axis=1, initial=0.0)
+    x, y, z, w = poses[:, 3:].T / np.where(largest > LARGE_QUATERNION, largest, 1.0)
     turn = np.arctan2(2.0 * (w * z + x * y), w * w + x * x - y * y - z * z)
     return np.column_stack([poses[:, :2], turn])
 

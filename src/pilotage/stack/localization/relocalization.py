@@ -10,12 +10,18 @@ from pilotage.core.angles import wrap_to_pi
 from pilotage.core.types import FloatArray
 from pilotage.sensors.readings import OdometryIncrement
 from pilotage.stack.localization.likelihood_field import LikelihoodField
-from pilotage.stack.localization.scan_search import FEW_SCANS, MOST_SCANS, RecentScans, ScanSearch
+from pilotage.stack.localization.scan_search import (
+    FEW_SCANS,
+    LEAST_SCANS,
+    MOST_SCANS,
+    RecentScans,
+    ScanSearch,
+)
 
 PATIENCE_S = 2.0
 """A filter that doubts itself for a moment often comes round; lost for longer, it searches."""
-LEAST_SCANS = 3
-"""With fewer scans from different places most places look alike."""
+AGAIN_SCANS = 3
+"""After so many new scans it searches again."""
 TRIAL_SCANS, TRIAL_M, TURN_AS_PATH_M = 15, 1.5, 0.5
 """A place counts after so many scans and so much path from which it went on to fit,"""
 FITTING = 0.85
@@ -55,7 +61,7 @@ class Relocalization:
         self._search: ScanSearch | None = None  # its scores are made when they are needed first
         self._scans = RecentScans()
         self._since_s: float | None = None
-        self._new = False
+        self._new = 0
         self.trial: Trial | None = None
 
     def move(self, odometry: OdometryIncrement) -> None:
@@ -66,7 +72,7 @@ class Relocalization:
 
     def see(self, points: FloatArray) -> None:
         """Keep a scan's end points (K, 2), in the robot's frame, where it was taken from elsewhere."""
-        self._new = self._scans.see(points) or self._new
+        self._new += self._scans.see(points)
 
     def forget(self) -> None:
         """The odometry cannot be relied on: what was seen before joins nothing any more."""
@@ -78,15 +84,16 @@ class Relocalization:
             self._since_s = self.trial = None
             return None
         self._since_s = t_s if self._since_s is None else self._since_s
-        waits = self.trial is not None or not self._new or len(self._scans) < LEAST_SCANS
+        waits = self.trial is not None or self._new < AGAIN_SCANS or len(self._scans) < LEAST_SCANS
         if waits or t_s - self._since_s < PATIENCE_S:
             return None
-        self._new = False
+        self._new = 0
         if self._search is None:
             self._search = ScanSearch(self._field, self._bounds_m)
         place = self._search.best(self._scans.cloud(FEW_SCANS))
-        if place is not None and not place.alone and len(self._scans) > FEW_SCANS:
-            place = self._search.best(self._scans.cloud(MOST_SCANS))
+        other = LEAST_SCANS if place is None else MOST_SCANS
+        if (place is None or not place.alone) and len(self._scans) > min(other, FEW_SCANS):
+            place = self._search.best(self._scans.cloud(other))
         if place is None or not place.alone:
             return None
         self.trial = Trial()

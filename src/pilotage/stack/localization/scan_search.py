@@ -19,19 +19,19 @@ CELL_M, MOST_CELLS = 0.1, 2_000_000
 """Side of a cell of the scores, larger where there would be more of them."""
 STD_M, OPEN_SCORE = 0.15, -0.3
 """What a point's end may be off by, and what one in the open speaks against a place."""
-REACH_M, STEP_RAD = 16.0, 0.0125
+REACH_M, STEP_RAD = 10.0, 0.02
 """Points farther away than a turn by one step moves by more than their spread are left out."""
-LEVELS, BUDGET, MOST_POINTS = 6, 400_000, 300
-LEAST_SCORE, PERFECT = 0.5, 0.95
+LEVELS, BUDGET, MOST_POINTS = 6, 3_000_000, 150
+LEAST_SCORE, PERFECT = 0.45, 0.95
 """Mean score a point from which a place is looked at, and that of a map and scans without any error, which
 the cells leave."""
-CLEARLY, CLEARLY_MORE = 2.0, 0.03
+CLEARLY, CLEARLY_MORE = 1.4, 0.03
 """A second place must miss a perfect score by so many times what the best one misses, and by so much more,"""
 OTHER_PLACE = np.array([1.0, 0.5])
 """where it is so many metres away or radians turned."""
-FEW_SCANS, MOST_SCANS, APART_M, APART_RAD = 12, 48, 0.4, 0.4
-"""How many scans are looked at together, and how far apart they were taken: few, whose odometry errs little,
-and where they fit in several places many."""
+LEAST_SCANS, FEW_SCANS, MOST_SCANS, APART_M, APART_RAD = 4, 12, 48, 0.4, 0.4
+"""How many scans are looked at together, and how far apart they were taken: a dozen; where these fit nowhere,
+because the odometry bends them, the last ones alone, and where they fit in several places many."""
 
 
 @dataclass(frozen=True, slots=True)

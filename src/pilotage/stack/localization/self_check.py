@@ -30,8 +30,9 @@ HOLD_S, MOST_HOLD_S = 3.0, 60.0
 SOON_S = 30.0
 RECENT, USUAL, FORGOTTEN = 0.1, 0.02, 0.002
 """What a new scan counts in the two means, and in the long one while the robot does not trust its place."""
-KEPT = 0.9
-"""Of the usual share, what a place must explain that the robot has just found."""
+KEPT, DEVIATIONS, LEAST_KEPT = 0.9, 3.0, 0.7
+"""Of the usual share, what a place must explain that the robot has just found: less where the share is seen
+to vary, by so many of its mean deviations, but never less than the last."""
 
 
 class SelfCheck:
@@ -124,12 +125,13 @@ class ExplainedShare:
     """Compares the share of a scan that the map explains with what is usual where the robot is.
 
     A short and a long mean, as augmented Monte-Carlo localization keeps them of the likelihood (Thrun et al.
-    2005, table 8.3). A place that only looks like the true one explains less of the scans, if seldom little.
+    2005, table 8.3), and how far the one usually is from the other: chairs were moved in one room, not in
+    the next. A place that only looks like the true one explains less of the scans, if seldom little.
     Where the surroundings have truly changed, the long mean follows within some minutes.
     """
 
     def __init__(self) -> None:
-        self._recent, self._usual = math.nan, math.nan
+        self._recent, self._usual, self._deviation = math.nan, math.nan, 0.0
 
     @property
     def usual(self) -> float:
@@ -145,5 +147,9 @@ class ExplainedShare:
         if math.isnan(self._usual):
             self._recent = self._usual = share
         self._recent += RECENT * (share - self._recent)
-        self._usual += (USUAL if trusted else FORGOTTEN) * (self._recent - self._usual)
-        return self._recent >= KEPT * self._usual
+        rate, off = USUAL if trusted else FORGOTTEN, self._recent - self._usual
+        kept = self._usual - max((1.0 - KEPT) * self._usual, DEVIATIONS * self._deviation)
+        as_usual = self._recent >= max(kept, LEAST_KEPT * self._usual)
+        self._usual += rate * off
+        self._deviation += rate * (abs(off) - self._deviation)
+        return as_usual

@@ -1,0 +1,64 @@
+"""``mypy --strict`` on a user's file outside the repository sees the types of the public face."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip("mypy", reason="needs the extra 'dev'")
+ROOT = Path(__file__).parents[2]
+RIGHT = """
+import numpy as np
+import pilotage as pl
+
+mission = pl.load("museum-1", seed=7, set={"stack.localizer.gate": 0.99})
+run = pl.run(mission)
+error_m: float = run.metrics["position_rmse_m"]
+run.report("night.html")
+again: pl.Run = pl.open_run(run.folder)
+sim = pl.make(mission)
+readings = sim.reset()
+readings = sim.step(pl.Twist(0.5, 0.1))
+path = pl.plan("map.yaml", (0.0, 0.0, 0.0), (1.0, 1.0)).path
+found = pl.localize("drive.bag", map="map.yaml", start=np.zeros(3))
+gain = pl.calibrate("commands", ["drive.bag"]).answer["speed_gain"]
+"""
+WRONG = {
+    'pl.load("museum-1", seed="seven")': "arg-type",
+    "pl.Twist(0.5)": "call-arg",
+    'pl.run(mission).metrics["position_rmse_m"].upper()': "attr-defined",
+    "pl.no_such_name": "attr-defined",
+}
+
+
+def test_a_strict_user_is_told_what_is_wrong_and_nothing_else(tmp_path: Path) -> None:
+    """The project's own cache is used: its modules are not analysed again."""
+    file = tmp_path / "mine.py"
+    file.write_text(RIGHT + "".join(f"{line}\n" for line in WRONG))
+    words = (
+        "--strict",
+        "--config-file",
+        str(ROOT / "pyproject.toml"),
+        "--cache-dir",
+        str(ROOT / ".mypy_cache"),
+    )
+    done = subprocess.run(
+        [sys.executable, "-m", "mypy", *words, "--no-error-summary", str(file)],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 1, done.stdout + done.stderr
+    first = RIGHT.count("\n") + 1
+    told = [line.split(": ", 2) for line in done.stdout.splitlines() if "error:" in line]
+    places = {
+        int(line.split(":")[1]): line.rsplit("[", 1)[1].rstrip("]")
+        for line in done.stdout.splitlines()
+        if "error:" in line
+    }
+    assert places == {first + k: code for k, code in enumerate(WRONG.values())}, done.stdout
+    assert told
