@@ -14,7 +14,7 @@ from pilotage.logs.people import RADIUS_M, read_people
 from pilotage.sensors.sensor import NonNegative, Positive
 from pilotage.sim.people.people import PEOPLE, Around, PeopleSetting
 
-CLEAR_M = 1.0
+CLEAR_M = 3.5
 """Recordings begin in the midst of things: who would appear nearer to a robot than this comes later. Real
 people are seen from farther away: a robot that brakes from 2 m/s while somebody comes at 2.5 needs 3.3 m."""
 APART_S = 1.0
