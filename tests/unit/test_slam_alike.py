@@ -10,10 +10,14 @@ import pytest
 
 from pilotage.core.types import FloatArray
 from pilotage.kernels.slam.frames import between
+from pilotage.kernels.slam.match_grid import max_pyramid
 from pilotage.stack.mapping.slam.closures import Verdict
+from pilotage.stack.mapping.slam.clouds import Clouds, cloud_of_beams
 from pilotage.stack.mapping.slam.config import SlamConfig
 from pilotage.stack.mapping.slam.mapper import map_log
-from support.laser_rooms import along, recording
+from pilotage.stack.mapping.slam.matching import laid
+from pilotage.stack.mapping.slam.submaps import LEVELS, drawn
+from support.laser_rooms import along, ranges, recording
 
 WIDTH_M = 2.0
 
@@ -65,3 +69,17 @@ def test_nothing_is_closed_between_places_that_only_look_alike(
         assert np.hypot(off[0], off[1]) < 0.5
     true = np.array([between(path[0], pose) for pose in path])
     assert np.hypot(*(result.poses - true)[:, :2].T).max() < 0.15
+
+
+def test_an_alignment_that_slides_along_a_corridor_is_no_match() -> None:
+    """The window does not hold the right place, and the alignment would go there all the same."""
+    walls = np.array([(-9.0, -1.0, 4.0, -1.0), (-9.0, 1.0, 4.0, 1.0), (4.0, -1.0, 4.0, 1.0)])
+    angles = np.linspace(-0.5 * np.pi, 0.5 * np.pi, 361)
+    cloud = cloud_of_beams(ranges(walls, np.zeros(3), angles), angles, float(angles[1] - angles[0]), 20.0)
+    submap = drawn(Clouds.of([cloud]), np.zeros((1, 3)), np.array([0]), np.zeros(3), 0.1)
+    pyramid = max_pyramid(submap.grid, LEVELS)
+    right, _ = laid(submap, pyramid, submap, 0.1, np.zeros(3), 0.1, 0.02)
+    assert right.aligned
+    slid, _ = laid(submap, pyramid, submap, 0.1, np.array([0.4, 0.0, 0.0]), 0.1, 0.02)
+    assert slid.score > 0.3
+    assert not slid.aligned

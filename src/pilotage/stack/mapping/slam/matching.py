@@ -22,6 +22,8 @@ LEAST_MEAN, RIVAL_SHARE = 0.25, 0.6
 SAME_PLACE_M, SAME_HEADING_RAD = 0.8, 0.35
 """A second answer nearer than this is the first one."""
 ALIGN_REACH_M, ALIGN_LAST_REACH_M, ALIGN_SCALE_M = 0.4, 0.15, 0.05
+MOST_ALIGNED_M, MOST_ALIGNED_RAD = 0.25, 0.1
+"""An alignment that ends farther from the place that was searched has slid along a corridor."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,7 +43,7 @@ class Match:
     overlap
         The smaller share of points where the other one saw.
     aligned
-        Whether the continuous alignment went through.
+        Whether the continuous alignment went through, and ended where the search had it.
     """
 
     relative: FloatArray
@@ -134,7 +136,9 @@ def laid(
     )
     pose[2] = (pose[2] + np.pi) % (2.0 * np.pi) - np.pi
     agreement, overlap = lying(map_, cell_m, moving.fine, pose)
-    found = Match(pose, hessian, float(best[3]), second, agreement, overlap, status != TOO_FEW)
+    slid = between(best[:3], pose)
+    held = float(np.hypot(slid[0], slid[1])) < MOST_ALIGNED_M and abs(float(slid[2])) < MOST_ALIGNED_RAD
+    found = Match(pose, hessian, float(best[3]), second, agreement, overlap, status != TOO_FEW and held)
     return found, not (cut_short or again)
 
 
