@@ -16,7 +16,7 @@ from pilotage.maps.world_map import WorldMap
 from pilotage.sensors.lidar import LidarConfig
 from pilotage.sensors.readings import OdometryIncrement
 from pilotage.stack.localization.likelihood_field import LikelihoodField
-from pilotage.stack.localization.relocalization import TRIAL_SCANS, Relocalization
+from pilotage.stack.localization.relocalization import TRIAL_SCANS, Relocalization, Trial
 from pilotage.stack.localization.scan_search import RecentScans, ScanSearch
 from support.laser_rooms import furnished, ranges
 
@@ -116,3 +116,20 @@ def test_a_robot_told_nothing_and_one_carried_away_find_themselves() -> None:
     (carried,) = simulate(load_mission("museum-kidnap", localizer, 2)).finished.robots
     assert carried.arrived, carried.reason
     assert not carried.collisions
+
+
+def test_a_trial_that_the_map_cannot_judge_ends() -> None:
+    field, bounds_m = field_of(furnished(), cells=False)
+    again = Relocalization(field, bounds_m)
+    again.trial = Trial()
+    for _ in range(20):
+        again.move(OdometryIncrement(0.3, 0.0))
+    assert again.trial is None
+
+
+def test_beams_are_weighed_alone_as_together() -> None:
+    field, _ = field_of(furnished(), cells=True)
+    pose = np.array([2.0, 3.5, 0.2])
+    points = seen_from(furnished(), np.array([2.05, 3.45, 0.21]))
+    alone = field.log_densities(points, pose)
+    assert alone.sum() == pytest.approx(field.log_likelihoods(points, pose[None])[0])

@@ -104,6 +104,13 @@ class LikelihoodField:
         )
         return out
 
+    def log_densities(self, points: FloatArray, pose: FloatArray) -> FloatArray:
+        """(K,) of each of a scan's end points (K, 2) in the robot's frame, from a pose (3,)."""
+        c, s = math.cos(pose[2]), math.sin(pose[2])
+        away = self._nearest.at(pose[:2] + points @ np.array([[c, s], [-s, c]]))
+        entries = np.minimum(away / self._step_m + 0.5, len(self._table) - 1.0)
+        return np.asarray(self._table[entries.astype(np.int64)])
+
     def kept(self, moved_m: float, turned_rad: float) -> float:
         """Share of what a filter knows that stays beside a scan taken after a move; 0: the two simply add up.
 

@@ -190,7 +190,8 @@ class ParticleFilterLocalizer:
         lost = self._blind or self._check.lost(t_s)
         if self._relocalization is not None:
             lost |= self._relocalization.trial is not None
-            self._relocalization.see(seen)
+            if isinstance(scan, LidarScan):
+                self._relocalization.see(seen)
             place = self._relocalization.begin(t_s, lost, mean)
             if place is not None and place is not mean:
                 mean, cov = self._begin_at(place)
@@ -281,8 +282,7 @@ class ParticleFilterLocalizer:
         the robot lost, it may have settled at a place that only looks alike: it is believed again when the
         scans fit as well as they used to; and so it is where more beams than usual end beside a wall.
         """
-        pose = mean[None]
-        beams = np.array([self._field.log_likelihoods(point[None], pose)[0] for point in points])
+        beams = self._field.log_densities(points, mean)
         at_wall = int((beams >= self._field.least_at_wall).sum())
         beside = int((beams > self._field.least_beside).sum())
         step = mean - prior[0]

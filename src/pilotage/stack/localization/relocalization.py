@@ -24,6 +24,8 @@ AGAIN_SCANS = 3
 """After so many new scans it searches again."""
 TRIAL_SCANS, TRIAL_M, TURN_AS_PATH_M = 15, 1.5, 0.5
 """A place counts after so many scans and so much path from which it went on to fit,"""
+LONGEST_TRIAL_M = 5.0
+"""Where the map says so little that a trial does not end, the search begins anew."""
 FITTING = 0.85
 """by this share of what is usual; less, and it is given up."""
 LEAST_USUAL = 0.6
@@ -69,6 +71,8 @@ class Relocalization:
         self._scans.move(odometry.distance_m, odometry.lateral_m, odometry.angle_rad)
         if self.trial is not None:
             self.trial.path_m += abs(odometry.distance_m) + TURN_AS_PATH_M * abs(odometry.angle_rad)
+            if self.trial.path_m > LONGEST_TRIAL_M:
+                self.trial = None
 
     def see(self, points: FloatArray) -> None:
         """Keep a scan's end points (K, 2), in the robot's frame, where it was taken from elsewhere."""
