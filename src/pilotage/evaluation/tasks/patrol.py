@@ -31,7 +31,8 @@ from pilotage.stack.patrol.graph_file import on_floor, read_patrol_graph
 from pilotage.stack.patrol.task import PatrolSite
 from pilotage.stack.patrol.tours import Round, idleness_bound_s
 
-VISITS_EVERY_S, LOOK_EVERY_S = 0.2, 1.0
+VISITS_EVERY_S, SEE_EVERY_S, LOOK_EVERY_S = 0.2, 0.4, 1.0
+"""Lasers see between two looks at everybody: a place that is passed is in view for less than a second."""
 CELL_M = 0.5
 
 
@@ -81,9 +82,8 @@ class PatrolTask:
         self._warm_s = min(config.warm_s, 0.25 * min(config.duration_s, mission.run.time_limit_s))
         self._failed: frozenset[str] = frozenset()
         dt_s = mission.run.dt_s
-        self._visits_every, self._look_every = (
-            max(1, round(VISITS_EVERY_S / dt_s)),
-            max(1, round(LOOK_EVERY_S / dt_s)),
+        self._visits_every, self._see_every, self._look_every = (
+            max(1, round(every_s / dt_s)) for every_s in (VISITS_EVERY_S, SEE_EVERY_S, LOOK_EVERY_S)
         )
         self._guards = GuardLog(len(self._names))
         self._step = 0
@@ -105,6 +105,10 @@ class PatrolTask:
         places = np.array([attempt.body.state[:2] for attempt in attempts])
         if self._step % self._visits_every == 0:
             self._visits.add(t_s, places)
+        if self._step % self._see_every == 0:
+            for attempt, lidar in zip(attempts, self._lidars, strict=True):
+                if lidar is not None:
+                    self._floor.look(t_s, attempt.body, lidar)
         if self._step % self._look_every == 0:
             self._look(t_s, attempts)
         self._guards.step(t_s, attempts)
@@ -117,11 +121,8 @@ class PatrolTask:
         return "the patrol's time is over" if t_s >= self._config.duration_s - 1e-6 else None
 
     def _look(self, t_s: float, attempts: Sequence[Attempt]) -> None:
-        """What the lasers have in view, how idle the places are, and who does not get on."""
+        """How long ago the floor was seen, how idle the places are, and who does not get on."""
         for index, attempt in enumerate(attempts):
-            lidar = self._lidars[index]
-            if lidar is not None:
-                self._floor.look(t_s, attempt.body, lidar)
             self._watch(index, t_s, attempt)
         self._failed = frozenset(
             attempt.body.name
