@@ -153,6 +153,30 @@ def test_those_who_are_left_take_the_share_of_a_robot_that_stops() -> None:
     assert later.worst_s <= 1.25 * idleness_bound_s(GRAPH, 3, SPEED_M_S) * 1.1
 
 
+@pytest.mark.parametrize(("off_s", "all_its"), [(15.0, False), (500.0, True)])
+def test_only_who_is_off_duty_for_long_leaves_its_share_to_the_others(off_s: float, all_its: bool) -> None:
+    """Two rooms far from each other, a robot in each."""
+    room = lattice(3, 2, 3.0)
+    count = len(room)
+    edges = np.full((2 * count, 2 * count), np.inf)
+    edges[:count, :count] = edges[count:, count:] = room.edges_m
+    edges[count - 1, count] = edges[count, count - 1] = 40.0
+    places = np.concatenate([room.vertices_xy_m, room.vertices_xy_m + np.array([45.0, 0.0])])
+    graph = PatrolGraph.of(places, edges)
+    memory, other = memory_at(0, graph), PatrolMemory(2 * count, 1, 2, count, SPEED_M_S)
+    strategy = builder("adaptive-rounds")(setting_for(graph, (0, count)))
+    went = {0}
+    for k in range(60):
+        t_s = 12.0 + 6.0 * k
+        other.update(t_s, on_duty=not 60.0 <= t_s < 60.0 + off_s)
+        memory.receive(other.message(t_s))
+        at = memory.own.at
+        target = strategy.next_vertex(memory.knowledge(t_s))
+        went.add(target)
+        memory.visit(int(graph.next_hop[at, target]) if target != at else at, t_s)
+    assert (len(went) == 2 * count) is all_its
+
+
 def test_a_poor_radio_costs_little_and_none_at_all_stops_nobody() -> None:
     heard = judged("adaptive-rounds")
     poor = judged("adaptive-rounds", radio=Radio(range_m=10.0, loss=0.3, delay_s=1.0))

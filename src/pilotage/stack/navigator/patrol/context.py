@@ -136,8 +136,6 @@ class Context:
         self.alarm = (math.nan, math.nan, math.nan)
         self._next_word_s = float(self.rng.uniform(0.0, config.message_period_s))
 
-    # --- sensing ------------------------------------------------------------------------------------
-
     def sense(self, readings: Readings, belief: Belief, *, lost: bool) -> None:
         """Take in one step's readings."""
         self.t_s, self.pose, self.cov = readings.t_s, belief.pose, belief.cov
@@ -202,8 +200,6 @@ class Context:
         self.memory.update(self.t_s, words=self.task.strategy.words(self.memory.knowledge(self.t_s)))
         self.journal.outbox.append(TeamWord(x, y, self.blocked, self.memory.message(self.t_s)))
 
-    # --- the patrol ---------------------------------------------------------------------------------
-
     def away_m(self, place: int) -> float:
         """Distance from a vertex or its station as the crow flies."""
         x, y = self.roadmap.places_xy_m[place]
@@ -264,8 +260,6 @@ class Context:
             return self.away_m(at) > self.task.visit_m
         self.hop = int(graph.next_hop[at, target])
         return True
-
-    # --- driving ------------------------------------------------------------------------------------
 
     def lead(self, vertex: int) -> Twist:
         """The command that leads to a vertex."""

@@ -34,7 +34,8 @@ class AdaptiveRoundsConfig(Config):
     slack: Positive = Field(default=0.05, le=0.5)
     silent_s: Positive = 30.0
     silent_ratio: Positive = 8.0
-    """A robot is given up when its last word is so old, and so many times as old as it usually is."""
+    """A robot is given up when its last word is so old, and so many times as old as it usually is; one that
+    says that it is off duty when it has been for ``silent_s``: who lost its way is often back in seconds."""
 
 
 def best_plan(setting: PatrolSetting, robots: int, config: AdaptiveRoundsConfig) -> Plan:
@@ -85,6 +86,7 @@ class AdaptiveRoundsStrategy:
         # age), fading over half a tour; as if there had been one of that length.
         self._memory_s = max(0.5 * Round.best(setting.graph).length_m / setting.speed_m_s, 1.0)
         self._gaps_s = np.tile([self._memory_s, 0.5 * self._memory_s**2], (team, 1))
+        self._off_s = np.full(team, math.inf)
         self._phase_s = setting.begin_s
         self._is_on_round, self._waited_s = False, 0.0
         self._last_wait_s: float | None = None
@@ -127,12 +129,11 @@ class AdaptiveRoundsStrategy:
         readily = heard.any() and limit_s[heard].max() <= 2.0 * self._config.silent_s
         limit_s[~heard] = limit_s[heard].max() if readily else math.inf
         silent = now_s - self._heard_s > np.maximum(limit_s, self._config.silent_s)
+        off = np.array([state is not None and not state.on_duty for state in knowledge.states])
+        self._off_s = np.where(off, np.minimum(self._off_s, now_s), math.inf)
+        silent |= now_s - self._off_s > self._config.silent_s
         silent[knowledge.robot] = False
-        team = [
-            robot
-            for robot, state in enumerate(knowledge.states)
-            if not silent[robot] and (state is None or state.on_duty or robot == knowledge.robot)
-        ]
+        team = np.flatnonzero(~silent).tolist()
         if frozenset(team) != self._team:
             self._team = frozenset(team)
             self._plan = best_plan(self._setting, len(team), self._config)
