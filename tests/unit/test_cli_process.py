@@ -173,6 +173,11 @@ def test_settings_of_others_libraries_break_nothing(tmp_path: Path) -> None:
         capture_output=True,
         text=True,
         check=False,
-        env={**os.environ, "MPLBACKEND": "none of these", "NUMBA_NUM_THREADS": "0"},
+        env={
+            **os.environ,
+            "MPLBACKEND": "none of these",
+            "MPLCONFIGDIR": "/dev/null/no-folder",
+            "NUMBA_NUM_THREADS": "0",
+        },
     )
     assert (done.returncode, done.stderr) == (0, "")

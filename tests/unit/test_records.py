@@ -212,6 +212,8 @@ def test_a_folder_is_there_whole_or_not_at_all(tmp_path: Path) -> None:
     cannot_be_written = RunFiles(files.trace, {"success": object()})
     with pytest.raises(TypeError):
         write_run(tmp_path, "a", cannot_be_written)
+    with pytest.raises(TypeError):
+        write_run(tmp_path / "new" / "folders", "a", cannot_be_written)
     assert [path.name for path in tmp_path.iterdir()] == ["a"]
     assert sorted(path.name for path in folder.iterdir()) == before
     write_run(tmp_path, "a", files)

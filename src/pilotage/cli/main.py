@@ -91,9 +91,15 @@ def _steady_streams() -> None:
 
 
 def _steady_environment() -> None:
-    """Pictures go to files, whatever was set for a notebook; a count of threads that is none ends Numba."""
+    """Pictures go to files, whatever was set for a notebook; a count of threads that is none ends Numba.
+
+    Matplotlib's words on a folder of its own that cannot be written are nothing to who asked for a run.
+    """
+    import logging
+
     from pilotage.core.whole_number import whole_number
 
+    logging.getLogger("matplotlib").setLevel(logging.ERROR)
     os.environ["MPLBACKEND"] = "Agg"
     if not whole_number(os.environ.get("NUMBA_NUM_THREADS", "1")):
         del os.environ["NUMBA_NUM_THREADS"]

@@ -6,7 +6,7 @@ import os
 import shutil
 import tempfile
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -122,8 +122,9 @@ def draft_folder(final: Path) -> Iterator[Path]:
     """A folder that takes the place of ``final`` when it is whole, and vanishes where it is not.
 
     Everything is written beside it first, so that two runs at once do not mix and an interrupted one leaves
-    nothing half-written.
+    nothing half-written, nor the folders that were made for it.
     """
+    made = [folder for folder in final.parents if not folder.exists()]
     final.parent.mkdir(parents=True, exist_ok=True)
     draft = Path(tempfile.mkdtemp(prefix=f".{final.name}-", dir=final.parent))
     try:
@@ -132,6 +133,9 @@ def draft_folder(final: Path) -> Iterator[Path]:
         replace_folder(draft, final)
     except BaseException:
         shutil.rmtree(draft, ignore_errors=True)
+        with suppress(OSError):  # another run is in one of them already
+            for folder in made:
+                folder.rmdir()
         raise
 
 
