@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from pilotage.core.errors import InputError
+from pilotage.core.shown import shown, visible
 from pilotage.core.types import FloatArray
 from pilotage.core.whole_file import draft_of
 from pilotage.records.run_data import RunData, read_run, read_team
@@ -44,9 +45,11 @@ def write_rerun(path: Path, folder: Path) -> None:
         Where Rerun is not installed, or the folder is no run's.
     """
     rr = rerun()
+    if visible(str(path)) != str(path):
+        raise InputError(f"{path}: expected a name of plain characters, as Rerun takes no other")
     first, whole = read_run(folder), read_trace(folder)
     with draft_of(path) as draft:
-        stream = rr.RecordingStream("pilotage", recording_id=folder.name)
+        stream = rr.RecordingStream("pilotage", recording_id=shown(folder.name))
         stream.save(draft)
         stream.log("/", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
         _world(rr, stream, first)

@@ -22,10 +22,12 @@ def draft_of(path: Path) -> Iterator[Path]:
 def write_whole(path: Path, text: str) -> None:
     """Write a UTF-8 file beside its place and rename it: a reader never sees half of it.
 
+    What is no character, such as the bytes of a file's name that is no text, becomes a question mark.
+
     Raises
     ------
     OSError
         Where it cannot be written; what stood there before stays as it was.
     """
     with draft_of(path) as draft:
-        draft.write_text(text, encoding="utf-8")
+        draft.write_text(text, encoding="utf-8", errors="replace")

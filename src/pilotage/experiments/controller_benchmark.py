@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import partial
@@ -155,7 +156,7 @@ def course_run_mission(
     InputError
         Where the controller or an override is not what it should be.
     """
-    draw = np.random.default_rng([request.seed, course.number, trial, *course.family.encode()])
+    draw = np.random.default_rng([request.seed, course.number, trial, *os.fsencode(course.family)])
     name = Path(course.family).stem if course.family not in DRAWN else course.family
     settings: dict[str, Any] = {
         "mission": f"{name}-{course.number}-{trial}-{controller}"[-100:],

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -84,7 +85,7 @@ def make_course_of(family: str, number: int, seed: int, driver: Driver) -> Cours
     InputError
         Where a file is not what it should be.
     """
-    rng = np.random.default_rng([seed, number, *family.encode()])
+    rng = np.random.default_rng([seed, number, *os.fsencode(family)])
     if family == DOORS:
         return _walled(family, number, *_doors(rng), driver)
     if family == CORRIDOR:

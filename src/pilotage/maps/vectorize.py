@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from pilotage.core.errors import InputError
+from pilotage.core.shown import shown
 from pilotage.core.types import FloatArray
 from pilotage.core.whole_file import write_whole
 from pilotage.maps.map_file import MOST_PARTS
@@ -59,7 +60,7 @@ def write_wall_map(path: Path, name: str, segments_m: FloatArray, bounds_m: Boun
             "take a larger --tolerance"
         )
     lines = [
-        f"# Walls of {source}: the outlines of its occupied cells. Metres, x right, y up.",
+        f"# Walls of {shown(source)}: the outlines of its occupied cells. Metres, x right, y up.",
         f"map: {name}",
         f"bounds_m: [{', '.join(_number(value) for value in bounds_m)}]",
         f"walls_count: {len(segments_m)}",

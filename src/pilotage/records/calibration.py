@@ -51,7 +51,7 @@ def write_calibration(
     folder = out / f"calibrate-{answer['calibration']}-{digest.hexdigest()[:8]}"
     folder.mkdir(parents=True, exist_ok=True)
     for name, text in texts.items():
-        (folder / name).write_text(text, encoding="utf-8")
+        (folder / name).write_text(text, encoding="utf-8", errors="replace")
     named: dict[str, Any] = {**answer, "calibration_dir": str(folder)}
     if PARAMETER_FILE in texts:
         named["parameter_file"] = str(folder / PARAMETER_FILE)

@@ -11,7 +11,7 @@ LOCALIZER_FILE = "localizer.yaml"
 
 def write_localizer(folder: Path, text: str) -> None:
     """Write the settings' YAML text, which ``--set @FILE`` reads again."""
-    (folder / LOCALIZER_FILE).write_text(text, encoding="utf-8")
+    (folder / LOCALIZER_FILE).write_text(text, encoding="utf-8", errors="replace")
 
 
 def read_localizer(folder: Path) -> str:

@@ -14,7 +14,7 @@ MISSION_FILE = "mission.yaml"
 
 def write_mission(folder: Path, text: str) -> None:
     """Write the mission's YAML text."""
-    (folder / MISSION_FILE).write_text(text, encoding="utf-8")
+    (folder / MISSION_FILE).write_text(text, encoding="utf-8", errors="replace")
 
 
 def read_mission(folder: Path) -> tuple[Mapping[str, Any], str]:

@@ -13,6 +13,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Rectangle
 from matplotlib.transforms import Affine2D
 
+from pilotage.core.shown import visible
 from pilotage.core.types import FloatArray
 from pilotage.core.whole_file import draft_of
 from pilotage.maps.occupancy_grid import OCCUPIED_FROM, OccupancyGrid
@@ -44,7 +45,7 @@ def draw_map(chart: WorldMap, path: Path) -> None:
         axes.set_aspect("equal")
         axes.set_xlabel("x [m]")
         axes.set_ylabel("y [m]")
-        axes.set_title(f"{chart.name}: {width:g} m x {height:g} m")
+        axes.set_title(f"{visible(chart.name)}: {width:g} m x {height:g} m")
         with draft_of(path) as draft:
             figure.savefig(draft, dpi=110, format="png")
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 import io
 import math
 import re
+import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -120,9 +121,11 @@ class Illustration:
 def drawing_style() -> Iterator[None]:
     """The context in which figures are made and rendered; it leaves the caller's settings alone.
 
-    Numbers come from files: what overflows or is no number is a gap in a curve, and no warning.
+    Numbers and names come from files: what overflows or is no number is a gap in a curve, a letter that the
+    font lacks an empty box, and neither is a warning.
     """
-    with mpl.rc_context(_RC), np.errstate(all="ignore"):
+    with mpl.rc_context(_RC), np.errstate(all="ignore"), warnings.catch_warnings():
+        warnings.filterwarnings("ignore", message="Glyph ")
         yield
 
 

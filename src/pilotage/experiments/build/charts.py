@@ -129,7 +129,7 @@ def _named(source: str, markings: MarkingsConfig) -> WorldMap:
     if not path.is_file():
         raise InputError(f"map '{source}': expected a map file, found none there")
     if suffix in ELEVATION_SUFFIXES and suffix == ".json":
-        return load_chart(ElevationMap(name="elevation", file=source))
+        return load_chart(validate(ElevationMap, {"name": "elevation", "file": source}, "map"))
     if suffix in {".yaml", ".yml"}:
         values = parse_yaml(read_text(path), str(path))
         if "image" not in values and ROS_KEYS & values.keys():

@@ -43,8 +43,9 @@ def export(folder: Path) -> list[Path]:
         if len({type(v) for v in values if v is not None}) > 1
         and not all(isinstance(v, int | float) for v in values if v is not None)
     }
-    with draft_of(parquet_path) as draft:
-        pq.write_table(pa.table({**columns, **mixed}), draft)
+    # A file that is open already: Arrow takes no path that is not text.
+    with draft_of(parquet_path) as draft, draft.open("wb") as file:
+        pq.write_table(pa.table({**columns, **mixed}), file)
     return [csv_path, parquet_path]
 
 
