@@ -19,7 +19,7 @@ from hypothesis import strategies as st
 
 from support import damage
 from support.fuzz_targets import BY_NAME, OPTIONS, QUICK, TARGETS, Target
-from support.fuzzing import Healthy, damaged_case
+from support.fuzzing import Healthy, damaged_case, renamed
 from support.outcome import run
 
 NAMES = [target.name for target in TARGETS]
@@ -60,6 +60,17 @@ def test_what_is_something_else_is_refused(name: str, healthy: Healthy, tmp_path
         # Columns with their unit are just what a range log is.
         right = kind == "a thousand columns" and name == "calibrate range"
         assert outcome.code in ((0,) if right else (2, *target.goes_on)), (kind, path.name)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_no_file_name_reaches_the_terminal_or_breaks_what_is_written(
+    name: str, healthy: Healthy, tmp_path: Path
+) -> None:
+    target = BY_NAME[name]
+    folder = healthy.copy(target, tmp_path / "case")
+    words = renamed(target, folder, damage.MARKS[NAMES.index(name) % len(damage.MARKS)])
+    outcome = run(words, folder)
+    assert not outcome.faults(), words
 
 
 @pytest.mark.parametrize("name", NAMES)

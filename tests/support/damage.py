@@ -67,6 +67,9 @@ WORDS = (
 )
 """In the place of a word."""
 
+MARKS = ("\x1b[31m", "\u202e\x07", "a\nb\r", "\udcff", "地図", "$\\frac{$")
+"""What a file's name may hold: bytes that are no text, what a terminal or YAML would obey or a font lacks."""
+
 VALUES: tuple[Any, ...] = (
     None,
     True,

@@ -31,6 +31,18 @@ class Healthy:
         return to
 
 
+def renamed(target: Target, folder: Path, mark: str) -> list[str]:
+    """Give the files that a use names, and what it writes, names with ``mark``; returns the words."""
+    words = list(target.words)
+    for i, word in enumerate(words):
+        if word == "out":
+            words[i] = f"{mark}out"
+        elif i and "/" not in word and word not in (".", "..") and (folder / word).exists():
+            (folder / word).rename(folder / f"{mark}{word}")
+            words[i] = f"{mark}{word}"
+    return words
+
+
 def damaged_case(target: Target, healthy: Healthy, to: Path, rng: random.Random) -> str:
     """Write a use's inputs, one of them damaged; says what was done to which."""
     folder = healthy.copy(target, to)
