@@ -42,7 +42,7 @@ def read_earlier_map(folder: Path, config: SlamConfig) -> EarlierMap:
     known = read_scan_covariances(folder / COVARIANCES_FILE)
     file = read_npz(path, "keyframes of 'pilotage slam'")
     count = len(known.graph)
-    shapes = dict.fromkeys(("t_s", "beams", "first_angle_rad", "angle_step_rad"), (count,))
+    shapes = dict.fromkeys(("t_s", "scans", "beams", "first_angle_rad", "angle_step_rad"), (count,))
     for name, shape in (shapes | {"ranges_m": (count, -1), "breaks": (-1,)}).items():
         if name not in file:
             raise InputError(
@@ -77,7 +77,8 @@ def read_earlier_map(folder: Path, config: SlamConfig) -> EarlierMap:
     graph = known.graph
     weighted = graph.information * known.weights[:, None, None]
     edges = Edges(graph.i, graph.j, graph.measurements, weighted, np.zeros(graph.i.size, np.bool_))
-    return EarlierMap(graph.poses, Clouds.of(clouds), scans, edges, breaks)
+    last = int(np.count_nonzero(file["scans"] < 0))
+    return EarlierMap(graph.poses, Clouds.of(clouds), scans, edges, breaks, last)
 
 
 def write_slam_folder(

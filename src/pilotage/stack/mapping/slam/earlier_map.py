@@ -14,8 +14,9 @@ from pilotage.stack.mapping.slam.uncertainty import Edges
 
 CELL_M, RANGE_M = 0.25, 12.0
 """Walls are counted in cells of this side, as far as submaps go."""
-SEEN_BY, COVERED = 8, 0.95
-"""A keyframe may go where so many later ones, at least, see this share of its cells."""
+SEEN_BY, SEEN_BY_OLD, COVERED = 8, 3, 0.95
+"""A keyframe may go where so many others, at least, see this share of its cells: one of the last recording,
+and one of those before it."""
 GAP_KEYFRAMES = 4
 """So many keyframes left out in a row part a stretch of path in two."""
 
@@ -77,6 +78,8 @@ class EarlierMap:
         What holds them; how much each counts is in its information.
     breaks
         (B,) keyframes that do not follow the path of the one before.
+    last
+        First keyframe of the last recording.
     """
 
     poses: FloatArray
@@ -84,13 +87,14 @@ class EarlierMap:
     scans: KeyframeScans
     edges: Edges
     breaks: IntArray
+    last: int = 0
 
     def __len__(self) -> int:
         return int(self.poses.shape[0])
 
 
-def needed(poses: FloatArray, clouds: Clouds) -> BoolArray:
-    """(K,) which keyframes, oldest first, show what later ones do not.
+def needed(poses: FloatArray, clouds: Clouds, last: int = 0) -> BoolArray:
+    """(K,) which keyframes, oldest first, show what others do not; ``last`` begins the last recording.
 
     Every one that stays owns a share of 1 - COVERED of cells that fewer than SEEN_BY others see: their number
     grows with the walls, not with the time spent among them.
@@ -107,7 +111,8 @@ def needed(poses: FloatArray, clouds: Clouds) -> BoolArray:
     ends = np.cumsum([cells.size for cells in own])
     for k, end in enumerate(ends):
         cells = which[end - own[k].size : end]
-        if np.count_nonzero(seen_by[cells] > SEEN_BY) >= COVERED * cells.size:
+        enough = SEEN_BY_OLD if k < last else SEEN_BY
+        if np.count_nonzero(seen_by[cells] > enough) >= COVERED * cells.size:
             stays[k] = False
             seen_by[cells] -= 1
     stays[-1] = True
@@ -116,7 +121,7 @@ def needed(poses: FloatArray, clouds: Clouds) -> BoolArray:
 
 def pruned(earlier: EarlierMap) -> EarlierMap:
     """Leave out the keyframes that later ones make superfluous; what held the others is kept as a tree."""
-    stays = needed(earlier.poses, earlier.clouds)
+    stays = needed(earlier.poses, earlier.clouds, earlier.last)
     kept = np.flatnonzero(stays)
     gaps = np.flatnonzero(np.diff(kept) > GAP_KEYFRAMES) + 1
     after = np.searchsorted(kept, earlier.breaks)
@@ -127,4 +132,5 @@ def pruned(earlier: EarlierMap) -> EarlierMap:
         earlier.scans.chosen(kept),
         without(earlier.edges, earlier.poses, ~stays),
         breaks.astype(np.int64),
+        int(np.searchsorted(kept, earlier.last)),
     )

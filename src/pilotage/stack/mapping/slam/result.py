@@ -128,4 +128,5 @@ class SlamResult:
         weighted = graph.information * self.known.weights[:, None, None]
         never = np.zeros(graph.i.size, np.bool_)
         edges = Edges(graph.i, graph.j, graph.measurements, weighted, never)
-        return EarlierMap(graph.poses, self.clouds, self.keyframe_scans(), edges, self.breaks())
+        last = len(graph) - self.keyframes.size
+        return EarlierMap(graph.poses, self.clouds, self.keyframe_scans(), edges, self.breaks(), last)
