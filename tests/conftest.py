@@ -12,6 +12,11 @@ from hypothesis import settings
 # No test opens a window, and figures look the same on every machine.
 os.environ["MPLBACKEND"] = "Agg"
 
+# Matrices here are small: a second thread of BLAS only waits for its turn, long on a busy machine.
+# Set before NumPy is imported, and for all processes that tests start.
+for _library in ("OPENBLAS", "OMP", "MKL"):
+    os.environ[f"{_library}_NUM_THREADS"] = "1"
+
 # Drawn examples are the same at every run and for every worker; compiling a kernel may take its time.
 settings.register_profile("pilotage", derandomize=True, deadline=None)
 settings.load_profile("pilotage")
