@@ -228,6 +228,16 @@ class TestPassages:
 
 
 class TestMuseum:
+    def test_who_begins_beside_a_wall_is_on_its_own_side_of_it(self) -> None:
+        """The vertex that is nearest as the crow flies is behind the wall: around it are 37 m."""
+        start = "team.starts=[{x_m: 8.62, y_m: 15.37, theta_rad: 0.0}]"
+        experiment = build(load_mission("museum-patrol", ["team.size=1", start], seed=0))
+        context = experiment.team[0].stack._context  # type: ignore[attr-defined]
+        graph, roadmap = context.task.graph, context.roadmap
+        behind = graph.nearest(8.62, 15.37)
+        assert context.came_from == roadmap.nearest(8.62, 15.37) != behind
+        assert graph.shortest_m[context.came_from, behind] > 10.0
+
     def test_eight_patrol_without_a_touch_and_twice_the_same(self) -> None:
         short = ["team.size=8", "task.duration_s=40", "run.time_limit_s=40"]
         runs = []

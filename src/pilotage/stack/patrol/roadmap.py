@@ -16,6 +16,7 @@ from pilotage.maps.world_map import WorldMap
 EASY_M, TIGHT_FACTOR = 0.5, 1.0
 """Nearer to walls than this, beyond the body, a metre takes longer: twice as long where it just fits."""
 STEP_M, ASIDE_REACH_M = 0.25, 5.0
+NEAREST = 6
 STATION_M = 0.4
 """So far from a charging station the body may have to stand, for a wall beside it."""
 
@@ -94,6 +95,16 @@ class Roadmap:
                 f"({x:g}, {y:g}), found a wall; move it or take a smaller robot"
             )
         return int(rows[best]), int(columns[best])
+
+    def nearest(self, x_m: float, y_m: float) -> int:
+        """The vertex that is reached soonest from a place, of the few that are nearest as the crow flies."""
+        places = self.places_xy_m[: self._vertices]
+        few = np.argsort(np.hypot(places[:, 0] - x_m, places[:, 1] - y_m), kind="stable")[:NEAREST]
+        times = [
+            eikonal.value_at(x_m, y_m, self.time_s(int(k)), *self.origin_xy_m, self.spacing_m, 0.0)
+            for k in few
+        ]
+        return int(few[int(np.argmin(times))])
 
     def longest_s(self, place: int) -> float:
         """Time to a place from the vertex that is farthest from it."""

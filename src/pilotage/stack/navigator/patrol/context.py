@@ -121,7 +121,7 @@ class Context:
             station = len(task.graph) + task.robot
             self.battery = Battery(task.supply, self.roadmap, station, speed)
         self.rng = robot.streams.stream("patrol")
-        at = task.graph.nearest(start.x_m, start.y_m)
+        at = self.roadmap.nearest(start.x_m, start.y_m)
         self.memory = PatrolMemory(len(task.graph), task.robot, len(task.starts), at, speed)
         self.hop = self.target = self.came_from = at
         self._left_s = 0.0
@@ -231,7 +231,7 @@ class Context:
         self.journal.count("charges")
         self.say("charged", "the battery is full: goes on with the patrol")
         self.memory.update(self.t_s, on_duty=True)
-        self.came_from, self._left_s = self.task.graph.nearest(self.pose.x_m, self.pose.y_m), self.t_s
+        self.came_from, self._left_s = self.roadmap.nearest(self.pose.x_m, self.pose.y_m), self.t_s
 
     def visit(self, vertex: int) -> None:
         """It is there."""

@@ -93,7 +93,7 @@ class PatrolNavigator:
         elif not lost and isinstance(state, Lost):
             context.say("found", "the robot knows where it is and goes on")
             context.memory.update(context.t_s, on_duty=not context.homeward)
-            context.came_from = context.task.graph.nearest(belief.pose.x_m, belief.pose.y_m)
+            context.came_from = context.roadmap.nearest(belief.pose.x_m, belief.pose.y_m)
             state = None
         self._state, command = resume(context) if state is None else state.step(readings)
         context.talk(lost=lost)
