@@ -224,6 +224,7 @@ class TestWatching:
         ("ekf-landmarks", "{name: bias-step, sensor: beacons, from_s: 30, by_m: 0.3}"),
         ("invariant-ekf-landmarks", "{name: shuffle, sensor: odometry}, {name: shuffle, sensor: beacons}"),
         ("ekf-walls", "{name: shuffle, sensor: odometry}, {name: shuffle, sensor: lidar}"),
+        ("particle-filter", "{name: shuffle, sensor: odometry}, {name: shuffle, sensor: lidar}"),
         (
             "particle-filter",
             "{name: outliers, sensor: lidar, share: 0.1}, "

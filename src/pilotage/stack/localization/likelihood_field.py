@@ -16,7 +16,7 @@ from pilotage.maps.outlines import rim_lines
 from pilotage.maps.segment_map import SegmentMap
 from pilotage.maps.world_map import WorldMap
 
-WALL_STD_M, GRID_SHARE = 0.0065, 1.0 / 3.0
+WALL_STD_M, GRID_SHARE = 0.01, 1.0 / 3.0
 """What walls are wrong by, and of cells which share of their side, beyond the cell itself."""
 INDEPENDENT_SHARE = 0.25
 """Of a scan's beams on cells: those on one wall end where its cells were drawn, together."""

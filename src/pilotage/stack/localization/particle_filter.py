@@ -79,7 +79,7 @@ class MclConfig(Config):
     """Readings beyond are left out."""
     range_var_m2: Positive | None = None
     field_std_m: NonNegative | None = None
-    """What the map is wrong by; added to the range's variance. None: 6.5 mm, of a grid a third of a cell
+    """What the map is wrong by; added to the range's variance. None: 1 cm, of a grid a third of a cell
     beside the cell itself."""
     random_share: float = Field(default=0.05, gt=0.0, lt=1.0)
     """Share of readings that are no wall of the map."""
@@ -295,8 +295,8 @@ class ParticleFilterLocalizer:
         again = self._relocalization
         passed = None if again is None else again.passed(share, self._explained.usual)
         if passed:
-            # It has begun anew: what spoke against the place before says nothing of this one.
-            self._check, self._found = SelfCheck(refused_share=MOST_BESIDE), True
+            self._check.begin_anew(t_s)
+            self._found = True
             self._explained.begin_anew()
             self._sharp.begin_anew()
         elif passed is not None:

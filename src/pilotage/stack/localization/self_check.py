@@ -28,8 +28,9 @@ MOST_NOISE = 15.0
 HOLD_S, MOST_HOLD_S = 3.0, 60.0
 """How long all has to be well before it is believed again; doubled each time that it was not for long."""
 SOON_S = 30.0
-RECENT, USUAL, FORGOTTEN = 0.1, 0.02, 0.002
-"""What a new scan counts in the two means, and in the long one while the robot does not trust its place."""
+RECENT, USUAL, FORGOTTEN, DEVIATES = 0.1, 0.02, 0.002, 0.1
+"""What a new scan counts in the two means, and in the long one while the robot does not trust its place; and
+of that in how far the first usually is from the second: rooms differ in time, a wrong filter at once."""
 KEPT, DEVIATIONS, LEAST_KEPT = 0.9, 3.0, 0.7
 """Of the usual share, what a place must explain that the robot has just found: less where the share is seen
 to vary, by so many of its mean deviations, but never less than the last."""
@@ -101,6 +102,14 @@ class SelfCheck:
             self._hold_s = min(2.0 * self._hold_s, MOST_HOLD_S) if soon else HOLD_S
         self._until_s = t_s + self._hold_s
 
+    def begin_anew(self, t_s: float) -> None:
+        """The filter has taken another place, which has stood its trial: what spoke against the last one says
+        nothing of this one. Who had to withdraw its word soon after it gave it waits nevertheless."""
+        self._updates.clear()
+        self._sums = [0.0, 0.0, 0.0, 0.0]
+        if self._hold_s <= HOLD_S:
+            self._until_s = min(self._until_s, t_s)
+
     def lost(self, t_s: float) -> bool:
         """Whether the filter is not to be believed now."""
         return t_s < self._until_s
@@ -151,5 +160,5 @@ class ExplainedShare:
         kept = self._usual - max((1.0 - KEPT) * self._usual, DEVIATIONS * self._deviation)
         as_usual = self._recent >= max(kept, LEAST_KEPT * self._usual)
         self._usual += rate * off
-        self._deviation += rate * (abs(off) - self._deviation)
+        self._deviation += DEVIATES * rate * (abs(off) - self._deviation)
         return as_usual
