@@ -13,9 +13,11 @@ import pilotage as pl
 from pilotage.bridges.export import FORMS
 from pilotage.bridges.ros.run_messages import field_names
 from pilotage.cli.main import main
+from pilotage.core.errors import InputError
 from pilotage.logs.bags import read_bag
 from pilotage.records.scans import read_sightings
 from pilotage.records.trace import Trace
+from support.fabricated_run import fabricate_run
 from support.missions import reach
 
 rosbags = pytest.importorskip("rosbags.highlevel", reason="needs the extra 'ros'")
@@ -223,3 +225,16 @@ def test_topics_are_what_their_types_say(run: pl.Run, bags: dict[str, Path]) -> 
     assert by_truth.odometry is not None
     assert by_truth.odometry[-1, 0] == pytest.approx(run.trace["true_x_m"][-1])
     assert by_default.odometry[-1, 0] != pytest.approx(by_truth.odometry[-1, 0])
+
+
+@pytest.mark.parametrize("to", ["mcap", "rosbag", "rerun"])
+def test_an_event_without_a_time_has_no_place_in_a_recording(tmp_path: Path, to: str) -> None:
+    if to == "rerun":
+        pytest.importorskip("rerun", reason="needs the extra 'rerun'")
+    events: list[dict[str, Any]] = [{"t_s": None, "kind": "moon-rise", "text": "it rose"}]
+    folder = fabricate_run(
+        tmp_path / "run", steps=5, metrics={"mission": "x", "success": True}, events=events
+    )
+    with pytest.raises(InputError, match="expected the time of every event"):
+        pl.export(str(folder), to, tmp_path / "out")
+    assert not (tmp_path / "out").exists()

@@ -29,6 +29,7 @@ from pilotage.stack.localization.ekf_walls import EkfWallsConfig, EkfWallsLocali
 from pilotage.stack.localization.global_search import GlobalSearch, GlobalSearchConfig
 from pilotage.stack.localization.localizer import LOCALIZERS
 from pilotage.stack.localization.odometry_prediction import OdometryNoise, OdometryPrediction
+from pilotage.stack.localization.particle_filter import MclConfig
 from pilotage.stack.localization.scan_fit import ScanFit
 from pilotage.stack.localization.wall_matching import WallMatcher, WallMatchingConfig
 from support.robots import ROOM, Told, sensors, told_of
@@ -133,15 +134,15 @@ def test_a_robot_carried_elsewhere_notices_at_once() -> None:
 
 
 def test_only_localizers_that_search_start_without_a_pose() -> None:
+    never = {"ekf-walls": EkfWallsConfig(recovery=None), "particle-filter": MclConfig(relocalize=False)}
     for entry in LOCALIZERS:
         nowhere = told_of(initial=Belief.anywhere(ROOM.bounds_m))
-        if entry.name == "ekf-walls":
-            assert nowhere.localizer(entry.factory, EkfWallsConfig()).belief.status is BeliefStatus.LOST
-            with pytest.raises(InputError, match="known"):
-                nowhere.localizer(entry.factory, EkfWallsConfig(recovery=None))
-        else:
-            with pytest.raises(InputError, match="ekf-walls"):
-                nowhere.localizer(entry.factory, entry.config())
+        config = entry.config()
+        if entry.name in never:
+            assert nowhere.localizer(entry.factory, config).belief.status is BeliefStatus.LOST
+            config = never[entry.name]
+        with pytest.raises(InputError, match="ekf-walls" if entry.name not in never else "known"):
+            nowhere.localizer(entry.factory, config)
 
 
 def test_the_telling_place_is_where_the_views_differ() -> None:

@@ -11,6 +11,7 @@ from pilotage.core.errors import InputError
 from pilotage.core.shown import shown, visible
 from pilotage.core.types import FloatArray
 from pilotage.core.whole_file import draft_of
+from pilotage.records.events import require_times
 from pilotage.records.run_data import RunData, read_run, read_team
 from pilotage.records.trace import Trace, read_trace
 
@@ -48,6 +49,7 @@ def write_rerun(path: Path, folder: Path) -> None:
     if visible(str(path)) != str(path):
         raise InputError(f"{path}: expected a name of plain characters, as Rerun takes no other")
     first, whole = read_run(folder), read_trace(folder)
+    require_times(first.events, folder)
     with draft_of(path) as draft:
         stream = rr.RecordingStream("pilotage", recording_id=shown(folder.name))
         stream.save(draft)

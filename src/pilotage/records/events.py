@@ -42,7 +42,18 @@ def _event(entry: Mapping[str, Any], path: Path) -> Event:
     if "t_s" not in entry or not isinstance(kind, str) or not isinstance(text, str):
         found = ", ".join(str(key) for key in entry) or "nothing in it"
         raise InputError(f"{path}: expected objects with t_s, kind and text, found one with {found}")
-    t_s = number(entry["t_s"])
-    if not math.isfinite(t_s):
-        raise InputError(f"{path}: expected the time of every event in seconds, found one without")
-    return Event(t_s, clean_text(kind), clean_text(text))
+    return Event(number(entry["t_s"]), clean_text(kind), clean_text(text))
+
+
+def require_times(events: Iterable[Event], folder: Path) -> None:
+    """Refuse events without a time, which a page shows and a recording has no place for.
+
+    Raises
+    ------
+    InputError
+        Where an event's time is not finite.
+    """
+    if not all(math.isfinite(event.t_s) for event in events):
+        raise InputError(
+            f"{folder / EVENTS_FILE}: expected the time of every event in seconds, found one without"
+        )

@@ -15,6 +15,7 @@ from pilotage.logs.odometry_steps import arc_ends
 from pilotage.maps.occupancy_grid import OccupancyGrid
 from pilotage.maps.rasterize import rasterized
 from pilotage.maps.segment_map import SegmentMap
+from pilotage.records.events import require_times
 from pilotage.records.run_data import RunData, read_run, read_team
 from pilotage.records.trace import Trace, read_trace
 from pilotage.records.world import World
@@ -59,6 +60,7 @@ def run_messages(folder: Path) -> RunMessages:
         Where it is none, or one of its files cannot be read.
     """
     first = read_run(folder)
+    require_times(first.events, folder)
     whole = read_trace(folder)
     team = read_team(folder, first)
     began_s = float(whole.t_s[0]) if whole.steps else 0.0

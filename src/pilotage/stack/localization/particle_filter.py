@@ -25,7 +25,7 @@ from pilotage.stack.interface import Belief, BeliefStatus
 from pilotage.stack.journal import Journal
 from pilotage.stack.knowledge import RobotKnowledge
 from pilotage.stack.localization.likelihood_field import LikelihoodField
-from pilotage.stack.localization.localizer import LOCALIZERS
+from pilotage.stack.localization.localizer import LOCALIZERS, require_initial_pose
 from pilotage.stack.localization.odometry_prediction import OdometryNoise, OdometryPrediction
 from pilotage.stack.localization.odometry_watch import (
     LINEAR_RAD,
@@ -126,6 +126,8 @@ class ParticleFilterLocalizer:
                 f"stack.localizer.most_particles: expected at least least_particles "
                 f"({config.least_particles}), found {config.most_particles}"
             )
+        if not config.relocalize:
+            require_initial_pose(initial, f"{NAME} without relocalize")
         self._config = config
         self._odometry, odometry = robot.one_sensor(WheelOdometryConfig, NAME)
         self._lidar, lidar = robot.one_sensor(LidarConfig, NAME)
