@@ -42,7 +42,10 @@ def _event(entry: Mapping[str, Any], path: Path) -> Event:
     if "t_s" not in entry or not isinstance(kind, str) or not isinstance(text, str):
         found = ", ".join(str(key) for key in entry) or "nothing in it"
         raise InputError(f"{path}: expected objects with t_s, kind and text, found one with {found}")
-    return Event(number(entry["t_s"]), clean_text(kind), clean_text(text))
+    t_s = number(entry["t_s"])
+    if entry["t_s"] is not None and not math.isfinite(t_s):
+        raise InputError(f"{path}: expected the time of an event in seconds, found something else")
+    return Event(t_s, clean_text(kind), clean_text(text))
 
 
 def require_times(events: Iterable[Event], folder: Path) -> None:
