@@ -109,8 +109,9 @@ class ParticleFilterLocalizer:
     so the filter believes a little less than it could. Scans on cells err alike (``LikelihoodField.kept``):
     the cloud is never much narrower than one scan alone would make it.
 
-    Fails after a wrong start or when carried away (particles are only where they once were), and where the
-    belief is no single hump: the spreading keeps mean and covariance, and would draw two humps together.
+    After a wrong start, or carried away, it notices and searches the whole map (``Relocalization``); it finds
+    no place while several look alike. Fails where the belief is no single hump: the spreading keeps mean and
+    covariance, and would draw two humps together.
     """
 
     def __init__(
@@ -195,7 +196,7 @@ class ParticleFilterLocalizer:
             if isinstance(scan, LidarScan):
                 self._relocalization.see(seen)
             place = self._relocalization.begin(t_s, lost, mean)
-            if place is not None and place is not mean:
+            if place is not None:
                 mean, cov = self._begin_at(place)
         self.belief = Belief(
             Pose2.from_array(mean), cov, BeliefStatus.LOST if lost else BeliefStatus.LOCALIZED

@@ -55,7 +55,7 @@ class Relocalization:
     Attributes
     ----------
     trial
-        The place under trial; None where there is none.
+        The place under trial, a new one or where the filter is anyway; None where there is none.
     """
 
     def __init__(self, field: LikelihoodField, bounds_m: tuple[float, float, float, float]) -> None:
@@ -83,7 +83,7 @@ class Relocalization:
         self._scans.forget()
 
     def begin(self, t_s: float, lost: bool, mean: FloatArray) -> FloatArray | None:
-        """A place (3,) to try, where one is found; the filter's own mean (3,) where that is the place."""
+        """A place (3,) to begin anew at; None where none is found, or a trial of the filter's own began."""
         if not lost:
             self._since_s = self.trial = None
             return None
@@ -103,7 +103,7 @@ class Relocalization:
         self.trial = Trial()
         off = place.pose - mean
         near = float(np.hypot(off[0], off[1])) < SAME_M and abs(wrap_to_pi(float(off[2]))) < SAME_RAD
-        return mean if near else place.pose
+        return None if near else place.pose
 
     def passed(self, at_wall_share: float, usual: float) -> bool | None:
         """One scan of a trial: whether the place has proved itself; None while that is open."""
