@@ -18,7 +18,7 @@ from pilotage.bridges.ros.run_messages import RunMessages, Stamped
 from pilotage.cli.app import dispatch
 from pilotage.core.errors import InputError
 from pilotage.core.types import Pose2
-from pilotage.logs.bag_series import LANDMARKS, read_series
+from pilotage.logs.bag_series import LANDMARKS, POSES, read_series
 from pilotage.maps.ros_map import RosMap, write_ros_map
 from support.command_bags import commanded
 
@@ -356,6 +356,18 @@ def test_numbers_that_are_none_are_left_out(tmp_path: Path) -> None:
     write_mcap(tmp_path / "a.mcap", drive)
     with pytest.raises(InputError, match="found none that can be read"):
         read_series(tmp_path / "a.mcap", LANDMARKS)
+
+
+def test_where_no_robot_was_is_left_out_and_told(tmp_path: Path) -> None:
+    """A number beyond all distances, whose square is beyond all numbers."""
+    drive = circle(parts="odometry")
+    odometry = [stamped for stamped in drive.stamped if stamped.topic == "/odom"]
+    odometry[3].fields["pose"]["pose"]["position"]["x"] = 1e200
+    write_mcap(tmp_path / "a.mcap", drive)
+    found = read_series(tmp_path / "a.mcap", POSES, "/odom")
+    assert len(found.t_s) == len(odometry) - 1
+    assert np.abs(found.values).max() < 100.0
+    assert any("1 messages of /odom" in text for text in found.warnings)
 
 
 @pytest.mark.parametrize("name", WRITERS)

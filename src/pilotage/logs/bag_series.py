@@ -21,12 +21,10 @@ from pilotage.core.types import FloatArray
 from pilotage.logs.bag_messages import OpenBag, read_through
 from pilotage.logs.bag_topics import Kind, full_name, holds, pick
 from pilotage.logs.bags import ODOMETRY, ODOMETRY_TYPE, TRANSFORM_TYPES, USUAL_TRUTH
-from pilotage.logs.scanner_mount import TransformTree, frame_name
+from pilotage.logs.scanner_mount import LARGEST, TransformTree, frame_name
 from pilotage.logs.trajectories import Trajectory3
 
 GAUSS_PER_TESLA = 1e4
-LARGE_QUATERNION = 1e6
-"""A damaged one, whose squares may be beyond all numbers."""
 Rows: TypeAlias = Iterator[tuple[Any, tuple[float, ...]]]
 """Header, or None for the time of receipt, and one row of numbers."""
 
@@ -170,8 +168,7 @@ def trajectory_of_bag(path: Path, topic: str | None = None) -> Trajectory3:
 
 def headings(poses: FloatArray) -> FloatArray:
     """Planar poses (N, 3) of poses in space (N, 7)."""
-    largest = np.abs(poses[:, 3:]).max(axis=1, initial=0.0)
-    x, y, z, w = poses[:, 3:].T / np.where(largest > LARGE_QUATERNION, largest, 1.0)
+    x, y, z, w = poses[:, 3:].T
     turn = np.arctan2(2.0 * (w * z + x * y), w * w + x * x - y * y - z * z)
     return np.column_stack([poses[:, :2], turn])
 
@@ -204,10 +201,14 @@ def _series(bag: OpenBag, path: Path, kind: Kind, name: str, said: list[str]) ->
                 frame = frame or ("" if header is None else frame_name(header.frame_id))
         except (AttributeError, TypeError, ValueError, OverflowError, IndexError):
             damaged += 1  # None, or what a damaged definition made of it
-    if damaged:
-        said.append(f"{damaged} messages of {name} that cannot be read were passed over")
     t_s, values = np.array(times), np.array(rows, dtype=np.float64)
     fine = np.isfinite(t_s) if not rows else np.isfinite(t_s) & np.isfinite(values).all(axis=1)
+    if rows:
+        sane = ~(np.abs(values) > LARGEST).any(axis=1)
+        damaged += int(np.sum(fine & ~sane))
+        fine &= sane
+    if damaged:
+        said.append(f"{damaged} messages of {name} that cannot be read were passed over")
     if not fine.any():
         raise InputError(f"{path}: expected {kind.what} in {name}, found none that can be read")
     t_s, values = t_s[fine], values[fine]

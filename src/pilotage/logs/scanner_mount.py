@@ -16,6 +16,8 @@ import numpy as np
 from pilotage.core.angles import wrap_to_pi
 from pilotage.core.types import FloatArray, Pose2
 
+LARGEST = 1e9
+"""No robot was farther away or faster, in any unit: what is beyond it was damaged."""
 LARGEST_TILT_RAD = math.radians(5.0)
 """A scanner tilted by more does not scan a floor plan."""
 MOVED_M_OR_RAD = 0.01
@@ -38,14 +40,14 @@ class TransformTree:
     moved: set[str] = field(default_factory=set)
 
     def add(self, transform: Any) -> None:
-        """Take a ``geometry_msgs/TransformStamped``; what is not finite is passed over."""
+        """Take a ``geometry_msgs/TransformStamped``; what is damaged is passed over."""
         child, parent = frame_name(transform.child_frame_id), frame_name(transform.header.frame_id)
         known = self.parents.get(child)
         if known is not None and (child in self.moved or known[0] != parent):
             return
         shift, turn = transform.transform.translation, transform.transform.rotation
         numbers = np.array([shift.x, shift.y, shift.z, turn.x, turn.y, turn.z, turn.w], dtype=np.float64)
-        if not np.isfinite(numbers).all() or np.linalg.norm(numbers[3:]) < 1e-6:
+        if not (np.abs(numbers) <= LARGEST).all() or np.linalg.norm(numbers[3:]) < 1e-6:
             return
         matrix = transform_matrix(numbers[:3], numbers[3:])
         if known is None:
