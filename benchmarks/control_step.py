@@ -55,7 +55,7 @@ def courses(count: int) -> list[Course]:
     """Courses that the robot of ``barn-course`` has a way through."""
     robot = mission_of(course_base(), ()).robot
     footprint = footprint_of(robot, "robot")
-    driver = Driver(footprint, drive.outline_of(footprint), motion_of(robot, "robot"))
+    driver = Driver(footprint, drive.polygon_around(footprint), motion_of(robot, "robot"))
     made = (make_course_of(FAMILY, number, 0, driver) for number in range(count))
     return [course for course in made if course is not None]
 

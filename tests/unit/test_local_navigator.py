@@ -14,7 +14,7 @@ from pilotage.models.footprint import Footprint
 from pilotage.models.motion.bicycle import BicycleConfig
 from pilotage.models.motion.differential_drive import DifferentialDriveConfig
 from pilotage.sensors.readings import LidarScan, OdometryIncrement, Reading, Readings
-from pilotage.stack.control.local.drive import limits_of, outline_of
+from pilotage.stack.control.local.drive import limits_of, polygon_around
 from pilotage.stack.control.local.role import LocalView
 from pilotage.stack.interface import Belief, StackStatus
 from pilotage.stack.navigator.local import LocalConfig, LocalNavigator
@@ -125,7 +125,7 @@ def test_limits_are_those_of_the_data_sheet() -> None:
 
 
 def test_the_outline_of_a_disc_holds_it() -> None:
-    corners = outline_of(Footprint.disc(0.3))
+    corners = polygon_around(Footprint.disc(0.3))
     middles = 0.5 * (corners + np.roll(corners, -1, axis=0))
     assert np.hypot(*middles.T) == pytest.approx(0.3)
 

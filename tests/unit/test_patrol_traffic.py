@@ -40,7 +40,7 @@ def stops(
     now = w if turning is None else turning
     return bool(
         voronoi_window.stop_is_clear(
-            v, now, v, w, limits, safety, near, strange, people, np.zeros(3), known, -2.0, -2.0, 0.1
+            v, now, v, w, limits, safety, (near, strange, people), np.zeros(3), (known, -2.0, -2.0, 0.1)
         )
     )
 
@@ -195,10 +195,13 @@ class TestStopping:
         for _ in range(25):
             ahead = voronoi_window.rotated((corner - pose[:2])[None], -pose[2])
             assert math.hypot(*ahead[0]) > 0.35
-            seen = (ahead, NOBODY, NOBODY, time, -2.0, -3.0, 0.1, NO_MAP, 0.0, 0.0, 0.1)
-            v, w, _ = voronoi_window.choose(
-                v, w, pose, limits, safety, *seen, 0.0, 0.9, 0.3, 0.5, 0.25, 6, 15
+            seen, field, known = (
+                (ahead, NOBODY, NOBODY),
+                (time, -2.0, -3.0, 0.1),
+                (NO_MAP, 0.0, 0.0, 0.1),
             )
+            window = (0.9, 0.3, 0.5, 0.25, 6, 15)
+            v, w, _ = voronoi_window.choose(v, w, pose, limits, safety, seen, field, known, 0.0, window)
             pose = pose + 0.2 * np.array(
                 [v * math.cos(pose[2] + 0.1 * w), v * math.sin(pose[2] + 0.1 * w), w]
             )

@@ -23,7 +23,6 @@ from pilotage.kernels.bodies import drive, environments
 from pilotage.models.motion.differential_drive import DifferentialDriveConfig
 from pilotage.sensors.lidar import LidarConfig
 from pilotage.sim.sensing.lidar import fan_of
-from pilotage.sim.worlds.world import outline_of
 
 Observations = dict[str, NDArray[np.float32]]
 
@@ -112,7 +111,7 @@ class MissionVectorEnv(VectorEnv[Any, Any, Any]):
             math.sqrt(lidar.range_var_m2),
         )
         world = source.world
-        self._solid = (outline_of(body.footprint), world.fixed, world.traffic.others, body.own)
+        self._solid = (body.footprint.outline, world.fixed, world.traffic.others, body.own)
         self._states = np.zeros((num_envs, drive.STATE_SIZE))
         self._speeds, self._commands = np.zeros((num_envs, 2)), np.zeros((num_envs, 2))
         self._counts = np.zeros(num_envs, dtype=np.int64)

@@ -30,7 +30,7 @@ from pilotage.logs.barn import (
     read_published,
 )
 from pilotage.missions.mission import Mission
-from pilotage.stack.control.local.drive import outline_of
+from pilotage.stack.control.local.drive import polygon_around
 
 MISSION = "barn-course"
 """What the courses are put into: robot, sensors, stack, and how it is judged."""
@@ -96,7 +96,7 @@ def bench_barn(request: BarnRequest, on_run: OnRun | None = None) -> BarnAnswer:
     for controller in request.controllers:
         course_mission(request, base, request.worlds[0], 0, controller)
     robot = mission_of(base, led_by(request.controllers[0], request.overrides)).robot
-    outline = outline_of(footprint_of(robot, "robot"))
+    outline = polygon_around(footprint_of(robot, "robot"))
     open_worlds = [world for world in request.worlds if has_way(world, outline)]
     if not open_worlds:
         raise InputError(

@@ -25,7 +25,7 @@ from pilotage.experiments.result_rows import write_rows
 from pilotage.experiments.run import run_mission
 from pilotage.experiments.run_pool import all_done
 from pilotage.missions.mission import Mission
-from pilotage.stack.control.local.drive import outline_of
+from pilotage.stack.control.local.drive import polygon_around
 from pilotage.stack.control.local.role import LOCAL_CONTROLLERS
 
 TIME_LIMIT_S = 100.0
@@ -101,7 +101,7 @@ def bench_controllers(
             )
     robot = mission_of(base, led_by(request.controllers[0], request.overrides)).robot
     footprint = footprint_of(robot, "robot")
-    driver = Driver(footprint, outline_of(footprint), motion_of(robot, "robot"))
+    driver = Driver(footprint, polygon_around(footprint), motion_of(robot, "robot"))
     courses: dict[tuple[str, int], Course] = {}
     without: dict[str, int] = {}
     for family in request.families:

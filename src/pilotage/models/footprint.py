@@ -34,6 +34,11 @@ class Footprint:
         """Whether the outline is the disc itself."""
         return len(self.points_m) == 0
 
+    @property
+    def outline(self) -> tuple[FloatArray, float, float]:
+        """As the kernels take it (``kernels.geometry.solids.Outline``)."""
+        return self.points_m, self.radius_m, self.inner_radius_m
+
     @staticmethod
     def disc(radius_m: float) -> Footprint:
         """A disc around the axle's middle."""

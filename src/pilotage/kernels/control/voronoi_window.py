@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import TypeAlias
 
 import numpy as np
 
@@ -11,6 +12,13 @@ from pilotage.kernels.control.eikonal import descent, value_at
 from pilotage.kernels.geometry.field import interpolate_at
 from pilotage.kernels.geometry.motion import exact_arc, wrap
 from pilotage.kernels.jit import kernel
+
+Field: TypeAlias = tuple[FloatArray, float, float, float]
+"""Values at nodes (rows, columns), the first node's x and y, and the spacing of the nodes."""
+Seen: TypeAlias = tuple[FloatArray, FloatArray, FloatArray]
+"""Returns, base frame: the nearest around it (K, 2), of what may move (M, 2), of people (P, 2)."""
+Window: TypeAlias = tuple[float, float, float, float, int, int]
+"""Horizon, cost of a heading off the field, cost of nearness and the distance it begins at, speeds, turns."""
 
 ROLL_S, LOOK_M, MOST_STEPS = 0.05, 0.05, 200
 """A command is followed in steps of time, and looked at after so many metres; braking takes 10 s at most."""
@@ -29,10 +37,7 @@ def scan_returns(
     far_m: float,
     tolerance_m: float,
     tolerance_per_m: float,
-    known: FloatArray,
-    x0: float,
-    y0: float,
-    resolution: float,
+    known: Field,
     sectors: int,
 ) -> tuple[FloatArray, FloatArray]:
     """Nearest returns by sector, and those that the known map does not explain.
@@ -42,7 +47,7 @@ def scan_returns(
     ranges, directions
         (B,) and (B, 2) unit vectors of the beams in the sensor's frame.
     known
-        Distance field of the robot's own map; empty (0, 0) for a robot that does not know where it is.
+        Distances on the robot's own map; of no nodes for a robot that does not know where it is.
     near_m, far_m
         Returns nearer than this to the base are kept by sector; those nearer than that are looked at at all.
 
@@ -54,6 +59,7 @@ def scan_returns(
         (M, 2) base frame: returns farther from everything on the map than
         ``tolerance_m + tolerance_per_m * range``; none without a map.
     """
+    known_m, x0, y0, resolution = known
     nearest = np.full(sectors, np.inf)
     points = np.empty((sectors, 2))
     strange = np.empty((ranges.shape[0], 2))
@@ -72,9 +78,9 @@ def scan_returns(
             if away < nearest[sector]:
                 nearest[sector] = away
                 points[sector, 0], points[sector, 1] = x, y
-        if known.shape[0] > 1:
+        if known_m.shape[0] > 1:
             mx, my = pose[0] + cp * x - sp * y, pose[1] + sp * x + cp * y
-            if interpolate_at(mx, my, known, x0, y0, resolution) > tolerance_m + tolerance_per_m * r:
+            if interpolate_at(mx, my, known_m, x0, y0, resolution) > tolerance_m + tolerance_per_m * r:
                 strange[count, 0], strange[count, 1] = x, y
                 count += 1
     kept = 0
@@ -94,14 +100,9 @@ def stop_is_clear(
     w: float,
     limits: FloatArray,
     safety: FloatArray,
-    near: FloatArray,
-    strange: FloatArray,
-    people: FloatArray,
+    seen: Seen,
     pose: FloatArray,
-    known: FloatArray,
-    known_x0: float,
-    known_y0: float,
-    resolution: float,
+    known: Field,
 ) -> bool:
     """Whether a disc told (v, w), and to stop after its reaction time, comes to rest clear of everything.
 
@@ -120,22 +121,23 @@ def stop_is_clear(
         Top speed, acceleration, deceleration, top turn rate, turn acceleration, period of the decision.
     safety
         Reaction time, radius, margin, gap, and the speed at which people may come.
-    near, strange, people
-        (K, 2), (M, 2) and (P, 2) returns, base frame; the second of what may move, the third of those who
-        give way to nobody: they may come on all the while.
+    seen
+        Of what stands, of what may move, and of those who give way to nobody: they may come on all the while.
     pose, known
-        Where it is on its map, and the map's distance field: a thin wall seen end on returns nothing. (1, 1)
+        Where it is on its map, and the map's distances: a thin wall seen end on returns nothing. Of one node
         for a robot that does not know where it is.
     """
     acceleration, deceleration, turning = limits[1], limits[2], limits[4]
     reaction, radius, margin, gap = safety[0], safety[1], safety[2], safety[3]
+    near, strange, people = seen
+    known_m, x0, y0, resolution = known
     # Who is nearer than the margin already may slide along, and come no nearer.
     apart = (radius + margin) * (radius + margin)
     for i in range(near.shape[0]):
         apart = min(apart, near[i, 0] * near[i, 0] + near[i, 1] * near[i, 1])
     clearance = np.inf
-    if known.shape[0] > 1:
-        here = interpolate_at(pose[0], pose[1], known, known_x0, known_y0, resolution)
+    if known_m.shape[0] > 1:
+        here = interpolate_at(pose[0], pose[1], known_m, x0, y0, resolution)
         clearance = min(radius + margin, here) - 1e-3
     cp, sp = math.cos(pose[2]), math.sin(pose[2])
     x = y = theta = since = 0.0
@@ -158,7 +160,7 @@ def stop_is_clear(
         since = 0.0
         if clearance < np.inf:
             mx, my = pose[0] + cp * x - sp * y, pose[1] + sp * x + cp * y
-            if interpolate_at(mx, my, known, known_x0, known_y0, resolution) < clearance:
+            if interpolate_at(mx, my, known_m, x0, y0, resolution) < clearance:
                 return False
         for i in range(near.shape[0]):
             px, py = near[i, 0], near[i, 1]
@@ -230,24 +232,11 @@ def choose(
     pose: FloatArray,
     limits: FloatArray,
     safety: FloatArray,
-    near: FloatArray,
-    strange: FloatArray,
-    people: FloatArray,
-    time: FloatArray,
-    x0: float,
-    y0: float,
-    spacing: float,
-    known: FloatArray,
-    known_x0: float,
-    known_y0: float,
-    resolution: float,
+    seen: Seen,
+    field: Field,
+    known: Field,
     lane_m: float,
-    horizon_s: float,
-    heading_cost: float,
-    near_cost: float,
-    soft_m: float,
-    speeds: int,
-    turns: int,
+    window: Window,
 ) -> tuple[float, float, int]:
     """The pair of speed and turn rate within reach that leads on best, of those that can stop in time.
 
@@ -255,12 +244,10 @@ def choose(
     ----------
     limits
         Top speed, acceleration, deceleration, top turn rate, turn acceleration, period of the decision.
-    safety, near, strange, people
+    safety, seen, known
         As ``stop_is_clear``.
-    time
-        Time to go (rows, columns), infinite where no place is.
-    known
-        As ``stop_is_clear``.
+    field
+        Time to go, infinite where no place is.
     lane_m
         The point so far to the left of the robot follows the field: the robot keeps to the right of it.
 
@@ -270,6 +257,9 @@ def choose(
         HELD where nothing but standing or turning was clear. It turns where the field falls, or where the way
         there cuts a corner to the nearest heading in which it may set out and comes nearer.
     """
+    near, strange, people = seen
+    time, x0, y0, spacing = field
+    horizon_s, heading_cost, near_cost, soft_m, speeds, turns = window
     top, acceleration, deceleration, top_turn, turn_acceleration, period = (
         limits[0],
         limits[1],
@@ -291,28 +281,14 @@ def choose(
     hard = within(near, longest + radius + margin)
     moving = within(strange, 2.0 * longest + radius + gap)
     coming = within(people, longest + radius + gap + safety[4] * (reaction + high_v / deceleration))
+    within_reach = hard, moving, coming
     beside = within(near, high_v * horizon_s + radius + soft_m)
     cp, sp = math.cos(pose[2]), math.sin(pose[2])
     for i in range(speeds):
         v = low_v + (high_v - low_v) * i / (speeds - 1)
         for j in range(turns):
             w = low_w + (high_w - low_w) * j / (turns - 1)
-            if not stop_is_clear(
-                v0,
-                w0,
-                v,
-                w,
-                limits,
-                safety,
-                hard,
-                moving,
-                coming,
-                pose,
-                known,
-                known_x0,
-                known_y0,
-                resolution,
-            ):
+            if not stop_is_clear(v0, w0, v, w, limits, safety, within_reach, pose, known):
                 continue
             x, y, theta = exact_arc(0.0, 0.0, 0.0, v * horizon_s, w * horizon_s)
             least = (soft_m + radius) * (soft_m + radius)
@@ -338,23 +314,7 @@ def choose(
                 moves, moves_v, moves_w = cost, v, w
     if best_v > 1e-3:
         return best_v, best_w, FREE
-    turn = free_turn(
-        pose,
-        limits,
-        safety,
-        hard,
-        moving,
-        coming,
-        time,
-        x0,
-        y0,
-        spacing,
-        known,
-        known_x0,
-        known_y0,
-        resolution,
-        heading_cost,
-    )
+    turn = free_turn(pose, limits, safety, within_reach, field, known, heading_cost)
     if not abs(turn) < np.inf:
         return best_v, best_w, HELD
     if abs(turn) < math.pi / HEADINGS and moves < np.inf:
@@ -369,26 +329,20 @@ def free_turn(
     pose: FloatArray,
     limits: FloatArray,
     safety: FloatArray,
-    near: FloatArray,
-    strange: FloatArray,
-    people: FloatArray,
-    time: FloatArray,
-    x0: float,
-    y0: float,
-    spacing: float,
-    known: FloatArray,
-    known_x0: float,
-    known_y0: float,
-    resolution: float,
+    seen: Seen,
+    field: Field,
+    known: Field,
     heading_cost: float,
 ) -> float:
     """The turn on the spot after which one that stands may set out and comes nearer; infinite without one.
 
     Parameters
     ----------
-    pose, limits, safety, near, strange, people, time, known
+    pose, limits, safety, seen, field, known
         As ``choose``.
     """
+    near, strange, people = seen
+    time, x0, y0, spacing = field
     here = value_at(pose[0], pose[1], time, x0, y0, spacing, 0.0)
     v = limits[1] * limits[5]
     turned = pose.copy()
@@ -400,22 +354,8 @@ def free_turn(
         cost = value_at(x, y, time, x0, y0, spacing, 2.0)
         if not cost < here - GAIN_S or not cost + heading_cost * abs(turn) < best:
             continue
-        if stop_is_clear(
-            0.0,
-            0.0,
-            v,
-            0.0,
-            limits,
-            safety,
-            rotated(near, -turn),
-            rotated(strange, -turn),
-            rotated(people, -turn),
-            turned,
-            known,
-            known_x0,
-            known_y0,
-            resolution,
-        ):
+        ahead = rotated(near, -turn), rotated(strange, -turn), rotated(people, -turn)
+        if stop_is_clear(0.0, 0.0, v, 0.0, limits, safety, ahead, turned, known):
             best, best_turn = cost + heading_cost * abs(turn), turn
     return best_turn
 

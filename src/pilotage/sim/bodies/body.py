@@ -10,7 +10,7 @@ from pilotage.core.types import STOP, Command, FloatArray, IntArray, Pose2, Twis
 from pilotage.kernels.bodies import clearances, drive
 from pilotage.models.footprint import Footprint
 from pilotage.sim.bodies.motion import SimulatedMotion
-from pilotage.sim.worlds.world import World, outline_of
+from pilotage.sim.worlds.world import World
 
 COLLISIONS, TOUCHING, BLOCKED = drive.COLLISIONS, drive.TOUCHING, drive.BLOCKED
 
@@ -57,7 +57,7 @@ class Body:
         self.rates_rad_s: FloatArray = np.zeros(len(motion.moves))
         self._dt_s = dt_s
         self._under_way: deque[Command] | None = deque([STOP] * delay_steps) if delay_steps else None
-        self._outline, self._others = outline_of(footprint), world.traffic.others
+        self._outline, self._others = footprint.outline, world.traffic.others
         self._among_all = (self._outline, world.fixed, self._others, own)
         self._step = (dt_s, motion.spins_on, motion.release_m, *self._among_all)
         self.carry_to(start)

@@ -9,7 +9,7 @@ import numpy as np
 from pilotage.core.errors import InputError
 from pilotage.core.types import BoolArray, FloatArray, IntArray, Pose2
 from pilotage.kernels.bodies import clearances, drive
-from pilotage.kernels.geometry.solids import Fixed, Outline
+from pilotage.kernels.geometry.solids import Fixed
 from pilotage.kernels.scans import mounted, sight
 from pilotage.maps.landmarks import Landmarks
 from pilotage.maps.world_map import WorldMap
@@ -21,11 +21,6 @@ from pilotage.sim.worlds.traffic import NOBODY, Traffic
 
 NO_SEGMENTS: FloatArray = np.zeros((0, 4))
 NO_CIRCLES: FloatArray = np.zeros((0, 3))
-
-
-def outline_of(footprint: Footprint) -> Outline:
-    """A footprint as the kernels take it."""
-    return footprint.points_m, footprint.radius_m, footprint.inner_radius_m
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -249,7 +244,7 @@ class World:
         """
         return clearances.at_poses(
             np.ascontiguousarray(poses, dtype=np.float64).reshape(-1, 3),
-            outline_of(footprint),
+            footprint.outline,
             self.fixed,
             self.traffic.others,
             own,
@@ -276,7 +271,7 @@ class World:
             pose.theta_rad,
             *move,
             clear,
-            outline_of(footprint),
+            footprint.outline,
             self.fixed,
             self.traffic.others,
             own,

@@ -42,7 +42,7 @@ class LocalDrive:
         self._lidar, self._scanner = robot.one_sensor(LidarConfig, needed_by)
         self._odometry, _ = robot.one_sensor(WheelOdometryConfig, needed_by)
         self._limits = limits_of(robot, reverse_m_s, needed_by)
-        self._outline = outline_of(robot.footprint)
+        self._outline = polygon_around(robot.footprint)
         self._angles = self._scanner.beam_angles_rad()
         mount = self._scanner.mount
         self._mount = Pose2(mount.x_m, mount.y_m, mount.theta_rad)
@@ -132,7 +132,7 @@ def limits_of(robot: RobotKnowledge, reverse_m_s: float, needed_by: str) -> Loca
     )
 
 
-def outline_of(footprint: Footprint) -> FloatArray:
+def polygon_around(footprint: Footprint) -> FloatArray:
     """(K, 2) corners of the outline; of a disc those of a polygon around it."""
     if not footprint.is_disc:
         return footprint.points_m

@@ -100,6 +100,9 @@ class Context:
         turning = min(motion.turn_acceleration_rad_s2, turn_rate / robot.dt_s)
         self._limits = np.array([speed, braking, braking, turn_rate, turning, period_s])
         self._safety = np.array([period_s + LATENCY_S, radius, config.margin_m, config.gap_m, PEOPLE_M_S])
+        window = config.window
+        costs = window.heading_s_per_rad, window.near_cost_s, window.soft_m
+        self._window = window.horizon_s, *costs, window.speeds, window.turns
         self._clearance_m = radius + config.plan_margin_m
         self.radius_m, self.speed_m_s = radius, speed
         # Half the width of what has room for two.
@@ -163,7 +166,7 @@ class Context:
                 self.config.look_m,
                 self.config.tolerance_m + spread_m,
                 SIGMAS * math.sqrt(belief.cov[2, 2]),
-                *self._field(lost=lost),
+                self._field(lost=lost),
                 SECTORS,
             )
             self.people = self._strangers()
@@ -186,7 +189,7 @@ class Context:
             nobody &= away > self.config.watch.mate_m + self.speed_m_s * (self.t_s - sent_s)
         return np.ascontiguousarray(self.strange[nobody])
 
-    def _field(self, *, lost: bool) -> tuple[FloatArray, float, float, float]:
+    def _field(self, *, lost: bool) -> voronoi_window.Field:
         """Distances on its map, their origin and resolution; none where it does not know where it is."""
         x0, y0 = self._known.origin_xy_m
         return NO_FIELD if lost else self._known.distance_m, x0, y0, self._known.resolution_m
@@ -299,7 +302,7 @@ class Context:
 
     def _choose(self, time: FloatArray, discs: FloatArray, lane_m: float) -> tuple[float, float, bool]:
         """Speed, turn rate, and whether it stays where it is: down a field, around discs (M, 3)."""
-        pose, window = self.pose, self.config.window
+        pose = self.pose
         (x0, y0), spacing = self.roadmap.origin_xy_m, self.roadmap.spacing_m
         if len(discs):
             dx, dy = eikonal.descent(pose.x_m, pose.y_m, time, x0, y0, spacing)
@@ -324,21 +327,11 @@ class Context:
             pose.as_array(),
             self._limits,
             self._safety,
-            self.near,
-            self.strange,
-            self.people,
-            time,
-            x0,
-            y0,
-            spacing,
-            *self._field(lost=False),
+            (self.near, self.strange, self.people),
+            (time, x0, y0, spacing),
+            self._field(lost=False),
             lane_m,
-            window.horizon_s,
-            window.heading_s_per_rad,
-            window.near_cost_s,
-            window.soft_m,
-            window.speeds,
-            window.turns,
+            self._window,
         )
         return v, w, status == voronoi_window.HELD
 
@@ -365,11 +358,9 @@ class Context:
                 command.w_rad_s,
                 self._limits,
                 self._safety,
-                self.near,
-                self.near,
-                NO_POINTS,
+                (self.near, self.near, NO_POINTS),
                 self.pose.as_array(),
-                *self._field(lost=True),
+                self._field(lost=True),
             ):
                 break
             v *= 0.5
