@@ -201,6 +201,15 @@ def slack_at(x: float, y: float, space: Space, clearance: float) -> float:
 
 
 @kernel
+def slacks_at(points: FloatArray, space: Space, clearance: float) -> FloatArray:
+    """``slack_at`` for points (K, 2); returns (K,)."""
+    out = np.empty(points.shape[0])
+    for k in range(points.shape[0]):
+        out[k] = slack_at(points[k, 0], points[k, 1], space, clearance)
+    return out
+
+
+@kernel
 def curve_is_free(
     x0: float,
     y0: float,

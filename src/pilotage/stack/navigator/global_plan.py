@@ -107,23 +107,41 @@ class GlobalPlan:
         begin: float,
         detour_m: float,
     ) -> PlanResult:
-        """Plan at the first clearance that gives a path, or at one that saves a detour."""
+        """Plan at the first clearance that gives a path, or at one that saves a detour.
+
+        No path is shorter than at the last clearance: what is that short already needs no other.
+        """
+        last: tuple[PlanResult, Path | None] | None = None
+        enough_m = math.inf
+        if detour_m < math.inf and len(clearances_m) > 1:
+            last = self._at(start, goal, field, clearances_m[-1])
+            if last[1] is None:
+                return last[0]
+            enough_m = last[1].length_m + detour_m
         found: tuple[PlanResult, Path, float] | None = None
         for clearance_m in clearances_m:
-            request = PlanRequest(start, goal, field, self._rng, clearance_m, *self._shape())
-            result = self._planner.plan(request)
-            if result.path is not None:
-                path = result.path
-                if self._smoother is not None:
-                    path = self._smoother.smooth(path, request, clearance_m)
-                if found is None or path.length_m < found[1].length_m - detour_m:
-                    found = result, path, clearance_m
-                if detour_m == math.inf:
-                    break
+            at_last = last if clearance_m == clearances_m[-1] else None
+            result, path = at_last or self._at(start, goal, field, clearance_m)
+            if path is None:
+                continue
+            if found is None or path.length_m < found[1].length_m - detour_m:
+                found = result, path, clearance_m
+            if found[1].length_m <= enough_m:
+                break
         if found is None:
             return result
         self._adopt(t_s, found[1], found[0], found[2], time.perf_counter() - begin, field.circles_m)
         return found[0]
+
+    def _at(
+        self, start: Pose2, goal: Goal, field: DistanceField, clearance_m: float
+    ) -> tuple[PlanResult, Path | None]:
+        """Plan and smooth at one clearance."""
+        request = PlanRequest(start, goal, field, self._rng, clearance_m, *self._shape())
+        result = self._planner.plan(request)
+        if result.path is None or self._smoother is None:
+            return result, result.path
+        return result, self._smoother.smooth(result.path, request, clearance_m)
 
     def _shape(self) -> tuple[Footprint | None, float]:
         """Outline and tightest arc, where the robot is known."""

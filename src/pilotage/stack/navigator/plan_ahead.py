@@ -119,7 +119,7 @@ class PlanAhead:
         asked = [own, *(self._radius_m + m for m in self._config.fallback_margins_m)]
         found = self._own_map.found_circles_m
         first = self._plan.progress is None
-        clearances_m = [c for c in asked if c <= own]
+        clearances_m = sorted({c for c in asked if c <= own}, reverse=True)
         result = self._plan.make(t_s, pose, self._goal, found, clearances_m, self._config.detour_m)
         self._planned_s, self._known = t_s, found
         if not first:
