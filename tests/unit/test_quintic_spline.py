@@ -13,7 +13,7 @@ from pilotage.core.errors import InputError
 from pilotage.core.types import BoolArray, FloatArray, Pose2
 from pilotage.kernels.grids.blocked_distance import distance_to_blocked
 from pilotage.maps.occupancy_grid import OccupancyGrid
-from pilotage.stack.planning.clear_spline import clear_spline, curve_clearance_m, path_knots
+from pilotage.stack.planning.clear_spline import clear_spline, path_knots
 from pilotage.stack.planning.grid_space import GridSpace
 from pilotage.stack.planning.quintic_spline import QuinticSpline
 
@@ -144,7 +144,20 @@ class TestClearSpline:
         least_m = distance_to_blocked(grid.places_at(points), blocked, 2).min() * grid.resolution_m
         assert least_m > clearance_m
         assert least_m == pytest.approx(result.clearance_m, abs=0.1)
-        assert result.clearance_m == pytest.approx(curve_clearance_m(result.spline, grid, blocked), abs=0.2)
+
+    @given(st.floats(0.0, 6.3), st.floats(1.1, 4.9), st.floats(1.1, 4.9))
+    @settings(max_examples=60, deadline=None)
+    def test_a_path_straight_away_from_all_is_clear(self, angle: float, x: float, y: float) -> None:
+        """Its distance grows as much as its length, to within rounding."""
+        blocked = np.zeros((9, 9), dtype=np.bool_)
+        blocked[0, 0] = True
+        grid = grid_of(blocked)
+        here, corner = grid.points_m(np.array([[x, y]]))[0], grid.points_m(np.array([[1.0, 1.0]]))[0]
+        away = (here - corner) / np.hypot(*(here - corner))
+        turn = np.array([[math.cos(angle), -math.sin(angle)], [math.sin(angle), math.cos(angle)]])
+        for ends in (np.array([here, here + 8.0 * away]), np.array([here, here + 3.0 * turn @ away])):
+            result = clear_spline(ends, grid, blocked, 0.0)
+            assert result.spline is not None or "the path itself" in result.reason
 
     def test_far_knots_are_drawn_to_the_path(self) -> None:
         """A hairpin around a long wall: through its ends alone the curve would cut through."""
@@ -155,7 +168,8 @@ class TestClearSpline:
         assert path is not None
         polyline = path_knots(grid, path.cells)
         knots = path_knots(grid, path.cells, 12)
-        assert curve_clearance_m(QuinticSpline(knots), grid, blocked) == 0.0
+        drawn = QuinticSpline(knots).sampled(1000).points_xy_m
+        assert blocked[tuple(grid.cells_at(drawn).T)].any()
         result = clear_spline(knots, grid, blocked, 2.0, polyline)
         assert result.spline is not None
         assert result.rounds > 0

@@ -21,6 +21,8 @@ from pilotage.stack.planning.quintic_spline import QuinticSpline
 
 STEPS_A_CELL = 80
 COARSE_STEPS_A_CELL = 2
+ROUNDING = 1e-9
+"""Cells: a straight curve that leads away from what is nearest grows as far away as it is long."""
 MAX_ROUNDS = 12
 """Each halves the distance of the knots where the curve was too near."""
 
@@ -119,11 +121,6 @@ def clear_spline(
     return ClearSpline(None, reason, least_m, MAX_ROUNDS, len(at))
 
 
-def curve_clearance_m(spline: QuinticSpline, grid: OccupancyGrid, blocked: BoolArray) -> float:
-    """Least distance of a curve from blocked cells, at most two cells' sides; 0 where it enters one."""
-    return _Ground(grid, np.ascontiguousarray(blocked), 0.0).too_near(spline)[1]
-
-
 def _count(length_m: float, side_m: float) -> int:
     return max(2, math.ceil(length_m / side_m * STEPS_A_CELL) + 1)
 
@@ -184,7 +181,7 @@ class _Ground:
         distance = self._distances(spline.at(coarse).points_xy_m)
         # A piece whose ends are d1 and d2 away comes no nearer than (d1 + d2 - piece) / 2.
         bound = 0.5 * (distance[:-1] + distance[1:] - coarse_step_m / side_m)
-        doubtful = np.flatnonzero(bound <= max(self._clearance, float(distance.min())))
+        doubtful = np.flatnonzero(bound <= max(self._clearance, float(distance.min())) + ROUNDING)
         parts = max(2, math.ceil(coarse_step_m / self.step_m))
         step_m = coarse_step_m / parts
         s = (coarse[doubtful, None] + np.arange(parts + 1) * step_m).ravel()
