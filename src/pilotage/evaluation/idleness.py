@@ -72,14 +72,3 @@ def idleness(
     mean = float(first.mean())
     std = math.sqrt(max(0.0, float(second.mean()) - mean**2))
     return Idleness(mean, std, float(worst.max()), first, worst, visits)
-
-
-def idleness_curve(
-    vertices: IntArray, times_s: FloatArray, count: int, at_s: FloatArray, begin_s: float = 0.0
-) -> FloatArray:
-    """(T, V) idleness of every vertex at some times (T,), for pictures."""
-    out = np.empty((len(at_s), count))
-    for vertex in range(count):
-        seen_s = np.concatenate([[begin_s], np.sort(times_s[vertices == vertex])])
-        out[:, vertex] = at_s - seen_s[np.searchsorted(seen_s, at_s, side="right") - 1]
-    return out

@@ -16,11 +16,13 @@ from pilotage.evaluation.driving import driving_metrics, header
 from pilotage.evaluation.finished import FinishedRun, RobotRun, Verdict
 from pilotage.evaluation.floor_ages import FloorAges
 from pilotage.evaluation.guard_log import GuardLog
+from pilotage.evaluation.guards import guards_of
 from pilotage.evaluation.patrol_visits import VisitLog
 from pilotage.evaluation.stuck_watch import StuckWatch
 from pilotage.evaluation.tasks.task import TASKS, Attempt, TaskSetting
 from pilotage.evaluation.tasks.team import verdict
 from pilotage.maps.floor import Floor
+from pilotage.maps.world_map import WorldMap
 from pilotage.missions.places import GoalConfig
 from pilotage.sensors.lidar import LidarConfig
 from pilotage.sensors.sensor import SENSORS, NonNegative, Positive
@@ -72,7 +74,8 @@ class PatrolTask:
                 "task 'patrol': expected team.strategy, found none; take one of 'components strategy'"
             )
         self._config, self._names = config, [robot.name for robot in mission.members]
-        graph = site_graph(config, setting)
+        self._chart, self._site = setting.chart, _floor(setting)
+        graph = _graph(config, setting.chart, self._site)
         self.patrol = PatrolSite(graph, config.visit_m)
         self.columns, self.goals = {}, ()
         self.events: list[Event] = []
@@ -182,6 +185,10 @@ class PatrolTask:
         metrics["idleness_bound_s"] = idleness_bound_s(graph, len(run.robots), speed_m_s)
         metrics |= self._guards.metrics(somebody=bool(run.mission.world.people))
         metrics |= self._floor.metrics(math.ceil(self._warm_s / LOOK_EVERY_S))
+        reach_m = max((lidar.max_range_m for lidar in self._lidars if lidar is not None), default=0.0)
+        if reach_m > 0.0:
+            least, enough = guards_of(self._chart, self._site, reach_m)
+            metrics |= {"static_guards_bound": least, "static_guards_enough": enough}
         return Verdict(metrics, judged.columns, {**judged.extras, **self._arrays(run)})
 
     def _judged(self, run: FinishedRun, robot: RobotRun, index: int) -> Verdict:
@@ -214,14 +221,17 @@ class PatrolTask:
         }
 
 
-def site_graph(config: PatrolConfig, setting: TaskSetting) -> PatrolGraph:
-    """The graph of a file, its edges measured on the map, or one that is derived from the map."""
+def _floor(setting: TaskSetting) -> Floor:
+    """Where the largest of the robots can be."""
     radius_m = max(footprint.radius_m for footprint in setting.footprints)
     start = setting.mission.start_of(setting.mission.members[0])
-    inside = None if start is None else (start.x_m, start.y_m)
-    floor = Floor.of(setting.chart, radius_m, inside_xy_m=inside)
+    return Floor.of(setting.chart, radius_m, inside_xy_m=None if start is None else (start.x_m, start.y_m))
+
+
+def _graph(config: PatrolConfig, chart: WorldMap, floor: Floor) -> PatrolGraph:
+    """The graph of a file, its edges measured on the map, or one that is derived from the map."""
     if config.graph is None:
-        return derive_graph(setting.chart, floor, config.derive).graph
+        return derive_graph(chart, floor, config.derive).graph
     return on_floor(read_patrol_graph(Path(config.graph)), floor, config.graph)
 
 

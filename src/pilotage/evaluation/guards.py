@@ -1,0 +1,72 @@
+"""How few who stand still would see the whole floor: the art gallery problem on places and points."""
+
+from __future__ import annotations
+
+import math
+from functools import lru_cache
+
+import numpy as np
+from scipy.optimize import LinearConstraint, milp
+from scipy.sparse import csr_array
+
+from pilotage.core.types import BoolArray, FloatArray
+from pilotage.kernels.patrol.cover import greedy_cover
+from pilotage.maps.floor import Floor
+from pilotage.maps.world_map import WorldMap
+from pilotage.stack.patrol.derive import views
+
+STAND_EVERY_M, SEE_EVERY_M = 1.0, 0.5
+BLOCK = 1024
+
+
+def guards_of(chart: WorldMap, floor: Floor, reach_m: float) -> tuple[int, int]:
+    """``fewest_guards`` of a floor: places a metre apart, points half a metre, all around within reach."""
+    sees = views(chart, floor, reach_m, STAND_EVERY_M, SEE_EVERY_M)[2]
+    return _fewest(np.packbits(sees).tobytes(), *sees.shape)
+
+
+@lru_cache(maxsize=8)
+def _fewest(packed: bytes, places: int, points: int) -> tuple[int, int]:
+    """All trials of a study ask of the same floor."""
+    bits = np.unpackbits(np.frombuffer(packed, dtype=np.uint8), count=places * points)
+    return fewest_guards(bits.reshape(places, points).astype(np.bool_))
+
+
+def fewest_guards(sees: BoolArray) -> tuple[int, int]:
+    """How few of the places see every point that any of them sees: a lower bound, and a number that suffices.
+
+    The bound is that of the set cover's linear relaxation (HiGHS), after what others imply is left out; the
+    other number is found by greed, and at most ln M + 1 times the fewest.
+
+    Parameters
+    ----------
+    sees
+        (P, M) as from ``stack.patrol.derive.views``; the answer is for these places and points, not for the
+        plane.
+    """
+    some = sees[:, sees.any(axis=0)]
+    if some.shape[1] == 0:
+        return 0, 0
+    enough = len(greedy_cover(some, np.zeros(len(some)), np.zeros(some.shape[1], np.bool_)))
+    # Whoever sees a point that few can see sees those that at least the same can see; and a place from which
+    # no more is seen than from another is not needed.
+    hard = some[:, _least(some.T)]
+    kept = hard[_least(~hard)]
+    relaxed = milp(
+        np.ones(len(kept)), constraints=LinearConstraint(csr_array(kept.T.astype(np.float64)), lb=1.0)
+    )
+    return 1 if relaxed.fun is None else max(1, math.ceil(float(relaxed.fun) - 1e-6)), enough
+
+
+def _least(sets: BoolArray) -> BoolArray:
+    """(K,) which of the sets, rows of (K, N), hold no other one; of equal ones the first."""
+    rows: FloatArray = sets.astype(np.float32)
+    size, index = rows.sum(axis=1), np.arange(len(rows))
+    out = np.empty(len(rows), np.bool_)
+    for begin in range(0, len(rows), BLOCK):
+        block = slice(begin, begin + BLOCK)
+        holds = rows[block] @ rows.T == size[None, :]
+        smaller = size[None, :] < size[block, None]
+        earlier = (size[None, :] == size[block, None]) & (index[None, :] < index[block, None])
+        out[block] = ~(holds & (smaller | earlier)).any(axis=1)
+    return out
