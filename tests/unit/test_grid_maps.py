@@ -18,7 +18,7 @@ from pilotage.core.errors import InputError
 from pilotage.core.types import Pose2
 from pilotage.maps import memory
 from pilotage.maps.grid_file import read_grid
-from pilotage.maps.grid_image import read_grey, read_hazard_image, write_grey, write_hazard_image
+from pilotage.maps.grid_image import read_grey, read_hazard_image, write_grey
 from pilotage.maps.moving_ai import read_moving_ai_map, read_scenario
 from pilotage.maps.occupancy_grid import FREE, OCCUPIED, UNKNOWN, OccupancyGrid, near_blocked
 from pilotage.maps.ros_map import RosMap, RosMapFile, read_ros_map, write_ros_map
@@ -102,8 +102,6 @@ class TestCells:
         away = (rows - 6) ** 2 + (columns - 6) ** 2
         for radius in (0.5, 1.0, 1.5, 5.0):
             assert (near_blocked(mask, radius) == ((away < radius**2) | mask)).all()
-        grid = OccupancyGrid.of(mask, 0.2).inflated(0.3)
-        assert np.count_nonzero(grid.blocked()) == 9
         assert not near_blocked(np.zeros((3, 3), np.bool_), 9.0).any()
 
 
@@ -113,7 +111,7 @@ class TestImages:
         write_grey(path, np.array([[255, 0], [127, 128]], np.uint8))
         grid = read_hazard_image(path, 10.0)
         assert grid.blocked().tolist() == [[True, False], [False, True]]
-        write_hazard_image(path, grid)
+        write_grey(path, np.where(grid.blocked(), np.uint8(255), np.uint8(0)))
         assert (read_hazard_image(path, 10.0).cells == grid.cells).all()
 
     def test_grey_in_other_clothes(self, tmp_path: Path) -> None:

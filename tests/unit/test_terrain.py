@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from PIL import Image
 from scipy.interpolate import CubicSpline
 
 from pilotage.core.errors import InputError
@@ -18,8 +19,8 @@ from pilotage.core.types import FloatArray, Pose2
 from pilotage.maps.crater_terrain import CraterTerrainConfig, crater_terrain
 from pilotage.maps.elevation import ElevationModel
 from pilotage.maps.elevation_file import read_elevation
-from pilotage.maps.grid_image import read_grey, read_hazard_image, write_grey, write_hazard_image
-from pilotage.maps.landmark_image import read_landmark_image, write_landmark_image
+from pilotage.maps.grid_image import read_grey, read_hazard_image, write_grey
+from pilotage.maps.landmark_image import read_landmark_image
 from pilotage.maps.occupancy_grid import squared_distances
 from pilotage.stack.planning.grid_space import GridSpace
 
@@ -178,8 +179,13 @@ class TestCraterTerrain:
         ground, obstacles, marks = (tmp_path / f"{name}.png" for name in ("ground", "obstacles", "marks"))
         shaded = terrain.elevation.shaded()
         write_grey(ground, shaded)
-        write_hazard_image(obstacles, terrain.hazards)
-        write_landmark_image(marks, shaded, terrain.hazards, terrain.landmarks)
+        write_grey(obstacles, np.where(terrain.hazards.blocked(), np.uint8(255), np.uint8(0)))
+        pixels = np.repeat(shaded[..., None], 3, axis=2)
+        for step in ((0, 0), (0, 1), (1, 0), (0, -1), (-1, 0)):
+            cells = terrain.hazards.cells_at(terrain.landmarks.points_xy_m) + np.array(step)
+            inside = ((cells >= 0) & (cells < shaded.shape)).all(axis=1)
+            pixels[tuple(cells[inside].T)] = (255, 220, 0)
+        Image.fromarray(pixels).save(marks)
         assert (read_grey(ground)[0] == shaded).all()
         origin = terrain.hazards.origin
         assert (read_hazard_image(obstacles, 200.0, origin).cells == terrain.hazards.cells).all()

@@ -119,12 +119,15 @@ def test_clearance_is_the_least_distance_between_sampled_outlines(shape: Footpri
     pose = Pose2.from_array(rng.uniform([-1.5, -1.5, -math.pi], [1.5, 1.5, math.pi]))
     found = float(world.clearance_m(shape, pose.as_array()[None, :])[0])
     c, s = math.cos(pose.theta_rad), math.sin(pose.theta_rad)
-    edge = sampled(shape.outline_m(240)) @ np.array([[c, s], [-s, c]]) + [pose.x_m, pose.y_m]
+    turn = np.linspace(0, 2 * math.pi, 200)
+    outline = (
+        shape.radius_m * np.column_stack([np.cos(turn), np.sin(turn)]) if shape.is_disc else shape.points_m
+    )
+    edge = sampled(outline) @ np.array([[c, s], [-s, c]]) + [pose.x_m, pose.y_m]
     points = [
         a + np.linspace(0, 1, 200)[:, None] * (b - a)
         for a, b in zip(segments[:, :2], segments[:, 2:], strict=True)
     ]
-    turn = np.linspace(0, 2 * math.pi, 200)
     points += [np.column_stack([x + r * np.cos(turn), y + r * np.sin(turn)]) for x, y, r in circles]
     solid = np.concatenate(points)
     # Squared distances by one product: hundreds of thousands of pairs.

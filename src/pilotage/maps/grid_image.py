@@ -91,8 +91,3 @@ def read_hazard_image(
     grey, _ = read_grey(path, size)
     cells = np.where(grey >= WHITE_FROM, np.int8(OCCUPIED), np.int8(FREE))
     return OccupancyGrid(cells, resolution_m, origin)
-
-
-def write_hazard_image(path: Path, grid: OccupancyGrid) -> None:
-    """Write an obstacle map: white where blocked, black elsewhere."""
-    write_grey(path, np.where(grid.blocked(), np.uint8(255), np.uint8(0)))

@@ -5,8 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
-from PIL import Image
 from scipy import ndimage
 
 from pilotage.core.errors import InputError
@@ -14,8 +12,6 @@ from pilotage.core.types import Pose2
 from pilotage.maps.image_file import opened_image
 from pilotage.maps.landmarks import Landmarks
 from pilotage.maps.occupancy_grid import CORNER, OccupancyGrid
-
-YELLOW = (255, 220, 0)
 
 COLOURED_FROM = 48
 """Least difference of a pixel's greatest and least channel that is a colour, not a grey."""
@@ -47,15 +43,3 @@ def read_landmark_image(
     middles = np.array(ndimage.center_of_mass(coloured, labels, np.arange(1, count + 1)))
     place = OccupancyGrid.of(np.zeros(coloured.shape, np.bool_), resolution_m, origin)
     return Landmarks(np.arange(count), place.centres_m(middles))
-
-
-def write_landmark_image(
-    path: Path, ground: NDArray[np.uint8], grid: OccupancyGrid, marks: Landmarks
-) -> None:
-    """Write a grey picture (rows, columns) of ``grid`` with the landmarks as yellow crosses."""
-    pixels = np.repeat(ground[..., None], 3, axis=2)
-    for row_step, column_step in ((0, 0), (0, 1), (1, 0), (0, -1), (-1, 0)):
-        cells = grid.cells_at(marks.points_xy_m) + np.array([row_step, column_step])
-        inside = ((cells >= 0) & (cells < ground.shape)).all(axis=1)
-        pixels[tuple(cells[inside].T)] = YELLOW
-    Image.fromarray(pixels).save(path, compress_level=1)

@@ -158,13 +158,6 @@ class OccupancyGrid:
         """Centres (K, 2) x, y in the map frame of cells (K, 2) row, column."""
         return self.points_m(np.asarray(cells, dtype=np.float64).reshape(-1, 2) + 0.5)
 
-    def inflated(self, radius_m: float, unknown_is_free: bool = False) -> OccupancyGrid:
-        """Return a grid where cells nearer than ``radius_m`` to a blocked one, by centres, are occupied."""
-        if not (math.isfinite(radius_m) and radius_m >= 0.0):
-            raise InputError(f"grid: expected a radius of 0 m or more to inflate by, found {radius_m}")
-        near = near_blocked(self.blocked(unknown_is_free=unknown_is_free), radius_m / self.resolution_m)
-        return OccupancyGrid(np.where(near, np.int8(OCCUPIED), self.cells), self.resolution_m, self.origin)
-
 
 def squared_distances(blocked: BoolArray) -> NDArray[np.uint32]:
     """(rows, columns) exact squared distance in cells, centre to centre, to the nearest blocked cell.

@@ -78,13 +78,6 @@ class Footprint:
         points.flags.writeable = False
         return Footprint(points, float(np.hypot(*points.T).max()), inner)
 
-    def outline_m(self, corners: int = 48) -> FloatArray:
-        """(K, 2) corners of the polygon, or of one around the disc, for pictures."""
-        if not self.is_disc:
-            return self.points_m.copy()
-        angle = 2.0 * math.pi * np.arange(corners) / corners
-        return self.radius_m * np.column_stack([np.cos(angle), np.sin(angle)])
-
 
 def _on_one_line(points: FloatArray) -> bool:
     """Whether no corner lies off the line through the others, to within rounding."""

@@ -98,23 +98,6 @@ def clearance_m(x: float, y: float, theta: float, body: Body, ground: Ground, en
     )
 
 
-@kernel
-def is_seen(x: float, y: float, theta: float, body: Body, ground: Ground) -> bool:
-    """Whether the ground under a footprint has been seen, to half a coarse cell; off the grid it has not."""
-    return seen_under(
-        x,
-        y,
-        theta,
-        body.outer_m,
-        body.discs,
-        ground.unseen_m,
-        ground.x0_m,
-        ground.y0_m,
-        ground.coarse_m,
-        ground.per_coarse,
-    )
-
-
 # Below the same with the arrays one by one: taking an array out of a tuple counts a reference and costs more
 # than the whole look-up. Loops take them out once, and ask ``disc_clearance`` and ``disc_seen`` first: these
 # are short enough to be compiled into the loop, and mostly tell enough.
