@@ -16,6 +16,7 @@ from pilotage.experiments.build.build import build
 from pilotage.experiments.loop import run_loop
 from pilotage.experiments.mission import load_mission, mission_of, read_mission
 from pilotage.kernels.control import eikonal, voronoi_window
+from pilotage.stack.navigator.patrol.passage import claimed, precedes, relation, stretch_of
 from pilotage.stack.navigator.patrol.still import StillWatch
 
 NOBODY = np.zeros((0, 2))
@@ -209,12 +210,49 @@ class TestStopping:
 
 
 class TestPassages:
-    @pytest.mark.parametrize("radio", [{}, None])
-    def test_two_who_meet_where_there_is_room_for_one_settle_it(self, radio: dict[str, Any] | None) -> None:
-        metrics = judged(corridor(0.9, 2, 200.0, radio=radio), seed=0)
+    @pytest.mark.parametrize(("size", "radio", "seed"), [(2, None, 0), (5, {}, 4), (5, None, 4)])
+    def test_who_meet_where_there_is_room_for_one_settle_it(
+        self, size: int, radio: dict[str, Any] | None, seed: int
+    ) -> None:
+        """Of five, two with a radio and four without were deadlocked when they only gave way at random."""
+        metrics = judged(corridor(0.9, size, 200.0, radio=radio), seed=seed)
         assert metrics["success"], metrics["reason"]
         assert metrics["collisions"] == metrics["deadlocks"] == 0
         assert metrics["gave_way"] > 0
+        assert metrics["idleness_worst_s"] < 60.0
+
+    def test_two_paths_through_one_passage_go_together_or_against_each_other(self) -> None:
+        line = np.column_stack([np.arange(0.0, 8.0, 0.5), np.full(16, 3.0)])
+        assert relation(line, line[4:] + np.array([0.2, 0.3])) == 1
+        assert relation(line, line[::-1] + np.array([0.2, 0.3])) == -1
+        assert relation(line, line[7:8]) == -1  # somebody stands there
+        assert relation(line, line + np.array([0.0, 2.0])) == 0
+
+    def test_who_claims_first_goes_first_and_who_turns_around_claims_anew(self) -> None:
+        way = np.column_stack([np.arange(0.0, 6.0, 0.25), np.full(24, 3.0), np.full(24, 0.5)])
+        stretch = stretch_of(way, 0.7)
+        back = stretch_of(way[::-1], 0.7)
+        assert stretch is not None
+        assert back is not None
+        first = claimed(stretch, None, 3.0)
+        assert claimed(stretch, first, 9.0).since_s == 3.0
+        assert claimed(back, first, 9.0).since_s == 9.0
+        assert precedes(first, 1, claimed(back, None, 40.0), 0)
+        assert precedes(first, 0, first, 1)
+        assert not precedes(first, 1, first, 0)
+
+    def test_who_waits_stands_where_those_who_come_out_do_not_pass(self) -> None:
+        """Off the corridor's axis, and not where two others stand already."""
+        roadmap = build(mission_of(corridor(0.9, 1, 10.0), seed=0)).team[0].stack._context.roadmap  # type: ignore[attr-defined]
+        mouth, outwards = np.array([4.2, 3.0]), np.array([-1.0, 0.0])
+        others: list[list[float]] = []
+        for _ in range(3):
+            field = roadmap.refuge(2.8, 3.0, mouth, outwards, np.array(others).reshape(-1, 2), 0.73, 1.0)
+            row, column = np.argwhere(field == 0.0).mean(axis=0)
+            x, y = roadmap.spacing_m * column, roadmap.spacing_m * row
+            assert abs(y - 3.0) > 1.1 or x < 1.0
+            assert all(math.hypot(x - a, y - b) > 0.8 for a, b in others)
+            others.append([x, y])
 
     def test_a_robot_that_died_in_the_passage_is_not_run_into(self) -> None:
         failures = [{"robot": 0, "at_s": 12.0}, {"robot": 1, "kind": "radio", "at_s": 1.0}]

@@ -3,22 +3,34 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from weakref import WeakKeyDictionary
 
 import numpy as np
-from scipy.ndimage import label, maximum_filter
+from scipy.ndimage import distance_transform_edt, label, maximum_filter
 
 from pilotage.core.errors import InputError
-from pilotage.core.types import FloatArray
+from pilotage.core.types import BoolArray, FloatArray
 from pilotage.kernels.control import eikonal
 from pilotage.maps.world_map import WorldMap
 
 EASY_M, TIGHT_FACTOR = 0.5, 1.0
 """Nearer to walls than this, beyond the body, a metre takes longer: twice as long where it just fits."""
-STEP_M, ASIDE_REACH_M = 0.25, 5.0
+STEP_M, ASIDE_REACH_M = 0.25, 6.0
+OFF_RATIO, AHEAD_M = 1.8, 3.5
+"""Who waits beside a passage stands so many half widths of two off its axis, or so far before it."""
 NEAREST = 6
 STATION_M = 0.4
 """So far from a charging station the body may have to stand, for a wall beside it."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class WayOut:
+    """To the end of a passage: time, where that is (2,), and the direction out of it there (2,)."""
+
+    time_s: float
+    mouth_xy_m: FloatArray
+    outwards: FloatArray
 
 
 class Roadmap:
@@ -120,32 +132,100 @@ class Roadmap:
             self._fields[place] = field
         return self._fields[place]
 
-    def aside(self, mouth_xy_m: FloatArray, outwards: FloatArray, pass_m: float) -> FloatArray | None:
-        """(rows, columns) time to a place beside a passage's mouth, off its axis, that has room for two.
+    def way_out(
+        self, x_m: float, y_m: float, other_xy_m: tuple[float, float], keep_m: float, pass_m: float
+    ) -> WayOut | None:
+        """The nearest end of the passage that a place is in, not past another; None where there is none.
 
-        None where there is none within ``ASIDE_REACH_M``.
+        Parameters
+        ----------
+        keep_m
+            To keep from the other.
+        pass_m
+            Half the width of what has room for two.
+        """
+        places = self._nodes_xy_m()
+        slow = self.slowness.copy()
+        slow[np.hypot(*(places - other_xy_m).transpose(2, 0, 1)) < keep_m] = np.inf
+        time = self._from(x_m, y_m, slow)
+        ends = np.where(self._room_m >= pass_m, time, np.inf)
+        best = np.unravel_index(int(np.argmin(ends)), ends.shape)
+        if not math.isfinite(ends[best]):
+            return None
+        mouth = places[best]
+        x, y = mouth.tolist()
+        inwards = eikonal.descent(x, y, time, *self.origin_xy_m, self.spacing_m)
+        return WayOut(float(ends[best]), mouth, -np.array(inwards))
+
+    def refuge(
+        self,
+        x_m: float,
+        y_m: float,
+        mouth_xy_m: FloatArray,
+        outwards: FloatArray,
+        bodies_xy_m: FloatArray,
+        pass_m: float,
+        keep_m: float,
+    ) -> FloatArray | None:
+        """(rows, columns) time to the nearest place where nobody stands who is in the way of who comes out.
+
+        It has room for two, lies off the passage's axis and before no other, or else as far from its mouth as
+        there is room, within ``ASIDE_REACH_M``. None where there is none.
 
         Parameters
         ----------
         mouth_xy_m, outwards
             (2,) where the passage ends and the direction in which it does.
+        bodies_xy_m
+            (K, 2) of others, to keep ``keep_m`` from.
         pass_m
             Half the width of what has room for two, and the distance to keep from the axis.
         """
-        # Not close to a wall: there it would take long to come to, and away from.
-        rows, columns = np.nonzero((self._room_m >= pass_m) & (self.slowness < 1.2 * self.slowness.min()))
-        offset = np.column_stack([columns, rows]) * self.spacing_m + np.array(self.origin_xy_m) - mouth_xy_m
+        wide = np.isfinite(self.slowness) & (self._room_m >= pass_m)
         axis = outwards / max(float(np.hypot(*outwards)), 1e-9)
-        ahead = offset @ axis
-        off = np.abs(offset @ np.array([-axis[1], axis[0]]))
+        row, column = self._node(x_m, y_m)
+        x, y = (x_m, y_m) if wide[row, column] else (mouth_xy_m + STEP_M * axis).tolist()
+        time = self._from(x, y, np.where(wide, self.slowness, np.inf))
+        # Not close to a wall: there it would take long to come to, and away from.
+        fit = np.isfinite(time) & (self.slowness < 1.2 * self.slowness.min())
+        rows, columns = np.nonzero(fit)
+        places = np.column_stack([columns, rows]) * self.spacing_m + np.array(self.origin_xy_m)
+        offset = places - mouth_xy_m
         away = np.hypot(*offset.T)
-        fit = (ahead > 0.0) & (off >= 1.3 * pass_m) & (away <= ASIDE_REACH_M)
-        if not fit.any():
+        free = away <= ASIDE_REACH_M
+        for body in bodies_xy_m:
+            free &= np.hypot(*(places - body).T) >= keep_m
+        if not free.any():
             return None
-        best = int(np.argmin(np.where(fit, away, np.inf)))
+        off, ahead = np.abs(offset @ np.array([-axis[1], axis[0]])), offset @ axis
+        narrow_m = self.spacing_m * distance_transform_edt(wide | ~np.isfinite(self.slowness))
+        clear = (
+            free & ((off >= OFF_RATIO * pass_m) | (ahead >= AHEAD_M)) & (narrow_m[rows, columns] >= pass_m)
+        )
+        when = time[rows, columns]
+        best = int(np.argmin(np.where(clear, when, np.inf))) if clear.any() else _farthest(free, away)
+        x, y = places[best].tolist()
+        return self._from(x, y, self.slowness)
+
+    def _nodes_xy_m(self) -> FloatArray:
+        rows, columns = self.slowness.shape
+        x0, y0 = self.origin_xy_m
+        xs, ys = x0 + self.spacing_m * np.arange(columns), y0 + self.spacing_m * np.arange(rows)
+        return np.stack(np.meshgrid(xs, ys), axis=-1)
+
+    def _node(self, x_m: float, y_m: float) -> tuple[int, int]:
+        rows, columns = self.slowness.shape
+        row = round((y_m - self.origin_xy_m[1]) / self.spacing_m)
+        column = round((x_m - self.origin_xy_m[0]) / self.spacing_m)
+        return min(max(row, 0), rows - 1), min(max(column, 0), columns - 1)
+
+    def _from(self, x_m: float, y_m: float, slow: FloatArray) -> FloatArray:
+        """(rows, columns) time to go from a place, or to it."""
         field = np.full(self.slowness.shape, np.inf)
-        field[rows[best], columns[best]] = 0.0
-        eikonal.sweep_down(field, self.slowness, self.spacing_m)
+        row, column = self._node(x_m, y_m)
+        near = slice(max(0, row - 1), row + 2), slice(max(0, column - 1), column + 2)
+        field[near][np.isfinite(slow[near])] = 0.0
+        eikonal.sweep_down(field, slow, self.spacing_m)
         return field
 
     def way(self, x_m: float, y_m: float, time_s: FloatArray, reach_m: float) -> FloatArray:
@@ -154,6 +234,10 @@ class Roadmap:
         return eikonal.way_down(
             x_m, y_m, time_s, self._room_m, *self.origin_xy_m, self.spacing_m, STEP_M, steps
         )
+
+
+def _farthest(free: BoolArray, away_m: FloatArray) -> int:
+    return int(np.argmax(np.where(free, away_m, -np.inf)))
 
 
 _SHARED: WeakKeyDictionary[WorldMap, dict[tuple[object, ...], Roadmap]] = WeakKeyDictionary()

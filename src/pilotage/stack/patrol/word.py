@@ -4,7 +4,28 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from pilotage.core.types import FloatArray
 from pilotage.stack.patrol.messages import PatrolMessage
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Claim:
+    """That a robot is in a passage that has room for one, or about to enter it.
+
+    Attributes
+    ----------
+    line_xy_m
+        (K, 2) from where it enters, or is, to where it leaves, in order; one place of who stands there.
+    turn, since_s
+        Who claims first goes first, by turns: those who claim within some seconds in one direction together.
+    inside
+        Whether it is in the passage.
+    """
+
+    line_xy_m: FloatArray
+    turn: int
+    since_s: float
+    inside: bool
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -17,6 +38,8 @@ class TeamWord:
         Where it believes to be; NaN while it does not know.
     blocked
         Whether something that moves keeps it from getting on.
+    claim
+        Of a passage; None: it is near none.
     news
         Of the patrol.
     """
@@ -24,4 +47,5 @@ class TeamWord:
     x_m: float
     y_m: float
     blocked: bool
+    claim: Claim | None
     news: PatrolMessage

@@ -19,13 +19,13 @@ from pilotage.stack.journal import Journal
 from pilotage.stack.knowledge import RobotKnowledge
 from pilotage.stack.navigator.patrol.battery import DOCK_M, Battery
 from pilotage.stack.navigator.patrol.config import Mode, PatrolNavigatorConfig
-from pilotage.stack.navigator.patrol.passage import Passage
+from pilotage.stack.navigator.patrol.passage import Pursuit
 from pilotage.stack.navigator.patrol.still import StillWatch
 from pilotage.stack.patrol.messages import PatrolMemory
-from pilotage.stack.patrol.roadmap import STEP_M, roadmap_of
+from pilotage.stack.patrol.roadmap import roadmap_of
 from pilotage.stack.patrol.task import PatrolTask
 from pilotage.stack.patrol.watch import IntruderWatch
-from pilotage.stack.patrol.word import TeamWord
+from pilotage.stack.patrol.word import Claim, TeamWord
 
 NO_FIELD: FloatArray = np.zeros((1, 1))
 NO_POINTS: FloatArray = np.zeros((0, 2))
@@ -41,8 +41,8 @@ THERE_RATIO = 1.0
 """Where somebody stands on the place to visit, so much of ``visit_m`` away is as good, in time to go."""
 LANE_AHEAD_M, MERGE_S = 2.0, 1.0
 """A passage is as wide as its narrowest place so far ahead; the last part of a way leads to the middle."""
-RECEDES_M_S = 0.1
-"""Who goes ahead through a passage at this speed is followed."""
+HEARD_PERIODS = 4.0
+"""Who said nothing for so many of its messages is silent."""
 PEOPLE_M_S = 1.4
 """Who is no mate may come on at a walk, and gives way to nobody."""
 SPEED_SHARE = 0.2
@@ -69,6 +69,10 @@ class Context:
         The last word of each team mate that was heard, by number, and when it was sent.
     taken
         Whether somebody who does not go stands where it drives to.
+    claim
+        Of the passage for one that it is in or about to enter.
+    pursuit
+        Of the one ahead in it.
     battery
         What it reckons of its own; None where it never has to charge.
     """
@@ -107,8 +111,8 @@ class Context:
         self.radius_m, self.speed_m_s = radius, speed
         # Half the width of what has room for two.
         self._pass_m = 2.0 * radius + config.plan_margin_m + 0.5 * config.gap_m
-        self._met: tuple[float, FloatArray] | None = None
-        self._receding = 0.0
+        self.claim: Claim | None = None
+        self._has_news, self.pursuit = False, Pursuit()
         self.roadmap = roadmap_of(
             chart,
             task.graph.vertices_xy_m,
@@ -196,12 +200,15 @@ class Context:
 
     def talk(self, *, lost: bool) -> None:
         """Broadcast, where it is time to."""
-        if self._radio is None or self.t_s < self._next_word_s:
+        due = self.t_s >= self._next_word_s
+        if self._radio is None or not (due or self._has_news):
             return
-        self._next_word_s += self.config.message_period_s
+        self._has_news = False
+        if due:
+            self._next_word_s += self.config.message_period_s
         x, y = (math.nan, math.nan) if lost else (self.pose.x_m, self.pose.y_m)
         self.memory.update(self.t_s, words=self.task.strategy.words(self.memory.knowledge(self.t_s)))
-        self.journal.outbox.append(TeamWord(x, y, self.blocked, self.memory.message(self.t_s)))
+        self.journal.outbox.append(TeamWord(x, y, self.blocked, self.claim, self.memory.message(self.t_s)))
 
     def away_m(self, place: int) -> float:
         """Distance from a vertex or its station as the crow flies."""
@@ -384,61 +391,47 @@ class Context:
         c, s = math.cos(self.pose.theta_rad), math.sin(self.pose.theta_rad)
         return np.asarray(points @ np.array([[c, s], [-s, c]]) + np.array([self.pose.x_m, self.pose.y_m]))
 
-    def passage(self, vertex: int) -> Passage | None:
-        """Somebody in a passage for one on the way to a vertex; None where there is nobody."""
-        if not self.strange.shape[0]:
-            self._met = None
-            return None
-        time = self.roadmap.time_s(vertex)
-        way = self.roadmap.way(self.pose.x_m, self.pose.y_m, time, 3.0 * self.config.look_m)
-        narrow = way[:, 2] < self._pass_m
-        if not narrow.any():
-            self._met = None
-            return None
-        first = int(np.argmax(narrow))
-        wide_again = np.flatnonzero(~narrow[first:])
-        last = first + int(wide_again[0]) if wide_again.size else len(way)
-        met = eikonal.first_met(way[first:last], self._on_map(self.strange), self.radius_m + 0.1)
-        if met < 0:
-            self._met = None
-            return None
-        there = way[first + met, :2]
-        recedes = False
-        if self._met is not None and self.t_s > self._met[0]:
-            away = there - np.array([self.pose.x_m, self.pose.y_m])
-            moved = float((there - self._met[1]) @ away) / max(float(np.hypot(*away)), 1e-6)
-            self._receding = 0.7 * self._receding + 0.3 * moved / (self.t_s - self._met[0])
-            recedes = self._receding > RECEDES_M_S
-        else:
-            self._receding = 0.0
-        self._met = self.t_s, there
-        return Passage(
-            inside=first == 0,
-            mouth_m=STEP_M * first,
-            other_m=STEP_M * (first + met),
-            beyond_m=STEP_M * (last - first - met),
-            recedes=recedes,
-            mouth_xy_m=way[first, :2],
-            outwards=way[first, :2] - way[min(first + 2, len(way) - 1), :2],
-        )
+    @property
+    def pass_m(self) -> float:
+        """Half the width of what has room for two."""
+        return self._pass_m
 
-    def retreat(self) -> tuple[float, FloatArray | None]:
-        """From inside a passage: how far it is back to its mouth, and the field to a place aside of it."""
-        vertex = self.way_out()
-        if vertex < 0:
-            return math.inf, None
-        time = self.roadmap.time_s(vertex)
-        way = self.roadmap.way(self.pose.x_m, self.pose.y_m, time, 3.0 * self.config.look_m)
-        wide = np.flatnonzero(way[:, 2] >= self._pass_m)
-        if not wide.size:
-            return math.inf, None
-        mouth = int(wide[0])
-        field = self.aside(way[mouth, :2], way[mouth, :2] - way[max(mouth - 2, 0), :2])
-        return STEP_M * mouth, time if field is None else field
+    def heard(self) -> list[tuple[int, TeamWord]]:
+        """The last words of mates that were heard lately, with their numbers."""
+        latest_s = self.t_s - HEARD_PERIODS * self.config.message_period_s
+        return [(number, word) for number, (sent_s, word) in self.mates.items() if sent_s > latest_s]
 
-    def aside(self, mouth_xy_m: FloatArray, outwards: FloatArray) -> FloatArray | None:
-        """The field to a place aside of a passage's mouth."""
-        return self.roadmap.aside(mouth_xy_m, outwards, self._pass_m)
+    def hears_all(self) -> bool:
+        """Whether no mate is silent, or lost."""
+        words = self.heard()
+        return len(words) == len(self.task.starts) - 1 and all(math.isfinite(word.x_m) for _, word in words)
+
+    def mate_reach_m(self, number: int) -> float:
+        """Within so far of where a mate said it is, what is seen may be that mate."""
+        return self.config.watch.mate_m + self.speed_m_s * (self.t_s - self.mates[number][0])
+
+    def tell_claim(self, claim: Claim | None) -> None:
+        """Claim a passage, or none any more; told at once where that is news."""
+        old, self.claim = self.claim, claim
+        before, now = (None if c is None else (c.since_s, c.inside) for c in (old, claim))
+        self._has_news |= before != now
+
+    def strange_on_map(self) -> FloatArray:
+        """(M, 2) what is on no map, map frame."""
+        return self._on_map(self.strange)
+
+    def bodies_on_map(self) -> FloatArray:
+        """(K, 2) middles of those who are seen, map frame."""
+        return self._on_map(voronoi_window.bodies(self.strange, self.radius_m))
+
+    def here(self) -> FloatArray:
+        """(1, 3) the place where it is, as a path; (0, 3) off the map."""
+        time = self.roadmap.time_s(self.came_from)
+        return self.roadmap.way(self.pose.x_m, self.pose.y_m, time, 0.0)
+
+    def is_narrow(self) -> bool:
+        """Whether there is room for one where it is."""
+        return bool((self.here()[:, 2] < self._pass_m).any())
 
     def way_out(self) -> int:
         """The vertex near by that leads away best from what is in the way; -1 where there is none."""
@@ -456,6 +449,9 @@ class Context:
             if self.away_m(vertex) <= 0.5 * self.task.visit_m:
                 continue
             time = roadmap.time_s(vertex)
+            narrow = roadmap.way(pose.x_m, pose.y_m, time, self.config.look_m)[:, 2] < self._pass_m
+            if narrow.any() and not narrow[0]:
+                continue
             direction = eikonal.descent(pose.x_m, pose.y_m, time, *roadmap.origin_xy_m, roadmap.spacing_m)
             toward = float(np.max(bearings @ np.array(direction), initial=0.0))
             cost = 3.0 * toward + float(self.rng.random())

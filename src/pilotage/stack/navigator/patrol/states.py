@@ -2,26 +2,28 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import NamedTuple, Protocol
 
 from pilotage.core.types import FloatArray, Twist
 from pilotage.sensors.readings import Readings
 from pilotage.stack.navigator.goal.wandering import Wandering
+from pilotage.stack.navigator.patrol import traffic
 from pilotage.stack.navigator.patrol.battery import DOCK_M, Battery
 from pilotage.stack.navigator.patrol.config import Mode
 from pilotage.stack.navigator.patrol.context import Context
-from pilotage.stack.navigator.patrol.passage import Passage
+from pilotage.stack.navigator.patrol.passage import Stretch
 from pilotage.stack.navigator.progress import StallWatch
 
 PROGRESS_S = 0.4
 """So much nearer in time to go counts as getting on."""
 MOUTH_M = 1.5
 """So far before a passage it stands aside."""
-THERE_S, SETTLED_S = 0.3, 8.0
-FACING_M, AT_REST_M_S, TIE_M = 2.0, 0.05, 0.5
-"""Two in a passage settle who backs out at rest, this near to each other; what differs by less is a tie."""
+THERE_S, SETTLED_S = 0.3, 4.0
+FACING_M, AT_REST_M_S = 0.5, 0.05
+"""Two in a passage settle who backs out at rest; so much before they see no path around each other."""
+SURE_S, MOST_BLIND_S = 2.0, 12.0
+"""Who hears nobody waits as long as driving through takes, and so much; no longer than that."""
 ASIDE_M = 0.6
 """Something this near that may move wants to pass somebody who waits."""
 
@@ -57,11 +59,9 @@ class Driving:
             return arrive(context)
         if context.runs_low():
             return resume(context)
-        if context.fresh:
-            passage = context.passage(context.hop)
-            met = None if passage is None else meet(context, passage, context.t_s)
-            if met is not None:
-                return met
+        met = meet(context, traffic.look(context, context.hop), context.t_s) if context.fresh else None
+        if met is not None:
+            return met
         command = context.lead(context.hop)
         if self.watch.stalled(context.to_go_s, context.t_s):
             return give_way(context)
@@ -80,11 +80,12 @@ class Waiting:
         del readings
         context = self.context
         context.mode, context.blocked = Mode.WAIT, False
+        traffic.look_along(context, context.here())
         context.memory.visit(context.came_from, context.t_s)
         if context.t_s - self.since_s >= context.config.ask_s:
             if context.ask():
                 return Move(set_out(context), context.stand())
-            if context.waits_for() or context.crowded(ASIDE_M):
+            if context.waits_for() or context.crowded(ASIDE_M) or is_wanted(context):
                 return give_way(context)
             return Move(Waiting(context, context.t_s), context.stand())
         return Move(self, context.stand())
@@ -108,7 +109,8 @@ class Yielding:
         if context.away_m(self.vertex) <= 0.5 * context.task.visit_m:
             context.visit(self.vertex)
             return resume(context)
-        return Move(self, context.lead(self.vertex))
+        met = meet(context, traffic.look(context, self.vertex), context.t_s) if context.fresh else None
+        return Move(self, context.lead(self.vertex)) if met is None else met
 
 
 @dataclass(frozen=True, slots=True)
@@ -135,8 +137,7 @@ class Holding:
             return give_way(context)
         if not context.fresh:
             return Move(self, context.stand())
-        passage = context.passage(context.hop)
-        met = None if passage is None else meet(context, passage, self.since_s)
+        met = meet(context, traffic.look(context, context.hop), self.since_s)
         if met is not None:
             return met
         state = set_out(context)
@@ -145,17 +146,20 @@ class Holding:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class StandingAside:
-    """Drives to a place beside a passage for one and stands there until whoever is in it is out.
+    """Drives to a place beside a passage for one and stands there until others who go first are through.
 
     Attributes
     ----------
     time
         Field of the roadmap that leads there.
+    since_s, until_s
+        When it began to; who does not hear everybody waits until then at least: from there it sees little.
     """
 
     context: Context
     time: FloatArray
     since_s: float
+    until_s: float
 
     def step(self, readings: Readings) -> Move:
         """Go there; then look whether the passage is free."""
@@ -166,13 +170,22 @@ class StandingAside:
         waited_s = context.t_s - self.since_s
         if waited_s > context.config.hold_s:
             return resume(context)
-        at_rest = waited_s > SETTLED_S and context.moving_m_s < AT_REST_M_S
-        if not context.fresh or (context.to_go_s > THERE_S and not at_rest):
+        if not context.fresh:
             return Move(self, command)
-        passage = context.passage(context.hop)
-        if passage is not None and not passage.recedes:
-            return Move(self, context.stand())
-        return resume(context)
+        if context.is_narrow():
+            # Still in it: the others are told which way it goes.
+            traffic.look_along(context, traffic.way_along(context, self.time))
+            return Move(self, command)
+        stretch = traffic.look(context, context.hop)
+        if stretch is None or (context.hears_all() and not traffic.is_taken(context, stretch)):
+            return resume(context)
+        if context.to_go_s > THERE_S:
+            # Somebody else may stand there now.
+            kept_out = waited_s > SETTLED_S and context.moving_m_s < AT_REST_M_S
+            return resume(context) if kept_out else Move(self, command)
+        if context.t_s >= self.until_s and not traffic.is_taken(context, stretch):
+            return resume(context)
+        return Move(self, context.stand())
 
 
 @dataclass(frozen=True, slots=True)
@@ -194,6 +207,7 @@ class Charging:
         del readings
         context = self.context
         context.mode, context.blocked = Mode.CHARGE, False
+        traffic.look_along(context, context.here())
         if context.away_m(self.battery.station) > 2.0 * DOCK_M:
             return resume(context)
         if context.away_m(context.came_from) <= context.task.visit_m:
@@ -216,6 +230,7 @@ class Lost:
     def step(self, readings: Readings) -> Move:
         """Wander."""
         self.context.mode = Mode.LOST
+        self.context.tell_claim(None)
         return Move(self, self.context.careful(self.wandering.step(readings)))
 
 
@@ -260,40 +275,49 @@ def give_way(context: Context) -> Move:
     return Move(Yielding(context, vertex, until_s), context.lead(vertex))
 
 
-def backs_out(context: Context, passage: Passage, own_m: float) -> bool:
-    """Whether, of two in a passage for one, this robot goes back: who has less far to, by what both can see.
-
-    Where it is as far for both the one with the larger number does, if they talk; else chance decides.
-    """
-    if abs(own_m - passage.beyond_m) > TIE_M:
-        return own_m < passage.beyond_m
-    near = [
-        number
-        for number, (sent_s, word) in context.mates.items()
-        if context.t_s - sent_s < 3.0 * context.config.message_period_s
-        and math.hypot(word.x_m - context.pose.x_m, word.y_m - context.pose.y_m) < 2.0 * passage.other_m
-    ]
-    if near:
-        return min(near) < context.task.robot
-    return bool(context.rng.random() < 0.5)
+def is_wanted(context: Context) -> bool:
+    """Whether it stands where mates want to pass who have room for one."""
+    claim = context.claim
+    return claim is not None and bool(traffic.rivals(context, claim.line_xy_m))
 
 
-def meet(context: Context, passage: Passage, since_s: float) -> Move | None:
-    """Somebody is in a passage for one ahead: stand aside, or settle who backs out; None to drive on."""
-    if passage.recedes:
+def meet(context: Context, stretch: Stretch | None, since_s: float) -> Move | None:
+    """What comes of a passage for one ahead: stand aside, back out of it, hold; None to drive on."""
+    if stretch is None:
         return None
-    if not passage.inside:
-        if passage.mouth_m > MOUTH_M:
+    if not stretch.inside:
+        if stretch.mouth_m > MOUTH_M or not traffic.is_taken(context, stretch):
             return None
-        field = context.aside(passage.mouth_xy_m, passage.outwards)
-        if field is None:
-            return Move(Holding(context, since_s), context.stand())
-        return Move(StandingAside(context, field, since_s), context.descend(field))
-    if passage.other_m > FACING_M or context.moving_m_s > AT_REST_M_S:
+        return stand_aside(
+            context, traffic.refuge(context, stretch.line_xy_m[0], stretch.outwards), stretch, since_s
+        )
+    lost = traffic.has_lost(context, stretch)
+    if lost:
+        return back_out(context, traffic.retreat(context, stretch), stretch, since_s)
+    if (
+        traffic.comes(context, stretch) > context.config.watch_m + FACING_M
+        or context.moving_m_s > AT_REST_M_S
+    ):
         return None
-    own_m, field = context.retreat()
-    if field is None or not backs_out(context, passage, own_m):
+    if lost is None:
+        goes, field = traffic.has_less_far(context, stretch)
+        if goes:
+            return back_out(context, field, stretch, since_s)
+    return Move(Holding(context, since_s), context.stand())
+
+
+def stand_aside(context: Context, field: FloatArray | None, stretch: Stretch, since_s: float) -> Move:
+    """To the place that a field leads to, if there is one."""
+    if field is None:
         return Move(Holding(context, since_s), context.stand())
-    context.journal.count("gave_way")
-    context.say("back-out", "met somebody where there is room for one: back, and aside")
-    return Move(StandingAside(context, field, context.t_s), context.descend(field))
+    through_s = (stretch.length_m / context.speed_m_s + SURE_S) * (0.5 + float(context.rng.random()))
+    until_s = context.t_s + min(through_s, MOST_BLIND_S)
+    return Move(StandingAside(context, field, context.t_s, until_s), context.descend(field))
+
+
+def back_out(context: Context, field: FloatArray | None, stretch: Stretch, since_s: float) -> Move:
+    """Out of a passage, and aside."""
+    if field is not None:
+        context.journal.count("gave_way")
+        context.say("back-out", "met somebody where there is room for one: back, and aside")
+    return stand_aside(context, field, stretch, since_s)
