@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from pilotage.report.style import BLUE, GREEN, INK, MUTED, ORANGE, PURPLE, VERMILLION
+from pilotage.report.style import BLUE, GREEN, INK, MUTED, ORANGE, PURPLE, SKY, VERMILLION
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,6 +22,7 @@ _KINDS = {
     "avoid-start": EventKind("avoidance begins", ORANGE, True),
     "avoid-end": EventKind("avoidance ends", ORANGE, False),
     "escape": EventKind("backs out", VERMILLION, True),
+    "wait": EventKind("waits among people", SKY, True),
     "hall": EventKind("narrow hall", BLUE, True),
     "arrived": EventKind("arrived", GREEN, False),
     "collision": EventKind("collision", VERMILLION, True),

@@ -9,7 +9,7 @@ import numpy as np
 from pilotage.core.types import FloatArray
 from pilotage.records.trace import Trace
 from pilotage.report.series import merge_spans, spans
-from pilotage.report.style import BLUE, FAINT, GREEN, INK, ORANGE, PURPLE, VERMILLION
+from pilotage.report.style import BLUE, FAINT, GREEN, INK, ORANGE, PURPLE, SKY, VERMILLION
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,7 +29,8 @@ ESCAPE = Mode(3, "back out", "back out", VERMILLION)
 REPLAN = Mode(4, "stopped to replan", "replan", PURPLE)
 ARRIVED = Mode(5, "arrived", "arrived", GREEN)
 WANDER = Mode(6, "lost: wandering", "lost", INK)
-MODES = (FOLLOW, LATERAL, AVOID, ESCAPE, REPLAN, ARRIVED, WANDER)
+WAIT = Mode(7, "waiting for somebody to pass", "wait", SKY)
+MODES = (FOLLOW, LATERAL, AVOID, ESCAPE, REPLAN, ARRIVED, WANDER, WAIT)
 
 
 def mode_spans(trace: Trace, mode: Mode) -> FloatArray:

@@ -16,6 +16,7 @@ SUMMED = frozenset(
         "attempts",
         "replans",
         "escapes",
+        "waits",
         "people_collisions",
         "people_touches",
     }

@@ -19,7 +19,9 @@ UNUSED = -1
 NOTCH_M = 0.08
 """Two people side by side, of 0.25 m radius, leave a notch twice as deep between them."""
 CLOSES_M = 1e-4
-"""Of rounding: less is no motion towards anybody."""
+"""Of rounding: less is no motion towards anybody, and no speed."""
+AWAY = 0.3
+"""Share of its motion by which a robot gains distance from those whom it drives away from."""
 SHIFT_M = 0.18
 """Mean of what a laser sees of a body of 0.25 m radius lies so far in front of its middle."""
 
@@ -268,3 +270,49 @@ def closes_in(
         if away < polygon_distance(c0 * dx + s0 * dy, c0 * dy - s0 * dx, polygon) - CLOSES_M:
             return True
     return False
+
+
+@kernel
+def drive_closes_in(
+    x: float,
+    y: float,
+    theta: float,
+    v: float,
+    w: float,
+    hold: float,
+    deceleration: float,
+    dt: float,
+    radius: float,
+    swings: bool,
+    movers: FloatArray,
+    keep: float,
+) -> bool:
+    """Whether a command, held and then braked from along its arc, brings a disc nearer to somebody.
+
+    ``movers`` (K, M, 3): discs at dt, 2 dt, ...; beyond the last ones time stands. Only those count that are
+    within ``keep`` by then, and each stands while the robot moves: who drives away, and not merely past
+    (``AWAY``: places are vague), closes no gap. ``swings``: a body in the disc that is no disc itself may
+    not turn there either.
+    """
+    rate = w / v if v != 0.0 else 0.0
+    speed, t = v, 0.0
+    for k in range(10 * movers.shape[0]):
+        if t >= hold:
+            left = abs(speed) - deceleration * dt
+            if left <= CLOSES_M:
+                return False
+            speed = math.copysign(left, speed)
+        turn = (rate * speed if v != 0.0 else w) * dt
+        middle = theta + 0.5 * turn
+        nx, ny = x + speed * dt * math.cos(middle), y + speed * dt * math.sin(middle)
+        discs = movers[min(k, movers.shape[0] - 1)]
+        for i in range(discs.shape[0]):
+            px, py = discs[i, 0], discs[i, 1]
+            after = math.hypot(px - nx, py - ny)
+            if after >= radius + discs[i, 2] + keep:
+                continue
+            gained = after - math.hypot(px - x, py - y)
+            if (swings and turn != 0.0) or gained < AWAY * abs(speed) * dt:
+                return True
+        x, y, theta, t = nx, ny, theta + turn, t + dt
+    return True

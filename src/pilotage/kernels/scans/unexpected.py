@@ -26,15 +26,16 @@ def unexplained_points(
     x0: float,
     y0: float,
     resolution: float,
-) -> FloatArray:
+) -> tuple[FloatArray, IntArray]:
     """Endpoints (K, 2) of the beams shorter than ``reach`` that end farther from every known wall than
-    ``tolerance + tolerance_per_m * range``.
+    ``tolerance + tolerance_per_m * range``; and which beams (K,) these are.
 
     Beams look from (x, y) along ``directions`` (N, 2) seen from the first one, which looks along ``first`` in
     the map frame; ``distance`` is the distance field of the known map. A point outside the field counts as
     explained.
     """
     points = np.empty((ranges.shape[0], 2))
+    beams = np.empty(ranges.shape[0], np.int64)
     count = 0
     c, s = math.cos(first), math.sin(first)
     for k in range(ranges.shape[0]):
@@ -46,8 +47,9 @@ def unexplained_points(
         if interpolate_at(px, py, distance, x0, y0, resolution) > tolerance + tolerance_per_m * r:
             points[count, 0] = px
             points[count, 1] = py
+            beams[count] = k
             count += 1
-    return points[:count].copy()
+    return points[:count].copy(), beams[:count].copy()
 
 
 @kernel

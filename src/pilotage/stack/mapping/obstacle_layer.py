@@ -8,7 +8,7 @@ import numpy as np
 from pydantic import Field
 
 from pilotage.core.config import Config
-from pilotage.core.types import FloatArray, IntArray
+from pilotage.core.types import FloatArray, IntArray, Pose2
 from pilotage.kernels.lines.clustering import beam_directions
 from pilotage.kernels.scans import unexpected
 from pilotage.maps.world_map import WorldMap
@@ -18,6 +18,9 @@ from pilotage.sensors.sensor import Positive
 from pilotage.stack.interface import Belief
 from pilotage.stack.knowledge import RobotKnowledge
 from pilotage.stack.mapping.mapper import MAPPERS
+
+INSIDE = 0.8
+"""Share of its own inner radius within which nothing else can stand."""
 
 
 class ObstacleLayerConfig(Config):
@@ -60,6 +63,7 @@ class ObstacleLayer:
         self._hits = np.zeros(shape, dtype=np.int64)
         self._sums = np.zeros((*shape, 2))
         self._origin = (xmin, ymin)
+        self._inside_m = INSIDE * robot.footprint.inner_radius_m
         self._passed: IntArray = np.zeros(0, dtype=np.int64)
         self._range_m = lidar.max_range_m
         self.circles_m: FloatArray = np.zeros((0, 3))
@@ -77,8 +81,8 @@ class ObstacleLayer:
         spread_m = config.sigmas * math.sqrt(max(cov[0, 0], cov[1, 1]))
         spread_rad = config.sigmas * math.sqrt(cov[2, 2])
         if config.forget_scans and len(self.circles_m):
-            self._forget(scan.ranges_m, x, y, first, spread_m, spread_rad)
-        points = unexpected.unexplained_points(
+            self._forget(scan.ranges_m, x, y, first, spread_m, spread_rad, pose)
+        points, _ = unexpected.unexplained_points(
             scan.ranges_m,
             x,
             y,
@@ -104,8 +108,9 @@ class ObstacleLayer:
         return True
 
     def _forget(
-        self, ranges_m: FloatArray, x: float, y: float, first: float, spread_m: float, spread_rad: float
-    ) -> None:
+        self, ranges_m: FloatArray, x: float, y: float, first: float, spread_m: float, spread_rad: float,
+        pose: Pose2,
+    ) -> None:  # fmt: skip
         """Take off the map what has been seen through often enough; it may be found there again."""
         config = self._config
         ranges_m = np.where(ranges_m > 0.0, np.minimum(ranges_m, self._range_m), 0.0)
@@ -115,6 +120,8 @@ class ObstacleLayer:
         )  # fmt: skip
         self._passed = np.where(through, self._passed + 1, 0)
         gone = self._passed >= config.forget_scans
+        # Where the robot stands nothing else does: somebody stood there.
+        gone |= np.hypot(*(self.circles_m[:, :2] - (pose.x_m, pose.y_m)).T) < self._inside_m
         if not gone.any():
             return
         # A disc lies at the mean of its cell's points, so in its cell.

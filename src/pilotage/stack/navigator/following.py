@@ -43,6 +43,10 @@ class WaypointFollower:
         self.control = NO_CONTROL
         self.feedforward = STOP
 
+    def hold(self) -> None:
+        """The last command was not driven: its reference point is the next one's again."""
+        self._index = max(0, self._index - 1)
+
     def replan(self, pose: Pose2, route: RouteAhead, walls: NearWalls, circles_m: FloatArray) -> bool:
         """Plan from the estimate to the next reachable waypoint; False where there is none."""
         self._local = self._local_planner.plan(pose, route, walls, circles_m)

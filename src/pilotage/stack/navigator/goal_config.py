@@ -8,8 +8,10 @@ from pydantic import Field
 
 from pilotage.core.config import Config
 from pilotage.sensors.sensor import NonNegative, Positive
+from pilotage.stack.control.give_way import GiveWayConfig
 from pilotage.stack.control.guard import GuardConfig
 from pilotage.stack.control.wander import WanderConfig
+from pilotage.stack.perception.moving_bodies import MovingBodiesConfig
 
 
 class Mode(IntEnum):
@@ -22,6 +24,7 @@ class Mode(IntEnum):
     REPLAN = 4
     ARRIVED = 5
     WANDER = 6
+    WAIT = 7
 
 
 class GoalNavigatorConfig(Config):
@@ -46,3 +49,5 @@ class GoalNavigatorConfig(Config):
     max_replans: int = Field(default=30, ge=0)
     guard: GuardConfig = GuardConfig()
     wander: WanderConfig = WanderConfig()
+    moving_bodies: MovingBodiesConfig = MovingBodiesConfig()
+    give_way: GiveWayConfig = GiveWayConfig()

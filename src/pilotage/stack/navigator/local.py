@@ -12,6 +12,7 @@ from pilotage.core.types import STOP, Twist
 from pilotage.maps.world_map import WorldMap
 from pilotage.sensors.readings import Readings
 from pilotage.sensors.sensor import NonNegative, Positive
+from pilotage.stack.control.give_way import GiveWay, GiveWayConfig
 from pilotage.stack.control.local.drive import LocalDrive
 from pilotage.stack.interface import NAVIGATORS, Belief, StackStatus
 from pilotage.stack.journal import Journal
@@ -20,6 +21,7 @@ from pilotage.stack.localization.dead_reckoning import DeadReckoningConfig, Dead
 from pilotage.stack.localization.localizer import Localizer
 from pilotage.stack.navigator.navigator import Parts
 from pilotage.stack.navigator.plan_ahead import PlanAhead, PlanAheadConfig
+from pilotage.stack.perception.moving_bodies import MovingBodies, MovingBodiesConfig
 
 PASSING_M = 0.05
 """A point on the plan is no place to stop at: only this near is it reached."""
@@ -36,6 +38,9 @@ class LocalConfig(Config):
     """The goal is placed anew in the odometry's frame where the localizer's correction moves it farther."""
     plan: PlanAheadConfig = PlanAheadConfig()
     """How the stack's planner leads, if it has one."""
+    moving_bodies: MovingBodiesConfig = MovingBodiesConfig()
+    give_way: GiveWayConfig = GiveWayConfig()
+    """With a plan the robot knows the walls, and so who walks about."""
 
 
 @NAVIGATORS.add("local", LocalConfig)
@@ -77,6 +82,8 @@ class LocalNavigator:
         self._localizer: Localizer = parts.localizer or DeadReckoningLocalizer(
             DeadReckoningConfig(), robot, chart, task.initial, journal
         )
+        self._bodies = MovingBodies(config.moving_bodies, robot, chart)
+        self._gives_way = GiveWay(config.give_way, robot, self._bodies)
         self._plan: PlanAhead | None = None
         if parts.planner is not None:
             self._plan = PlanAhead(
@@ -87,6 +94,7 @@ class LocalNavigator:
                 parts.planner,
                 parts.smoother,
                 parts.mapper,
+                self._bodies,
                 self._localizer.belief,
                 journal,
             )
@@ -123,8 +131,10 @@ class LocalNavigator:
         self._channel.tell(away_m)
         led = point != self._goal_xy_m
         command = self._drive.toward(
-            point, pose, readings, min(PASSING_M, tolerance_m) if led else tolerance_m
+            point, pose, readings, min(PASSING_M, tolerance_m) if led else tolerance_m, self._bodies.about
         )
+        if self._plan is not None and not self._gives_way.allows(command, pose, self._plan.mapped_m):
+            command = STOP
         self._tell(readings.t_s, led=led)
         return STOP if self._status is not StackStatus.RUNNING else command
 

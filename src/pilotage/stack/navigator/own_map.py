@@ -16,6 +16,8 @@ class OwnMap:
 
     Attributes
     ----------
+    told
+        The map as it was told.
     walls
         Segments that return a beam.
     barriers
@@ -25,6 +27,7 @@ class OwnMap:
     """
 
     def __init__(self, told: WorldMap, mapper: Mapper | None) -> None:
+        self.told = told
         self.walls = NearWalls(told.walls.segments_m)
         same = told.barriers is told.walls
         self.barriers = self.walls if same else NearWalls(told.barriers.segments_m)

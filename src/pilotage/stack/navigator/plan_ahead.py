@@ -20,6 +20,7 @@ from pilotage.stack.mapping.mapper import Mapper
 from pilotage.stack.navigator.global_plan import GlobalPlan
 from pilotage.stack.navigator.own_map import OwnMap
 from pilotage.stack.navigator.progress import StallWatch
+from pilotage.stack.perception.moving_bodies import MovingBodies
 from pilotage.stack.planning.planner import Planner, Smoother
 
 WATCH_M = 20.0
@@ -63,10 +64,12 @@ class PlanAhead:
         planner: Planner,
         smoother: Smoother | None,
         mapper: Mapper | None,
+        bodies: MovingBodies,
         initial: Belief,
         journal: Journal,
     ) -> None:
         self._config, self._goal, self._mapper, self._journal = config, goal, mapper, journal
+        self._bodies = bodies
         self._radius_m = robot.radius_m
         self._own_map = own_map = OwnMap(chart, mapper)
         rng = robot.streams.stream("planner")
@@ -85,6 +88,7 @@ class PlanAhead:
     def lead(self, readings: Readings, belief: Belief) -> tuple[float, float]:
         """The point to head for, by the plan as it is now; ``failure`` says why it gave up."""
         pose, t_s = belief.pose, readings.t_s
+        readings = self._bodies.step(readings, belief)
         if self._mapper is not None:
             self._mapper.step(readings, belief)
         if self._plan.progress is None:
@@ -92,7 +96,7 @@ class PlanAhead:
         else:
             self.to_go_m = self._plan.progress.update(pose)
             if self._stall.stalled(self.to_go_m, t_s):
-                self._stalls += 1
+                self._stalls += not self._bodies.about
                 if self._stalls > self._config.most_stalls:
                     self.failure = f"stuck: no progress on {self._stalls} plans"
                 self._make(t_s, pose, f"no progress for {self._config.stall_s:g} s")
@@ -102,6 +106,11 @@ class PlanAhead:
             self.failure = self.failure or "no plan leads to the goal"
             return pose.x_m, pose.y_m
         return self._point_ahead()
+
+    @property
+    def mapped_m(self) -> FloatArray:
+        """(M, 3) discs that the robot put on its map itself."""
+        return self._own_map.found_circles_m
 
     def _is_blocked(self) -> bool:
         """Whether what was mapped since the last look comes too near to the path ahead."""

@@ -70,13 +70,20 @@ class LocalDrive:
         )
 
     def toward(
-        self, goal_xy_m: tuple[float, float], belief: Pose2, readings: Readings, tolerance_m: float
+        self,
+        goal_xy_m: tuple[float, float],
+        belief: Pose2,
+        readings: Readings,
+        tolerance_m: float,
+        people_about: bool = False,
     ) -> Twist:
         """The command to a goal in the map, as the robot believes to stand there."""
         scan = readings.by_sensor.get(self._lidar)
         if isinstance(scan, LidarScan):
             self._place(goal_xy_m, belief)
-            self._command = self._controller.step(self._view(readings.t_s, scan.ranges_m, tolerance_m))
+            self._command = self._controller.step(
+                self._view(readings.t_s, scan.ranges_m, tolerance_m, people_about)
+            )
         return self._command
 
     def _place(self, goal_xy_m: tuple[float, float], belief: Pose2) -> None:
@@ -89,7 +96,7 @@ class LocalDrive:
         if not moved_m <= self._shift_m:
             self._goal_there = there
 
-    def _view(self, t_s: float, ranges_m: FloatArray, tolerance_m: float) -> LocalView:
+    def _view(self, t_s: float, ranges_m: FloatArray, tolerance_m: float, people_about: bool) -> LocalView:
         return LocalView(
             t_s=t_s,
             pose=self._pose,
@@ -102,6 +109,7 @@ class LocalDrive:
             limits=self._limits,
             footprint_xy_m=self._outline,
             goal_tolerance_m=tolerance_m,
+            people_about=people_about,
         )
 
 

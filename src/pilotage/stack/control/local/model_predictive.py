@@ -46,7 +46,7 @@ class Mppi:
 
     def __init__(self, config: MppiConfig, generator: np.random.Generator) -> None:
         self._config = config
-        self._ground = RollingGround(config.ground)
+        self._ground = RollingGround(config.ground, foresees=True)
         self._steps = max(2, round(config.horizon_s / config.step_s))
         self._noise = NoiseBank(
             generator, config.rollouts, self._steps, config.speed_std_m_s, config.turn_std_rad_s

@@ -92,6 +92,7 @@ class LocalView:
     limits: LocalLimits
     footprint_xy_m: FloatArray
     goal_tolerance_m: float = 0.3
+    people_about: bool = False
 
     def __post_init__(self) -> None:
         """Refuse a scan that does not fit its angles, and beams that are not evenly spaced."""

@@ -19,8 +19,8 @@ from pilotage.kernels.geometry.motion import wrap
 from pilotage.sensors.sensor import Positive
 from pilotage.stack.control.local.answer import Answer
 from pilotage.stack.control.local.body import make_body
-from pilotage.stack.control.local.movers import Movers, MoversConfig
 from pilotage.stack.control.local.role import LocalLimits, LocalView
+from pilotage.stack.perception.movers import Movers, MoversConfig
 
 INSIDE_M = 0.05
 """A point so deep inside the footprint is a mistake. Where people walk any inside is somebody who brushed
@@ -66,6 +66,10 @@ class RollingConfig(Config):
     """Hits that a cell loses where the laser sees past it; 0 for a world in which nothing moves."""
 
 
+PEOPLE_FADE_HITS = 60
+"""Where people walk about, what a beam goes through is gone at once."""
+
+
 @dataclass(frozen=True, slots=True)
 class Scene:
     """The ground at one step.
@@ -104,10 +108,14 @@ class Scene:
 
 
 class RollingGround:
-    """Keeps the grids of one robot; give it every view and every command."""
+    """Keeps the grids of one robot; give it every view and every command.
 
-    def __init__(self, config: RollingConfig) -> None:
-        self._config = config
+    A controller that ``foresees`` moving bodies finds them in the scene's movers; to the others they are
+    obstacles.
+    """
+
+    def __init__(self, config: RollingConfig, *, foresees: bool = False) -> None:
+        self._config, self._foresees, self._tracks = config, foresees, False
         self._cells = 2 * math.ceil(0.5 * config.width_m / config.cell_m)
         half = self._cells // 2
         self._cell_m, self._coarse_m = config.cell_m, 2.0 * config.cell_m
@@ -163,7 +171,10 @@ class RollingGround:
             view.mount.x_m, view.mount.y_m, view.mount.theta_rad, ranges, first, step, view.max_range_m
         )
         still = things = in_base
-        if self._config.movers.enabled:
+        self._tracks = self._config.movers.enabled or view.people_about
+        if not self._tracks:
+            self._movers.forget()
+        else:
             on_track, steady = self._movers.update(
                 (view.mount.x_m, view.mount.y_m),
                 in_base,
@@ -171,7 +182,9 @@ class RollingGround:
                 self._dt_s,
                 (view.mount.theta_rad + float(angles[0]), view.mount.theta_rad + float(angles[-1])),
             )
-            still, things = in_base[~on_track], in_base[steady]
+            things = in_base[steady]
+            if self._foresees:
+                still = in_base[~on_track]
         # Somebody is inside the robot's own outline: such a scan shows him, and not where the robot is.
         covered = least_m < body.inner_m
         if self._config.match and not first_view and not covered and self._are_many(things, angles.size):
@@ -201,8 +214,8 @@ class RollingGround:
             config.reach_m,
             still,
             body.polygon,
-            0.0 if config.movers.enabled else INSIDE_M,
-            config.fade_hits,
+            0.0 if self._tracks else INSIDE_M,
+            max(config.fade_hits, PEOPLE_FADE_HITS) if view.people_about else config.fade_hits,
             *self._corner_m,
             self._cell_m,
         )
@@ -233,7 +246,7 @@ class RollingGround:
 
     def _are_many(self, points: FloatArray, beams: int) -> bool:
         """Whether enough is near that stands: in the open the few points left may be a group that walks."""
-        if not self._config.movers.enabled:
+        if not self._tracks:
             return True
         near = np.hypot(points[:, 0], points[:, 1]) < self._config.reach_m
         return bool(near.sum() >= MANY_SHARE * beams)

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from pilotage.core.angles import wrap_to_pi
-from pilotage.core.types import Goal, Pose2
+from pilotage.core.types import Goal, Pose2, Twist
 from pilotage.sensors.readings import Readings
 from pilotage.stack.control.controller import Controller
+from pilotage.stack.control.give_way import GiveWay
 from pilotage.stack.control.guard import ArcGuard
 from pilotage.stack.control.reactive import Reaction, ReactionKind
 from pilotage.stack.interface import Belief, StackStatus
@@ -20,6 +23,7 @@ from pilotage.stack.navigator.goal_config import GoalNavigatorConfig, Mode
 from pilotage.stack.navigator.navigator import Parts, localizer_of
 from pilotage.stack.navigator.own_map import OwnMap
 from pilotage.stack.navigator.progress import PathProgress, StallWatch
+from pilotage.stack.perception.moving_bodies import MovingBodies
 from pilotage.stack.planning.local_planner import LocalPlanner
 from pilotage.stack.planning.planner import PlanResult
 
@@ -34,6 +38,9 @@ SETTING_OUT_M = 0.1
 
 TURN_RATE_RAD_S = 0.8
 """On the spot, where the plan does."""
+
+SOMEBODY_M = 2.0
+"""With somebody who walks so near, what is close in front is a reason to give way, not to turn away."""
 
 NO_REACTION = Reaction(ReactionKind.NONE, 0.0, math.inf, math.inf)
 
@@ -51,6 +58,8 @@ class Context:
         What is recorded of the last step.
     goals
         Places still to be visited, the current one first.
+    tries
+        New plans for which nobody who walks can be blamed.
     trail
         Poses since the last plan that did not start on them, for an escape to go back along.
     """
@@ -72,7 +81,11 @@ class Context:
         self.journal = journal
         self.goals: list[Goal] = list(task.goals)
         self._tolerance_m = task.goal_tolerance_m
-        self._turns_on_the_spot = robot.motion.least_turning_radius_m == 0.0
+        self.turns_on_the_spot = robot.motion.least_turning_radius_m == 0.0
+        self._bodies = MovingBodies(config.moving_bodies, robot, own_map.told)
+        self._gives_way = GiveWay(config.give_way, robot, self._bodies)
+        self._waits_s: float | None = None
+        self.tries = 0
         self.turn_rate_rad_s = min(TURN_RATE_RAD_S, robot.motion.top_turn_rate_rad_s)
         self.reactive, self._mapper, self.escape = parts.reactive, parts.mapper, parts.escape
         self.own_map, self.plan = own_map, plan
@@ -105,13 +118,14 @@ class Context:
         self.reaction = NO_REACTION
 
     def map_what_is_new(self, readings: Readings, belief: Belief) -> None:
-        """Put on the own map what the told one does not explain."""
+        """Put on the own map what the told one does not explain, and does not walk about."""
+        readings = self._bodies.step(readings, belief)
         if self._mapper is not None:
             self._mapper.step(readings, belief)
 
     def react(self, readings: Readings, pose: Pose2) -> ReactionKind:
-        """Let the reactive part say what is near."""
-        if self.reactive is not None:
+        """Let the reactive part say what is near; it does not know a wall from somebody who walks."""
+        if self.reactive is not None and self._bodies.nearest_m(pose.x_m, pose.y_m) > SOMEBODY_M:
             self.reaction = self.reactive.step(
                 readings, pose, self.own_map.walls, self.plan.circles_m, self._goes_straight()
             )
@@ -120,6 +134,34 @@ class Context:
     def make_plan(self, pose: Pose2, clearances_m: list[float]) -> PlanResult:
         """Plan to the current goal on the own map."""
         return self.plan.make(self.t_s, pose, self.goals[0], self.own_map.found_circles_m, clearances_m)
+
+    def plan_around_people(self, pose: Pose2) -> PlanResult:
+        """The same with those who walk about where they are now."""
+        circles = np.concatenate([self.own_map.found_circles_m, self._bodies.discs_m()])
+        return self.plan.make(self.t_s, pose, self.goals[0], circles, self.clearances_m(pose))
+
+    def waits(self, command: Twist, pose: Pose2) -> bool:
+        """Whether to wait for somebody rather than to drive a command; standing still is no stall then."""
+        if self._gives_way.allows(command, pose, self.own_map.found_circles_m):
+            self._waits_s = None
+            return False
+        if self._waits_s is None:
+            self._waits_s = self.t_s
+            self.journal.count("waits")
+        self._stall.restart(self.t_s)
+        return True
+
+    @property
+    def among_people(self) -> bool:
+        """Whether somebody walked about a moment ago: what blocks the path may be gone soon."""
+        return self._bodies.about
+
+    def out_of_patience(self) -> bool:
+        """Whether it has waited for long; having said so it waits as long again."""
+        out = self._waits_s is not None and self.t_s - self._waits_s >= self.config.give_way.patience_s
+        if out:
+            self._waits_s = self.t_s
+        return out
 
     def take_plan(self, kind: str, why: str = "") -> None:
         """Drive by the plan just made from now on."""
@@ -173,7 +215,7 @@ class Context:
     def turn_to_plan_rad(self, pose: Pose2) -> float:
         """How far to turn to head as the plan does here; 0 where the plan, or the robot, does not turn so."""
         path = self.plan.path
-        if path is None or not self._turns_on_the_spot:
+        if path is None or not self.turns_on_the_spot:
             return 0.0
         first = self.plan.turns_first and self.progress.at_m < SETTING_OUT_M
         if path.turning_radius_m > 0.0 and not first:

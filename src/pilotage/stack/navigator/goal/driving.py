@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TypeAlias
 
-from pilotage.core.types import Pose2, Twist
+from pilotage.core.types import STOP, Pose2, Twist
 from pilotage.sensors.readings import Readings
 from pilotage.stack.control.reactive import ReactionKind
 from pilotage.stack.interface import Belief
@@ -70,10 +70,27 @@ Driving: TypeAlias = Following | InHall | Avoiding
 
 
 def drive(context: Context, state: Driving, readings: Readings, belief: Belief) -> Move:
-    """One step by the plan: what to be about is decided first, then the command is looked at by the guard."""
+    """One step by the plan: decide what to be about, look at the command by the map, give way."""
     pose = belief.pose
     context.map_what_is_new(readings, belief)
     context.to_go_m = context.progress.update(pose)
+    move = _guarded(context, state, readings, pose)
+    return give_way(context, move, pose) if context.waits(move.command, pose) else move
+
+
+def give_way(context: Context, move: Move, pose: Pose2) -> Move:
+    """Wait for somebody; with patience at its end, plan around where everybody is."""
+    context.mode = Mode.WAIT
+    context.follower.hold()
+    if context.out_of_patience() and context.plan_around_people(pose).path is not None:
+        context.follower.drop()
+        context.journal.count("replans")
+        context.take_plan("replan", "somebody stands in the way for long")
+    return Move(move.state, STOP)
+
+
+def _guarded(context: Context, state: Driving, readings: Readings, pose: Pose2) -> Move:
+    """What the plan, the reactions and the robot's own map make of a step, whoever walks about."""
     move = _next(context, state, readings, pose)
     if _allows(context, pose, move.command):
         return move

@@ -4,13 +4,42 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from pilotage.core.types import STOP, Pose2
+from pilotage.core.types import STOP, Pose2, Twist
 from pilotage.sensors.readings import Readings
 from pilotage.stack.interface import Belief
 from pilotage.stack.navigator.goal.context import HERE_TOLERANCE_M, Context
 from pilotage.stack.navigator.goal.ended import fail
 from pilotage.stack.navigator.goal.state import Move, State
 from pilotage.stack.navigator.goal_config import Mode
+
+
+@dataclass(frozen=True, slots=True)
+class Waiting:
+    """Stands until whoever shuts it in may have gone, then plans again.
+
+    Attributes
+    ----------
+    resumes
+        What the robot is about with the new plan.
+    """
+
+    context: Context
+    resumes: State
+    until_s: float
+
+    def step(self, readings: Readings, belief: Belief) -> Move:
+        """Look around, which shows what has gone; escape after all where nobody is about any more."""
+        context, pose = self.context, belief.pose
+        context.map_what_is_new(readings, belief)
+        context.mode = Mode.WAIT
+        if context.t_s < self.until_s:
+            turn = Twist(0.0, context.turn_rate_rad_s if context.turns_on_the_spot else 0.0)
+            return Move(self, STOP if context.waits(turn, pose) else turn)
+        result = context.make_plan(pose, context.clearances_m(pose))
+        if result.path is not None:
+            context.take_plan("replan", "the path is free again")
+            return Move(self.resumes, STOP)
+        return begin_escape(context, self.resumes, f"waited, but replanning found {result.status}")
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,12 +69,19 @@ class Escaping:
             return replan(context, self.resumes, pose, "backed out")
         own, room_m = context.own_map, context.radius_m + HERE_TOLERANCE_M
         if context.guard.allows(command, pose, own.barriers, own.known_circles_m, room_m):
-            return Move(self, command)
+            return Move(self, STOP if context.waits(command, pose) else command)
         return replan(context, self.resumes, pose, "the way back is blocked")
 
 
 def begin_escape(context: Context, resumes: State, why: str) -> Move:
-    """Stop, and back out from the next step on; without an escape this is the end."""
+    """Stop, and back out from the next step on; without an escape this is the end.
+
+    Among people it waits instead: they go away, and nobody is seen behind a robot that backs out.
+    """
+    if context.among_people:
+        context.follower.drop()
+        context.say("wait", f"{why}: waiting, as somebody walks about")
+        return Move(Waiting(context, resumes, context.t_s + context.config.give_way.patience_s), STOP)
     if context.escape is None:
         return fail(context, f"stuck: {why}, and the stack has no escape")
     context.journal.count("escapes")
@@ -60,8 +96,9 @@ def replan(context: Context, resumes: State, pose: Pose2, why: str) -> Move:
     """Stop and plan anew on the robot's own map; back out where even that finds no path."""
     context.mode = Mode.REPLAN
     context.follower.drop()
-    if context.journal.counts["replans"] >= context.config.max_replans:
+    if context.tries >= context.config.max_replans:
         return fail(context, f"stuck: gave up after {context.journal.counts['replans']} replans")
+    context.tries += not context.among_people
     context.journal.count("replans")
     return set_out(context, resumes, pose, "replan", why)
 

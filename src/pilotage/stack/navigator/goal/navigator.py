@@ -68,7 +68,7 @@ class GoalNavigator:
         self._telemetry = journal.channel(COLUMNS, first=True)
         own_map = OwnMap(chart, parts.mapper)
         journal.result("mapped_circles_m", lambda: own_map.found_circles_m)
-        journal.counts |= {"attempts": 0, "replans": 0, "escapes": 0}
+        journal.counts |= {"attempts": 0, "replans": 0, "escapes": 0, "waits": 0}
         if len(task.goals) > 1:
             journal.counts["goals"] = 0
         least_m = robot.radius_m + config.guard.margin_m

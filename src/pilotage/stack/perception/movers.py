@@ -8,7 +8,7 @@ import numpy as np
 from pydantic import Field
 
 from pilotage.core.config import Config
-from pilotage.core.types import BoolArray, FloatArray
+from pilotage.core.types import BoolArray, FloatArray, IntArray
 from pilotage.kernels.control import movers as kernels
 from pilotage.sensors.sensor import NonNegative, Positive
 
@@ -49,6 +49,10 @@ class Movers:
         self._config = config
         self.tracks: FloatArray = np.zeros((0, kernels.COLUMNS))
 
+    def forget(self) -> None:
+        """Drop all tracks."""
+        self.tracks = self.tracks[:0]
+
     def update(
         self,
         sensor_xy_m: tuple[float, float],
@@ -59,8 +63,6 @@ class Movers:
     ) -> tuple[BoolArray, BoolArray]:
         """Take the scan's points (N, 2), base frame, in the order of the beams; tell which are on tracks.
 
-        Not to be called where ``enabled`` is not set.
-
         ``field_rad``: directions of the first and the last beam in the base frame.
 
         Returns (N,) points of bodies that count, which the obstacle grid shall not keep, and (N,) those that
@@ -69,12 +71,32 @@ class Movers:
         config = self._config
         c, s = math.cos(pose[2]), math.sin(pose[2])
         turn = np.array([[c, s], [-s, c]])
-        points = pose[:2] + in_base @ turn
         x, y = pose[:2] + np.array(sensor_xy_m) @ turn
-        centres, of_point = kernels.scan_clusters(
-            x, y, points, config.gap_m, config.widest_m, config.least_points
+        of_point = self.track(float(x), float(y), float(pose[2]), pose[:2] + in_base @ turn, dt_s, field_rad)
+        moved = np.hypot(
+            self.tracks[:, kernels.X] - self.tracks[:, kernels.X0],
+            self.tracks[:, kernels.Y] - self.tracks[:, kernels.Y0],
         )
-        self._keep_unseen(float(x), float(y), float(pose[2]), field_rad)
+        stands = (self.tracks[:, kernels.READINGS] >= config.stands_readings) & (moved < config.stands_m)
+        # One more place, for the points of no cluster.
+        on_track: BoolArray = np.append(self._count(), False)[of_point]
+        still: BoolArray = np.append(stands, True)[of_point]
+        return on_track, still
+
+    def track(
+        self, x_m: float, y_m: float, theta_rad: float, points: FloatArray, dt_s: float,
+        field_rad: tuple[float, float],
+    ) -> IntArray:  # fmt: skip
+        """One step of the tracks by points (N, 2) in their frame, as a sensor at x, y saw them in turn.
+
+        ``theta_rad``: of the base, in which ``field_rad`` are the directions of the first and the last beam.
+        Returns the row of ``tracks`` of each point (N,), -1 of those of no cluster.
+        """
+        config = self._config
+        centres, of_point = kernels.scan_clusters(
+            x_m, y_m, points, config.gap_m, config.widest_m, config.least_points
+        )
+        self._keep_unseen(x_m, y_m, theta_rad, field_rad)
         self.tracks, of_centre = kernels.track_step(
             self.tracks,
             centres,
@@ -85,19 +107,8 @@ class Movers:
             config.gate_std,
             config.most_missed,
         )
-        count = self._count()
-        moved = np.hypot(
-            self.tracks[:, kernels.X] - self.tracks[:, kernels.X0],
-            self.tracks[:, kernels.Y] - self.tracks[:, kernels.Y0],
-        )
-        stands = (self.tracks[:, kernels.READINGS] >= config.stands_readings) & (moved < config.stands_m)
-        # One more place, for the points of no cluster.
-        of_cluster = np.append(count[of_centre] if of_centre.size else np.zeros(0, np.bool_), False)
-        on_track: BoolArray = of_cluster[of_point]
-        still: BoolArray = np.append(stands[of_centre] if of_centre.size else np.zeros(0, np.bool_), True)[
-            of_point
-        ]
-        return on_track, still
+        of_track: IntArray = np.append(of_centre, kernels.UNUSED)[of_point]
+        return of_track
 
     def _keep_unseen(self, x_m: float, y_m: float, theta_rad: float, field_rad: tuple[float, float]) -> None:
         """Readings cannot be missed where no beam goes."""

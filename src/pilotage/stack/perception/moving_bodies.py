@@ -1,0 +1,181 @@
+"""Who moves about where a robot knows the walls: what its map does not explain, and does not stand."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+from pydantic import Field
+
+from pilotage.core.config import Config
+from pilotage.core.types import BoolArray, FloatArray, Pose2
+from pilotage.kernels.control import movers as kernels
+from pilotage.kernels.lines.clustering import beam_directions
+from pilotage.kernels.scans.unexpected import unexplained_points
+from pilotage.maps.world_map import WorldMap
+from pilotage.sensors.lidar import LidarConfig
+from pilotage.sensors.readings import LidarScan, Readings
+from pilotage.sensors.sensor import NonNegative, Positive
+from pilotage.stack.interface import Belief, BeliefStatus
+from pilotage.stack.knowledge import RobotKnowledge
+from pilotage.stack.perception.movers import Movers, MoversConfig
+
+WALKED_M = 0.4
+"""So far from where it was first seen, and faster than ``walks_m_s``: it walks beyond doubt."""
+
+
+class MovingBodiesConfig(Config):
+    """What is tracked, and what counts as standing."""
+
+    reach_m: Positive = 6.0
+    tolerance_m: Positive = 0.15
+    sigmas: NonNegative = 3.0
+    """The tolerance grows with the pose's uncertainty by this many standard deviations."""
+    walks_m_s: Positive = 0.25
+    """Slower than this, and told well enough, it stands: a thing for the map."""
+    stands_readings: int = Field(default=15, ge=1, le=1000)
+    """So many readings somebody who walked has to be so slow."""
+    about_s: NonNegative = 10.0
+    """For so long it reckons with people after it saw one walk."""
+    anyone_m_s: NonNegative = 1.0
+    """So fast may come who is not tracked."""
+    tracks: MoversConfig = MoversConfig()
+
+
+class MovingBodies:
+    """Tracks narrow clusters of returns that no known wall explains (``Movers``).
+
+    One that stands is left to the mapper; one that walks, or is too new to tell, is nothing to be mapped
+    but somebody to give way to. Posts on no map that hide each other may look like a walker for a moment.
+    Idle without exactly one lidar, without known walls, or while the robot does not know where it is.
+    Groups wider than ``tracks.widest_m`` without a notch between two are left to the mapper.
+    """
+
+    def __init__(self, config: MovingBodiesConfig, robot: RobotKnowledge, chart: WorldMap) -> None:
+        self._config = config
+        self._movers = Movers(config.tracks)
+        lidars = list(robot.sensors_of(LidarConfig).items())
+        walls = chart.walls
+        self._works = len(lidars) == 1 and len(walls.segments_m) + len(walls.circles_m) > 0
+        self._walks: BoolArray = np.zeros(0, np.bool_)
+        self._t_s = self.seen_s = -math.inf
+        self._field = 0.0, 0.0
+        self._loose: FloatArray = np.zeros((0, 2))
+        if not self._works:
+            return
+        self._lidar, lidar = lidars[0]
+        self._mount, self._step = lidar.mount, lidar.beam_step_rad
+        angles = lidar.beam_angles_rad()
+        self._first = float(angles[0])
+        self._directions = beam_directions(0.0, self._step, lidar.beams)
+        self._field = lidar.mount.theta_rad + self._first, lidar.mount.theta_rad + float(angles[-1])
+        self._reach_m = min(config.reach_m, lidar.max_range_m)
+        self._known = chart.wall_field
+
+    def step(self, readings: Readings, belief: Belief) -> Readings:
+        """Track; returns the readings without returns of what does not stand, for a mapper."""
+        scan = readings.by_sensor.get(self._lidar) if self._works else None
+        if not isinstance(scan, LidarScan):
+            return readings
+        if belief.status is BeliefStatus.LOST:
+            self._movers.forget()
+            self._walks, self._loose = self._walks[:0], self._loose[:0]
+            return readings
+        pose, cov, config, mount = belief.pose, belief.cov, self._config, self._mount
+        c, s = math.cos(pose.theta_rad), math.sin(pose.theta_rad)
+        x = pose.x_m + c * mount.x_m - s * mount.y_m
+        y = pose.y_m + s * mount.x_m + c * mount.y_m
+        points, beams = unexplained_points(
+            scan.ranges_m,
+            x,
+            y,
+            pose.theta_rad + mount.theta_rad + self._first,
+            self._directions,
+            self._reach_m,
+            config.tolerance_m + config.sigmas * math.sqrt(max(cov[0, 0], cov[1, 1])),
+            config.sigmas * math.sqrt(cov[2, 2]),
+            self._known.distance_m,
+            *self._known.origin_xy_m,
+            self._known.resolution_m,
+        )
+        dt_s = min(max(readings.t_s - self._t_s, 1e-3), 1.0)
+        self._t_s = readings.t_s
+        if not len(points) and not len(self._movers.tracks):
+            self._loose = points
+            return readings
+        of_track = self._movers.track(x, y, pose.theta_rad, points, dt_s, self._field)
+        self._walks = self._told()
+        walks = np.append(self._walks, False)[of_track]
+        self._loose = points[walks | (of_track < 0)]
+        dropped = beams[walks]
+        if not len(dropped):
+            return readings
+        ranges_m = scan.ranges_m.copy()
+        ranges_m[dropped] = math.nan
+        return replace(readings, by_sensor={**readings.by_sensor, self._lidar: LidarScan(ranges_m)})
+
+    def _told(self) -> BoolArray:
+        """Which tracks do not stand; notes when somebody was seen who walks beyond doubt.
+
+        Of who walked the readings are counted anew, and the place where he was first seen is dropped: he
+        stands when he has for ``stands_s``.
+        """
+        tracks, config = self._movers.tracks, self._config
+        fast = np.hypot(tracks[:, kernels.VX], tracks[:, kernels.VY]) > config.walks_m_s
+        unsure = tracks[:, kernels.VV] > config.tracks.unsure_std_m_s**2
+        went = np.hypot(
+            tracks[:, kernels.X] - tracks[:, kernels.X0], tracks[:, kernels.Y] - tracks[:, kernels.Y0]
+        )
+        walked = fast & ~unsure & ~(went <= WALKED_M)
+        if walked.any():
+            self.seen_s = self._t_s
+        tracks[walked, kernels.READINGS], tracks[walked, kernels.X0] = config.tracks.readings, math.nan
+        stood = tracks[:, kernels.READINGS] - config.tracks.readings >= config.stands_readings
+        rests = np.isnan(tracks[:, kernels.X0]) & ~stood
+        walks: BoolArray = unsure | fast | rests
+        return walks
+
+    def foretold(
+        self, step_s: float, steps: int, pose: Pose2, mapped_m: FloatArray, reach_m: float
+    ) -> FloatArray:
+        """Discs (steps, M, 3) of those who do not stand, after ``step_s`` and every ``step_s`` more.
+
+        Where people walk about, returns within ``reach_m`` of the robot that neither the map nor its discs
+        ``mapped_m`` (N, 3) explain may be somebody as well, who goes anywhere: in a group nobody is told
+        apart.
+        """
+        discs = self._movers.foretold(step_s, step_s, steps)[:, self._walks]
+        if not self.about:
+            return np.ascontiguousarray(discs)
+        near = self._loose[np.hypot(*(self._loose - (pose.x_m, pose.y_m)).T) < reach_m]
+        if len(near) and len(mapped_m):
+            away = np.hypot(*(near[:, None, :] - mapped_m[None, :, :2]).transpose(2, 0, 1)) - mapped_m[:, 2]
+            near = near[away.min(axis=1) > self._config.tolerance_m]
+        grown = np.empty((steps, len(near), 3))
+        grown[:, :, :2] = near
+        grown[:, :, 2] = self._config.anyone_m_s * step_s * np.arange(1, steps + 1)[:, None]
+        return np.concatenate([discs, grown], axis=1)
+
+    @property
+    def about(self) -> bool:
+        """Whether somebody walked about a moment ago: what blocks the path may be gone soon."""
+        return self._t_s - self.seen_s < self._config.about_s
+
+    def sees(self, bearing_rad: float) -> bool:
+        """Whether the laser looks in a direction of the base's frame."""
+        first, last = self._field
+        return (bearing_rad - first) % (2.0 * math.pi) <= last - first
+
+    def discs_m(self) -> FloatArray:
+        """(M, 3) where they are now, of their own size."""
+        tracks = self._movers.tracks[self._walks]
+        radius = np.full(len(tracks), self._config.tracks.radius_m)
+        return np.column_stack([tracks[:, kernels.X], tracks[:, kernels.Y], radius])
+
+    def nearest_m(self, x_m: float, y_m: float) -> float:
+        """Distance to the edge of the nearest of them; inf without any."""
+        discs = self.discs_m()
+        if not len(discs):
+            return math.inf
+        return float((np.hypot(discs[:, 0] - x_m, discs[:, 1] - y_m) - discs[:, 2]).min())

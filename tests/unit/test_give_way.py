@@ -1,0 +1,128 @@
+"""People who walk about are kept off the map and given way to, by whatever navigator and local controller."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+from pilotage.core.random import RandomStreams
+from pilotage.core.types import FloatArray, Pose2, Twist
+from pilotage.experiments.mission import mission_of, read_mission
+from pilotage.experiments.run import run_mission
+from pilotage.kernels.control.movers import drive_closes_in
+from pilotage.kernels.scans.rays import fan_ranges
+from pilotage.maps.segment_map import SegmentMap
+from pilotage.maps.world_map import WorldMap
+from pilotage.models.footprint import Footprint
+from pilotage.models.motion.differential_drive import DifferentialDriveConfig
+from pilotage.sensors.lidar import LidarConfig
+from pilotage.sensors.readings import LidarScan, Readings
+from pilotage.stack.control.give_way import GiveWay, GiveWayConfig
+from pilotage.stack.interface import Belief
+from pilotage.stack.knowledge import RobotKnowledge
+from pilotage.stack.perception.moving_bodies import MovingBodies, MovingBodiesConfig
+
+LIDAR = LidarConfig(beams=539, max_range_m=12.0)
+ROBOT = RobotKnowledge(
+    Footprint.disc(0.3), DifferentialDriveConfig(), {"lidar": LIDAR}, 0.1, RandomStreams(0, "robot")
+)
+WALLS = np.array([[8.0, -6.0, 8.0, 6.0], [-6.0, 6.0, 8.0, 6.0], [-6.0, -6.0, 8.0, -6.0]])
+CHART = WorldMap("room", (-6.0, -6.0, 8.0, 6.0), SegmentMap(WALLS, np.zeros((0, 3)), (-6.0, -6.0, 8.0, 6.0)))
+BELIEF = Belief(Pose2(0.0, 0.0, 0.0), 1e-6 * np.eye(3))
+NOTHING = np.zeros((0, 3))
+POST = [3.0, -1.5, 0.15]
+
+
+def _watch(bodies: MovingBodies, walker: tuple[float, float], velocity: tuple[float, float]) -> FloatArray:
+    """Two seconds of somebody who walks to a place beside a post; the last scan as a mapper gets it."""
+    angles = LIDAR.beam_angles_rad()
+    seen = Readings(0.0)
+    for t in np.arange(-1.9, 0.05, 0.1):
+        place = [walker[0] + t * velocity[0], walker[1] + t * velocity[1], 0.25]
+        circles = np.array([POST, place])
+        ranges = fan_ranges(0.0, 0.0, float(angles[0]), LIDAR.beam_step_rad, 539, 12.0, WALLS, circles)
+        seen = bodies.step(Readings(2.0 + t, {"lidar": LidarScan(ranges)}), BELIEF)
+    scan = seen.by_sensor["lidar"]
+    assert isinstance(scan, LidarScan)
+    return scan.ranges_m
+
+
+def test_a_mapper_is_shown_what_stands_and_not_who_walks() -> None:
+    bodies = MovingBodies(MovingBodiesConfig(), ROBOT, CHART)
+    ranges = _watch(bodies, (2.5, 1.0), (-1.0, 0.0))
+    angles = LIDAR.beam_angles_rad()
+    to_post, to_walker = math.atan2(POST[1], POST[0]), math.atan2(1.0, 2.5)
+    assert abs(ranges[np.argmin(np.abs(angles - to_post))] - (math.hypot(*POST[:2]) - 0.15)) < 0.01
+    assert np.isnan(ranges[np.argmin(np.abs(angles - to_walker))])
+    assert bodies.about
+    assert bodies.discs_m().shape == (1, 3)
+    assert np.hypot(*(bodies.discs_m()[0, :2] - (2.5, 1.0))) < 0.15
+
+
+def test_it_gives_way_ahead_and_may_drive_away_and_never_backs_blindly() -> None:
+    bodies = MovingBodies(MovingBodiesConfig(), ROBOT, CHART)
+    gives_way = GiveWay(GiveWayConfig(), ROBOT, bodies)
+    here = Pose2(0.0, 0.0, 0.0)
+    _watch(bodies, (0.9, 0.0), (-1.0, 0.0))
+    assert not gives_way.allows(Twist(0.5, 0.0), here, NOTHING)
+    assert gives_way.allows(Twist(0.0, 1.0), here, NOTHING)
+    # Behind it the laser does not look, and somebody walks about.
+    assert not gives_way.allows(Twist(-0.3, 0.0), here, NOTHING)
+    assert gives_way.allows(Twist(0.5, 0.0), Pose2(0.0, 0.0, math.pi), NOTHING)
+    far = MovingBodies(MovingBodiesConfig(), ROBOT, CHART)
+    _watch(far, (4.0, 0.0), (-1.0, 0.0))
+    assert GiveWay(GiveWayConfig(), ROBOT, far).allows(Twist(0.5, 0.0), here, NOTHING)
+
+
+def test_driving_past_is_no_driving_away() -> None:
+    def closes(bearing_rad: float, gap_m: float = 0.05) -> bool:
+        away = 0.3 + 0.25 + gap_m
+        discs = np.array([[[away * math.cos(bearing_rad), away * math.sin(bearing_rad), 0.25]]] * 4)
+        return bool(drive_closes_in(0.0, 0.0, 0.0, 0.5, 0.0, 0.1, 2.0, 0.05, 0.3, False, discs, 0.1))
+
+    assert closes(0.0)
+    assert closes(0.5 * math.pi)
+    assert not closes(0.75 * math.pi)
+    assert not closes(0.0, gap_m=0.5)
+    # A body that is no disc may not swing its corners into somebody, either.
+    touching = np.array([[[0.4, 0.0, 0.25]]] * 4)
+    assert drive_closes_in(0.0, 0.0, 0.0, 0.0, 1.0, 0.1, 2.0, 0.05, 0.3, True, touching, 0.1)
+
+
+HALL: dict[str, Any] = {
+    "world.map": {
+        "map": "hall",
+        "bounds_m": [-0.5, -0.5, 10.5, 8.5],
+        "walls_m": [[0, 0, 10, 0], [10, 0, 10, 8], [10, 8, 0, 8], [0, 8, 0, 0]],
+        "landmarks": [
+            {"id": k, "x_m": x, "y_m": y} for k, (x, y) in enumerate([(0, 0), (10, 0), (10, 8), (0, 8)])
+        ],
+    },
+    "world.start": {"x_m": 1.0, "y_m": 4.0, "theta_rad": 0.0},
+    "world.goal": {"x_m": 9.0, "y_m": 4.0},
+    "world.obstacles": [],
+    "world.people": [{"name": "social-force", "count": 8, "doors_m": [[5, 1], [5, 7], [3, 1], [7, 7]]}],
+    "run.time_limit_s": 150.0,
+}
+
+
+@pytest.mark.parametrize(
+    ("base", "controller"),
+    [
+        ("museum-1", None),
+        ("museum-1-fast", "gap-horizon"),
+        ("museum-1-fast", "dwa"),
+        ("museum-1-fast", "vfh"),
+    ],
+)
+def test_it_comes_through_people_and_drives_into_nobody(base: str, controller: str | None) -> None:
+    settings = HALL | ({"stack.local_controller": {"name": controller}} if controller else {})
+    metrics: dict[str, Any] = dict(
+        run_mission(mission_of(read_mission(base), (), 1, settings), save=False).metrics
+    )
+    assert metrics["success"], metrics["reason"]
+    assert metrics["people_collisions"] == 0
+    assert metrics["people_closest_m"] < 1.0, "nobody came near it: the test shows nothing"
