@@ -18,7 +18,9 @@ from pilotage.bridges.ros.run_messages import RunMessages, Stamped
 from pilotage.cli.app import dispatch
 from pilotage.core.errors import InputError
 from pilotage.core.types import Pose2
+from pilotage.experiments.recordings.run_scans import read_run_scans
 from pilotage.logs.bag_series import LANDMARKS, POSES, read_series
+from pilotage.logs.laser_recordings import read_laser_log
 from pilotage.maps.ros_map import RosMap, write_ros_map
 from support.command_bags import commanded
 
@@ -176,6 +178,21 @@ def test_scans_are_localized_alike_in_every_form(
     assert 9.0 < window.metrics["duration_s"] <= 10.0
     lines = (window.folder / "trajectory.tum").read_text().splitlines()
     assert len(lines) == len(window.trace["t_s"])
+
+
+def test_a_run_folder_holds_the_scans_and_odometry_of_its_bag(
+    museum: tuple[pl.Run, dict[str, Path]],
+) -> None:
+    own, bag = read_run_scans(museum[0].folder), read_laser_log(museum[1]["mcap"])
+    assert own.t_s == pytest.approx(bag.t_s, abs=1e-6)
+    assert np.array_equal(np.isfinite(own.ranges_m), np.isfinite(bag.ranges_m))
+    hit = np.isfinite(own.ranges_m)
+    assert own.ranges_m[hit] == pytest.approx(bag.ranges_m[hit], abs=1e-5)
+    assert own.angles_rad(0) == pytest.approx(bag.angles_rad(0), abs=1e-5)
+    assert own.mount == bag.mount
+    theirs, mine = bag.odometry_at_scans(), own.odometry_at_scans()
+    assert theirs is not None
+    assert mine == pytest.approx(theirs, abs=1e-6)
 
 
 def test_an_own_grid_and_a_page(museum: tuple[pl.Run, dict[str, Path]], tmp_path: Path) -> None:

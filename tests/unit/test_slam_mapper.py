@@ -189,7 +189,7 @@ def test_bad_input_is_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str
     for words, told in (
         ([str(tmp_path / "none.bag")], "found no such file"),
         ([str(tmp_path / "empty.log")], "expected FLASER"),
-        ([str(tmp_path / "run")], "run folder"),
+        ([str(tmp_path / "run")], "metrics.json"),
         ([str(log), "--config", str(config)], "keyframe_distance_m"),
         ([str(log), "--config", str(tmp_path / "no.yaml")], "found none"),
     ):

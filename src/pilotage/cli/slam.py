@@ -36,7 +36,9 @@ _TOLD = (
 
 
 def slam(
-    log: Annotated[Path, typer.Argument(metavar="LOG", help="A ROS bag, an MCAP file or a CARMEN log.")],
+    log: Annotated[
+        Path, typer.Argument(metavar="LOG", help="A ROS bag, an MCAP file, a CARMEN log or a run's folder.")
+    ],
     config: Annotated[
         Path | None, typer.Option("--config", metavar="FILE", help="YAML file with the few parameters.")
     ] = None,

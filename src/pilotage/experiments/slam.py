@@ -13,6 +13,7 @@ import numpy as np
 from pilotage.core.config import validate
 from pilotage.core.errors import InputError
 from pilotage.core.files import read_yaml
+from pilotage.experiments.recordings.run_scans import read_run_scans
 from pilotage.experiments.slam_folder import read_earlier_map, write_slam_folder
 from pilotage.logs.laser_log import LaserLog
 from pilotage.logs.laser_recordings import read_laser_log
@@ -36,13 +37,12 @@ class SlamRun:
 
 
 def read_recording(path: Path, topics: Sequence[str] = ()) -> LaserLog:
-    """Read a bag or a CARMEN log; InputError also for a run folder, which holds no raw scans."""
-    if (path / "mission.yaml").is_file():
-        raise InputError(
-            f"{path}: expected a bag or a CARMEN log, found a run folder, which holds no raw scans; "
-            "export the run as a bag and map that"
-        )
-    return read_laser_log(path, topics=topics)
+    """Read a bag, a CARMEN log or the folder of a run with a LiDAR."""
+    if not (path / "mission.yaml").is_file():
+        return read_laser_log(path, topics=topics)
+    if topics:
+        raise InputError(f"{path}: expected a bag where topics are named, found a run folder")
+    return read_run_scans(path)
 
 
 def read_slam_config(path: Path | None) -> SlamConfig:

@@ -156,7 +156,7 @@ def slam(
     Parameters
     ----------
     log
-        A ROS bag, an MCAP file or a CARMEN log with scans and odometry.
+        A ROS bag, an MCAP file or a CARMEN log with scans and odometry, or the folder of a run with a LiDAR.
     config
         A YAML file of the few parameters; None: as shipped.
     topics

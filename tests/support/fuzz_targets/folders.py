@@ -109,6 +109,9 @@ TARGETS: tuple[Target, ...] = (
         )
     ),
     Target(
+        "slam run", _run_folder, ("slam", "run", *SHORT), ("run/trace.parquet", "run/scans.npz"), goes_on=(0,)
+    ),
+    Target(
         "evaluate slam",
         _slam_folder,
         ("evaluate", "mapped/trajectory.tum", "mapped/before.tum"),

@@ -11,11 +11,11 @@ import numpy as np
 
 from pilotage.bridges.ros import messages as ros
 from pilotage.core.types import FloatArray, Pose2
-from pilotage.logs.odometry_steps import arc_ends
 from pilotage.maps.occupancy_grid import OccupancyGrid
 from pilotage.maps.rasterize import rasterized
 from pilotage.maps.segment_map import SegmentMap
 from pilotage.records.events import require_times
+from pilotage.records.reckoning import odometry_increments, reckoned
 from pilotage.records.run_data import RunData, read_run, read_team
 from pilotage.records.trace import Trace, read_trace
 from pilotage.records.world import World
@@ -171,27 +171,16 @@ def _robot(data: RunData, name: str, began_s: float) -> Iterator[Stamped]:
 def _odometry(trace: Trace) -> tuple[FloatArray | None, FloatArray]:
     """Poses (N, 3) in the odometry's own frame, which begins where the robot does, and (N, 3) the speeds
     forward, turning and to the left since the reading before; None and nothing without odometry."""
-    if not trace.has("odom_distance_m", "odom_angle_rad"):
+    steps = odometry_increments(trace)
+    if steps is None:
         return None, np.empty((0, 3))
-    read = np.isfinite(trace["odom_distance_m"]) & np.isfinite(trace["odom_angle_rad"])
-    steps = np.column_stack([trace[f"odom_{part}"] for part in ("distance_m", "angle_rad", "lateral_m")])
-    steps = np.where(read[:, None], np.nan_to_num(steps), 0.0)
-    nowhere = np.zeros((trace.steps, 3))
-    moves = arc_ends(nowhere, steps[:, 0], steps[:, 1])
-    sideways = arc_ends(nowhere, steps[:, 2], steps[:, 1])
-    moves[:, 0] -= sideways[:, 1]
-    moves[:, 1] += sideways[:, 0]
-    here, poses = Pose2(0.0, 0.0, 0.0), np.empty((trace.steps, 3))
-    for k, move in enumerate(moves):
-        here = here.compose(Pose2.from_array(move))
-        poses[k] = here.as_array()
-    speeds, rows = np.zeros((trace.steps, 3)), np.flatnonzero(read)
+    speeds, rows = np.zeros((trace.steps, 3)), np.flatnonzero(np.isfinite(steps[:, 0]))
     if len(rows) > 1:
         apart_s = np.diff(trace.t_s[rows])
         apart_s = np.maximum(np.concatenate([apart_s[:1], apart_s]), 1e-9)
         last = np.maximum(np.searchsorted(rows, np.arange(trace.steps), side="right") - 1, 0)
         speeds = (steps[rows] / apart_s[:, None])[last]
-    return poses, speeds
+    return reckoned(steps), speeds
 
 
 def _covariances(trace: Trace) -> FloatArray:
