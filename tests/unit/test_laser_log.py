@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from pilotage.core.errors import InputError
-from pilotage.core.types import FloatArray
-from pilotage.logs.laser_log import interpolate_poses, read_carmen_scans
+from pilotage.core.types import FloatArray, Pose2
+from pilotage.logs.laser_log import RawScan, assemble, interpolate_poses, read_carmen_scans
 from pilotage.logs.laser_recordings import read_laser_log
 from support.laser_bags import drive, write_ros1
 
@@ -95,3 +95,21 @@ def test_the_reader_is_told_by_the_content(tmp_path: Path) -> None:
         read_laser_log(tmp_path / "none")
     with pytest.raises(InputError, match="expected a ROS 1 bag"):
         read_laser_log(tmp_path)
+
+
+def test_a_field_of_view_divided_by_one_gap_too_few() -> None:
+    """Converters take the last of 180 beams for the far edge; the scanner's beams are a degree apart."""
+    for beams, told_deg, true_deg in (
+        (180, 180 / 179, 1.0),
+        (181, 1.0, 1.0),
+        (360, 180 / 359, 0.5),
+        (91, 2.2, 2.2),
+    ):
+        raw = [
+            RawScan(float(k), np.ones(beams), -0.5 * math.pi, math.radians(told_deg), 0.1, 9.0)
+            for k in range(2)
+        ]
+        log = assemble("x.log", raw, Pose2(0.0, 0.0, 0.0), False, np.zeros(0), np.zeros((0, 3)))
+        np.testing.assert_allclose(np.degrees(log.angle_step_rad), true_deg, rtol=1e-9)
+        assert log.first_angle_rad[0] == -0.5 * math.pi
+        assert any("as many steps as beams" in said for said in log.warnings) == (told_deg != true_deg)

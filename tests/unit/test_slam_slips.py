@@ -6,8 +6,11 @@ import numpy as np
 import pytest
 
 from pilotage.core.types import FloatArray
+from pilotage.stack.mapping.slam.closures import FAR_SLIP, USUAL_SLIP, candidates
 from pilotage.stack.mapping.slam.local_matching import Fit
+from pilotage.stack.mapping.slam.refinement import BESIDE, not_aligned
 from pilotage.stack.mapping.slam.slips import Slips
+from pilotage.stack.mapping.slam.uncertainty import Edges
 
 POINTS = 150.0
 
@@ -43,3 +46,30 @@ def test_walls_on_all_sides_leave_nothing_open() -> None:
     for _ in range(16):
         slips.matched(fit(np.array([[1.0, 0.0], [0.0, 1.0]]), 0.3, False))
     assert np.sqrt(np.linalg.eigvalsh(slips.taken())[-1]) < 0.002
+
+
+def test_a_loop_that_is_too_long_is_searched_in_a_window_that_is_cut() -> None:
+    poses = np.array([[0.0, 0.0, 0.0], *([50.0, 5.0 * k, 0.0] for k in range(4)), [6.0, 0.0, 0.0]])
+    joint: FloatArray = np.zeros((18, 18))
+    joint[15:, 15:] = np.diag([100.0, 100.0, 0.01])
+    pieces = np.zeros(6, np.int64)
+    assert candidates(poses, pieces, joint, 8.0, {}, USUAL_SLIP) == []
+    (found,) = candidates(poses, pieces, joint, 8.0, {}, FAR_SLIP)
+    assert (found.earlier, found.later, found.half_m) == (0, 5, 8.0)
+    # Once it was searched so, it is not again; what the usual windows hold is left to them.
+    assert candidates(poses, pieces, joint, 8.0, {(0, 5): 8.0}, FAR_SLIP) == []
+    assert candidates(poses, pieces, np.asarray(1e-4 * joint), 8.0, {}, FAR_SLIP) == []
+
+
+def test_closures_stay_where_no_keyframes_could_be_aligned() -> None:
+    def edges(pairs: list[tuple[int, int]], closes: bool) -> Edges:
+        i, j = np.array(pairs).T
+        count = len(pairs)
+        return Edges(i, j, np.zeros((count, 3)), np.tile(np.eye(3), (count, 1, 1)), np.full(count, closes))
+
+    closing = edges([(10, 100), (40, 130), (60, 150)], True)
+    aligned = edges([(10 + BESIDE, 100 - BESIDE), (40 + BESIDE + 1, 130)], True)
+    along = edges([(149, 150), (60, 62)], False)
+    kept = not_aligned(closing, aligned.and_more(along))
+    assert list(zip(kept.i.tolist(), kept.j.tolist(), strict=True)) == [(40, 130), (60, 150)]
+    assert len(not_aligned(closing, along)) == 3

@@ -16,13 +16,15 @@ import numpy as np
 
 from pilotage.core.angles import wrap_array_to_pi
 from pilotage.core.errors import InputError
-from pilotage.core.types import FloatArray, IntArray, Pose2
+from pilotage.core.types import BoolArray, FloatArray, IntArray, Pose2
 from pilotage.logs.carmen import CarmenLog, read_carmen
 from pilotage.logs.stamps import between_readings, increasing, keeps_order
 
 CARMEN_RANGE_MIN_M = 0.05
 CARMEN_RANGE_MAX_M = 80.0
 """A CARMEN scan of the old form says nothing of its limits; the SICK scanners in use then reach 80 m."""
+SCANNER_STEPS_DEG, STEP_ERROR = (1.0, 0.5, 1.0 / 3.0, 0.25), 1e-4
+"""Angles between beams that planar scanners are built with, and the share a told one may be off from one."""
 LARGEST_MOUNT_SPREAD = 0.02
 """Median deviation, in metres or radians, beyond which two poses of each scan give no mount."""
 
@@ -156,7 +158,7 @@ def assemble(
         sizes = ", ".join(str(size) for size in np.unique(beams)[:8])
         said.append(f"the number of beams changes from scan to scan ({sizes})")
     first = np.array([scan.first_angle_rad for scan in with_beams])
-    step = np.array([scan.angle_step_rad for scan in with_beams])
+    step = _without_the_last_post(np.array([scan.angle_step_rad for scan in with_beams]), beams, said)
     ranges_m = np.full((beams.size, int(beams.max())), np.nan)
     # A turned-over scanner sees its beams mirrored; a scanner of falling angles counts them clockwise.
     clockwise = (step < 0.0) != upside_down
@@ -189,6 +191,28 @@ def assemble(
         tuple(said),
         stamps_s,
     )
+
+
+def is_built_step(step_rad: FloatArray) -> BoolArray:
+    """(N,) whether angles between beams are such as planar scanners are built with."""
+    told = np.degrees(np.abs(step_rad))[:, None] / np.array(SCANNER_STEPS_DEG)
+    return np.asarray(np.abs(told - 1.0).min(axis=1) < STEP_ERROR)
+
+
+def _without_the_last_post(step_rad: FloatArray, beams: IntArray, said: list[str]) -> FloatArray:
+    """(N,) angles between beams, put right where a field of view of n steps was divided by n - 1.
+
+    Converters that know the field of view alone take the n-th beam for its far edge. A scanner of 180 beams a
+    degree apart then turns by half a per cent too much, and looks half a degree aside.
+    """
+    true_rad = step_rad * (beams - 1) / beams
+    if is_built_step(step_rad).any() or not is_built_step(true_rad).all():
+        return step_rad
+    said.append(
+        f"{beams[0]} beams are told to be {math.degrees(abs(step_rad[0])):.5g} deg apart: taken as "
+        f"{math.degrees(abs(true_rad[0])):.5g} deg, the same field of view in as many steps as beams"
+    )
+    return true_rad
 
 
 def _is_usable(scan: RawScan) -> bool:

@@ -13,6 +13,7 @@ from pilotage.kernels.slam.frames import composed
 from pilotage.logs.laser_log import LaserLog
 from pilotage.models.pose_graph_solver import Loss, Start, optimize
 from pilotage.stack.mapping.slam.closures import (
+    FAR_SLIP,
     LARGE_SLIP,
     NEIGHBOURHOOD,
     USUAL_SLIP,
@@ -26,10 +27,11 @@ from pilotage.stack.mapping.slam.closures import (
 )
 from pilotage.stack.mapping.slam.clouds import Clouds, cloud_of
 from pilotage.stack.mapping.slam.config import SlamConfig
-from pilotage.stack.mapping.slam.refinement import neighbours, pair_edges
+from pilotage.stack.mapping.slam.refinement import neighbours, not_aligned, pair_edges
 from pilotage.stack.mapping.slam.submaps import Extent, Submaps
 from pilotage.stack.mapping.slam.tracker import LocalTrack
 from pilotage.stack.mapping.slam.uncertainty import (
+    NO_EDGES,
     Edges,
     edge_information,
     joint_covariance,
@@ -47,6 +49,8 @@ SURE_M, SURE_RAD = 0.2, 0.05
 REFINEMENTS = 3
 SECOND_LOOK_M, SECOND_LOOKS, ATTACHED = 3.0, 3, 2
 """Largest window and number of the second looks, and closures with which a stretch is attached."""
+FAR_LOOPS = 8
+"""How often loops are looked for that are longer than the windows allow."""
 SPACING_STEP, MOST_SPACING_OFF = 0.005, 0.015
 LEAST_GAIN = 0.05
 """Share by which the objective must fall before another spacing of the beams is believed."""
@@ -105,13 +109,15 @@ class LoopCloser:
         All candidates that were searched, with their verdicts.
     submaps
         Of the track so far.
+    closing
+        The edges of those that were accepted.
     """
 
     def __init__(self, config: SlamConfig) -> None:
         self.submaps = Submaps(config)
         self.closures: list[Closure] = []
         self._config = config
-        self._closing: Edges | None = None
+        self.closing = NO_EDGES
         self._searched: dict[tuple[int, int], float] = {}
         self._accepted: set[tuple[int, int]] = set()
         self._slipped = False
@@ -122,15 +128,15 @@ class LoopCloser:
         """Take in what the track has become; one that has not ended has no last submap yet."""
         local = track.poses[track.keyframes]
         own = track_edges(track)
-        if self._closing is None:
+        if len(self.closing) == 0:
             poses = local.copy()
         else:
             known = self.state.poses[: len(local)]
-            self._closing = self._closing.chosen(np.maximum(self._closing.i, self._closing.j) < len(local))
+            self.closing = self.closing.chosen(np.maximum(self.closing.i, self.closing.j) < len(local))
             ahead = relative_poses(np.repeat(local[len(known) - 1 : len(known)], len(local), axis=0), local)
             added = [composed(known[-1], step) for step in ahead[len(known) :]]
             poses = np.concatenate([known, np.array(added).reshape(-1, 3)])
-            own = own.and_more(self._closing)
+            own = own.and_more(self.closing)
         self.submaps.grow(track.clouds, local, track.breaks, ended)
         self.state = solved(own, poses, ROBUST_STDS, self._slipped)
 
@@ -170,7 +176,7 @@ class LoopCloser:
         self.closures += judged
         if len(edges):
             self._slipped |= slip is LARGE_SLIP
-            self._closing = edges if self._closing is None else self._closing.and_more(edges)
+            self.closing = self.closing.and_more(edges)
             self.state = solved(state.edges.and_more(edges), state.poses, ROBUST_STDS, self._slipped)
         return len(found), len(edges)
 
@@ -199,11 +205,23 @@ def closed(track: LocalTrack, config: SlamConfig, on_round: OnRound) -> LoopClos
     """
     closer = LoopCloser(config)
     closer.grow(track)
-    rounds = [(window_m, USUAL_SLIP) for window_m in config.search_windows_m]
-    rounds += [(SECOND_LOOK_M, LARGE_SLIP)] * SECOND_LOOKS
-    for number, (window_m, slip) in enumerate(rounds, start=1):
+    number = 0
+
+    def close(window_m: float, slip: Slip) -> int:
+        nonlocal number
+        number += 1
         searched, count = closer.close(window_m, slip)
         on_round(f"round {number}: {searched} searched, {count} closed")
+        return count
+
+    for _ in range(FAR_LOOPS):
+        for window_m in config.search_windows_m:
+            close(window_m, USUAL_SLIP)
+        if not close(max(config.search_windows_m), FAR_SLIP):
+            break
+    for _ in range(SECOND_LOOKS):
+        if not close(SECOND_LOOK_M, LARGE_SLIP):
+            break
     return closer
 
 
@@ -213,15 +231,12 @@ def weak_edges(track: LocalTrack) -> Edges:
 
 
 def refined(
-    clouds: Clouds,
-    state: Solved,
-    kept: Edges,
-    submaps: Submaps,
-    rounds: int = REFINEMENTS,
-    every: int = 1,
-    since: int = 0,
+    closer: LoopCloser, clouds: Clouds, kept: Edges, rounds: int = REFINEMENTS, every: int = 1, since: int = 0
 ) -> Solved:
     """Align keyframes with all their neighbours that are surely neighbours, and solve; several times.
+
+    Closures between stretches of which no two keyframes could be aligned stay: passes of a corridor in
+    opposite directions see the same walls, but hardly from the same place.
 
     Parameters
     ----------
@@ -232,6 +247,7 @@ def refined(
     since
         With it keyframes before it are aligned with those from it on alone.
     """
+    state, submaps = closer.state, closer.submaps
     sure = _sure(state, submaps)
     for _ in range(rounds):
         pairs = neighbours(state.poses, since)
@@ -241,13 +257,12 @@ def refined(
             along = pairs[:, 1] - pairs[:, 0] == 1
             pairs = pairs[along | (np.arange(pairs.shape[0]) % every == 0)]
         edges = pair_edges(clouds, state.poses, pairs)
-        state = solved(edges.and_more(kept), state.poses, REFINED_STDS)
+        edges = edges.and_more(kept).and_more(not_aligned(closer.closing, edges))
+        state = solved(edges, state.poses, REFINED_STDS)
     return state
 
 
-def beam_spacing(
-    log: LaserLog, track: LocalTrack, state: Solved, submaps: Submaps, config: SlamConfig
-) -> float:
+def beam_spacing(log: LaserLog, track: LocalTrack, closer: LoopCloser, config: SlamConfig) -> float:
     """Estimate the angle between beams: the one with which the aligned keyframes contradict each other least.
 
     Some drivers and converters tell a field of view that is one beam off. Where the robot turns, half a per
@@ -259,7 +274,7 @@ def beam_spacing(
     def objective(steps: int) -> float:
         if steps not in objectives:
             clouds = keyframe_clouds(log, track, config, 1.0 + SPACING_STEP * steps)
-            objectives[steps] = refined(clouds, state, own, submaps, rounds=2, every=4).objective
+            objectives[steps] = refined(closer, clouds, own, rounds=2, every=4).objective
         return objectives[steps]
 
     # Down to where both neighbours are higher: a parabola tells nothing of what lies beside its points.
@@ -294,9 +309,10 @@ def _sure(state: Solved, submaps: Submaps) -> np.ndarray[tuple[int, int], np.dty
     joint = joint_covariance(state.edges, state.poses, state.weights, submaps.references)
     count = len(submaps)
     out = np.eye(count, dtype=np.bool_)
-    first, second = np.triu_indices(count, 1)
-    std_m, std_rad = spread(relative_covariances(joint, state.poses[submaps.references], first, second))
-    good = (std_m < SURE_M) & (std_rad < SURE_RAD)
-    good |= second - first <= 2
-    out[first, second] = out[second, first] = good
+    places = state.poses[submaps.references]
+    for k in range(count - 1):
+        # Row by row: the covariances of all pairs at once would be the largest thing in memory.
+        later = np.arange(k + 1, count)
+        std_m, std_rad = spread(relative_covariances(joint, places, np.full(later.size, k), later))
+        out[k, later] = out[later, k] = (std_m < SURE_M) & (std_rad < SURE_RAD) | (later - k <= 2)
     return out

@@ -41,12 +41,15 @@ class Slip:
     """What the front end may have slipped unnoticed anywhere: three standard deviations of it.
 
     It widens the windows and the gate with the graph. Two closures across the same slip still have to agree
-    without it. ``support`` closures more than usual are needed.
+    without it. ``support`` closures more than usual are needed. With ``far`` a window that would be larger
+    than the round's is cut to it: after a long way the place is nearer to where the graph has it than the
+    graph dares to say, or not in the window at all.
     """
 
     shift_m: float
     turn_rad: float
     support: int = 0
+    far: bool = False
 
     def covariance(self) -> FloatArray:
         """(3, 3)."""
@@ -56,6 +59,8 @@ class Slip:
 USUAL_SLIP = Slip(0.3, 0.04)
 LARGE_SLIP = Slip(1.5, 0.3, 2)
 """For a second look at stretches that should have been closed and were not."""
+FAR_SLIP = Slip(0.3, 0.04, 2, far=True)
+"""For loops so long that the graph would have them searched all over the building."""
 
 
 class Verdict(StrEnum):
@@ -141,7 +146,8 @@ def candidates(
     first, second = np.triu_indices(poses.shape[0], 1)
     torn = pieces[first] != pieces[second]
     distance = np.hypot(*(poses[first, :2] - poses[second, :2]).T)
-    near = (distance < NEAR_M + min(window_m, 2.0)) & (torn | (second - first >= LEAST_APART))
+    reach_m = window_m if slip.far else min(window_m, 2.0)
+    near = (distance < NEAR_M + reach_m) & (torn | (second - first >= LEAST_APART))
     first, second, distance, torn = first[near], second[near], distance[near], torn[near]
     if first.size == 0:
         return []
@@ -149,7 +155,9 @@ def candidates(
     half_m = WINDOW_STDS * std_m + slip.shift_m
     most_rad = np.where(torn, np.pi, MOST_TURN_RAD)
     half_rad = np.minimum(WINDOW_STDS * std_rad + slip.turn_rad, most_rad)
-    wanted = (half_m <= window_m) & (distance < NEAR_M + np.minimum(half_m, 2.0))
+    wanted = half_m > window_m if slip.far else half_m <= window_m
+    half_m = np.minimum(half_m, window_m)
+    wanted &= distance < NEAR_M + np.minimum(half_m, reach_m)
     of_later: dict[int, int] = {}
     of_earlier: dict[int, int] = {}
     chosen = []

@@ -59,7 +59,10 @@ def grid_of(odds: OddsArray, resolution_m: float, corner_xy_m: FloatArray) -> Oc
 
 def states_of(odds: OddsArray) -> OccupancyArray:
     """Cells that are occupied, free or unknown, in the order of the log-odds."""
-    return np.where(odds > SEEN_ODDS, OCCUPIED, np.where(odds < -SEEN_ODDS, FREE, UNKNOWN)).astype(np.int8)
+    out = np.full(odds.shape, UNKNOWN, np.int8)
+    out[odds > SEEN_ODDS] = OCCUPIED
+    out[odds < -SEEN_ODDS] = FREE
+    return out
 
 
 def _bounds(scans: KeyframeScans, poses: FloatArray, max_range_m: float) -> tuple[FloatArray, FloatArray]:

@@ -65,7 +65,7 @@ def extend_map(
     if not located:
         return NotJoined(f"nothing joins it to the map: {doubt}", found.searched, sound)
     submaps = closer.submaps
-    state = refined(kept.clouds.and_more(done.clouds), closer.state, base, submaps, since=len(kept))
+    state = refined(closer, kept.clouds.and_more(done.clouds), base, since=len(kept))
     walls = found.walls(state.poses[len(kept) :])
     if walls < config.least_agreement:
         doubt = f"only {walls:.0%} of its points lie on walls where the map saw"

@@ -10,7 +10,7 @@ import numpy as np
 from pilotage.core.errors import InputError
 from pilotage.core.types import FloatArray
 from pilotage.kernels.slam.frames import between, composed
-from pilotage.logs.laser_log import LaserLog
+from pilotage.logs.laser_log import LaserLog, is_built_step
 from pilotage.models.pose_graph import PoseGraph
 from pilotage.stack.mapping.slam.back_end import (
     LoopCloser,
@@ -82,14 +82,14 @@ def tracked(log: LaserLog, config: SlamConfig, say: OnStage) -> LocalTrack:
 def mapped(log: LaserLog, local: LocalTrack, config: SlamConfig, say: OnStage) -> Mapped:
     """Close the loops of a track of two keyframes or more, and refine its graph."""
     closer = closed(local, config, lambda text: say(text, 1.0))
-    state, submaps = closer.state, closer.submaps
     say("refining", 1.0)
     spacing = 1.0
     clouds = local.clouds
-    if config.calibrate_beam_spacing and any(state.edges.closes):
-        spacing = beam_spacing(log, local, state, submaps, config)
+    doubted = config.calibrate_beam_spacing and not is_built_step(log.angle_step_rad).all()
+    if doubted and len(closer.closing):
+        spacing = beam_spacing(log, local, closer, config)
         clouds = keyframe_clouds(log, local, config, spacing) if spacing != 1.0 else clouds
-    return Mapped(local, closer, clouds, refined(clouds, state, weak_edges(local), submaps), spacing)
+    return Mapped(local, closer, clouds, refined(closer, clouds, weak_edges(local)), spacing)
 
 
 def result_of(

@@ -128,7 +128,7 @@ class OnlineSlam:
         if len(self.keyframe_poses) < 2:
             return
         self.close(ended=True)
-        self._take(refined(track.clouds, self._closer.state, weak_edges(track), self._closer.submaps))
+        self._take(refined(self._closer, track.clouds, weak_edges(track)))
 
     def _take(self, state: Solved) -> None:
         """Put the keyframes where the graph has them; note what its edges are off by, a loop's in all."""

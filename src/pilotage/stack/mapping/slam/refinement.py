@@ -26,6 +26,8 @@ REACH_M, LAST_REACH_M, SCALE_M = 0.3, 0.12, 0.03
 LEAST_PAIRED = 0.4
 MOST_MOVED_M, MOST_MOVED_RAD = 0.35, 0.12
 PAIR_STD_M = 0.05
+BESIDE = 8
+"""A closure is told again by an alignment of keyframes at most so far along the path from both its ends."""
 
 
 def neighbours(poses: FloatArray, since: int = 0) -> IntArray:
@@ -83,3 +85,14 @@ def pair_edges(clouds: Clouds, poses: FloatArray, pairs: IntArray) -> Edges:
         edge_information(hessian[sound], relative[sound, 2], PAIR_STD_M),
         pairs[sound, 1] - pairs[sound, 0] > max(ALONG),
     )
+
+
+def not_aligned(closing: Edges, aligned: Edges) -> Edges:
+    """Return the closures between stretches of which no two keyframes are aligned with each other."""
+    ends = np.column_stack([closing.i, closing.j])
+    across = aligned.closes
+    if len(closing) == 0 or not across.any():
+        return closing
+    tree = cKDTree(np.column_stack([aligned.i[across], aligned.j[across]]))
+    far = np.asarray(tree.query(ends, p=np.inf)[0], np.float64)
+    return closing.chosen(far > BESIDE)

@@ -57,6 +57,15 @@ class Edges:
         return PoseGraph(poses, self.i, self.j, self.relative, self.information)
 
 
+NO_EDGES = Edges(
+    np.zeros(0, np.int64),
+    np.zeros(0, np.int64),
+    np.zeros((0, 3)),
+    np.zeros((0, 3, 3)),
+    np.zeros(0, np.bool_),
+)
+
+
 def edge_information(
     hessian: FloatArray, theta_rad: FloatArray, std_m: float, floor: FloatArray | None = None
 ) -> FloatArray:
@@ -145,4 +154,6 @@ def joint_covariance(edges: Edges, poses: FloatArray, weights: FloatArray, chose
         unit = np.zeros((size, block.size))
         unit[block, np.arange(block.size)] = 1.0
         out[:, start : start + 96] = factor.solve(unit)[places]
-    return 0.5 * (out + out.T)
+    out += out.T.copy()
+    out *= 0.5
+    return out
