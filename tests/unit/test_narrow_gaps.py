@@ -37,7 +37,7 @@ def _plan(name: str, room: SegmentMap) -> PlanResult:
 def test_a_gap_that_the_robot_fits_through_is_found_wherever_the_nodes_lie(name: str, door: bool) -> None:
     rng = np.random.default_rng(1)
     for _ in range(6):
-        half_gap_m, offset_m = CLEARANCE_M + rng.uniform(0.03, 0.08), rng.uniform(-0.3, 0.3)
+        half_gap_m, offset_m = CLEARANCE_M + rng.uniform(0.01, 0.08), rng.uniform(-0.3, 0.3)
         room = _room(half_gap_m, rng.uniform(-0.6, 0.6), offset_m, door)
         path = _plan(name, room).path
         assert path is not None

@@ -17,9 +17,8 @@ ROUNDS = 8
 """So many lines are hoped for in turn."""
 LONGER, MORE_M = 1.05, 0.2
 """A line is no better than one that is longer by this: hopes cut corners by as much."""
-FINER = 5
-BESIDE_M = 1.0
-"""Finer nodes reach so far beyond the stretch that is looked at closely."""
+FINER = ((4, 1.0), (16, 0.5))
+"""Nodes so many times as fine, that reach so far beyond the stretch that is looked at closely: in turn."""
 BEFORE_M = 0.4
 """A stretch begins and ends so far from where the hoped-for line comes too near to something."""
 SHUT_NODES = 2.5
@@ -34,8 +33,9 @@ def line_through_gaps(
     Nodes are hoped to be passable where a point within half a cell's diagonal could keep the clearance: no
     path is shorter than over these, but for the corners. Where such a line comes too near to something, its
     stretch is searched on finer nodes of the exact geometry; what is closed there is given up, and the next
-    line hoped for. Gaps less than a fifth of a node's spacing wider than the clearance asks for are still
-    missed. Needs geometry, and a clearance above half a cell's diagonal: else walls would be hoped through.
+    line hoped for. Gaps wider than the clearance asks for by less than an eighth of a node's spacing are
+    still missed. Needs geometry, and a clearance above half a cell's diagonal: else walls would be hoped
+    through.
     """
     half_diagonal_m = field.resolution_m * math.sqrt(0.5)
     if not search.space.margin or search.clearance_m <= half_diagonal_m:
@@ -81,13 +81,17 @@ def _looked_at(
 def _finer(search: NodeSearch, field: DistanceField, stretch: FloatArray) -> FloatArray | None:
     """A line between the ends of a stretch over finer nodes around it."""
     xmin, ymin, xmax, ymax = field.bounds_m
-    low = np.maximum(stretch.min(axis=0) - BESIDE_M, [xmin, ymin])
-    high = np.minimum(stretch.max(axis=0) + BESIDE_M, [xmax, ymax])
-    around = DistanceField.from_map(
-        SegmentMap(field.segments_m, field.circles_m, (*low.tolist(), *high.tolist())),
-        field.resolution_m / FINER,
-    )
-    return search.line(around, search.free(around), stretch[[0, -1]])[0]
+    for finer, beside_m in FINER:
+        low = np.maximum(stretch.min(axis=0) - beside_m, [xmin, ymin])
+        high = np.minimum(stretch.max(axis=0) + beside_m, [xmax, ymax])
+        around = DistanceField.from_map(
+            SegmentMap(field.segments_m, field.circles_m, (*low.tolist(), *high.tolist())),
+            field.resolution_m / finer,
+        )
+        line = search.line(around, search.free(around), stretch[[0, -1]])[0]
+        if line is not None:
+            return line
+    return None
 
 
 def _shut(hoped: BoolArray, sure: BoolArray, field: DistanceField, points: FloatArray) -> None:
