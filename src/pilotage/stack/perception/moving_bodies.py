@@ -40,6 +40,8 @@ class MovingBodiesConfig(Config):
     """For so long it reckons with people after it saw one walk."""
     anyone_m_s: NonNegative = 1.0
     """So fast may come who is not tracked."""
+    beside_m: NonNegative = 1.0
+    """Where people walk about, what is so near, and was not seen to stand all the time, is not mapped."""
     tracks: MoversConfig = MoversConfig()
 
 
@@ -108,6 +110,11 @@ class MovingBodies:
         self._walks = self._told()
         walks = np.append(self._walks, False)[of_track]
         self._loose = points[walks | (of_track < 0)]
+        if self.about:
+            # Who stands and pushes next to the robot is nothing for a map, whatever his track says.
+            beside = np.hypot(points[:, 0] - pose.x_m, points[:, 1] - pose.y_m) < config.beside_m
+            walked = np.append(np.isnan(self._movers.tracks[:, kernels.X0]), True)
+            walks |= beside & walked[of_track]
         dropped = beams[walks]
         if not len(dropped):
             return readings
