@@ -11,12 +11,12 @@ import pytest
 from pilotage.core.types import FloatArray
 from pilotage.kernels.slam.frames import between
 from pilotage.kernels.slam.match_grid import max_pyramid
-from pilotage.stack.mapping.slam.closures import Verdict
+from pilotage.stack.mapping.slam.closures import Verdict, judged_alone
 from pilotage.stack.mapping.slam.clouds import Clouds, cloud_of_beams
 from pilotage.stack.mapping.slam.config import SlamConfig
 from pilotage.stack.mapping.slam.mapper import map_log
-from pilotage.stack.mapping.slam.matching import laid
-from pilotage.stack.mapping.slam.submaps import LEVELS, drawn
+from pilotage.stack.mapping.slam.matching import laid, match
+from pilotage.stack.mapping.slam.submaps import LEVELS, Submaps, drawn
 from support.laser_rooms import along, ranges, recording
 
 WIDTH_M = 2.0
@@ -69,6 +69,30 @@ def test_nothing_is_closed_between_places_that_only_look_alike(
         assert np.hypot(off[0], off[1]) < 0.5
     true = np.array([between(path[0], pose) for pose in path])
     assert np.hypot(*(result.poses - true)[:, :2].T).max() < 0.15
+
+
+def test_a_bare_corridor_is_matched_across_its_course_alone() -> None:
+    walls = [(-30.0, -1.0, 30.0, -1.0), (-30.0, 1.0, 30.0, 1.0)]
+    end = [(4.0, -1.0, 4.0, 1.0)]
+    angles = np.linspace(-0.5 * np.pi, 0.5 * np.pi, 361)
+    poses = np.array([[0.5 * k, 0.0, 0.0] for k in range(3)])
+    matches = []
+    for seen in (walls, walls + end):
+        clouds = [
+            cloud_of_beams(ranges(np.array(seen), p, angles), angles, float(angles[1] - angles[0]), 8.0)
+            for p in poses
+        ]
+        submaps = Submaps(SlamConfig())
+        submaps.grow(Clouds.of([*clouds, *clouds]), np.concatenate([poses, poses]), np.array([3]))
+        matches.append(match(submaps, 0, 1, np.array([0.3, 0.1, 0.02]), 1.0, 0.1))
+    bare, held = matches
+    np.testing.assert_allclose(np.abs(bare.course), [1.0, 0.0], atol=0.01)
+    # Along the corridor the prediction stays and nothing is told; across it the walls do.
+    np.testing.assert_allclose(bare.relative, [0.3, 0.0, 0.0], atol=0.01)
+    assert abs(bare.hessian[0, 0]) < 1e-3 < bare.hessian[1, 1]
+    assert judged_alone(bare, SlamConfig()) is Verdict.ACROSS
+    assert not held.course.any()
+    np.testing.assert_allclose(held.relative, [0.0, 0.0, 0.0], atol=0.01)
 
 
 def test_an_alignment_that_slides_along_a_corridor_is_no_match() -> None:

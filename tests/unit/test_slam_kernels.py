@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from pilotage.core.types import FloatArray
 from pilotage.kernels.slam.align import CAPPED, CONVERGED, TOO_FEW, align, normal_equations
-from pilotage.kernels.slam.branch_bound import search_window
+from pilotage.kernels.slam.branch_bound import PASS_OVER_NONE, search_window
 from pilotage.kernels.slam.buckets import nearest, sort_into_buckets
 from pilotage.kernels.slam.frames import between, carried, composed
 from pilotage.kernels.slam.match_grid import max_pyramid, score_grid
@@ -127,11 +127,12 @@ def test_branch_and_bound_finds_what_looking_everywhere_finds(seed: int) -> None
     points = rng.uniform(-0.8, 0.8, (25, 2))
     centre, angles = np.array([2.0, 2.0, 0.3]), np.array([-0.2, 0.0, 0.2])
     pyramid, margin = max_pyramid(grid, 3)
-    none = np.array([0.0, 0.0, 0.0, -1.0, 0.0])
-    best, _ = search_window(pyramid, margin, 0.0, 0.0, 0.1, points, centre, 0.7, angles, -10.0, none, 10**6)
+    best, _ = search_window(
+        pyramid, margin, 0.0, 0.0, 0.1, points, centre, 0.7, angles, -10.0, PASS_OVER_NONE, 10**6
+    )
     flat, no_margin = max_pyramid(grid, 0)
     everywhere, _ = search_window(
-        flat, no_margin, 0.0, 0.0, 0.1, points, centre, 0.7, angles, -10.0, none, 10**6
+        flat, no_margin, 0.0, 0.0, 0.1, points, centre, 0.7, angles, -10.0, PASS_OVER_NONE, 10**6
     )
     assert best[3] == pytest.approx(everywhere[3], abs=1e-6)
 
@@ -142,11 +143,13 @@ def test_the_second_best_is_elsewhere() -> None:
     pyramid, margin = max_pyramid(grid, 3)
     point, centre = np.zeros((1, 2)), np.array([2.5, 1.5, 0.0])
     window = (pyramid, margin, 0.0, 0.0, 0.1, point, centre, 2.0, np.zeros(1))
-    best, _ = search_window(*window, 0.1, np.array([0.0, 0.0, 0.0, -1.0, 0.0]), 10**6)
-    other, _ = search_window(*window, 0.1, np.array([*best[:3], 0.8, 0.3]), 10**6)
+    best, _ = search_window(*window, 0.1, PASS_OVER_NONE, 10**6)
+    other, _ = search_window(*window, 0.1, np.array([*best[:3], 0.8, 0.3, 0.0, 0.0]), 10**6)
     assert best[3] == pytest.approx(1.0)
     assert other[3] == pytest.approx(0.9)
     assert np.hypot(*(best[:2] - other[:2])) > 2.5
+    beside, _ = search_window(*window, 0.1, np.array([*best[:3], 0.8, 0.3, 1.0, 0.0]), 10**6)
+    assert beside[3] == -np.inf  # both lie on one line along x
 
 
 def test_walls_score_and_open_floor_counts_against() -> None:

@@ -10,10 +10,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, TypeVar
 
 import numpy as np
 import yaml
+from numpy.typing import NDArray
 from pydantic import Field, field_validator, model_validator
 
 from pilotage.core.config import Config, validate
@@ -22,6 +23,8 @@ from pilotage.core.files import read_yaml
 from pilotage.core.types import Pose2
 from pilotage.maps.grid_image import ByteArray, read_grey, write_grey
 from pilotage.maps.occupancy_grid import FREE, OCCUPIED, UNKNOWN, OccupancyArray, OccupancyGrid
+
+Entry = TypeVar("Entry", bound=np.generic)
 
 
 class RosMapFile(Config):
@@ -74,7 +77,7 @@ class RosMap:
         """
         cells = grid.cells
         origin = (grid.origin.x_m, grid.origin.y_m, grid.origin.theta_rad)
-        trinary = bool(np.isin(cells, (FREE, OCCUPIED, UNKNOWN)).all())
+        trinary = bool(((cells == FREE) | (cells == OCCUPIED) | (cells == UNKNOWN)).all())
         # 205 is what map_saver writes for unknown: just above its threshold for free.
         values = np.arange(256, dtype=np.uint8)
         if trinary:
@@ -86,7 +89,7 @@ class RosMap:
             origin=origin,
             free_thresh=0.196,
         )
-        return RosMap(file, values[cells.view(np.uint8)])
+        return RosMap(file, _looked_up(values, cells.view(np.uint8)))
 
     @property
     def grid(self) -> OccupancyGrid:
@@ -98,12 +101,12 @@ class RosMap:
         file = self.file
         if file.mode == "raw":
             raw = np.arange(256)
-            return np.where(raw <= OCCUPIED, raw, UNKNOWN).astype(np.int8)[self.pixels]
+            return _looked_up(np.where(raw <= OCCUPIED, raw, UNKNOWN).astype(np.int8), self.pixels)
         if file.mode == "trinary" and self.alpha is not None:
             # map_server counts transparency as one more channel beside red, green and blue.
             shade = (3.0 * self.pixels + self.alpha) / (4.0 * 255.0)
             return self._occupancy(shade)
-        cells = self._occupancy(np.arange(256) / 255.0)[self.pixels]
+        cells = _looked_up(self._occupancy(np.arange(256) / 255.0), self.pixels)
         if file.mode == "scale" and self.alpha is not None:
             cells[self.alpha < 255] = UNKNOWN
         return cells
@@ -120,6 +123,14 @@ class RosMap:
                 between = np.rint(np.clip((p - file.free_thresh) / span, 0.0, 1.0) * 100.0)
         cells = np.where(p > file.occupied_thresh, OCCUPIED, np.where(p < file.free_thresh, FREE, between))
         return np.asarray(cells.astype(np.int8))
+
+
+def _looked_up(table: NDArray[Entry], pixels: ByteArray) -> NDArray[Entry]:
+    """Entries (256,) of pixels (H, W), row by row: an index of all would take 8 bytes a pixel."""
+    out = np.empty(pixels.shape, table.dtype)
+    for row, values in zip(out, pixels, strict=True):
+        row[:] = table[values]
+    return out
 
 
 def read_ros_map(path: Path) -> RosMap:

@@ -15,6 +15,8 @@ from pilotage.kernels.jit import kernel
 from pilotage.kernels.slam.match_grid import ScoreArray
 
 _STACK = 4096
+PASS_OVER_NONE = np.array([0.0, 0.0, 0.0, -1.0, 0.0, 0.0, 0.0])
+"""``away`` of ``search_window`` where every pose counts."""
 
 
 @kernel
@@ -63,8 +65,9 @@ def search_window(
     least_score
         Mean score a point below which nothing is returned.
     away
-        (5,) x, y, theta of a pose, a distance and an angle: poses within both are passed over; a negative
-        distance passes over none. Tells how good the best other answer is.
+        (7,) x, y, theta of a pose, a distance, an angle and a course: poses within distance and angle are
+        passed over, the distance being that from the line along the course (a unit vector) where there is
+        one; a negative distance passes over none. Tells how good the best other answer is.
     budget
         The cap on nodes.
 
@@ -129,6 +132,8 @@ def search_window(
                     ex, ey = x - away[0], y - away[1]
                     et = theta - away[2]
                     et = abs(et - 2.0 * math.pi * math.floor(et / (2.0 * math.pi) + 0.5))
+                    along = ex * away[5] + ey * away[6]
+                    ex, ey = ex - along * away[5], ey - along * away[6]
                     if ex * ex + ey * ey < away[3] * away[3] and et < away[4]:
                         continue
                 least = stack_bound[top]

@@ -9,6 +9,7 @@ from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 
 from pilotage.core.types import FloatArray
+from pilotage.maps.occupancy_grid import OccupancyArray
 from pilotage.report.slam.folder import SlamFolder, placed
 from pilotage.report.style import (
     BLUE,
@@ -32,6 +33,8 @@ from pilotage.report.style import (
 STAGES = 4
 MOST_POINTS = 12_000
 """Dots in a panel: more than the page can show apart."""
+MOST_CELLS = 2500
+"""Cells of the map along its longer side, likewise."""
 
 
 def map_figure(data: SlamFolder) -> Illustration:
@@ -40,11 +43,13 @@ def map_figure(data: SlamFolder) -> Illustration:
     width, height = grid.size_m
     figure, axes = _square_axes(width, height)
     x0, y0 = grid.origin.x_m, grid.origin.y_m
-    shades = np.select([grid.cells > 50, grid.cells >= 0], [2, 0], 1)
+    step = -(-max(grid.cells.shape) // MOST_CELLS)
+    shades = _shades(grid.cells, step)
+    tall_m, wide_m = (size * step * grid.resolution_m for size in shades.shape)
     axes.imshow(
         shades,
-        extent=(x0, x0 + width, y0, y0 + height),
-        cmap=ListedColormap(["#ffffff", SHADE, INK]),
+        extent=(x0, x0 + wide_m, y0 + height - tall_m, y0 + height),
+        cmap=ListedColormap([SHADE, "#ffffff", INK]),
         vmin=0,
         vmax=2,
         interpolation="nearest",
@@ -139,6 +144,14 @@ def uncertainty_figure(data: SlamFolder) -> Illustration:
     return Illustration(
         "uncertainty", "Uncertainty along the path", alt, caption, render(figure, "uncertainty", alt), keys
     )
+
+
+def _shades(cells: OccupancyArray, step: int) -> OccupancyArray:
+    """0 never seen, 1 free, 2 wall, of squares of ``step`` cells: the greatest of theirs."""
+    out = np.where(cells > 50, np.int8(2), np.where(cells >= 0, np.int8(1), np.int8(0)))
+    for axis in (0, 1):
+        out = np.maximum.reduceat(out, np.arange(0, cells.shape[axis], step), axis=axis)
+    return out
 
 
 def _square_axes(width_m: float, height_m: float) -> tuple[Figure, Axes]:

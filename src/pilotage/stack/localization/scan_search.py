@@ -10,7 +10,7 @@ import numpy as np
 
 from pilotage.core.types import FloatArray
 from pilotage.kernels.geometry.motion import exact_arc
-from pilotage.kernels.slam.branch_bound import search_window
+from pilotage.kernels.slam.branch_bound import PASS_OVER_NONE, search_window
 from pilotage.kernels.slam.frames import between
 from pilotage.kernels.slam.match_grid import ScoreArray, max_pyramid
 from pilotage.stack.localization.likelihood_field import LikelihoodField
@@ -27,7 +27,7 @@ LEAST_SCORE, PERFECT = 0.45, 0.95
 the cells leave."""
 CLEARLY, CLEARLY_MORE = 1.4, 0.03
 """A second place must miss a perfect score by so many times what the best one misses, and by so much more,"""
-OTHER_PLACE = np.array([1.0, 0.5])
+OTHER_PLACE = np.array([1.0, 0.5, 0.0, 0.0])
 """where it is so many metres away or radians turned."""
 LEAST_SCANS, FEW_SCANS, MOST_SCANS, APART_M, APART_RAD = 4, 12, 48, 0.4, 0.4
 """How many scans are looked at together, and how far apart they were taken: a dozen; where these fit nowhere,
@@ -120,7 +120,7 @@ class ScanSearch:
     def best(self, points: FloatArray) -> Place | None:
         """The best place for points (K, 2) in the robot's frame; None where they fit nowhere."""
         points = np.ascontiguousarray(points[:: max(1, math.ceil(len(points) / MOST_POINTS))])
-        found, whole = self._search(points, LEAST_SCORE, np.array([0.0, 0.0, 0.0, -1.0, 0.0]))
+        found, whole = self._search(points, LEAST_SCORE, PASS_OVER_NONE)
         if not (whole and np.isfinite(found[3])):
             return None
         at = found[None, :2]

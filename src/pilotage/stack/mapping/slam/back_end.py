@@ -13,6 +13,7 @@ from pilotage.kernels.slam.frames import composed
 from pilotage.logs.laser_log import LaserLog
 from pilotage.models.pose_graph_solver import Loss, Start, optimize
 from pilotage.stack.mapping.slam.closures import (
+    COUNTING,
     FAR_SLIP,
     LARGE_SLIP,
     NEIGHBOURHOOD,
@@ -171,7 +172,7 @@ class LoopCloser:
         for closure in judged:
             pair = closure.candidate.earlier, closure.candidate.later
             self._searched[pair] = closure.candidate.half_m
-            if closure.verdict is Verdict.ACCEPTED:
+            if closure.verdict in COUNTING:
                 self._accepted.add(pair)
         self.closures += judged
         if len(edges):

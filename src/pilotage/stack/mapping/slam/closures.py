@@ -28,6 +28,8 @@ AGAIN = 1.5
 """A pair is searched again once its window has shrunk by this factor."""
 MOST_PER_LATER, MOST_PER_EARLIER = 3, 6
 CLOSURE_STD_M = 0.1
+LEAST_TOLD = 1e-4 * np.eye(3)
+"""What a closure tells in any direction: nothing, but no zero."""
 CLOSURE_FLOOR = 4.0 * np.diag([0.004**2, 0.004**2, 0.0015**2])
 WIDE_M = 2.0
 SECONDING, AGREEING = 0.65, 0.9
@@ -67,6 +69,7 @@ class Verdict(StrEnum):
     """What became of a candidate."""
 
     ACCEPTED = "accepted"
+    ACROSS = "accepted across its course alone"
     NO_MATCH = "no match"
     LOW_SCORE = "low score"
     LITTLE_OVERLAP = "little overlap"
@@ -75,6 +78,10 @@ class Verdict(StrEnum):
     AGAINST_GRAPH = "contradicts the graph"
     AGAINST_OTHERS = "contradicts other closures"
     ALONE = "no other closure seconds it"
+
+
+COUNTING = (Verdict.ACCEPTED, Verdict.ACROSS)
+"""Verdicts with which a closure is in the graph."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -201,7 +208,7 @@ def judge(
     across = [
         int(pieces[closure.candidate.later] - pieces[closure.candidate.earlier]) for closure in closures
     ]
-    sound = [k for k, closure in enumerate(closures) if closure.verdict is Verdict.ACCEPTED]
+    sound = [k for k, closure in enumerate(closures) if closure.verdict in COUNTING]
     weak = [k for k, closure in enumerate(closures) if across[k] and _may_second(closure, config)]
     edges = _edges([closures[k] for k in sound + weak])
     if not sound:
@@ -210,7 +217,8 @@ def judge(
     gate = chi_square_quantile(config.gate_probability, 3)
     fits = chi_square <= gate
     taken = clique(consistent & fits[:, None] & fits[None, :], fits)
-    support = _support(edges, taken & fits)
+    full = np.array([closures[k].verdict is not Verdict.ACROSS for k in sound + weak])
+    support = np.where(full, _support(edges, taken & fits & full), _support(edges, taken & fits))
     for n, k in enumerate(sound):
         closure = replace(closures[k], chi_square=float(chi_square[n]), support=int(support[n]))
         # Beside a break the window is wide because the heading is open, not because the place is.
@@ -222,11 +230,14 @@ def judge(
             verdict = Verdict.AGAINST_OTHERS
         elif support[n] < needed:
             verdict = Verdict.ALONE
+        elif not full[n] and closure.candidate.half_m > WIDE_M:
+            # The next corridor may look the same across, and nothing along says no.
+            verdict = Verdict.AMBIGUOUS
         else:
-            verdict = Verdict.ACCEPTED
+            verdict = closure.verdict
         closures[k] = replace(closure, verdict=verdict)
     edges = edges.chosen(np.arange(len(edges)) < len(sound))
-    edges = edges.chosen(np.array([closures[k].verdict is Verdict.ACCEPTED for k in sound]))
+    edges = edges.chosen(np.array([closures[k].verdict in COUNTING for k in sound]))
     references = submaps.references
     return closures, replace(edges, i=references[edges.i], j=references[edges.j])
 
@@ -243,7 +254,7 @@ def judged_alone(found: Match, config: SlamConfig) -> Verdict:
         return Verdict.WALLS_DISAGREE
     if found.second > config.most_ambiguity * found.score:
         return Verdict.AMBIGUOUS
-    return Verdict.ACCEPTED
+    return Verdict.ACROSS if found.course.any() else Verdict.ACCEPTED
 
 
 def _may_second(closure: Closure, config: SlamConfig) -> bool:
@@ -265,7 +276,7 @@ def _edges(closures: list[Closure]) -> Edges:
         np.array([c.candidate.earlier for c in closures], np.int64),
         np.array([c.candidate.later for c in closures], np.int64),
         relative,
-        edge_information(hessian, relative[:, 2], CLOSURE_STD_M, CLOSURE_FLOOR),
+        edge_information(hessian, relative[:, 2], CLOSURE_STD_M, CLOSURE_FLOOR, LEAST_TOLD),
         np.ones(len(closures), np.bool_),
     )
 

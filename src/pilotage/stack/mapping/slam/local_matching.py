@@ -13,7 +13,7 @@ import numpy as np
 
 from pilotage.core.types import FloatArray, IntArray
 from pilotage.kernels.slam.align import TOO_FEW, align
-from pilotage.kernels.slam.branch_bound import search_window
+from pilotage.kernels.slam.branch_bound import PASS_OVER_NONE, search_window
 from pilotage.kernels.slam.buckets import sort_into_buckets
 from pilotage.kernels.slam.frames import between, carried, composed
 from pilotage.kernels.slam.match_grid import ScoreArray, max_pyramid, score_grid
@@ -38,7 +38,7 @@ FAR, LEAST_FAR = 0.6, 0.12
 LEAST_FOUND, FOUND, ALIKE = 40, 0.8, 0.8
 """Points and share of the usual fit that finding a place all round takes, and the share of its score from
 which a second place speaks against it,"""
-OTHER_PLACE = np.array([0.5, 0.35])
+OTHER_PLACE = np.array([0.5, 0.35, 0.0, 0.0])
 """where it is so far away and turned."""
 MOST_GAP_S = 2.5
 """The search window grows with the time since the last fit, up to this."""
@@ -161,7 +161,7 @@ class LocalMatcher:
             )
             return np.asarray(best)
 
-        best = search(0.3, np.array([0.0, 0.0, 0.0, -1.0, 0.0]))
+        best = search(0.3, PASS_OVER_NONE)
         if not np.isfinite(best[3]):
             return None
         if np.isfinite(search(ALIKE * float(best[3]), np.concatenate([best[:3], OTHER_PLACE]))[3]):
@@ -299,7 +299,7 @@ class LocalMatcher:
             0.3 + 0.6 * gap_s,
             SEARCH_STEP_RAD * np.arange(-turns, turns + 1, dtype=np.float64),
             0.2,
-            np.array([0.0, 0.0, 0.0, -1.0, 0.0]),
+            PASS_OVER_NONE,
             SEARCH_BUDGET,
         )
         if not np.isfinite(best[3]):

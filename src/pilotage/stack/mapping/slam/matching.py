@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from pilotage.core.types import FloatArray
 from pilotage.kernels.slam.align import TOO_FEW, align
-from pilotage.kernels.slam.branch_bound import search_window
+from pilotage.kernels.slam.branch_bound import PASS_OVER_NONE, search_window
 from pilotage.kernels.slam.buckets import sort_into_buckets
 from pilotage.kernels.slam.frames import between
 from pilotage.kernels.slam.match_grid import ScoreArray
 from pilotage.stack.mapping.slam.local_matching import BUCKET_M
+from pilotage.stack.mapping.slam.slips import CHANCE
 from pilotage.stack.mapping.slam.submaps import Submap, Submaps
 
 STEP_RAD = 0.02
@@ -24,6 +25,9 @@ SAME_PLACE_M, SAME_HEADING_RAD = 0.8, 0.35
 ALIGN_REACH_M, ALIGN_LAST_REACH_M, ALIGN_SCALE_M = 0.4, 0.15, 0.05
 MOST_ALIGNED_M, MOST_ALIGNED_RAD = 0.25, 0.1
 """An alignment that ends farther from the place that was searched has slid along a corridor."""
+HARDLY_HELD, BESIDE_M, BESIDE_RAD = 0.15, 0.3, 0.1
+"""Share of the points' weights that holds a match along a course on which another place lies all the same,
+and how far from the course that place may be."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,6 +48,10 @@ class Match:
         The smaller share of points where the other one saw.
     aligned
         Whether the continuous alignment went through, and ended where the search had it.
+    course
+        (2,) unit vector in the earlier one's frame along which the walls leave the place open, as a corridor
+        does; zero: there is none. Along it ``relative`` is what was predicted, the hessian tells nothing, and
+        ``second`` is the best place beside it.
     """
 
     relative: FloatArray
@@ -53,6 +61,7 @@ class Match:
     agreement: float
     overlap: float
     aligned: bool
+    course: FloatArray = field(default_factory=lambda: np.zeros(2))
 
 
 def match(
@@ -65,7 +74,10 @@ def match(
     if found.score <= 0.0:
         return found
     agreement, overlap = lying(moving, cell_m, map_.fine, between(found.relative, np.zeros(3)))
-    return replace(found, agreement=min(found.agreement, agreement), overlap=min(found.overlap, overlap))
+    relative = found.relative.copy()
+    relative[:2] += found.course * (found.course @ (predicted - relative)[:2])
+    agreement, overlap = min(found.agreement, agreement), min(found.overlap, overlap)
+    return replace(found, relative=relative, agreement=agreement, overlap=overlap)
 
 
 def laid(
@@ -113,16 +125,13 @@ def laid(
         )
         return np.asarray(best), nodes > budget
 
-    best, cut_short = search(least_score, np.array([0.0, 0.0, 0.0, -1.0, 0.0]))
+    best, cut_short = search(least_score, PASS_OVER_NONE)
     if not np.isfinite(best[3]):
         return Match(predicted, np.zeros((3, 3)), 0.0, 0.0, 0.0, 0.0, False), not cut_short
-    other, again = search(
-        max(LEAST_MEAN, rival_share * float(best[3])),
-        np.concatenate([best[:3], [SAME_PLACE_M, SAME_HEADING_RAD]]),
-    )
-    second = float(other[3]) if np.isfinite(other[3]) else 0.0
+    rival = max(LEAST_MEAN, rival_share * float(best[3]))
+    other, again = search(rival, np.array([*best[:3], SAME_PLACE_M, SAME_HEADING_RAD, 0.0, 0.0]))
     box, starts, _, reference = sort_into_buckets(map_.fine, BUCKET_M)
-    pose, hessian, _, status = align(
+    pose, hessian, fit, status = align(
         moving.fine,
         best[:3].copy(),
         1e-3 * np.eye(3),
@@ -134,12 +143,44 @@ def laid(
         starts,
         reference,
     )
+    course = open_course(hessian, float(fit[1]), other[:3] - best[:3] if np.isfinite(other[3]) else None)
+    if course.any():
+        other, again = search(rival, np.array([*best[:3], SAME_PLACE_M, SAME_HEADING_RAD, *course]))
+        free = np.append(course, 0.0)
+        pull = hessian @ free
+        hessian = hessian - np.outer(pull, pull) / max(free @ pull, 1e-9)
+    second = float(other[3]) if np.isfinite(other[3]) else 0.0
     pose[2] = (pose[2] + np.pi) % (2.0 * np.pi) - np.pi
     agreement, overlap = lying(map_, cell_m, moving.fine, pose)
     slid = between(best[:3], pose)
     held = float(np.hypot(slid[0], slid[1])) < MOST_ALIGNED_M and abs(float(slid[2])) < MOST_ALIGNED_RAD
-    found = Match(pose, hessian, float(best[3]), second, agreement, overlap, status != TOO_FEW and held)
+    aligned = status != TOO_FEW and held
+    found = Match(pose, hessian, float(best[3]), second, agreement, overlap, aligned, course)
     return found, not (cut_short or again)
+
+
+def open_course(hessian: FloatArray, weight: float, other: FloatArray | None) -> FloatArray:
+    """Return the course (2,) along which an alignment leaves the place open; zero where the walls hold it.
+
+    Parameters
+    ----------
+    hessian, weight
+        (3, 3) of the alignment, and the sum of its points' weights.
+    other
+        (3,) how far away the best other place in the window is, if there is any.
+    """
+    if weight <= 0.0 or hessian[2, 2] <= 0.0:
+        return np.zeros(2)
+    held = hessian[:2, :2] - np.outer(hessian[:2, 2], hessian[:2, 2]) / hessian[2, 2]
+    told, axes = np.linalg.eigh(held)
+    course = np.asarray(axes[:, 0], np.float64)
+    if told[0] < CHANCE * weight:
+        return course
+    if other is None or told[0] > HARDLY_HELD * weight:
+        return np.zeros(2)
+    turn = abs((other[2] + np.pi) % (2.0 * np.pi) - np.pi)
+    beside = abs(course[0] * other[1] - course[1] * other[0]) < BESIDE_M and turn < BESIDE_RAD
+    return course if beside else np.zeros(2)
 
 
 def lying(map_: Submap, cell_m: float, points: FloatArray, pose: FloatArray) -> tuple[float, float]:

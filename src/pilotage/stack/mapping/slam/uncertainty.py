@@ -67,7 +67,11 @@ NO_EDGES = Edges(
 
 
 def edge_information(
-    hessian: FloatArray, theta_rad: FloatArray, std_m: float, floor: FloatArray | None = None
+    hessian: FloatArray,
+    theta_rad: FloatArray,
+    std_m: float,
+    floor: FloatArray | None = None,
+    least: FloatArray = LEAST_INFORMATION,
 ) -> FloatArray:
     """Information (M, 3, 3) of relative poses in the frame of the second one.
 
@@ -81,13 +85,15 @@ def edge_information(
         What a point's residual counts as. Neighbouring points err together, so it is more than their scatter.
     floor
         (M, 3, 3) or (3, 3) covariance that is there in any case.
+    least
+        (3, 3) information that is there in any case.
     """
     c, s = np.cos(theta_rad), np.sin(theta_rad)
     turn = np.zeros((theta_rad.size, 3, 3))
     turn[:, 0, 0] = turn[:, 1, 1] = c
     turn[:, 0, 1], turn[:, 1, 0] = -s, s
     turn[:, 2, 2] = 1.0
-    out: FloatArray = turn.transpose(0, 2, 1) @ hessian @ turn / std_m**2 + LEAST_INFORMATION
+    out: FloatArray = turn.transpose(0, 2, 1) @ hessian @ turn / std_m**2 + least
     if floor is not None:
         out = np.asarray(np.linalg.inv(np.linalg.inv(out) + floor), np.float64)
     return np.asarray(0.5 * (out + out.transpose(0, 2, 1)))
