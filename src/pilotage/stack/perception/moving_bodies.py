@@ -41,7 +41,9 @@ class MovingBodiesConfig(Config):
     anyone_m_s: NonNegative = 1.0
     """So fast may come who is not tracked."""
     beside_m: NonNegative = 1.0
-    """Where people walk about, what is so near, and was not seen to stand all the time, is not mapped."""
+    beside_scans: int = Field(default=10, ge=1, le=1000)
+    """Where people walk about, what is so near, and was not seen to stand all the time, is shown to a mapper
+    in one of so many scans: what is no person is mapped all the same, later."""
     tracks: MoversConfig = MoversConfig()
 
 
@@ -63,6 +65,7 @@ class MovingBodies:
         self._walks: BoolArray = np.zeros(0, np.bool_)
         self._t_s = self.seen_s = -math.inf
         self._field = 0.0, 0.0
+        self._scans = 0
         self._loose: FloatArray = np.zeros((0, 2))
         if not self._works:
             return
@@ -110,7 +113,8 @@ class MovingBodies:
         self._walks = self._told()
         walks = np.append(self._walks, False)[of_track]
         self._loose = points[walks | (of_track < 0)]
-        if self.about:
+        self._scans += 1
+        if self.about and self._scans % config.beside_scans:
             # Who stands and pushes next to the robot is nothing for a map, whatever his track says.
             beside = np.hypot(points[:, 0] - pose.x_m, points[:, 1] - pose.y_m) < config.beside_m
             walked = np.append(np.isnan(self._movers.tracks[:, kernels.X0]), True)
@@ -146,13 +150,15 @@ class MovingBodies:
     def foretold(
         self, step_s: float, steps: int, pose: Pose2, mapped_m: FloatArray, reach_m: float
     ) -> FloatArray:
-        """Discs (steps, M, 3) of those who do not stand, after ``step_s`` and every ``step_s`` more.
+        """Discs (steps, M, 3) of those who do not stand, or walked before, after ``step_s`` and every
+        ``step_s`` more.
 
         Where people walk about, returns within ``reach_m`` of the robot that neither the map nor its discs
         ``mapped_m`` (N, 3) explain may be somebody as well, who goes anywhere: in a group nobody is told
         apart.
         """
-        discs = self._movers.foretold(step_s, step_s, steps)[:, self._walks]
+        people = self._walks | np.isnan(self._movers.tracks[:, kernels.X0])
+        discs = self._movers.foretold(step_s, step_s, steps)[:, people]
         if not self.about:
             return np.ascontiguousarray(discs)
         near = self._loose[np.hypot(*(self._loose - (pose.x_m, pose.y_m)).T) < reach_m]

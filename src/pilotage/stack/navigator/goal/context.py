@@ -182,6 +182,15 @@ class Context:
         """Tell that something happened."""
         self.journal.say(self.t_s, kind, text)
 
+    def place_back(self, distance_m: float) -> Pose2 | None:
+        """The newest place of its trail so far off in a straight line; what came after it is dropped."""
+        here = self.trail[-1] if self.trail else None
+        while self.trail and here is not None:
+            place = self.trail.pop()
+            if math.hypot(place.x_m - here.x_m, place.y_m - here.y_m) >= distance_m:
+                return place
+        return None
+
     # --- asking -------------------------------------------------------------------------------------
 
     def stalled(self) -> bool:
