@@ -19,7 +19,9 @@ def people_walk(factory: Any, config: Any) -> None:
     world, robots = World.of(ROOM_MAP), np.array([[2.0, 2.0, 0.0, 0.3]])
     courses = []
     for _ in range(2):
-        setting = PeopleSetting(world, robots, DT_S, np.random.default_rng(5), "world.people.0")
+        setting = PeopleSetting(
+            world, robots, np.array([[0.0, 1.0]]), DT_S, np.random.default_rng(5), "world.people.0"
+        )
         people = factory(config, setting)
         count = len(people.radius_m)
         now = np.full((count, 3), np.nan)

@@ -20,6 +20,7 @@ from pilotage.stack.patrol.watch import IntruderWatch, WatchConfig
 from support.worlds import ROOM_MAP
 
 ROBOTS = np.array([[2.0, 2.0, 0.0, 0.3]])
+STOPPING = np.array([[0.0, 1.0]])
 
 
 def judged(seed: int, duration_s: float, *overrides: str) -> dict[str, Any]:
@@ -32,7 +33,9 @@ def walked(plan: str, steps: int, robots: np.ndarray[Any, Any] = ROBOTS) -> np.n
     """(T, 2) where he was, a robot standing."""
     config = IntruderConfig.model_validate({"plan": plan, "enters_from_s": 0, "enters_until_s": 0})
     world = World.of(ROOM_MAP)
-    intruder = Intruder(config, PeopleSetting(world, robots, 0.1, np.random.default_rng(3), "world.people.0"))
+    intruder = Intruder(
+        config, PeopleSetting(world, robots, STOPPING, 0.1, np.random.default_rng(3), "world.people.0")
+    )
     around = Around(robots, np.full((1, 3), np.nan), 0)
     return np.vstack([intruder.step(0.1 * k, around) for k in range(steps)])
 
@@ -56,7 +59,9 @@ class TestWalking:
 
     def test_he_cannot_come_in_before_the_first_time_that_he_may(self) -> None:
         config = IntruderConfig(enters_from_s=20.0, enters_until_s=10.0)
-        setting = PeopleSetting(World.of(ROOM_MAP), ROBOTS, 0.1, np.random.default_rng(0), "world.people.0")
+        setting = PeopleSetting(
+            World.of(ROOM_MAP), ROBOTS, STOPPING, 0.1, np.random.default_rng(0), "world.people.0"
+        )
         with pytest.raises(InputError, match=r"enters_until_s: expected 20 s or more, found 10"):
             Intruder(config, setting)
 

@@ -22,10 +22,12 @@ from pilotage.report.replay.floor import floor_scene
 from pilotage.sensors.lidar import LidarConfig
 from pilotage.sensors.readings import LidarScan
 from pilotage.sim.people.crowd import Encounters
+from pilotage.sim.people.people import Around, PeopleSetting
+from pilotage.sim.people.track import TrackConfig, TrackPeople, needs_m
 from pilotage.sim.source import Simulator
 from pilotage.sim.worlds.world import World
 from support.people import Walker
-from support.worlds import CAR, robot
+from support.worlds import CAR, ROOM_MAP, robot
 
 WALKERS = Path(__file__).parent.parent / "support" / "walkers.txt"
 EMPTY = World.of(WorldMap("empty", (-20.0, -20.0, 20.0, 20.0)), np.array([[-19.0, -19.0, -19.0, 19.0]]))
@@ -174,3 +176,22 @@ def test_people_who_cannot_be_are_refused(people: object, words: str) -> None:
     with pytest.raises(InputError, match=words) as caught:
         run_mission(visited(people), save=False)  # type: ignore[arg-type]
     assert "\n" not in str(caught.value)
+
+
+def test_recorded_people_appear_no_nearer_than_a_robot_can_stop_for(tmp_path: Path) -> None:
+    file = tmp_path / "tracks.txt"
+    # He walks 1.25 m/s towards the robot; the recording begins with him 3 m ahead.
+    file.write_text("".join(f"{10 * k} 1 {3.0 - 0.5 * k:.2f} 0.0\n" for k in range(9)))
+    robot_m, stopping = np.array([[0.0, 0.0, 0.0, 0.3]]), np.array([[0.1, 2.0]])
+    for speed_m_s, there in ((0.0, True), (2.0, False)):
+        setting = PeopleSetting(
+            World.of(ROOM_MAP), robot_m, stopping, 0.1, np.random.default_rng(0), "world.people.0"
+        )
+        people = TrackPeople(TrackConfig(file=str(file)), setting)
+        moved = robot_m + np.array([0.1 * speed_m_s, 0.0, 0.0, 0.0])
+        nobody = np.full((1, 3), np.nan)
+        places = people.step(0.0, Around(moved, nobody, 0))
+        assert np.isfinite(places[0, 0]) == there
+    # By hand: 0.7 s until it brakes and 1 s until it stands, in which he comes nearer by 1.7 s of walking.
+    needed = needs_m(2.0, np.array([0.0, 1.25]), 0.7, 2.0)
+    assert needed == pytest.approx([2.0 * 0.7 + 1.0, 2.0 * 0.7 + 1.0 + 1.25 * 1.7])

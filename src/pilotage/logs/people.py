@@ -46,6 +46,11 @@ class PeopleTracks:
         places = self.places_xy_m[rows]
         return rows, places + share[:, None] * (self.places_xy_m[rows + 1] - places)
 
+    def speeds_m_s(self, rows: IntArray) -> FloatArray:
+        """(K,) how fast they walk on from annotations that are not their last ones."""
+        step = self.places_xy_m[rows + 1] - self.places_xy_m[rows]
+        return np.hypot(step[:, 0], step[:, 1]) / (self.t_s[rows + 1] - self.t_s[rows])
+
     def slots(self, apart_s: float) -> IntArray:
         """(N,) a small number for each annotation's person, another one for who is there at the same time.
 

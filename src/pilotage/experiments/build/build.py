@@ -136,12 +136,13 @@ def _people(mission: Mission, world: World, robots: Sequence[RobotSpec]) -> list
     """The plans of those who walk there, each with a random stream of its own."""
     streams = RandomStreams(mission.run.seed)
     starts = np.array([(r.start.x_m, r.start.y_m, r.start.theta_rad, r.footprint.radius_m) for r in robots])
+    stopping = np.array([(r.motion.delay_s, r.motion.braking_m_s2) for r in robots])
     plans = []
     for index, choice in enumerate(mission.world.people):
         where = f"world.people.{index}"
         config = PEOPLE.configure(choice.name, choice.parameters, where)
         rng = streams.stream(f"people/{index}")
-        setting = PeopleSetting(world, starts, mission.run.dt_s, rng, where)
+        setting = PeopleSetting(world, starts, stopping, mission.run.dt_s, rng, where)
         plans.append(PEOPLE.entry(choice.name).factory(config, setting))
     return plans
 

@@ -22,6 +22,8 @@ class PeopleSetting:
         The layers that stand still.
     robots_m
         (R, 4) x, y, heading and radius of the robots at the start.
+    stopping
+        (R, 2) delay (s) and braking (m/s^2) by the robots' data sheets.
     rng
         This plan's own.
     where
@@ -30,6 +32,7 @@ class PeopleSetting:
 
     world: World
     robots_m: FloatArray
+    stopping: FloatArray
     dt_s: float
     rng: np.random.Generator
     where: str

@@ -14,9 +14,8 @@ from pilotage.logs.people import RADIUS_M, read_people
 from pilotage.sensors.sensor import NonNegative, Positive
 from pilotage.sim.people.people import PEOPLE, Around, PeopleSetting
 
-CLEAR_M = 3.5
-"""Recordings begin in the midst of things: who would appear nearer to a robot than this comes later. Real
-people are seen from farther away: a robot that brakes from 2 m/s while somebody comes at 2.5 needs 3.3 m."""
+NOTICED_STEPS = 6
+"""So many steps after somebody appeared a robot brakes: four to track him, one to see, one to act."""
 APART_S = 1.0
 """Who comes so long after another one has left may take the place of its row."""
 
@@ -35,7 +34,12 @@ class TrackConfig(Config):
 
 @PEOPLE.add("track", TrackConfig)
 class TrackPeople:
-    """Straight between their annotations; there from the first to the last one; they give way to nobody."""
+    """Straight between their annotations; there from the first to the last one; they give way to nobody.
+
+    Recordings begin in the midst of things, and real people are seen from farther away: who would appear
+    so near that a robot, as fast as it is then, could not stop before he reaches it, comes later
+    (``needs_m``).
+    """
 
     def __init__(self, config: TrackConfig, setting: PeopleSetting) -> None:
         tracks = read_people(Path(config.file), config.frame_rate_hz)
@@ -47,6 +51,8 @@ class TrackPeople:
         self._tracks, self._begins_s = tracks, config.begins_s
         self._moved = np.array(config.moved_by_m)
         self._slot = tracks.slots(APART_S)
+        self._before: FloatArray = setting.robots_m
+        self._stopping, self._dt_s = setting.stopping, setting.dt_s
         self._there = np.zeros(int(self._slot.max()) + 1, dtype=np.bool_)
         self.radius_m: FloatArray = np.full(int(self._slot.max()) + 1, config.radius_m)
 
@@ -54,9 +60,23 @@ class TrackPeople:
         """Where they were then."""
         out = np.full((len(self.radius_m), 2), np.nan)
         rows, places = self._tracks.at(self._begins_s + t_s)
-        out[self._slot[rows]] = places + self._moved
-        for x, y, _, radius in around.robots_m.tolist():
-            near = np.hypot(out[:, 0] - x, out[:, 1] - y) < radius + self.radius_m + CLEAR_M
+        slots = self._slot[rows]
+        out[slots] = places + self._moved
+        walks = np.zeros(len(self.radius_m))
+        walks[slots] = self._tracks.speeds_m_s(rows)
+        driven = np.hypot(*(around.robots_m[:, :2] - self._before[:, :2]).T) / self._dt_s
+        self._before = around.robots_m.copy()
+        robots = zip(around.robots_m.tolist(), driven.tolist(), self._stopping.tolist(), strict=True)
+        for (x, y, _, radius), speed, (delay_s, braking) in robots:
+            needed = needs_m(speed, walks, delay_s + NOTICED_STEPS * self._dt_s, braking)
+            near = np.hypot(out[:, 0] - x, out[:, 1] - y) < radius + self.radius_m + needed
             out[near & ~self._there] = np.nan
         self._there = np.isfinite(out[:, 0])
         return out
+
+
+def needs_m(speed_m_s: float, walks_m_s: FloatArray, reaction_s: float, braking_m_s2: float) -> FloatArray:
+    """(K,) gap that a robot needs to stand before people reach it who come at it as fast as they walk."""
+    stands_s = reaction_s + speed_m_s / braking_m_s2
+    robot_m = speed_m_s * reaction_s + speed_m_s**2 / (2.0 * braking_m_s2)
+    return np.asarray(robot_m + walks_m_s * stands_s)
