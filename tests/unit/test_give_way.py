@@ -115,7 +115,7 @@ HALL: dict[str, Any] = {
         ("museum-1", None),
         ("museum-1-fast", "gap-horizon"),
         ("museum-1-fast", "dwa"),
-        ("museum-1-fast", "vfh"),
+        ("museum-1-fast", "pure-pursuit"),
     ],
 )
 def test_it_comes_through_people_and_drives_into_nobody(base: str, controller: str | None) -> None:

@@ -34,8 +34,9 @@ class ObstacleLayerConfig(Config):
     hits: int = Field(default=3, ge=1, le=1000)
     forget_scans: int = Field(default=3, ge=0, le=1000)
     """What so many scans in a row see through is forgotten: it went away; 0 keeps everything for ever."""
-    forget_beyond_m: Positive = 0.3
-    """Seen through: every beam that could have met it ends at least so far behind it."""
+    forget_beyond_m: Positive = 0.15
+    """Seen through: every beam that could have met it ends at least so far behind it. Nearer to a wall than
+    this nothing would ever be forgotten."""
     sigmas: Positive = 3.0
     """The tolerance grows with the pose's uncertainty by this many standard deviations."""
 

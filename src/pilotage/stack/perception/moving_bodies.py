@@ -21,8 +21,10 @@ from pilotage.stack.interface import Belief, BeliefStatus
 from pilotage.stack.knowledge import RobotKnowledge
 from pilotage.stack.perception.movers import Movers, MoversConfig
 
-WALKED_M = 0.4
-"""So far from where it was first seen, and faster than ``walks_m_s``: it walks beyond doubt."""
+WALKED_M, THROUGH_M = 0.6, 0.25
+"""So far from where it was first seen, which the laser sees through by so much: it walks beyond doubt."""
+STRAIGHT = 0.8
+"""Share of its motion by which somebody who comes straight on is nearer."""
 
 
 class MovingBodiesConfig(Config):
@@ -36,6 +38,8 @@ class MovingBodiesConfig(Config):
     """Slower than this, and told well enough, it stands: a thing for the map."""
     stands_readings: int = Field(default=15, ge=1, le=1000)
     """So many readings somebody who walked has to be so slow."""
+    parks_readings: int = Field(default=100, ge=1, le=100_000)
+    """After so many it is no person any more."""
     about_s: NonNegative = 10.0
     """For so long it reckons with people after it saw one walk."""
     anyone_m_s: NonNegative = 1.0
@@ -50,8 +54,8 @@ class MovingBodiesConfig(Config):
 class MovingBodies:
     """Tracks narrow clusters of returns that no known wall explains (``Movers``).
 
-    One that stands is left to the mapper; one that walks, or is too new to tell, is nothing to be mapped
-    but somebody to give way to. Posts on no map that hide each other may look like a walker for a moment.
+    One that stands is left to the mapper; one that walks is nothing to be mapped but somebody to give way to,
+    and so is, where people are about, one that is too new to tell.
     Idle without exactly one lidar, without known walls, or while the robot does not know where it is.
     Groups wider than ``tracks.widest_m`` without a notch between two are left to the mapper.
     """
@@ -91,11 +95,12 @@ class MovingBodies:
         c, s = math.cos(pose.theta_rad), math.sin(pose.theta_rad)
         x = pose.x_m + c * mount.x_m - s * mount.y_m
         y = pose.y_m + s * mount.x_m + c * mount.y_m
+        first = pose.theta_rad + mount.theta_rad + self._first
         points, beams = unexplained_points(
             scan.ranges_m,
             x,
             y,
-            pose.theta_rad + mount.theta_rad + self._first,
+            first,
             self._directions,
             self._reach_m,
             config.tolerance_m + config.sigmas * math.sqrt(max(cov[0, 0], cov[1, 1])),
@@ -110,7 +115,7 @@ class MovingBodies:
             self._loose = points
             return readings
         of_track = self._movers.track(x, y, pose.theta_rad, points, dt_s, self._field)
-        self._walks = self._told()
+        self._walks = self._told(x, y, first, scan.ranges_m)
         walks = np.append(self._walks, False)[of_track]
         self._loose = points[walks | (of_track < 0)]
         self._scans += 1
@@ -126,11 +131,14 @@ class MovingBodies:
         ranges_m[dropped] = math.nan
         return replace(readings, by_sensor={**readings.by_sensor, self._lidar: LidarScan(ranges_m)})
 
-    def _told(self) -> BoolArray:
+    def _told(self, x_m: float, y_m: float, first_rad: float, ranges_m: FloatArray) -> BoolArray:
         """Which tracks do not stand; notes when somebody was seen who walks beyond doubt.
 
-        Of who walked the readings are counted anew, and the place where he was first seen is dropped: he
-        stands when he has for ``stands_s``.
+        What a moving robot sees of a long thing around a corner, or through a gap, moves as well: somebody
+        has walked where the laser at x, y sees through the place at which he was first seen. Of who walked
+        that place is dropped and the readings are counted anew: he stands when he has for
+        ``stands_readings``, and is a thing after ``parks_readings``. Others do not stand only while people
+        are about.
         """
         tracks, config = self._movers.tracks, self._config
         fast = np.hypot(tracks[:, kernels.VX], tracks[:, kernels.VY]) > config.walks_m_s
@@ -138,13 +146,24 @@ class MovingBodies:
         went = np.hypot(
             tracks[:, kernels.X] - tracks[:, kernels.X0], tracks[:, kernels.Y] - tracks[:, kernels.Y0]
         )
-        walked = fast & ~unsure & ~(went <= WALKED_M)
+        known = np.isnan(tracks[:, kernels.X0])
+        for k in np.flatnonzero(fast & ~unsure & (went > WALKED_M)):
+            dx, dy = tracks[k, kernels.X0] - x_m, tracks[k, kernels.Y0] - y_m
+            beam = round(((math.atan2(dy, dx) - first_rad) % (2.0 * math.pi)) / self._step)
+            around = ranges_m[max(beam - 1, 0) : beam + 2]
+            known[k] = len(around) > 0 and float(around.min()) > math.hypot(dx, dy) + THROUGH_M
+            # Who comes straight on hides that place himself, and nothing that stands comes nearer so.
+            nearer = math.hypot(dx, dy) - math.hypot(tracks[k, kernels.X] - x_m, tracks[k, kernels.Y] - y_m)
+            known[k] |= nearer > STRAIGHT * went[k]
+        walked = known & fast & ~unsure
         if walked.any():
             self.seen_s = self._t_s
         tracks[walked, kernels.READINGS], tracks[walked, kernels.X0] = config.tracks.readings, math.nan
-        stood = tracks[:, kernels.READINGS] - config.tracks.readings >= config.stands_readings
-        rests = np.isnan(tracks[:, kernels.X0]) & ~stood
-        walks: BoolArray = unsure | fast | rests
+        stood = tracks[:, kernels.READINGS] - config.tracks.readings
+        parked = known & (stood >= config.parks_readings)
+        tracks[parked, kernels.X0 : kernels.Y0 + 1] = tracks[parked, kernels.X : kernels.Y + 1]
+        rests = known & ~parked & (stood < config.stands_readings)
+        walks: BoolArray = rests | ((unsure | fast) & (known | self.about))
         return walks
 
     def foretold(

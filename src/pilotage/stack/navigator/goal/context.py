@@ -8,6 +8,7 @@ import numpy as np
 
 from pilotage.core.angles import wrap_to_pi
 from pilotage.core.types import Goal, Pose2, Twist
+from pilotage.kernels.geometry import plane
 from pilotage.sensors.readings import Readings
 from pilotage.stack.control.controller import Controller
 from pilotage.stack.control.give_way import GiveWay
@@ -41,6 +42,9 @@ TURN_RATE_RAD_S = 0.8
 
 SOMEBODY_M = 2.0
 """With somebody who walks so near, what is close in front is a reason to give way, not to turn away."""
+
+BESIDE_M, ASIDE, ROOM_M = 0.15, 0.3, 0.05
+"""Of a retreat: what is mapped so near lies beside it, so far behind (a cosine); its room to walls."""
 
 NO_REACTION = Reaction(ReactionKind.NONE, 0.0, math.inf, math.inf)
 
@@ -156,6 +160,23 @@ class Context:
         """Whether somebody walked about a moment ago: what blocks the path may be gone soon."""
         return self._bodies.about
 
+    def leaves_room(self, command: Twist, pose: Pose2) -> bool:
+        """Whether a command keeps off the walls, and drives away from whatever was mapped beside the robot.
+
+        That may be somebody who stopped there: as an obstacle he would shut in for good who stands beside.
+        """
+        own = self.own_map
+        off = own.found_circles_m[:, :2] - (pose.x_m, pose.y_m)
+        away = np.hypot(*off.T) - own.found_circles_m[:, 2]
+        beside = away < self.radius_m + BESIDE_M
+        ahead = (off @ (math.cos(pose.theta_rad), math.sin(pose.theta_rad)))[beside]
+        if command.v_m_s and (math.copysign(1.0, command.v_m_s) * ahead > -ASIDE * away[beside]).any():
+            return False
+        circles = np.concatenate([own.known_circles_m, own.found_circles_m[~beside]])
+        here = plane.distance_to_nearest(pose.x_m, pose.y_m, own.barriers.segments_m, own.known_circles_m)
+        room_m = max(self.radius_m, min(self.radius_m + ROOM_M, here - HERE_TOLERANCE_M))
+        return self.guard.allows(command, pose, own.barriers, circles, room_m)
+
     def out_of_patience(self) -> bool:
         """Whether it has waited for long; having said so it waits as long again."""
         out = self._waits_s is not None and self.t_s - self._waits_s >= self.config.give_way.patience_s
@@ -203,7 +224,9 @@ class Context:
         here = self.own_map.distance_m(pose)
         asked = [own, *(self.radius_m + margin for margin in self.config.fallback_margins_m)]
         squeezed = max(here - HERE_TOLERANCE_M, self.radius_m - MAPPED_TOLERANCE_M)
-        return [c for c in asked if c <= own] + ([squeezed] if squeezed < min(asked) else [])
+        # Who walks beside it is no reason to squeeze past walls as well.
+        squeezes = squeezed < min(asked) and not self.among_people
+        return [c for c in asked if c <= own] + ([squeezed] if squeezes else [])
 
     def path_is_blocked(self) -> bool:
         """Whether the local path ahead comes too near to what the robot mapped."""

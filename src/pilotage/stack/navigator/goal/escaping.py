@@ -53,9 +53,8 @@ class Retreating:
         most = context.turn_rate_rad_s
         speed_m_s = RETREAT_M_S if abs(off_rad) < AHEAD_RAD else 0.0
         command = Twist(speed_m_s, min(max(2.0 * off_rad, -most), most))
-        own, room_m = context.own_map, context.radius_m + HERE_TOLERANCE_M
-        free = context.guard.allows(command, pose, own.barriers, own.circles_m, room_m)
-        return Move(self, command if free and not context.waits(command, pose) else STOP)
+        free = context.leaves_room(command, pose) and not context.waits(command, pose)
+        return Move(self, command if free else STOP)
 
 
 @dataclass(frozen=True, slots=True)
