@@ -10,6 +10,7 @@ from scipy.sparse.linalg import splu
 
 from pilotage.core.types import BoolArray, FloatArray, IntArray
 from pilotage.models.pose_graph import PoseGraph
+from pilotage.stack.mapping.slam.chains import BlockSystem, without_chains
 
 LEAST_INFORMATION = np.diag([1.0, 1.0, 1.0])
 """One metre, one radian: where an alignment tells nothing, the solver has a system all the same."""
@@ -133,33 +134,36 @@ def joint_covariance(edges: Edges, poses: FloatArray, weights: FloatArray, chose
     first, second = jacobians(poses[edges.i], poses[edges.j], edges.relative[:, 2])
     information = edges.information * weights[:, None, None]
     left, right = first.transpose(0, 2, 1) @ information, second.transpose(0, 2, 1) @ information
-    blocks = np.concatenate([left @ first, left @ second, right @ first, right @ second])
-    rows = np.concatenate([edges.i, edges.i, edges.j, edges.j])
-    columns = np.concatenate([edges.i, edges.j, edges.i, edges.j])
-    k = np.arange(3)
-    size = 3 * poses.shape[0]
-    system = csc_matrix(
-        (
-            blocks.ravel(),
-            (
-                np.broadcast_to(3 * rows[:, None, None] + k[None, :, None], blocks.shape).ravel(),
-                np.broadcast_to(3 * columns[:, None, None] + k[None, None, :], blocks.shape).ravel(),
-            ),
-        ),
-        shape=(size, size),
-    )
-    system = system + csc_matrix((np.full(3, 1e9), (k, k)), shape=(size, size))
+    diagonal = np.zeros((poses.shape[0], 3, 3))
+    np.add.at(diagonal, edges.i, left @ first)
+    np.add.at(diagonal, edges.j, right @ second)
+    diagonal[0] += 1e9 * np.eye(3)
+    kept = np.zeros(poses.shape[0], np.bool_)
+    kept[chosen] = True
+    whole = BlockSystem.merged(diagonal, edges.i, edges.j, left @ second)
+    system, stays = without_chains(whole, kept)
     factor = splu(
-        system.tocsc(), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
+        _as_matrix(system), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
     )
-    places = (3 * chosen[:, None] + k).ravel()
+    places = (3 * np.searchsorted(stays, chosen)[:, None] + np.arange(3)).ravel()
     out = np.empty((places.size, places.size))
     # A few columns at a time: all of them would be as large as the graph is long times the submaps.
     for start in range(0, places.size, 96):
         block = places[start : start + 96]
-        unit = np.zeros((size, block.size))
+        unit = np.zeros((3 * stays.size, block.size))
         unit[block, np.arange(block.size)] = 1.0
         out[:, start : start + 96] = factor.solve(unit)[places]
     out += out.T.copy()
     out *= 0.5
     return out
+
+
+def _as_matrix(system: BlockSystem) -> csc_matrix:
+    """(3 N, 3 N) of a block system."""
+    count = system.diagonal.shape[0]
+    k = np.arange(count)
+    blocks = np.concatenate([system.diagonal, system.blocks, system.blocks.transpose(0, 2, 1)])
+    rows = 3 * np.concatenate([k, system.i, system.j])[:, None, None] + np.arange(3)[None, :, None]
+    columns = 3 * np.concatenate([k, system.j, system.i])[:, None, None] + np.arange(3)[None, None, :]
+    at = (np.broadcast_to(rows, blocks.shape).ravel(), np.broadcast_to(columns, blocks.shape).ravel())
+    return csc_matrix((blocks.ravel(), at), shape=(3 * count, 3 * count))
