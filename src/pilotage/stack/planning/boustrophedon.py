@@ -13,7 +13,9 @@ from pilotage.core.config import Config
 from pilotage.core.errors import InputError
 from pilotage.core.types import BoolArray, FloatArray
 from pilotage.kernels.patrol.swept import mark_swept
+from pilotage.kernels.patrol.trim import trimmed
 from pilotage.kernels.tours.entries import anneal_entries
+from pilotage.maps.distance_field import DistanceField
 from pilotage.maps.floor import Floor, sweepable
 from pilotage.sensors.sensor import Positive
 from pilotage.stack.planning.driving_space import clearance_of, failure
@@ -23,7 +25,12 @@ from pilotage.stack.planning.sweep_lines import sweep_cell_m, sweep_lines
 
 TRIES_A_CELL = 3000
 """Changes that are tried to the order of cells."""
-DETOUR_ROUNDS = 6
+DETOUR_ROUNDS, TRIM_ROUNDS = 6, 40
+LAYOUTS = ((0.0, 8), (0.01, 12), (0.03, 8))
+"""Overlaps of neighbouring lines, as shares of the width, and rows of cells from one to the next: with less
+overlap more is left between the lines' ends, smaller cells come nearer to walls."""
+FINE_CELLS, MOST_FINE_CELLS = 12, 4_000_000
+"""Cells a width that tell whether a shorter path still sweeps the same; larger floors take coarser ones."""
 
 
 class BoustrophedonConfig(Config):
@@ -39,8 +46,9 @@ class BoustrophedonPlanner:
     """From the start over the whole reachable floor to the goal, in lines as far apart as a pass is wide.
 
     The floor is cut into cells where lines split and join; cells are put in a good order; what lines leave
-    out is swept by detours. Of both directions the shorter path is taken. Swept is all of the floor where
-    the robot's centre can be, by cells of an eighth of the width. Of the rim along walls that only its body
+    out is swept by detours; then the path is made shorter where other parts of it sweep the same. Of both
+    directions and some overlaps of lines the path is taken that wastes least. Swept is all of the floor where
+    the robot's centre can be, by cells of a twelfth of the width. Of the rim along walls that only its body
     reaches, the corners between the ends of lines are left (some 4 % of the floor): loops along all walls
     would sweep them for a path 5 to 20 % longer.
     """
@@ -58,39 +66,62 @@ class BoustrophedonPlanner:
         began = time.perf_counter()
         clearance_m, width_m = clearance_of(request, self._config.clearance_m), self._config.width_m
         start, goal = ((place.x_m, place.y_m) for place in (request.start, request.goal))
-        field, cell_m = request.field, sweep_cell_m(request.field.bounds_m, width_m)
         try:
-            floor = Floor.of_field(field, field.bounds_m, clearance_m, cell_m, start)
-            # A straight line through cells' middles comes half a diagonal nearer to walls than these are.
+            fine_m, bounds_m = width_m / FINE_CELLS, request.field.bounds_m
+            floor = Floor.of_field(request.field, bounds_m, clearance_m, fine_m, start)
             inner_m = clearance_m + math.sqrt(0.5) * floor.cell_m
-            # And where the floor ends in a cell whose middle lies beyond, it has a share of it.
-            whole = Floor.of_field(field, field.bounds_m, clearance_m - 0.4 * floor.cell_m, cell_m, start)
-            inner = Floor.of_field(field, field.bounds_m, inner_m, cell_m, start)
-            lines = [_swept_by(whole, inner, width_m, along_y, start, goal) for along_y in (False, True)]
+            inner = Floor.of_field(request.field, bounds_m, inner_m, fine_m, start)
+            lines = [
+                _completed(
+                    floor,
+                    inner,
+                    _sweep(request.field, clearance_m, width_m, along_y, layout, start, goal),
+                    width_m,
+                )
+                for layout in LAYOUTS
+                for along_y in (False, True)
+            ]
         except InputError as error:
             return failure(PlanStatus.NO_PATH, str(error), time.perf_counter() - began)
-        path = path_of_line(min(lines, key=_length_m), request, self._config.waypoint_spacing_m)
+        within_reach = sweepable(floor, width_m)
+        best = min(lines, key=lambda line: _waste_m(floor, within_reach, line, width_m))
+        path = path_of_line(best, request, self._config.waypoint_spacing_m)
         took = time.perf_counter() - began
-        area_m2 = np.count_nonzero(sweepable(floor, width_m)) * floor.cell_m**2
+        area_m2 = np.count_nonzero(within_reach) * floor.cell_m**2
         ratio = path.length_m * width_m / area_m2
         reason = f"{path.length_m:.1f} m for {area_m2:.1f} m2, {ratio:.3f} of area over width"
         return PlanResult(PlanStatus.FOUND, reason, path, took, took)
 
 
-def _swept_by(
-    floor: Floor,
-    inner: Floor,
+def _sweep(
+    field: DistanceField,
+    clearance_m: float,
     width_m: float,
     along_y: bool,
+    layout: tuple[float, int],
     start: tuple[float, float],
     goal: tuple[float, float],
 ) -> FloatArray:
-    """(N, 2) the path from start to goal that sweeps everything, by lines in one direction."""
-    cells = [_variants(lines) for lines in sweep_lines(inner, width_m, along_y)]
+    """(N, 2) the path from start to goal that sweeps everything, by lines in one direction, made shorter."""
+    bounds_m, (overlap, rows) = field.bounds_m, layout
+    cell_m = sweep_cell_m(bounds_m, width_m, overlap, rows)
+    # A straight line through cells' middles comes half a diagonal nearer to walls than these are.
+    inner_m = (
+        clearance_m + math.sqrt(0.5) * Floor.of_field(field, bounds_m, clearance_m, cell_m, start).cell_m
+    )
+    inner = Floor.of_field(field, bounds_m, inner_m, cell_m, start)
+    # And where the floor ends in a cell whose middle lies beyond, it has a share of it.
+    floor = Floor.of_field(field, bounds_m, clearance_m - 0.4 * inner.cell_m, cell_m, start)
+    cells = [_variants(lines) for lines in sweep_lines(inner, width_m, along_y, overlap)]
     path = np.array([start])
     ordered = _ordered(inner, cells, np.array(start), np.array(goal))
     for place in np.concatenate([*ordered, np.array([goal])]):
         path = np.vstack([path, _joined(inner, path[-1], place)[1:]])
+    return _trimmed(inner, _completed(floor, inner, path, width_m), width_m)
+
+
+def _completed(floor: Floor, inner: Floor, path: FloatArray, width_m: float) -> FloatArray:
+    """(N, 2) the path with detours to what it leaves of a floor, through the inner one."""
     for _ in range(DETOUR_ROUNDS):
         missing = floor.reachable & ~_covered(floor, path, width_m)
         places = _places_for(inner, path, missing, width_m)
@@ -98,6 +129,25 @@ def _swept_by(
             break
         path = _with_detours(inner, path, places)
     return path
+
+
+def _trimmed(inner: Floor, path: FloatArray, width_m: float) -> FloatArray:
+    """(N, 2) the path without what other parts of it sweep anyway."""
+    path = path[np.concatenate([[True], np.hypot(*np.diff(path, axis=0).T) > 1e-9])]
+    rows, columns = inner.reachable.shape
+    side_m = np.array([rows, columns]) * inner.cell_m
+    fine_m = max(width_m / FINE_CELLS, math.sqrt(float(side_m.prod()) / MOST_FINE_CELLS))
+    shape = math.ceil(side_m[0] / fine_m), math.ceil(side_m[1] / fine_m)
+    x0, y0 = inner.origin_xy_m
+    grid = float(x0), float(y0), inner.cell_m
+    free = np.ascontiguousarray(inner.reachable)
+    return trimmed(np.ascontiguousarray(path), width_m, fine_m, shape, free, grid, TRIM_ROUNDS)
+
+
+def _waste_m(floor: Floor, within_reach: BoolArray, path: FloatArray, width_m: float) -> float:
+    """Its length, and what it would take to sweep what it leaves."""
+    left = within_reach & ~_covered(floor, path, width_m)
+    return _length_m(path) + np.count_nonzero(left) * floor.cell_m**2 / width_m
 
 
 def _variants(lines: list[FloatArray]) -> list[FloatArray]:
