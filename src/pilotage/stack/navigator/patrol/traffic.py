@@ -157,12 +157,15 @@ def has_less_far(context: Context, stretch: Stretch) -> tuple[bool, FloatArray |
     pose, roadmap = context.pose, context.roadmap
     bodies = context.bodies_on_map()
     away = np.hypot(bodies[:, 0] - pose.x_m, bodies[:, 1] - pose.y_m)
-    facing = [eikonal.first_met(stretch.line_xy_m, body[None], context.radius_m) >= 0 for body in bodies]
+    facing = [
+        eikonal.first_met(stretch.line_xy_m, body[None], 2.0 * context.radius_m) >= 0 for body in bodies
+    ]
     away[~np.array(facing, dtype=np.bool_)] = math.inf
     if not np.isfinite(away).any():
         return False, None
     x, y = bodies[int(np.argmin(away))].tolist()
-    keep_m = 2.0 * context.radius_m
+    # Nothing leads past it: the passage has room for one.
+    keep_m = min(context.pass_m, float(away.min()) - 0.2)
     own = roadmap.way_out(pose.x_m, pose.y_m, (x, y), keep_m, context.pass_m)
     theirs = roadmap.way_out(x, y, (pose.x_m, pose.y_m), keep_m, context.pass_m)
     own_m, their_m = (math.inf if out is None else out.time_s * context.speed_m_s for out in (own, theirs))
