@@ -203,7 +203,10 @@ def command_is_safe(
             if movers.shape[1] > 0 and (v != 0.0 or w != 0.0):
                 at = min(k, movers.shape[0] - 1)
                 keep = movers_margin + margin_s * abs(v)
+                # Both where they are then and were before: who runs is past in between.
                 if closes_in(before, (x, y, theta), polygon, outer, movers[at], keep):
+                    return False, least
+                if at > 0 and closes_in(before, (x, y, theta), polygon, outer, movers[at - 1], keep):
                     return False, least
             if k >= held and v == 0.0 and w == 0.0:
                 break

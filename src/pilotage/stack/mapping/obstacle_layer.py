@@ -19,7 +19,7 @@ from pilotage.stack.interface import Belief
 from pilotage.stack.knowledge import RobotKnowledge
 from pilotage.stack.mapping.mapper import MAPPERS
 
-INSIDE = 0.8
+INSIDE = 0.95
 """Share of its own inner radius within which nothing else can stand."""
 
 

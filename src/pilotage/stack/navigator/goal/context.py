@@ -173,8 +173,7 @@ class Context:
         if command.v_m_s and (math.copysign(1.0, command.v_m_s) * ahead > -ASIDE * away[beside]).any():
             return False
         circles = np.concatenate([own.known_circles_m, own.found_circles_m[~beside]])
-        here = plane.distance_to_nearest(pose.x_m, pose.y_m, own.barriers.segments_m, own.known_circles_m)
-        room_m = max(self.radius_m, min(self.radius_m + ROOM_M, here - HERE_TOLERANCE_M))
+        room_m = max(self.radius_m, min(self.radius_m + ROOM_M, self._to_walls_m(pose) - HERE_TOLERANCE_M))
         return self.guard.allows(command, pose, own.barriers, circles, room_m)
 
     def out_of_patience(self) -> bool:
@@ -224,9 +223,15 @@ class Context:
         here = self.own_map.distance_m(pose)
         asked = [own, *(self.radius_m + margin for margin in self.config.fallback_margins_m)]
         squeezed = max(here - HERE_TOLERANCE_M, self.radius_m - MAPPED_TOLERANCE_M)
-        # Who walks beside it is no reason to squeeze past walls as well.
-        squeezes = squeezed < min(asked) and not self.among_people
-        return [c for c in asked if c <= own] + ([squeezed] if squeezes else [])
+        if self.among_people:
+            # Who stands beside it is no reason to squeeze past walls.
+            squeezed = max(self._to_walls_m(pose) - HERE_TOLERANCE_M, self.radius_m + HERE_TOLERANCE_M)
+        return [c for c in asked if c <= own] + ([squeezed] if squeezed < min(asked) else [])
+
+    def _to_walls_m(self, pose: Pose2) -> float:
+        """Distance to what the robot was told of."""
+        own = self.own_map
+        return plane.distance_to_nearest(pose.x_m, pose.y_m, own.barriers.segments_m, own.known_circles_m)
 
     def path_is_blocked(self) -> bool:
         """Whether the local path ahead comes too near to what the robot mapped."""
