@@ -113,6 +113,32 @@ class Yielding:
         return Move(self, context.lead(self.vertex)) if met is None else met
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class SteppingAside:
+    """Drives to a free place near by, off the line to somebody, and stands there for a while.
+
+    Attributes
+    ----------
+    time
+        Field of the roadmap that leads there.
+    """
+
+    context: Context
+    time: FloatArray
+    until_s: float
+
+    def step(self, readings: Readings) -> Move:
+        """Follow the field, then go on with the patrol."""
+        del readings
+        context = self.context
+        context.mode = Mode.YIELD
+        if context.t_s >= self.until_s or context.runs_low():
+            return resume(context)
+        if context.fresh:
+            traffic.look_along(context, context.here())
+        return Move(self, context.descend(self.time))
+
+
 @dataclass(frozen=True, slots=True)
 class Holding:
     """Waits inside a passage for one until somebody has backed out of it.
@@ -265,13 +291,21 @@ def resume(context: Context) -> Move:
 
 
 def give_way(context: Context) -> Move:
-    """Drive to a vertex near by, away from what is in the way; wait a little where there is none."""
+    """Drive to a vertex near by, away from what is in the way; wait a little where there is none.
+
+    Among several who stand around, to where nobody stands: vertices may all lie beyond them.
+    """
+    until_s = context.t_s + context.config.yield_s * (0.5 + float(context.rng.random()))
+    field = traffic.free_place(context)
+    if field is not None:
+        context.journal.count("gave_way")
+        context.say("give-way", f"no progress towards vertex {context.hop}: steps aside")
+        return Move(SteppingAside(context, field, until_s), context.descend(field))
     vertex = context.way_out()
     if vertex < 0:
         return Move(Waiting(context, context.t_s), context.stand())
     context.journal.count("gave_way")
     context.say("give-way", f"no progress towards vertex {context.hop}: makes room towards vertex {vertex}")
-    until_s = context.t_s + context.config.yield_s * (0.5 + float(context.rng.random()))
     return Move(Yielding(context, vertex, until_s), context.lead(vertex))
 
 

@@ -25,6 +25,7 @@ ROOM_M = 0.4
 """Who stands aside leaves so much between itself and others who do."""
 WAIT_M_S = 0.1
 """Of those who wait on one side a second counts as much as so many metres."""
+SEVERAL = 2
 TIE_M = 0.5
 """What differs by less is as far for both."""
 MOUTH_M = 1.2
@@ -191,3 +192,13 @@ def refuge(context: Context, mouth_xy_m: FloatArray, outwards: FloatArray) -> Fl
     keep_m = 2.0 * context.radius_m + ROOM_M
     pose = context.pose
     return context.roadmap.refuge(pose.x_m, pose.y_m, mouth_xy_m, outwards, others, context.pass_m, keep_m)
+
+
+def free_place(context: Context) -> FloatArray | None:
+    """The field to a place off the line to the nearest of several near by; None where there are fewer."""
+    here, bodies = np.array([context.pose.x_m, context.pose.y_m]), context.bodies_on_map()
+    away = np.hypot(*(bodies - here).T)
+    if np.count_nonzero(away < context.config.watch_m) < SEVERAL or context.is_narrow():
+        return None
+    nearest = bodies[int(np.argmin(away))]
+    return refuge(context, nearest, here - nearest)
