@@ -301,6 +301,7 @@ class TestMuseum:
         [
             (["team.strategy=null"], r"task 'patrol': expected team\.strategy, found none"),
             (["team.strategy=cyclc"], "unknown strategy 'cyclc'; did you mean 'cyclic'"),
+            (["team.size=17"], r"team\.size: .*16"),
             (["task.graph=nowhere.graph"], r"nowhere\.graph"),
             (["team.failures=[{robot: 9, at_s: 1}]"], r"team\.failures: there is no robot 9 of 4"),
             (["robot.motion=bicycle"], "expected a robot that turns on the spot"),

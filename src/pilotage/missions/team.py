@@ -12,7 +12,7 @@ from pilotage.missions.choice import ComponentChoice, by_default
 from pilotage.missions.places import Point, PoseConfig
 from pilotage.sensors.sensor import NonNegative, Positive
 
-LARGEST_TEAM = 64
+LARGEST_TEAM = 16
 RADIO = "radio"
 """What a team's radio is called among a robot's sensors."""
 
