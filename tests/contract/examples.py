@@ -368,6 +368,7 @@ EXAMPLES: dict[tuple[str, str], Example] = {
         {"beams": 90},
         FILTER_NUMBERS | {"kld_error", "kld_probability", "spread"},
     ),
+    ("localizer", "laser"): Example(localizer_follows, {"walls": {"gate": 0.99}, "cells": {"beams": 90}}),
     ("heading", "encoder-gyro"): Example(heading_filter_follows, {"process_var": 0.1}, SCALAR_FILTER_NUMBERS),
     ("heading", "encoder-magnetometer"): Example(
         heading_filter_follows, {"process_var": 0.1}, SCALAR_FILTER_NUMBERS

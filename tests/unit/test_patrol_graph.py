@@ -19,9 +19,10 @@ from pilotage.maps.floor import Floor
 from pilotage.maps.occupancy_grid import OccupancyGrid
 from pilotage.maps.segment_map import SegmentMap
 from pilotage.maps.world_map import WorldMap
-from pilotage.stack.patrol.derive import DerivationConfig, derive_graph
+from pilotage.stack.patrol.derive import DerivationConfig, derive_drivable, derive_graph
 from pilotage.stack.patrol.graph import PatrolGraph
 from pilotage.stack.patrol.graph_file import on_floor, read_patrol_graph
+from pilotage.stack.patrol.roadmap import Roadmap
 from pilotage.stack.patrol.tours import Round, spread
 
 PAIR = "2 100 80 0.1 1 2\n\n0 10 20 1 1 E 30\n\n1 40 20 1 0 W 34"
@@ -171,3 +172,33 @@ def test_a_floor_without_room_for_the_robot_is_refused() -> None:
     solid = WorldMap("solid", (0.0, 0.0, 2.0, 2.0), grid=OccupancyGrid.of(np.ones((20, 20), bool), 0.1))
     with pytest.raises(InputError, match="found none"):
         Floor.of(solid, 0.2)
+
+
+def passage(width_m: float) -> WorldMap:
+    """Two rooms, and a passage of 2 m from one to the other, off the lattice of everything."""
+    low, high = 2.03, 2.03 + width_m
+    walls = [[0, 0, 4, 0], [0, 0, 0, 5], [0, 5, 4, 5], [4, 0, 4, low], [4, high, 4, 5]]
+    walls += [[4, low, 6, low], [4, high, 6, high]]
+    walls += [[6, 0, 6, low], [6, high, 6, 5], [6, 0, 10, 0], [10, 0, 10, 5], [6, 5, 10, 5]]
+    rooms = SegmentMap(np.array(walls, dtype=float), np.zeros((0, 3)), (0.0, 0.0, 10.0, 5.0))
+    return WorldMap("passage", rooms.bounds_m, rooms)
+
+
+@pytest.mark.parametrize(("width_m", "both"), [(0.72, False), (1.2, True)])
+def test_a_derived_graph_counts_on_what_can_be_driven(width_m: float, both: bool) -> None:
+    """Who keeps 8 cm from walls does not come through 72 cm: one of the rooms is the floor then."""
+    world = passage(width_m)
+    _, derived = derive_drivable(world, 0.3)
+    vertices = derived.graph.vertices_xy_m
+    assert (vertices[:, 0].min() < 4.0 and vertices[:, 0].max() > 6.0) == both
+    roadmap = Roadmap(world, vertices, np.zeros((0, 2)), 0.38, 1.0, 0.15, 0.5, 0.35)
+    assert all(math.isfinite(roadmap.longest_s(vertex)) for vertex in range(len(vertices)))
+
+
+def test_a_passage_between_the_nodes_is_found_on_finer_ones() -> None:
+    places = np.array([[2.0, 2.5], [8.0, 2.5]])
+    roadmap = Roadmap(passage(0.86), places, np.zeros((0, 2)), 0.38, 1.0, 0.15, 0.5, 0.35)
+    assert roadmap.spacing_m < 0.15
+    assert 6.0 < roadmap.longest_s(0) < 14.0
+    with pytest.raises(InputError, match="found none from vertex 0 to 1 of 2"):
+        Roadmap(passage(0.74), places, np.zeros((0, 2)), 0.38, 1.0, 0.15, 0.5, 0.35)

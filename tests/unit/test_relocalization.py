@@ -15,10 +15,15 @@ from pilotage.maps.segment_map import SegmentMap
 from pilotage.maps.world_map import WorldMap
 from pilotage.sensors.lidar import LidarConfig
 from pilotage.sensors.readings import OdometryIncrement
+from pilotage.stack.journal import Journal
+from pilotage.stack.localization.ekf_walls import EkfWallsLocalizer
+from pilotage.stack.localization.laser import LaserConfig, LaserLocalizer
 from pilotage.stack.localization.likelihood_field import LikelihoodField
+from pilotage.stack.localization.particle_filter import ParticleFilterLocalizer
 from pilotage.stack.localization.relocalization import TRIAL_SCANS, Relocalization, Trial
 from pilotage.stack.localization.scan_search import RecentScans, ScanSearch
 from support.laser_rooms import furnished, ranges
+from support.robots import told_of
 
 ANGLES = LidarConfig(beams=180).beam_angles_rad()
 BOUNDS_M = (0.0, 0.0, 12.0, 9.0)
@@ -133,3 +138,14 @@ def test_beams_are_weighed_alone_as_together() -> None:
     points = seen_from(furnished(), np.array([2.05, 3.45, 0.21]))
     alone = field.log_densities(points, pose)
     assert alone.sum() == pytest.approx(field.log_likelihoods(points, pose[None])[0])
+
+
+def test_the_laser_localizer_takes_the_filter_that_suits_the_map() -> None:
+    told = told_of()
+    walls = told.chart.walls
+    cells = WorldMap("cells", walls.bounds_m, grid=rasterized(walls, 0.05))
+    for chart, kind in ((told.chart, EkfWallsLocalizer), (cells, ParticleFilterLocalizer)):
+        found = LaserLocalizer(LaserConfig(), told.robot, chart, told.initial, Journal())
+        assert isinstance(found._chosen, kind)
+        assert found.belief is told.initial
+        assert found.look_bearing_rad() is None

@@ -22,12 +22,11 @@ from pilotage.evaluation.stuck_watch import StuckWatch
 from pilotage.evaluation.tasks.task import TASKS, Attempt, TaskSetting
 from pilotage.evaluation.tasks.team import verdict
 from pilotage.maps.floor import Floor
-from pilotage.maps.world_map import WorldMap
 from pilotage.missions.places import GoalConfig
 from pilotage.sensors.lidar import LidarConfig
 from pilotage.sensors.sensor import SENSORS, NonNegative, Positive
 from pilotage.stack.interface import BeliefStatus
-from pilotage.stack.patrol.derive import DerivationConfig, derive_graph
+from pilotage.stack.patrol.derive import DerivationConfig, derive_drivable
 from pilotage.stack.patrol.graph import PatrolGraph
 from pilotage.stack.patrol.graph_file import on_floor, read_patrol_graph
 from pilotage.stack.patrol.task import PatrolSite
@@ -74,8 +73,8 @@ class PatrolTask:
                 "task 'patrol': expected team.strategy, found none; take one of 'components strategy'"
             )
         self._config, self._names = config, [robot.name for robot in mission.members]
-        self._chart, self._site = setting.chart, _floor(setting)
-        graph = _graph(config, setting.chart, self._site)
+        self._chart = setting.chart
+        self._site, graph = _site(config, setting)
         self.patrol = PatrolSite(graph, config.visit_m)
         self.columns, self.goals = {}, ()
         self.events: list[Event] = []
@@ -221,18 +220,17 @@ class PatrolTask:
         }
 
 
-def _floor(setting: TaskSetting) -> Floor:
-    """Where the largest of the robots can be."""
+def _site(config: PatrolConfig, setting: TaskSetting) -> tuple[Floor, PatrolGraph]:
+    """Where the largest of the robots can be, and the graph: of a file, its edges measured on the map, or one
+    that is derived from the map."""
     radius_m = max(footprint.radius_m for footprint in setting.footprints)
     start = setting.mission.start_of(setting.mission.members[0])
-    return Floor.of(setting.chart, radius_m, inside_xy_m=None if start is None else (start.x_m, start.y_m))
-
-
-def _graph(config: PatrolConfig, chart: WorldMap, floor: Floor) -> PatrolGraph:
-    """The graph of a file, its edges measured on the map, or one that is derived from the map."""
+    inside = None if start is None else (start.x_m, start.y_m)
     if config.graph is None:
-        return derive_graph(chart, floor, config.derive).graph
-    return on_floor(read_patrol_graph(Path(config.graph)), floor, config.graph)
+        floor, derived = derive_drivable(setting.chart, radius_m, inside, config.derive)
+        return floor, derived.graph
+    floor = Floor.of(setting.chart, radius_m, inside_xy_m=inside)
+    return floor, on_floor(read_patrol_graph(Path(config.graph)), floor, config.graph)
 
 
 def _lidar(setting: TaskSetting, index: int) -> LidarConfig | None:

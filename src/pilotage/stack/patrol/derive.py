@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,13 +15,17 @@ from pilotage.kernels.patrol.cover import greedy_cover
 from pilotage.kernels.patrol.visibility import seen_from
 from pilotage.maps.floor import Floor
 from pilotage.maps.world_map import WorldMap
-from pilotage.sensors.sensor import Positive
+from pilotage.sensors.sensor import NonNegative, Positive
 from pilotage.stack.patrol.graph import PatrolGraph
 
 BEAMS = 1440
 MOST_PAIRS = 30_000_000
 """Of places to look from and points to see: both are thinned beyond."""
 MOST_VERTICES = 400
+ON_WALL = 0.6
+"""Cells: the field of distances is sampled, and never quite 0."""
+CLOSE_M, CLOSE_EVERY_M = 1.5, 0.1
+"""What is seen from none of the places to look from is looked at from so near, by places so near together."""
 
 
 class DerivationConfig(Config):
@@ -35,6 +40,9 @@ class DerivationConfig(Config):
     see_every_m: Positive = 0.25
     stand_every_m: Positive = 0.5
     """Spacing of the points that must be seen, and of those to look from."""
+    room_m: NonNegative = 0.1
+    """Beyond the largest body, of the places and passages that the graph counts on: more than a navigator's
+    margin, so that what is derived can be driven."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -65,13 +73,14 @@ def derive_graph(world: WorldMap, floor: Floor, config: DerivationConfig | None 
 
     Rooms are what is left of the floor where passages narrower than a door are closed, grown back (Bormann
     et al. 2016, morphological segmentation); doors are where two of them meet. Viewpoints are chosen
-    greedily until every point that the robot's body can cover is in view from one within reach. Edges join
+    greedily until every point that the robot's body can cover is in view from one within reach; a point that
+    no place of the body's sees at all is left out. Edges join
     vertices whose regions, by length of path, touch.
 
     Raises
     ------
     InputError
-        Where parts of the floor are seen from nowhere at the given spacing, or need far too many vertices.
+        Where the floor needs far too many vertices.
     """
     config = config or DerivationConfig()
     rooms, doors_xy_m = _rooms_and_doors(floor, config.door_width_m)
@@ -80,13 +89,18 @@ def derive_graph(world: WorldMap, floor: Floor, config: DerivationConfig | None 
     # Between places that see as much, the one farther from walls: others pass, and people do.
     rows, columns = np.array([floor.cell_of(place) for place in stand]).T
     chosen = greedy_cover(sees, floor.clearance_m[rows, columns], covered)
-    if not covered.all():
-        x, y = points[np.argmin(covered)]
-        raise InputError(
-            f"patrol graph of '{world.name}': {np.count_nonzero(~covered)} of {len(points)} points of the "
-            f"floor are seen from nowhere (({x:.1f}, {y:.1f}) m is one); take a smaller stand_every_m"
-        )
     vertices = stand[chosen]
+    # What lies on a wall's line is no floor, though the body's edge can be there.
+    rows, columns = np.array([floor.cell_of(point) for point in points]).T
+    covered |= floor.clearance_m[rows, columns] <= ON_WALL * floor.cell_m
+    if not covered.all():
+        # Corners behind jambs: somebody has to look into them from nearby.
+        near = _thinned(_beside(floor, points[~covered]), floor, CLOSE_EVERY_M)
+        close = seen_from(floor.middles(near), config.reach_m, points[~covered], BEAMS, *_solid(world))
+        few = greedy_cover(close, floor.clearance_m[near], np.zeros(close.shape[1], np.bool_))
+        vertices = np.vstack([vertices, floor.middles(near)[few]])
+        covered[~covered] = close.any(axis=0)
+    viewpoints = len(vertices)
     for door in doors_xy_m:
         if np.hypot(*(vertices - door).T).min() >= config.apart_m:
             vertices = np.vstack([vertices, door])
@@ -97,7 +111,29 @@ def derive_graph(world: WorldMap, floor: Floor, config: DerivationConfig | None 
         )
     edges = floor.lengths_m(vertices, _touching(floor, vertices), "vertex")
     graph = PatrolGraph.of(vertices, edges, f"patrol graph of '{world.name}'")
-    return Derived(graph, doors_xy_m, rooms, points, len(chosen))
+    return Derived(graph, doors_xy_m, rooms, points[covered], viewpoints)
+
+
+def derive_drivable(
+    world: WorldMap,
+    radius_m: float,
+    inside_xy_m: tuple[float, float] | None = None,
+    config: DerivationConfig | None = None,
+) -> tuple[Floor, Derived]:
+    """A floor and its graph, all of whose places a robot comes to that keeps ``room_m`` from walls besides.
+
+    Where one that keeps none comes to more places, those are left out.
+    """
+    config = config or DerivationConfig()
+    floor = Floor.of(world, radius_m, inside_xy_m=inside_xy_m)
+    derived = derive_graph(world, floor, config)
+    roomy = Floor.of(world, radius_m + config.room_m, inside_xy_m=inside_xy_m)
+    try:
+        for place in derived.graph.vertices_xy_m:
+            roomy.nearest_cell(place)
+    except InputError:
+        return roomy, derive_graph(world, roomy, config)
+    return floor, derived
 
 
 def views(
@@ -113,8 +149,24 @@ def views(
     coarser = max(1.0, (pairs / MOST_PAIRS) ** 0.25)
     stand = floor.middles(_thinned(floor.reachable, floor, coarser * stand_every_m))
     points = floor.middles(_thinned(floor.swept, floor, coarser * see_every_m))
-    walls = world.walls
-    return stand, points, seen_from(stand, reach_m, points, BEAMS, walls.segments_m, walls.circles_m)
+    return stand, points, seen_from(stand, reach_m, points, BEAMS, *_solid(world))
+
+
+def _solid(world: WorldMap) -> tuple[FloatArray, FloatArray]:
+    return world.walls.segments_m, world.walls.circles_m
+
+
+def _beside(floor: Floor, points_xy_m: FloatArray) -> BoolArray:
+    """Cells that the body's centre can reach, near some of the points."""
+    out = np.zeros_like(floor.reachable)
+    reach = math.ceil(CLOSE_M / floor.cell_m)
+    for row, column in (floor.cell_of(point) for point in points_xy_m):
+        square = (
+            slice(max(0, row - reach), row + reach + 1),
+            slice(max(0, column - reach), column + reach + 1),
+        )
+        out[square] = floor.reachable[square]
+    return out
 
 
 def _thinned(cells: BoolArray, floor: Floor, every_m: float) -> BoolArray:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from weakref import WeakKeyDictionary
 
@@ -19,6 +20,8 @@ EASY_M, TIGHT_FACTOR = 0.5, 1.0
 STEP_M, ASIDE_REACH_M = 0.25, 6.0
 OFF_RATIO, AHEAD_M = 1.8, 3.5
 """Who waits beside a passage stands so many half widths of two off its axis, or so far before it."""
+FINER, MOST_NODES = (1, 2, 4), 2_000_000
+"""Nodes may lie beside a passage that the body just fits through: then they lie so many times as near."""
 NEAREST = 6
 STATION_M = 0.4
 """So far from a charging station the body may have to stand, for a wall beside it."""
@@ -63,7 +66,23 @@ class Roadmap:
         lane_m: float,
     ) -> None:
         self.places_xy_m: FloatArray = np.concatenate([vertices_xy_m, stations_xy_m])
-        self._vertices, self.spacing_m = len(vertices_xy_m), spacing_m
+        self._vertices = len(vertices_xy_m)
+        self._fields: dict[int, FloatArray] = {}
+        near = [near_m] * self._vertices + [STATION_M] * len(stations_xy_m)
+        for finer in FINER:
+            self._lay(chart, clearance_m, speed_m_s, spacing_m / finer, lane_m)
+            try:
+                self._seeds = self._joined(near, clearance_m)
+                return
+            except InputError:
+                if finer == FINER[-1] or 4 * self.slowness.size > MOST_NODES:
+                    raise
+
+    def _lay(
+        self, chart: WorldMap, clearance_m: float, speed_m_s: float, spacing_m: float, lane_m: float
+    ) -> None:
+        """Lay the nodes over the map."""
+        self.spacing_m = spacing_m
         xmin, ymin, xmax, ymax = chart.bounds_m
         self.origin_xy_m = (xmin, ymin)
         xs = np.arange(xmin, xmax + 0.5 * spacing_m, spacing_m)
@@ -72,21 +91,23 @@ class Roadmap:
         distance = chart.field.at(grid.reshape(-1, 2)).reshape(grid.shape[:2])
         free = distance >= clearance_m
         tight = np.clip(1.0 - (distance - clearance_m) / EASY_M, 0.0, 1.0)
-        self.slowness: FloatArray = np.where(free, (1.0 + TIGHT_FACTOR * tight**2) / speed_m_s, np.inf)
+        self.slowness = np.where(free, (1.0 + TIGHT_FACTOR * tight**2) / speed_m_s, np.inf)
         # Who keeps to one side is so far from where the passage is widest.
         size = 2 * math.ceil(lane_m / spacing_m) + 1
         self._room_m: FloatArray = maximum_filter(distance, size=size)
-        self._fields: dict[int, FloatArray] = {}
-        near = [near_m] * self._vertices + [STATION_M] * len(stations_xy_m)
-        self._seeds = [self._seed(k, within_m, clearance_m) for k, within_m in enumerate(near)]
-        regions, _ = label(free, structure=np.ones((3, 3)))
-        of_place = [int(regions[seed]) for seed in self._seeds]
+
+    def _joined(self, near_m: Sequence[float], clearance_m: float) -> list[tuple[int, int]]:
+        """The places' nodes, between all of which the body can drive."""
+        seeds = [self._seed(k, within_m, clearance_m) for k, within_m in enumerate(near_m)]
+        regions, _ = label(np.isfinite(self.slowness))
+        of_place = [int(regions[seed]) for seed in seeds]
         apart = [k for k, region in enumerate(of_place) if region != of_place[0]]
         if apart:
             raise InputError(
                 f"patrol graph: expected paths with {clearance_m:.2f} m to each side, found none from "
                 f"vertex 0 to {len(apart)} of {len(of_place)} places ({self._called(apart[0])} is the first)"
             )
+        return seeds
 
     def _called(self, place: int) -> str:
         """A place as the mission calls it."""
