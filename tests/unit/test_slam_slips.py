@@ -6,8 +6,18 @@ import numpy as np
 import pytest
 
 from pilotage.core.types import FloatArray
-from pilotage.stack.mapping.slam.closures import FAR_SLIP, USUAL_SLIP, candidates
+from pilotage.stack.mapping.slam.closures import (
+    FAR_SLIP,
+    LEAST_PROOFS,
+    USUAL_SLIP,
+    Candidate,
+    Closure,
+    Verdict,
+    candidates,
+    unproven,
+)
 from pilotage.stack.mapping.slam.local_matching import Fit
+from pilotage.stack.mapping.slam.matching import Match
 from pilotage.stack.mapping.slam.refinement import BESIDE, not_aligned
 from pilotage.stack.mapping.slam.slips import Slips
 from pilotage.stack.mapping.slam.uncertainty import Edges
@@ -57,8 +67,8 @@ def test_a_loop_that_is_too_long_is_searched_in_a_window_that_is_cut() -> None:
     (found,) = candidates(poses, pieces, joint, 8.0, {}, FAR_SLIP)
     assert (found.earlier, found.later, found.half_m) == (0, 5, 8.0)
     # Once it was searched so, it is not again; what the usual windows hold is left to them.
-    assert candidates(poses, pieces, joint, 8.0, {(0, 5): 8.0}, FAR_SLIP) == []
     assert candidates(poses, pieces, np.asarray(1e-4 * joint), 8.0, {}, FAR_SLIP) == []
+    assert candidates(poses, pieces, joint, 8.0, {(0, 5): 8.0}, FAR_SLIP) == []
 
 
 def test_closures_stay_where_no_keyframes_could_be_aligned() -> None:
@@ -73,3 +83,15 @@ def test_closures_stay_where_no_keyframes_could_be_aligned() -> None:
     kept = not_aligned(closing, aligned.and_more(along))
     assert list(zip(kept.i.tolist(), kept.j.tolist(), strict=True)) == [(40, 130), (60, 150)]
     assert len(not_aligned(closing, along)) == 3
+
+
+def test_what_is_closed_across_a_corridor_alone_must_be_borne_out() -> None:
+    def closure(earlier: int, later: int, half_m: float, verdict: Verdict) -> Closure:
+        found = Match(np.zeros(3), np.eye(3), 0.8, 0.0, 1.0, 1.0, True, np.array([1.0, 0.0]))
+        return Closure(Candidate(earlier, later, half_m, 0.1), found, 1.0, 8, verdict)
+
+    across = [closure(10 * k, 100 + 10 * k, 8.0, Verdict.ACROSS) for k in (0, 20)]
+    narrow = closure(200, 300, 1.0, Verdict.ACROSS)
+    full = [closure(k, 100 + k, 1.0, Verdict.ACCEPTED) for k in range(LEAST_PROOFS)]
+    assert unproven([*across, narrow, *full]) == across[1:]
+    assert unproven([*across, narrow, *full[1:]]) == across

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable
-from dataclasses import dataclass
+from copy import copy
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -17,14 +18,17 @@ from pilotage.stack.mapping.slam.closures import (
     FAR_SLIP,
     LARGE_SLIP,
     NEIGHBOURHOOD,
+    TRIAL_SLIP,
     USUAL_SLIP,
     Closure,
     Slip,
     Verdict,
     candidates,
+    is_on_trial,
     judge,
     relative_covariances,
     spread,
+    unproven,
 )
 from pilotage.stack.mapping.slam.clouds import Clouds, cloud_of
 from pilotage.stack.mapping.slam.config import SlamConfig
@@ -50,8 +54,9 @@ SURE_M, SURE_RAD = 0.2, 0.05
 REFINEMENTS = 3
 SECOND_LOOK_M, SECOND_LOOKS, ATTACHED = 3.0, 3, 2
 """Largest window and number of the second looks, and closures with which a stretch is attached."""
-FAR_LOOPS = 8
-"""How often loops are looked for that are longer than the windows allow."""
+FAR_LOOPS, TRIALS, TRIAL_M = 8, 3, 12.0
+"""How often loops are looked for that are longer than the windows allow, and likewise across corridors alone;
+half a window's side for what must follow along them."""
 SPACING_STEP, MOST_SPACING_OFF = 0.005, 0.015
 LEAST_GAIN = 0.05
 """Share by which the objective must fall before another spacing of the beams is believed."""
@@ -181,6 +186,37 @@ class LoopCloser:
             self.state = solved(state.edges.and_more(edges), state.poses, ROBUST_STDS, self._slipped)
         return len(found), len(edges)
 
+    def copied(self) -> LoopCloser:
+        """Return one that can go on by itself."""
+        other = copy(self)
+        other.closures, other._searched = self.closures.copy(), self._searched.copy()
+        other._accepted = self._accepted.copy()
+        return other
+
+    def forget(self, window_m: float) -> None:
+        """Let pairs be searched again that were in a window of that size."""
+        self._searched = {pair: half_m for pair, half_m in self._searched.items() if half_m < window_m}
+
+    def refuse(self, closures: list[Closure]) -> None:
+        """Take closures back that nothing bore out; they are not searched again."""
+        refused = {(c.candidate.earlier, c.candidate.later) for c in closures}
+        known = {id(c) for c in closures}
+        self.closures = [c for c in self.closures if id(c) not in known]
+        self.closures += [replace(closure, verdict=Verdict.UNPROVEN) for closure in closures]
+        self._searched |= dict.fromkeys(refused, 0.0)
+        ends = {(int(self.submaps.references[a]), int(self.submaps.references[b])) for a, b in refused}
+
+        def others(edges: Edges) -> Edges:
+            pairs = zip(edges.i.tolist(), edges.j.tolist(), edges.closes.tolist(), strict=True)
+            return edges.chosen(
+                np.array([not closes or (i, j) not in ends for i, j, closes in pairs], np.bool_)
+            )
+
+        if refused & self._accepted:
+            self._accepted -= refused
+            self.closing = others(self.closing)
+            self.state = solved(others(self.state.edges), self.state.poses, ROBUST_STDS, self._slipped)
+
     def _joint_of_submaps(self) -> FloatArray:
         """(3 S, 3 S) covariance of the submaps' poses; computed anew only where the graph has changed."""
         state, known = self.state, self._joint
@@ -208,20 +244,41 @@ def closed(track: LocalTrack, config: SlamConfig, on_round: OnRound) -> LoopClos
     closer.grow(track)
     number = 0
 
-    def close(window_m: float, slip: Slip) -> int:
+    def close(closer: LoopCloser, window_m: float, slip: Slip) -> int:
         nonlocal number
         number += 1
         searched, count = closer.close(window_m, slip)
         on_round(f"round {number}: {searched} searched, {count} closed")
         return count
 
-    for _ in range(FAR_LOOPS):
+    def close_all(closer: LoopCloser) -> None:
         for window_m in config.search_windows_m:
-            close(window_m, USUAL_SLIP)
-        if not close(max(config.search_windows_m), FAR_SLIP):
+            close(closer, window_m, USUAL_SLIP)
+
+    widest_m = max(config.search_windows_m)
+
+    def close_far(closer: LoopCloser, window_m: float) -> None:
+        close_all(closer)
+        for _ in range(FAR_LOOPS):
+            if not close(closer, window_m, FAR_SLIP):
+                break
+            close_all(closer)
+
+    close_far(closer, widest_m)
+    for _ in range(TRIALS):
+        trial = closer.copied()
+        trial.forget(widest_m)
+        if not close(trial, widest_m, TRIAL_SLIP):
             break
+        trial.forget(widest_m)
+        close_far(trial, TRIAL_M)
+        on_trial = [c for c in trial.closures[len(closer.closures) :] if is_on_trial(c)]
+        doubtful = unproven(trial.closures[len(closer.closures) :])
+        if len(doubtful) < len(on_trial):
+            closer = trial
+        closer.refuse(doubtful)
     for _ in range(SECOND_LOOKS):
-        if not close(SECOND_LOOK_M, LARGE_SLIP):
+        if not close(closer, SECOND_LOOK_M, LARGE_SLIP):
             break
     return closer
 

@@ -30,12 +30,17 @@ MOST_PER_LATER, MOST_PER_EARLIER = 3, 6
 CLOSURE_STD_M = 0.1
 LEAST_TOLD = 1e-4 * np.eye(3)
 """What a closure tells in any direction: nothing, but no zero."""
+COURSE_RAD = 0.03
+"""How well the direction of an open course is known."""
 CLOSURE_FLOOR = 4.0 * np.diag([0.004**2, 0.004**2, 0.0015**2])
 WIDE_M = 2.0
 SECONDING, AGREEING = 0.65, 0.9
 """Share of the least score, and agreement of the walls, with which a match may second another."""
 NEIGHBOURHOOD = 8
 """A wide search must be seconded by closures of submaps at most so far along the path, on both sides."""
+LEAST_ON_TRIAL, LEAST_PROOFS, PROVING = 6, 3, 25
+"""Closures across a corridor alone that must second one in a wide window, and full ones that must follow from
+it, submaps at most so far along the path on both sides."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,13 +50,15 @@ class Slip:
     It widens the windows and the gate with the graph. Two closures across the same slip still have to agree
     without it. ``support`` closures more than usual are needed. With ``far`` a window that would be larger
     than the round's is cut to it: after a long way the place is nearer to where the graph has it than the
-    graph dares to say, or not in the window at all.
+    graph dares to say, or not in the window at all. On ``trial`` closures that leave their course open count
+    there too.
     """
 
     shift_m: float
     turn_rad: float
     support: int = 0
     far: bool = False
+    trial: bool = False
 
     def covariance(self) -> FloatArray:
         """(3, 3)."""
@@ -62,7 +69,10 @@ USUAL_SLIP = Slip(0.3, 0.04)
 LARGE_SLIP = Slip(1.5, 0.3, 2)
 """For a second look at stretches that should have been closed and were not."""
 FAR_SLIP = Slip(0.3, 0.04, 2, far=True)
-"""For loops so long that the graph would have them searched all over the building."""
+FAR_FROM_M = 8.0
+"""Half a window's side beyond which a search is one for such loops."""
+TRIAL_SLIP = replace(FAR_SLIP, trial=True)
+"""For loops so long that the graph would have them searched all over the building, and again in corridors."""
 
 
 class Verdict(StrEnum):
@@ -78,6 +88,7 @@ class Verdict(StrEnum):
     AGAINST_GRAPH = "contradicts the graph"
     AGAINST_OTHERS = "contradicts other closures"
     ALONE = "no other closure seconds it"
+    UNPROVEN = "no full closure followed from it"
 
 
 COUNTING = (Verdict.ACCEPTED, Verdict.ACROSS)
@@ -162,7 +173,7 @@ def candidates(
     half_m = WINDOW_STDS * std_m + slip.shift_m
     most_rad = np.where(torn, np.pi, MOST_TURN_RAD)
     half_rad = np.minimum(WINDOW_STDS * std_rad + slip.turn_rad, most_rad)
-    wanted = half_m > window_m if slip.far else half_m <= window_m
+    wanted = half_m > min(window_m, FAR_FROM_M) if slip.far else half_m <= window_m
     half_m = np.minimum(half_m, window_m)
     wanted &= distance < NEAR_M + np.minimum(half_m, reach_m)
     of_later: dict[int, int] = {}
@@ -230,7 +241,7 @@ def judge(
             verdict = Verdict.AGAINST_OTHERS
         elif support[n] < needed:
             verdict = Verdict.ALONE
-        elif not full[n] and closure.candidate.half_m > WIDE_M:
+        elif not (full[n] or closure.candidate.half_m <= WIDE_M or _on_trial(slip, int(support[n]))):
             # The next corridor may look the same across, and nothing along says no.
             verdict = Verdict.AMBIGUOUS
         else:
@@ -240,6 +251,29 @@ def judge(
     edges = edges.chosen(np.array([closures[k].verdict in COUNTING for k in sound]))
     references = submaps.references
     return closures, replace(edges, i=references[edges.i], j=references[edges.j])
+
+
+def _on_trial(slip: Slip, support: int) -> bool:
+    """Whether a closure across its course alone may count in a wide window until others prove it."""
+    return slip.trial and support >= LEAST_ON_TRIAL
+
+
+def is_on_trial(closure: Closure) -> bool:
+    """Whether a closure counts that leaves its course open in a wide window."""
+    return closure.verdict is Verdict.ACROSS and closure.candidate.half_m > WIDE_M
+
+
+def unproven(closures: list[Closure]) -> list[Closure]:
+    """Return those on trial that no full closures near them confirm."""
+    full = [c.candidate for c in closures if c.verdict is Verdict.ACCEPTED]
+    earlier = np.array([c.earlier for c in full], np.int64)
+    later = np.array([c.later for c in full], np.int64)
+
+    def proofs(candidate: Candidate) -> int:
+        near = np.abs(earlier - candidate.earlier) <= PROVING
+        return int(np.count_nonzero(near & (np.abs(later - candidate.later) <= PROVING)))
+
+    return [c for c in closures if is_on_trial(c) and proofs(c.candidate) < LEAST_PROOFS]
 
 
 def judged_alone(found: Match, config: SlamConfig) -> Verdict:
@@ -272,11 +306,18 @@ def _edges(closures: list[Closure]) -> Edges:
     """Edges between submaps, by their numbers."""
     relative = np.array([c.match.relative for c in closures]).reshape(-1, 3)
     hessian = np.array([c.match.hessian for c in closures]).reshape(-1, 3, 3)
+    # Across an open course a match is as sure as the course's direction over what it may be off along it.
+    course = np.array([c.match.course * COURSE_RAD * c.candidate.half_m for c in closures]).reshape(-1, 2)
+    c, s = np.cos(relative[:, 2]), np.sin(relative[:, 2])
+    across = np.zeros((len(closures), 3))
+    across[:, 0] = -c * course[:, 1] + s * course[:, 0]
+    across[:, 1] = s * course[:, 1] + c * course[:, 0]
+    floor = CLOSURE_FLOOR + across[:, :, None] * across[:, None, :]
     return Edges(
         np.array([c.candidate.earlier for c in closures], np.int64),
         np.array([c.candidate.later for c in closures], np.int64),
         relative,
-        edge_information(hessian, relative[:, 2], CLOSURE_STD_M, CLOSURE_FLOOR, LEAST_TOLD),
+        edge_information(hessian, relative[:, 2], CLOSURE_STD_M, floor, LEAST_TOLD),
         np.ones(len(closures), np.bool_),
     )
 
