@@ -12,7 +12,7 @@ from pilotage.stack.mapping.slam.earlier_map import KeyframeScans
 
 HIT_ODDS, MISS_ODDS, MOST_ODDS = 0.85, 0.25, 6.0
 SEEN_ODDS = 0.2
-MOST_CELLS = 60_000_000
+MOST_CELLS = 80_000_000
 MARGIN_M = 0.5
 
 
