@@ -173,8 +173,7 @@ def candidates(
     half_m = WINDOW_STDS * std_m + slip.shift_m
     most_rad = np.where(torn, np.pi, MOST_TURN_RAD)
     half_rad = np.minimum(WINDOW_STDS * std_rad + slip.turn_rad, most_rad)
-    # Beyond a break the graph's place is a guess, not one that the way there made unsure.
-    wanted = (half_m > min(window_m, FAR_FROM_M)) & ~torn if slip.far else half_m <= window_m
+    wanted = half_m > min(window_m, FAR_FROM_M) if slip.far else half_m <= window_m
     half_m = np.minimum(half_m, window_m)
     wanted &= distance < NEAR_M + np.minimum(half_m, reach_m)
     of_later: dict[int, int] = {}
