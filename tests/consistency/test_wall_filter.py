@@ -53,6 +53,11 @@ def test_it_knows_where_it_is_to_a_hand() -> None:
     assert sample().worst_m.max() < 0.1
 
 
+def test_the_laser_localizer_is_this_filter_where_walls_are_lines() -> None:
+    ours = sample("stack.localizer={name: laser}", runs=1)
+    assert (ours.nees == sample().nees[:1]).all()
+
+
 def test_nees_lies_in_its_pointwise_band() -> None:
     # 99.9 % band at each step; 95 % of 290 correlated steps inside fails for a right filter below 1e-3.
     assert fraction_in_band(sample().nees, 3, 0.999) >= 0.95

@@ -27,6 +27,7 @@ from pilotage.stack.control.wander import WanderConfig, Wanderer
 from pilotage.stack.interface import Belief, BeliefStatus
 from pilotage.stack.localization.ekf_walls import EkfWallsConfig, EkfWallsLocalizer
 from pilotage.stack.localization.global_search import GlobalSearch, GlobalSearchConfig
+from pilotage.stack.localization.laser import LaserConfig
 from pilotage.stack.localization.localizer import LOCALIZERS
 from pilotage.stack.localization.odometry_prediction import OdometryNoise, OdometryPrediction
 from pilotage.stack.localization.particle_filter import MclConfig
@@ -134,7 +135,8 @@ def test_a_robot_carried_elsewhere_notices_at_once() -> None:
 
 
 def test_only_localizers_that_search_start_without_a_pose() -> None:
-    never = {"ekf-walls": EkfWallsConfig(recovery=None), "particle-filter": MclConfig(relocalize=False)}
+    walls, cells = EkfWallsConfig(recovery=None), MclConfig(relocalize=False)
+    never = {"ekf-walls": walls, "particle-filter": cells, "laser": LaserConfig(walls=walls, cells=cells)}
     for entry in LOCALIZERS:
         nowhere = told_of(initial=Belief.anywhere(ROOM.bounds_m))
         config = entry.config()

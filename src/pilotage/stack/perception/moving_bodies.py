@@ -56,16 +56,18 @@ class MovingBodies:
 
     One that stands is left to the mapper; one that walks is nothing to be mapped but somebody to give way to,
     and so is, where people are about, one that is too new to tell.
-    Idle without exactly one lidar, without known walls, or while the robot does not know where it is.
+    Idle where told to mind nobody, without exactly one lidar or known walls, or while the robot is lost.
     Groups wider than ``tracks.widest_m`` without a notch between two are left to the mapper.
     """
 
-    def __init__(self, config: MovingBodiesConfig, robot: RobotKnowledge, chart: WorldMap) -> None:
+    def __init__(
+        self, config: MovingBodiesConfig, robot: RobotKnowledge, chart: WorldMap, *, minds: bool = True
+    ) -> None:
         self._config = config
         self._movers = Movers(config.tracks)
         lidars = list(robot.sensors_of(LidarConfig).items())
         walls = chart.walls
-        self._works = len(lidars) == 1 and len(walls.segments_m) + len(walls.circles_m) > 0
+        self._works = minds and len(lidars) == 1 and len(walls.segments_m) + len(walls.circles_m) > 0
         self._walks: BoolArray = np.zeros(0, np.bool_)
         self._t_s = self.seen_s = -math.inf
         self._field = 0.0, 0.0

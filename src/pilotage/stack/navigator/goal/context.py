@@ -86,7 +86,8 @@ class Context:
         self.goals: list[Goal] = list(task.goals)
         self._tolerance_m = task.goal_tolerance_m
         self.turns_on_the_spot = robot.motion.least_turning_radius_m == 0.0
-        self._bodies = MovingBodies(config.moving_bodies, robot, own_map.told)
+        # Without a mapper it minds nothing but its map: who shows it wrong scans shows it nobody.
+        self._bodies = MovingBodies(config.moving_bodies, robot, own_map.told, minds=parts.mapper is not None)
         self._gives_way = GiveWay(config.give_way, robot, self._bodies)
         self._waits_s: float | None = None
         self.tries = 0
