@@ -178,6 +178,8 @@ class MovingBodies:
         ``mapped_m`` (N, 3) explain may be somebody as well, who goes anywhere: in a group nobody is told
         apart.
         """
+        if not len(self._movers.tracks) and not self.about:
+            return np.empty((steps, 0, 3))
         people = self._walks | np.isnan(self._movers.tracks[:, kernels.X0])
         discs = self._movers.foretold(step_s, step_s, steps)[:, people]
         if not self.about:
@@ -209,7 +211,7 @@ class MovingBodies:
 
     def nearest_m(self, x_m: float, y_m: float) -> float:
         """Distance to the edge of the nearest of them; inf without any."""
-        discs = self.discs_m()
-        if not len(discs):
+        if not self._walks.any():
             return math.inf
+        discs = self.discs_m()
         return float((np.hypot(discs[:, 0] - x_m, discs[:, 1] - y_m) - discs[:, 2]).min())

@@ -344,6 +344,8 @@ class Context:
 
     def _mute(self, beside: FloatArray) -> FloatArray:
         """(K, 2) middles, map frame, of bodies among returns that no mate who talks says it is."""
+        if not len(beside):
+            return NO_POINTS
         # Whoever is met is as large as the robot itself; its near side alone is seen.
         middles = self._on_map(voronoi_window.bodies(beside, self.radius_m))
         for sent_s, word in self.mates.values():
