@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from pilotage.core.errors import InputError
 from pilotage.core.types import FloatArray, IntArray
 from pilotage.evaluation.endings import ending_of
 from pilotage.evaluation.judge import SUCCESS, Judgement, judge
@@ -186,6 +187,12 @@ def read_study(folder: Path) -> StudyTable:
     rows, trouble = read_rows(folder / DATABASE)
     if trouble:
         raise save_what_is_left(folder, study, trouble)
+    for row in rows:
+        if not 0 <= row["cell"] < len(study.cells):
+            raise InputError(
+                f"{folder}: expected trials of the {len(study.cells)} settings of study.yaml, found row "
+                f"{row['row']} of setting {row['cell']}: is it the definition that they were run by?"
+            )
     done = [row for row in rows if row["status"] == "done"]
     numbers = [flat(row["metrics"]) | flat(row["timings"]) for row in done]
     names = sorted({name for row in numbers for name in row})
