@@ -12,9 +12,11 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+import yaml
 
 from pilotage.cli.main import main
 from pilotage.core.errors import InputError
+from pilotage.core.yaml_text import load_yaml
 from pilotage.experiments.studies.database import DATABASE
 from pilotage.experiments.studies.engine import run_study
 from pilotage.experiments.studies.options import StudyOptions
@@ -93,6 +95,21 @@ def test_a_broken_database_is_told_in_one_line_and_what_is_left_is_exported(
         for entry in saved[1:]:
             row = dict(zip(header, entry.split(","), strict=True))
             assert float(row["planned_length_m"]) == expected(int(row["row"]))["planned_length_m"]
+
+
+def test_a_definition_with_fewer_settings_than_its_trials_is_told_in_one_line(
+    finished: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = tmp_path / "x"
+    shutil.copytree(finished, folder, ignore=shutil.ignore_patterns("report.html"))
+    definition = folder / "study.yaml"
+    tree = load_yaml(definition.read_text(encoding="utf-8"), "")
+    del tree["factors"][0]["values"][1:]
+    definition.write_text(yaml.safe_dump(tree), encoding="utf-8")
+    assert main(["report", str(folder)]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert "expected trials of the 1 settings of study.yaml, found row 1 of setting 1" in line
+    assert not (folder / "report.html").exists()
 
 
 def test_the_database_of_something_else_is_left_alone(tmp_path: Path) -> None:
