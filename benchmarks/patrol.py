@@ -1,12 +1,13 @@
 """Patrol strategies against one another on the graph alone: idleness, radio, failures.
 
-python -m benchmarks.patrol --seeds 12 [--floors cumberland museum ...] [--teams 2 4 8] [--what compare radio
-failure]
+python -m benchmarks.patrol --seeds 12 [--floors cumberland museum MAP.yaml ...] [--teams 2 4 8]
+[--what compare radio failure]
 
 Floors are the literature's given graphs (``../shared/data/patrol``, edges as long as the paths on their
-maps) and graphs derived from other maps. Trials of one seed share starts, paces and luck on the way.
-Idleness is in units of the bound, the best tour over the robots' summed speed, after the first third of the
-time. Differences: Wilcoxon's signed-rank test on seeds, corrected over all rivals by Holm.
+maps), graphs derived from other maps, and any other map, with the ``.graph`` beside it if there is one.
+Trials of one seed share starts, paces and luck on the way. Idleness is in units of the bound, the best tour
+over the robots' summed speed, after the first third of the time. Differences: Wilcoxon's signed-rank test on
+seeds, corrected over all rivals by Holm.
 """
 
 from __future__ import annotations
@@ -47,15 +48,18 @@ DERIVED: dict[str, tuple[str, float, tuple[float, float] | None]] = {
 
 def floor_graph(name: str) -> PatrolGraph:
     """A given graph on its floor, one derived from a map, or by ``random-K`` places in a square by lot."""
-    if name in GIVEN:
-        graph = read_patrol_graph(DATA / f"patrol/{name}.graph")
-        x, y = graph.vertices_xy_m[0]
-        world = load_chart(str(DATA / f"patrol/{name}.yaml"))
-        return on_floor(graph, Floor.of(world, 0.25, inside_xy_m=(float(x), float(y))))
+    source = DATA / f"patrol/{name}.yaml" if name in GIVEN else Path(name)
+    if source.suffix == ".yaml":
+        world, file = load_chart(str(source)), source.with_suffix(".graph")
+        if not file.exists():
+            return derive_graph(world, Floor.of(world, 0.25)).graph
+        graph = read_patrol_graph(file)
+        x, y = graph.vertices_xy_m[0].tolist()
+        return on_floor(graph, Floor.of(world, 0.25, inside_xy_m=(x, y)))
     if name.startswith("random-"):
         return random_graph(int(name.removeprefix("random-")))
-    source, radius_m, inside = DERIVED[name]
-    world = load_chart(source if source == "museum" else str(DATA / source))
+    place, radius_m, inside = DERIVED[name]
+    world = load_chart(place if place == "museum" else str(DATA / place))
     return derive_graph(world, Floor.of(world, radius_m, inside_xy_m=inside)).graph
 
 

@@ -275,7 +275,7 @@ class TestMuseum:
         experiment = build(load_mission("museum-patrol", ["team.size=1", start], seed=0))
         context = experiment.team[0].stack._context  # type: ignore[attr-defined]
         graph, roadmap = context.task.graph, context.roadmap
-        behind = graph.nearest(8.62, 15.37)
+        behind = int(np.argmin(np.hypot(*(graph.vertices_xy_m - [8.62, 15.37]).T)))
         assert context.came_from == roadmap.nearest(8.62, 15.37) != behind
         assert graph.shortest_m[context.came_from, behind] > 10.0
 

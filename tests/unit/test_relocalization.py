@@ -21,7 +21,7 @@ from pilotage.stack.localization.laser import LaserConfig, LaserLocalizer
 from pilotage.stack.localization.likelihood_field import LikelihoodField
 from pilotage.stack.localization.particle_filter import ParticleFilterLocalizer
 from pilotage.stack.localization.relocalization import TRIAL_SCANS, Relocalization, Trial
-from pilotage.stack.localization.scan_search import RecentScans, ScanSearch
+from pilotage.stack.localization.scan_search import LEAST_POINTS, RecentScans, ScanSearch
 from support.laser_rooms import furnished, ranges
 from support.robots import told_of
 
@@ -92,8 +92,10 @@ def test_scans_of_another_building_fit_nowhere() -> None:
     assert ScanSearch(field, bounds_m).best(rng.uniform(-4.0, 4.0, (300, 2))) is None
 
 
-@pytest.mark.parametrize(("share", "passes"), [(0.9, True), (0.3, False)])
-def test_a_place_counts_after_a_trial(share: float, passes: bool) -> None:
+@pytest.mark.parametrize(
+    ("share", "weight", "passes"), [(0.9, 1.0, True), (0.3, 1.0, False), (0.9, 2.0 / 60.0, False)]
+)
+def test_a_place_counts_after_a_trial(share: float, weight: float, passes: bool) -> None:
     walls, (field, bounds_m) = furnished(), field_of(furnished(), cells=False)
     again, mean = Relocalization(field, bounds_m), np.zeros(3)
     pose, found = np.array([2.0, 3.5, 0.2]), None
@@ -109,9 +111,17 @@ def test_a_place_counts_after_a_trial(share: float, passes: bool) -> None:
     verdicts = []
     for _ in range(2 * TRIAL_SCANS):
         again.move(OdometryIncrement(0.1, 0.0))
-        verdicts.append(again.passed(share, 0.9))
-    assert [verdict for verdict in verdicts if verdict is not None] == [passes]
-    assert again.trial is None
+        verdicts.append(again.passed(share, weight, 0.9))
+    assert [verdict for verdict in verdicts if verdict is not None] == ([passes] if weight == 1.0 else [])
+    assert (again.trial is None) == (weight == 1.0)  # two beams of 60 say nothing yet
+
+
+def test_few_points_fit_nowhere() -> None:
+    walls, (field, bounds_m) = furnished(), field_of(furnished(), cells=False)
+    seen = seen_from(walls, np.array([2.0, 3.5, 0.2]))
+    search = ScanSearch(field, bounds_m)
+    assert search.best(seen) is not None
+    assert search.best(seen[: LEAST_POINTS - 1]) is None
 
 
 def test_a_robot_told_nothing_and_one_carried_away_find_themselves() -> None:

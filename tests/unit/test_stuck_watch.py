@@ -8,17 +8,24 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
+from pilotage.core.types import FloatArray
 from pilotage.evaluation.stuck_watch import StuckWatch
 
 PLACES = np.array([[0.0, 0.0], [0.8, 0.0], [1.6, 0.0], [9.0, 0.0]])
 """The first three share borders: a visit is counted to the nearest within a metre."""
 
 
-def stuck(path: Callable[[int], tuple[float, float]], *, waits: bool = False, visit_m: float = 1.0) -> bool:
-    watch = StuckWatch(PLACES, 1, 60.0)
+def stuck(
+    path: Callable[[int], tuple[float, float]],
+    *,
+    waits: bool = False,
+    visit_m: float = 1.0,
+    places: FloatArray = PLACES,
+) -> bool:
+    watch = StuckWatch(places, 1, 60.0, visit_m)
     for t in range(180):
         xy = path(t)
-        away = np.hypot(*(PLACES - xy).T)
+        away = np.hypot(*(places - xy).T)
         place = int(np.argmin(away)) if away.min() <= visit_m else -1
         watch.look(0, float(t), xy, place, waits=waits)
     return 0 in watch.since_s
@@ -34,10 +41,14 @@ def test_who_stays_is_told_even_if_it_shakes_on_a_border(at: float, shakes_m: fl
 def test_who_drives_or_makes_short_rounds_is_not() -> None:
     assert not stuck(lambda t: (0.1 * t, 0.0))
     assert not stuck(lambda t: (0.4 + 0.4 * math.cos(0.1 * t), 0.0))
+    # 0.6 m of the 1.6 between two places: half a metre before each it turns.
+    apart = np.delete(PLACES, 1, axis=0)
+    assert not stuck(lambda t: (0.8 + 0.3 * math.cos(0.3 * t), 0.0), places=apart)
+    assert stuck(lambda t: (0.8 + 0.15 * math.cos(0.3 * t), 0.0), places=apart)
 
 
 def test_what_is_told_is_when_it_came_to_a_stop() -> None:
-    watch = StuckWatch(PLACES, 2, 60.0)
+    watch = StuckWatch(PLACES, 2, 60.0, 1.0)
     told = [
         (t, robot)
         for t in range(200)

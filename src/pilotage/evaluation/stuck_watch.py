@@ -7,13 +7,16 @@ import math
 from pilotage.core.types import FloatArray
 
 STUCK_M = 1.0
+TRULY_M, TRULY_SHARE = 0.25, 0.4
+"""Who goes between two places comes so far from the border at least, and that share of the path between where
+they count as visited."""
 
 
 class StuckWatch:
     """Tells a robot that stays within a metre for longer than ``stuck_s`` although nothing told it to wait.
 
-    A round may be shorter than that metre: who goes from one place to another that is so near gets on. Two
-    that shake on the border between two places, or of one, do not.
+    A round may be shorter than that metre, for places are visited ``visit_m`` before them: who goes from one
+    to another that is so near gets on. Two that shake on the border between two places, or of one, do not.
 
     Attributes
     ----------
@@ -21,8 +24,8 @@ class StuckWatch:
         By robot from when on it was found stuck, the first time.
     """
 
-    def __init__(self, places_xy_m: FloatArray, robots: int, stuck_s: float) -> None:
-        self._places, self._stuck_s = places_xy_m, stuck_s
+    def __init__(self, places_xy_m: FloatArray, robots: int, stuck_s: float, visit_m: float) -> None:
+        self._places, self._stuck_s, self._visit_m = places_xy_m, stuck_s, visit_m
         self._anchors = [(math.nan, math.nan, 0.0)] * robots
         self._last, self._went_m = [-1] * robots, [0.0] * robots
         self.since_s: dict[int, float] = {}
@@ -47,4 +50,5 @@ class StuckWatch:
         if last < 0:
             return False
         apart_m = math.hypot(*(self._places[place] - self._places[last]).tolist())
-        return apart_m < STUCK_M and self._went_m[robot] >= 0.4 * apart_m
+        drive_m = apart_m - self._visit_m
+        return drive_m < STUCK_M and self._went_m[robot] >= max(TRULY_M, TRULY_SHARE * drive_m)

@@ -129,24 +129,40 @@ class Floor:
             x0 + (near[:, 1] + 0.5) * self.cell_m - x, y0 + (near[:, 0] + 0.5) * self.cell_m - y
         )
         if len(near) == 0 or away_m.min() > SNAP_M:
-            found = f"{self.clearance_m[row, column]:.2f} m" if self._contains(x, y) else "one beyond the map"
             raise InputError(
                 f"{what} ({x:g}, {y:g}): expected a place on the reachable floor, {self.radius_m:g} m from "
-                f"walls, found {found}"
+                f"walls, found {self._found_at(x, y)}"
             )
         best = near[np.argmin(away_m)]
         return int(best[0]), int(best[1])
 
-    def _contains(self, x_m: float, y_m: float) -> bool:
+    def _found_at(self, x_m: float, y_m: float) -> str:
+        """What there is at a place that is not reachable."""
         rows, columns = self.reachable.shape
         x0, y0 = self.origin_xy_m
-        return bool(0.0 <= x_m - x0 <= columns * self.cell_m and 0.0 <= y_m - y0 <= rows * self.cell_m)
+        if not (0.0 <= x_m - x0 <= columns * self.cell_m and 0.0 <= y_m - y0 <= rows * self.cell_m):
+            return "one beyond the map"
+        clearance_m = float(self.clearance_m[self.cell_of(np.array([x_m, y_m]))])
+        apart = ", but no passage so wide leads there; take a smaller robot"
+        return f"{clearance_m:.2f} m" + apart * (clearance_m >= self.radius_m)
 
     def costs_from(self, point_xy_m: FloatArray, what: str = "place") -> tuple[FloatArray, IntArray]:
         """Cells of path, by neighbours, from a place to each cell, and each one's predecessor, both flat."""
         row, column = self.nearest_cell(point_xy_m, what)
         factor = np.where(self.reachable, 1.0, np.inf)
         return travel_costs(factor, row * factor.shape[1] + column, 1.0, 1.0)
+
+    def nearest_of(self, places_xy_m: FloatArray, point_xy_m: FloatArray, what: str = "place") -> int:
+        """Which of places (P, 2) has the shortest path to a point; the first of equal ones.
+
+        Raises
+        ------
+        InputError
+            Where the point or a place is off the reachable floor.
+        """
+        costs, _ = self.costs_from(point_xy_m, what)
+        rows, columns = np.array([self.nearest_cell(place) for place in places_xy_m]).T
+        return int(np.argmin(costs[rows * self.reachable.shape[1] + columns]))
 
     def coarser(self) -> Floor:
         """The same floor in cells of twice the side, each reachable where any of its four is."""

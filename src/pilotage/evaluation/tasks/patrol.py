@@ -11,7 +11,7 @@ import numpy as np
 
 from pilotage.core.config import Config
 from pilotage.core.errors import InputError
-from pilotage.core.types import Event, FloatArray
+from pilotage.core.types import Event, FloatArray, IntArray
 from pilotage.evaluation.driving import driving_metrics, header
 from pilotage.evaluation.finished import FinishedRun, RobotRun, Verdict
 from pilotage.evaluation.floor_ages import FloorAges
@@ -48,7 +48,7 @@ class PatrolConfig(Config):
     """A place is visited by a robot whose centre is this near."""
     stuck_s: Positive = 60.0
     """A robot on duty that stays within a metre for longer is deadlocked: if nothing told it to wait, and it
-    does not go between places to visit that are nearer to each other than that."""
+    does not go between places to visit that are nearer to each other than that and ``visit_m``."""
     warm_s: NonNegative = 300.0
     """Idleness and coverage count from then on, or from a quarter of the duration if that is earlier."""
     window_s: Positive = 60.0
@@ -75,7 +75,7 @@ class PatrolTask:
         self._config, self._names = config, [robot.name for robot in mission.members]
         self._chart = setting.chart
         self._site, graph = _site(config, setting)
-        self.patrol = PatrolSite(graph, config.visit_m)
+        self.patrol = PatrolSite(graph, config.visit_m, _starts(graph, self._site, setting))
         self.columns, self.goals = {}, ()
         self.events: list[Event] = []
         self._visits = VisitLog(graph.vertices_xy_m, config.visit_m, len(self._names))
@@ -90,7 +90,7 @@ class PatrolTask:
         self._guards = GuardLog(len(self._names))
         self._step = 0
         self._contacts = [0] * len(self._names)
-        self._stuck = StuckWatch(graph.vertices_xy_m, len(self._names), config.stuck_s)
+        self._stuck = StuckWatch(graph.vertices_xy_m, len(self._names), config.stuck_s, config.visit_m)
         self._series: list[tuple[float, float, float]] = []
 
     @staticmethod
@@ -231,6 +231,17 @@ def _site(config: PatrolConfig, setting: TaskSetting) -> tuple[Floor, PatrolGrap
         return floor, derived.graph
     floor = Floor.of(setting.chart, radius_m, inside_xy_m=inside)
     return floor, on_floor(read_patrol_graph(Path(config.graph)), floor, config.graph)
+
+
+def _starts(graph: PatrolGraph, floor: Floor, setting: TaskSetting) -> IntArray:
+    """(N,) which vertex each robot comes to first: the nearest as the crow flies may lie behind a wall."""
+    found = []
+    for index, robot in enumerate(setting.mission.members):
+        start = setting.mission.start_of(robot)
+        assert start is not None, "settled when the mission was built"
+        place = np.array([start.x_m, start.y_m])
+        found.append(floor.nearest_of(graph.vertices_xy_m, place, f"start of robot {index}"))
+    return np.array(found, dtype=np.int64)
 
 
 def _lidar(setting: TaskSetting, index: int) -> LidarConfig | None:

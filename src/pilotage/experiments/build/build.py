@@ -320,13 +320,12 @@ def _share(mission: Mission, index: int, sheet: RobotKnowledge, whole: Task) -> 
         if mission.team.battery is not None:
             raise InputError(f"team.battery: expected task 'patrol', found '{mission.task.name}'")
         return None
-    starts = np.array([_nearest(mission, k, site) for k in range(len(mission.members))])
     setting = PatrolSetting(
-        site.graph, index, starts, sheet.motion.top_speed_m_s, sheet.streams.stream("strategy")
+        site.graph, index, site.starts, sheet.motion.top_speed_m_s, sheet.streams.stream("strategy")
     )
     assert mission.team.strategy is not None, "the task looked"
     strategy = build_component(STRATEGIES, mission.team.strategy, "strategy", setting)
-    return PatrolTask(site.graph, site.visit_m, index, starts, strategy, _supply(mission))
+    return PatrolTask(site.graph, site.visit_m, site.starts, index, strategy, _supply(mission))
 
 
 def _supply(mission: Mission) -> Supply | None:
@@ -341,13 +340,6 @@ def _stations(mission: Mission) -> list[tuple[float, float]]:
     """Each robot's charging station; none where nobody charges."""
     places = [mission.station_of(index) for index in range(len(mission.members))]
     return [place for place in places if place is not None]
-
-
-def _nearest(mission: Mission, index: int, site: PatrolSite) -> int:
-    """The vertex nearest to a robot's start."""
-    start = mission.start_of(mission.members[index])
-    assert start is not None, "settled above"
-    return site.graph.nearest(start.x_m, start.y_m)
 
 
 def _obstacles(

@@ -16,6 +16,7 @@ from pilotage.core.errors import InputError, unknown_name
 from pilotage.core.types import Pose2
 from pilotage.experiments.values import parse_yaml, read_text
 from pilotage.maps.crater_cache import cached_crater_terrain
+from pilotage.maps.edge import closed
 from pilotage.maps.elevation_file import read_elevation
 from pilotage.maps.grid_file import GRID_SUFFIXES, read_grid
 from pilotage.maps.grid_image import read_grey, read_hazard_image
@@ -95,8 +96,10 @@ def load_chart(source: MapSource, markings: MarkingsConfig = PLAIN) -> WorldMap:
 
 
 def chart_of(world: WorldConfig) -> WorldMap:
-    """The chart of a mission's world, its table of landmarks put on it."""
+    """The chart of a mission's world, its edge closed where cells are its walls, its landmarks put on it."""
     chart = load_chart(world.map, world.markings)
+    if chart.grid is not None and chart.geometry is None and not chart.open_ground:
+        chart = replace(chart, grid=closed(chart.grid))  # its bounds stay: they are those of the floor
     if world.landmarks is None:
         return chart
     if isinstance(world.landmarks, str):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from scipy.ndimage import binary_dilation
@@ -72,7 +73,7 @@ class LikelihoodField:
                 f"'{chart.name}'; see stack.map"
             )
         self._half_m, self._bounds_m = half_m, chart.bounds_m
-        self._nearest = NearestObstacles.from_map(walls, resolution_m)
+        self._nearest = _nearest_of(chart, walls, resolution_m)
         self._known = _known_of(chart)
         std_m = math.sqrt(range_var_m2 + (least_std_m if field_std_m is None else field_std_m) ** 2)
         if std_m == 0.0:
@@ -149,6 +150,17 @@ class LikelihoodField:
     def distances_m(self, points: FloatArray) -> FloatArray:
         """(K,) from points (K, 2) of the map frame to the nearest wall or occupied cell."""
         return np.maximum(self._nearest.at(points) - self._half_m, 0.0)
+
+
+_SHARED: WeakKeyDictionary[WorldMap, dict[float, NearestObstacles]] = WeakKeyDictionary()
+
+
+def _nearest_of(chart: WorldMap, walls: SegmentMap, resolution_m: float) -> NearestObstacles:
+    """What of a map's walls is nearest where; robots that are told the same map work it out once."""
+    known = _SHARED.setdefault(chart, {})
+    if resolution_m not in known:
+        known[resolution_m] = NearestObstacles.from_map(walls, resolution_m)
+    return known[resolution_m]
 
 
 def _known_of(chart: WorldMap) -> OccupancyGrid | None:

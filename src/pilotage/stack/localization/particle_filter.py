@@ -34,7 +34,7 @@ from pilotage.stack.localization.odometry_watch import (
     increment_of,
 )
 from pilotage.stack.localization.relocalization import STDS, Relocalization
-from pilotage.stack.localization.self_check import ExplainedShare, SelfCheck
+from pilotage.stack.localization.self_check import LEAST_SEEN, ExplainedShare, SelfCheck
 
 NAME = "particle-filter"
 COLUMNS = {"particles": "1", "effective_particles": "1", "scan_parts": "1", "localized": "1"}
@@ -291,12 +291,13 @@ class ParticleFilterLocalizer:
         step = mean - prior[0]
         step[2] = wrap_to_pi(float(step[2]))
         self._check.tell(t_s, beside, at_wall, float(step @ np.linalg.solve(prior[1], step)), POSE_DOF)
-        self._unexplained = self._unexplained + 1 if at_wall < LEAST_AT_WALL * len(points) else 0
+        if len(points) >= LEAST_SEEN:
+            self._unexplained = self._unexplained + 1 if at_wall < LEAST_AT_WALL * len(points) else 0
         if self._unexplained >= UNEXPLAINED_SCANS:
             self._check.alarm(t_s)
-        share = at_wall / len(points)
+        share, weight = at_wall / len(points), len(points) / len(self._picked)
         again = self._relocalization
-        passed = None if again is None else again.passed(share, self._explained.usual)
+        passed = None if again is None else again.passed(share, weight, self._explained.usual)
         if passed:
             self._check.begin_anew(t_s)
             self._found = True
@@ -306,13 +307,13 @@ class ParticleFilterLocalizer:
             self._check.alarm(t_s)
         if self._check.lost(t_s) or prior[1][0, 0] + prior[1][1, 1] > UNSURE_M**2:
             self._found = False
-        as_usual = self._explained.tell(share, self._found)
+        as_usual = self._explained.tell(share, self._found, weight)
         if as_usual:
             self._found = True
         elif not self._found:
             self._check.alarm(t_s)
         # Crowds do not change which share of what ends about a wall ends at it; a wrong pose does.
-        if beside and not self._sharp.tell(at_wall / beside, self._found):
+        if beside and not self._sharp.tell(at_wall / beside, self._found, beside / len(self._picked)):
             self._check.alarm(t_s)
 
     def _resample(self, weights: FloatArray, mean: FloatArray, cov: FloatArray, growth: float) -> None:

@@ -24,10 +24,12 @@ AGAIN_SCANS = 3
 """After so many new scans it searches again."""
 TRIAL_SCANS, TRIAL_M, TURN_AS_PATH_M = 15, 1.5, 0.5
 """A place counts after so many scans and so much path from which it went on to fit,"""
+TRIAL_WEIGHT = 5.0
+"""and readings of so many full scans: on open ground a few of each say next to nothing;"""
 LONGEST_TRIAL_M = 5.0
 """Where the map says so little that a trial does not end, the search begins anew."""
 FITTING = 0.85
-"""by this share of what is usual; less, and it is given up."""
+"""this share of what is usual; less, and it is given up."""
 LEAST_USUAL = 0.6
 """What is usual at least: share of the beams on the map's walls."""
 SAME_M, SAME_RAD = 0.3, 0.15
@@ -38,9 +40,11 @@ STDS = np.array([0.1, 0.1, 0.02])
 
 @dataclass(slots=True)
 class Trial:
-    """A place that is being tried: scans, the sum of their shares at walls, and the path since."""
+    """A place that is being tried: scans, what they count in all (readings over those of full ones), what of
+    that fits, and the path since."""
 
     scans: int = 0
+    weight: float = 0.0
     fitting: float = 0.0
     path_m: float = 0.0
 
@@ -105,14 +109,17 @@ class Relocalization:
         near = float(np.hypot(off[0], off[1])) < SAME_M and abs(wrap_to_pi(float(off[2]))) < SAME_RAD
         return None if near else place.pose
 
-    def passed(self, at_wall_share: float, usual: float) -> bool | None:
-        """One scan of a trial: whether the place has proved itself; None while that is open."""
+    def passed(self, at_wall_share: float, weight: float, usual: float) -> bool | None:
+        """One scan of a trial, of readings over a full one's: whether the place has proved itself; None while
+        that is open."""
         trial = self.trial
         if trial is None:
             return None
         trial.scans += 1
-        trial.fitting += at_wall_share
-        if trial.scans < TRIAL_SCANS or trial.path_m < TRIAL_M:
+        trial.weight += weight
+        trial.fitting += weight * at_wall_share
+        enough = trial.scans >= TRIAL_SCANS and trial.weight >= TRIAL_WEIGHT and trial.path_m >= TRIAL_M
+        if not enough:
             return None
         self.trial = None
-        return trial.fitting / trial.scans >= FITTING * float(np.fmax(usual, LEAST_USUAL))
+        return trial.fitting / trial.weight >= FITTING * float(np.fmax(usual, LEAST_USUAL))

@@ -22,6 +22,8 @@ STD_M, OPEN_SCORE = 0.15, -0.3
 REACH_M, STEP_RAD = 10.0, 0.02
 """Points farther away than a turn by one step moves by more than their spread are left out."""
 LEVELS, BUDGET, MOST_POINTS = 6, 3_000_000, 150
+LEAST_POINTS = 60
+"""Fewer fit somewhere on any map, as what is seen on open ground does: no place is found by them."""
 LEAST_SCORE, PERFECT = 0.45, 0.95
 """Mean score a point from which a place is looked at, and that of a map and scans without any error, which
 the cells leave."""
@@ -118,7 +120,9 @@ class ScanSearch:
         self._half_m = 0.5 * max(width, height)
 
     def best(self, points: FloatArray) -> Place | None:
-        """The best place for points (K, 2) in the robot's frame; None where they fit nowhere."""
+        """The best place for points (K, 2) in the robot's frame; None where they fit nowhere, or are few."""
+        if len(points) < LEAST_POINTS:
+            return None
         points = np.ascontiguousarray(points[:: max(1, math.ceil(len(points) / MOST_POINTS))])
         found, whole = self._search(points, LEAST_SCORE, PASS_OVER_NONE)
         if not (whole and np.isfinite(found[3])):

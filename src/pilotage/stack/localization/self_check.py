@@ -151,12 +151,19 @@ class ExplainedShare:
         """Forget the last scans: they were seen from a place that was the wrong one."""
         self._recent = self._usual
 
-    def tell(self, share: float, trusted: bool) -> bool:
-        """One scan; returns whether the last ones fit as well as usual."""
+    def tell(self, share: float, trusted: bool, weight: float = 1.0) -> bool:
+        """One scan; returns whether the last ones fit as well as usual.
+
+        Parameters
+        ----------
+        weight
+            What it counts: its readings over those of a full scan. On open ground one of two readings is
+            half of them, and says next to nothing.
+        """
         if math.isnan(self._usual):
             self._recent = self._usual = share
-        self._recent += RECENT * (share - self._recent)
-        rate, off = USUAL if trusted else FORGOTTEN, self._recent - self._usual
+        self._recent += weight * RECENT * (share - self._recent)
+        rate, off = weight * (USUAL if trusted else FORGOTTEN), self._recent - self._usual
         kept = self._usual - max((1.0 - KEPT) * self._usual, DEVIATIONS * self._deviation)
         as_usual = self._recent >= max(kept, LEAST_KEPT * self._usual)
         self._usual += rate * off

@@ -74,8 +74,8 @@ def derive_graph(world: WorldMap, floor: Floor, config: DerivationConfig | None 
     Rooms are what is left of the floor where passages narrower than a door are closed, grown back (Bormann
     et al. 2016, morphological segmentation); doors are where two of them meet. Viewpoints are chosen
     greedily until every point that the robot's body can cover is in view from one within reach; a point that
-    no place of the body's sees at all is left out. Edges join
-    vertices whose regions, by length of path, touch.
+    no place of the body's sees at all is left out. Edges join vertices whose regions, by length of path,
+    touch.
 
     Raises
     ------

@@ -89,7 +89,3 @@ class PatrolGraph:
         while found[-1] != goal:
             found.append(int(self.next_hop[found[-1], goal]))
         return found
-
-    def nearest(self, x_m: float, y_m: float) -> int:
-        """The vertex nearest to a point, as the crow flies."""
-        return int(np.argmin(np.hypot(*(self.vertices_xy_m - [x_m, y_m]).T)))

@@ -23,22 +23,23 @@ def read_patrol_graph(path: Path) -> PatrolGraph:
     """Read a ``.graph`` file.
 
     Numbers and letters between blanks: how many vertices, width and height of the map in pixels, metres a
-    pixel, x and y of its lower left corner; then for each vertex its number, x and y in pixels (y up), how
-    many neighbours, and of each its number, a compass direction and the cost of the edge in pixels. Costs
-    that differ both ways are averaged (they are rounded by hand); none is taken for less than the straight
-    line.
+    pixel, x and y of where pixels are counted from; then for each vertex its number, x and y in pixels (y
+    up, below 0 where they are counted from the middle), how many neighbours, and of each its number, a
+    compass direction and the cost of the edge in pixels. Costs that differ both ways are averaged (they are
+    rounded by hand); none is taken for less than the straight line. What is told one way only can be driven
+    back as well.
 
     Raises
     ------
     InputError
-        Where the file is missing, cut short or holds something else; where an edge leads one way only; where
-        the graph is not connected.
+        Where the file is missing, cut short or holds something else; where the graph is not connected.
     """
     words = iter(enumerate(read_text(path, "a patrol graph").split(), start=1))
     count = _whole(words, path, "a number of vertices", 1)
     if count > limit(MOST_VERTICES):
         raise too_large(str(path), limit(MOST_VERTICES), count, "vertices")
-    width, height = (_whole(words, path, "a size in pixels", 1) for _ in range(2))
+    for _ in range(2):
+        _whole(words, path, "a size in pixels", 1)
     resolution_m = _number(words, path, "metres a pixel")
     if not resolution_m > 0.0:
         raise InputError(f"{path}: expected metres a pixel above 0, found {resolution_m:g}")
@@ -48,12 +49,8 @@ def read_patrol_graph(path: Path) -> PatrolGraph:
         number = _whole(words, path, f"vertex {vertex}", 0)
         if number != vertex:
             raise InputError(f"{path}: expected vertex {vertex}, found {number}; they are numbered from 0")
-        for axis, size in enumerate((width, height)):
-            places[vertex, axis] = pixel = _number(words, path, f"a pixel of vertex {vertex}")
-            if not 0.0 <= pixel <= size:
-                raise InputError(
-                    f"{path}: vertex {vertex}: expected pixels from 0 to {size}, found {pixel:g}"
-                )
+        for axis in range(2):
+            places[vertex, axis] = _number(words, path, f"a pixel of vertex {vertex}")
         for _ in range(_whole(words, path, f"a number of neighbours of vertex {vertex}", 0)):
             other = _whole(words, path, f"a neighbour of vertex {vertex}", 0)
             if other >= count or other == vertex:
@@ -65,13 +62,11 @@ def read_patrol_graph(path: Path) -> PatrolGraph:
     left = next(words, None)
     if left is not None:
         raise InputError(f"{path}: expected {count} vertices and no more, found '{left[1][:20]}' after them")
-    one_way = np.argwhere(np.isfinite(costs) != np.isfinite(costs.T))
-    if len(one_way):
-        a, b = one_way[0]
-        raise InputError(f"{path}: expected edges both ways, found one between {a} and {b} one way only")
+    back = np.where(np.isfinite(costs.T), costs.T, costs)
+    costs = np.where(np.isfinite(costs), costs, back)
     xy = np.array(corner) + resolution_m * places
     straight = np.hypot(*(xy[:, None] - xy[None]).transpose(2, 0, 1))
-    return PatrolGraph.of(xy, np.maximum(0.5 * resolution_m * (costs + costs.T), straight), str(path))
+    return PatrolGraph.of(xy, np.maximum(0.5 * resolution_m * (costs + back), straight), str(path))
 
 
 def on_floor(graph: PatrolGraph, floor: Floor, where: str = "patrol graph") -> PatrolGraph:

@@ -19,10 +19,13 @@ class PatrolSite:
         Places to visit.
     visit_m
         A place counts as visited this near to it.
+    starts
+        (N,) the vertex that each robot's starting place has the shortest path to.
     """
 
     graph: PatrolGraph
     visit_m: float
+    starts: IntArray
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -51,12 +54,10 @@ class PatrolTask:
 
     Attributes
     ----------
-    graph, visit_m
+    graph, visit_m, starts
         As ``PatrolSite``.
     robot
         Its number.
-    starts
-        (N,) the vertex nearest to each robot's starting place.
     strategy
         Who says where to go next.
     supply
@@ -65,7 +66,7 @@ class PatrolTask:
 
     graph: PatrolGraph
     visit_m: float
-    robot: int
     starts: IntArray
+    robot: int
     strategy: Strategy
     supply: Supply | None = None
