@@ -214,3 +214,13 @@ def test_the_vertex_that_is_nearest_behind_a_wall_is_not_where_a_robot_begins() 
     )  # the other one is 1.2 m away, through the wall
     assert floor.nearest_of(places[::-1], np.array([6.6, 4.4])) == 0
     assert floor.nearest_of(places, np.array([5.0, 2.5])) == 0
+
+
+def test_graphs_of_the_same_floor_are_one() -> None:
+    """So that their tours and shares are worked out once."""
+    graph, again = lattice(3, 4), lattice(3, 4)
+    assert graph == again
+    assert hash(graph) == hash(again)
+    assert Round.best(graph) is Round.best(again)
+    assert graph != lattice(4, 3)
+    assert graph != graph.vertices_xy_m.tobytes()

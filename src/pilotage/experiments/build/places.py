@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from functools import cached_property
 
 import numpy as np
-from scipy.ndimage import label
+from scipy.ndimage import binary_dilation, label
 
 from pilotage.core.angles import wrap_to_pi
 from pilotage.core.errors import InputError
 from pilotage.core.random import RandomStreams
-from pilotage.core.types import Pose2
+from pilotage.core.types import BoolArray, Pose2
 from pilotage.experiments.build.robots import footprint_of
 from pilotage.kernels.grids.blocked_distance import distance_to_blocked
 from pilotage.maps.distance_field import DistanceField
@@ -24,7 +25,10 @@ from pilotage.models.footprint import Footprint
 GRID_M = 0.1
 MAX_DRAWS = 100_000
 ROOM_M = 0.1
-"""Of a starting place that is drawn, beyond the body."""
+"""Of a starting place that is drawn, beyond the body,"""
+EASY_M, STEP_M = 0.1, 0.15
+"""and of the passages from it to the others besides, where there are such: a planner's nodes lie apart, and a
+gap between them that the body just fits through may have none. A place so near to that floor is of it."""
 
 
 def start_pose(mission: Mission, index: int, chart: WorldMap) -> PoseConfig:
@@ -110,7 +114,8 @@ def _with_drawn_starts(mission: Mission, chart: WorldMap, about: tuple[float, fl
             clear_m = footprint_of(robot, f"robots.{index}").radius_m + ROOM_M
             if clear_m not in floors:
                 floors[clear_m] = OpenFloor(chart, clear_m, near)
-            start = floors[clear_m].draw(rng, placed, spacing_m)
+            floor = floors[clear_m]
+            start = floor.draw(rng, placed, spacing_m, floor.easy) or floor.draw(rng, placed, spacing_m)
             if start is None:
                 raise InputError(
                     f"team.size: expected {index} robots at most, as starting places {spacing_m:g} m "
@@ -209,20 +214,40 @@ class OpenFloor:
                 f"reached, found less at ({reachable_from.x_m:g}, {reachable_from.y_m:g})"
             )
 
-    def _region(self, x: float, y: float) -> int:
+    @cached_property
+    def easy(self) -> BoolArray:
+        """(rows, columns) of it what is beside its largest part whose passages have ``EASY_M`` more room."""
+        home = self._regions == self._home
+        pieces, count = label(home & (self._field.distance_m >= self._clearance_m + EASY_M))
+        if not count:
+            return np.asarray(home)
+        largest = pieces == 1 + int(np.argmax(np.bincount(pieces.ravel())[1:]))
+        steps = math.ceil(STEP_M / self._field.resolution_m)
+        return np.asarray(home & binary_dilation(largest, iterations=steps))
+
+    def _node(self, x: float, y: float) -> tuple[int, int] | None:
         (x0, y0), step = self._field.origin_xy_m, self._field.resolution_m
         row, col = round((y - y0) / step), round((x - x0) / step)
         inside = 0 <= row < self._regions.shape[0] and 0 <= col < self._regions.shape[1]
-        return int(self._regions[row, col]) if inside else 0
+        return (row, col) if inside else None
+
+    def _region(self, x: float, y: float) -> int:
+        node = self._node(x, y)
+        return 0 if node is None else int(self._regions[node])
 
     def draw(
-        self, rng: np.random.Generator, apart_from: Sequence[PoseConfig] = (), spacing_m: float = 0.0
+        self,
+        rng: np.random.Generator,
+        apart_from: Sequence[PoseConfig] = (),
+        spacing_m: float = 0.0,
+        part: BoolArray | None = None,
     ) -> PoseConfig | None:
-        """Draw a pose, at least ``spacing_m`` from others; None where nothing is found."""
+        """Draw a pose, at least ``spacing_m`` from others, on a part of it; None where nothing is found."""
         xmin, ymin, xmax, ymax = self._chart.bounds_m
         for _ in range(MAX_DRAWS if self._home else 0):
             x, y, theta = rng.uniform([xmin, ymin, -math.pi], [xmax, ymax, math.pi])
-            if self._region(x, y) != self._home:
+            node = self._node(x, y)
+            if node is None or self._regions[node] != self._home or not (part is None or part[node]):
                 continue
             if any(math.hypot(x - place.x_m, y - place.y_m) < spacing_m for place in apart_from):
                 continue

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,6 +15,8 @@ from pilotage.core.types import FloatArray, IntArray
 @dataclass(frozen=True, slots=True, eq=False)
 class PatrolGraph:
     """Vertices to visit and how far it is between them; connected, the same both ways.
+
+    Graphs of the same places and lengths are equal: tours and shares of one serve all runs on its floor.
 
     Attributes
     ----------
@@ -31,6 +34,13 @@ class PatrolGraph:
     edges_m: FloatArray
     shortest_m: FloatArray
     next_hop: IntArray
+    _digest: bytes
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, PatrolGraph) and self._digest == other._digest
+
+    def __hash__(self) -> int:
+        return hash(self._digest)
 
     @staticmethod
     def of(vertices_xy_m: FloatArray, edges_m: FloatArray, where: str = "patrol graph") -> PatrolGraph:
@@ -73,7 +83,8 @@ class PatrolGraph:
         shortest = np.minimum(shortest, shortest.T)
         for array in (places, edges, shortest, hop):
             array.flags.writeable = False
-        return PatrolGraph(places, edges, shortest, hop)
+        digest = hashlib.sha256(places.tobytes() + edges.tobytes()).digest()
+        return PatrolGraph(places, edges, shortest, hop, digest)
 
     def __len__(self) -> int:
         return len(self.vertices_xy_m)

@@ -431,6 +431,12 @@ class Context:
         time = self.roadmap.time_s(self.came_from)
         return self.roadmap.way(self.pose.x_m, self.pose.y_m, time, 0.0)
 
+    def is_off_roadmap(self) -> bool:
+        """Whether nothing leads from where it is, nor from beside it, to where it was last."""
+        roadmap, (x, y) = self.roadmap, (self.pose.x_m, self.pose.y_m)
+        grid = roadmap.time_s(self.came_from), *roadmap.origin_xy_m, roadmap.spacing_m
+        return eikonal.value_at(x, y, *grid, 0.0) == math.inf and eikonal.descent(x, y, *grid) == (0.0, 0.0)
+
     def is_narrow(self) -> bool:
         """Whether there is room for one where it is."""
         return bool((self.here()[:, 2] < self._pass_m).any())

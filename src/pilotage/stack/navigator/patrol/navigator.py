@@ -38,6 +38,7 @@ class PatrolNavigator:
     Every command can be braked in the robot's own half of the distance to what may move (buffered Voronoi
     cells, Zhou et al. 2017): laser alone, whether anybody talks or not. Who does not get on gives way, with
     a radio the one with the larger number first. One whose battery runs low goes to its station and charges.
+    Who is lost, or where no path begins, wanders.
 
     A robot of any shape is driven as the disc around it, and has to turn on the spot. Fails where the scanner
     does not see all round.
@@ -85,12 +86,13 @@ class PatrolNavigator:
         belief, context = self._localizer.step(readings), self._context
         lost = belief.status is BeliefStatus.LOST
         context.sense(readings, belief, lost=lost)
-        state = self._state
-        if lost and not isinstance(state, Lost):
-            context.say("lost", "the robot does not know where it is: wandering until it does")
+        state, astray = self._state, lost or context.is_off_roadmap()
+        if astray and not isinstance(state, Lost):
+            what = "does not know where it is" if lost else "finds no path from where it is"
+            context.say("lost", f"the robot {what}: wandering until it does")
             context.memory.update(context.t_s, on_duty=False)
             state = Lost(context, self._wandering)
-        elif not lost and isinstance(state, Lost):
+        elif not astray and isinstance(state, Lost):
             context.say("found", "the robot knows where it is and goes on")
             context.memory.update(context.t_s, on_duty=not context.homeward)
             context.came_from = context.roadmap.nearest(belief.pose.x_m, belief.pose.y_m)
