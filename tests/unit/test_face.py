@@ -229,7 +229,7 @@ def test_wrong_steps_are_told_in_one_line() -> None:
         ((0.5, 0.1), "found a list of 2"),
         ("go", "found str"),
         ([0.5], "expected Twist or WheelSpeeds"),
-        (pl.Twist(float("nan"), 0.0), "expected finite speeds"),
+        (pl.Twist(float("nan"), 0.0), "expected a finite number, found nan"),
     ):
         with pytest.raises(pl.InputError, match=message):
             sim.step(wrong)  # type: ignore[arg-type]
@@ -388,7 +388,7 @@ class TestFiltersOnArrays:
         [
             ({"landmarks": [1.0, 2.0]}, "landmarks: expected"),
             ({"landmarks": [[0.5, 1.0, 2.0]]}, "whole numbers"),
-            ({"pose": (0.0, 1.0)}, "pose: expected shape"),
+            ({"pose": (0.0, 1.0)}, "pose: expected numbers of shape"),
             ({"pose": (0.0, np.nan, 0.0)}, "finite"),
             ({"cov": -np.eye(3)}, "symmetric positive"),
             ({"gate": 0.0}, "gate"),
@@ -402,7 +402,7 @@ class TestFiltersOnArrays:
 
     def test_wrong_measurements_are_told_in_one_line(self) -> None:
         start = pl.filters.EkfLandmarks(landmarks=self.landmarks)
-        with pytest.raises(pl.InputError, match="ranges_m: expected shape"):
+        with pytest.raises(pl.InputError, match="ranges_m: expected numbers of shape"):
             start.update([0, 1], [1.0], [0.0, 0.0])
         with pytest.raises(pl.InputError, match="finite"):
             start.predict(np.inf, 0.0)

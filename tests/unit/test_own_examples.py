@@ -81,7 +81,10 @@ def test_what_cannot_be_drawn_is_one_line(tmp_path: Path, capsys: pytest.Capture
         (["draw", "musem"], "did you mean 'museum'"),
         (["draw", "museum", "--out", str(tmp_path / "x.jpg")], "expected a PNG file"),
         (["draw", str(tmp_path / "plan.png")], "draw --resolution 0.05, in a mission world.map"),
-        (["draw", str(tmp_path / "plan.png"), "--resolution", "-1"], "--resolution: expected metres above 0"),
+        (
+            ["draw", str(tmp_path / "plan.png"), "--resolution", "-1"],
+            "--resolution: expected a number above 0",
+        ),
         (["draw", "museum", "--out", str(tmp_path / "none" / "x.png")], "expected a folder"),
         (["vectorize", "museum"], "has walls already"),
         (["vectorize", str(ros_map(tmp_path, room())), "--out", str(tmp_path / "w.png")], "YAML file"),

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from pilotage.core import given
 from pilotage.core.errors import InputError, unknown_name
 from pilotage.core.whole_file import draft_of
 from pilotage.face.runs import Run, open_run
@@ -67,10 +68,10 @@ def export(run: Run | str | PathLike[str], to: str, out: str | PathLike[str] | N
     >>> pl.export(run, "csv").name
     'trace.csv'
     """
-    if to not in FORMS:
+    if not isinstance(to, str) or to not in FORMS:
         raise unknown_name("format", str(to), FORMS)
     form, opened = FORMS[to], run if isinstance(run, Run) else open_run(run)
-    path = opened.folder / form.usual if out is None else Path(out)
+    path = opened.folder / form.usual if out is None else given.path("--out", out)
     if not path.parent.is_dir():
         raise InputError(f"--out: expected a folder that is there, found none: '{path.parent}'")
     as_folder = form.folder and path.suffix != ".bag"

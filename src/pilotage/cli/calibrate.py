@@ -9,7 +9,7 @@ from typing import Annotated, Any
 
 import typer
 
-from pilotage.cli.options import Json, Overrides, Seed
+from pilotage.cli.options import Json, Out, Overrides, Seed
 from pilotage.cli.output import print_columns, print_json, stdout_for_json
 from pilotage.core.errors import InputError, unknown_name
 
@@ -29,9 +29,7 @@ def calibrate(
     ] = None,
     seed: Seed = None,
     overrides: Overrides = None,
-    out: Annotated[Path, typer.Option(help="Folder in which the calibration's own folder is made.")] = Path(
-        "runs"
-    ),
+    out: Out = Path("runs"),
     sensor: Annotated[
         str | None,
         typer.Option(

@@ -54,13 +54,11 @@ def evaluate(
     if tolerance is not None:
         raise InputError("evaluate: expected --tolerance together with --relations only")
     from pilotage.face.recordings import evaluate as judged_by
-    from pilotage.face.recordings import judged_format
 
-    told = str(judged_format(estimate, reference, form))
-    errors = judged_by(estimate, reference, format=told, align=align, scale=scale, topics=topics or ())
+    errors = judged_by(estimate, reference, format=form, align=align, scale=scale, topics=topics or ())
     answer: dict[str, float | int | str | bool] = {
         **errors,
-        "format": told,
+        "format": errors.format,
         "align": align,
         "scale_corrected": scale,
     }

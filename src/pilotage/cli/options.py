@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 from typing import Annotated, TypeAlias
 
@@ -29,20 +28,10 @@ def parse_seed(text: str) -> int:
 
 
 def parse_out(text: str) -> Path:
-    """Read a folder to write into, which may yet have to be made.
+    """Read a folder to write into; InputError where it cannot be made or written to."""
+    from pilotage.core import given
 
-    Raises
-    ------
-    InputError
-        If it cannot be made or written to: better told before a run than after it.
-    """
-    out = Path(text)
-    there = next(folder for folder in (out, *out.absolute().parents) if folder.exists())
-    if not there.is_dir():
-        raise InputError(f"--out: expected a folder, found a file: '{there}'")
-    if not os.access(there, os.W_OK | os.X_OK):
-        raise InputError(f"--out: expected a folder that can be written to, found '{there}' read-only")
-    return out
+    return given.folder("--out", text)
 
 
 Json: TypeAlias = Annotated[

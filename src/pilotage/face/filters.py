@@ -14,7 +14,9 @@ from typing import Any, ClassVar, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike
 
+from pilotage.core import given
 from pilotage.core.chi_square import chi_square_quantile
+from pilotage.core.config import SMALLEST
 from pilotage.core.errors import InputError
 from pilotage.core.types import BoolArray, FloatArray, Pose2
 from pilotage.kernels.filters import ekf, iekf, sighting, ukf
@@ -76,22 +78,19 @@ class _LandmarkFilter:
     _update: ClassVar[Callable[..., Any]]
 
     def __post_init__(self) -> None:
-        pose = self.pose.as_array() if isinstance(self.pose, Pose2) else _array("pose", self.pose, (3,))
-        cov = _array("cov", self.cov, (3, 3))
+        pose = given.array("pose", self.pose.as_array() if isinstance(self.pose, Pose2) else self.pose, 3)
+        cov = given.array("cov", self.cov, 3, 3)
         if not np.allclose(cov, cov.T, rtol=1e-9, atol=1e-15) or np.linalg.eigvalsh(cov)[0] < -1e-12:
             raise InputError("cov: expected a symmetric positive matrix (3, 3), found one that is not")
         for name in ("range_var_m2", "bearing_var_rad2"):
-            if not (math.isfinite(getattr(self, name)) and getattr(self, name) > 0.0):
-                raise InputError(f"{name}: expected a variance above 0, found {getattr(self, name)}")
+            object.__setattr__(self, name, given.number(name, getattr(self, name), SMALLEST))
         for name in ("distance_var_m2_per_m", "angle_var_rad2_per_rad", "angle_var_rad2_per_m"):
-            if not (math.isfinite(getattr(self, name)) and getattr(self, name) >= 0.0):
-                raise InputError(f"{name}: expected a variance of 0 or more, found {getattr(self, name)}")
-        if not 0.0 < self.gate <= 1.0:
-            raise InputError(f"gate: expected a probability above 0 and up to 1, found {self.gate}")
+            object.__setattr__(self, name, given.number(name, getattr(self, name), 0.0))
+        object.__setattr__(self, "gate", given.number("gate", self.gate, high=1.0, above=0.0))
         object.__setattr__(self, "landmarks", _landmarks(self.landmarks))
         object.__setattr__(self, "pose", _frozen(pose))
         object.__setattr__(self, "cov", _frozen(cov))
-        object.__setattr__(self, "mount", _frozen(_array("mount", self.mount, (3,))))
+        object.__setattr__(self, "mount", _frozen(given.array("mount", self.mount, 3)))
 
     @property
     def mean(self) -> Pose2:
@@ -112,9 +111,8 @@ class _LandmarkFilter:
         InputError
             Where a number is not finite.
         """
-        distance, angle = float(distance_m), float(angle_rad)
-        if not (math.isfinite(distance) and math.isfinite(angle)):
-            raise InputError(f"predict: expected a finite distance and angle, found {distance}, {angle}")
+        distance = given.number("predict: distance_m", distance_m)
+        angle = given.number("predict: angle_rad", angle_rad)
         variances = increment_variances(
             distance,
             angle,
@@ -140,11 +138,13 @@ class _LandmarkFilter:
         Raises
         ------
         InputError
-            Where the three differ in length, or a number is not finite.
+            Where the three differ in length, an id is no whole number, or a range or bearing none at all.
         """
-        numbers = np.atleast_1d(np.asarray(ids, dtype=np.int64))
-        ranges = _array("ranges_m", np.atleast_1d(ranges_m), numbers.shape)
-        bearings = _array("bearings_rad", np.atleast_1d(bearings_rad), numbers.shape)
+        numbers = given.indices("ids", _several(ids), None)
+        ranges = given.array("ranges_m", _several(ranges_m), len(numbers))
+        if (ranges < 0.0).any():
+            raise InputError(f"ranges_m: expected ranges of 0 or more, found {ranges.min():g}")
+        bearings = given.array("bearings_rad", _several(bearings_rad), len(numbers))
         known = self.landmarks
         assert isinstance(known, Landmarks), "settled at construction"
         order = np.argsort(known.ids)
@@ -200,29 +200,21 @@ class UkfLandmarks(_LandmarkFilter):
     _update: ClassVar[Callable[..., Any]] = ukf.update_range_bearings
 
 
-def _landmarks(given: Any) -> Landmarks:
-    if isinstance(given, Landmarks):
-        return given
-    table = np.asarray(given, dtype=np.float64)
-    if table.ndim != 2 or table.shape[0] == 0 or table.shape[1] not in (2, 3):
+def _landmarks(known: Any) -> Landmarks:
+    if isinstance(known, Landmarks):
+        return known
+    table = given.array("landmarks", known, None, None)
+    if table.shape[0] == 0 or table.shape[1] not in (2, 3):
         raise InputError(f"landmarks: expected (M, 2) x, y or (M, 3) id, x, y, found {table.shape}")
     if table.shape[1] == 2:
         return Landmarks(np.arange(len(table)), table)
-    if not np.all(table[:, 0] == np.round(table[:, 0])):
-        raise InputError("landmarks: expected whole numbers as ids, found others")
-    return Landmarks(table[:, 0].astype(np.int64), table[:, 1:])
+    return Landmarks(given.indices("landmarks: ids", table[:, 0], None), table[:, 1:])
 
 
-def _array(name: str, given: Any, shape: tuple[int, ...]) -> FloatArray:
-    try:
-        values = np.array(given, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise InputError(f"{name}: expected numbers of shape {shape}, found {given!r}") from None
-    if values.shape != shape:
-        raise InputError(f"{name}: expected shape {shape}, found {values.shape}")
-    if not np.isfinite(values).all():
-        raise InputError(f"{name}: expected finite numbers, found NaN or infinity")
-    return values
+def _several(values: ArrayLike) -> ArrayLike:
+    """One number stands for a list of it."""
+    alone = np.isscalar(values) or (isinstance(values, np.ndarray) and values.ndim == 0)
+    return np.array([values]) if alone else values
 
 
 def _frozen(values: FloatArray) -> FloatArray:

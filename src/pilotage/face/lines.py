@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pilotage.core.config import validate
+from pilotage.core import given
+from pilotage.core.config import SMALLEST, validate
 from pilotage.core.errors import InputError
 from pilotage.sensors.lidar import LidarConfig
 from pilotage.stack.perception.lines import DetectedLines, LineExtractionConfig, LineExtractor
@@ -59,18 +60,17 @@ def extract(
     >>> len(found), float(np.round(found.rho_alpha[0, 0], 3))
     (1, 2.0)
     """
-    ranges = np.array(ranges_m, dtype=np.float64)
-    if ranges.ndim != 1 or ranges.size < 2:
+    ranges = given.array("ranges_m", ranges_m, None, finite=False)
+    if ranges.size < 2:
         raise InputError(f"ranges_m: expected (N,) of two readings or more, found {ranges.shape}")
-    if not (math.isfinite(range_var_m2) and range_var_m2 > 0.0):
-        raise InputError(f"range_var_m2: expected a variance above 0, found {range_var_m2}")
-    nothing = ~np.isfinite(ranges) | (ranges > max_range_m)
-    ranges[nothing] = max_range_m
-    values = {
-        "beams": int(ranges.size),
-        "field_of_view_rad": float(field_of_view_rad),
-        "max_range_m": float(max_range_m),
-    }
+    if (ranges < 0.0).any():
+        raise InputError(f"ranges_m: expected ranges of 0 or more, found {ranges.min():g}")
+    limit_m = given.number("max_range_m", max_range_m, above=0.0)
+    variance_m2 = given.number("range_var_m2", range_var_m2, SMALLEST)
+    ranges[~(ranges <= limit_m)] = limit_m
+    view_rad = given.number("field_of_view_rad", field_of_view_rad)
+    values = {"beams": int(ranges.size), "field_of_view_rad": view_rad, "max_range_m": limit_m}
     lidar = validate(LidarConfig, values, "lidar")
-    config = validate(LineExtractionConfig, {"max_range_m": max_range_m, **(set or {})}, "lines")
-    return LineExtractor(config, lidar, range_var_m2, np.random.default_rng(seed)).extract(ranges)
+    config = validate(LineExtractionConfig, {"max_range_m": limit_m, **given.settings("set", set)}, "lines")
+    rng = np.random.default_rng(given.whole("seed", seed))
+    return LineExtractor(config, lidar, variance_m2, rng).extract(ranges)

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
 from typing import Any
 
+from pilotage.core import given
+from pilotage.core.config import validate
 from pilotage.core.errors import InputError
 from pilotage.experiments.build.charts import load_chart
 from pilotage.maps.occupancy_grid import OCCUPIED_FROM
@@ -64,8 +65,9 @@ def draw(
     """
     from pilotage.report.map_picture import draw_map
 
-    chart = _chart(map, resolution_m)
-    path = Path(f"{Path(map).stem}.png") if out is None else Path(out)
+    source = given.path("map", map)
+    chart = _chart(source, resolution_m)
+    path = Path(f"{source.stem}.png") if out is None else given.path("--out", out)
     if path.suffix.lower() != ".png":
         raise InputError(f"--out: expected a PNG file, found '{path}'")
     if path.is_dir() or (out is None and path.exists()):
@@ -102,28 +104,32 @@ def vectorize(
     InputError
         Where the map has no cells, or too many walls come of them.
     """
-    chart = _chart(map, resolution_m)
+    source, tolerance_m = given.path("map", map), given.number("--tolerance", tolerance_m, 0.0)
+    chart = _chart(source, resolution_m)
     if chart.grid is None or chart.geometry is not None:
         raise InputError(f"vectorize: expected a map of cells, found '{map}', which has walls already")
-    path = Path(f"{Path(map).stem}-walls.yaml") if out is None else Path(out)
+    path = Path(f"{source.stem}-walls.yaml") if out is None else given.path("--out", out)
     if path.suffix.lower() not in {".yaml", ".yml"}:
         raise InputError(f"--out: expected a YAML file, found '{path}'")
     if path.is_dir() or not path.parent.is_dir():
         raise InputError(f"--out: expected a file in a folder that is there, found '{path}'")
-    if path.exists() and path.resolve() == Path(map).resolve():
+    if path.exists() and path.resolve() == source.resolve():
         raise InputError(f"--out: expected another file than the map itself, found '{path}'")
     segments = wall_segments(chart.grid, tolerance_m)
     name = "".join(c if c.isalnum() or c in "-_" else "-" for c in path.stem)
-    write_wall_map(path, f"'{name}'", segments, chart.bounds_m, Path(map).name)
+    write_wall_map(path, f"'{name}'", segments, chart.bounds_m, source.name)
     return path
 
 
-def _chart(map: str | PathLike[str], resolution_m: float | None) -> WorldMap:  # noqa: A002 - the word for it
+def _chart(source: Path, resolution_m: float | None) -> WorldMap:
     if resolution_m is None:
-        return load_chart(str(map))
-    if not 0.0 < resolution_m < math.inf:
-        raise InputError(f"--resolution: expected metres above 0, found {resolution_m:g}")
-    return load_chart(GridMap(name="grid", file=str(map), resolution_m=resolution_m))
+        return load_chart(str(source))
+    told = {
+        "name": "grid",
+        "file": str(source),
+        "resolution_m": given.number("--resolution", resolution_m, above=0.0),
+    }
+    return load_chart(validate(GridMap, told, str(source)))
 
 
 def layers_of(chart: WorldMap) -> dict[str, Any]:

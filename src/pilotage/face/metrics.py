@@ -34,7 +34,7 @@ class Metrics(Mapping[str, float]):
         self._numbers = dict(_numbers(self._answer))
 
     def __getitem__(self, key: str) -> float:
-        if key not in self._numbers:
+        if not isinstance(key, str) or key not in self._numbers:
             raise UnknownMetricError(str(unknown_name("metric", str(key), self._numbers)))
         return self._numbers[key]
 

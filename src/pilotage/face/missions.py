@@ -4,11 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from os import PathLike
-from pathlib import Path
 from typing import Any, TypeAlias
 
-import numpy as np
-
+from pilotage.core import given
 from pilotage.core.errors import InputError
 from pilotage.experiments.mission import extended, mission_of, read_mission
 from pilotage.experiments.resolve import resolved_values
@@ -57,7 +55,8 @@ def load(
         ...
     pilotage.core.errors.InputError: unknown mission 'museum-one'; did you mean 'museum-concave'?
     """
-    return mission_of(values_of(source), (), _seed(seed), _plain(set or {}))
+    changes = given.plain(given.settings("set", set))
+    return mission_of(values_of(source), (), None if seed is None else given.whole("seed", seed), changes)
 
 
 def values_of(source: MissionLike) -> dict[str, Any]:
@@ -71,9 +70,9 @@ def values_of(source: MissionLike) -> dict[str, Any]:
     if isinstance(source, Mission):
         return resolved_values(source)
     if isinstance(source, Mapping):
-        return extended({str(key): value for key, value in _plain(source).items()}, "mission")
+        return extended(given.plain(given.settings("mission", source)), "mission")
     if isinstance(source, PathLike):
-        path = Path(source)
+        path = given.path("mission", source)
         return read_mission(str(path) if path.suffix else f"{path.parent}/{path.name}")
     if isinstance(source, str):
         return read_mission(source)
@@ -85,28 +84,3 @@ def values_of(source: MissionLike) -> dict[str, Any]:
 def as_mission(source: MissionLike, seed: int | None = None) -> Mission:
     """The mission itself, or what is loaded by that name."""
     return source if isinstance(source, Mission) and seed is None else load(source, seed=seed)
-
-
-def _seed(seed: int | None) -> int | None:
-    if seed is None:
-        return None
-    if isinstance(seed, bool) or not isinstance(seed, int | np.integer):
-        raise InputError(f"seed: expected a whole number >= 0, found {seed!r}")
-    return int(seed)
-
-
-def _plain(values: Mapping[str, Any]) -> dict[str, Any]:
-    """The same with numpy's numbers and arrays, tuples and paths as YAML would have them."""
-    if not isinstance(values, Mapping):
-        raise InputError(f"set: expected a mapping of keys to values, found a {type(values).__name__}")
-    return {key: _plain_value(value) for key, value in values.items()}
-
-
-def _plain_value(value: Any) -> Any:
-    if isinstance(value, Mapping):
-        return _plain(value)
-    if isinstance(value, list | tuple):
-        return [_plain_value(item) for item in value]
-    if isinstance(value, np.ndarray | np.generic):
-        return value.tolist()
-    return str(value) if isinstance(value, PathLike) else value

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from pilotage.core import given
 from pilotage.core.angles import wrap_to_pi
 from pilotage.core.errors import InputError
 from pilotage.core.types import Goal, Pose2
@@ -66,18 +66,26 @@ def on_walls(
     >>> str(found.status), 4.0 < found.path.length_m < 7.0
     ('found', True)
     """
-    walls = SegmentMap.of(np.asarray(segments_m, dtype=np.float64), np.asarray(circles_m, dtype=np.float64))
+    segments, circles = (
+        given.array("segments_m", segments_m, None, 4),
+        given.array("circles_m", circles_m, None, 3),
+    )
+    walls = SegmentMap.of(segments, circles)
     if bounds_m is not None:
-        walls = SegmentMap(walls.segments_m, walls.circles_m, bounds_m)
-    config = PLANNERS.configure(planner, dict(set or {}), f"planner '{planner}'")
+        xmin, ymin, xmax, ymax = given.array("bounds_m", bounds_m, 4).tolist()
+        walls = SegmentMap(walls.segments_m, walls.circles_m, (xmin, ymin, xmax, ymax))
+    asked_m = None if clearance_m is None else given.number("clearance_m", clearance_m, 0.0)
+    config = PLANNERS.configure(
+        given.word("planner", planner), given.settings("set", set), f"planner '{planner}'"
+    )
     x, y, theta = _place("start", start, walls)
     goal_x, goal_y, goal_theta = _place("goal", goal, walls)
     request = PlanRequest(
         Pose2(x, y, 0.0 if theta is None else theta),
         Goal(goal_x, goal_y, goal_theta),
         DistanceField.from_map(walls),
-        np.random.default_rng(seed),
-        clearance_m,
+        np.random.default_rng(given.whole("seed", seed)),
+        asked_m,
     )
     return PLANNERS.entry(planner).factory(config).plan(request)
 
@@ -123,30 +131,28 @@ def on_cells(
     >>> str(found.status), len(found.path.cells)
     ('found', 21)
     """
-    grid = np.ascontiguousarray(blocked, dtype=np.bool_)
-    factors = None if cost_factors is None else np.ascontiguousarray(cost_factors, dtype=np.float64)
-    if factors is not None and factors.shape != grid.shape:
-        raise InputError(f"cost_factors: expected the grid's shape {grid.shape}, found {factors.shape}")
+    grid = given.truths("blocked", blocked, None, None)
+    factors = None if cost_factors is None else given.array("cost_factors", cost_factors, *grid.shape)
     space = GridSpace(grid, factors)
     cells = []
     for name, cell in (("start", start), ("goal", goal)):
-        if len(cell) != 2 or not space.contains((int(cell[0]), int(cell[1]))):
+        row, column = given.indices(name, cell, 2).tolist()
+        if not space.contains((row, column)):
             raise InputError(f"{name}: expected a row and a column of the grid {grid.shape}, found {cell}")
-        cells.append((int(cell[0]), int(cell[1])))
-    config = GRID_PLANNERS.configure(planner, dict(set or {}), f"planner '{planner}'")
+        cells.append((row, column))
+    config = GRID_PLANNERS.configure(
+        given.word("planner", planner), given.settings("set", set), f"planner '{planner}'"
+    )
     return GRID_PLANNERS.entry(planner).factory(config).search(GridRequest(space, cells[0], cells[1]))
 
 
 def _place(name: str, place: ArrayLike, walls: SegmentMap) -> tuple[float, float, float | None]:
-    values = np.asarray(place, dtype=np.float64).reshape(-1)
-    if values.size not in (2, 3) or not np.isfinite(values).all():
-        raise InputError(f"{name}: expected x, y or x, y, theta, found {place!r}")
-    x, y = float(values[0]), float(values[1])
+    values = given.place(name, place)
+    x, y = values[:2]
     if not walls.contains(x, y):
         xmin, ymin, xmax, ymax = walls.bounds_m
         raise InputError(
             f"{name}: expected a place within {xmin:g} to {xmax:g}, {ymin:g} to {ymax:g} m, "
             f"found ({x:g}, {y:g})"
         )
-    theta = wrap_to_pi(float(values[2])) if values.size == 3 else None
-    return x, y, theta if theta is None or math.isfinite(theta) else None
+    return x, y, wrap_to_pi(values[2]) if len(values) == 3 else None

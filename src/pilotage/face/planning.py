@@ -12,6 +12,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
+from pilotage.core import given
 from pilotage.core.errors import InputError
 from pilotage.core.types import FloatArray, Pose2
 from pilotage.experiments.grid_planning import is_grid_map, plan_on_grid
@@ -106,9 +107,13 @@ def plan(
     >>> pl.plan("museum", (1.0, 1.0), (20.0, 12.0), planner="astar", clearance_m=0.3).success
     True
     """
-    if clearance_m is not None and not (math.isfinite(clearance_m) and clearance_m >= 0.0):
-        raise InputError(f"clearance_m: expected metres of 0 or more, found {clearance_m}")
-    source, settings = str(map), _settings(set)
+    if clearance_m is not None:
+        clearance_m = given.number("clearance_m", clearance_m, 0.0)
+    if slope_limit_deg is not None:
+        slope_limit_deg = given.number("slope_limit_deg", slope_limit_deg)
+    if planner is not None:
+        given.word("planner", planner)
+    source, settings, seed = str(given.path("map", map)), _settings(set), given.whole("seed", seed)
     from_, to = _place("start", start), _place("goal", goal)
     if Path(source).suffix and is_grid_map(source):
         if clearance_m is not None:
@@ -133,28 +138,16 @@ def plan(
 def _place(name: str, place: Place) -> tuple[float, ...]:
     if isinstance(place, Pose2):
         return place.x_m, place.y_m, place.theta_rad
-    try:
-        values = tuple(float(value) for value in place)
-    except (TypeError, ValueError):
-        values = ()
-    if len(values) not in (2, 3) or not all(math.isfinite(value) for value in values):
-        raise InputError(f"{name}: expected x, y or x, y, theta in metres and radians, found {place!r}")
-    return values
+    return given.place(name, place)
 
 
 def _settings(settings: Mapping[str, Any] | Sequence[str] | None) -> list[str]:
     """As the command line has them."""
     if settings is None:
         return []
-    if isinstance(settings, Mapping):
-        return [f"{key}={_yaml(value)}" for key, value in settings.items()]
-    if isinstance(settings, str):
-        raise InputError(f"set: expected a mapping of parameters to values, found the text '{settings}'")
-    return list(settings)
-
-
-def _yaml(value: Any) -> str:
-    return str(value).lower() if isinstance(value, bool) else str(value)
+    if isinstance(settings, list | tuple):
+        return list(given.words("set", settings))
+    return given.overrides("set", settings)
 
 
 def _number(value: Any) -> float:

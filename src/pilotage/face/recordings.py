@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -12,6 +11,7 @@ from typing import Any, Literal, TypeAlias
 
 import numpy as np
 
+from pilotage.core import given
 from pilotage.core.errors import InputError, unknown_name
 from pilotage.core.types import FloatArray, Pose2
 from pilotage.evaluation.trajectory import TrajectoryErrors, trajectory_errors
@@ -85,26 +85,25 @@ def localize(
     """
     from pilotage.experiments.recordings.localize import FORMATS, Setting, localize_log
 
-    if format is not None and format not in FORMATS:
+    if format is not None and given.word("format", format) not in FORMATS:
         raise unknown_name("format", format, FORMATS)
-    overrides = [f"{key}={json.dumps(value)}" for key, value in (set or {}).items()]
     setting = Setting(
-        None if map is None else str(map),
-        None if landmarks is None else Path(landmarks),
-        None if start is None else Pose2.from_array(np.asarray(start, dtype=np.float64)),
-        tuple(topics),
-        None if truth is None else str(truth),
-        from_s,
-        to_s,
+        None if map is None else str(given.path("map", map)),
+        None if landmarks is None else given.path("landmarks", landmarks),
+        None if start is None else Pose2.from_array(given.array("start", start, 3)),
+        given.words("topics", topics),
+        None if truth is None else str(given.path("truth", truth)),
+        given.number("from_s", from_s),
+        given.number("to_s", to_s, high=math.inf),
     )
     result = localize_log(
-        Path(log),
-        Path(out),
+        given.path("log", log),
+        given.folder("out", out),
         form=format,
-        robot=robot,
-        localizer=localizer,
-        overrides=overrides,
-        max_range_m=max_range_m,
+        robot=None if robot is None else given.whole("robot", robot),
+        localizer=None if localizer is None else given.word("localizer", localizer),
+        overrides=given.overrides("set", set),
+        max_range_m=None if max_range_m is None else given.number("max_range_m", max_range_m, above=0.0),
         setting=setting,
     )
     return Run(result.run_dir)
@@ -171,9 +170,10 @@ def slam(
     """
     from pilotage.experiments.slam import read_slam_config, slam_log
 
-    settings = read_slam_config(None if config is None else Path(config))
-    earlier = None if extend is None else Path(extend)
-    run = slam_log(Path(log), Path(out), settings, topics=topics, extend=earlier)
+    settings = read_slam_config(None if config is None else given.path("config", config))
+    earlier = None if extend is None else given.path("extend", extend)
+    recording, asked = given.path("log", log), given.words("topics", topics)
+    run = slam_log(recording, given.folder("out", out), settings, topics=asked, extend=earlier)
     if run.run_dir is None:
         raise InputError(f"{log}: {run.metrics['reason']}")
     trajectory = read_trajectory(run.run_dir / "trajectory.tum", TrajectoryFormat.TUM)
@@ -257,31 +257,40 @@ def calibrate(
     """
     from pilotage.experiments import calibrate as lab
 
-    if what not in KINDS:
+    if given.word("what", what) not in KINDS:
         raise unknown_name("calibration", what, KINDS)
-    single = isinstance(logs, str | PathLike)
-    places = [Path(logs)] if single else [Path(log) for log in logs]  # type: ignore[arg-type,union-attr]
-    target = Path(out)
+    listed = logs if isinstance(logs, list | tuple) else [logs]
+    places, target = [given.path("logs", log) for log in listed], given.folder("out", out)
+    set, topics, seed = given.words("set", set), given.words("topics", topics), given.whole("seed", seed)  # noqa: A001
+    if truth is not None:
+        given.word("truth", truth)
     if what == "odometry":
         result = lab.odometry_from(
             places,
             target,
             overrides=set,
             seed=seed,
-            wheel_base_m=wheel_base_m,
-            sensor=sensor,
+            wheel_base_m=None
+            if wheel_base_m is None
+            else given.number("--wheel-base", wheel_base_m, above=0.0),
+            sensor=given.word("sensor", sensor),
             topics=topics,
             truth=truth,
         )
     elif what == "range":
         result = lab.range_from(places, target, overrides=set, seed=seed, topics=topics)
     elif what == "heading":
-        result = lab.heading_from(places, target, axis=axis, topics=topics)
+        result = lab.heading_from(places, target, axis=given.word("axis", axis), topics=topics)
     else:
         from pilotage.experiments.calibrate_commands import commands_from
 
         result = commands_from(
-            places, target, robots=robots, leave_one_out=leave_one_out, topics=topics, truth=truth
+            places,
+            target,
+            robots=given.indices("robots", robots, None).tolist(),
+            leave_one_out=given.flag("leave_one_out", leave_one_out),
+            topics=topics,
+            truth=truth,
         )
     return Calibration(result.answer, result.folder)
 
@@ -352,14 +361,16 @@ def evaluate(
     >>> round(found["ate_rmse_m"], 6), round(found["rpe_rmse_m"], 6)
     (0.05, 0.0)
     """
-    given = isinstance(estimate, np.ndarray), isinstance(reference, np.ndarray)
-    if any(given):
-        if not all(given):
+    align, scale = given.flag("align", align), given.flag("scale", scale)
+    topics, told = given.words("topics", topics), _told_format(format)
+    files = isinstance(estimate, str | PathLike), isinstance(reference, str | PathLike)
+    if not all(files):
+        if any(files):
             raise InputError("evaluate: expected two files or two arrays, found one of each")
         found, true = _of_array("estimate", estimate), _of_array("reference", reference)
         return Evaluation(trajectory_errors(found, true, align=align, scale=scale), "arrays")
-    paths = Path(str(estimate)), Path(str(reference))
-    form = judged_format(paths[0], paths[1], format)
+    paths = given.path("estimate", estimate), given.path("reference", reference)
+    form = told or _format_by_columns(paths[0], paths[1])
     found, true = _read_both(paths, form, topics)
     if found.t_s is None and len(found) != len(true):
         short, full = paths if len(found) < len(true) else paths[::-1]
@@ -370,19 +381,14 @@ def evaluate(
     return Evaluation(trajectory_errors(found, true, align=align, scale=scale), str(form))
 
 
-def judged_format(estimate: Path, reference: Path, told: str | None) -> TrajectoryFormat:
+def _format_by_columns(estimate: Path, reference: Path) -> TrajectoryFormat:
     """The format of both files.
 
     Raises
     ------
     InputError
-        Where there is no such format, or the two differ by their columns.
+        Where the two differ by their columns.
     """
-    names = [str(name) for name in TrajectoryFormat]
-    if told is not None:
-        if told not in names:
-            raise unknown_name("--format", told, names)
-        return TrajectoryFormat(told)
     formats = [
         TrajectoryFormat.TUM if _is_bag(path) else guess_format(path) for path in (estimate, reference)
     ]
@@ -392,6 +398,13 @@ def judged_format(estimate: Path, reference: Path, told: str | None) -> Trajecto
             f"{estimate} as {formats[0]} and {reference} as {formats[1]}"
         )
     return formats[0]
+
+
+def _told_format(told: str | None) -> TrajectoryFormat | None:
+    names = [str(name) for name in TrajectoryFormat]
+    if told is not None and given.word("--format", told) not in names:
+        raise unknown_name("--format", told, names)
+    return None if told is None else TrajectoryFormat(told)
 
 
 def _is_bag(path: Path) -> bool:
@@ -423,8 +436,8 @@ def _read_both(
 
 def _of_array(name: str, values: Any) -> Trajectory3:
     """Planar poses as a path in space."""
-    poses = np.asarray(values, dtype=np.float64)
-    if poses.ndim != 2 or poses.shape[1] not in (3, 4) or not np.isfinite(poses).all():
+    poses = given.array(name, values, None, None)
+    if poses.shape[1] not in (3, 4):
         raise InputError(
             f"{name}: expected finite poses (N, 3) x, y, theta or (N, 4) t, x, y, theta, found {poses.shape}"
         )

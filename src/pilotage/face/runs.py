@@ -11,6 +11,7 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
+from pilotage.core import given
 from pilotage.core.errors import InputError
 from pilotage.core.types import Event
 from pilotage.experiments.run import run_mission
@@ -114,7 +115,7 @@ class Run:
         page = write_report(self.folder)
         if path is None:
             return page
-        wanted = Path(path)
+        wanted = given.path("report", path)
         if wanted.is_dir():
             raise InputError(f"report: expected a file to write, found the folder '{wanted}'")
         wanted.parent.mkdir(parents=True, exist_ok=True)
@@ -166,12 +167,11 @@ def run(
     >>> run.success, run.metrics["position_rmse_m"] < 0.05
     (True, True)
     """
-    loaded = as_mission(mission, seed)
+    save, progress = given.flag("save", save), None if progress is None else given.flag("progress", progress)
+    place, loaded = given.folder("out", out), as_mission(mission, seed)
     passing = None if save else Path(tempfile.mkdtemp(prefix="pilotage-run-"))
-    folder = Path(out) if passing is None else passing
+    folder = place if passing is None else passing
     try:
-        if folder.exists() and not folder.is_dir():
-            raise InputError(f"out: expected a folder, found a file: '{folder}'")
         with showing_progress(progress, loaded.run.time_limit_s) as on_progress:
             result = run_mission(loaded, out=folder, on_progress=on_progress)
     except BaseException:
@@ -197,7 +197,7 @@ def open_run(folder: str | PathLike[str]) -> Run:
     >>> pl.open_run(run.folder).metrics["steps"] == run.metrics["steps"]
     True
     """
-    path = Path(folder)
+    path = given.path("folder", folder)
     missing = [name for name in (METRICS_FILE, TRACE_FILE) if not (path / name).is_file()]
     if missing:
         found = "nothing" if not path.exists() else "a file" if path.is_file() else f"no {missing[0]} in it"

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from typing import overload
 
+from pilotage.core import given
 from pilotage.core.errors import InputError
 from pilotage.core.types import STOP, Command, Pose2, Twist, WheelSpeeds
 from pilotage.experiments.build.build import Source, build_source
@@ -135,12 +135,13 @@ class Simulation:
 
     def _commands(self, command: Command | Sequence[Command]) -> list[Command]:
         count = len(self._built().simulator.bodies)
-        given = [command] if isinstance(command, Twist | WheelSpeeds) else command
-        if not isinstance(given, list | tuple) or len(given) != count:
-            what = f"a list of {len(given)}" if isinstance(given, list | tuple) else type(given).__name__
+        asked_of = [command] if isinstance(command, Twist | WheelSpeeds) else command
+        if not isinstance(asked_of, list | tuple) or len(asked_of) != count:
+            lists = isinstance(asked_of, list | tuple)
+            what = f"a list of {len(asked_of)}" if lists else type(asked_of).__name__
             asked = "a Twist or WheelSpeeds" if count == 1 else f"a list of {count} commands, one a robot"
             raise InputError(f"step: expected {asked}, found {what}")
-        for one in given:
+        for one in asked_of:
             if not isinstance(one, Twist | WheelSpeeds):
                 raise InputError(f"step: expected Twist or WheelSpeeds, found {type(one).__name__}")
             values = (
@@ -148,9 +149,9 @@ class Simulation:
                 if isinstance(one, Twist)
                 else (one.left_rad_s, one.right_rad_s)
             )
-            if not all(math.isfinite(value) for value in values):
-                raise InputError(f"step: expected finite speeds, found {one}")
-        return list(given)
+            for value in values:
+                given.number(f"step: speed of {type(one).__name__}", value)
+        return list(asked_of)
 
 
 def make(mission: MissionLike, *, seed: int | None = None) -> Simulation:

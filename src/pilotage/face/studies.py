@@ -11,9 +11,9 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
+from pilotage.core import given
 from pilotage.core.config import validate
 from pilotage.core.errors import InputError
-from pilotage.evaluation.metrics import METRICS
 from pilotage.experiments.resolve import resolved_values
 from pilotage.experiments.studies.definition import StudyDefinition
 from pilotage.experiments.studies.engine import Listener, run_study
@@ -143,12 +143,16 @@ def study(
     >>> found.table()["success"]
     [1.0, 1.0]
     """
-    loaded = as_mission(mission)
-    definition = _definition(loaded.mission, vary, trials, metrics, name)
+    loaded, place, resume = as_mission(mission), given.folder("out", out), given.flag("resume", resume)
+    definition = _definition(
+        loaded.mission, given.settings("vary", vary), given.whole("trials", trials, 1), metrics, name
+    )
+    if workers is not None:
+        given.whole("workers", workers, 1)
     made = make_study(definition, values=resolved_values(loaded))
     if name is None:
         made = _named_by_content(made)
-    folder = Path(out) / made.name
+    folder = place / made.name
     begun = folder.exists() and any(folder.iterdir())
     options = StudyOptions(workers=workers, resume=resume and begun)
     counts = run_study(made, folder, options, Listener())
@@ -164,21 +168,17 @@ def study(
 def _definition(
     mission: str, vary: Mapping[str, Sequence[Any]], trials: int, metrics: Sequence[str], name: str | None
 ) -> StudyDefinition:
-    if not isinstance(vary, Mapping) or not vary:
+    if not vary:
         raise InputError("vary: expected a mapping of dotted keys to lists of values, found none")
     factors = []
     for key, values in vary.items():
-        if isinstance(values, str) or not hasattr(values, "__iter__"):
-            raise InputError(f"vary '{key}': expected a list of values, found {values!r}")
-        plain = [value.item() if hasattr(value, "item") else value for value in values]
-        factors.append({"name": str(key), "key": key, "values": plain})
-    if isinstance(metrics, str):
-        raise InputError(f"metrics: expected a list of names, found the text '{metrics}'")
-    for metric in metrics:
-        if not isinstance(metric, str):
-            raise InputError(f"metrics: expected names such as {next(iter(METRICS)).key}, found {metric!r}")
+        listed = given.plain(values)
+        if not isinstance(listed, list):
+            raise InputError(f"vary '{key}': expected a list of values, found {given.told(values)}")
+        factors.append({"name": key, "key": key, "values": listed})
+    metrics = given.words("metrics", metrics)
     asked: dict[str, Any] = {
-        "study": name or "study",
+        "study": "study" if name is None else given.word("name", name),
         "mission": mission,
         "factors": factors,
         "trials": trials,

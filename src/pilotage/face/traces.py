@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any
 
+from pilotage.core import given
 from pilotage.core.errors import InputError, unknown_name
 from pilotage.core.types import FloatArray
 from pilotage.face.tables import pandas
@@ -38,7 +39,7 @@ class Trace(Mapping[str, FloatArray]):
         self._recorded = recorded
 
     def __getitem__(self, column: str) -> FloatArray:
-        found = self._recorded.columns.get(column)
+        found = self._recorded.columns.get(column) if isinstance(column, str) else None
         if found is None:
             error = unknown_name("column", str(column), self._recorded.columns)
             raise UnknownColumnError(str(error))
@@ -77,7 +78,7 @@ class Trace(Mapping[str, FloatArray]):
             if robot not in names:
                 raise unknown_name("robot", robot, names)
             robot = names.index(robot)
-        if not 0 <= robot < max(len(names), 1):
+        if not 0 <= given.whole("robot", robot) < max(len(names), 1):
             raise InputError(f"robot: expected a number from 0 to {max(len(names), 1) - 1}, found {robot}")
         return Trace(self._recorded.of(robot))
 

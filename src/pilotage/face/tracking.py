@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from pilotage.core import given
 from pilotage.core.types import FloatArray
 from pilotage.face.recordings import FilePath
 
@@ -76,19 +77,18 @@ def track(
     from pilotage.tracking.sheet import parse_corners
     from pilotage.tracking.track import follow
 
+    film, folder = given.path("video", video), None if out is None else given.folder("out", out)
     options = TrackOptions(
-        None if corners is None else parse_corners(corners),
-        None if hsv is None else parse_hsv(hsv),
-        grid,
-        size_m,
-        radius_m,
-        height_m,
+        None if corners is None else parse_corners(given.word("corners", corners)),
+        None if hsv is None else parse_hsv(given.word("hsv", hsv)),
+        given.whole("grid", grid, 1),
+        given.number("size_m", size_m, above=0.0),
+        None if radius_m is None else given.number("radius_m", radius_m, above=0.0),
+        given.number("height_m", height_m, 0.0),
     )
-    film = Path(video)
     found = follow(film, learn_scene(film, options))
     written: tuple[Path, ...] = ()
-    if out is not None:
-        folder = Path(out)
+    if folder is not None:
         folder.mkdir(parents=True, exist_ok=True)
         written = tuple(write_track(folder, found))
     answer = found.as_dict()
