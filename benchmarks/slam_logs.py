@@ -41,6 +41,7 @@ def chosen(log: LaserLog, which: IntArray | BoolArray) -> LaserLog:
         beams=log.beams[which],
         first_angle_rad=log.first_angle_rad[which],
         angle_step_rad=log.angle_step_rad[which],
+        told_angles=None if log.told_angles is None else log.told_angles[which],
     )
 
 

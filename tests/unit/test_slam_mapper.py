@@ -16,11 +16,14 @@ from pilotage.core.types import FloatArray
 from pilotage.evaluation.slam_consistency import read_scan_covariances
 from pilotage.experiments.slam import read_slam_config
 from pilotage.kernels.slam.frames import between
-from pilotage.logs.laser_log import LaserLog
+from pilotage.logs.laser_log import LaserLog, RawScan, assemble
 from pilotage.stack.mapping.slam.closures import Verdict
 from pilotage.stack.mapping.slam.config import SlamConfig
 from pilotage.stack.mapping.slam.mapper import map_log
 from pilotage.stack.mapping.slam.result import SlamResult
+from pilotage.stack.mapping.slam.scan_poses import aligned_scans
+from pilotage.stack.mapping.slam.tracker import track
+from support import laser_rooms
 from support.laser_rooms import along, furnished, recording, room, write_carmen
 
 ROUND = [(1.5, 1.2), (5.0, 1.2), (5.0, 4.0), (8.5, 5.8), (5.0, 6.0), (2.0, 4.0), (1.5, 1.2), (4.0, 1.2)]
@@ -53,6 +56,38 @@ def test_a_room_is_mapped_and_its_loop_closed() -> None:
     again = map_log(log, SlamConfig())
     assert np.array_equal(result.poses, again.poses)
     assert np.array_equal(result.grid.cells, again.grid.cells)
+
+
+@pytest.mark.parametrize("true_deg", [180.0 / 179.0, 1.0])
+def test_closed_loops_tell_how_far_beams_are_apart(true_deg: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    """180 beams are told over 180 degrees: there are scanners of which this is true."""
+    monkeypatch.setattr(laser_rooms, "SPAN_RAD", np.radians(179.0 * true_deg))
+    path = along(ROUND)
+    log = recording(furnished(), path, np.random.default_rng(3))
+    assert log.odometry is not None
+    first = float(log.first_angle_rad[0])
+    told = [
+        RawScan(t, r, first, np.pi / 179.0, 0.05, 30.0) for t, r in zip(log.t_s, log.ranges_m, strict=True)
+    ]
+    read = assemble("told", told, log.mount, False, log.t_s, log.odometry)
+    assert np.degrees(read.angle_step_rad) == pytest.approx(1.0)
+    result = map_log(read, SlamConfig())
+    assert any("speak for the 1.0056 deg" in text for text in result.warnings) == (true_deg > 1.0)
+    assert rms_m(result, path) < 0.02
+
+
+def test_scans_between_keyframes_are_put_where_they_fit() -> None:
+    path = along(ROUND)
+    log = recording(furnished(), path, rng := np.random.default_rng(4))
+    local = track(log, SlamConfig())
+    true = np.array([between(path[0], pose) for pose in path])
+    start = true + rng.standard_normal(true.shape) * (0.05, 0.05, 0.02)
+    out = aligned_scans(log, local, local.clouds, true[local.keyframes], start, SlamConfig(), 1.0)
+    assert np.array_equal(out[local.keyframes], start[local.keyframes])
+    rest = np.setdiff1d(np.arange(len(log)), local.keyframes)
+    off = (out - true)[rest]
+    assert np.hypot(off[:, 0], off[:, 1]).mean() < 0.01
+    assert np.abs(off[:, 2]).mean() < 0.003
 
 
 def test_no_odometry_is_needed() -> None:

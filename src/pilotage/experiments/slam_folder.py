@@ -10,7 +10,7 @@ import yaml
 
 from pilotage.core.errors import InputError
 from pilotage.core.files.arrays import read_npz, require_numbers
-from pilotage.core.types import FloatArray
+from pilotage.core.types import FloatArray, Pose2
 from pilotage.evaluation.slam_consistency import COVARIANCES_FILE, read_scan_covariances
 from pilotage.logs.g2o import write_g2o
 from pilotage.logs.laser_log import LaserLog
@@ -107,18 +107,8 @@ def _of_frame(log: LaserLog, config: SlamConfig, poses: FloatArray) -> FloatArra
     """Poses (N, 3) of the frame that the trajectory is asked for in: the scanner's or the robot's."""
     if config.trajectory == "scanner":
         return poses
-    mount = log.mount.as_array()
-    c, s = np.cos(mount[2]), np.sin(mount[2])
-    back = np.array([-c * mount[0] - s * mount[1], s * mount[0] - c * mount[1], -mount[2]])
-    c_all, s_all = np.cos(poses[:, 2]), np.sin(poses[:, 2])
-    return np.stack(
-        [
-            poses[:, 0] + c_all * back[0] - s_all * back[1],
-            poses[:, 1] + s_all * back[0] + c_all * back[1],
-            poses[:, 2] + back[2],
-        ],
-        axis=1,
-    )
+    back = log.mount.inverse()
+    return np.array([Pose2.from_array(pose).compose(back).as_array() for pose in poses])
 
 
 def _tum(t_s: FloatArray, poses: FloatArray) -> str:

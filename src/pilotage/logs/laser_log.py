@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -75,6 +75,8 @@ class LaserLog:
         What was missing, damaged or put right, a sentence each.
     stamps_s
         (N,) the scans' times as the log has them, where they were put right.
+    told_angles
+        (N, 2) first angles and steps as the log tells them, where others were taken for more probable.
     """
 
     name: str
@@ -91,6 +93,7 @@ class LaserLog:
     odometry: FloatArray | None
     warnings: tuple[str, ...] = ()
     stamps_s: FloatArray | None = None
+    told_angles: FloatArray | None = None
 
     def __len__(self) -> int:
         return int(self.t_s.shape[0])
@@ -100,6 +103,19 @@ class LaserLog:
         k = np.arange(self.ranges_m.shape[1], dtype=np.float64)
         k[int(self.beams[scan]) :] = np.nan
         return np.asarray(self.first_angle_rad[scan] + self.angle_step_rad[scan] * k)
+
+    def as_told(self) -> LaserLog:
+        """Return the same with the beams where the log tells them."""
+        if self.told_angles is None:
+            return self
+        step_deg = math.degrees(self.told_angles[0, 1])
+        return replace(
+            self,
+            first_angle_rad=self.told_angles[:, 0],
+            angle_step_rad=self.told_angles[:, 1],
+            warnings=(*self.warnings, f"closed loops speak for the {step_deg:.5g} deg that were told"),
+            told_angles=None,
+        )
 
     def odometry_at_scans(self) -> FloatArray | None:
         """Return (N, 3) the odometry at the scans' times, or None without odometry.
@@ -158,14 +174,20 @@ def assemble(
         sizes = ", ".join(str(size) for size in np.unique(beams)[:8])
         said.append(f"the number of beams changes from scan to scan ({sizes})")
     first = np.array([scan.first_angle_rad for scan in with_beams])
-    step = _without_the_last_post(np.array([scan.angle_step_rad for scan in with_beams]), beams, said)
+    told = np.array([scan.angle_step_rad for scan in with_beams])
+    step = _without_the_last_post(told, beams, said)
     ranges_m = np.full((beams.size, int(beams.max())), np.nan)
     # A turned-over scanner sees its beams mirrored; a scanner of falling angles counts them clockwise.
     clockwise = (step < 0.0) != upside_down
-    last = first + step * (beams - 1)
     for row, scan in enumerate(with_beams):
         ranges_m[row, : beams[row]] = scan.ranges_m[::-1] if clockwise[row] else scan.ranges_m
     sign = -1.0 if upside_down else 1.0
+
+    def angles(step_rad: FloatArray) -> FloatArray:
+        least = np.where(clockwise, first + step_rad * (beams - 1), first)
+        return np.column_stack([sign * least, np.abs(step_rad)])
+
+    taken = angles(step)
     range_min_m = float(np.median([scan.range_min_m for scan in with_beams]))
     range_max_m = float(np.median([scan.range_max_m for scan in with_beams]))
     if no_times is None:
@@ -180,8 +202,8 @@ def assemble(
         t_s,
         _three_kinds(ranges_m, range_min_m, range_max_m),
         beams,
-        np.where(clockwise, sign * last, sign * first),
-        np.abs(step),
+        taken[:, 0],
+        taken[:, 1],
         range_min_m,
         range_max_m,
         mount,
@@ -190,6 +212,7 @@ def assemble(
         poses,
         tuple(said),
         stamps_s,
+        None if step is told else angles(told),
     )
 
 
@@ -203,7 +226,8 @@ def _without_the_last_post(step_rad: FloatArray, beams: IntArray, said: list[str
     """(N,) angles between beams, put right where a field of view of n steps was divided by n - 1.
 
     Converters that know the field of view alone take the n-th beam for its far edge. A scanner of 180 beams a
-    degree apart then turns by half a per cent too much, and looks half a degree aside.
+    degree apart then turns by half a per cent too much, and looks half a degree aside. There are scanners,
+    above all simulated ones, that do space their beams so: closed loops can tell (``LaserLog.as_told``).
     """
     true_rad = step_rad * (beams - 1) / beams
     if is_built_step(step_rad).any() or not is_built_step(true_rad).all():

@@ -11,7 +11,6 @@ import numpy as np
 
 from pilotage.core.types import FloatArray
 from pilotage.kernels.slam.frames import composed
-from pilotage.logs.laser_log import LaserLog
 from pilotage.models.pose_graph_solver import Loss, Start, optimize
 from pilotage.stack.mapping.slam.closures import (
     COUNTING,
@@ -30,20 +29,20 @@ from pilotage.stack.mapping.slam.closures import (
     spread,
     unproven,
 )
-from pilotage.stack.mapping.slam.clouds import Clouds, cloud_of
+from pilotage.stack.mapping.slam.clouds import Clouds
 from pilotage.stack.mapping.slam.config import SlamConfig
 from pilotage.stack.mapping.slam.refinement import neighbours, not_aligned, pair_edges
 from pilotage.stack.mapping.slam.submaps import Extent, Submaps
 from pilotage.stack.mapping.slam.tracker import LocalTrack
 from pilotage.stack.mapping.slam.uncertainty import (
     NO_EDGES,
+    TRACK_STD_M,
     Edges,
     edge_information,
     joint_covariance,
     relative_poses,
 )
 
-TRACK_STD_M = 0.03
 TRACK_FLOOR = np.diag([0.004**2, 0.004**2, 0.0015**2])
 ROBUST_STDS = 3.0
 REFINED_STDS = 3.5
@@ -57,9 +56,6 @@ SECOND_LOOK_M, SECOND_LOOKS, ATTACHED = 3.0, 3, 2
 FAR_LOOPS, TRIALS, TRIAL_M = 8, 3, 12.0
 """How often loops are looked for that are longer than the windows allow, and likewise across corridors alone;
 half a window's side for what must follow along them."""
-SPACING_STEP, MOST_SPACING_OFF = 0.005, 0.015
-LEAST_GAIN = 0.05
-"""Share by which the objective must fall before another spacing of the beams is believed."""
 
 OnRound = Callable[[str], None]
 
@@ -318,42 +314,6 @@ def refined(
         edges = edges.and_more(kept).and_more(not_aligned(closer.closing, edges))
         state = solved(edges, state.poses, REFINED_STDS)
     return state
-
-
-def beam_spacing(log: LaserLog, track: LocalTrack, closer: LoopCloser, config: SlamConfig) -> float:
-    """Estimate the angle between beams: the one with which the aligned keyframes contradict each other least.
-
-    Some drivers and converters tell a field of view that is one beam off. Where the robot turns, half a per
-    cent of wrong spacing turns the map by degrees, which no alignment of single scans can notice.
-    """
-    own = weak_edges(track)
-    objectives: dict[int, float] = {}
-
-    def objective(steps: int) -> float:
-        if steps not in objectives:
-            clouds = keyframe_clouds(log, track, config, 1.0 + SPACING_STEP * steps)
-            objectives[steps] = refined(closer, clouds, own, rounds=2, every=4).objective
-        return objectives[steps]
-
-    # Down to where both neighbours are higher: a parabola tells nothing of what lies beside its points.
-    best, most = 0, round(MOST_SPACING_OFF / SPACING_STEP)
-    while abs(best) < most:
-        lower = min((best - 1, best, best + 1), key=objective)
-        if lower == best:
-            break
-        best = lower
-    if abs(best) == most:
-        return 1.0
-    below, here, above = objective(best - 1), objective(best), objective(best + 1)
-    curvature = below - 2.0 * here + above
-    off = 0.5 * (below - above) / curvature if curvature > 0.0 else 0.0
-    expected = here - 0.5 * curvature * off * off
-    return 1.0 + SPACING_STEP * (best + off) if expected < (1.0 - LEAST_GAIN) * objective(0) else 1.0
-
-
-def keyframe_clouds(log: LaserLog, track: LocalTrack, config: SlamConfig, spacing: float) -> Clouds:
-    """Points of the keyframes with another spacing of the beams."""
-    return Clouds.of([cloud_of(log, int(k), config.max_range_m, spacing) for k in track.keyframes])
 
 
 def _owners(submaps: Submaps, count: int) -> np.ndarray[tuple[int], np.dtype[np.int64]]:

@@ -82,7 +82,7 @@ def extend_map(
         tuple(_unfound(log, done, groups, located)),
     )
     say("drawing", 1.0)
-    return result_of(log, config, done, state, joined)
+    return result_of(config, done, state, joined)
 
 
 def _groups(done: Mapped) -> list[set[int]]:

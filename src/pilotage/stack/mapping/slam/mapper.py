@@ -10,17 +10,16 @@ import numpy as np
 from pilotage.core.errors import InputError
 from pilotage.core.types import FloatArray
 from pilotage.kernels.slam.frames import between, composed
-from pilotage.logs.laser_log import LaserLog, is_built_step
+from pilotage.logs.laser_log import LaserLog
 from pilotage.models.pose_graph import PoseGraph
 from pilotage.stack.mapping.slam.back_end import (
     LoopCloser,
     Solved,
-    beam_spacing,
     closed,
-    keyframe_clouds,
     refined,
     weak_edges,
 )
+from pilotage.stack.mapping.slam.beam_spacing import beam_spacing, keyframe_clouds, told_angles_fit
 from pilotage.stack.mapping.slam.closures import Verdict, moved
 from pilotage.stack.mapping.slam.clouds import Clouds
 from pilotage.stack.mapping.slam.config import SlamConfig
@@ -29,7 +28,7 @@ from pilotage.stack.mapping.slam.earlier_map import keyframe_scans
 from pilotage.stack.mapping.slam.odometry import scanner_odometry
 from pilotage.stack.mapping.slam.result import Joined, SlamResult
 from pilotage.stack.mapping.slam.scan_covariances import ScanCovariances
-from pilotage.stack.mapping.slam.scan_poses import scan_poses
+from pilotage.stack.mapping.slam.scan_poses import aligned_scans, scan_poses
 from pilotage.stack.mapping.slam.tracker import LocalTrack, track
 from pilotage.stack.mapping.slam.uncertainty import relative_poses
 
@@ -42,6 +41,7 @@ OnStage = Callable[[str, float], None]
 class Mapped:
     """A recording whose graph is closed and refined: track, its closer, points, graph, spacing of beams."""
 
+    log: LaserLog
     local: LocalTrack
     closer: LoopCloser
     clouds: Clouds
@@ -63,7 +63,7 @@ def map_log(log: LaserLog, config: SlamConfig, on_stage: OnStage | None = None) 
         return _standing(log, config, local)
     done = mapped(log, local, config, say)
     say("drawing", 1.0)
-    return result_of(log, config, done, done.state)
+    return result_of(config, done, done.state)
 
 
 def tracked(log: LaserLog, config: SlamConfig, say: OnStage) -> LocalTrack:
@@ -85,16 +85,18 @@ def mapped(log: LaserLog, local: LocalTrack, config: SlamConfig, say: OnStage) -
     say("refining", 1.0)
     spacing = 1.0
     clouds = local.clouds
-    doubted = config.calibrate_beam_spacing and not is_built_step(log.angle_step_rad).all()
-    if doubted and len(closer.closing):
+    if config.calibrate_beam_spacing and told_angles_fit(log, local, closer, config):
+        log = log.as_told()
+        local = tracked(log, config, say)
+        closer = closed(local, config, lambda text: say(text, 1.0))
+        clouds = local.clouds
+    elif config.calibrate_beam_spacing:
         spacing = beam_spacing(log, local, closer, config)
         clouds = keyframe_clouds(log, local, config, spacing) if spacing != 1.0 else clouds
-    return Mapped(local, closer, clouds, refined(closer, clouds, weak_edges(local)), spacing)
+    return Mapped(log, local, closer, clouds, refined(closer, clouds, weak_edges(local)), spacing)
 
 
-def result_of(
-    log: LaserLog, config: SlamConfig, done: Mapped, state: Solved, joined: Joined | None = None
-) -> SlamResult:
+def result_of(config: SlamConfig, done: Mapped, state: Solved, joined: Joined | None = None) -> SlamResult:
     """Return everything that is known of a mapped recording.
 
     Parameters
@@ -102,9 +104,11 @@ def result_of(
     state, joined
         The graph in the end; where it extends an earlier map that one's keyframes are its first.
     """
-    local, closer = done.local, done.closer
+    log, local, closer = done.log, done.local, done.closer
     since = 0 if joined is None else len(joined.earlier)
-    poses = scan_poses(local, state.poses[since:])
+    own = state.poses[since:]
+    hung = scan_poses(local, own)
+    poses = aligned_scans(log, local, done.clouds, own, hung, config, done.spacing)
     scans = keyframe_scans(log, np.arange(len(log)), done.spacing)
     drawn_from, drawn_at = scans, poses
     extents, closures = tuple(closer.submaps.extents), closer.closures

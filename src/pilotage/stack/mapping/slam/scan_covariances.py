@@ -1,10 +1,11 @@
 """How sure the poses of scans are, alone and seen from one another.
 
 What the graph says holds given that its edges err independently; they do not, as each scan is in many of
-them, so its covariances are doubled. On top, every scan has an error of its own: stamps that are some
-milliseconds off, a body that moves while the mirror turns, a mount known to a centimetre or two. Both were
-set so that the relations of the Intel and the Freiburg 079 recordings come out consistent; see
-docs/decisions/0038.
+them, so its covariances are doubled. Every scan has an error of its own: stamps that are some milliseconds
+off, a body that moves while the mirror turns. And the place of the scanner on the robot is known to a few
+centimetres only: an error that all scans share, and that shows between poses as far as they are turned
+against each other. The three numbers serve the Intel and the Freiburg 079 recordings together; see
+docs/decisions/0038 and 0230.
 """
 
 from __future__ import annotations
@@ -18,7 +19,8 @@ from pilotage.models.pose_graph import PoseGraph
 from pilotage.models.pose_graph_covariance import PoseCovariances, covariances
 
 SHARED_EDGES = 2.0
-SCAN_STD = np.array([0.02, 0.02, 0.006])
+SCAN_STD = np.array([0.012, 0.012, 0.004])
+MOUNT_STD_M = 0.03
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,7 +50,7 @@ class ScanCovariances:
         carry[:, 0, 2] = -(self.poses[:, 1] - keyframes[:, 1])
         carry[:, 1, 2] = self.poses[:, 0] - keyframes[:, 0]
         shared = carry @ (SHARED_EDGES * own[self.owner]) @ carry.transpose(0, 2, 1)
-        return np.asarray(shared + np.diag(SCAN_STD**2))
+        return np.asarray(shared + np.diag(SCAN_STD**2) + _of_mount(self.poses[:, 2] - self.poses[0, 2]))
 
     def relative(self, i: IntArray, j: IntArray) -> FloatArray:
         """Return (K, 3, 3) of x, y, theta of scan j as seen from scan i."""
@@ -68,7 +70,15 @@ class ScanCovariances:
         lever[:, 0, 2] = -s * d[:, 0] + c * d[:, 1]
         lever[:, 1, 2] = -c * d[:, 0] - s * d[:, 1]
         out = rotation @ between @ rotation.transpose(0, 2, 1) + own + lever @ own @ lever.transpose(0, 2, 1)
+        out += _of_mount(self.poses[j, 2] - self.poses[i, 2])
         return np.asarray(0.5 * (out + out.transpose(0, 2, 1)))
 
     def _of_graph(self) -> PoseCovariances:
         return covariances(self.graph, weights=self.weights)
+
+
+def _of_mount(turn_rad: FloatArray) -> FloatArray:
+    """(K, 3, 3) between poses turned against each other by (K,): a mount m off moves one by (R - I) m."""
+    out = np.zeros((turn_rad.size, 3, 3))
+    out[:, 0, 0] = out[:, 1, 1] = 2.0 * (1.0 - np.cos(turn_rad)) * MOUNT_STD_M**2
+    return out

@@ -1,13 +1,31 @@
-"""Poses of all scans from those of the keyframes."""
+"""Poses of all scans from those of the keyframes: hung between them, then aligned with what they saw."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from pilotage.core.types import FloatArray
-from pilotage.kernels.slam.frames import between, composed
+from pilotage.kernels.slam.align import TOO_FEW, align
+from pilotage.kernels.slam.buckets import sort_into_buckets
+from pilotage.kernels.slam.frames import between, composed, gathered
+from pilotage.logs.laser_log import LaserLog
+from pilotage.stack.mapping.slam.clouds import Clouds, cloud_of
+from pilotage.stack.mapping.slam.config import SlamConfig
+from pilotage.stack.mapping.slam.refinement import LAST_REACH_M, SCALE_M
+from pilotage.stack.mapping.slam.slips import told_by
 from pilotage.stack.mapping.slam.tracker import LocalTrack
-from pilotage.stack.mapping.slam.uncertainty import relative_poses
+from pilotage.stack.mapping.slam.uncertainty import TRACK_STD_M, relative_poses
+
+AROUND = 4
+"""Keyframes to either side along the path that lend a scan their points."""
+BUCKET_M, REACH_M = 0.25, 0.5
+MOST_MOVED_M, MOST_MOVED_RAD = 1.0, 0.3
+PRIOR = np.diag([0.1, 0.1, 1.0])
+"""Holds a scan that is being aligned where nothing else does, in squared residuals."""
+HUNG_COV = np.diag([0.02, 0.02, 0.008]) ** 2
+"""Of where a scan hangs between the keyframes, as a rule; what is off by many times that does not count."""
+DOUBTED_SQUARE = 3.0
+"""Squared distance of the aligned pose from where the scan hung, in covariances: that counts half then."""
 
 
 def scan_poses(track: LocalTrack, keyframe_poses: FloatArray) -> FloatArray:
@@ -37,3 +55,60 @@ def scan_poses(track: LocalTrack, keyframe_poses: FloatArray) -> FloatArray:
             )
         out[i] = here
     return out
+
+
+def aligned_scans(
+    log: LaserLog,
+    track: LocalTrack,
+    clouds: Clouds,
+    keyframe_poses: FloatArray,
+    start: FloatArray,
+    config: SlamConfig,
+    spacing: float,
+) -> FloatArray:
+    """(N, 3) poses of all scans, those between the keyframes aligned with the keyframes around them.
+
+    The front end had to place a scan by what was before it, from a motion that a stamp may have told wrongly.
+    Here what comes after it counts as well. One that fits nowhere near its start stays there.
+
+    Parameters
+    ----------
+    clouds, keyframe_poses
+        Points of the keyframes and (K, 3) their poses.
+    start
+        (N, 3) of ``scan_poses``.
+    spacing
+        As in ``cloud_of``.
+    """
+    out = start.copy()
+    between_keyframes = np.ones(len(log), np.bool_)
+    between_keyframes[track.keyframes] = False
+    waiting = np.flatnonzero(between_keyframes)
+    waiting = waiting[np.argsort(track.owner[waiting], kind="stable")]
+    have = -1
+    for i in waiting.tolist():
+        owner = int(track.owner[i])
+        if owner != have:
+            around = np.arange(max(0, owner - AROUND), min(len(clouds), owner + AROUND + 2))
+            points = gathered(clouds.points, clouds.starts, around, keyframe_poses, np.zeros(3))
+            box, starts, _, ordered = sort_into_buckets(points, BUCKET_M)
+            have = owner
+        cloud = cloud_of(log, i, config.max_range_m, spacing)
+        pose, hessian, fit, status = align(
+            cloud, start[i], PRIOR, REACH_M, LAST_REACH_M, SCALE_M, 30, box, starts, ordered
+        )
+        off = pose - start[i]
+        off[2] = (off[2] + np.pi) % (2.0 * np.pi) - np.pi
+        if status != TOO_FEW and np.hypot(off[0], off[1]) < MOST_MOVED_M and abs(off[2]) < MOST_MOVED_RAD:
+            out[i] += _believed(off, told_by(hessian, float(fit[1])))
+            out[i, 2] = (out[i, 2] + np.pi) % (2.0 * np.pi) - np.pi
+    return out
+
+
+def _believed(off: FloatArray, hessian: FloatArray) -> FloatArray:
+    """How far (3,) a scan moves that an alignment would move by ``off``: both count by what they know."""
+    told = hessian / TRACK_STD_M**2
+    # By the matrix inversion lemma: the inverse of what tells nothing along a corridor is not needed.
+    gain = np.linalg.solve(np.eye(3) + told @ HUNG_COV, told)
+    kept = 1.0 / (1.0 + float(off @ gain @ off) / DOUBTED_SQUARE)
+    return np.asarray(np.linalg.solve(told + kept * np.linalg.inv(HUNG_COV), told @ off))

@@ -40,8 +40,7 @@ class Slips:
         self._sum = self._sum + np.diag([position, position, heading])
         c, s = np.cos(fit.pose[2]), np.sin(fit.pose[2])
         turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
-        told, axes = np.linalg.eigh(turn.T @ fit.hessian @ turn - CHANCE * fit.weight * _EVEN)
-        told = axes @ np.diag(np.maximum(told, 0.0)) @ axes.T
+        told = told_by(turn.T @ fit.hessian @ turn, fit.weight)
         # Squared: what the map holds, however weakly, does not add up from scan to scan.
         left = np.linalg.matrix_power(np.linalg.solve(told + PRIOR, PRIOR), 2) * fit.guess_error
         if fit.by_odometry:
@@ -61,3 +60,9 @@ class Slips:
 
 
 _EVEN = np.diag([1.0, 1.0, 0.0])
+
+
+def told_by(hessian: FloatArray, weight: float) -> FloatArray:
+    """(3, 3) of an alignment's Hessian what does not come by chance; ``weight``: the sum of its points'."""
+    told, axes = np.linalg.eigh(hessian - CHANCE * weight * _EVEN)
+    return np.asarray(axes @ np.diag(np.maximum(told, 0.0)) @ axes.T)

@@ -12,6 +12,8 @@ from pilotage.core.types import BoolArray, FloatArray, IntArray
 from pilotage.models.pose_graph import PoseGraph
 from pilotage.stack.mapping.slam.chains import BlockSystem, without_chains
 
+TRACK_STD_M = 0.03
+"""What the residual of a point counts as that is aligned with keyframes along the path."""
 LEAST_INFORMATION = np.diag([1.0, 1.0, 1.0])
 """One metre, one radian: where an alignment tells nothing, the solver has a system all the same."""
 
