@@ -13,6 +13,7 @@ from pilotage.core.types import FloatArray, Pose2, Twist
 from pilotage.experiments.mission import mission_of, read_mission
 from pilotage.experiments.run import run_mission
 from pilotage.kernels.control.movers import drive_closes_in
+from pilotage.kernels.geometry.motion import exact_arc
 from pilotage.kernels.scans.rays import fan_ranges
 from pilotage.maps.segment_map import SegmentMap
 from pilotage.maps.world_map import WorldMap
@@ -21,8 +22,10 @@ from pilotage.models.motion.differential_drive import DifferentialDriveConfig
 from pilotage.sensors.lidar import LidarConfig
 from pilotage.sensors.readings import LidarScan, Readings
 from pilotage.stack.control.give_way import GiveWay, GiveWayConfig
+from pilotage.stack.control.make_room import MakeRoom, MakeRoomConfig
 from pilotage.stack.interface import Belief
 from pilotage.stack.knowledge import RobotKnowledge
+from pilotage.stack.perception.movers import Movers, MoversConfig
 from pilotage.stack.perception.moving_bodies import MovingBodies, MovingBodiesConfig
 
 LIDAR = LidarConfig(beams=539, max_range_m=12.0)
@@ -126,3 +129,53 @@ def test_it_comes_through_people_and_drives_into_nobody(base: str, controller: s
     assert metrics["success"], metrics["reason"]
     assert metrics["people_collisions"] == 0
     assert metrics["people_closest_m"] < 1.0, "nobody came near it: the test shows nothing"
+
+
+def test_a_robot_in_a_door_makes_room_for_who_presses_and_stays_out_in_the_open() -> None:
+    """A gap of 1.2 m in a wall, the robot in it, somebody before it: out on its own side."""
+    ends = np.array([[0.0, -6.0, 0.0, -0.6], [0.0, 0.6, 0.0, 6.0]])
+    chart = WorldMap(
+        "door",
+        (-6.0, -6.0, 8.0, 6.0),
+        SegmentMap(np.vstack([WALLS, ends]), np.zeros((0, 3)), (-6.0, -6.0, 8.0, 6.0)),
+    )
+    bodies = MovingBodies(MovingBodiesConfig(), ROBOT, chart)
+    _watch(bodies, (0.7, 0.0), (-1.0, 0.0))
+    makes_room = MakeRoom(MakeRoomConfig(), ROBOT, chart.field, bodies)
+    assert not makes_room.helps(Pose2(4.0, 0.0, 0.0), NOTHING)
+    pose = Pose2(0.0, 0.0, 0.0)
+    assert makes_room.helps(pose, NOTHING)
+    makes_room.begin(0.0)
+    for k in range(150):
+        command = makes_room.step(0.1 * k, pose, NOTHING)
+        if command is None:
+            break
+        pose = Pose2(
+            *exact_arc(pose.x_m, pose.y_m, pose.theta_rad, 0.1 * command.v_m_s, 0.1 * command.w_rad_s)
+        )
+        gap_m = chart.field.at(np.array([[pose.x_m, pose.y_m]]))[0]
+        assert gap_m > ROBOT.radius_m
+    assert pose.x_m < -0.6
+    assert gap_m > 0.85
+
+
+def test_what_has_stood_for_long_is_a_thing_until_it_moves() -> None:
+    config = MoversConfig(enabled=True, stands_readings=20)
+    movers = Movers(config)
+    pose = np.zeros(3)
+
+    def seen(x: float) -> FloatArray:
+        y = np.linspace(-0.1, 0.1, 7)
+        return np.column_stack([np.full(7, x), y])
+
+    for _ in range(25):
+        on_track, still = movers.update((0.0, 0.0), seen(2.0), pose, 0.1, (-2.0, 2.0))
+    assert not on_track.any()
+    assert still.all()
+    assert movers.foretold(0.1, 0.1, 3).shape[1] == 0
+    assert math.isinf(movers.nearest_m(0.0, 0.0))
+    for k in range(8):
+        on_track, still = movers.update((0.0, 0.0), seen(2.0 - 0.1 * k), pose, 0.1, (-2.0, 2.0))
+    assert on_track.all()
+    assert not still.any()
+    assert movers.foretold(0.1, 0.1, 3).shape[1] == 1

@@ -10,6 +10,7 @@ from pilotage.core.config import Config
 from pilotage.sensors.sensor import NonNegative, Positive
 from pilotage.stack.control.give_way import GiveWayConfig
 from pilotage.stack.control.guard import GuardConfig
+from pilotage.stack.control.make_room import MakeRoomConfig
 from pilotage.stack.control.wander import WanderConfig
 from pilotage.stack.perception.moving_bodies import MovingBodiesConfig
 
@@ -51,3 +52,4 @@ class GoalNavigatorConfig(Config):
     wander: WanderConfig = WanderConfig()
     moving_bodies: MovingBodiesConfig = MovingBodiesConfig()
     give_way: GiveWayConfig = GiveWayConfig()
+    make_room: MakeRoomConfig = MakeRoomConfig()

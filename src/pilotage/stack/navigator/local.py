@@ -8,12 +8,13 @@ from pydantic import Field
 
 from pilotage.core.config import Config
 from pilotage.core.errors import InputError
-from pilotage.core.types import STOP, Twist
+from pilotage.core.types import STOP, FloatArray, Pose2, Twist
 from pilotage.maps.world_map import WorldMap
 from pilotage.sensors.readings import Readings
 from pilotage.sensors.sensor import NonNegative, Positive
 from pilotage.stack.control.give_way import GiveWay, GiveWayConfig
 from pilotage.stack.control.local.drive import LocalDrive
+from pilotage.stack.control.make_room import MakeRoom, MakeRoomConfig
 from pilotage.stack.interface import NAVIGATORS, Belief, StackStatus
 from pilotage.stack.journal import Journal
 from pilotage.stack.knowledge import RobotKnowledge, TaskKnowledge
@@ -41,6 +42,10 @@ class LocalConfig(Config):
     moving_bodies: MovingBodiesConfig = MovingBodiesConfig()
     give_way: GiveWayConfig = GiveWayConfig()
     """With a plan the robot knows the walls, and so who walks about."""
+    make_room: MakeRoomConfig = MakeRoomConfig()
+    shut_in_s: Positive = 6.0
+    shut_in_m: Positive = 0.3
+    """Having come no farther than this among people in that time, it makes room."""
 
 
 @NAVIGATORS.add("local", LocalConfig)
@@ -84,6 +89,10 @@ class LocalNavigator:
         )
         self._bodies = MovingBodies(config.moving_bodies, robot, chart)
         self._gives_way = GiveWay(config.give_way, robot, self._bodies)
+        self._make_room = MakeRoom(config.make_room, robot, chart.field, self._bodies)
+        self._shut_in = config.shut_in_s, config.shut_in_m
+        self._stood: tuple[float, Pose2] | None = None
+        self._makes_room = False
         self._plan: PlanAhead | None = None
         if parts.planner is not None:
             self._plan = PlanAhead(
@@ -133,10 +142,28 @@ class LocalNavigator:
         command = self._drive.toward(
             point, pose, readings, min(PASSING_M, tolerance_m) if led else tolerance_m, self._bodies.about
         )
-        if self._plan is not None and not self._gives_way.allows(command, pose, self._plan.mapped_m):
-            command = STOP
+        if self._plan is not None:
+            command = self._among_people(readings.t_s, command, pose, self._plan.mapped_m)
         self._tell(readings.t_s, led=led)
         return STOP if self._status is not StackStatus.RUNNING else command
+
+    def _among_people(self, t_s: float, command: Twist, pose: Pose2, mapped_m: FloatArray) -> Twist:
+        """The command as people leave it: making room where they shut the robot in, else giving way."""
+        longest_s, least_m = self._shut_in
+        if self._stood is None or _apart_m(pose, self._stood[1]) > least_m or not self._bodies.about:
+            self._stood = t_s, pose
+        waited = t_s - self._stood[0] >= longest_s
+        if waited and not self._makes_room and self._make_room.helps(pose, mapped_m):
+            self._journal.say(t_s, "make-room", "somebody stands in the way: making room")
+            self._make_room.begin(t_s)
+            self._makes_room = True
+        if self._makes_room:
+            room = self._make_room.step(t_s, pose, mapped_m)
+            if room is None:
+                self._makes_room, self._stood = False, (t_s, pose)
+            else:
+                command = room
+        return command if self._gives_way.allows(command, pose, mapped_m) else STOP
 
     def _tell(self, t_s: float, *, led: bool) -> None:
         word = self._drive.status
@@ -149,3 +176,7 @@ class LocalNavigator:
     def _end(self, t_s: float, status: StackStatus, why: str) -> None:
         self._status, self._reason = status, why
         self._journal.say(t_s, str(status), why)
+
+
+def _apart_m(a: Pose2, b: Pose2) -> float:
+    return math.hypot(a.x_m - b.x_m, a.y_m - b.y_m)

@@ -48,10 +48,11 @@ class Movers:
     def __init__(self, config: MoversConfig) -> None:
         self._config = config
         self.tracks: FloatArray = np.zeros((0, kernels.COLUMNS))
+        self._things: BoolArray = np.zeros(0, np.bool_)
 
     def forget(self) -> None:
         """Drop all tracks."""
-        self.tracks = self.tracks[:0]
+        self.tracks, self._things = self.tracks[:0], self._things[:0]
 
     def update(
         self,
@@ -65,6 +66,8 @@ class Movers:
 
         ``field_rad``: directions of the first and the last beam in the base frame.
 
+        What has stood for long is a thing until it moves: the end of a wall, or a post, is no body.
+
         Returns (N,) points of bodies that count, which the obstacle grid shall not keep, and (N,) those that
         the odometry may be corrected by: of wide things, and of narrow ones that have stood for long.
         """
@@ -73,13 +76,16 @@ class Movers:
         turn = np.array([[c, s], [-s, c]])
         x, y = pose[:2] + np.array(sensor_xy_m) @ turn
         of_point = self.track(float(x), float(y), float(pose[2]), pose[:2] + in_base @ turn, dt_s, field_rad)
+        tracks = self.tracks
         moved = np.hypot(
-            self.tracks[:, kernels.X] - self.tracks[:, kernels.X0],
-            self.tracks[:, kernels.Y] - self.tracks[:, kernels.Y0],
+            tracks[:, kernels.X] - tracks[:, kernels.X0], tracks[:, kernels.Y] - tracks[:, kernels.Y0]
         )
-        stands = (self.tracks[:, kernels.READINGS] >= config.stands_readings) & (moved < config.stands_m)
+        went = moved >= config.stands_m
+        tracks[went, kernels.X0 : kernels.Y0 + 1] = tracks[went, kernels.X : kernels.Y + 1]
+        tracks[went, kernels.READINGS] = np.minimum(tracks[went, kernels.READINGS], config.readings)
+        self._things = stands = tracks[:, kernels.READINGS] >= config.stands_readings
         # One more place, for the points of no cluster.
-        on_track: BoolArray = np.append(self._count(), False)[of_point]
+        on_track: BoolArray = np.append(self._count() & ~stands, False)[of_point]
         still: BoolArray = np.append(stands, True)[of_point]
         return on_track, still
 
@@ -107,6 +113,7 @@ class Movers:
             config.gate_std,
             config.most_missed,
         )
+        self._things = np.zeros(len(self.tracks), np.bool_)
         of_track: IntArray = np.append(of_centre, kernels.UNUSED)[of_point]
         return of_track
 
@@ -121,7 +128,7 @@ class Movers:
         tracks[kept, kernels.MISSED] = np.minimum(tracks[kept, kernels.MISSED], config.most_missed - 1)
 
     def _count(self) -> BoolArray:
-        """Which tracks have been read often enough."""
+        """Which tracks have been read often enough since they moved last."""
         enough: BoolArray = self.tracks[:, kernels.READINGS] >= self._config.readings
         return enough
 
@@ -134,7 +141,7 @@ class Movers:
         config = self._config
         if not self.tracks.shape[0]:
             return np.zeros((steps, 0, 3))
-        tracks = self.tracks if sure else self.tracks[self._count()]
+        tracks = self.tracks[~self._things] if sure else self.tracks[self._count() & ~self._things]
         discs: FloatArray = kernels.foretold(
             np.ascontiguousarray(tracks),
             first_s,
@@ -148,15 +155,20 @@ class Movers:
         return discs
 
     def unsure(self) -> BoolArray:
-        """Of which of all tracks it cannot be told yet where they go."""
-        unsure: BoolArray = self.tracks[:, kernels.VV] > self._config.unsure_std_m_s**2
+        """Of which of those foretold it cannot be told yet where they go."""
+        unsure: BoolArray = self.tracks[~self._things, kernels.VV] > self._config.unsure_std_m_s**2
         return unsure
+
+    def rests(self, readings: int) -> BoolArray:
+        """Which of those foretold have not moved for so many readings."""
+        rests: BoolArray = self.tracks[~self._things, kernels.READINGS] >= readings
+        return rests
 
     def nearest_m(self, x_m: float, y_m: float) -> float:
         """Distance from a point to the nearest body's edge; inf without any."""
         if not self.tracks.shape[0]:
             return math.inf
-        bodies = self.tracks[self._count()]
+        bodies = self.tracks[self._count() & ~self._things]
         if not bodies.shape[0]:
             return math.inf
         away = np.hypot(bodies[:, kernels.X] - x_m, bodies[:, kernels.Y] - y_m)

@@ -198,6 +198,12 @@ class MovingBodies:
         """Whether somebody walked about a moment ago: what blocks the path may be gone soon."""
         return self._t_s - self.seen_s < self._config.about_s
 
+    def is_new(self, x_m: float, y_m: float, reach_m: float) -> bool:
+        """Whether something came into sight so near to a place that cannot be told yet from somebody."""
+        tracks, config = self._movers.tracks, self._config
+        new = tracks[:, kernels.READINGS] < config.stands_readings
+        return bool((np.hypot(tracks[new, kernels.X] - x_m, tracks[new, kernels.Y] - y_m) < reach_m).any())
+
     def sees(self, bearing_rad: float) -> bool:
         """Whether the laser looks in a direction of the base's frame."""
         first, last = self._field

@@ -83,7 +83,9 @@ class GapHorizonConfig(Config):
     has tried that, it closes the place and looks elsewhere."""
     close_ahead_m: Positive = 1.2
     stand_m: NonNegative = 0.1
-    """A robot that does not drive does not start, nor turn, with a moving body nearer than this."""
+    """A robot that does not drive does not start, nor turn, with a moving body nearer than this, ..."""
+    rests_readings: int = Field(default=50, ge=1, le=1000)
+    """... unless that has not moved for so many: its commands are checked all the same."""
     unsure_m: NonNegative = 1.0
     unsure_s: NonNegative = 0.5
     """Nor, for so long, with one nearer than this of which it cannot tell yet where it goes."""
@@ -282,6 +284,7 @@ class GapHorizon:
             if (unsure & scene.movers.unsure()).any():
                 return True
         keep = config.stand_m
+        now = now[~scene.movers.rests(config.rests_readings)]
         near: float = movers_clearance(x, y, theta, body.polygon, body.outer_m, now, keep)
         return near < keep
 

@@ -13,6 +13,7 @@ from pilotage.sensors.readings import Readings
 from pilotage.stack.control.controller import Controller
 from pilotage.stack.control.give_way import GiveWay
 from pilotage.stack.control.guard import ArcGuard
+from pilotage.stack.control.make_room import MakeRoom
 from pilotage.stack.control.reactive import Reaction, ReactionKind
 from pilotage.stack.interface import Belief, StackStatus
 from pilotage.stack.journal import Journal
@@ -42,9 +43,6 @@ TURN_RATE_RAD_S = 0.8
 
 SOMEBODY_M = 2.0
 """With somebody who walks so near, what is close in front is a reason to give way, not to turn away."""
-
-BESIDE_M, ASIDE, ROOM_M = 0.15, 0.3, 0.05
-"""Of a retreat: what is mapped so near lies beside it, so far behind (a cosine); its room to walls."""
 
 NO_REACTION = Reaction(ReactionKind.NONE, 0.0, math.inf, math.inf)
 
@@ -89,7 +87,9 @@ class Context:
         # Without a mapper it minds nothing but its map: who shows it wrong scans shows it nobody.
         self._bodies = MovingBodies(config.moving_bodies, robot, own_map.told, minds=parts.mapper is not None)
         self._gives_way = GiveWay(config.give_way, robot, self._bodies)
+        self.make_room = MakeRoom(config.make_room, robot, own_map.told.field, self._bodies)
         self._waits_s: float | None = None
+        self._waited_at, self._waited = (math.inf, math.inf), 0
         self.tries = 0
         self.turn_rate_rad_s = min(TURN_RATE_RAD_S, robot.motion.top_turn_rate_rad_s)
         self.reactive, self._mapper, self.escape = parts.reactive, parts.mapper, parts.escape
@@ -161,28 +161,24 @@ class Context:
         """Whether somebody walked about a moment ago: what blocks the path may be gone soon."""
         return self._bodies.about
 
-    def leaves_room(self, command: Twist, pose: Pose2) -> bool:
-        """Whether a command keeps off the walls, and drives away from whatever was mapped beside the robot.
+    def meets_something_new(self, pose: Pose2) -> bool:
+        """Whether something came into sight just now, near enough, that may be the first person it meets."""
+        return self._bodies.is_new(pose.x_m, pose.y_m, SOMEBODY_M)
 
-        That may be somebody who stopped there: as an obstacle he would shut in for good who stands beside.
-        """
-        own = self.own_map
-        off = own.found_circles_m[:, :2] - (pose.x_m, pose.y_m)
-        away = np.hypot(*off.T) - own.found_circles_m[:, 2]
-        beside = away < self.radius_m + BESIDE_M
-        ahead = (off @ (math.cos(pose.theta_rad), math.sin(pose.theta_rad)))[beside]
-        if command.v_m_s and (math.copysign(1.0, command.v_m_s) * ahead > -ASIDE * away[beside]).any():
-            return False
-        circles = np.concatenate([own.known_circles_m, own.found_circles_m[~beside]])
-        room_m = max(self.radius_m, min(self.radius_m + ROOM_M, self._to_walls_m(pose) - HERE_TOLERANCE_M))
-        return self.guard.allows(command, pose, own.barriers, circles, room_m)
+    def helps_to_make_room(self, pose: Pose2) -> bool:
+        """Whether a place aside is any better than to stand here."""
+        return self.make_room.helps(pose, self.own_map.found_circles_m)
 
-    def out_of_patience(self) -> bool:
-        """Whether it has waited for long; having said so it waits as long again."""
-        out = self._waits_s is not None and self.t_s - self._waits_s >= self.config.give_way.patience_s
-        if out:
-            self._waits_s = self.t_s
-        return out
+    def out_of_patience(self, pose: Pose2) -> int:
+        """How often in a row it has now waited for long in one place; 0 while it still has patience."""
+        if self._waits_s is None or self.t_s - self._waits_s < self.config.give_way.patience_s:
+            return 0
+        self._waits_s = self.t_s
+        here = pose.x_m, pose.y_m
+        if math.dist(here, self._waited_at) > self.config.stall_progress_m:
+            self._waited_at, self._waited = here, 0
+        self._waited += 1
+        return self._waited
 
     def take_plan(self, kind: str, why: str = "") -> None:
         """Drive by the plan just made from now on."""
@@ -202,15 +198,6 @@ class Context:
     def say(self, kind: str, text: str) -> None:
         """Tell that something happened."""
         self.journal.say(self.t_s, kind, text)
-
-    def place_back(self, distance_m: float) -> Pose2 | None:
-        """The newest place of its trail so far off in a straight line; what came after it is dropped."""
-        here = self.trail[-1] if self.trail else None
-        while self.trail and here is not None:
-            place = self.trail.pop()
-            if math.hypot(place.x_m - here.x_m, place.y_m - here.y_m) >= distance_m:
-                return place
-        return None
 
     # --- asking -------------------------------------------------------------------------------------
 

@@ -11,7 +11,7 @@ from pilotage.stack.control.reactive import ReactionKind
 from pilotage.stack.interface import Belief
 from pilotage.stack.navigator.goal.context import HERE_TOLERANCE_M, Context
 from pilotage.stack.navigator.goal.ended import arrive
-from pilotage.stack.navigator.goal.escaping import begin_escape, replan, set_out
+from pilotage.stack.navigator.goal.escaping import begin_escape, make_room, replan, set_out
 from pilotage.stack.navigator.goal.state import Move, State
 from pilotage.stack.navigator.goal_config import Mode
 
@@ -79,10 +79,13 @@ def drive(context: Context, state: Driving, readings: Readings, belief: Belief) 
 
 
 def give_way(context: Context, move: Move, pose: Pose2) -> Move:
-    """Wait for somebody; with patience at its end, plan around where everybody is."""
+    """Wait for somebody; after long plan around where everybody is, and after as long again make room."""
     context.mode = Mode.WAIT
     context.follower.hold()
-    if context.out_of_patience() and context.plan_around_people(pose).path is not None:
+    waited = context.out_of_patience(pose)
+    if waited and waited % 2 == 0 and context.helps_to_make_room(pose):
+        return make_room(context, _anew(context, move.state), "somebody stands in the way: making room")
+    if waited and context.plan_around_people(pose).path is not None:
         context.follower.drop()
         context.journal.count("replans")
         context.take_plan("replan", "somebody stands in the way for long")
@@ -117,9 +120,11 @@ def _next(context: Context, state: Driving, readings: Readings, pose: Pose2) -> 
     kind = context.react(readings, pose)
     resumes = state.resumes if isinstance(state, Avoiding) else state
     if kind is ReactionKind.TRAPPED:
-        return begin_escape(context, _anew(context, resumes), "turning found no way out")
+        return begin_escape(context, _anew(context, resumes), pose, "turning found no way out")
     if context.stalled():
-        return begin_escape(context, _anew(context, resumes), f"no progress for {context.config.stall_s:g} s")
+        return begin_escape(
+            context, _anew(context, resumes), pose, f"no progress for {context.config.stall_s:g} s"
+        )
     if kind is ReactionKind.AVOID:
         return _avoid(context, state, resumes)
     if isinstance(state, Avoiding):

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
-from pilotage.core.angles import wrap_to_pi
 from pilotage.core.types import STOP, Pose2, Twist
 from pilotage.sensors.readings import Readings
 from pilotage.stack.interface import Belief
@@ -14,47 +12,42 @@ from pilotage.stack.navigator.goal.ended import fail
 from pilotage.stack.navigator.goal.state import Move, State
 from pilotage.stack.navigator.goal_config import Mode
 
-WAITS = 3
+WAITS = 1
 """So often it waits before it makes room."""
-RETREAT_M, RETREAT_M_S, RETREAT_S = 2.5, 0.3, 20.0
-"""How far along its trail it goes back, how fast, and for how long at most."""
-NEAR_M, AHEAD_RAD = 0.2, 0.3
-"""Where it is there, and where it drives on rather than turns."""
 
 
 @dataclass(frozen=True, slots=True)
-class Retreating:
-    """Turns about and drives back to where it came from, looking ahead: to make room in a door.
+class MakingRoom:
+    """Goes where nobody has to get past it, then waits again.
 
     Attributes
     ----------
-    to
-        A place on its trail.
-    until_s
-        By then it waits again, wherever it got to.
+    resumes
+        What the robot is about with a new plan.
     """
 
     context: Context
     resumes: State
-    to: Pose2
-    until_s: float
 
     def step(self, readings: Readings, belief: Belief) -> Move:
-        """Towards the place where the own map and everybody leave room; else stand."""
+        """On towards more room while somebody leaves it any; else stand."""
         context, pose = self.context, belief.pose
         context.map_what_is_new(readings, belief)
         context.to_go_m = context.progress.update(pose)
         context.mode = Mode.ESCAPE
-        dx, dy = self.to.x_m - pose.x_m, self.to.y_m - pose.y_m
-        if math.hypot(dx, dy) < NEAR_M or context.t_s >= self.until_s:
+        command = context.make_room.step(context.t_s, pose, context.own_map.found_circles_m)
+        if command is None:
             until_s = context.t_s + context.config.give_way.patience_s
             return Move(Waiting(context, self.resumes, until_s), STOP)
-        off_rad = wrap_to_pi(math.atan2(dy, dx) - pose.theta_rad)
-        most = context.turn_rate_rad_s
-        speed_m_s = RETREAT_M_S if abs(off_rad) < AHEAD_RAD else 0.0
-        command = Twist(speed_m_s, min(max(2.0 * off_rad, -most), most))
-        free = context.leaves_room(command, pose) and not context.waits(command, pose)
-        return Move(self, command if free else STOP)
+        return Move(self, STOP if context.waits(command, pose) else command)
+
+
+def make_room(context: Context, resumes: State, why: str) -> Move:
+    """Out of the way of people from the next step on."""
+    context.follower.drop()
+    context.say("make-room", why)
+    context.make_room.begin(context.t_s)
+    return Move(MakingRoom(context, resumes), STOP)
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,7 +78,7 @@ class Waiting:
             context.take_plan("replan", "the path is free again")
             return Move(self.resumes, STOP)
         return begin_escape(
-            context, self.resumes, f"waited, but replanning found {result.status}", self.left - 1
+            context, self.resumes, pose, f"waited, but replanning found {result.status}", self.left - 1
         )
 
 
@@ -120,18 +113,17 @@ class Escaping:
         return replan(context, self.resumes, pose, "the way back is blocked")
 
 
-def begin_escape(context: Context, resumes: State, why: str, waits: int = WAITS) -> Move:
+def begin_escape(context: Context, resumes: State, pose: Pose2, why: str, waits: int = WAITS) -> Move:
     """Stop, and back out from the next step on; without an escape this is the end.
 
-    Among people it waits instead, so often, and then makes room: a robot that backs out sees nobody behind
-    it.
+    Among people, and where the first one may have come along, it waits instead: a robot that backs out sees
+    nobody behind it. Having waited so often it makes room.
     """
-    if context.among_people:
+    if context.among_people and waits <= 0 and context.helps_to_make_room(pose):
+        return make_room(context, resumes, f"{why}: making room, as somebody walks about")
+    if context.among_people or (waits > 0 and context.meets_something_new(pose)):
         context.follower.drop()
-        context.say("wait", f"{why}: waiting, as somebody walks about")
-        back = context.place_back(RETREAT_M) if waits <= 0 and context.turns_on_the_spot else None
-        if back is not None:
-            return Move(Retreating(context, resumes, back, context.t_s + RETREAT_S), STOP)
+        context.say("wait", f"{why}: waiting, as somebody may walk about")
         return Move(Waiting(context, resumes, context.t_s + context.config.give_way.patience_s, waits), STOP)
     if context.escape is None:
         return fail(context, f"stuck: {why}, and the stack has no escape")
@@ -158,6 +150,6 @@ def set_out(context: Context, resumes: State, pose: Pose2, kind: str, why: str) 
     """Stop and plan to the current goal; back out where there is no path from here."""
     result = context.make_plan(pose, context.clearances_m(pose))
     if result.path is None:
-        return begin_escape(context, resumes, f"replanning found {result.status} ({result.reason})")
+        return begin_escape(context, resumes, pose, f"replanning found {result.status} ({result.reason})")
     context.take_plan(kind, why)
     return Move(resumes, STOP)
