@@ -57,7 +57,9 @@ def test_only_what_all_beams_pass_is_seen_through() -> None:
     disc = np.array([[2.0, 0.0, 0.03]])
 
     def gone(ranges: list[float], discs: FloatArray = disc, spread: float = 0.0) -> bool:
-        return bool(seen_through(discs, np.array(ranges), 0.0, 0.0, -0.02, 0.01, 5.0, 0.3, spread, 0.0)[0])
+        return bool(
+            seen_through(discs, np.array(ranges), 0.0, 0.0, -0.02, 0.01, 5.0, 0.3, spread, 0.0, 20.0)[0]
+        )
 
     assert gone([9.0] * 5)
     assert not gone([2.0] * 5)

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from pilotage.kernels.arrays import FloatArray, IntArray
+from pilotage.kernels.arrays import BoolArray, FloatArray, IntArray
 from pilotage.kernels.control.footprint import polygon_distance
 from pilotage.kernels.geometry.motion import wrap
 from pilotage.kernels.jit import kernel
@@ -192,6 +192,91 @@ def track_step(
         of_centre[j] = kept
         kept += 1
     return out[:kept], of_centre
+
+
+@kernel
+def keep_unseen(
+    tracks: FloatArray,
+    x: float,
+    y: float,
+    theta: float,
+    first: float,
+    last: float,
+    lost_var: float,
+    readings: int,
+    most_missed: int,
+) -> None:
+    """Readings of tracks (M, 11) cannot be missed where no beam goes; in place.
+
+    Beams of a sensor at x, y look from ``first`` to ``last``, seen from ``theta``. A track goes on so until
+    its place is vaguer than ``lost_var``.
+    """
+    for i in range(tracks.shape[0]):
+        bearing = math.atan2(tracks[i, Y] - y, tracks[i, X] - x) - theta
+        unseen = (bearing - first) % (2.0 * math.pi) > last - first
+        if unseen and tracks[i, PP] < lost_var and tracks[i, READINGS] >= readings:
+            tracks[i, MISSED] = min(tracks[i, MISSED], most_missed - 1.0)
+
+
+@kernel
+def tell_walkers(
+    tracks: FloatArray,
+    x: float,
+    y: float,
+    first: float,
+    step: float,
+    ranges: FloatArray,
+    about: bool,
+    walks_speed: float,
+    unsure_var: float,
+    walked: float,
+    through: float,
+    straight: float,
+    readings: int,
+    stands: int,
+    parks: int,
+) -> tuple[BoolArray, bool]:
+    """Which tracks (M, 11) do not stand, and whether one of them is of somebody who walks, or did.
+
+    Somebody walks who is faster than ``walks_speed`` and ``walked`` so far from where he was first seen, if
+    the laser at x, y sees ``through`` behind that place, or if he comes ``straight`` on, by that share of
+    his motion. Of him the place is dropped (NaN) and readings count anew from ``readings``: with ``stands``
+    more he stands, with ``parks`` more he is a thing. Others do not stand only while people are ``about``.
+    """
+    out = np.zeros(tracks.shape[0], np.bool_)
+    people = False
+    fast_or_unsure = np.zeros(tracks.shape[0], np.bool_)
+    known = np.zeros(tracks.shape[0], np.bool_)
+    for i in range(tracks.shape[0]):
+        track = tracks[i]
+        unsure = track[VV] > unsure_var
+        fast = math.hypot(track[VX], track[VY]) > walks_speed
+        fast_or_unsure[i] = fast or unsure
+        known[i] = math.isnan(track[X0])
+        if fast and not unsure and not known[i]:
+            went = math.hypot(track[X] - track[X0], track[Y] - track[Y0])
+            if went > walked:
+                dx, dy = track[X0] - x, track[Y0] - y
+                away = math.hypot(dx, dy)
+                beam = round(((math.atan2(dy, dx) - first) % (2.0 * math.pi)) / step)
+                seen = beam - 1 < ranges.shape[0]
+                for k in range(max(beam - 1, 0), min(beam + 2, ranges.shape[0])):
+                    # Also of a beam without an answer nothing is known.
+                    seen = seen and ranges[k] > away + through
+                known[i] = seen or away - math.hypot(track[X] - x, track[Y] - y) > straight * went
+        if known[i] and fast and not unsure:
+            track[READINGS], track[X0] = readings, math.nan
+        if not known[i]:
+            continue
+        stood = track[READINGS] - readings
+        if stood >= parks:
+            track[X0], track[Y0] = track[X], track[Y]
+        else:
+            people = True
+            out[i] = stood < stands
+    for i in range(tracks.shape[0]):
+        out[i] = out[i] or (fast_or_unsure[i] and (known[i] or about or people))
+    return out, people
 
 
 @kernel

@@ -55,6 +55,9 @@ def unexplained_points(
 @kernel
 def confirm_cells(
     points: FloatArray,
+    x: float,
+    y: float,
+    reach: float,
     hits: IntArray,
     sums: FloatArray,
     x0: float,
@@ -64,12 +67,15 @@ def confirm_cells(
 ) -> FloatArray:
     """Count points (K, 2) into ``hits`` (ny, nx) and add them to ``sums`` (ny, nx, 2), both in place.
 
+    Only those nearer to (x, y) than ``reach``.
     Returns the mean points (C, 2) of the cells whose count reaches ``threshold`` by this call.
     """
     ny, nx = hits.shape
     means = np.empty((points.shape[0], 2))
     count = 0
     for k in range(points.shape[0]):
+        if math.hypot(points[k, 0] - x, points[k, 1] - y) >= reach:
+            continue
         col = math.floor((points[k, 0] - x0) / cell)
         row = math.floor((points[k, 1] - y0) / cell)
         if not (0 <= row < ny and 0 <= col < nx) or hits[row, col] >= threshold:
@@ -96,6 +102,7 @@ def seen_through(
     beyond: float,
     spread: float,
     spread_rad: float,
+    most: float,
 ) -> BoolArray:
     """Which discs (N, 3) within ``reach`` the beams show not to be there, (N,).
 
@@ -118,8 +125,42 @@ def seen_through(
             continue
         gone = True
         for k in range(low, high + 1):
-            if ranges[k] <= away + beyond:
+            # Beams without an echo, 0 or NaN, say nothing.
+            if not ranges[k] > away + beyond or most <= away + beyond:
                 gone = False
                 break
         out[i] = gone
     return out
+
+
+@kernel
+def gone_discs(
+    discs: FloatArray,
+    passed: IntArray,
+    ranges: FloatArray,
+    x: float,
+    y: float,
+    first: float,
+    step: float,
+    reach: float,
+    beyond: float,
+    spread: float,
+    spread_rad: float,
+    most: float,
+    px: float,
+    py: float,
+    inside: float,
+    scans: int,
+) -> tuple[BoolArray, bool]:
+    """Which discs (N, 3) were ``seen_through`` by so many scans in a row, and whether any.
+
+    ``passed`` (N,): by how many so far, in place; ranges longer than ``most`` saw that far. Where the robot
+    stands, within ``inside`` of (px, py), nothing else does.
+    """
+    gone = seen_through(discs, ranges, x, y, first, step, reach, beyond, spread, spread_rad, most)
+    some = False
+    for i in range(discs.shape[0]):
+        passed[i] = passed[i] + 1 if gone[i] else 0
+        gone[i] = passed[i] >= scans or math.hypot(discs[i, 0] - px, discs[i, 1] - py) < inside
+        some |= gone[i]
+    return gone, some

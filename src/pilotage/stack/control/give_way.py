@@ -46,8 +46,10 @@ class GiveWay:
         """Whether the command closes in on nobody; ``mapped_m`` (N, 3) discs are things."""
         if command.v_m_s == 0.0 and not (self._swings and command.w_rad_s):
             return True
-        if command.v_m_s < 0.0 and self._bodies.about and not self._bodies.sees(math.pi):
+        if command.v_m_s < 0.0 and self._bodies.may_be_at(math.pi):
             return False
+        if not self._bodies.about:
+            return True
         discs = self._bodies.foretold(CHECK_STEP_S, STEPS, pose, mapped_m, REACH_M)
         if not discs.shape[1]:
             return True

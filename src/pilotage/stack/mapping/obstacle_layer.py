@@ -9,7 +9,6 @@ from pydantic import Field
 
 from pilotage.core.config import Config
 from pilotage.core.types import FloatArray, IntArray, Pose2
-from pilotage.kernels.lines.clustering import beam_directions
 from pilotage.kernels.scans import unexpected
 from pilotage.maps.world_map import WorldMap
 from pilotage.sensors.lidar import LidarConfig
@@ -18,6 +17,7 @@ from pilotage.sensors.sensor import Positive
 from pilotage.stack.interface import Belief
 from pilotage.stack.knowledge import RobotKnowledge
 from pilotage.stack.mapping.mapper import MAPPERS
+from pilotage.stack.perception.unexplained import Unexplained, UnexplainedReturns
 
 INSIDE = 0.95
 """Share of its own inner radius within which nothing else can stand."""
@@ -53,12 +53,10 @@ class ObstacleLayer:
     def __init__(self, config: ObstacleLayerConfig, robot: RobotKnowledge, chart: WorldMap) -> None:
         self._config = config
         self._lidar, lidar = robot.one_sensor(LidarConfig, "obstacle-layer")
-        self._mount = lidar.mount
-        self._first = float(lidar.beam_angles_rad()[0])
         self._step = lidar.beam_step_rad
-        self._directions = beam_directions(0.0, self._step, lidar.beams)
         self._reach_m = min(config.reach_m, lidar.max_range_m)
-        self._known = chart.wall_field
+        self.unexplained = UnexplainedReturns(lidar, chart, config.tolerance_m, config.sigmas)
+        self.unexplained.look_to(config.reach_m)
         xmin, ymin, xmax, ymax = chart.bounds_m
         shape = (math.ceil((ymax - ymin) / config.cell_m), math.ceil((xmax - xmin) / config.cell_m))
         self._hits = np.zeros(shape, dtype=np.int64)
@@ -74,32 +72,21 @@ class ObstacleLayer:
         scan = readings.by_sensor.get(self._lidar)
         if not isinstance(scan, LidarScan):
             return False
-        pose, cov, config = belief.pose, belief.cov, self._config
-        c, s = math.cos(pose.theta_rad), math.sin(pose.theta_rad)
-        x = pose.x_m + c * self._mount.x_m - s * self._mount.y_m
-        y = pose.y_m + s * self._mount.x_m + c * self._mount.y_m
-        first = pose.theta_rad + self._mount.theta_rad + self._first
-        spread_m = config.sigmas * math.sqrt(max(cov[0, 0], cov[1, 1]))
-        spread_rad = config.sigmas * math.sqrt(cov[2, 2])
+        config, seen = self._config, self.unexplained.of(scan, belief)
         if config.forget_scans and len(self.circles_m):
-            self._forget(scan.ranges_m, x, y, first, spread_m, spread_rad, pose)
-        points, _ = unexpected.unexplained_points(
-            scan.ranges_m,
-            x,
-            y,
-            first,
-            self._directions,
-            self._reach_m,
-            config.tolerance_m + spread_m,
-            spread_rad,
-            self._known.distance_m,
-            *self._known.origin_xy_m,
-            self._known.resolution_m,
-        )
-        if points.shape[0] == 0:
+            self._forget(scan.ranges_m, seen, belief.pose)
+        if seen.points_m.shape[0] == 0:
             return False
         means = unexpected.confirm_cells(
-            points, self._hits, self._sums, *self._origin, config.cell_m, config.hits
+            seen.points_m,
+            seen.x_m,
+            seen.y_m,
+            self._reach_m,
+            self._hits,
+            self._sums,
+            *self._origin,
+            config.cell_m,
+            config.hits,
         )
         if means.shape[0] == 0:
             return False
@@ -108,22 +95,29 @@ class ObstacleLayer:
         self._passed = np.append(self._passed, np.zeros(len(discs), dtype=np.int64))
         return True
 
-    def _forget(
-        self, ranges_m: FloatArray, x: float, y: float, first: float, spread_m: float, spread_rad: float,
-        pose: Pose2,
-    ) -> None:  # fmt: skip
+    def _forget(self, ranges_m: FloatArray, seen: Unexplained, pose: Pose2) -> None:
         """Take off the map what has been seen through often enough; it may be found there again."""
         config = self._config
-        ranges_m = np.where(ranges_m > 0.0, np.minimum(ranges_m, self._range_m), 0.0)
-        through = unexpected.seen_through(
-            self.circles_m, ranges_m, x, y, first, self._step, self._reach_m, config.forget_beyond_m,
-            spread_m, spread_rad,
-        )  # fmt: skip
-        self._passed = np.where(through, self._passed + 1, 0)
-        gone = self._passed >= config.forget_scans
         # Where the robot stands nothing else does: somebody stood there.
-        gone |= np.hypot(*(self.circles_m[:, :2] - (pose.x_m, pose.y_m)).T) < self._inside_m
-        if not gone.any():
+        gone, some = unexpected.gone_discs(
+            self.circles_m,
+            self._passed,
+            ranges_m,
+            seen.x_m,
+            seen.y_m,
+            seen.first_rad,
+            self._step,
+            self._reach_m,
+            config.forget_beyond_m,
+            seen.spread_m,
+            seen.spread_rad,
+            self._range_m,
+            pose.x_m,
+            pose.y_m,
+            self._inside_m,
+            config.forget_scans,
+        )
+        if not some:
             return
         # A disc lies at the mean of its cell's points, so in its cell.
         columns, rows = ((self.circles_m[gone, :2] - self._origin) / config.cell_m).astype(np.int64).T

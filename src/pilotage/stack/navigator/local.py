@@ -20,7 +20,7 @@ from pilotage.stack.journal import Journal
 from pilotage.stack.knowledge import RobotKnowledge, TaskKnowledge
 from pilotage.stack.localization.dead_reckoning import DeadReckoningConfig, DeadReckoningLocalizer
 from pilotage.stack.localization.localizer import Localizer
-from pilotage.stack.navigator.navigator import Parts
+from pilotage.stack.navigator.navigator import Parts, unexplained_of
 from pilotage.stack.navigator.plan_ahead import PlanAhead, PlanAheadConfig
 from pilotage.stack.perception.moving_bodies import MovingBodies, MovingBodiesConfig
 
@@ -87,7 +87,7 @@ class LocalNavigator:
         self._localizer: Localizer = parts.localizer or DeadReckoningLocalizer(
             DeadReckoningConfig(), robot, chart, task.initial, journal
         )
-        self._bodies = MovingBodies(config.moving_bodies, robot, chart)
+        self._bodies = MovingBodies(config.moving_bodies, robot, chart, unexplained=unexplained_of(parts))
         self._gives_way = GiveWay(config.give_way, robot, self._bodies)
         self._make_room = MakeRoom(config.make_room, robot, chart.field, self._bodies)
         self._shut_in = config.shut_in_s, config.shut_in_m

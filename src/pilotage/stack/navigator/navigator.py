@@ -13,6 +13,7 @@ from pilotage.stack.localization.heading_filter import HeadingFilter
 from pilotage.stack.localization.localizer import Localizer
 from pilotage.stack.mapping.mapper import Mapper
 from pilotage.stack.patrol.task import PatrolTask
+from pilotage.stack.perception.unexplained import UnexplainedReturns
 from pilotage.stack.planning.local_planner import LocalPlanner
 from pilotage.stack.planning.planner import Planner, Smoother
 
@@ -41,3 +42,9 @@ def localizer_of(parts: Parts, needed_by: str) -> Localizer:
             f"navigator '{needed_by}': expected stack.localizer, or run.oracles: [localizer], found neither"
         )
     return parts.localizer
+
+
+def unexplained_of(parts: Parts) -> UnexplainedReturns | None:
+    """What the mapper makes of each scan, if it is one that does: nobody has to work it out again."""
+    found: UnexplainedReturns | None = getattr(parts.mapper, "unexplained", None)
+    return found

@@ -102,7 +102,16 @@ class Movers:
         centres, of_point = kernels.scan_clusters(
             x_m, y_m, points, config.gap_m, config.widest_m, config.least_points
         )
-        self._keep_unseen(x_m, y_m, theta_rad, field_rad)
+        kernels.keep_unseen(
+            self.tracks,
+            x_m,
+            y_m,
+            theta_rad,
+            *field_rad,
+            config.lost_std_m**2,
+            config.readings,
+            config.most_missed,
+        )
         self.tracks, of_centre = kernels.track_step(
             self.tracks,
             centres,
@@ -116,16 +125,6 @@ class Movers:
         self._things = np.zeros(len(self.tracks), np.bool_)
         of_track: IntArray = np.append(of_centre, kernels.UNUSED)[of_point]
         return of_track
-
-    def _keep_unseen(self, x_m: float, y_m: float, theta_rad: float, field_rad: tuple[float, float]) -> None:
-        """Readings cannot be missed where no beam goes."""
-        tracks, config = self.tracks, self._config
-        first, last = field_rad
-        bearing = np.arctan2(tracks[:, kernels.Y] - y_m, tracks[:, kernels.X] - x_m) - theta_rad
-        unseen = np.mod(bearing - first, 2.0 * np.pi) > last - first
-        kept = unseen & (tracks[:, kernels.PP] < config.lost_std_m**2)
-        kept &= tracks[:, kernels.READINGS] >= config.readings
-        tracks[kept, kernels.MISSED] = np.minimum(tracks[kept, kernels.MISSED], config.most_missed - 1)
 
     def _count(self) -> BoolArray:
         """Which tracks have been read often enough since they moved last."""

@@ -11,8 +11,6 @@ from pydantic import Field
 from pilotage.core.config import Config
 from pilotage.core.types import BoolArray, FloatArray, Pose2
 from pilotage.kernels.control import movers as kernels
-from pilotage.kernels.lines.clustering import beam_directions
-from pilotage.kernels.scans.unexpected import unexplained_points
 from pilotage.maps.world_map import WorldMap
 from pilotage.sensors.lidar import LidarConfig
 from pilotage.sensors.readings import LidarScan, Readings
@@ -20,6 +18,7 @@ from pilotage.sensors.sensor import NonNegative, Positive
 from pilotage.stack.interface import Belief, BeliefStatus
 from pilotage.stack.knowledge import RobotKnowledge
 from pilotage.stack.perception.movers import Movers, MoversConfig
+from pilotage.stack.perception.unexplained import UnexplainedReturns
 
 WALKED_M, THROUGH_M = 0.6, 0.25
 """So far from where it was first seen, which the laser sees through by so much: it walks beyond doubt."""
@@ -41,7 +40,9 @@ class MovingBodiesConfig(Config):
     parks_readings: int = Field(default=100, ge=1, le=100_000)
     """After so many it is no person any more."""
     about_s: NonNegative = 10.0
-    """For so long it reckons with people after it saw one walk."""
+    """For so long it reckons with people after it saw one who walks, or walked a moment ago."""
+    backs_after_s: NonNegative = 30.0
+    """For so long it does not drive where its laser does not look."""
     anyone_m_s: NonNegative = 1.0
     """So fast may come who is not tracked."""
     beside_m: NonNegative = 1.0
@@ -61,7 +62,13 @@ class MovingBodies:
     """
 
     def __init__(
-        self, config: MovingBodiesConfig, robot: RobotKnowledge, chart: WorldMap, *, minds: bool = True
+        self,
+        config: MovingBodiesConfig,
+        robot: RobotKnowledge,
+        chart: WorldMap,
+        *,
+        minds: bool = True,
+        unexplained: UnexplainedReturns | None = None,
     ) -> None:
         self._config = config
         self._movers = Movers(config.tracks)
@@ -78,11 +85,13 @@ class MovingBodies:
         self._lidar, lidar = lidars[0]
         self._mount, self._step = lidar.mount, lidar.beam_step_rad
         angles = lidar.beam_angles_rad()
-        self._first = float(angles[0])
-        self._directions = beam_directions(0.0, self._step, lidar.beams)
-        self._field = lidar.mount.theta_rad + self._first, lidar.mount.theta_rad + float(angles[-1])
+        self._field = lidar.mount.theta_rad + float(angles[0]), lidar.mount.theta_rad + float(angles[-1])
         self._reach_m = min(config.reach_m, lidar.max_range_m)
-        self._known = chart.wall_field
+        same = unexplained is not None and (unexplained.tolerance_m, unexplained.sigmas)
+        if unexplained is None or same != (config.tolerance_m, config.sigmas):
+            unexplained = UnexplainedReturns(lidar, chart, config.tolerance_m, config.sigmas)
+        self._unexplained = unexplained
+        unexplained.look_to(config.reach_m)
 
     def step(self, readings: Readings, belief: Belief) -> Readings:
         """Track; returns the readings without returns of what does not stand, for a mapper."""
@@ -93,24 +102,12 @@ class MovingBodies:
             self._movers.forget()
             self._walks, self._loose = self._walks[:0], self._loose[:0]
             return readings
-        pose, cov, config, mount = belief.pose, belief.cov, self._config, self._mount
-        c, s = math.cos(pose.theta_rad), math.sin(pose.theta_rad)
-        x = pose.x_m + c * mount.x_m - s * mount.y_m
-        y = pose.y_m + s * mount.x_m + c * mount.y_m
-        first = pose.theta_rad + mount.theta_rad + self._first
-        points, beams = unexplained_points(
-            scan.ranges_m,
-            x,
-            y,
-            first,
-            self._directions,
-            self._reach_m,
-            config.tolerance_m + config.sigmas * math.sqrt(max(cov[0, 0], cov[1, 1])),
-            config.sigmas * math.sqrt(cov[2, 2]),
-            self._known.distance_m,
-            *self._known.origin_xy_m,
-            self._known.resolution_m,
-        )
+        pose, config = belief.pose, self._config
+        seen = self._unexplained.of(scan, belief)
+        x, y, first, points, beams = seen.x_m, seen.y_m, seen.first_rad, seen.points_m, seen.beams
+        if self._unexplained.reach_m > self._reach_m:
+            near = scan.ranges_m[beams] < self._reach_m
+            points, beams = points[near], beams[near]
         dt_s = min(max(readings.t_s - self._t_s, 1e-3), 1.0)
         self._t_s = readings.t_s
         if not len(points) and not len(self._movers.tracks):
@@ -134,39 +131,34 @@ class MovingBodies:
         return replace(readings, by_sensor={**readings.by_sensor, self._lidar: LidarScan(ranges_m)})
 
     def _told(self, x_m: float, y_m: float, first_rad: float, ranges_m: FloatArray) -> BoolArray:
-        """Which tracks do not stand; notes when somebody was seen who walks beyond doubt.
+        """Which tracks do not stand; notes when somebody is there who walks beyond doubt, or did.
 
         What a moving robot sees of a long thing around a corner, or through a gap, moves as well: somebody
-        has walked where the laser at x, y sees through the place at which he was first seen. Of who walked
-        that place is dropped and the readings are counted anew: he stands when he has for
-        ``stands_readings``, and is a thing after ``parks_readings``. Others do not stand only while people
-        are about.
+        has walked where the laser sees through the place at which he was first seen, or comes straight on,
+        which hides that place. Also while he only stands and presses he has not gone.
         """
-        tracks, config = self._movers.tracks, self._config
-        fast = np.hypot(tracks[:, kernels.VX], tracks[:, kernels.VY]) > config.walks_m_s
-        unsure = tracks[:, kernels.VV] > config.tracks.unsure_std_m_s**2
-        went = np.hypot(
-            tracks[:, kernels.X] - tracks[:, kernels.X0], tracks[:, kernels.Y] - tracks[:, kernels.Y0]
+        config = self._config
+        walks, people = kernels.tell_walkers(
+            self._movers.tracks,
+            x_m,
+            y_m,
+            first_rad,
+            self._step,
+            ranges_m,
+            self.about,
+            config.walks_m_s,
+            config.tracks.unsure_std_m_s**2,
+            WALKED_M,
+            THROUGH_M,
+            STRAIGHT,
+            config.tracks.readings,
+            config.stands_readings,
+            config.parks_readings,
         )
-        known = np.isnan(tracks[:, kernels.X0])
-        for k in np.flatnonzero(fast & ~unsure & (went > WALKED_M)):
-            dx, dy = tracks[k, kernels.X0] - x_m, tracks[k, kernels.Y0] - y_m
-            beam = round(((math.atan2(dy, dx) - first_rad) % (2.0 * math.pi)) / self._step)
-            around = ranges_m[max(beam - 1, 0) : beam + 2]
-            known[k] = len(around) > 0 and float(around.min()) > math.hypot(dx, dy) + THROUGH_M
-            # Who comes straight on hides that place himself, and nothing that stands comes nearer so.
-            nearer = math.hypot(dx, dy) - math.hypot(tracks[k, kernels.X] - x_m, tracks[k, kernels.Y] - y_m)
-            known[k] |= nearer > STRAIGHT * went[k]
-        walked = known & fast & ~unsure
-        if walked.any():
+        if people:
             self.seen_s = self._t_s
-        tracks[walked, kernels.READINGS], tracks[walked, kernels.X0] = config.tracks.readings, math.nan
-        stood = tracks[:, kernels.READINGS] - config.tracks.readings
-        parked = known & (stood >= config.parks_readings)
-        tracks[parked, kernels.X0 : kernels.Y0 + 1] = tracks[parked, kernels.X : kernels.Y + 1]
-        rests = known & ~parked & (stood < config.stands_readings)
-        walks: BoolArray = rests | ((unsure | fast) & (known | self.about))
-        return walks
+        told: BoolArray = walks
+        return told
 
     def foretold(
         self, step_s: float, steps: int, pose: Pose2, mapped_m: FloatArray, reach_m: float
@@ -204,10 +196,11 @@ class MovingBodies:
         new = tracks[:, kernels.READINGS] < config.stands_readings
         return bool((np.hypot(tracks[new, kernels.X] - x_m, tracks[new, kernels.Y] - y_m) < reach_m).any())
 
-    def sees(self, bearing_rad: float) -> bool:
-        """Whether the laser looks in a direction of the base's frame."""
+    def may_be_at(self, bearing_rad: float) -> bool:
+        """Whether somebody may be in a direction of the base's frame in which the laser does not look."""
         first, last = self._field
-        return (bearing_rad - first) % (2.0 * math.pi) <= last - first
+        sees = (bearing_rad - first) % (2.0 * math.pi) <= last - first
+        return not sees and self._t_s - self.seen_s < self._config.backs_after_s
 
     def discs_m(self) -> FloatArray:
         """(M, 3) where they are now, of their own size."""
