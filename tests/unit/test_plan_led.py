@@ -94,3 +94,10 @@ def test_the_museum_is_driven_past_a_trap_near_the_least() -> None:
     assert metrics["driven_over_least"] < 1.10
     assert metrics["time_over_least"] < 1.20
     assert math.isfinite(metrics["least_time_s"])
+
+
+def test_goal_turns_away_from_a_trap_that_it_sees_and_does_not_drive_into_it() -> None:
+    metrics = driven(load_mission("museum-concave", [], 41))  # drove 1.15 times the shortest
+    assert metrics["success"]
+    assert metrics["replans"] > 0
+    assert metrics["driven_over_least"] < 1.09

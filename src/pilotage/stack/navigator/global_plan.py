@@ -9,6 +9,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from pilotage.core.types import FloatArray, Goal, Pose2
+from pilotage.kernels.geometry import plane
 from pilotage.maps.distance_field import DistanceField
 from pilotage.maps.ground_distance import with_circles
 from pilotage.maps.world_map import WorldMap
@@ -28,6 +29,11 @@ from pilotage.stack.planning.planner import (
 
 HEADINGS, TRIED = 16, 4
 """Headings to turn to before setting out, and how many of them are tried, the freest first."""
+
+WATCH_M = 20.0
+"""What is newly mapped is looked for so far ahead on the plan."""
+SLACK_M = 0.005
+"""Between what a plan keeps and what is checked while driving it."""
 
 FAR_M = 3.0
 """Free ground farther ahead makes a heading no better."""
@@ -63,6 +69,7 @@ class GlobalPlan:
         self.path: Path | None = None
         self.progress: PathProgress | None = None
         self.circles_m: FloatArray = chart.barriers.circles_m
+        self._looked_at: FloatArray | None = None
 
     @property
     def clearance_m(self) -> float:
@@ -84,6 +91,7 @@ class GlobalPlan:
         Returns the last result; its path is None where no clearance gave one.
         """
         begin = time.perf_counter()
+        self._looked_at = mapped_m
         field = with_circles(self._chart.field, mapped_m)
         result = self._try(t_s, start, goal, field, clearances_m, begin, detour_m)
         self.turns_first = False
@@ -96,6 +104,21 @@ class GlobalPlan:
                     break
         self._journal.planning_time_s += time.perf_counter() - begin
         return result
+
+    def is_blocked(self, mapped_m: FloatArray, least_m: float) -> bool:
+        """Whether what was mapped since the last look comes nearer to the path ahead than ``least_m``.
+
+        Nor nearer than the plan itself keeps. ``mapped_m``: discs (N, 3), a new array where they changed.
+        """
+        looked = self._looked_at
+        if mapped_m is looked or not len(mapped_m) or self.path is None or self.progress is None:
+            return False
+        self._looked_at = new = mapped_m
+        if looked is not None and np.array_equal(mapped_m[: len(looked)], looked):
+            new = mapped_m[len(looked) :]
+        ahead = self.path.states[self.progress.index(0.0) : self.progress.index(WATCH_M), :2]
+        least_m = min(least_m, self.progress.clearance_m - SLACK_M)
+        return bool(plane.least_distance(ahead, plane.NO_SEGMENTS, new) < least_m)
 
     def _try(
         self,

@@ -36,6 +36,8 @@ class GoalNavigatorConfig(Config):
     """Where this much of the local path ahead comes too near a mapped obstacle: stop and replan; 0: never."""
     watch_margin_m: NonNegative = 0.03
     """Too near: below the body's radius plus this."""
+    watch_plan_s: NonNegative = 1.0
+    """Where something new stands anywhere on the plan ahead it plans anew, no two plans in less time."""
     stall_s: Positive = 20.0
     stall_progress_m: Positive = 0.5
     waypoint_ahead_m: Positive = 0.4

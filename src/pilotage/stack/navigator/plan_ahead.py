@@ -9,7 +9,6 @@ from pydantic import Field
 
 from pilotage.core.config import Config
 from pilotage.core.types import FloatArray, Goal, Pose2
-from pilotage.kernels.geometry import plane
 from pilotage.maps.world_map import WorldMap
 from pilotage.sensors.readings import Readings
 from pilotage.sensors.sensor import NonNegative, Positive
@@ -22,11 +21,6 @@ from pilotage.stack.navigator.own_map import OwnMap
 from pilotage.stack.navigator.progress import StallWatch
 from pilotage.stack.perception.moving_bodies import MovingBodies
 from pilotage.stack.planning.planner import Planner, Smoother
-
-WATCH_M = 20.0
-"""What is newly mapped is looked for so far ahead on the plan."""
-TOLERANCE_M = 0.005
-"""Slack between what a plan keeps and what is checked while driving it."""
 
 
 class PlanAheadConfig(Config):
@@ -75,8 +69,7 @@ class PlanAhead:
         rng = robot.streams.stream("planner")
         self._plan = GlobalPlan(planner, smoother, chart, rng, journal, robot.radius_m, robot)
         self._stall = StallWatch(config.stall_progress_m, config.stall_s)
-        self._stalls, self._planned_s, self._clearance_m = 0, -math.inf, math.inf
-        self._known = own_map.found_circles_m
+        self._stalls, self._planned_s = 0, -math.inf
         self._path: FloatArray = np.zeros((0, 2))
         self.to_go_m = math.inf
         self.failure = ""
@@ -113,14 +106,8 @@ class PlanAhead:
         return self._own_map.found_circles_m
 
     def _is_blocked(self) -> bool:
-        """Whether what was mapped since the last look comes too near to the path ahead."""
-        found = self._own_map.found_circles_m
-        if found is self._known or not len(found):
-            return False
-        self._known = found
-        ahead = self._path[self._index() : self._index(WATCH_M)]
-        least_m = min(self._radius_m + self._config.watch_margin_m, self._clearance_m - TOLERANCE_M)
-        return len(ahead) > 0 and float(plane.least_distance(ahead, plane.NO_SEGMENTS, found)) < least_m
+        least_m = self._radius_m + self._config.watch_margin_m
+        return self._plan.is_blocked(self._own_map.found_circles_m, least_m)
 
     def _make(self, t_s: float, pose: Pose2, why: str) -> None:
         """Plan from here, at the planner's own clearance or at less."""
@@ -130,14 +117,13 @@ class PlanAhead:
         first = self._plan.progress is None
         clearances_m = sorted({c for c in asked if c <= own}, reverse=True)
         result = self._plan.make(t_s, pose, self._goal, found, clearances_m, self._config.detour_m)
-        self._planned_s, self._known = t_s, found
+        self._planned_s = t_s
         if not first:
             self._journal.count("replans")
         if result.path is None:
             self._journal.say(t_s, "no-plan", f"{why}: {result.status}, {result.reason}")
             return
         assert self._plan.path is not None
-        self._clearance_m = self._journal.plans[-1].clearance_m
         self._path = np.ascontiguousarray(self._plan.path.states[:, :2])
         self._stall.restart(t_s)
         self.to_go_m = self._plan.path.length_m

@@ -28,7 +28,7 @@ class PathProgress:
     """
 
     def __init__(self, states: FloatArray, waypoints: FloatArray, clearance_m: float) -> None:
-        self._clearance_m = clearance_m
+        self.clearance_m = clearance_m
         self._states = np.ascontiguousarray(states)
         self._waypoints = waypoints
         self._points = states[:, :2]
@@ -88,7 +88,7 @@ class PathProgress:
             self._waypoints[first:],
             np.maximum(self.waypoint_along_m[first:] - self.at_m, 0.0),
             self._states[here:],
-            self._clearance_m,
+            self.clearance_m,
         )
 
     def turn_ahead_rad(self, reach_m: float) -> float:

@@ -22,7 +22,7 @@ from pilotage.stack.navigator.following import WaypointFollower
 from pilotage.stack.navigator.global_plan import GlobalPlan
 from pilotage.stack.navigator.goal.wandering import Wandering
 from pilotage.stack.navigator.goal_config import GoalNavigatorConfig, Mode
-from pilotage.stack.navigator.navigator import Parts, localizer_of
+from pilotage.stack.navigator.navigator import Parts, localizer_of, unexplained_of
 from pilotage.stack.navigator.own_map import OwnMap
 from pilotage.stack.navigator.progress import PathProgress, StallWatch
 from pilotage.stack.perception.moving_bodies import MovingBodies
@@ -85,10 +85,17 @@ class Context:
         self._tolerance_m = task.goal_tolerance_m
         self.turns_on_the_spot = robot.motion.least_turning_radius_m == 0.0
         # Without a mapper it minds nothing but its map: who shows it wrong scans shows it nobody.
-        self._bodies = MovingBodies(config.moving_bodies, robot, own_map.told, minds=parts.mapper is not None)
+        self._bodies = MovingBodies(
+            config.moving_bodies,
+            robot,
+            own_map.told,
+            minds=parts.mapper is not None,
+            unexplained=unexplained_of(parts),
+        )
         self._gives_way = GiveWay(config.give_way, robot, self._bodies)
         self.make_room = MakeRoom(config.make_room, robot, own_map.told.field, self._bodies)
         self._waits_s: float | None = None
+        self._planned_s = 0.0
         self._waited_at, self._waited = (math.inf, math.inf), 0
         self.tries = 0
         self.turn_rate_rad_s = min(TURN_RATE_RAD_S, robot.motion.top_turn_rate_rad_s)
@@ -130,7 +137,8 @@ class Context:
 
     def react(self, readings: Readings, pose: Pose2) -> ReactionKind:
         """Let the reactive part say what is near; it does not know a wall from somebody who walks."""
-        if self.reactive is not None and self._bodies.nearest_m(pose.x_m, pose.y_m) > SOMEBODY_M:
+        near = self._bodies.about and self._bodies.nearest_m(pose.x_m, pose.y_m) <= SOMEBODY_M
+        if self.reactive is not None and not near:
             self.reaction = self.reactive.step(
                 readings, pose, self.own_map.walls, self.plan.circles_m, self._goes_straight()
             )
@@ -184,6 +192,7 @@ class Context:
         """Drive by the plan just made from now on."""
         plan = self.journal.plans[-1]
         self._stall.restart(self.t_s)
+        self._planned_s = self.t_s
         self.to_go_m = plan.length_m
         because = f"{why}: " if why else ""
         self.say(
@@ -228,6 +237,15 @@ class Context:
             return False
         ahead = self.follower.clearance_ahead_m(config.watch_ahead_m, self._mapper.circles_m)
         return ahead < min(self.radius_m + config.watch_margin_m, self.clearance_m - HERE_TOLERANCE_M)
+
+    def plan_is_blocked(self) -> bool:
+        """Whether something new stands on the plan ahead: the sooner it turns away the shorter its path.
+
+        Not where people walk about: what blocks the path may be gone by then.
+        """
+        if self.t_s - self._planned_s < self.config.watch_plan_s or self.among_people:
+            return False
+        return self.plan.is_blocked(self.own_map.found_circles_m, self.radius_m + self.config.watch_margin_m)
 
     def near_goal(self, pose: Pose2) -> bool:
         """Whether this is the end: near the goal, and not merely passing by it with path left to go."""

@@ -182,6 +182,11 @@ def _follow(context: Context, state: Following, pose: Pose2) -> Move:
             )
     elif context.path_is_blocked():
         return replan(context, Following(context), pose, "a mapped obstacle stands on the local path")
+    elif context.plan_is_blocked():
+        context.mode = Mode.REPLAN
+        context.follower.drop()
+        context.journal.count("replans")
+        return set_out(context, Following(context), pose, "replan", "a mapped obstacle stands on the plan")
     command = context.follower.step(pose)
     context.mode = Mode.FOLLOW
     if context.reaction.kind is ReactionKind.LATERAL:
