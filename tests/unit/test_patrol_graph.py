@@ -176,6 +176,12 @@ def test_a_floor_without_room_for_the_robot_is_refused() -> None:
         Floor.of(solid, 0.2)
 
 
+@pytest.mark.parametrize("reach_m", [1e-9, 0.08])
+def test_a_laser_that_sees_next_to_nothing_is_refused_at_once(reach_m: float) -> None:
+    with pytest.raises(InputError, match="expected at most 400 vertices"):
+        derive_graph(WORLD, Floor.of(WORLD, 0.3), DerivationConfig(reach_m=reach_m))
+
+
 def passage(width_m: float) -> WorldMap:
     """Two rooms, and a passage of 2 m from one to the other, off the lattice of everything."""
     low, high = 2.03, 2.03 + width_m

@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from pilotage.cli.options import parse_seed
 from pilotage.core.errors import InputError
 from pilotage.core.whole_number import whole_number
 from pilotage.experiments.build.build import build_source
+from pilotage.experiments.build.charts import load_chart
 from pilotage.experiments.mission import load_mission
 from pilotage.experiments.studies.engine import run_study
 from pilotage.experiments.studies.replay import parse_row
 from pilotage.experiments.studies.sweep import sweep_study
+from pilotage.stack.control.local.sampling import NoiseBank
 from pilotage.tracking.robot_colour import parse_hsv
 
 BOX = "{kind: bx, from_m: [1, 2], to_m: [3, 4]}"
@@ -31,6 +35,7 @@ WALL = "{kind: box, from_m: [4, 4], to_m: [5, 4]}"
             "world.kidnaps.0.to: expected room for the robot's footprint",
         ),
         (["robot.faults=[{name: drop, sensor: lidar, share: 3}]"], "robot.faults.0.share"),
+        (["robot.footprint={points_m: [[0, 0], [1, 0], [1, 1, 2]]}"], "expected at most 2 items, found 3"),
     ],
 )
 def test_missions(settings: list[str], words: str) -> None:
@@ -44,6 +49,36 @@ def test_a_ros_map_without_its_image_says_so(tmp_path: Path) -> None:
     path.write_text("resolution: 0.05\norigin: [0, 0, 0]\nnegate: 0\n")
     with pytest.raises(InputError, match="image: missing; a ROS map names its image"):
         build_source(load_mission("museum-1", [f"world.map={path}"], 0))
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "words"),
+    [
+        ("a.map", "type octile\nheight 2\nwidth 2\nmap\n..\n..\n..\n", "expected 2 rows, as its header says"),
+        (
+            "a.yaml",
+            "map: a\nwalls_m: [[0, 0, 4, 3], [1, 1, 1, 1]]\n",
+            "walls_m.1: expected a wall from one place to",
+        ),
+        (
+            "a.yaml",
+            "image: a.pgm\nresolution: 1\norigin: [0, 0, 0]\nfree_thresh: 0.7\noccupied_thresh: 0.6\n",
+            "expected free_thresh below occupied_thresh 0.6, found 0.7",
+        ),
+    ],
+)
+def test_maps_that_were_taken_silently_or_refused_with_all_they_hold(
+    name: str, text: str, words: str, tmp_path: Path
+) -> None:
+    (tmp_path / name).write_text(text)
+    with pytest.raises(InputError, match=re.escape(words)) as caught:
+        load_chart(str(tmp_path / name))
+    assert "{" not in str(caught.value)
+
+
+def test_more_samples_than_memory_holds_are_refused_before_they_are_drawn() -> None:
+    with pytest.raises(InputError, match="expected at most 1,000,000 commands to sample"):
+        NoiseBank(np.random.default_rng(0), 192, 1_600_000_000, 0.5, 1.0)
 
 
 def test_values_of_a_sweep_that_cannot_be_built_are_told_before_the_first_trial(tmp_path: Path) -> None:

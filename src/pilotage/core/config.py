@@ -126,6 +126,9 @@ def describe(error: ValidationError, model: type[BaseModel], where: str) -> str:
         hint = f"did you mean '{close}'?" if close else "known: " + ", ".join(known)
         return f"{place}: unknown value {_show(found)}; {hint}"
     message = first["msg"].removeprefix("Value error, ")
+    if first["type"] in {"too_long", "too_short"}:
+        bound, key = ("at most", "max_length") if first["type"] == "too_long" else ("at least", "min_length")
+        message = f"expected {bound} {first['ctx'][key]} items, found {first['ctx']['actual_length']}"
     message = message[:1].lower() + message[1:]
     # A file knows mappings and lists, not Python's classes.
     message = re.sub(r" or instance of \w+$", "", message)

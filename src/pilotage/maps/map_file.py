@@ -86,6 +86,11 @@ def build_map(entry: MapFile, where: str) -> LandmarkMap:
     ):
         if found > limit(MOST_PARTS):
             raise too_large(where, limit(MOST_PARTS), found, what)
+    for i, (x0, y0, x1, y1) in enumerate(entry.walls_m):
+        if (x0, y0) == (x1, y1):  # bodies run into it, and no laser sees it
+            raise InputError(
+                f"{where}: walls_m.{i}: expected a wall from one place to another, found ({x0:g}, {y0:g})"
+            )
     walls = SegmentMap.of(np.array(entry.walls_m), np.array(entry.circles_m).reshape(-1, 3))
     if entry.bounds_m is not None:
         walls = SegmentMap(walls.segments_m, walls.circles_m, entry.bounds_m)

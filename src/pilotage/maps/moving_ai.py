@@ -113,6 +113,11 @@ def read_moving_ai_map(path: Path) -> MovingAiMap:
     lines = body[: rows * (columns + 1)]
     if lines.size < rows * (columns + 1) or (lines.reshape(rows, -1)[:, -1] != ord("\n")).any():
         raise InputError(_wrong_rows(body, rows, columns, path))
+    more = body[rows * (columns + 1) :]
+    if not np.isin(
+        more, list(b" \t\n\x1a")
+    ).all():  # a header that says too little would leave the rest of the map out
+        raise InputError(f"{path}: expected {rows} rows, as its header says, found more below them")
     terrain = np.ascontiguousarray(lines.reshape(rows, columns + 1)[:, :-1])
     strange = np.setdiff1d(np.flatnonzero(np.bincount(terrain.ravel(), minlength=256)), list(KNOWN))
     if strange.size:

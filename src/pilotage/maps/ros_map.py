@@ -46,7 +46,8 @@ class RosMapFile(Config):
     @model_validator(mode="after")
     def _thresholds_in_order(self) -> RosMapFile:
         if not self.free_thresh < self.occupied_thresh:
-            raise ValueError(f"expected free_thresh below occupied_thresh {self.occupied_thresh}")
+            free, occupied = self.free_thresh, self.occupied_thresh
+            raise ValueError(f"expected free_thresh below occupied_thresh {occupied:g}, found {free:g}")
         return self
 
 

@@ -83,6 +83,9 @@ def derive_graph(world: WorldMap, floor: Floor, config: DerivationConfig | None 
         Where the floor needs far too many vertices.
     """
     config = config or DerivationConfig()
+    least = np.count_nonzero(floor.swept) * floor.cell_m**2 / (math.pi * config.reach_m**2)
+    if least > MOST_VERTICES:  # before the work that it would be
+        raise _too_many(world, math.ceil(least))
     rooms, doors_xy_m = _rooms_and_doors(floor, config.door_width_m)
     stand, points, sees = views(world, floor, config.reach_m, config.stand_every_m, config.see_every_m)
     covered = np.zeros(len(points), np.bool_)
@@ -105,13 +108,17 @@ def derive_graph(world: WorldMap, floor: Floor, config: DerivationConfig | None 
         if np.hypot(*(vertices - door).T).min() >= config.apart_m:
             vertices = np.vstack([vertices, door])
     if len(vertices) > MOST_VERTICES:
-        raise InputError(
-            f"patrol graph of '{world.name}': expected at most {MOST_VERTICES} vertices, found "
-            f"{len(vertices)}; take a larger reach_m"
-        )
+        raise _too_many(world, len(vertices))
     edges = floor.lengths_m(vertices, _touching(floor, vertices), "vertex")
     graph = PatrolGraph.of(vertices, edges, f"patrol graph of '{world.name}'")
     return Derived(graph, doors_xy_m, rooms, points[covered], viewpoints)
+
+
+def _too_many(world: WorldMap, vertices: float) -> InputError:
+    return InputError(
+        f"patrol graph of '{world.name}': expected at most {MOST_VERTICES} vertices, found {vertices:g} or "
+        "more; take a larger reach_m"
+    )
 
 
 def derive_drivable(

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
+from pilotage.core.errors import InputError
 from pilotage.core.types import FloatArray
 
 STEPS_KEPT = 16
 """Noise for so many steps is drawn beforehand; each step takes a random stretch of it."""
+MOST_COMMANDS = 1_000_000
+"""Rollouts times steps; half a gigabyte of noise."""
 KEEP = 0.8
 """Of a command's noise goes on in the next command: independent noise would average out in the motion."""
 
@@ -23,6 +26,11 @@ class NoiseBank:
         speed_std_m_s: float,
         turn_std_rad_s: float,
     ) -> None:
+        if rollouts * steps > MOST_COMMANDS:
+            raise InputError(
+                f"stack.local_controller: expected at most {MOST_COMMANDS:,} commands to sample (rollouts "
+                f"times horizon_s / step_s), found {rollouts * steps:,}; take a longer step_s"
+            )
         self._generator = generator
         self._rollouts = rollouts
         noise = generator.standard_normal((STEPS_KEPT * rollouts, steps, 2))
