@@ -11,7 +11,15 @@ import numpy as np
 from pilotage.core.angles import wrap_array_to_pi
 from pilotage.core.errors import InputError
 from pilotage.core.types import FloatArray, IntArray, Pose2
-from pilotage.experiments.recordings.drive import BEACONS, HOLD_S, LIDAR, ODOMETRY, RecordedDrive
+from pilotage.experiments.recordings.drive import (
+    BEACONS,
+    HOLD_S,
+    LIDAR,
+    ODOMETRY,
+    SPARE,
+    RecordedDrive,
+    limits,
+)
 from pilotage.logs.bag_messages import is_bag
 from pilotage.logs.bag_series import (
     LANDMARKS,
@@ -32,7 +40,6 @@ from pilotage.logs.laser_log import LaserLog, interpolate_poses
 from pilotage.logs.laser_recordings import read_laser_log
 from pilotage.logs.trajectories import read_tum
 from pilotage.maps.world_map import WorldMap
-from pilotage.models.motion.differential_drive import DifferentialDriveConfig
 from pilotage.sensors.beacon import BeaconConfig
 from pilotage.sensors.lidar import LidarConfig
 from pilotage.sensors.sensor import Mount, SensorConfig
@@ -48,9 +55,6 @@ WHEEL_NOISE = WheelOdometryConfig(
 LASER_VAR_M2 = 0.02**2
 BEACON_VAR_M2, BEACON_VAR_RAD2 = 0.1**2, 0.03**2
 LARGEST_RANGE_M = 1000.0
-SPARE = 1.3
-"""The robot may be so much faster than it was ever seen."""
-MOST_M_S, MOST_RAD_S = 30.0, 30.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -170,6 +174,7 @@ def bag_drive(
             )
     known = _truth(log, truth, clock, bag)
     gaps = int((np.diff(odometry_t_s) > HOLD_S).sum())
+    steps_s = np.maximum(np.diff(clock), 1e-3)
     return RecordedDrive(
         log.name.split(".")[0],
         None,
@@ -193,7 +198,7 @@ def bag_drive(
         scan_at=scan_at,
         chart=chart,
         start=start,
-        motion=_motion(clock, moves),
+        motion=limits(np.hypot(moves[1:, 0], moves[1:, 1]) / steps_s, moves[1:, 2] / steps_s),
         warnings=tuple(said),
     )
 
@@ -292,17 +297,6 @@ def _moves(poses: FloatArray) -> FloatArray:
     along = (c * step[:, 0] + s * step[:, 1]) / stretch
     aside = (c * step[:, 1] - s * step[:, 0]) / stretch
     return np.concatenate([np.zeros((1, 3)), np.column_stack([along, aside, turn])])
-
-
-def _motion(clock: FloatArray, moves: FloatArray) -> DifferentialDriveConfig:
-    """Limits that the recording itself keeps, but for a few leaps of its odometry."""
-    dt = np.maximum(np.diff(clock), 1e-3)
-    speed, turn = np.hypot(moves[1:, 0], moves[1:, 1]) / dt, np.abs(moves[1:, 2]) / dt
-    fastest = [SPARE * float(np.quantile(rates, 0.999)) for rates in (speed, turn)]
-    return DifferentialDriveConfig(
-        max_speed_m_s=min(max(fastest[0], 0.1), MOST_M_S),
-        max_turn_rate_rad_s=min(max(fastest[1], 0.1), MOST_RAD_S),
-    )
 
 
 def _sheet(laser: LaserLog) -> LidarConfig:

@@ -24,7 +24,9 @@ ODOMETRY, BEACONS, LIDAR = "odometry", "beacons", "lidar"
 SCORE_HZ = 10.0
 HOLD_S = 0.5
 """A command is held no longer than this where the next one is missing."""
-USUAL_MOTION = DifferentialDriveConfig()
+SPARE = 1.3
+"""The robot may be so much faster than it was ever seen."""
+MOST_M_S, MOST_RAD_S = 30.0, 30.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,6 +82,7 @@ class RecordedDrive:
     truth_gaps: int
     odometry_gaps: int
     misread: tuple[str, ...]
+    motion: DifferentialDriveConfig
     rate_var: tuple[float, float] | None = None
     stale: tuple[str, ...] = ()
     sideways_m: FloatArray | None = None
@@ -87,7 +90,6 @@ class RecordedDrive:
     scan_at: IntArray | None = None
     chart: WorldMap | None = None
     start: Pose2 | None = None
-    motion: DifferentialDriveConfig = USUAL_MOTION
     warnings: tuple[str, ...] = ()
 
     def readings_at(self, k: int) -> Readings:
@@ -178,6 +180,7 @@ def mrclam_drive(folder: Path, robot: int) -> RecordedDrive:
         log.truth_gaps_s.shape[0],
         int((np.diff(log.odometry_t_s) > TRUTH_GAP_S).sum()),
         log.misread,
+        limits(log.speed_m_s, log.turn_rate_rad_s),
         stale=log.stale,
     )
 
@@ -232,7 +235,16 @@ def aer1513_drive(path: Path, max_range_m: float | None = None) -> RecordedDrive
         int((dt > TRUTH_GAP_S).sum()) + unknown_begins.shape[0],
         int((dt > HOLD_S).sum()),
         (),
+        limits(log.speed_m_s, log.turn_rate_rad_s),
         (log.speed_var_m2_s2 * step, log.turn_rate_var_rad2_s2 * step),
+    )
+
+
+def limits(speed_m_s: FloatArray, turn_rate_rad_s: FloatArray) -> DifferentialDriveConfig:
+    """Limits that a recording (K,) keeps itself, but for a few leaps; where it is silent none is known."""
+    speed, turn = (SPARE * float(np.quantile(np.abs(rates), 0.999)) for rates in (speed_m_s, turn_rate_rad_s))
+    return DifferentialDriveConfig(
+        max_speed_m_s=min(max(speed, 0.1), MOST_M_S), max_turn_rate_rad_s=min(max(turn, 0.1), MOST_RAD_S)
     )
 
 
