@@ -14,7 +14,7 @@ WINDOW = 30
 """Updates that are looked back at."""
 LEAST_SEEN = 10
 """Readings, fewer of which say nothing."""
-REFUSED_SHARE, NOISE_SHARE = 0.5, 0.75
+REFUSED_SHARE, NOISE_SHARE = 0.5, 0.85
 """Who refuses more than this of what its gate should let through is wrong as likely as its readings are; of
 what its noise would let through, had it more of that than it believes, at least so much must pass."""
 NIS_EXCESS, NIS_SIGMAS = 0.5, 6.0
