@@ -11,7 +11,7 @@ import numpy as np
 from scipy.ndimage import distance_transform_edt, label, maximum_filter
 
 from pilotage.core.errors import InputError
-from pilotage.core.types import BoolArray, FloatArray
+from pilotage.core.types import BoolArray, FloatArray, IntArray
 from pilotage.kernels.control import eikonal
 from pilotage.maps.world_map import WorldMap
 
@@ -23,6 +23,8 @@ OFF_RATIO, AHEAD_M = 1.8, 3.5
 FINER, MOST_NODES = (1, 2, 4), 2_000_000
 """Nodes may lie beside a passage that the body just fits through: then they lie so many times as near."""
 NEAREST = 6
+MOST_FIELD_BYTES = 256_000_000
+"""Of fields that are kept; beyond that who was not asked for longest is worked out again."""
 STATION_M = 0.4
 """So far from a charging station the body may have to stand, for a wall beside it."""
 
@@ -98,7 +100,8 @@ class Roadmap:
 
     def _joined(self, near_m: Sequence[float], clearance_m: float) -> list[tuple[int, int]]:
         """The places' nodes, between all of which the body can drive."""
-        seeds = [self._seed(k, within_m, clearance_m) for k, within_m in enumerate(near_m)]
+        free = np.argwhere(np.isfinite(self.slowness))
+        seeds = [self._seed(free, k, within_m, clearance_m) for k, within_m in enumerate(near_m)]
         regions, _ = label(np.isfinite(self.slowness))
         of_place = [int(regions[seed]) for seed in seeds]
         apart = [k for k, region in enumerate(of_place) if region != of_place[0]]
@@ -113,10 +116,10 @@ class Roadmap:
         """A place as the mission calls it."""
         return f"vertex {place}" if place < self._vertices else f"team.stations.{place - self._vertices}"
 
-    def _seed(self, place: int, near_m: float, clearance_m: float) -> tuple[int, int]:
-        """The free node nearest to a place."""
+    def _seed(self, free: IntArray, place: int, near_m: float, clearance_m: float) -> tuple[int, int]:
+        """The free node, of (F, 2) rows and columns, nearest to a place."""
         x, y = self.places_xy_m[place]
-        rows, columns = np.nonzero(np.isfinite(self.slowness))
+        rows, columns = free.T
         away = np.hypot(
             self.origin_xy_m[0] + columns * self.spacing_m - x,
             self.origin_xy_m[1] + rows * self.spacing_m - y,
@@ -145,13 +148,16 @@ class Roadmap:
         return max(float(time[seed]) for seed in self._seeds[: self._vertices])
 
     def time_s(self, place: int) -> FloatArray:
-        """(rows, columns) time to go to a place; worked out when first asked for."""
-        if place not in self._fields:
+        """(rows, columns) time to go to a place; worked out when asked for, and kept while there is room."""
+        field = self._fields.pop(place, None)
+        if field is None:
             field = np.full(self.slowness.shape, np.inf)
             field[self._seeds[place]] = 0.0
             eikonal.sweep_down(field, self.slowness, self.spacing_m)
-            self._fields[place] = field
-        return self._fields[place]
+        self._fields[place] = field  # the last one that was asked for
+        while len(self._fields) > max(1, MOST_FIELD_BYTES // field.nbytes):
+            del self._fields[next(iter(self._fields))]
+        return field
 
     def way_out(
         self, x_m: float, y_m: float, other_xy_m: tuple[float, float], keep_m: float, pass_m: float
