@@ -82,12 +82,20 @@ def test_scans_between_keyframes_are_put_where_they_fit() -> None:
     local = track(log, SlamConfig())
     true = np.array([between(path[0], pose) for pose in path])
     start = true + rng.standard_normal(true.shape) * (0.05, 0.05, 0.02)
-    out = aligned_scans(log, local, local.clouds, true[local.keyframes], start, SlamConfig(), 1.0)
+    out, left = aligned_scans(log, local, local.clouds, true[local.keyframes], start, SlamConfig(), 1.0)
     assert np.array_equal(out[local.keyframes], start[local.keyframes])
     rest = np.setdiff1d(np.arange(len(log)), local.keyframes)
     off = (out - true)[rest]
     assert np.hypot(off[:, 0], off[:, 1]).mean() < 0.01
     assert np.abs(off[:, 2]).mean() < 0.003
+    assert not left[local.keyframes].any()
+    assert np.linalg.eigvalsh(left).min() > -1e-12
+    slipped = replace(local, slips=np.tile(np.diag([0.25, 0.25, 0.01]), (len(local.keyframes), 1, 1)))
+    _, left = aligned_scans(log, slipped, local.clouds, true[local.keyframes], out, SlamConfig(), 1.0)
+    assert np.sqrt(np.linalg.eigvalsh(left[rest])[:, -1].max()) < 0.05
+    blind = replace(log, ranges_m=np.full_like(log.ranges_m, np.inf))
+    _, left = aligned_scans(blind, slipped, local.clouds, true[local.keyframes], out, SlamConfig(), 1.0)
+    assert 0.2 < np.sqrt(np.linalg.eigvalsh(left[rest])[:, -1].max()) < 0.26
 
 
 def test_no_odometry_is_needed() -> None:

@@ -56,6 +56,7 @@ def read_scan_covariances(path: Path) -> ScanCovariances:
         if owner.size and not (owner.min() >= 0 and owner.max() < len(graph)):
             raise ValueError(f"owner: expected keyframes 0 to {len(graph) - 1}")
         weights, poses = file.floats("graph_weights", graph.i.size), file.floats("poses", owner.size, 3)
-        return ScanCovariances(graph, weights, owner, poses)
+        own = file.floats("own", owner.size, 3, 3)
+        return ScanCovariances(graph, weights, owner, poses, own)
     except (ValueError, InputError) as error:
         raise InputError(f"{path}: expected covariances of 'pilotage slam', found {error}") from None

@@ -133,6 +133,7 @@ def _write_covariances(path: Path, result: SlamResult) -> None:
         covariances=known.marginals(),
         poses=known.poses,
         owner=known.owner,
+        own=known.own,
         graph_poses=known.graph.poses,
         graph_i=known.graph.i,
         graph_j=known.graph.j,

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pilotage.core.types import FloatArray
+from pilotage.core.types import BoolArray, FloatArray
 from pilotage.kernels.slam.frames import composed
 from pilotage.models.pose_graph_solver import Loss, Start, optimize
 from pilotage.stack.mapping.slam.closures import (
@@ -158,7 +158,7 @@ class LoopCloser:
     def close(self, window_m: float, slip: Slip) -> tuple[int, int]:
         """Search what may overlap within a window and solve; how many were searched, and how many closed."""
         state, submaps = self.state, self.submaps
-        joint = self._joint_of_submaps()
+        joint = self.joint()
         places = state.poses[submaps.references]
         if slip is LARGE_SLIP:
             self._searched = dict.fromkeys(self._searched, np.inf)
@@ -187,6 +187,7 @@ class LoopCloser:
         other = copy(self)
         other.closures, other._searched = self.closures.copy(), self._searched.copy()
         other._accepted = self._accepted.copy()
+        self._joint = None  # the copy has it; two of them would be the largest thing in memory
         return other
 
     def forget(self, window_m: float) -> None:
@@ -213,7 +214,7 @@ class LoopCloser:
             self.closing = others(self.closing)
             self.state = solved(others(self.state.edges), self.state.poses, ROBUST_STDS, self._slipped)
 
-    def _joint_of_submaps(self) -> FloatArray:
+    def joint(self) -> FloatArray:
         """(3 S, 3 S) covariance of the submaps' poses; computed anew only where the graph has changed."""
         state, known = self.state, self._joint
         if known is None or known[0] is not state or len(known[1]) != 3 * len(self.submaps):
@@ -302,7 +303,7 @@ def refined(
         With it keyframes before it are aligned with those from it on alone.
     """
     state, submaps = closer.state, closer.submaps
-    sure = _sure(state, submaps)
+    sure = _sure(closer.joint(), state, submaps)
     for _ in range(rounds):
         pairs = neighbours(state.poses, since)
         owner = _owners(submaps, state.poses.shape[0])
@@ -322,9 +323,8 @@ def _owners(submaps: Submaps, count: int) -> np.ndarray[tuple[int], np.dtype[np.
     return np.searchsorted(middles, np.arange(count)).astype(np.int64)
 
 
-def _sure(state: Solved, submaps: Submaps) -> np.ndarray[tuple[int, int], np.dtype[np.bool_]]:
+def _sure(joint: FloatArray, state: Solved, submaps: Submaps) -> BoolArray:
     """(C, C) whether two submaps are known well enough against each other."""
-    joint = joint_covariance(state.edges, state.poses, state.weights, submaps.references)
     count = len(submaps)
     out = np.eye(count, dtype=np.bool_)
     places = state.poses[submaps.references]

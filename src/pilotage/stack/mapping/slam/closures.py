@@ -161,15 +161,20 @@ def candidates(
     poses, pieces
         (C, 3) of their reference keyframes, and (C,) which piece of the track each belongs to.
     """
-    first, second = np.triu_indices(poses.shape[0], 1)
+    reach_m = window_m if slip.far else min(window_m, 2.0)
+    pairs, stds = [np.zeros((2, 0), np.int64)], [np.zeros((2, 0))]
+    # Row by row: the covariances of all pairs at once would be the largest thing in memory.
+    for row in range(poses.shape[0] - 1):
+        later = np.arange(row + 1, poses.shape[0])
+        close = np.hypot(*(poses[row, :2] - poses[later, :2]).T) < NEAR_M + reach_m
+        later = later[close & ((pieces[later] != pieces[row]) | (later - row >= LEAST_APART))]
+        rows = np.full(later.size, row)
+        pairs.append(np.stack([rows, later]))
+        stds.append(np.stack(spread(relative_covariances(joint, poses, rows, later))))
+    first, second = np.concatenate(pairs, axis=1)
+    std_m, std_rad = np.concatenate(stds, axis=1)
     torn = pieces[first] != pieces[second]
     distance = np.hypot(*(poses[first, :2] - poses[second, :2]).T)
-    reach_m = window_m if slip.far else min(window_m, 2.0)
-    near = (distance < NEAR_M + reach_m) & (torn | (second - first >= LEAST_APART))
-    first, second, distance, torn = first[near], second[near], distance[near], torn[near]
-    if first.size == 0:
-        return []
-    std_m, std_rad = spread(relative_covariances(joint, poses, first, second))
     half_m = WINDOW_STDS * std_m + slip.shift_m
     most_rad = np.where(torn, np.pi, MOST_TURN_RAD)
     half_rad = np.minimum(WINDOW_STDS * std_rad + slip.turn_rad, most_rad)

@@ -108,7 +108,7 @@ def result_of(config: SlamConfig, done: Mapped, state: Solved, joined: Joined | 
     since = 0 if joined is None else len(joined.earlier)
     own = state.poses[since:]
     hung = scan_poses(local, own)
-    poses = aligned_scans(log, local, done.clouds, own, hung, config, done.spacing)
+    poses, sure = aligned_scans(log, local, done.clouds, own, hung, config, done.spacing)
     scans = keyframe_scans(log, np.arange(len(log)), done.spacing)
     drawn_from, drawn_at = scans, poses
     extents, closures = tuple(closer.submaps.extents), closer.closures
@@ -122,7 +122,7 @@ def result_of(config: SlamConfig, done: Mapped, state: Solved, joined: Joined | 
         before = np.array([composed(poses[0], between(before[0], pose)) for pose in before])
         warnings += joined.warnings
     scale, turn = _odometry_scales(log, poses, config)
-    known = ScanCovariances(state.edges.graph(state.poses), state.weights, since + local.owner, poses)
+    known = ScanCovariances(state.edges.graph(state.poses), state.weights, since + local.owner, poses, sure)
     result = SlamResult(
         log.t_s,
         poses,
@@ -149,7 +149,12 @@ def by_stamps(result: SlamResult, stamps_s: FloatArray) -> SlamResult:
     """Return the scans with the stamps (N,) that the log gives them, in their order."""
     order = np.argsort(stamps_s, kind="stable")
     rank = np.argsort(order, kind="stable")
-    known = replace(result.known, owner=result.known.owner[order], poses=result.poses[order])
+    known = replace(
+        result.known,
+        owner=result.known.owner[order],
+        poses=result.poses[order],
+        own=result.known.own[order],
+    )
     return replace(
         result,
         t_s=stamps_s[order],
@@ -173,7 +178,7 @@ def _standing(log: LaserLog, config: SlamConfig, local: LocalTrack) -> SlamResul
         log.t_s,
         local.poses,
         local.poses,
-        ScanCovariances(graph, np.zeros(0), local.owner, local.poses),
+        ScanCovariances(graph, np.zeros(0), local.owner, local.poses, np.zeros((len(log), 3, 3))),
         local.keyframes,
         (),
         (),

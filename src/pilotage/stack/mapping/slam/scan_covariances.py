@@ -5,7 +5,7 @@ them, so its covariances are doubled. Every scan has an error of its own: stamps
 off, a body that moves while the mirror turns. And the place of the scanner on the robot is known to a few
 centimetres only: an error that all scans share, and that shows between poses as far as they are turned
 against each other. The three numbers serve the Intel and the Freiburg 079 recordings together; see
-docs/decisions/0038 and 0230.
+docs/decisions/0038 and 0212.
 """
 
 from __future__ import annotations
@@ -19,8 +19,8 @@ from pilotage.models.pose_graph import PoseGraph
 from pilotage.models.pose_graph_covariance import PoseCovariances, covariances
 
 SHARED_EDGES = 2.0
-SCAN_STD = np.array([0.012, 0.012, 0.004])
-MOUNT_STD_M = 0.03
+SCAN_STD = np.array([0.01, 0.01, 0.0035])
+MOUNT_STD_M = 0.04
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,22 +35,26 @@ class ScanCovariances:
         (N,) keyframe of each scan.
     poses
         (N, 3) of the scans in the map.
+    own
+        (N, 3, 3) in the map of what may be left, beside its keyframes, of a slip of the front end.
     """
 
     graph: PoseGraph
     weights: FloatArray
     owner: IntArray
     poses: FloatArray
+    own: FloatArray
 
     def marginals(self) -> FloatArray:
         """Return (N, 3, 3) in the map, the first keyframe being held."""
-        own = self._of_graph().marginals() if len(self.graph) > 1 else np.zeros((1, 3, 3))
+        graph = self._of_graph().marginals() if len(self.graph) > 1 else np.zeros((1, 3, 3))
         keyframes = self.graph.poses[self.owner]
         carry = np.tile(np.eye(3), (self.owner.size, 1, 1))
         carry[:, 0, 2] = -(self.poses[:, 1] - keyframes[:, 1])
         carry[:, 1, 2] = self.poses[:, 0] - keyframes[:, 0]
-        shared = carry @ (SHARED_EDGES * own[self.owner]) @ carry.transpose(0, 2, 1)
-        return np.asarray(shared + np.diag(SCAN_STD**2) + _of_mount(self.poses[:, 2] - self.poses[0, 2]))
+        shared = carry @ (SHARED_EDGES * graph[self.owner]) @ carry.transpose(0, 2, 1)
+        own = self.own + np.diag(SCAN_STD**2)
+        return np.asarray(shared + own + _of_mount(self.poses[:, 2] - self.poses[0, 2]))
 
     def relative(self, i: IntArray, j: IntArray) -> FloatArray:
         """Return (K, 3, 3) of x, y, theta of scan j as seen from scan i."""
@@ -63,13 +67,17 @@ class ScanCovariances:
         rotation = np.tile(np.eye(3), (first.size, 1, 1))
         rotation[:, 0, 0] = rotation[:, 1, 1] = np.cos(turn)
         rotation[:, 0, 1], rotation[:, 1, 0] = -np.sin(turn), np.sin(turn)
-        own = np.diag(SCAN_STD**2)
         c, s = np.cos(self.poses[i, 2]), np.sin(self.poses[i, 2])
+        into = np.tile(np.eye(3), (first.size, 1, 1))
+        into[:, 0, 0] = into[:, 1, 1] = c
+        into[:, 0, 1], into[:, 1, 0] = s, -s
+        own = into @ (self.own[[i, j]] + np.diag(SCAN_STD**2)) @ into.transpose(0, 2, 1)
         d = self.poses[j] - self.poses[i]
         lever = np.tile(np.eye(3), (first.size, 1, 1))
         lever[:, 0, 2] = -s * d[:, 0] + c * d[:, 1]
         lever[:, 1, 2] = -c * d[:, 0] - s * d[:, 1]
-        out = rotation @ between @ rotation.transpose(0, 2, 1) + own + lever @ own @ lever.transpose(0, 2, 1)
+        out = rotation @ between @ rotation.transpose(0, 2, 1) + own[1]
+        out += lever @ own[0] @ lever.transpose(0, 2, 1)
         out += _of_mount(self.poses[j, 2] - self.poses[i, 2])
         return np.asarray(0.5 * (out + out.transpose(0, 2, 1)))
 

@@ -23,7 +23,7 @@ MOST_MOVED_M, MOST_MOVED_RAD = 1.0, 0.3
 PRIOR = np.diag([0.1, 0.1, 1.0])
 """Holds a scan that is being aligned where nothing else does, in squared residuals."""
 HUNG_COV = np.diag([0.02, 0.02, 0.008]) ** 2
-"""Of where a scan hangs between the keyframes, as a rule; what is off by many times that does not count."""
+"""Of where a scan hangs between the keyframes, beside what may have slipped between these."""
 DOUBTED_SQUARE = 3.0
 """Squared distance of the aligned pose from where the scan hung, in covariances: that counts half then."""
 
@@ -35,26 +35,48 @@ def scan_poses(track: LocalTrack, keyframe_poses: FloatArray) -> FloatArray:
     """
     count = track.poses.shape[0]
     out = np.empty((count, 3))
-    moved = relative_poses(track.poses[:-1], track.poses[1:])
-    path = np.concatenate([[0.0], np.cumsum(np.hypot(moved[:, 0], moved[:, 1]) + 0.3 * np.abs(moved[:, 2]))])
+    shares = _shares(track)
     last = track.keyframes.size - 1
     for i in range(count):
         k = int(track.owner[i])
         here = composed(keyframe_poses[k], between(track.poses[track.keyframes[k]], track.poses[i]))
         if k < last:
-            a, b = int(track.keyframes[k]), int(track.keyframes[k + 1])
-            share = (path[i] - path[a]) / max(path[b] - path[a], 1e-9)
+            b = int(track.keyframes[k + 1])
             there = composed(keyframe_poses[k + 1], between(track.poses[b], track.poses[i]))
             turn = (there[2] - here[2] + np.pi) % (2.0 * np.pi) - np.pi
             here = np.array(
                 [
-                    here[0] + share * (there[0] - here[0]),
-                    here[1] + share * (there[1] - here[1]),
-                    (here[2] + share * turn + np.pi) % (2.0 * np.pi) - np.pi,
+                    here[0] + shares[i] * (there[0] - here[0]),
+                    here[1] + shares[i] * (there[1] - here[1]),
+                    (here[2] + shares[i] * turn + np.pi) % (2.0 * np.pi) - np.pi,
                 ]
             )
         out[i] = here
     return out
+
+
+def _shares(track: LocalTrack) -> FloatArray:
+    """(N,) of the path from the keyframe before each scan to the one after it; 0 behind the last one."""
+    moved = relative_poses(track.poses[:-1], track.poses[1:])
+    path = np.concatenate([[0.0], np.cumsum(np.hypot(moved[:, 0], moved[:, 1]) + 0.3 * np.abs(moved[:, 2]))])
+    at = path[track.keyframes]
+    whole = np.append(np.maximum(np.diff(at), 1e-9), np.inf)
+    return np.asarray((path - at[track.owner]) / whole[track.owner])
+
+
+def _slipped(track: LocalTrack, poses: FloatArray) -> FloatArray:
+    """(N, 3, 3) in the map of what the front end may have slipped at scans that hang at poses (N, 3).
+
+    It is nothing at the keyframes before and behind, and in between that of a Brownian bridge.
+    """
+    share = np.clip(_shares(track), 0.0, 1.0)
+    ahead = np.minimum(track.owner + 1, track.keyframes.size - 1)
+    slipped = (share * (1.0 - share))[:, None, None] * track.slips[ahead]
+    turn = np.zeros((share.size, 3, 3))
+    turn[:, 0, 0] = turn[:, 1, 1] = np.cos(poses[:, 2])
+    turn[:, 1, 0] = np.sin(poses[:, 2])
+    turn[:, 0, 1], turn[:, 2, 2] = -turn[:, 1, 0], 1.0
+    return np.asarray(turn @ slipped @ turn.transpose(0, 2, 1))
 
 
 def aligned_scans(
@@ -65,8 +87,8 @@ def aligned_scans(
     start: FloatArray,
     config: SlamConfig,
     spacing: float,
-) -> FloatArray:
-    """(N, 3) poses of all scans, those between the keyframes aligned with the keyframes around them.
+) -> tuple[FloatArray, FloatArray]:
+    """Poses (N, 3) of all scans, those between the keyframes aligned with the keyframes around them.
 
     The front end had to place a scan by what was before it, from a motion that a stamp may have told wrongly.
     Here what comes after it counts as well. One that fits nowhere near its start stays there.
@@ -79,8 +101,13 @@ def aligned_scans(
         (N, 3) of ``scan_poses``.
     spacing
         As in ``cloud_of``.
+
+    Returns
+    -------
+    The poses, and (N, 3, 3) in the map what is left there of slips between the keyframes.
     """
     out = start.copy()
+    slipped = _slipped(track, start)
     between_keyframes = np.ones(len(log), np.bool_)
     between_keyframes[track.keyframes] = False
     waiting = np.flatnonzero(between_keyframes)
@@ -100,15 +127,22 @@ def aligned_scans(
         off = pose - start[i]
         off[2] = (off[2] + np.pi) % (2.0 * np.pi) - np.pi
         if status != TOO_FEW and np.hypot(off[0], off[1]) < MOST_MOVED_M and abs(off[2]) < MOST_MOVED_RAD:
-            out[i] += _believed(off, told_by(hessian, float(fit[1])))
+            told = told_by(hessian, float(fit[1])) / TRACK_STD_M**2
+            step, slipped[i] = _believed(off, told, slipped[i])
+            out[i] += step
             out[i, 2] = (out[i, 2] + np.pi) % (2.0 * np.pi) - np.pi
-    return out
+    return out, slipped
 
 
-def _believed(off: FloatArray, hessian: FloatArray) -> FloatArray:
-    """How far (3,) a scan moves that an alignment would move by ``off``: both count by what they know."""
-    told = hessian / TRACK_STD_M**2
+def _believed(off: FloatArray, told: FloatArray, slipped: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """How far (3,) a scan moves that an alignment would move by ``off``, and what is left (3, 3) of a slip.
+
+    Alignment and place count by what they know: ``told`` (3, 3) is the alignment's information.
+    """
+    hung = HUNG_COV + slipped
     # By the matrix inversion lemma: the inverse of what tells nothing along a corridor is not needed.
-    gain = np.linalg.solve(np.eye(3) + told @ HUNG_COV, told)
+    gain = np.linalg.solve(np.eye(3) + told @ hung, told)
     kept = 1.0 / (1.0 + float(off @ gain @ off) / DOUBTED_SQUARE)
-    return np.asarray(np.linalg.solve(told + kept * np.linalg.inv(HUNG_COV), told @ off))
+    left = np.linalg.solve((np.eye(3) + told @ slipped / kept).T, slipped / kept).T
+    moved = np.linalg.solve(told + kept * np.linalg.inv(hung), told @ off)
+    return np.asarray(moved), np.asarray(0.5 * (left + left.T))

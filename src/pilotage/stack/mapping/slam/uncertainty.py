@@ -155,8 +155,10 @@ def joint_covariance(edges: Edges, poses: FloatArray, weights: FloatArray, chose
         unit = np.zeros((3 * stays.size, block.size))
         unit[block, np.arange(block.size)] = 1.0
         out[:, start : start + 96] = factor.solve(unit)[places]
-    out += out.T.copy()
-    out *= 0.5
+    for start in range(0, places.size, 96):
+        rows = slice(start, start + 96)
+        out[rows, start:] = 0.5 * (out[rows, start:] + out[start:, rows].T)
+        out[start:, rows] = out[rows, start:].T
     return out
 
 
