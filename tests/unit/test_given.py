@@ -140,6 +140,28 @@ def test_a_table_of_another_width_is_not_folded_anew() -> None:
         cells(blocked=np.full((8, 9), 100))
 
 
+def test_what_no_file_could_hold_is_no_setting() -> None:
+    endless: list[Any] = []
+    endless.append(endless)
+    deep: Any = 1.0
+    for _ in range(2000):
+        deep = [deep]
+    for value in (
+        endless,
+        deep,
+        object(),
+        1j,
+        b"x",
+        (i for i in range(3)),
+        {1: 2},
+        np.array([None])[:0].dtype,
+    ):
+        with pytest.raises(pl.InputError):
+            pl.load("museum-1", set={"run.time_limit_s": value})
+    changed = {"run.time_limit_s": np.float32(2.0), "world.start.x_m": np.array(1.5)}
+    assert pl.load("museum-1", set=changed).run.time_limit_s == 2.0
+
+
 @pytest.mark.parametrize("out", ["loop", "nowhere", "loop/in", "file"])
 def test_a_folder_that_cannot_be_is_refused_before_anything_runs(out: str, tmp_path: Path) -> None:
     (tmp_path / "loop").symlink_to("loop")

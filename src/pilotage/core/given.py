@@ -7,10 +7,12 @@ and masked arrays are no numbers here, although NumPy would convert them.
 from __future__ import annotations
 
 import contextlib
+import datetime
 import json
 import math
 import numbers
 import os
+import reprlib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -19,10 +21,8 @@ import numpy as np
 
 from pilotage.core.config import LARGEST, LARGEST_WHOLE
 from pilotage.core.errors import InputError
+from pilotage.core.limits import DEPTH
 from pilotage.core.types import BoolArray, FloatArray, IntArray
-
-SHOWN = 60
-"""Characters of what was found."""
 
 
 def number(
@@ -176,33 +176,39 @@ def settings(name: str, given: Any) -> dict[str, Any]:
     return dict(given)
 
 
-def plain(value: Any) -> Any:
-    """The same with NumPy's numbers and arrays, tuples and paths as a YAML file would have them."""
-    if isinstance(value, Mapping):
-        return {key: plain(one) for key, one in value.items()}
-    if isinstance(value, list | tuple):
-        return [plain(one) for one in value]
+def plain(name: str, value: Any, inside: int = 0) -> Any:
+    """The same with NumPy's numbers and arrays, tuples and paths as a YAML file would have them.
+
+    Raises
+    ------
+    InputError
+        Where something is what no file could hold, or a list contains itself.
+    """
+    if isinstance(value, Mapping) and inside <= DEPTH:
+        return {word(f"{name}: key", key): plain(name, one, inside + 1) for key, one in value.items()}
+    if isinstance(value, list | tuple) and inside <= DEPTH:
+        return [plain(name, one, inside + 1) for one in value]
     if isinstance(value, np.ndarray | np.generic):
-        return value.tolist()
-    return str(value) if isinstance(value, os.PathLike) else value
+        value = value.tolist()
+        return plain(name, value, inside + 1) if isinstance(value, list) else plain(name, value)
+    if isinstance(value, os.PathLike):
+        return str(path(name, value))
+    if value is None or isinstance(value, bool | int | float | str | datetime.date):
+        return value
+    raise InputError(f"{name}: expected numbers, texts, lists and mappings, found {told(value)}")
 
 
 def overrides(name: str, given: Any) -> list[str]:
     """Values by dotted key as the command line has them: ``KEY=VALUE``, the value as JSON, which is YAML."""
-    try:
-        return [f"{key}={json.dumps(plain(value))}" for key, value in settings(name, given).items()]
-    except (TypeError, ValueError, RecursionError):
-        raise InputError(
-            f"{name}: expected numbers, texts, lists and mappings, found {told(given)}"
-        ) from None
+    plainly = plain(name, settings(name, given))
+    return [f"{key}={json.dumps(value, default=str)}" for key, value in plainly.items()]
 
 
 def told(given: Any) -> str:
     """What was found, shortly; a large value by its kind."""
     if isinstance(given, np.ndarray):
         return f"an array of {given.dtype}, shape {given.shape}"
-    text = repr(given) if not isinstance(given, int) or given.bit_length() < 200 else "a number too large"
-    return text if len(text) <= SHOWN else f"a {type(given).__name__}: {text[:SHOWN]}..."
+    return reprlib.repr(given)
 
 
 def _real(given: Any) -> float | None:

@@ -55,7 +55,7 @@ def load(
         ...
     pilotage.core.errors.InputError: unknown mission 'museum-one'; did you mean 'museum-concave'?
     """
-    changes = given.plain(given.settings("set", set))
+    changes = given.plain("set", given.settings("set", set))
     return mission_of(values_of(source), (), None if seed is None else given.whole("seed", seed), changes)
 
 
@@ -70,7 +70,7 @@ def values_of(source: MissionLike) -> dict[str, Any]:
     if isinstance(source, Mission):
         return resolved_values(source)
     if isinstance(source, Mapping):
-        return extended(given.plain(given.settings("mission", source)), "mission")
+        return extended(given.plain("mission", given.settings("mission", source)), "mission")
     if isinstance(source, PathLike):
         path = given.path("mission", source)
         return read_mission(str(path) if path.suffix else f"{path.parent}/{path.name}")

@@ -172,7 +172,7 @@ def _definition(
         raise InputError("vary: expected a mapping of dotted keys to lists of values, found none")
     factors = []
     for key, values in vary.items():
-        listed = given.plain(values)
+        listed = given.plain(f"vary '{key}'", values)
         if not isinstance(listed, list):
             raise InputError(f"vary '{key}': expected a list of values, found {given.told(values)}")
         factors.append({"name": key, "key": key, "values": listed})
