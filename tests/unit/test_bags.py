@@ -8,6 +8,7 @@ import os
 import sys
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -188,10 +189,31 @@ def test_scans_without_beams(tmp_path: Path) -> None:
     none = np.empty(0)
     log = read(tmp_path, with_scan(drive(), 0, ranges_m=none))
     assert len(log) == 29
-    assert log.warnings == ("1 scans without beams, times or angles were left out",)
+    assert log.warnings == ("1 scans without beams, times, angles or limits were left out",)
     (tmp_path / "b").mkdir()
     with pytest.raises(InputError, match="30 scans without a usable beam"):
         read(tmp_path / "b", Drive(tuple(Scan(scan.t_s, none) for scan in drive().scans)))
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"first_rad": -90.0, "step_rad": 1.0},
+        {"step_rad": 1e30},
+        {"step_rad": 1e-30},
+        {"first_rad": -1e38},
+        {"range_max_m": 0.0},
+        {"range_max_m": -1.0},
+        {"range_min_m": 20.0, "range_max_m": 10.0},
+        {"range_min_m": math.nan},
+    ],
+    ids=str,
+)
+def test_scans_that_no_scanner_makes(tmp_path: Path, changes: dict[str, Any]) -> None:
+    """They were mapped with success, or ended the localizer in a traceback."""
+    impossible = tuple(replace(scan, **changes) for scan in drive().scans)
+    with pytest.raises(InputError, match=r"30 scans without a usable beam \(angles in radians"):
+        read(tmp_path, replace(drive(), scans=impossible))
 
 
 @pytest.mark.parametrize("form", CUT_FORMS)

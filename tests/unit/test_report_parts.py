@@ -18,6 +18,7 @@ from scipy.stats import chi2
 from pilotage.core.types import FloatArray
 from pilotage.records.run_data import read_run
 from pilotage.report import quantities, summary_table
+from pilotage.report.calibration.plots import MOST_BINS, histogram, panels_in_a_row
 from pilotage.report.figures.consistency import chi_square_band
 from pilotage.report.figures.layers import ellipse_outlines
 from pilotage.report.figures.map_view import view_limits
@@ -136,3 +137,11 @@ def test_map_shows_the_whole_floor_or_the_part_that_matters(tmp_path: Path) -> N
     assert part[0] > -20.0
     assert part[3] < 30.0
     assert "Only the part of the floor around the run is shown." in page_of(run)
+
+
+def test_values_nearly_all_of_which_are_equal_make_a_histogram_of_few_bars() -> None:
+    values = np.zeros(100_000)
+    values[:3], values[-20_000:] = 1e3, 1e-9
+    _, (axes,) = panels_in_a_row(["a"], ["b"])
+    histogram(axes, values)
+    assert 1 <= len(axes.patches) <= MOST_BINS

@@ -77,6 +77,11 @@ def odometry_of_bag(path: Path, topics: Sequence[str] = (), truth: str | None = 
     nearest = np.searchsorted(true.t_s, at, side="right").clip(1, len(true.t_s) - 1)
     dense = true.t_s[nearest] - true.t_s[nearest - 1] <= TRUTH_GAP_S
     whole = dense[1:] & dense[:-1]
+    if np.count_nonzero(whole) < LEAST_ROWS:
+        raise InputError(
+            f"{path}: expected {LEAST_ROWS} or more steps of {claimed.topic} with a pose of {true.topic} "
+            f"every {TRUTH_GAP_S:g} s beside them, found {np.count_nonzero(whole)}; are their times right?"
+        )
     moved = carried_over(known[:-1], read[:-1], read[1:])
     return OdometrySteps(
         path.stem,

@@ -25,6 +25,8 @@ CARMEN_RANGE_MAX_M = 80.0
 """A CARMEN scan of the old form says nothing of its limits; the SICK scanners in use then reach 80 m."""
 SCANNER_STEPS_DEG, STEP_ERROR = (1.0, 0.5, 1.0 / 3.0, 0.25), 1e-4
 """Angles between beams that planar scanners are built with, and the share a told one may be off from one."""
+LEAST_STEP_RAD, MOST_VIEW_RAD, MOST_FIRST_RAD = 1e-6, 4.0 * math.pi, 4.0 * math.pi
+"""Beyond these beams lie on one another, or their angles are degrees or no angles."""
 LARGEST_MOUNT_SPREAD = 0.02
 """Median deviation, in metres or radians, beyond which two poses of each scan give no mount."""
 
@@ -164,9 +166,14 @@ def assemble(
     said = list(warnings)
     with_beams = [scan for scan in scans if scan.ranges_m.size and _is_usable(scan)]
     if len(with_beams) < len(scans):
-        said.append(f"{len(scans) - len(with_beams)} scans without beams, times or angles were left out")
+        said.append(
+            f"{len(scans) - len(with_beams)} scans without beams, times, angles or limits were left out"
+        )
     if not with_beams:
-        raise InputError(f"{name}: expected laser scans, found {len(scans)} scans without a usable beam")
+        raise InputError(
+            f"{name}: expected laser scans, found {len(scans)} scans without a usable beam (angles in "
+            "radians, at most two turns; range_max above range_min)"
+        )
     no_times, poses, readings_s = _in_order(odometry_t_s, odometry, said)
     with_beams, t_s, stamps_s = _ordered(with_beams, readings_s, said)
     beams = np.array([scan.ranges_m.size for scan in with_beams], dtype=np.int64)
@@ -240,9 +247,12 @@ def _without_the_last_post(step_rad: FloatArray, beams: IntArray, said: list[str
 
 
 def _is_usable(scan: RawScan) -> bool:
-    numbers = (scan.t_s, scan.first_angle_rad, scan.angle_step_rad, scan.range_min_m, scan.range_max_m)
-    finite = all(math.isfinite(number) for number in numbers[:4])  # a limit of infinity is one
-    return finite and not math.isnan(numbers[4]) and (scan.angle_step_rad != 0.0 or scan.ranges_m.size == 1)
+    """Whether a scanner could have made it; NaN is in no range, a limit of infinity is one."""
+    view_rad = abs(scan.angle_step_rad) * (scan.ranges_m.size - 1)
+    apart = scan.ranges_m.size == 1 or abs(scan.angle_step_rad) >= LEAST_STEP_RAD
+    turns = abs(scan.first_angle_rad) <= MOST_FIRST_RAD and view_rad <= MOST_VIEW_RAD
+    reaches = scan.range_max_m > max(scan.range_min_m, 0.0)
+    return math.isfinite(scan.t_s) and apart and turns and reaches
 
 
 def _three_kinds(ranges_m: FloatArray, least: float, most: float) -> FloatArray:

@@ -45,7 +45,7 @@ from pilotage.sensors.lidar import LidarConfig
 from pilotage.sensors.sensor import Mount, SensorConfig
 from pilotage.sensors.wheel_odometry import WheelOdometryConfig
 
-LARGEST_STEP_S, FILL_S = 0.2, 0.1
+LARGEST_STEP_S, FILL_S, MOST_FILLED_S = 0.2, 0.1, 100_000.0
 """Between readings farther apart than the first the odometry moves the robot in steps of the second."""
 BASES = ("base_link", "base_footprint")
 WHEEL_NOISE = WheelOdometryConfig(
@@ -151,7 +151,7 @@ def bag_drive(
             f"{log}: expected odometry and {'scans' if laser else 'landmarks'} over the same time, "
             f"found {len(events)} readings in common"
         )
-    clock = _filled(events)
+    clock = _filled(log, events)
     moves = _moves(interpolate_poses(odometry_t_s, odometry, clock))
     sensors: dict[str, SensorConfig] = {ODOMETRY: WHEEL_NOISE}
     scans, scan_at = None, None
@@ -281,9 +281,15 @@ def _turned(log: Path, topic: str, t_s: FloatArray, poses: FloatArray) -> FloatA
     return np.column_stack([places, wrap_array_to_pi(heading)])
 
 
-def _filled(events: FloatArray) -> FloatArray:
+def _filled(log: Path, events: FloatArray) -> FloatArray:
     """The times of readings, and times between those that are far apart."""
-    gaps = np.flatnonzero(np.diff(events) > LARGEST_STEP_S)
+    apart_s = np.diff(events)
+    gaps = np.flatnonzero(apart_s > LARGEST_STEP_S)
+    if apart_s[gaps].sum() > MOST_FILLED_S:
+        raise InputError(
+            f"{log}: expected readings with at most {MOST_FILLED_S:g} s without any in all, found "
+            f"{apart_s[gaps].sum():g} s; are their times right? --from and --to take a part"
+        )
     between = [np.arange(events[k] + FILL_S, events[k + 1] - 0.5 * FILL_S, FILL_S) for k in gaps]
     return np.unique(np.concatenate([events, *between]))
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -11,7 +13,7 @@ from pilotage.core.types import FloatArray
 from pilotage.report.style import BLUE, SKY, VERMILLION, WIDTH_PT, note
 
 _LEFT_PT, _RIGHT_PT, _TOP_PT, _BOTTOM_PT, _GAP_PT = 50.0, 10.0, 22.0, 36.0, 52.0
-NO_SCATTER = 1e-12
+NO_SCATTER, MOST_BINS = 1e-12, 200
 
 
 def panels_in_a_row(
@@ -40,7 +42,11 @@ def histogram(axes: Axes, values: FloatArray, expected: float | None = None) -> 
         axes.set_xticks([])
         return
     mean = float(values.mean())
-    axes.hist(values, bins="fd", density=True, color=SKY, edgecolor="white", linewidth=0.4)
+    # Freedman and Diaconis 1981, with a bound: where nearly all values are equal and a few are not, the bars
+    # would fill the memory.
+    width = 2.0 * float(stats.iqr(values)) / np.cbrt(values.size)
+    bins = min(MOST_BINS, math.ceil(min(np.ptp(values) / max(width, NO_SCATTER), MOST_BINS)))
+    axes.hist(values, bins=bins, density=True, color=SKY, edgecolor="white", linewidth=0.4)
     x = np.linspace(mean - 4.0 * std, mean + 4.0 * std, 121)
     axes.plot(x, stats.norm.pdf(x, mean, std), color=VERMILLION, linewidth=1.6)
     if expected is not None:
