@@ -36,8 +36,11 @@ class GoalNavigatorConfig(Config):
     """Where this much of the local path ahead comes too near a mapped obstacle: stop and replan; 0: never."""
     watch_margin_m: NonNegative = 0.03
     """Too near: below the body's radius plus this."""
-    watch_plan_s: NonNegative = 1.0
-    """Where something new stands anywhere on the plan ahead it plans anew, no two plans in less time."""
+    watch_plan_s: NonNegative | None = None
+    """Where something new stands anywhere on the plan ahead it plans anew, no two plans in less time.
+
+    None: it drives up to it and reacts, as the night-watch report's robot does.
+    """
     stall_s: Positive = 20.0
     stall_progress_m: Positive = 0.5
     waypoint_ahead_m: Positive = 0.4

@@ -243,7 +243,8 @@ class Context:
 
         Not where people walk about: what blocks the path may be gone by then.
         """
-        if self.t_s - self._planned_s < self.config.watch_plan_s or self.among_people:
+        period_s = self.config.watch_plan_s
+        if period_s is None or self.t_s - self._planned_s < period_s or self.among_people:
             return False
         return self.plan.is_blocked(self.own_map.found_circles_m, self.radius_m + self.config.watch_margin_m)
 
