@@ -218,6 +218,7 @@ class LoopCloser:
         """(3 S, 3 S) covariance of the submaps' poses; computed anew only where the graph has changed."""
         state, known = self.state, self._joint
         if known is None or known[0] is not state or len(known[1]) != 3 * len(self.submaps):
+            known = self._joint = None
             out = joint_covariance(state.edges, state.poses, state.weights, self.submaps.references)
             self._joint = known = state, out
         return known[1]
