@@ -11,12 +11,7 @@ import pytest
 gymnasium = pytest.importorskip("gymnasium", reason="needs the extra 'gym'")
 
 import pilotage as pl  # noqa: E402
-from pilotage.bridges import gym  # noqa: E402
-
-
-@pytest.fixture(autouse=True)
-def registered() -> None:
-    gym.register()
+from pilotage.bridges import gym  # noqa: E402 - registers the environments
 
 
 def rollout(env: Any, seed: int, steps: int = 30) -> list[Any]:

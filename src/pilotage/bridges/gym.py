@@ -1,10 +1,11 @@
 """Missions as Gymnasium environments: ``gymnasium.make("pilotage/museum-1-v0")``.
 
-Importing this module is cheap, because Gymnasium does so itself (entry point ``gymnasium.envs``).
+Importing this module registers them, as Gymnasium has it since 1.0: it looks for no entry points any more.
 """
 
 from __future__ import annotations
 
+import contextlib
 from importlib import resources
 
 VERSION = "v0"
@@ -23,3 +24,7 @@ def register() -> None:
     for key, options in {**known, OWN: {}}.items():
         if key not in gymnasium.registry:
             gymnasium.register(id=key, entry_point=place, vector_entry_point=many, kwargs=options)
+
+
+with contextlib.suppress(ImportError):  # the extra is told of where an environment is made
+    register()
