@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from pydantic import Field
 
 from pilotage.core.angles import wrap_to_pi
 from pilotage.core.config import Config
@@ -29,7 +30,7 @@ NOW_S, AGAIN_S = 0.05, 0.3
 class MakeRoomConfig(Config):
     """How far, how fast, for how long, and what a place has to be better by."""
 
-    reach_m: Positive = 2.5
+    reach_m: float = Field(default=2.5, gt=0.0, le=20.0)
     speed_m_s: Positive = 0.3
     longest_s: Positive = 15.0
     look_s: Positive = 1.0
