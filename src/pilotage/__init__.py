@@ -15,6 +15,7 @@ from __future__ import annotations
 import importlib
 from typing import TYPE_CHECKING, Any
 
+from pilotage.bridges.gym_import import register_with_gymnasium as _register_with_gymnasium
 from pilotage.core.version import __version__ as __version__
 
 if TYPE_CHECKING:
@@ -119,3 +120,6 @@ if not TYPE_CHECKING:  # a checker that saw this would take any name for a right
 
 def __dir__() -> list[str]:
     return sorted([*globals(), *__all__])
+
+
+_register_with_gymnasium()

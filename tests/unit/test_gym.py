@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 import warnings
 from typing import Any
 
@@ -23,6 +25,13 @@ def rollout(env: Any, seed: int, steps: int = 30) -> list[Any]:
         if over or late:
             break
     return out
+
+
+@pytest.mark.parametrize("order", ["import gymnasium, pilotage", "import pilotage, gymnasium"])
+def test_importing_both_is_enough(order: str) -> None:
+    ask = f"{order}; print(gymnasium.spec('pilotage/museum-1-v0').id)"
+    done = subprocess.run([sys.executable, "-c", ask], capture_output=True, text=True, check=True)
+    assert done.stdout == "pilotage/museum-1-v0\n"
 
 
 @pytest.mark.parametrize("name", ["museum-1", "car-park", "gale-pose"])
