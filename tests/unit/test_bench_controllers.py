@@ -7,8 +7,6 @@ import json
 import math
 import sqlite3
 from pathlib import Path
-from types import SimpleNamespace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -21,8 +19,6 @@ from pilotage.experiments.course_families import Course, Driver, make_course_of
 from pilotage.maps.segment_map import SegmentMap
 from pilotage.models.footprint import Footprint
 from pilotage.models.motion.differential_drive import DifferentialDriveConfig
-from pilotage.stack.control.local.body import make_body
-from pilotage.stack.control.local.narrow_passage import NarrowPassage
 
 JACKAL = np.array([[0.254, 0.215], [-0.254, 0.215], [-0.254, -0.215], [0.254, -0.215]])
 DRIVER = Driver(Footprint.polygon(JACKAL), JACKAL, DifferentialDriveConfig(max_speed_m_s=2.0))
@@ -85,15 +81,6 @@ def test_openings_little_wider_than_the_robot_are_driven_through() -> None:
     request = CourseRequest(("bottleneck-0.46",), ("gap-horizon",))
     run = drive_course(request, course_base(), drawn("bottleneck-0.46"), 0, "gap-horizon")
     assert run.success, run
-
-
-def test_with_its_front_in_a_gap_it_backs_straight_out_and_does_not_turn() -> None:
-    scene: Any = SimpleNamespace(start=np.array([-0.28, 0.05, 0.2, 0.0, 0.0]), body=make_body(JACKAL))
-    passage = NarrowPassage(0.0, 0.0, 0.0, 0.46, stage=0, begun_s=0.0)
-    same, command = passage.command(scene)
-    assert same is passage
-    assert command.v_m_s < 0.0
-    assert command.w_rad_s == 0.0
 
 
 def rooms(path: Path, opening_m: float) -> str:

@@ -31,8 +31,6 @@ from pilotage.stack.control.local.sampling import NoiseBank
 
 TRIED_M = 0.3
 """Two narrow places nearer to each other than this are one."""
-LOOK_ANEW_M = 0.5
-"""So far around a gap that it stands before, a place from which it sees both sides of it."""
 Share = Field(default=0.65, gt=0.0, le=1.0)
 SPEEDS = np.array([1.0, 0.7, 0.45, 0.25])
 LOOKS = np.array([[0.3, 0.1], [0.45, 0.3]])
@@ -155,10 +153,7 @@ class GapHorizon:
             self._plan = None
             return STOP
         if self._passage is not None:
-            stage = self._passage.stage
             self._passage, wanted = self._passage.step(scene, view.t_s)
-            if self._passage is not None and stage == 0 and self._passage.stage == 1:
-                self._ground.look_anew(self._passage.x_m, self._passage.y_m, LOOK_ANEW_M)
             for share in (1.0, 0.5, 0.25):
                 command = self._checked(
                     scene, share * np.array([wanted.v_m_s, wanted.w_rad_s]), config.passage_margin_m

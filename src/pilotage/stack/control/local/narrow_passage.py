@@ -20,13 +20,9 @@ SLOW_M_S = 0.35
 SLOWER_M_S = 0.15
 ROOM_M = 0.03
 """With less room than this on either side it drives at the slower speed."""
-LEAST_ROOM_M = 0.010
+LEAST_ROOM_M = 0.006
 """With less than this on either side, as far as can be measured, it does not go in."""
-NEWEST = 0.05
-"""Share of the newest measurement in the width: each alone is a centimetre off."""
 LOOK_M = 0.1
-ONTO_M = 0.15
-"""It steers back onto the axis within about this."""
 SIDES_M = 0.8
 ALONG_M = 0.35
 """Points so far before and behind the narrowest place are those that it has to pass between."""
@@ -60,8 +56,7 @@ class NarrowPassage:
         along, _ = self._place(float(scene.start[0]), float(scene.start[1]))
         if t_s - self.begun_s > LONGEST_S or along > BEYOND_M:
             return None, Twist(0.0, 0.0)
-        if along < -scene.body.outer_m:
-            # With its front in the gap the robot hides the sides from its laser.
+        if along < -scene.body.inner_m:
             return self._measured(scene).command(scene)
         return self.command(scene)
 
@@ -69,9 +64,6 @@ class NarrowPassage:
         """What to do at this stage."""
         x, y, theta = float(scene.start[0]), float(scene.start[1]), float(scene.start[2])
         c, s = math.cos(self.direction_rad), math.sin(self.direction_rad)
-        if self.stage == 0 and -scene.body.outer_m < self._place(x, y)[0] < 0.0:
-            # Askew with its front in the gap: it may not turn there.
-            return self, Twist(-SLOWER_M_S, 0.0)
         if self.stage == 0:
             tx, ty = self.x_m - BEFORE_M * c, self.y_m - BEFORE_M * s
             away = math.hypot(tx - x, ty - y)
@@ -91,12 +83,12 @@ class NarrowPassage:
                 return replace(self, stage=2), Twist(0.0, 0.0)
             return self, Twist(0.0, _limited(3.0 * off, scene.drive.turn_rate))
         along, across = self._place(x, y)
-        room = 0.5 * self.width_m - scene.body.inner_m
-        if -scene.body.outer_m - LOOK_M < along < -scene.body.inner_m and room < LEAST_ROOM_M:
+        too_narrow = self.width_m < 2.0 * (scene.body.inner_m + LEAST_ROOM_M)
+        if too_narrow and -scene.body.outer_m - LOOK_M < along < -scene.body.inner_m:
             return self, Twist(0.0, 0.0)
         # Steers back onto the axis: a heading that falls with the distance to it.
-        wanted = self.direction_rad - math.atan2(across, ONTO_M)
-        tight = room < ROOM_M
+        wanted = self.direction_rad - math.atan2(across, 0.25)
+        tight = 0.5 * self.width_m - scene.body.inner_m < ROOM_M
         return self, Twist(SLOWER_M_S if tight else SLOW_M_S, _limited(4.0 * wrap(wanted - theta), 1.0))
 
     def _place(self, x: float, y: float) -> tuple[float, float]:
@@ -110,7 +102,6 @@ class NarrowPassage:
         if found is None:
             return self
         x, y, direction, width = found
-        width += (1.0 - NEWEST) * (self.width_m - width)
         return replace(self, x_m=x, y_m=y, direction_rad=direction, width_m=width)
 
 

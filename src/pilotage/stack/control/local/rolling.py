@@ -357,17 +357,6 @@ class RollingGround:
         self._closed.append((x_m, y_m, radius_m))
         self._since_plan = 10**6
 
-    def look_anew(self, x_m: float, y_m: float, radius_m: float) -> None:
-        """Forget the points in a disc of the map frame that the laser looks at now.
-
-        What was first seen from afar lies a few centimetres off by the odometry's drift since, and stays
-        where no beam ends any more but none goes far past.
-        """
-        x0, y0 = self._corner_m
-        centres = (np.arange(self._cells) + 0.5) * self._cell_m
-        away = np.hypot(x0 + centres[None, :] - x_m, y0 + centres[:, None] - y_m)
-        self._hits[away < radius_m] = 0
-
     def open_all(self) -> None:
         """Forget what was closed: a way through it may be better than none."""
         self._closed.clear()
