@@ -1,6 +1,6 @@
 """The mapper on recorded buildings, as they are and damaged: errors of the relations, NEES and speed.
 
-    python -m benchmarks.slam_logs ../shared/data/slam --log intel --damage none zero-odometry jitter
+    python -m benchmarks.slam_logs ../shared/data/slam --log intel --damage none zero-odometry jitter [--json]
 
 Each FOLDER/NAME.bag goes with NAME.relations. Damages: ``zero-odometry`` (its poses are all zero), ``jitter``
 (the stamp of each scan moved by a normal error of 50 ms, the messages in the order they were recorded),
@@ -11,6 +11,7 @@ Each FOLDER/NAME.bag goes with NAME.relations. Damages: ``zero-odometry`` (its p
 from __future__ import annotations
 
 import argparse
+import json
 import tempfile
 import time
 from dataclasses import replace
@@ -85,8 +86,8 @@ def damaged(log: LaserLog, damage: str, seed: int) -> tuple[LaserLog, FloatArray
     return log, log.t_s
 
 
-def measured(folder: Path, name: str, damage: str, seed: int) -> str:
-    """One line of numbers."""
+def measured(folder: Path, name: str, damage: str, seed: int) -> tuple[str, dict[str, float]]:
+    """One line of numbers, and those of it that docs/slam.md quotes."""
     log, true_s = damaged(read_laser_log(folder / f"{name}.bag"), damage, seed)
     began = time.perf_counter()
     result = map_log(log, SlamConfig())
@@ -101,12 +102,13 @@ def measured(folder: Path, name: str, damage: str, seed: int) -> str:
     found = errors.summary()
     nees = relation_nees(errors, result.known.relative(order[errors.first], order[errors.second]))
     accepted = sum(closure.verdict is Verdict.ACCEPTED for closure in result.closures)
-    return (
+    line = (
         f"{name} {damage}: {found['trans_mean_m']:.4f} m (most {found['trans_max_m']:.2f}), "
         f"{found['rot_mean_deg']:.2f} deg, NEES {nees.mean():.2f} (median {np.median(nees):.2f}), "
         f"{accepted} of {len(result.closures)} closures, {result.lost} scans lost, "
         f"{(true_s.max() - true_s.min()) / took_s:.0f} x real time; {'; '.join(result.warnings)}"
     )
+    return line, {"error_m": float(found["trans_mean_m"] or 0.0), "nees": float(nees.mean())}
 
 
 def main() -> None:
@@ -116,10 +118,16 @@ def main() -> None:
     parser.add_argument("--log", nargs="+", default=["intel", "fr079"])
     parser.add_argument("--damage", nargs="+", choices=DAMAGES, default=list(DAMAGES))
     parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--json", action="store_true", help="one JSON object instead of lines")
     asked = parser.parse_args()
+    values = {}
     for name in asked.log:
         for damage in asked.damage:
-            print(measured(asked.folder, name, damage, asked.seed), flush=True)
+            line, values[f"{name} {damage}"] = measured(asked.folder, name, damage, asked.seed)
+            if not asked.json:
+                print(line, flush=True)
+    if asked.json:
+        print(json.dumps(values))
 
 
 if __name__ == "__main__":

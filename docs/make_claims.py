@@ -3,19 +3,19 @@
     python docs/make_claims.py [NAME ...] [--workers N]     # measure all that is registered, or these
     python docs/make_claims.py --quote                      # only put the numbers into the pages
     python docs/make_claims.py --loose                      # numbers on the pages that nothing accounts for
-    python docs/make_claims.py --adopt                      # put those into docs/given.json, as open
+    python docs/make_claims.py --given                      # into docs/given.json: only what nobody measured
 
-docs/claims.yaml registers what is measured, a line each: a study, or a command that writes values as JSON to
-the file in place of ``{json}``, or prints one JSON object of numbers, or of rows with a ratio each. A page
-quotes a value by a comment right behind it, which no reader sees:
+docs/claims.yaml registers what is measured, a line each: a study, a mission over seeds (``sweep``), or a
+command that writes values as JSON to the file in place of ``{json}``, or prints one JSON object of numbers,
+or of rows with a ratio each. A page quotes a value by a comment right behind it, which no reader sees:
 
     94.5<!--= gale :: dead reckoning :: ellipse :: %1 -->
 
 that is source, key (of a study: cell and metric), and how it is written: an optional field (``low``,
 ``high``, ``n``, ``largest``, ...; ``ci`` is value, low and high), a scale (``%`` hundreds, ``m`` thousands)
 and the digits behind the point. ``--quote`` writes anew what stands before the comment. Every other number
-of a page stands in docs/given.json: parameters, definitions, published values (``given``), and numbers
-measured once by a command that no line of claims.yaml runs yet (``open``: no new ones).
+of a page stands in docs/given.json: parameters, definitions, published values. What was measured is quoted or
+not said.
 """
 
 from __future__ import annotations
@@ -104,18 +104,12 @@ def loose(text: str) -> list[str]:
 
 def unaccounted(page: Path, given: Mapping[str, Any]) -> list[str]:
     """Numbers of a page that are neither quoted nor in docs/given.json."""
-    known = {number for numbers in given.get(page.name, {}).values() for number in numbers}
-    return sorted({number for number in loose(page.read_text(encoding="utf-8")) if number not in known})
+    return sorted(set(loose(page.read_text(encoding="utf-8"))) - set(given.get(page.name, ())))
 
 
-def adopt() -> None:
-    """Take unaccounted numbers into docs/given.json, as open; what is gone from the pages goes."""
-    given = json.loads(GIVEN.read_text(encoding="utf-8")) if GIVEN.is_file() else {}
-    found: dict[str, Any] = {}
-    for page in PAGES:
-        there = set(loose(page.read_text(encoding="utf-8")))
-        known = set(given.get(page.name, {}).get("given", [])) & there
-        found[page.name] = {"given": sorted(known), "open": sorted(there - known)}
+def give() -> None:
+    """Take unaccounted numbers into docs/given.json; what is gone from the pages goes."""
+    found = {page.name: sorted(set(loose(page.read_text(encoding="utf-8")))) for page in PAGES}
     GIVEN.write_text(json.dumps(found, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
 
 
@@ -140,10 +134,11 @@ def written(claims: Mapping[str, Any]) -> str:
 def measure(name: str, entry: Mapping[str, Any], workers: int) -> dict[str, Any]:
     """Run what is registered and collect its values."""
     with tempfile.TemporaryDirectory() as folder:
-        if "study" in entry:
-            trials = entry.get("trials")
-            command = f"pilotage study {entry['study']}" + ("" if trials is None else f" --trials {trials}")
-            values, seeds, count = _studied(entry["study"], trials, Path(folder), workers)
+        kind = next((word for word in ("study", "sweep") if word in entry), None)
+        if kind is not None:
+            trials = f" --trials {entry['trials']}" if "trials" in entry else ""
+            command = f"pilotage {kind} {entry[kind]}{trials}"
+            values, seeds, count = _studied(command.split()[1:], Path(folder), workers)
         else:
             command, found = entry["command"], Path(folder) / "values.json"
             words = command.replace("{json}", str(found)).split()
@@ -163,7 +158,7 @@ def measure(name: str, entry: Mapping[str, Any], workers: int) -> dict[str, Any]
     return {"date": today, "command": command, "seeds": seeds, "n": count, "values": values}
 
 
-def _told(metrics: Mapping[str, Any]) -> dict[str, Any]:
+def _told(metrics: Mapping[str, Any], where: str = "") -> dict[str, Any]:
     """One run's numbers, with their intervals where ``KEY_low`` and ``KEY_high`` stand beside; or ratios."""
     if "rows" in metrics:
         rows = [row for row in metrics["rows"] if row["ratio"] is not None]
@@ -178,17 +173,19 @@ def _told(metrics: Mapping[str, Any]) -> dict[str, Any]:
     for key, value in numbers.items():
         stem = key.removesuffix("_mean")
         interval = {end: numbers[f"{stem}_{end}"] for end in ("low", "high") if f"{stem}_{end}" in numbers}
-        found[key] = _numbers(value=value, **interval)
+        found[f"{where}{key}"] = _numbers(value=value, **interval)
+    for key, inner in metrics.items():
+        if isinstance(inner, dict):
+            found |= _told(inner, f"{where}{key} :: ")
     return found
 
 
-def _studied(study: str, trials: int | None, folder: Path, workers: int) -> tuple[dict[str, Any], str, int]:
+def _studied(words: list[str], folder: Path, workers: int) -> tuple[dict[str, Any], str, int]:
     """Every cell and metric of a study, its success, why trials ended, and the changes from the baselines."""
-    line = [sys.executable, "-m", "pilotage.cli.main", "study", study, "--out", str(folder), "--no-report"]
-    line += [] if trials is None else ["--trials", str(trials)]
+    line = [sys.executable, "-m", "pilotage.cli.main", *words, "--out", str(folder), "--no-report"]
     done = subprocess.run([*line, "--workers", str(workers)], cwd=folder, check=False)
     if done.returncode not in (0, 1):
-        raise ClaimError(f"{study}: the study ended with exit code {done.returncode}")
+        raise ClaimError(f"{' '.join(words)}: the study ended with exit code {done.returncode}")
     return collected(next(folder.rglob("trials.sqlite")).parent)
 
 
@@ -230,6 +227,20 @@ def collected(folder: Path) -> tuple[dict[str, Any], str, int]:
                 values[f"{cell.name} :: {metric} change"] = _numbers(
                     value=change.mean, low=change.low, high=change.high, n=change.n, p=change.p_corrected
                 )
+    for group in table.groups if len(table.groups) > 1 else ():
+        for metric in table.metrics:
+            column = table.column(metric)[np.isin(table.cell, group.cells)]
+            column = column[np.isfinite(column)]
+            if column.size:
+                values[f"{group.name} :: {metric}"] = _numbers(
+                    value=column.mean(), n=column.size, smallest=column.min(), largest=column.max()
+                )
+    for (first, other), found in judged.contrasts.items():
+        for cell, change in zip(table.cells, found, strict=True):
+            if change.n:
+                values[f"{cell.name} :: {first} less {other}"] = _numbers(
+                    value=change.mean, low=change.low, high=change.high, n=change.n, p=change.p_corrected
+                )
     seeds = table.study.definition.seeds.first
     last = seeds + table.study.definition.trials - 1
     return values, f"{seeds} to {last}", table.study.definition.trials
@@ -247,13 +258,13 @@ def main() -> int:
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--quote", action="store_true")
     parser.add_argument("--loose", action="store_true")
-    parser.add_argument("--adopt", action="store_true")
+    parser.add_argument("--given", action="store_true")
     options = parser.parse_args()
     registry = yaml.safe_load(REGISTRY.read_text(encoding="utf-8"))
     claims = json.loads(CLAIMS.read_text(encoding="utf-8")) if CLAIMS.is_file() else {}
     try:
-        if options.adopt:
-            adopt()
+        if options.given:
+            give()
             return 0
         if options.loose:
             given = json.loads(GIVEN.read_text(encoding="utf-8"))

@@ -256,6 +256,13 @@ def test_an_unknown_key_to_vary_is_answered_with_the_nearest() -> None:
         sweep_study("museum-plan", ["stack.planner.turning_radius=0.1,0.2"], (), 2, ())
 
 
+def test_a_sweep_of_nothing_runs_the_mission_over_its_seeds() -> None:
+    study = sweep_study("museum-plan", (), ["stack.planner.turning_radius_m=0.3"], 3, ())
+    assert [cell.name for cell in study.cells] == ["mission"]
+    assert study.definition.trials == 3
+    assert study.cells[0].overrides == ("stack.planner.turning_radius_m=0.3",)
+
+
 def test_ranges_hold_both_ends() -> None:
     study = sweep_study("museum-plan", ["stack.planner.turning_radius_m=0.1:0.5:0.1"], (), 1, ())
     assert [cell.values["turning_radius_m"] for cell in study.cells] == [0.1, 0.2, 0.3, 0.4, 0.5]

@@ -99,13 +99,14 @@ def study(
 def sweep(
     mission: Annotated[str, typer.Argument(metavar="MISSION|FILE", help="A shipped name or a YAML file.")],
     vary: Annotated[
-        list[str],
+        list[str] | None,
         typer.Option(
             "--vary",
             metavar="KEY=A:B:STEP|V1,V2",
-            help="What is varied, A:B:COUNT:log in equal ratios; again for more factors.",
+            help="What is varied, A:B:COUNT:log in equal ratios; again for more factors; "
+            "left out, the mission as it is runs over the seeds.",
         ),
-    ],
+    ] = None,
     overrides: Overrides = None,
     trials: Annotated[int, typer.Option("--trials", metavar="N", min=1, help="Trials in every cell.")] = 10,
     metrics: Annotated[
@@ -125,7 +126,7 @@ def sweep(
     report: Report = True,
     quiet: Quiet = False,
 ) -> int:
-    """Write a study that varies a mission's parameters, and run it."""
+    """Write a study that varies a mission's parameters and its seeds, and run it."""
     from pilotage.experiments.studies.options import StudyOptions
     from pilotage.experiments.studies.sweep import sweep_study
 
@@ -133,7 +134,7 @@ def sweep(
     asked = () if metrics is None else tuple(part.strip() for part in metrics.split(","))
     if not all(asked):
         raise InputError(f"--metrics '{metrics}': expected names with commas between, M1,M2")
-    made = sweep_study(mission, vary, overrides or (), trials, asked, name)
+    made = sweep_study(mission, vary or (), overrides or (), trials, asked, name)
     return run_and_tell(made, out / made.name, options, Show(json, report, quiet))
 
 

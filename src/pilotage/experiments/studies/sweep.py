@@ -27,7 +27,7 @@ def sweep_study(
     metrics: Sequence[str],
     name: str | None = None,
 ) -> Study:
-    """Make a study that varies a mission's parameters on a grid.
+    """Make a study that varies a mission's parameters on a grid; without any, its seeds alone.
 
     Raises
     ------
