@@ -145,10 +145,11 @@ def test_odometry_from_transforms(tmp_path: Path) -> None:
 def test_odometry_that_is_not_finite_or_short(tmp_path: Path) -> None:
     rows = list(drive().odometry[:30])
     rows[7] = (rows[7][0], math.nan, 0.0, 0.0)
+    rows[9] = (rows[9][0], 4e86, 0.0, 0.0)
     log = read(tmp_path, replace(drive(), odometry=tuple(rows)))
     assert log.odometry is not None
-    assert log.odometry.shape == (29, 3)
-    assert "1 odometry readings that are not finite were left out" in log.warnings
+    assert log.odometry.shape == (28, 3)
+    assert "2 odometry readings that are no places were left out" in log.warnings
     assert any("odometry covers" in said for said in log.warnings)
 
 

@@ -228,10 +228,13 @@ def test_topics_are_what_their_types_say(run: pl.Run, bags: dict[str, Path]) -> 
 
 
 @pytest.mark.parametrize("to", ["mcap", "rosbag", "rerun"])
-def test_an_event_without_a_time_has_no_place_in_a_recording(tmp_path: Path, to: str) -> None:
+@pytest.mark.parametrize("t_s", [None, 2.0**64])
+def test_an_event_without_a_time_has_no_place_in_a_recording(
+    tmp_path: Path, to: str, t_s: float | None
+) -> None:
     if to == "rerun":
         pytest.importorskip("rerun", reason="needs the extra 'rerun'")
-    events: list[dict[str, Any]] = [{"t_s": None, "kind": "moon-rise", "text": "it rose"}]
+    events: list[dict[str, Any]] = [{"t_s": t_s, "kind": "moon-rise", "text": "it rose"}]
     folder = fabricate_run(
         tmp_path / "run", steps=5, metrics={"mission": "x", "success": True}, events=events
     )

@@ -18,6 +18,7 @@ from pilotage.core.angles import wrap_array_to_pi
 from pilotage.core.errors import InputError
 from pilotage.core.types import BoolArray, FloatArray, IntArray, Pose2
 from pilotage.logs.carmen import CarmenLog, read_carmen
+from pilotage.logs.scanner_mount import LARGEST
 from pilotage.logs.stamps import between_readings, increasing, keeps_order
 
 CARMEN_RANGE_MIN_M = 0.05
@@ -303,16 +304,16 @@ def _by_time(
 def _in_order(
     t_s: FloatArray, poses: FloatArray, said: list[str]
 ) -> tuple[FloatArray | None, FloatArray | None, FloatArray]:
-    """Odometry by increasing times, all finite; of two readings of a time the later counts.
+    """Odometry by increasing times, all possible; of two readings of a time the later counts.
 
     The third are the times of all readings in the order of the file, where that is the order of time.
     """
     poses = poses.reshape(-1, 3)
-    finite = np.isfinite(t_s) & np.isfinite(poses).all(axis=1)
-    if not finite.all():
-        said.append(f"{int(np.count_nonzero(~finite))} odometry readings that are not finite were left out")
-    count = np.cumsum(finite)
-    t_s, poses = t_s[finite], poses[finite]
+    possible = np.isfinite(t_s) & (np.abs(poses) <= LARGEST).all(axis=1)
+    if not possible.all():
+        said.append(f"{int(np.count_nonzero(~possible))} odometry readings that are no places were left out")
+    count = np.cumsum(possible)
+    t_s, poses = t_s[possible], poses[possible]
     if t_s.size == 0:
         return None, None, np.zeros(0)
     notes: list[str] = []

@@ -15,6 +15,8 @@ from pilotage.records.numbers import number
 from pilotage.records.reading import clean_text, is_there
 
 EVENTS_FILE = "events.jsonl"
+LATEST_S = 2**31 - 1
+"""What a stamp of ROS holds, 1 and 2."""
 
 
 def write_events(folder: Path, events: Iterable[Event]) -> None:
@@ -49,14 +51,15 @@ def _event(entry: Mapping[str, Any], path: Path) -> Event:
 
 
 def require_times(events: Iterable[Event], folder: Path) -> None:
-    """Refuse events without a time, which a page shows and a recording has no place for.
+    """Refuse events without a time that a recording can hold, which a page shows.
 
     Raises
     ------
     InputError
-        Where an event's time is not finite.
+        Where an event's time is not finite, before the begin or beyond 32 bits of seconds.
     """
-    if not all(math.isfinite(event.t_s) for event in events):
+    if not all(0.0 <= event.t_s <= LATEST_S for event in events):
         raise InputError(
-            f"{folder / EVENTS_FILE}: expected the time of every event in seconds, found one without"
+            f"{folder / EVENTS_FILE}: expected the time of every event in seconds, 0 to {LATEST_S}, "
+            "found one without"
         )

@@ -27,11 +27,13 @@ def drawn_map(
         Where the map would have more cells than fit into memory.
     """
     low, high = _bounds(scans, poses, max_range_m)
-    columns, rows = (np.ceil((high - low) / resolution_m).astype(np.int64) + 1).tolist()
-    if columns * rows > MOST_CELLS:
+    sides = np.ceil((high - low) / resolution_m) + 1.0
+    if not sides[0] * sides[1] <= MOST_CELLS:
         raise InputError(
-            f"map: expected at most {MOST_CELLS} cells, found {rows} x {columns}; take a coarser resolution_m"
+            f"map: expected at most {MOST_CELLS} cells, found {sides[1]:.0f} x {sides[0]:.0f}; "
+            "take a coarser resolution_m"
         )
+    columns, rows = sides.astype(np.int64).tolist()
     odds = np.zeros((rows, columns), np.float32)
     for i, pose in enumerate(poses):
         add_scan(
