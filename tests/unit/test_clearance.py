@@ -9,7 +9,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pilotage.kernels.rrt import dubins, guide, guide_moves
-from pilotage.kernels.rrt.clearance import curve_is_free, exact_distance, least_step, skin, slack_at
+from pilotage.kernels.rrt.clearance import (
+    curve_is_free,
+    exact_distance,
+    first_blocked,
+    least_step,
+    skin,
+    slack_at,
+    slacks_at,
+)
 from pilotage.maps.distance_field import DistanceField
 from pilotage.maps.segment_map import SegmentMap
 from pilotage.stack.planning.driving_space import space_for
@@ -52,6 +60,20 @@ def test_slack_is_a_lower_bound_and_exact_at_the_threshold(x: float, y: float) -
 def test_off_the_grid_is_never_free() -> None:
     for x, y in ((-1e-6, 3.0), (3.0, 16.1), (math.nan, 1.0)):
         assert slack_at(x, y, CROWD_SPACE, 0.0) < 0.0
+
+
+@given(st.integers(0, 10_000), st.booleans())
+def test_the_first_blocked_state_is_found_whatever_is_skipped(seed: int, cells: bool) -> None:
+    """Random walks, half of them on the field alone, whose interpolation is steeper than a distance."""
+    space = CROWD_SPACE
+    if cells:
+        space = space._replace(margin=0.0, segments=np.zeros((0, 4)), circles=np.zeros((0, 3)))
+    rng = np.random.default_rng(seed)
+    turns = np.cumsum(rng.normal(0.0, 0.2, 600))
+    steps = rng.choice([0.01, 0.05, 0.4]) * np.column_stack([np.cos(turns), np.sin(turns)])
+    states = np.column_stack([rng.uniform(1.0, 15.0, 2) + np.cumsum(steps, axis=0), turns])
+    (blocked,) = np.nonzero(slacks_at(states[:, :2], space, 0.3) < 0.0)
+    assert first_blocked(states, space, 0.3) == (blocked[0] if blocked.size else -1)
 
 
 @given(
