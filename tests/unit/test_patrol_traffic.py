@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -210,16 +211,27 @@ class TestStopping:
 
 
 class TestPassages:
-    @pytest.mark.parametrize(("size", "radio", "seed"), [(2, None, 0), (5, {}, 4), (5, None, 4)])
+    @pytest.mark.parametrize(("size", "radio", "seed"), [(2, None, 0), (8, {}, 1), (5, None, 4)])
     def test_who_meet_where_there_is_room_for_one_settle_it(
         self, size: int, radio: dict[str, Any] | None, seed: int
     ) -> None:
-        """Of five, two with a radio and four without were deadlocked when they only gave way at random."""
+        """Of five without, four were deadlocked when they only gave way at random; of eight with a radio, one
+        that insisted on a place that the others visited."""
         metrics = judged(corridor(0.9, size, 200.0, radio=radio), seed=seed)
         assert metrics["success"], metrics["reason"]
         assert metrics["collisions"] == metrics["deadlocks"] == 0
         assert metrics["gave_way"] > 0
         assert metrics["idleness_worst_s"] < 60.0
+
+    def test_who_is_sent_only_to_places_that_it_visits_where_it_stands_waits(self, tmp_path: Path) -> None:
+        """Driving all the time and going nowhere it was told to be deadlocked."""
+        graph = tmp_path / "two.graph"
+        graph.write_text("2 160 60 0.1 0 0\n\n0 20 30 1\n1 E 3\n\n1 23 30 1\n0 W 3\n")
+        values = corridor(1.5, 1, 80.0)
+        values["task"]["graph"] = str(graph)
+        metrics = judged(values, seed=0)
+        assert metrics["success"], metrics["reason"]
+        assert metrics["idleness_worst_s"] < 2.0
 
     def test_two_paths_through_one_passage_go_together_or_against_each_other(self) -> None:
         line = np.column_stack([np.arange(0.0, 8.0, 0.5), np.full(16, 3.0)])

@@ -45,6 +45,10 @@ def test_who_drives_or_makes_short_rounds_is_not() -> None:
     apart = np.delete(PLACES, 1, axis=0)
     assert not stuck(lambda t: (0.8 + 0.3 * math.cos(0.3 * t), 0.0), places=apart)
     assert stuck(lambda t: (0.8 + 0.15 * math.cos(0.3 * t), 0.0), places=apart)
+    # 1.8 m of the 2.4 between two: all of it within a metre of the middle, where it began.
+    wide = np.array([[0.0, 0.0], [2.4, 0.0]])
+    assert not stuck(lambda t: (1.2 + 0.9 * math.sin(0.3 * t), 0.0), places=wide)
+    assert stuck(lambda t: (1.2 + 0.3 * math.sin(0.3 * t), 0.0), places=wide)
 
 
 def test_what_is_told_is_when_it_came_to_a_stop() -> None:

@@ -144,11 +144,19 @@ class PatrolMemory:
         """What it would say of itself."""
         return self._own
 
+    def visited_s(self, vertex: int) -> float:
+        """When anybody was last there, as far as it knows."""
+        return float(self._visited_s[vertex])
+
+    def leave(self, vertex: int, t_s: float) -> None:
+        """It goes on as if it had been there: others visit it."""
+        self._tell(replace(self._own, t_s=t_s, at=vertex))
+
     def visit(self, vertex: int, t_s: float) -> None:
         """It is at a vertex, to stay or on its way."""
         self._own_s[vertex] = max(self._own_s[vertex], t_s)
         self._visited_s[vertex] = max(self._visited_s[vertex], t_s)
-        self._tell(replace(self._own, t_s=t_s, at=vertex))
+        self.leave(vertex, t_s)
 
     def bound(self, target: int, t_s: float, arrives_s: float) -> None:
         """It drives to a target, or waits there."""

@@ -131,7 +131,7 @@ class Context:
         at = self.roadmap.nearest(start.x_m, start.y_m)
         self.memory = PatrolMemory(len(task.graph), task.robot, len(task.starts), at, speed)
         self.hop = self.target = self.came_from = at
-        self._left_s = 0.0
+        self._left_s, self._kept_out_s = 0.0, math.inf
         self.t_s, self.pose, self.cov = 0.0, start, np.zeros((3, 3))
         self.near = self.strange = self.people = NO_POINTS
         self.fresh = False
@@ -251,8 +251,31 @@ class Context:
             old = self.memory.own.speed_m_s
             new = (1.0 - SPEED_SHARE) * old + SPEED_SHARE * min(edge_m / took_s, self.speed_m_s)
             self.memory.update(self.t_s, speed_m_s=new)
-        self.came_from, self._left_s = vertex, self.t_s
+        self.came_from, self._left_s, self._kept_out_s = vertex, self.t_s, math.inf
         self.memory.visit(vertex, self.t_s)
+
+    def is_kept_out_for_long(self) -> bool:
+        """Whether it has stood before passages, now and then, for ``hold_s`` since it was at a place."""
+        self._kept_out_s = min(self._kept_out_s, self.t_s)
+        return self.t_s - self._kept_out_s > self.config.hold_s
+
+    def leave_to_mates(self, *, for_long: bool) -> bool:
+        """Go on as if it had been where it is kept out of, if a mate stands there or has been there since.
+
+        Who hears nobody takes it that who keeps it out ``for_long`` goes there.
+        """
+        if self.homeward:
+            return False
+        heard, (x, y) = self.heard(), self.roadmap.places_xy_m[self.hop]
+        since_s = max(self._left_s, self.t_s - self.config.hold_s)
+        left = self.memory.visited_s(self.hop) > since_s or any(
+            math.hypot(word.x_m - x, word.y_m - y) <= self.task.visit_m for _, word in heard
+        )
+        if left or (for_long and not heard):
+            self.came_from, self._left_s, self._kept_out_s = self.hop, self.t_s, math.inf
+            self.memory.leave(self.hop, self.t_s)
+            return True
+        return False
 
     def ask(self) -> bool:
         """Let the strategy say where to go, or the battery; False where the strategy says to wait."""
@@ -440,32 +463,6 @@ class Context:
     def is_narrow(self) -> bool:
         """Whether there is room for one where it is."""
         return bool((self.here()[:, 2] < self._pass_m).any())
-
-    def way_out(self) -> int:
-        """The vertex near by that leads away best from what is in the way; -1 where there is none."""
-        graph, roadmap, pose = self.task.graph, self.roadmap, self.pose
-        around = {self.came_from, self.hop, *graph.neighbours(self.came_from).tolist()}
-        if self.homeward:
-            around.discard(self.hop)
-        else:
-            around |= set(graph.neighbours(self.hop).tolist())
-        seen = self.strange
-        bearings = self._on_map(seen) - np.array([pose.x_m, pose.y_m])
-        bearings /= np.hypot(*bearings.T)[:, None]
-        best, least = -1, math.inf
-        for vertex in sorted(around):
-            if self.away_m(vertex) <= 0.5 * self.task.visit_m:
-                continue
-            time = roadmap.time_s(vertex)
-            narrow = roadmap.way(pose.x_m, pose.y_m, time, self.config.look_m)[:, 2] < self._pass_m
-            if narrow.any() and not narrow[0]:
-                continue
-            direction = eikonal.descent(pose.x_m, pose.y_m, time, *roadmap.origin_xy_m, roadmap.spacing_m)
-            toward = float(np.max(bearings @ np.array(direction), initial=0.0))
-            cost = 3.0 * toward + float(self.rng.random())
-            if cost < least:
-                best, least = vertex, cost
-        return best
 
     def crowded(self, reach_m: float) -> bool:
         """Whether something that may move is so near to the body's edge."""

@@ -64,6 +64,7 @@ class Driving:
             return met
         command = context.lead(context.hop)
         if self.watch.stalled(context.to_go_s, context.t_s):
+            forgo(context, for_long=False)
             return give_way(context)
         return Move(self, command)
 
@@ -83,11 +84,12 @@ class Waiting:
         traffic.look_along(context, context.here())
         context.memory.visit(context.came_from, context.t_s)
         if context.t_s - self.since_s >= context.config.ask_s:
-            if context.ask():
-                return Move(set_out(context), context.stand())
+            move = resume(context)
+            if isinstance(move.state, Driving):
+                return move
             if context.waits_for() or context.crowded(ASIDE_M) or is_wanted(context):
                 return give_way(context)
-            return Move(Waiting(context, context.t_s), context.stand())
+            return move
         return Move(self, context.stand())
 
 
@@ -283,11 +285,29 @@ def arrive(context: Context) -> Move:
 
 
 def resume(context: Context) -> Move:
-    """Where to now."""
-    if not context.ask():
-        return Move(Waiting(context, context.t_s), context.stand())
-    state = set_out(context)
-    return Move(state, context.lead(context.hop))
+    """Where to now; it waits where all that it is sent to is visited from where it stands."""
+    visited: set[int] = set()
+    while context.ask() and context.hop not in visited:
+        if context.homeward or not context.arrived(blocked=False):
+            state = set_out(context)
+            return Move(state, context.lead(context.hop))
+        visited.add(context.hop)
+        context.visit(context.hop)
+    return Move(Waiting(context, context.t_s), context.stand())
+
+
+def forgo(context: Context, *, for_long: bool) -> bool:
+    """Leave the place that it is kept out of to mates who visit it, and more behind passages for one.
+
+    False where it has to go there itself.
+    """
+    left = context.leave_to_mates(for_long=for_long)
+    for _ in range(len(context.task.graph)):
+        if not context.ask() or traffic.look(context, context.hop) is None:
+            break
+        if not context.leave_to_mates(for_long=for_long):
+            break
+    return left
 
 
 def give_way(context: Context) -> Move:
@@ -301,7 +321,7 @@ def give_way(context: Context) -> Move:
         context.journal.count("gave_way")
         context.say("give-way", f"no progress towards vertex {context.hop}: steps aside")
         return Move(SteppingAside(context, field, until_s), context.descend(field))
-    vertex = context.way_out()
+    vertex = traffic.way_out(context)
     if vertex < 0:
         return Move(Waiting(context, context.t_s), context.stand())
     context.journal.count("gave_way")
@@ -342,6 +362,8 @@ def meet(context: Context, stretch: Stretch | None, since_s: float) -> Move | No
 
 def stand_aside(context: Context, field: FloatArray | None, stretch: Stretch, since_s: float) -> Move:
     """To the place that a field leads to, if there is one."""
+    if context.is_kept_out_for_long() and forgo(context, for_long=True):
+        return resume(context)
     if field is None:
         return Move(Holding(context, since_s), context.stand())
     through_s = (stretch.length_m / context.speed_m_s + SURE_S) * (0.5 + float(context.rng.random()))

@@ -202,3 +202,29 @@ def free_place(context: Context) -> FloatArray | None:
         return None
     nearest = bodies[int(np.argmin(away))]
     return refuge(context, nearest, here - nearest)
+
+
+def way_out(context: Context) -> int:
+    """The vertex near by that leads away best from what is in the way; -1 where there is none."""
+    graph, roadmap, pose = context.task.graph, context.roadmap, context.pose
+    around = {context.came_from, context.hop, *graph.neighbours(context.came_from).tolist()}
+    if context.homeward:
+        around.discard(context.hop)
+    else:
+        around |= set(graph.neighbours(context.hop).tolist())
+    bearings = context.strange_on_map() - np.array([pose.x_m, pose.y_m])
+    bearings /= np.hypot(*bearings.T)[:, None]
+    best, least = -1, math.inf
+    for vertex in sorted(around):
+        if context.away_m(vertex) <= 0.5 * context.task.visit_m:
+            continue
+        time = roadmap.time_s(vertex)
+        narrow = roadmap.way(pose.x_m, pose.y_m, time, context.config.look_m)[:, 2] < context.pass_m
+        if narrow.any() and not narrow[0]:
+            continue
+        direction = eikonal.descent(pose.x_m, pose.y_m, time, *roadmap.origin_xy_m, roadmap.spacing_m)
+        toward = float(np.max(bearings @ np.array(direction), initial=0.0))
+        cost = 3.0 * toward + float(context.rng.random())
+        if cost < least:
+            best, least = vertex, cost
+    return best
