@@ -84,6 +84,28 @@ def word_fits(x: float, y: float, theta: float, word: FloatArray, car: Car, grou
 
 
 @kernel
+def path_fits(states: FloatArray, turns: bool, car: Car, ground: Ground) -> bool:
+    """Whether the outline fits along states (N, 3) and between them; ``turns``: on the spot at bends."""
+    for i in range(states.shape[0]):
+        before = states[max(i - 1, 0)]
+        dx, dy = states[i, 0] - before[0], states[i, 1] - before[1]
+        turned = (states[i, 2] - before[2] + math.pi) % (2.0 * math.pi) - math.pi
+        sharp = turns and turned != 0.0
+        length = math.hypot(dx, dy) + (0.0 if sharp else car.radius * abs(turned))
+        count = max(1, math.ceil(length / CHECK_M))
+        for k in range(1, count + 1):
+            theta = before[2] if sharp else before[2] + turned * k / count
+            if not pose_fits(before[0] + dx * k / count, before[1] + dy * k / count, theta, car, ground):
+                return False
+        if sharp:
+            count = max(1, math.ceil(car.radius * abs(turned) / CHECK_M))
+            for k in range(1, count + 1):
+                if not pose_fits(states[i, 0], states[i, 1], before[2] + turned * k / count, car, ground):
+                    return False
+    return True
+
+
+@kernel
 def search(
     start: FloatArray,
     goal: FloatArray,

@@ -20,7 +20,11 @@ class Control:
 
 
 class Controller(Protocol):
-    """Follows a moving reference. Built as ``cls(config, robot: RobotKnowledge)``."""
+    """Follows a moving reference. Built as ``cls(config, robot: RobotKnowledge)``.
+
+    One that cannot catch up with it, and needs a local plan from the estimate, says so by a class attribute
+    ``NEEDS_LOCAL_PLAN = True``.
+    """
 
     def reset(self) -> None:
         """Forget the past: the robot was moved by something else meanwhile."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import ClassVar
 
 from pilotage.core.config import Config
 from pilotage.core.types import Pose2, Twist
@@ -31,6 +32,8 @@ class PiFollower:
     that moves parallel to it is met by a constant turn, so it needs the feed-forward and a local plan
     that starts at the estimate.
     """
+
+    NEEDS_LOCAL_PLAN: ClassVar[bool] = True
 
     def __init__(self, config: PiFollowerConfig, robot: RobotKnowledge) -> None:
         self._config = config

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from dataclasses import dataclass
 
@@ -10,7 +11,7 @@ from pydantic import Field
 
 from pilotage.core.config import Config
 from pilotage.core.errors import InputError
-from pilotage.core.types import FloatArray, Goal, Pose2
+from pilotage.core.types import BoolArray, FloatArray, Goal, Pose2
 from pilotage.maps.memory import require_memory
 from pilotage.maps.occupancy_grid import OccupancyGrid, near_blocked
 from pilotage.maps.world_map import WorldMap
@@ -20,16 +21,20 @@ from pilotage.stack.planning.grid_planner import GridPlanner, GridRequest, GridR
 from pilotage.stack.planning.grid_space import Cell, GridSpace
 from pilotage.stack.planning.quintic_spline import QuinticSpline
 
+BESIDE_M = 0.05
+"""Between the disc around a robot and solid cells: it is beside its curve by about so much."""
+
 
 class CostMapConfig(Config):
     """The grid that a planner searches, made of the map's.
 
-    Cells whose centre is nearer than ``inflation_m`` to a hazard's are blocked as well. With
+    Cells whose centre is nearer than ``inflation_m`` to a hazard's are blocked as well; None: so many as the
+    disc around the robot needs where cells are solid, none on open ground. With
     ``slope_that_doubles_deg`` a metre on such a slope costs two, on others in proportion to the slope's
     square (ground with heights only).
     """
 
-    inflation_m: NonNegative = 0.0
+    inflation_m: NonNegative | None = None
     slope_that_doubles_deg: float | None = Field(None, gt=0.0, lt=90.0)
 
 
@@ -43,6 +48,8 @@ class CellRoute:
         Row and column by the rover report's equations 3.1 and 3.2.
     path_xy_m
         (N, 2) centres of the path's cells; empty where there is no path.
+    blocked
+        Cells where the robot's centre cannot be.
     preparation_s
         Wall time to make the grid ready: inflation, costs, the frame around it.
     """
@@ -51,6 +58,7 @@ class CellRoute:
     goal_cell: Cell
     result: GridResult
     path_xy_m: FloatArray
+    blocked: BoolArray
     preparation_s: float
 
 
@@ -61,12 +69,17 @@ def grid_of(chart: WorldMap, needed_by: str) -> OccupancyGrid:
     return chart.grid
 
 
-def cost_map(chart: WorldMap, config: CostMapConfig, needed_by: str) -> GridSpace:
-    """The grid that is searched; InputError for slope as a cost where no heights are known."""
-    grid = grid_of(chart, needed_by)
+def blocked_for(chart: WorldMap, config: CostMapConfig, radius_m: float, needed_by: str) -> BoolArray:
+    """Cells (rows, columns) where the centre of a robot that a disc of this radius holds cannot be."""
+    grid, inflation_m = grid_of(chart, needed_by), config.inflation_m
+    if inflation_m is None:
+        inflation_m = 0.0 if chart.open_ground else radius_m + BESIDE_M + math.sqrt(2.0) * grid.resolution_m
     blocked = grid.blocked()
-    if config.inflation_m > 0.0:
-        blocked = near_blocked(blocked, config.inflation_m / grid.resolution_m)
+    return near_blocked(blocked, inflation_m / grid.resolution_m) if inflation_m > 0.0 else blocked
+
+
+def cost_map(chart: WorldMap, blocked: BoolArray, config: CostMapConfig, needed_by: str) -> GridSpace:
+    """The grid that is searched; InputError for slope as a cost where no heights are known."""
     if config.slope_that_doubles_deg is None:
         return GridSpace(blocked)
     if chart.elevation is None:
@@ -79,16 +92,23 @@ def cost_map(chart: WorldMap, config: CostMapConfig, needed_by: str) -> GridSpac
 
 
 def route_over_cells(
-    chart: WorldMap, planner: GridPlanner, config: CostMapConfig, start: Pose2, goal: Goal, needed_by: str
+    chart: WorldMap,
+    planner: GridPlanner,
+    config: CostMapConfig,
+    radius_m: float,
+    start: Pose2,
+    goal: Goal,
+    needed_by: str,
 ) -> CellRoute:
     """Plan over the cells from start to goal; what the search looked at is told."""
     began = time.perf_counter()
-    space, grid = cost_map(chart, config, needed_by), grid_of(chart, needed_by)
+    grid, blocked = grid_of(chart, needed_by), blocked_for(chart, config, radius_m, needed_by)
+    space = cost_map(chart, blocked, config, needed_by)
     preparation_s = time.perf_counter() - began
     first, last = _cell(grid, start.x_m, start.y_m), _cell(grid, goal.x_m, goal.y_m)
     result = planner.search(GridRequest(space, first, last, tell_looked_at=True))
     path = np.zeros((0, 2)) if result.path is None else grid.centres_m(result.path.cells)
-    return CellRoute(first, last, result, path, preparation_s)
+    return CellRoute(first, last, result, path, blocked, preparation_s)
 
 
 def curve_along(route: CellRoute, grid: OccupancyGrid, clear: bool) -> tuple[QuinticSpline | None, str]:
@@ -100,7 +120,7 @@ def curve_along(route: CellRoute, grid: OccupancyGrid, clear: bool) -> tuple[Qui
         return None, "start and goal are in the same cell: there is no curve"
     if not clear:
         return QuinticSpline(grid.points_m(path.cells)), "curve through all cells, not checked"
-    curve = clear_spline(path_knots(grid, path.cells), grid, grid.blocked())
+    curve = clear_spline(path_knots(grid, path.cells), grid, route.blocked)
     if curve.spline is None:
         return None, f"no clear curve: {curve.reason}"
     return curve.spline, f"clear curve with {curve.knots} knots"

@@ -11,18 +11,26 @@ from pydantic import Field
 from pilotage.core.angles import wrap_to_pi
 from pilotage.core.config import Config
 from pilotage.core.errors import InputError
-from pilotage.core.types import STOP, FloatArray, Goal, Pose2, Twist
+from pilotage.core.types import STOP, FloatArray, Pose2, Twist
 from pilotage.maps.world_map import WorldMap
 from pilotage.sensors.readings import Readings
 from pilotage.stack.interface import NAVIGATORS, Belief, PlannedPath, StackStatus
 from pilotage.stack.journal import Journal
 from pilotage.stack.knowledge import RobotKnowledge, TaskKnowledge
 from pilotage.stack.navigator.cells import CellRoute, CostMapConfig, curve_along, grid_of, route_over_cells
-from pilotage.stack.navigator.navigator import Parts
+from pilotage.stack.navigator.navigator import DISC_HINT, Parts, check_keeps_time
 from pilotage.stack.planning.grid_planner import GridPlanner
 from pilotage.stack.planning.quintic_spline import QuinticSpline
 
 NAME = "navigator 'curve'"
+MOST_OFF_RAD = 0.35
+"""A robot that cannot turn on the spot gets onto a curve that begins so far off its heading."""
+TURNS_FROM_RAD, TURN_SHARE, HEADING_PER_S = 0.1, 0.5, 3.0
+"""Who can turns to a curve that begins farther off, at this share of its turn rate; an error dies out."""
+SLOWEST = 0.1
+"""Of the top speed, however tight a bend is."""
+CATCHES_UP_S = 5.0
+"""So long it goes on towards the curve's end when the reference is there and it is not."""
 
 
 class SplineConfig(Config):
@@ -38,7 +46,7 @@ class CurveConfig(Config):
     cost_map: CostMapConfig = CostMapConfig()
     spline: SplineConfig | None = SplineConfig()
     speed_m_s: float | None = Field(default=None, gt=0.0)
-    """Along the curve; None: as fast as the robot can."""
+    """Along the curve; None: as fast as the robot can take its tightest bend."""
 
 
 @NAVIGATORS.add("curve", CurveConfig)
@@ -46,7 +54,8 @@ class CurveNavigator:
     """Plans over the cells with the mission's planner, puts a quintic spline along the path, and tracks it.
 
     The reference moves along the curve at constant speed (equations 5.1 to 5.6), whatever the robot does;
-    the controller follows it from the believed pose. Arrives when the reference does.
+    the controller follows it from the believed pose. Arrives when the reference does, or 5 s later where the
+    robot is not within the goal's tolerance yet. Fails at once where a car's curve is none that it can drive.
     """
 
     def __init__(
@@ -59,6 +68,7 @@ class CurveNavigator:
         journal: Journal,
     ) -> None:
         goal = task.goal
+        check_keeps_time(parts, "curve")
         if goal is None or not hasattr(parts.planner, "search"):
             raise InputError(
                 f"{NAME}: expected world.goal and a stack.planner over cells (astar, dijkstra, theta-star), "
@@ -66,12 +76,15 @@ class CurveNavigator:
             )
         self._localizer, self._controller, self._journal = parts.localizer, parts.controller, journal
         self._initial = task.initial
-        self._t_s, self._index, self._dt_s = 0.0, 0, robot.dt_s
-        self._speed_m_s = min(config.speed_m_s or math.inf, robot.motion.top_speed_m_s)
+        self._index, self._dt_s, self._motion = 0, robot.dt_s, robot.motion
+        self._speed_m_s, self._asked_m_s = robot.motion.top_speed_m_s, config.speed_m_s
+        self._outline = robot.footprint
+        self._tolerance_m, self._waited_s = task.goal_tolerance_m, 0.0
         self._status, self._reason = StackStatus.RUNNING, ""
-        self._references: FloatArray = np.zeros((0, 4))
+        self._references: FloatArray = np.zeros((0, 5))
         planner = cast(GridPlanner, parts.planner)
-        route = route_over_cells(chart, planner, config.cost_map, self.belief.pose, goal, NAME)
+        start = self.belief.pose
+        route = route_over_cells(chart, planner, config.cost_map, robot.radius_m, start, goal, NAME)
         journal.planning_time_s += route.result.planning_time_s
         journal.result("route", lambda: route)
         path = route.result.path
@@ -82,12 +95,14 @@ class CurveNavigator:
             return
         if parts.localizer is None or parts.controller is None:
             raise InputError(f"{NAME}: expected stack.localizer and stack.controller, found one missing")
-        curve, self._reason = curve_along(route, grid_of(chart, NAME), config.spline.clear)
-        if curve is None:
-            self._status = StackStatus.FAILED
-            journal.say(0.0, "failed", self._reason)
+        grid = grid_of(chart, NAME)
+        curve, self._reason = curve_along(route, grid, config.spline.clear)
+        why = self._reason if curve is None else self._cannot_drive(curve, grid.resolution_m)
+        if curve is None or why:
+            self._status, self._reason = StackStatus.FAILED, why
+            journal.say(0.0, "failed", why)
             return
-        self._follow(curve, route, goal)
+        self._follow(curve, route)
         self._channel = journal.channel(
             {"ref_x_m": "m", "ref_y_m": "m", "ref_theta_rad": "rad", "distance_to_go_m": "m"}
         )
@@ -96,21 +111,57 @@ class CurveNavigator:
         found = route.result.path is not None
         self._status = StackStatus.ARRIVED if found else StackStatus.FAILED
         self._reason = f"{route.result.status}: {route.result.reason}"
+        if not found and not self._outline.is_disc:
+            self._reason += DISC_HINT
         self._journal.say(0.0, "plan" if found else "failed", route.result.reason)
         if found:
             self._adopt(np.column_stack([route.path_xy_m, np.zeros(len(route.path_xy_m))]), route)
 
-    def _follow(self, curve: QuinticSpline, route: CellRoute, goal: Goal) -> None:
-        """Lay out the reference, one pose a step."""
-        del goal
-        count = max(2, math.ceil(curve.length_m / (self._speed_m_s * self._dt_s)) + 1)
-        samples = curve.at(np.minimum(np.arange(count) * self._speed_m_s * self._dt_s, curve.length_m))
-        self._length_m = curve.length_m
-        self._references = np.column_stack(
-            [samples.points_xy_m, samples.heading_rad, samples.curvature_per_m]
+    def _cannot_drive(self, curve: QuinticSpline, cell_m: float) -> str:
+        """Why the robot cannot keep to a curve; nothing where it can, or turns within a cell."""
+        least_m = self._motion.least_turning_radius_m
+        if least_m <= 0.5 * cell_m:
+            return ""
+        samples = curve.at(np.linspace(0.0, curve.length_m, max(2, math.ceil(curve.length_m / cell_m) + 1)))
+        bends_m = 1.0 / max(float(np.abs(samples.curvature_per_m).max()), 1e-9)
+        off_rad = wrap_to_pi(float(samples.heading_rad[0]) - self.belief.pose.theta_rad)
+        if bends_m >= least_m and abs(off_rad) <= MOST_OFF_RAD:
+            return ""
+        return (
+            f"the curve begins {math.degrees(off_rad):.0f} degrees off the robot's heading and bends to "
+            f"{bends_m:.2f} m, it turns in {least_m:.2f} m at least: take navigator maneuver and planner "
+            "hybrid-astar"
         )
-        self._adopt(self._references[:, :3], route)
+
+    def _follow(self, curve: QuinticSpline, route: CellRoute) -> None:
+        """Lay out the reference, one pose a step; who can turns to it first."""
+        samples = curve.at(np.linspace(0.0, curve.length_m, max(2, math.ceil(curve.length_m / 0.05) + 1)))
+        tightest_per_m = max(float(np.abs(samples.curvature_per_m).max()), 1e-9)
+        if self._asked_m_s is None:
+            slow_m_s = self._motion.top_turn_rate_rad_s / tightest_per_m
+            self._speed_m_s = min(self._speed_m_s, max(slow_m_s, SLOWEST * self._speed_m_s))
+        else:
+            self._speed_m_s = min(self._speed_m_s, self._asked_m_s)
+        step_m = self._speed_m_s * self._dt_s
+        count = max(2, math.ceil(curve.length_m / step_m) + 1)
+        s_m = np.minimum(np.arange(count) * step_m, curve.length_m)
+        samples = curve.at(s_m)
+        rows = [samples.points_xy_m, samples.heading_rad, samples.curvature_per_m, curve.length_m - s_m]
+        references = np.column_stack(rows)
+        self._adopt(references[:, :3], route)
+        self._references = np.vstack([self._turn_to(references[0]), references])
         self._journal.say(0.0, "plan", f"{route.result.reason}; {self._reason}")
+
+    def _turn_to(self, first: FloatArray) -> FloatArray:
+        """References (N, 5) of a turn on the spot to the curve's heading; none where the robot cannot."""
+        off_rad = wrap_to_pi(float(first[2]) - self.belief.pose.theta_rad)
+        if self._motion.least_turning_radius_m > 0.0 or abs(off_rad) <= TURNS_FROM_RAD:
+            return np.zeros((0, 5))
+        rate = TURN_SHARE * self._motion.top_turn_rate_rad_s * self._dt_s
+        rows = np.tile(first, (math.ceil(abs(off_rad) / rate) + math.ceil(1.0 / self._dt_s), 1))
+        left_rad = np.maximum(abs(off_rad) - np.arange(len(rows)) * rate, 0.0)
+        rows[:, 2] -= math.copysign(1.0, off_rad) * left_rad
+        return rows
 
     def _adopt(self, states: FloatArray, route: CellRoute) -> None:
         length_m = float(np.hypot(*np.diff(states[:, :2], axis=0).T).sum())
@@ -139,20 +190,20 @@ class CurveNavigator:
             return STOP
         last = len(self._references) - 1
         if self._index >= last:
+            x, y, *_ = self._references[-1].tolist()
+            self._waited_s += self._dt_s
+            if math.hypot(x - pose.x_m, y - pose.y_m) > self._tolerance_m and self._waited_s <= CATCHES_UP_S:
+                return self._controller.step(pose, Pose2(x, y, pose.theta_rad), STOP).twist
             self._status = StackStatus.ARRIVED
             self._journal.say(readings.t_s, "arrived", self._reason)
             return STOP
-        x, y, theta, curvature = self._references[self._index + 1].tolist()
+        x, y, theta, curvature, to_go_m = self._references[self._index + 1].tolist()
         here = self._references[self._index]
-        advanced = min(
-            self._speed_m_s * self._dt_s, self._length_m - self._index * self._speed_m_s * self._dt_s
-        )
         self._index += 1
         reference = Pose2(x, y, wrap_to_pi(theta))
-        speed = advanced / self._dt_s
+        speed = (float(here[4]) - to_go_m) / self._dt_s
         turned = wrap_to_pi(theta - float(here[2])) / self._dt_s
-        control = self._controller.step(pose, reference, Twist(speed, turned if curvature else 0.0))
-        self._channel.tell(
-            x, y, reference.theta_rad, self._length_m - self._index * self._speed_m_s * self._dt_s
-        )
-        return control.twist
+        self._channel.tell(x, y, reference.theta_rad, to_go_m)
+        if speed == 0.0:
+            return Twist(0.0, turned + HEADING_PER_S * wrap_to_pi(theta - pose.theta_rad))
+        return self._controller.step(pose, reference, Twist(speed, turned if curvature else 0.0)).twist

@@ -5,11 +5,13 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from pilotage.core.types import FloatArray, Goal, Pose2
 from pilotage.kernels.geometry import plane
+from pilotage.kernels.rrt import hybrid
 from pilotage.maps.distance_field import DistanceField
 from pilotage.maps.ground_distance import with_circles
 from pilotage.maps.world_map import WorldMap
@@ -38,12 +40,20 @@ SLACK_M = 0.005
 FAR_M = 3.0
 """Free ground farther ahead makes a heading no better."""
 
+BESIDE_M = 0.05
+"""An outline that is driven along a path keeps this from walls, or what the path keeps where that is less."""
+
 
 class GlobalPlan:
     """Holds the current path; every plan adopted goes into the journal.
 
     A robot that can turn on the spot, and that no curve leads on from as it stands, plans from other headings
     of the same place: ``turns_first`` says that the path begins with such a turn.
+
+    ``as_planned`` says that the very path is driven: then its corners are no tighter than the robot can turn,
+    and its outline fits all along it, though the planner may know neither. A smoothed path that is not so
+    gives way to the planner's own; one that was prescribed is not smoothed. ``too_tight`` says that the last
+    path had corners that the robot cannot drive, ``hopeless`` that no other clearance can help.
     """
 
     def __init__(
@@ -56,8 +66,11 @@ class GlobalPlan:
         least_clearance_m: float = 0.0,
         robot: RobotKnowledge | None = None,
         can_turn_first: bool = False,
+        as_planned: bool = False,
     ) -> None:
         self._robot = robot
+        self._as_planned = as_planned
+        self.too_tight, self.hopeless = False, False
         self._can_turn_first = can_turn_first
         self.turns_first = False
         self._least_clearance_m = least_clearance_m
@@ -146,6 +159,8 @@ class GlobalPlan:
             at_last = last if clearance_m == clearances_m[-1] else None
             result, path = at_last or self._at(start, goal, field, clearance_m)
             if path is None:
+                if self.hopeless:
+                    break
                 continue
             if found is None or path.length_m < found[1].length_m - detour_m:
                 found = result, path, clearance_m
@@ -162,9 +177,43 @@ class GlobalPlan:
         """Plan and smooth at one clearance."""
         request = PlanRequest(start, goal, field, self._rng, clearance_m, *self._shape())
         result = self._planner.plan(request)
-        if result.path is None or self._smoother is None:
-            return result, result.path
-        return result, self._smoother.smooth(result.path, request, clearance_m)
+        self.too_tight, self.hopeless = False, False
+        if result.path is None:
+            return result, None
+        paths = [result.path]
+        smoothed = self._smoother is not None and not result.given
+        if self._smoother is not None and smoothed:
+            paths.insert(0, self._smoother.smooth(result.path, request, clearance_m))
+        for path in paths:
+            why = self._cannot_drive(path, request, clearance_m)
+            if not why:
+                return result, path
+        # Nearer to walls an outline fits no better; curves in place of corners may find more room there.
+        self.hopeless = not (self.too_tight and smoothed)
+        return replace(result, status=PlanStatus.NO_PATH, reason=why, path=None), None
+
+    def _cannot_drive(self, path: Path, request: PlanRequest, clearance_m: float) -> str:
+        """Why the robot cannot drive the very path; nothing where it can, or need not."""
+        robot = self._robot
+        if not self._as_planned or robot is None:
+            return ""
+        least_m = robot.motion.least_turning_radius_m
+        self.too_tight = path.turning_radius_m < least_m * (1.0 - 1e-9)
+        if self.too_tight:
+            return f"the path's corners are too tight, the robot turns in {least_m:.2f} m at least"
+        outline, field = robot.footprint, request.field
+        if clearance_m >= outline.radius_m:
+            return ""
+        car = hybrid.Car(
+            outline.points_m, outline.radius_m, outline.inner_radius_m, min(BESIDE_M, clearance_m), 1.0
+        )
+        ground = hybrid.Ground(
+            field.distance_m, *field.origin_xy_m, field.resolution_m, field.segments_m, field.circles_m
+        )
+        states = np.vstack([request.start.as_array(), path.states])
+        if hybrid.path_fits(states, path.turning_radius_m == 0.0, car, ground):
+            return ""
+        return f"the robot's outline does not fit along the path, which keeps {clearance_m:.2f} m"
 
     def _shape(self) -> tuple[Footprint | None, float]:
         """Outline and tightest arc, where the robot is known."""

@@ -20,7 +20,7 @@ from pilotage.stack.journal import Journal
 from pilotage.stack.knowledge import RobotKnowledge, TaskKnowledge
 from pilotage.stack.localization.dead_reckoning import DeadReckoningConfig, DeadReckoningLocalizer
 from pilotage.stack.localization.localizer import Localizer
-from pilotage.stack.navigator.navigator import Parts, unexplained_of
+from pilotage.stack.navigator.navigator import Parts, check_for_centre, unexplained_of
 from pilotage.stack.navigator.plan_ahead import PlanAhead, PlanAheadConfig
 from pilotage.stack.perception.moving_bodies import MovingBodies, MovingBodiesConfig
 
@@ -73,6 +73,7 @@ class LocalNavigator:
             raise InputError("navigator 'local': expected world.goal, found none")
         if parts.local_controller is None:
             raise InputError("navigator 'local': expected stack.local_controller, found none")
+        check_for_centre(parts, "local")
         self._journal = journal
         self._goal_xy_m = (task.goal.x_m, task.goal.y_m)
         self._drive = LocalDrive(

@@ -20,10 +20,12 @@ from pilotage.stack.interface import NAVIGATORS, Belief, StackStatus
 from pilotage.stack.journal import Journal
 from pilotage.stack.knowledge import RobotKnowledge, TaskKnowledge
 from pilotage.stack.navigator.global_plan import GlobalPlan
-from pilotage.stack.navigator.navigator import Parts, localizer_of
+from pilotage.stack.navigator.navigator import Parts, check_keeps_time, localizer_of
 from pilotage.stack.navigator.timed_path import laid_out, with_turns
 
 MOST_REPLANS = 8
+BESIDE_INNER_M = (0.15, 0.08, 0.04, 0.01)
+"""What paths planned for the centre keep beside the outline's inner disc, where they can keep no more."""
 HEADING_PER_S = 3.0
 """A heading error dies out in so much of a second's inverse while it turns on the spot."""
 
@@ -69,38 +71,59 @@ class ManeuverNavigator:
         )
         self._config, self._robot, self._goal, self._journal = config, robot, task.goal, journal
         self._localizer = localizer_of(parts, "maneuver")
+        check_keeps_time(parts, "maneuver")
         self._controller: Controller = parts.controller or KanayamaController(config.tracking, robot)
         rng = robot.streams.stream("planner")
-        self._plan = GlobalPlan(parts.planner, parts.smoother, chart, rng, journal, robot=robot)
+        self._plan = GlobalPlan(
+            parts.planner, parts.smoother, chart, rng, journal, robot=robot, as_planned=True
+        )
         self._status, self._reason = StackStatus.RUNNING, ""
         self._references: FloatArray = np.zeros((0, 5))
         self._index, self._replans = 0, 0
         self._think(0.0)
+        if self._plan.hopeless and self._plan.too_tight:
+            raise InputError(
+                f"navigator 'maneuver': {self._reason}; take stack.planner hybrid-astar or "
+                "rrt-star-dubins, or stack.smoother: shortcut"
+            )
 
     def _think(self, t_s: float) -> None:
         """Plan from where it believes to be, and lay out the reference, one row a step."""
         plan = self._plan
         nothing = np.zeros((0, 3))
-        full = plan.clearance_m
-        result = plan.make(t_s, self.belief.pose, self._goal, nothing, (full, 0.6 * full, 0.3 * full, 0.0))
-        if result.path is None:
+        result = plan.make(t_s, self.belief.pose, self._goal, nothing, self._clearances_m())
+        if result.path is None or plan.path is None:
             self._status, self._reason = StackStatus.FAILED, f"{result.status}: {result.reason}"
             self._journal.say(t_s, "failed", self._reason)
             return
         braking = self._robot.motion.braking_m_s2
         acceleration = self._config.acceleration_share * (braking if math.isfinite(braking) else 2.0)
         speed = min(self._config.speed_m_s, self._robot.motion.top_speed_m_s)
-        states, dt_s, motion = result.path.states, self._robot.dt_s, self._robot.motion
-        if motion.least_turning_radius_m == 0.0:
-            rate = self._config.turn_share * motion.top_turn_rate_rad_s
+        states, dt_s, motion = plan.path.states, self._robot.dt_s, self._robot.motion
+        turns = motion.least_turning_radius_m == 0.0
+        rate = (self._config.turn_share if turns else 1.0) * motion.top_turn_rate_rad_s
+        if plan.path.turning_radius_m == 0.0:
             heading = self.belief.pose.theta_rad
             self._references = with_turns(states, heading, rate, speed, acceleration, dt_s)
         else:
-            rate = motion.curvature_rate_per_m_s
-            self._references = laid_out(states, speed, acceleration, rate, self._config.pause_s, dt_s)
+            wheels, pause_s = motion.curvature_rate_per_m_s, 0.0 if turns else self._config.pause_s
+            self._references = laid_out(states, speed, acceleration, wheels, pause_s, dt_s, rate)
         self._index = 0
         self._controller.reset()
         self._journal.say(t_s, "plan" if t_s == 0.0 else "replan", result.reason)
+
+    def _clearances_m(self) -> list[float]:
+        """Clearances to try in turn: the planner's own, and less.
+
+        A path that is planned for the centre has to keep at least what the outline's inner disc needs; one
+        that is planned for the outline keeps its clearance beside it.
+        """
+        full, outline = self._plan.clearance_m, self._robot.footprint
+        inner_m = outline.inner_radius_m
+        tried = [0.6 * full, 0.3 * full, 0.0]
+        if full >= inner_m:
+            tried = [outline.radius_m, *(inner_m + margin for margin in BESIDE_INNER_M)]
+        return [full, *sorted({clearance for clearance in tried if clearance < full}, reverse=True)]
 
     @property
     def belief(self) -> Belief:

@@ -17,6 +17,9 @@ from pilotage.stack.perception.unexplained import UnexplainedReturns
 from pilotage.stack.planning.local_planner import LocalPlanner
 from pilotage.stack.planning.planner import Planner, Smoother
 
+DISC_HINT = " (for the disc around the robot; navigator maneuver and planner hybrid-astar drive its outline)"
+"""Where a disc finds no path, and the body is none."""
+
 
 @dataclass(frozen=True, slots=True)
 class Parts:
@@ -42,6 +45,24 @@ def localizer_of(parts: Parts, needed_by: str) -> Localizer:
             f"navigator '{needed_by}': expected stack.localizer, or run.oracles: [localizer], found neither"
         )
     return parts.localizer
+
+
+def check_keeps_time(parts: Parts, needed_by: str) -> None:
+    """InputError for a controller that needs a local plan from the estimate: here the reference runs on."""
+    if getattr(parts.controller, "NEEDS_LOCAL_PLAN", False):
+        raise InputError(
+            f"navigator '{needed_by}': expected a stack.controller that catches up with a moving reference "
+            "(kanayama), found one that needs a local plan from where the robot is; take navigator goal"
+        )
+
+
+def check_for_centre(parts: Parts, needed_by: str) -> None:
+    """InputError for a planner of outlines: here the robot is the disc around it, driven forwards."""
+    if getattr(parts.planner, "FOR_OUTLINE", False):
+        raise InputError(
+            f"navigator '{needed_by}': expected a stack.planner for the disc around the robot (theta-star, "
+            "rrt-star-dubins), found one for its outline, backwards too; take navigator maneuver for it"
+        )
 
 
 def unexplained_of(parts: Parts) -> UnexplainedReturns | None:

@@ -37,7 +37,8 @@ class PlanOnlyNavigator:
                 "navigator 'plan-only': expected world.goal and stack.planner, found one missing"
             )
         self._localizer = localizer_of(parts, "plan-only")
-        plan = GlobalPlan(parts.planner, parts.smoother, chart, robot.streams.stream("planner"), journal)
+        rng = robot.streams.stream("planner")
+        plan = GlobalPlan(parts.planner, parts.smoother, chart, rng, journal, robot=robot)
         nothing = chart.walls.circles_m[:0]
         journal.result("mapped_circles_m", lambda: nothing)
         result = plan.make(0.0, self.belief.pose, task.goal, nothing, (plan.clearance_m,))

@@ -47,7 +47,7 @@ def with_turns(
         if len(piece) < 2:
             continue
         rows.append(_turn(piece[0], theta_rad, turn_rate_rad_s, dt_s))
-        rows.append(laid_out(piece, speed_m_s, acceleration_m_s2, math.inf, 0.0, dt_s))
+        rows.append(laid_out(piece, speed_m_s, acceleration_m_s2, math.inf, 0.0, dt_s, turn_rate_rad_s))
         theta_rad = float(piece[-1, 2])
     rows.append(_turn(states[-1], theta_rad, turn_rate_rad_s, dt_s))
     return np.vstack(rows)
@@ -73,6 +73,7 @@ def laid_out(
     curvature_rate_per_m_s: float,
     pause_s: float,
     dt_s: float,
+    turn_rate_rad_s: float = math.inf,
 ) -> FloatArray:
     """(N, 5) x, y, theta, v, w of the reference at the end of each step.
 
@@ -86,6 +87,8 @@ def laid_out(
         (M, 3) densely along the path; a step against the heading is one backwards.
     pause_s
         Rest before each piece; w is then what the piece begins with, for wheels that can turn meanwhile.
+    turn_rate_rad_s
+        The fastest turn: arcs are driven no faster than it allows.
     """
     delta = np.diff(states[:, :2], axis=0)
     length = np.hypot(delta[:, 0], delta[:, 1])
@@ -108,16 +111,21 @@ def laid_out(
         x, y, theta = (float(column[0]) for column in columns)
         first_w = sign[first] * math.copysign(1e-3, curvature[0]) if abs(curvature[0]) > ABRUPT_PER_M else 0.0
         rows += [[x, y, wrap_to_pi(theta), 0.0, first_w]] * round(pause_s / dt_s)
-        limit = _limits(s, curvature, speed_m_s, curvature_rate_per_m_s)
+        limit = _limits(s, curvature, speed_m_s, curvature_rate_per_m_s, turn_rate_rad_s)
         rows += _timed(
             s, columns, curvature, limit, sign[first], acceleration_m_s2, curvature_rate_per_m_s, dt_s
         )
     return np.array(rows).reshape(-1, 5)
 
 
-def _limits(s: FloatArray, curvature: FloatArray, speed_m_s: float, rate: float) -> FloatArray:
-    """(K,) speed limit at each state: slow where the curvature jumps."""
+def _limits(
+    s: FloatArray, curvature: FloatArray, speed_m_s: float, rate: float, turn_rate_rad_s: float
+) -> FloatArray:
+    """(K,) speed limit at each state: slow on arcs, and where the curvature jumps."""
     limit = np.full(len(s), speed_m_s)
+    on_arcs = turn_rate_rad_s / np.maximum(np.abs(curvature), 1e-9)
+    limit[:-1] = np.minimum(limit[:-1], on_arcs)
+    limit[1:] = np.minimum(limit[1:], on_arcs)
     jumps = np.abs(np.diff(curvature))
     for k in np.flatnonzero(jumps > ABRUPT_PER_M):
         slow = max(TRANSITION_M * rate / float(jumps[k]), CREEP_M_S)

@@ -18,6 +18,16 @@ STATE_SPACING_M = 0.05
 CHECK_SPACING_M = 0.01
 """Spacing at which finished paths are checked."""
 
+USUAL_RADIUS_M = 0.5
+"""Of curves where nobody says another (the night-watch report's)."""
+SPARE = 1.1
+"""A curve of the tightest arc leaves a follower nothing to steer with."""
+
+
+def usual_radius_m(least_m: float) -> float:
+    """Radius of curves for a motion that cannot turn tighter than ``least_m``."""
+    return max(USUAL_RADIUS_M, SPARE * least_m)
+
 
 def space_for(field: DistanceField, clearance_m: float) -> Space:
     """Prepare a field for collision checks at one clearance."""
@@ -93,4 +103,5 @@ __all__ = [
     "is_valid",
     "space_for",
     "spaced_waypoints",
+    "usual_radius_m",
 ]

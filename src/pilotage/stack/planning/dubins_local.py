@@ -14,6 +14,7 @@ from pilotage.kernels.rrt import local_path
 from pilotage.maps.near_walls import NearWalls
 from pilotage.sensors.sensor import NonNegative, Positive
 from pilotage.stack.knowledge import RobotKnowledge
+from pilotage.stack.planning.driving_space import usual_radius_m
 from pilotage.stack.planning.local_planner import LOCAL_PLANNERS, LocalPath, RouteAhead
 
 PLAN_TOLERANCE_M = 0.005
@@ -28,7 +29,8 @@ class DubinsLocalConfig(Config):
     """
 
     speed_m_s: Positive = 0.5
-    turning_radius_m: Positive = 0.5
+    turning_radius_m: Positive | None = None
+    """None: 0.5 m, or where the motion needs more at this speed, a tenth more than that."""
     margin_m: NonNegative = 0.05
     """The local path keeps this, and the radius of the disc around the robot, from all on the robot's map."""
     look_ahead: int = Field(default=5, ge=1, le=100)
@@ -54,18 +56,21 @@ class DubinsLocalPlanner:
                 f"stack.local_planner.speed_m_s: expected at most robot.motion.max_speed_m_s = "
                 f"{robot.motion.top_speed_m_s:g}, found {config.speed_m_s:g}"
             )
-        least_m = robot.motion.least_turning_radius_m
-        if config.turning_radius_m < least_m:
+        motion = robot.motion
+        least_m, turn_rate = motion.least_turning_radius_m, motion.top_turn_rate_rad_s
+        at_speed_m = config.speed_m_s / turn_rate
+        radius_m = config.turning_radius_m or usual_radius_m(max(least_m, at_speed_m))
+        if radius_m < least_m:
             raise InputError(
                 f"stack.local_planner.turning_radius_m: expected at least the {least_m:g} m that the robot's "
-                f"motion can turn in, found {config.turning_radius_m:g}"
+                f"motion can turn in, found {radius_m:g}"
             )
-        most_turn = robot.motion.top_turn_rate_rad_s
-        if config.speed_m_s / config.turning_radius_m > most_turn:
+        if radius_m < at_speed_m:
             raise InputError(
                 f"stack.local_planner.turning_radius_m: expected at least speed over turn rate = "
-                f"{config.speed_m_s / most_turn:g} m, found {config.turning_radius_m:g}"
+                f"{at_speed_m:g} m, found {radius_m:g}"
             )
+        self._radius_m = radius_m
         self._config = config
         self._step_m = config.speed_m_s * robot.dt_s
         self._clearance_m = robot.radius_m + config.margin_m
@@ -85,7 +90,7 @@ class DubinsLocalPlanner:
                 x,
                 y,
                 theta,
-                config.turning_radius_m,
+                self._radius_m,
                 self._step_m,
                 index == last,
                 config.detour_ratio * route.ahead_m[index] + config.detour_m,

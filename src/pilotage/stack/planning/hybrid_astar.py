@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import time
+from typing import ClassVar
 
 import numpy as np
 from pydantic import Field
@@ -16,10 +17,12 @@ from pilotage.kernels.rrt import hybrid, reeds_shepp
 from pilotage.maps.distance_field import DistanceField
 from pilotage.models.footprint import Footprint
 from pilotage.sensors.sensor import NonNegative, Positive
-from pilotage.stack.planning.driving_space import failure, spaced_waypoints
+from pilotage.stack.planning.driving_space import SPARE, failure, spaced_waypoints
 from pilotage.stack.planning.planner import PLANNERS, Path, PlanRequest, PlanResult, PlanStatus
 
 STATE_SPACING_M = 0.025
+LEAST_RADIUS_M = 0.3
+"""Of who turns on the spot: tighter arcs would be driven slowly."""
 
 
 class HybridAstarConfig(Config):
@@ -28,7 +31,7 @@ class HybridAstarConfig(Config):
     clearance_m: NonNegative = 0.06
     """Between the outline and anything solid."""
     turning_radius_m: Positive | None = None
-    """None: a tenth more than the motion's least, so that a follower has something left to steer with."""
+    """None: a tenth more than the motion's least, which leaves a follower some to steer with, or 0.3 m."""
     reverse_cost: float = Field(default=1.5, ge=1.0)
     switch_cost_m: NonNegative = 0.5
     turn_cost: float = Field(default=1.05, ge=1.0)
@@ -46,6 +49,8 @@ class HybridAstarPlanner:
     heading is taken to have that of the straight line to it.
     """
 
+    FOR_OUTLINE: ClassVar[bool] = True
+
     def __init__(self, config: HybridAstarConfig) -> None:
         self._config = config
 
@@ -60,7 +65,7 @@ class HybridAstarPlanner:
         config, field = self._config, request.field
         clearance_m = config.clearance_m if request.clearance_m is None else request.clearance_m
         outline = request.footprint or Footprint.disc(0.0)
-        turning_m = config.turning_radius_m or 1.1 * max(request.least_turning_radius_m, 0.1)
+        turning_m = config.turning_radius_m or max(SPARE * request.least_turning_radius_m, LEAST_RADIUS_M)
         car = hybrid.Car(
             np.ascontiguousarray(outline.points_m),
             outline.radius_m,

@@ -136,7 +136,8 @@ class PlanResult:
 class Planner(Protocol):
     """Finds a path for the robot's centre on its map. Built as ``cls(config)``.
 
-    The clearance of a request holds the whole robot: of a polygon, the disc around it.
+    The clearance of a request holds the whole robot: of a polygon, the disc around it. One that keeps it from
+    the outline itself, or plans backwards, says so by a class attribute ``FOR_OUTLINE = True``.
     """
 
     @property

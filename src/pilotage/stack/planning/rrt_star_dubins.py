@@ -26,6 +26,7 @@ from pilotage.stack.planning.driving_space import (
     clearance_of,
     failure,
     space_for,
+    usual_radius_m,
 )
 from pilotage.stack.planning.planner import PLANNERS, Path, PlanRequest, PlanResult, PlanStatus
 
@@ -48,13 +49,14 @@ class RrtStarDubinsConfig(Config):
     ``validation_distance_m`` is the largest spacing between states that are checked along an edge, but for
     stretches that the distance to obstacles proves free; null: as fine as an obstacle could hide in between.
     The finished path is checked every centimetre either way: an edge that fails is cut, and the search goes
-    on (decision 0050). ``guide_bias`` is the share of samples near a rough path found on the distance field,
+    on (decision 0050). ``turning_radius_m`` null: 0.5 m, or a tenth more than the motion's least if that
+    is more. ``guide_bias`` is the share of samples near a rough path found on the distance field,
     later near the incumbent: 0 is plain RRT*. With ``stop`` 'first' the search ends at the first solution,
     as the report's does, with 'optimize' after ``iterations``. A time budget makes the result depend on the
     machine; without one the same seed gives the same path.
     """
 
-    turning_radius_m: float = Field(0.5, gt=0.0, le=100.0)
+    turning_radius_m: float | None = Field(None, gt=0.0, le=100.0)
     validation_distance_m: float | None = Field(None, gt=0.0, le=100.0)
     max_connection_distance_m: float = Field(1.5, gt=0.0, le=1000.0)
     clearance_m: float = Field(0.46, ge=0.0, le=100.0)
@@ -93,6 +95,7 @@ class RrtStarDubinsPlanner:
         """Answer one query; the path's waypoints are the nodes of the tree."""
         began = time.perf_counter()
         config = self._config
+        radius_m = config.turning_radius_m or usual_radius_m(request.least_turning_radius_m)
         clearance_m = clearance_of(request, config.clearance_m)
         if not math.isfinite(request.start.theta_rad):
             raise InputError(f"plan: expected a finite start heading, found {request.start.theta_rad}")
@@ -100,7 +103,7 @@ class RrtStarDubinsPlanner:
         blocked = blocked_end(request, space, clearance_m)
         if blocked is not None:
             return failure(*blocked, time.perf_counter() - began)
-        direct = self._direct(request, space, clearance_m)
+        direct = self._direct(request, space, clearance_m, radius_m)
         if direct is not None:
             took = time.perf_counter() - began
             return PlanResult(
@@ -109,7 +112,7 @@ class RrtStarDubinsPlanner:
         guide_path, bound, proof = _look_around(request, space, clearance_m, config)
         if proof is not None:
             return failure(PlanStatus.NO_PATH, proof, time.perf_counter() - began)
-        search = self._search(request, space, clearance_m)
+        search = self._search(request, space, clearance_m, radius_m)
         goal = request.goal
         goal_heading = 0.0 if goal.theta_rad is None else goal.theta_rad
         tree = rrt_tree.make_tree(
@@ -128,7 +131,7 @@ class RrtStarDubinsPlanner:
         while True:
             cost = float(tree.cost[rrt_tree.GOAL])
             if cost < checked_cost - 1e-9:
-                path, failing = _extract(tree, space, clearance_m, config.turning_radius_m)
+                path, failing = _extract(tree, space, clearance_m, radius_m)
                 if path is None:
                     rrt_samples.recede_guide(tree, guide_path, int(tree.parent[failing]))
                     rrt_tree.cut(tree, failing)
@@ -157,9 +160,9 @@ class RrtStarDubinsPlanner:
         reason = f"{best.length_m:.2f} m after {done} iterations"
         return PlanResult(PlanStatus.FOUND, reason, best, first_s, elapsed, done, edges, first=first)
 
-    def _direct(self, request: PlanRequest, space: Space, clearance_m: float) -> Path | None:
+    def _direct(self, request: PlanRequest, space: Space, clearance_m: float, radius_m: float) -> Path | None:
         """The shortest Dubins curve to the goal where it is free: no tree finds a better path."""
-        radius_m, goal = self._config.turning_radius_m, request.goal
+        goal = request.goal
         x, y, th = request.start.x_m, request.start.y_m, request.start.theta_rad
         if goal.theta_rad is None:
             word, l0, l1, l2 = dubins.shortest_to_point(x, y, th, goal.x_m, goal.y_m, radius_m)
@@ -174,21 +177,23 @@ class RrtStarDubinsPlanner:
             poses[:, 2] = wrap_array_to_pi(poses[:, 2])
         return Path(states, waypoints, l0 + l1 + l2, radius_m)
 
-    def _search(self, request: PlanRequest, space: Space, clearance_m: float) -> rrt_samples.Search:
+    def _search(
+        self, request: PlanRequest, space: Space, clearance_m: float, radius_m: float
+    ) -> rrt_samples.Search:
         """Settings for the kernel; edges keep a little more clearance for what fine checks may step over.
 
         What coarser ones, asked for by ``validation_distance_m``, step over, the finished path's check sees.
         """
         config = self._config
-        step = least_step(clearance_m, config.turning_radius_m)
-        extra = skin(step, clearance_m, config.turning_radius_m)
+        step = least_step(clearance_m, radius_m)
+        extra = skin(step, clearance_m, radius_m)
         if config.validation_distance_m is not None:
             step, extra = config.validation_distance_m, 0.0
         for x, y in ((request.start.x_m, request.start.y_m), (request.goal.x_m, request.goal.y_m)):
             # Where an end touches the clearance's edge there is no room for more.
             extra = min(extra, max(0.0, float(slack_at(x, y, space, clearance_m))))
         return rrt_samples.Search(
-            radius=config.turning_radius_m,
+            radius=radius_m,
             connection=config.max_connection_distance_m,
             clearance=clearance_m + extra,
             min_step=step,
@@ -224,13 +229,11 @@ def _look_around(
             for k, n in zip(ij, space.distance.shape, strict=True)
         ]
         widest_m = guide.widest_way(space.distance, *ends) + space.resolution * math.sqrt(0.5)
-        at_most_m = min(math.ceil(widest_m * 1000.0) / 1000.0, clearance_m)
-        return (
-            NO_GUIDE,
-            NO_BOUND,
-            f"no path from start to goal keeps {clearance_m:g} m from the obstacles: the widest path needs a "
-            f"clearance of at most {at_most_m:g} m (clearance_m; a narrow body can do with less)",
-        )
+        at_most_m = math.ceil(widest_m * 1000.0) / 1000.0
+        proof = f"no path from start to goal keeps {clearance_m:g} m from the obstacles"
+        if at_most_m < clearance_m:
+            proof += f": the widest path needs a clearance of at most {at_most_m:g} m"
+        return NO_GUIDE, NO_BOUND, f"{proof} (clearance_m; a narrow body can do with less)"
     guide_path = guide.trace(move, space, stride, *start, 3) if config.guide_bias > 0.0 else NO_GUIDE
     if config.stop == "first" or config.guide_bias == 0.0:
         return guide_path, NO_BOUND, None

@@ -14,6 +14,7 @@ from pilotage.kernels.rrt import dubins, shortcut
 from pilotage.kernels.rrt.clearance import Space, least_step, skin, slack_at
 from pilotage.stack.planning.driving_space import (
     CHECK_SPACING_M,
+    SPARE,
     STATE_SPACING_M,
     is_valid,
     space_for,
@@ -77,7 +78,9 @@ class ShortcutSmoother:
         """Return a path from the same start to the same goal that is valid and no longer than ``path``."""
         space = space_for(request.field, clearance_m)
         tight = path.turning_radius_m < request.least_turning_radius_m
-        radius_m = max(path.turning_radius_m, request.least_turning_radius_m, LEAST_RADIUS_M)
+        radius_m = max(
+            path.turning_radius_m, SPARE * request.least_turning_radius_m if tight else LEAST_RADIUS_M
+        )
         step = min(CHECK_SPACING_M * 5.0, least_step(clearance_m, radius_m))
         extra = skin(step, clearance_m, radius_m)
         for state in (path.states[0], path.states[-1]):
@@ -85,7 +88,7 @@ class ShortcutSmoother:
         heading_free = request.goal.theta_rad is None
         own_cost = OWN_COST if tight else 1.0
         rules = shortcut.Rules(radius_m, clearance_m + extra, step, heading_free, own_cost)
-        best = _Chain.of(path)
+        best = _Chain.of(path, request.start.theta_rad if tight else None)
         for number in range(self._config.rounds):
             shorter = self._round(best, space, rules)
             better = shorter.length_m < best.length_m or (tight and number == 0)
@@ -130,9 +133,13 @@ class _Chain:
         self.states, self.length_m, self._fine, self.own = states, length_m, fine, own
 
     @staticmethod
-    def of(path: Path) -> _Chain:
-        """The input as it is."""
-        return _Chain(path.states, path.length_m, path.states, True)
+    def of(path: Path, heading_rad: float | None) -> _Chain:
+        """The input as it is, but for the first heading where lines begin with another than the robot's."""
+        states = path.states
+        if heading_rad is not None:
+            states = states.copy()
+            states[0, 2] = heading_rad
+        return _Chain(states, path.length_m, states, True)
 
     @staticmethod
     def through(

@@ -79,7 +79,7 @@ class Context:
         journal: Journal,
     ) -> None:
         self.config = config
-        self.radius_m = robot.radius_m
+        self.radius_m, self.is_disc = robot.radius_m, robot.footprint.is_disc
         self.journal = journal
         self.goals: list[Goal] = list(task.goals)
         self._tolerance_m = task.goal_tolerance_m
@@ -216,14 +216,19 @@ class Context:
 
     def clearances_m(self, pose: Pose2) -> list[float]:
         """Clearances to try in turn: the planner's own, the fallbacks, and what there is where it stands."""
-        own = self.plan.clearance_m
+        asked = self.first_clearances_m()
         here = self.own_map.distance_m(pose)
-        asked = [own, *(self.radius_m + margin for margin in self.config.fallback_margins_m)]
         squeezed = max(here - HERE_TOLERANCE_M, self.radius_m - MAPPED_TOLERANCE_M)
         if self.among_people:
             # Who stands beside it is no reason to squeeze past walls.
             squeezed = max(self._to_walls_m(pose) - HERE_TOLERANCE_M, self.radius_m + HERE_TOLERANCE_M)
-        return [c for c in asked if c <= own] + ([squeezed] if squeezed < min(asked) else [])
+        return asked + ([squeezed] if squeezed < min(asked) else [])
+
+    def first_clearances_m(self) -> list[float]:
+        """Clearances to try in turn wherever it stands: the planner's own, and the fallbacks below it."""
+        own = self.plan.clearance_m
+        fallbacks = (self.radius_m + margin for margin in self.config.fallback_margins_m)
+        return [own, *(clearance for clearance in fallbacks if clearance <= own)]
 
     def _to_walls_m(self, pose: Pose2) -> float:
         """Distance to what the robot was told of."""

@@ -126,7 +126,7 @@ def begin_escape(context: Context, resumes: State, pose: Pose2, why: str, waits:
         context.say("wait", f"{why}: waiting, as somebody may walk about")
         return Move(Waiting(context, resumes, context.t_s + context.config.give_way.patience_s, waits), STOP)
     if context.escape is None:
-        return fail(context, f"stuck: {why}, and the stack has no escape")
+        return fail(context, f"stuck: {why}, and the stack has no escape (stack.escape: back-out)")
     context.journal.count("escapes")
     context.say("escape", f"{why}: backing out the way it came")
     context.escape.begin(context.trail)

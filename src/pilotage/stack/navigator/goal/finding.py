@@ -12,6 +12,7 @@ from pilotage.stack.navigator.goal.driving import Following
 from pilotage.stack.navigator.goal.ended import fail
 from pilotage.stack.navigator.goal.state import Move, State
 from pilotage.stack.navigator.goal_config import Mode
+from pilotage.stack.navigator.navigator import DISC_HINT
 from pilotage.stack.planning.planner import PlanStatus
 
 PLAN_AGAIN_S = 1.0
@@ -94,11 +95,12 @@ def first_state(context: Context, belief: Belief) -> State:
     """
     if belief.status is BeliefStatus.LOST:
         return LookingAround(context)
-    result = context.make_plan(belief.pose, [context.plan.clearance_m])
+    result = context.make_plan(belief.pose, context.first_clearances_m())
     if result.status is PlanStatus.START_BLOCKED:
         context.say("look-around", f"{result.reason}: looking around before planning")
         return LookingAround(context)
     if result.path is None:
-        return fail(context, f"{result.status}: {result.reason}").state
+        hint = "" if context.is_disc or result.status is not PlanStatus.NO_PATH else DISC_HINT
+        return fail(context, f"{result.status}: {result.reason}{hint}").state
     context.take_plan("plan")
     return Following(context)

@@ -17,7 +17,7 @@ from pilotage.stack.navigator.goal.ended import Ended
 from pilotage.stack.navigator.goal.finding import Lost, first_state, lose
 from pilotage.stack.navigator.goal.state import State
 from pilotage.stack.navigator.goal_config import GoalNavigatorConfig
-from pilotage.stack.navigator.navigator import Parts, localizer_of
+from pilotage.stack.navigator.navigator import Parts, check_for_centre, localizer_of
 from pilotage.stack.navigator.own_map import OwnMap
 
 COLUMNS = {
@@ -64,6 +64,7 @@ class GoalNavigator:
                 "navigator 'goal': expected stack.planner, stack.local_planner and stack.controller, "
                 "found one of them missing"
             )
+        check_for_centre(parts, "goal")
         self._localizer = localizer_of(parts, "goal")
         self._telemetry = journal.channel(COLUMNS, first=True)
         own_map = OwnMap(chart, parts.mapper)

@@ -1,0 +1,127 @@
+"""A stranger's robots on a stranger's floor: each pairing drives, or is refused with what would."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import pilotage as pl
+
+CAR: dict[str, Any] = {
+    "footprint": {"points_m": [[0.47, 0.2], [-0.13, 0.2], [-0.13, -0.2], [0.47, -0.2]]},
+    "motion": {"name": "bicycle", "wheelbase_m": 0.35, "max_speed_m_s": 0.8, "max_steering_rad": 0.6},
+}
+DISC: dict[str, Any] = {
+    "footprint": {"radius_m": 0.25},
+    "motion": {"name": "differential-drive", "max_speed_m_s": 0.8},
+}
+START, GOAL = {"x_m": 1.2, "y_m": 1.0, "theta_rad": 0.0}, {"x_m": 4.6, "y_m": 3.6, "tolerance_m": 0.4}
+
+
+@pytest.fixture
+def floor(tmp_path: Path) -> Callable[[float], str]:
+    """Two rooms of 3 m x 4.5 m and a door in cells of 5 cm."""
+
+    def write(door_m: float) -> str:
+        cells = np.full((90, 120), 254, np.uint8)
+        cells[:2] = cells[-2:] = 0
+        cells[:, :2] = cells[:, -2:] = cells[:, 59:61] = 0
+        half = round(door_m / 0.1)
+        cells[45 - half : 45 + half, 59:61] = 254
+        (tmp_path / "floor.pgm").write_bytes(b"P5 120 90 255\n" + cells.tobytes())
+        told = "image: floor.pgm\nresolution: 0.05\norigin: [0, 0, 0]\nnegate: 0\n"
+        (tmp_path / "floor.yaml").write_text(told + "occupied_thresh: 0.65\nfree_thresh: 0.196\n")
+        return str(tmp_path / "floor.yaml")
+
+    return write
+
+
+def drive(floor: str, robot: dict[str, Any], **stack: Any) -> pl.Run:
+    """Run it on the given map; the pose is known so that driving alone is judged."""
+    mission = {
+        "mission": "own",
+        "world": {"map": floor, "start": START, "goal": GOAL},
+        "robot": robot | {"sensors": {"odometry": {"name": "wheel-odometry"}}},
+        "stack": {"initial": {"x_var_m2": 0.0, "y_var_m2": 0.0, "theta_var_rad2": 0.0}} | stack,
+        "run": {"time_limit_s": 90, "oracles": ["localizer"]},
+    }
+    return pl.run(mission, save=False, progress=False)
+
+
+@pytest.mark.parametrize(
+    ("robot", "stack"),
+    [
+        (CAR, {"navigator": "maneuver", "planner": "hybrid-astar"}),
+        (CAR, {"navigator": "maneuver", "planner": "rrt-star-dubins", "smoother": "shortcut"}),
+        (CAR, {"navigator": "maneuver", "planner": "theta-star", "smoother": "shortcut"}),
+        (DISC, {"navigator": "maneuver", "planner": "hybrid-astar"}),
+        (DISC, {"navigator": "maneuver", "planner": "astar"}),
+        (DISC, {"navigator": "curve", "planner": "theta-star", "controller": "kanayama"}),
+        (
+            DISC,
+            {
+                "navigator": "goal",
+                "planner": "rrt-star-dubins",
+                "local_planner": "dubins",
+                "controller": "kanayama",
+            },
+        ),
+    ],
+)
+def test_it_drives_through_a_door_of_its_own_floor(
+    floor: Callable[[float], str], robot: dict[str, Any], stack: dict[str, Any]
+) -> None:
+    run = drive(floor(0.9), robot, **stack)
+    assert run.success, run.reason
+    assert run.metrics["collisions"] == 0
+
+
+def test_a_car_is_taken_for_a_disc_where_the_door_is_wide(floor: Callable[[float], str]) -> None:
+    """Neither planner nor local planner is told a turning radius: they take what the motion can."""
+    stack = {"planner": "theta-star", "local_planner": "dubins", "controller": "kanayama"}
+    assert drive(floor(1.5), CAR, navigator="goal", smoother="shortcut", **stack).success
+    narrow = drive(floor(0.9), CAR, navigator="goal", smoother="shortcut", **stack)
+    assert not narrow.success
+    assert "navigator maneuver and planner hybrid-astar" in narrow.reason
+
+
+@pytest.mark.parametrize(
+    ("robot", "stack", "remedy"),
+    [
+        (
+            CAR,
+            {"navigator": "maneuver", "planner": "astar"},
+            "hybrid-astar or rrt-star-dubins, or",
+        ),
+        (
+            CAR,
+            {"navigator": "maneuver", "planner": "hybrid-astar", "controller": "pi-follower"},
+            r"kanayama.*take navigator goal",
+        ),
+        (DISC, {"navigator": "curve", "planner": "astar", "controller": "pi-follower"}, "kanayama"),
+        (
+            DISC,
+            {
+                "navigator": "goal",
+                "planner": "hybrid-astar",
+                "local_planner": "dubins",
+                "controller": "kanayama",
+            },
+            "take navigator maneuver",
+        ),
+    ],
+)
+def test_what_cannot_work_is_refused_with_what_would(
+    floor: Callable[[float], str], robot: dict[str, Any], stack: dict[str, Any], remedy: str
+) -> None:
+    with pytest.raises(pl.InputError, match=remedy):
+        drive(floor(0.9), robot, **stack)
+
+
+def test_a_curve_that_no_car_can_drive_fails_before_the_start(floor: Callable[[float], str]) -> None:
+    run = drive(floor(1.5), CAR, navigator="curve", planner="astar", controller="kanayama")
+    assert not run.success
+    assert run.metrics["duration_s"] == 0.0
+    assert "take navigator maneuver" in run.reason
