@@ -5,7 +5,12 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+import tempfile
 from pathlib import Path
+
+import pytest
+
+from pilotage.kernels.user_cache import user_cache
 
 TOY = """
 from pilotage.kernels.jit import kernel
@@ -40,3 +45,20 @@ def test_of_processes_that_begin_together_one_compiles(tmp_path: Path) -> None:
         check=True,
     )
     assert again.stdout.split() == ["1", "0"]  # another source is compiled anew
+
+
+@pytest.mark.parametrize(("home", "xdg"), [("", ""), ("here", "there")])
+def test_a_home_that_is_no_place_is_not_taken(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, home: str, xdg: str
+) -> None:
+    """An empty HOME was the root of the file system, a relative one a folder wherever one stands."""
+    monkeypatch.delenv("PILOTAGE_CACHE_DIR", raising=False)
+    monkeypatch.setenv("HOME", home)
+    monkeypatch.setenv("XDG_CACHE_HOME", xdg)
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    monkeypatch.chdir(tmp_path)
+    folder = user_cache("toys")
+    assert folder is not None
+    assert folder.is_relative_to(tmp_path)
+    assert folder.parent.name.startswith("pilotage-")
+    assert [path.name for path in tmp_path.iterdir()] == [folder.parent.name]

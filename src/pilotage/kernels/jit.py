@@ -8,7 +8,6 @@ Clones and installations of one source share it; of processes that need a functi
 from __future__ import annotations
 
 import hashlib
-import os
 import re
 import tempfile
 import time
@@ -26,6 +25,8 @@ from numba.core.caching import (
     _SourceFileBackedLocatorMixin,
 )
 from numba.cpython.unsafe import numbers as _bits
+
+from pilotage.kernels.user_cache import user_cache
 
 __all__ = ["cache_is_cold", "kernel", "kernel_without_lock", "leading_zeros", "trailing_zeros"]
 
@@ -74,29 +75,7 @@ def _digest(path: Path) -> str:
     return sha.hexdigest()[:16]
 
 
-def _cache_folder() -> Path:
-    """A writable folder for compiled kernels: the user's cache, else one under the temporary folder."""
-    root = os.environ.get("PILOTAGE_CACHE_DIR")
-    candidates = [Path(root)] if root else []
-    try:
-        home = Path.home() / ".cache"
-    except RuntimeError:  # no home folder
-        home = None
-    xdg = os.environ.get("XDG_CACHE_HOME")
-    candidates += [Path(folder) / "pilotage" for folder in (xdg, home) if folder]
-    candidates.append(Path(tempfile.gettempdir()) / f"pilotage-{os.getuid() if hasattr(os, 'getuid') else 0}")
-    for base in candidates:
-        folder = base / "kernels"
-        try:
-            folder.mkdir(parents=True, exist_ok=True)
-            if os.access(folder, os.W_OK):
-                return folder
-        except OSError:
-            continue
-    return Path(tempfile.mkdtemp(prefix="pilotage-kernels-"))
-
-
-_CACHE = _cache_folder()
+_CACHE = user_cache("kernels") or Path(tempfile.mkdtemp(prefix="pilotage-kernels-"))
 
 
 def _folder_of(path: Path) -> Path:

@@ -10,11 +10,11 @@ from pathlib import Path
 import numpy as np
 import scipy
 
-from pilotage.core.cache import cache_folder
 from pilotage.core.errors import InputError
 from pilotage.core.files import read_bytes
 from pilotage.core.files.arrays import map_npy
 from pilotage.core.types import Pose2
+from pilotage.kernels.user_cache import user_cache
 from pilotage.maps import crater_terrain as generator
 from pilotage.maps.crater_terrain import CraterTerrain, CraterTerrainConfig, crater_terrain
 from pilotage.maps.elevation import ElevationModel
@@ -36,7 +36,7 @@ def cached_crater_terrain(config: CraterTerrainConfig) -> CraterTerrain:
     """
     if config.rows * config.columns < WORTH_KEEPING_CELLS:
         return crater_terrain(config)
-    folder = cache_folder("terrain")
+    folder = user_cache("terrain")
     if folder is None:
         return crater_terrain(config)
     place = folder / _digest(config)
