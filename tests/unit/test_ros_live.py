@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 import json
 import math
 import os
@@ -22,6 +23,7 @@ from pilotage.sensors.lidar import LidarConfig
 from pilotage.sensors.readings import OdometryIncrement
 
 STRANGER = Path(__file__).parents[1] / "support" / "ros" / "route_driver.py"
+LISTENER = STRANGER.with_name("transform_listener.py")
 RUN = "import sys; from pilotage.cli.main import main; sys.exit(main(sys.argv[1:]))"
 EXACT = [f"robot.sensors.odometry.{key}=0" for key in ("distance_var_m2_per_m", "angle_var_rad2_per_rad")]
 WALL_S = float(os.environ.get("PILOTAGE_ROS_SECONDS", "12"))
@@ -60,7 +62,12 @@ def test_another_process_drives_the_museum_route(speed: float) -> None:
     points = mission.stack.planner.model_dump()["points_m"]  # type: ignore[union-attr]
     frame = [start.x_m, start.y_m, start.theta_rad]
     stranger = process(sys.executable, str(STRANGER), json.dumps(points), json.dumps(frame))
-    time.sleep(2.0)
+    by_dds = (
+        importlib.util.find_spec("tf2_msgs") is None and importlib.util.find_spec("cyclonedds") is not None
+    )
+    listener = process(sys.executable, str(LISTENER)) if by_dds else None
+    for waits in (stranger, listener):
+        assert waits is None or (waits.stdout is not None and waits.stdout.readline() == "listens\n")
     words = ("serve", "museum-route", "--speed", str(speed), "--duration", str(speed * WALL_S), "--json")
     served = process(sys.executable, "-c", RUN, *words, *(w for key in EXACT for w in ("--set", key)))
     ours, theirs = answer(served), answer(stranger)
@@ -78,6 +85,15 @@ def test_another_process_drives_the_museum_route(speed: float) -> None:
     assert isinstance(sent, dict)
     assert {*silent, *sent} == {"/clock", "/odom", "/scan", "/tf"}, "each is spoken, or named as silent"
     assert set(silent) <= {"/tf"}
+    if listener is not None:
+        assert not silent
+        tf, seen = answer(listener), theirs["seen"]
+        assert isinstance(seen, dict)
+        assert seen["/tf"] == ["tf2_msgs/msg/TFMessage"]
+        first, last = tf["times"]  # type: ignore[misc]
+        assert last == pytest.approx(speed * WALL_S)
+        assert tf["count"] == round((last - first) / 0.1) + 1
+        assert tf["frames"] == [["odom", "base_link"], ["base_link", "laser"]]
     passed = theirs["passed"]
     assert isinstance(passed, int)
     assert passed >= min(len(points), 1 + speed * WALL_S // 45)

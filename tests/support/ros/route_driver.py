@@ -1,7 +1,7 @@
 """A stranger's node: follows waypoints by ``/odom`` and ``/cmd_vel`` alone, and counts what it hears.
 
 Knows rclpy and nothing of pilotage. Arguments: waypoints as JSON, pose of the odometry's frame as JSON.
-Prints a JSON object when nothing has come for three seconds.
+Prints a line when it listens, and a JSON object when nothing has come for three seconds.
 """
 
 from __future__ import annotations
@@ -18,6 +18,9 @@ from nav_msgs.msg import Odometry
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import LaserScan
 
+LOOKS_AROUND = 50
+"""Messages of odometry after which it asks which topics there are."""
+
 
 def main() -> None:
     """Drive until the robot falls silent."""
@@ -27,7 +30,7 @@ def main() -> None:
     node = rclpy.create_node("stranger")
     publisher = node.create_publisher(Twist, "/cmd_vel", 1000)
     stamps: dict[str, list[float]] = {"/odom": [], "/scan": [], "/clock": []}
-    state: dict[str, Any] = {"next": 1, "sent": 0, "heard": time.monotonic()}
+    state: dict[str, Any] = {"next": 1, "sent": 0, "seen": {}, "heard": time.monotonic()}
 
     def hear(topic: str, stamp: Any) -> None:
         stamps[topic].append(stamp.sec + 1e-9 * stamp.nanosec)
@@ -35,6 +38,8 @@ def main() -> None:
 
     def odometry(message: Any) -> None:
         hear("/odom", message.header.stamp)
+        if len(stamps["/odom"]) == LOOKS_AROUND:
+            state["seen"] = dict(node.get_topic_names_and_types())
         at, turn = message.pose.pose.position, message.pose.pose.orientation
         x = x0 + math.cos(th0) * at.x - math.sin(th0) * at.y
         y = y0 + math.sin(th0) * at.x + math.cos(th0) * at.y
@@ -53,11 +58,14 @@ def main() -> None:
     node.create_subscription(Odometry, "/odom", odometry, 1000)
     node.create_subscription(LaserScan, "/scan", lambda message: hear("/scan", message.header.stamp), 1000)
     node.create_subscription(Clock, "/clock", lambda message: hear("/clock", message.clock), 1000)
+    sys.stdout.write("listens\n")
+    sys.stdout.flush()
     begun = time.monotonic()
-    while time.monotonic() - max(state["heard"], begun + 40.0 * (not stamps["/odom"])) < 3.0:
+    while time.monotonic() - max(state["heard"], begun + 120.0 * (not stamps["/odom"])) < 3.0:
         rclpy.spin_once(node, timeout_sec=0.1)
     told = {topic: [len(times), *(times[:1] + times[-1:])] for topic, times in stamps.items()}
-    sys.stdout.write(json.dumps({"topics": told, "sent": state["sent"], "passed": state["next"]}) + "\n")
+    answer = {"topics": told, "seen": state["seen"], "sent": state["sent"], "passed": state["next"]}
+    sys.stdout.write(json.dumps(answer) + "\n")
     node.destroy_node()
     rclpy.shutdown()
 

@@ -8,6 +8,8 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any
 
+from pilotage.bridges.ros.messages import TRANSFORMS
+from pilotage.bridges.ros.transforms import TransformTopic
 from pilotage.core.errors import InputError
 
 DEPTH = 1000
@@ -27,25 +29,31 @@ class Node:
 
     def __init__(self, rclpy: Any, node: Any) -> None:
         self._rclpy, self._node = rclpy, node
-        self._publishers: dict[str, tuple[Any, type[Any]]] = {}
+        self._publishers: dict[str, Callable[[Mapping[str, Any]], None]] = {}
         self.sent: dict[str, int] = {}
         self.received: dict[str, int] = {}
 
     def publishes(self, topic: str, msgtype: str) -> bool:
-        """Open a topic; False where its type is not installed."""
+        """Open a topic; False where neither its type nor DDS to speak it without is installed."""
         try:
             kind = _type(msgtype)
         except ImportError:
-            return False
-        self._publishers[topic] = self._node.create_publisher(kind, topic, DEPTH), kind
+            if msgtype != TRANSFORMS:
+                return False
+            try:
+                self._publishers[topic] = TransformTopic(topic, DEPTH).send
+            except ImportError:
+                return False
+        else:
+            publisher = self._node.create_publisher(kind, topic, DEPTH)
+            self._publishers[topic] = lambda fields: publisher.publish(filled(kind(), fields))
         self.sent[topic] = 0
         return True
 
     def publish(self, topic: str, fields: Mapping[str, Any]) -> None:
         """Send a message, where the topic could be opened."""
         if topic in self._publishers:
-            publisher, kind = self._publishers[topic]
-            publisher.publish(filled(kind(), fields))
+            self._publishers[topic](fields)
             self.sent[topic] += 1
 
     def listens(self, topic: str, msgtype: str, hear: Callable[[Any], None]) -> None:

@@ -35,7 +35,8 @@ def serve(mission: Mission, speed: float = 1.0, duration_s: float | None = None)
     Returns
     -------
     Steps, messages sent and received by topic, late steps, collisions, and where the robot truly ended.
-    ``/tf`` is ``silent`` where ``tf2_msgs`` is not installed; ``/odom`` carries the same transform.
+    ``/tf`` is ``silent`` where neither ``tf2_msgs`` nor ``cyclonedds`` is installed; ``/odom`` carries the
+    same transform.
 
     Raises
     ------
