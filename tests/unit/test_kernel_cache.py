@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import subprocess
 import sys
 import tempfile
 from pathlib import Path
+from typing import Any, cast
 
 import pytest
+from numba.core import event
 
+from pilotage.kernels.jit import kernel
 from pilotage.kernels.user_cache import user_cache
 
 TOY = """
@@ -62,3 +66,45 @@ def test_a_home_that_is_no_place_is_not_taken(
     assert folder.is_relative_to(tmp_path)
     assert folder.parent.name.startswith("pilotage-")
     assert [path.name for path in tmp_path.iterdir()] == [folder.parent.name]
+
+
+def test_a_kernel_is_compiled_for_a_type_not_for_each_number_in_a_call() -> None:
+    @kernel
+    def scaled(x: float, by: int) -> float:
+        return x * by
+
+    @kernel
+    def both(x: float, by: int) -> float:
+        return scaled(x, 2) + scaled(x, 3) + scaled(x, by)
+
+    assert both(1.0, 4) == 9.0
+    assert len(cast(Any, scaled).signatures) == 1
+
+
+def test_garbage_is_looked_for_as_before_once_a_kernel_is_compiled() -> None:
+    during = []
+
+    class Looks(event.Listener):
+        def on_start(self, _: object) -> None:
+            during.append(gc.get_threshold())
+
+        def on_end(self, _: object) -> None:
+            during.append(gc.get_threshold())
+
+    @kernel
+    def half(x: float) -> float:
+        return 0.5 * x
+
+    @kernel
+    def quarter(x: float) -> float:
+        return half(half(x))
+
+    before = gc.get_threshold()
+    gc.set_threshold(600, 9, 9)
+    try:
+        with event.install_listener("numba:compile", Looks()):
+            assert quarter(4.0) == 1.0
+        assert gc.get_threshold() == (600, 9, 9)
+    finally:
+        gc.set_threshold(*before)
+    assert sum(threshold[0] > 10_000 for threshold in during) >= 3, "of the one within the other and back"

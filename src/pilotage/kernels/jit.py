@@ -7,17 +7,19 @@ Clones and installations of one source share it; of processes that need a functi
 
 from __future__ import annotations
 
+import gc
 import hashlib
 import re
 import tempfile
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Mapping
 from functools import cache
 from pathlib import Path
 from typing import IO, Any, TypeVar, cast
 
 import numba
 import numpy as np
+from numba.core import event, types
 from numba.core.caching import (
     CompileResultCacheImpl,
     FunctionCache,
@@ -157,17 +159,51 @@ class _Cache(FunctionCache):
             self._lock = None
 
 
+class _FewCollections(event.Listener):
+    """Lets garbage pile up while functions are compiled: looking for it all the time took a sixth of that."""
+
+    _THRESHOLD = 50_000, 20, 20
+    _depth, _before = 0, (700, 10, 10)
+
+    def on_start(self, _: object) -> None:
+        """Within numba's lock, so one thread at a time; a function may need others compiled first."""
+        if self._depth == 0:
+            self._before = gc.get_threshold()
+            gc.set_threshold(*self._THRESHOLD)
+        self._depth += 1
+
+    def on_end(self, _: object) -> None:
+        """Also where it could not be compiled."""
+        self._depth -= 1
+        if self._depth == 0:
+            gc.set_threshold(*self._before)
+
+
+event.register("numba:compile", _FewCollections())  # type: ignore[no-untyped-call]
+
+_OPTIONS: dict[str, Any] = {"error_model": "numpy", "no_cfunc_wrapper": True}
+
+
 def kernel(function: F) -> F:
     """Compile ``function`` with numba: cached, no fast-math, no parallel threads, errors as in numpy."""
-    return _cached(numba.njit(error_model="numpy")(function), function)
+    return _cached(numba.njit(**_OPTIONS)(function), function)
 
 
 def kernel_without_lock(function: F) -> F:
     """As ``kernel``; other threads of Python run meanwhile, so that each core may step its share."""
-    return _cached(numba.njit(error_model="numpy", nogil=True)(function), function)
+    return _cached(numba.njit(nogil=True, **_OPTIONS)(function), function)
 
 
 def _cached(dispatcher: Any, function: F) -> F:
-    if hasattr(dispatcher, "_cache"):  # a plain function where NUMBA_DISABLE_JIT is set
-        dispatcher._cache = _Cache(function)  # type: ignore[no-untyped-call]
+    if not hasattr(dispatcher, "_cache"):  # a plain function where NUMBA_DISABLE_JIT is set
+        return cast(F, dispatcher)
+    dispatcher._cache = _Cache(function)  # type: ignore[no-untyped-call]
+    resolve = dispatcher.get_call_template
+
+    def resolve_once(args: Iterable[Any], kws: Mapping[str, Any]) -> Any:
+        """Compile for a number, not for each number that some kernel has written in its call."""
+        wide: Callable[[Any], Any] = types.unliteral
+        return resolve([wide(arg) for arg in args], {key: wide(kws[key]) for key in kws})
+
+    dispatcher.get_call_template = resolve_once
     return cast(F, dispatcher)
