@@ -10,6 +10,9 @@ import numpy as np
 from pilotage.core.errors import InputError
 from pilotage.core.types import FloatArray
 
+NO_CORNERS: FloatArray = np.zeros((0, 2))
+NO_CORNERS.flags.writeable = False  # as a polygon's: kernels are compiled once for both
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Footprint:
@@ -42,7 +45,7 @@ class Footprint:
     @staticmethod
     def disc(radius_m: float) -> Footprint:
         """A disc around the axle's middle."""
-        return Footprint(np.zeros((0, 2)), radius_m, radius_m)
+        return Footprint(NO_CORNERS, radius_m, radius_m)
 
     @staticmethod
     def polygon(points_m: FloatArray, where: str = "robot.footprint.points_m") -> Footprint:

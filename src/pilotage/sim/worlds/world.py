@@ -60,8 +60,10 @@ class World:
         obstacle_circles_m: FloatArray = NO_CIRCLES,
     ) -> World:
         """Build from a map and what stands there besides."""
-        extra = np.ascontiguousarray(obstacle_segments_m, dtype=np.float64).reshape(-1, 4)
-        extra_circles = np.ascontiguousarray(obstacle_circles_m, dtype=np.float64).reshape(-1, 3)
+        extra = np.array(obstacle_segments_m, dtype=np.float64).reshape(-1, 4)
+        extra_circles = np.array(obstacle_circles_m, dtype=np.float64).reshape(-1, 3)
+        # As those of a map of walls: kernels are compiled once for all worlds.
+        extra.flags.writeable = extra_circles.flags.writeable = False
         segments, circles = extra, extra_circles
         if chart.geometry is not None:
             both = chart.geometry.with_obstacles(extra, extra_circles)
