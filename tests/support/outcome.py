@@ -13,12 +13,14 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from numba.core import event
+
 from pilotage.cli.main import main
 
-CPU_S = 30.0
-"""Processor time after which a command counts as hung: ten times what the slowest damaged input takes."""
-WALL_S = 300.0
-"""For what waits without working, such as for a pipe that nobody writes."""
+CPU_S = 60.0
+"""Processor time after which a command counts as hung, compiling apart: many times what the slowest takes."""
+WALL_S = 1800.0
+"""For what waits without working, such as for a pipe that nobody writes; slow machines take less."""
 MEMORY_MB = 1000
 """What a damaged input may take beyond what the process holds anyway."""
 LONGEST_LINE = 1600
@@ -134,12 +136,29 @@ def _limited() -> Iterator[None]:
     signal.setitimer(signal.ITIMER_PROF, CPU_S)
     timer = _Timer(WALL_S)
     try:
-        yield
+        with event.install_listener("numba:compile", _Compiling()):
+            yield
     finally:
         signal.setitimer(signal.ITIMER_PROF, 0.0)
         timer.stop()
         for number, handler in before.items():
             signal.signal(number, handler)
+
+
+class _Compiling(event.Listener):
+    """Stops the count of processor time meanwhile: which command compiles what depends on what ran before."""
+
+    _depth, _left_s = 0, 0.0
+
+    def on_start(self, _: object) -> None:
+        if self._depth == 0:
+            self._left_s, _interval_s = signal.setitimer(signal.ITIMER_PROF, 0.0)
+        self._depth += 1
+
+    def on_end(self, _: object) -> None:
+        self._depth -= 1
+        if self._depth == 0:
+            signal.setitimer(signal.ITIMER_PROF, max(self._left_s, 1e-3))
 
 
 class _Timer:
