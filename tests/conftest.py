@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import sys
 from collections.abc import Iterator
@@ -16,6 +17,9 @@ os.environ["MPLBACKEND"] = "Agg"
 # Set before NumPy is imported, and for all processes that tests start.
 for _library in ("OPENBLAS", "OMP", "MKL"):
     os.environ[f"{_library}_NUM_THREADS"] = "1"
+
+# With thousands of tests in memory, looking for garbage as often as Python does takes a tenth of the time.
+gc.set_threshold(50_000, 20, 20)
 
 # Drawn examples are the same at every run and for every worker; compiling a kernel may take its time.
 settings.register_profile("pilotage", derandomize=True, deadline=None)

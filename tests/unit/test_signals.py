@@ -28,9 +28,11 @@ import pilotage.experiments.run as lab
 from pilotage.cli.main import main
 
 once = lab.run_mission
+warm = []
 
 def endless(mission, **options):
-    warm = once(mission, save=False)
+    if not warm:
+        warm.append(once(mission, save=False))
     print("ready", flush=True)
     while True:
         once(mission, save=False)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from support.fuzz_targets.missions import ONE_COURSE
 from support.fuzz_targets.target import ENDS, QUICK
 
 OPTIONS: tuple[tuple[str, ...], ...] = (
@@ -42,7 +43,7 @@ OPTIONS: tuple[tuple[str, ...], ...] = (
     ("slam", "walls.yaml", "--topic", "VALUE", "--config", "VALUE"),
     ("bench", "VALUE"),
     ("bench", "barn", "VALUE"),
-    ("bench", "controllers", "VALUE"),
+    ("bench", "controllers", *ONE_COURSE, "--set", "run.time_limit_s=1", "VALUE"),
     ("bench", "controllers", "doors", "--controller", "VALUE"),
     ("export", "VALUE", "--to", "csv"),
     ("export", ".", "--to", "VALUE"),
