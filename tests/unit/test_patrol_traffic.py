@@ -233,6 +233,16 @@ class TestPassages:
         assert metrics["success"], metrics["reason"]
         assert metrics["idleness_worst_s"] < 2.0
 
+    def test_at_given_places_it_turns_as_soon_as_it_visits_them(self, tmp_path: Path) -> None:
+        """It drove on to half a metre from each: 14.6 s to and fro instead of 13.8."""
+        graph = tmp_path / "ends.graph"
+        graph.write_text("2 160 60 0.1 0 0\n\n0 40 30 1\n1 E 75\n\n1 115 30 1\n0 W 75\n")
+        values = corridor(3.0, 1, 90.0)
+        values["task"]["graph"] = str(graph)
+        metrics = judged(values, seed=0)
+        assert metrics["visits_min"] >= 3
+        assert metrics["idleness_worst_s"] < 0.95 * metrics["idleness_bound_s"]
+
     def test_two_paths_through_one_passage_go_together_or_against_each_other(self) -> None:
         line = np.column_stack([np.arange(0.0, 8.0, 0.5), np.full(16, 3.0)])
         assert relation(line, line[4:] + np.array([0.2, 0.3])) == 1

@@ -48,7 +48,11 @@ def test_who_drives_or_makes_short_rounds_is_not() -> None:
     # 1.8 m of the 2.4 between two: all of it within a metre of the middle, where it began.
     wide = np.array([[0.0, 0.0], [2.4, 0.0]])
     assert not stuck(lambda t: (1.2 + 0.9 * math.sin(0.3 * t), 0.0), places=wide)
-    assert stuck(lambda t: (1.2 + 0.3 * math.sin(0.3 * t), 0.0), places=wide)
+    assert stuck(lambda t: (1.2 + 0.15 * math.sin(0.3 * t), 0.0), places=wide)
+    # 1.1 m of 3 m, each end within a metre of its place.
+    far = np.array([[0.0, 0.0], [3.0, 0.0]])
+    assert not stuck(lambda t: (1.5 + 0.55 * math.sin(0.3 * t), 0.0), places=far)
+    assert stuck(lambda t: (1.5 + 0.45 * math.sin(0.3 * t), 0.0), places=far)
 
 
 def test_what_is_told_is_when_it_came_to_a_stop() -> None:

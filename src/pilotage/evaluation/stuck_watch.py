@@ -15,9 +15,9 @@ they count as visited."""
 class StuckWatch:
     """Tells a robot that stays within a metre for longer than ``stuck_s`` although nothing told it to wait.
 
-    A round may lie within that metre, two of them across, for places are visited ``visit_m`` before them: who
-    goes from one to another that is so near gets on. Two that shake on the border between two places, or of
-    one, do not.
+    A round may lie within that metre, two of them across, for places are visited up to ``visit_m`` before
+    them: who goes from one to another that is so near gets on. Two that shake on the border between two
+    places, or of one, do not.
 
     Attributes
     ----------
@@ -51,5 +51,5 @@ class StuckWatch:
         if last < 0:
             return False
         apart_m = math.hypot(*(self._places[place] - self._places[last]).tolist())
-        drive_m = apart_m - self._visit_m
+        drive_m = apart_m - 2.0 * self._visit_m
         return drive_m < 2.0 * STUCK_M and self._went_m[robot] >= max(TRULY_M, TRULY_SHARE * drive_m)

@@ -48,7 +48,7 @@ class PatrolConfig(Config):
     """A place is visited by a robot whose centre is this near."""
     stuck_s: Positive = 60.0
     """A robot on duty that stays within a metre for longer is deadlocked: if nothing told it to wait, and it
-    does not go between places to visit that are nearer to each other than that and ``visit_m``."""
+    does not visit places in turn that are so near to each other that it need not leave that metre."""
     warm_s: NonNegative = 300.0
     """Idleness and coverage count from then on, or from a quarter of the duration if that is earlier."""
     window_s: Positive = 60.0
@@ -75,7 +75,9 @@ class PatrolTask:
         self._config, self._names = config, [robot.name for robot in mission.members]
         self._chart = setting.chart
         self._site, graph = _site(config, setting)
-        self.patrol = PatrolSite(graph, config.visit_m, _starts(graph, self._site, setting))
+        # From the vertices of a derived graph the floor is to be seen; at a given place somebody is to be.
+        near_m = (0.5 if config.graph is None else 1.0) * config.visit_m
+        self.patrol = PatrolSite(graph, config.visit_m, near_m, _starts(graph, self._site, setting))
         self.columns, self.goals = {}, ()
         self.events: list[Event] = []
         self._visits = VisitLog(graph.vertices_xy_m, config.visit_m, len(self._names))

@@ -325,7 +325,7 @@ def _share(mission: Mission, index: int, sheet: RobotKnowledge, whole: Task) -> 
     )
     assert mission.team.strategy is not None, "the task looked"
     strategy = build_component(STRATEGIES, mission.team.strategy, "strategy", setting)
-    return PatrolTask(site.graph, site.visit_m, site.starts, index, strategy, _supply(mission))
+    return PatrolTask(site.graph, site.visit_m, site.near_m, site.starts, index, strategy, _supply(mission))
 
 
 def _supply(mission: Mission) -> Supply | None:

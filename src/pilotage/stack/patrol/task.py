@@ -19,12 +19,16 @@ class PatrolSite:
         Places to visit.
     visit_m
         A place counts as visited this near to it.
+    near_m
+        Whoever goes there comes so near, if it does not know its own place too badly: to places that are
+        looked from nearer than to others.
     starts
         (N,) the vertex that each robot's starting place has the shortest path to.
     """
 
     graph: PatrolGraph
     visit_m: float
+    near_m: float
     starts: IntArray
 
 
@@ -54,7 +58,7 @@ class PatrolTask:
 
     Attributes
     ----------
-    graph, visit_m, starts
+    graph, visit_m, near_m, starts
         As ``PatrolSite``.
     robot
         Its number.
@@ -66,6 +70,7 @@ class PatrolTask:
 
     graph: PatrolGraph
     visit_m: float
+    near_m: float
     starts: IntArray
     robot: int
     strategy: Strategy

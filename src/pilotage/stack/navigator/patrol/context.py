@@ -224,7 +224,12 @@ class Context:
         """Whether it is near enough to where it drives to; what blocks a vertex may be there in its place."""
         if self.homeward:
             return self.away_m(self.hop) <= DOCK_M
-        return self.away_m(self.hop) <= (0.9 if blocked or self.taken else 0.5) * self.task.visit_m
+        visit_m = self.task.visit_m
+        if blocked or self.taken:
+            return self.away_m(self.hop) <= 0.9 * visit_m
+        spread_m = SIGMAS * math.sqrt(max(self.cov[0, 0], self.cov[1, 1]))
+        sure_m = min(self.task.near_m, 0.95 * visit_m - spread_m)
+        return self.away_m(self.hop) <= max(sure_m, 0.5 * visit_m)
 
     def runs_low(self) -> bool:
         """Whether it has to go to its station from now on; tells the others that its share is theirs."""

@@ -64,7 +64,12 @@ class Driving:
             return met
         command = context.lead(context.hop)
         if self.watch.stalled(context.to_go_s, context.t_s):
-            forgo(context, for_long=False)
+            kept_out_of = context.hop
+            if forgo(context, for_long=False):
+                resume(context)
+                if context.hop == kept_out_of and not (context.waits_for() or is_wanted(context)):
+                    # All else that it is sent to is visited from here.
+                    return Move(Waiting(context, context.t_s), context.stand())
             return give_way(context)
         return Move(self, command)
 
