@@ -29,6 +29,7 @@ def normal_equations(
     box: FloatArray,
     starts: IntArray,
     points: FloatArray,
+    paired: IntArray,
     hessian: FloatArray,
     gradient: FloatArray,
 ) -> tuple[float, float, int]:
@@ -42,6 +43,8 @@ def normal_equations(
         Greatest distance of a pair, and the residual at which its weight has fallen to a half.
     box, starts, points
         Reference from ``sort_into_buckets``.
+    paired
+        (K,) with which reference each point was paired last, -1: none yet. Filled here.
     hessian, gradient
         (3, 3) and (3,), filled here.
 
@@ -53,13 +56,16 @@ def normal_equations(
     gradient[:] = 0.0
     c, s = math.cos(theta), math.sin(theta)
     squares = weights = 0.0
-    pairs = 0
+    pairs, last = 0, -1
     for k in range(source.shape[0]):
         rx = c * source[k, 0] - s * source[k, 1]
         ry = s * source[k, 0] + c * source[k, 1]
-        i, _ = nearest(x + rx, y + ry, reach_m, box, starts, points)
+        # Beside what the point before was paired with is where a point is that was not paired yet.
+        guess = paired[k] if paired[k] >= 0 else last
+        i = nearest(x + rx, y + ry, reach_m, guess, box, starts, points)
         if i < 0:
             continue
+        paired[k] = last = i
         nx, ny = points[i, 2], points[i, 3]
         if nx == 0.0 and ny == 0.0:
             continue
@@ -163,12 +169,13 @@ def align(
     step = np.zeros(3)
     system = np.zeros((3, 3))
     fit = np.zeros(4)
+    paired = np.full(source.shape[0], -1)
     status = CAPPED
     reach = reach_m
     scale = scale_m * max(1.0, reach_m / final_reach_m)
     for _ in range(iterations):
         squares, weights, pairs = normal_equations(
-            source, pose[0], pose[1], pose[2], reach, scale, box, starts, points, hessian, gradient
+            source, pose[0], pose[1], pose[2], reach, scale, box, starts, points, paired, hessian, gradient
         )
         fit[0] = math.sqrt(squares / weights) if weights > 0.0 else 0.0
         fit[1] = weights

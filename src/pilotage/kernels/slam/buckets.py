@@ -62,24 +62,36 @@ def sort_into_buckets(points: FloatArray, cell_m: float) -> tuple[FloatArray, In
 
 @kernel
 def nearest(
-    x: float, y: float, reach_m: float, box: FloatArray, starts: IntArray, points: FloatArray
-) -> tuple[int, float]:
-    """Index into the sorted points (K, 4) of the nearest within reach and its squared distance; -1: none."""
+    x: float, y: float, reach_m: float, guess: int, box: FloatArray, starts: IntArray, points: FloatArray
+) -> int:
+    """Index into the sorted points (K, 4) of the nearest within reach; -1: none.
+
+    ``guess``, an index or -1, is looked at first: a near one leaves few buckets to look into. The answer does
+    not depend on it.
+    """
     columns = int(box[3])
     rows = (starts.shape[0] - 1) // columns
-    column0 = max(0, math.floor((x - reach_m - box[0]) / box[2]))
-    column1 = min(columns - 1, math.floor((x + reach_m - box[0]) / box[2]))
-    row0 = max(0, math.floor((y - reach_m - box[1]) / box[2]))
-    row1 = min(rows - 1, math.floor((y + reach_m - box[1]) / box[2]))
     best = -1
     least = reach_m * reach_m
+    reach = reach_m
+    if guess >= 0:
+        dx, dy = points[guess, 0] - x, points[guess, 1] - y
+        d = dx * dx + dy * dy
+        if d < least:
+            # A little more, for the guess itself to be found again among those as near.
+            reach = math.sqrt(d) + 1e-9
+            least = reach * reach
+    column0 = max(0, math.floor((x - reach - box[0]) / box[2]))
+    column1 = min(columns - 1, math.floor((x + reach - box[0]) / box[2]))
+    row0 = max(0, math.floor((y - reach - box[1]) / box[2]))
+    row1 = min(rows - 1, math.floor((y + reach - box[1]) / box[2]))
+    if column1 < column0:
+        return best
     for row in range(row0, row1 + 1):
-        if column1 < column0:
-            break
         for i in range(starts[row * columns + column0], starts[row * columns + column1 + 1]):
             dx, dy = points[i, 0] - x, points[i, 1] - y
             d = dx * dx + dy * dy
             if d < least:
                 least = d
                 best = i
-    return best, least
+    return best

@@ -10,7 +10,7 @@ from pilotage.kernels.slam.align import TOO_FEW, align
 from pilotage.kernels.slam.buckets import sort_into_buckets
 from pilotage.kernels.slam.frames import between, gathered
 
-BUCKET_M = 0.25
+BUCKET_M = 0.15
 
 
 @kernel

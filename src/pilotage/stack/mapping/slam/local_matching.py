@@ -20,7 +20,7 @@ from pilotage.kernels.slam.match_grid import ScoreArray, max_pyramid, score_grid
 from pilotage.stack.mapping.slam.config import SlamConfig
 from pilotage.stack.mapping.slam.odometry import MotionGuess, distance
 
-BUCKET_M = 0.25
+BUCKET_M = 0.1
 START_REACH_M, REACH_M, SCALE_M = 0.4, 0.2, 0.05
 PRIOR = np.diag([2.0, 2.0, 20.0])
 """Holds the pose at the guess where the scan leaves it open, in squared residuals. More would pull every

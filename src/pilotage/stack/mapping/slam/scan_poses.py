@@ -18,7 +18,7 @@ from pilotage.stack.mapping.slam.uncertainty import TRACK_STD_M, relative_poses
 
 AROUND = 4
 """Keyframes to either side along the path that lend a scan their points."""
-BUCKET_M, REACH_M = 0.25, 0.5
+BUCKET_M, REACH_M = 0.15, 0.5
 MOST_MOVED_M, MOST_MOVED_RAD = 1.0, 0.3
 PRIOR = np.diag([0.1, 0.1, 1.0])
 """Holds a scan that is being aligned where nothing else does, in squared residuals."""
