@@ -183,14 +183,15 @@ def test_between_undoes_composed(values: list[float]) -> None:
 
 
 def test_a_beam_clears_its_way_and_marks_its_end() -> None:
-    odds = np.zeros((10, 40), np.float32)
+    odds = np.zeros((10, 40), np.int8)
     beams = np.array([2.0, np.nan, np.inf])
-    add_scan(odds, 0.0, 0.0, 0.1, np.array([0.55, 0.55, 0.0]), beams, 0.0, 1e-9, 3.0, 0.9, 0.4, 5.0)
-    assert odds[5, 25] == pytest.approx(0.9 - 0.4)
-    assert (odds[5, 6:25] == pytest.approx(-0.8)) if odds[5, 6] else True
-    assert (odds[5, 6:25] < 0.0).all()
-    assert odds[5, 36:].max() <= 0.0
-    assert (odds[:5] == 0.0).all()
+    add_scan(odds, 0.0, 0.0, 0.1, np.array([0.55, 0.55, 0.0]), beams, 0.0, 1e-9, 3.0, 9, 4, 11)
+    assert odds[5, 25] == 9 - 4
+    assert (odds[5, 6:25] == -8).all()
+    assert odds[5, 36:].max() <= 0
+    assert (odds[:5] == 0).all()
+    add_scan(odds, 0.0, 0.0, 0.1, np.array([0.55, 0.55, 0.0]), beams, 0.0, 1e-9, 3.0, 9, 4, 11)
+    assert (odds[5, 6:25] == -11).all()
 
 
 def test_lines_go_on_over_beams_that_are_missing() -> None:

@@ -20,7 +20,7 @@ from pilotage.stack.mapping.slam.local_matching import Fit
 from pilotage.stack.mapping.slam.matching import Match
 from pilotage.stack.mapping.slam.refinement import BESIDE, not_aligned
 from pilotage.stack.mapping.slam.slips import Slips
-from pilotage.stack.mapping.slam.uncertainty import Edges
+from pilotage.stack.mapping.slam.uncertainty import Edges, JointCovariance
 
 POINTS = 150.0
 
@@ -60,14 +60,15 @@ def test_walls_on_all_sides_leave_nothing_open() -> None:
 
 def test_a_loop_that_is_too_long_is_searched_in_a_window_that_is_cut() -> None:
     poses = np.array([[0.0, 0.0, 0.0], *([50.0, 5.0 * k, 0.0] for k in range(4)), [6.0, 0.0, 0.0]])
-    joint: FloatArray = np.zeros((18, 18))
-    joint[15:, 15:] = np.diag([100.0, 100.0, 0.01])
+    pairs = np.zeros((21, 3, 3))
+    pairs[-1] = np.diag([100.0, 100.0, 0.01])
+    joint = JointCovariance(pairs)
     pieces = np.zeros(6, np.int64)
     assert candidates(poses, pieces, joint, 8.0, {}, USUAL_SLIP) == []
     (found,) = candidates(poses, pieces, joint, 8.0, {}, FAR_SLIP)
     assert (found.earlier, found.later, found.half_m) == (0, 5, 8.0)
     # Once it was searched so, it is not again; what the usual windows hold is left to them.
-    assert candidates(poses, pieces, np.asarray(1e-4 * joint), 8.0, {}, FAR_SLIP) == []
+    assert candidates(poses, pieces, JointCovariance(1e-4 * pairs), 8.0, {}, FAR_SLIP) == []
     assert candidates(poses, pieces, joint, 8.0, {(0, 5): 8.0}, FAR_SLIP) == []
 
 

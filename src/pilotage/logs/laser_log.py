@@ -208,7 +208,7 @@ def assemble(
     return LaserLog(
         name,
         t_s,
-        _three_kinds(ranges_m, range_min_m, range_max_m),
+        _in_three_kinds(ranges_m, range_min_m, range_max_m),
         beams,
         taken[:, 0],
         taken[:, 1],
@@ -256,12 +256,13 @@ def _is_usable(scan: RawScan) -> bool:
     return math.isfinite(scan.t_s) and apart and turns and reaches
 
 
-def _three_kinds(ranges_m: FloatArray, least: float, most: float) -> FloatArray:
-    """Ranges as REP 117 has them: measured, infinite (nothing within reach), NaN (no measurement)."""
+def _in_three_kinds(ranges_m: FloatArray, least: float, most: float) -> FloatArray:
+    """Ranges as REP 117 has them, in place: measured, infinite (nothing in reach), NaN (not measured)."""
     with np.errstate(invalid="ignore"):
-        out = np.where(ranges_m > most, np.inf, ranges_m)
+        ranges_m[ranges_m > most] = np.inf
         # Zero is what many drivers write for no measurement, also where the least range is zero.
-        return np.where((out < least) | (out <= 0.0), np.nan, out)
+        ranges_m[(ranges_m < least) | (ranges_m <= 0.0)] = np.nan
+    return ranges_m
 
 
 def _ordered(

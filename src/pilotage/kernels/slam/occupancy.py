@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from pilotage.kernels.arrays import FloatArray
 from pilotage.kernels.jit import kernel
 
-OddsArray = NDArray[np.float32]
+OddsArray = NDArray[np.int8]
+"""Log-odds in whole steps: a byte is enough, and a building has tens of millions of cells."""
 
 
 @kernel
@@ -24,9 +25,9 @@ def add_scan(
     first_rad: float,
     step_rad: float,
     farthest_m: float,
-    hit_odds: float,
-    miss_odds: float,
-    most_odds: float,
+    hit_odds: int,
+    miss_odds: int,
+    most_odds: int,
 ) -> None:
     """Add a scan to the log-odds (rows, columns) of a grid, row 0 with the least y.
 
@@ -37,7 +38,7 @@ def add_scan(
     ranges_m
         (B,) NaN for no measurement; beyond ``farthest_m`` (or infinite) a beam only clears up to there.
     hit_odds, miss_odds, most_odds
-        What a hit adds, what a passing beam takes, and where both end.
+        What a hit adds, what a passing beam takes, and where both end (at most 127).
     """
     rows, columns = odds.shape
     ox, oy = (pose[0] - corner_x) / cell_m, (pose[1] - corner_y) / cell_m

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+from pilotage.core.memory import give_back
 from pilotage.core.whole_file import write_whole
 from pilotage.report.markup import contents, document, escape, figure_section, layer_rules, tiles
 from pilotage.report.slam.closures import closures_figure, closures_section
@@ -46,6 +47,7 @@ OF_EXTENSIONS = ("stretches", "stretches_agreeing", "walls_agreement", "keyframe
 def write_slam_report(folder: Path) -> Path:
     """Write ``report.html`` into a folder of ``pilotage slam`` and return its path."""
     path = folder / REPORT_FILE
+    give_back()
     write_whole(path, slam_page(read_slam_folder(folder)))
     return path
 

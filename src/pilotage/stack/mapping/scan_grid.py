@@ -41,7 +41,7 @@ class ScanGrid:
         self._scans: list[FloatArray] = []
         self.poses = np.zeros((0, 3))
         self.corner_xy_m: FloatArray = np.zeros(2)
-        self._odds: OddsArray = np.zeros((0, 0), np.float32)
+        self._odds: OddsArray = np.zeros((0, 0), np.int8)
 
     @property
     def states(self) -> OccupancyArray:
@@ -72,11 +72,11 @@ class ScanGrid:
 
     def grid(self) -> OccupancyGrid:
         """Return the map as it is now."""
-        odds = self._odds if self._odds.size else np.zeros((1, 1), np.float32)
+        odds = self._odds if self._odds.size else np.zeros((1, 1), np.int8)
         return grid_of(odds, self.resolution_m, self.corner_xy_m)
 
     def _redraw(self) -> None:
-        self._odds[:] = 0.0
+        self._odds[:] = 0
         for index in range(len(self._scans)):
             self._draw(index)
 
@@ -117,7 +117,7 @@ class ScanGrid:
         width, height = ((high - low) * block).tolist()
         if (height, width) == (rows, columns):
             return
-        odds = np.zeros((height, width), np.float32)
+        odds = np.zeros((height, width), np.int8)
         left, down = ((own - low) * block).tolist()
         odds[down : down + rows, left : left + columns] = self._odds
         self._odds, self.corner_xy_m = odds, np.asarray(low * size_m, np.float64)

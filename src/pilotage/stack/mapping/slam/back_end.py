@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from pilotage.core.memory import give_back
 from pilotage.core.types import BoolArray, FloatArray
 from pilotage.kernels.slam.frames import composed
 from pilotage.models.pose_graph_solver import Loss, Start, optimize
@@ -38,6 +39,7 @@ from pilotage.stack.mapping.slam.uncertainty import (
     NO_EDGES,
     TRACK_STD_M,
     Edges,
+    JointCovariance,
     edge_information,
     joint_covariance,
     relative_poses,
@@ -123,7 +125,8 @@ class LoopCloser:
         self._searched: dict[tuple[int, int], float] = {}
         self._accepted: set[tuple[int, int]] = set()
         self._slipped = False
-        self._joint: tuple[Solved, FloatArray] | None = None
+        self._joint: tuple[Solved, JointCovariance] | None = None
+        self._sure: tuple[Solved, BoolArray] | None = None
         self.state: Solved
 
     def grow(self, track: LocalTrack, ended: bool = True) -> None:
@@ -214,14 +217,22 @@ class LoopCloser:
             self.closing = others(self.closing)
             self.state = solved(others(self.state.edges), self.state.poses, ROBUST_STDS, self._slipped)
 
-    def joint(self) -> FloatArray:
-        """(3 S, 3 S) covariance of the submaps' poses; computed anew only where the graph has changed."""
-        state, known = self.state, self._joint
-        if known is None or known[0] is not state or len(known[1]) != 3 * len(self.submaps):
+    def joint(self) -> JointCovariance:
+        """Covariance of the submaps' poses; computed anew only where the graph or they have changed."""
+        state, known, count = self.state, self._joint, len(self.submaps)
+        if known is None or known[0] is not state or len(known[1].pairs) != count * (count + 1) // 2:
             known = self._joint = None
             out = joint_covariance(state.edges, state.poses, state.weights, self.submaps.references)
             self._joint = known = state, out
         return known[1]
+
+    def sure(self) -> BoolArray:
+        """(S, S) whether two submaps are known well enough against each other to align their keyframes."""
+        if self._sure is None or self._sure[0] is not self.state:
+            places = self.state.poses[self.submaps.references]
+            self._sure = self.state, _sure(self.joint(), places)
+            self._joint = None  # nothing is closed any more, and it is the largest thing in memory
+        return self._sure[1]
 
     def look_again(self) -> None:
         """Search the latest submaps' candidates anew that only lacked another to second them."""
@@ -246,6 +257,7 @@ def closed(track: LocalTrack, config: SlamConfig, on_round: OnRound) -> LoopClos
         nonlocal number
         number += 1
         searched, count = closer.close(window_m, slip)
+        give_back()
         on_round(f"round {number}: {searched} searched, {count} closed")
         return count
 
@@ -262,12 +274,11 @@ def closed(track: LocalTrack, config: SlamConfig, on_round: OnRound) -> LoopClos
                 break
             close_all(closer)
 
-    close_far(closer, widest_m)
-    for _ in range(TRIALS):
+    def tried(closer: LoopCloser) -> LoopCloser | None:
         trial = closer.copied()
         trial.forget(widest_m)
         if not close(trial, widest_m, TRIAL_SLIP):
-            break
+            return None
         trial.forget(widest_m)
         close_far(trial, TRIAL_M)
         on_trial = [c for c in trial.closures[len(closer.closures) :] if is_on_trial(c)]
@@ -275,6 +286,14 @@ def closed(track: LocalTrack, config: SlamConfig, on_round: OnRound) -> LoopClos
         if len(doubtful) < len(on_trial):
             closer = trial
         closer.refuse(doubtful)
+        return closer
+
+    close_far(closer, widest_m)
+    for _ in range(TRIALS):
+        borne_out = tried(closer)
+        if borne_out is None:
+            break
+        closer = borne_out
     for _ in range(SECOND_LOOKS):
         if not close(closer, SECOND_LOOK_M, LARGE_SLIP):
             break
@@ -303,8 +322,7 @@ def refined(
     since
         With it keyframes before it are aligned with those from it on alone.
     """
-    state, submaps = closer.state, closer.submaps
-    sure = _sure(closer.joint(), state, submaps)
+    state, submaps, sure = closer.state, closer.submaps, closer.sure()
     for _ in range(rounds):
         pairs = neighbours(state.poses, since)
         owner = _owners(submaps, state.poses.shape[0])
@@ -324,11 +342,10 @@ def _owners(submaps: Submaps, count: int) -> np.ndarray[tuple[int], np.dtype[np.
     return np.searchsorted(middles, np.arange(count)).astype(np.int64)
 
 
-def _sure(joint: FloatArray, state: Solved, submaps: Submaps) -> BoolArray:
-    """(C, C) whether two submaps are known well enough against each other."""
-    count = len(submaps)
+def _sure(joint: JointCovariance, places: FloatArray) -> BoolArray:
+    """(C, C) whether two poses (C, 3) are known well enough against each other."""
+    count = places.shape[0]
     out = np.eye(count, dtype=np.bool_)
-    places = state.poses[submaps.references]
     for k in range(count - 1):
         # Row by row: the covariances of all pairs at once would be the largest thing in memory.
         later = np.arange(k + 1, count)

@@ -68,6 +68,7 @@ def _objective(
 ) -> Callable[[float], float]:
     """Return what the refined graph's objective is with a spacing over that of the log."""
     own = weak_edges(track)
+    closer.sure()  # before there are other points: what it needs is large as well
 
     def objective(spacing: float) -> float:
         clouds = keyframe_clouds(log, track, config, spacing)
@@ -78,4 +79,6 @@ def _objective(
 
 def keyframe_clouds(log: LaserLog, track: LocalTrack, config: SlamConfig, spacing: float) -> Clouds:
     """Points of the keyframes with another spacing of the beams."""
+    if spacing == 1.0:
+        return track.clouds
     return Clouds.of([cloud_of(log, int(k), config.max_range_m, spacing) for k in track.keyframes])

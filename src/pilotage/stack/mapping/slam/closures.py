@@ -14,6 +14,7 @@ from pilotage.stack.mapping.slam.matching import Match, match
 from pilotage.stack.mapping.slam.submaps import Submaps
 from pilotage.stack.mapping.slam.uncertainty import (
     Edges,
+    JointCovariance,
     edge_information,
     errors_of,
     jacobians,
@@ -127,13 +128,12 @@ def moved(closure: Closure, by: int) -> Closure:
 
 
 def relative_covariances(
-    joint: FloatArray, poses: FloatArray, first: IntArray, second: IntArray
+    joint: JointCovariance, poses: FloatArray, first: IntArray, second: IntArray
 ) -> FloatArray:
-    """Covariances (M, 3, 3) of poses (C, 3) seen from one another, from their joint covariance (3 C, 3 C)."""
+    """Covariances (M, 3, 3) of poses (C, 3) seen from one another."""
     theta = relative_poses(poses[first], poses[second])[:, 2]
     a, b = jacobians(poses[first], poses[second], theta)
-    blocks = joint.reshape(poses.shape[0], 3, poses.shape[0], 3)
-    aa, bb, ab = blocks[first, :, first], blocks[second, :, second], blocks[first, :, second]
+    aa, bb, ab = (joint.blocks(*pair) for pair in ((first, first), (second, second), (first, second)))
     at, bt = a.transpose(0, 2, 1), b.transpose(0, 2, 1)
     cross = a @ ab @ bt
     return np.asarray(a @ aa @ at + b @ bb @ bt + cross + cross.transpose(0, 2, 1))
@@ -149,7 +149,7 @@ def spread(covariance: FloatArray) -> tuple[FloatArray, FloatArray]:
 def candidates(
     poses: FloatArray,
     pieces: IntArray,
-    joint: FloatArray,
+    joint: JointCovariance,
     window_m: float,
     searched: dict[tuple[int, int], float],
     slip: Slip,
@@ -199,7 +199,7 @@ def candidates(
 def judge(
     submaps: Submaps,
     poses: FloatArray,
-    joint: FloatArray,
+    joint: JointCovariance,
     found: list[Candidate],
     config: SlamConfig,
     slip: Slip,
@@ -209,7 +209,7 @@ def judge(
     Parameters
     ----------
     poses
-        (C, 3) of the submaps' reference keyframes, and their joint covariance (3 C, 3 C).
+        (C, 3) of the submaps' reference keyframes, and their joint covariance.
 
     Returns
     -------
@@ -328,7 +328,7 @@ def _edges(closures: list[Closure]) -> Edges:
 
 
 def _joint_test(
-    edges: Edges, poses: FloatArray, joint: FloatArray, probability: float, slip: Slip
+    edges: Edges, poses: FloatArray, joint: JointCovariance, probability: float, slip: Slip
 ) -> tuple[FloatArray, BoolArray]:
     """Chi-square (M,) of each closure with the graph, and (M, M) which pairs agree.
 
@@ -338,12 +338,13 @@ def _joint_test(
     count = len(edges)
     innovation = errors_of(edges, poses)
     a, b = jacobians(poses[edges.i], poses[edges.j], edges.relative[:, 2])
-    rows = np.zeros((count, 3, poses.shape[0], 3))
+    used, at = np.unique(np.concatenate([edges.i, edges.j]), return_inverse=True)
+    rows = np.zeros((count, 3, used.size, 3))
     k = np.arange(count)
-    rows[k, :, edges.i] += a
-    rows[k, :, edges.j] += b
+    rows[k, :, at[:count]] += a
+    rows[k, :, at[count:]] += b
     flat = rows.reshape(3 * count, -1)
-    covariance = (flat @ joint @ flat.T).reshape(count, 3, count, 3)
+    covariance = (flat @ joint.among(used) @ flat.T).reshape(count, 3, count, 3)
     covariance[k, :, k] += np.linalg.inv(edges.information)
     own = covariance[k, :, k]
     alone = squared(innovation, own)

@@ -10,8 +10,8 @@ from pilotage.kernels.slam.occupancy import OddsArray, add_scan
 from pilotage.maps.occupancy_grid import FREE, OCCUPIED, UNKNOWN, OccupancyArray, OccupancyGrid
 from pilotage.stack.mapping.slam.earlier_map import KeyframeScans
 
-HIT_ODDS, MISS_ODDS, MOST_ODDS = 0.85, 0.25, 6.0
-SEEN_ODDS = 0.2
+HIT_ODDS, MISS_ODDS, MOST_ODDS, SEEN_ODDS = 17, 5, 120, 4
+"""In twentieths: 0.85, -0.25, 6 at most, and beyond 0.2 a cell is known."""
 MOST_CELLS = 80_000_000
 MARGIN_M = 0.5
 
@@ -34,7 +34,7 @@ def drawn_map(
             "take a coarser resolution_m"
         )
     columns, rows = sides.astype(np.int64).tolist()
-    odds = np.zeros((rows, columns), np.float32)
+    odds = np.zeros((rows, columns), np.int8)
     for i, pose in enumerate(poses):
         add_scan(
             odds,
@@ -56,7 +56,9 @@ def drawn_map(
 def grid_of(odds: OddsArray, resolution_m: float, corner_xy_m: FloatArray) -> OccupancyGrid:
     """Occupancy of log-odds (rows, columns), row 0 with the least y, from a lower-left corner (2,)."""
     corner = Pose2(float(corner_xy_m[0]), float(corner_xy_m[1]), 0.0)
-    return OccupancyGrid(np.ascontiguousarray(states_of(odds)[::-1]), resolution_m, corner)
+    states = states_of(odds[::-1])
+    states.flags.writeable = False
+    return OccupancyGrid(states, resolution_m, corner)
 
 
 def states_of(odds: OddsArray) -> OccupancyArray:

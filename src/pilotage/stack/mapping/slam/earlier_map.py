@@ -57,7 +57,7 @@ class KeyframeScans:
         )
 
 
-def keyframe_scans(log: LaserLog, chosen: IntArray, spacing: float) -> KeyframeScans:
+def keyframe_scans(log: LaserLog, chosen: IntArray | slice, spacing: float) -> KeyframeScans:
     """Return some scans (K,) of a log, its angles put right by the true spacing over the told one."""
     step, beams = log.angle_step_rad[chosen], log.beams[chosen]
     first = log.first_angle_rad[chosen] + 0.5 * step * (beams - 1) * (1.0 - spacing)

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pilotage.core.errors import InputError
+from pilotage.core.memory import give_back
 from pilotage.core.types import FloatArray
 from pilotage.kernels.slam.frames import between, composed
 from pilotage.logs.laser_log import LaserLog
@@ -62,6 +63,7 @@ def map_log(log: LaserLog, config: SlamConfig, on_stage: OnStage | None = None) 
     if local.keyframes.size < 2:
         return _standing(log, config, local)
     done = mapped(log, local, config, say)
+    give_back()
     say("drawing", 1.0)
     return result_of(config, done, done.state)
 
@@ -71,7 +73,9 @@ def tracked(log: LaserLog, config: SlamConfig, say: OnStage) -> LocalTrack:
     if len(log) < LEAST_SCANS:
         raise InputError(f"{log.name}: expected at least {LEAST_SCANS} scans to map, found {len(log)}")
     count = len(log)
+    give_back()
     local = track(log, config, lambda i: say("matching", (i + 1) / count))
+    give_back()
     if local.clouds.points.shape[0] == 0:
         raise InputError(
             f"{log.name}: expected ranges up to max_range_m {config.max_range_m:g}, found not one"
@@ -109,7 +113,7 @@ def result_of(config: SlamConfig, done: Mapped, state: Solved, joined: Joined | 
     own = state.poses[since:]
     hung = scan_poses(local, own)
     poses, sure = aligned_scans(log, local, done.clouds, own, hung, config, done.spacing)
-    scans = keyframe_scans(log, np.arange(len(log)), done.spacing)
+    scans = keyframe_scans(log, slice(None), done.spacing)
     drawn_from, drawn_at = scans, poses
     extents, closures = tuple(closer.submaps.extents), closer.closures
     clouds, before = done.clouds, local.poses
@@ -172,7 +176,7 @@ def _silent(text: str, share: float) -> None:
 def _standing(log: LaserLog, config: SlamConfig, local: LocalTrack) -> SlamResult:
     """A recording in which the robot never left its first keyframe."""
     none = np.zeros(0, np.int64)
-    scans = keyframe_scans(log, np.arange(len(log)), 1.0)
+    scans = keyframe_scans(log, slice(None), 1.0)
     graph = PoseGraph(np.zeros((1, 3)), none, none, np.zeros((0, 3)), np.zeros((0, 3, 3)))
     result = SlamResult(
         log.t_s,

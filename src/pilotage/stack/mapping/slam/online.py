@@ -138,7 +138,9 @@ class OnlineSlam:
         self._loops = int(state.edges.closes.sum())
         self.keyframe_poses = state.poses.copy()
         last = np.array([len(state.poses) - 1])
-        self.covariance = SHARED_EDGES * joint_covariance(state.edges, state.poses, state.weights, last)
+        self.covariance = (
+            SHARED_EDGES * joint_covariance(state.edges, state.poses, state.weights, last).pairs[0]
+        )
 
     def _extend(self) -> None:
         """Hang the new keyframe on the one before."""

@@ -37,10 +37,10 @@ def neighbours(poses: FloatArray, since: int = 0) -> IntArray:
     """
     count = poses.shape[0]
     tree = cKDTree(poses[:, :2])
-    pairs = [(i, i + ahead) for i in range(count) for ahead in ALONG if i + ahead < count and not since]
-    around = tree.query_ball_point(poses[:, :2], RADIUS_M, return_sorted=True)
+    first = [np.arange(count - ahead) for ahead in ALONG if ahead < count and not since]
+    second = [np.arange(ahead, count) for ahead in ALONG if ahead < count and not since]
     for i in range(since, count):
-        near = np.asarray(around[i], np.int64)
+        near = np.array(tree.query_ball_point(poses[i, :2], RADIUS_M, return_sorted=True), np.int64)
         near = near[near < (since or i - LEAST_BEHIND)]
         turn = np.abs((poses[near, 2] - poses[i, 2] + np.pi) % (2.0 * np.pi) - np.pi)
         near, turn = near[turn < MOST_TURN_RAD], turn[turn < MOST_TURN_RAD]
@@ -53,8 +53,12 @@ def neighbours(poses: FloatArray, since: int = 0) -> IntArray:
                 chosen.append(k)
                 if len(chosen) == NEIGHBOURS:
                     break
-        pairs += [(k, i) for k in chosen]
-    return np.array(sorted(pairs), np.int64).reshape(-1, 2)
+        first.append(np.array(chosen, np.int64))
+        second.append(np.full(len(chosen), i))
+    if not first:
+        return np.zeros((0, 2), np.int64)
+    pairs = np.column_stack([np.concatenate(first), np.concatenate(second)])
+    return np.asarray(pairs[np.lexsort(pairs.T[::-1])])
 
 
 def pair_edges(clouds: Clouds, poses: FloatArray, pairs: IntArray) -> Edges:

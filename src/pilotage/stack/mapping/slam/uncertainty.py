@@ -131,8 +131,35 @@ def errors_of(edges: Edges, poses: FloatArray) -> FloatArray:
     return relative_poses(edges.relative, predicted)
 
 
-def joint_covariance(edges: Edges, poses: FloatArray, weights: FloatArray, chosen: IntArray) -> FloatArray:
-    """(3 C, 3 C) joint covariance of chosen poses in the map, the first pose being held."""
+@dataclass(frozen=True, slots=True)
+class JointCovariance:
+    """Joint covariance of C poses, every pair of them once: it is the largest thing in memory.
+
+    Attributes
+    ----------
+    pairs
+        (C (C + 1) / 2, 3, 3) the block of rows of pose a and columns of b, b <= a, at a (a + 1) / 2 + b.
+    """
+
+    pairs: FloatArray
+
+    def blocks(self, a: IntArray, b: IntArray) -> FloatArray:
+        """(M, 3, 3) rows of poses ``a`` (M,) and columns of ``b`` (M,)."""
+        last = np.maximum(a, b)
+        out = self.pairs[last * (last + 1) // 2 + np.minimum(a, b)]
+        return np.asarray(np.where((a < b)[:, None, None], out.transpose(0, 2, 1), out))
+
+    def among(self, chosen: IntArray) -> FloatArray:
+        """(3 K, 3 K) of some of the poses (K,)."""
+        count = chosen.size
+        out = self.blocks(np.repeat(chosen, count), np.tile(chosen, count)).reshape(count, count, 3, 3)
+        return np.asarray(out.transpose(0, 2, 1, 3).reshape(3 * count, 3 * count))
+
+
+def joint_covariance(
+    edges: Edges, poses: FloatArray, weights: FloatArray, chosen: IntArray
+) -> JointCovariance:
+    """Joint covariance of chosen poses (C,) in the map, the first pose being held."""
     first, second = jacobians(poses[edges.i], poses[edges.j], edges.relative[:, 2])
     information = edges.information * weights[:, None, None]
     left, right = first.transpose(0, 2, 1) @ information, second.transpose(0, 2, 1) @ information
@@ -147,19 +174,19 @@ def joint_covariance(edges: Edges, poses: FloatArray, weights: FloatArray, chose
     factor = splu(
         _as_matrix(system), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
     )
+    count = chosen.size
     places = (3 * np.searchsorted(stays, chosen)[:, None] + np.arange(3)).ravel()
-    out = np.empty((places.size, places.size))
+    out = np.empty((count * (count + 1) // 2, 3, 3))
     # A few columns at a time: all of them would be as large as the graph is long times the submaps.
-    for start in range(0, places.size, 96):
-        block = places[start : start + 96]
+    for start in range(0, count, 32):
+        block = places[3 * start : 3 * start + 96]
         unit = np.zeros((3 * stays.size, block.size))
         unit[block, np.arange(block.size)] = 1.0
-        out[:, start : start + 96] = factor.solve(unit)[places]
-    for start in range(0, places.size, 96):
-        rows = slice(start, start + 96)
-        out[rows, start:] = 0.5 * (out[rows, start:] + out[start:, rows].T)
-        out[start:, rows] = out[rows, start:].T
-    return out
+        columns = factor.solve(unit)[places].reshape(count, 3, -1, 3)
+        for b in range(start, min(start + 32, count)):
+            a = np.arange(b, count)
+            out[a * (a + 1) // 2 + b] = columns[b:, :, b - start]
+    return JointCovariance(out)
 
 
 def _as_matrix(system: BlockSystem) -> csc_matrix:
