@@ -58,21 +58,26 @@ def test_a_room_is_mapped_and_its_loop_closed() -> None:
     assert np.array_equal(result.grid.cells, again.grid.cells)
 
 
-@pytest.mark.parametrize("true_deg", [180.0 / 179.0, 1.0])
-def test_closed_loops_tell_how_far_beams_are_apart(true_deg: float, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("beams", [180, 90])
+@pytest.mark.parametrize("as_told", [True, False])
+def test_closed_loops_tell_how_far_beams_are_apart(
+    beams: int, as_told: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """180 beams are told over 180 degrees: there are scanners of which this is true."""
-    monkeypatch.setattr(laser_rooms, "SPAN_RAD", np.radians(179.0 * true_deg))
-    path = along(ROUND)
-    log = recording(furnished(), path, np.random.default_rng(3))
+    told_deg = beams / (beams - 1)
+    monkeypatch.setattr(laser_rooms, "SPAN_RAD", np.radians((beams - 1) * (told_deg if as_told else 1.0)))
+    path = along(ROUND if beams == 180 else ROUND + ROUND[1:])
+    log = recording(furnished(), path, np.random.default_rng(3), beams=beams)
     assert log.odometry is not None
     first = float(log.first_angle_rad[0])
     told = [
-        RawScan(t, r, first, np.pi / 179.0, 0.05, 30.0) for t, r in zip(log.t_s, log.ranges_m, strict=True)
+        RawScan(t, r, first, np.radians(told_deg), 0.05, 30.0)
+        for t, r in zip(log.t_s, log.ranges_m, strict=True)
     ]
     read = assemble("told", told, log.mount, False, log.t_s, log.odometry)
     assert np.degrees(read.angle_step_rad) == pytest.approx(1.0)
     result = map_log(read, SlamConfig())
-    assert any("speak for the 1.0056 deg" in text for text in result.warnings) == (true_deg > 1.0)
+    assert any(f"speak for the {told_deg:.5g} deg" in text for text in result.warnings) == as_told
     assert rms_m(result, path) < 0.02
 
 

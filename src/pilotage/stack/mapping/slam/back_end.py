@@ -306,7 +306,7 @@ def weak_edges(track: LocalTrack) -> Edges:
 
 
 def refined(
-    closer: LoopCloser, clouds: Clouds, kept: Edges, rounds: int = REFINEMENTS, every: int = 1, since: int = 0
+    closer: LoopCloser, clouds: Clouds, kept: Edges, rounds: int = REFINEMENTS, most: int = 0, since: int = 0
 ) -> Solved:
     """Align keyframes with all their neighbours that are surely neighbours, and solve; several times.
 
@@ -317,8 +317,8 @@ def refined(
     ----------
     kept
         Edges that count beside those of the alignments.
-    every
-        Of the pairs that are not along the path, one in so many is taken.
+    most
+        With it pairs that are not along the path are taken evenly, and about so many at most.
     since
         With it keyframes before it are aligned with those from it on alone.
     """
@@ -327,8 +327,9 @@ def refined(
         pairs = neighbours(state.poses, since)
         owner = _owners(submaps, state.poses.shape[0])
         pairs = pairs[sure[owner[pairs[:, 0]], owner[pairs[:, 1]]]]
-        if every > 1:
+        if most:
             along = pairs[:, 1] - pairs[:, 0] == 1
+            every = -(-pairs.shape[0] // most)
             pairs = pairs[along | (np.arange(pairs.shape[0]) % every == 0)]
         edges = pair_edges(clouds, state.poses, pairs)
         edges = edges.and_more(kept).and_more(not_aligned(closer.closing, edges))

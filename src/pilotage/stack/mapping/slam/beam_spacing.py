@@ -15,19 +15,27 @@ from pilotage.stack.mapping.slam.tracker import LocalTrack
 SPACING_STEP, MOST_SPACING_OFF = 0.005, 0.015
 LEAST_GAIN = 0.05
 """Share by which the objective must fall before another spacing of the beams is believed."""
+TOWARDS_TOLD = 1.0 / 3.0
+"""Where the objective is least, as a share of the way to the told spacing, from which that one is believed:
+it lies nearer to the other one, with which the track was matched."""
+MOST_PAIRS = 8000
+"""Pairs of keyframes that tell: more of them tell it no better."""
 
 
 def told_angles_fit(log: LaserLog, track: LocalTrack, closer: LoopCloser, config: SlamConfig) -> bool:
     """Whether the aligned keyframes contradict each other less with the angles that the log tells.
 
     Where a field of view was divided by one beam too few the reader takes the angle that scanners are built
-    with. It is a guess; with closed loops the scans decide.
+    with. It is a guess; with closed loops the scans decide: by the parabola through the objectives of both
+    and of a spacing as far off on the other side, for where few scans turn both fit almost as well.
     """
     if log.told_angles is None or not len(closer.closing):
         return False
     told = float(np.median(log.told_angles[:, 1] / log.angle_step_rad))
     objective = _objective(log, track, closer, config)
-    return objective(told) < (1.0 - LEAST_GAIN) * objective(1.0)
+    below, here, above = objective(2.0 - told), objective(1.0), objective(told)
+    curvature = below - 2.0 * here + above
+    return 0.5 * (below - above) > TOWARDS_TOLD * max(curvature, 0.0)
 
 
 def beam_spacing(log: LaserLog, track: LocalTrack, closer: LoopCloser, config: SlamConfig) -> float:
@@ -72,7 +80,7 @@ def _objective(
 
     def objective(spacing: float) -> float:
         clouds = keyframe_clouds(log, track, config, spacing)
-        return refined(closer, clouds, own, rounds=2, every=4).objective
+        return refined(closer, clouds, own, rounds=2, most=MOST_PAIRS).objective
 
     return objective
 
