@@ -231,7 +231,10 @@ class LoopCloser:
         if self._sure is None or self._sure[0] is not self.state:
             places = self.state.poses[self.submaps.references]
             self._sure = self.state, _sure(self.joint(), places)
-            self._joint = None  # nothing is closed any more, and it is the largest thing in memory
+            # Nothing is closed any more, and these are the largest things in memory.
+            self._joint = None
+            self.submaps.forget()
+            give_back()
         return self._sure[1]
 
     def look_again(self) -> None:

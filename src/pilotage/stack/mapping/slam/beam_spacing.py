@@ -87,6 +87,5 @@ def _objective(
 
 def keyframe_clouds(log: LaserLog, track: LocalTrack, config: SlamConfig, spacing: float) -> Clouds:
     """Points of the keyframes with another spacing of the beams."""
-    if spacing == 1.0:
-        return track.clouds
-    return Clouds.of([cloud_of(log, int(k), config.max_range_m, spacing) for k in track.keyframes])
+    clouds = (cloud_of(log, int(k), config.max_range_m, spacing) for k in track.keyframes)
+    return Clouds.filled(clouds, int(log.beams[track.keyframes].sum()))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -24,9 +25,16 @@ class Clouds:
     @staticmethod
     def of(clouds: list[FloatArray]) -> Clouds:
         """Put clouds one after the other."""
-        sizes = [cloud.shape[0] for cloud in clouds]
-        points = np.concatenate(clouds) if clouds else np.zeros((0, 6))
-        return Clouds(np.ascontiguousarray(points), np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64))
+        return Clouds.filled(clouds, sum(cloud.shape[0] for cloud in clouds))
+
+    @staticmethod
+    def filled(clouds: Iterable[FloatArray], most: int) -> Clouds:
+        """Put clouds of at most so many points one after the other as they come."""
+        points, starts = np.empty((most, 6)), [0]
+        for cloud in clouds:
+            starts.append(starts[-1] + cloud.shape[0])
+            points[starts[-2] : starts[-1]] = cloud
+        return Clouds(points[: starts[-1]], np.array(starts, np.int64))
 
     def and_more(self, other: Clouds) -> Clouds:
         """Return both one after the other."""

@@ -22,7 +22,7 @@ RANGE_M = 12.0
 STD_M, OPEN_SCORE = 0.12, -0.4
 MARGIN_M = 0.5
 LEVELS = 5
-KEPT_PYRAMIDS, KEPT_SUBMAPS = 8, 120
+KEPT_PYRAMIDS, KEPT_SUBMAPS = 2, 100
 
 
 @dataclass(frozen=True, slots=True)
@@ -147,6 +147,11 @@ class Submaps:
         self.references = np.array([extent.reference for extent in self.extents], np.int64)
         self.pieces = np.array([extent.piece for extent in self.extents], np.int64)
         self._clouds, self._local = clouds, local
+
+    def forget(self) -> None:
+        """Let go of what is drawn; it is drawn again when it is asked for."""
+        self._drawn.clear()
+        self._pyramids.clear()
 
     def __len__(self) -> int:
         return len(self.extents)
