@@ -13,6 +13,7 @@ from pilotage.logs.laser_log import LaserLog
 from pilotage.stack.mapping.slam.clouds import Clouds, cloud_of
 from pilotage.stack.mapping.slam.config import SlamConfig
 from pilotage.stack.mapping.slam.local_matching import Aside, LocalMatcher
+from pilotage.stack.mapping.slam.movers import Movers
 from pilotage.stack.mapping.slam.odometry import ScanMotions, smoothed_times
 from pilotage.stack.mapping.slam.slips import (
     BLIND_BREAK_SLIP,
@@ -99,6 +100,7 @@ class Tracker:
     def __init__(self, config: SlamConfig) -> None:
         self._config = config
         self._matcher = LocalMatcher(config)
+        self._movers = Movers()
         self._poses: list[FloatArray] = []
         self._owner: list[int] = []
         self._keyframes: list[int] = []
@@ -120,11 +122,12 @@ class Tracker:
         others: Sequence[FloatArray] = (),
     ) -> bool:
         """Place the next scan (K, 6); True where it became a keyframe. As ``LocalMatcher.match``."""
-        hessian, broken = np.zeros((3, 3)), False
+        hessian, broken, whole = np.zeros((3, 3)), False, cloud
         if not self._poses:
             pose = np.zeros(3)
         else:
             last = self._poses[-1]
+            cloud = self._movers.without(cloud, self._matcher.fallback(last, step, dt_s))
             fit = self._matcher.match(cloud, last, step, dt_s, gap_s, others)
             self._lost_run = 0 if fit is not None else self._lost_run + 1
             if fit is None:
@@ -145,6 +148,7 @@ class Tracker:
             self._hessians.append(hessian)
             self._slips.append(self._slip.taken())
             self._matcher.add_keyframe(cloud, pose)
+            self._movers.add(whole, pose)
         self._owner.append(len(self._keyframes) - 1)
         if self._torn is not None and not broken:
             self._heal(self._torn, cloud, new)
@@ -154,6 +158,7 @@ class Tracker:
         """Begin a new piece; one that has hardly begun is dropped."""
         torn, count = self._torn, len(self._keyframes)
         aside = self._matcher.set_aside()
+        self._movers.forget()
         if torn is not None and count - torn.keyframe < SHORT:
             self._slip.add(np.sum(self._slips[torn.keyframe :], axis=0))
             for kept in (self._keyframes, self._clouds, self._hessians, self._slips):
@@ -189,6 +194,7 @@ class Tracker:
         for k in range(torn.scan, len(self._poses)):
             self._poses[k] = np.asarray(composed(moved, self._poses[k]))
         self._matcher.carry(moved)
+        self._movers.carry(moved)
         self._hessians[torn.keyframe], self._slips[torn.keyframe] = fit.hessian, HEALED_SLIP.copy()
         self._breaks.remove(torn.keyframe)
         self._torn = None

@@ -1,0 +1,90 @@
+"""People around the robot: what stands where it was seen through is no part of the building."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from pilotage.core.types import BoolArray, FloatArray
+from pilotage.kernels.slam.frames import between
+from pilotage.kernels.slam.movers import polar, seen_through
+from pilotage.stack.mapping.slam.clouds import cloud_of_beams
+from pilotage.stack.mapping.slam.config import SlamConfig
+from pilotage.stack.mapping.slam.movers import Movers
+from pilotage.stack.mapping.slam.tracker import Tracker
+from support.laser_rooms import furnished, ranges, room
+
+STEP = np.radians(1.0)
+HERE = np.array([2.0, 3.5, 0.2])
+
+
+def box(x: float, y: float, half_m: float = 0.2) -> FloatArray:
+    return np.array(room(x - half_m, y - half_m, x + half_m, y + half_m))
+
+
+def seen(walls: FloatArray, pose: FloatArray, first_deg: float = -90.0, beams: int = 181) -> FloatArray:
+    angles = np.radians(first_deg) + STEP * np.arange(beams)
+    return cloud_of_beams(ranges(walls, pose, angles), angles, float(STEP), 25.0)
+
+
+def through(points: FloatArray, pose: FloatArray, earlier: FloatArray) -> BoolArray:
+    return seen_through(points, pose, polar(earlier), 0.3, 0.2, 8.0)
+
+
+@pytest.mark.parametrize("first_deg", [-90.0, -180.0, 60.0])
+def test_who_came_is_told_from_walls(first_deg: float) -> None:
+    beams = 181 if first_deg == -90.0 else 360
+    before = seen(furnished(), HERE, first_deg, beams)
+    there = HERE + np.array([0.3, 0.1, 0.3])
+    visitor = np.concatenate([furnished(), box(3.4, 4.2)])
+    now = seen(visitor, there, first_deg, beams)
+    told = through(now, between(HERE, there), before)
+    world = there[:2] + now[:, :2] @ np.array(
+        [[np.cos(there[2]), np.sin(there[2])], [-np.sin(there[2]), np.cos(there[2])]]
+    )
+    own = np.abs(world - (3.4, 4.2)).max(axis=1) < 0.21
+    assert own.sum() > 10
+    assert told[own].mean() > 0.8
+    assert not told[~own].any()
+    # The guess of the motion may be some centimetres and degrees off.
+    off = between(HERE, there + np.array([0.05, -0.05, 0.03]))
+    assert through(now, off, before)[~own].mean() < 0.02
+
+
+def test_beams_that_hit_nothing_tell_nothing() -> None:
+    wall = np.array([(6.0, 1.0, 6.0, 9.0)])
+    before = seen(wall, HERE)
+    now = seen(np.concatenate([wall, box(2.0, 5.0)]), HERE)
+    aside = now[:, 1] > 1.0
+    assert not through(now, np.zeros(3), before)[aside & (now[:, 0] < 1.0)].any()
+    assert not through(now, np.zeros(3), before[:5]).any()
+
+
+def test_a_scan_of_which_most_seems_to_move_is_left_whole() -> None:
+    movers, hall = Movers(), np.array(room(0.0, 0.0, 10.0, 8.0))
+    for _ in range(6):
+        movers.add(seen(hall, HERE), HERE)
+    wrong = seen(box(2.0, 3.5, 1.0), HERE)
+    assert len(movers.without(wrong, HERE)) == len(wrong)
+    few = seen(np.concatenate([hall, box(4.0, 4.0)]), HERE)
+    assert len(movers.without(few, HERE)) < len(few)
+    movers.forget()
+    assert len(movers.without(few, HERE)) == len(few)
+
+
+def test_companions_do_not_stop_the_map() -> None:
+    """Two people walk along with the robot. As if they were walls, the track stands: 11 m of 14 are lost."""
+    rng = np.random.default_rng(2)
+    niches = [box(x, y, 0.25) for x in (-1.0, 3.0, 5.5, 8.0, 11.0, 12.0, 16.0) for y in (-1.0, 1.0)]
+    walls = np.concatenate([np.array(room(-4.0, -1.0, 20.0, 1.0)), *niches])
+    angles = np.radians(-90.0) + STEP * np.arange(181)
+    tracker, last = Tracker(SlamConfig()), np.zeros(3)
+    for k in range(140):
+        pose = np.array([0.1 * k, 0.0, 0.0])
+        people = [box(pose[0] + x + 0.2 * np.sin(0.1 * k + x), y) for x, y in ((1.2, 0.6), (1.8, -0.6))]
+        around = walls if k < 15 else np.concatenate([walls, *people])
+        measured = ranges(around, pose, angles) + 0.01 * rng.standard_normal(181)
+        step = 1.03 * between(last, pose)
+        tracker.add(cloud_of_beams(measured, angles, float(STEP), 25.0), step, 0.2, 0.2)
+        last = pose
+    assert np.hypot(*(tracker.pose - last)[:2]) < 0.1
