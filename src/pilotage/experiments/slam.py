@@ -13,6 +13,7 @@ import numpy as np
 from pilotage.core.config import validate
 from pilotage.core.errors import InputError
 from pilotage.core.files import read_yaml
+from pilotage.core.memory import give_back
 from pilotage.experiments.recordings.run_scans import read_run_scans
 from pilotage.experiments.slam_folder import read_earlier_map, write_slam_folder
 from pilotage.logs.laser_log import LaserLog
@@ -112,6 +113,7 @@ def slam_log(
         "times_real_time": duration_s / (done - began),
         "front_end_times_real_time": duration_s / max(matched[0] - read, 1e-9),
     }
+    give_back()
     write_slam_folder(final, log, config, result, metrics)
     return SlamRun(metrics, final, result.warnings)
 

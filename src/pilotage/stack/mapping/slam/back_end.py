@@ -337,6 +337,7 @@ def refined(
         edges = pair_edges(clouds, state.poses, pairs)
         edges = edges.and_more(kept).and_more(not_aligned(closer.closing, edges))
         state = solved(edges, state.poses, REFINED_STDS)
+        give_back()
     return state
 
 

@@ -22,7 +22,7 @@ RANGE_M = 12.0
 STD_M, OPEN_SCORE = 0.12, -0.4
 MARGIN_M = 0.5
 LEVELS = 5
-KEPT_PYRAMIDS, KEPT_SUBMAPS = 2, 100
+KEPT_PYRAMIDS, KEPT_SUBMAPS = 2, 64
 
 
 @dataclass(frozen=True, slots=True)
