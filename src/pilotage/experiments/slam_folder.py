@@ -134,6 +134,7 @@ def _write_covariances(path: Path, result: SlamResult) -> None:
         poses=known.poses,
         owner=known.owner,
         own=known.own,
+        mount_m=np.array([known.mount_m]),
         graph_poses=known.graph.poses,
         graph_i=known.graph.i,
         graph_j=known.graph.j,

@@ -126,7 +126,8 @@ def result_of(config: SlamConfig, done: Mapped, state: Solved, joined: Joined | 
         before = np.array([composed(poses[0], between(before[0], pose)) for pose in before])
         warnings += joined.warnings
     scale, turn = _odometry_scales(log, poses, config)
-    known = ScanCovariances(state.edges.graph(state.poses), state.weights, since + local.owner, poses, sure)
+    graph, owner = state.edges.graph(state.poses), since + local.owner
+    known = ScanCovariances(graph, state.weights, owner, poses, sure, _mount_m(log))
     result = SlamResult(
         log.t_s,
         poses,
@@ -169,6 +170,10 @@ def by_stamps(result: SlamResult, stamps_s: FloatArray) -> SlamResult:
     )
 
 
+def _mount_m(log: LaserLog) -> float:
+    return float(np.hypot(log.mount.x_m, log.mount.y_m))
+
+
 def _silent(text: str, share: float) -> None:
     """Nobody listens."""
 
@@ -182,7 +187,9 @@ def _standing(log: LaserLog, config: SlamConfig, local: LocalTrack) -> SlamResul
         log.t_s,
         local.poses,
         local.poses,
-        ScanCovariances(graph, np.zeros(0), local.owner, local.poses, np.zeros((len(log), 3, 3))),
+        ScanCovariances(
+            graph, np.zeros(0), local.owner, local.poses, np.zeros((len(log), 3, 3)), _mount_m(log)
+        ),
         local.keyframes,
         (),
         (),

@@ -4,8 +4,9 @@ What the graph says holds given that its edges err independently; they do not, a
 them, so its covariances are doubled. Every scan has an error of its own: stamps that are some milliseconds
 off, a body that moves while the mirror turns. And the place of the scanner on the robot is known to a few
 centimetres only: an error that all scans share, and that shows between poses as far as they are turned
-against each other. The three numbers serve the Intel and the Freiburg 079 recordings together; see
-docs/decisions/0038 and 0212.
+against each other. Whose frame somebody's reference speaks of is as unsure as the frames are apart that the
+recording tells. The numbers serve the Intel and the Freiburg 079 recordings together; see
+docs/decisions/0038, 0212 and 0216.
 """
 
 from __future__ import annotations
@@ -19,8 +20,8 @@ from pilotage.models.pose_graph import PoseGraph
 from pilotage.models.pose_graph_covariance import PoseCovariances, covariances
 
 SHARED_EDGES = 2.0
-SCAN_STD = np.array([0.01, 0.01, 0.0035])
-MOUNT_STD_M = 0.04
+SCAN_STD = np.array([0.0097, 0.0097, 0.0034])
+MOUNT_STD_M = 0.03
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,6 +38,8 @@ class ScanCovariances:
         (N, 3) of the scans in the map.
     own
         (N, 3, 3) in the map of what may be left, beside its keyframes, of a slip of the front end.
+    mount_m
+        How far the scanner is told to be from the robot's frame.
     """
 
     graph: PoseGraph
@@ -44,6 +47,7 @@ class ScanCovariances:
     owner: IntArray
     poses: FloatArray
     own: FloatArray
+    mount_m: float
 
     def marginals(self) -> FloatArray:
         """Return (N, 3, 3) in the map, the first keyframe being held."""
@@ -54,7 +58,7 @@ class ScanCovariances:
         carry[:, 1, 2] = self.poses[:, 0] - keyframes[:, 0]
         shared = carry @ (SHARED_EDGES * graph[self.owner]) @ carry.transpose(0, 2, 1)
         own = self.own + np.diag(SCAN_STD**2)
-        return np.asarray(shared + own + _of_mount(self.poses[:, 2] - self.poses[0, 2]))
+        return np.asarray(shared + own + self._of_mount(self.poses[:, 2] - self.poses[0, 2]))
 
     def relative(self, i: IntArray, j: IntArray) -> FloatArray:
         """Return (K, 3, 3) of x, y, theta of scan j as seen from scan i."""
@@ -78,15 +82,15 @@ class ScanCovariances:
         lever[:, 1, 2] = -c * d[:, 0] - s * d[:, 1]
         out = rotation @ between @ rotation.transpose(0, 2, 1) + own[1]
         out += lever @ own[0] @ lever.transpose(0, 2, 1)
-        out += _of_mount(self.poses[j, 2] - self.poses[i, 2])
+        out += self._of_mount(self.poses[j, 2] - self.poses[i, 2])
         return np.asarray(0.5 * (out + out.transpose(0, 2, 1)))
 
     def _of_graph(self) -> PoseCovariances:
         return covariances(self.graph, weights=self.weights)
 
-
-def _of_mount(turn_rad: FloatArray) -> FloatArray:
-    """(K, 3, 3) between poses turned against each other by (K,): a mount m off moves one by (R - I) m."""
-    out = np.zeros((turn_rad.size, 3, 3))
-    out[:, 0, 0] = out[:, 1, 1] = 2.0 * (1.0 - np.cos(turn_rad)) * MOUNT_STD_M**2
-    return out
+    def _of_mount(self, turn_rad: FloatArray) -> FloatArray:
+        """(K, 3, 3) between poses turned against each other by (K,): a mount m off moves one by (R - I) m."""
+        out = np.zeros((turn_rad.size, 3, 3))
+        variance = MOUNT_STD_M**2 + self.mount_m**2
+        out[:, 0, 0] = out[:, 1, 1] = 2.0 * (1.0 - np.cos(turn_rad)) * variance
+        return out
