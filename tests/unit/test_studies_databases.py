@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import os
 import shutil
+import socket
 import sqlite3
 import subprocess
 import sys
 import threading
+import time
 from collections.abc import Callable
 from pathlib import Path
 
@@ -20,6 +22,7 @@ from pilotage.core.yaml_text import load_yaml
 from pilotage.experiments.studies.database import DATABASE
 from pilotage.experiments.studies.engine import run_study
 from pilotage.experiments.studies.options import StudyOptions
+from pilotage.experiments.studies.owners import is_gone
 from pilotage.experiments.studies.store import Store
 from pilotage.experiments.studies.trial import Outcome
 from support.hostile_studies import TESTS, expected, rows_of, study_of
@@ -146,10 +149,21 @@ store.close()
         assert process.stdin is not None
         process.stdin.write("go\n")
         process.stdin.flush()
-    claimed = [int(line) for process in crew for line in process.communicate(timeout=600)[0].split()]
+    claimed = [int(line) for process in crew for line in process.communicate()[0].split()]
     assert [process.returncode for process in crew] == [0] * 3
     assert sorted(claimed) == list(range(18))
     assert [row["status"] for row in rows_of(tmp_path / "x")] == ["done"] * 18
+
+
+def test_a_slow_process_of_this_machine_keeps_its_rows() -> None:
+    here, now_s = socket.gethostname(), time.time()
+    ended = subprocess.Popen([sys.executable, "-c", ""])
+    ended.wait()
+    assert not is_gone(here, os.getpid(), now_s - 120.0), "it may be starved or suspended"
+    assert is_gone(here, ended.pid, now_s)
+    assert is_gone(here, os.getpid(), now_s - 3600.0), "a number that another process has by now"
+    assert is_gone("elsewhere", os.getpid(), now_s - 120.0)
+    assert not is_gone("elsewhere", ended.pid, now_s)
 
 
 def test_it_can_be_queried_while_it_runs(order: Callable[..., None], tmp_path: Path) -> None:

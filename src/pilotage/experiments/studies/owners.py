@@ -8,7 +8,9 @@ import sqlite3
 import time
 
 STALE_S = 30.0
-"""An owner that has not been heard of for so long is gone; one on this machine as soon as its process is."""
+"""An owner elsewhere that was not heard of for so long is gone; one on this machine once its process is."""
+REUSED_S = 600.0
+"""A silence after which a process of that number on this machine is another one, as after a new start."""
 
 ENDED: set[str] = set()
 """Owners in this very process that could not say good-bye, as on a full disk."""
@@ -38,8 +40,11 @@ def others(database: sqlite3.Connection, owner: str) -> int:
 
 
 def is_gone(host: str, pid: int, heard_s: float) -> bool:
-    """Whether an owner is to be taken for dead."""
-    return time.time() - heard_s > STALE_S or (host == socket.gethostname() and not _alive(pid))
+    """Whether an owner is to be taken for dead: one of this machine by its process, which may be slow."""
+    silent_s = time.time() - heard_s
+    if host == socket.gethostname():
+        return silent_s > REUSED_S or not _alive(pid)
+    return silent_s > STALE_S
 
 
 def _alive(pid: int) -> bool:
