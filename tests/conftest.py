@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gc
 import os
+import signal
 import sys
 from collections.abc import Iterator
 
@@ -17,6 +18,9 @@ os.environ["MPLBACKEND"] = "Agg"
 # Set before NumPy is imported, and for all processes that tests start.
 for _library in ("OPENBLAS", "OMP", "MKL"):
     os.environ[f"{_library}_NUM_THREADS"] = "1"
+
+# A shell's background job ignores Ctrl-C, and so would all that tests start; those of Ctrl-C need it heard.
+signal.signal(signal.SIGINT, signal.default_int_handler)
 
 # With thousands of tests in memory, looking for garbage as often as Python does takes a tenth of the time.
 gc.set_threshold(50_000, 20, 20)

@@ -38,7 +38,7 @@ def find_browser() -> str | None:
 class Browser:
     """One page in a headless Chromium; events it reports are kept in ``events``."""
 
-    def __init__(self, program: str, timeout_s: float = 300.0) -> None:
+    def __init__(self, program: str, timeout_s: float = 3000.0) -> None:
         self._timeout_s = timeout_s
         self._profile = tempfile.mkdtemp(prefix="pilotage-browser-")
         to_read, self._write = os.pipe()

@@ -24,7 +24,8 @@ from support.damaged_runs import damages
 from support.fabricated_run import fabricate_run
 from support.laser_drives import laser_drive
 
-DRAWN = 16
+DRAWN = 9
+"""Of each kind of folder; PILOTAGE_DAMAGED_RUNS tries all damages, the fuzz tests draw others."""
 
 
 def a_floor(folder: Path) -> Path:

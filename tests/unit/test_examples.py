@@ -18,7 +18,6 @@ def test_example_runs(script: Path, tmp_path: Path) -> None:
         cwd=tmp_path,
         capture_output=True,
         text=True,
-        timeout=3000,
         check=False,
     )
     assert done.returncode == 0, done.stderr

@@ -68,7 +68,6 @@ def test_the_lines_run_as_written(tmp_path: Path) -> None:
         cwd=tmp_path,
         capture_output=True,
         text=True,
-        timeout=600,
         check=False,
     )
     assert (done.returncode, done.stderr) == (0, "")

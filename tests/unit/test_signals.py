@@ -9,7 +9,7 @@ import subprocess
 import sys
 import time
 import weakref
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 
 import pytest
 
@@ -21,9 +21,7 @@ SIGNALS = 12
 LONGEST_WAIT_S = 0.15
 
 ENDLESS = """
-import signal
 import sys
-signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background job ignores it
 import pilotage.experiments.run as lab
 from pilotage.cli.main import main
 
@@ -45,14 +43,6 @@ if len(sys.argv) > 1:
 while True:
     print(main(short), flush=True)
 """
-
-
-@pytest.fixture(autouse=True)
-def heard() -> Iterator[None]:
-    """Ctrl-C is heard, also where the tests are a shell's background job, which ignores it."""
-    before = signal.signal(signal.SIGINT, signal.default_int_handler)
-    yield
-    signal.signal(signal.SIGINT, before)
 
 
 def started(*arguments: str) -> subprocess.Popen[str]:

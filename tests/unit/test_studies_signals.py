@@ -16,9 +16,7 @@ from pilotage.cli.main import main
 from support.hostile_studies import TESTS, expected, rows_of
 
 SLOW = f"""
-import signal
 import sys
-signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background job ignores it
 sys.path.insert(0, {str(TESTS)!r})
 from support import hostile_trials
 from pilotage.experiments.studies import local_workers
@@ -76,9 +74,7 @@ def test_a_signal_ends_it_without_orphans(
         text=True,
     )
     marks = tmp_path / "marks"
-    until = time.monotonic() + 600.0
     while not list(marks.glob("4-*")):
-        assert time.monotonic() < until
         assert process.poll() is None, process.communicate()
         time.sleep(0.01)
     began = time.monotonic()
@@ -88,7 +84,7 @@ def test_a_signal_ends_it_without_orphans(
         else:
             os.kill(process.pid, number)
         time.sleep(0.01)
-    _, err = process.communicate(timeout=600)
+    _, err = process.communicate()
     assert process.returncode == code
     assert err.splitlines()[-1:] == ([] if not told else err.splitlines()[:1])  # one line, no traceback
     assert err.startswith(told)

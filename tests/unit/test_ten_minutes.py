@@ -77,7 +77,6 @@ def test_the_ten_minutes_run_as_they_stand(tmp_path: Path, shell: dict[str, str]
                 env=shell,
                 capture_output=True,
                 text=True,
-                timeout=900,
                 check=False,
             )
             assert done.returncode == 0, (typed, done.stdout, done.stderr)
