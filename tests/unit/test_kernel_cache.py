@@ -13,6 +13,7 @@ from typing import Any, cast
 import pytest
 from numba.core import event
 
+from pilotage.kernels import jit
 from pilotage.kernels.jit import kernel
 from pilotage.kernels.user_cache import user_cache
 
@@ -68,6 +69,12 @@ def test_a_home_that_is_no_place_is_not_taken(
     assert [path.name for path in tmp_path.iterdir()] == [folder.parent.name]
 
 
+@pytest.fixture
+def nothing_compiled(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(jit, "_CACHE", tmp_path)
+
+
+@pytest.mark.usefixtures("nothing_compiled")
 def test_a_kernel_is_compiled_for_a_type_not_for_each_number_in_a_call() -> None:
     @kernel
     def scaled(x: float, by: int) -> float:
@@ -81,6 +88,7 @@ def test_a_kernel_is_compiled_for_a_type_not_for_each_number_in_a_call() -> None
     assert len(cast(Any, scaled).signatures) == 1
 
 
+@pytest.mark.usefixtures("nothing_compiled")
 def test_garbage_is_looked_for_as_before_once_a_kernel_is_compiled() -> None:
     during = []
 
