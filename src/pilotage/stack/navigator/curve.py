@@ -19,6 +19,7 @@ from pilotage.stack.journal import Journal
 from pilotage.stack.knowledge import RobotKnowledge, TaskKnowledge
 from pilotage.stack.navigator.cells import CellRoute, CostMapConfig, curve_along, grid_of, route_over_cells
 from pilotage.stack.navigator.navigator import DISC_HINT, Parts, check_keeps_time
+from pilotage.stack.navigator.timed_path import laid_out
 from pilotage.stack.planning.grid_planner import GridPlanner
 from pilotage.stack.planning.quintic_spline import QuinticSpline
 
@@ -27,8 +28,10 @@ MOST_OFF_RAD = 0.35
 """A robot that cannot turn on the spot gets onto a curve that begins so far off its heading."""
 TURNS_FROM_RAD, TURN_SHARE, HEADING_PER_S = 0.1, 0.5, 3.0
 """Who can turns to a curve that begins farther off, at this share of its turn rate; an error dies out."""
-SLOWEST = 0.1
-"""Of the top speed, however tight a bend is."""
+ACCELERATION_SHARE, AT_ONCE_M_S2 = 0.4, 2.0
+"""Of the motion's braking; and what stands for that of a motion that stops at once."""
+SAMPLES_M, MOST_SAMPLES = 0.02, 20_000
+"""Between samples of a curve whose speed follows its bends, and how many there are at most."""
 CATCHES_UP_S = 5.0
 """So long it goes on towards the curve's end when the reference is there and it is not."""
 
@@ -46,14 +49,14 @@ class CurveConfig(Config):
     cost_map: CostMapConfig = CostMapConfig()
     spline: SplineConfig | None = SplineConfig()
     speed_m_s: float | None = Field(default=None, gt=0.0)
-    """Along the curve; None: as fast as the robot can take its tightest bend."""
+    """Along the curve; None: as fast as the robot can take its bends."""
 
 
 @NAVIGATORS.add("curve", CurveConfig)
 class CurveNavigator:
     """Plans over the cells with the mission's planner, puts a quintic spline along the path, and tracks it.
 
-    The reference moves along the curve at constant speed (equations 5.1 to 5.6), whatever the robot does;
+    The reference moves along the curve, at constant speed where one is set (equations 5.1 to 5.6);
     the controller follows it from the believed pose. Arrives when the reference does, or 5 s later where the
     robot is not within the goal's tolerance yet. Fails at once where a car's curve is none that it can drive.
     """
@@ -77,7 +80,8 @@ class CurveNavigator:
         self._localizer, self._controller, self._journal = parts.localizer, parts.controller, journal
         self._initial = task.initial
         self._index, self._dt_s, self._motion = 0, robot.dt_s, robot.motion
-        self._speed_m_s, self._asked_m_s = robot.motion.top_speed_m_s, config.speed_m_s
+        asked_m_s = config.speed_m_s
+        self._speed_m_s = None if asked_m_s is None else min(asked_m_s, robot.motion.top_speed_m_s)
         self._outline = robot.footprint
         self._tolerance_m, self._waited_s = task.goal_tolerance_m, 0.0
         self._status, self._reason = StackStatus.RUNNING, ""
@@ -135,22 +139,31 @@ class CurveNavigator:
 
     def _follow(self, curve: QuinticSpline, route: CellRoute) -> None:
         """Lay out the reference, one pose a step; who can turns to it first."""
-        samples = curve.at(np.linspace(0.0, curve.length_m, max(2, math.ceil(curve.length_m / 0.05) + 1)))
-        tightest_per_m = max(float(np.abs(samples.curvature_per_m).max()), 1e-9)
-        if self._asked_m_s is None:
-            slow_m_s = self._motion.top_turn_rate_rad_s / tightest_per_m
-            self._speed_m_s = min(self._speed_m_s, max(slow_m_s, SLOWEST * self._speed_m_s))
+        if self._speed_m_s is None:
+            references = self._as_fast_as_it_can(curve)
         else:
-            self._speed_m_s = min(self._speed_m_s, self._asked_m_s)
-        step_m = self._speed_m_s * self._dt_s
-        count = max(2, math.ceil(curve.length_m / step_m) + 1)
-        s_m = np.minimum(np.arange(count) * step_m, curve.length_m)
-        samples = curve.at(s_m)
-        rows = [samples.points_xy_m, samples.heading_rad, samples.curvature_per_m, curve.length_m - s_m]
-        references = np.column_stack(rows)
+            step_m = self._speed_m_s * self._dt_s
+            count = max(2, math.ceil(curve.length_m / step_m) + 1)
+            s_m = np.minimum(np.arange(count) * step_m, curve.length_m)
+            samples = curve.at(s_m)
+            rows = [samples.points_xy_m, samples.heading_rad, samples.curvature_per_m, curve.length_m - s_m]
+            references = np.column_stack(rows)
         self._adopt(references[:, :3], route)
         self._references = np.vstack([self._turn_to(references[0]), references])
         self._journal.say(0.0, "plan", f"{route.result.reason}; {self._reason}")
+
+    def _as_fast_as_it_can(self, curve: QuinticSpline) -> FloatArray:
+        """References (N, 5) that are slow in bends, and gather speed and brake as the motion can."""
+        motion = self._motion
+        count = min(MOST_SAMPLES, max(2, math.ceil(curve.length_m / SAMPLES_M) + 1))
+        samples = curve.at(np.linspace(0.0, curve.length_m, count))
+        states = np.column_stack([samples.points_xy_m, samples.heading_rad])
+        braking = motion.braking_m_s2 if math.isfinite(motion.braking_m_s2) else AT_ONCE_M_S2
+        acceleration, turn_rate = ACCELERATION_SHARE * braking, TURN_SHARE * motion.top_turn_rate_rad_s
+        rows = laid_out(states, motion.top_speed_m_s, acceleration, math.inf, 0.0, self._dt_s, turn_rate)
+        to_go_m = np.maximum(curve.length_m - np.cumsum(rows[:, 3]) * self._dt_s, 0.0)
+        ahead = np.column_stack([rows[:, :3], np.ones(len(rows)), to_go_m])
+        return np.vstack([[*states[0], 0.0, curve.length_m], ahead])
 
     def _turn_to(self, first: FloatArray) -> FloatArray:
         """References (N, 5) of a turn on the spot to the curve's heading; none where the robot cannot."""
