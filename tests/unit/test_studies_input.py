@@ -65,6 +65,7 @@ def refused(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
             "{study: x, mission: museum-plan, trials: 10000000, configurations: [{name: a}, {name: b}]}",
             "rows",
         ),
+        (f"{{study: {'a' * 300}, mission: museum-plan}}", "200 characters"),
     ],
 )
 def test_a_wrong_study_file_is_one_line(

@@ -100,7 +100,7 @@ class StudyDefinition(Config):
         By metric, a bound or an optimum.
     """
 
-    study: str = Field(min_length=1, pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]*$")
+    study: str = Field(min_length=1, max_length=200, pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]*$")
     question: str = ""
     description: str = ""
     mission: str = Field(min_length=1)
