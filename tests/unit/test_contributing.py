@@ -88,7 +88,11 @@ def test_the_examples_run_from_outside(tmp_path: Path) -> None:
         (tmp_path / f"{name}.py").write_text("\n\n".join(between.sub("", text) for text in texts))
         words += ["--plugin", f"{name}.py"]
         assert f"--plugin {name}.py" in TEXT
-    assert check(run(tmp_path, FROM_OUTSIDE, *words)) >= 2.0
+    (metric,) = re.findall(r"^```python\n# wobble.py\n(.*?)^```", TEXT, re.MULTILINE | re.DOTALL)
+    (tmp_path / "wobble.py").write_text(metric)
+    done = run(tmp_path, FROM_OUTSIDE, *words, "--plugin", "wobble.py")
+    assert check(done) >= 2.0
+    assert json.loads(done.stdout)["wobble_rad"] > 0.0
 
 
 @pytest.mark.parametrize("word", ["stroll", "beeline"])

@@ -348,7 +348,11 @@ def test_evaluate_names_the_file_that_is_wrong(tmp_path: Path, capsys: Capture) 
     tum.write_text(TEXTS["tum.txt"][1])
     for text, said in (
         ("".join(kitti.splitlines(keepends=True)[:3]), f"{cut}: without times expected as many poses"),
-        (kitti[:9], f"{cut} line 1: expected 8 columns (TUM) or 12 (KITTI), found 4"),
+        (
+            kitti[:9],
+            f"{cut} line 1: expected 8 columns (TUM: t x y z qx qy qz qw) or 12 (KITTI), blanks "
+            "between them and no names above, found 4",
+        ),
         ("", f"{cut} line 1: expected poses, found the end of the file"),
     ):
         cut.write_text(text)

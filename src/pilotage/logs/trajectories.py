@@ -72,7 +72,10 @@ def guess_format(path: Path) -> TrajectoryFormat:
         if columns in FORM_OF:
             return FORM_OF[columns]
         if columns:
-            raise InputError(f"{path} line {number}: expected 8 columns (TUM) or 12 (KITTI), found {columns}")
+            raise InputError(
+                f"{path} line {number}: expected 8 columns (TUM: t x y z qx qy qz qw) or 12 (KITTI), blanks "
+                f"between them and no names above, found {columns}"
+            )
     raise InputError(f"{path} line {len(lines) + 1}: expected poses, found the end of the file")
 
 

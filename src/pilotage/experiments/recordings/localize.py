@@ -182,8 +182,9 @@ def localize_log(
         chosen = robot, max_range_m, overrides or None, localizer, None if setting == UNSET else setting
         if any(value is not None for value in chosen):
             raise InputError(
-                "localize: --format stops takes no --robot, --localizer, --max-range, --set, --map and the "
-                "like: it learns from the log itself"
+                f"localize: '{log}' is read as a rover's stops (CSV), which takes no --robot, --localizer, "
+                "--max-range, --set, --map and the like; scans and landmarks come in bags, MCAP files, "
+                "MRCLAM folders and AER1513's .mat (--format)"
             )
         return LocalizedLog(*localize_stops(log, out), [])
     drive = read_drive(log, form, robot, max_range_m, setting)
