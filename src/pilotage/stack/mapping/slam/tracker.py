@@ -127,7 +127,8 @@ class Tracker:
             pose = np.zeros(3)
         else:
             last = self._poses[-1]
-            cloud = self._movers.without(cloud, self._matcher.fallback(last, step, dt_s))
+            if step is not None:  # a guess by constant velocity alone makes movers of walls
+                cloud = self._movers.without(cloud, self._matcher.fallback(last, step, dt_s))
             fit = self._matcher.match(cloud, last, step, dt_s, gap_s, others)
             self._lost_run = 0 if fit is not None else self._lost_run + 1
             if fit is None:
