@@ -64,12 +64,9 @@ class Driving:
             return met
         command = context.lead(context.hop)
         if self.watch.stalled(context.to_go_s, context.t_s):
-            kept_out_of = context.hop
-            if forgo(context, for_long=False):
-                resume(context)
-                if context.hop == kept_out_of and not (context.waits_for() or is_wanted(context)):
-                    # All else that it is sent to is visited from here.
-                    return Move(Waiting(context, context.t_s), context.stand())
+            left = forgo(context, for_long=False)
+            if left is not None and isinstance(left.state, Waiting) and not is_wanted(context):
+                return left
             return give_way(context)
         return Move(self, command)
 
@@ -301,18 +298,25 @@ def resume(context: Context) -> Move:
     return Move(Waiting(context, context.t_s), context.stand())
 
 
-def forgo(context: Context, *, for_long: bool) -> bool:
-    """Leave the place that it is kept out of to mates who visit it, and more behind passages for one.
+def forgo(context: Context, *, for_long: bool) -> Move | None:
+    """Leave the place that it is kept out of to mates who visit it, and those after it.
 
-    False where it has to go there itself.
+    Down to one that nobody visits or, ``for_long`` before a passage for one, that is not behind one; where
+    mates visit all that it is sent to it waits. None where it has to go to the first itself.
     """
-    left = context.leave_to_mates(for_long=for_long)
+    first = context.hop
+    if not context.leave_to_mates(for_long=for_long):
+        return None
     for _ in range(len(context.task.graph)):
-        if not context.ask() or traffic.look(context, context.hop) is None:
+        if not context.ask() or context.hop == first:
+            break
+        if for_long and traffic.look(context, context.hop) is None:
             break
         if not context.leave_to_mates(for_long=for_long):
             break
-    return left
+    if context.hop == first and context.heard():
+        return Move(Waiting(context, context.t_s), context.stand())
+    return resume(context)
 
 
 def give_way(context: Context) -> Move:
@@ -367,8 +371,9 @@ def meet(context: Context, stretch: Stretch | None, since_s: float) -> Move | No
 
 def stand_aside(context: Context, field: FloatArray | None, stretch: Stretch, since_s: float) -> Move:
     """To the place that a field leads to, if there is one."""
-    if context.is_kept_out_for_long() and forgo(context, for_long=True):
-        return resume(context)
+    left = forgo(context, for_long=True) if context.is_kept_out_for_long() else None
+    if left is not None:
+        return left
     if field is None:
         return Move(Holding(context, since_s), context.stand())
     through_s = (stretch.length_m / context.speed_m_s + SURE_S) * (0.5 + float(context.rng.random()))
