@@ -40,6 +40,8 @@ SLACK_M = 0.005
 FAR_M = 3.0
 """Free ground farther ahead makes a heading no better."""
 
+INSTEAD = " (stack.planner: hybrid-astar plans for outline and arcs)"
+"""What does where a path for the centre does not."""
 BESIDE_M = 0.05
 """An outline that is driven along a path keeps this from walls, or what the path keeps where that is less."""
 
@@ -200,7 +202,7 @@ class GlobalPlan:
         least_m = robot.motion.least_turning_radius_m
         self.too_tight = path.turning_radius_m < least_m * (1.0 - 1e-9)
         if self.too_tight:
-            return f"the path's corners are too tight, the robot turns in {least_m:.2f} m at least"
+            return f"the path's corners are too tight, the robot turns in {least_m:.2f} m at least{INSTEAD}"
         outline, field = robot.footprint, request.field
         if clearance_m >= outline.radius_m:
             return ""
@@ -213,7 +215,7 @@ class GlobalPlan:
         states = np.vstack([request.start.as_array(), path.states])
         if hybrid.path_fits(states, path.turning_radius_m == 0.0, car, ground):
             return ""
-        return f"the robot's outline does not fit along the path, which keeps {clearance_m:.2f} m"
+        return f"the robot's outline does not fit along the path, which keeps {clearance_m:.2f} m{INSTEAD}"
 
     def _shape(self) -> tuple[Footprint | None, float]:
         """Outline and tightest arc, where the robot is known."""

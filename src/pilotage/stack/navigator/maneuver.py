@@ -24,7 +24,7 @@ from pilotage.stack.navigator.navigator import Parts, check_keeps_time, localize
 from pilotage.stack.navigator.timed_path import laid_out, with_turns
 
 MOST_REPLANS = 8
-BESIDE_INNER_M = (0.15, 0.08, 0.04, 0.01)
+BESIDE_INNER_M = (0.25, 0.2, 0.15, 0.08, 0.04, 0.01)
 """What paths planned for the centre keep beside the outline's inner disc, where they can keep no more."""
 HEADING_PER_S = 3.0
 """A heading error dies out in so much of a second's inverse while it turns on the spot."""
@@ -83,8 +83,7 @@ class ManeuverNavigator:
         self._think(0.0)
         if self._plan.hopeless and self._plan.too_tight:
             raise InputError(
-                f"navigator 'maneuver': {self._reason}; take stack.planner hybrid-astar or "
-                "rrt-star-dubins, or stack.smoother: shortcut"
+                f"navigator 'maneuver': {self._reason}; or take rrt-star-dubins, or stack.smoother: shortcut"
             )
 
     def _think(self, t_s: float) -> None:
