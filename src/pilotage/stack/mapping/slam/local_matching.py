@@ -117,6 +117,11 @@ class LocalMatcher:
         self.lost = 0
         self.rms_m = SCALE_M
 
+    @property
+    def guess_error(self) -> float:
+        """Usual error of the most trusted guess of the motion."""
+        return self._guess.least_error
+
     def add_keyframe(self, cloud: FloatArray, pose: FloatArray) -> None:
         """Let a scan lend its points to those that follow."""
         self._local = [*self._local, carried(cloud, pose)][-self._config.local_keyframes :]

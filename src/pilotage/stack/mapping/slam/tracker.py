@@ -23,6 +23,9 @@ from pilotage.stack.mapping.slam.slips import (
     Slips,
 )
 
+SURE_GUESS = 0.035
+"""Usual error of the guesses (a radian as half a metre) up to which people are told from walls by odometry:
+wrong stamps, and constant velocity alone, make movers of walls."""
 GUESSED_SCANS = 3
 """So many scans in a row may hang by the odometry alone before the track breaks."""
 RIGID = 1e4 * np.eye(3)
@@ -127,7 +130,7 @@ class Tracker:
             pose = np.zeros(3)
         else:
             last = self._poses[-1]
-            if step is not None:  # a guess by constant velocity alone makes movers of walls
+            if step is not None and self._matcher.guess_error < SURE_GUESS:
                 cloud = self._movers.without(cloud, self._matcher.fallback(last, step, dt_s))
             fit = self._matcher.match(cloud, last, step, dt_s, gap_s, others)
             self._lost_run = 0 if fit is not None else self._lost_run + 1
