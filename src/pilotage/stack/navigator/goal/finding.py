@@ -95,7 +95,10 @@ def first_state(context: Context, belief: Belief) -> State:
     """
     if belief.status is BeliefStatus.LOST:
         return LookingAround(context)
-    result = context.make_plan(belief.pose, context.first_clearances_m())
+    own, *less = context.first_clearances_m()
+    result = context.make_plan(belief.pose, [own])
+    if result.status is PlanStatus.NO_PATH and less:
+        result = context.make_plan(belief.pose, less)
     if result.status is PlanStatus.START_BLOCKED:
         context.say("look-around", f"{result.reason}: looking around before planning")
         return LookingAround(context)
