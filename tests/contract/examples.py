@@ -19,6 +19,7 @@ from contract.rover_examples import (
     chains_legs,
     dead_reckoning_follows_the_bend,
     drives_over_cells,
+    gps_filter_follows_the_bend,
     moves_to_a_pose,
     rover_filter_follows,
 )
@@ -357,6 +358,9 @@ EXAMPLES: dict[tuple[str, str], Example] = {
     ),
     ("localizer", "dead-reckoning"): Example(
         dead_reckoning_follows, pure_numbers=frozenset({"odometry_var_scale"})
+    ),
+    ("localizer", "ekf-gps"): Example(
+        gps_filter_follows_the_bend, {"gate": 0.99}, frozenset({"gate", "odometry_var_scale"})
     ),
     ("localizer", "ekf-walls"): Example(
         localizer_follows,

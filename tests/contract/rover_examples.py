@@ -16,6 +16,8 @@ from pilotage.models.footprint import Footprint
 from pilotage.models.motion.bicycle import BicycleConfig
 from pilotage.models.motion.motion import MotionConfig
 from pilotage.sensors.beacon import BeaconConfig
+from pilotage.sensors.compass import CompassConfig
+from pilotage.sensors.gps import GpsConfig
 from pilotage.sensors.readings import BeaconReadings, OdometryIncrement, Readings
 from pilotage.sensors.wheel_odometry import WheelOdometryConfig
 from pilotage.sim.source import RobotSpec, Simulator
@@ -40,7 +42,12 @@ SEER = BeaconConfig(
     range_var_m2=0.01,
     bearing_var_rad2=1.9e-5,
 )
-SENSORS = {"odometer": ODOMETER, "lidar": SEER}
+SENSORS = {
+    "odometer": ODOMETER,
+    "lidar": SEER,
+    "gps": GpsConfig(),
+    "compass": CompassConfig(rate_hz=1.0),
+}
 DT_S = 1.0
 BODY = Footprint.disc(0.5)
 MOTION = BicycleConfig(
@@ -83,7 +90,7 @@ def _follows_the_bend(factory: Any, config: Any) -> None:
     assert beliefs[0].pose == beliefs[1].pose
 
 
-dead_reckoning_follows_the_bend = _follows_the_bend
+dead_reckoning_follows_the_bend = gps_filter_follows_the_bend = _follows_the_bend
 
 
 def rover_filter_follows(factory: Any, config: Any) -> None:

@@ -11,7 +11,7 @@ from pilotage.sensors.sensor import SENSORS, NonNegative, Positive, SensorConfig
 class GpsConfig(SensorConfig):
     """Position of the antenna with white noise and a Gauss-Markov bias; some fixes fail to come.
 
-    No localizer that is shipped reads it: it is there for one of your own.
+    The localizer ``ekf-gps`` reads it.
 
     The bias of each axis is stationary: its standard deviation does not change, its correlation falls by e
     in ``bias_time_s`` (Gelb 1974, section 2.2).

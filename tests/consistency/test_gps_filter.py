@@ -1,0 +1,102 @@
+"""Consistency of the filter on position fixes, with and without a compass, and one that is told too little.
+
+False-alarm rates: NEES of 40 drives at a step is chi-square with 120 degrees of freedom over 40; a band of
+99.9 % at each of four steps alarms falsely in fewer than 1 of 250 draws of the seeds.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from scipy.stats import chi2
+
+from pilotage.core.random import RandomStreams
+from pilotage.core.types import FloatArray, Pose2, Twist
+from pilotage.maps.world_map import WorldMap
+from pilotage.models.footprint import Footprint
+from pilotage.models.motion.differential_drive import DifferentialDriveConfig
+from pilotage.sensors.compass import CompassConfig
+from pilotage.sensors.gps import GpsConfig
+from pilotage.sensors.readings import GpsFix, OdometryIncrement, Reading, Readings
+from pilotage.sensors.sensor import Mount, SensorConfig
+from pilotage.sensors.wheel_odometry import WheelOdometryConfig
+from pilotage.sim.source import RobotSpec, Simulator
+from pilotage.sim.worlds.world import World
+from pilotage.stack.interface import Belief, BeliefStatus
+from pilotage.stack.journal import Journal
+from pilotage.stack.knowledge import RobotKnowledge
+from pilotage.stack.localization.ekf_gps import EkfGpsConfig, EkfGpsLocalizer
+
+OPEN = WorldMap("open", (-500.0, -500.0, 500.0, 500.0))
+DT_S, BODY, MOTION = 0.2, Footprint.disc(0.3), DifferentialDriveConfig(max_speed_m_s=2.0)
+INITIAL = np.array([0.25, 0.25, 0.01])
+WHEELS = WheelOdometryConfig(rate_hz=5.0, distance_var_m2_per_m=4e-4, angle_var_rad2_per_rad=4e-4)
+GPS = GpsConfig(mount=Mount(x_m=0.4, y_m=-0.2))
+COMPASS = CompassConfig(rate_hz=5.0)
+STEPS, LOOKED_AT = 1500, (100, 400, 900, 1500)
+
+
+def drives(
+    sensors: dict[str, SensorConfig], config: EkfGpsConfig, runs: int
+) -> tuple[FloatArray, FloatArray]:
+    """(runs, 4) NEES and position errors [m] at the steps looked at, of drives that wind over open ground."""
+    values, errors = np.empty((runs, 4)), np.empty((runs, 4))
+    for run in range(runs):
+        streams = RandomStreams(run)
+        rng = np.random.default_rng(1000 + run)
+        start = Pose2.from_array(np.sqrt(INITIAL) * rng.standard_normal(3))
+        sim = Simulator(World.of(OPEN), [RobotSpec("robot", BODY, MOTION, sensors, start, streams)], DT_S)
+        robot = RobotKnowledge(BODY, MOTION, sensors, DT_S, streams)
+        belief = Belief(Pose2(0.0, 0.0, 0.0), np.diag(INITIAL))
+        localizer = EkfGpsLocalizer(config, robot, OPEN, belief, Journal())
+        for step in range(1, STEPS + 1):
+            command = Twist(1.0, 0.3 * math.sin(0.01 * step))
+            belief = localizer.step(sim.step([command])[0])
+            if step in LOOKED_AT:
+                k, truth = LOOKED_AT.index(step), sim.bodies[0].pose
+                off = np.array([belief.pose.x_m - truth.x_m, belief.pose.y_m - truth.y_m, 0.0])
+                off[2] = math.remainder(belief.pose.theta_rad - truth.theta_rad, 2.0 * math.pi)
+                values[run, k] = off @ np.linalg.solve(belief.cov, off)
+                errors[run, k] = math.hypot(off[0], off[1])
+    return values, errors
+
+
+@pytest.mark.parametrize("compass", [True, False])
+def test_it_knows_how_far_off_it_is(compass: bool) -> None:
+    sensors: dict[str, SensorConfig] = {"wheels": WHEELS, "gps": GPS} | (
+        {"compass": COMPASS} if compass else {}
+    )
+    values, errors = drives(sensors, EkfGpsConfig(), 40)
+    low, high = (float(chi2.ppf(share, 120)) / 40.0 for share in (0.0005, 0.9995))
+    assert (values.mean(axis=0) > low).all()
+    assert (values.mean(axis=0) < high).all()
+    assert errors.mean() < 1.0  # a receiver alone is off by 1.4 m
+
+
+def test_who_takes_a_lasting_error_for_noise_is_too_sure() -> None:
+    """What the test above would see if the filter did not know of it."""
+    values, _ = drives({"wheels": WHEELS, "gps": GPS}, EkfGpsConfig(bias_std_m=0.0), 20)
+    assert values[:, 1:].mean() > 6.0
+
+
+def test_a_receiver_that_jumps_for_good_is_doubted_and_then_followed() -> None:
+    """No word of the robot's says that it is localized while it is far from where it believes to be."""
+    robot = RobotKnowledge(BODY, MOTION, {"wheels": WHEELS, "gps": GPS}, DT_S, RandomStreams(0))
+    localizer = EkfGpsLocalizer(
+        EkfGpsConfig(), robot, OPEN, Belief(Pose2(0, 0, 0), np.diag(INITIAL)), Journal()
+    )
+    lost = []
+    for step in range(1, 1500):
+        jump_m = 0.0 if step < 500 else 60.0
+        readings: dict[str, Reading] = {
+            "wheels": OdometryIncrement(0.2, 0.0),
+            "gps": GpsFix(0.2 * step + 0.4, jump_m - 0.2),
+        }
+        belief = localizer.step(Readings(step * DT_S, readings))
+        lost.append(belief.status is BeliefStatus.LOST)
+    assert not any(lost[:500])
+    assert any(lost[500:530])
+    assert not any(lost[-500:])
+    assert belief.pose.y_m == pytest.approx(60.0, abs=2.0)
