@@ -1,4 +1,4 @@
-"""Consistency of the filter on position fixes, with and without a compass, and one that is told too little.
+"""Consistency of `ekf-gps`, the filter on position fixes: with a compass, without, and told too little.
 
 False-alarm rates: NEES of 40 drives at a step is chi-square with 120 degrees of freedom over 40; a band of
 99.9 % at each of four steps alarms falsely in fewer than 1 of 250 draws of the seeds.

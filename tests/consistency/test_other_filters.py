@@ -33,6 +33,7 @@ ASKED_IN = {
     "ekf-augmented": "test_augmented_filter.py",
     "ekf-landmarks": "test_landmark_filter.py",
     "ekf-gauss-markov": "../unit/test_localize_logs.py",
+    "ekf-gps": "test_gps_filter.py",
     "ekf-walls": "test_wall_filter.py",
     "ekf-walls-report": "test_wall_filter.py",  # which shows that it is not
     "encoder-gyro": "test_heading_filters.py",
