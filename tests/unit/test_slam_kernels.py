@@ -185,13 +185,25 @@ def test_between_undoes_composed(values: list[float]) -> None:
 def test_a_beam_clears_its_way_and_marks_its_end() -> None:
     odds = np.zeros((10, 40), np.int8)
     beams = np.array([2.0, np.nan, np.inf])
-    add_scan(odds, 0.0, 0.0, 0.1, np.array([0.55, 0.55, 0.0]), beams, 0.0, 1e-9, 3.0, 9, 4, 11)
+    add_scan(odds, 0.0, 0.0, 0.1, np.array([0.55, 0.55, 0.0]), beams, 0.0, 1e-9, 3.0, 9, 4, 11, 9)
     assert odds[5, 25] == 9 - 4
     assert (odds[5, 6:25] == -8).all()
     assert odds[5, 36:].max() <= 0
     assert (odds[:5] == 0).all()
-    add_scan(odds, 0.0, 0.0, 0.1, np.array([0.55, 0.55, 0.0]), beams, 0.0, 1e-9, 3.0, 9, 4, 11)
+    add_scan(odds, 0.0, 0.0, 0.1, np.array([0.55, 0.55, 0.0]), beams, 0.0, 1e-9, 3.0, 9, 4, 11, 9)
     assert (odds[5, 6:25] == -11).all()
+
+
+def test_a_beam_that_nothing_came_back_from_ends_at_a_wall() -> None:
+    """What lies behind stays unknown, and the wall a wall; a cell that one scan alone marked is cleared."""
+    odds = np.zeros((3, 60), np.int8)
+    odds[1, 30], odds[1, 15] = 18, 9
+    add_scan(
+        odds, 0.0, 0.0, 0.1, np.array([0.05, 0.15, 0.0]), np.array([np.inf]), 0.0, 1e-9, 5.0, 9, 4, 40, 9
+    )
+    assert (odds[1, 1:15] == -4).all()
+    assert (odds[1, 15], odds[1, 30]) == (5, 18)
+    assert (odds[1, 31:] == 0).all()
 
 
 def test_lines_go_on_over_beams_that_are_missing() -> None:

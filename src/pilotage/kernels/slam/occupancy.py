@@ -28,6 +28,7 @@ def add_scan(
     hit_odds: int,
     miss_odds: int,
     most_odds: int,
+    wall_odds: int,
 ) -> None:
     """Add a scan to the log-odds (rows, columns) of a grid, row 0 with the least y.
 
@@ -39,6 +40,9 @@ def add_scan(
         (B,) NaN for no measurement; beyond ``farthest_m`` (or infinite) a beam only clears up to there.
     hit_odds, miss_odds, most_odds
         What a hit adds, what a passing beam takes, and where both end (at most 127).
+    wall_odds
+        A beam that nothing came back from says nothing beyond a cell of more than this: it was swallowed by
+        what others saw there (dark paint, glass at a slant), not let through.
     """
     rows, columns = odds.shape
     ox, oy = (pose[0] - corner_x) / cell_m, (pose[1] - corner_y) / cell_m
@@ -65,6 +69,8 @@ def add_scan(
             if min(tc, tr) > reach:
                 break
             if 0 <= row < rows and 0 <= c < columns:
+                if not hit and odds[row, c] > wall_odds:
+                    break
                 odds[row, c] = max(-most_odds, odds[row, c] - miss_odds)
             if tc < tr:
                 tc += dc

@@ -8,7 +8,14 @@ from pilotage.core.types import FloatArray
 from pilotage.kernels.slam.occupancy import OddsArray, add_scan
 from pilotage.maps.occupancy_grid import OccupancyArray, OccupancyGrid
 from pilotage.sensors.lidar import LidarConfig
-from pilotage.stack.mapping.slam.drawing import HIT_ODDS, MISS_ODDS, MOST_ODDS, grid_of, states_of
+from pilotage.stack.mapping.slam.drawing import (
+    HIT_ODDS,
+    MISS_ODDS,
+    MOST_ODDS,
+    WALL_ODDS,
+    grid_of,
+    states_of,
+)
 
 BLOCK_M = 8.0
 """The grid grows by whole blocks."""
@@ -97,6 +104,7 @@ class ScanGrid:
             HIT_ODDS,
             MISS_ODDS,
             MOST_ODDS,
+            WALL_ODDS,
         )
 
     def _grow(self, middle: FloatArray, reach_m: float) -> None:
