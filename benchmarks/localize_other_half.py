@@ -37,6 +37,7 @@ def first_scans(log: LaserLog, count: int) -> LaserLog:
         beams=log.beams[:count],
         first_angle_rad=log.first_angle_rad[:count],
         angle_step_rad=log.angle_step_rad[:count],
+        told_angles=None if log.told_angles is None else log.told_angles[:count],
     )
 
 
