@@ -17,7 +17,7 @@ from numba.core import event
 
 from pilotage.cli.main import main
 
-CPU_S = 60.0
+CPU_S = 30.0
 """Processor time after which a command counts as hung, compiling apart: many times what the slowest takes."""
 WALL_S = 1800.0
 """For what waits without working, such as for a pipe that nobody writes; slow machines take less."""

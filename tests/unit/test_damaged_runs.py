@@ -24,7 +24,7 @@ from support.damaged_runs import damages
 from support.fabricated_run import fabricate_run
 from support.laser_drives import laser_drive
 
-DRAWN = 9
+DRAWN = 16
 """Of each kind of folder; PILOTAGE_DAMAGED_RUNS tries all damages, the fuzz tests draw others."""
 
 

@@ -74,7 +74,7 @@ def test_a_shift_is_found_and_its_size_told() -> None:
 
 
 @given(arrays(np.float64, 12, elements=NUMBERS), arrays(np.float64, 12, elements=NUMBERS))
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=25, deadline=None)
 def test_a_difference_turns_its_sign_with_its_sides(first: np.ndarray, other: np.ndarray) -> None:
     there, back = difference(first, other), difference(other, first)
     assert there.mean == pytest.approx(-back.mean)
