@@ -54,5 +54,34 @@ class MotionConfig(Config):
         return math.inf
 
 
+class LimitedMotionConfig(MotionConfig):
+    """A motion whose speed and turn rate follow the command within limits of acceleration."""
+
+    max_speed_m_s: Positive = 1.0
+    max_turn_rate_rad_s: Positive = 2.0
+    max_acceleration_m_s2: Positive = 2.0
+    max_turn_acceleration_rad_s2: Positive = 8.0
+
+    @property
+    def top_speed_m_s(self) -> float:
+        """Fastest forward speed."""
+        return self.max_speed_m_s
+
+    @property
+    def top_turn_rate_rad_s(self) -> float:
+        """Fastest turn."""
+        return self.max_turn_rate_rad_s
+
+    @property
+    def braking_m_s2(self) -> float:
+        """The acceleration limit holds for braking too."""
+        return self.max_acceleration_m_s2
+
+    @property
+    def turn_acceleration_rad_s2(self) -> float:
+        """How fast it can change its turn rate."""
+        return self.max_turn_acceleration_rad_s2
+
+
 MOTIONS: Registry[MotionConfig] = Registry("motion", "pilotage.models.motion")
 """Motion names to their data sheets; ``sim`` says for each what it truly does."""

@@ -17,8 +17,9 @@ from pilotage.sensors.wheel_odometry import WheelOdometryConfig
 from pilotage.stack.interface import Belief
 from pilotage.stack.journal import Journal
 from pilotage.stack.knowledge import RobotKnowledge
-from pilotage.stack.localization.landmark_filter import LandmarkFilter, LandmarkFilterConfig
+from pilotage.stack.localization.landmark_filter import LandmarkFilter, LandmarkFilterConfig, Update
 from pilotage.stack.localization.localizer import LOCALIZERS
+from pilotage.stack.localization.odometry_prediction import Predict
 
 NAME = "ekf-augmented"
 ERRORS = {"distance_scale": "1", "angle_scale": "1", "angle_bias_rad_s": "rad/s", "bearing_offset_rad": "rad"}
@@ -76,6 +77,8 @@ class EkfAugmentedLocalizer(LandmarkFilter):
     only, angle scale and bias are one. The covariance says so.
     """
 
+    NAME = NAME
+
     def __init__(
         self,
         config: EkfAugmentedConfig,
@@ -84,9 +87,7 @@ class EkfAugmentedLocalizer(LandmarkFilter):
         initial: Belief,
         journal: Journal,
     ) -> None:
-        super().__init__(
-            NAME, self._predict, augmented.update_range_bearings, config, robot, chart, initial, journal
-        )
+        super().__init__(config, robot, chart, initial, journal)
         believed = config.systematic
         self._walk = np.array(
             [
@@ -119,6 +120,9 @@ class EkfAugmentedLocalizer(LandmarkFilter):
         self._odometry_s: float | None = None
         self._since_s = self._period_s
         self._errors = journal.channel(ERROR_COLUMNS)
+
+    def _kernels(self) -> tuple[Predict, Update]:
+        return self._predict, augmented.update_range_bearings
 
     def step(self, readings: Readings) -> Belief:
         """Predict by the odometry reading less its errors, then update by every beacon seen."""

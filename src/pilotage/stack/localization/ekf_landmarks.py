@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 from pilotage.kernels.filters import ekf
-from pilotage.maps.world_map import WorldMap
-from pilotage.stack.interface import Belief
-from pilotage.stack.journal import Journal
-from pilotage.stack.knowledge import RobotKnowledge
-from pilotage.stack.localization.landmark_filter import LandmarkFilter, LandmarkFilterConfig
+from pilotage.stack.localization.landmark_filter import LandmarkFilter, LandmarkFilterConfig, Update
 from pilotage.stack.localization.localizer import LOCALIZERS
+from pilotage.stack.localization.odometry_prediction import Predict
 
 
 @LOCALIZERS.add("ekf-landmarks", LandmarkFilterConfig)
@@ -21,14 +18,7 @@ class EkfLandmarkLocalizer(LandmarkFilter):
     pose far outside its covariance gates away what could mend it.
     """
 
-    def __init__(
-        self,
-        config: LandmarkFilterConfig,
-        robot: RobotKnowledge,
-        chart: WorldMap,
-        initial: Belief,
-        journal: Journal,
-    ) -> None:
-        super().__init__(
-            "ekf-landmarks", ekf.predict, ekf.update_range_bearings, config, robot, chart, initial, journal
-        )
+    NAME = "ekf-landmarks"
+
+    def _kernels(self) -> tuple[Predict, Update]:
+        return ekf.predict, ekf.update_range_bearings

@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 from pilotage.kernels.filters import ekf, iekf
-from pilotage.maps.world_map import WorldMap
-from pilotage.stack.interface import Belief
-from pilotage.stack.journal import Journal
-from pilotage.stack.knowledge import RobotKnowledge
-from pilotage.stack.localization.landmark_filter import LandmarkFilter, LandmarkFilterConfig
+from pilotage.stack.localization.landmark_filter import LandmarkFilter, LandmarkFilterConfig, Update
 from pilotage.stack.localization.localizer import LOCALIZERS
+from pilotage.stack.localization.odometry_prediction import Predict
 
 
 @LOCALIZERS.add("iekf-landmarks", LandmarkFilterConfig)
@@ -19,14 +16,7 @@ class IteratedEkfLandmarkLocalizer(LandmarkFilter):
     a vague start. Fails as the EKF does without beacons in sight, and gates on the first linearization.
     """
 
-    def __init__(
-        self,
-        config: LandmarkFilterConfig,
-        robot: RobotKnowledge,
-        chart: WorldMap,
-        initial: Belief,
-        journal: Journal,
-    ) -> None:
-        super().__init__(
-            "iekf-landmarks", ekf.predict, iekf.update_range_bearings, config, robot, chart, initial, journal
-        )
+    NAME = "iekf-landmarks"
+
+    def _kernels(self) -> tuple[Predict, Update]:
+        return ekf.predict, iekf.update_range_bearings

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from typing import ClassVar
 
 import numpy as np
 from pydantic import Field
@@ -73,29 +74,27 @@ Update = Callable[..., int]
 
 
 class LandmarkFilter:
-    """A filter with known correspondences; the arithmetic of its two steps is handed in.
+    """A filter with known correspondences; which filter, the kernels of its two steps say.
 
-    Parameters
+    Attributes
     ----------
-    name
+    NAME
         As registered, for messages.
-    predict, update
-        Kernels with the arguments of ``ekf.predict`` and ``ekf.update_range_bearings``.
     """
+
+    NAME: ClassVar[str]
 
     def __init__(
         self,
-        name: str,
-        predict: Predict,
-        update: Update,
         config: LandmarkFilterConfig,
         robot: RobotKnowledge,
         chart: WorldMap,
         initial: Belief,
         journal: Journal,
     ) -> None:
+        name = self.NAME
         require_initial_pose(initial, name)
-        self._update_kernel = update
+        predict, self._update_kernel = self._kernels()
         self._odometry, odometry = robot.one_sensor(WheelOdometryConfig, name)
         self._beacons, beacons = robot.one_sensor(BeaconConfig, name)
         if len(chart.landmarks) == 0:
@@ -128,6 +127,10 @@ class LandmarkFilter:
         self._cov = initial.cov.copy()
         self.belief = initial
         self._telemetry = journal.channel(SIGHTING_COLUMNS)
+
+    def _kernels(self) -> tuple[Predict, Update]:
+        """With the arguments of ``ekf.predict`` and ``ekf.update_range_bearings``."""
+        raise NotImplementedError
 
     def step(self, readings: Readings) -> Belief:
         """Predict by the odometry increment, then update by every beacon seen."""

@@ -20,9 +20,8 @@ from pilotage.stack.exploration.floor_frontiers import Frontier, SeenFloor
 from pilotage.stack.interface import NAVIGATORS, Belief, BeliefStatus, StackStatus
 from pilotage.stack.journal import Journal
 from pilotage.stack.knowledge import RobotKnowledge, TaskKnowledge
-from pilotage.stack.localization.localizer import Localizer
 from pilotage.stack.mapping.scan_grid import ScanGrid, echoes
-from pilotage.stack.navigator.navigator import Parts, localizer_of
+from pilotage.stack.navigator.navigator import LocalizingNavigator, Parts, localizer_of
 
 AHEAD_M = 2.5
 """The local controller is led by a point so far ahead on the path."""
@@ -79,7 +78,7 @@ class Target:
 
 
 @NAVIGATORS.add("floor-frontier", FloorExplorerConfig)
-class FloorExplorer:
+class FloorExplorer(LocalizingNavigator):
     """Explores a floor with a laser scanner until no frontier is left that it can look at.
 
     Goes to the nearest frontier (Yamauchi, 1997), long ones a little sooner; paths are planned over seen free
@@ -104,8 +103,8 @@ class FloorExplorer:
         del chart  # it knows nothing of the floor
         if parts.local_controller is None:
             raise InputError("navigator 'floor-frontier': expected stack.local_controller, found none")
-        self._config, self._journal = config, journal
-        self._localizer: Localizer = localizer_of(parts, "floor-frontier")
+        super().__init__(localizer_of(parts, "floor-frontier"), journal)
+        self._config = config
         self._lidar, self._scanner = robot.one_sensor(LidarConfig, "navigator 'floor-frontier'")
         self._drive = LocalDrive(
             parts.local_controller,
@@ -126,7 +125,6 @@ class FloorExplorer:
         self._left: list[FloatArray] = []
         self._sure_m, self._checked = 0.0, 0
         self._planned_s, self._moved_s, self._moved_from = -math.inf, 0.0, self._start
-        self._status, self._reason = StackStatus.RUNNING, ""
         self._frontiers = 0
         journal.result("grid", self._grid.grid)
         journal.counts |= {"frontiers_seen": 0, "frontiers_left": 0, "loops_sought": 0}
@@ -135,16 +133,6 @@ class FloorExplorer:
         )
 
     _target: Target | None
-
-    @property
-    def belief(self) -> Belief:
-        """The localizer's belief."""
-        return self._localizer.belief
-
-    @property
-    def status(self) -> tuple[StackStatus, str]:
-        """Arrived where it is back, and why it explores no more."""
-        return self._status, self._reason
 
     def step(self, readings: Readings) -> Twist:
         """Localize, look whether there is something better to do, and drive."""
@@ -339,8 +327,7 @@ class FloorExplorer:
 
     def _end(self, t_s: float, status: StackStatus, why: str) -> None:
         self._doing, self._target = Doing.DONE, None
-        self._status, self._reason = status, why
-        self._journal.say(t_s, str(status), why)
+        super()._end(t_s, status, why)
 
     # --- driving ------------------------------------------------------------------------------------
 

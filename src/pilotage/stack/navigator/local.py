@@ -15,12 +15,12 @@ from pilotage.sensors.sensor import NonNegative, Positive
 from pilotage.stack.control.give_way import GiveWay, GiveWayConfig
 from pilotage.stack.control.local.drive import LocalDrive
 from pilotage.stack.control.make_room import MakeRoom, MakeRoomConfig
-from pilotage.stack.interface import NAVIGATORS, Belief, StackStatus
+from pilotage.stack.interface import NAVIGATORS, StackStatus
 from pilotage.stack.journal import Journal
 from pilotage.stack.knowledge import RobotKnowledge, TaskKnowledge
 from pilotage.stack.localization.dead_reckoning import DeadReckoningConfig, DeadReckoningLocalizer
 from pilotage.stack.localization.localizer import Localizer
-from pilotage.stack.navigator.navigator import Parts, check_for_centre, unexplained_of
+from pilotage.stack.navigator.navigator import LocalizingNavigator, Parts, check_for_centre, unexplained_of
 from pilotage.stack.navigator.plan_ahead import PlanAhead, PlanAheadConfig
 from pilotage.stack.perception.moving_bodies import MovingBodies, MovingBodiesConfig
 
@@ -49,7 +49,7 @@ class LocalConfig(Config):
 
 
 @NAVIGATORS.add("local", LocalConfig)
-class LocalNavigator:
+class LocalNavigator(LocalizingNavigator):
     """Hands laser, odometry and goal to the local controller, and its command on.
 
     The controller sees poses that are integrated from the odometry alone, which drift but do not jump.
@@ -74,7 +74,6 @@ class LocalNavigator:
         if parts.local_controller is None:
             raise InputError("navigator 'local': expected stack.local_controller, found none")
         check_for_centre(parts, "local")
-        self._journal = journal
         self._goal_xy_m = (task.goal.x_m, task.goal.y_m)
         self._drive = LocalDrive(
             parts.local_controller,
@@ -85,9 +84,10 @@ class LocalNavigator:
             needed_by="navigator 'local'",
             goal_xy_m=self._goal_xy_m,
         )
-        self._localizer: Localizer = parts.localizer or DeadReckoningLocalizer(
+        localizer: Localizer = parts.localizer or DeadReckoningLocalizer(
             DeadReckoningConfig(), robot, chart, task.initial, journal
         )
+        super().__init__(localizer, journal)
         self._bodies = MovingBodies(config.moving_bodies, robot, chart, unexplained=unexplained_of(parts))
         self._gives_way = GiveWay(config.give_way, robot, self._bodies)
         self._make_room = MakeRoom(config.make_room, robot, chart.field, self._bodies)
@@ -109,18 +109,8 @@ class LocalNavigator:
                 journal,
             )
         self._tolerance_m = min(config.arrival_m or math.inf, task.goal_tolerance_m)
-        self._status, self._reason, self._word = StackStatus.RUNNING, "", ""
+        self._word = ""
         self._channel = journal.channel({"distance_to_go_m": "m"}, first=True)
-
-    @property
-    def belief(self) -> Belief:
-        """The localizer's belief."""
-        return self._localizer.belief
-
-    @property
-    def status(self) -> tuple[StackStatus, str]:
-        """Arrived where the controller says so."""
-        return self._status, self._reason
 
     def step(self, readings: Readings) -> Twist:
         """Localize, move the odometry's pose on, and ask the controller where there is a scan."""
@@ -173,10 +163,6 @@ class LocalNavigator:
         elif word == "closed" and word != self._word:
             self._journal.count("closed")
         self._word = word
-
-    def _end(self, t_s: float, status: StackStatus, why: str) -> None:
-        self._status, self._reason = status, why
-        self._journal.say(t_s, str(status), why)
 
 
 def _apart_m(a: Pose2, b: Pose2) -> float:

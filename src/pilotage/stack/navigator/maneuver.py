@@ -16,11 +16,11 @@ from pilotage.sensors.readings import Readings
 from pilotage.sensors.sensor import Positive
 from pilotage.stack.control.controller import Controller
 from pilotage.stack.control.kanayama import KanayamaConfig, KanayamaController
-from pilotage.stack.interface import NAVIGATORS, Belief, StackStatus
+from pilotage.stack.interface import NAVIGATORS, StackStatus
 from pilotage.stack.journal import Journal
 from pilotage.stack.knowledge import RobotKnowledge, TaskKnowledge
 from pilotage.stack.navigator.global_plan import GlobalPlan
-from pilotage.stack.navigator.navigator import Parts, check_keeps_time, localizer_of
+from pilotage.stack.navigator.navigator import LocalizingNavigator, Parts, check_keeps_time, localizer_of
 from pilotage.stack.navigator.timed_path import laid_out, with_turns
 
 MOST_REPLANS = 8
@@ -47,7 +47,7 @@ class ManeuverConfig(Config):
 
 
 @NAVIGATORS.add("maneuver", ManeuverConfig)
-class ManeuverNavigator:
+class ManeuverNavigator(LocalizingNavigator):
     """Follows a plan with its changes of direction by a speed profile; the plan is made on the true outline.
 
     A robot that turns on the spot does so at the path's corners, so that it drives the very lines of a sweep.
@@ -66,18 +66,17 @@ class ManeuverNavigator:
     ) -> None:
         if task.goal is None or parts.planner is None:
             raise InputError("navigator 'maneuver': expected world.goal and stack.planner, found one missing")
+        super().__init__(localizer_of(parts, "maneuver"), journal)
         self._channel = journal.channel(
             {"ref_x_m": "m", "ref_y_m": "m", "ref_theta_rad": "rad", "distance_to_go_m": "m"}, first=True
         )
-        self._config, self._robot, self._goal, self._journal = config, robot, task.goal, journal
-        self._localizer = localizer_of(parts, "maneuver")
+        self._config, self._robot, self._goal = config, robot, task.goal
         check_keeps_time(parts, "maneuver")
         self._controller: Controller = parts.controller or KanayamaController(config.tracking, robot)
         rng = robot.streams.stream("planner")
         self._plan = GlobalPlan(
             parts.planner, parts.smoother, chart, rng, journal, robot=robot, as_planned=True
         )
-        self._status, self._reason = StackStatus.RUNNING, ""
         self._references: FloatArray = np.zeros((0, 5))
         self._index, self._replans = 0, 0
         self._think(0.0)
@@ -92,8 +91,7 @@ class ManeuverNavigator:
         nothing = np.zeros((0, 3))
         result = plan.make(t_s, self.belief.pose, self._goal, nothing, self._clearances_m())
         if result.path is None or plan.path is None:
-            self._status, self._reason = StackStatus.FAILED, f"{result.status}: {result.reason}"
-            self._journal.say(t_s, "failed", self._reason)
+            self._end(t_s, StackStatus.FAILED, f"{result.status}: {result.reason}")
             return
         braking = self._robot.motion.braking_m_s2
         acceleration = self._config.acceleration_share * (braking if math.isfinite(braking) else 2.0)
@@ -124,16 +122,6 @@ class ManeuverNavigator:
             tried = [outline.radius_m, *(inner_m + margin for margin in BESIDE_INNER_M)]
         return [full, *sorted({clearance for clearance in tried if clearance < full}, reverse=True)]
 
-    @property
-    def belief(self) -> Belief:
-        """The localizer's belief."""
-        return self._localizer.belief
-
-    @property
-    def status(self) -> tuple[StackStatus, str]:
-        """Arrived where the reference has come to its end."""
-        return self._status, self._reason
-
     def step(self, readings: Readings) -> Twist:
         """Localize, move the reference on, and follow it."""
         pose = self._localizer.step(readings).pose
@@ -159,8 +147,7 @@ class ManeuverNavigator:
     def _astray(self, t_s: float) -> Twist:
         self._replans += 1
         if self._replans > MOST_REPLANS:
-            self._status, self._reason = StackStatus.FAILED, "stuck: it cannot keep to its plans"
-            self._journal.say(t_s, "failed", self._reason)
+            self._end(t_s, StackStatus.FAILED, "stuck: it cannot keep to its plans")
         else:
             self._journal.count("replans")
             self._think(t_s)

@@ -9,6 +9,8 @@ from pilotage.stack.control.controller import Controller
 from pilotage.stack.control.escape import Escape
 from pilotage.stack.control.local.role import LocalController
 from pilotage.stack.control.reactive import Reactive
+from pilotage.stack.interface import Belief, StackStatus
+from pilotage.stack.journal import Journal
 from pilotage.stack.localization.heading_filter import HeadingFilter
 from pilotage.stack.localization.localizer import Localizer
 from pilotage.stack.mapping.mapper import Mapper
@@ -36,6 +38,29 @@ class Parts:
     local_controller: LocalController | None = None
     heading: HeadingFilter | None = None
     patrol: PatrolTask | None = None
+
+
+class LocalizingNavigator:
+    """What navigators show of themselves: their localizer's belief, and how the task stands and why."""
+
+    def __init__(self, localizer: Localizer, journal: Journal) -> None:
+        self._localizer, self._journal = localizer, journal
+        self._status, self._reason = StackStatus.RUNNING, ""
+
+    @property
+    def belief(self) -> Belief:
+        """The localizer's belief."""
+        return self._localizer.belief
+
+    @property
+    def status(self) -> tuple[StackStatus, str]:
+        """How the task stands as the robot sees it, and why."""
+        return self._status, self._reason
+
+    def _end(self, t_s: float, status: StackStatus, why: str) -> None:
+        """Arrive or fail, and say so."""
+        self._status, self._reason = status, why
+        self._journal.say(t_s, str(status), why)
 
 
 def localizer_of(parts: Parts, needed_by: str) -> Localizer:

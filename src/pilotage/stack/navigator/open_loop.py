@@ -9,10 +9,10 @@ from pilotage.core.types import STOP, Twist
 from pilotage.maps.world_map import WorldMap
 from pilotage.sensors.readings import Readings
 from pilotage.sensors.sensor import Positive
-from pilotage.stack.interface import NAVIGATORS, Belief, StackStatus
+from pilotage.stack.interface import NAVIGATORS, StackStatus
 from pilotage.stack.journal import Journal
 from pilotage.stack.knowledge import RobotKnowledge, TaskKnowledge
-from pilotage.stack.navigator.navigator import Parts, localizer_of
+from pilotage.stack.navigator.navigator import LocalizingNavigator, Parts, localizer_of
 
 
 class TimedCommand(Config):
@@ -36,7 +36,7 @@ class OpenLoopConfig(Config):
 
 
 @NAVIGATORS.add("open-loop", OpenLoopConfig)
-class OpenLoopNavigator:
+class OpenLoopNavigator(LocalizingNavigator):
     """Commands speeds by the clock whatever the sensors say; localizes meanwhile, looks at nothing.
 
     Arrives when the last command has been carried out for its time. It does not stop for a wall.
@@ -51,6 +51,7 @@ class OpenLoopNavigator:
         parts: Parts,
         journal: Journal,
     ) -> None:
+        super().__init__(localizer_of(parts, "open-loop"), journal)
         alone = TimedCommand(
             duration_s=config.duration_s,
             speed_m_s=config.speed_m_s,
@@ -62,19 +63,6 @@ class OpenLoopNavigator:
         ends_s = np.cumsum([leg.duration_s for leg in legs])
         self._ends = [max(1, round(end_s / robot.dt_s)) for end_s in ends_s.tolist()]
         self._steps = self._leg = 0
-        self._localizer = localizer_of(parts, "open-loop")
-        self._status, self._reason = StackStatus.RUNNING, ""
-        self._journal = journal
-
-    @property
-    def belief(self) -> Belief:
-        """The localizer's belief."""
-        return self._localizer.belief
-
-    @property
-    def status(self) -> tuple[StackStatus, str]:
-        """Running until the time is over."""
-        return self._status, self._reason
 
     def step(self, readings: Readings) -> Twist:
         """Localize; command what the clock says, or stop."""
@@ -85,6 +73,5 @@ class OpenLoopNavigator:
             self._steps += 1
             return self._commands[self._leg]
         if self._status is StackStatus.RUNNING:
-            self._status, self._reason = StackStatus.ARRIVED, "the command was carried out to its end"
-            self._journal.say(readings.t_s, "arrived", self._reason)
+            self._end(readings.t_s, StackStatus.ARRIVED, "the command was carried out to its end")
         return STOP

@@ -7,11 +7,11 @@ from pilotage.core.errors import InputError
 from pilotage.core.types import STOP, Twist
 from pilotage.maps.world_map import WorldMap
 from pilotage.sensors.readings import Readings
-from pilotage.stack.interface import NAVIGATORS, Belief, StackStatus
+from pilotage.stack.interface import NAVIGATORS, StackStatus
 from pilotage.stack.journal import Journal
 from pilotage.stack.knowledge import RobotKnowledge, TaskKnowledge
 from pilotage.stack.navigator.global_plan import GlobalPlan
-from pilotage.stack.navigator.navigator import Parts, localizer_of
+from pilotage.stack.navigator.navigator import LocalizingNavigator, Parts, localizer_of
 
 
 class PlanOnlyConfig(Config):
@@ -19,7 +19,7 @@ class PlanOnlyConfig(Config):
 
 
 @NAVIGATORS.add("plan-only", PlanOnlyConfig)
-class PlanOnlyNavigator:
+class PlanOnlyNavigator(LocalizingNavigator):
     """Plans once from the initial belief and is done; the robot stays where it is."""
 
     def __init__(
@@ -36,28 +36,17 @@ class PlanOnlyNavigator:
             raise InputError(
                 "navigator 'plan-only': expected world.goal and stack.planner, found one missing"
             )
-        self._localizer = localizer_of(parts, "plan-only")
+        super().__init__(localizer_of(parts, "plan-only"), journal)
         rng = robot.streams.stream("planner")
         plan = GlobalPlan(parts.planner, parts.smoother, chart, rng, journal, robot=robot)
         nothing = chart.walls.circles_m[:0]
         journal.result("mapped_circles_m", lambda: nothing)
         result = plan.make(0.0, self.belief.pose, task.goal, nothing, (plan.clearance_m,))
         if result.path is None:
-            self._status, self._reason = StackStatus.FAILED, f"{result.status}: {result.reason}"
-            journal.say(0.0, "failed", self._reason)
+            self._end(0.0, StackStatus.FAILED, f"{result.status}: {result.reason}")
         else:
             self._status, self._reason = StackStatus.ARRIVED, "planned"
             journal.say(0.0, "plan", f"{journal.plans[-1].length_m:.2f} m, nobody drives it")
-
-    @property
-    def belief(self) -> Belief:
-        """The localizer's belief."""
-        return self._localizer.belief
-
-    @property
-    def status(self) -> tuple[StackStatus, str]:
-        """Arrived where there is a plan."""
-        return self._status, self._reason
 
     def step(self, readings: Readings) -> Twist:
         """Stay."""

@@ -11,10 +11,10 @@ from pilotage.core.types import STOP, Pose2, Twist
 from pilotage.maps.world_map import WorldMap
 from pilotage.sensors.readings import Readings
 from pilotage.stack.control.polar_pose import PolarPoseConfig, PolarPoseController
-from pilotage.stack.interface import NAVIGATORS, Belief, StackStatus
+from pilotage.stack.interface import NAVIGATORS, StackStatus
 from pilotage.stack.journal import Journal
 from pilotage.stack.knowledge import RobotKnowledge, TaskKnowledge
-from pilotage.stack.navigator.navigator import Parts, localizer_of
+from pilotage.stack.navigator.navigator import LocalizingNavigator, Parts, localizer_of
 
 
 class PoseConfig(PolarPoseConfig):
@@ -25,7 +25,7 @@ class PoseConfig(PolarPoseConfig):
 
 
 @NAVIGATORS.add("pose", PoseConfig)
-class PoseNavigator:
+class PoseNavigator(LocalizingNavigator):
     """Drives by the polar law from where it believes to be (rover report, chapter 2).
 
     Arrives at the first step at which it believes to be near enough. It looks at no
@@ -45,22 +45,11 @@ class PoseNavigator:
         goal = task.goal
         if goal is None or goal.theta_rad is None:
             raise InputError("navigator 'pose': expected world.goal with theta_rad, found none")
-        self._localizer, self._journal = localizer_of(parts, "pose"), journal
+        super().__init__(localizer_of(parts, "pose"), journal)
         pose = Pose2(goal.x_m, goal.y_m, goal.theta_rad)
         self._law = PolarPoseController(config, pose, robot.motion.top_speed_m_s)
         self._tolerance_m = min(config.arrival_m or math.inf, task.goal_tolerance_m)
-        self._status, self._reason = StackStatus.RUNNING, ""
         self._channel = journal.channel({"distance_to_go_m": "m"})
-
-    @property
-    def belief(self) -> Belief:
-        """The localizer's belief."""
-        return self._localizer.belief
-
-    @property
-    def status(self) -> tuple[StackStatus, str]:
-        """Arrived where it believes to be near enough."""
-        return self._status, self._reason
 
     def step(self, readings: Readings) -> Twist:
         """Localize, and steer by distance and two angles."""
@@ -70,9 +59,7 @@ class PoseNavigator:
         if self._status is not StackStatus.RUNNING:
             return STOP
         if to_go_m <= self._tolerance_m:
-            self._status = StackStatus.ARRIVED
-            self._reason = f"within {self._tolerance_m:g} m of the goal"
-            self._journal.say(readings.t_s, "arrived", self._reason)
+            self._end(readings.t_s, StackStatus.ARRIVED, f"within {self._tolerance_m:g} m of the goal")
             return STOP
         twist = self._law.command(pose.x_m, pose.y_m, pose.theta_rad)
         return twist if math.isfinite(twist.w_rad_s) else STOP

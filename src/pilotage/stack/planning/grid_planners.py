@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from typing import TypeAlias
+from typing import ClassVar, TypeAlias
 
 from pydantic import Field
 
@@ -30,10 +30,10 @@ class GridSearchConfig(Config):
     waypoint_spacing_m: float = Field(1.5, gt=0.0, le=1000.0)
 
 
-@PLANNERS.add("astar", GridSearchConfig)
-@GRID_PLANNERS.add("astar", GridSearchConfig)
-class AstarPlanner:
-    """A* with the octile distance: exactly the shortest path over eight neighbours."""
+class _GridSearch:
+    """A search over cells that answers on grids and, its nodes the cells, on distance fields."""
+
+    ANY_ANGLE: ClassVar[bool] = False
 
     def __init__(self, config: GridSearchConfig) -> None:
         self._config = config
@@ -49,7 +49,19 @@ class AstarPlanner:
 
     def plan(self, request: PlanRequest) -> PlanResult:
         """Answer one query on a distance field."""
-        return plan_over_nodes(request, self._find, self._config.clearance_m, self._config.waypoint_spacing_m)
+        config = self._config
+        return plan_over_nodes(
+            request, self._find, config.clearance_m, config.waypoint_spacing_m, self.ANY_ANGLE
+        )
+
+    def _find(self, space: GridSpace, start: Cell, goal: Cell, tell: bool = False) -> GridPath | None:
+        raise NotImplementedError
+
+
+@PLANNERS.add("astar", GridSearchConfig)
+@GRID_PLANNERS.add("astar", GridSearchConfig)
+class AstarPlanner(_GridSearch):
+    """A* with the octile distance: exactly the shortest path over eight neighbours."""
 
     def _find(self, space: GridSpace, start: Cell, goal: Cell, tell: bool = False) -> GridPath | None:
         return space.shortest(start, goal, self._config.corner_cutting, tell_looked_at=tell)
@@ -57,24 +69,8 @@ class AstarPlanner:
 
 @PLANNERS.add("dijkstra", GridSearchConfig)
 @GRID_PLANNERS.add("dijkstra", GridSearchConfig)
-class DijkstraPlanner:
+class DijkstraPlanner(_GridSearch):
     """Dijkstra's search: as ``astar``, without the estimate of what is left; for comparison."""
-
-    def __init__(self, config: GridSearchConfig) -> None:
-        self._config = config
-
-    @property
-    def clearance_m(self) -> float:
-        """Distance that it keeps from obstacles where a request names none."""
-        return self._config.clearance_m
-
-    def search(self, request: GridRequest) -> GridResult:
-        """Answer one query on a grid."""
-        return _answer(request, self._find)
-
-    def plan(self, request: PlanRequest) -> PlanResult:
-        """Answer one query on a distance field."""
-        return plan_over_nodes(request, self._find, self._config.clearance_m, self._config.waypoint_spacing_m)
 
     def _find(self, space: GridSpace, start: Cell, goal: Cell, tell: bool = False) -> GridPath | None:
         return space.shortest(start, goal, self._config.corner_cutting, Search.DIJKSTRA, tell)
@@ -82,29 +78,13 @@ class DijkstraPlanner:
 
 @PLANNERS.add("theta-star", GridSearchConfig)
 @GRID_PLANNERS.add("theta-star", GridSearchConfig)
-class ThetaStarPlanner:
+class ThetaStarPlanner(_GridSearch):
     """Lazy Theta*: straight lines at any angle, shorter than any path over eight neighbours as a rule.
 
     Near the shortest any-angle path, not always equal to it. Not for cell costs.
     """
 
-    def __init__(self, config: GridSearchConfig) -> None:
-        self._config = config
-
-    @property
-    def clearance_m(self) -> float:
-        """Distance that it keeps from obstacles where a request names none."""
-        return self._config.clearance_m
-
-    def search(self, request: GridRequest) -> GridResult:
-        """Answer one query on a grid."""
-        return _answer(request, self._find)
-
-    def plan(self, request: PlanRequest) -> PlanResult:
-        """Answer one query on a distance field."""
-        return plan_over_nodes(
-            request, self._find, self._config.clearance_m, self._config.waypoint_spacing_m, any_angle=True
-        )
+    ANY_ANGLE = True
 
     def _find(self, space: GridSpace, start: Cell, goal: Cell, tell: bool = False) -> GridPath | None:  # noqa: ARG002
         return space.any_angle(start, goal, self._config.corner_cutting)

@@ -10,8 +10,8 @@ from pilotage.core.types import Twist
 from pilotage.kernels.control.dynamic_window import choose_in_window
 from pilotage.sensors.sensor import NonNegative, Positive
 from pilotage.stack.control.local.role import LOCAL_CONTROLLERS, LocalView
-from pilotage.stack.control.local.rolling import RollingConfig, RollingGround, Scene
-from pilotage.stack.control.local.rolling_step import rolling_step, what_it_does
+from pilotage.stack.control.local.rolling import RollingConfig, Scene
+from pilotage.stack.control.local.rolling_step import RollingController
 
 
 class DwaConfig(Config):
@@ -31,7 +31,7 @@ class DwaConfig(Config):
 
 
 @LOCAL_CONTROLLERS.add("dwa", DwaConfig)
-class Dwa:
+class Dwa(RollingController):
     """The best arc of constant rates among those within reach that can still stop (Fox et al. 1997).
 
     The goal's direction in the objective is replaced by the time to go, as with a global planner behind it.
@@ -40,20 +40,8 @@ class Dwa:
 
     def __init__(self, config: DwaConfig, generator: np.random.Generator) -> None:
         del generator  # nothing here is drawn
+        super().__init__(config.ground)
         self._config = config
-        self._ground = RollingGround(config.ground)
-        self._status = "waiting"
-
-    @property
-    def status(self) -> str:
-        """What it is doing, in a word."""
-        return self._status
-
-    def step(self, view: LocalView) -> Twist:
-        """Take the view in and give the next command."""
-        command, scene = rolling_step(self._ground, view, self._decide)
-        self._status = what_it_does(command, scene, view)
-        return command
 
     def _decide(self, view: LocalView, scene: Scene) -> Twist:
         del view

@@ -15,8 +15,8 @@ from pilotage.kernels.control.rollouts import follow_path
 from pilotage.kernels.control.togo import togo_at
 from pilotage.sensors.sensor import NonNegative, Positive
 from pilotage.stack.control.local.role import LOCAL_CONTROLLERS, LocalView
-from pilotage.stack.control.local.rolling import RollingConfig, RollingGround, Scene
-from pilotage.stack.control.local.rolling_step import rolling_step, what_it_does
+from pilotage.stack.control.local.rolling import RollingConfig, Scene
+from pilotage.stack.control.local.rolling_step import RollingController
 
 SPACING_M = 0.1
 
@@ -43,7 +43,7 @@ class TebConfig(Config):
 
 
 @LOCAL_CONTROLLERS.add("teb", TebConfig)
-class Teb:
+class Teb(RollingController):
     """Elastic bands (Quinlan and Khatib 1993) with time-optimal speeds, one a homotopy class.
 
     After Roesmann et al. (2017), who choose among classes by time; here position and time are optimized one
@@ -54,21 +54,9 @@ class Teb:
 
     def __init__(self, config: TebConfig, generator: np.random.Generator) -> None:
         del generator  # nothing here is drawn
+        super().__init__(config.ground)
         self._config = config
-        self._ground = RollingGround(config.ground)
         self._band: FloatArray | None = None
-        self._status = "waiting"
-
-    @property
-    def status(self) -> str:
-        """What it is doing, in a word."""
-        return self._status
-
-    def step(self, view: LocalView) -> Twist:
-        """Take the view in and give the next command."""
-        command, scene = rolling_step(self._ground, view, self._decide)
-        self._status = what_it_does(command, scene, view)
-        return command
 
     def _decide(self, view: LocalView, scene: Scene) -> Twist:
         del view

@@ -25,8 +25,8 @@ from pilotage.kernels.control.togo import UNREACHED_S, togo_at
 from pilotage.sensors.sensor import NonNegative, Positive
 from pilotage.stack.control.local.narrow_passage import NarrowPassage, find_narrow_passage
 from pilotage.stack.control.local.role import LOCAL_CONTROLLERS, LocalView
-from pilotage.stack.control.local.rolling import RollingConfig, RollingGround, Scene
-from pilotage.stack.control.local.rolling_step import rolling_step, what_it_does
+from pilotage.stack.control.local.rolling import RollingConfig, Scene
+from pilotage.stack.control.local.rolling_step import RollingController
 from pilotage.stack.control.local.sampling import NoiseBank
 
 TRIED_M = 0.3
@@ -93,7 +93,7 @@ class GapHorizonConfig(Config):
 
 
 @LOCAL_CONTROLLERS.add("gap-horizon", GapHorizonConfig)
-class GapHorizon:
+class GapHorizon(RollingController):
     """Plans over the seen ground only, and drives only what can still be braked there.
 
     1. The time to go (Dijkstra, speed by clearance, unseen ground taken for free but slow) says where to.
@@ -110,8 +110,8 @@ class GapHorizon:
     """
 
     def __init__(self, config: GapHorizonConfig, generator: np.random.Generator) -> None:
+        super().__init__(config.ground, foresees=True)
         self._config = config
-        self._ground = RollingGround(config.ground, foresees=True)
         self._steps = max(2, round(config.horizon_s / config.step_s))
         self._noise = NoiseBank(
             generator, config.rollouts, self._steps, config.speed_std_m_s, config.turn_std_rad_s
@@ -122,24 +122,10 @@ class GapHorizon:
         self._plan: FloatArray | None = None
         self._since_sampled = config.resample_steps
         self._keep_turning = True
-        self._status = "waiting"
-        self.scene: Scene | None = None
         self._passage: NarrowPassage | None = None
         self._moved_s = self._drove_s = 0.0
         self._tried: list[tuple[float, float]] = []
         self._since: tuple[float, float, float] | None = None
-
-    @property
-    def status(self) -> str:
-        """What it is doing, in a word."""
-        return self._status
-
-    def step(self, view: LocalView) -> Twist:
-        """Take the view in and give the next command."""
-        command, self.scene = rolling_step(self._ground, view, self._decide)
-        self._watch(view, self.scene)
-        self._status = what_it_does(command, self.scene, view)
-        return command
 
     def _decide(self, view: LocalView, scene: Scene) -> Twist:
         config = self._config
@@ -197,7 +183,7 @@ class GapHorizon:
         turns = self._keep_turning and not self._people_are_near(scene)
         return Twist(0.0, curvature * math.copysign(slower, scene.start[3]) if turns else 0.0)
 
-    def _watch(self, view: LocalView, scene: Scene) -> None:
+    def _look_back(self, view: LocalView, scene: Scene) -> None:
         """Where the robot is stuck: try the narrowest place straight, or close it; reopen where all is."""
         config = self._config
         x, y = float(scene.pose[0]), float(scene.pose[1])

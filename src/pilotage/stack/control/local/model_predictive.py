@@ -10,8 +10,8 @@ from pilotage.core.types import Twist
 from pilotage.kernels.control.rollouts import Price, later, rollout_costs, weighted_mean
 from pilotage.sensors.sensor import NonNegative, Positive
 from pilotage.stack.control.local.role import LOCAL_CONTROLLERS, LocalView
-from pilotage.stack.control.local.rolling import RollingConfig, RollingGround, Scene
-from pilotage.stack.control.local.rolling_step import rolling_step, what_it_does
+from pilotage.stack.control.local.rolling import RollingConfig, Scene
+from pilotage.stack.control.local.rolling_step import RollingController
 from pilotage.stack.control.local.sampling import NoiseBank
 
 
@@ -37,7 +37,7 @@ class MppiConfig(Config):
 
 
 @LOCAL_CONTROLLERS.add("mppi", MppiConfig)
-class Mppi:
+class Mppi(RollingController):
     """Model predictive path integral control (Williams et al. 2017) on the seen ground.
 
     The mean of the samples, weighted by exp(-cost / temperature), is the next step's first guess. The mean of
@@ -45,26 +45,14 @@ class Mppi:
     """
 
     def __init__(self, config: MppiConfig, generator: np.random.Generator) -> None:
+        super().__init__(config.ground, foresees=True)
         self._config = config
-        self._ground = RollingGround(config.ground, foresees=True)
         self._steps = max(2, round(config.horizon_s / config.step_s))
         self._noise = NoiseBank(
             generator, config.rollouts, self._steps, config.speed_std_m_s, config.turn_std_rad_s
         )
         self._commands = np.empty((config.rollouts, self._steps, 2))
         self._mean = np.zeros((self._steps, 2))
-        self._status = "waiting"
-
-    @property
-    def status(self) -> str:
-        """What it is doing, in a word."""
-        return self._status
-
-    def step(self, view: LocalView) -> Twist:
-        """Take the view in and give the next command."""
-        command, scene = rolling_step(self._ground, view, self._decide)
-        self._status = what_it_does(command, scene, view)
-        return command
 
     def _decide(self, view: LocalView, scene: Scene) -> Twist:
         config = self._config

@@ -13,8 +13,8 @@ from pilotage.kernels.control.motion_limits import braking_is_free
 from pilotage.kernels.geometry.motion import wrap
 from pilotage.sensors.sensor import NonNegative, Positive
 from pilotage.stack.control.local.role import LOCAL_CONTROLLERS, LocalView
-from pilotage.stack.control.local.rolling import RollingConfig, RollingGround, Scene
-from pilotage.stack.control.local.rolling_step import rolling_step, what_it_does
+from pilotage.stack.control.local.rolling import RollingConfig, Scene
+from pilotage.stack.control.local.rolling_step import RollingController
 
 
 class PursuitConfig(Config):
@@ -34,7 +34,7 @@ class PursuitConfig(Config):
 
 
 @LOCAL_CONTROLLERS.add("pure-pursuit", PursuitConfig)
-class RegulatedPursuit:
+class RegulatedPursuit(RollingController):
     """Regulated pure pursuit (Macenski et al. 2023) on the way that the time to go leads.
 
     Slows in curves and near obstacles, and halves its speed until it can brake on the arc it drives; it does
@@ -43,20 +43,8 @@ class RegulatedPursuit:
 
     def __init__(self, config: PursuitConfig, generator: np.random.Generator) -> None:
         del generator  # nothing here is drawn
+        super().__init__(config.ground)
         self._config = config
-        self._ground = RollingGround(config.ground)
-        self._status = "waiting"
-
-    @property
-    def status(self) -> str:
-        """What it is doing, in a word."""
-        return self._status
-
-    def step(self, view: LocalView) -> Twist:
-        """Take the view in and give the next command."""
-        command, scene = rolling_step(self._ground, view, self._decide)
-        self._status = what_it_does(command, scene, view)
-        return command
 
     def _decide(self, view: LocalView, scene: Scene) -> Twist:
         del view

@@ -2,28 +2,37 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 from pilotage.core.types import STOP, Twist
 from pilotage.stack.control.local.role import LocalView
-from pilotage.stack.control.local.rolling import RollingGround, Scene
-
-Decide = Callable[[LocalView, Scene], Twist]
+from pilotage.stack.control.local.rolling import RollingConfig, RollingGround, Scene
 
 
-def rolling_step(ground: RollingGround, view: LocalView, decide: Decide) -> tuple[Twist, Scene]:
-    """Update the ground, decide unless the goal is reached, and tell the ground what was commanded."""
-    scene = ground.update(view)
-    arrived = scene.distance_m < view.goal_tolerance_m
-    command = STOP if arrived or scene.blind else decide(view, scene)
-    ground.sent(view.t_s, command)
-    return command, scene
+class RollingController:
+    """A local controller on its own rolling ground; what to command there, ``_decide`` says."""
+
+    def __init__(self, ground: RollingConfig, *, foresees: bool = False) -> None:
+        self._ground = RollingGround(ground, foresees=foresees)
+        self.status = "waiting"
+
+    def step(self, view: LocalView) -> Twist:
+        """Take the view in and give the next command."""
+        scene = self._ground.update(view)
+        arrived = scene.distance_m < view.goal_tolerance_m
+        command = STOP if arrived or scene.blind else self._decide(view, scene)
+        self._ground.sent(view.t_s, command)
+        self._look_back(view, scene)
+        self.status = "arrived" if arrived else _word_of(command)
+        return command
+
+    def _decide(self, view: LocalView, scene: Scene) -> Twist:
+        """The command short of the goal, where the laser sees."""
+        raise NotImplementedError
+
+    def _look_back(self, view: LocalView, scene: Scene) -> None:
+        """What a controller makes of a step that is over; most make nothing of it."""
 
 
-def what_it_does(command: Twist, scene: Scene, view: LocalView) -> str:
-    """The command in a word."""
-    if scene.distance_m < view.goal_tolerance_m:
-        return "arrived"
+def _word_of(command: Twist) -> str:
     if command.v_m_s < -0.01:
         return "backing"
     if command.v_m_s > 0.05:

@@ -13,8 +13,8 @@ from pilotage.kernels.control.polar_histogram import best_opening, binary_histog
 from pilotage.kernels.geometry.motion import wrap
 from pilotage.sensors.sensor import NonNegative, Positive
 from pilotage.stack.control.local.role import LOCAL_CONTROLLERS, LocalView
-from pilotage.stack.control.local.rolling import RollingConfig, RollingGround, Scene
-from pilotage.stack.control.local.rolling_step import rolling_step, what_it_does
+from pilotage.stack.control.local.rolling import RollingConfig, Scene
+from pilotage.stack.control.local.rolling_step import RollingController
 
 
 class VfhConfig(Config):
@@ -38,7 +38,7 @@ class VfhConfig(Config):
 
 
 @LOCAL_CONTROLLERS.add("vfh", VfhConfig)
-class Vfh:
+class Vfh(RollingController):
     """VFH+ (Ulrich and Borenstein 1998): the robot is a disc, enlarged obstacles block directions.
 
     Speed: what still stops before the nearest obstacle of the chosen direction, less for a turn. It takes the
@@ -47,22 +47,10 @@ class Vfh:
 
     def __init__(self, config: VfhConfig, generator: np.random.Generator) -> None:
         del generator  # nothing here is drawn
+        super().__init__(config.ground)
         self._config = config
-        self._ground = RollingGround(config.ground)
         self._blocked = np.zeros(config.sectors, dtype=np.bool_)
         self._before = math.nan
-        self._status = "waiting"
-
-    @property
-    def status(self) -> str:
-        """What it is doing, in a word."""
-        return self._status
-
-    def step(self, view: LocalView) -> Twist:
-        """Take the view in and give the next command."""
-        command, scene = rolling_step(self._ground, view, self._decide)
-        self._status = what_it_does(command, scene, view)
-        return command
 
     def _decide(self, view: LocalView, scene: Scene) -> Twist:
         del view
