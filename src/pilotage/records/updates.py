@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from pilotage.core.scan_update import LineVerdict, ScanUpdate
-from pilotage.core.types import FloatArray, IntArray
+from pilotage.core.types import FloatArray
 from pilotage.records.arrays import Arrays, read_arrays, write_arrays
 from pilotage.records.plans import places
 from pilotage.records.reading import broken, clean_text
@@ -29,36 +29,15 @@ class KeptUpdate:
     update: ScanUpdate
 
 
-@dataclass(frozen=True, slots=True)
-class RecordedUpdate:
-    """One update as it is drawn, all in the map frame as it was believed before the update.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RecordedUpdate(ScanUpdate):
+    """One update as it is drawn, when it was and why it was kept.
 
-    Attributes
-    ----------
-    t_s, why
-        When it was, and why it was kept.
-    sensor_pose, sensor_pose_after
-        (3,) of the scanner before and after.
-    points_m, clusters, members
-        (N, 2) the scan, and per point its cluster and its line, -1 for none.
-    ends_m, walls_m
-        (L, 4) the lines, and the walls that they were matched to (nan for none).
-    distances, gate, verdicts
-        Squared Mahalanobis distances (L,), the gate's chi-square value, and what became of each line.
+    All is in the map frame as it was believed before the update, the points and lines as well.
     """
 
     t_s: float
     why: str
-    sensor_pose: FloatArray
-    sensor_pose_after: FloatArray
-    points_m: FloatArray
-    clusters: IntArray
-    members: IntArray
-    ends_m: FloatArray
-    walls_m: FloatArray
-    distances: FloatArray
-    gate: float
-    verdicts: tuple[LineVerdict, ...]
 
 
 def update_arrays(updates: Iterable[KeptUpdate]) -> Mapping[str, Any]:

@@ -3,20 +3,18 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 from pilotage.core.errors import InputError
-from pilotage.core.types import Event
 from pilotage.evaluation.driving import driving_metrics, header, poses
 from pilotage.evaluation.finished import FinishedRun, RobotRun, Verdict
 from pilotage.evaluation.floor_map import floor_map_metrics
-from pilotage.evaluation.tasks.collisions import CollisionWatch
-from pilotage.evaluation.tasks.task import Attempt, TaskSetting, all_ended
-from pilotage.evaluation.tasks.team import verdict
+from pilotage.evaluation.tasks.task import Attempt, TaskSetting
+from pilotage.evaluation.tasks.watched import WatchedTask
 from pilotage.maps.occupancy_grid import OccupancyGrid
 
 
-class FloorExploration:
+class FloorExploration(WatchedTask):
     """Looks at robots that explore a floor.
 
     Over at the first collision, or when nobody explores any more; a success where the robot says that it is
@@ -29,31 +27,15 @@ class FloorExploration:
                 "task 'explore': expected a sheet with cells or a floor with walls as world.map, "
                 f"found '{setting.chart.name}'"
             )
-        self.columns: Mapping[str, str] = {}
-        self.events: list[Event] = []
+        super().__init__()
         self._least_mapped, self._return_m = least_mapped, return_m
-        self._watch = CollisionWatch(self.events)
-
-    def step(self, t_s: float, attempts: Sequence[Attempt]) -> str | None:
-        """Over at the first collision, or when nobody explores any more."""
-        collision = self._watch.step(t_s, attempts)
-        if collision is not None:
-            return collision
-        return "" if all_ended(attempts) else None
-
-    def row(self, index: int) -> tuple[float, ...]:  # noqa: ARG002
-        """Nothing beyond what every trace has."""
-        return ()
 
     def progress(self, attempts: Sequence[Attempt]) -> tuple[tuple[str, str], ...]:
         """How far the robots drove."""
         return (("driven", f"{sum(attempt.body.driven_m for attempt in attempts):>6.1f} m"),)
 
-    def judge(self, run: FinishedRun) -> Verdict:
+    def judge_robot(self, run: FinishedRun, robot: RobotRun) -> Verdict:
         """Outcome, what of the floor is mapped and how well, pose errors."""
-        return verdict([self._judged(run, robot) for robot in run.robots], run)
-
-    def _judged(self, run: FinishedRun, robot: RobotRun) -> Verdict:
         grid = robot.results.get("grid")
         driven, nees = driving_metrics(run, robot)
         metrics = header(run, robot) | driven

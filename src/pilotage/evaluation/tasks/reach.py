@@ -4,23 +4,22 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import ClassVar, Literal
+from typing import Literal
 
 import numpy as np
 
 from pilotage.core.angles import wrap_to_pi
 from pilotage.core.config import Config
 from pilotage.core.errors import InputError
-from pilotage.core.types import Event, FloatArray, Pose2
+from pilotage.core.types import FloatArray, Pose2
 from pilotage.evaluation.cell_plans import route_metrics, route_of
 from pilotage.evaluation.driving import driving_metrics, header, planning_metrics, poses, shortest_for
 from pilotage.evaluation.finished import FinishedRun, RobotRun, Verdict
 from pilotage.evaluation.halls import hall_offset_m
 from pilotage.evaluation.least_time import least_drive_metrics
 from pilotage.evaluation.rounds import rounds_metrics, visited_steps
-from pilotage.evaluation.tasks.collisions import CollisionWatch
-from pilotage.evaluation.tasks.task import TASKS, Attempt, TaskSetting, all_ended
-from pilotage.evaluation.tasks.team import verdict
+from pilotage.evaluation.tasks.task import TASKS, Attempt, TaskSetting
+from pilotage.evaluation.tasks.watched import WatchedTask
 from pilotage.evaluation.terrain import terrain_columns, terrain_metrics
 from pilotage.missions.places import GoalConfig
 
@@ -42,12 +41,8 @@ THERE = "the goal is reached"
 
 
 @TASKS.add("reach", ReachConfig)
-class ReachTask:
+class ReachTask(WatchedTask):
     """Done when every robot says that it has arrived; a success if it truly has, and nothing was touched."""
-
-    columns: Mapping[str, str]
-    goals: tuple[GoalConfig, ...]
-    drives: ClassVar[bool] = True
 
     def __init__(self, config: ReachConfig, setting: TaskSetting) -> None:
         mission = setting.mission
@@ -58,39 +53,29 @@ class ReachTask:
             raise InputError(
                 "task.ends_there: expected task.order 'given', found 'best', in which robots choose the last"
             )
-        self.columns, self.goals, self.any_order = {}, config.goals, config.order == "best"
+        super().__init__(config.goals)
+        self.any_order = config.order == "best"
         self._ends_there = config.ends_there
         self._last = [
             config.goals[-1] if config.goals else mission.goal_of(robot) for robot in mission.members
         ]
-        self.events: list[Event] = []
-        self._watch = CollisionWatch(self.events)
 
     def step(self, t_s: float, attempts: Sequence[Attempt]) -> str | None:
-        """Over at the first collision, or when nobody is under way any more."""
-        collision = self._watch.step(t_s, attempts)
-        if collision is not None:
-            return collision
-        if self._ends_there and all(
-            goal is not None and _is_there(goal, attempt.body.pose)
-            for goal, attempt in zip(self._last, attempts, strict=True)
+        """Over at the first collision, when nobody is under way any more, or where all are there."""
+        over = super().step(t_s, attempts)
+        if (
+            not over
+            and self._ends_there
+            and all(
+                goal is not None and _is_there(goal, attempt.body.pose)
+                for goal, attempt in zip(self._last, attempts, strict=True)
+            )
         ):
             return THERE
-        return "" if all_ended(attempts) else None
+        return over
 
-    def row(self, index: int) -> tuple[float, ...]:  # noqa: ARG002
-        """Nothing beyond what every trace has."""
-        return ()
-
-    def progress(self, attempts: Sequence[Attempt]) -> tuple[tuple[str, str], ...]:  # noqa: ARG002
-        """Nothing beyond what every progress line has."""
-        return ()
-
-    def judge(self, run: FinishedRun) -> Verdict:
+    def judge_robot(self, run: FinishedRun, robot: RobotRun) -> Verdict:
         """Position errors, consistency, path quality, clearance, and whether the goal was reached."""
-        return verdict([self._judged(run, robot) for robot in run.robots], run)
-
-    def _judged(self, run: FinishedRun, robot: RobotRun) -> Verdict:
         shortest = shortest_for(run, robot)
         route = route_of(robot)
         metrics = header(run, robot)

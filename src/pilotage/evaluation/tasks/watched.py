@@ -7,7 +7,6 @@ from typing import ClassVar
 
 from pilotage.core.types import Event
 from pilotage.evaluation.finished import FinishedRun, RobotRun, Verdict
-from pilotage.evaluation.tasks.collisions import CollisionWatch
 from pilotage.evaluation.tasks.task import Attempt, all_ended
 from pilotage.evaluation.tasks.team import verdict
 from pilotage.missions.places import GoalConfig
@@ -23,13 +22,14 @@ class WatchedTask:
     def __init__(self, goals: tuple[GoalConfig, ...] = ()) -> None:
         self.columns, self.goals = {}, goals
         self.events: list[Event] = []
-        self._watch = CollisionWatch(self.events)
 
     def step(self, t_s: float, attempts: Sequence[Attempt]) -> str | None:
         """Over at the first collision, or when nobody is under way any more."""
-        collision = self._watch.step(t_s, attempts)
-        if collision is not None:
-            return collision
+        for attempt in attempts:
+            if attempt.body.collisions:
+                self.events.append(Event(t_s, "collision", "the body touched something"))
+                pose = attempt.body.pose
+                return f"collision at ({pose.x_m:.2f}, {pose.y_m:.2f}) after {t_s:.1f} s"
         return "" if all_ended(attempts) else None
 
     def row(self, index: int) -> tuple[float, ...]:  # noqa: ARG002
