@@ -68,9 +68,9 @@ ALLOWED = {
     ("logs/salvage/sqlite.py", "sqlite3.connect"): "in memory, of bytes that came through the door",
     ("cli/main.py", "*.open"): "the null device, where a stream was closed",
     ("cli/study_page.py", "*.read_text"): "the page that was just written",
-    ("report/slam/folder.py", "np.loadtxt"): "of text that came through the door",
     ("report/markup.py", "*.read_text"): "the page's own style sheet",
     ("report/replay/section.py", "*.read_text"): "the player's own script and style sheet",
+    ("report/slam/viewer.py", "*.read_text"): "the viewer's own script",
     ("face/examples.py", "*.read_text"): "the templates that come with pilotage",
     (
         "experiments/studies/engine.py",

@@ -1,4 +1,4 @@
-"""``pilotage report``: write a saved run's, study's or calibration's page again."""
+"""``pilotage report``: write a saved run's, study's, calibration's or map's page again."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ def report(
         Path,
         typer.Argument(
             metavar="RUN|STUDY",
-            help="The folder of a run, a study or a calibration, such as runs/museum-1-0-1a2b3c.",
+            help="The folder of a run, a study, a calibration or a map, such as runs/museum-1-0-1a2b3c.",
         ),
     ],
 ) -> None:
-    """Write report.html into the folder of a run, a study or a calibration and print its path."""
+    """Write report.html into the folder of a run, study, calibration or map and print its path."""
     from pilotage.experiments.studies.study import is_study_folder
 
     if is_study_folder(str(run)):

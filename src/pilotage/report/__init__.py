@@ -24,7 +24,7 @@ def write_report(run_dir: Path, on_damage: Callable[[str], None] | None = None) 
     run_dir
         Folder that a run left behind: ``metrics.json`` and ``trace.parquet`` at least; without the other
         files the figures that need them are left out, with a word. A calibration's folder is told by its
-        ``calibration.json``.
+        ``calibration.json``, a mapped recording's by its ``closures.json``.
     on_damage
         Told one line for each file of a run that cannot be read; the page is written without it and says so.
         None makes it an error, as it always is for what a run is told by (see ``records.run_data.read_run``).
@@ -44,6 +44,12 @@ def write_report(run_dir: Path, on_damage: Callable[[str], None] | None = None) 
         from pilotage.report.calibration.page import write_calibration_report
 
         return write_calibration_report(run_dir)
+    from pilotage.records.slam_folder import is_slam_folder
+
+    if is_slam_folder(run_dir):
+        from pilotage.report.slam.page import write_slam_report
+
+        return write_slam_report(run_dir)
     from pilotage.report.page import write_report as write
 
     return write(run_dir, on_damage)

@@ -125,6 +125,24 @@ TARGETS: tuple[Target, ...] = (
         goes_on=(0,),
     ),
     Target(
+        "report slam",
+        _slam_folder,
+        ("report", "mapped"),
+        tuple(
+            f"mapped/{file}"
+            for file in (
+                "metrics.json",
+                "closures.json",
+                "before.tum",
+                "keyframes.npz",
+                "covariances.npz",
+                "map.yaml",
+            )
+        ),
+        True,
+        goes_on=(0,),
+    ),
+    Target(
         "extend slam",
         _map_and_recording,
         ("slam", "lab.log", "--extend", "mapped", *SHORT),

@@ -21,12 +21,13 @@ MOST_PIXELS = 1000
 _COLOURS = np.array([(0, 0, 0, 0), (0xD3, 0xD9, 0xDF, 255), (0x2F, 0x3B, 0x47, 255)], dtype=np.uint8)
 
 
-def cell_classes(grid: OccupancyGrid) -> tuple[IntArray, FloatArray]:
+def cell_classes(grid: OccupancyGrid, most: int = MOST_PIXELS) -> tuple[IntArray, FloatArray]:
     """Classes of a grid's cells for a picture, row 0 at the top, and its (2,) width and height in metres.
 
-    Blocks of cells of a large grid become one: occupied where one of them is, unknown where all are.
+    Blocks of cells of a grid of more than ``most`` along a side become one: occupied where one of them is,
+    unknown where all are.
     """
-    step = max(1, math.ceil(max(grid.rows, grid.columns) / MOST_PIXELS))
+    step = max(1, math.ceil(max(grid.rows, grid.columns) / most))
     rows, columns = math.ceil(grid.rows / step), math.ceil(grid.columns / step)
     # Whole blocks: rows are added at the top and columns at the right, away from the origin.
     padded = np.full((rows * step, columns * step), UNKNOWN, dtype=np.int8)

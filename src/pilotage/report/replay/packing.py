@@ -16,14 +16,12 @@ from typing import Any
 
 import numpy as np
 
-from pilotage.report.replay.scene import ReplayScene
-
 _LEVEL = 6
 NO_RANGE = 65535
 
 
-def pack(scene: ReplayScene) -> str:
-    """Return the scene for the player, in base64."""
+def pack(scene: object) -> str:
+    """Return a scene, or any other dataclass of arrays, for the page's script, in base64."""
     body = bytearray()
     header = json.dumps(_plain(scene, body), allow_nan=False, separators=(",", ":")).encode()
     header += b" " * (-(len(header) + 4) % 8)

@@ -30,7 +30,7 @@ LONG_SPEEDS = {
     604800.0: "7 days/s",
 }
 LONG_S, PLAY_S = 7200.0, 75.0
-"""A longer run is told in hours and days, as ``player.js`` does, and plays in about so much time."""
+"""A longer run is told in hours and days, as ``player.js`` does; any plays in about so much time at most."""
 
 
 @cache
@@ -47,8 +47,13 @@ def style() -> str:
 
 
 def script_source() -> str:
-    """Return the content security policy's source: this one script may run, and no other."""
-    digest = hashlib.sha256(script().encode("utf-8")).digest()
+    """Return the content security policy's source of the player: this script may run."""
+    return source_of(script())
+
+
+def source_of(text: str) -> str:
+    """Return a content security policy's source: a script of this text may run, and no other."""
+    digest = hashlib.sha256(text.encode("utf-8")).digest()
     return f"'sha256-{base64.b64encode(digest).decode('ascii')}'"
 
 
@@ -76,7 +81,8 @@ def replay_section(scene: ReplayScene | None) -> str:
 def _speeds(scene: ReplayScene) -> str:
     """The choice of speeds: times real time, or for a long run its time in a second."""
     span_s = float(scene.t_s[-1] - scene.t_s[0])
-    names, chosen = {s: f"{s:g} ×" for s in SPEEDS}, SPEED
+    names = {s: f"{s:g} ×" for s in SPEEDS}
+    chosen = next((s for s in SPEEDS if s >= SPEED and span_s <= PLAY_S * s), SPEEDS[-1])
     if span_s > LONG_S:
         names, chosen = LONG_SPEEDS, min(LONG_SPEEDS, key=lambda s: abs(math.log(s * PLAY_S / span_s)))
     return "".join(

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from matplotlib.figure import Figure
 
+from pilotage.records.slam_folder import ClosureRow, SlamFolder, placed
 from pilotage.report.markup import escape
-from pilotage.report.slam.folder import SlamFolder, placed
+from pilotage.report.slam.viewer import MOST_CLOSURES, viewer
 from pilotage.report.style import BLUE, VERMILLION, WIDTH_PT, Illustration, Key, render
 
 COLUMNS = 4
@@ -49,11 +48,11 @@ def closures_figure(data: SlamFolder) -> Illustration:
                 cell / (cell + 26.0) / rows * 0.94,
             )
         )
-        axes.set_title(f"{closure['number']}: {closure['verdict']}", fontsize=7.5)
-        for number, colour in ((closure["earlier_submap"], BLUE), (closure["later_submap"], VERMILLION)):
+        axes.set_title(f"{closure.number}: {closure.verdict}", fontsize=7.5)
+        for number, colour in ((closure.earlier_submap, BLUE), (closure.later_submap, VERMILLION)):
             points = data.submap(number)
             if colour is VERMILLION:
-                points = placed(points, np.array(closure["relative"]))
+                points = placed(points, np.array(closure.relative))
             points = points[:: max(1, len(points) // POINTS)]
             axes.plot(points[:, 0], points[:, 1], ",", color=colour, alpha=0.8, rasterized=True)
         axes.set_xlim(-7.0, 7.0)
@@ -80,12 +79,18 @@ def closures_section(data: SlamFolder) -> str:
         f"<td>{escape(MEANINGS.get(verdict, ''))}</td></tr>"
         for verdict, count in counts.items()
     )
-    listed = sorted(data.closures, key=lambda c: (_interest(c), c["number"]))[:LISTED]
-    rows = "".join(_row(c) for c in sorted(listed, key=lambda c: c["number"]))
-    left = len(data.closures) - len(listed)
-    more = f'<p class="absent">{left} more are in closures.json.</p>' if left else ""
+    kept = sorted(data.closures, key=lambda c: (_interest(c), c.number))[:MOST_CLOSURES]
+    rows = "".join(_row(c) for c in sorted(kept[:LISTED], key=lambda c: c.number))
+    looked = [c for c in sorted(kept, key=lambda c: c.number) if c.score > 0.0]
+    left = len(data.closures) - min(len(kept), LISTED)
+    more = (
+        f'<p class="absent">{left} more can be looked at by number, and are in closures.json.</p>'
+        if left
+        else ""
+    )
     return (
         '<section id="closures"><h2><a href="#closures">Closures, all</a></h2>'
+        f"{viewer(data, looked, [_said(c) for c in looked])}"
         '<table class="metrics"><thead><tr><th scope="col">verdict</th>'
         '<th scope="col" class="value">count</th>'
         f'<th scope="col">why</th></tr></thead><tbody>{summary}</tbody></table>'
@@ -98,34 +103,46 @@ def closures_section(data: SlamFolder) -> str:
     )
 
 
-def _row(c: dict[str, Any]) -> str:
-    chi = "–" if c["chi_square"] is None else f"{c['chi_square']:.1f}"
+def _row(c: ClosureRow) -> str:
+    chi = "–" if c.chi_square is None else f"{c.chi_square:.1f}"
     cells = (
-        f"{'earlier map' if c['earlier_scan'] is None else c['earlier_scan']} ↔ {c['later_scan']}",
-        f"±{c['window_m']:.1f} m",
-        f"{c['score']:.2f}",
-        f"{c['second_score']:.2f}",
-        f"{c['agreement']:.0%}",
+        f"{'earlier map' if c.earlier_scan is None else c.earlier_scan} ↔ {c.later_scan}",
+        f"±{c.window_m:.1f} m",
+        f"{c.score:.2f}",
+        f"{c.second_score:.2f}",
+        f"{c.agreement:.0%}",
         chi,
-        str(c["support"]),
+        str(c.support),
     )
     values = "".join(f'<td class="value">{escape(cell)}</td>' for cell in cells)
-    return f"<tr><td>{c['number']}</td>{values}<td>{escape(c['verdict'])}</td></tr>"
+    return f'<tr data-closure="{c.number}"><td>{c.number}</td>{values}<td>{escape(c.verdict)}</td></tr>'
 
 
-def _interest(c: dict[str, Any]) -> int:
+def _said(c: ClosureRow) -> str:
+    """What the viewer says of a closure, with the reason in full."""
+    chi = "" if c.chi_square is None else f", chi-square {c.chi_square:.1f}"
+    earlier = "of the earlier map" if c.earlier_scan is None else c.earlier_scan
+    why = f" ({MEANINGS[c.verdict]})" if c.verdict in MEANINGS else ""
+    return (
+        f"scans {earlier} and {c.later_scan}, window ±{c.window_m:.1f} m, score {c.score:.2f} "
+        f"(second {c.second_score:.2f}), agreement {c.agreement:.0%}{chi}, seconded by {c.support}: "
+        f"{c.verdict}{why}"
+    )
+
+
+def _interest(c: ClosureRow) -> int:
     """Accepted ones first, then what was refused late; what never matched tells least."""
-    if c["accepted"]:
+    if c.accepted:
         return 0
-    return 2 if c["verdict"] in {"no match", "low score"} else 1
+    return 2 if c.verdict in {"no match", "low score"} else 1
 
 
-def _choice(closures: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    accepted = sorted((c for c in closures if c["accepted"]), key=lambda c: -c["window_m"])
+def _choice(closures: list[ClosureRow]) -> list[ClosureRow]:
+    accepted = sorted((c for c in closures if c.accepted), key=lambda c: -c.window_m)
     chosen = accepted[:ACCEPTED_DRAWN]
-    reasons: dict[str, list[dict[str, Any]]] = {}
-    for c in sorted(closures, key=lambda c: -c["score"]):
-        if not c["accepted"] and c["score"] > 0.0:
-            reasons.setdefault(c["verdict"], []).append(c)
+    reasons: dict[str, list[ClosureRow]] = {}
+    for c in sorted(closures, key=lambda c: -c.score):
+        if not c.accepted and c.score > 0.0:
+            reasons.setdefault(c.verdict, []).append(c)
     refused = [group[k] for k in range(2) for group in reasons.values() if len(group) > k]
     return chosen + refused[:REFUSED_DRAWN]

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from pilotage.core.types import FloatArray
 from pilotage.maps.occupancy_grid import OccupancyArray
-from pilotage.report.slam.folder import SlamFolder
+from pilotage.records.slam_folder import SlamFolder
 from pilotage.report.style import (
     BLUE,
     FAINT,
@@ -130,7 +130,7 @@ def uncertainty_figure(data: SlamFolder) -> Illustration:
     series(heading, t_s, angle, BLUE)
     for axes, values in ((position, largest), (heading, angle)):
         axes.set_ylim(0.0, nice_limit(float(values.max())))
-        ticks = [c["later_t_s"] - data.t_s[0] for c in data.closures if c["accepted"]]
+        ticks = [c.later_t_s - data.t_s[0] for c in data.closures if c.accepted]
         axes.plot(ticks, np.zeros(len(ticks)), "|", color=GREEN, markersize=7.0, clip_on=False)
     time_limits([position, heading], t_s)
     caption = (
@@ -173,10 +173,9 @@ def _square_axes(width_m: float, height_m: float) -> tuple[Figure, Axes]:
 
 
 def _closure_lines(data: SlamFolder, accepted: bool) -> list[FloatArray]:
-    chosen = [c for c in data.closures if c["accepted"] is accepted]
+    chosen = [c for c in data.closures if c.accepted is accepted]
     return [
-        np.array([data.reference(c["earlier_submap"])[:2], data.reference(c["later_submap"])[:2]])
-        for c in chosen
+        np.array([data.reference(c.earlier_submap)[:2], data.reference(c.later_submap)[:2]]) for c in chosen
     ]
 
 

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from pilotage.core.memory import give_back
 from pilotage.core.whole_file import write_whole
+from pilotage.records.slam_folder import SlamFolder, read_slam_folder
 from pilotage.report.markup import contents, document, escape, figure_section, layer_rules, tiles
+from pilotage.report.replay.section import SLUG, TITLE, replay_section, script_source, source_of, style
+from pilotage.report.slam import viewer
 from pilotage.report.slam.closures import closures_figure, closures_section
 from pilotage.report.slam.figures import (
     before_after_figure,
@@ -15,7 +19,7 @@ from pilotage.report.slam.figures import (
     map_figure,
     uncertainty_figure,
 )
-from pilotage.report.slam.folder import SlamFolder, read_slam_folder
+from pilotage.report.slam.replay import slam_scene
 from pilotage.report.style import drawing_style
 
 REPORT_FILE = "report.html"
@@ -65,9 +69,11 @@ def slam_page(data: SlamFolder) -> str:
     m = data.metrics
     sections = [figure_section(n, figure) for n, figure in enumerate(figures, start=1)]
     sections.insert(4, closures_section(data))
-    sections += [_numbers(m), _warnings(m)]
+    sections.insert(1, replay_section(slam_scene(data)))
+    sections += [_numbers(m), _warnings(m), f"<script>{viewer.script()}</script>"]
     entries = [(figure.slug, figure.title) for figure in figures]
     entries.insert(4, ("closures", "Closures, all"))
+    entries.insert(1, (SLUG, TITLE))
     entries += [("numbers", "Numbers")]
     headline = (
         f"{m['scans']} scans over {m['path_length_m']:.0f} m; {m['closures_accepted']} of "
@@ -77,7 +83,8 @@ def slam_page(data: SlamFolder) -> str:
         headline += f" Joined to {Path(m['extends']).name} by {m['closures_joining']} of them."
     return document(
         title=escape(f"Map of {m['log']}"),
-        layers="".join(layer_rules(figure) for figure in figures),
+        layers="".join(layer_rules(figure) for figure in figures) + style() + viewer.STYLE,
+        script_source=f"{script_source()} {source_of(viewer.script())}",
         eyebrow="pilotage slam",
         heading=escape(f"Map of {m['log']}"),
         description="",
@@ -90,7 +97,7 @@ def slam_page(data: SlamFolder) -> str:
     )
 
 
-def _tiles(m: dict[str, Any]) -> list[tuple[str, str]]:
+def _tiles(m: Mapping[str, Any]) -> list[tuple[str, str]]:
     return [
         ("map", f"{m['map_columns'] * m['resolution_m']:.0f} x {m['map_rows'] * m['resolution_m']:.0f} m"),
         ("closed loops", str(m["closures_accepted"])),
@@ -99,7 +106,7 @@ def _tiles(m: dict[str, Any]) -> list[tuple[str, str]]:
     ]
 
 
-def _numbers(m: dict[str, Any]) -> str:
+def _numbers(m: Mapping[str, Any]) -> str:
     rows = "".join(
         f'<tr><th scope="row">{escape(key.replace("_", " "))}</th><td class="value">{_text(m.get(key))}</td>'
         f"<td>{escape(meaning)}</td></tr>"
@@ -113,7 +120,7 @@ def _numbers(m: dict[str, Any]) -> str:
     )
 
 
-def _warnings(m: dict[str, Any]) -> str:
+def _warnings(m: Mapping[str, Any]) -> str:
     lines = "".join(f'<p class="absent">{escape(str(text))}.</p>' for text in m["warnings"])
     return f'<section id="warnings"><h2>What the recording lacked</h2>{lines}</section>' if lines else ""
 
