@@ -196,9 +196,9 @@ class TestWords:
                 entry("planner", duration_s=(-5.0, -6.0, -4.0, True), collisions=(0.0, 0.0, 0.0, False)),
                 entry("mapper", duration_s=(-5.0, -5.0, -5.0, False)),
             ]
-        )
+        ).html
         assert "<b>−5.0</b>" in table
         assert "in every trial" in table
         assert "knows &lt;all&gt;" in table
         assert "collisions" not in table  # nobody changes them
-        assert ranking_table([entry("mapper", duration_s=(0.0, 0.0, 0.0, False))]) == ""
+        assert ranking_table([entry("mapper", duration_s=(0.0, 0.0, 0.0, False))]).html == ""

@@ -109,7 +109,7 @@ def test_a_carried_robot_breaks_the_way(tmp_path: Path) -> None:
 
 
 def test_no_poses_no_replay() -> None:
-    assert "no poses over time" in replay_section(None)
+    assert "no poses over time" in replay_section(None).html
 
 
 def test_long_runs_are_thinned_and_say_so(tmp_path: Path) -> None:
@@ -239,7 +239,7 @@ def test_cells_fill_in_and_empty_again(browser: Browser, tmp_path: Path) -> None
         t_s, (0.0, 0.0, 2.0, 1.0), rasters=(cells,), poses=(PoseTrack("robot", still, still, still, "ink"),)
     )
     page = tmp_path / "page.html"
-    page.write_text(f"<!DOCTYPE html><body>{replay_section(scene)}", encoding="utf-8")
+    page.write_text(f"<!DOCTYPE html><body>{replay_section(scene).html}", encoding="utf-8")
     browser.open(page, READY)
     pixel = f"[...{PLAYER}.map.rasters[0].pixels.data.slice(4, 7)].join()"
     assert browser.js(f"{PLAYER}.seek(4.9) || {pixel}") == "255,255,255"

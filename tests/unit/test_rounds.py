@@ -119,9 +119,9 @@ def test_goals_that_cannot_be_are_refused(overrides: list[str], words: str) -> N
 
 @pytest.mark.parametrize("metrics", [{}, {"goals_m": [[1, 2]], "goals_reached_at_s": [1.0]}, {"goals_m": 3}])
 def test_a_run_without_rounds_has_no_section(metrics: dict[str, Any]) -> None:
-    assert rounds_section(metrics) == ""
+    assert rounds_section(metrics).html == ""
 
 
 def test_damaged_rounds_leave_gaps() -> None:
-    made = rounds_section({"goals_m": [[1, 2], "x", [3]], "goals_reached_at_s": [5.0, None]})
+    made = rounds_section({"goals_m": [[1, 2], "x", [3]], "goals_reached_at_s": [5.0, None]}).html
     assert made.count("not reached") == 2

@@ -159,7 +159,7 @@ def test_sightings_that_do_not_fit_are_left_out(estimated: Path) -> None:
 def test_long_runs_are_told_in_hours_and_play_in_about_a_minute(estimated: Path) -> None:
     scene = terrain_scene(read_run(estimated))
     assert scene is not None
-    section = replay_section(scene)
+    section = replay_section(scene).html
     chosen = next(s for s in LONG_SPEEDS if f'value="{s:.0f}" selected' in section)
     assert 30.0 < scene.t_s[-1] / chosen < 200.0
     assert "ten minutes" in section

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import html
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from importlib import resources
 from string import Template
 
@@ -14,18 +15,89 @@ from pilotage.report.metrics_table import Row
 from pilotage.report.style import Illustration, Key
 
 escape = html.escape
+REPORT_FILE = "report.html"
+"""Every page's name, in the folder that it is about."""
+VALUE, PLAIN, ROW = "value", "value plain", "row"
+"""How a column's cells look: numbers, numbers with something below, the row's own name; else plain text."""
+Columns = Sequence[tuple[str, str]]
+"""Headings, each with how its cells look."""
 
 
-def figure_section(number: int, figure: Illustration) -> str:
-    """Return one numbered figure with its legend and caption."""
-    title = f'<h2><a href="#{figure.slug}">{escape(figure.title)}</a></h2>'
-    if not figure.svg:
-        return f'<section id="{figure.slug}">{title}<p class="absent">{escape(figure.caption)}</p></section>'
-    return (
-        f'<section id="{figure.slug}">{title}<figure>{legend(figure)}'
-        f'<div class="plot" tabindex="0">{figure.svg}</div>'
-        f"<figcaption><b>Figure {number}.</b> {escape(figure.caption)}</figcaption></figure></section>"
+class Html(str):
+    """Markup already: ``table`` does not escape it."""
+
+    __slots__ = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Section:
+    """A part of a page that its contents name; one without ``html`` is left out."""
+
+    slug: str
+    title: str
+    html: str
+
+
+def section(slug: str, title: str, *parts: str) -> Section:
+    """A section of markup under its heading; without any it is left out."""
+    inner = "".join(parts)
+    head = f'<section id="{slug}"><h2><a href="#{slug}">{escape(title)}</a></h2>'
+    return Section(slug, title, f"{head}{inner}</section>" if inner else "")
+
+
+def table(columns: Columns, rows: Iterable[Sequence[str]], look: str = "", *, box: str = "") -> str:
+    """A table of text, or of ``Html``; a row of one cell is a heading over those that follow.
+
+    Parameters
+    ----------
+    look
+        The style sheet's class of the table: ``cells``, ``events``, ``metrics``.
+    box
+        What it may scroll in: ``wide`` or ``long``.
+    """
+    heads = "".join(
+        f'<th scope="col" class="value">{_escaped(name)}</th>'
+        if cells.startswith(VALUE)
+        else f'<th scope="col">{_escaped(name)}</th>'
+        for name, cells in columns
     )
+    body = "".join(_row(columns, row) for row in rows)
+    style = f' class="{look}"' if look else ""
+    made = f"<table{style}><thead><tr>{heads}</tr></thead><tbody>{body}</tbody></table>"
+    return f'<div class="{box}" tabindex="0">{made}</div>' if box else made
+
+
+def _row(columns: Columns, row: Sequence[str]) -> str:
+    if len(row) == 1 < len(columns):
+        title = _escaped(row[0])
+        return f'<tr class="group"><th colspan="{len(columns)}" scope="rowgroup">{title}</th></tr>'
+    return f"<tr>{''.join(_cell(text, look) for text, (_, look) in zip(row, columns, strict=True))}</tr>"
+
+
+def _cell(text: str, look: str) -> str:
+    if look == ROW:
+        return f'<th scope="row">{_escaped(text)}</th>'
+    style = f' class="{look}"' if look else ""
+    return f"<td{style}>{_escaped(text)}</td>"
+
+
+def _escaped(text: str) -> str:
+    return text if isinstance(text, Html) else escape(text)
+
+
+def figure_sections(figures: Sequence[Illustration]) -> list[Section]:
+    """The figures with legend and caption, numbered as they are drawn."""
+    made, number = [], 0
+    for figure in figures:
+        number += bool(figure.svg)
+        inner = f'<p class="absent">{escape(figure.caption)}</p>'
+        if figure.svg:
+            inner = (
+                f'<figure>{legend(figure)}<div class="plot" tabindex="0">{figure.svg}</div><figcaption>'
+                f"<b>Figure {number}.</b> {escape(figure.caption)}</figcaption></figure>"
+            )
+        made.append(section(figure.slug, figure.title, inner))
+    return made
 
 
 def legend(figure: Illustration) -> str:
@@ -68,64 +140,78 @@ def swatch(key: Key) -> str:
     return f'<svg class="swatch" viewBox="0 0 22 12" aria-hidden="true">{shape}</svg>'
 
 
-def metrics_section(groups: Sequence[tuple[str, Sequence[Row]]]) -> str:
-    """Return the table of metrics with what each means."""
-    rows = []
+def metrics_section(groups: Sequence[tuple[str, Sequence[Row]]]) -> Section:
+    """The table of metrics with what each means."""
+    columns = (("what", ROW), ("value", VALUE), ("what it means", ""))
+    rows: list[tuple[str, ...]] = []
     for title, members in groups:
-        rows.append(f'<tr class="group"><th colspan="3" scope="rowgroup">{escape(title)}</th></tr>')
-        rows += [
-            f'<tr><th scope="row">{escape(row.name)}</th><td class="value">{escape(row.value)}</td>'
-            f"<td>{escape(row.meaning)}{_band(row)}</td></tr>"
-            for row in members
-        ]
-    body = "".join(rows) or '<tr><td colspan="3">The run left no numbers.</td></tr>'
-    return (
-        '<section id="metrics"><h2><a href="#metrics">Numbers</a></h2><table class="metrics"><thead><tr>'
-        '<th scope="col">what</th><th scope="col" class="value">value</th><th scope="col">what it means</th>'
-        f"</tr></thead><tbody>{body}</tbody></table></section>"
-    )
+        rows.append((title,))
+        rows += [(row.name, row.value, Html(f"{escape(row.meaning)}{_band(row)}")) for row in members]
+    return section("metrics", "Numbers", table(columns, rows or [("The run left no numbers.",)], "metrics"))
 
 
 def _band(row: Row) -> str:
     return f' <span class="range">95 % band: {escape(row.band)}.</span>' if row.band else ""
 
 
-def events_section(events: Sequence[Event]) -> str:
-    """Return the numbered list of events."""
-    head = '<section id="events"><h2><a href="#events">Events</a></h2>'
+def events_section(events: Sequence[Event]) -> Section:
+    """The numbered list of events."""
     if not events:
-        return f'{head}<p class="absent">Nothing out of the ordinary happened.</p></section>'
+        return section("events", "Events", '<p class="absent">Nothing out of the ordinary happened.</p>')
     rows = []
     for index, event in enumerate(events, start=1):
         kind = event_kind(event.kind)
         time = f"{event.t_s:.1f} s" if event.t_s == event.t_s else quantities.NOTHING
-        rows.append(
-            f'<tr><td><span class="badge" style="border-color:{kind.colour}">{index}</span></td>'
-            f'<td class="value">{time}</td><td>{escape(kind.name)}</td><td>{escape(event.text)}</td></tr>'
-        )
-    return (
-        f'{head}<div class="long"><table class="events"><thead><tr><th scope="col">no.</th>'
-        '<th scope="col" class="value">time</th><th scope="col">kind</th>'
-        '<th scope="col">what happened</th></tr></thead>'
-        f"<tbody>{''.join(rows)}</tbody></table></div></section>"
-    )
+        badge = Html(f'<span class="badge" style="border-color:{kind.colour}">{index}</span>')
+        rows.append((badge, time, kind.name, event.text))
+    columns = (("no.", ""), ("time", VALUE), ("kind", ""), ("what happened", ""))
+    return section("events", "Events", table(columns, rows, "events", box="long"))
 
 
-def tiles(entries: Sequence[tuple[str, str]]) -> str:
-    """Return the few numbers that stand large above everything."""
-    return "".join(f"<div><dt>{escape(name)}</dt><dd>{escape(value)}</dd></div>" for name, value in entries)
+def page(
+    sections: Sequence[Section],
+    figures: Sequence[Illustration] = (),
+    *,
+    title: str,
+    eyebrow: str,
+    footer: str,
+    heading: str = "",
+    descriptions: Sequence[str] = (),
+    outcome: str = "",
+    headline: str = "",
+    tiles: Sequence[tuple[str, str]] = (),
+    rules: str = "",
+    script_source: str = "'none'",
+) -> str:
+    """The whole page.
 
-
-def contents(entries: Sequence[tuple[str, str]]) -> str:
-    """Return the table of contents."""
-    items = "".join(f'<li><a href="#{slug}">{escape(title)}</a></li>' for slug, title in entries)
-    return f'<nav aria-label="Contents"><ol>{items}</ol></nav>'
-
-
-def document(script_source: str = "'none'", **parts: str) -> str:
-    """Return the whole page; ``script_source`` is the one script that its policy lets run."""
+    Parameters
+    ----------
+    figures
+        Those whose layers are switched.
+    heading
+        The title, where none is given.
+    outcome
+        Markup before the headline; all else is text.
+    tiles
+        The few numbers that stand large above everything: (name, value).
+    script_source
+        The one script that the page's policy lets run.
+    """
+    shown = [part for part in sections if part.html]
+    entries = "".join(f'<li><a href="#{part.slug}">{escape(part.title)}</a></li>' for part in shown)
     return _PAGE.substitute(
-        parts,
+        title=escape(title),
+        layers="".join(layer_rules(figure) for figure in figures) + rules,
+        eyebrow=escape(eyebrow),
+        heading=escape(heading or title),
+        description="".join(f'<p class="description">{escape(text)}</p>' for text in descriptions),
+        outcome=outcome,
+        headline=escape(headline),
+        tiles="".join(f"<div><dt>{escape(name)}</dt><dd>{escape(value)}</dd></div>" for name, value in tiles),
+        contents=f'<nav aria-label="Contents"><ol>{entries}</ol></nav>',
+        body="\n".join(part.html for part in shown),
+        footer=escape(footer),
         script_source=script_source,
         style=resources.files(__package__).joinpath("page.css").read_text("utf-8"),
     )

@@ -14,27 +14,21 @@ from pilotage.report.drawn import figures_of, pose_given, scene_of
 from pilotage.report.figures.team import team_figures
 from pilotage.report.headline import headline, outcome
 from pilotage.report.markup import (
-    contents,
-    document,
+    REPORT_FILE,
+    Section,
     escape,
     events_section,
-    figure_section,
-    layer_rules,
+    figure_sections,
     metrics_section,
-    tiles,
+    page,
+    section,
 )
 from pilotage.report.metrics_table import metric_rows
-from pilotage.report.replay.section import SLUG, TITLE, replay_section, script_source, style
+from pilotage.report.replay.section import replay_section, script_source, style
 from pilotage.report.replay.team import team_scene
-from pilotage.report.rounds import SLUG as ROUNDS_SLUG
-from pilotage.report.rounds import TITLE as ROUNDS_TITLE
 from pilotage.report.rounds import rounds_section
 from pilotage.report.style import drawing_style
-from pilotage.report.team import SLUG as TEAM_SLUG
-from pilotage.report.team import TITLE as TEAM_TITLE
 from pilotage.report.team import team_section, team_tiles
-
-REPORT_FILE = "report.html"
 
 ESTIMATED = frozenset({"position_rmse_m", "position_max_m", "heading_rmse_rad", "nees_mean"})
 """What says nothing where the pose was given."""
@@ -75,55 +69,40 @@ def run_page(run: RunData, damaged: Sequence[str] = (), team: Sequence[RunData] 
     with drawing_style():
         figures = team_figures(team) if several else figures_of(run)
         scene = team_scene(team) if several else scene_of(run)
-    sections: list[str] = []
-    entries: list[tuple[str, str]] = []
+    sections: list[Section] = []
     # What was only planned has nothing to replay, and nothing is missing.
     if scene is not None or run.trace.steps:
         sections.append(replay_section(scene))
-        entries.append((SLUG, TITLE))
     if several:
         sections.append(team_section(run.metrics))
-        entries.append((TEAM_SLUG, TEAM_TITLE))
-    drawn = 0
     slugs = [figure.slug for figure in figures]
     explained = next((slug for slug in ("timeline", "coverage") if slug in slugs), slugs[0] if slugs else "")
-    for figure in figures:
-        drawn += bool(figure.svg)
-        sections.append(figure_section(drawn, figure))
-        entries.append((figure.slug, figure.title))
+    for drawn in figure_sections(figures):
+        sections.append(drawn)
         # What happened explains the map and the numbers; the numbers come before their curves.
-        if figure.slug == "map" and (made := rounds_section(run.metrics)):
-            sections.append(made)
-            entries.append((ROUNDS_SLUG, ROUNDS_TITLE))
-        if figure.slug == explained:
+        if drawn.slug == "map":
+            sections.append(rounds_section(run.metrics))
+        if drawn.slug == explained:
             sections += [events_section(run.events), metrics_section(metric_rows(run.metrics))]
-            entries += [("events", "Events"), ("metrics", "Numbers")]
     if run.mission_text:
         sections.append(_mission_section(run.mission_text))
-        entries.append(("mission", "The mission as it ran"))
     description = str(run.mission.get("description") or "")
     source = "recording" if run.recorded else "simulator"
-    return document(
-        title=escape(f"{run.name}: run report"),
-        layers="".join(layer_rules(figure) for figure in figures) + style(),
-        script_source=script_source(),
+    return page(
+        sections,
+        figures,
+        title=f"{run.name}: run report",
+        heading=run.name,
         eyebrow=_eyebrow(run),
-        heading=escape(run.name),
-        description=_paragraphs([*([description] if description else []), *damaged]),
+        descriptions=[*([description] if description else []), *damaged],
         outcome=_outcome(run),
-        headline=escape(headline(run.metrics)),
-        tiles=tiles(team_tiles(run.metrics) if several else _tiles(run)),
-        contents=contents(entries),
-        body="\n".join(sections),
-        footer=escape(
-            f"Made by pilotage from the run folder {run.run_dir.name}. Angles are counter-clockwise; true "
-            f"values come from the {source}, the robot never sees them."
-        ),
+        headline=headline(run.metrics),
+        tiles=team_tiles(run.metrics) if several else _tiles(run),
+        rules=style(),
+        script_source=script_source(),
+        footer=f"Made by pilotage from the run folder {run.run_dir.name}. Angles are counter-clockwise; true "
+        f"values come from the {source}, the robot never sees them.",
     )
-
-
-def _paragraphs(texts: Sequence[str]) -> str:
-    return "".join(f'<p class="description">{escape(text)}</p>' for text in texts)
 
 
 def _eyebrow(run: RunData) -> str:
@@ -131,7 +110,7 @@ def _eyebrow(run: RunData) -> str:
     if run.metrics.get("seed") is not None:
         parts.append(f"seed {run.metrics['seed']}")
     parts.append(f"{quantities.count(run.trace.steps)} steps")
-    return escape(" · ".join(parts))
+    return " · ".join(parts)
 
 
 def _outcome(run: RunData) -> str:
@@ -177,15 +156,16 @@ def _tiles(run: RunData) -> list[tuple[str, str]]:
     return [(name, write(x)) for name, x, write in entries if math.isfinite(x)]
 
 
-def _mission_section(text: str) -> str:
+def _mission_section(text: str) -> Section:
     shown = (
         text
         if len(text) <= _LONGEST_MISSION
         else text[:_LONGEST_MISSION] + "\n# ... the rest is in mission.yaml"
     )
-    return (
-        '<section id="mission"><h2><a href="#mission">The mission as it ran</a></h2>'
+    return section(
+        "mission",
+        "The mission as it ran",
         "<p>The run folder&#x27;s <code>mission.yaml</code> holds everything that is needed to run it again: "
         "<code>pilotage run mission.yaml</code>.</p>"
-        f"<details><summary>Show it</summary><pre>{escape(shown)}</pre></details></section>"
+        f"<details><summary>Show it</summary><pre>{escape(shown)}</pre></details>",
     )

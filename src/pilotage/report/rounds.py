@@ -8,18 +8,18 @@ from typing import Any
 
 from pilotage.records.numbers import number
 from pilotage.report import quantities
-from pilotage.report.markup import escape
+from pilotage.report.markup import VALUE, Section, escape, section, table
 
 SLUG, TITLE = "rounds", "The rounds"
 EXACT = 1e-6
 """A share below this is rounding."""
 
 
-def rounds_section(metrics: Mapping[str, Any]) -> str:
-    """Return the table of goals; empty where there are not several."""
+def rounds_section(metrics: Mapping[str, Any]) -> Section:
+    """The table of goals; left out where there are not several."""
     places, times = metrics.get("goals_m"), metrics.get("goals_reached_at_s")
     if not isinstance(places, list) or not isinstance(times, list) or len(places) < 2:
-        return ""
+        return section(SLUG, TITLE)
     rows, before = [], 0.0
     for index, place in enumerate(places, start=1):
         x, y = (
@@ -31,16 +31,9 @@ def rounds_section(metrics: Mapping[str, Any]) -> str:
         reached = quantities.duration(at_s) if math.isfinite(at_s) else "not reached"
         took = quantities.duration(at_s - before) if math.isfinite(at_s) else quantities.NOTHING
         before = at_s if math.isfinite(at_s) else before
-        rows.append(
-            f'<tr><td>{index}</td><td>({x:.2f}, {y:.2f})</td><td class="value">{escape(reached)}</td>'
-            f'<td class="value">{escape(took)}</td></tr>'
-        )
-    return (
-        f'<section id="{SLUG}"><h2><a href="#{SLUG}">{TITLE}</a></h2><p>{escape(_how_good(metrics))}</p>'
-        '<table class="events"><thead><tr><th scope="col">no.</th><th scope="col">goal [m]</th>'
-        '<th scope="col" class="value">reached after</th><th scope="col" class="value">took</th></tr></thead>'
-        f"<tbody>{''.join(rows)}</tbody></table></section>"
-    )
+        rows.append((str(index), f"({x:.2f}, {y:.2f})", reached, took))
+    columns = (("no.", ""), ("goal [m]", ""), ("reached after", VALUE), ("took", VALUE))
+    return section(SLUG, TITLE, f"<p>{escape(_how_good(metrics))}</p>", table(columns, rows, "events"))
 
 
 def _how_good(metrics: Mapping[str, Any]) -> str:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from html import escape
 from typing import Any
 
 import numpy as np
@@ -17,6 +16,7 @@ from pilotage.records.run_data import RunData
 from pilotage.records.trace import Trace
 from pilotage.report import quantities
 from pilotage.report.headline import own_metrics, succeeded
+from pilotage.report.markup import ROW, VALUE, Html, Section, escape, section, table
 from pilotage.report.style import BLUE, GREEN, INK, ORANGE, PURPLE, SKY, VERMILLION
 
 COLOURS = (BLUE, VERMILLION, GREEN, PURPLE, ORANGE, SKY, INK)
@@ -73,28 +73,23 @@ def team_tiles(metrics: Mapping[str, Any]) -> list[tuple[str, str]]:
     return [("succeeded", f"{good} of {count}"), *told]
 
 
-def team_section(metrics: Mapping[str, Any]) -> str:
-    """Return the table of the robots: each one's outcome and its main numbers."""
+def team_section(metrics: Mapping[str, Any]) -> Section:
+    """The table of the robots: each one's outcome and its main numbers."""
     each = own_metrics(metrics)
     keys = [
         key
         for key in COLUMNS
         if key in METRICS and any(math.isfinite(number(entry.get(key))) for entry in each.values())
     ]
-    head = "".join(f'<th scope="col" class="value">{escape(METRICS.find(key).name)}</th>' for key in keys)
+    columns = [("robot", ROW), ("outcome", ""), *((METRICS.find(key).name, VALUE) for key in keys)]
     rows = [_row(k, name, entry, keys) for k, (name, entry) in enumerate(list(each.items())[:MOST_ROWS])]
-    return (
-        f'<section id="{SLUG}"><h2><a href="#{SLUG}">{TITLE}</a></h2><div class="long"><table class="events">'
-        f'<thead><tr><th scope="col">robot</th><th scope="col">outcome</th>{head}</tr></thead>'
-        f"<tbody>{''.join(rows)}</tbody></table></div></section>"
-    )
+    return section(SLUG, TITLE, table(columns, rows, "events", box="long"))
 
 
-def _row(robot: int, name: str, entry: Mapping[str, Any], keys: Sequence[str]) -> str:
+def _row(robot: int, name: str, entry: Mapping[str, Any], keys: Sequence[str]) -> list[str]:
     reason = str(entry.get("reason") or "")
     outcome = "✓ success" if entry.get("success") is True else f"✗ {reason}"
-    texts = (quantities.measured(number(entry.get(key)), METRICS.find(key).unit) for key in keys)
-    values = "".join(f'<td class="value">{escape(text)}</td>' for text in texts)
+    values = (quantities.measured(number(entry.get(key)), METRICS.find(key).unit) for key in keys)
     badge = f'<span class="badge" style="border-color:{colour_of(robot)}">{robot + 1}</span>'
-    head = f'<th scope="row" style="white-space:nowrap">{badge} {escape(name)}</th>'
-    return f"<tr>{head}<td>{escape(outcome)}</td>{values}</tr>"
+    named = Html(f'<span style="white-space:nowrap">{badge} {escape(name)}</span>')
+    return [named, outcome, *values]

@@ -10,11 +10,10 @@ from pathlib import Path
 from matplotlib.figure import Figure
 
 from pilotage.core.whole_file import write_whole
-from pilotage.evaluation.courses import CourseRun, CourseSummary, by_course, summarize_courses
-from pilotage.evaluation.paired import difference
+from pilotage.evaluation.courses import CourseRun, CourseSummary, summarize_courses
 from pilotage.report.barn.figure import COLOURS, HEIGHT_PT, MARKS
-from pilotage.report.barn.page import REPORT_FILE, percent, section, table
-from pilotage.report.markup import contents, document, escape, figure_section, layer_rules, tiles
+from pilotage.report.barn.pairs import number, outcome, pairs_section, percent, plain_table, replay_link
+from pilotage.report.markup import REPORT_FILE, Section, figure_sections, page, section
 from pilotage.report.style import WIDTH_PT, Illustration, Key, drawing_style, render
 
 HEAD = (
@@ -55,64 +54,56 @@ class ControllersPage:
     replays: Mapping[tuple[str, str, int, int], str] = field(default_factory=dict)
 
 
-def write_controllers_report(folder: Path, page: ControllersPage) -> Path:
+def write_controllers_report(folder: Path, shown: ControllersPage) -> Path:
     """Write ``report.html`` into a folder and return its path."""
     path = folder / REPORT_FILE
-    write_whole(path, controllers_page(page))
+    write_whole(path, controllers_page(shown))
     return path
 
 
-def controllers_page(page: ControllersPage) -> str:
+def controllers_page(shown: ControllersPage) -> str:
     """Return the page as HTML."""
-    families = list(dict.fromkeys(run.family for runs in page.runs.values() for run in runs))
-    best = max(page.runs, key=lambda name: summarize_courses(page.runs[name]).success)
-    found = summarize_courses(page.runs[best])
-    sections = [
-        section("all", "All courses", table(HEAD, [_row(name, runs) for name, runs in page.runs.items()]))
-    ]
-    entries = [("all", "All courses")]
-    for number, family in enumerate(families):
-        slug, title = f"family-{number}", Path(family).stem if "/" in family else family
-        parts = {name: [run for run in runs if run.family == family] for name, runs in page.runs.items()}
-        body = table(HEAD, [_row(name, runs) for name, runs in parts.items()])
-        if any(math.isfinite(run.near_share) for runs in parts.values() for run in runs):
-            body += table(PEOPLE_HEAD, [_people_row(name, runs) for name, runs in parts.items()])
-        if family in page.without_way:
-            body += (
-                f"<p>{page.without_way[family]} courses have no way for this robot and were not driven.</p>"
-            )
-        sections.append(section(slug, title, body))
-        entries.append((slug, title))
+    families = list(dict.fromkeys(run.family for runs in shown.runs.values() for run in runs))
+    best = max(shown.runs, key=lambda name: summarize_courses(shown.runs[name]).success)
+    found = summarize_courses(shown.runs[best])
     figures = []
     if any(family.startswith(BOTTLENECK) for family in families):
         with drawing_style():
-            figures = [_bottlenecks(page)]
-        sections.append(figure_section(1, figures[0]))
-        entries.append((figures[0].slug, figures[0].title))
-    sections += [_pairs(page.runs), _worst(page)]
-    entries += [("pairs", "On the same courses"), ("worst", "Worst runs")]
-    return document(
+            figures = [_bottlenecks(shown)]
+    all_rows = [_row(name, runs) for name, runs in shown.runs.items()]
+    return page(
+        [
+            section("all", "All courses", plain_table(HEAD, all_rows)),
+            *(_family(shown, position, family) for position, family in enumerate(families)),
+            *figure_sections(figures),
+            pairs_section(shown.runs, lambda run: (run.family, run.course), COMPARED),
+            _worst(shown),
+        ],
+        figures,
         title="Controllers",
-        layers="".join(layer_rules(figure) for figure in figures),
         eyebrow="pilotage bench controllers",
         heading="Local controllers on courses of many kinds",
-        description="",
-        outcome="",
-        headline=escape(
-            f"{best}: {percent(found.success)} of {found.trials} runs on {found.courses} courses arrive."
-        ),
-        tiles=tiles(
-            [
-                ("success", percent(found.success)),
-                ("collisions", percent(found.collision)),
-                ("time over bound", _number(found.over_bound, 3)),
-                ("people hit", str(found.people_collisions)),
-            ]
-        ),
-        contents=contents(entries),
-        body="\n".join(sections),
+        headline=f"{best}: {percent(found.success)} of {found.trials} runs on {found.courses} courses "
+        "arrive.",
+        tiles=[
+            ("success", percent(found.success)),
+            ("collisions", percent(found.collision)),
+            ("time over bound", number(found.over_bound, 3)),
+            ("people hit", str(found.people_collisions)),
+        ],
         footer="Made by pilotage.",
     )
+
+
+def _family(shown: ControllersPage, position: int, family: str) -> Section:
+    """The runs on courses of one kind."""
+    parts = {name: [run for run in runs if run.family == family] for name, runs in shown.runs.items()}
+    body = plain_table(HEAD, [_row(name, runs) for name, runs in parts.items()])
+    if any(math.isfinite(run.near_share) for runs in parts.values() for run in runs):
+        body += plain_table(PEOPLE_HEAD, [_people_row(name, runs) for name, runs in parts.items()])
+    if family in shown.without_way:
+        body += f"<p>{shown.without_way[family]} courses have no way for this robot and were not driven.</p>"
+    return section(f"family-{position}", Path(family).stem if "/" in family else family, body)
 
 
 def _row(name: str, runs: Sequence[CourseRun]) -> list[str]:
@@ -125,9 +116,9 @@ def _row(name: str, runs: Sequence[CourseRun]) -> list[str]:
         f"{percent(found.success_low)} to {percent(found.success_high)}",
         percent(found.collision),
         percent(found.timeout),
-        f"{_number(found.time_s, 2)} s",
-        _number(found.over_bound, 3),
-        f"{_number(found.over_bound_low, 3)} to {_number(found.over_bound_high, 3)}",
+        f"{number(found.time_s, 2)} s",
+        number(found.over_bound, 3),
+        f"{number(found.over_bound_low, 3)} to {number(found.over_bound_high, 3)}",
         str(found.trials),
         str(found.courses),
     ]
@@ -139,27 +130,27 @@ def _people_row(name: str, runs: Sequence[CourseRun]) -> list[str]:
         name,
         str(found.people_collisions),
         str(found.people_touches),
-        f"{_number(found.closest_m, 2)} m",
+        f"{number(found.closest_m, 2)} m",
         percent(found.near_share),
         percent(found.time_lost) if math.isfinite(found.time_lost) else "–",
         str(found.trials),
     ]
 
 
-def _bottlenecks(page: ControllersPage) -> Illustration:
+def _bottlenecks(shown: ControllersPage) -> Illustration:
     """Success over the width of the openings."""
     figure = Figure(figsize=(WIDTH_PT / 72.0, HEIGHT_PT / 72.0))
     axes = figure.add_axes((0.08, 0.17, 0.9, 0.78))
     keys = []
-    for number, (name, runs) in enumerate(page.runs.items()):
+    for k, (name, runs) in enumerate(shown.runs.items()):
         by_width: dict[float, list[CourseRun]] = {}
         for run in runs:
             if run.family.startswith(BOTTLENECK):
                 by_width.setdefault(float(run.family.removeprefix(BOTTLENECK)), []).append(run)
         widths = sorted(by_width)
         found = [summarize_courses(by_width[width]) for width in widths]
-        colour = COLOURS[number % len(COLOURS)]
-        axes.plot(widths, [s.success for s in found], MARKS[number % len(MARKS)] + "-", color=colour)
+        colour = COLOURS[k % len(COLOURS)]
+        axes.plot(widths, [s.success for s in found], MARKS[k % len(MARKS)] + "-", color=colour)
         axes.fill_between(
             widths, [s.success_low for s in found], [s.success_high for s in found], color=colour, alpha=0.15
         )
@@ -169,7 +160,7 @@ def _bottlenecks(page: ControllersPage) -> Illustration:
     axes.set_ylim(-0.03, 1.03)
     slug, title = "bottleneck", "Success against the bottleneck"
     alt = "Share of runs that reach the goal over the width of the narrowest opening"
-    shut = {f: n for f, n in page.without_way.items() if f.startswith(BOTTLENECK)}
+    shut = {f: n for f, n in shown.without_way.items() if f.startswith(BOTTLENECK)}
     said = ", ".join(f"{n} of {f.removeprefix(BOTTLENECK)} m" for f, n in shut.items())
     caption = "Courses that a search over all poses finds a way through, with 95 % Wilson bands." + (
         f" Without a way, and not driven: {said}." if said else ""
@@ -177,56 +168,13 @@ def _bottlenecks(page: ControllersPage) -> Illustration:
     return Illustration(slug, title, alt, caption, render(figure, slug, alt), tuple(keys))
 
 
-def _pairs(runs: Mapping[str, Sequence[CourseRun]]) -> str:
-    names = list(runs)
-    if len(names) < 2:
-        text = '<p class="absent">One controller only; name several to compare them on the same courses.</p>'
-        return section("pairs", "On the same courses", text)
+def _worst(shown: ControllersPage) -> Section:
     rows = []
-    for name in names[1:]:
-        for what, digits, value in COMPARED:
-            found = difference(by_course(runs[names[0]], value), by_course(runs[name], value))
-            rows.append(
-                [
-                    f"{what}: {name} minus {names[0]}",
-                    f"{found.mean:+.{digits}f}",
-                    f"{found.low:+.{digits}f} to {found.high:+.{digits}f}",
-                    f"{found.p_value:.2g}" if math.isfinite(found.p_value) else "–",
-                    str(found.n),
-                ]
-            )
-    head = ("what", "mean difference", "95 %", "p (Wilcoxon)", "courses")
-    return section("pairs", "On the same courses", table(head, rows))
-
-
-def _worst(page: ControllersPage) -> str:
-    rows = []
-    for name, runs in page.runs.items():
+    for name, runs in shown.runs.items():
         ordered = sorted(runs, key=lambda run: (not run.collision, run.success, -run.time_s / run.bound_s))
         for run in ordered[:WORST]:
-            word = "reached" if run.success else "collision" if run.collision else "timeout"
-            link = page.replays.get((name, run.family, run.course, run.trial))
-            replay = f'<a href="{escape(link)}">replay</a>' if link else ""
-            cells = [
-                name,
-                Path(run.family).name,
-                str(run.course),
-                str(run.trial),
-                word,
-                f"{run.time_s:.2f} s",
-            ]
-            rows.append("".join(f"<td>{escape(cell)}</td>" for cell in cells) + f"<td>{replay}</td>")
-    head = "".join(
-        f'<th scope="col">{name}</th>'
-        for name in ("controller", "family", "course", "trial", "outcome", "time", "")
-    )
-    body = "".join(f"<tr>{row}</tr>" for row in rows)
-    return section(
-        "worst",
-        "Worst runs",
-        f'<div class="wide"><table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table></div>',
-    )
-
-
-def _number(value: float, digits: int) -> str:
-    return f"{value:.{digits}f}" if math.isfinite(value) else "–"
+            cells = [name, Path(run.family).name, str(run.course), str(run.trial), outcome(run)]
+            link = replay_link(shown.replays.get((name, run.family, run.course, run.trial)))
+            rows.append([*cells, f"{run.time_s:.2f} s", link])
+    heads = ("controller", "family", "course", "trial", "outcome", "time", "")
+    return section("worst", "Worst runs", plain_table(heads, rows))

@@ -14,10 +14,20 @@ from pilotage.report.calibration.drive_figures import drive_figures
 from pilotage.report.calibration.heading_figures import heading_figures
 from pilotage.report.calibration.odometry_figures import odometry_figures
 from pilotage.report.calibration.range_figures import range_figures
-from pilotage.report.markup import contents, document, escape, figure_section, layer_rules, tiles
+from pilotage.report.markup import (
+    REPORT_FILE,
+    ROW,
+    VALUE,
+    Html,
+    Section,
+    escape,
+    figure_sections,
+    page,
+    section,
+    table,
+)
 from pilotage.report.style import drawing_style
 
-REPORT_FILE = "report.html"
 _FIGURES = {
     "odometry": odometry_figures,
     "range": range_figures,
@@ -85,14 +95,14 @@ def write_calibration_report(folder: Path) -> Path:
     """Write ``report.html`` into a calibration folder and return its path."""
     path, data = folder / REPORT_FILE, read_calibration(folder)
     try:
-        page = calibration_page(data)
+        text = calibration_page(data)
     except (KeyError, TypeError, ValueError, IndexError, AttributeError, ArithmeticError) as error:
         # What an answer holds depends on what was calibrated and found: it is checked as it is drawn.
         raise InputError(
             f"{folder / CALIBRATION_FILE}: expected what 'pilotage calibrate' writes, found something that "
             f"cannot be drawn ({type(error).__name__}: {error}); calibrate again"
         ) from None
-    write_whole(path, page)
+    write_whole(path, text)
     return path
 
 
@@ -100,27 +110,16 @@ def calibration_page(data: CalibrationData) -> str:
     """Return the page as HTML."""
     with drawing_style():
         figures = _FIGURES[data.kind](data)
-    sections = [_estimates(data), _offset(data), *(figure_section(i + 1, f) for i, f in enumerate(figures))]
-    entries = [("estimates", "Estimates")]
-    entries += [("offset", "The shape of the offset")] if sections[1] else []
-    entries += [(figure.slug, figure.title) for figure in figures]
-    if data.parameters:
-        sections.append(_parameters(data))
-        entries.append(("parameters", "Parameter file"))
-    title = _TITLES[data.kind]
     source = "simulated calibration runs" if data.answer.get("simulated") else "recorded logs"
-    return document(
-        title=escape(f"{title}: {data.folder.name}"),
-        layers="".join(layer_rules(figure) for figure in figures),
-        eyebrow=escape(f"pilotage calibration · {source}"),
-        heading=escape(title),
-        description="",
-        outcome="",
-        headline=escape(_headline(data.answer)),
-        tiles=tiles(_tiles(data.answer)),
-        contents=contents(entries),
-        body="\n".join(section for section in sections if section),
-        footer=escape(f"Made by pilotage from {data.folder.name}; intervals hold the truth 95 times in 100."),
+    return page(
+        [_estimates(data), _offset(data), *figure_sections(figures), _parameters(data)],
+        figures,
+        title=f"{_TITLES[data.kind]}: {data.folder.name}",
+        heading=_TITLES[data.kind],
+        eyebrow=f"pilotage calibration · {source}",
+        headline=_headline(data.answer),
+        tiles=_tiles(data.answer),
+        footer=f"Made by pilotage from {data.folder.name}; intervals hold the truth 95 times in 100.",
     )
 
 
@@ -160,58 +159,55 @@ def _value(key: str, value: float) -> str:
     return f"{scientific(value, 4 if _unit(key) else 5)} {_unit(key)}".strip()
 
 
-def _estimates(data: CalibrationData) -> str:
+def _estimates(data: CalibrationData) -> Section:
     rows = []
     for key, value in _found(data.answer):
-        low, high = (_value(key, value[end]) for end in ("low", "high"))
-        rows.append(
-            f'<tr><th scope="row">{escape(_name(key))}</th>'
-            f'<td class="value">{escape(_value(key, value["value"]))}</td>'
-            f'<td>{escape(_MEANINGS.get(key, ""))} <span class="range">95 %: {escape(low)} to {escape(high)}.'
-            "</span></td></tr>"
-        )
+        low, high = (escape(_value(key, value[end])) for end in ("low", "high"))
+        band = f'<span class="range">95 %: {low} to {high}.</span>'
+        meaning = Html(f"{escape(_MEANINGS.get(key, ''))} {band}")
+        rows.append((_name(key), _value(key, value["value"]), meaning))
     missing = [_name(key) for key, value in data.answer.items() if value is None]
-    untold = f'<p class="absent">Not told by these logs: {escape(", ".join(missing))}.</p>' if missing else ""
-    warnings = "".join(f'<p class="absent">{escape(text)}.</p>' for text in data.answer.get("warnings", ()))
-    return (
-        '<section id="estimates"><h2><a href="#estimates">Estimates</a></h2>'
-        '<table class="metrics"><thead><tr>'
-        '<th scope="col">what</th><th scope="col" class="value">value</th><th scope="col">what it means</th>'
-        f"</tr></thead><tbody>{''.join(rows)}</tbody></table>{untold}{warnings}</section>"
-    )
+    told = [f"Not told by these logs: {', '.join(missing)}"] if missing else []
+    told += data.answer.get("warnings", ())
+    columns = (("what", ROW), ("value", VALUE), ("what it means", ""))
+    notes = (f'<p class="absent">{escape(text)}.</p>' for text in told)
+    return section("estimates", "Estimates", table(columns, rows, "metrics"), *notes)
 
 
-def _offset(data: CalibrationData) -> str:
-    offset = data.answer.get("offset")
+def _offset(data: CalibrationData) -> Section:
+    slug, title, offset = "offset", "The shape of the offset", data.answer.get("offset")
     if not isinstance(offset, Mapping):
-        return ""
-    rows = "".join(
-        f'<tr><th scope="row">{escape(str(model["shape"]))}</th>'
-        f'<td class="value">{escape(str(model["free_parameters"]))}</td>'
-        f'<td class="value">{1e3 * model["rms_m"]:.3f} mm</td><td>{model["delta_bic"]:.1f}</td></tr>'
+        return section(slug, title)
+    rows = [
+        (
+            str(model["shape"]),
+            str(model["free_parameters"]),
+            f"{1e3 * model['rms_m']:.3f} mm",
+            f"{model['delta_bic']:.1f}",
+        )
         for model in offset["models"]
+    ]
+    columns = (
+        ("shape", ROW),
+        ("free parameters", VALUE),
+        ("error left a step", VALUE),
+        ("BIC above the best (6 is strong, 10 decisive)", ""),
     )
-    return (
-        '<section id="offset"><h2><a href="#offset">The shape of the offset</a></h2>'
-        f"<p><b>{escape(str(offset['shape']))}</b>: {escape(str(offset['explanation']))}.</p>"
-        '<table><thead><tr><th scope="col">shape</th><th scope="col" class="value">free parameters</th>'
-        '<th scope="col" class="value">error left a step</th>'
-        '<th scope="col">BIC above the best (6 is strong, 10 decisive)</th></tr></thead>'
-        f"<tbody>{rows}</tbody></table></section>"
-    )
+    told = f"<p><b>{escape(str(offset['shape']))}</b>: {escape(str(offset['explanation']))}.</p>"
+    return section(slug, title, told, table(columns, rows))
 
 
-def _parameters(data: CalibrationData) -> str:
+def _parameters(data: CalibrationData) -> Section:
+    slug, title = "parameters", "Parameter file"
+    if not data.parameters:
+        return section(slug, title)
     use = (
         "Lay it over another recording: <code>pilotage localize LOG --format mrclam --robot N"
         if data.kind == "commands"
         else "Lay it over any mission: <code>pilotage run MISSION"
     )
-    return (
-        '<section id="parameters"><h2><a href="#parameters">Parameter file</a></h2>'
-        f"<p>{use} --set @parameters.yaml</code>.</p>"
-        f"<pre>{escape(data.parameters)}</pre></section>"
-    )
+    lines = f"<p>{use} --set @parameters.yaml</code>.</p><pre>{escape(data.parameters)}</pre>"
+    return section(slug, title, lines)
 
 
 def _headline(answer: Mapping[str, Any]) -> str:

@@ -6,9 +6,9 @@ import base64
 import hashlib
 import math
 from functools import cache
-from html import escape
 from importlib import resources
 
+from pilotage.report.markup import Section, escape, section
 from pilotage.report.replay.packing import pack
 from pilotage.report.replay.scene import ReplayScene
 
@@ -57,16 +57,17 @@ def source_of(text: str) -> str:
     return f"'sha256-{base64.b64encode(digest).decode('ascii')}'"
 
 
-def replay_section(scene: ReplayScene | None) -> str:
-    """Return the section; without a scene a word about why there is none."""
-    head = f'<section id="{SLUG}"><h2><a href="#{SLUG}">{TITLE}</a></h2>'
+def replay_section(scene: ReplayScene | None) -> Section:
+    """The section; without a scene a word about why there is none."""
     if scene is None:
-        return f'{head}<p class="absent">The run left no poses over time to replay.</p></section>'
+        return section(SLUG, TITLE, '<p class="absent">The run left no poses over time to replay.</p>')
     long = float(scene.t_s[-1] - scene.t_s[0]) > LONG_S
     step = "ten minutes (with shift ten times that)" if long else "a second (with shift ten)"
     note = f" {escape(scene.note)}" if scene.note else ""
-    return (
-        f"{head}{_PLAYER.replace('{speeds}', _speeds(scene))}"
+    return section(
+        SLUG,
+        TITLE,
+        f"{_PLAYER.replace('{speeds}', _speeds(scene))}"
         '<noscript><p class="absent">The replay needs JavaScript; the rest of the page does not.</p>'
         "</noscript>"
         '<p class="absent" id="replay-trouble" role="alert" hidden></p>'
@@ -74,7 +75,7 @@ def replay_section(scene: ReplayScene | None) -> str:
         "+ − zoom, f follows, 0 shows all. Drag or pinch the map; the wheel zooms once the map is clicked. "
         f"A click on a curve goes to that moment.{note}</p>"
         f'<script type="text/plain" id="replay-scene">{pack(scene)}</script>'
-        f"<script>{script()}</script></section>"
+        f"<script>{script()}</script>",
     )
 
 

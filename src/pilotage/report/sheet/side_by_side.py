@@ -10,7 +10,7 @@ from pilotage.core.whole_file import write_whole
 from pilotage.records.numbers import number
 from pilotage.records.run_data import RunData, read_run
 from pilotage.report import quantities
-from pilotage.report.markup import contents, document, escape, figure_section, layer_rules, tiles
+from pilotage.report.markup import figure_sections, page
 from pilotage.report.sheet.maps import ACCURACY_KEYS, draw_features, draw_visits
 from pilotage.report.sheet.panels import sheet_panels
 from pilotage.report.sheet.path import PATH_KEYS, draw_path
@@ -19,7 +19,7 @@ from pilotage.report.style import Illustration, drawing_style, render
 IN_A_ROW = 3
 
 
-def write_side_by_side(folders: Mapping[str, Path], page: Path) -> Path:
+def write_side_by_side(folders: Mapping[str, Path], file: Path) -> Path:
     """Write a page with a panel for each run: its path, its visited cells, its features.
 
     Parameters
@@ -38,23 +38,18 @@ def write_side_by_side(folders: Mapping[str, Path], page: Path) -> Path:
             raise InputError(f"{name}: expected a run on a sheet, found none in {folders[name]}")
     with drawing_style():
         figures = _figures(runs)
-    text = document(
+    coverage = {name: number(run.metrics.get("coverage_visited")) for name, run in runs.items()}
+    text = page(
+        figure_sections(figures),
+        figures,
         title="Runs side by side",
-        layers="".join(layer_rules(figure) for figure in figures),
-        eyebrow=escape(f"pilotage report · {len(runs)} runs"),
-        heading="Runs side by side",
-        description=f'<p class="description">{escape(_told(runs))}</p>',
-        outcome="",
-        headline="",
-        tiles=tiles(
-            [(name, quantities.share(number(r.metrics.get("coverage_visited")))) for name, r in runs.items()]
-        ),
-        contents=contents([(figure.slug, figure.title) for figure in figures]),
-        body="\n".join(figure_section(number, figure) for number, figure in enumerate(figures, start=1)),
+        eyebrow=f"pilotage report · {len(runs)} runs",
+        descriptions=[_told(runs)],
+        tiles=[(name, quantities.share(visited)) for name, visited in coverage.items()],
         footer="Made by pilotage from run folders; the tiles tell the share of all cells that was visited.",
     )
-    write_whole(page, text)
-    return page
+    write_whole(file, text)
+    return file
 
 
 def _figures(runs: Mapping[str, RunData]) -> list[Illustration]:

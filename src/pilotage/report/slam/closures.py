@@ -6,8 +6,8 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from pilotage.records.slam_folder import ClosureRow, SlamFolder, placed
-from pilotage.report.markup import escape
-from pilotage.report.slam.viewer import MOST_CLOSURES, viewer
+from pilotage.report.markup import ROW, VALUE, Html, Section, section, table
+from pilotage.report.slam.viewer import MOST_CLOSURES, script, viewer
 from pilotage.report.style import BLUE, VERMILLION, WIDTH_PT, Illustration, Key, render
 
 COLUMNS = 4
@@ -71,16 +71,12 @@ def closures_figure(data: SlamFolder) -> Illustration:
     return Illustration(slug, title, alt, caption, render(figure, slug, alt), keys)
 
 
-def closures_section(data: SlamFolder) -> str:
-    """Return the table: how many of each verdict, then closure by closure."""
+def closures_section(data: SlamFolder) -> Section:
+    """The table: how many of each verdict, then closure by closure."""
     counts = data.metrics["closures_by_verdict"]
-    summary = "".join(
-        f'<tr><th scope="row">{escape(verdict)}</th><td class="value">{count}</td>'
-        f"<td>{escape(MEANINGS.get(verdict, ''))}</td></tr>"
-        for verdict, count in counts.items()
-    )
+    summary = [(verdict, str(count), MEANINGS.get(verdict, "")) for verdict, count in counts.items()]
     kept = sorted(data.closures, key=lambda c: (_interest(c), c.number))[:MOST_CLOSURES]
-    rows = "".join(_row(c) for c in sorted(kept[:LISTED], key=lambda c: c.number))
+    rows = map(_row, sorted(kept[:LISTED], key=lambda c: c.number))
     looked = [c for c in sorted(kept, key=lambda c: c.number) if c.score > 0.0]
     left = len(data.closures) - min(len(kept), LISTED)
     more = (
@@ -88,34 +84,31 @@ def closures_section(data: SlamFolder) -> str:
         if left
         else ""
     )
-    return (
-        '<section id="closures"><h2><a href="#closures">Closures, all</a></h2>'
-        f"{viewer(data, looked, [_said(c) for c in looked])}"
-        '<table class="metrics"><thead><tr><th scope="col">verdict</th>'
-        '<th scope="col" class="value">count</th>'
-        f'<th scope="col">why</th></tr></thead><tbody>{summary}</tbody></table>'
-        '<div class="long"><table class="events"><thead><tr><th scope="col">no.</th>'
-        '<th scope="col" class="value">scans</th><th scope="col" class="value">window</th>'
-        '<th scope="col" class="value">score</th><th scope="col" class="value">second</th>'
-        '<th scope="col" class="value">agreement</th><th scope="col" class="value">chi-square</th>'
-        '<th scope="col" class="value">seconded by</th><th scope="col">verdict</th></tr></thead>'
-        f"<tbody>{rows}</tbody></table></div>{more}</section>"
+    numbers = ("scans", "window", "score", "second", "agreement", "chi-square", "seconded by")
+    columns = (("no.", ""), *((name, VALUE) for name in numbers), ("verdict", ""))
+    return section(
+        "closures",
+        "Closures, all",
+        viewer(data, looked, [_said(c) for c in looked]),
+        table((("verdict", ROW), ("count", VALUE), ("why", "")), summary, "metrics"),
+        table(columns, rows, "events", box="long"),
+        more,
+        f"<script>{script()}</script>",
     )
 
 
-def _row(c: ClosureRow) -> str:
-    chi = "–" if c.chi_square is None else f"{c.chi_square:.1f}"
-    cells = (
+def _row(c: ClosureRow) -> tuple[str, ...]:
+    return (
+        Html(f'<span data-closure="{c.number}">{c.number}</span>'),
         f"{'earlier map' if c.earlier_scan is None else c.earlier_scan} ↔ {c.later_scan}",
         f"±{c.window_m:.1f} m",
         f"{c.score:.2f}",
         f"{c.second_score:.2f}",
         f"{c.agreement:.0%}",
-        chi,
+        "–" if c.chi_square is None else f"{c.chi_square:.1f}",
         str(c.support),
+        c.verdict,
     )
-    values = "".join(f'<td class="value">{escape(cell)}</td>' for cell in cells)
-    return f'<tr data-closure="{c.number}"><td>{c.number}</td>{values}<td>{escape(c.verdict)}</td></tr>'
 
 
 def _said(c: ClosureRow) -> str:

@@ -9,8 +9,18 @@ from typing import Any
 from pilotage.core.memory import give_back
 from pilotage.core.whole_file import write_whole
 from pilotage.records.slam_folder import SlamFolder, read_slam_folder
-from pilotage.report.markup import contents, document, escape, figure_section, layer_rules, tiles
-from pilotage.report.replay.section import SLUG, TITLE, replay_section, script_source, source_of, style
+from pilotage.report.markup import (
+    REPORT_FILE,
+    ROW,
+    VALUE,
+    Section,
+    escape,
+    figure_sections,
+    page,
+    section,
+    table,
+)
+from pilotage.report.replay.section import replay_section, script_source, source_of, style
 from pilotage.report.slam import viewer
 from pilotage.report.slam.closures import closures_figure, closures_section
 from pilotage.report.slam.figures import (
@@ -22,7 +32,6 @@ from pilotage.report.slam.figures import (
 from pilotage.report.slam.replay import slam_scene
 from pilotage.report.style import drawing_style
 
-REPORT_FILE = "report.html"
 MEANINGS = {
     "scans": "scans of the recording, each with a pose in trajectory.tum",
     "scans_searched": "scans whose neighbourhood was searched because no guess of the motion fitted",
@@ -67,33 +76,26 @@ def slam_page(data: SlamFolder) -> str:
             uncertainty_figure(data),
         ]
     m = data.metrics
-    sections = [figure_section(n, figure) for n, figure in enumerate(figures, start=1)]
+    sections = figure_sections(figures)
     sections.insert(4, closures_section(data))
     sections.insert(1, replay_section(slam_scene(data)))
-    sections += [_numbers(m), _warnings(m), f"<script>{viewer.script()}</script>"]
-    entries = [(figure.slug, figure.title) for figure in figures]
-    entries.insert(4, ("closures", "Closures, all"))
-    entries.insert(1, (SLUG, TITLE))
-    entries += [("numbers", "Numbers")]
+    sections += [_numbers(m), _warnings(m)]
     headline = (
         f"{m['scans']} scans over {m['path_length_m']:.0f} m; {m['closures_accepted']} of "
         f"{m['closures_searched']} compared pairs of stretches closed a loop."
     )
     if "extends" in m:
         headline += f" Joined to {Path(m['extends']).name} by {m['closures_joining']} of them."
-    return document(
-        title=escape(f"Map of {m['log']}"),
-        layers="".join(layer_rules(figure) for figure in figures) + style() + viewer.STYLE,
-        script_source=f"{script_source()} {source_of(viewer.script())}",
+    return page(
+        sections,
+        figures,
+        title=f"Map of {m['log']}",
         eyebrow="pilotage slam",
-        heading=escape(f"Map of {m['log']}"),
-        description="",
-        outcome="",
-        headline=escape(headline),
-        tiles=tiles(_tiles(m)),
-        contents=contents(entries),
-        body="\n".join(section for section in sections if section),
-        footer=escape(f"Made by pilotage from {data.folder.name}."),
+        headline=headline,
+        tiles=_tiles(m),
+        rules=style() + viewer.STYLE,
+        script_source=f"{script_source()} {source_of(viewer.script())}",
+        footer=f"Made by pilotage from {data.folder.name}.",
     )
 
 
@@ -106,26 +108,22 @@ def _tiles(m: Mapping[str, Any]) -> list[tuple[str, str]]:
     ]
 
 
-def _numbers(m: Mapping[str, Any]) -> str:
-    rows = "".join(
-        f'<tr><th scope="row">{escape(key.replace("_", " "))}</th><td class="value">{_text(m.get(key))}</td>'
-        f"<td>{escape(meaning)}</td></tr>"
+def _numbers(m: Mapping[str, Any]) -> Section:
+    rows = [
+        (key.replace("_", " "), _text(m.get(key)), meaning)
         for key, meaning in MEANINGS.items()
         if key in m or key not in OF_EXTENSIONS
-    )
-    return (
-        '<section id="numbers"><h2><a href="#numbers">Numbers</a></h2><table class="metrics"><thead><tr>'
-        '<th scope="col">what</th><th scope="col" class="value">value</th><th scope="col">what it means</th>'
-        f"</tr></thead><tbody>{rows}</tbody></table></section>"
-    )
+    ]
+    columns = (("what", ROW), ("value", VALUE), ("what it means", ""))
+    return section("numbers", "Numbers", table(columns, rows, "metrics"))
 
 
-def _warnings(m: Mapping[str, Any]) -> str:
-    lines = "".join(f'<p class="absent">{escape(str(text))}.</p>' for text in m["warnings"])
-    return f'<section id="warnings"><h2>What the recording lacked</h2>{lines}</section>' if lines else ""
+def _warnings(m: Mapping[str, Any]) -> Section:
+    lines = (f'<p class="absent">{escape(str(text))}.</p>' for text in m["warnings"])
+    return section("warnings", "What the recording lacked", *lines)
 
 
 def _text(value: object) -> str:
     if value is None:
         return "–"
-    return f"{value:.4g}" if isinstance(value, float) else escape(str(value))
+    return f"{value:.4g}" if isinstance(value, float) else str(value)

@@ -13,8 +13,10 @@ class ClosureViewer {
     this.number.addEventListener("input", () => this.show(Number(this.number.value)));
     root.querySelector("[data-before]").addEventListener("click", () => this.step(-1));
     root.querySelector("[data-after]").addEventListener("click", () => this.step(1));
-    for (const row of document.querySelectorAll("[data-closure]")) {
-      row.addEventListener("click", () => { this.show(Number(row.dataset.closure)); root.scrollIntoView({ block: "nearest" }); });
+    // A row of the table is marked in its first cell.
+    this.marks = [...document.querySelectorAll("[data-closure]")].map((mark) => [mark.closest("tr"), Number(mark.dataset.closure)]);
+    for (const [row, closure] of this.marks) {
+      row.addEventListener("click", () => { this.show(closure); root.scrollIntoView({ block: "nearest" }); });
     }
     root.hidden = false;
     new ResizeObserver(() => this.show(this.shown)).observe(root);
@@ -32,9 +34,7 @@ class ClosureViewer {
     this.shown = number;
     if (document.activeElement !== this.number) this.number.value = String(number);
     this.said.textContent = this.book.said[k];
-    for (const row of document.querySelectorAll("[data-closure]")) {
-      row.setAttribute("aria-selected", String(Number(row.dataset.closure) === number));
-    }
+    for (const [row, closure] of this.marks) row.setAttribute("aria-selected", String(closure === number));
     const box = this.canvas.getBoundingClientRect(), ratio = Math.min(window.devicePixelRatio || 1, 2);
     this.canvas.width = Math.max(1, Math.round(box.width * ratio));
     this.canvas.height = Math.max(1, Math.round(box.height * ratio));

@@ -91,5 +91,5 @@ STYLE = """
 border-radius:.5rem}
 .closure-viewer input{font:inherit;width:6em}
 .closure-viewer button{font:inherit;min-width:2.2rem}
-[data-closure]{cursor:pointer}
-[data-closure][aria-selected=true]{background:var(--soft)}"""
+tr:has([data-closure]){cursor:pointer}
+tr[aria-selected=true]{background:var(--soft)}"""

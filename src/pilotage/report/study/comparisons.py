@@ -12,7 +12,8 @@ from pilotage.evaluation.metrics import METRICS
 from pilotage.evaluation.paired import Difference
 from pilotage.experiments.studies.groups import CellGroup
 from pilotage.experiments.studies.table import StudyTable
-from pilotage.report.markup import escape
+from pilotage.report import markup
+from pilotage.report.markup import PLAIN, ROW, VALUE, Section, escape, section
 from pilotage.report.study.answer import SURE
 from pilotage.report.study.scales import Scale, p_value, scale_of
 
@@ -34,8 +35,8 @@ APART = (
 HEADS = ("difference", "95 % interval", "median", "p, corrected", "effect")
 
 
-def comparisons_table(table: StudyTable, judgement: Judgement) -> str:
-    """Differences on the same seeds, one folding table a metric; empty where nothing is compared."""
+def comparisons_table(table: StudyTable, judgement: Judgement) -> Section:
+    """Differences on the same seeds, one folding table a metric; left out where nothing is compared."""
     parts = []
     success = table.column("success")
     told_apart = (*table.metrics, "success") if bool(np.any(success == 0.0)) else table.metrics
@@ -58,12 +59,8 @@ def comparisons_table(table: StudyTable, judgement: Judgement) -> str:
                 f"<h3>{escape(f'{names[0]} less {names[1]}, within each trial')}</h3>"
                 f"{_table(pair[0], rows, True)}"
             )
-    if not parts:
-        return ""
-    return (
-        '<section id="comparisons"><h2><a href="#comparisons">Comparisons</a></h2>'
-        f"<p>{PAIRED if table.same_seeds else APART}</p>{''.join(parts)}</section>"
-    )
+    note = f"<p>{PAIRED if table.same_seeds else APART}</p>"
+    return section("comparisons", "Comparisons", *([note, *parts] if parts else []))
 
 
 def _rows(table: StudyTable, judgement: Judgement, group: CellGroup, metric: str) -> Iterator[Row]:
@@ -80,28 +77,20 @@ def _table(metric: str, rows: list[Row], shown: bool) -> str:
         return ""
     scale = scale_of(metric, [found.mean for _, found in rows])
     unit = " [percentage points]" if scale.unit == "%" else scale.label
-    heads = "".join(f'<th scope="col" class="value">{name}</th>' for name in HEADS)
-    body = "".join(_row(name, found, scale) for name, found in rows)
-    return (
-        f"<details{' open' if shown else ''}><summary>{escape(METRICS.find(metric).name + unit)}</summary>"
-        f'<div class="wide" tabindex="0"><table class="cells"><thead><tr><th scope="col">setting</th>{heads}'
-        f'<th scope="col">verdict</th></tr></thead><tbody>{body}</tbody></table></div></details>'
-    )
+    columns = [("setting", ROW), (HEADS[0], VALUE), *((name, PLAIN) for name in HEADS[1:]), ("verdict", "")]
+    made = markup.table(columns, [_row(name, found, scale) for name, found in rows], "cells", box="wide")
+    title = escape(METRICS.find(metric).name + unit)
+    return f"<details{' open' if shown else ''}><summary>{title}</summary>{made}</details>"
 
 
-def _row(name: str, found: Difference, scale: Scale) -> str:
+def _row(name: str, found: Difference, scale: Scale) -> tuple[str, ...]:
     digits = scale.decimals(found.mean, found.low, found.high)
     mean, low, high, median = (
         scale.write(value, digits, signed=True) for value in (found.mean, found.low, found.high, found.median)
     )
     effect = f"{found.effect:+.2f}".replace("-", "−")
     band = f"{low} to {high}" if math.isfinite(found.low) else "–"
-    texts = (band, median, p_value(found.p_corrected), effect)
-    values = "".join(f'<td class="value plain">{escape(text)}</td>' for text in texts)
-    return (
-        f'<tr><th scope="row">{escape(name)}</th><td class="value">{mean}</td>'
-        f"{values}<td>{verdict(found)}</td></tr>"
-    )
+    return name, mean, band, median, p_value(found.p_corrected), effect, verdict(found)
 
 
 def verdict(found: Difference) -> str:

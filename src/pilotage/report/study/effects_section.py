@@ -12,7 +12,8 @@ from pilotage.evaluation.metrics import METRICS
 from pilotage.experiments.studies.cells import show
 from pilotage.experiments.studies.findings import SETTING, Best, Finding
 from pilotage.experiments.studies.table import StudyTable
-from pilotage.report.markup import escape
+from pilotage.report import markup
+from pilotage.report.markup import PLAIN, ROW, Html, Section, escape, section
 from pilotage.report.quantities import count, measured
 from pilotage.report.study.scales import Scale, p_value, points, scale_of, told
 
@@ -30,10 +31,10 @@ HOW = (
 PAIRED, APART = "Wilcoxon or Friedman, on the same seeds", "Mann and Whitney or Kruskal and Wallis"
 
 
-def effects_section(table: StudyTable, findings: Sequence[Finding], best: Sequence[Best]) -> str:
-    """What the study found, in words and as a table; empty where nothing could be looked at."""
+def effects_section(table: StudyTable, findings: Sequence[Finding], best: Sequence[Best]) -> Section:
+    """What the study found, in words and as a table; left out where nothing could be looked at."""
     if not findings:
-        return ""
+        return section("effects", "Findings")
     sure = sorted((f for f in findings if f.is_sure), key=lambda f: -f.effect.share)
     sure.sort(key=lambda f: f.metric != table.primary)
     lines = [_shown(table, finding) for finding in sure[:MOST_LINES]]
@@ -46,11 +47,8 @@ def effects_section(table: StudyTable, findings: Sequence[Finding], best: Sequen
     open_ = [text for _, entries in together if (text := _open(list(entries)))]
     rest = f"<h3>What these trials cannot tell</h3>{_list(open_[:MOST_LINES])}" if open_ else ""
     how = HOW.format(tests=PAIRED if table.same_seeds else APART)
-    return (
-        '<section id="effects"><h2><a href="#effects">Findings</a></h2>'
-        f"{_list(lines)}{rest}<details><summary>All effects</summary><p>{how}</p>{_tables(table, findings)}"
-        "</details></section>"
-    )
+    made = f"<details><summary>All effects</summary><p>{how}</p>{_tables(table, findings)}</details>"
+    return section("effects", "Findings", _list(lines), rest, made)
 
 
 def _list(texts: Iterable[str]) -> str:
@@ -161,21 +159,17 @@ def _open(findings: Sequence[Finding]) -> str:
 
 
 def _tables(table: StudyTable, findings: Sequence[Finding]) -> str:
+    columns = [("factor", ROW), *((name, PLAIN) for name in HEADS)]
     parts = []
     for _, entries in groupby(findings, key=lambda f: (f.group, f.metric)):
         rows = list(entries)
         scale = scale_of(rows[0].metric, [float(value) for f in rows for value in f.effect.means.ravel()])
-        heads = "".join(f'<th scope="col" class="value">{name}</th>' for name in HEADS)
-        body = "".join(_row(table, finding, scale) for finding in rows)
-        parts.append(
-            f"<h3>{escape(_metric(rows[0]) + scale.label)}</h3>"
-            '<div class="wide" tabindex="0"><table class="cells"><thead><tr><th scope="col">factor</th>'
-            f"{heads}</tr></thead><tbody>{body}</tbody></table></div>"
-        )
+        made = markup.table(columns, [_row(table, f, scale) for f in rows], "cells", box="wide")
+        parts.append(f"<h3>{escape(_metric(rows[0]) + scale.label)}</h3>{made}")
     return "".join(parts)
 
 
-def _row(table: StudyTable, finding: Finding, scale: Scale) -> str:
+def _row(table: StudyTable, finding: Finding, scale: Scale) -> list[str]:
     effect, change = finding.effect, finding.effect.change()
     digits = scale.decimals(change.mean, change.low, change.high)
     mean, low, high, size = (
@@ -189,6 +183,4 @@ def _row(table: StudyTable, finding: Finding, scale: Scale) -> str:
     share = f"{100.0 * effect.share:.1f} %"
     texts = (str(effect.n), *_ends(table, finding), mean, band, share, p_value(finding.p_corrected), size)
     name = " with ".join(factor_words(factor) for factor in finding.factors)
-    bold = ("<b>", "</b>") if finding.is_sure else ("", "")
-    values = "".join(f'<td class="value plain">{escape(text)}</td>' for text in texts)
-    return f'<tr><th scope="row">{bold[0]}{escape(name)}{bold[1]}</th>{values}</tr>'
+    return [Html(f"<b>{escape(name)}</b>") if finding.is_sure else name, *texts]

@@ -10,7 +10,7 @@ import numpy as np
 from pilotage.evaluation.metrics import METRICS
 from pilotage.experiments.studies.table import StudyTable
 from pilotage.report import quantities
-from pilotage.report.markup import escape
+from pilotage.report.markup import Section, escape, section
 from pilotage.report.replay.section import SLUG
 
 
@@ -59,10 +59,8 @@ def describe(table: StudyTable, row: int) -> str:
     return f"{setting}, seed {int(table.seed[at])}: {metric.name} {value}{ended}."
 
 
-def examples_section(examples: Sequence[Example]) -> str:
-    """The section; empty without examples."""
-    if not examples:
-        return ""
+def examples_section(examples: Sequence[Example]) -> Section:
+    """The section; left out without examples."""
     parts = []
     for example in examples:
         replay = f'<a href="{escape(example.link)}#{SLUG}">Replay it</a> · ' if example.replay else ""
@@ -74,7 +72,4 @@ def examples_section(examples: Sequence[Example]) -> str:
             f'<figure class="example"><h3>{escape(example.title)}</h3><div class="plot" tabindex="0">'
             f"{example.svg}</div><figcaption>{escape(example.text)}</figcaption>{link}</figure>"
         )
-    return (
-        '<section id="trials"><h2><a href="#trials">The median and the worst trial</a></h2>'
-        f"{''.join(parts)}</section>"
-    )
+    return section("trials", "The median and the worst trial", *parts)

@@ -15,7 +15,7 @@ from pilotage.evaluation.judge import Judgement
 from pilotage.experiments.studies.findings import Best, Finding
 from pilotage.experiments.studies.study import study_yaml
 from pilotage.experiments.studies.table import StudyTable
-from pilotage.report.markup import contents, document, escape, figure_section, layer_rules, tiles
+from pilotage.report.markup import REPORT_FILE, Section, escape, figure_sections, page, section
 from pilotage.report.quantities import count
 from pilotage.report.study.answer import answer, answers
 from pilotage.report.study.comparisons import comparisons_table
@@ -32,8 +32,6 @@ from pilotage.report.study.tables import (
 )
 from pilotage.report.style import drawing_style
 
-REPORT_FILE = "report.html"
-
 
 def study_page(
     table: StudyTable,
@@ -47,35 +45,29 @@ def study_page(
     question = definition.question or definition.description
     with drawing_style():
         figures = [*settings_figures(table, judgement), *factor_figures(table, judgement)]
-    sections = [
-        ("ranking", "What each module costs", "" if ranking is None else ranking_table(ranking)),
-        ("effects", "Findings", effects_section(table, *found)),
-        ("findings", "What it says", _findings(table, judgement)),
-        *((f.slug, f.title, figure_section(number, f)) for number, f in enumerate(figures, start=1)),
-        ("cells", "Every setting", cells_table(table, judgement)),
-        ("comparisons", "Comparisons", comparisons_table(table, judgement)),
-        ("consistency", "Consistency", consistency_table(table)),
-        ("endings", "Why trials ended", endings_table(table)),
-        ("trials", "The median and the worst trial", examples_section(examples)),
-        ("failures", "Trials that broke", failures_table(table)),
-        ("again", "To run it again", _again(table)),
-    ]
-    present = [entry for entry in sections if entry[2]]
-    return document(
-        title=escape(f"{table.study.name}: study report"),
-        layers="".join(layer_rules(figure) for figure in figures),
-        eyebrow=escape(f"pilotage study report · mission {mission} · {count(table.row.size)} trials"),
-        heading=escape(table.study.name),
-        description=f'<p class="description">{escape(question)}</p>' if question else "",
-        outcome="",
-        headline=escape(answer(table, judgement) if ranking is None else ranking_answer(ranking)),
-        tiles=tiles(_tiles(table)),
-        contents=contents([(slug, title) for slug, title, _ in present]),
-        body="\n".join(section for _, _, section in present),
-        footer=escape(
-            "Made by pilotage from the study's database. Settings are compared on "
-            f"{'the same seeds' if table.same_seeds else 'seeds of their own'}; intervals are 95 %."
-        ),
+    return page(
+        [
+            *(() if ranking is None else (ranking_table(ranking),)),
+            effects_section(table, *found),
+            _findings(table, judgement),
+            *figure_sections(figures),
+            cells_table(table, judgement),
+            comparisons_table(table, judgement),
+            consistency_table(table),
+            endings_table(table),
+            examples_section(examples),
+            failures_table(table),
+            _again(table),
+        ],
+        figures,
+        title=f"{table.study.name}: study report",
+        heading=table.study.name,
+        eyebrow=f"pilotage study report · mission {mission} · {count(table.row.size)} trials",
+        descriptions=[question] if question else (),
+        headline=answer(table, judgement) if ranking is None else ranking_answer(ranking),
+        tiles=_tiles(table),
+        footer="Made by pilotage from the study's database. Settings are compared on "
+        f"{'the same seeds' if table.same_seeds else 'seeds of their own'}; intervals are 95 %.",
     )
 
 
@@ -92,7 +84,7 @@ def write_page(
     return path
 
 
-def _findings(table: StudyTable, judgement: Judgement) -> str:
+def _findings(table: StudyTable, judgement: Judgement) -> Section:
     """What each group of settings says beyond the headline, and what one must know to read it."""
     parts = [
         f"{f'<h3>{escape(name)}</h3>' if len(table.groups) > 1 else ''}"
@@ -101,10 +93,7 @@ def _findings(table: StudyTable, judgement: Judgement) -> str:
     ]
     text = table.study.definition.description if table.study.definition.question else ""
     note = f'<p class="note">{escape(text)}</p>' if text else ""
-    if not parts and not note:
-        return ""
-    head = '<section id="findings"><h2><a href="#findings">What it says</a></h2>'
-    return f"{head}{''.join(parts)}{note}</section>"
+    return section("findings", "What it says", *parts, note)
 
 
 def _tiles(table: StudyTable) -> list[tuple[str, str]]:
@@ -119,18 +108,18 @@ def _tiles(table: StudyTable) -> list[tuple[str, str]]:
     return [*entries, ("still to run", count(table.waiting))] if table.waiting else entries
 
 
-def _again(table: StudyTable) -> str:
+def _again(table: StudyTable) -> Section:
     definition, first = escape(study_yaml(table.study)), table.study.definition.seeds.first
     last = first + table.study.definition.trials - 1
-    return (
-        '<section id="again"><h2><a href="#again">To run it again</a></h2>'
+    return section(
+        "again",
+        "To run it again",
         f"<p>Seeds {first} to {last}, the same in every setting. The folder&#x27;s "
         "<code>study.yaml</code> holds everything that is needed: "
         "<code>pilotage study study.yaml</code>. Any single trial: "
         "<code>pilotage run --from STUDY:ROW</code>, in the folder that holds the study&#x27;s. "
         f"{escape(f'Made with {versions()}.')}</p>"
-        f"<details><summary>Show the definition</summary><pre>{definition}</pre></details>"
-        "</section>"
+        f"<details><summary>Show the definition</summary><pre>{definition}</pre></details>",
     )
 
 

@@ -8,7 +8,7 @@ from typing import Any
 
 from pilotage.evaluation.metrics import METRICS
 from pilotage.report import quantities
-from pilotage.report.markup import escape
+from pilotage.report.markup import PLAIN, ROW, Html, Section, escape, section, table
 from pilotage.report.study.scales import Scale, points, scale_of, told
 
 Module = Mapping[str, Any]
@@ -17,29 +17,25 @@ Named = tuple[str, Mapping[str, Any]]
 """A metric and its change."""
 
 
-def ranking_table(modules: Sequence[Module]) -> str:
+def ranking_table(modules: Sequence[Module]) -> Section:
     """One row a module, most costly first: how each metric changes where an oracle stands in for it."""
     metrics = [name for name in _metrics(modules) if any(_moves(m["changes"].get(name)) for m in modules)]
     if not metrics:
-        return ""
+        return section("ranking", "What each module costs")
     scales = {name: _scale(name, modules) for name in metrics}
-    head = "".join(
-        f'<th scope="col" class="value">{escape(METRICS.find(name).name)}{scales[name].label}</th>'
-        for name in metrics
-    )
     rows = []
     for module in modules:
-        text = module["oracle"]
-        small = f'<span class="what">{escape(text)}</span>' if text else ""
-        cells = "".join(_entry(module["changes"].get(name), scales[name]) for name in metrics)
-        rows.append(f'<tr><th scope="row">{escape(module["module"])}{small}</th>{cells}</tr>')
-    return (
-        '<section id="ranking"><h2><a href="#ranking">What each module costs</a></h2>'
+        small = f'<span class="what">{escape(module["oracle"])}</span>' if module["oracle"] else ""
+        cells = (_entry(module["changes"].get(name), scales[name]) for name in metrics)
+        rows.append([Html(escape(module["module"]) + small), *cells])
+    heads = ((METRICS.find(name).name + scales[name].label, PLAIN) for name in metrics)
+    return section(
+        "ranking",
+        "What each module costs",
         "<p>How the mission changes where an oracle replaces one module, on the same seeds; below it the "
         "95 % interval. Bold is what the trials tell from chance. Success counts before accuracy, accuracy "
-        "before safety and time; times and paths are compared where both runs succeeded.</p>"
-        '<div class="wide" tabindex="0"><table class="cells"><thead><tr><th scope="col">oracle for</th>'
-        f"{head}</tr></thead><tbody>{''.join(rows)}</tbody></table></div></section>"
+        "before safety and time; times and paths are compared where both runs succeeded.</p>",
+        table([("oracle for", ROW), *heads], rows, "cells", box="wide"),
     )
 
 
@@ -132,9 +128,9 @@ def _scale(name: str, modules: Sequence[Module]) -> Scale:
 
 def _entry(change: Mapping[str, Any] | None, scale: Scale) -> str:
     if change is None or not math.isfinite(change["mean"]):
-        return f'<td class="value plain">{quantities.NOTHING}</td>'
+        return quantities.NOTHING
     if change["mean"] == change["low"] == change["high"] == 0.0:
-        return '<td class="value plain">0</td>'
+        return "0"
     digits = scale.decimals(change["mean"], change["low"], change["high"])
     mean = scale.write(change["mean"], digits, signed=True)
     if change["low"] == change["high"]:
@@ -143,4 +139,4 @@ def _entry(change: Mapping[str, Any] | None, scale: Scale) -> str:
         low, high = (scale.write(change[end], digits, signed=True) for end in ("low", "high"))
         band = f"{low} to {high}"
     shown = f"<b>{mean}</b>" if change["sure"] else mean
-    return f'<td class="value plain">{shown}<br><span class="range">{band}</span></td>'
+    return Html(f'{shown}<br><span class="range">{band}</span>')

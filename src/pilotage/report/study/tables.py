@@ -15,21 +15,23 @@ from pilotage.evaluation.pooled import IDEALS, Pooled, pool
 from pilotage.experiments.studies.cells import Cell
 from pilotage.experiments.studies.groups import CellGroup
 from pilotage.experiments.studies.table import StudyTable
-from pilotage.report import quantities
-from pilotage.report.markup import escape
+from pilotage.report import markup, quantities
+from pilotage.report.markup import PLAIN, ROW, VALUE, Html, Section, escape, section
 from pilotage.report.study.answer import best_cell
 from pilotage.report.study.scales import Scale, scale_of
 
 
-def cells_table(table: StudyTable, judgement: Judgement) -> str:
+def cells_table(table: StudyTable, judgement: Judgement) -> Section:
     """Mean and interval of each metric in each setting, beside what was published; all numbers folded."""
     parts = [_group_table(table, judgement, group) for group in table.groups]
     published = any(cell.published for cell in table.cells)
-    return (
-        '<section id="cells"><h2><a href="#cells">Every setting</a></h2>'
+    return section(
+        "cells",
+        "Every setting",
         "<p>Means over the trials; below each its 95 % bootstrap interval, the variance in the square of the "
         f"column&#x27;s unit{', and what was published' if published else ''}. The best mean of a column is "
-        f"bold. Success with its 95 % Wilson interval.{_of_few(table)}</p>{''.join(parts)}</section>"
+        f"bold. Success with its 95 % Wilson interval.{_of_few(table)}</p>",
+        *parts,
     )
 
 
@@ -54,15 +56,9 @@ def _group_table(table: StudyTable, judgement: Judgement, group: CellGroup) -> s
         for m in metrics
         if (lower := _lower(table, judgement, m, group)) is not None and _differ(judgement, m, group)
     }
-    head = "".join(
-        f'<th scope="col" class="value">{escape(METRICS.find(m).name)}{scales[m].label}</th>' for m in metrics
-    )
     rows = []
     for cell in table.members(group):
-        parts = [
-            f'<th scope="row">{escape(cell.text)}</th><td class="value">{_rate(judgement.rates[cell.index])}'
-        ]
-        parts += [
+        entries = [
             _entry(
                 judgement.summaries[m][cell.index],
                 scales[m],
@@ -71,16 +67,15 @@ def _group_table(table: StudyTable, judgement: Judgement, group: CellGroup) -> s
             )
             for m in metrics
         ]
-        rows.append(f"<tr>{'</td>'.join(parts)}</td></tr>")
+        rows.append([cell.text, _rate(judgement.rates[cell.index]), *entries])
+    heads = [METRICS.find(m).name + scales[m].label for m in metrics]
+    columns = [("setting", ROW), ("success", VALUE), *((head, PLAIN) for head in heads)]
     caption = f"<h3>{escape(group.name)}</h3>" if len(table.groups) > 1 else ""
-    return (
-        f'{caption}<div class="wide" tabindex="0"><table class="cells"><thead><tr>'
-        f'<th scope="col">setting</th><th scope="col" class="value">success</th>{head}</tr></thead>'
-        f"<tbody>{''.join(rows)}</tbody></table></div>{_all_numbers(table, judgement, group, given)}"
-    )
+    made = markup.table(columns, rows, "cells", box="wide")
+    return f"{caption}{made}{_all_numbers(table, judgement, group, given)}"
 
 
-def _entry(summary: Summary, scale: Scale, best: bool, published: float | None) -> str:
+def _entry(summary: Summary, scale: Scale, best: bool, published: float | None) -> Html:
     digits = scale.decimals(summary.mean, summary.low, summary.high)
     mean = scale.write(summary.mean, digits)
     lines = []
@@ -90,7 +85,7 @@ def _entry(summary: Summary, scale: Scale, best: bool, published: float | None) 
     if published is not None:
         lines.append(f"published {quantities.significant(published * scale.times, 4)}")
     small = "".join(f"<br><span class='range'>{escape(line)}</span>" for line in lines)
-    return f'<td class="value plain">{f"<b>{mean}</b>" if best else mean}{small}'
+    return Html(f"{f'<b>{mean}</b>' if best else mean}{small}")
 
 
 def _all_numbers(table: StudyTable, judgement: Judgement, group: CellGroup, metrics: Sequence[str]) -> str:
@@ -99,104 +94,86 @@ def _all_numbers(table: StudyTable, judgement: Judgement, group: CellGroup, metr
     for metric in metrics:
         scale = _scale(judgement, metric, table.members(group))
         head = f"{METRICS.find(metric).name}{scale.label}, variance in its square"
-        rows.append(f'<tr class="group"><th colspan="8" scope="rowgroup">{escape(head)}</th></tr>')
+        rows.append([head])
         for cell in table.members(group):
             found = judgement.summaries[metric][cell.index]
             digits = scale.decimals(found.mean, found.low, found.high)
             numbers = (found.mean, found.low, found.high, found.median, found.smallest, found.largest)
             texts = [scale.write(number, digits) for number in numbers]
             texts.insert(4, scale.write_variance(found.variance, found.mean))
-            values = "".join(f'<td class="value plain">{text}</td>' for text in (str(found.n), *texts))
-            rows.append(f'<tr><th scope="row">{escape(cell.text)}</th>{values}</tr>')
+            rows.append([cell.text, str(found.n), *texts])
     names = ("n", "mean", "from", "to", "median", "variance", "smallest", "largest")
-    heads = "".join(f'<th scope="col" class="value">{name}</th>' for name in names)
+    columns = [("setting", ROW), *((name, PLAIN) for name in names)]
     what = f" of {group.name}" if len(table.groups) > 1 else ""
     return (
         f"<details><summary>All numbers{escape(what)}: count, median, variance, extremes</summary>"
-        f'<div class="wide" tabindex="0"><table class="cells"><thead><tr><th scope="col">setting</th>{heads}'
-        f"</tr></thead><tbody>{''.join(rows)}</tbody></table></div></details>"
+        f"{markup.table(columns, rows, 'cells', box='wide')}</details>"
     )
 
 
-def consistency_table(table: StudyTable) -> str:
-    """NEES and NIS pooled over the runs of each setting; empty where the study reports neither."""
+def consistency_table(table: StudyTable) -> Section:
+    """NEES and NIS pooled over the runs of each setting; left out where the study reports neither."""
     shown = [metric for metric in IDEALS if metric in table.metrics]
-    tables = []
+    columns = [("setting", ROW)]
+    for m in shown:
+        columns += [(f"{METRICS.find(m).name}, ideal {IDEALS[m]:g}", PLAIN), ("verdict", "")]
+    parts = []
     for group in table.groups:
         rows = []
         for cell in table.members(group):
             pooled = [pool(table.column(m)[table.cell == cell.index], IDEALS[m]) for m in shown]
             if any(entry.n for entry in pooled):
-                rows.append(
-                    f'<tr><th scope="row">{escape(cell.text)}</th>{"".join(map(_pooled, pooled))}</tr>'
-                )
+                rows.append([cell.text, *(text for entry in pooled for text in _pooled(entry))])
         if rows:
-            head = "".join(
-                f'<th scope="col" class="value">{METRICS.find(m).name}, ideal {IDEALS[m]:g}</th>'
-                '<th scope="col">verdict</th>'
-                for m in shown
-            )
             caption = f"<h3>{escape(group.name)}</h3>" if len(table.groups) > 1 else ""
-            tables.append(
-                f'{caption}<div class="wide" tabindex="0"><table class="cells"><thead><tr>'
-                f'<th scope="col">setting</th>{head}</tr></thead><tbody>{"".join(rows)}</tbody></table></div>'
-            )
-    if not tables:
-        return ""
-    return (
-        '<section id="consistency"><h2><a href="#consistency">Consistency</a></h2>'
+            parts.append(caption + markup.table(columns, rows, "cells", box="wide"))
+    note = (
         "<p>Means over the runs with their 95 % bands; runs are independent, the steps within one are not. "
         "A filter is overconfident where the whole band lies above the ideal value. NIS is told per degree "
-        f"of freedom, corrected for what the gate cuts off.</p>{''.join(tables)}</section>"
+        "of freedom, corrected for what the gate cuts off.</p>"
     )
+    return section("consistency", "Consistency", *([note, *parts] if parts else []))
 
 
-def _pooled(entry: Pooled) -> str:
+def _pooled(entry: Pooled) -> tuple[str, str]:
     if not entry.n:
-        return f'<td class="value plain">{quantities.NOTHING}</td><td></td>'
+        return quantities.NOTHING, ""
     scale = Scale()
     digits = scale.decimals(entry.mean, entry.low, entry.high)
     band = f"{scale.write(entry.low, digits)} to {scale.write(entry.high, digits)}"
     below = f"<br><span class='range'>{band}</span>" if math.isfinite(entry.low) else ""
-    return f'<td class="value plain">{scale.write(entry.mean, digits)}{below}</td><td>{entry.verdict}</td>'
+    return Html(f"{scale.write(entry.mean, digits)}{below}"), entry.verdict
 
 
-def endings_table(table: StudyTable) -> str:
-    """How many trials of each setting ended why; empty where all ended alike."""
+def endings_table(table: StudyTable) -> Section:
+    """How many trials of each setting ended why; left out where all ended alike."""
+    slug, title = "endings", "Why trials ended"
     kinds = [kind for kind, _ in Counter(table.ended).most_common()]
     if len(kinds) < 2:
-        return ""
-    head = "".join(f'<th scope="col" class="value">{escape(kind) or "not said"}</th>' for kind in kinds)
+        return section(slug, title)
     rows = []
     for cell in table.cells:
         found = Counter(table.ended[i] for i in np.flatnonzero(table.cell == cell.index))
-        counts = "".join(f'<td class="value plain">{found[kind] or ""}</td>' for kind in kinds)
-        rows.append(f'<tr><th scope="row">{escape(cell.name)}</th>{counts}</tr>')
-    return (
-        '<section id="endings"><h2><a href="#endings">Why trials ended</a></h2>'
+        rows.append([cell.name, *(str(found[kind] or "") for kind in kinds)])
+    columns = [("setting", ROW), *((kind or "not said", PLAIN) for kind in kinds)]
+    return section(
+        slug,
+        title,
         "<p>Counted over the trials of each setting; in <code>trials.csv</code> the column "
-        "<code>ended</code>, and in <code>ended_because</code> each trial&#x27;s own words.</p>"
-        f'<div class="wide" tabindex="0"><table class="cells"><thead><tr><th scope="col">setting</th>{head}'
-        f"</tr></thead><tbody>{''.join(rows)}</tbody></table></div></section>"
+        "<code>ended</code>, and in <code>ended_because</code> each trial&#x27;s own words.</p>",
+        markup.table(columns, rows, "cells", box="wide"),
     )
 
 
-def failures_table(table: StudyTable) -> str:
-    """Trials that gave no numbers, with the reason; empty where there are none."""
-    if not table.broken:
-        return ""
-    rows = "".join(
-        f'<tr><td class="value">{failure.row}</td><td>{escape(table.cells[failure.cell].name)}</td>'
-        f'<td class="value">{failure.seed}</td><td>{escape(failure.reason)}</td></tr>'
+def failures_table(table: StudyTable) -> Section:
+    """Trials that gave no numbers, with the reason; left out where there are none."""
+    rows = [
+        (str(failure.row), table.cells[failure.cell].name, str(failure.seed), failure.reason)
         for failure in table.broken
-    )
-    return (
-        '<section id="failures"><h2><a href="#failures">Trials that broke</a></h2>'
-        '<div class="long"><table><thead><tr><th scope="col" class="value">row</th>'
-        '<th scope="col">setting</th>'
-        '<th scope="col" class="value">seed</th><th scope="col">why</th></tr></thead>'
-        f"<tbody>{rows}</tbody></table></div></section>"
-    )
+    ]
+    columns = (("row", VALUE), ("setting", ""), ("seed", VALUE), ("why", ""))
+    made = markup.table(columns, rows, box="long") if rows else ""
+    return section("failures", "Trials that broke", made)
 
 
 def _scale(judgement: Judgement, metric: str, cells: Sequence[Cell]) -> Scale:
@@ -220,10 +197,10 @@ def _differ(judgement: Judgement, metric: str, group: CellGroup) -> bool:
     return len(finite) > 1 and min(finite) < max(finite)
 
 
-def _rate(rate: Rate) -> str:
+def _rate(rate: Rate) -> Html:
     if not rate.trials:
-        return quantities.NOTHING
-    return (
+        return Html(quantities.NOTHING)
+    return Html(
         f"{rate.successes}/{rate.trials}<br><span class='range'>{100.0 * rate.low:.0f} to "
         f"{100.0 * rate.high:.0f}&nbsp;%</span>"
     )
