@@ -95,7 +95,7 @@ class TestMuseum:
     def test_a_team_alone_raises_no_alarm_and_one_without_radios_never(self) -> None:
         metrics = judged(2, 40.0, "world.people=[]")
         assert metrics["false_alarms"] == metrics["alarms"] == 0
-        assert "detected" not in metrics
+        assert metrics["detected"] is None
         come = "world.people=[{name: intruder, enters_from_s: 5, enters_until_s: 10}]"
         silent = judged(2, 40.0, come, "team.radio=null")
         assert not silent["detected"]

@@ -41,13 +41,13 @@ class GuardLog:
                 self._detected_s = t_s
 
     def metrics(self, *, somebody: bool) -> dict[str, object]:
-        """Alarms with nobody there; where there is ``somebody``, whether and how soon he was detected."""
-        metrics: dict[str, object] = {"false_alarms": self._false}
-        if somebody:
-            found = math.isfinite(self._detected_s)
-            metrics["detected"] = found
-            metrics["detection_time_s"] = self._detected_s - self._came_s if found else None
-        return metrics
+        """Alarms with nobody there; whether and how soon ``somebody`` was detected, None without anybody."""
+        found = math.isfinite(self._detected_s)
+        return {
+            "false_alarms": self._false,
+            "detected": found if somebody else None,
+            "detection_time_s": self._detected_s - self._came_s if found else None,
+        }
 
 
 def _people(attempt: Attempt) -> FloatArray:
