@@ -19,6 +19,8 @@ REPORT_FILE = "report.html"
 """Every page's name, in the folder that it is about."""
 VALUE, PLAIN, ROW = "value", "value plain", "row"
 """How a column's cells look: numbers, numbers with something below, the row's own name; else plain text."""
+WHOLE = 9
+"""Characters of a cell that stay on one line."""
 Columns = Sequence[tuple[str, str]]
 """Headings, each with how its cells look."""
 
@@ -77,6 +79,8 @@ def _row(columns: Columns, row: Sequence[str]) -> str:
 def _cell(text: str, look: str) -> str:
     if look == ROW:
         return f'<th scope="row">{_escaped(text)}</th>'
+    # A number is read whole; an interval or a sentence may be broken at its blanks.
+    look = look or ("whole" if len(text) <= WHOLE else "")
     style = f' class="{look}"' if look else ""
     return f"<td{style}>{_escaped(text)}</td>"
 
