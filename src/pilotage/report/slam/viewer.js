@@ -43,7 +43,7 @@ class ClosureViewer {
     const pairs = [[this.book.earlier[k], 0, 0, 0, this.book.colours[0]], [this.book.later[k], x, y, turn, this.book.colours[1]]];
     const placed = pairs.map(([stretch, dx, dy, angle]) => this.points(stretch, dx, dy, angle));
     const all = placed.flat();
-    const span = (values) => { const sorted = [...values].sort((a, b) => a - b); return [sorted[0], sorted[sorted.length - 1]]; };
+    const span = (values) => { const sorted = [...values].sort((a, b) => a - b); const at = (share) => sorted[Math.round(share * (sorted.length - 1))]; return [at(0.01), at(0.99)]; };
     if (!all.length) return;
     const [x0, x1] = span(all.map((p) => p[0])), [y0, y1] = span(all.map((p) => p[1]));
     const scale = 0.94 * Math.min(this.canvas.width / Math.max(x1 - x0, 1), this.canvas.height / Math.max(y1 - y0, 1));
