@@ -13,6 +13,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
+from scipy import stats
 
 from pilotage.evaluation.intervals import COVERAGE, bootstrap_mean, summarize, wilson
 from pilotage.evaluation.paired import corrected, difference
@@ -80,6 +81,14 @@ def test_a_difference_turns_its_sign_with_its_sides(first: np.ndarray, other: np
     assert there.mean == pytest.approx(-back.mean)
     assert there.effect == pytest.approx(-back.effect)
     assert there.p_value == pytest.approx(back.p_value, nan_ok=True)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_pairs_that_are_alike_are_tested_as_scipy_tests_them(seed: int) -> None:
+    """All patterns of signs at once, which is exact: the very p-value of trying them one by one."""
+    change = np.random.default_rng(seed).integers(-3, 4, 8).astype(float)
+    found = difference(np.zeros(8), change)
+    assert found.p_value == stats.wilcoxon(change, zero_method="pratt").pvalue
 
 
 def test_nothing_changed_is_no_evidence() -> None:

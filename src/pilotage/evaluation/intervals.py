@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from scipy import stats
@@ -50,31 +52,26 @@ def bootstrap_mean(values: FloatArray) -> tuple[float, float]:
     scale = float(np.abs(values).max())
     if np.ptp(values) <= ROUNDING * scale:
         return float(values.min()), float(values.max())
-    low, high = _resampled(values / scale)  # squares of very small numbers would vanish
-    return scale * low, scale * high
+    return _resampled((values,), scale, np.mean)
 
 
-def _resampled(values: FloatArray) -> tuple[float, float]:
-    found = stats.bootstrap(
-        (values,),
-        np.mean,
-        confidence_level=LEVEL,
-        n_resamples=RESAMPLES,
-        method="BCa",
-        rng=np.random.default_rng(0),
-    ).confidence_interval
-    if math.isfinite(found.low) and math.isfinite(found.high):
-        return float(found.low), float(found.high)
-    # BCa has no acceleration where almost all values are equal.
-    found = stats.bootstrap(
-        (values,),
-        np.mean,
-        confidence_level=LEVEL,
-        n_resamples=RESAMPLES,
-        method="percentile",
-        rng=np.random.default_rng(0),
-    ).confidence_interval
-    return float(found.low), float(found.high)
+def _resampled(
+    samples: tuple[FloatArray, ...], scale: float, statistic: Callable[..., Any]
+) -> tuple[float, float]:
+    """Of samples as shares of their scale: squares of very small numbers would vanish."""
+    for method in ("BCa", "percentile"):  # BCa has no acceleration where almost all values are equal
+        found = stats.bootstrap(
+            tuple(values / scale for values in samples),
+            statistic,
+            vectorized=True,
+            confidence_level=LEVEL,
+            n_resamples=RESAMPLES,
+            method=method,
+            rng=np.random.default_rng(0),
+        ).confidence_interval
+        if math.isfinite(found.low) and math.isfinite(found.high):
+            break
+    return scale * float(found.low), scale * float(found.high)
 
 
 def bootstrap_difference(first: FloatArray, other: FloatArray) -> tuple[float, float]:
@@ -86,19 +83,9 @@ def bootstrap_difference(first: FloatArray, other: FloatArray) -> tuple[float, f
         change = float(other.mean() - first.mean())
         change = 0.0 if abs(change) <= ROUNDING * scale else change
         return change, change
-    for method in ("BCa", "percentile"):  # BCa has no acceleration where almost all values are equal
-        found = stats.bootstrap(
-            (first / scale, other / scale),
-            lambda one, two, axis: np.mean(two, axis=axis) - np.mean(one, axis=axis),
-            vectorized=True,
-            confidence_level=LEVEL,
-            n_resamples=RESAMPLES,
-            method=method,
-            rng=np.random.default_rng(0),
-        ).confidence_interval
-        if math.isfinite(found.low) and math.isfinite(found.high):
-            break
-    return scale * float(found.low), scale * float(found.high)
+    return _resampled(
+        (first, other), scale, lambda one, two, axis: np.mean(two, axis=axis) - np.mean(one, axis=axis)
+    )
 
 
 def summarize(values: FloatArray) -> Summary:
