@@ -8,9 +8,13 @@ from scipy.optimize import Bounds, LinearConstraint, milp
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
+from pilotage.core.errors import InputError
 from pilotage.core.types import BoolArray, FloatArray
+from pilotage.experiments.build.build import build_source
 from pilotage.experiments.build.charts import load_chart
+from pilotage.experiments.mission import load_mission
 from pilotage.maps.floor import Floor
+from pilotage.missions.mission import Mission
 from pilotage.stack.patrol.graph_file import on_floor, read_patrol_graph
 from pilotage.stack.patrol.tours import Round
 from support.recordings import recording
@@ -51,3 +55,25 @@ def test_given_graphs_lie_on_their_floors_and_have_the_best_tour(name: str, vert
     driven = on_floor(graph, Floor.of(world, 0.25, inside_xy_m=(float(start[0]), float(start[1]))))
     for each in (graph, driven):
         assert Round.best(each).length_m <= 1.01 * optimal_tour_m(each.shortest_m)
+
+
+def test_teams_start_on_the_floor_of_their_patrol_and_too_many_are_refused() -> None:
+    """Between cells of 0.05 and 0.1 m passages differ: a start that was drawn had none to the graph."""
+    house = ["world.map=" + str(recording("ros_maps/turtlebot3_house.yaml")), "team.size=16"]
+    mission = build_source(
+        load_mission("museum-patrol", [*house, "robot.footprint.radius_m=0.25"], seed=0)
+    ).mission
+    floor = Floor.of(
+        load_chart(str(recording("ros_maps/turtlebot3_house.yaml"))), 0.35, inside_xy_m=_start(mission, 0)
+    )
+    for index in range(16):
+        floor.nearest_cell(np.array(_start(mission, index)))
+    with pytest.raises(InputError, match=r"team\.size: expected 11 robots at most") as caught:
+        build_source(load_mission("museum-patrol", house, seed=0))
+    assert "\n" not in str(caught.value)
+
+
+def _start(mission: Mission, index: int) -> tuple[float, float]:
+    start = mission.start_of(mission.members[index])
+    assert start is not None
+    return start.x_m, start.y_m

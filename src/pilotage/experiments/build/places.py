@@ -16,6 +16,7 @@ from pilotage.core.types import BoolArray, Pose2
 from pilotage.experiments.build.robots import footprint_of
 from pilotage.kernels.grids.blocked_distance import distance_to_blocked
 from pilotage.maps.distance_field import DistanceField
+from pilotage.maps.floor import Floor
 from pilotage.maps.world_map import WorldMap
 from pilotage.missions.mission import Mission
 from pilotage.missions.places import Kidnap, PoseConfig
@@ -108,6 +109,7 @@ def _with_drawn_starts(mission: Mission, chart: WorldMap, about: tuple[float, fl
     placed: list[PoseConfig] = [robot.start for robot in mission.robots if robot.start is not None]
     robots: list[RobotConfig] = []
     floors: dict[float, OpenFloor] = {}
+    full: set[float] = set()
     for index, robot in enumerate(mission.robots):
         start = robot.start
         if start is None:
@@ -115,7 +117,11 @@ def _with_drawn_starts(mission: Mission, chart: WorldMap, about: tuple[float, fl
             if clear_m not in floors:
                 floors[clear_m] = OpenFloor(chart, clear_m, near)
             floor = floors[clear_m]
-            start = floor.draw(rng, placed, spacing_m, floor.easy) or floor.draw(rng, placed, spacing_m)
+            if clear_m not in full:
+                start = floor.draw(rng, placed, spacing_m, floor.easy)
+            if start is None:
+                full.add(clear_m)
+                start = floor.draw(rng, placed, spacing_m, floor.in_cells(placed[:1]))
             if start is None:
                 raise InputError(
                     f"team.size: expected {index} robots at most, as starting places {spacing_m:g} m "
@@ -224,6 +230,28 @@ class OpenFloor:
         largest = pieces == 1 + int(np.argmax(np.bincount(pieces.ravel())[1:]))
         steps = math.ceil(STEP_M / self._field.resolution_m)
         return np.asarray(home & binary_dilation(largest, iterations=steps))
+
+    def in_cells(self, first: Sequence[PoseConfig]) -> BoolArray:
+        """(rows, columns) of it what a task's floor, in cells, reaches from the first who was placed."""
+        home = np.asarray(self._regions == self._home)
+        inside = (first[0].x_m, first[0].y_m) if first else None
+        try:
+            cells = Floor.of(self._chart, self._clearance_m, inside_xy_m=inside)
+        except InputError:
+            return home
+        axes = []
+        for count, origin_m, low_m, cell_count in zip(
+            home.shape,
+            self._field.origin_xy_m[::-1],
+            cells.origin_xy_m[::-1],
+            cells.reachable.shape,
+            strict=True,
+        ):
+            place_m = origin_m + self._field.resolution_m * np.arange(count)
+            axes.append(
+                np.clip(np.floor((place_m - low_m) / cells.cell_m).astype(np.int64), 0, cell_count - 1)
+            )
+        return np.asarray(home & cells.reachable[np.ix_(*axes)])
 
     def _node(self, x: float, y: float) -> tuple[int, int] | None:
         (x0, y0), step = self._field.origin_xy_m, self._field.resolution_m

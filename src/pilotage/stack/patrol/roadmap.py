@@ -232,7 +232,11 @@ class Roadmap:
         when = time[rows, columns]
         best = int(np.argmin(np.where(clear, when, np.inf))) if clear.any() else _farthest(free, away)
         x, y = places[best].tolist()
-        return self._from(x, y, self.slowness)
+        return self.field_to(x, y)
+
+    def field_to(self, x_m: float, y_m: float) -> FloatArray:
+        """(rows, columns) time to go to any place."""
+        return self._from(x_m, y_m, self.slowness)
 
     def _nodes_xy_m(self) -> FloatArray:
         rows, columns = self.slowness.shape

@@ -29,6 +29,22 @@ class Claim:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class Clearing:
+    """That a robot has not got on for long, goes first now, and where others are to go for that.
+
+    Attributes
+    ----------
+    since_s
+        From when on it has not got on: of several the one of the earliest goes first.
+    orders
+        Numbers of robots, and the place x_m, y_m that each is to go to and to wait at.
+    """
+
+    since_s: float
+    orders: tuple[tuple[int, float, float], ...]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class TeamWord:
     """One broadcast.
 
@@ -40,6 +56,8 @@ class TeamWord:
         Whether something that moves keeps it from getting on.
     claim
         Of a passage; None: it is near none.
+    clearing
+        None unless it goes first.
     news
         Of the patrol.
     """
@@ -48,4 +66,5 @@ class TeamWord:
     y_m: float
     blocked: bool
     claim: Claim | None
+    clearing: Clearing | None
     news: PatrolMessage

@@ -58,6 +58,8 @@ class PatrolNavigatorConfig(Config):
     patience_s: Positive = 3.0
     """Without progress for so long, and up to twice as long by a draw, it gives way."""
     yield_s: Positive = 8.0
+    precede_s: Positive = 20.0
+    """Who came no nearer to its next place for so long goes first, and others make room as it tells them."""
     message_period_s: Positive = 1.0
     ask_s: Positive = 1.0
     """While it waits its strategy is asked so often."""

@@ -19,13 +19,14 @@ from pilotage.stack.journal import Journal
 from pilotage.stack.knowledge import RobotKnowledge
 from pilotage.stack.navigator.patrol.battery import DOCK_M, Battery
 from pilotage.stack.navigator.patrol.config import Mode, PatrolNavigatorConfig
+from pilotage.stack.navigator.patrol.headway import Headway
 from pilotage.stack.navigator.patrol.passage import Pursuit
 from pilotage.stack.navigator.patrol.still import StillWatch
 from pilotage.stack.patrol.messages import PatrolMemory
 from pilotage.stack.patrol.roadmap import roadmap_of
 from pilotage.stack.patrol.task import PatrolTask
 from pilotage.stack.patrol.watch import IntruderWatch
-from pilotage.stack.patrol.word import Claim, TeamWord
+from pilotage.stack.patrol.word import Claim, Clearing, TeamWord
 
 NO_FIELD: FloatArray = np.zeros((1, 1))
 NO_POINTS: FloatArray = np.zeros((0, 2))
@@ -71,8 +72,10 @@ class Context:
         Whether somebody who does not go stands where it drives to.
     claim
         Of the passage for one that it is in or about to enter.
-    pursuit
-        Of the one ahead in it.
+    clearing
+        What it tells others to do while it goes first.
+    pursuit, headway
+        Of the one ahead in the passage; its own towards its hop.
     battery
         What it reckons of its own; None where it never has to charge.
     """
@@ -112,7 +115,8 @@ class Context:
         # Half the width of what has room for two.
         self._pass_m = 2.0 * radius + config.plan_margin_m + 0.5 * config.gap_m
         self.claim: Claim | None = None
-        self._has_news, self.pursuit = False, Pursuit()
+        self.clearing: Clearing | None = None
+        self._has_news, self.pursuit, self.headway = False, Pursuit(), Headway()
         self.roadmap = roadmap_of(
             chart,
             task.graph.vertices_xy_m,
@@ -208,7 +212,8 @@ class Context:
             self._next_word_s += self.config.message_period_s
         x, y = (math.nan, math.nan) if lost else (self.pose.x_m, self.pose.y_m)
         self.memory.update(self.t_s, words=self.task.strategy.words(self.memory.knowledge(self.t_s)))
-        self.journal.outbox.append(TeamWord(x, y, self.blocked, self.claim, self.memory.message(self.t_s)))
+        news = self.memory.message(self.t_s)
+        self.journal.outbox.append(TeamWord(x, y, self.blocked, self.claim, self.clearing, news))
 
     def away_m(self, place: int) -> float:
         """Distance from a vertex or its station as the crow flies."""
@@ -299,14 +304,14 @@ class Context:
         self.hop = int(graph.next_hop[at, target])
         return True
 
-    def lead(self, vertex: int) -> Twist:
-        """The command that leads to a vertex."""
-        return self.descend(self.roadmap.time_s(vertex), self.roadmap.places_xy_m[vertex])
+    def lead(self, vertex: int, *, first: bool = False) -> Twist:
+        """The command that leads to a vertex; ``first`` as below."""
+        return self.descend(self.roadmap.time_s(vertex), self.roadmap.places_xy_m[vertex], first=first)
 
-    def descend(self, time: FloatArray, at: FloatArray | None = None) -> Twist:
+    def descend(self, time: FloatArray, at: FloatArray | None = None, *, first: bool = False) -> Twist:
         """The command that leads down a field of the roadmap, to a place (2,) to visit if it leads to one.
 
-        Between two scans the last command stands.
+        Between two scans the last command stands. Who goes ``first`` drives on towards mates who talk.
         """
         roadmap, pose = self.roadmap, self.pose
         (x0, y0), spacing = roadmap.origin_xy_m, roadmap.spacing_m
@@ -321,7 +326,7 @@ class Context:
         self.blocked = self.taken = False
         beside = voronoi_window.within(self.strange, self.config.watch_m)
         around_m, body_m = self._clearance_m + 0.5 * self.config.gap_m, self._clearance_m + self.radius_m
-        discs = _discs(self._on_map(beside), around_m)
+        discs = _discs(self._on_map(beside[:0] if first else beside), around_m)
         still = self._still.step(self.t_s, self._mute(beside))
         if len(still):
             discs = np.concatenate([discs, _discs(still, body_m)])

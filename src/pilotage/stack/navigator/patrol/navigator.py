@@ -13,6 +13,7 @@ from pilotage.stack.navigator.goal.wandering import Wandering
 from pilotage.stack.navigator.navigator import Parts, localizer_of
 from pilotage.stack.navigator.patrol.config import PatrolNavigatorConfig
 from pilotage.stack.navigator.patrol.context import Context
+from pilotage.stack.navigator.patrol.precedence import precedence
 from pilotage.stack.navigator.patrol.states import Charging, Lost, State, Waiting, resume
 
 COLUMNS = {
@@ -97,7 +98,7 @@ class PatrolNavigator:
             context.memory.update(context.t_s, on_duty=not context.homeward)
             context.came_from = context.roadmap.nearest(belief.pose.x_m, belief.pose.y_m)
             state = None
-        self._state, command = resume(context) if state is None else state.step(readings)
+        self._state, command = resume(context) if state is None else precedence(context, state).step(readings)
         context.talk(lost=lost)
         self._telemetry.tell(
             context.mode,

@@ -12,11 +12,10 @@ from pilotage.stack.navigator.patrol import traffic
 from pilotage.stack.navigator.patrol.battery import DOCK_M, Battery
 from pilotage.stack.navigator.patrol.config import Mode
 from pilotage.stack.navigator.patrol.context import Context
+from pilotage.stack.navigator.patrol.headway import PROGRESS_S
 from pilotage.stack.navigator.patrol.passage import Stretch
 from pilotage.stack.navigator.progress import StallWatch
 
-PROGRESS_S = 0.4
-"""So much nearer in time to go counts as getting on."""
 MOUTH_M = 1.5
 """So far before a passage it stands aside."""
 THERE_S, SETTLED_S = 0.3, 4.0
@@ -283,6 +282,7 @@ def arrive(context: Context) -> Move:
     if battery is not None and battery.low:
         return Move(Charging(context, battery, context.t_s), context.stand())
     context.visit(context.hop)
+    context.headway.restart(context.t_s)
     return resume(context)
 
 
@@ -295,6 +295,7 @@ def resume(context: Context) -> Move:
             return Move(state, context.lead(context.hop))
         visited.add(context.hop)
         context.visit(context.hop)
+        context.headway.restart(context.t_s)
     return Move(Waiting(context, context.t_s), context.stand())
 
 
@@ -307,6 +308,7 @@ def forgo(context: Context, *, for_long: bool) -> Move | None:
     first = context.hop
     if not context.leave_to_mates(for_long=for_long):
         return None
+    context.headway.restart(context.t_s)
     for _ in range(len(context.task.graph)):
         if not context.ask() or context.hop == first:
             break

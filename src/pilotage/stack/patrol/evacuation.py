@@ -1,0 +1,157 @@
+"""Where those who stand on the path of one who goes first are to go."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Mapping, Sequence
+
+import numpy as np
+
+from pilotage.core.types import BoolArray, FloatArray
+from pilotage.kernels.control import eikonal
+from pilotage.stack.patrol.roadmap import STEP_M, Roadmap
+
+AROUND_M = 8.0
+"""Beyond the path nobody is sent farther than this."""
+DEEPEST = 6
+"""So many push each other at most."""
+OFF_M = (0.25, 0.1)
+"""Beyond the sum of two bodies, to keep from the path; less where there is no such place."""
+
+
+class Evacuation:
+    """A search for places off a path, one robot after the other, as pebbles on a graph are moved.
+
+    Each goes to the nearest place that it can reach past the others where they are or were told to go. Where
+    there is none it pushes those who stand between, who then have to leave its path as well, the one who
+    goes first included: as in PIBT (Okumura et al. 2022) priority is inherited, and handed back where that
+    leads nowhere. Fails where the floor around has no place left.
+
+    Parameters
+    ----------
+    line_xy_m
+        (K, 2) the path, from the robot that goes first on.
+    first
+        Number of that robot.
+    places
+        Where each robot is, by number; that one's too.
+    sent
+        Where some of them were told to go already.
+    given
+        Those of them who were told by others, and cannot be told otherwise.
+    fixed_xy_m
+        (F, 2) bodies that nobody can tell to go.
+    apart_m
+        Between the middles of two that stand beside each other.
+
+    Attributes
+    ----------
+    sent
+        The orders, with those that were added.
+    """
+
+    def __init__(
+        self,
+        roadmap: Roadmap,
+        line_xy_m: FloatArray,
+        first: int,
+        places: Mapping[int, tuple[float, float]],
+        sent: Mapping[int, tuple[float, float]],
+        given: Collection[int],
+        fixed_xy_m: FloatArray,
+        apart_m: float,
+    ) -> None:
+        self._first, self._places, self._apart_m = first, places, apart_m
+        self._line, self._fixed = line_xy_m, fixed_xy_m
+        self.sent = dict(sent)
+        self._given = given
+        x0, y0 = roadmap.origin_xy_m
+        step = roadmap.spacing_m
+        low = np.floor((line_xy_m.min(axis=0) - AROUND_M - (x0, y0)) / step).astype(np.int64)
+        high = np.ceil((line_xy_m.max(axis=0) + AROUND_M - (x0, y0)) / step).astype(np.int64)
+        column, row = np.maximum(low, 0).tolist()
+        self._slow = roadmap.slowness[row : high[1] + 1, column : high[0] + 1]
+        self._step_m, self._x0, self._y0 = step, x0 + column * step, y0 + row * step
+        rows, columns = self._slow.shape
+        xs, ys = self._x0 + step * np.arange(columns), self._y0 + step * np.arange(rows)
+        self._nodes: FloatArray = np.stack(np.meshgrid(xs, ys), axis=-1)
+
+    def clear(self) -> bool:
+        """Send everybody off the path who is on it and was not sent; whether there were places for all."""
+        on = [
+            n for n in self._places if n != self._first and n not in self.sent and self._is_on(n, self._line)
+        ]
+        # Those at its far end make room for those before them.
+        along = {n: int(np.argmin(np.hypot(*(self._line - self._places[n]).T))) for n in on}
+        found = [self._leave(n, [self._line], 0) for n in sorted(on, key=lambda n: -along[n])]
+        return all(found)
+
+    def _is_on(self, number: int, line: FloatArray) -> bool:
+        """Whether a robot stands on a path, or will when it is where it was told to go."""
+        place = self.sent.get(number, self._places[number])
+        return bool(np.hypot(*(line - place).T).min() < self._apart_m + OFF_M[-1])
+
+    def _leave(self, number: int, lines: Sequence[FloatArray], depth: int) -> bool:
+        """Find a place off some paths for one robot, and for those whom it has to push."""
+        others = {n: self.sent.get(n, place) for n, place in self._places.items() if n != number}
+        fixed = {n: place for n, place in others.items() if n in self._given}
+        # Past everybody; pushing all but the one who goes first, who comes back to its own path; it as well.
+        for stays in (others, fixed | {n: others[n] for n in others if n == self._first}, fixed):
+            for off_m in OFF_M:
+                path = self._path_off(number, lines, stays, self._apart_m + off_m)
+                if path is None:
+                    continue
+                before = dict(self.sent)
+                pushed = [n for n in others if n not in stays and self._is_on(n, path)]
+                x, y = path[-1].tolist()
+                self.sent[number] = x, y
+                if not pushed:
+                    return True
+                if depth < DEEPEST and all(
+                    self._leave(n, [path] if n == self._first else [*lines, path], depth + 1) for n in pushed
+                ):
+                    return True
+                self.sent = before
+                break
+        return False
+
+    def _path_off(
+        self,
+        number: int,
+        lines: Sequence[FloatArray],
+        stays: Mapping[int, tuple[float, float]],
+        off_m: float,
+    ) -> FloatArray | None:
+        """(N, 2) from a robot to the nearest place off some paths, around who stands; None without one."""
+        here = np.array(self._places[number])
+        slow = self._slow.copy()
+        taken = np.zeros(slow.shape, dtype=np.bool_)
+        for body in [*self._fixed, *map(np.array, stays.values())]:
+            taken |= self._near(body, here, slow)
+        time = np.full(slow.shape, np.inf)
+        row, column = round((here[1] - self._y0) / self._step_m), round((here[0] - self._x0) / self._step_m)
+        if not (0 <= row < slow.shape[0] and 0 <= column < slow.shape[1]):
+            return None
+        near = slice(max(0, row - 1), row + 2), slice(max(0, column - 1), column + 2)
+        time[near][np.isfinite(slow[near])] = 0.0
+        eikonal.sweep_down(time, slow, self._step_m)
+        when = np.where(taken, np.inf, time)
+        for line in lines:
+            nearest = np.full(slow.shape, np.inf)
+            for place in line:
+                np.minimum(nearest, np.hypot(*(self._nodes - place).transpose(2, 0, 1)), out=nearest)
+            when[nearest < off_m] = np.inf
+        best = np.unravel_index(int(np.argmin(when)), when.shape)
+        if not math.isfinite(when[best]):
+            return None
+        # Down the field of times from the robot: backwards.
+        x, y = self._nodes[best].tolist()
+        steps = math.ceil(4.0 * AROUND_M / STEP_M)
+        back = eikonal.way_down(x, y, time, time, self._x0, self._y0, self._step_m, STEP_M, steps)
+        return np.concatenate([here[None], back[::-1, :2]])
+
+    def _near(self, body: FloatArray, here: FloatArray, slow: FloatArray) -> BoolArray:
+        """Nodes that a body keeps; no path leads there, but for one that it stands close to already."""
+        away = np.hypot(*(self._nodes - body).transpose(2, 0, 1))
+        slow[away < min(self._apart_m, float(np.hypot(*(body - here))) - 1.5 * self._step_m)] = np.inf
+        return np.asarray(away < self._apart_m)

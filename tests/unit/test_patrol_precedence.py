@@ -1,0 +1,156 @@
+"""Of robots that wait for each other one goes first, and the others find places off its path."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from pilotage.core.types import FloatArray
+from pilotage.experiments.build.build import build
+from pilotage.experiments.loop import run_loop
+from pilotage.experiments.mission import mission_of, read_mission
+from pilotage.sensors.readings import Readings
+from pilotage.stack.navigator.patrol.headway import Headway
+from pilotage.stack.navigator.patrol.precedence import MOST_S, Leading, orders, told
+from pilotage.stack.navigator.patrol.states import Move
+from pilotage.stack.patrol.evacuation import Evacuation
+from pilotage.stack.patrol.roadmap import Roadmap
+from pilotage.stack.patrol.word import Clearing, TeamWord
+
+APART_M = 0.7
+NOBODY = np.zeros((0, 2))
+Places = dict[int, tuple[float, float]]
+
+
+def hall_and_dead_end(size: int, duration_s: float) -> dict[str, Any]:
+    """A hall of 8 m x 3 m with a dead end of 4 m x 0.9 m."""
+    walls = [[0, 0, 8, 0], [0, 0, 0, 3], [8, 0, 8, 3], [0, 3, 3.55, 3], [4.45, 3, 8, 3]]
+    walls += [[3.55, 3, 3.55, 7], [4.45, 3, 4.45, 7], [3.55, 7, 4.45, 7]]
+    values = read_mission("museum-patrol")
+    values["world"] = {"map": {"map": "dead end", "bounds_m": [0, 0, 8, 7], "walls_m": walls}}
+    values["task"] = {"name": "patrol", "duration_s": duration_s, "derive": {"reach_m": 4.0}}
+    values["team"] = {"size": size, "strategy": "cyclic", "radio": {}}
+    values["run"]["time_limit_s"] = duration_s
+    return values
+
+
+@pytest.fixture(scope="module")
+def roadmap() -> Roadmap:
+    stack = build(mission_of(hall_and_dead_end(1, 10.0), seed=0)).team[0].stack
+    found = stack._context.roadmap  # type: ignore[attr-defined]
+    assert isinstance(found, Roadmap)
+    return found
+
+
+def line_to(roadmap: Roadmap, x_m: float, y_m: float, to: tuple[float, float]) -> FloatArray:
+    return roadmap.way(x_m, y_m, roadmap.field_to(*to), 12.0)[:, :2]
+
+
+def planned(places: Places, sent: Places) -> Places:
+    return {n: sent.get(n, place) for n, place in places.items()}
+
+
+class TestEvacuation:
+    def test_all_leave_the_path_for_places_apart(self, roadmap: Roadmap) -> None:
+        """Robots anywhere in the hall; one of them is to go into the dead end."""
+        rng = np.random.default_rng(5)
+        for _ in range(6):
+            places: Places = {}
+            while len(places) < 6:
+                x, y = rng.uniform([0.5, 0.5], [7.5, 2.5]).tolist()
+                if all(math.dist((x, y), other) > 0.75 for other in places.values()):
+                    places[len(places)] = x, y
+            line = line_to(roadmap, *places[0], (4.0, 6.3))
+            search = Evacuation(roadmap, line, 0, places, {}, (), NOBODY, APART_M)
+            assert search.clear()
+            assert 0 not in search.sent
+            where = planned(places, search.sent)
+            for n in range(1, 6):
+                assert np.hypot(*(line - where[n]).T).min() >= APART_M
+                assert all(math.dist(where[n], where[k]) >= APART_M - 0.06 for k in range(1, n))
+
+    def test_out_of_a_dead_end_the_one_who_goes_first_makes_room_itself(self, roadmap: Roadmap) -> None:
+        places: Places = {3: (4.0, 3.6), 1: (4.0, 6.2)}
+        line = line_to(roadmap, *places[3], (4.0, 6.3))
+        search = Evacuation(roadmap, line, 3, places, {}, (), NOBODY, APART_M)
+        assert search.clear()
+        assert set(search.sent) == {1, 3}
+        assert all(y < 2.7 for _, y in search.sent.values())
+        assert math.dist(search.sent[1], search.sent[3]) >= APART_M
+
+    def test_those_behind_push_those_before_them(self, roadmap: Roadmap) -> None:
+        """Two in the dead end, one comes out of its depth: the one at the mouth goes as well."""
+        places: Places = {0: (4.0, 6.2), 1: (4.0, 5.0), 2: (4.0, 3.8)}
+        line = line_to(roadmap, *places[0], (1.0, 1.5))
+        search = Evacuation(roadmap, line, 0, places, {}, (), NOBODY, APART_M)
+        assert search.clear()
+        assert set(search.sent) == {1, 2}
+        assert all(y < 2.7 for _, y in search.sent.values())
+
+    def test_who_was_told_by_another_stays_and_where_no_place_is_left_it_says_so(
+        self, roadmap: Roadmap
+    ) -> None:
+        places: Places = {0: (1.0, 1.5), 1: (4.0, 6.2)}
+        line = line_to(roadmap, *places[0], (4.0, 6.3))
+        given: Places = {2: (4.0, 3.6)}
+        search = Evacuation(roadmap, line, 0, places | given, given, given, NOBODY, APART_M)
+        assert not search.clear()
+        assert search.sent == given
+        body = np.array([[4.0, 3.6]])
+        assert not Evacuation(roadmap, line, 0, places, {}, (), body, APART_M).clear()
+
+
+class TestOrder:
+    def test_who_goes_to_and_fro_gets_nowhere(self) -> None:
+        headway = Headway()
+        for k in range(100):
+            headway.step(0.2 * k, 4, 9.0 - 3.0 * abs(math.sin(0.3 * k)))
+        assert headway.since_s < 2.0
+        headway.step(20.0, 4, 5.0)
+        assert headway.since_s == 20.0
+        headway.step(30.0, 7, 2.0)
+        assert headway.since_s == 20.0
+        headway.restart(31.0)
+        assert headway.since_s == 31.0
+
+    def test_of_two_who_tell_it_to_go_the_one_without_headway_for_longest_counts(self) -> None:
+        context = build(mission_of(hall_and_dead_end(4, 10.0), seed=0)).team[3].stack._context  # type: ignore[attr-defined]
+        word = TeamWord(1.0, 1.0, False, None, None, context.memory.message(0.0))
+        asks = {0: (9.0, 5.0), 1: (4.0, 6.0), 2: (4.0, 7.0)}
+        for number, (since_s, x_m) in asks.items():
+            clearing = Clearing(since_s, ((3, x_m, 1.0), (9, x_m, 2.0)))
+            context.mates[number] = 0.0, replace(word, clearing=clearing)
+        assert told(context) == (6.0, 1.0)
+        assert orders(context, 3.0) == {}
+        assert orders(context, 4.0) == {3: (6.0, 1.0), 9: (6.0, 2.0)}
+        context.t_s = 60.0  # they have long been silent
+        assert told(context) is None
+
+
+def test_whoever_goes_first_arrives(monkeypatch: pytest.MonkeyPatch) -> None:
+    """All who are kept out for a second go first by turns: each is through in time, nobody is touched."""
+    began: dict[int, float] = {}
+    took_s: list[float] = []
+    step = Leading.step
+
+    def watched(self: Leading, readings: Readings) -> Move:
+        began.setdefault(self.context.task.robot, self.context.t_s)
+        move = step(self, readings)
+        if move.state is not self:
+            took_s.append(self.context.t_s - began.pop(self.context.task.robot))
+        return move
+
+    monkeypatch.setattr(Leading, "step", watched)
+    values = hall_and_dead_end(6, 60.0)
+    values["stack"]["navigator"] = {"name": "patrol", "precede_s": 1.0}
+    values["task"]["visit_m"] = 0.5
+    experiment = build(mission_of(values, seed=1))
+    metrics = experiment.task.judge(run_loop(experiment).finished).metrics
+    assert metrics["collisions"] == metrics["deadlocks"] == 0
+    assert len(took_s) > 5
+    assert np.median(took_s) < 10.0
+    assert max(took_s) < MOST_S
