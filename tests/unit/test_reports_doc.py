@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import importlib.util
+import itertools
 import json
 from pathlib import Path
 
 import pytest
 
 from pilotage.cli.main import main
-from pilotage.experiments.mission import shipped_missions
+from pilotage.experiments.build.build import build
+from pilotage.experiments.mission import load_mission, shipped_missions
 from pilotage.experiments.reproduced import Reproduced, reproduced
 from pilotage.experiments.studies.study import shipped_studies
 
@@ -35,6 +37,10 @@ def test_what_reproduces_it_exists(row: Reproduced, capsys: pytest.CaptureFixtur
         assert (ROOT / words[0]).is_file(), f"{row.command}: no such file"
     elif words[1] == "run":
         assert words[2] in shipped_missions()
+        said = row.remark.split()
+        overrides = [value for flag, value in itertools.pairwise(said) if flag == "--set"]
+        if overrides:
+            build(load_mission(words[2], overrides, 0))
     elif words[1] == "study":
         assert words[2] in shipped_studies()
     else:
