@@ -216,7 +216,7 @@ def trial(robot: Mapping[str, float], name: str, seed: int) -> tuple[list[float]
     printed = run.robots[0].results["cells"]
     assert isinstance(printed, CellMap)
     truth = true_map(markings.source)
-    visits = experiment.task._visits[0].visited  # type: ignore[attr-defined]
+    visits = verdict.extras[f"{run.robots[0].name}/visited"] > 0.0
     right = float(np.count_nonzero(visits & printed.holds(CellState.VISITED)))
     found = [*map_summary(printed, truth), float(np.count_nonzero(visits)), right, run.duration_s]
     return found, str(verdict.metrics["reason"]).split("; touched")[0]
