@@ -1,4 +1,4 @@
-"""The rover's estimators over many runs: do their 95 % ellipses hold the truth 95 % of the time?
+"""The rover's estimators over many runs: do their regions hold the truth as often as they say?
 
 ``python -m benchmarks.gale [--runs 1000] [--reckoned 3000] [--json OUT]``: each task's drive once by truth,
 then the estimators' kernels along it with noise of their own a run (the study ``gale-estimation`` runs whole
@@ -8,6 +8,7 @@ missions instead, fewer times). A run's steps share their error: intervals come 
 from __future__ import annotations
 
 import argparse
+import cmath
 import json
 import math
 import sys
@@ -20,11 +21,12 @@ from scipy.spatial import cKDTree
 from pilotage.core.chi_square import chi_square_quantile
 from pilotage.core.types import FloatArray, IntArray
 from pilotage.evaluation.driving import poses
+from pilotage.evaluation.position_region import squared_off
 from pilotage.evaluation.rover_metrics import stretches_without
 from pilotage.experiments.build.build import build
 from pilotage.experiments.loop import run_loop
 from pilotage.experiments.mission import load_mission
-from pilotage.kernels.filters import rover_filter, rover_odometry
+from pilotage.kernels.filters import bent_region, rover_filter, rover_odometry
 from pilotage.kernels.geometry.motion import wrap
 from pilotage.kernels.jit import kernel
 
@@ -74,18 +76,25 @@ def run(
     R: FloatArray,
     gate: float,
     reckon: bool,
-) -> FloatArray:
-    """(T, 2) squared Mahalanobis distance of the position, and of the pose, of one run.
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """(T, 3) errors, (T, 3, 3) covariances and (T, REGION) regions (of dead reckoning) of one run.
 
     ``start`` (3,) errors, ``odometry`` (T, 2) and ``sighted`` (S, 2) noise of unit variance.
     """
     steps = truth.shape[0]
-    out = np.empty((steps, 2))
+    errors, covs = np.empty((steps, 3)), np.empty((steps, 3, 3))
+    regions = np.empty((steps if reckon else 0, bent_region.REGION))
     mean, cov, anchor = truth[0].copy(), initial.copy(), np.full(1, -1, dtype=np.int64)
     for i in range(3):
         mean[i] += start[i] * math.sqrt(initial[i, i])
     refused, sums = np.zeros(1, dtype=np.int64), np.zeros(rover_odometry.SUMS, dtype=np.complex128)
-    pose, spread, error = mean.copy(), cov.copy(), np.empty(3)
+    moves, knots, stretches = (
+        np.zeros(bent_region.KNOTS, dtype=np.complex128),
+        np.zeros((bent_region.KNOTS, 2)),
+        0,
+    )
+    spread = np.zeros(bent_region.SUMS, dtype=np.complex128)
+    spread[0] = initial[0, 0] + initial[1, 1]
     for k in range(steps):
         if k > 0:
             dx, dy = truth[k, 0] - truth[k - 1, 0], truth[k, 1] - truth[k - 1, 1]
@@ -96,11 +105,16 @@ def run(
             said = distance + math.sqrt(q_distance) * odometry[k, 0]
             increment = (said, aside + 0.5 * turned, turn + turned, q_distance, q_turn)
             if reckon:
+                move = cmath.rect(said, mean[2] + increment[1])
+                stretches = bent_region.add_move(moves, knots, spread, stretches, move, cov[2, 2], q_distance)
                 rover_odometry.predict_second_order(mean, cov, sums, *increment)
             else:
                 rover_filter.predict(mean, cov, anchor, *increment)
         a, b = first[k], first[k + 1]
-        if not reckon:
+        if reckon:
+            bent_region.region(moves, knots, spread, stretches, regions[k])
+            errors[k], covs[k] = truth[k] - mean, cov
+        else:
             ranges, bearings = np.empty(b - a), np.empty(b - a)
             for j in range(a, b):
                 dx, dy = points[seen[j], 0] - truth[k, 0], points[seen[j], 1] - truth[k, 1]
@@ -110,25 +124,18 @@ def run(
             rover_filter.update(
                 mean, cov, anchor, ids[seen[a:b]], ranges, bearings, ids, points, R, gate, refused
             )
-            rover_filter.moments(mean, cov, anchor, points, pose, spread)
-        else:
-            pose[:], spread[:, :] = mean, cov
-        for i in range(3):
-            error[i] = truth[k, i] - pose[i]
-        error[2] = wrap(error[2])
-        xx, xy, yy = spread[0, 0], spread[0, 1], spread[1, 1]
-        x, y = error[0], error[1]
-        out[k, 0] = (yy * x * x - 2.0 * xy * x * y + xx * y * y) / (xx * yy - xy * xy)
-        out[k, 1] = error @ np.linalg.solve(spread, error)
-    return out
+            rover_filter.moments(mean, cov, anchor, points, errors[k], covs[k])
+            errors[k] = truth[k] - errors[k]
+        errors[k, 2] = wrap(errors[k, 2])
+    return errors, covs, regions
 
 
 def judged(drive: Drive, runs: int, reckon: bool) -> dict[str, dict[str, float]]:
-    """Over runs: share of the steps in the 95 % ellipse, and mean NEES of pose and position."""
-    inside, position, pose = np.empty(runs), np.empty(runs), np.empty(runs)
+    """Over runs: shares of the steps in the regions, and mean NEES of pose and position."""
+    values: dict[str, list[float]] = {}
     for seed in range(runs):
         rng = np.random.default_rng(seed)
-        found = run(
+        errors, covs, regions = run(
             drive.truth,
             rng.standard_normal(3),
             rng.standard_normal((len(drive.truth), 2)),
@@ -142,16 +149,22 @@ def judged(drive: Drive, runs: int, reckon: bool) -> dict[str, dict[str, float]]
             GATE,
             reckon,
         )
-        inside[seed] = (found[:, 0] <= chi_square_quantile(0.95, 2)).mean()
-        position[seed], pose[seed] = found.mean(axis=0)
+        off = squared_off(errors[:, :2], covs, regions if reckon else None)
+        pose = np.einsum("ti,ti->t", errors, np.linalg.solve(covs, errors[:, :, None])[:, :, 0])
+        found = {"in ellipse": off <= chi_square_quantile(0.95, 2), "position NEES": off, "NEES": pose}
+        for share in (0.5, 0.8, 0.99):
+            found[f"in {share:.0%} region"] = off <= chi_square_quantile(share, 2)
+        for name, steps in found.items():
+            values.setdefault(name, []).append(float(steps.mean()))
+    half = {name: 1.96 * float(np.std(each)) / math.sqrt(runs) for name, each in values.items()}
     return {
         name: {
-            "value": float(values.mean()),
-            "low": float(values.mean() - 1.96 * values.std() / math.sqrt(runs)),
-            "high": float(values.mean() + 1.96 * values.std() / math.sqrt(runs)),
+            "value": float(np.mean(each)),
+            "low": float(np.mean(each)) - half[name],
+            "high": float(np.mean(each)) + half[name],
             "n": runs,
         }
-        for name, values in (("in ellipse", inside), ("position NEES", position), ("NEES", pose))
+        for name, each in values.items()
     }
 
 

@@ -7,11 +7,13 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from pilotage.core.chi_square import chi_square_quantile
 from pilotage.core.types import FloatArray
 from pilotage.evaluation.driving import covariances, poses
 from pilotage.evaluation.finished import FinishedRun, RobotRun
+from pilotage.evaluation.position_region import bent_regions, squared_off
 from pilotage.evaluation.relief import relief
-from pilotage.evaluation.rover_metrics import ellipse_axes, in_ellipse, root_determinant, stretches_without
+from pilotage.evaluation.rover_metrics import root_determinant, stretches_without
 from pilotage.kernels.grids.blocked_distance import distance_to_blocked
 from pilotage.maps.occupancy_grid import OccupancyGrid, squared_distances
 from pilotage.maps.world_map import WorldMap
@@ -24,7 +26,7 @@ NEAR_CELLS = 3.0
 
 
 def terrain_columns(run: FinishedRun, robot: RobotRun) -> dict[str, FloatArray]:
-    """What is worked out for every row of a rover's trace: path, hazards, heights, ellipses."""
+    """What is worked out for every row of a rover's trace: path, hazards, heights, uncertainty."""
     trace, chart = robot.trace, run.chart
     points = poses(trace, "true")[:, :2]
     if len(points) == 0 or chart.grid is None:
@@ -40,14 +42,7 @@ def terrain_columns(run: FinishedRun, robot: RobotRun) -> dict[str, FloatArray]:
         columns["slope_rad"] = chart.elevation.slopes_at(chart.grid.cells_at(points))
     if isinstance(robot.motion, BicycleConfig):
         columns["steering_rad"] = steering_rad(trace, robot.motion.wheelbase_m)
-    covs = covariances(trace)
-    axes = ellipse_axes(covs, run.mission.run.ellipse_probability)
-    return columns | {
-        "ellipse_major_m": axes[:, 0],
-        "ellipse_minor_m": axes[:, 1],
-        "ellipse_direction_rad": axes[:, 2],
-        "root_determinant_m2": root_determinant(covs),
-    }
+    return columns | {"root_determinant_m2": root_determinant(covariances(trace))}
 
 
 def steering_rad(trace: Mapping[str, FloatArray], wheelbase_m: float) -> FloatArray:
@@ -81,7 +76,8 @@ def terrain_metrics(
     estimate, covs = poses(trace, "est"), covariances(trace)
     error = estimate[-1] - truth[-1]
     metrics["final_position_error_m"] = float(math.hypot(error[0], error[1]))
-    inside = in_ellipse(truth, estimate, covs, run.mission.run.ellipse_probability)
+    off = squared_off((truth - estimate)[:, :2], covs, bent_regions(trace))
+    inside = off <= chi_square_quantile(run.mission.run.ellipse_probability, 2)
     metrics["ellipse_coverage"] = float(inside.mean())
     metrics["final_in_ellipse"] = bool(inside[-1])
     metrics["final_believed_error_m"] = float(math.sqrt(covs[-1, 0, 0] + covs[-1, 1, 1]))

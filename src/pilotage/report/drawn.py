@@ -95,7 +95,7 @@ def without_given_pose(run: RunData) -> RunData:
     """The run without its estimate where that is the truth by definition."""
     if not pose_given(run):
         return run
-    believed = ("est_", "cov_", "nees", "ellipse_", "root_determinant")
+    believed = ("est_", "cov_", "nees", "region_", "root_determinant")
     columns = {name: v for name, v in run.trace.columns.items() if not name.startswith(believed)}
     return replace(run, trace=Trace(columns, run.trace.steps))
 

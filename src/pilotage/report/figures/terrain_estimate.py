@@ -1,4 +1,4 @@
-"""How a rover's path is estimated: with its ellipses on the map, errors and covariance over time."""
+"""How a rover's path is estimated: with its regions on the map, errors and covariance over time."""
 
 from __future__ import annotations
 
@@ -9,6 +9,8 @@ from matplotlib.axes import Axes
 from matplotlib.path import Path as Outline
 
 from pilotage.core.types import FloatArray
+from pilotage.evaluation.driving import covariances
+from pilotage.evaluation.position_region import bent_regions, outlines
 from pilotage.records.numbers import number
 from pilotage.records.run_data import RunData
 from pilotage.report import quantities
@@ -45,21 +47,18 @@ def thinned(points: FloatArray) -> FloatArray:
 
 
 def estimate_layers(axes: Axes, run: RunData, landmarks: FloatArray, unit: float) -> list[Key]:
-    """Draw the estimated path, ellipses along it and the landmarks; return their keys."""
+    """Draw the estimated path, the regions along it and the landmarks; return their keys."""
     trace = run.trace
     estimate = np.column_stack([trace["est_x_m"], trace["est_y_m"]]) / unit
     axes.plot(*thinned(estimate).T, color=YELLOW, linewidth=1.1, zorder=5.4)
     chosen = _along(trace["distance_m"])
-    angle = np.linspace(0.0, 2.0 * math.pi, 49)
-    outlines = []
-    for k in chosen:
-        a, b, turn = (trace[f"ellipse_{n}"][k] for n in ("major_m", "minor_m", "direction_rad"))
-        along, across = a * np.cos(angle) / unit, b * np.sin(angle) / unit
-        x = estimate[k, 0] + along * math.cos(turn) - across * math.sin(turn)
-        y = estimate[k, 1] + along * math.sin(turn) + across * math.cos(turn)
-        outlines.append(Outline(np.column_stack([x, y]), closed=True))
-    one_shape(axes, outlines, facecolor="none", edgecolor=VERMILLION, linewidth=1.0, zorder=5.6)
-    keys = [Key("estimated path", YELLOW), Key(f"{_probability(run)} ellipses", VERMILLION)]
+    bent = bent_regions(trace.columns)
+    about = outlines(
+        covariances(trace.columns)[chosen], None if bent is None else bent[chosen], _probability(run)
+    )
+    shapes = [Outline(shape, closed=True) for shape in estimate[chosen, None] + about / unit]
+    one_shape(axes, shapes, facecolor="none", edgecolor=VERMILLION, linewidth=1.0, zorder=5.6)
+    keys = [Key("estimated path", YELLOW), Key(f"{region_name(run)}s", VERMILLION)]
     inside = landmarks / unit
     if len(inside):
         axes.plot(
@@ -76,13 +75,14 @@ def estimate_layers(axes: Axes, run: RunData, landmarks: FloatArray, unit: float
     return keys
 
 
-def ellipses_told(run: RunData) -> str:
-    """How often the truth lies inside the ellipses."""
+def regions_told(run: RunData) -> str:
+    """How often the truth lies inside the regions."""
     share = number(run.metrics.get("ellipse_coverage"))
     if not math.isfinite(share):
         return ""
-    held, ellipse = quantities.share(share), _probability(run)
-    return f"In {held} of the steps of this run the truth is inside the {ellipse} ellipse."
+    return (
+        f"In {quantities.share(share)} of the steps of this run the truth is inside the {region_name(run)}."
+    )
 
 
 def drive_figure(run: RunData) -> Illustration:
@@ -197,7 +197,13 @@ def _along(distance_km: FloatArray) -> list[int]:
     return sorted({min(int(k), len(distance_km) - 1) for k in np.searchsorted(distance_km, wanted)})
 
 
-def _probability(run: RunData) -> str:
-    stack = run.mission.get("stack")
-    share = number(stack.get("ellipse_probability")) if isinstance(stack, dict) else math.nan
-    return f"{100.0 * share:g} %" if math.isfinite(share) else "95 %"
+def region_name(run: RunData) -> str:
+    """What the position is told to be in: an ellipse, or a bent region where the error is bent."""
+    shape = "ellipse" if bent_regions(run.trace.columns) is None else "region"
+    return f"{100.0 * _probability(run):g} % {shape}"
+
+
+def _probability(run: RunData) -> float:
+    settings = run.mission.get("run")
+    share = number(settings.get("ellipse_probability")) if isinstance(settings, dict) else math.nan
+    return share if math.isfinite(share) else 0.95

@@ -16,7 +16,7 @@ from pilotage.records.numbers import number
 from pilotage.records.run_data import RunData
 from pilotage.records.terrain import Picture, TerrainPictures
 from pilotage.report import quantities
-from pilotage.report.figures.terrain_estimate import ellipses_told, estimate_layers, thinned
+from pilotage.report.figures.terrain_estimate import estimate_layers, region_name, regions_told, thinned
 from pilotage.report.style import BLUE, GREEN, ORANGE, SKY, VERMILLION, WIDTH_PT, Illustration, Key, render
 
 _LEFT_PT, _RIGHT_PT, _TOP_PT, _BOTTOM_PT = 44.0, 8.0, 8.0, 32.0
@@ -66,8 +66,8 @@ def close_up_figure(run: RunData) -> Illustration:
     ground = pictures.hazards if pictures.ground is None else pictures.ground
     show_ground(axes, pictures, tinted(ground, pictures.hazards, ORANGE, 0.45))
     keys = _path(axes, run, pictures, SKY)
-    alt = "The path, its estimate and the ellipses from near"
-    caption = f"Ellipses stand at equal distances along the path. {ellipses_told(run)}".rstrip()
+    alt = "The path, its estimate and the regions that it may be in, from near"
+    caption = f"The {region_name(run)}s stand at equal distances along the path. {regions_told(run)}".rstrip()
     return Illustration(slug, title, alt, caption, render(figure, slug, alt), tuple(keys))
 
 
@@ -110,7 +110,7 @@ def _told(run: RunData) -> str:
     """Length and effort in a sentence."""
     driven = number(run.metrics.get("path_length_m"))
     if math.isfinite(driven):
-        return f"The path is {quantities.length(driven)} long. {ellipses_told(run)}".rstrip()
+        return f"The path is {quantities.length(driven)} long. {regions_told(run)}".rstrip()
     planned = number(run.metrics.get("planned_length_m"))
     if not math.isfinite(planned):
         return "No path was found."
@@ -182,7 +182,7 @@ def _path(axes: Axes, run: RunData, pictures: TerrainPictures, colour: str = VER
     keys = [Key("true path" if driven else "planned path", colour)]
     if len(points) > 1:
         axes.plot(*points.T, color=colour, linewidth=1.8, path_effects=dark, zorder=5)
-    if run.trace.has("est_x_m", "ellipse_major_m"):
+    if run.trace.has("est_x_m", "cov_xx_m2"):
         keys += estimate_layers(axes, run, pictures.landmarks, unit)
     for name, place, dot in _places(run, pictures):
         x, y = place / unit
