@@ -4,19 +4,20 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 
-from pilotage.core.types import FloatArray
+from pilotage.core.types import FloatArray, Pose2
 from pilotage.experiments.build.build import build
 from pilotage.experiments.loop import run_loop
 from pilotage.experiments.mission import mission_of, read_mission
 from pilotage.sensors.readings import Readings
 from pilotage.stack.navigator.patrol.headway import Headway
 from pilotage.stack.navigator.patrol.precedence import MOST_S, Leading, orders, told
-from pilotage.stack.navigator.patrol.states import Move
+from pilotage.stack.navigator.patrol.states import Move, State, Waiting
 from pilotage.stack.patrol.evacuation import Evacuation
 from pilotage.stack.patrol.roadmap import Roadmap
 from pilotage.stack.patrol.word import Clearing, TeamWord
@@ -129,6 +130,29 @@ class TestOrder:
         assert orders(context, 4.0) == {3: (6.0, 1.0), 9: (6.0, 2.0)}
         context.t_s = 60.0  # they have long been silent
         assert told(context) is None
+
+
+@pytest.mark.parametrize(("passes_s", "stays"), [(2.0, True), (6.0, False)])
+def test_who_waits_lets_somebody_pass_and_makes_room_for_one_who_does_not(
+    passes_s: float, stays: bool
+) -> None:
+    """It drove to the next place for whoever came within 0.6 m: eight seconds lost at each meeting."""
+    context = build(mission_of(hall_and_dead_end(1, 10.0), seed=0)).team[0].stack._context  # type: ignore[attr-defined]
+    stay = SimpleNamespace(next_vertex=lambda knowledge: knowledge.at)
+    context.task = replace(context.task, strategy=stay)
+    at = int(np.argmin(context.roadmap.places_xy_m[:, 1]))
+    context.memory.visit(at, 0.0)
+    context.hop = context.target = context.came_from = at
+    x, y = context.roadmap.places_xy_m[at].tolist()
+    context.pose, context.fresh = Pose2(x, y, 0.0), True
+    state: State = Waiting(context, 0.0, 0.0)
+    for k in range(1, 81):
+        context.t_s = 0.1 * k
+        context.strange = np.array([[0.6, 0.3]]) if 1.0 < context.t_s < 1.0 + passes_s else NOBODY
+        state = state.step(Readings(context.t_s, {})).state
+        if not isinstance(state, Waiting):
+            break
+    assert isinstance(state, Waiting) is stays
 
 
 def test_whoever_goes_first_arrives(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple, Protocol
 
 from pilotage.core.types import FloatArray, Twist
@@ -72,10 +72,17 @@ class Driving:
 
 @dataclass(frozen=True, slots=True)
 class Waiting:
-    """Stands at a vertex because its strategy says so; makes room for who wants to pass."""
+    """Stands at a vertex because its strategy says so; makes room for who wants to pass.
+
+    Attributes
+    ----------
+    since_s, clear_s
+        When it was told to last, and when nobody was close to it last: who only passes does for a moment.
+    """
 
     context: Context
     since_s: float
+    clear_s: float
 
     def step(self, readings: Readings) -> Move:
         """Ask again from time to time."""
@@ -84,14 +91,16 @@ class Waiting:
         context.mode, context.blocked = Mode.WAIT, False
         traffic.look_along(context, context.here())
         context.memory.visit(context.came_from, context.t_s)
-        if context.t_s - self.since_s >= context.config.ask_s:
-            move = resume(context)
-            if isinstance(move.state, Driving):
-                return move
-            if context.waits_for() or context.crowded(ASIDE_M) or is_wanted(context):
-                return give_way(context)
+        clear_s = self.clear_s if context.crowded(ASIDE_M) else context.t_s
+        if context.t_s - self.since_s < context.config.ask_s:
+            return Move(replace(self, clear_s=clear_s), context.stand())
+        move = resume(context)
+        if isinstance(move.state, Driving):
             return move
-        return Move(self, context.stand())
+        pressed = context.t_s - clear_s > context.config.patience_s
+        if pressed or context.waits_for() or is_wanted(context):
+            return give_way(context)
+        return Move(replace(self, since_s=context.t_s, clear_s=clear_s), context.stand())
 
 
 @dataclass(frozen=True, slots=True)
@@ -296,7 +305,12 @@ def resume(context: Context) -> Move:
         visited.add(context.hop)
         context.visit(context.hop)
         context.headway.restart(context.t_s)
-    return Move(Waiting(context, context.t_s), context.stand())
+    return wait(context)
+
+
+def wait(context: Context) -> Move:
+    """Where it is."""
+    return Move(Waiting(context, context.t_s, context.t_s), context.stand())
 
 
 def forgo(context: Context, *, for_long: bool) -> Move | None:
@@ -317,7 +331,7 @@ def forgo(context: Context, *, for_long: bool) -> Move | None:
         if not context.leave_to_mates(for_long=for_long):
             break
     if context.hop == first and context.heard():
-        return Move(Waiting(context, context.t_s), context.stand())
+        return wait(context)
     return resume(context)
 
 
@@ -334,7 +348,7 @@ def give_way(context: Context) -> Move:
         return Move(SteppingAside(context, field, until_s), context.descend(field))
     vertex = traffic.way_out(context)
     if vertex < 0:
-        return Move(Waiting(context, context.t_s), context.stand())
+        return wait(context)
     context.journal.count("gave_way")
     context.say("give-way", f"no progress towards vertex {context.hop}: makes room towards vertex {vertex}")
     return Move(Yielding(context, vertex, until_s), context.lead(vertex))
