@@ -38,6 +38,7 @@ SLUG = "close-ups"
 TITLE = "Close-ups"
 MOST = 3
 PATH_S = 30.0
+LEAST_ROWS = 10
 _LEFT_PT, _RIGHT_PT, _TOP_PT, _BOTTOM_PT, _GAP_PT = 24.0, 4.0, 20.0, 22.0, 28.0
 # What went wrong is worth more than what went well.
 _SHOWN_EVENTS = ("collision", "failed", "stuck", "escape", "avoid-start", "replan", "hall")
@@ -45,10 +46,11 @@ _SHOWN_EVENTS = ("collision", "failed", "stuck", "escape", "avoid-start", "repla
 
 @dataclass(frozen=True, slots=True)
 class Moment:
-    """A step worth a closer look, and why."""
+    """A step worth a closer look, why, and how far off the belief is: the window holds it."""
 
     step: int
     title: str
+    error_m: float = 0.0
 
 
 def close_ups_figure(run: RunData) -> Illustration:
@@ -58,14 +60,18 @@ def close_ups_figure(run: RunData) -> Illustration:
     if not moments:
         return Illustration(SLUG, TITLE, "", "The run recorded no true path to look at closely.")
     radius = run.outline.radius_m or 0.3
-    half_m = 6.0 * radius
-    side = (WIDTH_PT - _LEFT_PT - _RIGHT_PT - (MOST - 1) * _GAP_PT) / MOST
+    least_m = 6.0 * radius
+    # Coordinates of four digits need room.
+    digits_pt = 14.0 if max(np.abs(path[moment.step]).max() for moment in moments) >= 1000.0 else 0.0
+    left_pt, gap_pt = _LEFT_PT + digits_pt, _GAP_PT + digits_pt
+    side = (WIDTH_PT - left_pt - _RIGHT_PT - (MOST - 1) * gap_pt) / MOST
     total = side + _TOP_PT + _BOTTOM_PT
     figure = Figure(figsize=(WIDTH_PT / 72.0, total / 72.0))
     for index, moment in enumerate(moments):
-        left = _LEFT_PT + index * (side + _GAP_PT)
+        left = left_pt + index * (side + gap_pt)
         axes = figure.add_axes((left / WIDTH_PT, _BOTTOM_PT / total, side / WIDTH_PT, side / total))
         x, y = (float(value) for value in path[moment.step])
+        half_m = max(least_m, 1.3 * moment.error_m)
         axes.set_xlim(x - half_m, x + half_m)
         axes.set_ylim(y - half_m, y + half_m)
         axes.set_autoscale_on(False)
@@ -74,9 +80,9 @@ def close_ups_figure(run: RunData) -> Illustration:
         axes.locator_params(nbins=5)
         _draw(axes, _window(run, x, y, half_m, moment.step), run, moment.step, radius)
     caption = (
-        f"Windows of {quantities.length(2.0 * half_m)}, in metres like the map, with the path of "
-        f"{PATH_S:g} s before and after. The body is the robot at that moment, dashed is where it "
-        "believed to be; the small black ellipses hold it with 95 % probability and are to scale."
+        f"Windows of {quantities.length(2.0 * least_m)}, larger for a larger error, in metres like the map, "
+        f"with the path of {PATH_S:g} s before and after. The body is the robot at that moment, dashed is "
+        "where it believed to be; the small black ellipses hold it with 95 % probability and are to scale."
     )
     candidates = (
         (True, Key("true path", BLUE)),
@@ -121,7 +127,8 @@ def _moments(run: RunData, path: FloatArray) -> list[Moment]:
         if known[moment.step] and all(
             math.dist(path[moment.step], path[other.step]) > 1.0 for other in apart
         ):
-            apart.append(Moment(moment.step, f"{moment.title}, at {trace.t_s[moment.step]:.1f} s"))
+            off_m = float(np.nan_to_num(error[moment.step]))
+            apart.append(Moment(moment.step, f"{moment.title}, at {trace.t_s[moment.step]:.1f} s", off_m))
     return apart[:MOST]
 
 
@@ -169,8 +176,10 @@ def _window(run: RunData, x: float, y: float, half_m: float, step: int) -> RunDa
     """Return the run with only what lies in a window: lines are cut at its rim to keep the page small.
 
     Of the paths only those of `PATH_S` around the moment: a robot that passes often would fill the window.
+    A recording of a row a day still has some rows.
     """
     soon = np.abs(run.trace.t_s - run.trace.t_s[step]) <= PATH_S
+    soon[max(step - LEAST_ROWS, 0) : step + LEAST_ROWS + 1] = True
 
     def near(points: FloatArray) -> BoolArray:
         # A little more than the window, so that lines leave it instead of ending at its rim.
