@@ -132,6 +132,21 @@ sys.exit(code or ", ".join(sorted(heavy)) or 0)
     assert (done.returncode, done.stderr) == (0, "")
 
 
+def test_garbage_is_looked_for_seldom_in_a_process_of_its_own_only() -> None:
+    script = """
+import gc, sys
+from pilotage.cli.main import main
+before = gc.get_threshold()
+code = main(["--version"])
+called = gc.get_threshold() == before
+sys.argv[1:] = ["--version"]
+code = code or main()
+print(code, called, gc.get_threshold()[0] >= 50 * before[0])
+"""
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=False)
+    assert done.stdout.splitlines()[-1] == "0 True True"
+
+
 def test_a_closed_pipe_is_quiet() -> None:
     reader, writer = os.pipe()
     os.close(reader)

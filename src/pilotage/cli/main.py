@@ -97,8 +97,10 @@ def _steady_environment() -> None:
     """
     import logging
 
+    from pilotage.core.memory import look_seldom
     from pilotage.core.whole_number import whole_number
 
+    look_seldom()
     logging.getLogger("matplotlib").setLevel(logging.ERROR)
     os.environ["MPLBACKEND"] = "Agg"
     if not whole_number(os.environ.get("NUMBA_NUM_THREADS", "1")):

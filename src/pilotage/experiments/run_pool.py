@@ -10,6 +10,7 @@ from concurrent.futures.process import BrokenProcessPool
 from typing import Any, TypeVar
 
 from pilotage.core.errors import InputError
+from pilotage.core.memory import look_seldom
 
 J = TypeVar("J", bound=tuple[Any, ...])
 R = TypeVar("R")
@@ -27,9 +28,7 @@ def all_done(work: Callable[..., R], jobs: Sequence[J], workers: int, what: str)
         for job in jobs:
             yield job, work(*job)
         return
-    pool = ProcessPoolExecutor(
-        min(workers, len(jobs)), multiprocessing.get_context("spawn"), _leave_ctrl_c_to_the_parent
-    )
+    pool = ProcessPoolExecutor(min(workers, len(jobs)), multiprocessing.get_context("spawn"), _begin)
     try:
         waiting = {pool.submit(work, *job): job for job in jobs}
         for future in as_completed(waiting):
@@ -40,5 +39,6 @@ def all_done(work: Callable[..., R], jobs: Sequence[J], workers: int, what: str)
         pool.shutdown(cancel_futures=True)
 
 
-def _leave_ctrl_c_to_the_parent() -> None:
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+def _begin() -> None:
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent decides
+    look_seldom()

@@ -18,6 +18,7 @@ from multiprocessing.connection import Connection, wait
 from multiprocessing.context import SpawnProcess
 from typing import Any
 
+from pilotage.core.memory import look_seldom
 from pilotage.experiments.studies.database import StudyStoppedError
 from pilotage.experiments.studies.trial import Outcome, Task, TrialRunner
 from pilotage.experiments.studies.workers import AHEAD, WAIT_S, hung
@@ -203,6 +204,7 @@ def _interrupts_held() -> Iterator[None]:
 def _work(pipe: Connection, base: Mapping[str, Any], memory_bytes: int) -> None:
     """A worker's life: run what comes, until the pipe closes."""
     _bound_memory(memory_bytes)
+    look_seldom()
     # Ctrl-C goes to the whole group: the parent decides.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     if hasattr(signal, "pthread_sigmask"):
