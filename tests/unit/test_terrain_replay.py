@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +15,10 @@ from pilotage.experiments.mission import load_mission
 from pilotage.experiments.run import run_mission
 from pilotage.records.run_data import read_run
 from pilotage.records.terrain import TerrainPictures, read_terrain
+from pilotage.records.trace import Trace
 from pilotage.report import write_report
+from pilotage.report.figures.terrain_estimate import rover_error_figure
+from pilotage.report.figures.terrain_map import close_up_figure
 from pilotage.report.replay.section import LONG_SPEEDS, replay_section
 from pilotage.report.replay.terrain import GREYS, SHARES, ground_raster, terrain_scene
 from support.browser import Browser, find_browser
@@ -76,6 +80,17 @@ def test_a_drive_with_its_estimate(estimated: Path) -> None:
     (plan,) = scene.paths
     assert len(plan.paths_m[0]) < 20  # bends only: hundreds of cells lie between
     assert plan.paths_m[0][0].tolist() == [55.0, 45.0]
+
+
+@pytest.mark.parametrize("lost", ["cov_xy_m2", "cov_tt_rad2", "distance_m", "nees"])
+def test_what_a_damaged_trace_has_lost_is_not_drawn(estimated: Path, lost: str) -> None:
+    run = read_run(estimated)
+    columns = {name: values for name, values in run.trace.columns.items() if name != lost}
+    damaged = replace(run, trace=Trace(columns, run.trace.steps))
+    pictures = [close_up_figure(damaged), rover_error_figure(damaged)]
+    told = {key.label for picture in pictures for key in picture.keys}
+    assert ("95 % ellipses" in told) == (lost in ("cov_tt_rad2", "nees"))
+    assert ("standard deviation" in told) == (lost == "distance_m")
 
 
 def test_only_a_plan_is_shown_along_it(tmp_path: Path) -> None:

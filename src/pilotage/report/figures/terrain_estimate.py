@@ -9,7 +9,6 @@ from matplotlib.axes import Axes
 from matplotlib.path import Path as Outline
 
 from pilotage.core.types import FloatArray
-from pilotage.evaluation.driving import covariances
 from pilotage.evaluation.position_region import bent_regions, outlines
 from pilotage.records.numbers import number
 from pilotage.records.run_data import RunData
@@ -37,6 +36,7 @@ from pilotage.report.style import (
 ELLIPSES = 24
 """So many along the path, at equal distances."""
 MOST_POINTS = 4000
+POSITION_COVARIANCE = ("cov_xx_m2", "cov_xy_m2", "cov_yy_m2")
 HOURS_S = 3600.0
 
 
@@ -53,9 +53,9 @@ def estimate_layers(axes: Axes, run: RunData, landmarks: FloatArray, unit: float
     axes.plot(*thinned(estimate).T, color=YELLOW, linewidth=1.1, zorder=5.4)
     chosen = _along(trace["distance_m"])
     bent = bent_regions(trace.columns)
-    about = outlines(
-        covariances(trace.columns)[chosen], None if bent is None else bent[chosen], _probability(run)
-    )
+    xx, xy, yy = (trace[name][chosen] for name in POSITION_COVARIANCE)
+    covs = np.array([[xx, xy], [xy, yy]]).transpose(2, 0, 1)
+    about = outlines(covs, None if bent is None else bent[chosen], _probability(run))
     shapes = [Outline(shape, closed=True) for shape in estimate[chosen, None] + about / unit]
     one_shape(axes, shapes, facecolor="none", edgecolor=VERMILLION, linewidth=1.0, zorder=5.6)
     keys = [Key("estimated path", YELLOW), Key(f"{region_name(run)}s", VERMILLION)]
@@ -157,7 +157,7 @@ def rover_error_figure(run: RunData) -> Illustration:
     """Error of the position beside its standard deviation, of the heading, and the NEES."""
     slug, title = "rover-error", "Errors and what the rover believes of them"
     trace = run.trace
-    if not trace.has("est_x_m", "nees") or trace.steps < 2:
+    if not trace.has("est_x_m", "nees", "cov_tt_rad2", *POSITION_COVARIANCE) or trace.steps < 2:
         return Illustration(slug, title, "", "The mission has no estimator.")
     hours = trace.t_s / HOURS_S
     error = np.hypot(trace["est_x_m"] - trace["true_x_m"], trace["est_y_m"] - trace["true_y_m"])

@@ -16,7 +16,13 @@ from pilotage.records.numbers import number
 from pilotage.records.run_data import RunData
 from pilotage.records.terrain import Picture, TerrainPictures
 from pilotage.report import quantities
-from pilotage.report.figures.terrain_estimate import estimate_layers, region_name, regions_told, thinned
+from pilotage.report.figures.terrain_estimate import (
+    POSITION_COVARIANCE,
+    estimate_layers,
+    region_name,
+    regions_told,
+    thinned,
+)
 from pilotage.report.style import BLUE, GREEN, ORANGE, SKY, VERMILLION, WIDTH_PT, Illustration, Key, render
 
 _LEFT_PT, _RIGHT_PT, _TOP_PT, _BOTTOM_PT = 44.0, 8.0, 8.0, 32.0
@@ -182,7 +188,7 @@ def _path(axes: Axes, run: RunData, pictures: TerrainPictures, colour: str = VER
     keys = [Key("true path" if driven else "planned path", colour)]
     if len(points) > 1:
         axes.plot(*points.T, color=colour, linewidth=1.8, path_effects=dark, zorder=5)
-    if run.trace.has("est_x_m", "cov_xx_m2"):
+    if run.trace.has("est_x_m", "distance_m", *POSITION_COVARIANCE):
         keys += estimate_layers(axes, run, pictures.landmarks, unit)
     for name, place, dot in _places(run, pictures):
         x, y = place / unit
