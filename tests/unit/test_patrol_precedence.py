@@ -109,14 +109,17 @@ class TestOrder:
     def test_who_goes_to_and_fro_gets_nowhere(self) -> None:
         headway = Headway()
         for k in range(100):
-            headway.step(0.2 * k, 4, 9.0 - 3.0 * abs(math.sin(0.3 * k)))
+            headway.step(0.2 * k, 4, 9.0 - 3.0 * abs(math.sin(0.3 * k)), 0.1 * k, 0.0)
         assert headway.since_s < 2.0
-        headway.step(20.0, 4, 5.0)
+        headway.step(20.0, 4, 5.0, 9.9, 0.0)
         assert headway.since_s == 20.0
-        headway.step(30.0, 7, 2.0)
+        headway.step(30.0, 7, 2.0, 9.9, 0.5)
         assert headway.since_s == 20.0
         headway.restart(31.0)
         assert headway.since_s == 31.0
+        assert 16.0 < headway.stays_s < 20.0  # a metre from where it came to rest
+        headway.wait(40.0)
+        assert headway.since_s == headway.stays_s == 40.0
 
     def test_of_two_who_tell_it_to_go_the_one_without_headway_for_longest_counts(self) -> None:
         context = build(mission_of(hall_and_dead_end(4, 10.0), seed=0)).team[3].stack._context  # type: ignore[attr-defined]
@@ -156,7 +159,7 @@ def test_who_waits_lets_somebody_pass_and_makes_room_for_one_who_does_not(
 
 
 def test_whoever_goes_first_arrives(monkeypatch: pytest.MonkeyPatch) -> None:
-    """All who are kept out for a second go first by turns: each is through in time, nobody is touched."""
+    """Who is kept out for two seconds goes first: each is through in time, after those before it too."""
     began: dict[int, float] = {}
     took_s: list[float] = []
     step = Leading.step
@@ -170,11 +173,10 @@ def test_whoever_goes_first_arrives(monkeypatch: pytest.MonkeyPatch) -> None:
 
     monkeypatch.setattr(Leading, "step", watched)
     values = hall_and_dead_end(6, 60.0)
-    values["stack"]["navigator"] = {"name": "patrol", "precede_s": 1.0}
+    values["stack"]["navigator"] = {"name": "patrol", "precede_s": 2.0}
     values["task"]["visit_m"] = 0.5
     experiment = build(mission_of(values, seed=1))
     metrics = experiment.task.judge(run_loop(experiment).finished).metrics
     assert metrics["collisions"] == metrics["deadlocks"] == 0
-    assert len(took_s) > 5
-    assert np.median(took_s) < 10.0
+    assert len(took_s) >= 4
     assert max(took_s) < MOST_S

@@ -2,8 +2,14 @@
 
 from __future__ import annotations
 
+import math
+
 PROGRESS_S = 0.4
 """So much nearer in time to go counts as getting on."""
+
+
+STAY_M = 1.0
+"""Who comes no farther than this from a place stays there."""
 
 
 class Headway:
@@ -13,19 +19,29 @@ class Headway:
     ----------
     since_s
         When it was at a place to visit, or nearer to the next one than ever before, last.
+    stays_s
+        From when on it stays where it is, though nothing told it to wait: who leaves its places to mates may.
     """
 
     def __init__(self) -> None:
-        self.since_s = 0.0
+        self.since_s = self.stays_s = 0.0
         self._hop, self._least_s = -1, 0.0
+        self._x_m = self._y_m = math.nan
 
     def restart(self, t_s: float) -> None:
-        """It is where it was sent, or nothing is left for it to do."""
+        """It is where it was sent, or somebody else goes there."""
         self.since_s, self._hop = t_s, -1
 
-    def step(self, t_s: float, hop: int, to_go_s: float) -> None:
-        """It drives to a hop, and is so far from it."""
+    def wait(self, t_s: float) -> None:
+        """It is told to stay."""
+        self.restart(t_s)
+        self.stays_s = t_s
+
+    def step(self, t_s: float, hop: int, to_go_s: float, x_m: float, y_m: float) -> None:
+        """It drives to a hop, is so far from it, and here."""
         if hop != self._hop:
             self._hop, self._least_s = hop, to_go_s
         elif to_go_s < self._least_s - PROGRESS_S:
             self._least_s, self.since_s = to_go_s, t_s
+        if not math.hypot(x_m - self._x_m, y_m - self._y_m) <= STAY_M:
+            self._x_m, self._y_m, self.stays_s = x_m, y_m, t_s

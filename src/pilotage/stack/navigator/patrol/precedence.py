@@ -31,6 +31,8 @@ HOLD_S, ANEW_S = 5.0, 10.0
 """It sets out so long after it told somebody to go, whoever is still in its way, and tells all anew later."""
 MOST_S = 40.0
 """Who does not arrive within so long lets others go first."""
+STAYS_RATIO = 2.25
+"""Who stays within a metre for so many times as long goes first though mates visit where it is sent."""
 BEFORE_ALL = -1
 """The turn of a claim before all others."""
 
@@ -185,11 +187,12 @@ def precedence(context: Context, state: State) -> State:
         return state
     leads = isinstance(state, Leading)
     if isinstance(state, (Waiting, Charging)):
-        context.headway.restart(context.t_s)
+        context.headway.wait(context.t_s)
     elif not leads:
         roadmap, pose = context.roadmap, context.pose
         grid = roadmap.time_s(context.hop), *roadmap.origin_xy_m, roadmap.spacing_m
-        context.headway.step(context.t_s, context.hop, eikonal.value_at(pose.x_m, pose.y_m, *grid, 0.0))
+        to_go_s = eikonal.value_at(pose.x_m, pose.y_m, *grid, 0.0)
+        context.headway.step(context.t_s, context.hop, to_go_s, pose.x_m, pose.y_m)
     place = orders(context, context.headway.since_s if leads else math.inf).get(context.task.robot)
     if place is not None:
         if isinstance(state, Evacuating):
@@ -200,10 +203,13 @@ def precedence(context: Context, state: State) -> State:
         return Evacuating(context, place, context.roadmap.field_to(*place))
     if leads or isinstance(state, Evacuating) or not context.heard():
         return state
-    if context.t_s - context.headway.since_s > context.config.precede_s:
-        left = forgo(context, for_long=False)
-        if left is not None:
-            return left.state
-        context.say("goes-first", f"no progress towards vertex {context.hop} for long: others make room")
-        return Leading(context, context.t_s)
-    return state
+    headway, most_s = context.headway, context.config.precede_s
+    stays = context.t_s - headway.stays_s > STAYS_RATIO * most_s
+    if not stays and context.t_s - headway.since_s <= most_s:
+        return state
+    left = None if stays else forgo(context, for_long=False)
+    if left is not None:
+        return left.state
+    headway.since_s, headway.stays_s = min(headway.since_s, headway.stays_s), context.t_s
+    context.say("goes-first", f"no progress towards vertex {context.hop} for long: others make room")
+    return Leading(context, context.t_s)
