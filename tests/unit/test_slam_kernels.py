@@ -18,13 +18,12 @@ from pilotage.kernels.slam.scan_lines import scan_lines, scan_points
 from support.laser_rooms import BEAMS, SPAN_RAD, furnished, ranges
 
 ANGLES = np.linspace(-0.5 * SPAN_RAD, 0.5 * SPAN_RAD, BEAMS)
-MOUNT = np.array([0.0, 0.0, 0.0, 1.0])
 NO_PRIOR = 1e-9 * np.eye(3)
 HERE = np.array([2.0, 3.5, 0.2])
 
 
 def cloud(pose: FloatArray, noise: FloatArray | float = 0.0) -> FloatArray:
-    points, hit = scan_points(ranges(furnished(), pose, ANGLES) + noise, ANGLES, MOUNT, 0.1, 30.0)
+    points, hit = scan_points(ranges(furnished(), pose, ANGLES) + noise, ANGLES, 0.1, 30.0)
     return scan_lines(points, hit, 0.0, 0.0, float(ANGLES[1] - ANGLES[0]))
 
 
@@ -90,7 +89,7 @@ def test_the_covariance_of_a_match_is_that_of_many_matches() -> None:
 
 def test_a_bare_corridor_leaves_its_direction_open() -> None:
     walls = np.array([(-60.0, -1.0, 60.0, -1.0), (-60.0, 1.0, 60.0, 1.0)])
-    points, hit = scan_points(ranges(walls, np.zeros(3), ANGLES), ANGLES, MOUNT, 0.1, 25.0)
+    points, hit = scan_points(ranges(walls, np.zeros(3), ANGLES), ANGLES, 0.1, 25.0)
     lines = scan_lines(points, hit, 0.0, 0.0, float(ANGLES[1] - ANGLES[0]))
     _, hessian, _, _ = aligned(lines, np.zeros(3), lines)
     assert hessian[0, 0] < 1e-3 * hessian[1, 1]
@@ -211,7 +210,7 @@ def test_lines_go_on_over_beams_that_are_missing() -> None:
     wall = np.array([(2.0, -3.0, 2.0, 3.0)])
     measured = ranges(wall, np.zeros(3), ANGLES)
     lost = np.where(np.random.default_rng(9).random(measured.size) < 0.33, np.inf, measured)
-    points, hit = scan_points(lost, ANGLES, MOUNT, 0.1, 25.0)
+    points, hit = scan_points(lost, ANGLES, 0.1, 25.0)
     lines = scan_lines(points, hit, 0.0, 0.0, float(ANGLES[1] - ANGLES[0]))
     assert (np.hypot(lines[:, 2], lines[:, 3]) > 0.5).mean() > 0.9
     middle = measured.size // 2
@@ -219,5 +218,5 @@ def test_lines_go_on_over_beams_that_are_missing() -> None:
     few[[middle - 3, middle - 2, middle + 2, middle + 3]] = measured[
         [middle - 3, middle - 2, middle + 2, middle + 3]
     ]
-    points, hit = scan_points(few, ANGLES, MOUNT, 0.1, 25.0)
+    points, hit = scan_points(few, ANGLES, 0.1, 25.0)
     assert not scan_lines(points, hit, 0.0, 0.0, float(ANGLES[1] - ANGLES[0]))[:, 2:4].any()

@@ -29,6 +29,10 @@ from support.laser_rooms import along, furnished, recording, room, write_carmen
 ROUND = [(1.5, 1.2), (5.0, 1.2), (5.0, 4.0), (8.5, 5.8), (5.0, 6.0), (2.0, 4.0), (1.5, 1.2), (4.0, 1.2)]
 
 
+def _times(log: LaserLog, factor: float) -> FloatArray | None:
+    return None if log.odometry_t_s is None else factor * log.odometry_t_s
+
+
 def rms_m(result: SlamResult, path: np.ndarray) -> float:
     true = np.array([between(path[0], pose) for pose in path])
     return float(np.sqrt(((result.poses[:, :2] - true[:, :2]) ** 2).sum(axis=1).mean()))
@@ -106,8 +110,15 @@ def test_scans_between_keyframes_are_put_where_they_fit() -> None:
 def test_no_odometry_is_needed() -> None:
     path = along(ROUND)
     log = recording(furnished(), path, np.random.default_rng(2))
-    result = map_log(replace(log, odometry=None, odometry_t_s=None), SlamConfig())
+    blind = replace(log, odometry=None, odometry_t_s=None)
+    result = map_log(blind, SlamConfig())
     assert rms_m(result, path) < 0.04
+    assert not any("no odometry" in warning for warning in result.warnings)
+    # So long between its scans nobody knows how far a robot came: told, and not where there is an odometry.
+    slow = SlamConfig(calibrate_beam_spacing=False)
+    for told, scans in ((True, blind), (False, log)):
+        rare = map_log(replace(scans, t_s=10.0 * scans.t_s, odometry_t_s=_times(scans, 10.0)), slow)
+        assert any("no odometry" in warning for warning in rare.warnings) == told
 
 
 @pytest.mark.parametrize("seed", range(3))

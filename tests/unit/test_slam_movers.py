@@ -28,7 +28,8 @@ def seen(walls: FloatArray, pose: FloatArray, first_deg: float = -90.0, beams: i
 
 
 def through(points: FloatArray, pose: FloatArray, earlier: FloatArray) -> BoolArray:
-    return seen_through(points, pose, polar(earlier), 0.3, 0.2, 8.0)
+    view, at = polar(earlier)[None], np.zeros((1, 3))
+    return seen_through(points, pose, view, np.array([len(earlier)]), at, 1, 0.3, 0.2, 8.0)
 
 
 @pytest.mark.parametrize("first_deg", [-90.0, -180.0, 60.0])
@@ -66,8 +67,10 @@ def test_a_scan_of_which_most_seems_to_move_is_left_whole() -> None:
         movers.add(seen(hall, HERE), HERE)
     wrong = seen(box(2.0, 3.5, 1.0), HERE)
     assert len(movers.without(wrong, HERE)) == len(wrong)
+    assert movers.crowded == 1
     few = seen(np.concatenate([hall, box(4.0, 4.0)]), HERE)
     assert len(movers.without(few, HERE)) < len(few)
+    assert movers.crowded == 1
     movers.forget()
     assert len(movers.without(few, HERE)) == len(few)
 

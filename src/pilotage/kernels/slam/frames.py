@@ -47,6 +47,15 @@ def composed(a: FloatArray, b: FloatArray) -> FloatArray:
 
 
 @kernel
+def composed_all(poses: FloatArray, b: FloatArray) -> FloatArray:
+    """(N, 3) poses that have b (3,) in the frames of ``poses`` (N, 3)."""
+    out = np.empty(poses.shape)
+    for k in range(poses.shape[0]):
+        out[k] = composed(poses[k], b)
+    return out
+
+
+@kernel
 def gathered(
     points: FloatArray, starts: IntArray, chosen: IntArray, poses: FloatArray, frame: FloatArray
 ) -> FloatArray:

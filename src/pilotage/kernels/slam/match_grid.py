@@ -51,6 +51,9 @@ def score_grid(
     if open_score < 0.0:
         _mark_open(grid, points_xy, origins_xy, counts, box, cell_m, open_score)
     reach = math.ceil(2.5 * std_m / cell_m)
+    most = 6.25 * std_m * std_m
+    # Squared distances first: one exponential a cell instead of one for each point near it.
+    squares = np.full((rows, columns), np.float32(np.inf))
     for k in range(points_xy.shape[0]):
         x, y = (points_xy[k, 0] - box[0]) / cell_m, (points_xy[k, 1] - box[1]) / cell_m
         column, row = math.floor(x), math.floor(y)
@@ -60,12 +63,13 @@ def score_grid(
             dy = (r + 0.5 - y) * cell_m
             for c in range(max(0, column - reach), min(columns, column + reach + 1)):
                 dx = (c + 0.5 - x) * cell_m
-                d = dx * dx + dy * dy
-                if d > 6.25 * std_m * std_m:
-                    continue
-                value = np.float32(math.exp(-0.5 * d / (std_m * std_m)))
-                if value > grid[r, c]:
-                    grid[r, c] = value
+                d = np.float32(dx * dx + dy * dy)
+                if d < squares[r, c]:
+                    squares[r, c] = d
+    for r in range(rows):
+        for c in range(columns):
+            if squares[r, c] <= most:
+                grid[r, c] = math.exp(-0.5 * squares[r, c] / (std_m * std_m))
     return grid
 
 
@@ -117,8 +121,12 @@ def max_pyramid(grid: ScoreArray, levels: int) -> tuple[ScoreArray, int]:
         half = 1 << (h - 1)
         below, level = pyramid[h - 1], pyramid[h]
         for r in range(rows):
-            r1 = min(rows - 1, r + half)
+            upper, lower, out = below[r], below[min(rows - 1, r + half)], level[r]
             for c in range(columns):
-                c1 = min(columns - 1, c + half)
-                level[r, c] = max(max(below[r, c], below[r, c1]), max(below[r1, c], below[r1, c1]))
+                out[c] = upper[c] if upper[c] > lower[c] else lower[c]
+            # In place: to the right of c nothing has been written yet.
+            for c in range(columns - half):
+                out[c] = out[c] if out[c] > out[c + half] else out[c + half]
+            for c in range(columns - half, columns):
+                out[c] = max(out[c], out[columns - 1])
     return pyramid, margin

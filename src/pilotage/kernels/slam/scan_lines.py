@@ -16,16 +16,14 @@ _REACH = 4
 
 @kernel
 def scan_points(
-    ranges_m: FloatArray, angles_rad: FloatArray, mount: FloatArray, nearest_m: float, farthest_m: float
+    ranges_m: FloatArray, angles_rad: FloatArray, nearest_m: float, farthest_m: float
 ) -> tuple[FloatArray, BoolArray]:
-    """Points (B, 2) of a scan in the robot's frame, and which beams (B,) hit something.
+    """Points (B, 2) of a scan in the scanner's frame, and which beams (B,) hit something.
 
     Parameters
     ----------
     ranges_m, angles_rad
         (B,) ranges, NaN or infinite where there was no echo, and directions in the scanner's frame.
-    mount
-        (4,) x, y, heading of the scanner in the robot's frame, and -1 where it hangs upside down, else 1.
     nearest_m, farthest_m
         Ranges outside are no hits.
     """
@@ -36,9 +34,8 @@ def scan_points(
         r = ranges_m[i]
         if not (nearest_m <= r <= farthest_m):
             continue
-        a = mount[2] + mount[3] * angles_rad[i]
-        points[i, 0] = mount[0] + r * math.cos(a)
-        points[i, 1] = mount[1] + r * math.sin(a)
+        points[i, 0] = r * math.cos(angles_rad[i])
+        points[i, 1] = r * math.sin(angles_rad[i])
         hit[i] = True
     return points, hit
 
@@ -117,9 +114,11 @@ def scan_lines(
             root = math.sqrt(half * half + cxy * cxy)
             small = 0.5 * (cxx + cyy) - root
             large = 0.5 * (cxx + cyy) + root
-            angle = 0.5 * math.atan2(2.0 * cxy, cxx - cyy)
             if large > 1e-8 and small < 0.0016 and small < 0.1 * large:
-                nx, ny = -math.sin(angle), math.cos(angle)
+                # Half the angle whose cosine is half / root and whose sine has the sign of cxy.
+                nx, ny = math.sqrt(0.5 - 0.5 * half / root), math.sqrt(0.5 + 0.5 * half / root)
+                if cxy > 0.0:
+                    nx = -nx
                 if nx * dx + ny * dy > 0.0:
                     nx, ny = -nx, -ny
                 out[k, 2] = nx
@@ -129,3 +128,12 @@ def scan_lines(
                 out[k, 5] = py + away * ny
         k += 1
     return out[:k].copy()
+
+
+@kernel
+def scan_cloud(
+    ranges_m: FloatArray, angles_rad: FloatArray, step_rad: float, nearest_m: float, farthest_m: float
+) -> FloatArray:
+    """Points (K, 6) of ``scan_lines`` from ranges (B,) in directions (B,)."""
+    points, hit = scan_points(ranges_m, angles_rad, nearest_m, farthest_m)
+    return scan_lines(points, hit, 0.0, 0.0, step_rad)

@@ -8,11 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from pilotage.core.types import FloatArray, IntArray
-from pilotage.kernels.slam.scan_lines import scan_lines, scan_points
+from pilotage.kernels.slam.scan_lines import scan_cloud
 from pilotage.logs.laser_log import LaserLog
 
 _LEAST_RANGE_M = 0.1
-_NO_MOUNT = np.array([0.0, 0.0, 0.0, 1.0])
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,15 +56,15 @@ def cloud_of(log: LaserLog, scan: int, max_range_m: float, spacing: float = 1.0)
         True angle between beams over the one that the log tells.
     """
     beams = int(log.beams[scan])
-    step = float(log.angle_step_rad[scan])
-    angles = log.first_angle_rad[scan] + step * np.arange(beams)
-    middle = log.first_angle_rad[scan] + 0.5 * step * (beams - 1)
-    return cloud_of_beams(log.ranges_m[scan, :beams], middle + spacing * (angles - middle), step, max_range_m)
+    first, step = float(log.first_angle_rad[scan]), float(log.angle_step_rad[scan])
+    # The middle stays where it is.
+    first += 0.5 * (1.0 - spacing) * step * (beams - 1)
+    angles: FloatArray = first + spacing * step * np.arange(beams, dtype=np.float64)
+    return cloud_of_beams(log.ranges_m[scan, :beams], angles, step, max_range_m)
 
 
 def cloud_of_beams(
     ranges_m: FloatArray, angles_rad: FloatArray, step_rad: float, max_range_m: float
 ) -> FloatArray:
     """Points (K, 6) of ranges (B,), infinite or NaN where nothing was hit, in their directions (B,)."""
-    points, hit = scan_points(ranges_m, angles_rad, _NO_MOUNT, _LEAST_RANGE_M, max_range_m)
-    return np.asarray(scan_lines(points, hit, 0.0, 0.0, step_rad))
+    return scan_cloud(ranges_m, angles_rad, step_rad, _LEAST_RANGE_M, max_range_m)

@@ -14,23 +14,26 @@ import numpy as np
 from pilotage.core.types import FloatArray, IntArray
 from pilotage.kernels.slam.align import TOO_FEW, align
 from pilotage.kernels.slam.branch_bound import PASS_OVER_NONE, search_window
-from pilotage.kernels.slam.buckets import sort_into_buckets
+from pilotage.kernels.slam.buckets import fused, sort_into_buckets
 from pilotage.kernels.slam.frames import between, carried, composed
 from pilotage.kernels.slam.match_grid import ScoreArray, max_pyramid, score_grid
+from pilotage.kernels.slam.placing import ITERATIONS, REACH_M, SCALE_M, distance, placed, plausibility
 from pilotage.stack.mapping.slam.config import SlamConfig
-from pilotage.stack.mapping.slam.odometry import MotionGuess, distance
+from pilotage.stack.mapping.slam.odometry import MotionGuess
 
 BUCKET_M = 0.1
-START_REACH_M, REACH_M, SCALE_M = 0.4, 0.2, 0.05
+LOCAL_BUCKET_M, FUSED_M, FUSED_COSINE = 0.2, 0.1, 0.9
+"""What the last keyframes saw of a square in directions alike is one point: fewer to look through, and each
+the mean of several scans. Not without odometry, where single points are all that tells how far one came."""
+MOST_POINTS = 240
+"""Of a scan of more points every second, third, ... is aligned: beams nearer together than their lines are
+long tell little of their own."""
 PRIOR = np.diag([2.0, 2.0, 20.0])
 """Holds the pose at the guess where the scan leaves it open, in squared residuals. More would pull every
 scan a little towards an odometry whose errors all have one sign."""
-GOOD, POOR, NONE = 0.92, 0.75, 0.3
-"""Fit over its running mean from which no further guess is tried, below which there is a search, and below
-which it is no fit at all: what hangs by so few points hangs by chance."""
-SPLIT = 0.1
-"""Guesses farther apart than this are all tried: where the robot begins to turn, the first one fits nowhere
-or, worse, somewhere else."""
+POOR, NONE = 0.75, 0.3
+"""Fit over its running mean below which there is a search, and below which it is no fit at all: what hangs by
+so few points hangs by chance."""
 SEARCH_RANGE_M, SEARCH_CELL_M, SEARCH_STD_M, SEARCH_STEP_RAD = 12.0, 0.05, 0.07, 0.02
 SEARCH_BUDGET = 200_000
 FAR, LEAST_FAR = 0.6, 0.12
@@ -45,9 +48,7 @@ MOST_GAP_S = 2.5
 SEARCH_KEYFRAMES, SEARCH_LEVELS = 8, 4
 BETTER_POOR, BETTER_GOOD = 1.1, 1.03
 """By how much a place that was searched must fit better than the guesses."""
-OFF_M, OFF_ERRORS = 0.05, 10.0
-"""A match this far from all guesses, and so many of their usual errors more, counts half."""
-
+_NO_OTHERS = np.zeros((0, 3))
 
 Reference = tuple[FloatArray, IntArray, FloatArray]
 """Points in buckets, as ``align`` takes them."""
@@ -83,6 +84,20 @@ class Fit:
     guess_error: float = 0.0
     by_odometry: bool = False
 
+    def by(self, error: float, odometry: bool) -> Fit:
+        """Return the same with the guess that was trusted: its usual error and whether it is the odometry."""
+        return Fit(
+            self.value,
+            self.pose,
+            self.hessian,
+            self.start,
+            self.rms_m,
+            self.off,
+            self.weight,
+            error,
+            odometry,
+        )
+
 
 @dataclass(frozen=True, slots=True)
 class Aside:
@@ -112,7 +127,7 @@ class LocalMatcher:
         self._usual = 0.6
         self._reference: Reference | None = None
         self._around: tuple[ScoreArray, int, FloatArray] | None = None
-        self._lost_s = 0.0
+        self._lost_s, self._led = 0.0, False
         self.searched = 0
         self.lost = 0
         self.rms_m = SCALE_M
@@ -122,13 +137,22 @@ class LocalMatcher:
         """Usual error of the most trusted guess of the motion."""
         return self._guess.least_error
 
+    @staticmethod
+    def thinned(cloud: FloatArray) -> FloatArray:
+        """Return as many points of a scan (K, 6) as are worth while, evenly spread."""
+        every = -(-cloud.shape[0] // MOST_POINTS)
+        return cloud if every <= 1 else np.ascontiguousarray(cloud[::every])
+
     def add_keyframe(self, cloud: FloatArray, pose: FloatArray) -> None:
         """Let a scan lend its points to those that follow."""
         self._local = [*self._local, carried(cloud, pose)][-self._config.local_keyframes :]
         self._refer()
 
     def _refer(self) -> None:
-        box, starts, _, points = sort_into_buckets(np.concatenate(self._local), BUCKET_M)
+        side_m = LOCAL_BUCKET_M if self._led else BUCKET_M
+        box, starts, _, points = sort_into_buckets(np.concatenate(self._local), side_m)
+        if self._led:
+            starts, points = fused(box, starts, points, FUSED_M, FUSED_COSINE)
         self._reference = box, starts, points
         self._around = None
 
@@ -202,18 +226,13 @@ class LocalMatcher:
         others
             (3,) each, what else the odometry may have meant: tried where the first fits less than well.
         """
-        best: Fit | None = None
-        credible = [*self._guess.credible(step, dt_s), *others]
-        motions = self._guess.guesses(step, dt_s)
-        split = max(distance(motions[0], motion) for motion in motions) > SPLIT
-        for number, motion in enumerate([*motions, *others]):
-            fits_well = best is not None and best.value > GOOD * self._usual
-            if fits_well and (number >= len(motions) or not split):
-                break
-            fit = self._plausible(self._align(cloud, composed(last, motion), START_REACH_M), last, credible)
-            if fit is not None and (best is None or fit.value > 1.03 * best.value + 0.005):
-                best = fit
+        self._led = step is not None
+        motions, count = self._guess.guesses(step, dt_s)
+        other = np.array(others) if others else _NO_OTHERS
+        led = step is not None and self._guess.odometry_leads
+        best, split = self._placed(cloud, last, motions, count, led, other)
         poor = best is None or best.value < POOR * self._usual
+        credible = np.concatenate([motions[:count], other])
         if poor or step is None:
             # Without odometry a scan may slide along a corridor and still fit: look around every time.
             self.searched += 1
@@ -223,7 +242,7 @@ class LocalMatcher:
                 better = BETTER_POOR if poor else BETTER_GOOD
                 for fit in self._search(cloud, centre, gap_s, last, motions[0] if poor else None):
                     found = self._plausible(fit, last, credible)
-                    if found is not None and (best is None or found.value > better * best.value + 0.01):
+                    if best is None or found.value > better * best.value + 0.01:
                         best = found
         if best is None or best.value < NONE * self._usual:
             best = self._far(cloud, last, motions[0], None if step is None else credible)
@@ -234,22 +253,46 @@ class LocalMatcher:
         self._lost_s = 0.0
         self.rms_m += 0.05 * (best.rms_m - self.rms_m)
         self._usual += 0.02 * (best.value - self._usual)
-        error, by_odometry = self._guess.least_error, step is not None and self._guess.odometry_leads
+        out = best.by(self._guess.least_error, led)
         self._guess.learn(step, between(last, best.pose), dt_s)
-        return replace(best, guess_error=error, by_odometry=by_odometry)
+        return out
 
     def fallback(self, last: FloatArray, step: FloatArray | None, dt_s: float) -> FloatArray:
         """Pose by the most trusted guess alone."""
-        return np.asarray(composed(last, self._guess.guesses(step, dt_s)[0]))
+        return np.asarray(composed(last, self._guess.guesses(step, dt_s)[0][0]))
 
-    def _plausible(self, fit: Fit | None, last: FloatArray, guesses: list[FloatArray]) -> Fit | None:
+    def _placed(
+        self,
+        cloud: FloatArray,
+        last: FloatArray,
+        motions: FloatArray,
+        count: int,
+        led: bool,
+        others: FloatArray,
+    ) -> tuple[Fit | None, bool]:
+        """Align from the guesses alone; and whether these are far apart."""
+        reference = self._reference
+        if reference is None or cloud.shape[0] == 0:
+            return None, False
+        pose, hessian, start, told, split = placed(
+            cloud,
+            last,
+            motions,
+            count,
+            led,
+            others,
+            self._guess.least_error,
+            self._usual,
+            PRIOR,
+            *reference,
+        )
+        value, off, rms_m, weight = told.tolist()
+        return None if value < 0.0 else Fit(value, pose, hessian, start, rms_m, off, weight), split
+
+    def _plausible(self, fit: Fit, last: FloatArray, guesses: FloatArray) -> Fit:
         """Lower a fit's value by how far it is from all credible guesses, in units of their usual error."""
-        if fit is None:
-            return None
-        motion = between(last, fit.pose)
-        off = min(distance(motion, guess) for guess in guesses)
-        scale = OFF_M + OFF_ERRORS * self._guess.least_error
-        return replace(fit, value=fit.value / (1.0 + (off / scale) ** 2), off=off)
+        share, off = plausibility(between(last, fit.pose), guesses, self._guess.least_error)
+        return replace(fit, value=share * fit.value, off=off)
 
     def _align(
         self, cloud: FloatArray, start: FloatArray, reach_m: float, reference: Reference | None = None
@@ -257,14 +300,16 @@ class LocalMatcher:
         reference = reference or self._reference
         if reference is None or cloud.shape[0] == 0:
             return None
-        pose, hessian, fit, status = align(cloud, start, PRIOR, reach_m, REACH_M, SCALE_M, 25, *reference)
+        pose, hessian, fit, status = align(
+            cloud, start, PRIOR, reach_m, REACH_M, SCALE_M, ITERATIONS, *reference
+        )
         if status == TOO_FEW:
             return None
         pose[2] = (pose[2] + np.pi) % (2.0 * np.pi) - np.pi
         return Fit(float(fit[1]) / cloud.shape[0], pose, hessian, start, float(fit[0]), weight=float(fit[1]))
 
     def _far(
-        self, cloud: FloatArray, last: FloatArray, motion: FloatArray, credible: list[FloatArray] | None
+        self, cloud: FloatArray, last: FloatArray, motion: FloatArray, credible: FloatArray | None
     ) -> Fit | None:
         """Search as far as any gap would have it: the stamps of scans may lie about how long it was.
 
@@ -275,7 +320,7 @@ class LocalMatcher:
         if credible is None:
             return min(fits, key=lambda fit: distance(between(last, fit.pose), motion), default=None)
         found = [self._plausible(fit, last, credible) for fit in fits]
-        near = [fit for fit in found if fit is not None and fit.value >= LEAST_FAR * self._usual]
+        near = [fit for fit in found if fit.value >= LEAST_FAR * self._usual]
         return max(near, key=lambda fit: fit.value, default=None)
 
     def _search(

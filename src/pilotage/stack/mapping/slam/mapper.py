@@ -11,6 +11,7 @@ from pilotage.core.errors import InputError
 from pilotage.core.memory import give_back
 from pilotage.core.types import FloatArray
 from pilotage.kernels.slam.frames import between, composed
+from pilotage.kernels.slam.placing import START_REACH_M
 from pilotage.logs.laser_log import LaserLog
 from pilotage.models.pose_graph import PoseGraph
 from pilotage.stack.mapping.slam.back_end import (
@@ -34,6 +35,8 @@ from pilotage.stack.mapping.slam.tracker import LocalTrack, track
 from pilotage.stack.mapping.slam.uncertainty import relative_poses
 
 LEAST_SCANS = 2
+MOST_CROWDED, MOST_FAR, FAR_S = 0.02, 0.1, 1.0
+"""Shares of the scans from which it is told that much seemed to move, and that they are far apart."""
 OnStage = Callable[[str, float], None]
 """Called with what is going on and the share of the recording that was matched."""
 
@@ -117,7 +120,7 @@ def result_of(config: SlamConfig, done: Mapped, state: Solved, joined: Joined | 
     drawn_from, drawn_at = scans, poses
     extents, closures = tuple(closer.submaps.extents), closer.closures
     clouds, before = done.clouds, local.poses
-    warnings = (*_warnings(log, local), *_torn(log, local, closer))
+    warnings = (*_warnings(log, local, config), *_torn(log, local, closer))
     if joined is not None:
         drawn_from = joined.earlier.scans.and_more(scans)
         drawn_at = np.concatenate([state.poses[:since], poses])
@@ -201,7 +204,7 @@ def _standing(log: LaserLog, config: SlamConfig, local: LocalTrack) -> SlamResul
         float("nan"),
         local.searched,
         local.lost,
-        (*_warnings(log, local), "the robot hardly moved: one keyframe is all there is"),
+        (*_warnings(log, local, config), "the robot hardly moved: one keyframe is all there is"),
     )
     return result if log.stamps_s is None else by_stamps(result, log.stamps_s)
 
@@ -240,11 +243,24 @@ def _torn(log: LaserLog, local: LocalTrack, closer: LoopCloser) -> list[str]:
     return out
 
 
-def _warnings(log: LaserLog, local: LocalTrack) -> tuple[str, ...]:
+def _warnings(log: LaserLog, local: LocalTrack, config: SlamConfig) -> tuple[str, ...]:
     """What the log said, and what the front end has to add."""
     out = list(log.warnings)
     if local.lost:
         out.append(f"{local.lost} of {len(log)} scans could not be matched; their poses are guesses")
+    if local.crowded > MOST_CROWDED * len(log):
+        out.append(
+            f"in {local.crowded} of {len(log)} scans 40 % and more seemed to move: where people fill the "
+            "view the map may follow them and not know it"
+        )
+    moved = relative_poses(local.poses[:-1], local.poses[1:])
+    far = (np.hypot(moved[:, 0], moved[:, 1]) > START_REACH_M) | (np.diff(log.t_s) > FAR_S)
+    if far.mean() > MOST_FAR and scanner_odometry(log, config.use_odometry) is None:
+        out.append(
+            f"no odometry, and {far.mean():.0%} of the scans lie more than {START_REACH_M:g} m or "
+            f"{FAR_S:g} s behind the one before: where places look alike the track may be wrong, and "
+            "the covariances do not count that"
+        )
     return tuple(out)
 
 

@@ -12,8 +12,8 @@ from pilotage.kernels.slam.branch_bound import PASS_OVER_NONE, search_window
 from pilotage.kernels.slam.buckets import sort_into_buckets
 from pilotage.kernels.slam.frames import between
 from pilotage.kernels.slam.match_grid import ScoreArray
+from pilotage.kernels.slam.slips import CHANCE
 from pilotage.stack.mapping.slam.local_matching import BUCKET_M
-from pilotage.stack.mapping.slam.slips import CHANCE
 from pilotage.stack.mapping.slam.submaps import Submap, Submaps
 
 STEP_RAD = 0.02

@@ -7,17 +7,15 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from pilotage.core.types import FloatArray, Pose2
-from pilotage.kernels.slam.frames import between, composed
+from pilotage.kernels.slam.frames import between, composed, composed_all
+from pilotage.kernels.slam.placing import distance, guessed_motions, learn_motion, readings_differ
 from pilotage.logs.laser_log import LaserLog
 
-_MEMORY = 0.02
-"""Weight of the newest error in the running mean: fifty scans count."""
 _SMOOTHED = 4
 """Scans to either side over which stamps are averaged: loggers write them in bursts."""
 STAMP_OFF_S, OTHER_READING_M = 0.1, 0.08
 """A stamp may be off by so much; readings nearer together (a radian as half a metre) are one guess."""
-CREDIBLE = 3.0
-"""A guess is credible whose mean error is within this factor of the least."""
+_NONE = np.zeros(3)
 
 
 def scanner_odometry(log: LaserLog, used: bool) -> FloatArray | None:
@@ -25,8 +23,7 @@ def scanner_odometry(log: LaserLog, used: bool) -> FloatArray | None:
     poses = log.odometry_at_scans() if used else None
     if poses is None or not np.any(np.abs(np.diff(poses, axis=0)) > 1e-9):
         return None
-    mount = mount_pose(log.mount)
-    return np.array([composed(pose, mount) for pose in poses])
+    return composed_all(poses, mount_pose(log.mount))
 
 
 class ScanMotions:
@@ -42,16 +39,22 @@ class ScanMotions:
         self._at_scans = at_scans
         self._anchor = None if at_scans is None else at_scans[0]
         self._readings = np.zeros((0, 3))
+        self._differ = [False] * len(log)
         if at_scans is not None and log.odometry is not None and log.odometry_t_s is not None:
-            mount = mount_pose(log.mount)
-            self._readings = np.array([composed(pose, mount) for pose in log.odometry])
+            self._readings = composed_all(log.odometry, mount_pose(log.mount))
             self._first = np.searchsorted(log.odometry_t_s, log.t_s - STAMP_OFF_S)
             self._end = np.searchsorted(log.odometry_t_s, log.t_s + STAMP_OFF_S)
+        if at_scans is not None and len(self._readings):
+            self._differ = readings_differ(
+                at_scans, self._readings, self._first, self._end, OTHER_READING_M
+            ).tolist()
 
     def of(self, scan: int) -> tuple[FloatArray | None, list[FloatArray]]:
         """Return the motion (3,) since the last scan by the odometry, if any, and what else it may be."""
         if self._at_scans is None or self._anchor is None:
             return None, []
+        if not self._differ[scan]:
+            return between(self._anchor, self._at_scans[scan]), []
         kept = [self._at_scans[scan]]
         near = self._readings[self._first[scan] : self._end[scan]]
         off = np.hypot(*(near[:, :2] - kept[0][:2]).T) + 0.5 * np.abs(_turn(near[:, 2] - kept[0][2]))
@@ -63,6 +66,9 @@ class ScanMotions:
     def learn(self, scan: int, motion: FloatArray, step: FloatArray | None, others: list[FloatArray]) -> None:
         """Count the next motion from the reading that a match (3,) of this scan was nearest to."""
         if step is None or self._at_scans is None or self._anchor is None:
+            return
+        if not others:
+            self._anchor = self._at_scans[scan]
             return
         best = min(others, key=lambda other: distance(other, motion), default=step)
         usual = distance(step, motion)
@@ -94,11 +100,6 @@ def smoothed_times(t_s: FloatArray) -> FloatArray:
     return np.asarray((sums[2 * k + 1 :] - sums[: -2 * k - 1]) / (2 * k + 1))
 
 
-def distance(a: FloatArray, b: FloatArray) -> float:
-    """How far two motions (3,) are apart, a radian counting as half a metre."""
-    return float(np.hypot(a[0] - b[0], a[1] - b[1])) + 0.5 * abs(float(a[2] - b[2]))
-
-
 @dataclass(slots=True)
 class MotionGuess:
     """Guesses of the next relative motion, ordered by how far each was off lately.
@@ -120,25 +121,13 @@ class MotionGuess:
         """Whether the odometry was nearest lately."""
         return int(self.errors.argmin()) == 0
 
-    def guesses(self, step: FloatArray | None, dt_s: float) -> list[FloatArray]:
-        """Return the motions (3,), the most trusted first."""
-        return [motion for motion, _ in self._by_trust(step, dt_s)]
-
-    def credible(self, step: FloatArray | None, dt_s: float) -> list[FloatArray]:
-        """Return those of the guesses that were about as good as the best one lately."""
-        most = CREDIBLE * self.least_error + 0.003
-        return [motion for motion, error in self._by_trust(step, dt_s) if error <= most]
-
-    def _by_trust(self, step: FloatArray | None, dt_s: float) -> list[tuple[FloatArray, float]]:
-        """Motions and their running mean errors, the least one first."""
-        same = self.velocity * dt_s if dt_s < 1.5 else np.zeros(3)
-        motions = [np.zeros(3) if step is None else step, same, np.zeros(3)]
-        order = np.argsort(self.errors, kind="stable").tolist()
-        return [(motions[k], float(self.errors[k])) for k in order if k != 0 or step is not None]
+    def guesses(self, step: FloatArray | None, dt_s: float) -> tuple[FloatArray, int]:
+        """Return the motions (G, 3), the most trusted first, and how many were about as good as that one."""
+        return guessed_motions(
+            self.errors, self.velocity, _NONE if step is None else step, step is not None, dt_s
+        )
 
     def learn(self, step: FloatArray | None, motion: FloatArray, dt_s: float) -> None:
         """Take in the motion that the scan told."""
-        motions = [np.zeros(3) if step is None else step, self.velocity * dt_s, np.zeros(3)]
-        for k, guess in enumerate(motions):
-            self.errors[k] += _MEMORY * (min(1.0, distance(guess, motion)) - self.errors[k])
-        self.velocity = 0.5 * self.velocity + 0.5 * motion / max(dt_s, 0.05)
+        led = step is not None
+        learn_motion(self.errors, self.velocity, step if step is not None else _NONE, led, motion, dt_s)

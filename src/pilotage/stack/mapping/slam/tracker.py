@@ -62,6 +62,8 @@ class LocalTrack:
         they lie beside it is a guess.
     searched, lost
         How many scans needed a search, and how many could not be aligned (their pose is the guess).
+    crowded
+        Scans of which so much seemed to move that people may fill the view.
     """
 
     poses: FloatArray
@@ -73,6 +75,7 @@ class LocalTrack:
     breaks: IntArray
     searched: int
     lost: int
+    crowded: int = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -125,14 +128,16 @@ class Tracker:
         others: Sequence[FloatArray] = (),
     ) -> bool:
         """Place the next scan (K, 6); True where it became a keyframe. As ``LocalMatcher.match``."""
-        hessian, broken, whole = np.zeros((3, 3)), False, cloud
+        hessian, broken, led = np.zeros((3, 3)), False, None
+        light = self._matcher.thinned(cloud)
         if not self._poses:
             pose = np.zeros(3)
         else:
             last = self._poses[-1]
             if step is not None and self._matcher.guess_error < SURE_GUESS:
-                cloud = self._movers.without(cloud, self._matcher.fallback(last, step, dt_s))
-            fit = self._matcher.match(cloud, last, step, dt_s, gap_s, others)
+                led = self._matcher.fallback(last, step, dt_s)
+                light = self._movers.without(light, led)
+            fit = self._matcher.match(light, last, step, dt_s, gap_s, others)
             self._lost_run = 0 if fit is not None else self._lost_run + 1
             if fit is None:
                 pose, hessian = self._matcher.fallback(last, step, dt_s), RIGID
@@ -148,14 +153,14 @@ class Tracker:
         new = new and not (self._lost_run and not broken)
         if new or broken:
             self._keyframes.append(len(self._poses) - 1)
-            self._clouds.append(cloud)
+            self._clouds.append(cloud if led is None else self._movers.without(cloud, led))
             self._hessians.append(hessian)
             self._slips.append(self._slip.taken())
-            self._matcher.add_keyframe(cloud, pose)
-            self._movers.add(whole, pose)
+            self._matcher.add_keyframe(light, pose)
+            self._movers.add(cloud, pose)
         self._owner.append(len(self._keyframes) - 1)
         if self._torn is not None and not broken:
-            self._heal(self._torn, cloud, new)
+            self._heal(self._torn, light, new)
         return new or broken
 
     def _tear(self) -> None:
@@ -256,6 +261,7 @@ class Tracker:
             np.array(self._breaks, np.int64),
             self._matcher.searched,
             self._matcher.lost,
+            self._movers.crowded,
         )
 
 

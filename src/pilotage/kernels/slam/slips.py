@@ -1,0 +1,69 @@
+"""What an alignment tells, and how far a scan may have slipped where it tells nothing."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from pilotage.kernels.arrays import FloatArray
+from pilotage.kernels.jit import kernel
+from pilotage.kernels.slam.frames import between
+
+CHANCE = 0.03
+"""Part of the weights of an alignment's points that tells nothing: their lines' directions are not exact, so
+that even a bare wall seems to hold a scan along its course."""
+SLIP_SHARE, SLIP_M = 0.15, 0.4
+"""A match as far as SLIP_M from its guess may be off by as much; a nearer one by that share and less."""
+
+
+@kernel
+def told_by(hessian: FloatArray, weight: float) -> FloatArray:
+    """(3, 3) of an alignment's Hessian what does not come by chance; ``weight``: the sum of its points'."""
+    system = hessian.copy()
+    system[0, 0] -= CHANCE * weight
+    system[1, 1] -= CHANCE * weight
+    told, axes = np.linalg.eigh(system)
+    out = np.zeros((3, 3))
+    for m in range(3):
+        for a in range(3):
+            for b in range(3):
+                out[a, b] += max(told[m], 0.0) * axes[a, m] * axes[b, m]
+    return out
+
+
+@kernel
+def slipped(
+    start: FloatArray, pose: FloatArray, hessian: FloatArray, weight: float, error: float, prior: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """What a scan may have slipped, in its own frame.
+
+    Parameters
+    ----------
+    start, pose, hessian, weight
+        (3,), (3,) and (3, 3) of the alignment, and the sum of its points' weights.
+    error
+        Usual error of the guess it began from.
+    prior
+        (3, 3) information of the start in the alignment.
+
+    Returns
+    -------
+    covariance
+        (3, 3) for how far the alignment moved it.
+    left
+        (3, 3) square root of the covariance of what only the guess tells.
+    """
+    off = between(start, pose)
+    far, turned = math.hypot(off[0], off[1]), abs(off[2])
+    covariance = np.zeros((3, 3))
+    covariance[0, 0] = covariance[1, 1] = (SLIP_SHARE * far) ** 2 + (far * far / SLIP_M) ** 2
+    covariance[2, 2] = (SLIP_SHARE * turned) ** 2 + (turned * turned / (0.5 * SLIP_M)) ** 2
+    turn = np.eye(3)
+    turn[0, 0] = turn[1, 1] = math.cos(pose[2])
+    turn[1, 0] = math.sin(pose[2])
+    turn[0, 1] = -turn[1, 0]
+    told = told_by(turn.T @ hessian @ turn, weight)
+    # Squared: what the map holds, however weakly, does not add up from scan to scan.
+    share = np.linalg.solve(told + prior, prior)
+    return covariance, error * (share @ share)
