@@ -76,10 +76,11 @@ def test_openings_narrower_than_the_robot_have_no_way_and_all_others_have_one() 
     assert drawn("bottleneck-0.60").bound_s > 3.0
 
 
-def test_openings_little_wider_than_the_robot_are_driven_through() -> None:
-    """1.5 cm of room on either side, under a laser noise of 1 cm."""
-    request = CourseRequest(("bottleneck-0.46",), ("gap-horizon",))
-    run = drive_course(request, course_base(), drawn("bottleneck-0.46"), 0, "gap-horizon")
+@pytest.mark.parametrize("number", [0, 1])
+def test_openings_little_wider_than_the_robot_are_driven_through(number: int) -> None:
+    """2.5 cm of room on either side, under a laser noise of 1 cm; with 1.5 cm a third are (decision 0248)."""
+    request = CourseRequest(("bottleneck-0.48",), ("gap-horizon",))
+    run = drive_course(request, course_base(), drawn("bottleneck-0.48", number), 0, "gap-horizon")
     assert run.success, run
 
 

@@ -42,7 +42,10 @@ class GapHorizonConfig(Config):
     """Horizon, samples and what a plan costs beside its time."""
 
     ground: RollingConfig = RollingConfig()
-    horizon_s: Positive = 1.6
+    horizon_s: Positive = 1.0
+    far_horizon_s: Positive = 1.6
+    """The same with a moving body in sight, or a place ahead that only an outline that stands straight gets
+    through: it has to be lined up for early. Elsewhere as many samples of a shorter plan find a better."""
     step_s: Positive = 0.1
     rollouts: int = Field(default=192, ge=8, le=20000)
     resample_steps: int = Field(default=2, ge=1, le=100)
@@ -51,7 +54,7 @@ class GapHorizonConfig(Config):
     turn_std_rad_s: Positive = 1.0
     temperature_s: Positive = 0.05
     margin_m: NonNegative = 0.015
-    margin_s: NonNegative = 0.02
+    margin_s: NonNegative = 0.025
     """Between footprint and obstacle points, in plans: at rest, and more per m/s."""
     least_margin_m: NonNegative = 0.01
     least_margin_s: NonNegative = 0.015
@@ -112,13 +115,8 @@ class GapHorizon(RollingController):
     def __init__(self, config: GapHorizonConfig, generator: np.random.Generator) -> None:
         super().__init__(config.ground, foresees=True)
         self._config = config
-        self._steps = max(2, round(config.horizon_s / config.step_s))
-        self._noise = NoiseBank(
-            generator, config.rollouts, self._steps, config.speed_std_m_s, config.turn_std_rad_s
-        )
-        self._commands = np.empty((config.rollouts, self._steps, 2))
-        most = 1 + len(SPEEDS) * len(LOOKS) + 1 + len(DODGES) + 2
-        self._candidates = np.empty((most, self._steps, 2))
+        self._near = _Samples(config, config.horizon_s, generator)
+        self._far = _Samples(config, config.far_horizon_s, generator)
         self._plan: FloatArray | None = None
         self._since_sampled = config.resample_steps
         self._keep_turning = True
@@ -224,9 +222,10 @@ class GapHorizon(RollingController):
     def _plans(self, scene: Scene, price: Price) -> tuple[FloatArray, FloatArray]:
         """All plans (K, N, 2) worth a look with their costs, until the next call."""
         config = self._config
-        plans, count = self._candidates, 0
+        samples = self._far if self._looks_far(scene) else self._near
+        plans, count = samples.plans, 0
         if self._plan is not None:
-            plans[0] = later(self._plan, scene.dt_s / config.step_s)
+            plans[0] = _fitted(later(self._plan, scene.dt_s / config.step_s), samples.steps)
             count = 1
         chased = plans[count : count + len(SPEEDS) * len(LOOKS)]
         speeds = SPEEDS * scene.drive.speed
@@ -234,7 +233,9 @@ class GapHorizon(RollingController):
         count += len(chased)
         plans[count] = 0.0
         count += 1
-        movers = scene.movers.foretold(scene.delay_s + config.step_s, config.step_s, self._steps, sure=False)
+        movers = scene.movers.foretold(
+            scene.delay_s + config.step_s, config.step_s, samples.steps, sure=False
+        )
         if movers.shape[1]:
             # Out of the way of whoever comes: what pursuit of the path does not think of.
             plans[count : count + len(DODGES)] = DODGES[:, None]
@@ -246,11 +247,17 @@ class GapHorizon(RollingController):
             return plans[:count], costs
         self._since_sampled = 0
         mean = plans[int(np.argmin(costs))]
-        sampled = rollout_costs(scene.start, mean, self._noise.draw(), *fixed, self._commands)
+        sampled = rollout_costs(scene.start, mean, samples.noise.draw(), *fixed, samples.commands)
         more = plans[count : count + 2]
-        more[0] = self._commands[int(np.argmin(sampled))]
-        more[1] = weighted_mean(self._commands, sampled, config.temperature_s)
+        more[0] = samples.commands[int(np.argmin(sampled))]
+        more[1] = weighted_mean(samples.commands, sampled, config.temperature_s)
         return plans[: count + 2], np.append(costs, plan_costs(scene.start, more, *fixed))
+
+    def _looks_far(self, scene: Scene) -> bool:
+        if math.isfinite(scene.movers.nearest_m(float(scene.pose[0]), float(scene.pose[1]))):
+            return True
+        ahead = np.ascontiguousarray(scene.path[: max(3, round(self._config.close_ahead_m / 0.1))])
+        return bool(path_distances(ahead, scene.ground).min() < scene.body.outer_m)
 
     def _people_are_near(self, scene: Scene) -> bool:
         return scene.movers.nearest_m(float(scene.pose[0]), float(scene.pose[1])) < self._config.calm_m
@@ -307,3 +314,21 @@ class GapHorizon(RollingController):
                 self._keep_turning = keep_turning
                 return Twist(float(first[0]), float(first[1]))
         return None
+
+
+class _Samples:
+    """Room for plans of one length: noise, what it makes of the best plan, and those worth a look."""
+
+    def __init__(self, config: GapHorizonConfig, horizon_s: float, generator: np.random.Generator) -> None:
+        self.steps = max(2, round(horizon_s / config.step_s))
+        self.noise = NoiseBank(
+            generator, config.rollouts, self.steps, config.speed_std_m_s, config.turn_std_rad_s
+        )
+        self.commands = np.empty((config.rollouts, self.steps, 2))
+        most = 1 + len(SPEEDS) * len(LOOKS) + 1 + len(DODGES) + 2
+        self.plans = np.empty((most, self.steps, 2))
+
+
+def _fitted(plan: FloatArray, steps: int) -> FloatArray:
+    """A plan (N, 2) cut off, or going on with its last command."""
+    return plan[np.minimum(np.arange(steps), len(plan) - 1)]

@@ -18,6 +18,8 @@ NEAR_M = 0.06
 STRAIGHT_RAD = 0.02
 SLOW_M_S = 0.35
 SLOWER_M_S = 0.15
+TURN_RAD_S = 1.0
+"""Beside posts that are millimetres away, corners swing no more than two centimetres in a step."""
 ROOM_M = 0.03
 """With less room than this on either side it drives at the slower speed."""
 LEAST_ROOM_M = 0.006
@@ -72,7 +74,7 @@ class NarrowPassage:
             bearing = wrap(math.atan2(ty - y, tx - x) - theta)
             backwards = abs(bearing) > 0.5 * math.pi
             off = wrap(bearing - math.pi) if backwards else bearing
-            turn = _limited(3.0 * off, scene.drive.turn_rate)
+            turn = _limited(3.0 * off, TURN_RAD_S)
             if abs(off) > 0.35:
                 return self, Twist(0.0, turn)
             speed = min(SLOW_M_S, 1.5 * away + 0.05)
@@ -81,7 +83,7 @@ class NarrowPassage:
             off = wrap(self.direction_rad - theta)
             if abs(off) < STRAIGHT_RAD and abs(scene.start[4]) < 0.1:
                 return replace(self, stage=2), Twist(0.0, 0.0)
-            return self, Twist(0.0, _limited(3.0 * off, scene.drive.turn_rate))
+            return self, Twist(0.0, _limited(3.0 * off, TURN_RAD_S))
         along, across = self._place(x, y)
         too_narrow = self.width_m < 2.0 * (scene.body.inner_m + LEAST_ROOM_M)
         if too_narrow and -scene.body.outer_m - LOOK_M < along < -scene.body.inner_m:
@@ -89,7 +91,9 @@ class NarrowPassage:
         # Steers back onto the axis: a heading that falls with the distance to it.
         wanted = self.direction_rad - math.atan2(across, 0.25)
         tight = 0.5 * self.width_m - scene.body.inner_m < ROOM_M
-        return self, Twist(SLOWER_M_S if tight else SLOW_M_S, _limited(4.0 * wrap(wanted - theta), 1.0))
+        return self, Twist(
+            SLOWER_M_S if tight else SLOW_M_S, _limited(4.0 * wrap(wanted - theta), TURN_RAD_S)
+        )
 
     def _place(self, x: float, y: float) -> tuple[float, float]:
         """Along the axis from the gap's middle, and across it to the left."""
