@@ -3,15 +3,16 @@
     python -m benchmarks.slam_extension ../shared/data/slam --log intel fr079 --again 3
 
 Each log is cut into halves. The first is mapped; the second, whose odometry has an origin and a heading of
-its own, extends it. Relations are those of both halves, the first one's scans hanging on the keyframes of
-theirs that were kept. Then the second half extends the answer over and over (``--again``): the graph must not
-grow.
+its own, extends it (``--backwards``: the other way round). Relations are those of both halves, the mapped
+one's scans hanging on the keyframes of theirs that were kept. Then the new half extends the answer over and
+over (``--again``): the graph must not grow.
 ``--other`` extends a half by another building's, which must be refused.
 """
 
 from __future__ import annotations
 
 import argparse
+import resource
 import tempfile
 import time
 from dataclasses import replace
@@ -36,8 +37,8 @@ OTHER_START = np.array([5.0, -3.0, 2.1])
 """Where the second recording's odometry believes it begins."""
 
 
-def half(log: LaserLog, second: bool) -> LaserLog:
-    """One half; the second has an origin and a heading of its own."""
+def half(log: LaserLog, second: bool, moved: bool) -> LaserLog:
+    """One half; where it is ``moved`` its odometry has an origin and a heading of its own."""
     middle = len(log) // 2
     which = np.arange(middle, len(log)) if second else np.arange(middle)
     out = chosen(log, which)
@@ -45,7 +46,7 @@ def half(log: LaserLog, second: bool) -> LaserLog:
         return out
     near = (log.odometry_t_s >= out.t_s[0] - 1.0) & (log.odometry_t_s <= out.t_s[-1] + 1.0)
     odometry = log.odometry[near]
-    if second:
+    if moved:
         odometry = np.array([composed(OTHER_START, between(odometry[0], pose)) for pose in odometry])
     return replace(out, odometry=odometry, odometry_t_s=log.odometry_t_s[near])
 
@@ -64,41 +65,50 @@ def error_m(t_s: FloatArray, poses: FloatArray, relations: Path) -> str:
     """Mean translational error of the relations whose moments are there, and how many are."""
     with tempfile.TemporaryDirectory() as draft:
         path = Path(draft) / "trajectory.tum"
-        stamps = t_s + 1e-6 * np.arange(t_s.size) * np.append(False, np.diff(t_s) <= 0.0)
-        write_planar_tum(path, stamps, poses)
+        order = np.argsort(t_s, kind="stable")
+        stamps = t_s[order] + 1e-6 * np.arange(t_s.size) * np.append(False, np.diff(t_s[order]) <= 0.0)
+        write_planar_tum(path, stamps, poses[order])
         errors = relation_errors(read_tum(path), read_relations(relations))
     found = errors.summary()
     return f"{found['trans_mean_m']:.4f} m (most {found['trans_max_m']:.2f}, {found['relations']} relations)"
 
 
-def measured(folder: Path, name: str, again: int, other: str | None) -> None:
+def memory_mb() -> float:
+    """Most resident memory of this process so far."""
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0
+
+
+def measured(folder: Path, name: str, again: int, other: str | None, backwards: bool) -> None:
     """Print the lines of a building."""
     log, relations = read_laser_log(folder / f"{name}.bag"), folder / f"{name}.relations"
     config = SlamConfig()
-    first, second = half(log, False), half(log, True)
-    began = time.perf_counter()
+    first, second = half(log, backwards, False), half(log, not backwards, True)
+    began = time.process_time()
     mapped = map_log(first, config)
-    print(f"{name} first half: {error_m(mapped.t_s, mapped.poses, relations)}", flush=True)
+    print(f"{name} mapped half: {error_m(mapped.t_s, mapped.poses, relations)}", flush=True)
     if other is not None:
-        answer = extend_map(half(read_laser_log(folder / f"{other}.bag"), True), config, mapped.earlier_map())
+        answer = extend_map(
+            half(read_laser_log(folder / f"{other}.bag"), True, True), config, mapped.earlier_map()
+        )
         print(
             f"{name} extended by {other}: {answer if isinstance(answer, NotJoined) else 'JOINED'}", flush=True
         )
-    between_s = time.perf_counter()
+    between_s = time.process_time()
     answer = extend_map(second, config, mapped.earlier_map())
     if isinstance(answer, NotJoined) or answer.joined is None:
         print(f"{name} extended: {answer}")
         return
-    took_s = time.perf_counter() - between_s
+    took_s = time.process_time() - between_s
     joined = answer.joined
     before = rehung(mapped, joined, answer.known.graph.poses[: len(joined.earlier)])
     t_s, poses = np.concatenate([first.t_s, second.t_s]), np.concatenate([before, answer.poses])
     print(
-        f"{name} extended: {error_m(t_s, poses, relations)}, second half alone "
+        f"{name} extended: {error_m(t_s, poses, relations)}, new half alone "
         f"{error_m(answer.t_s, answer.poses, relations)}; "
         f"{joined.agreeing} of {joined.stretches} stretches agree, "
-        f"walls {joined.walls:.2f}, {(second.t_s[-1] - second.t_s[0]) / took_s:.0f} x real time; "
-        f"{'; '.join(answer.warnings)}; first half {between_s - began:.0f} s",
+        f"walls {joined.walls:.2f}, "
+        f"{(second.t_s[-1] - second.t_s[0]) / took_s:.0f} x real time (processor time); "
+        f"{'; '.join(answer.warnings)}; mapped half {between_s - began:.0f} s, {memory_mb():.0f} MB at most",
         flush=True,
     )
     for number in range(again + 1):
@@ -106,7 +116,7 @@ def measured(folder: Path, name: str, again: int, other: str | None) -> None:
         points = answer.clouds.points.shape[0]
         print(
             f"{name} after {number + 1}: {len(graph)} keyframes, {graph.i.size} edges, {points} points, "
-            f"second half {error_m(answer.t_s, answer.poses, relations)}",
+            f"new half {error_m(answer.t_s, answer.poses, relations)}",
             flush=True,
         )
         if number == again:
@@ -125,9 +135,10 @@ def main() -> None:
     parser.add_argument("--log", nargs="+", default=["intel", "fr079"])
     parser.add_argument("--again", type=int, default=0)
     parser.add_argument("--other")
+    parser.add_argument("--backwards", action="store_true", help="the first half extends the second")
     asked = parser.parse_args()
     for name in asked.log:
-        measured(asked.folder, name, asked.again, asked.other)
+        measured(asked.folder, name, asked.again, asked.other, asked.backwards)
 
 
 if __name__ == "__main__":
