@@ -202,6 +202,8 @@ def test_random_places_are_drawn_from_the_seed_and_recorded() -> None:
     assert settled == build(mission).mission
     assert build(load_mission("museum-lost", seed=5)).mission.world.start != settled.world.start
     assert "random_start: null" in resolved_yaml(settled)
+    anywhere = build(load_mission("museum-lost", ("world.start=null",), seed=4)).mission.world.start
+    assert anywhere == settled.world.start  # the largest floor is the one that the file's start is on
     carried = build(load_mission("museum-kidnap", seed=4)).mission.world.kidnaps[0].to
     assert carried is not None
     assert MUSEUM.distance_m(carried.x_m, carried.y_m) >= 0.6

@@ -32,7 +32,10 @@ class GoalConfig(Config):
 
 
 class RandomPlace(Config):
-    """A pose drawn from the run's seed among those that a body can drive to from ``world.start``."""
+    """A pose drawn from the run's seed among those that a body can drive to from ``world.start``.
+
+    Without a ``start`` among those of the map's largest floor.
+    """
 
     clearance_m: Positive = 0.6
 

@@ -57,18 +57,24 @@ def start_pose(mission: Mission, index: int, chart: WorldMap) -> PoseConfig:
 def settle_places(mission: Mission, chart: WorldMap, about: tuple[float, float] | None = None) -> Mission:
     """Return the mission with all its places known, so that it can be recorded and run again as it is.
 
-    A team's starts are drawn on the floor of the place that the task is ``about``, if it is about one.
+    A random start without ``world.start`` is drawn on the largest floor. A team's starts are drawn on the
+    floor of the place that the task is ``about``, if it is about one.
     """
     if mission.team.size is not None:
         mission = _with_drawn_starts(mission, chart, about)
     world = mission.world
-    given = [start_pose(mission, index, chart) for index in range(len(mission.members))]
-    if world.random_start is None and all(kidnap.to is not None for kidnap in world.kidnaps):
-        return mission if mission.robots or world.start is not None else _started(mission, given)
     streams = RandomStreams(mission.run.seed)
-    starts = given
-    if world.random_start is not None:
+    if world.random_start is None:
+        starts = [start_pose(mission, index, chart) for index in range(len(mission.members))]
+        if all(kidnap.to is not None for kidnap in world.kidnaps):
+            return mission if mission.robots or world.start is not None else _started(mission, starts)
+        given: list[PoseConfig | None] = [*starts]
+    else:
         rng, clearance_m = streams.stream("start"), world.random_start.clearance_m
+        given = [
+            mission.start_of(robot) if chart.markings is None else start_pose(mission, index, chart)
+            for index, robot in enumerate(mission.members)
+        ]
         starts = [random_pose(chart, start, clearance_m, rng) for start in given]
     rng = streams.stream("kidnap")
     kidnaps = tuple(
@@ -176,14 +182,14 @@ def pose_of(place: PoseConfig) -> Pose2:
     return Pose2(place.x_m, place.y_m, wrap_to_pi(place.theta_rad))
 
 
-def _carried(kidnap: Kidnap, chart: WorldMap, near: PoseConfig, rng: np.random.Generator) -> Kidnap:
+def _carried(kidnap: Kidnap, chart: WorldMap, near: PoseConfig | None, rng: np.random.Generator) -> Kidnap:
     return kidnap.model_copy(update={"to": random_pose(chart, near, kidnap.clearance_m, rng)})
 
 
 def random_pose(
-    chart: WorldMap, reachable_from: PoseConfig, clearance_m: float, rng: np.random.Generator
+    chart: WorldMap, reachable_from: PoseConfig | None, clearance_m: float, rng: np.random.Generator
 ) -> PoseConfig:
-    """Draw a pose, uniform over the floor that is connected to a place at a clearance.
+    """Draw a pose, uniform over the floor that is connected to a place at a clearance, or the largest one.
 
     Raises
     ------

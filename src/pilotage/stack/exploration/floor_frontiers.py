@@ -41,12 +41,15 @@ class Frontier:
         How many cells it has, as a length.
     view
         The cell to look at it from, -1 where none is reached, and ``cost_m`` what it costs to get there.
+    crossings
+        (N,) its own cells that can be driven to, the cheapest first: there the robot fits through it.
     """
 
     middle_xy_m: FloatArray
     length_m: float
     view: int
     cost_m: float
+    crossings: IntArray
 
 
 class SeenFloor:
@@ -101,6 +104,11 @@ class SeenFloor:
         row, column = divmod(cell, self._free.shape[1])
         return self._corner + self.cell_m * np.array([column + 0.5, row + 0.5])
 
+    def points_of(self, cells: IntArray) -> FloatArray:
+        """Middles (N, 2) of cells (N,) by their numbers."""
+        columns = self._free.shape[1]
+        return self._corner + self.cell_m * (np.stack([cells % columns, cells // columns], axis=1) + 0.5)
+
     def cost_to(self, xy_m: FloatArray) -> float:
         """What it costs to get to a point, or to the nearest place with room beside it."""
         return float(self.cost_m[self._nearest_with_room(xy_m)])
@@ -134,9 +142,7 @@ class SeenFloor:
         cells = [cell]
         while cells[-1] != self._start and len(cells) < self.cost_m.size:
             cells.append(int(self._parent[cells[-1]]))
-        columns = self._free.shape[1]
-        at = np.array(cells[::-1])
-        return self._corner + self.cell_m * (np.stack([at % columns, at // columns], axis=1) + 0.5)
+        return self.points_of(np.array(cells[::-1]))
 
     def _frontier(self, rows: IntArray, columns: IntArray) -> Frontier:
         length_m = rows.size * self.cell_m
@@ -145,7 +151,10 @@ class SeenFloor:
         view = self._view_of(middle)
         cost_m = float(self.cost_m[view]) if view >= 0 else math.inf
         xy_m = self._corner + self.cell_m * (np.array([middle[1], middle[0]]) + 0.5)
-        return Frontier(xy_m, length_m, view, cost_m)
+        cells = rows * self._free.shape[1] + columns
+        cells = cells[np.isfinite(self.cost_m[cells])]
+        cells = cells[np.argsort(self.cost_m[cells], kind="stable")]
+        return Frontier(xy_m, length_m, view, cost_m, cells)
 
     def _view_of(self, middle: tuple[int, int]) -> int:
         """The cheapest cell near a frontier from which it is seen; -1 where there is none."""

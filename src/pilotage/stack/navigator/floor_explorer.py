@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import StrEnum
 
 import numpy as np
@@ -27,7 +27,10 @@ AHEAD_M = 2.5
 """The local controller is led by a point so far ahead on the path."""
 STALL_M = 0.3
 SAME_M = 0.6
-"""A frontier this near to one that was given up is that one."""
+"""A frontier this near to one that was looked at is that one."""
+CROSSED_M, FAILED_M = 0.2, 0.6
+"""So much of a frontier around a place where it stood on it, or could not get to, is given up."""
+COUNTS = ("frontiers_seen", "frontiers_left", "frontiers_given_up", "loops_sought")
 RETURNS = 4
 """How often it checks, with loops closed anew, that it truly stands where it began."""
 
@@ -49,6 +52,8 @@ class FloorExplorerConfig(Config):
     least_frontier_m: Positive = 0.4
     look_m: Positive = 0.35
     """A frontier is looked at from this near to where it is best seen."""
+    cross_m: Positive = 0.1
+    """So near it comes to a place on a frontier that it drives to because looking did not do."""
     replan_s: Positive = 1.0
     switch_m: NonNegative = 2.0
     """Another frontier must be nearer by this before it is gone to instead."""
@@ -74,7 +79,9 @@ class Target:
     xy_m: FloatArray
     frontier_xy_m: FloatArray
     score: float
-    path: FloatArray
+    crossing: bool
+    """Whether it is on the frontier itself, not a place to look at it from."""
+    path: FloatArray = field(default_factory=lambda: np.zeros((0, 2)))
 
 
 @NAVIGATORS.add("floor-frontier", FloorExplorerConfig)
@@ -87,8 +94,11 @@ class FloorExplorer(LocalizingNavigator):
     loop closing: Stachniss, Haehnel and Burgard, 2004). In the end it returns to its start.
 
     The map is the localizer's where that makes one (``slam``), else it is drawn from scans at the poses that
-    the localizer tells; with the oracle ``localizer`` that is exploration with a perfect pose. Frontiers that
-    were looked at and stayed, or cannot be reached, are left, and said.
+    the localizer tells; with the oracle ``localizer`` that is exploration with a perfect pose.
+
+    A frontier is looked at from near it first. One that stays (the edge of a shadow, beside a door post) and
+    that the robot fits through is driven to, and given up only where it stood on it, or got no nearer. One
+    that is too narrow is given up when it was looked at. What is given up is said, with the reason.
     """
 
     def __init__(
@@ -114,6 +124,8 @@ class FloorExplorer(LocalizingNavigator):
             needed_by="navigator 'floor-frontier'",
         )
         self._clearance_m = robot.radius_m + config.clearance_m
+        # A frontier no longer than the robot is wide is one that a small robot fits through.
+        self._least_m = min(config.least_frontier_m, 2.0 * self._clearance_m)
         own = getattr(self._localizer, "scan_grid", None)
         self._draws = own is None
         self._grid: ScanGrid = ScanGrid(self._scanner, config.resolution_m) if own is None else own
@@ -122,12 +134,14 @@ class FloorExplorer(LocalizingNavigator):
         start = task.initial.pose
         self._start = np.array([start.x_m, start.y_m])
         self._doing, self._target = Doing.EXPLORE, None
-        self._left: list[FloatArray] = []
+        self._looked: list[FloatArray] = []
+        self._tried: list[tuple[FloatArray, float]] = []
+        """Places on frontiers that it stood on or could not get to, and how much around them is given up."""
         self._sure_m, self._checked = 0.0, 0
         self._planned_s, self._moved_s, self._moved_from = -math.inf, 0.0, self._start
         self._frontiers = 0
         journal.result("grid", self._grid.grid)
-        journal.counts |= {"frontiers_seen": 0, "frontiers_left": 0, "loops_sought": 0}
+        journal.counts |= dict.fromkeys(COUNTS, 0)
         self._channel = journal.channel(
             {"goal_x_m": "m", "goal_y_m": "m", "frontiers": "1", "position_std_m": "m"}, first=True
         )
@@ -170,7 +184,10 @@ class FloorExplorer(LocalizingNavigator):
     # --- deciding -----------------------------------------------------------------------------------
 
     def _arrival_m(self) -> float:
-        return self._config.arrival_m if self._doing is Doing.RETURN else self._config.look_m
+        if self._doing is Doing.RETURN:
+            return self._config.arrival_m
+        crossing = self._target is not None and self._target.crossing
+        return self._config.cross_m if crossing else self._config.look_m
 
     def _there(self, here: FloatArray) -> bool:
         target = self._target
@@ -200,25 +217,46 @@ class FloorExplorer(LocalizingNavigator):
         """Frontiers within reach that were not given up, the best first."""
         config, out = self._config, []
         if self._target is not None and self._doing is Doing.EXPLORE and self._there(here):
-            # It has been looked at: what is still unseen of it stays so.
-            self._give_up(self._target.frontier_xy_m)
-            self._journal.count("frontiers_seen")
-        for frontier in floor.frontiers(config.least_frontier_m):
-            if frontier.view < 0 or self._is_left(frontier):
+            self._met(self._target)
+        for frontier in floor.frontiers(self._least_m):
+            cell, crossing = self._place_for(floor, frontier)
+            if cell < 0:
                 continue
-            xy_m = floor.point_of(frontier.view)
+            xy_m = floor.point_of(cell)
             bearing = math.atan2(xy_m[1] - here[1], xy_m[0] - here[0]) - belief.pose.theta_rad
             turn = abs((bearing + math.pi) % (2.0 * math.pi) - math.pi)
-            score = frontier.cost_m + config.turn_cost_m_per_rad * turn
+            score = float(floor.cost_m[cell]) + config.turn_cost_m_per_rad * turn
             score -= config.length_gain * min(frontier.length_m, 4.0)
-            out.append(Target(xy_m, frontier.middle_xy_m, score, np.zeros((0, 2))))
+            out.append(Target(xy_m, frontier.middle_xy_m, score, crossing))
         return sorted(out, key=lambda target: target.score)
 
-    def _is_left(self, frontier: Frontier) -> bool:
-        return any(float(np.hypot(*(frontier.middle_xy_m - place))) < SAME_M for place in self._left)
+    def _place_for(self, floor: SeenFloor, frontier: Frontier) -> tuple[int, bool]:
+        """The cell to go to for a frontier, -1 for none, and whether it is on the frontier itself."""
+        if frontier.view >= 0 and not self._is_looked(frontier):
+            return frontier.view, False
+        places = floor.points_of(frontier.crossings)
+        open_ = np.ones(len(places), np.bool_)
+        for place, around_m in self._tried:
+            open_ &= np.hypot(*(places - place).T) > around_m
+        return (int(frontier.crossings[open_.argmax()]), True) if open_.any() else (-1, False)
 
-    def _give_up(self, frontier_xy_m: FloatArray) -> None:
-        self._left.append(frontier_xy_m)
+    def _is_looked(self, frontier: Frontier) -> bool:
+        return any(float(np.hypot(*(frontier.middle_xy_m - place))) < SAME_M for place in self._looked)
+
+    def _met(self, target: Target) -> None:
+        """It stands where it was to go: what is still unseen from there stays so."""
+        if target.crossing:
+            self._tried.append((target.xy_m, CROSSED_M))
+        else:
+            self._looked.append(target.frontier_xy_m)
+            self._journal.count("frontiers_seen")
+
+    def _failed_to_reach(self, target: Target) -> None:
+        """It cannot get to a target: the frontier counts as looked at, its cells around as tried."""
+        if self._doing is Doing.EXPLORE:
+            self._looked.append(target.frontier_xy_m)
+            if target.crossing:
+                self._tried.append((target.xy_m, FAILED_M))
 
     def _go_exploring(self, floor: SeenFloor, found: list[Target], here: FloatArray) -> None:
         """To the best frontier, or on to the one it is under way to while that is about as good."""
@@ -238,7 +276,7 @@ class FloorExplorer(LocalizingNavigator):
             return
         target.path = floor.path_to(target.xy_m)
         if len(target.path) == 0:
-            self._give_up(target.frontier_xy_m)
+            self._failed_to_reach(target)
             self._target = None
 
     # --- closing loops ------------------------------------------------------------------------------
@@ -263,7 +301,7 @@ class FloorExplorer(LocalizingNavigator):
             return False
         place = early[int(np.where(far, costs, np.inf).argmin())]
         self._doing = Doing.CLOSE
-        self._go(floor, Target(place, place, 0.0, np.zeros((0, 2))))
+        self._go(floor, Target(place, place, 0.0, False))
         self._journal.say(
             t_s, "close", f"unsure of its place: back to ({place[0]:.1f}, {place[1]:.1f}) for a loop"
         )
@@ -276,8 +314,12 @@ class FloorExplorer(LocalizingNavigator):
         elif t_s - self._moved_s > self._config.stall_s:
             self._moved_s = t_s
             if self._target is not None and self._doing is not Doing.RETURN:
-                self._journal.say(t_s, "stall", "it gets no nearer: this frontier is given up")
-                self._give_up(self._target.frontier_xy_m)
+                what = "a frontier" if self._doing is Doing.EXPLORE else "the place of a loop"
+                x_m, y_m = self._target.xy_m
+                self._journal.say(
+                    t_s, "stall", f"it gets no nearer to {what}: ({x_m:.1f}, {y_m:.1f}) is given up"
+                )
+                self._failed_to_reach(self._target)
                 self._target = None
             elif self._doing is Doing.RETURN:
                 self._fail(t_s, "stuck on its way back to the start")
@@ -285,14 +327,15 @@ class FloorExplorer(LocalizingNavigator):
     # --- coming back --------------------------------------------------------------------------------
 
     def _set_out_home(self, t_s: float, floor: SeenFloor, here: FloatArray) -> None:
-        left = [f for f in floor.frontiers(self._config.least_frontier_m) if f.view < 0 or self._is_left(f)]
-        unreached = sum(1 for frontier in left if frontier.view < 0)
-        self._journal.counts["frontiers_left"] = len(left)
+        left = floor.frontiers(self._least_m)
+        unreached = sum(1 for frontier in left if frontier.view < 0 and not frontier.crossings.size)
+        wide = sum(1 for frontier in left if frontier.crossings.size)
+        self._journal.counts |= {"frontiers_left": len(left), "frontiers_given_up": wide}
         self._journal.say(
             t_s,
             "explored",
-            f"no frontier is left to look at; {unreached} of those that stay are out of reach, "
-            f"{len(left) - unreached} were looked at",
+            f"no frontier is left to look at; of those that stay {unreached} are out of reach, "
+            f"{len(left) - unreached - wide} too narrow and looked at, {wide} wide enough and given up",
         )
         self._doing = Doing.RETURN
         self._come_back(t_s, floor, here)
@@ -305,9 +348,8 @@ class FloorExplorer(LocalizingNavigator):
             if len(path) == 0 and off_m > 1.0:
                 self._fail(t_s, "no path over the floor that it has seen leads back to the start")
                 return
-            self._target = Target(
-                self._start, self._start, 0.0, np.concatenate([path[:-1], self._start[None]])
-            )
+            path = np.concatenate([path[:-1], self._start[None]])
+            self._target = Target(self._start, self._start, 0.0, False, path)
             return
         close_loops = getattr(self._localizer, "close_loops", None)
         if close_loops is not None and self._checked < RETURNS:
@@ -319,8 +361,9 @@ class FloorExplorer(LocalizingNavigator):
         refine = getattr(self._localizer, "refine", None)
         if refine is not None:
             refine()
-        left = self._journal.counts["frontiers_left"]
-        self._end(t_s, StackStatus.ARRIVED, f"explored, {left} frontiers left, back at the start")
+        left, wide = (self._journal.counts[key] for key in ("frontiers_left", "frontiers_given_up"))
+        told = f"explored, {left} frontiers left, {wide} of them wide enough, back at the start"
+        self._end(t_s, StackStatus.ARRIVED, told)
 
     def _fail(self, t_s: float, why: str) -> None:
         self._end(t_s, StackStatus.FAILED, why)
