@@ -28,7 +28,12 @@ POSTS = np.array([[2.0, 0.1, 0.075], [3.0, 0.9, 0.075], [3.0, -0.8, 0.075], [4.2
 
 
 def view_of(
-    t: float, pose: Pose2, twist: Twist, circles: FloatArray, limits: LocalLimits = LIMITS
+    t: float,
+    pose: Pose2,
+    twist: Twist,
+    circles: FloatArray,
+    limits: LocalLimits = LIMITS,
+    tolerance_m: float = 0.3,
 ) -> LocalView:
     """What a robot with true odometry and a perfect laser sees; the goal is 6 m ahead."""
     x = pose.x_m + math.cos(pose.theta_rad) * MOUNT.x_m
@@ -37,7 +42,7 @@ def view_of(
     ranges = fan_ranges(
         x, y, pose.theta_rad + float(ANGLES[0]), step, ANGLES.shape[0], 20.0, NO_SEGMENTS, circles
     )
-    return LocalView(t, pose, twist, ranges, ANGLES, MOUNT, 20.0, (6.0, 0.0), limits, JACKAL, 0.3)
+    return LocalView(t, pose, twist, ranges, ANGLES, MOUNT, 20.0, (6.0, 0.0), limits, JACKAL, tolerance_m)
 
 
 def drive(
@@ -46,6 +51,7 @@ def drive(
     limits: LocalLimits = LIMITS,
     true_share: float = 1.0,
     seconds: float = 15.0,
+    tolerance_m: float = 0.3,
 ) -> tuple[bool, float, list[Twist]]:
     """Whether it came to the goal, its least clearance, and its commands; with the delay of the limits."""
     true = Drive(
@@ -61,13 +67,13 @@ def drive(
     commands: list[Twist] = []
     late = round(limits.delay_s / 0.05)
     for k in range(round(seconds / 0.05)):
-        view = view_of(0.05 * k, Pose2(x, y, theta), Twist(v, w), circles, limits)
+        view = view_of(0.05 * k, Pose2(x, y, theta), Twist(v, w), circles, limits, tolerance_m)
         commands.append(controller.step(view))
         acting = commands[-1 - late] if len(commands) > late else Twist(0.0, 0.0)
         for _ in range(5):
             x, y, theta, v, w = advance(x, y, theta, v, w, acting.v_m_s, acting.w_rad_s, 0.01, true)
             least = min(least, discs_clearance(x, y, theta, JACKAL, circles))
-        if math.hypot(x - 6.0, y) < 0.35:
+        if math.hypot(x - 6.0, y) < 1.2 * tolerance_m:
             return True, least, commands
     return False, least, commands
 
@@ -110,6 +116,14 @@ def test_our_own_hits_nothing_it_has_seen_with_weak_brakes_worse_than_told(seed:
     weak = LocalLimits(2.0, 0.5, 1.0, 1.0, 4.0, 6.0, 0.1)
     _, least, _ = drive(make("gap-horizon"), circles, weak, true_share=0.75, seconds=12.0)
     assert least > 0.0
+
+
+@pytest.mark.parametrize("seed", [1, 10])
+def test_our_own_goes_on_to_a_goal_that_has_to_be_met_closely(seed: int) -> None:
+    """Plans of a second alone stand still before it more often; longer ones come within 5 cm."""
+    slow = LocalLimits(0.5, 0.2, 0.5, 0.5, 1.0, 2.0)
+    arrived, _, _ = drive(make("gap-horizon", seed), POSTS[2:], slow, seconds=30.0, tolerance_m=0.05)
+    assert arrived
 
 
 def test_it_stands_before_a_closed_wall() -> None:

@@ -44,8 +44,9 @@ class GapHorizonConfig(Config):
     ground: RollingConfig = RollingConfig()
     horizon_s: Positive = 1.0
     far_horizon_s: Positive = 1.6
-    """The same with a moving body in sight, or a place ahead that only an outline that stands straight gets
-    through: it has to be lined up for early. Elsewhere as many samples of a shorter plan find a better."""
+    """The same close to the goal, with a moving body in sight, or a place ahead that only an outline that
+    stands straight gets through: it has to be lined up for early. Elsewhere as many samples of a shorter plan
+    find a better one."""
     step_s: Positive = 0.1
     rollouts: int = Field(default=192, ge=8, le=20000)
     resample_steps: int = Field(default=2, ge=1, le=100)
@@ -254,6 +255,9 @@ class GapHorizon(RollingController):
         return plans[: count + 2], np.append(costs, plan_costs(scene.start, more, *fixed))
 
     def _looks_far(self, scene: Scene) -> bool:
+        # The last decimetres before a goal of a narrow tolerance: short plans stood still before it.
+        if scene.distance_m < self._config.close_ahead_m:
+            return True
         if math.isfinite(scene.movers.nearest_m(float(scene.pose[0]), float(scene.pose[1]))):
             return True
         ahead = np.ascontiguousarray(scene.path[: max(3, round(self._config.close_ahead_m / 0.1))])
