@@ -255,10 +255,14 @@ class GapHorizon(RollingController):
         return plans[: count + 2], np.append(costs, plan_costs(scene.start, more, *fixed))
 
     def _looks_far(self, scene: Scene) -> bool:
-        # The last decimetres before a goal of a narrow tolerance: short plans stood still before it.
+        # Close to a goal of a narrow tolerance short plans stood still before it.
         if scene.distance_m < self._config.close_ahead_m:
             return True
-        if math.isfinite(scene.movers.nearest_m(float(scene.pose[0]), float(scene.pose[1]))):
+        # Somebody may walk here, by the mission's word or by what was seen.
+        people = self._config.ground.movers.enabled or math.isfinite(
+            scene.movers.nearest_m(float(scene.pose[0]), float(scene.pose[1]))
+        )
+        if people:
             return True
         ahead = np.ascontiguousarray(scene.path[: max(3, round(self._config.close_ahead_m / 0.1))])
         return bool(path_distances(ahead, scene.ground).min() < scene.body.outer_m)
