@@ -10,14 +10,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pilotage.core.types import FloatArray, Pose2
+from pilotage.core.types import FloatArray, Pose2, Twist
 from pilotage.experiments.build.build import build
 from pilotage.experiments.loop import run_loop
 from pilotage.experiments.mission import mission_of, read_mission
 from pilotage.sensors.readings import Readings
+from pilotage.stack.interface import BeliefStatus
 from pilotage.stack.navigator.patrol.headway import Headway
 from pilotage.stack.navigator.patrol.precedence import MOST_S, Leading, orders, told
-from pilotage.stack.navigator.patrol.states import Move, State, Waiting
+from pilotage.stack.navigator.patrol.states import Lost, Move, State, Waiting
 from pilotage.stack.patrol.evacuation import Evacuation
 from pilotage.stack.patrol.roadmap import Roadmap
 from pilotage.stack.patrol.word import Clearing, TeamWord
@@ -133,6 +134,22 @@ class TestOrder:
         assert orders(context, 4.0) == {3: (6.0, 1.0), 9: (6.0, 2.0)}
         context.t_s = 60.0  # they have long been silent
         assert told(context) is None
+
+
+def test_who_is_lost_while_it_goes_first_tells_nobody_to_make_room() -> None:
+    """Its orders stood until it knew where it was again, and the mates waited where it had sent them."""
+    stack: Any = build(mission_of(hall_and_dead_end(2, 10.0), seed=0)).team[0].stack
+    context = stack._context
+    stack.step(Readings(0.0, {}))
+    stack._state = Leading(context, 0.0)
+    context.clearing = Clearing(0.0, ((1, 4.0, 1.5),))
+    lost = replace(stack._localizer.belief, status=BeliefStatus.LOST)
+    stack._localizer = SimpleNamespace(step=lambda _: lost, belief=lost)
+    stack._wandering = SimpleNamespace(step=lambda _: Twist(0.0, 0.3))
+    stack.step(Readings(10.0, {}))
+    assert isinstance(stack._state, Lost)
+    assert context.clearing is None
+    assert context.journal.outbox[-1].clearing is None
 
 
 @pytest.mark.parametrize(("passes_s", "stays"), [(2.0, True), (6.0, False)])

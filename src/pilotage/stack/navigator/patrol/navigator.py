@@ -13,7 +13,7 @@ from pilotage.stack.navigator.goal.wandering import Wandering
 from pilotage.stack.navigator.navigator import Parts, localizer_of
 from pilotage.stack.navigator.patrol.config import PatrolNavigatorConfig
 from pilotage.stack.navigator.patrol.context import Context
-from pilotage.stack.navigator.patrol.precedence import precedence
+from pilotage.stack.navigator.patrol.precedence import Leading, precedence
 from pilotage.stack.navigator.patrol.states import Charging, Lost, State, Waiting, resume
 
 COLUMNS = {
@@ -99,6 +99,8 @@ class PatrolNavigator:
             context.came_from = context.roadmap.nearest(belief.pose.x_m, belief.pose.y_m)
             state = None
         self._state, command = resume(context) if state is None else precedence(context, state).step(readings)
+        if not isinstance(self._state, Leading):
+            context.clearing = None  # also where it lost its way meanwhile: nobody makes room for it any more
         context.talk(lost=lost)
         self._telemetry.tell(
             context.mode,

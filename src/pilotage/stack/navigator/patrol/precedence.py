@@ -60,7 +60,7 @@ class Leading:
         context = self.context
         context.mode, own = Mode.HOLD, context.task.robot
         if context.arrived(blocked=True):
-            return self._over(arrive(context))
+            return arrive(context)
         if not context.fresh:
             return Move(self, context.lead(context.hop))
         line = context.roadmap.way(
@@ -69,7 +69,7 @@ class Leading:
         if context.t_s - self.began_s > MOST_S or context.runs_low() or not len(line):
             context.headway.restart(context.t_s)
             context.say("gives-up", f"not at vertex {context.hop} for {MOST_S:.0f} s: lets others go first")
-            return self._over(resume(context))
+            return resume(context)
         traffic.look(context, context.hop)
         if context.claim is not None:
             context.tell_claim(replace(context.claim, turn=BEFORE_ALL))
@@ -117,10 +117,6 @@ class Leading:
             del self.sent[own]
             return Move(self, context.stand())
         return Move(self, context.descend(context.roadmap.field_to(x, y)))
-
-    def _over(self, move: Move) -> Move:
-        self.context.clearing = None
-        return move
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -177,8 +173,13 @@ def told(context: Context) -> Place | None:
 
 def evacuate(context: Context, place: Place) -> Move:
     """To a place that was told."""
-    field_s = context.roadmap.field_to(*place)
-    return Move(Evacuating(context, place, field_s), context.descend(field_s))
+    state = evacuating(context, place)
+    return Move(state, context.descend(state.time))
+
+
+def evacuating(context: Context, place: Place) -> Evacuating:
+    """The state that leads to a place that was told."""
+    return Evacuating(context, place, context.roadmap.field_to(*place))
 
 
 def precedence(context: Context, state: State) -> State:
@@ -197,10 +198,9 @@ def precedence(context: Context, state: State) -> State:
     if place is not None:
         if isinstance(state, Evacuating):
             return state
-        context.clearing = None
         context.journal.count("gave_way")
         context.say("make-room", f"makes room at ({place[0]:.1f}, {place[1]:.1f}) for one that goes first")
-        return Evacuating(context, place, context.roadmap.field_to(*place))
+        return evacuating(context, place)
     if leads or isinstance(state, Evacuating) or not context.heard():
         return state
     headway, most_s = context.headway, context.config.precede_s
