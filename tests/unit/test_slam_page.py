@@ -44,7 +44,7 @@ def test_every_known_cell_appears_once_and_not_before_it_could_be_seen(data: Sla
     np.testing.assert_array_equal(np.sort(raster.change_cell), np.flatnonzero(classes != UNKNOWN_CELL))
     np.testing.assert_array_equal(raster.change_value, classes[raster.change_cell])
     assert (np.diff(raster.change_t_s) >= 0.0).all()
-    times = data.t_s[data.keyframes] - data.t_s[0]
+    times = data.t_s[data.keyframes.scans] - data.t_s[0]
     assert set(raster.change_t_s) <= set(times)
     x0, y0, x1, _ = raster.bounds_m
     columns = raster.cells.shape[1]

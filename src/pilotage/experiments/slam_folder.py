@@ -9,23 +9,20 @@ import numpy as np
 import yaml
 
 from pilotage.core.errors import InputError
-from pilotage.core.files.arrays import read_npz, require_numbers
 from pilotage.core.types import FloatArray, Pose2
 from pilotage.evaluation.slam_consistency import COVARIANCES_FILE, read_scan_covariances
 from pilotage.logs.g2o import write_g2o
 from pilotage.logs.laser_log import LaserLog
 from pilotage.maps.ros_map import RosMap, write_ros_map
-from pilotage.models.pose_graph import LARGEST
 from pilotage.records.metrics import clean
 from pilotage.records.run_folder import draft_folder
+from pilotage.records.slam_keyframes import KEYFRAMES_FILE, Keyframes, read_keyframes, write_keyframes
 from pilotage.stack.mapping.slam.closures import Closure, Verdict
 from pilotage.stack.mapping.slam.clouds import Clouds, cloud_of_beams
 from pilotage.stack.mapping.slam.config import SlamConfig
 from pilotage.stack.mapping.slam.earlier_map import EarlierMap, KeyframeScans
 from pilotage.stack.mapping.slam.result import SlamResult
 from pilotage.stack.mapping.slam.uncertainty import Edges
-
-KEYFRAMES_FILE = "keyframes.npz"
 
 
 def read_earlier_map(folder: Path, config: SlamConfig) -> EarlierMap:
@@ -40,30 +37,17 @@ def read_earlier_map(folder: Path, config: SlamConfig) -> EarlierMap:
     if not path.is_file() or not (folder / COVARIANCES_FILE).is_file():
         raise InputError(f"{folder}: expected a folder of 'pilotage slam', found no {KEYFRAMES_FILE}")
     known = read_scan_covariances(folder / COVARIANCES_FILE)
-    file = read_npz(path, "keyframes of 'pilotage slam'")
-    count = len(known.graph)
-    shapes = dict.fromkeys(("t_s", "scans", "beams", "first_angle_rad", "angle_step_rad"), (count,))
-    for name, shape in (shapes | {"ranges_m": (count, -1), "breaks": (-1,)}).items():
-        if name not in file:
-            raise InputError(
-                f"{path}: expected {name}, found none; map the recording anew with this pilotage"
-            )
-        found = file[name].shape
-        if len(found) != len(shape) or any(b not in (-1, a) for a, b in zip(found, shape, strict=True)):
-            raise InputError(f"{path}: expected {name} of {count} keyframes, found shape {found}")
-        if name != "ranges_m":
-            require_numbers(file[name], LARGEST * 10.0, f"{path}: {name}")
-    beams, breaks = file["beams"].astype(np.int64), file["breaks"].astype(np.int64)
-    if beams.size and not (beams.min() >= 0 and beams.max() <= file["ranges_m"].shape[1]):
-        raise InputError(f"{path}: expected at most {file['ranges_m'].shape[1]} beams, found other numbers")
-    if breaks.size and not (breaks.min() > 0 and breaks.max() < count and (np.diff(breaks) > 0).all()):
-        raise InputError(f"{path}: expected increasing breaks of {count} keyframes, found others")
+    try:
+        keyframes = read_keyframes(path, len(known.graph))
+    except ValueError as error:
+        raise InputError(f"{path}: {error}; map the recording anew with this pilotage") from None
+    beams = keyframes.beams
     scans = KeyframeScans(
-        file["t_s"].astype(np.float64),
-        file["ranges_m"].astype(np.float64),
+        keyframes.t_s,
+        keyframes.ranges_m.astype(np.float64),
         beams,
-        file["first_angle_rad"].astype(np.float64),
-        file["angle_step_rad"].astype(np.float64),
+        keyframes.first_angle_rad,
+        keyframes.angle_step_rad,
     )
     clouds = [
         cloud_of_beams(
@@ -72,13 +56,12 @@ def read_earlier_map(folder: Path, config: SlamConfig) -> EarlierMap:
             float(scans.angle_step_rad[k]),
             config.max_range_m,
         )
-        for k in range(count)
+        for k in range(len(keyframes))
     ]
     graph = known.graph
     weighted = graph.information * known.weights[:, None, None]
     edges = Edges(graph.i, graph.j, graph.measurements, weighted, np.zeros(graph.i.size, np.bool_))
-    last = int(np.count_nonzero(file["scans"] < 0))
-    return EarlierMap(graph.poses, Clouds.of(clouds), scans, edges, breaks, last)
+    return EarlierMap(graph.poses, Clouds.of(clouds), scans, edges, keyframes.breaks, keyframes.since)
 
 
 def write_slam_folder(
@@ -95,7 +78,7 @@ def write_slam_folder(
         write_ros_map(draft / "map.yaml", RosMap.of(result.grid, "map.pgm"))
         write_g2o(draft / "graph.g2o", result.known.graph)
         _write_covariances(draft / COVARIANCES_FILE, result)
-        _write_keyframes(draft / KEYFRAMES_FILE, result)
+        write_keyframes(draft / KEYFRAMES_FILE, _keyframes(result))
         t_s = result.keyframe_scans().t_s
         closures = [_row(number, c, result, t_s) for number, c in enumerate(result.closures, start=1)]
         (draft / "closures.json").write_text(json.dumps(clean(closures), indent=1) + "\n", encoding="utf-8")
@@ -144,25 +127,24 @@ def _write_covariances(path: Path, result: SlamResult) -> None:
     )
 
 
-def _write_keyframes(path: Path, result: SlamResult) -> None:
+def _keyframes(result: SlamResult) -> Keyframes:
     """Keyframes of the graph: points, submaps, and what a later recording needs to extend the map."""
     scans = result.keyframe_scans()
     since = len(result.known.graph) - result.keyframes.size
     before = result.known.graph.poses.copy()
     before[since:] = result.before[result.keyframes]
-    np.savez_compressed(
-        path,
+    return Keyframes(
         scans=np.concatenate([np.full(since, -1), result.keyframes]),
+        t_s=scans.t_s,
         before=before,
         points_xy_m=result.clouds.points[:, :2].astype(np.float32),
         starts=result.clouds.starts,
-        extents=np.array([(e.first, e.last, e.reference) for e in result.extents]).reshape(-1, 3),
-        breaks=result.breaks(),
-        t_s=scans.t_s,
         ranges_m=scans.ranges_m.astype(np.float32),
         beams=scans.beams,
         first_angle_rad=scans.first_angle_rad,
         angle_step_rad=scans.angle_step_rad,
+        extents=np.array([(e.first, e.last, e.reference) for e in result.extents], np.int64).reshape(-1, 3),
+        breaks=result.breaks(),
     )
 
 

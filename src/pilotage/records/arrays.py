@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pilotage.core.errors import InputError
-from pilotage.core.files.arrays import read_npz
+from pilotage.core.files.arrays import read_npz, require_numbers
 from pilotage.core.limits import MB, limit
 from pilotage.core.types import FloatArray, IntArray
-from pilotage.records.numbers import LARGEST
+from pilotage.records.numbers import FARTHEST_M, LARGEST
 from pilotage.records.reading import is_there
 
 ARCHIVE_BYTES = 128 * MB
@@ -49,6 +49,11 @@ class Arrays:
         if bool((np.abs(out[np.isfinite(out)]) > LARGEST).any()):
             raise ValueError(f"{name}: expected numbers within {LARGEST:g}")
         return out
+
+    def finite(self, name: str, *shape: int, most: float = FARTHEST_M) -> FloatArray:
+        """Float64 of a shape, all within ``most``."""
+        out = self._of(name, "fiub", shape).astype(np.float64)
+        return np.asarray(require_numbers(out, most, name))
 
     def any_floats(self, name: str) -> FloatArray:
         """Float64 of whatever shape it has."""

@@ -75,7 +75,7 @@ def before_after_figure(data: SlamFolder) -> Illustration:
     """Draw the keyframes' points at the poses of the front end alone, and at the last ones."""
     figure = Figure(figsize=(WIDTH_PT / 72.0, 0.5 * WIDTH_PT / 72.0))
     both = (
-        ("before: matching alone", data.before, data.keyframe_before),
+        ("before: matching alone", data.before, data.keyframes.before),
         ("after", data.poses, data.keyframe_poses),
     )
     for index, (title, poses, keyframe_poses) in enumerate(both):
@@ -102,8 +102,8 @@ def growth_figure(data: SlamFolder) -> Illustration:
     low, high = everything.min(axis=0), everything.max(axis=0)
     for stage in range(1, STAGES + 1):
         axes = figure.add_axes((0.01 + 0.247 * (stage - 1), 0.02, 0.235, 0.84))
-        until = data.since + max(1, (len(data.keyframes) - data.since) * stage // STAGES)
-        scan = int(data.keyframes[until - 1])
+        until = data.keyframes.since + max(1, (len(data.keyframes) - data.keyframes.since) * stage // STAGES)
+        scan = int(data.keyframes.scans[until - 1])
         axes.set_title(f"after {data.t_s[scan] - data.t_s[0]:.0f} s")
         _dots(axes, _cloud(data, data.keyframe_poses, until))
         axes.plot(data.poses[:scan, 0], data.poses[:scan, 1], color=BLUE, linewidth=0.6)
@@ -113,7 +113,7 @@ def growth_figure(data: SlamFolder) -> Illustration:
         axes.set_aspect("equal", adjustable="box", anchor="C")
         axes.set_axis_off()
     alt = "The map after each quarter of the recording"
-    known = " The walls of the earlier map are there from the start." if data.since else ""
+    known = " The walls of the earlier map are there from the start." if data.keyframes.since else ""
     caption = f"The map as it grew, with the path so far and where the robot was.{known}"
     return Illustration("growth", "How the map grew", alt, caption, render(figure, "growth", alt))
 
@@ -181,12 +181,14 @@ def _closure_lines(data: SlamFolder, accepted: bool) -> list[FloatArray]:
 
 def _cloud(data: SlamFolder, poses: FloatArray, until: int) -> FloatArray:
     """Points (K, 2) of the first keyframes at given poses of theirs, thinned evenly."""
-    chosen = np.arange(0, int(data.starts[until]), max(1, int(data.starts[until]) // MOST_POINTS))
+    chosen = np.arange(
+        0, int(data.keyframes.starts[until]), max(1, int(data.keyframes.starts[until]) // MOST_POINTS)
+    )
     if not chosen.size:
         return np.zeros((1, 2))
-    pose = poses[np.searchsorted(data.starts, chosen, side="right") - 1]
+    pose = poses[np.searchsorted(data.keyframes.starts, chosen, side="right") - 1]
     c, s = np.cos(pose[:, 2]), np.sin(pose[:, 2])
-    x, y = data.points_xy_m[chosen].astype(np.float64).T
+    x, y = data.keyframes.points_xy_m[chosen].astype(np.float64).T
     return np.column_stack([pose[:, 0] + c * x - s * y, pose[:, 1] + s * x + c * y])
 
 

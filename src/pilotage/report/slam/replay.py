@@ -38,9 +38,9 @@ def slam_scene(data: SlamFolder) -> ReplayScene | None:
     t_s = data.t_s - data.t_s[0]
     if t_s.size < 2 or not bool((np.diff(t_s) >= 0.0).all()) or t_s[-1] <= 0.0:
         return None
-    own = data.keyframes >= 0
+    own = data.keyframes.scans >= 0
     frames = np.arange(0, t_s.size, math.ceil(t_s.size / MOST_FRAMES))
-    frames = np.unique(np.concatenate([frames, data.keyframes[own], [t_s.size - 1]]))
+    frames = np.unique(np.concatenate([frames, data.keyframes.scans[own], [t_s.size - 1]]))
     # The player's frames rise; of scans of one stamp the last counts.
     frames = frames[np.append(np.diff(t_s[frames]) > 0.0, True)]
     raster = _growing(data)
@@ -97,13 +97,13 @@ def _first_seen(data: SlamFolder, middles: FloatArray, side_m: float) -> FloatAr
     step = max(1, math.ceil(len(middles) * len(times) / MOST_LOOKS))
     # From the last one on, so that in the end the first one stands.
     for k in range((len(times) - 1) // step * step, -1, -step):
-        beams = int(data.beams[k])
-        ranges = np.nan_to_num(data.ranges_m[k, :beams].astype(np.float64), nan=0.0, posinf=0.0)
+        beams = int(data.keyframes.beams[k])
+        ranges = np.nan_to_num(data.keyframes.ranges_m[k, :beams].astype(np.float64), nan=0.0, posinf=0.0)
         if beams < 2 or not bool((ranges > 0.0).any()):
             continue
         x, y, theta = data.keyframe_poses[k].tolist()
-        first = theta + float(data.first_angle_rad[k])
-        turn, reach = float(data.angle_step_rad[k]), float(ranges.max()) + side_m
+        first = theta + float(data.keyframes.first_angle_rad[k])
+        turn, reach = float(data.keyframes.angle_step_rad[k]), float(ranges.max()) + side_m
         if turn < 0.0:
             first, turn, ranges = first + (beams - 1) * turn, -turn, ranges[::-1].copy()
         mark_seen(seen_s, middles, x, y, first, turn, ranges, reach, side_m, float(times[k]))
@@ -116,7 +116,7 @@ def _first_seen(data: SlamFolder, middles: FloatArray, side_m: float) -> FloatAr
 
 def _times(data: SlamFolder) -> FloatArray:
     """(K,) of the keyframes, from the recording's start on."""
-    return np.where(data.keyframes >= 0, data.t_s[data.keyframes] - data.t_s[0], 0.0)
+    return np.where(data.keyframes.scans >= 0, data.t_s[data.keyframes.scans] - data.t_s[0], 0.0)
 
 
 def _scans(data: SlamFolder, own: BoolArray) -> tuple[ScanTrack, ...]:
@@ -124,13 +124,13 @@ def _scans(data: SlamFolder, own: BoolArray) -> tuple[ScanTrack, ...]:
     chosen = np.flatnonzero(own)
     if not chosen.size:
         return ()
-    beams = data.beams[chosen]
-    angles = np.stack([data.first_angle_rad[chosen], data.angle_step_rad[chosen]])
+    beams = data.keyframes.beams[chosen]
+    angles = np.stack([data.keyframes.first_angle_rad[chosen], data.keyframes.angle_step_rad[chosen]])
     if beams.min() != beams.max() or bool((np.ptp(angles, axis=1) > 1e-6).any()):
         return ()
     count = int(beams[0])
     beam = np.arange(0, count, math.ceil(chosen.size * count / MOST_SCAN_VALUES))
-    ranges = data.ranges_m[np.ix_(chosen, beam)].astype(np.float64)
+    ranges = data.keyframes.ranges_m[np.ix_(chosen, beam)].astype(np.float64)
     ranges[~np.isfinite(ranges) | (ranges <= 0.0)] = np.nan
     directions = angles[0, 0] + beam * angles[1, 0]
     return (ScanTrack("scan", _times(data)[chosen], ranges, directions, np.zeros(3), 0, SKY),)

@@ -84,20 +84,6 @@ class Fit:
     guess_error: float = 0.0
     by_odometry: bool = False
 
-    def by(self, error: float, odometry: bool) -> Fit:
-        """Return the same with the guess that was trusted: its usual error and whether it is the odometry."""
-        return Fit(
-            self.value,
-            self.pose,
-            self.hessian,
-            self.start,
-            self.rms_m,
-            self.off,
-            self.weight,
-            error,
-            odometry,
-        )
-
 
 @dataclass(frozen=True, slots=True)
 class Aside:
@@ -253,7 +239,7 @@ class LocalMatcher:
         self._lost_s = 0.0
         self.rms_m += 0.05 * (best.rms_m - self.rms_m)
         self._usual += 0.02 * (best.value - self._usual)
-        out = best.by(self._guess.least_error, led)
+        out = replace(best, guess_error=self._guess.least_error, by_odometry=led)
         self._guess.learn(step, between(last, best.pose), dt_s)
         return out
 
