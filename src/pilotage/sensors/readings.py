@@ -14,12 +14,14 @@ from pilotage.core.types import FloatArray, IntArray
 class OdometryIncrement:
     """Motion since the last odometry reading: distance along the arc and change of heading.
 
-    A base that drives sideways has a distance to the left besides.
+    A base that drives sideways has a distance to the left besides. Where it is known how uncertain this very
+    turn is, as of one that wheels and gyroscope tell together, that counts instead of the data sheet.
     """
 
     distance_m: float
     angle_rad: float
     lateral_m: float = 0.0
+    angle_var_rad2: float | None = None
 
 
 @dataclass(frozen=True, slots=True)

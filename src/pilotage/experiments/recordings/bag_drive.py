@@ -11,8 +11,11 @@ import numpy as np
 from pilotage.core.angles import wrap_array_to_pi
 from pilotage.core.errors import InputError
 from pilotage.core.types import FloatArray, IntArray, Pose2
+from pilotage.experiments.recordings.bag_gyroscope import SHEET as GYROSCOPE_SHEET
+from pilotage.experiments.recordings.bag_gyroscope import bag_gyroscope
 from pilotage.experiments.recordings.drive import (
     BEACONS,
+    GYROSCOPE,
     HOLD_S,
     LIDAR,
     ODOMETRY,
@@ -106,9 +109,9 @@ def bag_drive(
 ) -> RecordedDrive:
     """Read a recording against a map.
 
-    Odometry is a topic of ``nav_msgs/Odometry``, else the transforms, else velocities that are integrated;
-    the heading is the gyroscope's where one is named. Scans are used where the map has walls, landmarks where
-    it has landmarks.
+    Odometry is a topic of ``nav_msgs/Odometry``, else the transforms, else velocities that are integrated; a
+    gyroscope is taken along where the bag has one. Scans are used where the map has walls, landmarks where it
+    has landmarks.
 
     Parameters
     ----------
@@ -172,6 +175,10 @@ def bag_drive(
                 f"{log}: expected landmarks of the map in {seen.topic}, found only the identities "
                 f"{', '.join(f'{i:g}' for i in np.unique(seen.values[:, 0])[:8])}"
             )
+    wheels = (odometry_t_s, odometry)
+    turning = bag_gyroscope(log, wanted.gyroscope, BASES, clock, wheels, said) if bag else None
+    if turning is not None:
+        sensors[GYROSCOPE] = GYROSCOPE_SHEET
     known = _truth(log, truth, clock, bag)
     gaps = int((np.diff(odometry_t_s) > HOLD_S).sum())
     steps_s = np.maximum(np.diff(clock), 1e-3)
@@ -198,6 +205,7 @@ def bag_drive(
         scan_at=scan_at,
         chart=chart,
         start=start,
+        turning=turning,
         motion=limits(np.hypot(moves[1:, 0], moves[1:, 1]) / steps_s, moves[1:, 2] / steps_s),
         warnings=tuple(said),
     )
@@ -249,7 +257,7 @@ def _odometry(
         raise InputError(f"{log}: expected odometry, found none")
     if len(t_s) < 2:
         raise InputError(f"{log}: expected two or more readings of odometry, found {len(t_s)}")
-    return (t_s, poses) if wanted.gyroscope is None else (t_s, _turned(log, wanted.gyroscope, t_s, poses))
+    return t_s, poses
 
 
 def _integrated(told: Series) -> tuple[FloatArray, FloatArray]:
@@ -262,23 +270,6 @@ def _integrated(told: Series) -> tuple[FloatArray, FloatArray]:
     along = np.column_stack([c * steps[:, 0] - s * steps[:, 1], s * steps[:, 0] + c * steps[:, 1]])
     places = np.concatenate([np.zeros((1, 2)), np.cumsum(along, axis=0)])
     return told.t_s, np.column_stack([places, wrap_array_to_pi(heading)])
-
-
-def _turned(log: Path, topic: str, t_s: FloatArray, poses: FloatArray) -> FloatArray:
-    """The same path with the gyroscope's heading, whose bias is its mean rate where the wheels rest."""
-    rates = read_series(log, RATES, topic)
-    step = np.hypot(*np.diff(poses[:, :2], axis=0).T) + np.abs(wrap_array_to_pi(np.diff(poses[:, 2])))
-    at = np.clip(np.searchsorted(t_s, rates.t_s) - 1, 0, len(step) - 1)
-    resting = step[at] < 1e-6
-    bias = float(rates.values[resting, 2].mean()) if resting.sum() > 1 else 0.0
-    turn = np.concatenate([[0.0], np.cumsum(np.diff(rates.t_s) * (rates.values[:-1, 2] - bias))])
-    heading = poses[0, 2] + np.interp(t_s, rates.t_s, turn)
-    moves = _moves(poses)
-    middle = 0.5 * (heading[:-1] + heading[1:])
-    c, s = np.cos(middle), np.sin(middle)
-    along = np.column_stack([c * moves[1:, 0] - s * moves[1:, 1], s * moves[1:, 0] + c * moves[1:, 1]])
-    places = poses[0, :2] + np.concatenate([np.zeros((1, 2)), np.cumsum(along, axis=0)])
-    return np.column_stack([places, wrap_array_to_pi(heading)])
 
 
 def _filled(log: Path, events: FloatArray) -> FloatArray:

@@ -16,11 +16,18 @@ from pilotage.maps.landmarks import Landmarks
 from pilotage.maps.world_map import WorldMap
 from pilotage.models.motion.differential_drive import DifferentialDriveConfig
 from pilotage.sensors.beacon import BeaconConfig
-from pilotage.sensors.readings import BeaconReadings, LidarScan, OdometryIncrement, Reading, Readings
+from pilotage.sensors.readings import (
+    BeaconReadings,
+    GyroscopeRates,
+    LidarScan,
+    OdometryIncrement,
+    Reading,
+    Readings,
+)
 from pilotage.sensors.sensor import Mount, SensorConfig
 from pilotage.sensors.wheel_odometry import WheelOdometryConfig
 
-ODOMETRY, BEACONS, LIDAR = "odometry", "beacons", "lidar"
+ODOMETRY, BEACONS, LIDAR, GYROSCOPE = "odometry", "beacons", "lidar", "gyroscope"
 SCORE_HZ = 10.0
 HOLD_S = 0.5
 """A command is held no longer than this where the next one is missing."""
@@ -55,6 +62,8 @@ class RecordedDrive:
         (K,) as ``distance_m``, to the left; None where the base cannot.
     scans, scan_at
         (S, B) ranges, and (K,) which of them came at a step (-1: none); None without a laser.
+    turning
+        Topic, and (K,) mean rate of the step by the gyroscope; nan where it is silent; None without one.
     chart
         The robot's map; None: landmarks alone.
     start
@@ -88,6 +97,7 @@ class RecordedDrive:
     sideways_m: FloatArray | None = None
     scans: FloatArray | None = None
     scan_at: IntArray | None = None
+    turning: tuple[str, FloatArray] | None = None
     chart: WorldMap | None = None
     start: Pose2 | None = None
     warnings: tuple[str, ...] = ()
@@ -103,6 +113,8 @@ class RecordedDrive:
             said[BEACONS] = BeaconReadings(self.ids[rows], self.ranges_m[rows], self.bearings_rad[rows])
         if self.scans is not None and self.scan_at is not None and self.scan_at[k] >= 0:
             said[LIDAR] = LidarScan(self.scans[self.scan_at[k]])
+        if self.turning is not None and np.isfinite(self.turning[1][k]):
+            said[GYROSCOPE] = GyroscopeRates(self.turning[1][k : k + 1])
         return Readings(float(self.t_s[k]), said)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import math
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -206,6 +206,7 @@ def localize_log(
         "localizer": localizer,
         "learned_from": learned_from,
         "overrides": list(overrides),
+        **_gyroscope(drive, followed.trace),
         "duration_s": float(drive.t_s[-1]),
         "steps": steps,
         "wall_time_s": loop_s,
@@ -219,6 +220,14 @@ def localize_log(
         "stale_odometry_rows": len(drive.stale),
     }
     return _write(out, drive, metrics, followed, {"name": localizer, **config.model_dump(mode="json")})
+
+
+def _gyroscope(drive: RecordedDrive, trace: Mapping[str, FloatArray]) -> dict[str, object]:
+    """Which gyroscope the localizer made use of, and its bias at the end."""
+    bias = trace.get("gyro_bias_rad_s")
+    if drive.turning is None or bias is None or not len(bias):
+        return {}
+    return {"gyroscope": drive.turning[0], "gyro_bias_rad_s": float(bias[-1])}
 
 
 def _verdict(scores: dict[str, object], localized: BoolArray) -> dict[str, object]:
@@ -427,6 +436,8 @@ def _write(
     write_planar_tum(final / TRAJECTORY, drive.begin_s + trace["t_s"][known], poses[known])
     metrics = {**metrics, "run_dir": str(final)}
     left_out = [*drive.warnings]
+    if drive.turning is not None and "gyroscope" not in metrics:
+        left_out.append(f"'{metrics['localizer']}' makes no use of the gyroscope {drive.turning[0]}")
     left_out += [f"{place}: left out, its time lies after the next row's" for place in drive.stale]
     left_out += [f"{place}: left out, nobody wears this barcode" for place in drive.misread]
     return LocalizedLog(metrics, final, left_out)

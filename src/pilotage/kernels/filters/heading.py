@@ -72,6 +72,30 @@ def turn_by_encoders_and_gyro(
 
 
 @kernel
+def correct_by_gyro(
+    state: FloatArray, P: FloatArray, innovation: float, dt: float, encoder_cov: float, var: float
+) -> float:
+    """Correct ``state`` (2,) and P (2, 2) in place by what a gyroscope said over a time ``dt``, which the
+    encoders have predicted already; returns the correction of the heading.
+
+    The innovation, of variance ``var``, is v = b dt + e - w with w the encoders' errors over that time, whose
+    covariance with the heading's error is ``encoder_cov``: all their variance, but for what the heading was
+    corrected by meanwhile. K = -cov((heading, bias), v) / var(v), the Kalman gain.
+    """
+    if not var > 0.0:
+        return 0.0
+    heading_cov, bias_cov = encoder_cov + P[0, 1] * dt, P[1, 1] * dt
+    correction = heading_cov / var * innovation
+    state[0] = wrap(state[0] + correction)
+    state[1] += bias_cov / var * innovation
+    P[0, 0] -= heading_cov * heading_cov / var
+    P[0, 1] -= heading_cov * bias_cov / var
+    P[1, 0] = P[0, 1]
+    P[1, 1] -= bias_cov * bias_cov / var
+    return float(correction)
+
+
+@kernel
 def correct_by_heading(
     state: FloatArray,
     P: FloatArray,

@@ -18,9 +18,10 @@ from pilotage.sensors.wheel_odometry import WheelOdometryConfig
 from pilotage.stack.interface import Belief
 from pilotage.stack.journal import Journal
 from pilotage.stack.knowledge import RobotKnowledge
+from pilotage.stack.localization.gyro_odometry import GyroOdometry
 from pilotage.stack.localization.localizer import LOCALIZERS, require_initial_pose
-from pilotage.stack.localization.odometry_prediction import OdometryNoise, OdometryPrediction
-from pilotage.stack.localization.odometry_watch import OdometryWatch, increment_of
+from pilotage.stack.localization.odometry_prediction import OdometryBelief, OdometryPrediction
+from pilotage.stack.localization.odometry_watch import OdometryWatch
 from pilotage.stack.localization.region_columns import REGION_COLUMNS
 
 
@@ -32,7 +33,7 @@ class DeadReckoningConfig(Config):
     """
 
     odometry_model: OdometryModel = OdometryModel.EXACT_ARC
-    odometry: OdometryNoise = OdometryNoise()
+    odometry: OdometryBelief = OdometryBelief()
     odometry_var_scale: Positive = 1.0
     covariance: Literal["first-order", "second-order"] = "first-order"
 
@@ -89,6 +90,7 @@ class DeadReckoningLocalizer:
         self._prediction = OdometryPrediction(
             sensor, config.odometry, config.odometry_var_scale, config.odometry_model
         )
+        self._motion = GyroOdometry(robot, self._odometry, self._prediction, journal)
         self._watch = OdometryWatch(robot, sensor)
         self.belief = initial
         self._pose = initial.pose.as_array()
@@ -100,7 +102,7 @@ class DeadReckoningLocalizer:
 
     def step(self, readings: Readings) -> Belief:
         """Move by the odometry increment, if there is one."""
-        odometry = increment_of(readings.by_sensor.get(self._odometry))
+        odometry = self._motion.increment(readings, self.belief)
         if odometry is not None:
             if self._second:
                 self._move_by_moments(odometry)

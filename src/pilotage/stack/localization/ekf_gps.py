@@ -21,9 +21,10 @@ from pilotage.sensors.wheel_odometry import WheelOdometryConfig
 from pilotage.stack.interface import Belief, BeliefStatus
 from pilotage.stack.journal import Journal
 from pilotage.stack.knowledge import RobotKnowledge
+from pilotage.stack.localization.gyro_odometry import GyroOdometry
 from pilotage.stack.localization.localizer import LOCALIZERS, require_initial_pose
-from pilotage.stack.localization.odometry_prediction import OdometryNoise, OdometryPrediction
-from pilotage.stack.localization.odometry_watch import LINEAR_RAD, OdometryWatch, increment_of
+from pilotage.stack.localization.odometry_prediction import OdometryBelief, OdometryPrediction
+from pilotage.stack.localization.odometry_watch import LINEAR_RAD, OdometryWatch
 from pilotage.stack.localization.self_check import SelfCheck
 
 NAME = "ekf-gps"
@@ -61,7 +62,7 @@ class EkfGpsConfig(Config):
     heading_std_rad: Positive | None = None
     declination_std_rad: NonNegative = 0.05
     odometry_model: OdometryModel = OdometryModel.EXACT_ARC
-    odometry: OdometryNoise = OdometryNoise()
+    odometry: OdometryBelief = OdometryBelief()
     odometry_var_scale: Positive = 1.0
     doubt_after: int | None = Field(default=10, ge=1)
     """Fixes in a row that the gate refused, until the filter doubts itself and widens its place; None:
@@ -95,6 +96,7 @@ class EkfGpsLocalizer:
         self._prediction = OdometryPrediction(
             odometry, config.odometry, config.odometry_var_scale, config.odometry_model, satellite.predict
         )
+        self._motion = GyroOdometry(robot, self._odometry, self._prediction, journal)
         self._fix_var = _var(config.position_std_m, gps.position_std_m)
         self._heading_var = heading_var
         offset_var = (gps.bias_std_m if config.bias_std_m is None else config.bias_std_m) ** 2
@@ -131,7 +133,7 @@ class EkfGpsLocalizer:
 
     def step(self, readings: Readings) -> Belief:
         """Predict by the odometry increment, let the lasting errors age, then update by what was read."""
-        odometry = increment_of(readings.by_sensor.get(self._odometry))
+        odometry = self._motion.increment(readings, self.belief)
         if odometry is not None:
             self._prediction.move(self._state, self._cov, odometry)
         self._watch.widen(self._cov, readings.t_s, odometry)

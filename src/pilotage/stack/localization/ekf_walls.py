@@ -20,9 +20,10 @@ from pilotage.sensors.wheel_odometry import WheelOdometryConfig
 from pilotage.stack.interface import Belief, BeliefStatus
 from pilotage.stack.journal import Journal
 from pilotage.stack.knowledge import RobotKnowledge
+from pilotage.stack.localization.gyro_odometry import GyroOdometry
 from pilotage.stack.localization.localizer import LOCALIZERS, require_initial_pose
-from pilotage.stack.localization.odometry_prediction import OdometryNoise, OdometryPrediction
-from pilotage.stack.localization.odometry_watch import LINEAR_RAD, OdometryWatch, increment_of
+from pilotage.stack.localization.odometry_prediction import OdometryBelief, OdometryPrediction
+from pilotage.stack.localization.odometry_watch import LINEAR_RAD, OdometryWatch
 from pilotage.stack.localization.recovery import Recovery, RecoveryConfig
 from pilotage.stack.localization.self_check import SelfCheck
 from pilotage.stack.localization.wall_correction import correct
@@ -59,7 +60,7 @@ class EkfWallsConfig(Config):
     range_var_m2: Positive | None = None
     measurement_var_scale: Positive = 1.0
     odometry_model: OdometryModel = OdometryModel.EXACT_ARC
-    odometry: OdometryNoise = OdometryNoise()
+    odometry: OdometryBelief = OdometryBelief()
     odometry_var_scale: Positive = 1.0
     lines: LineExtractionConfig = LineExtractionConfig()
     matching: WallMatchingConfig = WallMatchingConfig()
@@ -100,6 +101,7 @@ class EkfWallsLocalizer:
         self._prediction = OdometryPrediction(
             odometry, config.odometry, config.odometry_var_scale, config.odometry_model
         )
+        self._motion = GyroOdometry(robot, self._odometry, self._prediction, journal)
         self._extractor = LineExtractor(config.lines, lidar, range_var, robot.streams.stream("ekf-walls"))
         # Only the covariances are scaled: which points make a line is no matter of belief.
         self._var_scale = config.measurement_var_scale
@@ -137,7 +139,7 @@ class EkfWallsLocalizer:
     def step(self, readings: Readings) -> Belief:
         """Predict by the odometry increment, then update by the lines of the scan."""
         self._t_s = readings.t_s
-        odometry = increment_of(readings.by_sensor.get(self._odometry))
+        odometry = self._motion.increment(readings, self.belief)
         if odometry is not None:
             self._move(odometry)
         self._watch.widen(self._cov, readings.t_s, odometry)

@@ -22,14 +22,14 @@ from pilotage.stack.interface import Belief, BeliefStatus
 from pilotage.stack.journal import Journal
 from pilotage.stack.knowledge import RobotKnowledge
 from pilotage.stack.localization.beacon_fix import fix_from_beacons
+from pilotage.stack.localization.gyro_odometry import GyroOdometry
 from pilotage.stack.localization.landmark_filter import SIGHTING_COLUMNS
 from pilotage.stack.localization.localizer import LOCALIZERS, require_initial_pose
-from pilotage.stack.localization.odometry_prediction import OdometryNoise, OdometryPrediction
+from pilotage.stack.localization.odometry_prediction import OdometryBelief, OdometryPrediction
 from pilotage.stack.localization.odometry_watch import (
     LINEAR_RAD,
     OdometryWatch,
     add_variances,
-    increment_of,
 )
 from pilotage.stack.localization.self_check import NOISE_SHARE, SelfCheck
 
@@ -41,7 +41,7 @@ class InvariantEkfConfig(Config):
     """The share of true sightings that the gate lets through; noise left out is the data sheet's."""
 
     gate: float = Field(default=0.9999, gt=0.0, lt=1.0)
-    odometry: OdometryNoise = OdometryNoise()
+    odometry: OdometryBelief = OdometryBelief()
     measurement_var_scale: Positive = 1.0
     odometry_var_scale: Positive = 1.0
     """Factors on the variances, for experiments with a filter that is wrong about its noise."""
@@ -77,6 +77,7 @@ class InvariantEkfLocalizer:
         self._prediction = OdometryPrediction(
             odometry, config.odometry, config.odometry_var_scale, OdometryModel.EXACT_ARC
         )
+        self._motion = GyroOdometry(robot, self._odometry, self._prediction, journal)
         order = np.argsort(chart.landmarks.ids)
         self._ids = np.ascontiguousarray(chart.landmarks.ids[order])
         self._points = np.ascontiguousarray(chart.landmarks.points_xy_m[order])
@@ -98,7 +99,7 @@ class InvariantEkfLocalizer:
 
     def step(self, readings: Readings) -> Belief:
         """Predict by the odometry increment, then update by every landmark seen."""
-        odometry = increment_of(readings.by_sensor.get(self._odometry))
+        odometry = self._motion.increment(readings, self.belief)
         if odometry is not None:
             chord_m, aside_rad = chord(odometry.distance_m, odometry.angle_rad)
             variances = self._prediction.variances(odometry)

@@ -24,13 +24,13 @@ from pilotage.stack.interface import Belief, BeliefStatus
 from pilotage.stack.journal import Journal
 from pilotage.stack.knowledge import RobotKnowledge
 from pilotage.stack.localization.beacon_fix import fix_from_beacons
+from pilotage.stack.localization.gyro_odometry import GyroOdometry
 from pilotage.stack.localization.localizer import require_initial_pose
-from pilotage.stack.localization.odometry_prediction import OdometryNoise, OdometryPrediction, Predict
+from pilotage.stack.localization.odometry_prediction import OdometryBelief, OdometryPrediction, Predict
 from pilotage.stack.localization.odometry_watch import (
     LINEAR_RAD,
     MOST_HEADING_VAR,
     OdometryWatch,
-    increment_of,
 )
 from pilotage.stack.localization.self_check import NOISE_SHARE, SelfCheck
 
@@ -62,7 +62,7 @@ class LandmarkFilterConfig(Config):
     bearing_var_rad2: Positive | None = None
     measurement_var_scale: Positive = 1.0
     odometry_model: OdometryModel = OdometryModel.EXACT_ARC
-    odometry: OdometryNoise = OdometryNoise()
+    odometry: OdometryBelief = OdometryBelief()
     odometry_var_scale: Positive = 1.0
     doubt_after: int | None = Field(default=5, ge=1)
     """Sightings one after the other of which the gate let nothing through, until the filter doubts itself
@@ -102,6 +102,7 @@ class LandmarkFilter:
         self._prediction = OdometryPrediction(
             odometry, config.odometry, config.odometry_var_scale, config.odometry_model, predict
         )
+        self._motion = GyroOdometry(robot, self._odometry, self._prediction, journal)
         order = np.argsort(chart.landmarks.ids)
         self._ids = chart.landmarks.ids[order]
         self._points = chart.landmarks.points_xy_m[order]
@@ -135,7 +136,7 @@ class LandmarkFilter:
     def step(self, readings: Readings) -> Belief:
         """Predict by the odometry increment, then update by every beacon seen."""
         self._t_s = readings.t_s
-        odometry = increment_of(readings.by_sensor.get(self._odometry))
+        odometry = self._motion.increment(readings, self.belief)
         if odometry is not None:
             self._prediction.move(self._pose, self._cov, odometry)
         self._watch.widen(self._cov, readings.t_s, odometry)

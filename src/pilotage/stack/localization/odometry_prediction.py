@@ -24,6 +24,13 @@ class OdometryNoise(Config):
     angle_var_rad2_per_m: NonNegative | None = None
 
 
+class OdometryBelief(OdometryNoise):
+    """Of a filter that takes turns from wheels and gyroscope together, where the robot carries one."""
+
+    gyroscope: bool = True
+    """Whether it does (``gyro_odometry``)."""
+
+
 Predict = Callable[[FloatArray, FloatArray, float, float, FloatArray, bool], None]
 """A kernel that moves pose (3,) and covariance (3, 3) in place by distance, angle and their Q."""
 
@@ -57,12 +64,15 @@ class OdometryPrediction:
             pick(believed.angle_var_rad2_per_m, sensor.angle_var_rad2_per_m),
         )
         self._predict = predict
+        self.with_gyroscope = isinstance(believed, OdometryBelief) and believed.gyroscope
         self.exact = model is OdometryModel.EXACT_ARC
         self._Q = np.zeros((2, 2))
 
     def variances(self, odometry: OdometryIncrement) -> tuple[float, float]:
         """Variances of an increment's distance and angle."""
-        return increment_variances(odometry.distance_m, odometry.angle_rad, *self._densities)
+        found = increment_variances(odometry.distance_m, odometry.angle_rad, *self._densities)
+        own = odometry.angle_var_rad2
+        return found if own is None else (found[0], own)
 
     def move(self, pose: FloatArray, cov: FloatArray, odometry: OdometryIncrement) -> None:
         """Move ``pose`` (3,) and ``cov`` (3, 3) in place."""

@@ -24,14 +24,14 @@ from pilotage.sensors.wheel_odometry import WheelOdometryConfig
 from pilotage.stack.interface import Belief, BeliefStatus
 from pilotage.stack.journal import Journal
 from pilotage.stack.knowledge import RobotKnowledge
+from pilotage.stack.localization.gyro_odometry import GyroOdometry
 from pilotage.stack.localization.likelihood_field import LikelihoodField
 from pilotage.stack.localization.localizer import LOCALIZERS, require_initial_pose
-from pilotage.stack.localization.odometry_prediction import OdometryNoise, OdometryPrediction
+from pilotage.stack.localization.odometry_prediction import OdometryBelief, OdometryPrediction
 from pilotage.stack.localization.odometry_watch import (
     LINEAR_RAD,
     MOST_HEADING_VAR,
     OdometryWatch,
-    increment_of,
 )
 from pilotage.stack.localization.relocalization import STDS, Relocalization
 from pilotage.stack.localization.self_check import LEAST_SEEN, ExplainedShare, SelfCheck
@@ -87,7 +87,7 @@ class MclConfig(Config):
     """Whether it searches the whole map while it is lost."""
     measurement_var_scale: Positive = 1.0
     odometry_model: OdometryModel = OdometryModel.EXACT_ARC
-    odometry: OdometryNoise = OdometryNoise()
+    odometry: OdometryBelief = OdometryBelief()
     odometry_var_scale: Positive = 1.0
 
     @model_validator(mode="before")
@@ -135,6 +135,7 @@ class ParticleFilterLocalizer:
         self._prediction = OdometryPrediction(
             odometry, config.odometry, config.odometry_var_scale, config.odometry_model
         )
+        self._motion = GyroOdometry(robot, self._odometry, self._prediction, journal)
         self._watch, self._check = OdometryWatch(robot, odometry), SelfCheck(refused_share=MOST_BESIDE)
         self._blind = bool(initial.cov[2, 2] > LINEAR_RAD**2)
         self._unexplained, self._found = 0, True
@@ -172,7 +173,7 @@ class ParticleFilterLocalizer:
 
     def step(self, readings: Readings) -> Belief:
         """Move the cloud by the odometry increment, then weigh it by the scan."""
-        odometry, t_s = increment_of(readings.by_sensor.get(self._odometry)), readings.t_s
+        odometry, t_s = self._motion.increment(readings, self.belief), readings.t_s
         if odometry is not None:
             self._move(odometry)
         self._spread(*self._watch.variances(t_s, odometry))
