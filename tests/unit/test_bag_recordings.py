@@ -382,6 +382,67 @@ def test_sensors_at_rest(tmp_path: Path) -> None:
     assert "laser_beam_0_var_m2" not in beams, "it hits nothing now and then"
 
 
+def test_fiducials_at_rest_tell_range_and_bearing_noise(tmp_path: Path) -> None:
+    """Beside each other, one straight behind: its bearing does not jump by a turn."""
+    rng = np.random.default_rng(0)
+    msgtype, types = DETECTIONS["aruco"]
+    out = []
+    for k in range(300):
+        t_s = 10.0 + 0.1 * k
+        seen = {3: (2.0, 0.0), 4: (-1.0, 0.001)}
+        where = {i: (x + rng.normal(0.0, 0.02), y + rng.normal(0.0, 0.02)) for i, (x, y) in seen.items()}
+        message = detected("aruco", ros.header(t_s, "camera"), where)
+        out.append(Stamped("/tags", ros.nanoseconds(t_s), msgtype, message))
+    write_ros1(tmp_path / "tags.bag", RunMessages(out, types))
+    found = pl.calibrate("range", tmp_path / "tags.bag", out=tmp_path)
+    assert found["tags_landmark_3_range_var_m2"]["value"] == pytest.approx(4e-4, rel=0.3)
+    assert found["tags_landmark_3_bearing_var_rad2"]["value"] == pytest.approx(1e-4, rel=0.3)
+    assert found["tags_landmark_4_bearing_var_rad2"]["value"] == pytest.approx(4e-4, rel=0.3)
+    again = pl.calibrate("range", tmp_path / "tags.bag", topics=["/tags"], out=tmp_path / "named")
+    assert again["tags_landmark_3_range_var_m2"] == found["tags_landmark_3_range_var_m2"]
+
+
+def test_a_gyroscope_is_calibrated_against_the_truth_of_its_bag(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """While driving, too; without a truth a drive is no log at rest, however evenly it turned."""
+    drive = noisy(np.random.default_rng(0))
+    write_mcap(tmp_path / "a.mcap", drive)
+    found = pl.calibrate("heading", tmp_path / "a.mcap", out=tmp_path)
+    (entry,) = found["gyroscope_while_driving"]
+    assert entry["bias_with_scale_rad_s"]["low"] < 0.015 < entry["bias_with_scale_rad_s"]["high"]
+    assert entry["scale"]["low"] < 1.0 < entry["scale"]["high"]
+    even = [s for s in circle(parts="odometry imu").stamped if s.topic != "/ground_truth"]
+    write_mcap(tmp_path / "b.mcap", RunMessages(even, {}))
+    assert dispatch(["calibrate", "heading", str(tmp_path / "b.mcap"), "--out", str(tmp_path)]) == 0
+    told = capsys.readouterr().out
+    assert "b_turn_rad" in told
+    assert "(--truth TOPIC) would tell" in told
+    assert "gyro_bias_rad_s" not in told
+
+
+def test_odometry_that_was_recorded_as_transforms(table: Path, tmp_path: Path) -> None:
+    """Of the usual frames: for a calibration, and beside landmarks without any scan."""
+    drive = noisy(np.random.default_rng(5))
+    moved = []
+    for one in drive.stamped:
+        if one.topic == "/odom":
+            pose = one.fields["pose"]["pose"]
+            turn = 2.0 * math.atan2(pose["orientation"]["z"], pose["orientation"]["w"])
+            at = Pose2(pose["position"]["x"], pose["position"]["y"], turn)
+            tree = {"transforms": [ros.transform(one.time_ns * 1e-9, "odom", "base_link", at)]}
+            moved.append(Stamped("/tf", one.time_ns, ros.TRANSFORMS, tree))
+        else:
+            moved.append(one)
+    write_mcap(tmp_path / "tf.mcap", RunMessages(moved, drive.own_types))
+    write_mcap(tmp_path / "plain.mcap", drive)
+    places = [tmp_path / "tf.mcap", tmp_path / "plain.mcap"]
+    scales = [pl.calibrate("odometry", place, out=tmp_path)["angle_scale"]["value"] for place in places]
+    assert scales[0] == pytest.approx(scales[1], rel=1e-6)
+    runs = [pl.localize(place, landmarks=table, out=tmp_path) for place in places]
+    assert runs[0].metrics["position_rmse_m"] == pytest.approx(runs[1].metrics["position_rmse_m"], rel=1e-3)
+
+
 def test_bags_are_judged_by_their_topics(museum: tuple[pl.Run, dict[str, Path]]) -> None:
     run, bags = museum
     found = pl.evaluate(bags["ros1"], bags["mcap"], topics=["/pose", "/truth"])
@@ -417,6 +478,9 @@ def test_bags_are_judged_by_their_topics(museum: tuple[pl.Run, dict[str, Path]])
         ("calibrate odometry {bag} --truth /scan", "expected the topic /scan of"),
         ("calibrate heading {bag}", "expected a topic of sensor_msgs/msg/Imu, found /cmd_vel"),
         ("calibrate range {bag}", "expected a robot that stands still"),
+        ("calibrate range {still} --truth /truth", "--truth is for"),
+        ("calibrate odometry {bag} --topic /truth --truth /truth", "expected --truth TOPIC beside"),
+        ("calibrate heading {still} --truth /truth", "expected a topic of sensor_msgs/msg/Imu, found /scan"),
         ("calibrate odometry {csv} --topic /odom", "expected a bag where topics are named"),
         ("evaluate {bag} {bag}", "expected two topics of the one bag"),
         ("evaluate {bag} {bag} --topic /scan --topic /truth", "expected the topic /scan of"),

@@ -96,7 +96,9 @@ class GyroscopeCalibration:
 
 
 def is_moving(log: HeadingLog) -> bool:
-    """Whether the one-second means of the angular rate differ by more than 0.1 rad/s on any axis."""
+    """Whether it is known to have turned, or means over a second differ by over 0.1 rad/s on any axis."""
+    if log.turns:
+        return True
     seconds = np.floor(log.t_s - log.t_s[0]).astype(np.int64)
     counts = np.bincount(seconds)
     full = counts > 0.2 * np.median(counts)

@@ -132,7 +132,10 @@ def calibrate_odometry(logs: Sequence[OdometrySteps]) -> OdometryCalibration:
     used = [log for log in errors if log.used]
     distance, angle = _distance_model(used), _angle_model(used)
     if distance is None and angle is None:
-        raise InputError("calibrate odometry: expected logs of a robot that moves, found it standing still")
+        moved = any(bool(_moves(log).any()) for log in logs)
+        problem = "a robot that moves, found it standing still"
+        exact = "odometry whose errors vary, found all alike: is the truth the odometry itself?"
+        raise InputError(f"calibrate odometry: expected logs of {exact if moved else problem}")
     warnings += _noise_warnings(errors)
     if not any(log.distance_m.std() > NO_NOISE and log.angle_rad.std() > NO_NOISE for log in used):
         warnings.append("no log shows distance and angle errors at once: their covariance is zero in each")

@@ -61,7 +61,8 @@ def calibrate(
     truth: Annotated[
         str | None,
         typer.Option(
-            metavar="TOPIC", help="odometry, commands, of bags: the true poses; /tf:PARENT:CHILD too."
+            metavar="TOPIC",
+            help="odometry, heading, commands, of bags: the true poses; /tf:PARENT:CHILD too.",
         ),
     ] = None,
     report: Annotated[bool, typer.Option(help="Write report.html into the calibration's folder.")] = True,
@@ -80,8 +81,8 @@ def calibrate(
         )
     if what != "odometry" and (sensor is not None or wheel_base is not None):
         raise InputError("calibrate: --sensor and --wheel-base are for 'calibrate odometry'")
-    if truth is not None and what not in ("odometry", "commands"):
-        raise InputError("calibrate: --truth is for 'calibrate odometry' and 'calibrate commands'")
+    if truth is not None and what == "range":
+        raise InputError("calibrate: --truth is for 'calibrate odometry', 'heading' and 'commands'")
     if topics and not logs:
         raise InputError("calibrate: --topic is for bags")
     if axis is not None and what != "heading":
@@ -110,7 +111,7 @@ def calibrate(
                 places, out, overrides=overrides or (), seed=seed or 0, topics=topics or ()
             )
         elif what == "heading":
-            result = lab.heading_from(places, out, axis=axis or "z", topics=topics or ())
+            result = lab.heading_from(places, out, axis=axis or "z", topics=topics or (), truth=truth)
         else:
             from pilotage.experiments.calibrate_commands import commands_from
 
@@ -164,5 +165,16 @@ def _print(answer: Mapping[str, Any]) -> None:
             (f"magnetometer_offset_{axis}_gauss", f"{e['value']:.5g}", f"{e['low']:.5g} to {e['high']:.5g}")
             for axis, e in entry["offset_gauss"].items()
         ]
+    for entry in answer.get("gyroscope_while_driving", ()):
+        rows += [
+            (f"{entry['log']}_{key}", f"{e['value']:.5g}", f"{e['low']:.5g} to {e['high']:.5g}")
+            for key in ("bias_rad_s", "bias_with_scale_rad_s", "scale")
+            if (e := entry[key]) is not None
+        ]
+    rows += [
+        (f"{entry['log']}_turn_rad", f"{entry['turn_rad']:.5g}", "about the axis, by the gyroscope alone")
+        for entry in answer.get("gyroscope", ())
+        if entry["moving"]
+    ]
     rows += [("warning", "", text) for text in answer.get("warnings", ())]
     print_columns(rows)

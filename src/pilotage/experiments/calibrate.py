@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from pilotage.calibration.heading import calibrate_heading
+from pilotage.calibration.heading import AXES, calibrate_heading
 from pilotage.calibration.odometry import LogErrors, OdometryCalibration, calibrate_odometry
 from pilotage.calibration.odometry_summary import odometry_summary
 from pilotage.calibration.parameter_file import parameter_yaml
@@ -16,9 +16,14 @@ from pilotage.calibration.steady import SteadyReadings, calibrate_steady
 from pilotage.core.errors import InputError
 from pilotage.core.types import FloatArray
 from pilotage.experiments.calibration_runs import drive_odometry_runs, listen_in_the_room
-from pilotage.logs.bag_calibration import headings_of_bag, odometry_of_bag, steady_of_bag
+from pilotage.logs.bag_calibration import (
+    headings_of_bag,
+    odometry_of_bag,
+    reckonings_of_bag,
+    steady_of_bag,
+)
 from pilotage.logs.bag_messages import is_bag
-from pilotage.logs.heading_csv import DRIVE_SUFFIX, find_heading_logs, read_heading_log
+from pilotage.logs.heading_csv import DRIVE_SUFFIX, HeadingSensor, find_heading_logs, read_heading_log
 from pilotage.logs.odometry_csv import read_odometry_csv
 from pilotage.logs.odometry_steps import OdometrySteps
 from pilotage.logs.reckoning_mat import read_reckoning_mat
@@ -94,21 +99,34 @@ def range_from(
 
 
 def heading_from(
-    places: Sequence[Path], out: Path, *, axis: str = "z", topics: Sequence[str] = ()
+    places: Sequence[Path],
+    out: Path,
+    *,
+    axis: str = "z",
+    topics: Sequence[str] = (),
+    truth: str | None = None,
 ) -> CalibrationResult:
-    """Calibrate gyroscopes and magnetometers from their logs and from bags."""
+    """Calibrate gyroscopes and magnetometers from their logs and from bags, these against their truth too."""
     if not places:
         raise InputError(
             "calibrate heading: expected gyroscope or magnetometer logs; "
             "the simulated robot has no such sensor"
         )
-    bags = [place for place in places if _a_bag(place, topics)]
+    bags = [place for place in places if _a_bag(place, [*topics, *([truth] if truth else [])])]
     paths = [path for place in places if place not in bags for path in find_heading_logs(place)]
     logs = [read_heading_log(path) for path in paths if path.suffix != DRIVE_SUFFIX]
     logs += [log for bag in bags for log in headings_of_bag(bag, topics)]
     drives = [read_reckoning_mat(path) for path in paths if path.suffix == DRIVE_SUFFIX]
+    if axis in AXES:
+        drives += [drive for bag in bags for drive in reckonings_of_bag(bag, topics, truth, AXES.index(axis))]
     found = calibrate_heading(logs, axis, drives)
     answer = {"calibration": "heading", "simulated": False, **found.as_dict()}
+    told = {drive.name for drive in drives}
+    answer["warnings"] = [
+        f"{log.place}: the robot turned; its true heading (--truth TOPIC) would tell bias and scale"
+        for log in logs
+        if log.turns and log.name not in told and log.sensor is HeadingSensor.GYROSCOPE
+    ]
     data: dict[str, FloatArray] = {}
     for i, log in enumerate(logs):
         data |= {f"{i}/{log.sensor}/t_s": log.t_s, f"{i}/{log.sensor}/values": log.values}

@@ -248,7 +248,8 @@ def calibrate(
     robots, leave_one_out
         commands: from these robots of the recordings only; a set without each recording in turn besides.
     topics, truth
-        Of bags: what is calibrated, where the usual one is not meant; odometry: the topic of the truth.
+        Of bags: what is calibrated, where the usual one is not meant; odometry, heading, commands: the topic
+        of the truth.
 
     Raises
     ------
@@ -280,7 +281,7 @@ def calibrate(
     elif what == "range":
         result = lab.range_from(places, target, overrides=set, seed=seed, topics=topics)
     elif what == "heading":
-        result = lab.heading_from(places, target, axis=given.word("axis", axis), topics=topics)
+        result = lab.heading_from(places, target, axis=given.word("axis", axis), topics=topics, truth=truth)
     else:
         from pilotage.experiments.calibrate_commands import commands_from
 

@@ -1,4 +1,4 @@
-"""What a calibration takes from a bag: odometry beside the truth, gyroscopes, magnetometers, ranges."""
+"""What a calibration takes from a bag: odometry and gyroscopes beside the truth, magnetometers, ranges."""
 
 from __future__ import annotations
 
@@ -7,15 +7,20 @@ from pathlib import Path
 
 import numpy as np
 
+from pilotage.core.angles import wrap_array_to_pi
 from pilotage.core.errors import InputError
 from pilotage.logs.bag_series import (
     FIELDS,
+    LANDMARKS,
     RANGES,
     RATES,
     TRUTH,
     TWISTS,
+    Series,
     has,
+    has_odometry,
     headings,
+    read_odometry,
     read_poses,
     read_series,
     topic_of,
@@ -26,7 +31,8 @@ from pilotage.logs.heading_csv import HeadingLog, HeadingSensor
 from pilotage.logs.laser_log import interpolate_poses
 from pilotage.logs.mrclam import MrclamLog
 from pilotage.logs.odometry_steps import OdometryForm, OdometrySteps, carried_over
-from pilotage.logs.steady_csv import LEAST_ROWS, Column
+from pilotage.logs.reckoning_mat import ReckoningLog
+from pilotage.logs.steady_csv import LEAST_ROWS, MOST_COLUMNS, Column
 from pilotage.maps.world_map import NO_LANDMARKS
 
 STEP_S = 0.1
@@ -38,6 +44,8 @@ COMMAND_HELD_S = 0.5
 MOST_BEAMS = 8
 LARGEST_WAY_M = 0.02
 """A robot that stands does not go farther by its odometry."""
+LARGEST_TURN_RAD = 0.05
+"""Nor does it turn by more."""
 
 
 def odometry_of_bag(path: Path, topics: Sequence[str] = (), truth: str | None = None) -> OdometrySteps:
@@ -46,7 +54,7 @@ def odometry_of_bag(path: Path, topics: Sequence[str] = (), truth: str | None = 
     Parameters
     ----------
     topics
-        The odometry (``nav_msgs/Odometry``); by default the usual one.
+        The odometry (``nav_msgs/Odometry``); by default the usual one, without any the transforms.
     truth
         The topic of the true poses, or ``/tf:PARENT:CHILD``; by default one of the usual names.
 
@@ -57,7 +65,7 @@ def odometry_of_bag(path: Path, topics: Sequence[str] = (), truth: str | None = 
     """
     if len(topics) > 1:
         raise InputError(f"{path}: expected one topic of odometry, found {len(topics)}")
-    claimed = read_poses(path, topics[0] if topics else None, ODOMETRY)
+    claimed = read_odometry(path, topics[0] if topics else None)
     true = read_poses(path, truth, TRUTH)
     if true.topic == claimed.topic:
         raise InputError(f"{path}: expected --truth TOPIC beside the odometry {claimed.topic}, found none")
@@ -124,7 +132,7 @@ def commands_of_bag(path: Path, topics: Sequence[str] = (), truth: str | None = 
     if truth is not None or (False not in told and has(path, TRUTH)):
         went = read_poses(path, truth, TRUTH)
     else:
-        went = read_poses(path, told.get(False), ODOMETRY)
+        went = read_odometry(path, told.get(False))
     if min(len(sent.t_s), len(went.t_s)) < LEAST_ROWS:
         raise InputError(
             f"{path}: expected {LEAST_ROWS} or more messages of {sent.topic} and of {went.topic}, found "
@@ -160,6 +168,50 @@ def headings_of_bag(path: Path, topics: Sequence[str] = ()) -> list[HeadingLog]:
     InputError
         Where the bag has none; the message tells what it holds.
     """
+    found = _heading_series(path, topics)
+    driven = headings(read_odometry(path).values)[:, 2] if has_odometry(path) else np.zeros(1)
+    turns = bool(np.ptp(np.unwrap(driven)) > LARGEST_TURN_RAD)
+    return [
+        HeadingLog(path.stem, sensor, s.t_s - s.t_s[0], s.values, f"{path} {s.topic}", turns)
+        for sensor, s in found
+    ]
+
+
+def reckonings_of_bag(
+    path: Path, topics: Sequence[str] = (), truth: str | None = None, axis: int = 2
+) -> list[ReckoningLog]:
+    """The gyroscopes of ``headings_of_bag`` beside the true heading of the same bag; none without a truth.
+
+    Parameters
+    ----------
+    truth
+        As ``odometry_of_bag`` has it.
+    axis
+        Which of the gyroscope's the robot turns about, 0 to 2.
+
+    Raises
+    ------
+    InputError
+        Where a gyroscope or the truth that is asked for is not there.
+    """
+    if truth is None and not has(path, TRUTH):
+        return []
+    true = read_poses(path, truth, TRUTH)
+    out = []
+    for sensor, told in _heading_series(path, topics):
+        if sensor is not HeadingSensor.GYROSCOPE or len(told.t_s) < LEAST_ROWS:
+            continue
+        rates, dt_s = told.values[:, axis], np.diff(told.t_s)
+        heading = np.unwrap(interpolate_poses(true.t_s, headings(true.values), told.t_s)[:, 2])
+        after = np.searchsorted(true.t_s, told.t_s).clip(1, len(true.t_s) - 1)
+        known = true.t_s[after] - true.t_s[after - 1] <= TRUTH_GAP_S
+        known &= (told.t_s >= true.t_s[0]) & (told.t_s <= true.t_s[-1])
+        turn = np.where(known[1:] & known[:-1], np.diff(heading), np.nan)
+        out.append(ReckoningLog(path.stem, told.t_s[1:], dt_s, 0.5 * (rates[1:] + rates[:-1]) * dt_s, turn))
+    return out
+
+
+def _heading_series(path: Path, topics: Sequence[str]) -> list[tuple[HeadingSensor, Series]]:
     kinds = ((RATES, HeadingSensor.GYROSCOPE), (FIELDS, HeadingSensor.MAGNETOMETER))
     chosen: list[tuple[Kind, HeadingSensor, str | None]]
     if topics:
@@ -172,30 +224,30 @@ def headings_of_bag(path: Path, topics: Sequence[str] = ()) -> list[HeadingLog]:
         chosen = [(kind, sensor, None) for kind, sensor in kinds if has(path, kind)]
     if not chosen:
         read_series(path, RATES)  # tells what the bag holds
-    series = [(sensor, read_series(path, kind, name)) for kind, sensor, name in chosen]
-    return [
-        HeadingLog(path.stem, sensor, s.t_s - s.t_s[0], s.values, f"{path} {s.topic}") for sensor, s in series
-    ]
+    return [(sensor, read_series(path, kind, name)) for kind, sensor, name in chosen]
 
 
 def steady_of_bag(path: Path, topics: Sequence[str] = ()) -> list[Column]:
-    """Ranges at rest: a ``sensor_msgs/Range``, or a few beams of a laser that always hit something.
+    """Ranges at rest: of a few beams of a laser that always hit something, else of a ``sensor_msgs/Range``,
+    else of fiducials, with their bearings.
 
     Raises
     ------
     InputError
-        Where the bag has neither, or no beam always hits; the message tells what it holds.
+        Where the bag has none, or no beam always hits; the message tells what it holds.
     """
     if len(topics) > 1:
-        raise InputError(f"{path}: expected one topic of ranges or scans, found {len(topics)}")
+        raise InputError(f"{path}: expected one topic of ranges, scans or landmarks, found {len(topics)}")
     asked = topic_of(path, topics[0]) if topics else None
-    if has(path, ODOMETRY):
-        driven = headings(read_poses(path, None, ODOMETRY).values)[:, :2]
+    if has_odometry(path):
+        driven = headings(read_odometry(path).values)[:, :2]
         way_m = float(np.hypot(*(driven - driven[0]).T).max())
         if way_m > LARGEST_WAY_M:
             raise InputError(f"{path}: expected a robot that stands still, found one that went {way_m:.2f} m")
-    if asked is not None and asked[1] not in (*RANGES.types, *SCANS.types):
-        raise InputError(f"{path}: topic {asked[0]}: expected {RANGES} or {SCANS}, found {asked[1]}")
+    if asked is not None and asked[1] not in (*RANGES.types, *SCANS.types, *LANDMARKS.types):
+        raise InputError(
+            f"{path}: topic {asked[0]}: expected {RANGES}, {SCANS} or {LANDMARKS}, found {asked[1]}"
+        )
     if (asked is None and has(path, SCANS)) or (asked is not None and asked[1] in SCANS.types):
         log = read_bag(path, None if asked is None else asked[0])
         always = np.flatnonzero(np.isfinite(log.ranges_m).all(axis=0))
@@ -206,7 +258,30 @@ def steady_of_bag(path: Path, topics: Sequence[str] = ()) -> list[Column]:
             )
         beams = np.unique(always[np.linspace(0, always.size - 1, MOST_BEAMS).astype(int)])
         return [Column(f"beam_{beam}", "m", log.ranges_m[:, beam].copy()) for beam in beams]
+    marked = has(path, LANDMARKS) and not has(path, RANGES) if asked is None else asked[1] in LANDMARKS.types
+    if marked:
+        return _steady_landmarks(path, None if asked is None else asked[0])
     found = read_series(path, RANGES, None if asked is None else asked[0])
     if len(found.t_s) < LEAST_ROWS:
         raise InputError(f"{path}: expected {LEAST_ROWS} or more ranges, found {len(found.t_s)}")
     return [Column("range", "m", found.values[:, 0].copy())]
+
+
+def _steady_landmarks(path: Path, topic: str | None) -> list[Column]:
+    """Range and bearing of each landmark that is seen often enough, in the sensor's frame (x looks ahead)."""
+    found = read_series(path, LANDMARKS, topic)
+    out = []
+    for identity in np.unique(found.values[:, 0]):
+        x, y = found.values[found.values[:, 0] == identity, 1:3].T
+        if len(x) >= LEAST_ROWS:
+            bearing = np.arctan2(y, x)
+            middle = np.arctan2(np.sin(bearing).mean(), np.cos(bearing).mean())
+            out.append(Column(f"landmark_{identity:g}_range", "m", np.hypot(x, y)))
+            out.append(
+                Column(f"landmark_{identity:g}_bearing", "rad", middle + wrap_array_to_pi(bearing - middle))
+            )
+    if not out:
+        raise InputError(
+            f"{path}: expected a landmark in {found.topic} seen {LEAST_ROWS} or more times, found none"
+        )
+    return out[:MOST_COLUMNS]

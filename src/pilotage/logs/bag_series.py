@@ -20,7 +20,14 @@ from pilotage.core.errors import InputError
 from pilotage.core.types import FloatArray
 from pilotage.logs.bag_messages import OpenBag, read_through
 from pilotage.logs.bag_topics import Kind, full_name, holds, pick
-from pilotage.logs.bags import ODOMETRY, ODOMETRY_TYPE, TRANSFORM_TYPES, USUAL_TRUTH
+from pilotage.logs.bags import (
+    ODOMETRY,
+    ODOMETRY_TYPE,
+    TRANSFORM_TYPES,
+    USUAL_BASES,
+    USUAL_ODOMETRY_FRAMES,
+    USUAL_TRUTH,
+)
 from pilotage.logs.scanner_mount import LARGEST, TransformTree, frame_name
 from pilotage.logs.trajectories import Trajectory3
 
@@ -149,6 +156,47 @@ def read_poses(path: Path, topic: str | None = None, kind: Kind = POSES) -> Seri
         if full_name(name) not in {full_name(known) for known in names}:
             raise InputError(f"{path}: expected transforms in {full_name(name)}, {holds(bag.topics)}")
         return _of_transforms(bag, path, names, frame_name(frames[0]), frame_name(frames[1]))
+
+    return read_through(path, read)
+
+
+def read_odometry(path: Path, topic: str | None = None) -> Series:
+    """Poses (N, 7) by the odometry: the topic, else the usual one, else the transforms of the usual frames.
+
+    Raises
+    ------
+    InputError
+        As ``read_poses``.
+    """
+    if topic is None and not has(path, ODOMETRY):
+        found = _odometry_frames(path)
+        if found is not None:
+            return read_poses(path, found)
+    return read_poses(path, topic, ODOMETRY)
+
+
+def has_odometry(path: Path) -> bool:
+    """Whether ``read_odometry`` finds any without being told where."""
+    return has(path, ODOMETRY) or _odometry_frames(path) is not None
+
+
+def _odometry_frames(path: Path) -> str | None:
+    """The transforms that tell of odometry, as ``read_poses`` takes them; None where there are none."""
+
+    def read(bag: OpenBag) -> str | None:
+        names = [topic.name for topic in bag.topics if topic.msgtype in TRANSFORM_TYPES]
+        moving = [name for name in names if not name.endswith("_static")]
+        if not moving:
+            return None
+        tree = TransformTree()
+        for _, _, message in bag.messages(set(names)):
+            for transform in getattr(message, "transforms", ()):
+                tree.add(transform)
+        for parent in USUAL_ODOMETRY_FRAMES:
+            for child in USUAL_BASES:
+                if tree.chain(parent, child) is not None:
+                    return f"{moving[0]}:{parent}:{child}"
+        return None
 
     return read_through(path, read)
 

@@ -42,6 +42,8 @@ class HeadingLog:
         (N, 3): rad/s about the axes (gyroscope) or gauss along them (magnetometer).
     place
         The file, for complaints.
+    turns
+        Whether something else tells that the robot turned.
     """
 
     name: str
@@ -49,6 +51,7 @@ class HeadingLog:
     t_s: FloatArray
     values: FloatArray
     place: str
+    turns: bool = False
 
 
 def read_heading_log(path: Path) -> HeadingLog:

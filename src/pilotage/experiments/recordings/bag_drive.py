@@ -31,8 +31,10 @@ from pilotage.logs.bag_series import (
     TWISTS,
     Series,
     has,
+    has_odometry,
     headings,
     mount_matrix,
+    read_odometry,
     read_poses,
     read_series,
     topic_of,
@@ -245,8 +247,8 @@ def _odometry(
         t_s, poses = _integrated(read_series(log, TWISTS, wanted.twist))
     elif laser is not None and laser.odometry is not None and laser.odometry_t_s is not None:
         t_s, poses = laser.odometry_t_s, laser.odometry
-    elif is_bag(log) and (wanted.odometry is not None or has(log, WHEELS)):
-        found = read_poses(log, wanted.odometry, WHEELS)
+    elif is_bag(log) and (wanted.odometry is not None or has_odometry(log)):
+        found = read_odometry(log, wanted.odometry)
         t_s, poses = found.t_s, headings(found.values)
     elif is_bag(log) and has(log, TWISTS):
         told = read_series(log, TWISTS)
