@@ -19,6 +19,9 @@ os.environ["MPLBACKEND"] = "Agg"
 for _library in ("OPENBLAS", "OMP", "MKL"):
     os.environ[f"{_library}_NUM_THREADS"] = "1"
 
+# numba would colour each word of what its overloads say where they do not apply; nobody reads most of it.
+os.environ["NUMBA_DISABLE_ERROR_MESSAGE_HIGHLIGHTING"] = "1"
+
 # A shell's background job ignores Ctrl-C, and so would all that tests start; those of Ctrl-C need it heard.
 signal.signal(signal.SIGINT, signal.default_int_handler)
 

@@ -9,6 +9,7 @@ import os
 import random
 import re
 import socket
+import struct
 import zlib
 from collections.abc import Callable
 from contextlib import suppress
@@ -235,10 +236,18 @@ def bomb(levels: int = 9) -> Content:
 
 
 def zeros_packed(megabytes: int) -> Content:
-    """Gzipped zeros: small, and large where they are unpacked."""
-    packer = zlib.compressobj(9, zlib.DEFLATED, 31)
+    """Gzipped zeros: small, and large where they are unpacked.
+
+    After a full flush nothing refers to what came before, so one packed block stands for all of them.
+    """
     block = bytes(1_000_000)
-    return b"".join(packer.compress(block) for _ in range(megabytes)) + packer.flush()
+    packer = zlib.compressobj(9, zlib.DEFLATED, -zlib.MAX_WBITS)
+    packed, check = packer.compress(block) + packer.flush(zlib.Z_FULL_FLUSH), 0
+    for _ in range(megabytes):
+        check = zlib.crc32(block, check)
+    size = megabytes * len(block)
+    head = gzip.compress(b"", mtime=0)[:10]
+    return head + packed * megabytes + packer.flush() + struct.pack("<LL", check, size % 2**32)
 
 
 WHOLE: dict[str, Content] = {

@@ -10,9 +10,14 @@ import tempfile
 from pathlib import Path
 from typing import Any, cast
 
+import numpy as np
 import pytest
-from numba.core import event
+from numba.core import event, types
+from numba.core.errors import TypingError
+from numba.core.typing import templates
+from numba.extending import overload
 
+from pilotage.core.types import FloatArray
 from pilotage.kernels import jit
 from pilotage.kernels.jit import kernel
 from pilotage.kernels.user_cache import user_cache
@@ -116,3 +121,65 @@ def test_garbage_is_looked_for_as_before_once_a_kernel_is_compiled() -> None:
     finally:
         gc.set_threshold(*before)
     assert sum(threshold[0] > 10_000 for threshold in during) >= 3, "of the one within the other and back"
+
+
+@pytest.mark.usefixtures("nothing_compiled")
+def test_a_slice_of_another_shape_is_refused_without_compiling_functions_on_text() -> None:
+    compiled: list[str] = []
+
+    class Names(event.Listener):
+        def on_start(self, start: Any) -> None:
+            compiled.append(start.data["dispatcher"].py_func.__module__)
+
+        def on_end(self, _: object) -> None:
+            pass
+
+    @kernel
+    def copied(into: FloatArray, row: FloatArray) -> None:
+        into[1] = row
+
+    into = np.zeros((2, 3))
+    with event.install_listener("numba:compile", Names()):
+        copied(into, np.arange(3.0))
+    assert into.tolist() == [[0.0, 0.0, 0.0], [0.0, 1.0, 2.0]]
+    with pytest.raises(ValueError, match="cannot assign slice from input of different size"):
+        copied(into, np.arange(4.0))
+    assert not any("unicode" in name for name in compiled)
+
+
+@pytest.mark.usefixtures("nothing_compiled")
+def test_what_numba_leaves_out_while_it_compiles() -> None:
+    """Each of these took a part of the processor time and made no other code."""
+
+    @kernel
+    def summed(values: FloatArray) -> float:
+        total = 0.0
+        for value in values:
+            total = total + value
+        return total
+
+    assert summed(np.arange(4.0)) == 6.0
+    (version,) = cast(Any, summed).overloads.values()
+    assert version.library.is_light, "no pass over each function beside those over the module"
+    assert templates._OverloadFunctionTemplate.generic.__module__ == "pilotage.kernels.compiling"
+
+
+@pytest.mark.usefixtures("nothing_compiled")
+def test_an_overload_that_refused_some_types_is_asked_for_others() -> None:
+    @overload(_doubled, strict=False)
+    def _(x: Any) -> Any:
+        return (lambda x: 2.0 * x) if x == types.float64 else None
+
+    @kernel
+    def asks(x: Any) -> Any:
+        return _doubled(x)
+
+    for refused in (True, False):
+        with pytest.raises(TypingError):
+            asks(refused)
+    assert asks(1.5) == 3.0
+
+
+def _doubled(x: Any) -> Any:
+    """A function that a kernel cannot call but for its overload."""
+    raise NotImplementedError(x)

@@ -7,7 +7,6 @@ Clones and installations of one source share it; of processes that need a functi
 
 from __future__ import annotations
 
-import gc
 import hashlib
 import re
 import tempfile
@@ -28,6 +27,7 @@ from numba.core.caching import (
 )
 from numba.cpython.unsafe import numbers as _bits
 
+from pilotage.kernels.compiling import FewCollections, lighten
 from pilotage.kernels.user_cache import user_cache
 
 __all__ = ["cache_is_cold", "kernel", "kernel_without_lock", "leading_zeros", "trailing_zeros"]
@@ -159,27 +159,23 @@ class _Cache(FunctionCache):
             self._lock = None
 
 
-class _FewCollections(event.Listener):
-    """Lets garbage pile up while functions are compiled: looking for it all the time took a sixth of that."""
+class _First(event.Listener):
+    """Before the first function of a process is compiled, the compiler is made lighter."""
 
-    _THRESHOLD = 50_000, 20, 20
-    _depth, _before = 0, (700, 10, 10)
+    _done = False
 
-    def on_start(self, _: object) -> None:
-        """Within numba's lock, so one thread at a time; a function may need others compiled first."""
-        if self._depth == 0:
-            self._before = gc.get_threshold()
-            gc.set_threshold(*self._THRESHOLD)
-        self._depth += 1
+    def on_start(self, start: Any) -> None:
+        """Within numba's lock, so one thread at a time."""
+        if not self._done:
+            self._done = True
+            lighten(start.data["dispatcher"].targetctx)
 
     def on_end(self, _: object) -> None:
-        """Also where it could not be compiled."""
-        self._depth -= 1
-        if self._depth == 0:
-            gc.set_threshold(*self._before)
+        """Nothing: it is once and for all."""
 
 
-event.register("numba:compile", _FewCollections())  # type: ignore[no-untyped-call]
+event.register("numba:compile", _First())  # type: ignore[no-untyped-call]
+event.register("numba:compile", FewCollections())  # type: ignore[no-untyped-call]
 
 _OPTIONS: dict[str, Any] = {"error_model": "numpy", "no_cfunc_wrapper": True}
 
@@ -198,12 +194,17 @@ def _cached(dispatcher: Any, function: F) -> F:
     if not hasattr(dispatcher, "_cache"):  # a plain function where NUMBA_DISABLE_JIT is set
         return cast(F, dispatcher)
     dispatcher._cache = _Cache(function)  # type: ignore[no-untyped-call]
-    resolve = dispatcher.get_call_template
+    resolve, compile_anew, versions = dispatcher.get_call_template, dispatcher.compile, dispatcher.overloads
+
+    def compile_once(signature: Any) -> Any:
+        """What is there is taken without numba's lock and timers: each call in a kernel asks for it."""
+        known = versions.get(signature) if isinstance(signature, tuple) else None
+        return compile_anew(signature) if known is None else known.entry_point
 
     def resolve_once(args: Iterable[Any], kws: Mapping[str, Any]) -> Any:
         """Compile for a number, not for each number that some kernel has written in its call."""
         wide: Callable[[Any], Any] = types.unliteral
         return resolve([wide(arg) for arg in args], {key: wide(kws[key]) for key in kws})
 
-    dispatcher.get_call_template = resolve_once
+    dispatcher.compile, dispatcher.get_call_template = compile_once, resolve_once
     return cast(F, dispatcher)
