@@ -192,6 +192,19 @@ def test_a_missing_extra_is_one_line_and_leaves_nothing(
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.skipif(not Path("/proc/self").is_dir(), reason="needs a folder that takes no files")
+@pytest.mark.parametrize("to", ["mcap", "rosbag", "rerun", "tum", "csv"])
+def test_a_place_that_takes_no_files_is_one_line(
+    to: str, run: pl.Run, capsys: pytest.CaptureFixture[str]
+) -> None:
+    if to == "rerun":
+        pytest.importorskip("rerun", reason="needs the extra 'rerun'")
+    assert main(["export", str(run.folder), "--to", to, "--out", "/proc/out"]) == 2
+    said = capsys.readouterr()
+    assert (said.out, said.err.count("\n")) == ("", 1)
+    assert "/proc/" in said.err
+
+
 def test_the_command_says_where(run: pl.Run, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["export", str(run.folder), "--to", "csv"]) == 0
     assert capsys.readouterr().out.strip() == str(run.folder / "trace.csv")

@@ -51,6 +51,7 @@ def write_rerun(path: Path, folder: Path) -> None:
     first, whole = read_run(folder), read_trace(folder)
     require_times(first.events, folder)
     with draft_of(path) as draft:
+        draft.touch()  # where nothing can be written the system says so, not Rerun by an error of its own
         stream = rr.RecordingStream("pilotage", recording_id=shown(folder.name))
         stream.save(draft)
         stream.log("/", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
