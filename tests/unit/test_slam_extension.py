@@ -4,20 +4,26 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 from pilotage.cli.main import main
 from pilotage.core.types import FloatArray
+from pilotage.kernels.slam.branch_bound import search_window
 from pilotage.kernels.slam.frames import between, composed
+from pilotage.kernels.slam.match_grid import max_pyramid
 from pilotage.models.pose_graph_covariance import covariances
+from pilotage.stack.mapping.slam import matching
 from pilotage.stack.mapping.slam.config import SlamConfig
 from pilotage.stack.mapping.slam.earlier_map import needed, pruned
 from pilotage.stack.mapping.slam.extension import extend_map
 from pilotage.stack.mapping.slam.mapper import map_log
 from pilotage.stack.mapping.slam.marginalization import without
+from pilotage.stack.mapping.slam.matching import laid
 from pilotage.stack.mapping.slam.result import NotJoined, SlamResult
+from pilotage.stack.mapping.slam.submaps import LEVELS, drawn
 from pilotage.stack.mapping.slam.uncertainty import Edges, relative_poses
 from support.laser_rooms import along, furnished, recording, room, write_carmen
 
@@ -227,3 +233,33 @@ def test_the_frame_stays(first: SlamResult) -> None:
     moved = answer.known.graph.poses[: len(kept)] - kept.poses
     assert np.hypot(moved[:, 0], moved[:, 1]).max() < 0.02
     assert composed(kept.poses[0], np.zeros(3)) == pytest.approx(answer.known.graph.poses[0])
+
+
+def test_rivals_are_looked_for_where_they_count_alone(
+    first: SlamResult, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The place is the same to the last bit; nobody asks for other places of what is none already."""
+    earlier, cell_m = first.earlier_map(), CONFIG.search_cell_m
+    everything = np.arange(len(earlier))
+    whole = drawn(earlier.clouds, earlier.poses, everything, np.zeros(3), cell_m)
+    moving = drawn(earlier.clouds, earlier.poses, everything[:8], earlier.poses[0], cell_m)
+    searched: list[float] = []
+
+    def counted(*asked: Any) -> tuple[FloatArray, int]:
+        searched.append(asked[9])
+        return search_window(*asked)
+
+    monkeypatch.setattr(matching, "search_window", counted)
+    pyramid, window = max_pyramid(whole.grid, LEVELS), (cell_m, earlier.poses[0], 2.0, 0.3)
+    plain, _ = laid(whole, pyramid, moving, *window)
+    assert len(searched) > 1
+    for budget, worth, searches in ((10**6, False, 1), (10**6, True, len(searched)), (10, True, 1)):
+        searched.clear()
+        asked = 0.25, 0.6, budget, lambda found, worth=worth: worth and found.score > 0.0
+        found, everywhere = laid(whole, pyramid, moving, *window, *asked)
+        assert len(searched) == searches
+        assert everywhere == (budget > 10)
+        if everywhere:
+            assert (found.relative == plain.relative).all()
+            assert (found.score, found.agreement) == (plain.score, plain.agreement)
+            assert (found.second > 0.6 * found.score) == (worth and plain.second > 0.6 * plain.score)

@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 
 from pilotage.core.types import FloatArray
 from pilotage.kernels.slam.align import CAPPED, CONVERGED, TOO_FEW, align, normal_equations
-from pilotage.kernels.slam.branch_bound import PASS_OVER_NONE, search_window
-from pilotage.kernels.slam.buckets import nearest, sort_into_buckets
+from pilotage.kernels.slam.branch_bound import NO_SEED, PASS_OVER_NONE, search_window
+from pilotage.kernels.slam.buckets import BEYOND_M, nearest, sort_into_buckets
 from pilotage.kernels.slam.frames import between, carried, composed
 from pilotage.kernels.slam.match_grid import max_pyramid, score_grid
 from pilotage.kernels.slam.occupancy import add_scan
@@ -49,11 +49,23 @@ def test_the_gradient_is_that_of_the_residuals() -> None:
     box, starts, _, points = sort_into_buckets(cloud(HERE), 0.25)
     source = cloud(HERE)[20:160]
     hessian, gradient = np.zeros((3, 3)), np.zeros(3)
-    none = np.full(len(source), -1)
+    none, unknown = np.full(len(source), -1), np.full((len(source), 3), -1.0)
     at = np.array([1e-3, -5e-4, 2e-4])
     # So wide a scale weighs all pairs with one.
     normal_equations(
-        source, at[0], at[1], at[2], 0.2, 1e6, box, starts, points, none.copy(), hessian, gradient
+        source,
+        at[0],
+        at[1],
+        at[2],
+        0.2,
+        1e6,
+        box,
+        starts,
+        points,
+        none.copy(),
+        unknown.copy(),
+        hessian,
+        gradient,
     )
     numeric = np.zeros(3)
     for k in range(3):
@@ -62,10 +74,59 @@ def test_the_gradient_is_that_of_the_residuals() -> None:
             moved[k] += sign * 1e-7
             h, g = np.zeros((3, 3)), np.zeros(3)
             squares, _, _ = normal_equations(
-                source, moved[0], moved[1], moved[2], 0.2, 1e6, box, starts, points, none.copy(), h, g
+                source,
+                moved[0],
+                moved[1],
+                moved[2],
+                0.2,
+                1e6,
+                box,
+                starts,
+                points,
+                none.copy(),
+                unknown.copy(),
+                h,
+                g,
             )
             numeric[k] += sign * 0.5 * squares / 2e-7
     assert gradient == pytest.approx(numeric, rel=1e-3, abs=1e-4)
+
+
+@settings(max_examples=40, deadline=None)
+@given(st.integers(0, 2**31), st.floats(1e-4, 0.03))
+def test_a_pair_that_is_kept_is_the_one_that_would_be_found(seed: int, step: float) -> None:
+    """However the poses go on and the reach shrinks: the same sums to the last bit, and the same pairs."""
+    rng = np.random.default_rng(seed)
+    box, starts, _, points = sort_into_buckets(
+        np.concatenate([cloud(HERE, 0.02 * rng.standard_normal(BEAMS)) for _ in range(3)]), 0.2
+    )
+    source, at, reach = cloud(HERE), 0.05 * rng.standard_normal(3), 0.4
+    kept = np.full(len(source), -1), np.full((len(source), 3), -1.0)
+    for _ in range(12):
+        fresh = np.full(len(source), -1), np.full((len(source), 3), -1.0)
+        told = []
+        for paired, stands in (kept, fresh):
+            hessian, gradient = np.zeros((3, 3)), np.zeros(3)
+            sums = normal_equations(
+                source,
+                at[0],
+                at[1],
+                at[2],
+                reach,
+                0.05,
+                box,
+                starts,
+                points,
+                paired,
+                stands,
+                hessian,
+                gradient,
+            )
+            told.append([*sums, *hessian.ravel(), *gradient])
+        assert told[0] == told[1]
+        assert told[0][2] > 0
+        at = at + step * rng.standard_normal(3)
+        reach = max(0.1, reach * float(rng.choice([0.6, 1.0])))
 
 
 def test_the_covariance_of_a_match_is_that_of_many_matches() -> None:
@@ -99,7 +160,7 @@ def test_too_few_points_are_said() -> None:
     _, _, _, status = aligned(cloud(HERE)[:5], np.zeros(3), cloud(HERE))
     assert status == TOO_FEW
     box, starts, _, points = sort_into_buckets(np.zeros((0, 6)), 0.25)
-    assert nearest(0.0, 0.0, 1.0, -1, box, starts, points) == -1
+    assert nearest(0.0, 0.0, 1.0, -1, box, starts, points)[0] == -1
 
 
 @settings(max_examples=40, deadline=None)
@@ -113,8 +174,14 @@ def test_the_nearest_point_is_the_nearest(seed: int, reach: float) -> None:
     for x, y in rng.uniform(-2.5, 2.5, (20, 2)):
         distance = np.hypot(points[:, 0] - x, points[:, 1] - y)
         wanted = int(distance.argmin()) if distance.min() < reach else -1
+        next_m = np.sort(distance)[1]
         for guess in (-1, int(distance.argmin()), *rng.integers(60, size=3).tolist()):
-            assert nearest(x, y, reach, guess, box, starts, points) == wanted
+            found, least, second = nearest(x, y, reach, guess, box, starts, points)
+            assert found == wanted
+            assert least == pytest.approx(min(distance.min(), reach) ** 2)
+            # As far away as the next one, or as it was looked.
+            looked = reach if guess < 0 else min(reach, distance[guess] + BEYOND_M)
+            assert second == pytest.approx(min(next_m, looked) ** 2)
 
 
 @settings(max_examples=15, deadline=None)
@@ -127,13 +194,57 @@ def test_branch_and_bound_finds_what_looking_everywhere_finds(seed: int) -> None
     centre, angles = np.array([2.0, 2.0, 0.3]), np.array([-0.2, 0.0, 0.2])
     pyramid, margin = max_pyramid(grid, 3)
     best, _ = search_window(
-        pyramid, margin, 0.0, 0.0, 0.1, points, centre, 0.7, angles, -10.0, PASS_OVER_NONE, 10**6
+        pyramid,
+        margin,
+        0.0,
+        0.0,
+        0.1,
+        points,
+        centre,
+        0.7,
+        angles,
+        -10.0,
+        PASS_OVER_NONE,
+        10**6,
+        NO_SEED,
+        False,
     )
     flat, no_margin = max_pyramid(grid, 0)
     everywhere, _ = search_window(
-        flat, no_margin, 0.0, 0.0, 0.1, points, centre, 0.7, angles, -10.0, PASS_OVER_NONE, 10**6
+        flat,
+        no_margin,
+        0.0,
+        0.0,
+        0.1,
+        points,
+        centre,
+        0.7,
+        angles,
+        -10.0,
+        PASS_OVER_NONE,
+        10**6,
+        NO_SEED,
+        False,
     )
     assert best[3] == pytest.approx(everywhere[3], abs=1e-6)
+    for seed_pose in (best[:3], centre + np.array([0.5, -0.4, 0.1]), centre + 3.0):
+        seeded, _ = search_window(
+            pyramid,
+            margin,
+            0.0,
+            0.0,
+            0.1,
+            points,
+            centre,
+            0.7,
+            angles,
+            -10.0,
+            PASS_OVER_NONE,
+            10**6,
+            seed_pose,
+            False,
+        )
+        assert (seeded == best).all()
 
 
 def test_the_second_best_is_elsewhere() -> None:
@@ -142,12 +253,15 @@ def test_the_second_best_is_elsewhere() -> None:
     pyramid, margin = max_pyramid(grid, 3)
     point, centre = np.zeros((1, 2)), np.array([2.5, 1.5, 0.0])
     window = (pyramid, margin, 0.0, 0.0, 0.1, point, centre, 2.0, np.zeros(1))
-    best, _ = search_window(*window, 0.1, PASS_OVER_NONE, 10**6)
-    other, _ = search_window(*window, 0.1, np.array([*best[:3], 0.8, 0.3, 0.0, 0.0]), 10**6)
+    best, _ = search_window(*window, 0.1, PASS_OVER_NONE, 10**6, NO_SEED, False)
+    other, _ = search_window(*window, 0.1, np.array([*best[:3], 0.8, 0.3, 0.0, 0.0]), 10**6, NO_SEED, False)
     assert best[3] == pytest.approx(1.0)
     assert other[3] == pytest.approx(0.9)
+    some, looked = search_window(*window, 0.1, PASS_OVER_NONE, 10**6, NO_SEED, True)
+    assert some[3] in (pytest.approx(1.0), pytest.approx(0.9))
+    assert looked <= search_window(*window, 0.1, PASS_OVER_NONE, 10**6, NO_SEED, False)[1]
     assert np.hypot(*(best[:2] - other[:2])) > 2.5
-    beside, _ = search_window(*window, 0.1, np.array([*best[:3], 0.8, 0.3, 1.0, 0.0]), 10**6)
+    beside, _ = search_window(*window, 0.1, np.array([*best[:3], 0.8, 0.3, 1.0, 0.0]), 10**6, NO_SEED, False)
     assert beside[3] == -np.inf  # both lie on one line along x
 
 

@@ -13,9 +13,10 @@ import numpy as np
 
 from pilotage.kernels.arrays import FloatArray, IntArray
 from pilotage.kernels.jit import kernel
-from pilotage.kernels.slam.buckets import nearest
+from pilotage.kernels.slam.buckets import BEYOND_M, nearest
 
 CONVERGED, CAPPED, TOO_FEW = 0, 1, 2
+ROUNDING_M = 1e-9
 
 
 @kernel
@@ -30,6 +31,7 @@ def normal_equations(
     starts: IntArray,
     points: FloatArray,
     paired: IntArray,
+    stands: FloatArray,
     hessian: FloatArray,
     gradient: FloatArray,
 ) -> tuple[float, float, int]:
@@ -40,11 +42,15 @@ def normal_equations(
     source
         (K, 6) of ``scan_lines`` in the moving frame.
     reach_m, scale_m
-        Greatest distance of a pair, and the residual at which its weight has fallen to a half.
+        Greatest distance of a pair, and the residual at which its weight has fallen to a half. The reach is
+        never more than where ``paired`` was filled.
     box, starts, points
         Reference from ``sort_into_buckets``.
     paired
-        (K,) with which reference each point was paired last, -1: none yet. Filled here.
+        (K,) the nearest reference of each point as it was looked up last, -1: none. Filled here.
+    stands
+        (K, 3) where it was looked up, and how far the point may be from there with the same answer, which is
+        half of what the next reference was farther away; -1: not looked up yet. Filled here.
     hessian, gradient
         (3, 3) and (3,), filled here.
 
@@ -52,46 +58,57 @@ def normal_equations(
     -------
     Sum of weighted squared residuals, sum of weights, number of pairs.
     """
-    hessian[:, :] = 0.0
-    gradient[:] = 0.0
+    h00 = h01 = h02 = h11 = h12 = h22 = g0 = g1 = g2 = 0.0
     c, s = math.cos(theta), math.sin(theta)
     squares = weights = 0.0
     pairs, last = 0, -1
     for k in range(source.shape[0]):
         rx = c * source[k, 0] - s * source[k, 1]
         ry = s * source[k, 0] + c * source[k, 1]
-        # Beside what the point before was paired with is where a point is that was not paired yet.
-        guess = paired[k] if paired[k] >= 0 else last
-        i = nearest(x + rx, y + ry, reach_m, guess, box, starts, points)
+        qx, qy = x + rx, y + ry
+        i = paired[k]
+        mx, my, may = qx - stands[k, 0], qy - stands[k, 1], stands[k, 2]
+        if may < 0.0 or mx * mx + my * my >= may * may:
+            # Beside what the point before was paired with is where a point is that was not paired yet.
+            i, least, second = nearest(qx, qy, reach_m + BEYOND_M, i if i >= 0 else last, box, starts, points)
+            paired[k] = i
+            stands[k, 0], stands[k, 1] = qx, qy
+            # Rounding may turn round which of two is nearer.
+            stands[k, 2] = (0.5 * (math.sqrt(second) - math.sqrt(least)) if i >= 0 else BEYOND_M) - ROUNDING_M
         if i < 0:
             continue
-        paired[k] = last = i
+        dx, dy = qx - points[i, 0], qy - points[i, 1]
+        if dx * dx + dy * dy >= reach_m * reach_m:
+            continue
+        last = i
         nx, ny = points[i, 2], points[i, 3]
         if nx == 0.0 and ny == 0.0:
             continue
         sx, sy = source[k, 2], source[k, 3]
         if (sx != 0.0 or sy != 0.0) and (c * sx - s * sy) * nx + (s * sx + c * sy) * ny < 0.7:
             continue
-        residual = nx * (x + rx - points[i, 0]) + ny * (y + ry - points[i, 1])
+        residual = nx * dx + ny * dy
         u = residual / scale_m
         w = 1.0 / (1.0 + u * u)
         w = w * w
         turn = ny * rx - nx * ry
-        hessian[0, 0] += w * nx * nx
-        hessian[0, 1] += w * nx * ny
-        hessian[0, 2] += w * nx * turn
-        hessian[1, 1] += w * ny * ny
-        hessian[1, 2] += w * ny * turn
-        hessian[2, 2] += w * turn * turn
-        gradient[0] += w * nx * residual
-        gradient[1] += w * ny * residual
-        gradient[2] += w * turn * residual
+        h00 += w * nx * nx
+        h01 += w * nx * ny
+        h02 += w * nx * turn
+        h11 += w * ny * ny
+        h12 += w * ny * turn
+        h22 += w * turn * turn
+        g0 += w * nx * residual
+        g1 += w * ny * residual
+        g2 += w * turn * residual
         squares += w * residual * residual
         weights += w
         pairs += 1
-    hessian[1, 0] = hessian[0, 1]
-    hessian[2, 0] = hessian[0, 2]
-    hessian[2, 1] = hessian[1, 2]
+    hessian[0, 0], hessian[1, 1], hessian[2, 2] = h00, h11, h22
+    hessian[0, 1] = hessian[1, 0] = h01
+    hessian[0, 2] = hessian[2, 0] = h02
+    hessian[1, 2] = hessian[2, 1] = h12
+    gradient[0], gradient[1], gradient[2] = g0, g1, g2
     return squares, weights, pairs
 
 
@@ -170,12 +187,25 @@ def align(
     system = np.zeros((3, 3))
     fit = np.zeros(4)
     paired = np.full(source.shape[0], -1)
+    stands = np.full((source.shape[0], 3), -1.0)
     status = CAPPED
     reach = reach_m
     scale = scale_m * max(1.0, reach_m / final_reach_m)
     for _ in range(iterations):
         squares, weights, pairs = normal_equations(
-            source, pose[0], pose[1], pose[2], reach, scale, box, starts, points, paired, hessian, gradient
+            source,
+            pose[0],
+            pose[1],
+            pose[2],
+            reach,
+            scale,
+            box,
+            starts,
+            points,
+            paired,
+            stands,
+            hessian,
+            gradient,
         )
         fit[0] = math.sqrt(squares / weights) if weights > 0.0 else 0.0
         fit[1] = weights

@@ -9,27 +9,51 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 
-from pilotage.kernels.arrays import FloatArray, IntArray
+from pilotage.kernels.arrays import FloatArray
 from pilotage.kernels.jit import kernel
 from pilotage.kernels.slam.match_grid import ScoreArray
 
-_STACK = 4096
+_LOOK_EVERY, _SPREAD = 4, 16
 PASS_OVER_NONE = np.array([0.0, 0.0, 0.0, -1.0, 0.0, 0.0, 0.0])
 """``away`` of ``search_window`` where every pose counts."""
+NO_SEED = np.full(3, np.nan)
+SEED_LESS = 1e-6
 
 
 @kernel
-def _score(pyramid: ScoreArray, level: int, margin: int, cells: IntArray, column: int, row: int) -> float:
-    """Sum of the scores of cells (K, 2) shifted by whole cells."""
-    grid = pyramid[level]
-    rows, columns = grid.shape
-    total = 0.0
-    for k in range(cells.shape[0]):
-        c = cells[k, 0] + column + margin
-        r = cells[k, 1] + row + margin
-        if 0 <= r < rows and 0 <= c < columns:
-            total += grid[r, c]
+def _at(grid: ScoreArray, cells: NDArray[np.int32], k: int, column: int, row: int) -> float:
+    """Score of a cell of ``cells`` (2, K), shifted; outside of the grid is its margin."""
+    c = min(max(cells[0, k] + column, 0), grid.shape[1] - 1)
+    r = min(max(cells[1, k] + row, 0), grid.shape[0] - 1)
+    return float(grid[r, c])
+
+
+@kernel
+def _score(grid: ScoreArray, cells: NDArray[np.int32], column: int, row: int, least: float) -> float:
+    """Sum of the scores of cells (2, K) shifted by whole cells; a bound of it where not above ``least``.
+
+    A score is 1 at most: after some of the points the rest may be known not to suffice. Four sums side by
+    side, as one would wait for each addition; scores are single and sums double, so that their order does
+    not count.
+    """
+    count = cells.shape[1]
+    a = b = c = d = 0.0
+    k = 0
+    while k + 4 <= count:
+        for _ in range(min(_LOOK_EVERY, (count - k) // 4)):
+            a += _at(grid, cells, k, column, row)
+            b += _at(grid, cells, k + 1, column, row)
+            c += _at(grid, cells, k + 2, column, row)
+            d += _at(grid, cells, k + 3, column, row)
+            k += 4
+        most: float = a + b + c + d + (count - k)
+        if most <= least:
+            return most
+    for m in range(k, count):
+        a += _at(grid, cells, m, column, row)
+    total: float = a + b + c + d
     return total
 
 
@@ -47,13 +71,15 @@ def search_window(
     least_score: float,
     away: FloatArray,
     budget: int,
+    seed: FloatArray,
+    any_will_do: bool,
 ) -> tuple[FloatArray, int]:
     """Search the best pose of points over a square window of shifts and a list of angles.
 
     Parameters
     ----------
     pyramid, margin
-        From ``max_pyramid``.
+        From ``max_pyramid``; scores are 1 at most.
     corner_x, corner_y, cell_m
         The grid's lower-left corner and its cells' side.
     points_xy
@@ -70,6 +96,11 @@ def search_window(
         one; a negative distance passes over none. Tells how good the best other answer is.
     budget
         The cap on nodes.
+    seed
+        (3,) pose that is likely to be near the best, or ``NO_SEED``: what scores less than the window's pose
+        nearest to it is not looked at. The answer does not depend on it. Not together with ``away``.
+    any_will_do
+        Whether the first pose that reaches ``least_score`` is as good as the best.
 
     Returns
     -------
@@ -88,25 +119,38 @@ def search_window(
     stride = 1 << levels
     roots_side = (width + stride - 1) // stride
     roots = angles_rad.shape[0] * roots_side * roots_side
-    cells = np.empty((angles_rad.shape[0], count, 2), np.int64)
+    cells = np.empty((angles_rad.shape[0], 2, count), np.int32)
     bounds = np.empty(roots)
     nodes = 0
     for a in range(angles_rad.shape[0]):
         theta = centre[2] + angles_rad[a]
         c, s = math.cos(theta), math.sin(theta)
-        for k in range(count):
-            x = centre[0] + c * points_xy[k, 0] - s * points_xy[k, 1]
-            y = centre[1] + s * points_xy[k, 0] + c * points_xy[k, 1]
-            cells[a, k, 0] = math.floor((x - corner_x) / cell_m) - reach
-            cells[a, k, 1] = math.floor((y - corner_y) / cell_m) - reach
+        k = 0
+        # Neighbours on one wall tell alike: points from all over settle sooner what a pose is not.
+        for first in range(_SPREAD):
+            for p in range(first, count, _SPREAD):
+                x = centre[0] + c * points_xy[p, 0] - s * points_xy[p, 1]
+                y = centre[1] + s * points_xy[p, 0] + c * points_xy[p, 1]
+                cells[a, 0, k] = math.floor((x - corner_x) / cell_m) - reach + margin
+                cells[a, 1, k] = math.floor((y - corner_y) / cell_m) - reach + margin
+                k += 1
+    least = least_score * count
+    if seed[0] == seed[0]:
+        a = int(np.argmin(np.abs(angles_rad - (seed[2] - centre[2]))))
+        column = round((seed[0] - centre[0]) / cell_m) + reach
+        row = round((seed[1] - centre[1]) / cell_m) + reach
+        if 0 <= column < width and 0 <= row < width:
+            # A little less, for that pose itself to be found.
+            least = max(least, _score(pyramid[0], cells[a], column, row, least) - SEED_LESS)
+    for a in range(angles_rad.shape[0]):
         for i in range(roots_side * roots_side):
             column, row = (i % roots_side) * stride, (i // roots_side) * stride
-            bounds[a * roots_side * roots_side + i] = _score(pyramid, levels, margin, cells[a], column, row)
+            bounds[a * roots_side * roots_side + i] = _score(pyramid[levels], cells[a], column, row, least)
             nodes += 1
     order = np.argsort(-bounds)
-    least = least_score * count
-    stack = np.empty((_STACK, 4), np.int64)
-    stack_bound = np.empty(_STACK)
+    # Of each level at most three children wait while the fourth is looked into.
+    stack = np.empty((3 * levels + 1, 4), np.int64)
+    stack_bound = np.empty(3 * levels + 1)
     child_order = np.empty(4, np.int64)
     child_score = np.empty(4)
     for root in order:
@@ -138,6 +182,8 @@ def search_window(
                         continue
                 least = stack_bound[top]
                 best[0], best[1], best[2], best[3] = x, y, theta, least / count
+                if any_will_do:
+                    return best, nodes
                 continue
             half = 1 << (level - 1)
             found = 0
@@ -145,7 +191,7 @@ def search_window(
                 cc, rr = column + (child % 2) * half, row + (child // 2) * half
                 if cc >= width or rr >= width:
                     continue
-                value = _score(pyramid, level - 1, margin, cells[a], cc, rr)
+                value = _score(pyramid[level - 1], cells[a], cc, rr, least)
                 nodes += 1
                 if value <= least:
                     continue

@@ -9,6 +9,9 @@ import numpy as np
 from pilotage.kernels.arrays import FloatArray, IntArray
 from pilotage.kernels.jit import kernel
 
+BEYOND_M = 0.01
+"""How much farther than a guess ``nearest`` looks: a pair stands for longer while points move."""
+
 
 @kernel
 def sort_into_buckets(points: FloatArray, cell_m: float) -> tuple[FloatArray, IntArray, IntArray, FloatArray]:
@@ -122,35 +125,42 @@ def fused(
 @kernel
 def nearest(
     x: float, y: float, reach_m: float, guess: int, box: FloatArray, starts: IntArray, points: FloatArray
-) -> int:
-    """Index into the sorted points (K, 4) of the nearest within reach; -1: none.
+) -> tuple[int, float, float]:
+    """Find the nearest of the sorted points (K, 4), and how near the next one is at least.
 
-    ``guess``, an index or -1, is looked at first: a near one leaves few buckets to look into. The answer does
-    not depend on it.
+    Parameters
+    ----------
+    reach_m
+        Points as far away or farther are not found.
+    guess
+        Index of a point, or -1: a near one leaves few buckets to look into. The answer does not depend on it.
+
+    Returns
+    -------
+    Index of the nearest (-1: none within reach), its squared distance (``reach_m`` squared where there is
+    none), and a squared distance within which there is no other point.
     """
     columns = int(box[3])
     rows = (starts.shape[0] - 1) // columns
-    best = -1
-    least = reach_m * reach_m
     reach = reach_m
     if guess >= 0:
         dx, dy = points[guess, 0] - x, points[guess, 1] - y
-        d = dx * dx + dy * dy
-        if d < least:
-            # A little more, for the guess itself to be found again among those as near.
-            reach = math.sqrt(d) + 1e-9
-            least = reach * reach
-    column0 = max(0, math.floor((x - reach - box[0]) / box[2]))
-    column1 = min(columns - 1, math.floor((x + reach - box[0]) / box[2]))
-    row0 = max(0, math.floor((y - reach - box[1]) / box[2]))
-    row1 = min(rows - 1, math.floor((y + reach - box[1]) / box[2]))
+        # A little farther than the guess, to know how far away the next one is.
+        reach = min(reach_m, math.sqrt(dx * dx + dy * dy) + BEYOND_M)
+    best = -1
+    least = second = reach * reach
+    left, low, scale = x - box[0], y - box[1], 1.0 / box[2]
+    # What is cut off towards zero only makes the first bucket of a side one more than there is.
+    column0, column1 = max(0, int((left - reach) * scale)), min(columns - 1, int((left + reach) * scale))
+    row0, row1 = max(0, int((low - reach) * scale)), min(rows - 1, int((low + reach) * scale))
     if column1 < column0:
-        return best
+        return best, least, second
     for row in range(row0, row1 + 1):
         for i in range(starts[row * columns + column0], starts[row * columns + column1 + 1]):
             dx, dy = points[i, 0] - x, points[i, 1] - y
             d = dx * dx + dy * dy
-            if d < least:
-                least = d
-                best = i
-    return best
+            # Without branches, whose outcome a processor could not guess.
+            second = min(second, max(least, d))
+            best = i if d < least else best
+            least = min(least, d)
+    return best, least, second

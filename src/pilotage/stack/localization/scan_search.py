@@ -10,7 +10,7 @@ import numpy as np
 
 from pilotage.core.types import FloatArray
 from pilotage.kernels.geometry.motion import exact_arc
-from pilotage.kernels.slam.branch_bound import PASS_OVER_NONE, search_window
+from pilotage.kernels.slam.branch_bound import NO_SEED, PASS_OVER_NONE, search_window
 from pilotage.kernels.slam.frames import between
 from pilotage.kernels.slam.match_grid import ScoreArray, max_pyramid
 from pilotage.stack.localization.likelihood_field import LikelihoodField
@@ -151,5 +151,7 @@ class ScanSearch:
             least,
             away,
             BUDGET,
+            NO_SEED,
+            False,
         )
         return np.asarray(best), nodes <= BUDGET

@@ -13,7 +13,7 @@ import numpy as np
 
 from pilotage.core.types import FloatArray, IntArray
 from pilotage.kernels.slam.align import TOO_FEW, align
-from pilotage.kernels.slam.branch_bound import PASS_OVER_NONE, search_window
+from pilotage.kernels.slam.branch_bound import NO_SEED, PASS_OVER_NONE, search_window
 from pilotage.kernels.slam.buckets import fused, sort_into_buckets
 from pilotage.kernels.slam.frames import between, carried, composed
 from pilotage.kernels.slam.match_grid import ScoreArray, max_pyramid, score_grid
@@ -173,6 +173,8 @@ class LocalMatcher:
                 least,
                 away,
                 SEARCH_BUDGET,
+                NO_SEED,
+                False,
             )
             return np.asarray(best)
 
@@ -226,7 +228,7 @@ class LocalMatcher:
             centres = [last, composed(last, motions[0])] if poor and split else [last]
             for centre in centres:
                 better = BETTER_POOR if poor else BETTER_GOOD
-                for fit in self._search(cloud, centre, gap_s, last, motions[0] if poor else None):
+                for fit in self._search(cloud, centre, gap_s, last, motions[0] if poor else None, best):
                     found = self._plausible(fit, last, credible)
                     if best is None or found.value > better * best.value + 0.01:
                         best = found
@@ -310,9 +312,15 @@ class LocalMatcher:
         return max(near, key=lambda fit: fit.value, default=None)
 
     def _search(
-        self, cloud: FloatArray, centre: FloatArray, gap_s: float, last: FloatArray, motion: FloatArray | None
+        self,
+        cloud: FloatArray,
+        centre: FloatArray,
+        gap_s: float,
+        last: FloatArray,
+        motion: FloatArray | None,
+        found: Fit | None = None,
     ) -> list[Fit]:
-        """Search the neighbourhood of a pose, the wider the longer ago it was.
+        """Search the neighbourhood of a pose, the wider the longer ago it was; ``found``: the best so far.
 
         With a motion the heading found is tried with the guess's position too: along a corridor the best
         score may lie anywhere, but no turn does.
@@ -337,6 +345,8 @@ class LocalMatcher:
             0.2,
             PASS_OVER_NONE,
             SEARCH_BUDGET,
+            NO_SEED if found is None else found.pose,
+            False,
         )
         if not np.isfinite(best[3]):
             return []

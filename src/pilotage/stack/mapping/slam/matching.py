@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from pilotage.core.types import FloatArray
 from pilotage.kernels.slam.align import TOO_FEW, align
-from pilotage.kernels.slam.branch_bound import PASS_OVER_NONE, search_window
+from pilotage.kernels.slam.branch_bound import NO_SEED, PASS_OVER_NONE, search_window
 from pilotage.kernels.slam.buckets import sort_into_buckets
 from pilotage.kernels.slam.frames import between
 from pilotage.kernels.slam.match_grid import ScoreArray
@@ -91,6 +92,7 @@ def laid(
     least_score: float = LEAST_MEAN,
     rival_share: float = RIVAL_SHARE,
     budget: int = BUDGET,
+    worth_rivals: Callable[[Match], bool] | None = None,
 ) -> tuple[Match, bool]:
     """Search a submap in a window of a map.
 
@@ -98,6 +100,9 @@ def laid(
     ----------
     least_score, rival_share
         Mean score a point from which a place is one, and share of the best one's from which another is told.
+    worth_rivals
+        Whether other places are looked for, by the match alone. Where this is given none are looked for
+        either if the budget did not suffice for the best, and any other place will do for ``second``.
 
     Returns
     -------
@@ -109,7 +114,7 @@ def laid(
     angles: FloatArray = STEP_RAD * np.arange(-turns, turns + 1, dtype=np.float64)
     corner = map_.corner_xy_m
 
-    def search(least: float, away: FloatArray) -> tuple[FloatArray, bool]:
+    def search(least: float, away: FloatArray, any_will_do: bool = False) -> tuple[FloatArray, bool]:
         best, nodes = search_window(
             *pyramid,
             corner[0],
@@ -122,14 +127,14 @@ def laid(
             least,
             away,
             budget,
+            NO_SEED,
+            any_will_do,
         )
         return np.asarray(best), nodes > budget
 
     best, cut_short = search(least_score, PASS_OVER_NONE)
     if not np.isfinite(best[3]):
         return Match(predicted, np.zeros((3, 3)), 0.0, 0.0, 0.0, 0.0, False), not cut_short
-    rival = max(LEAST_MEAN, rival_share * float(best[3]))
-    other, again = search(rival, np.array([*best[:3], SAME_PLACE_M, SAME_HEADING_RAD, 0.0, 0.0]))
     box, starts, _, reference = sort_into_buckets(map_.fine, BUCKET_M)
     pose, hessian, fit, status = align(
         moving.fine,
@@ -143,19 +148,27 @@ def laid(
         starts,
         reference,
     )
-    course = open_course(hessian, float(fit[1]), other[:3] - best[:3] if np.isfinite(other[3]) else None)
-    if course.any():
-        other, again = search(rival, np.array([*best[:3], SAME_PLACE_M, SAME_HEADING_RAD, *course]))
-        free = np.append(course, 0.0)
-        pull = hessian @ free
-        hessian = hessian - np.outer(pull, pull) / max(free @ pull, 1e-9)
-    second = float(other[3]) if np.isfinite(other[3]) else 0.0
     pose[2] = (pose[2] + np.pi) % (2.0 * np.pi) - np.pi
     agreement, overlap = lying(map_, cell_m, moving.fine, pose)
     slid = between(best[:3], pose)
     held = float(np.hypot(slid[0], slid[1])) < MOST_ALIGNED_M and abs(float(slid[2])) < MOST_ALIGNED_RAD
     aligned = status != TOO_FEW and held
-    found = Match(pose, hessian, float(best[3]), second, agreement, overlap, aligned, course)
+    found = Match(pose, hessian, float(best[3]), 0.0, agreement, overlap, aligned)
+    if worth_rivals is not None and (cut_short or not worth_rivals(found)):
+        return found, not cut_short
+    any_rival = worth_rivals is not None
+    rival = max(LEAST_MEAN, rival_share * float(best[3]))
+    other, again = search(rival, np.array([*best[:3], SAME_PLACE_M, SAME_HEADING_RAD, 0.0, 0.0]), any_rival)
+    course = open_course(hessian, float(fit[1]), other[:3] - best[:3] if np.isfinite(other[3]) else None)
+    if course.any():
+        other, again = search(
+            rival, np.array([*best[:3], SAME_PLACE_M, SAME_HEADING_RAD, *course]), any_rival
+        )
+        free = np.append(course, 0.0)
+        pull = hessian @ free
+        hessian = hessian - np.outer(pull, pull) / max(free @ pull, 1e-9)
+    second = float(other[3]) if np.isfinite(other[3]) else 0.0
+    found = replace(found, hessian=hessian, second=second, course=course)
     return found, not (cut_short or again)
 
 

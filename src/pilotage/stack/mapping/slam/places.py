@@ -138,6 +138,8 @@ def places(
             config.least_score,
             config.most_ambiguity,
             BUDGET,
+            # What does not count already needs no rivals.
+            lambda found: judged_alone(found, config) is Verdict.ACCEPTED,
         )
         sound[k] = everywhere and judged_alone(matches[k], config) is Verdict.ACCEPTED
     alone = np.diag(sound)
