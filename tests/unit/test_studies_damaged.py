@@ -3,13 +3,21 @@
 from __future__ import annotations
 
 import os
+import sqlite3
+import time
+from collections.abc import Callable
+from contextlib import closing
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
 from pilotage.cli.main import main
 from pilotage.core.errors import InputError
-from pilotage.experiments.studies.database import DATABASE
+from pilotage.experiments.studies import engine
+from pilotage.experiments.studies.database import DATABASE, CorruptDatabaseError
+from pilotage.experiments.studies.engine import run_study
+from pilotage.experiments.studies.options import StudyOptions
 from pilotage.experiments.studies.store import Store
 from support.hostile_studies import study_of
 
@@ -68,3 +76,63 @@ def test_what_is_no_file_is_not_read(how: str, tmp_path: Path, capsys: pytest.Ca
     assert len(capsys.readouterr().err.splitlines()) == 1
     with pytest.raises(InputError, match="expected a study's database, found"):
         Store(tmp_path / "x", study_of())
+
+
+@pytest.mark.parametrize(
+    ("damage", "told"),
+    [
+        ("update trials set status = 'weird' where row = 4", "row 4 neither waits nor runs nor is finished"),
+        ("update trials set attempts = 'x', status = 'pending' where row = 4", "row 4 neither waits nor"),
+        ("update trials set cell = 99, status = 'pending' where row = 4", "row 4 is not what was written"),
+        ("update trials set seed = -1, status = 'pending' where row = 4", "row 4 is not what was written"),
+        ("update trials set row = 99, status = 'pending' where row = 4", "row 99 is not what was written"),
+        ("delete from trials where row = 4", "17 of 18 rows are there"),
+    ],
+)
+def test_a_row_that_nobody_made_is_told_and_not_waited_for(
+    damage: str, told: str, order: Callable[..., None], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    order()
+    run_study(study_of(), tmp_path / "study", StudyOptions(workers=1))
+    _change(tmp_path / "study", damage)
+    _never_waits(monkeypatch)
+    with pytest.raises(CorruptDatabaseError, match=told):
+        run_study(study_of(), tmp_path / "study", StudyOptions(workers=1, resume=True))
+
+
+@pytest.mark.parametrize(
+    "owner",
+    [
+        "",
+        "insert into owners values ('ghost', 'elsewhere', 7, 1e18)",
+        "insert into owners values ('ghost', 'elsewhere', 'pid', 'soon')",
+        "insert into owners select 'ghost', host, 1180591620717411303424, heard_s from owners union "
+        "select 'ghost', 'elsewhere', 1e300, 1e300 limit 1",
+    ],
+    ids=["nobody", "from the future", "no numbers", "no process"],
+)
+def test_a_claim_of_nobody_is_free(
+    owner: str, order: Callable[..., None], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    order()
+    run_study(study_of(), tmp_path / "study", StudyOptions(workers=1))
+    _change(
+        tmp_path / "study", f"update trials set status = 'running', owner = 'ghost' where row = 4; {owner}"
+    )
+    _never_waits(monkeypatch)
+    counts = run_study(study_of(), tmp_path / "study", StudyOptions(workers=1, resume=True))
+    assert (counts.done, counts.failed) == (18, 0)
+
+
+def _change(folder: Path, statements: str) -> None:
+    with closing(sqlite3.connect(folder / DATABASE)) as database:
+        database.executescript(statements)
+
+
+def _never_waits(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Nobody else is at work: to wait for another process would be without end."""
+
+    def waits(_: float) -> None:
+        raise AssertionError("it waits for nobody")
+
+    monkeypatch.setattr(engine, "time", SimpleNamespace(monotonic=time.monotonic, sleep=waits))

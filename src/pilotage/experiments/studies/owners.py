@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import socket
 import sqlite3
@@ -31,6 +32,11 @@ def hear(database: sqlite3.Connection, owner: str) -> None:
                 (other,),
             )
             database.execute("delete from owners where owner = ?", (other,))
+    # Claimed by nobody who is known, as in a damaged file: it would be waited for without end.
+    database.execute(
+        "update trials set status = 'pending', owner = null, attempts = max(attempts - 1, 0) "
+        "where status = 'running' and (owner is null or owner not in (select owner from owners))"
+    )
 
 
 def others(database: sqlite3.Connection, owner: str) -> int:
@@ -40,8 +46,15 @@ def others(database: sqlite3.Connection, owner: str) -> int:
 
 
 def is_gone(host: str, pid: int, heard_s: float) -> bool:
-    """Whether an owner is to be taken for dead: one of this machine by its process, which may be slow."""
+    """Whether an owner is to be taken for dead: one of this machine by its process, which may be slow.
+
+    One that no process of ours wrote, in a damaged file, is: by its types, its process, or a time to come.
+    """
+    if not isinstance(pid, int) or not 0 < pid < 2**31 or not isinstance(heard_s, float):
+        return True
     silent_s = time.time() - heard_s
+    if not -REUSED_S <= silent_s < math.inf:
+        return True
     if host == socket.gethostname():
         return silent_s > REUSED_S or not _alive(pid)
     return silent_s > STALE_S

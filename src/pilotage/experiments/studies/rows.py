@@ -145,6 +145,8 @@ def _row(found: sqlite3.Row) -> dict[str, Any]:
     numbers = (row["row"], row["cell"], row["trial"], row["seed"])
     if not all(isinstance(number, int) for number in numbers) or not isinstance(row["reason"], str):
         raise ValueError(f"row {row['row']}: expected whole numbers and text")
+    if row["status"] not in ("pending", "running", "done", "failed"):
+        raise ValueError(f"row {row['row']} neither waits nor runs nor is finished")
     for key in ("metrics", "timings"):
         row[key] = load_json(row[key], f"row {row['row']}") if row[key] else {}
         if not isinstance(row[key], dict):

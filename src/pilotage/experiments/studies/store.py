@@ -96,6 +96,7 @@ class Store:
                     _fill(self._db, study)
                 else:
                     self._check(study)
+                    self._check_rows(study)
         except BaseException:
             self._db.close()
             raise
@@ -235,6 +236,21 @@ class Store:
             f"({changes_told(load_json(found.get('essence', '{}'), str(self.path)), study)}); "
             "give it another name or folder"
         )
+
+    def _check_rows(self, study: Study) -> None:
+        """All are there, and those to be run are as they were made; finished ones have their checksum."""
+        (count,) = self._db.execute("select count(*) from trials").fetchone()
+        if count != study.rows:
+            raise CorruptDatabaseError(self.path, f"{count} of {study.rows} rows are there")
+        unfinished = self._db.execute(
+            "select row, status, attempts, cell, trial, seed from trials "
+            "where status not in ('done', 'failed')"
+        )
+        for row, status, attempts, *made in unfinished:
+            if status not in ("pending", "running") or not isinstance(attempts, int):
+                raise CorruptDatabaseError(self.path, f"row {row} neither waits nor runs nor is finished")
+            if not 0 <= row < study.rows or made != [*study.place(row), study.seed(row)]:
+                raise CorruptDatabaseError(self.path, f"row {row} is not what was written")
 
     def _hear(self) -> None:
         hear(self._db, self._owner)
