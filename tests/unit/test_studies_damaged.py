@@ -18,6 +18,7 @@ from pilotage.experiments.studies import engine
 from pilotage.experiments.studies.database import DATABASE, CorruptDatabaseError
 from pilotage.experiments.studies.engine import run_study
 from pilotage.experiments.studies.options import StudyOptions
+from pilotage.experiments.studies.rows import read_rows
 from pilotage.experiments.studies.store import Store
 from support.hostile_studies import study_of
 
@@ -96,8 +97,12 @@ def test_a_row_that_nobody_made_is_told_and_not_waited_for(
     run_study(study_of(), tmp_path / "study", StudyOptions(workers=1))
     _change(tmp_path / "study", damage)
     _never_waits(monkeypatch)
+    before = {path.name for path in (tmp_path / "study").iterdir()}
+    assert f"{DATABASE}-wal" not in before
     with pytest.raises(CorruptDatabaseError, match=told):
         run_study(study_of(), tmp_path / "study", StudyOptions(workers=1, resume=True))
+    read_rows(tmp_path / "study" / DATABASE)
+    assert {path.name for path in (tmp_path / "study").iterdir()} - before <= {"trials-salvaged.csv"}
 
 
 @pytest.mark.parametrize(

@@ -164,6 +164,22 @@ def close_gently(database: sqlite3.Connection, path: Path) -> None:
     database.close()
 
 
+def has_log(path: Path) -> bool:
+    """Whether a log lies beside a database: another process is at work, or was and did not close it."""
+    return path.with_name(f"{path.name}-wal").exists()
+
+
+def drop_log(path: Path) -> None:
+    """Take away the log of who may only read, who makes one and cannot delete it.
+
+    SQLite does as the last connection that may write closes; where another process has come, it stays.
+    """
+    with suppress(OSError, sqlite3.Error):
+        if has_log(path) and os.access(path, os.W_OK):
+            with closing(sqlite3.connect(path, timeout=0.0)) as database:
+                database.execute("select 1 from sqlite_master").fetchone()
+
+
 @contextmanager
 def telling(path: Path) -> Iterator[None]:
     """Turn a database's errors into what they mean: broken, not ours to write, or no room."""

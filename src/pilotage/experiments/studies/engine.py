@@ -18,7 +18,13 @@ from pilotage.experiments.build.build import build_source
 from pilotage.experiments.given import has
 from pilotage.experiments.mission import mission_of
 from pilotage.experiments.studies.dask_workers import DaskWorkers
-from pilotage.experiments.studies.database import DATABASE, CorruptDatabaseError, StudyStoppedError
+from pilotage.experiments.studies.database import (
+    DATABASE,
+    CorruptDatabaseError,
+    StudyStoppedError,
+    drop_log,
+    has_log,
+)
 from pilotage.experiments.studies.export import save_what_is_left
 from pilotage.experiments.studies.local_workers import LocalWorkers
 from pilotage.experiments.studies.options import StudyOptions, cores
@@ -86,11 +92,15 @@ def run_study(
         raise InputError(f"{folder}: expected a study that was begun, found none; leave --resume out")
     if not (folder / DATABASE).is_file():
         check_worlds(study)
+    had_log = has_log(folder / DATABASE)
     try:
         counts = _run(study, folder, options, listener)
         check_metrics(study, folder)
     except CorruptDatabaseError as error:
-        raise save_what_is_left(folder, study, error.trouble) from None
+        saved = save_what_is_left(folder, study, error.trouble)
+        if not had_log:
+            drop_log(folder / DATABASE)
+        raise saved from None
     except OSError as error:
         if error.errno != errno.ENOSPC:
             raise

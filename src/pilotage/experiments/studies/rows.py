@@ -11,7 +11,14 @@ from typing import Any
 from pilotage.core.errors import InputError
 from pilotage.core.files import require_file
 from pilotage.core.json_text import load_json
-from pilotage.experiments.studies.database import BUSY_S, LONGEST, checksum, foreign_tables
+from pilotage.experiments.studies.database import (
+    BUSY_S,
+    LONGEST,
+    checksum,
+    drop_log,
+    foreign_tables,
+    has_log,
+)
 
 AT_ONCE = 1024
 """Rows of a broken database that are asked for together before they are asked for one by one."""
@@ -33,6 +40,15 @@ def read_rows(path: Path) -> tuple[list[dict[str, Any]], str]:
     """
     if not path.is_file():
         raise InputError(f"{path}: expected a study's database, found none")
+    had_log = has_log(path)
+    try:
+        return _read_rows(path)
+    finally:
+        if not had_log:
+            drop_log(path)
+
+
+def _read_rows(path: Path) -> tuple[list[dict[str, Any]], str]:
     try:
         with reader(path) as database:
             found = [_row(row) for row in database.execute("select * from trials order by row")]
