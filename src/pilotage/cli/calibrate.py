@@ -65,6 +65,12 @@ def calibrate(
             help="odometry, heading, commands, of bags: the true poses; /tf:PARENT:CHILD too.",
         ),
     ] = None,
+    landmarks: Annotated[
+        Path | None,
+        typer.Option(
+            "--landmarks", metavar="CSV", help="commands, of bags: a table id, x_m, y_m, for the camera."
+        ),
+    ] = None,
     report: Annotated[bool, typer.Option(help="Write report.html into the calibration's folder.")] = True,
     json: Json = False,
 ) -> int:
@@ -83,6 +89,8 @@ def calibrate(
         raise InputError("calibrate: --sensor and --wheel-base are for 'calibrate odometry'")
     if truth is not None and what == "range":
         raise InputError("calibrate: --truth is for 'calibrate odometry', 'heading' and 'commands'")
+    if landmarks is not None and what != "commands":
+        raise InputError("calibrate: --landmarks is for 'calibrate commands'")
     if topics and not logs:
         raise InputError("calibrate: --topic is for bags")
     if axis is not None and what != "heading":
@@ -122,6 +130,7 @@ def calibrate(
                 leave_one_out=leave_one_out,
                 topics=topics or (),
                 truth=truth,
+                landmarks=landmarks,
             )
         answer: dict[str, Any] = dict(result.answer)
         if report:

@@ -17,6 +17,8 @@ from pilotage.experiments.calibrate import CalibrationResult, write_calibration
 from pilotage.logs.bag_calibration import commands_of_bag
 from pilotage.logs.bag_messages import is_bag
 from pilotage.logs.mrclam import ROBOTS, MrclamLog, read_mrclam
+from pilotage.maps.landmark_table import read_landmark_table
+from pilotage.maps.world_map import NO_LANDMARKS
 from pilotage.records.calibration import PARAMETER_FILE, SETS_FILE
 
 LOCALIZER = "ekf-gauss-markov"
@@ -30,11 +32,13 @@ def commands_from(
     leave_one_out: bool = False,
     topics: Sequence[str] = (),
     truth: str | None = None,
+    landmarks: Path | None = None,
 ) -> CalibrationResult:
     """Calibrate from bags, or folders of MRCLAM recordings; without ``robots`` from all that are in them.
 
-    With ``leave_one_out`` a file of parameter sets is written too: one learned from all recordings, and one
-    without each of them, so that none is ever run with parameters learned from itself.
+    With a table of ``landmarks`` a bag's camera is calibrated too. With ``leave_one_out`` a file of parameter
+    sets is written too: one learned from all recordings, and one without each of them, so that none is ever
+    run with parameters learned from itself.
     """
     bags = [is_bag(place) for place in places]
     if any(bags):
@@ -42,9 +46,10 @@ def commands_from(
             other = f"--robot {robots[0]}" if robots else f"{places[bags.index(False)]} beside a bag"
             raise InputError(f"calibrate commands: expected bags alone, found {other}")
         recordings = [(place, 0) for place in places]
-        logs = [commands_of_bag(place, topics, truth) for place in places]
-    elif topics or truth is not None:
-        raise InputError("calibrate commands: --topic and --truth are for bags")
+        known = NO_LANDMARKS if landmarks is None else read_landmark_table(landmarks)
+        logs = [commands_of_bag(place, topics, truth, known) for place in places]
+    elif topics or truth is not None or landmarks is not None:
+        raise InputError("calibrate commands: --topic, --truth and --landmarks are for bags")
     else:
         recordings = [(place, robot) for place in places for robot in _robots(place, robots)]
         logs = [read_mrclam(place, robot) for place, robot in recordings]

@@ -229,6 +229,7 @@ def calibrate(
     leave_one_out: bool = False,
     topics: Sequence[str] = (),
     truth: str | None = None,
+    landmarks: FilePath | None = None,
     out: FilePath = "runs",
 ) -> Calibration:
     """Estimate a sensor's or a drive's noise and systematic errors.
@@ -250,6 +251,8 @@ def calibrate(
     topics, truth
         Of bags: what is calibrated, where the usual one is not meant; odometry, heading, commands: the topic
         of the truth.
+    landmarks
+        commands, of bags: a CSV table id, x_m, y_m, by which the camera is calibrated too.
 
     Raises
     ------
@@ -292,6 +295,7 @@ def calibrate(
             leave_one_out=given.flag("leave_one_out", leave_one_out),
             topics=topics,
             truth=truth,
+            landmarks=None if landmarks is None else given.path("landmarks", landmarks),
         )
     return Calibration(result.answer, result.folder)
 

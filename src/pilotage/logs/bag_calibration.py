@@ -20,19 +20,21 @@ from pilotage.logs.bag_series import (
     has,
     has_odometry,
     headings,
+    landmarks_in_base,
     read_odometry,
     read_poses,
     read_series,
     topic_of,
 )
 from pilotage.logs.bag_topics import Kind
-from pilotage.logs.bags import ODOMETRY, SCANS, read_bag
+from pilotage.logs.bags import ODOMETRY, SCANS, USUAL_BASES, read_bag
 from pilotage.logs.heading_csv import HeadingLog, HeadingSensor
 from pilotage.logs.laser_log import interpolate_poses
 from pilotage.logs.mrclam import MrclamLog
 from pilotage.logs.odometry_steps import OdometryForm, OdometrySteps, carried_over
 from pilotage.logs.reckoning_mat import ReckoningLog
 from pilotage.logs.steady_csv import LEAST_ROWS, MOST_COLUMNS, Column
+from pilotage.maps.landmarks import Landmarks
 from pilotage.maps.world_map import NO_LANDMARKS
 
 STEP_S = 0.1
@@ -101,38 +103,45 @@ def odometry_of_bag(path: Path, topics: Sequence[str] = (), truth: str | None = 
     )
 
 
-def commands_of_bag(path: Path, topics: Sequence[str] = (), truth: str | None = None) -> MrclamLog:
+def commands_of_bag(
+    path: Path, topics: Sequence[str] = (), truth: str | None = None, landmarks: Landmarks = NO_LANDMARKS
+) -> MrclamLog:
     """Commanded velocities beside where the robot went: by the truth, where there is any, else the odometry.
 
-    A command holds until the next one, half a second at most, as bases take it. There are no landmarks.
+    A command holds until the next one, half a second at most, as bases take it.
 
     Parameters
     ----------
     topics
-        The commands (``Twist``, ``TwistStamped``) and the odometry (``nav_msgs/Odometry``), in any order; by
-        default the usual ones.
+        The commands (``Twist``, ``TwistStamped``), the odometry (``nav_msgs/Odometry``) and detections of
+        landmarks, in any order; by default the usual ones.
     truth
         As ``odometry_of_bag`` has it.
+    landmarks
+        Where they are in the frame of the truth; none: the detections are left out.
 
     Raises
     ------
     InputError
-        Where the bag has not both; the message tells what it holds.
+        Where the bag has not both commands and where they led, or landmarks are given and it has no truth or
+        none of them; the message tells what it holds.
     """
-    told: dict[bool, str] = {}
+    told: dict[Kind, str] = {}
     for asked in topics:
         name, msgtype = topic_of(path, asked)
-        if msgtype not in (*TWISTS.types, *ODOMETRY.types) or (msgtype in TWISTS.types) in told:
+        kind = next((k for k in (TWISTS, ODOMETRY, LANDMARKS) if msgtype in k.types), None)
+        if kind is None or kind in told or (kind is LANDMARKS and not len(landmarks.ids)):
             raise InputError(
-                f"{path}: topic {name}: expected one of commands ({TWISTS.types[-1]}) and one of odometry "
-                f"({ODOMETRY.types[0]}), found {msgtype}"
+                f"{path}: topic {name}: expected one of commands ({TWISTS.types[-1]}), one of odometry "
+                f"({ODOMETRY.types[0]}) and with --landmarks one of detections, found {msgtype}"
             )
-        told[msgtype in TWISTS.types] = name
-    sent = read_series(path, TWISTS, told.get(True))
-    if truth is not None or (False not in told and has(path, TRUTH)):
+        told[kind] = name
+    sent = read_series(path, TWISTS, told.get(TWISTS))
+    if truth is not None or len(landmarks.ids) or (ODOMETRY not in told and has(path, TRUTH)):
         went = read_poses(path, truth, TRUTH)
     else:
-        went = read_odometry(path, told.get(False))
+        went = read_odometry(path, told.get(ODOMETRY))
+    seen = _detections(path, told.get(LANDMARKS), landmarks)
     if min(len(sent.t_s), len(went.t_s)) < LEAST_ROWS:
         raise InputError(
             f"{path}: expected {LEAST_ROWS} or more messages of {sent.topic} and of {went.topic}, found "
@@ -143,21 +152,32 @@ def commands_of_bag(path: Path, topics: Sequence[str] = (), truth: str | None = 
     rates = np.concatenate([sent.values[:, :2], np.zeros((len(silent), 2))])
     order = np.argsort(t_s, kind="stable")
     wide = np.flatnonzero(np.diff(went.t_s) > TRUTH_GAP_S)
-    none = np.zeros(0)
     return MrclamLog(
         0,
         t_s[order],
         rates[order, 0],
         rates[order, 1],
-        none,
-        none.astype(np.int64),
-        none,
-        none,
+        seen.t_s,
+        seen.values[:, 0].astype(np.int64),
+        np.hypot(seen.values[:, 1], seen.values[:, 2]),
+        np.arctan2(seen.values[:, 2], seen.values[:, 1]),
         went.t_s,
         headings(went.values),
         np.column_stack([went.t_s[wide], went.t_s[wide + 1]]),
-        NO_LANDMARKS,
+        landmarks,
     )
+
+
+def _detections(path: Path, topic: str | None, landmarks: Landmarks) -> Series:
+    """Of the landmarks that are known, in the robot's frame; none where none are."""
+    if not len(landmarks.ids):
+        return Series("", "", np.zeros(0), np.zeros((0, 4)))
+    found = landmarks_in_base(path, topic, USUAL_BASES)
+    known = np.isin(found.values[:, 0], landmarks.ids)
+    if not known.any():
+        seen = ", ".join(f"{i:g}" for i in np.unique(found.values[:, 0])[:8])
+        raise InputError(f"{path}: expected landmarks of the table in {found.topic}, found only {seen}")
+    return Series(found.topic, found.frame, found.t_s[known], found.values[known], found.warnings)
 
 
 def headings_of_bag(path: Path, topics: Sequence[str] = ()) -> list[HeadingLog]:

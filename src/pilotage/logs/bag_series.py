@@ -8,7 +8,7 @@ them 0. Landmarks are read from any list of detections that names what was seen 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeAlias
@@ -234,6 +234,29 @@ def mount_matrix(path: Path, base: str, sensor: str) -> FloatArray | None:
         return None if found is None else found[0]
 
     return read_through(path, read)
+
+
+def landmarks_in_base(path: Path, topic: str | None, bases: Sequence[str]) -> Series:
+    """Landmarks as the robot's frame has them, x ahead and y to the left, by the transforms.
+
+    They lead from one of the frames ``bases``; a warning tells where none do.
+
+    Raises
+    ------
+    InputError
+        As ``read_series``.
+    """
+    found = read_series(path, LANDMARKS, topic)
+    matrix = next((m for base in bases if (m := mount_matrix(path, base, found.frame)) is not None), None)
+    if matrix is None:
+        said = (
+            f"no transforms from {' or '.join(bases)} to the frame '{found.frame}' of {found.topic}: x is "
+            "taken to look ahead and y to the left"
+        )
+        return Series(found.topic, found.frame, found.t_s, found.values, (*found.warnings, said))
+    places = found.values[:, 1:] @ matrix[:3, :3].T + matrix[:3, 3]
+    rows = np.column_stack([found.values[:, :1], places])
+    return Series(found.topic, found.frame, found.t_s, rows, found.warnings)
 
 
 def _series(bag: OpenBag, path: Path, kind: Kind, name: str, said: list[str]) -> Series:

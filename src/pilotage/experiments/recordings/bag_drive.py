@@ -33,7 +33,7 @@ from pilotage.logs.bag_series import (
     has,
     has_odometry,
     headings,
-    mount_matrix,
+    landmarks_in_base,
     read_odometry,
     read_poses,
     read_series,
@@ -223,20 +223,12 @@ def _laser(log: Path, chart: WorldMap, wanted: BagTopics, bag: bool) -> LaserLog
 
 
 def _landmarks(log: Path, chart: WorldMap, wanted: BagTopics, said: list[str]) -> Series | None:
-    """Landmarks as the robot's frame has them: x ahead, y to the left."""
+    """Landmarks in the robot's frame, where the map and the recording have any."""
     if not len(chart.landmarks.ids) or (wanted.landmarks is None and not has(log, LANDMARKS)):
         return None
-    found = read_series(log, LANDMARKS, wanted.landmarks)
+    found = landmarks_in_base(log, wanted.landmarks, BASES)
     said += found.warnings
-    matrix = next((m for base in BASES if (m := mount_matrix(log, base, found.frame)) is not None), None)
-    if matrix is None:
-        said.append(
-            f"no transforms from {' or '.join(BASES)} to the frame '{found.frame}' of {found.topic}: x is "
-            "taken to look ahead and y to the left"
-        )
-        return found
-    places = found.values[:, 1:] @ matrix[:3, :3].T + matrix[:3, 3]
-    return Series(found.topic, found.frame, found.t_s, np.column_stack([found.values[:, :1], places]))
+    return found
 
 
 def _odometry(
