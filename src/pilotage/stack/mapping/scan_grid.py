@@ -43,7 +43,7 @@ class ScanGrid:
 
     def __init__(self, scanner: LidarConfig, resolution_m: float) -> None:
         angles = scanner.beam_angles_rad()
-        self.resolution_m = resolution_m
+        self.resolution_m, self._scanner = resolution_m, scanner
         self._first, self._step, self._reach = float(angles[0]), scanner.beam_step_rad, scanner.max_range_m
         self._scans: list[FloatArray] = []
         self.poses = np.zeros((0, 3))
@@ -81,6 +81,13 @@ class ScanGrid:
         """Return the map as it is now."""
         odds = self._odds if self._odds.size else np.zeros((1, 1), np.int8)
         return grid_of(odds, self.resolution_m, self.corner_xy_m)
+
+    def drawn(self, resolution_m: float) -> OccupancyGrid:
+        """Return a map of the same scans at the same poses, in cells of another side."""
+        other = ScanGrid(self._scanner, resolution_m)
+        other._scans, other.poses = self._scans, self.poses
+        other._redraw()
+        return other.grid()
 
     def _redraw(self) -> None:
         self._odds[:] = 0

@@ -11,6 +11,7 @@ import numpy as np
 from pilotage.core.config import Config
 from pilotage.core.errors import InputError
 from pilotage.core.types import STOP, FloatArray, Pose2, Twist
+from pilotage.maps.occupancy_grid import OccupancyGrid
 from pilotage.maps.world_map import WorldMap
 from pilotage.sensors.lidar import LidarConfig
 from pilotage.sensors.readings import LidarScan, Readings
@@ -66,6 +67,9 @@ class FloorExplorerConfig(Config):
     arrival_m: Positive = 0.04
     """How near to the start it has to believe to be in the end."""
     resolution_m: Positive = 0.05
+    """Side of a cell of the map that it drives by, where the localizer makes none,"""
+    map_resolution_m: Positive | None = None
+    """and of the map that it leaves, drawn anew from the same scans: walls are known to half a cell."""
     keyframe_m: Positive = 0.25
     keyframe_rad: Positive = 0.2
     """How far apart the scans of its map are, where the localizer makes none."""
@@ -140,13 +144,17 @@ class FloorExplorer(LocalizingNavigator):
         self._sure_m, self._checked = 0.0, 0
         self._planned_s, self._moved_s, self._moved_from = -math.inf, 0.0, self._start
         self._frontiers = 0
-        journal.result("grid", self._grid.grid)
+        journal.result("grid", self._left)
         journal.counts |= dict.fromkeys(COUNTS, 0)
         self._channel = journal.channel(
             {"goal_x_m": "m", "goal_y_m": "m", "frontiers": "1", "position_std_m": "m"}, first=True
         )
 
     _target: Target | None
+
+    def _left(self) -> OccupancyGrid:
+        side_m = self._config.map_resolution_m
+        return self._grid.grid() if side_m is None else self._grid.drawn(side_m)
 
     def step(self, readings: Readings) -> Twist:
         """Localize, look whether there is something better to do, and drive."""
