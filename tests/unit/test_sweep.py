@@ -2,22 +2,24 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 import pytest
 
 from pilotage.core.errors import InputError
-from pilotage.core.types import FloatArray, Goal, Pose2
+from pilotage.core.types import BoolArray, FloatArray, Goal, Pose2
 from pilotage.experiments.build.build import build
 from pilotage.experiments.loop import run_loop
 from pilotage.experiments.mission import mission_of
+from pilotage.kernels.patrol.reshape import Ground, count_leg, is_free, reshape, straightened
 from pilotage.kernels.patrol.swept import mark_swept
-from pilotage.kernels.patrol.trim import trimmed
 from pilotage.kernels.tours.entries import anneal_entries, entries_cost
 from pilotage.maps.floor import Floor
 from pilotage.maps.segment_map import SegmentMap, box_segments
 from pilotage.maps.world_map import WorldMap
 from pilotage.stack.navigator.timed_path import with_turns
-from pilotage.stack.planning.boustrophedon import BoustrophedonConfig, BoustrophedonPlanner
+from pilotage.stack.planning.boustrophedon import BoustrophedonConfig, BoustrophedonPlanner, subdivided
 from pilotage.stack.planning.planner import PlanRequest, PlanResult
 from support.missions import MISSIONS
 
@@ -28,15 +30,15 @@ FLOORS = {
     "a box askew": np.vstack([ROOM, box_segments(5.0, 4.0, 2.0, 1.0, 0.6)]),
     "a slanted wall": np.array([*ROOM, [0, 5, 4, 8]], dtype=float),
 }
-MOST = 1.08
-"""Of area over width: 1.1 is what is asked for, and what these took before paths were trimmed, or more."""
+MOST = 1.06
+"""Of area over width: 1.1 is what is asked for; the same lines without changes take more."""
 
 
 def swept(walls: FloatArray, goal: tuple[float, float] = (1.0, 1.0)) -> tuple[WorldMap, PlanResult]:
     world = WorldMap(
         "floor", (0.0, 0.0, 10.0, 8.0), geometry=SegmentMap(walls, np.zeros((0, 3)), (0, 0, 10, 8))
     )
-    planner = BoustrophedonPlanner(BoustrophedonConfig(width_m=0.5, clearance_m=0.25))
+    planner = BoustrophedonPlanner(BoustrophedonConfig(width_m=0.8, clearance_m=0.4))
     request = PlanRequest(Pose2(1.0, 1.0, 0.0), Goal(*goal), world.field, np.random.default_rng(0))
     return world, planner.plan(request)
 
@@ -46,13 +48,13 @@ def test_the_whole_floor_is_swept_and_nothing_is_touched(name: str) -> None:
     world, result = swept(FLOORS[name])
     assert result.path is not None
     xy = np.ascontiguousarray(result.path.states[:, :2])
-    assert min(world.walls.distance_m(x, y) for x, y in xy) >= 0.249
-    floor = Floor.of(world, 0.25, 0.5 / 12, (1.0, 1.0))
+    assert min(world.walls.distance_m(x, y) for x, y in xy) >= 0.399
+    floor = Floor.of(world, 0.4, 0.8 / 12, (1.0, 1.0))
     covered = np.zeros_like(floor.reachable)
-    mark_swept(xy, 0.25, *floor.origin_xy_m, floor.cell_m, covered)
+    mark_swept(xy, 0.4, *floor.origin_xy_m, floor.cell_m, covered)
     assert not (floor.reachable & ~covered).any()
     area_m2 = np.count_nonzero(floor.swept) * floor.cell_m**2
-    assert result.path.length_m * 0.5 / area_m2 <= MOST
+    assert result.path.length_m * 0.8 / area_m2 <= MOST
 
 
 def test_a_goal_that_is_walled_off_is_no_path() -> None:
@@ -73,29 +75,80 @@ def test_a_disc_covers_what_is_within_its_radius_of_a_line() -> None:
     assert not covered[away > 0.301].any()
 
 
-def test_a_path_is_trimmed_to_what_it_needs_and_leaves_nothing_out() -> None:
+CELL_M, SHAPE, WIDTH_M = 0.04, (160, 260), 0.5
+
+
+def ground_of(path: FloatArray, must: BoolArray, free: BoolArray | None = None) -> Ground:
+    """Cells that a path has to sweep, with its counts."""
+    grid = 0.0, 0.0, CELL_M
+    price = np.where(must, 60.0 * CELL_M**2 / WIDTH_M, 0.0)
+    counts = np.zeros(SHAPE, np.int64)
+    ground = WIDTH_M, grid, price, counts, grid, np.ones(SHAPE, np.bool_) if free is None else free
+    for a, b in itertools.pairwise(path):
+        count_leg(np.concatenate([a, b]), 1, ground)
+    return ground
+
+
+def reshaped(path: FloatArray, ground: Ground, tries: int) -> FloatArray:
+    room = np.zeros((3 * len(path), 2))
+    room[: len(path)] = path
+    draws = np.random.default_rng(3).random((tries, 6))
+    return room[: reshape(room, len(path), draws, (0.05, 0.0005), ground)]
+
+
+def test_the_cells_that_a_leg_sweeps_are_those_near_to_it() -> None:
+    rng = np.random.default_rng(4)
+    legs = [*rng.uniform(-0.5, 7.0, (30, 4)), [1.0, 1.0, 1.0, 1.0], [1, 2, 4, 2], [3, 1, 3, 5]]
+    for leg in np.array(legs):
+        path, near = leg.reshape(2, 2), np.zeros(SHAPE, np.bool_)
+        ground = ground_of(path, np.ones(SHAPE, np.bool_))
+        mark_swept(path, 0.5 * WIDTH_M, 0.0, 0.0, CELL_M, near)
+        # On the very rim rounding decides.
+        assert np.count_nonzero((ground[3] == 1) != near) <= 4
+        gained = -60.0 * CELL_M**2 / WIDTH_M * np.count_nonzero(ground[3])
+        assert -count_leg(leg, -1, ground) == pytest.approx(gained)
+        assert not ground[3].any()
+
+
+def test_a_path_is_changed_to_what_it_needs_and_leaves_nothing_out() -> None:
     """Lines across a room, a way back along their ends, and a detour to where they were."""
     lines = [[1.0 + 8.0 * (k % 4 in (1, 2)), 1.0 + 0.5 * (k // 2)] for k in range(20)]
-    path = np.array([[1.0, 1.0], *lines, [9.0, 5.5], [4.0, 5.0], [9.0, 5.5], [9.0, 1.0], [1.0, 1.0]])
-    free = np.ones((80, 120), np.bool_)
-    cell, shape = 0.04, (160, 260)
-    before, after = np.zeros(shape, np.bool_), np.zeros(shape, np.bool_)
-    mark_swept(path, 0.25, 0.0, 0.0, cell, before)
-    short = trimmed(path, 0.5, cell, shape, free, (0.0, 0.0, 0.1), 40)
-    mark_swept(short, 0.25 + 1e-6, 0.0, 0.0, cell, after)
+    corners = np.array([[1.0, 1.0], *lines, [9.0, 5.5], [4.0, 5.0], [9.0, 5.5], [9.0, 1.0], [1.0, 1.0]])
+    path = subdivided(corners, WIDTH_M)
+    assert np.hypot(*np.diff(path, axis=0).T).max() <= WIDTH_M + 1e-9
+    must, after = np.zeros(SHAPE, np.bool_), np.zeros(SHAPE, np.bool_)
+    mark_swept(path, 0.5 * WIDTH_M, 0.0, 0.0, CELL_M, must)
+    ground = ground_of(path, must)
+    short = reshaped(path, ground, 60_000)
     assert (short[[0, -1]] == path[[0, -1]]).all()
-    assert not (before & ~after).any()
+    mark_swept(np.ascontiguousarray(short), 0.5 * WIDTH_M, 0.0, 0.0, CELL_M, after)
+    assert np.count_nonzero(must & ~after) <= 2
+    # What it counts on the way is what there is in the end.
+    assert (ground_of(short, must)[3] == ground[3]).all()
     lengths = [np.hypot(*np.diff(line, axis=0).T).sum() for line in (path, short)]
     # The detour is 10 m of it; the way back sweeps half a metre of each second pair of lines' ends.
     assert lengths[1] < lengths[0] - 12.0
 
 
-def test_nothing_is_cut_short_through_a_wall() -> None:
-    path = np.array([[1.0, 1.0], [1.0, 3.0], [1.4, 3.0], [1.4, 1.0]])
-    free = np.ones((40, 40), np.bool_)
-    free[:25, 12] = False
-    short = trimmed(path, 4.0, 0.2, (20, 20), free, (0.0, 0.0, 0.1), 40)
-    assert short[:, 1].max() > 2.5
+def test_nothing_is_driven_through_a_wall() -> None:
+    path = subdivided(np.array([[1.0, 1.0], [1.0, 3.0], [1.4, 3.0], [1.4, 1.0]]), 0.25)
+    free = np.ones(SHAPE, np.bool_)
+    free[:60, 30] = False
+    short = reshaped(path, ground_of(path, np.zeros(SHAPE, np.bool_), free), 20_000)
+    grid = 0.0, 0.0, CELL_M
+    assert all(is_free(a, b, free, grid) for a, b in itertools.pairwise(short))
+    assert short[:, 1].max() > 2.3
+    assert np.hypot(*np.diff(short, axis=0).T).sum() < 3.2
+
+
+def test_a_line_takes_the_place_of_vertices_beside_it_where_it_is_free() -> None:
+    path = np.array([[1, 1], [2, 1.01], [3, 1], [4, 1.2], [5, 1], [5, 3], [5.02, 2], [5, 4]], dtype=float)
+    open_floor = ground_of(path, np.zeros(SHAPE, np.bool_))
+    assert straightened(path, 0.05, open_floor).tolist() == path[[0, 2, 3, 4, 5, 6, 7]].tolist()
+    free = np.ones(SHAPE, np.bool_)
+    free[25, 35] = False  # on the straight line, below the first bend
+    straight = straightened(np.array([[1, 1.02], [1.4, 1.07], [2, 1.02]]), 0.1, ground_of(path, ~free, free))
+    assert len(straight) == 3
 
 
 def test_things_in_a_row_are_visited_one_after_the_other() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 import time
 
@@ -12,8 +13,8 @@ from scipy import ndimage
 from pilotage.core.config import Config
 from pilotage.core.errors import InputError
 from pilotage.core.types import BoolArray, FloatArray
+from pilotage.kernels.patrol.reshape import count_leg, reshape, straightened
 from pilotage.kernels.patrol.swept import mark_swept
-from pilotage.kernels.patrol.trim import trimmed
 from pilotage.kernels.tours.entries import anneal_entries
 from pilotage.maps.distance_field import DistanceField
 from pilotage.maps.floor import Floor, sweepable
@@ -25,14 +26,24 @@ from pilotage.stack.planning.sweep_lines import sweep_cell_m, sweep_lines
 
 TRIES_A_CELL = 3000
 """Changes that are tried to the order of cells."""
-DETOUR_ROUNDS, TRIM_ROUNDS = 6, 40
+DETOUR_ROUNDS = 6
 DRIVEN = 0.003
 """Of the width is lost to driving: 1 mm to either side of a pass of 0.6 m."""
-LAYOUTS = ((0.0, 8), (0.005, 8), (0.01, 12), (0.03, 8))
-"""Overlaps of neighbouring lines, as shares of the width, and rows of cells from one to the next: with less
-overlap more is left between the lines' ends, smaller cells come nearer to walls."""
-FINE_CELLS, MOST_FINE_CELLS = 12, 4_000_000
-"""Cells a width that tell whether a shorter path still sweeps the same; larger floors take coarser ones."""
+FINE_CELLS = 12
+"""Cells a width that tell what is swept; larger floors take coarser ones."""
+TRIES_A_WIDTH, MOST_TRIES, BATCH = 700, 2_000_000, 20_000
+"""Changes that are tried to the path, for each width of its length, and at most; so many draws at once."""
+CHANGE_CELLS, MARGIN, MOST_CHANGE_CELLS = 36, 0.25, 12_000_000
+"""Cells a width that these changes are judged by, for they would find slivers between the middles of coarser
+ones; a pass is taken to be narrower by so much of a cell to either side."""
+WARM, COLD = 0.15, 0.001
+"""Temperature of these changes at first and in the end, in widths."""
+STRAIGHT = 0.01
+"""Of the width may a line pass beside the vertices that it takes the place of."""
+FLOOR_WORTH, FLOOR_WORTH_END, RIM_WORTH = 3.0, 60.0, 3.0
+"""A cell that is left costs so many times what it takes a pass to sweep it: of the floor where the robot's
+centre can be, which has to be swept all in the end, and of the rim that only its body reaches, where corners
+may be left that would take more."""
 
 
 class BoustrophedonConfig(Config):
@@ -45,14 +56,13 @@ class BoustrophedonConfig(Config):
 
 @PLANNERS.add("boustrophedon", BoustrophedonConfig)
 class BoustrophedonPlanner:
-    """From the start over the whole reachable floor to the goal, in lines as far apart as a pass is wide.
+    """From the start over the whole reachable floor to the goal, in passes beside one another.
 
-    The floor is cut into cells where lines split and join; cells are put in a good order; what lines leave
-    out is swept by detours; then the path is made shorter where other parts of it sweep the same. Of both
-    directions and some overlaps of lines the path is taken that wastes least. Swept is all of the floor where
-    the robot's centre can be, by cells of a twelfth of the width. Of the rim along walls that only its body
-    reaches, the corners between the ends of lines are left (some 4 % of the floor): loops along all walls
-    would sweep them for a path 5 to 20 % longer.
+    The floor is cut into cells where lines split and join, and cells are put in a good order; of both
+    directions of lines the path is taken that wastes less. Then it is changed at random, as a whole, until it
+    is short for what it sweeps; what is left is swept by detours. Swept is all of the floor where the robot's
+    centre can be, by cells of a twelfth of the width. Of the rim along walls that only its body reaches,
+    corners are left (2 to 5 % of the floor) that would take three times the path that their area does.
     """
 
     def __init__(self, config: BoustrophedonConfig) -> None:
@@ -75,20 +85,20 @@ class BoustrophedonPlanner:
             floor = Floor.of_field(request.field, bounds_m, clearance_m, fine_m, start)
             inner_m = clearance_m + math.sqrt(0.5) * floor.cell_m
             inner = Floor.of_field(request.field, bounds_m, inner_m, fine_m, start)
-            lines = [
-                _completed(
-                    floor,
-                    inner,
-                    _sweep(request.field, clearance_m, driven_m, along_y, layout, start, goal),
-                    driven_m,
-                )
-                for layout in LAYOUTS
+            paths = [
+                _lines(request.field, clearance_m, driven_m, along_y, start, goal)
                 for along_y in (False, True)
             ]
         except InputError as error:
             return failure(PlanStatus.NO_PATH, str(error), time.perf_counter() - began)
         within_reach = sweepable(floor, width_m)
-        best = min(lines, key=lambda line: _waste_m(floor, within_reach, line, width_m))
+
+        def waste_m(path: FloatArray) -> float:
+            return _waste_m(floor, within_reach, path, width_m)
+
+        first = min(paths, key=waste_m)
+        changed = _reshaped(request.field, floor, inner, within_reach, first, driven_m)
+        best = min((_completed(floor, inner, path, driven_m) for path in (changed, first)), key=waste_m)
         path = path_of_line(best, request, self._config.waypoint_spacing_m)
         took = time.perf_counter() - began
         area_m2 = np.count_nonzero(within_reach) * floor.cell_m**2
@@ -97,31 +107,28 @@ class BoustrophedonPlanner:
         return PlanResult(PlanStatus.FOUND, reason, path, took, took)
 
 
-def _sweep(
+def _lines(
     field: DistanceField,
     clearance_m: float,
     width_m: float,
     along_y: bool,
-    layout: tuple[float, int],
     start: tuple[float, float],
     goal: tuple[float, float],
 ) -> FloatArray:
-    """(N, 2) the path from start to goal that sweeps everything, by lines in one direction, made shorter."""
-    bounds_m, (overlap, rows) = field.bounds_m, layout
-    cell_m = sweep_cell_m(bounds_m, width_m, overlap, rows)
+    """(N, 2) a path from start to goal that sweeps nearly everything, by lines in one direction."""
+    bounds_m = field.bounds_m
+    cell_m = sweep_cell_m(bounds_m, width_m)
     # A straight line through cells' middles comes half a diagonal nearer to walls than these are.
     inner_m = (
         clearance_m + math.sqrt(0.5) * Floor.of_field(field, bounds_m, clearance_m, cell_m, start).cell_m
     )
     inner = Floor.of_field(field, bounds_m, inner_m, cell_m, start)
-    # And where the floor ends in a cell whose middle lies beyond, it has a share of it.
-    floor = Floor.of_field(field, bounds_m, clearance_m - 0.4 * inner.cell_m, cell_m, start)
-    cells = [_variants(lines) for lines in sweep_lines(inner, width_m, along_y, overlap)]
+    cells = [_variants(lines) for lines in sweep_lines(inner, width_m, along_y)]
     path = np.array([start])
     ordered = _ordered(inner, cells, np.array(start), np.array(goal))
     for place in np.concatenate([*ordered, np.array([goal])]):
         path = np.vstack([path, _joined(inner, path[-1], place)[1:]])
-    return _trimmed(inner, _completed(floor, inner, path, width_m), width_m)
+    return path
 
 
 def _completed(floor: Floor, inner: Floor, path: FloatArray, width_m: float) -> FloatArray:
@@ -135,17 +142,73 @@ def _completed(floor: Floor, inner: Floor, path: FloatArray, width_m: float) -> 
     return path
 
 
-def _trimmed(inner: Floor, path: FloatArray, width_m: float) -> FloatArray:
-    """(N, 2) the path without what other parts of it sweep anyway."""
-    path = path[np.concatenate([[True], np.hypot(*np.diff(path, axis=0).T) > 1e-9])]
-    rows, columns = inner.reachable.shape
-    side_m = np.array([rows, columns]) * inner.cell_m
-    fine_m = max(width_m / FINE_CELLS, math.sqrt(float(side_m.prod()) / MOST_FINE_CELLS))
-    shape = math.ceil(side_m[0] / fine_m), math.ceil(side_m[1] / fine_m)
-    x0, y0 = inner.origin_xy_m
-    grid = float(x0), float(y0), inner.cell_m
+def _reshaped(
+    field: DistanceField,
+    floor: Floor,
+    inner: Floor,
+    within_reach: BoolArray,
+    path: FloatArray,
+    width_m: float,
+) -> FloatArray:
+    """(N, 2) the path changed at random until it is short for what it sweeps, through the inner floor."""
+    line = subdivided(path, width_m)
+    size = len(line)
+    # Vertices are put in and left out: room for three times as many.
+    path = np.zeros((3 * size + 100, 2))
+    path[:size] = line
+    coarse = float(floor.origin_xy_m[0]), float(floor.origin_xy_m[1]), floor.cell_m
+    parts = _parts(floor, width_m)
+    fine = *coarse[:2], floor.cell_m / parts
+    must, may = _parted_floor(field, floor, parts), _parted(within_reach, parts)
+    counts, price = np.zeros(must.shape, np.int64), np.zeros(must.shape)
+    cell_price = fine[2] ** 2 / width_m
+    price[may] = RIM_WORTH * cell_price
     free = np.ascontiguousarray(inner.reachable)
-    return trimmed(np.ascontiguousarray(path), width_m, fine_m, shape, free, grid, TRIM_ROUNDS)
+    ground = width_m - 2.0 * MARGIN * fine[2], fine, price, counts, coarse, free
+    for a, b in itertools.pairwise(line):
+        count_leg(np.concatenate([a, b]), 1, ground)
+    rng = np.random.default_rng(0)  # the same floor, the same path
+    batches = math.ceil(min(TRIES_A_WIDTH * size, MOST_TRIES) / BATCH)
+    for batch in range(batches):
+        done, then = batch / batches, (batch + 1) / batches
+        price[must] = cell_price * FLOOR_WORTH * (FLOOR_WORTH_END / FLOOR_WORTH) ** done
+        heats = WARM * width_m * (COLD / WARM) ** done, WARM * width_m * (COLD / WARM) ** then
+        size = reshape(path, size, rng.random((BATCH, 6)), heats, ground)
+    # Legs of a width are for changing them; every bend that is left is a stop and a turn.
+    return straightened(path[:size].copy(), STRAIGHT * width_m, ground)
+
+
+def _parts(floor: Floor, width_m: float) -> int:
+    """Of a cell's side, odd, so that a cell's middle is that of a part."""
+    wanted = CHANGE_CELLS * floor.cell_m / width_m
+    most = math.sqrt(MOST_CHANGE_CELLS / floor.reachable.size)
+    return max(1, 2 * min(math.ceil(0.5 * wanted - 0.6), math.floor(0.5 * most - 0.5)) + 1)
+
+
+def _parted(cells: BoolArray, parts: int) -> BoolArray:
+    """The same in cells of a part of the side."""
+    return np.repeat(np.repeat(cells, parts, axis=0), parts, axis=1)
+
+
+def _parted_floor(field: DistanceField, floor: Floor, parts: int) -> BoolArray:
+    """The floor in cells of a part of the side, with its edge where distances to walls say."""
+    near = ndimage.binary_dilation(floor.reachable, np.ones((3, 3), np.bool_))
+    out = _parted(near, parts)
+    cell_m, (x0, y0) = floor.cell_m / parts, floor.origin_xy_m
+    x = x0 + (np.arange(out.shape[1]) + 0.5) * cell_m
+    for row, cells in enumerate(out):
+        at = np.column_stack([x[cells], np.full(np.count_nonzero(cells), y0 + (row + 0.5) * cell_m)])
+        cells[cells] = field.at(at) >= floor.radius_m
+    return out
+
+
+def subdivided(path: FloatArray, longest_m: float) -> FloatArray:
+    """(N, 2) the same path, in legs no longer than so."""
+    length_m = np.hypot(*np.diff(path, axis=0).T)
+    parts = np.maximum(1, np.ceil(length_m / longest_m - 1e-9)).astype(int)
+    at = np.concatenate([k + np.arange(number) / number for k, number in enumerate(parts)])
+    at = np.append(at, len(path) - 1)
+    return np.column_stack([np.interp(at, np.arange(len(path)), path[:, k]) for k in (0, 1)])
 
 
 def _waste_m(floor: Floor, within_reach: BoolArray, path: FloatArray, width_m: float) -> float:

@@ -10,26 +10,17 @@ import numpy as np
 from pilotage.core.types import BoolArray, FloatArray, IntArray
 from pilotage.maps.floor import MOST_CELLS, Floor
 
+ROWS = 8
+"""Of cells from one line to the next, at most."""
 WALL_SHARE = 0.3
 """A cell's end is a wall where at least so much of it is one; what is left over is swept by detours."""
 
 
-def sweep_cell_m(
-    bounds_m: tuple[float, float, float, float], width_m: float, overlap: float = 0.0, rows: int = 8
-) -> float:
-    """Side of cells of which a whole number lies between two lines, as fine as the floor's size allows.
-
-    Parameters
-    ----------
-    overlap
-        Of neighbouring lines, as a share of the width.
-    rows
-        Of cells from one line to the next, at most.
-    """
+def sweep_cell_m(bounds_m: tuple[float, float, float, float], width_m: float) -> float:
+    """Side of cells of which a whole number lies between two lines, as fine as the floor's size allows."""
     xmin, ymin, xmax, ymax = bounds_m
     least_m = math.sqrt((xmax - xmin) * (ymax - ymin) / MOST_CELLS)
-    apart_m = (1.0 - overlap) * width_m
-    return apart_m / max(1, min(rows, math.floor(apart_m / least_m)))
+    return width_m / max(1, min(ROWS, math.floor(width_m / least_m)))
 
 
 @dataclass(slots=True)
@@ -66,14 +57,14 @@ class SweepCell:
         return min((cell.reached for cell in self.below), default=float(self.first))
 
 
-def sweep_lines(floor: Floor, width_m: float, along_y: bool, overlap: float) -> list[list[FloatArray]]:
+def sweep_lines(floor: Floor, width_m: float, along_y: bool) -> list[list[FloatArray]]:
     """Lines (2, 2) for each cell, from one side of the cell to the other; each in the same direction.
 
     At a wall a line runs along it; between, lines are one width apart or less. Cells are ``sweep_cell_m``
     wide. They go on across cells where nothing but an event parts these.
     """
     reachable = floor.reachable.T if along_y else floor.reachable
-    apart = round((1.0 - overlap) * width_m / floor.cell_m)
+    apart = round(width_m / floor.cell_m)
     out = []
     for cell in _cells(reachable):
         _choose_lines(cell, reachable, apart)

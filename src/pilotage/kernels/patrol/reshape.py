@@ -1,0 +1,300 @@
+"""A path that sweeps a floor, changed at random until it is short for what it sweeps.
+
+Simulated annealing (Kirkpatrick et al. 1983) over polylines, with the moves of tour searches: vertices
+moved, put in, left out, stretches turned around (2-opt) or put elsewhere (Or-opt). No bound is known of how
+far it ends from the best.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TypeAlias
+
+import numpy as np
+
+from pilotage.kernels.arrays import BoolArray, FloatArray, IntArray
+from pilotage.kernels.geometry.plane import point_segment_distance
+from pilotage.kernels.jit import kernel
+
+NEAR, LONGEST_LEG, LONGEST_CHAIN, LEAST_MOVE = 1.8, 2.6, 12, 0.02
+"""In widths: vertices so near are joined in other ways, legs get no longer, and vertices move so little. So
+many vertices change their place together at most."""
+
+Grid: TypeAlias = tuple[float, float, float]
+"""x, y of the lower left corner, and side of the cells."""
+Ground: TypeAlias = tuple[float, Grid, FloatArray, IntArray, Grid, BoolArray]
+"""What is swept of which cells: the width of a pass; the cells; what it costs to leave each (rows, columns),
+as a length; and how many legs sweep it. Then coarser cells, and whether legs may lead through each."""
+
+
+@kernel
+def is_free(a: FloatArray, b: FloatArray, free: BoolArray, grid: Grid) -> bool:
+    """Whether the straight line between two places stays in free cells."""
+    x0, y0, cell = grid
+    steps = math.ceil(math.hypot(b[0] - a[0], b[1] - a[1]) / (0.25 * cell)) + 1
+    for k in range(steps + 1):
+        column = math.floor((a[0] + (b[0] - a[0]) * k / steps - x0) / cell)
+        row = math.floor((a[1] + (b[1] - a[1]) * k / steps - y0) / cell)
+        if not (0 <= row < free.shape[0] and 0 <= column < free.shape[1] and free[row, column]):
+            return False
+    return True
+
+
+@kernel
+def count_leg(leg: FloatArray, sign: int, ground: Ground) -> float:
+    """Count a leg (4,) in the cells that it sweeps, or take it back; how much more is left then, by price."""
+    width, grid, price, counts, _, _ = ground
+    x0, y0, cell = grid
+    radius = 0.5 * width
+    ax, ay, bx, by = leg
+    length = math.hypot(bx - ax, by - ay)
+    # The sides of what it sweeps, beside the leg; its ends are discs.
+    nx, ny = (0.0, 0.0) if length == 0.0 else (radius * (ay - by) / length, radius * (bx - ax) / length)
+    low_row = max(0, math.ceil((min(ay, by) - radius - y0) / cell - 0.5))
+    high_row = min(counts.shape[0] - 1, math.floor((max(ay, by) + radius - y0) / cell - 0.5))
+    cost = 0.0
+    for row in range(low_row, high_row + 1):
+        y = y0 + (row + 0.5) * cell
+        left, right = math.inf, -math.inf
+        for end in range(2):
+            x, off = (ax, y - ay) if end == 0 else (bx, y - by)
+            if abs(off) <= radius:
+                half = math.sqrt(radius * radius - off * off)
+                left, right = min(left, x - half), max(right, x + half)
+        for side in range(-1, 2, 2):
+            from_y, to_y = ay + side * ny, by + side * ny
+            if min(from_y, to_y) <= y <= max(from_y, to_y) and from_y != to_y:
+                x = ax + side * nx + (bx - ax) * (y - from_y) / (to_y - from_y)
+                left, right = min(left, x), max(right, x)
+        if left > right:
+            continue
+        low = max(0, math.ceil((left - x0) / cell - 0.5))
+        high = min(counts.shape[1] - 1, math.floor((right - x0) / cell - 0.5))
+        for column in range(low, high + 1):
+            if sign > 0 and counts[row, column] == 0:
+                cost -= price[row, column]
+            counts[row, column] += sign
+            if sign < 0 and counts[row, column] == 0:
+                cost += price[row, column]
+    return cost
+
+
+@kernel
+def is_taken(old: FloatArray, new: FloatArray, bar: float, ground: Ground) -> bool:
+    """Whether legs ``new`` (K, 4) take the place of ``old`` (M, 4): free, and ``bar`` costlier at most.
+
+    The ground counts the new ones then.
+    """
+    width, _, _, _, grid, free = ground
+    cost = 0.0
+    for k in range(old.shape[0]):
+        cost -= math.hypot(old[k, 2] - old[k, 0], old[k, 3] - old[k, 1])
+    for k in range(new.shape[0]):
+        length = math.hypot(new[k, 2] - new[k, 0], new[k, 3] - new[k, 1])
+        if length > LONGEST_LEG * width:
+            return False
+        cost += length
+    # What is a width longer hardly ever sweeps so much more: not worth counting cells.
+    if cost > bar + width:
+        return False
+    for k in range(new.shape[0]):
+        if not is_free(new[k, :2], new[k, 2:], free, grid):
+            return False
+    for k in range(new.shape[0]):
+        cost += count_leg(new[k], 1, ground)
+    for k in range(old.shape[0]):
+        cost += count_leg(old[k], -1, ground)
+    if cost <= bar:
+        return True
+    for k in range(old.shape[0]):
+        count_leg(old[k], 1, ground)
+    for k in range(new.shape[0]):
+        count_leg(new[k], -1, ground)
+    return False
+
+
+@kernel
+def put_leg(legs: FloatArray, k: int, a: FloatArray, b: FloatArray) -> None:
+    """Row ``k`` of legs (K, 4) from one place to another."""
+    legs[k, 0], legs[k, 1], legs[k, 2], legs[k, 3] = a[0], a[1], b[0], b[1]
+
+
+@kernel
+def offset_of(width: float, far: float, turn: float) -> tuple[float, float]:
+    """A step of a width or less, by two draws from [0, 1): how far and where to."""
+    away = width * math.pow(LEAST_MOVE, far)
+    return away * math.cos(2.0 * math.pi * turn), away * math.sin(2.0 * math.pi * turn)
+
+
+@kernel
+def near_one(path: FloatArray, size: int, at: int, begin: int, reach: float) -> int:
+    """The first vertex from ``begin`` on, around, near to vertex ``at``, and no neighbour; else -1."""
+    x, y = path[at, 0], path[at, 1]
+    for step in range(size):
+        k = begin + step
+        if k >= size:
+            k -= size
+        ex, ey = path[k, 0] - x, path[k, 1] - y
+        if ex * ex + ey * ey < reach * reach and abs(k - at) > 1:
+            return k
+    return -1
+
+
+@kernel
+def shift(path: FloatArray, k: int, count: int, dx: float, dy: float, bar: float, ground: Ground) -> None:
+    """Vertices ``k`` and after it, so many, sideways; the legs on both sides of them follow."""
+    spot = path[k - 1 : k + count + 1].copy()
+    spot[1 : count + 1, 0] += dx
+    spot[1 : count + 1, 1] += dy
+    old, new = np.empty((count + 1, 4)), np.empty((count + 1, 4))
+    for i in range(count + 1):
+        put_leg(old, i, path[k - 1 + i], path[k + i])
+        put_leg(new, i, spot[i], spot[i + 1])
+    if is_taken(old, new, bar, ground):
+        path[k : k + count] = spot[1 : count + 1]
+
+
+@kernel
+def leave_out(path: FloatArray, size: int, k: int, bar: float, ground: Ground) -> int:
+    """Vertex ``k``; how many there are afterwards."""
+    old, new = np.empty((2, 4)), np.empty((1, 4))
+    put_leg(old, 0, path[k - 1], path[k])
+    put_leg(old, 1, path[k], path[k + 1])
+    put_leg(new, 0, path[k - 1], path[k + 1])
+    if not is_taken(old, new, bar, ground):
+        return size
+    path[k : size - 1] = path[k + 1 : size].copy()
+    return size - 1
+
+
+@kernel
+def put_in(path: FloatArray, size: int, k: int, place: FloatArray, bar: float, ground: Ground) -> int:
+    """A vertex after vertex ``k``; how many there are afterwards."""
+    if size + 1 >= path.shape[0]:
+        return size
+    old, new = np.empty((1, 4)), np.empty((2, 4))
+    put_leg(old, 0, path[k], path[k + 1])
+    put_leg(new, 0, path[k], place)
+    put_leg(new, 1, place, path[k + 1])
+    if not is_taken(old, new, bar, ground):
+        return size
+    path[k + 2 : size + 1] = path[k + 1 : size].copy()
+    path[k + 1] = place
+    return size + 1
+
+
+@kernel
+def turn_around(path: FloatArray, i: int, j: int, bar: float, ground: Ground) -> None:
+    """What lies between legs ``i`` and ``j``, the later one."""
+    old, new = np.empty((2, 4)), np.empty((2, 4))
+    put_leg(old, 0, path[i], path[i + 1])
+    put_leg(old, 1, path[j], path[j + 1])
+    put_leg(new, 0, path[i], path[j])
+    put_leg(new, 1, path[i + 1], path[j + 1])
+    if is_taken(old, new, bar, ground):
+        path[i + 1 : j + 1] = path[i + 1 : j + 1][::-1].copy()
+
+
+@kernel
+def put_elsewhere(
+    path: FloatArray, k: int, count: int, after: int, turned: bool, bar: float, ground: Ground
+) -> None:
+    """Vertices ``k`` and after it, so many, between vertex ``after``, none of them, and the next one."""
+    last = k + count - 1
+    chain = path[k : last + 1].copy()
+    if turned:
+        chain = chain[::-1].copy()
+    old, new = np.empty((3, 4)), np.empty((3, 4))
+    put_leg(old, 0, path[k - 1], path[k])
+    put_leg(old, 1, path[last], path[last + 1])
+    put_leg(old, 2, path[after], path[after + 1])
+    put_leg(new, 0, path[k - 1], path[last + 1])
+    put_leg(new, 1, path[after], chain[0])
+    put_leg(new, 2, chain[count - 1], path[after + 1])
+    if not is_taken(old, new, bar, ground):
+        return
+    if after > last:
+        path[k : after + 1 - count] = path[last + 1 : after + 1].copy()
+        path[after + 1 - count : after + 1] = chain
+    else:
+        path[after + 1 + count : last + 1] = path[after + 1 : k].copy()
+        path[after + 1 : after + 1 + count] = chain
+
+
+@kernel
+def reshape(
+    path: FloatArray, size: int, draws: FloatArray, heats: tuple[float, float], ground: Ground
+) -> int:
+    """Change the first ``size`` rows of ``path`` (N, 2) by lot, but for both ends; how many there are then.
+
+    A change is taken by Metropolis' rule, by its length and the price of cells that it leaves or sweeps
+    besides. Legs of the path should be no longer than a width or two: longer ones only get shorter.
+
+    Parameters
+    ----------
+    draws
+        (R, 6) uniform in [0, 1), one row a change that is tried.
+    heats
+        Temperature at the first and at the last of them, as lengths.
+    ground
+        Its counts are of this path; they change with it.
+    """
+    width, reach = ground[0], NEAR * ground[0]
+    place = np.empty(2)
+    for r in range(draws.shape[0]):
+        if size < 4:
+            return size
+        kind, which, a, b, c, luck = draws[r]
+        bar = -heats[0] * math.pow(heats[1] / heats[0], r / draws.shape[0]) * math.log(max(luck, 1e-12))
+        k = 1 + int(which * (size - 2))
+        if kind < 0.25:
+            dx, dy = offset_of(width, a, b)
+            shift(path, k, 1, dx, dy, bar, ground)
+        elif kind < 0.35:
+            size = leave_out(path, size, k, bar, ground)
+        elif kind < 0.45:
+            dx, dy = offset_of(width, a, b)
+            place[0] = path[k, 0] + c * (path[k + 1, 0] - path[k, 0]) + dx
+            place[1] = path[k, 1] + c * (path[k + 1, 1] - path[k, 1]) + dy
+            size = put_in(path, size, k, place, bar, ground)
+        elif kind < 0.6:
+            count = 2 + int(a * (LONGEST_CHAIN - 1))
+            if k + count < size:
+                dx, dy = offset_of(width, c, b)
+                shift(path, k, count, dx, dy, bar, ground)
+        elif kind < 0.8:
+            j = near_one(path, size - 1, k - 1, int(a * (size - 1)), reach)
+            if j >= 0:
+                turn_around(path, min(k - 1, j), max(k - 1, j), bar, ground)
+        else:
+            count = 1 + int(a * LONGEST_CHAIN)
+            after = near_one(path, size - 1, k, int(b * (size - 1)), reach)
+            if k + count < size and after >= 0 and not k - 1 <= after < k + count:
+                put_elsewhere(path, k, count, after, c < 0.5, bar, ground)
+    return size
+
+
+@kernel
+def straightened(path: FloatArray, off: float, ground: Ground) -> FloatArray:
+    """The path (N, 2) by fewer vertices: those that a free straight line passes within ``off`` are gone.
+
+    From each vertex on the line leads to the farthest one that may be next, tried one by one.
+    """
+    _, _, _, _, grid, free = ground
+    keep = np.zeros(path.shape[0], np.bool_)
+    keep[0] = True
+    first = 0
+    while first < path.shape[0] - 1:
+        last = first + 1
+        while last + 1 < path.shape[0]:
+            a, b = path[first], path[last + 1]
+            straight = is_free(a, b, free, grid)
+            for k in range(first + 1, last + 1):
+                away = point_segment_distance(path[k, 0], path[k, 1], a[0], a[1], b[0], b[1])
+                straight = straight and away <= off
+            if not straight:
+                break
+            last += 1
+        keep[last] = True
+        first = last
+    return path[keep]
