@@ -116,10 +116,9 @@ bench: setup  ## compare with the peers: installs them, prints a table of ratios
 	  $(PIP) install --quiet --require-hashes -r requirements-bench.lock; \
 	  cksum < requirements-bench.lock > $(BENCH_STAMP); \
 	fi
-	@$(PY) -m benchmarks.peers $(ARGS)
-	@$(PY) -m benchmarks.ekf_peer
-	@$(PY) -m benchmarks.grid_peers
-	@$(PY) -m benchmarks.pose_graphs
+	@missed=0; $(PY) -m benchmarks.peers $(ARGS) || missed=1; \
+	for part in ekf_peer grid_peers pose_graphs slam_peers; do $(PY) -m benchmarks.$$part || missed=1; done; \
+	exit $$missed
 
 COMPILE = $(UV) pip compile --quiet --universal --python-version 3.11 --generate-hashes --no-header --no-annotate
 

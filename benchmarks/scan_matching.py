@@ -6,7 +6,7 @@ Each places every scan against its own local map; loops are not closed. KISS-ICP
 knows no odometry: ``ratio`` compares with pilotage without it, ``odometry_ratio`` with pilotage as it is
 used. pilotage begins with ranges, KISS-ICP with points that are ready. Its parameters are its own for a range
 of 25 m; scans are not deskewed, as no beam has a time. All are warmed up and take turns; the medians are
-compared. It is in no extra yet: ``pip install kiss-icp`` (MIT).
+compared. It is in the extra ``bench`` (MIT).
 
 Exit code 0 where pilotage is at least 5 times as fast on every log, 1 where not or the peer is not installed.
 """
