@@ -351,5 +351,6 @@ def test_who_drives_away_from_somebody_who_comes_closes_no_gap() -> None:
     assert closes((0.0, 0.0, 0.3), -0.6, 0.0)  # a corner swings towards him
     assert closes((0.001, 0.0, 0.1), 0.0, 0.5)  # turning on the spot, all around it
     assert not closes((0.1, 0.0, 0.1), -0.5, 0.0)  # a bend away from him
+    assert closes((0.05, 0.0, 0.0), 0.0, 0.47)  # past him: he may be nearer than he is believed to be
     both = np.array([[0.58, 0.0, 0.25], [-0.5, 0.0, 0.25]])
     assert closes_in((0.0, 0.0, 0.0), (0.05, 0.0, 0.0), body.polygon, body.outer_m, both, 0.05)

@@ -333,12 +333,14 @@ def closes_in(
 ) -> bool:
     """Whether a footprint's own motion brings it nearer to one of the discs (M, 3) that is within ``keep``.
 
-    The discs stand while it moves, from pose to pose: who drives away from somebody who comes closes no gap.
-    Who turns on the spot swings corners to all sides, and counts as the disc of radius ``outer``.
+    The discs stand while it moves, from pose to pose: who drives away, and not merely past (``AWAY``: places
+    are vague), closes no gap. Who turns on the spot swings corners to all sides, and counts as the disc of
+    radius ``outer``.
     """
     x, y, theta = after
     x0, y0, theta0 = before
-    spins = abs(wrap(theta - theta0)) * outer > math.hypot(x - x0, y - y0)
+    moved = math.hypot(x - x0, y - y0)
+    spins = abs(wrap(theta - theta0)) * outer > moved
     c, s = math.cos(theta), math.sin(theta)
     for i in range(movers.shape[0]):
         dx, dy = movers[i, 0] - x, movers[i, 1] - y
@@ -352,7 +354,7 @@ def closes_in(
             continue
         c0, s0 = math.cos(theta0), math.sin(theta0)
         dx, dy = movers[i, 0] - x0, movers[i, 1] - y0
-        if away < polygon_distance(c0 * dx + s0 * dy, c0 * dy - s0 * dx, polygon) - CLOSES_M:
+        if away < polygon_distance(c0 * dx + s0 * dy, c0 * dy - s0 * dx, polygon) + AWAY * moved - CLOSES_M:
             return True
     return False
 

@@ -32,10 +32,9 @@ class MoversConfig(Config):
     """So often read in one place it is a thing that stands, by which the odometry may be corrected."""
     stands_m: Positive = 0.15
     radius_m: Positive = 0.25
-    deviations: NonNegative = 2.0
-    """The disc grows by so many standard deviations of the foretold place, where a command is checked."""
     plan_deviations: NonNegative = 0.3
-    """The same where plans are priced: by all that a body may do no plan would get past it."""
+    """The disc grows by so many standard deviations of the foretold place where plans are priced: by all that
+    a body may do no plan would get past it."""
     unsure_std_m_s: Positive = 0.4
     """Whose velocity is told no better than this may yet go anywhere."""
     lost_std_m: Positive = 1.0
@@ -131,23 +130,25 @@ class Movers:
         enough: BoolArray = self.tracks[:, kernels.READINGS] >= self._config.readings
         return enough
 
-    def foretold(self, first_s: float, step_s: float, steps: int, *, sure: bool = True) -> FloatArray:
+    def foretold(
+        self, first_s: float, step_s: float, steps: int, deviations: float | None = None
+    ) -> FloatArray:
         """Discs (steps, M, 3) at ``first_s`` from now and every ``step_s`` after.
 
-        ``sure``: as wide as for the check of a command, and of whatever may yet prove to move; else as for
-        the price of a plan.
+        ``deviations``: for the check of a command, of whatever may yet prove to move, wider by so many
+        standard deviations of the foretold place; None: as for the price of a plan.
         """
         config = self._config
         if not self.tracks.shape[0]:
             return np.zeros((steps, 0, 3))
-        tracks = self.tracks[~self._things] if sure else self.tracks[self._count() & ~self._things]
+        tracks = self.tracks[~self._things if deviations is not None else self._count() & ~self._things]
         discs: FloatArray = kernels.foretold(
             np.ascontiguousarray(tracks),
             first_s,
             step_s,
             steps,
             config.radius_m,
-            config.deviations if sure else config.plan_deviations,
+            config.plan_deviations if deviations is None else deviations,
             config.acceleration_std_m_s2,
             config.turning_std_rad_s,
         )

@@ -49,6 +49,8 @@ class MovingBodiesConfig(Config):
     beside_scans: int = Field(default=10, ge=1, le=1000)
     """Where people walk about, what is so near, and was not seen to stand all the time, is shown to a mapper
     in one of so many scans: what is no person is mapped all the same, later."""
+    deviations: NonNegative = 2.0
+    """The disc of one who walks grows by so many standard deviations of the foretold place."""
     tracks: MoversConfig = MoversConfig()
 
 
@@ -173,7 +175,7 @@ class MovingBodies:
         if not len(self._movers.tracks) and not self.about:
             return np.empty((steps, 0, 3))
         people = self._walks | np.isnan(self._movers.tracks[:, kernels.X0])
-        discs = self._movers.foretold(step_s, step_s, steps)[:, people]
+        discs = self._movers.foretold(step_s, step_s, steps, self._config.deviations)[:, people]
         if not self.about:
             return np.ascontiguousarray(discs)
         near = self._loose[np.hypot(*(self._loose - (pose.x_m, pose.y_m)).T) < reach_m]

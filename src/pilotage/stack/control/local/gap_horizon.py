@@ -72,6 +72,8 @@ class GapHorizonConfig(Config):
     """Share of the data sheet's braking and turning that is relied on."""
     people_margin_m: NonNegative = 0.05
     """To where a moving body is foretold, in a command's last check: the robot brings itself no nearer."""
+    people_deviations: NonNegative = 1.5
+    """By so many standard deviations of the foretold place it may be nearer."""
     people_hold_s: NonNegative = 0.3
     """Near people a command that speeds up has to be good for so long before the braking begins."""
     people_cost: NonNegative = 1.5
@@ -234,9 +236,7 @@ class GapHorizon(RollingController):
         count += len(chased)
         plans[count] = 0.0
         count += 1
-        movers = scene.movers.foretold(
-            scene.delay_s + config.step_s, config.step_s, samples.steps, sure=False
-        )
+        movers = scene.movers.foretold(scene.delay_s + config.step_s, config.step_s, samples.steps)
         if movers.shape[1]:
             # Out of the way of whoever comes: what pursuit of the path does not think of.
             plans[count : count + len(DODGES)] = DODGES[:, None]
@@ -276,7 +276,7 @@ class GapHorizon(RollingController):
         if abs(scene.start[3]) > 0.05:
             self._drove_s = t_s
             return False
-        now = scene.movers.foretold(0.0, scene.dt_s, 1)[0]
+        now = scene.movers.foretold(0.0, scene.dt_s, 1, config.people_deviations)[0]
         if not now.shape[0]:
             return False
         x, y, theta = scene.pose
@@ -313,7 +313,9 @@ class GapHorizon(RollingController):
                 self._worse(scene),
                 scene.body,
                 scene.ground,
-                scene.movers.foretold(scene.delay_s + config.check_step_s, config.check_step_s, 30),
+                scene.movers.foretold(
+                    scene.delay_s + config.check_step_s, config.check_step_s, 30, config.people_deviations
+                ),
                 margin_m,
                 config.least_margin_s,
                 config.people_margin_m,

@@ -81,7 +81,7 @@ class Mppi(RollingController):
             scene.drive,
             scene.body,
             scene.ground,
-            scene.movers.foretold(scene.delay_s + config.step_s, config.step_s, self._steps, sure=False),
+            scene.movers.foretold(scene.delay_s + config.step_s, config.step_s, self._steps),
             price,
             self._commands,
         )
