@@ -63,7 +63,7 @@ LOCAL_EXAMPLES: dict[str, tuple[Callable[[Any, Any], None], frozenset[str]]] = {
     "pure-pursuit": (controller_finds_the_door, frozenset()),
     "gap-horizon": (
         controller_finds_the_door,
-        frozenset({"near_cost", "reverse_cost", "people_cost", "brake_trust"}),
+        frozenset({"near_cost", "reverse_cost", "people_cost", "people_std", "brake_trust"}),
     ),
 }
 """By controller: what it must do, and which of its floats are pure numbers."""

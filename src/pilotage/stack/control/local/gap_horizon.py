@@ -72,7 +72,7 @@ class GapHorizonConfig(Config):
     """Share of the data sheet's braking and turning that is relied on."""
     people_margin_m: NonNegative = 0.05
     """To where a moving body is foretold, in a command's last check: the robot brings itself no nearer."""
-    people_deviations: NonNegative = 1.5
+    people_std: NonNegative = 1.5
     """By so many standard deviations of the foretold place it may be nearer."""
     people_hold_s: NonNegative = 0.3
     """Near people a command that speeds up has to be good for so long before the braking begins."""
@@ -276,7 +276,7 @@ class GapHorizon(RollingController):
         if abs(scene.start[3]) > 0.05:
             self._drove_s = t_s
             return False
-        now = scene.movers.foretold(0.0, scene.dt_s, 1, config.people_deviations)[0]
+        now = scene.movers.foretold(0.0, scene.dt_s, 1, config.people_std)[0]
         if not now.shape[0]:
             return False
         x, y, theta = scene.pose
@@ -314,7 +314,7 @@ class GapHorizon(RollingController):
                 scene.body,
                 scene.ground,
                 scene.movers.foretold(
-                    scene.delay_s + config.check_step_s, config.check_step_s, 30, config.people_deviations
+                    scene.delay_s + config.check_step_s, config.check_step_s, 30, config.people_std
                 ),
                 margin_m,
                 config.least_margin_s,
