@@ -174,7 +174,7 @@ class FloorExplorer(LocalizingNavigator):
         if target is None or belief.status is BeliefStatus.LOST:
             return STOP
         tolerance_m = 0.5 * self._arrival_m()
-        return self._drive.toward(self._led_to(target.path, here), belief.pose, readings, tolerance_m)
+        return self._drive.toward(self._led_to(target.path, here), belief, readings, tolerance_m)
 
     def _draw(self, readings: Readings, pose: Pose2) -> None:
         """Put a scan on the own map where the robot has moved since the last one."""

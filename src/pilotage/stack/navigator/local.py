@@ -131,7 +131,7 @@ class LocalNavigator(LocalizingNavigator):
         self._channel.tell(away_m)
         led = point != self._goal_xy_m
         command = self._drive.toward(
-            point, pose, readings, min(PASSING_M, tolerance_m) if led else tolerance_m, self._bodies.about
+            point, belief, readings, min(PASSING_M, tolerance_m) if led else tolerance_m, self._bodies.about
         )
         if self._plan is not None:
             command = self._among_people(readings.t_s, command, pose, self._plan.mapped_m)

@@ -14,17 +14,22 @@ from pilotage.sensors.lidar import LidarConfig
 from pilotage.sensors.readings import LidarScan, OdometryIncrement, Readings
 from pilotage.sensors.wheel_odometry import WheelOdometryConfig
 from pilotage.stack.control.local.role import LocalController, LocalLimits, LocalView
+from pilotage.stack.interface import Belief
 from pilotage.stack.knowledge import RobotKnowledge
 
 DISC_CORNERS = 16
 """Of the polygon around a disc."""
+SURE_WITHIN_M = 1.0
+"""From so far on a belief may place a goal that has to be met closely, at every step."""
 
 
 class LocalDrive:
     """Hands laser, odometry and goal to a local controller; between two scans its last command stands.
 
     The controller sees poses that are integrated from the odometry alone, which drift but do not jump. The
-    goal is placed anew in them where the localizer's correction moves it farther than ``shift_m``.
+    goal is placed anew in them where the localizer's correction moves it farther than ``shift_m``; one that
+    has to be met more closely at every step once it is near, if the belief is as close, and else where the
+    correction is more than half its tolerance.
     """
 
     def __init__(
@@ -72,7 +77,7 @@ class LocalDrive:
     def toward(
         self,
         goal_xy_m: tuple[float, float],
-        belief: Pose2,
+        belief: Belief,
         readings: Readings,
         tolerance_m: float,
         people_about: bool = False,
@@ -80,23 +85,34 @@ class LocalDrive:
         """The command to a goal in the map, as the robot believes to stand there."""
         scan = readings.by_sensor.get(self._lidar)
         if isinstance(scan, LidarScan):
-            self._place(goal_xy_m, belief)
-            self._command = self._controller.step(
-                self._view(readings.t_s, scan.ranges_m, tolerance_m, people_about)
-            )
+            # Farther off the heading's error counts as well.
+            away_m = math.hypot(goal_xy_m[0] - belief.pose.x_m, goal_xy_m[1] - belief.pose.y_m)
+            near = away_m < SURE_WITHIN_M and tolerance_m < self._shift_m
+            sure = near and _std_m(belief) < 0.5 * tolerance_m
+            self._place(goal_xy_m, belief.pose, 0.0 if sure else min(self._shift_m, 0.5 * tolerance_m))
+            view = self._view(readings.t_s, scan.ranges_m, tolerance_m, people_about, goal_is_sure=sure)
+            self._command = self._controller.step(view)
         return self._command
 
-    def _place(self, goal_xy_m: tuple[float, float], belief: Pose2) -> None:
+    def _place(self, goal_xy_m: tuple[float, float], belief: Pose2, shift_m: float) -> None:
         """Place the goal in the odometry's frame as it lies from where the robot believes to be."""
         dx, dy = goal_xy_m[0] - belief.x_m, goal_xy_m[1] - belief.y_m
         turn = self._pose.theta_rad - belief.theta_rad
         c, s = math.cos(turn), math.sin(turn)
         there = self._pose.x_m + c * dx - s * dy, self._pose.y_m + s * dx + c * dy
         moved_m = math.hypot(there[0] - self._goal_there[0], there[1] - self._goal_there[1])
-        if not moved_m <= self._shift_m:
+        if not moved_m <= shift_m:
             self._goal_there = there
 
-    def _view(self, t_s: float, ranges_m: FloatArray, tolerance_m: float, people_about: bool) -> LocalView:
+    def _view(
+        self,
+        t_s: float,
+        ranges_m: FloatArray,
+        tolerance_m: float,
+        people_about: bool,
+        *,
+        goal_is_sure: bool,
+    ) -> LocalView:
         return LocalView(
             t_s=t_s,
             pose=self._pose,
@@ -110,7 +126,13 @@ class LocalDrive:
             footprint_xy_m=self._outline,
             goal_tolerance_m=tolerance_m,
             people_about=people_about,
+            goal_is_sure=goal_is_sure,
         )
+
+
+def _std_m(belief: Belief) -> float:
+    """Of the position, in the direction in which it is known worst."""
+    return math.sqrt(max(float(np.linalg.eigvalsh(belief.cov[:2, :2])[-1]), 0.0))
 
 
 def limits_of(robot: RobotKnowledge, reverse_m_s: float, needed_by: str) -> LocalLimits:

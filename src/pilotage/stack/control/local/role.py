@@ -77,6 +77,9 @@ class LocalView:
         corrects the odometry keeps it there.
     goal_tolerance_m
         Nearer than this is there.
+    goal_is_sure
+        The goal is where it should be in the odometry's frame as it is now: a controller that corrects the
+        odometry does not move it.
     footprint_xy_m
         (K, 2) corners of a convex polygon in the base frame.
     """
@@ -93,6 +96,7 @@ class LocalView:
     footprint_xy_m: FloatArray
     goal_tolerance_m: float = 0.3
     people_about: bool = False
+    goal_is_sure: bool = False
 
     def __post_init__(self) -> None:
         """Refuse a scan that does not fit its angles, and beams that are not evenly spaced."""

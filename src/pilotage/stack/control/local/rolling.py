@@ -190,7 +190,7 @@ class RollingGround:
         if self._config.match and not first_view and not covered and self._are_many(things, angles.size):
             self._match(view, things)
         self._odometry = view.pose
-        if self._goal_given != view.goal_xy_m:
+        if view.goal_is_sure or self._goal_given != view.goal_xy_m:
             self._goal_given = view.goal_xy_m
             self._goal = _moved(view.goal_xy_m, view.pose, self._pose)
         # Not before the scan is matched: it is to the last ground, whose means roll as well.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pilotage.core.types import STOP, Twist
+from pilotage.stack.control.local.fine_goal import approach, is_fine, rests_within
 from pilotage.stack.control.local.role import LocalView
 from pilotage.stack.control.local.rolling import RollingConfig, RollingGround, Scene
 
@@ -17,8 +18,16 @@ class RollingController:
     def step(self, view: LocalView) -> Twist:
         """Take the view in and give the next command."""
         scene = self._ground.update(view)
-        arrived = scene.distance_m < view.goal_tolerance_m
-        command = STOP if arrived or scene.blind else self._decide(view, scene)
+        fine = is_fine(scene, view.goal_tolerance_m)
+        if fine:
+            arrived = rests_within(scene, view.goal_tolerance_m)
+        else:
+            arrived = scene.distance_m < view.goal_tolerance_m
+        command: Twist | None = STOP if arrived or scene.blind else None
+        if command is None and fine:
+            command = approach(scene, view.goal_tolerance_m)
+        if command is None:
+            command = self._decide(view, scene)
         self._ground.sent(view.t_s, command)
         self._look_back(view, scene)
         self.status = "arrived" if arrived else _word_of(command)

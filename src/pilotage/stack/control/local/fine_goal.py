@@ -1,0 +1,101 @@
+"""The last stretch to a goal that has to be met finer than the grids are: straight, ending at rest."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from pilotage.core.types import Twist
+from pilotage.kernels.control.band import path_distances
+from pilotage.kernels.control.motion_limits import command_is_safe
+from pilotage.kernels.geometry.motion import wrap
+from pilotage.stack.control.local.rolling import Scene
+
+AIM = 0.3
+"""Of the tolerance the robot has to come to rest within: its belief is off as well."""
+NEAR_M = 0.3
+"""From so far on, and sooner where braking takes longer."""
+BRAKE_TRUST = 0.65
+"""Share of the data sheet's braking that the speed reckons with."""
+TURN_GAIN_PER_S = 3.0
+TURN_IN_PLACE_RAD = 0.35
+"""Farther off than this it turns before it drives."""
+LEAST_SPEED_M_S = 0.01
+LEAST_TURN_RAD_S = 0.1
+CHECK_STEP_S, CHECK_STEPS = 0.05, 30
+MARGIN_M, MARGIN_S = 0.01, 0.015
+"""To what was seen, at rest, and more per m/s."""
+PEOPLE_MARGIN_M, PEOPLE_STD = 0.05, 1.5
+"""To where moving bodies are foretold, with so many standard deviations of the place."""
+
+
+def is_fine(scene: Scene, tolerance_m: float) -> bool:
+    """Whether the cell of the time to go that holds the goal may have its middle outside the tolerance."""
+    return tolerance_m < math.sqrt(2.0) * scene.ground.coarse_m
+
+
+def rests_within(scene: Scene, tolerance_m: float) -> bool:
+    """Whether the robot is at the goal, and would still be if it stopped now."""
+    x, y, theta, v, _ = scene.start
+    slide = v * abs(v) / (2.0 * BRAKE_TRUST * scene.sheet.deceleration)
+    there = math.hypot(
+        x + slide * math.cos(theta) - scene.goal[0], y + slide * math.sin(theta) - scene.goal[1]
+    )
+    return max(scene.distance_m, there) < AIM * tolerance_m
+
+
+def approach(scene: Scene, tolerance_m: float) -> Twist | None:
+    """The command straight to the goal; None where it is far, not to be seen from here, or not safe.
+
+    It turns on the spot, then follows the arc through the goal, backwards where that is nearer, at the
+    speed from which it can stop there. Fails where the goal is nearer to an obstacle than the footprint
+    allows, and for robots that neither back nor may turn where they are.
+    """
+    x, y, theta, v, _ = (float(value) for value in scene.start)
+    drive, body, goal = scene.drive, scene.body, scene.goal
+    braking = BRAKE_TRUST * drive.deceleration
+    dx, dy = float(goal[0]) - x, float(goal[1]) - y
+    away = math.hypot(dx, dy)
+    if away > NEAR_M + v * v / (2.0 * braking) + abs(v) * scene.dt_s:
+        return None
+    line = np.linspace([x, y], goal, max(2, math.ceil(away / scene.ground.cell_m)))
+    if path_distances(line, scene.ground).min() < body.inner_m:
+        return None
+    bearing = wrap(math.atan2(dy, dx) - theta)
+    backwards = abs(bearing) > 0.5 * math.pi and drive.reverse > 0.0
+    off = wrap(bearing - math.pi) if backwards else bearing
+    if away < 0.5 * AIM * tolerance_m:
+        command = Twist(0.0, 0.0)
+    elif abs(off) > TURN_IN_PLACE_RAD:
+        turn = max(TURN_GAIN_PER_S * abs(off), LEAST_TURN_RAD_S)
+        command = Twist(0.0, math.copysign(min(turn, drive.turn_rate), off))
+    else:
+        # One step is driven at this speed before it can fall.
+        lag = braking * scene.dt_s
+        speed = min(math.sqrt(lag * lag + 2.0 * braking * away) - lag, away / scene.dt_s)
+        speed = max(min(speed, drive.reverse if backwards else drive.speed), LEAST_SPEED_M_S)
+        turn = 2.0 * speed * math.sin(off) / away
+        command = Twist(-speed if backwards else speed, min(max(turn, -drive.turn_rate), drive.turn_rate))
+    return command if _is_safe(scene, command) else None
+
+
+def _is_safe(scene: Scene, command: Twist) -> bool:
+    discs = scene.movers.foretold(scene.delay_s + CHECK_STEP_S, CHECK_STEP_S, CHECK_STEPS, PEOPLE_STD)
+    safe, _ = command_is_safe(
+        scene.start,
+        command.v_m_s,
+        command.w_rad_s,
+        scene.dt_s,
+        CHECK_STEP_S,
+        True,
+        scene.drive,
+        scene.sheet.scaled(BRAKE_TRUST),
+        scene.body,
+        scene.ground,
+        discs,
+        MARGIN_M,
+        MARGIN_S,
+        PEOPLE_MARGIN_M,
+    )
+    return bool(safe)
