@@ -132,6 +132,22 @@ sys.exit(code or ", ".join(sorted(heavy)) or 0)
     assert (done.returncode, done.stderr) == (0, "")
 
 
+def test_a_run_imports_only_what_it_uses(tmp_path: Path) -> None:
+    """Arrow would import pandas for any array; half a second of each run and of each worker of a study."""
+    script = """
+import sys
+from pilotage.cli.main import main
+words = ["--no-report", "--set", "run.time_limit_s=0.5", "--out", sys.argv[1]]
+code = main(["run", "museum-1", *words])
+unused = {"pandas", "matplotlib", "scipy.optimize", "scipy.spatial", "scipy.stats"} & set(sys.modules)
+sys.exit(", ".join(sorted(unused)) or code)
+"""
+    words = [sys.executable, "-W", "error", "-c", script, str(tmp_path)]
+    done = subprocess.run(words, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (1, "")
+    assert list(tmp_path.glob("*/trace.parquet"))
+
+
 def test_garbage_is_looked_for_seldom_in_a_process_of_its_own_only() -> None:
     script = """
 import gc, sys

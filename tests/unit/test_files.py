@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import gzip
+import io
 import json
 import os
 import struct
+import tempfile
 import zipfile
 import zlib
 from pathlib import Path
@@ -23,7 +25,7 @@ from pilotage.core.errors import InputError
 from pilotage.core.files import read_bytes, read_json, read_json_lines, read_text, read_yaml, require_file
 from pilotage.core.files.arrays import map_npy, read_npy, read_npz, require_numbers
 from pilotage.core.files.images import opened_image
-from pilotage.core.files.parquet import read_parquet
+from pilotage.core.files.parquet import arrow_table, read_parquet
 from pilotage.core.json_text import load_json
 from pilotage.core.shown import shown, visible
 from pilotage.core.yaml_text import load_yaml
@@ -304,6 +306,27 @@ def test_parquet_counts_what_its_pages_unpack_to(tmp_path: Path) -> None:
     path.write_bytes(b"PAR1 and more")
     with pytest.raises(InputError, match="expected a Parquet file"):
         read_parquet(path)
+
+
+@given(
+    st.sampled_from(["f8", "f4", "f2", "i8", "i4", "u2", ">f8", "?"]), st.integers(0, 7), st.integers(1, 3)
+)
+def test_a_column_is_read_as_it_was_written(kind: str, rows: int, group: int) -> None:
+    """Of whatever type, in whatever pieces; what lies otherwise in memory than Arrow has it as well."""
+    values = (np.arange(2 * rows) % 5).astype(kind)[::2]
+    file = io.BytesIO()
+    table = arrow_table({"a": values, "b": values[::-1]}, {"told": "so"})
+    assert table.schema.metadata == {b"told": b"so"}
+    assert table.column("a").to_pylist() == values.tolist()
+    pq.write_table(table, file, row_group_size=group)
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "a.parquet"
+        path.write_bytes(file.getvalue())
+        found = read_parquet(path)
+    for name, wanted in (("a", values), ("b", values[::-1])):
+        assert found[name].dtype == values.dtype.newbyteorder("=")
+        assert found[name].tolist() == wanted.tolist()
+        assert found[name].flags.writeable or kind == "?"
 
 
 @given(st.text(max_size=300), st.integers(10, 50))

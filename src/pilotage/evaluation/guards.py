@@ -6,7 +6,6 @@ import math
 from functools import lru_cache
 
 import numpy as np
-from scipy.optimize import LinearConstraint, milp
 from scipy.sparse import csr_array
 
 from pilotage.core.types import BoolArray, FloatArray
@@ -44,6 +43,8 @@ def fewest_guards(sees: BoolArray) -> tuple[int, int]:
         (P, M) as from ``stack.patrol.derive.views``; the answer is for these places and points, not for the
         plane.
     """
+    from scipy.optimize import LinearConstraint, milp  # loads 0.1 s of SciPy, which most runs never need
+
     some = sees[:, sees.any(axis=0)]
     if some.shape[1] == 0:
         return 0, 0

@@ -7,6 +7,7 @@ from typing import Any
 
 from pilotage.core import given
 from pilotage.core.errors import InputError, unknown_name
+from pilotage.core.files.parquet import arrow_table
 from pilotage.core.types import FloatArray
 from pilotage.face.tables import pandas
 from pilotage.records.trace import ROBOT_COLUMN
@@ -84,12 +85,10 @@ class Trace(Mapping[str, FloatArray]):
 
     def to_arrow(self) -> Any:
         """Return a ``pyarrow.Table``; of several robots with the column ``robot``."""
-        import pyarrow as pa
-
         columns: dict[str, Any] = dict(self._recorded.columns)
         if self._recorded.robot is not None:
             columns = {ROBOT_COLUMN: self._recorded.robot, **columns}
-        return pa.table(columns)
+        return arrow_table(columns)
 
     def to_pandas(self) -> Any:
         """Return a pandas DataFrame; InputError where pandas is not installed."""

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from pilotage.core.errors import InputError
-from pilotage.core.files.parquet import parquet_metadata, read_parquet
+from pilotage.core.files.parquet import arrow_table, parquet_metadata, read_parquet
 from pilotage.core.json_text import load_json
 from pilotage.core.limits import MB
 from pilotage.core.types import FloatArray, IntArray
@@ -112,7 +112,6 @@ def merged(traces: Mapping[str, Mapping[str, FloatArray]]) -> Trace:
 
 def write_trace(folder: Path, trace: Trace) -> None:
     """Write the trace; with several robots also the column ``robot`` and their names in the metadata."""
-    import pyarrow as pa
     import pyarrow.parquet as pq
 
     columns: dict[str, Any] = dict(trace.columns)
@@ -121,7 +120,7 @@ def write_trace(folder: Path, trace: Trace) -> None:
         columns = {ROBOT_COLUMN: trace.robot.astype(np.int32), **columns}
         metadata = {ROBOTS_KEY: json.dumps(list(trace.robots))}
     with (folder / TRACE_FILE).open("wb") as file:  # Arrow takes no name whose bytes are no UTF-8
-        pq.write_table(pa.table(columns, metadata=metadata), file)
+        pq.write_table(arrow_table(columns, metadata), file)
 
 
 def read_trace(folder: Path, columns: Sequence[str] | None = None) -> Trace:

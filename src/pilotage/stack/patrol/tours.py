@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
 
 from pilotage.core.types import FloatArray, IntArray
 from pilotage.models.tour import closed_tour
@@ -79,6 +78,8 @@ def spread(walk: Round, graph: PatrolGraph, starts: IntArray, speed_m_s: float, 
     starts
         (N,) the vertex where each robot is at ``begin_s``.
     """
+    from scipy.optimize import linear_sum_assignment  # loads 0.1 s of SciPy, which most runs never need
+
     count, stops = len(starts), walk.stops
     best: tuple[float, list[Slot]] | None = None
     for first in range(len(stops)):

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components, minimum_spanning_tree
-from scipy.spatial import cKDTree
 
 from pilotage.core.types import BoolArray, FloatArray, IntArray
 from pilotage.models.pose_graph_covariance import covariances
@@ -47,6 +46,8 @@ def _tree(
     edges: Edges, poses: FloatArray, leaving: BoolArray
 ) -> tuple[IntArray, IntArray, FloatArray, FloatArray] | None:
     """Tree over the poses that stay of a group's edges; None where there is but one."""
+    from scipy.spatial import cKDTree  # loads 0.1 s of SciPy, which most runs never need
+
     members, ends = np.unique(np.concatenate([edges.i, edges.j]), return_inverse=True)
     stays = np.flatnonzero(~leaving[members])
     if stays.size < 2:

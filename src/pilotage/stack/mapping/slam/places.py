@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from pilotage.core.chi_square import chi_square_quantile
 from pilotage.core.types import BoolArray, FloatArray, IntArray
@@ -151,6 +150,8 @@ def places(
 
 def _agreeing_pairs(found: Places, earlier: EarlierMap, state: Solved, config: SlamConfig) -> BoolArray:
     """(S, S) pairs of sound matches that lie to each other as they do in the recording."""
+    from scipy.spatial import cKDTree  # loads 0.1 s of SciPy, which most runs never need
+
     out = np.diag(found.sound)
     chosen = np.flatnonzero(found.sound)
     if chosen.size < 2:
@@ -183,6 +184,8 @@ def _agreeing_pairs(found: Places, earlier: EarlierMap, state: Solved, config: S
 
 def links(found: Places, chosen: IntArray, earlier: EarlierMap) -> Edges:
     """Edges from the map's keyframes nearest to chosen stretches to the stretches' own, by their numbers."""
+    from scipy.spatial import cKDTree  # loads 0.1 s of SciPy, which most runs never need
+
     placed = found.poses()[chosen]
     near = np.asarray(cKDTree(earlier.poses[:, :2]).query(placed[:, :2])[1], np.int64)
     relative = relative_poses(earlier.poses[near], placed)

@@ -7,7 +7,6 @@ import zlib
 
 import numpy as np
 from pydantic import Field
-from scipy.optimize import linear_sum_assignment
 
 from pilotage.core.config import Config
 from pilotage.core.types import FloatArray, IntArray
@@ -142,6 +141,8 @@ class AdaptiveRoundsStrategy:
 
     def _seats(self, places: dict[int, int]) -> dict[int, int]:
         """Which group each robot belongs to: the least sum of squared distances to the rounds."""
+        from scipy.optimize import linear_sum_assignment  # loads 0.1 s of SciPy, which most runs never need
+
         plan, robots = self._plan, sorted(places)
         seats = np.repeat(np.arange(len(plan.sizes)), plan.sizes)
         away = np.array(

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
 
 from pilotage.core.config import Config
 from pilotage.core.types import FloatArray
@@ -25,6 +24,8 @@ class MspPartitionStrategy:
     """
 
     def __init__(self, config: MspPartitionConfig, setting: PatrolSetting) -> None:
+        from scipy.optimize import linear_sum_assignment  # loads 0.1 s of SciPy, which most runs never need
+
         del config
         graph, team = setting.graph, setting.team_size
         groups = min(team, len(graph))
