@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import atexit
 import gc
 import os
+import shutil
 import signal
 import sys
+import tempfile
 from collections.abc import Iterator
 
 import pytest
@@ -22,6 +25,13 @@ for _library in ("OPENBLAS", "OMP", "MKL"):
 # numba would colour each word of what its overloads say where they do not apply; nobody reads most of it.
 os.environ["NUMBA_DISABLE_ERROR_MESSAGE_HIGHLIGHTING"] = "1"
 
+# Where bytecode may not lie beside the source, it lies in a folder of this run: else each of the processes
+# that tests start would compile all of pilotage from its text.
+if os.environ.pop("PYTHONDONTWRITEBYTECODE", "") and "PYTHONPYCACHEPREFIX" not in os.environ:
+    _bytecode = tempfile.mkdtemp(prefix="pilotage-bytecode-")
+    atexit.register(shutil.rmtree, _bytecode, ignore_errors=True)
+    os.environ["PYTHONPYCACHEPREFIX"] = _bytecode
+
 # A shell's background job ignores Ctrl-C, and so would all that tests start; those of Ctrl-C need it heard.
 signal.signal(signal.SIGINT, signal.default_int_handler)
 
@@ -31,6 +41,19 @@ gc.set_threshold(50_000, 20, 20)
 # Drawn examples are the same at every run and for every worker; compiling a kernel may take its time.
 settings.register_profile("pilotage", derandomize=True, deadline=None)
 settings.load_profile("pilotage")
+
+
+@pytest.fixture(autouse=True, scope="session")
+def _nothing_is_timed() -> Iterator[None]:
+    """Missions are not built twice here so that their times are right: no test looks at times.
+
+    Commands in processes of their own warm up as ever.
+    """
+    run = sys.modules.get("pilotage.experiments.run")
+    with pytest.MonkeyPatch.context() as patch:
+        if run is not None:
+            patch.setattr(run, "warm_up", lambda _: None)
+        yield
 
 
 @pytest.fixture(autouse=True)
