@@ -20,6 +20,9 @@ from pilotage.kernels.control.match import match_scan
 from pilotage.kernels.control.motion_limits import Drive, advance, approach, command_is_safe
 from pilotage.kernels.control.movers import (
     COLUMNS,
+    MISSED,
+    PP,
+    READINGS,
     VX,
     VY,
     X,
@@ -282,7 +285,7 @@ def test_a_walker_is_tracked_and_foretold() -> None:
     rng = np.random.default_rng(2)
     for k in range(60):
         place = np.array([[0.05 * 1.2 * k, 1.0], [3.0, -2.0]]) + rng.normal(0.0, 0.03, (2, 2))
-        tracks, of_centre = track_step(tracks, place, 0.05, 0.08, 0.8, 0.4, 4.0, 8)
+        tracks, of_centre = track_step(tracks, place, 0.05, 0.08, 0.8, 0.4, 0.2, 4.0, True, 8)
         assert of_centre.shape == (2,)
     assert tracks.shape[0] == 2
     walker = tracks[int(np.argmax(np.abs(tracks[:, VX])))]
@@ -298,6 +301,36 @@ def test_a_walker_is_tracked_and_foretold() -> None:
     runner[VX] *= 4.0
     both = foretold(np.array([walker, runner]), 1.0, 0.5, 1, 0.25, 1.0, 0.8, 0.4)[0, :, 2]
     assert both[1] > both[0] + 0.3
+
+
+@pytest.mark.parametrize("dt", [0.05, 0.1])
+def test_a_runner_who_turns_is_followed_whatever_the_rate(dt: float) -> None:
+    """Half a second after a turn by 30 degrees, which changes the velocity by 1.4 m/s."""
+
+    def behind(lasts: float) -> float:
+        tracks, place, velocity = np.zeros((0, COLUMNS)), np.zeros(2), np.array([2.8, 0.0])
+        for k in range(round(2.5 / dt)):
+            if k == round(2.0 / dt):
+                velocity = 2.8 * np.array([math.cos(math.pi / 6.0), math.sin(math.pi / 6.0)])
+            place = place + dt * velocity
+            tracks, _ = track_step(tracks, place[None], dt, 0.08, 0.8, 0.4, lasts, 4.0, True, 8)
+        assert tracks.shape[0] == 1
+        return math.hypot(*(tracks[0, VX : VY + 1] - velocity))
+
+    assert behind(0.2) < 0.25
+    assert behind(0.2) < 0.7 * behind(0.0)
+
+
+def test_a_vague_track_does_not_take_the_centre_of_a_sure_one() -> None:
+    """In standard deviations the vague one is nearer: 0.4 m of 0.41, where the sure one is 0.15 m of 0.09."""
+    tracks = np.zeros((2, COLUMNS))
+    tracks[:, READINGS], tracks[:, X] = 10.0, (0.15, -0.4)
+    tracks[:, PP] = 0.04**2, 0.4**2
+    out, of_centre = track_step(tracks, np.zeros((1, 2)), 0.05, 0.08, 0.8, 0.4, 0.2, 4.0, True, 8)
+    assert of_centre.tolist() == [0]
+    assert out[:, MISSED].tolist() == [0.0, 1.0]
+    _, of_centre = track_step(tracks, np.zeros((1, 2)), 0.05, 0.08, 0.8, 0.4, 0.2, 4.0, False, 8)
+    assert of_centre.tolist() == [1]
 
 
 def test_clusters_end_at_gaps_and_wide_ones_are_none() -> None:

@@ -77,6 +77,7 @@ def limit_errors(
             drive.deceleration * share,
             drive.turn_rate,
             drive.turn_acceleration * share,
+            drive.least_radius,
         )
         there = drive_out(before, begin, end, delay * hypotheses[h, 1], sent, limits)
         dv, dw = (there[3] - after[3]) / speed_std, (there[4] - after[4]) / turn_std

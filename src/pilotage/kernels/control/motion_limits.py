@@ -28,6 +28,7 @@ class Drive(NamedTuple):
     """Limits of a body as a kernel takes them, in SI units.
 
     ``reverse`` is the highest speed backwards, ``turn_acceleration`` holds for speeding up and slowing down.
+    With a ``least_radius`` above 0 it turns no sharper than so, driving forward.
     """
 
     speed: float
@@ -36,6 +37,7 @@ class Drive(NamedTuple):
     deceleration: float
     turn_rate: float
     turn_acceleration: float
+    least_radius: float = 0.0
 
     def scaled(self, share: float) -> Drive:
         """The limits with every acceleration multiplied by ``share``; not for kernels."""
@@ -46,6 +48,7 @@ class Drive(NamedTuple):
             self.deceleration * share,
             self.turn_rate,
             self.turn_acceleration * share,
+            self.least_radius,
         )
 
 
@@ -67,6 +70,9 @@ def advance(
     cv = min(max(cv, -drive.reverse), drive.speed)
     cw = min(max(cw, -drive.turn_rate), drive.turn_rate)
     nv = approach(v, cv, drive.acceleration * dt, drive.deceleration * dt)
+    if drive.least_radius > 0.0:
+        sharpest = max(nv, 0.0) / drive.least_radius
+        cw = min(max(cw, -sharpest), sharpest)
     nw = approach(w, cw, drive.turn_acceleration * dt, drive.turn_acceleration * dt)
     px, py, ptheta = exact_arc(x, y, theta, 0.5 * (v + nv) * dt, 0.5 * (w + nw) * dt)
     return px, py, ptheta, nv, nw

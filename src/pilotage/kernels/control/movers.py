@@ -122,21 +122,25 @@ def track_step(
     place_std: float,
     acceleration_std: float,
     turning_std: float,
+    lasts: float,
     gate: float,
+    likeliest: bool,
     most_missed: int,
 ) -> tuple[FloatArray, IntArray]:
     """One step of all tracks (M, 11): predict, take the nearest centre (C, 2), begin and end tracks.
 
-    Constant velocity with white acceleration noise (``_acceleration_var``); nearest neighbour within the
-    gate, the nearest pair first (wrong where two bodies meet). Returns the tracks (M', 11) and the track of
-    each centre (C,).
+    Constant velocity with acceleration noise (``_acceleration_var``), drawn anew after ``lasts`` seconds, or
+    after a step if that is longer: the spectral density of white noise is the variance times that time.
+    The pair nearest in standard deviations comes first, or the ``likeliest`` in the gate (both wrong where
+    two bodies meet): the former gives the centre of a sure track to a vague one, of who was not seen for a
+    while. Returns the tracks (M', 11) and the track of each centre (C,).
     """
     m, c = tracks.shape[0], centres.shape[0]
     out = np.empty((m + c, COLUMNS))
     r = place_std * place_std
     moved = tracks.copy()
     for i in range(m):
-        q = _acceleration_var(tracks[i], acceleration_std, turning_std)
+        q = _acceleration_var(tracks[i], acceleration_std, turning_std) * max(1.0, lasts / dt)
         moved[i, X] += dt * moved[i, VX]
         moved[i, Y] += dt * moved[i, VY]
         moved[i, PP] += 2.0 * dt * moved[i, PV] + dt * dt * moved[i, VV] + q * dt**4 / 4.0
@@ -145,17 +149,19 @@ def track_step(
     of_centre = np.full(c, UNUSED)
     taken = np.zeros(m, np.bool_)
     for _ in range(min(m, c)):
-        best, bi, bj = gate, -1, -1
+        best, bi, bj = math.inf, -1, -1
         for i in range(m):
             if taken[i]:
                 continue
-            spread = math.sqrt(moved[i, PP] + r)
+            s = moved[i, PP] + r
+            vague = 2.0 * math.log(s) if likeliest else 0.0
             for j in range(c):
                 if of_centre[j] >= 0:
                     continue
-                d = math.hypot(centres[j, 0] - moved[i, X], centres[j, 1] - moved[i, Y]) / spread
-                if d < best:
-                    best, bi, bj = d, i, j
+                dx, dy = centres[j, 0] - moved[i, X], centres[j, 1] - moved[i, Y]
+                d2 = (dx * dx + dy * dy) / s
+                if d2 < gate * gate and d2 + vague < best:
+                    best, bi, bj = d2 + vague, i, j
         if bi < 0:
             break
         taken[bi] = True

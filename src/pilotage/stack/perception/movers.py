@@ -25,7 +25,12 @@ class MoversConfig(Config):
     acceleration_std_m_s2: Positive = 0.8
     turning_std_rad_s: NonNegative = 0.4
     """Times its speed is the acceleration of a body that is faster than walkers are."""
+    acceleration_lasts_s: NonNegative = 0.0
+    """For how long a body keeps accelerating as it does: at least from reading to reading. The longer, the
+    sooner a track follows who turns, and the less it smooths."""
     gate_std: Positive = 4.0
+    likeliest: bool = False
+    """Readings go to the track that makes them likeliest, not to the nearest in its standard deviations."""
     most_missed: int = Field(default=8, ge=0, le=1000)
     readings: int = Field(default=4, ge=2, le=1000)
     stands_readings: int = Field(default=200, ge=2, le=1000)
@@ -118,7 +123,9 @@ class Movers:
             config.place_std_m,
             config.acceleration_std_m_s2,
             config.turning_std_rad_s,
+            config.acceleration_lasts_s,
             config.gate_std,
+            config.likeliest,
             config.most_missed,
         )
         self._things = np.zeros(len(self.tracks), np.bool_)

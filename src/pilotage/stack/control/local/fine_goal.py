@@ -57,7 +57,7 @@ def approach(scene: Scene, tolerance_m: float) -> Twist | None:
     braking = BRAKE_TRUST * drive.deceleration
     dx, dy = float(goal[0]) - x, float(goal[1]) - y
     away = math.hypot(dx, dy)
-    if away > NEAR_M + v * v / (2.0 * braking) + abs(v) * scene.dt_s:
+    if drive.least_radius > 0.0 or away > NEAR_M + v * v / (2.0 * braking) + abs(v) * scene.dt_s:
         return None
     line = np.linspace([x, y], goal, max(2, math.ceil(away / scene.ground.cell_m)))
     if path_distances(line, scene.ground).min() < body.inner_m:

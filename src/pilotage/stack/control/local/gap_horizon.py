@@ -11,7 +11,7 @@ from pydantic import Field
 from pilotage.core.config import Config
 from pilotage.core.types import STOP, FloatArray, Twist
 from pilotage.kernels.control.band import path_distances
-from pilotage.kernels.control.motion_limits import Drive, command_is_safe
+from pilotage.kernels.control.motion_limits import Drive, approach, command_is_safe
 from pilotage.kernels.control.movers import movers_clearance
 from pilotage.kernels.control.rollouts import (
     Price,
@@ -29,6 +29,10 @@ from pilotage.stack.control.local.rolling import RollingConfig, Scene
 from pilotage.stack.control.local.rolling_step import RollingController
 from pilotage.stack.control.local.sampling import NoiseBank
 
+MOST_BLIND_RAD = math.pi / 3.0
+"""To either side of straight behind: with a wider blind sector no arc is safe, and this one is taken."""
+ROUND = 0.9
+"""With an inner radius of this share of the outer one or more nothing swings when it turns."""
 TRIED_M = 0.3
 """Two narrow places nearer to each other than this are one."""
 Share = Field(default=0.65, gt=0.0, le=1.0)
@@ -83,6 +87,9 @@ class GapHorizonConfig(Config):
     calm_rad_s: Positive = 2.0
     """With a moving body so near it drives and turns no faster: behind one there may be another, whom nobody
     sees, and corners that swing do not stop at once."""
+    backs_after_s: NonNegative = 10.0
+    """For so long after it saw somebody it does not back where its laser does not look, unless it has come
+    nowhere for as long: it may be shut in."""
     stuck_s: Positive = 2.0
     stuck_m: Positive = 0.15
     """Where it came no farther than this in that time, it tries the narrowest place ahead straight; where it
@@ -127,15 +134,21 @@ class GapHorizon(RollingController):
         self._moved_s = self._drove_s = 0.0
         self._tried: list[tuple[float, float]] = []
         self._since: tuple[float, float, float] | None = None
+        self._saw_people_s = -math.inf
+        self._came: tuple[float, float, float] | None = None
+
+    def _careful(self, view: LocalView, scene: Scene) -> Scene:
+        config, drive = self._config, scene.drive
+        if self._people_are_near(scene):
+            drive = drive._replace(
+                speed=min(drive.speed, config.calm_m_s), turn_rate=min(drive.turn_rate, config.calm_rad_s)
+            )
+        if self._may_be_followed(view, scene):
+            drive = drive._replace(reverse=0.0, least_radius=self._swings_m(view, scene))
+        return scene if drive is scene.drive else replace(scene, drive=drive)
 
     def _decide(self, view: LocalView, scene: Scene) -> Twist:
         config = self._config
-        if self._people_are_near(scene):
-            calm = scene.drive._replace(
-                speed=min(scene.drive.speed, config.calm_m_s),
-                turn_rate=min(scene.drive.turn_rate, config.calm_rad_s),
-            )
-            scene = replace(scene, drive=calm)
         if self._must_stand(scene, view.t_s):
             self._plan = None
             return STOP
@@ -267,6 +280,24 @@ class GapHorizon(RollingController):
         ahead = np.ascontiguousarray(scene.path[: max(3, round(self._config.close_ahead_m / 0.1))])
         return bool(path_distances(ahead, scene.ground).min() < scene.body.outer_m)
 
+    def _may_be_followed(self, view: LocalView, scene: Scene) -> bool:
+        """Whether somebody whom nobody sees may be behind: where people walk, and the laser does not look."""
+        x, y = float(scene.pose[0]), float(scene.pose[1])
+        if math.isfinite(scene.movers.nearest_m(x, y)):
+            self._saw_people_s = view.t_s
+        if self._came is None or math.hypot(x - self._came[1], y - self._came[2]) > self._config.stuck_m:
+            self._came = (view.t_s, x, y)
+        if _blind_rad(view) <= 0.0:
+            return False
+        return view.t_s - min(self._saw_people_s, self._came[0]) < self._config.backs_after_s
+
+    def _swings_m(self, view: LocalView, scene: Scene) -> float:
+        """Least radius of an arc on which no corner comes nearer to anybody in the sector behind."""
+        body = scene.body
+        if body.inner_m > ROUND * body.outer_m:
+            return 0.0
+        return body.outer_m / math.cos(min(0.5 * _blind_rad(view), MOST_BLIND_RAD))
+
     def _people_are_near(self, scene: Scene) -> bool:
         return scene.movers.nearest_m(float(scene.pose[0]), float(scene.pose[1])) < self._config.calm_m
 
@@ -296,20 +327,27 @@ class GapHorizon(RollingController):
 
     def _checked(self, scene: Scene, first: FloatArray, margin_m: float | None = None) -> Twist | None:
         """The command if it can be held for a step and braked from without touching anything."""
-        config = self._config
+        config, drive = self._config, scene.drive
         margin_m = config.least_margin_m if margin_m is None else margin_m
         hold_s = scene.dt_s
-        if abs(first[0]) > abs(scene.start[3]) and self._people_are_near(scene):
+        # As it is checked, so it is sent: near people the limits are narrower than the robot's own.
+        v, w = float(first[0]), float(first[1])
+        v, w = min(max(v, -drive.reverse), drive.speed), min(max(w, -drive.turn_rate), drive.turn_rate)
+        if drive.least_radius > 0.0:
+            faster, slower = drive.acceleration * scene.dt_s, drive.deceleration * scene.dt_s
+            most = max(approach(float(scene.start[3]), v, faster, slower), 0.0) / drive.least_radius
+            w = min(max(w, -most), most)
+        if abs(v) > abs(scene.start[3]) and self._people_are_near(scene):
             hold_s = max(hold_s, config.people_hold_s)
         for keep_turning in (True, False):
             safe, _ = command_is_safe(
                 scene.start,
-                float(first[0]),
-                float(first[1]),
+                v,
+                w,
                 hold_s,
                 config.check_step_s,
                 keep_turning,
-                scene.drive,
+                drive,
                 self._worse(scene),
                 scene.body,
                 scene.ground,
@@ -322,7 +360,7 @@ class GapHorizon(RollingController):
             )
             if safe:
                 self._keep_turning = keep_turning
-                return Twist(float(first[0]), float(first[1]))
+                return Twist(v, w)
         return None
 
 
@@ -337,6 +375,13 @@ class _Samples:
         self.commands = np.empty((config.rollouts, self.steps, 2))
         most = 1 + len(SPEEDS) * len(LOOKS) + 1 + len(DODGES) + 2
         self.plans = np.empty((most, self.steps, 2))
+
+
+def _blind_rad(view: LocalView) -> float:
+    """Width of the sector that no beam looks into, if it holds what is straight behind; else 0."""
+    first, looks = float(view.beam_angles_rad[0]), float(view.beam_angles_rad[-1] - view.beam_angles_rad[0])
+    behind = (math.pi - view.mount.theta_rad - first) % (2.0 * math.pi)
+    return 0.0 if behind <= looks else 2.0 * math.pi - looks
 
 
 def _fitted(plan: FloatArray, steps: int) -> FloatArray:

@@ -16,7 +16,7 @@ from pilotage.kernels.control.footprint import Body
 from pilotage.kernels.control.ground import Ground
 from pilotage.kernels.control.motion_limits import Drive
 from pilotage.kernels.geometry.motion import wrap
-from pilotage.sensors.sensor import Positive
+from pilotage.sensors.sensor import NonNegative, Positive
 from pilotage.stack.control.local.answer import Answer
 from pilotage.stack.control.local.body import make_body
 from pilotage.stack.control.local.role import LocalLimits, LocalView
@@ -33,6 +33,14 @@ ROLL_M, MOST_OFF_M = 0.5, 1.0
 """The grids follow a robot so far from their middle: where the time to go is worked out, and at any time."""
 BEYOND_S = 6.0
 """The time to go is worked out so far past the robot: no plan goes back farther."""
+
+
+class RollingMoversConfig(MoversConfig):
+    """Tracks as fast robots need them: of who turns within half a second, whatever the laser's rate."""
+
+    # A class of its own: as mere values of a default, whoever set another key of the part would lose them.
+    acceleration_lasts_s: NonNegative = 0.2
+    likeliest: bool = True
 
 
 class RollingConfig(Config):
@@ -61,7 +69,7 @@ class RollingConfig(Config):
     edge_m: float = Field(default=-0.01, ge=-0.1, le=1.0)
     """Kept beside the footprint's inner disc where the time to go looks for a way; below 0 for gaps whose
     middle no cell hits: what then proves too narrow has to be found out by trying."""
-    movers: MoversConfig = MoversConfig()
+    movers: RollingMoversConfig = RollingMoversConfig()
     fade_hits: int = Field(default=3, ge=0, le=60)
     """Hits that a cell loses where the laser sees past it; 0 for a world in which nothing moves."""
 

@@ -1,0 +1,86 @@
+"""What our own controller does where people walk: nothing that its laser does not let it answer for."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from pilotage.core.types import FloatArray, Pose2, Twist
+from pilotage.experiments.barn_benchmark import course_base
+from pilotage.experiments.controller_benchmark import CourseRequest, course_run_mission
+from pilotage.experiments.course_families import Driver, make_course_of
+from pilotage.kernels.control.motion_limits import Drive, advance
+from pilotage.kernels.scans.rays import fan_ranges
+from pilotage.models.footprint import Footprint
+from pilotage.models.motion.differential_drive import DifferentialDriveConfig
+from pilotage.stack.control.local.gap_horizon import GapHorizonConfig
+from pilotage.stack.control.local.role import LOCAL_CONTROLLERS, LocalLimits, LocalView
+
+JACKAL = np.array([[0.254, 0.215], [-0.254, 0.215], [-0.254, -0.215], [0.254, -0.215]])
+LIMITS = LocalLimits(2.0, 0.5, 3.0, 3.0, 4.0, 6.0)
+DRIVE = Drive(2.0, 0.5, 3.0, 3.0, 4.0, 6.0)
+MOUNT = Pose2(0.12, 0.0, 0.0)
+DT_S = 0.05
+THREE_QUARTERS = np.linspace(-0.75 * math.pi, 0.75 * math.pi, 541)
+WHOLE = np.linspace(-math.pi, math.pi, 721)
+
+
+def driven(beams: FloatArray, half_m: float, walks_m_s: float, heading_rad: float = 0.0) -> FloatArray:
+    """(80, 4) speed and turn rate commanded and driven, in a corridor with somebody who comes straight on."""
+    config = LOCAL_CONTROLLERS.configure("gap-horizon", {"ground": {"movers": {"enabled": True}}}, "")
+    controller = LOCAL_CONTROLLERS.entry("gap-horizon").factory(config, np.random.default_rng(1))
+    walls = np.array([[-8.0, half_m, 8.0, half_m], [-8.0, -half_m, 8.0, -half_m]])
+    state = (0.0, 0.0, heading_rad, 0.0, 0.0)
+    rows = []
+    for k in range(80):
+        t_s = k * DT_S
+        walker = np.array([[3.0 - walks_m_s * t_s, 0.02, 0.25]])
+        x, y, theta, v, w = state
+        eye = x + MOUNT.x_m * math.cos(theta), y + MOUNT.x_m * math.sin(theta), theta + float(beams[0])
+        ranges = fan_ranges(*eye, float(beams[1] - beams[0]), beams.shape[0], 20.0, walls, walker)
+        pose, twist = Pose2(x, y, theta), Twist(v, w)
+        view = LocalView(t_s, pose, twist, ranges, beams, MOUNT, 20.0, (6.0, 0.0), LIMITS, JACKAL)
+        command = controller.step(view)
+        state = advance(*state, command.v_m_s, command.w_rad_s, DT_S, DRIVE)
+        rows.append((command.v_m_s, command.w_rad_s, *state[3:]))
+    return np.array(rows)
+
+
+def test_it_does_not_back_from_people_where_its_laser_does_not_look() -> None:
+    meetings = [(0.5, 0.3), (0.5, 0.8), (0.7, 1.2), (1.0, 0.5)]
+    assert [driven(THREE_QUARTERS, *meeting)[:, 0].min() for meeting in meetings] == [0.0] * len(meetings)
+    # With eyes all around it does: whoever comes leaves it no better way.
+    assert min(driven(WHOLE, *meeting)[:, 0].min() for meeting in meetings) < -0.3
+
+
+@pytest.mark.parametrize("heading_rad", [1.2, -2.0])
+def test_its_corners_come_nearer_to_nobody_whom_its_laser_does_not_see(heading_rad: float) -> None:
+    """On arcs of at least the outer radius over cos 45 degrees; standing, it does not turn."""
+    radius_m = math.hypot(0.254, 0.215) * math.sqrt(2.0)
+
+    def swings(beams: FloatArray) -> float:
+        # Somebody is known after four readings; what was turned until then has to end first.
+        rows = driven(beams, 0.7, 0.8, heading_rad)[16:]
+        return float((np.abs(rows[:, 3]) * radius_m - rows[:, 2]).max())
+
+    assert swings(THREE_QUARTERS) < 0.05
+    assert swings(WHOLE) > 0.3
+
+
+def test_who_is_told_that_people_walk_keeps_the_other_settings_of_their_tracks() -> None:
+    name = "gap-horizon"
+    driver = Driver(Footprint.polygon(JACKAL), JACKAL, DifferentialDriveConfig(max_speed_m_s=2.0))
+    request = CourseRequest(("crowd",), (name,))
+    course = make_course_of("crowd", 0, 1, driver)
+    assert course is not None
+    assert course.people
+    choice = course_run_mission(request, course_base(), course, 0, name).stack.local_controller
+    assert choice is not None
+    told = LOCAL_CONTROLLERS.configure(name, choice.parameters, name)
+    assert isinstance(told, GapHorizonConfig)
+    movers = told.ground.movers
+    assert movers.enabled
+    assert movers == GapHorizonConfig().ground.movers.model_copy(update={"enabled": True})
+    assert movers.acceleration_lasts_s == pytest.approx(0.2)
