@@ -6,6 +6,7 @@ import math
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -17,9 +18,10 @@ from pilotage.experiments.mission import mission_of, read_mission
 from pilotage.sensors.readings import Readings
 from pilotage.stack.interface import BeliefStatus
 from pilotage.stack.navigator.patrol.headway import Headway
-from pilotage.stack.navigator.patrol.precedence import MOST_S, Leading, orders, told
-from pilotage.stack.navigator.patrol.states import Lost, Move, State, Waiting
+from pilotage.stack.navigator.patrol.precedence import MOST_S, Leading, orders, precedence, told
+from pilotage.stack.navigator.patrol.states import Lost, Move, State, Waiting, set_out
 from pilotage.stack.patrol.evacuation import Evacuation
+from pilotage.stack.patrol.messages import PatrolMemory
 from pilotage.stack.patrol.roadmap import Roadmap
 from pilotage.stack.patrol.word import Clearing, TeamWord
 
@@ -122,6 +124,22 @@ class TestOrder:
         headway.wait(40.0)
         assert headway.since_s == headway.stays_s == 40.0
 
+    def test_who_is_sent_elsewhere_and_sways_gets_nowhere(self) -> None:
+        headway = Headway()
+        headway.step(1.0, 4, 9.0, 0.0, 0.0)
+        headway.redirect(0.5)
+        assert headway.since_s == 0.5
+        headway.redirect(0.2)
+        headway.step(2.0, 7, 6.0, 0.0, 0.0)
+        headway.step(3.0, 7, 5.1, 0.9, 0.0)
+        assert headway.since_s == 0.5
+        headway.step(4.0, 7, 4.5, 1.5, 0.0)
+        assert headway.since_s == 4.0
+        headway.restart(5.0)
+        headway.step(6.0, 4, 9.0, 1.5, 0.0)
+        headway.step(7.0, 4, 8.5, 2.0, 0.0)
+        assert headway.since_s == 7.0
+
     def test_of_two_who_tell_it_to_go_the_one_without_headway_for_longest_counts(self) -> None:
         context = build(mission_of(hall_and_dead_end(4, 10.0), seed=0)).team[3].stack._context  # type: ignore[attr-defined]
         word = TeamWord(1.0, 1.0, False, None, None, context.memory.message(0.0))
@@ -197,3 +215,75 @@ def test_whoever_goes_first_arrives(monkeypatch: pytest.MonkeyPatch) -> None:
     assert metrics["collisions"] == metrics["deadlocks"] == 0
     assert len(took_s) >= 4
     assert max(took_s) < MOST_S
+
+
+def leader(team: int) -> Any:
+    """What the first robot of a team knows, at the left of the hall, on its way to the dead end."""
+    context = build(mission_of(hall_and_dead_end(team, 10.0), seed=0)).team[0].stack._context  # type: ignore[attr-defined]
+    context.pose, context.fresh = Pose2(0.8, 1.5, 0.0), True
+    context.hop = context.target = int(np.argmax(context.roadmap.places_xy_m[:, 1]))
+    context.lead = Mock(return_value=Twist(0.5, 0.0))
+    return context
+
+
+def hear(context: Any, t_s: float, places: Places) -> None:
+    """At a time all mates say where they are."""
+    context.t_s = t_s
+    for number, (x, y) in places.items():
+        word = TeamWord(x, y, False, None, None, context.memory.message(t_s))
+        context.mates[number] = t_s, word
+
+
+class TestWhoeverGoesFirst:
+    def test_drives_past_who_stands_aside_while_others_far_ahead_are_told_to_go(self) -> None:
+        """Every order anywhere on its path began its five seconds anew: it stood for half a minute."""
+        context = leader(4)
+        line = line_to(context.roadmap, 0.8, 1.5, tuple(context.roadmap.places_xy_m[context.hop]))
+        hear(context, 0.0, {1: tuple(line[4])})
+        state = Leading(context, 0.0)
+        assert state.step(Readings(0.0, {})).command == Twist(0.0, 0.0)
+        ((number, *place),) = context.clearing.orders
+        assert number == 1
+        # There, but for a hand's breadth, where no place farther off was left.
+        off = np.array(place) - line[4]
+        off /= np.hypot(*off)
+        state.sent[1] = tuple(line[4] + 0.8 * off)
+        beside = line[4] + 0.65 * off
+        hear(context, 4.0, {1: tuple(beside), 2: (4.0, 2.7)})
+        assert state.step(Readings(4.0, {})).command.v_m_s > 0.0
+        assert {n for n, *_ in context.clearing.orders} == {1, 2}
+
+    def test_lets_go_whom_it_has_passed_while_others_are_told(self) -> None:
+        context = leader(5)
+        hear(context, 0.0, {1: (2.0, 1.5)})
+        state = Leading(context, 0.0)
+        state.step(Readings(0.0, {}))
+        told_m = context.clearing.orders[0][1:]
+        context.pose = Pose2(3.0, 2.1, 0.0)
+        for t_s, others in ((6.0, {2: (4.0, 2.9)}), (11.0, {2: (4.0, 2.9), 3: (3.7, 2.1)})):
+            hear(context, t_s, {1: told_m, **others})
+            state.step(Readings(t_s, {}))
+        assert {n for n, *_ in context.clearing.orders} == {2, 3}
+
+
+def test_who_leaves_its_place_to_a_mate_and_gets_no_farther_goes_first_soon() -> None:
+    """The way to the next place was shut by the same crowd: it waited as long again, a minute in all."""
+    context = leader(2)
+    del context.lead
+    first = context.hop
+    then = int(np.argmin(context.roadmap.places_xy_m[:, 1]))
+    on = SimpleNamespace(next_vertex=lambda knowledge: then if knowledge.at == first else first)
+    context.task = replace(context.task, strategy=on)
+    context.pose = Pose2(2.5, 1.5, 0.0)
+    mate = PatrolMemory(len(context.task.graph), 1, 2, first, 1.0)
+    mate.visit(first, 10.0)
+    context.memory.receive(mate.message(10.0))
+    hear(context, 0.0, {1: (4.0, 6.0)})
+    state: State = set_out(context)
+    while not isinstance(state, Leading):
+        hear(context, context.t_s + 0.5, {1: (4.0, 6.0)})
+        state = precedence(context, state)
+        assert context.t_s < 30.0
+        if context.t_s < 20.0:
+            assert context.hop == first
+    assert context.target == then

@@ -6,8 +6,8 @@ import math
 
 PROGRESS_S = 0.4
 """So much nearer in time to go counts as getting on."""
-
-
+SWAY_S = 1.0
+"""Sent elsewhere on its way it has to get so much nearer besides: beside a passage it goes to and fro."""
 STAY_M = 1.0
 """Who comes no farther than this from a place stays there."""
 
@@ -29,8 +29,15 @@ class Headway:
         self._x_m = self._y_m = math.nan
 
     def restart(self, t_s: float) -> None:
-        """It is where it was sent, or somebody else goes there."""
+        """It is where it was sent."""
         self.since_s, self._hop = t_s, -1
+
+    def redirect(self, since_s: float) -> None:
+        """Somebody else goes there: it has not got on yet, but the way to the next place may be open.
+
+        It is taken to have got on at that time, if it did no later.
+        """
+        self.since_s = max(self.since_s, since_s)
 
     def wait(self, t_s: float) -> None:
         """It is told to stay."""
@@ -40,7 +47,8 @@ class Headway:
     def step(self, t_s: float, hop: int, to_go_s: float, x_m: float, y_m: float) -> None:
         """It drives to a hop, is so far from it, and here."""
         if hop != self._hop:
-            self._hop, self._least_s = hop, to_go_s
+            self._least_s = to_go_s - (0.0 if self._hop < 0 else SWAY_S)
+            self._hop = hop
         elif to_go_s < self._least_s - PROGRESS_S:
             self._least_s, self.since_s = to_go_s, t_s
         if not math.hypot(x_m - self._x_m, y_m - self._y_m) <= STAY_M:

@@ -45,14 +45,14 @@ class Leading:
 
     Attributes
     ----------
-    sent, told_s
-        Where it told others to go, and when last; itself too, where somebody has to pass it first.
+    sent, since_s
+        Where it told others to go, and from when on each; itself too, where somebody has to pass it first.
     """
 
     context: Context
     began_s: float
     sent: dict[int, Place] = field(default_factory=dict)
-    told_s: float = -math.inf
+    since_s: dict[int, float] = field(default_factory=dict)
 
     def step(self, readings: Readings) -> Move:
         """Look who is on the path; drive where nobody is."""
@@ -80,29 +80,53 @@ class Leading:
         )
         if own in self.sent:
             return self._make_room(places)
-        ahead = line[: math.ceil(AHEAD_M / STEP_M)]
-        near = [np.hypot(*(ahead - place).T).min() < apart_m(context) for place in places.values()]
-        holds = any(near) and context.t_s - self.told_s < HOLD_S
+        holds = self._waits_for(line[: math.ceil(AHEAD_M / STEP_M)], places)
         return Move(self, context.stand() if holds else context.lead(context.hop, first=True))
+
+    def _waits_for(self, ahead: FloatArray, places: dict[int, Place]) -> bool:
+        """Whether somebody on its path was told to go a moment ago, and is not there yet.
+
+        Who stands where it was told to stands as far from the path as there was room: waiting brings no more.
+        """
+        context = self.context
+        return any(
+            context.t_s - self.since_s[n] < HOLD_S
+            and math.dist(places[n], place) > context.radius_m
+            and np.hypot(*(ahead - places[n]).T).min() < apart_m(context)
+            for n, place in self.sent.items()
+            if n in places
+        )
 
     def _send(self, line: FloatArray, places: dict[int, Place]) -> None:
         context, own = self.context, self.context.task.robot
         here = {**places, own: (context.pose.x_m, context.pose.y_m)}
         others = orders(context, context.headway.since_s)
-        anew = context.t_s - self.told_s > ANEW_S
-        told = others if anew else {n: place for n, place in self.sent.items() if n in here} | others
+        # Each is told anew by itself: some are told all the while, and others were passed long ago.
+        kept = {
+            n: place
+            for n, place in self.sent.items()
+            if n in here and context.t_s - self.since_s[n] <= ANEW_S
+        }
         bodies = context.bodies_on_map()
         known = np.array(list(places.values())).reshape(-1, 2)
         silent = [
             b for b in bodies if not len(known) or np.hypot(*(known - b).T).min() > context.radius_m + 0.3
         ]
         search = Evacuation(
-            context.roadmap, line, own, here, told, others, np.array(silent).reshape(-1, 2), apart_m(context)
+            context.roadmap,
+            line,
+            own,
+            here,
+            kept | others,
+            others,
+            np.array(silent).reshape(-1, 2),
+            apart_m(context),
         )
         search.clear()
-        if search.sent != told or anew:
-            self.told_s = context.t_s
         self.sent = {n: place for n, place in search.sent.items() if n not in others}
+        self.since_s = {
+            n: self.since_s[n] if kept.get(n) == place else context.t_s for n, place in self.sent.items()
+        }
 
     def _make_room(self, places: dict[int, Place]) -> Move:
         """To its own place until those whom it lets pass are where they were told to go."""

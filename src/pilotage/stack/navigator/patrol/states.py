@@ -23,6 +23,8 @@ FACING_M, AT_REST_M_S = 0.5, 0.05
 """Two in a passage settle who backs out at rest; so much before they see no path around each other."""
 SURE_S, MOST_BLIND_S = 2.0, 12.0
 """Who hears nobody waits as long as driving through takes, and so much; no longer than that."""
+ANEW_S = 5.0
+"""Who leaves a place to mates has so long to get on towards the next one before it goes first."""
 ASIDE_M = 0.6
 """Something this near that may move wants to pass somebody who waits."""
 
@@ -322,7 +324,7 @@ def forgo(context: Context, *, for_long: bool) -> Move | None:
     first = context.hop
     if not context.leave_to_mates(for_long=for_long):
         return None
-    context.headway.restart(context.t_s)
+    context.headway.redirect(context.t_s - max(0.0, context.config.precede_s - ANEW_S))
     for _ in range(len(context.task.graph)):
         if not context.ask() or context.hop == first:
             break
