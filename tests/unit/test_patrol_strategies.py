@@ -7,6 +7,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
+from benchmarks.patrol import random_graph
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -15,7 +16,8 @@ from pilotage.evaluation.idleness import Idleness, idleness
 from pilotage.experiments.graph_patrol import GraphPatrol, Radio, patrol
 from pilotage.stack.patrol.graph import PatrolGraph
 from pilotage.stack.patrol.messages import PatrolMemory
-from pilotage.stack.patrol.partition import even_sizes, partition
+from pilotage.stack.patrol.partition import Plan, even_sizes, partition
+from pilotage.stack.patrol.strategies.adaptive_rounds import AdaptiveRoundsConfig, best_plan
 from pilotage.stack.patrol.strategy import STRATEGIES, PatrolSetting, Strategy
 from pilotage.stack.patrol.tours import Round, idleness_bound_s
 
@@ -201,3 +203,30 @@ def test_idleness_is_the_integral_of_its_curve(visits: list[tuple[int, float]], 
     assert found.worst_s >= curve.max() - 1e-9
     assert found.worst_s == pytest.approx(curve.max(), abs=0.02)
     assert math.isfinite(found.std_s)
+
+
+def test_sharing_costs_the_rounds_that_are_shared_alone() -> None:
+    """By hand: one robot to and fro over 10 m, and two around 24 m."""
+    xy = np.array([[0.0, 0.0], [10.0, 0.0], [20.0, 0.0], [26.0, 0.0], [26.0, 6.0], [20.0, 6.0]])
+    edges = np.full((6, 6), math.inf)
+    for a, b in ((0, 1), (1, 2), (2, 3), (3, 4), (4, 5), (5, 2)):
+        edges[a, b] = edges[b, a] = math.dist(xy[a], xy[b])
+    graph = PatrolGraph.of(xy, edges)
+    rounds = Round.best(graph, (0, 1)), Round.best(graph, (2, 3, 4, 5))
+    assert [walk.length_m for walk in rounds] == [20.0, 24.0]
+    plan = Plan(rounds, (1, 2), 20.0, (2 * 10.0 + 4 * 6.0) / 6)
+    assert plan.expected_m(6, 0.0) == pytest.approx((plan.worst_m, plan.mean_m))
+    # The worst is of the one that is alone.
+    assert plan.expected_m(6, 0.1) == pytest.approx((20.0, (2 * 10.0 + 4 * 6.0 * 1.05) / 6))
+    assert Plan(rounds, (2, 1), 24.0, 9.0).expected_m(6, 0.1)[0] == 24.0
+    assert Plan(rounds[1:], (2,), 12.0, 6.0).expected_m(6, 0.1)[0] == math.inf  # nobody goes to two of them
+    assert Plan(rounds, (4, 2), 12.0, 6.0).expected_m(6, 0.1)[0] == pytest.approx(13.2)
+
+
+def test_a_pair_that_shares_a_short_round_keeps_no_plan_from_being_taken() -> None:
+    """All rounds were charged for one that is shared: a share for each was taken, worse in both."""
+    graph = random_graph(1)
+    plan = best_plan(setting_for(graph, (0, 1, 2, 3)), 4, AdaptiveRoundsConfig())
+    alone = partition(graph, (1, 1, 1, 1))
+    assert plan.worst_m < alone.worst_m
+    assert plan.mean_m < 0.97 * alone.mean_m

@@ -42,6 +42,16 @@ class Plan:
     worst_m: float
     mean_m: float
 
+    def expected_m(self, vertices: int, sharing_cost: float) -> tuple[float, float]:
+        """Worst and mean distance where robots that share a round do not quite keep apart.
+
+        Parameters
+        ----------
+        sharing_cost
+            What the worst of such a round grows by, as a share of it; its mean grows by half of that.
+        """
+        return _promised(self.rounds, self.sizes, vertices, sharing_cost)
+
 
 def even_sizes(robots: int, groups: int) -> tuple[int, ...]:
     """Robots in groups, larger ones first."""
@@ -82,11 +92,19 @@ def partition(graph: PatrolGraph, sizes: tuple[int, ...], mean_weight: float = 0
 
 def _plan(graph: PatrolGraph, shares: list[set[int]], sizes: tuple[int, ...]) -> Plan:
     rounds = tuple(Round.best(graph, tuple(sorted(share))) for share in shares)
-    worst, mean = np.full(len(graph), np.inf), np.full(len(graph), np.inf)
+    return Plan(rounds, sizes, *_promised(rounds, sizes, len(graph), 0.0))
+
+
+def _promised(
+    rounds: tuple[Round, ...], sizes: tuple[int, ...], vertices: int, sharing_cost: float
+) -> tuple[float, float]:
+    worst, mean = np.full(vertices, np.inf), np.full(vertices, np.inf)
     for walk, size in zip(rounds, sizes, strict=True):
+        extra = sharing_cost * (size > 1)
         for vertex, (longest, usual) in _gaps(walk, size).items():
-            worst[vertex], mean[vertex] = min(worst[vertex], longest), min(mean[vertex], usual)
-    return Plan(rounds, sizes, float(worst.max()), float(mean.mean()))
+            worst[vertex] = min(worst[vertex], (1.0 + extra) * longest)
+            mean[vertex] = min(mean[vertex], (1.0 + 0.5 * extra) * usual)
+    return float(worst.max()), float(mean.mean())
 
 
 def _gaps(walk: Round, size: int) -> dict[int, tuple[float, float]]:

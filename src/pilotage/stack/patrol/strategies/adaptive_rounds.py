@@ -23,13 +23,14 @@ KEY, PHASE_M, PHASE_S = range(3)
 class AdaptiveRoundsConfig(Config):
     """How plans are weighed, and when a robot waits or gives another one up.
 
-    A plan's cost is its worst idleness plus ``mean_weight`` times its mean; rounds that several robots share
-    count ``sharing_cost`` more, for what keeping apart costs. A robot waits while it is further ahead of its
+    A plan's cost is its worst idleness plus ``mean_weight`` times its mean; of a round that several robots
+    share the worst counts ``sharing_cost`` more and the mean half of that, for what keeping apart costs. A
+    robot waits while it is further ahead of its
     place among those that share its round than ``slack`` of the distance between them.
     """
 
     mean_weight: NonNegative = 2.0
-    sharing_cost: NonNegative = 0.05
+    sharing_cost: NonNegative = 0.06
     slack: Positive = Field(default=0.05, le=0.5)
     silent_s: Positive = 30.0
     silent_ratio: Positive = 8.0
@@ -51,9 +52,8 @@ def best_plan(setting: PatrolSetting, robots: int, config: AdaptiveRoundsConfig)
     ]
 
     def cost(plan: Plan) -> float:
-        # By the longest of the rounds, each as it is shared: those of one robot need not keep apart.
-        extra = 1.0 + config.sharing_cost * (max(plan.sizes) > 1)
-        return extra * (plan.worst_m + config.mean_weight * plan.mean_m)
+        worst_m, mean_m = plan.expected_m(len(graph), config.sharing_cost)
+        return worst_m + config.mean_weight * mean_m
 
     return min(plans, key=cost)
 
