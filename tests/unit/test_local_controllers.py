@@ -12,6 +12,8 @@ from pilotage.core.types import FloatArray, Pose2, Twist
 from pilotage.kernels.control.footprint import discs_clearance
 from pilotage.kernels.control.motion_limits import Drive, advance
 from pilotage.kernels.scans.rays import fan_ranges
+from pilotage.stack.control.local.gap_horizon import GapHorizon
+from pilotage.stack.control.local.narrow_passage import NarrowPassage
 from pilotage.stack.control.local.role import (
     LOCAL_CONTROLLERS,
     LocalController,
@@ -124,6 +126,35 @@ def test_our_own_goes_on_to_a_goal_that_has_to_be_met_closely(seed: int) -> None
     slow = LocalLimits(0.5, 0.2, 0.5, 0.5, 1.0, 2.0)
     arrived, _, _ = drive(make("gap-horizon", seed), POSTS[2:], slow, seconds=30.0, tolerance_m=0.05)
     assert arrived
+
+
+def test_with_a_post_closer_than_it_can_measure_it_drives_slowly() -> None:
+    """A belief that is a centimetre off may have the wrong side as the near one."""
+
+    def speed(room_m: float) -> float:
+        posts = np.array([[0.0, 0.215 + room_m + 0.075, 0.075]])
+        return make("gap-horizon").step(view_of(0.0, Pose2(0.0, 0.0, 0.0), Twist(0.0, 0.0), posts)).v_m_s
+
+    assert 0.1 < speed(0.005) <= 0.35
+    assert speed(0.05) > 0.5
+
+
+def test_lining_up_before_a_gap_it_swings_no_corner_by_more_closely_than_elsewhere() -> None:
+    """A front corner would pass a post by 3 mm on its way round to the point before a gap on the left."""
+    away = math.hypot(0.254, 0.215) + 0.003 + 0.075
+    posts = np.array([[away * math.cos(-0.2), away * math.sin(-0.2), 0.075]])
+    controller = make("gap-horizon")
+    assert isinstance(controller, GapHorizon)
+    controller._passage = NarrowPassage(0.6, 1.0, 0.0, 0.5, 0, 0.0)
+    state = (0.0, 0.0, 0.0, 0.0, 0.0)
+    true = Drive(2.0, 0.5, 3.0, 3.0, 4.0, 6.0)
+    least = math.inf
+    for k in range(30):
+        command = controller.step(view_of(0.05 * k, Pose2(*state[:3]), Twist(*state[3:]), posts))
+        state = advance(*state, command.v_m_s, command.w_rad_s, 0.05, true)
+        least = min(least, discs_clearance(*state[:3], JACKAL, posts))
+    assert state[2] > 0.1
+    assert least > 0.0045
 
 
 def test_it_stands_before_a_closed_wall() -> None:

@@ -11,6 +11,7 @@ from pydantic import Field
 from pilotage.core.config import Config
 from pilotage.core.types import STOP, FloatArray, Twist
 from pilotage.kernels.control.band import path_distances
+from pilotage.kernels.control.ground import sure_clearance
 from pilotage.kernels.control.motion_limits import Drive, approach, command_is_safe
 from pilotage.kernels.control.movers import movers_clearance
 from pilotage.kernels.control.rollouts import (
@@ -23,7 +24,7 @@ from pilotage.kernels.control.rollouts import (
 )
 from pilotage.kernels.control.togo import UNREACHED_S, togo_at
 from pilotage.sensors.sensor import NonNegative, Positive
-from pilotage.stack.control.local.narrow_passage import NarrowPassage, find_narrow_passage
+from pilotage.stack.control.local.narrow_passage import THROUGH, NarrowPassage, find_narrow_passage
 from pilotage.stack.control.local.role import LOCAL_CONTROLLERS, LocalView
 from pilotage.stack.control.local.rolling import RollingConfig, Scene
 from pilotage.stack.control.local.rolling_step import RollingController
@@ -66,6 +67,9 @@ class GapHorizonConfig(Config):
     """The same in the last check of a command."""
     passage_margin_m: NonNegative = 0.004
     """The same in a gap that is driven straight and slowly, its axis measured again and again."""
+    squeezed_m_s: Positive = 0.35
+    """With an obstacle point nearer than ``least_margin_m`` it drives no faster: which side is nearer than
+    believed the next readings tell."""
     soft_m: Positive = 0.15
     near_cost: NonNegative = 1.0
     heading_s_per_rad: NonNegative = 0.25
@@ -154,10 +158,11 @@ class GapHorizon(RollingController):
             return STOP
         if self._passage is not None:
             self._passage, wanted = self._passage.step(scene, view.t_s)
+            # What lines up before the gap has no need to swing its corners by as closely as it is narrow.
+            inside = self._passage is None or self._passage.stage == THROUGH
+            margin_m = config.passage_margin_m if inside else config.least_margin_m
             for share in (1.0, 0.5, 0.25):
-                command = self._checked(
-                    scene, share * np.array([wanted.v_m_s, wanted.w_rad_s]), config.passage_margin_m
-                )
+                command = self._checked(scene, share * np.array([wanted.v_m_s, wanted.w_rad_s]), margin_m)
                 if command is not None:
                     if abs(command.v_m_s) + abs(command.w_rad_s) > 0.02:
                         self._moved_s = view.t_s
@@ -320,6 +325,26 @@ class GapHorizon(RollingController):
         near: float = movers_clearance(x, y, theta, body.polygon, body.outer_m, now, keep)
         return near < keep
 
+    def _is_squeezed(self, scene: Scene) -> bool:
+        body, ground, enough = scene.body, scene.ground, self._config.least_margin_m
+        x, y, theta = scene.pose
+        room_m: float = sure_clearance(
+            x,
+            y,
+            theta,
+            body.polygon,
+            body.outer_m,
+            ground.hits,
+            ground.nearest,
+            ground.mean,
+            ground.x0_m,
+            ground.y0_m,
+            ground.cell_m,
+            ground.per_cell,
+            enough,
+        )
+        return room_m < enough
+
     def _worse(self, scene: Scene) -> Drive:
         """Limits that are relied on: worse than the data sheet's, and than those that seem likely."""
         share = min(self._config.brake_trust, 0.9 * scene.drive.deceleration / scene.sheet.deceleration)
@@ -332,6 +357,8 @@ class GapHorizon(RollingController):
         hold_s = scene.dt_s
         # As it is checked, so it is sent: near people the limits are narrower than the robot's own.
         v, w = float(first[0]), float(first[1])
+        if abs(v) > config.squeezed_m_s and self._is_squeezed(scene):
+            v, w = math.copysign(config.squeezed_m_s, v), w * config.squeezed_m_s / abs(v)
         v, w = min(max(v, -drive.reverse), drive.speed), min(max(w, -drive.turn_rate), drive.turn_rate)
         if drive.least_radius > 0.0:
             faster, slower = drive.acceleration * scene.dt_s, drive.deceleration * scene.dt_s

@@ -30,6 +30,8 @@ ALONG_M = 0.35
 """Points so far before and behind the narrowest place are those that it has to pass between."""
 TURNS_RAD = np.linspace(-0.25, 0.25, 51)
 LONGEST_S = 25.0
+THROUGH = 2
+"""The last stage."""
 TRIES = 3
 
 
@@ -82,7 +84,7 @@ class NarrowPassage:
         if self.stage == 1:
             off = wrap(self.direction_rad - theta)
             if abs(off) < STRAIGHT_RAD and abs(scene.start[4]) < 0.1:
-                return replace(self, stage=2), Twist(0.0, 0.0)
+                return replace(self, stage=THROUGH), Twist(0.0, 0.0)
             return self, Twist(0.0, _limited(3.0 * off, TURN_RAD_S))
         along, across = self._place(x, y)
         too_narrow = self.width_m < 2.0 * (scene.body.inner_m + LEAST_ROOM_M)
