@@ -43,9 +43,44 @@ def test_a_carmen_log(tmp_path: Path) -> None:
     assert log.ranges_m[0].tolist() == [1.0, 2.0, math.inf]
     np.testing.assert_allclose(log.angles_rad(0), [-math.pi / 2, 0.0, math.pi / 2])
     assert (log.mount.x_m, log.mount.y_m, log.mount.theta_rad) == pytest.approx((0.2, 0.0, 0.0), abs=1e-9)
-    assert log.odometry_t_s is not None
-    assert log.odometry_t_s.tolist() == [-0.5, 0.5, 1.5, 2.5, 3.5, 4.5]
+    at = log.odometry_at_scans()
+    assert at is not None
+    np.testing.assert_allclose(at, poses(6), atol=1e-12)
     assert log.warnings == ()
+
+
+def test_what_scans_carry_counts_more_than_the_times_of_the_lines_between(tmp_path: Path) -> None:
+    """Old loggers stamped ODOM lines in bursts: interpolated, the odometry would be metres off."""
+    ways, lines = poses(12), []
+    for k, pose in enumerate(ways):
+        x, y, theta = pose
+        lines += [odom(10.0 * (k // 6), (x - 0.01, y, theta)), flaser(1.7 * k, pose)]
+        lines.append(odom(10.0 * (k // 6), (x + 0.02, y, theta)))
+    log = read_carmen_scans(written(tmp_path, "".join(lines)))
+    at = log.odometry_at_scans()
+    assert at is not None
+    np.testing.assert_allclose(at, ways, atol=1e-12)
+
+
+def test_scans_of_one_time_keep_their_own_odometry(tmp_path: Path) -> None:
+    """Times of a second's resolution, or none: 0 in every line."""
+    ways = poses(9)
+    lines = [odom(k // 4, pose) + flaser(k // 4, pose) for k, pose in enumerate(ways)]
+    log = read_carmen_scans(written(tmp_path, "".join(lines)))
+    at = log.odometry_at_scans()
+    assert at is not None
+    np.testing.assert_allclose(at, ways, atol=1e-12)
+    assert np.abs(log.t_s - np.arange(9) // 4).max() < 1e-5
+
+
+def test_the_lines_count_where_the_scans_carry_corrected_poses(tmp_path: Path) -> None:
+    ways, lines = poses(9), []
+    for k, (x, y, theta) in enumerate(ways):
+        lines += [odom(k, (x, y, theta)), flaser(k, (x + 0.5 * k, y - 3.0, theta))]
+    log = read_carmen_scans(written(tmp_path, "".join(lines)))
+    at = log.odometry_at_scans()
+    assert at is not None
+    np.testing.assert_allclose(at, ways, atol=1e-12)
 
 
 def test_odometry_of_the_scans_where_there_are_no_lines_of_it(tmp_path: Path) -> None:

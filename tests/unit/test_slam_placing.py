@@ -14,7 +14,7 @@ from pilotage.kernels.slam.buckets import fused, sort_into_buckets
 from pilotage.kernels.slam.frames import carried, composed
 from pilotage.kernels.slam.match_grid import max_pyramid
 from pilotage.kernels.slam.movers import bearing_of
-from pilotage.kernels.slam.placing import guessed_motions, learn_motion, placed
+from pilotage.kernels.slam.placing import guessed_motions, learn_motion, placed, plausibility
 from pilotage.kernels.slam.scan_lines import scan_cloud
 from pilotage.kernels.slam.slips import told_by
 from support.laser_rooms import BEAMS, SPAN_RAD, furnished, ranges
@@ -98,6 +98,38 @@ def test_the_odometry_is_believed_after_it_was_right_and_not_where_there_is_none
     assert motions[0] == pytest.approx(step)
     assert credible == 1
     assert len(guessed_motions(errors, velocity, np.zeros(3), False, 0.2)[0]) == 2
+
+
+def test_a_velocity_of_long_ago_is_no_guess_that_was_right() -> None:
+    """Its error is that of the guess which is made of it: standing still."""
+    errors, velocity, step = np.array([0.0, 0.001, 0.002]), np.zeros(3), np.array([1.0, 0.0, 0.0])
+    for _ in range(100):
+        learn_motion(errors, velocity, 1.1 * step, True, step, 3.5)
+    motions, credible = guessed_motions(errors, velocity, 1.1 * step, True, 3.5)
+    assert not motions[1:].any()
+    assert credible == 1
+    assert errors[1] == pytest.approx(errors[2], abs=0.01)
+
+
+def test_a_robot_does_not_stand_while_its_wheels_turn() -> None:
+    """Before anything was right or wrong, and until the odometry was wrong for long."""
+    step = np.array([1.0, 0.0, 0.1])
+    beginning = np.array([0.02, 0.001, 0.002])
+    motions, credible = guessed_motions(beginning, np.zeros(3), step, True, 0.2)
+    assert motions[0] == pytest.approx(step)
+    assert credible == 1
+    spinning = np.array([0.9, 0.001, 0.002])
+    assert not guessed_motions(spinning, np.zeros(3), step, True, 0.2)[0][0].any()
+
+
+def test_what_speaks_against_the_odometry() -> None:
+    """Long motions may be off by more, but however bad it was none stands still of which it tells a metre."""
+    stood, long = np.zeros(3), np.array([[1.0, 0.0, 0.0]])
+    turned = long[0] + (0.1, 0.05, 0.2)
+    assert plausibility(turned, long, 0.001, True)[0] > 1.5 * plausibility(turned, long, 0.001, False)[0]
+    assert plausibility(stood, long, 0.2, True)[0] < 0.25 < 0.7 < plausibility(stood, long, 0.2, False)[0]
+    short, near = np.array([[0.1, 0.0, 0.05]]), np.array([0.12, 0.0, 0.06])
+    assert plausibility(near, short, 0.01, True) == plausibility(near, short, 0.01, False)
 
 
 def test_bearings_are_those_of_the_exact_function() -> None:

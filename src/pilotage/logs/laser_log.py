@@ -19,7 +19,7 @@ from pilotage.core.errors import InputError
 from pilotage.core.types import BoolArray, FloatArray, IntArray, Pose2
 from pilotage.logs.carmen import CarmenLog, read_carmen
 from pilotage.logs.scanner_mount import LARGEST
-from pilotage.logs.stamps import between_readings, increasing, keeps_order
+from pilotage.logs.stamps import apart, between_readings, increasing, keeps_order
 
 CARMEN_RANGE_MIN_M = 0.05
 CARMEN_RANGE_MAX_M = 80.0
@@ -28,6 +28,9 @@ SCANNER_STEPS_DEG, STEP_ERROR = (1.0, 0.5, 1.0 / 3.0, 0.25), 1e-4
 """Angles between beams that planar scanners are built with, and the share a told one may be off from one."""
 LEAST_STEP_RAD, MOST_VIEW_RAD, MOST_FIRST_RAD = 1e-6, 4.0 * math.pi, 4.0 * math.pi
 """Beyond these beams lie on one another, or their angles are degrees or no angles."""
+BESIDE_M, BESIDE_RAD, MOST_BETWEEN = 0.02, 0.02, 0.8
+"""How far from the course between two ODOM lines the robot's pose of a scan lies that is the odometry, and of
+what share of the scans that is asked."""
 LARGEST_MOUNT_SPREAD = 0.02
 """Median deviation, in metres or radians, beyond which two poses of each scan give no mount."""
 
@@ -37,6 +40,7 @@ class RawScan:
     """One scan as it was recorded: beam ``k`` looks along ``first_angle_rad + k * angle_step_rad``.
 
     ``readings_before`` counts the readings of the odometry that were recorded before it; -1: unknown.
+    ``odometry`` is its pose (3,) of the robot where the scan carries one.
     """
 
     t_s: float
@@ -46,6 +50,7 @@ class RawScan:
     range_min_m: float
     range_max_m: float
     readings_before: int = -1
+    odometry: FloatArray | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -177,6 +182,11 @@ def assemble(
         )
     no_times, poses, readings_s = _in_order(odometry_t_s, odometry, said)
     with_beams, t_s, stamps_s = _ordered(with_beams, readings_s, said)
+    carried = [scan.odometry for scan in with_beams if scan.odometry is not None]
+    if len(carried) == len(with_beams):
+        # Each scan has a reading of its own, also where many have one time.
+        no_times = t_s = apart(t_s)
+        poses = np.array(carried)
     beams = np.array([scan.ranges_m.size for scan in with_beams], dtype=np.int64)
     if beams.min() < beams.max():
         sizes = ", ".join(str(size) for size in np.unique(beams)[:8])
@@ -340,9 +350,11 @@ def read_carmen_scans(path: Path) -> LaserLog:
 def laser_log_of_carmen(log: CarmenLog, name: str) -> LaserLog:
     """Bring a CARMEN log into this form.
 
-    Odometry is that of the ODOM lines, or the robot's poses of the scans where there are none. The mount is
-    the median pose of the laser relative to the robot.
+    Odometry is the robot's poses of the scans where these lie on the course of the ODOM lines, or where there
+    are none: what a scan carries needs no times to tell where it was taken. In corrected logs they lie
+    elsewhere, and the ODOM lines count. The mount is the median pose of the laser relative to the robot.
     """
+    carried = _carry_odometry(log)
     scans = [
         RawScan(
             float(log.t_s[k]),
@@ -351,7 +363,8 @@ def laser_log_of_carmen(log: CarmenLog, name: str) -> LaserLog:
             float(log.angle_step_rad[k]),
             CARMEN_RANGE_MIN_M,
             CARMEN_RANGE_MAX_M,
-            int(log.readings_before[k]) if log.odometry_t_s.size else k,
+            int(log.readings_before[k]),
+            log.robot_poses[k] if carried else None,
         )
         for k in range(log.t_s.size)
     ]
@@ -361,11 +374,26 @@ def laser_log_of_carmen(log: CarmenLog, name: str) -> LaserLog:
     nothing = sum(int(np.count_nonzero(np.isnan(scan.ranges_m))) for scan in scans)
     if nothing:
         said.append(f"{nothing} ranges are not numbers: no measurement")
-    t_s, poses = log.odometry_t_s, log.odometry
-    if t_s.size == 0:
-        t_s, poses = log.t_s, log.robot_poses
+    if log.odometry_t_s.size == 0:
         said.append("no ODOM lines: odometry is what the scans carry")
-    return assemble(name, scans, _mount(log, said), False, t_s, poses, said)
+    return assemble(name, scans, _mount(log, said), False, log.odometry_t_s, log.odometry, said)
+
+
+def _carry_odometry(log: CarmenLog) -> bool:
+    """Whether the scans' robot poses are the odometry: between the ODOM lines around each of them."""
+    last = log.odometry.shape[0] - 1
+    if last < 0:
+        return True
+    before = log.odometry[np.clip(log.readings_before - 1, 0, last)]
+    after = log.odometry[np.clip(log.readings_before, 0, last)]
+    way_m = np.hypot(*(after - before)[:, :2].T)
+    to_m = np.hypot(*(log.robot_poses - before)[:, :2].T)
+    from_m = np.hypot(*(after - log.robot_poses)[:, :2].T)
+    turned = np.abs(wrap_array_to_pi(log.robot_poses[:, 2] - before[:, 2]))
+    turned += np.abs(wrap_array_to_pi(after[:, 2] - log.robot_poses[:, 2]))
+    way_rad = np.abs(wrap_array_to_pi(after[:, 2] - before[:, 2]))
+    between = (to_m + from_m < way_m + BESIDE_M) & (turned < way_rad + BESIDE_RAD)
+    return bool(between.mean() > MOST_BETWEEN)
 
 
 def _mount(log: CarmenLog, said: list[str]) -> Pose2:

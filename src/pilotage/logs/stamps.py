@@ -62,6 +62,14 @@ def increasing(t_s: FloatArray) -> FloatArray:
     return np.maximum.accumulate(np.asarray(pooled + spread))
 
 
+def apart(t_s: FloatArray) -> FloatArray:
+    """Return times (N,) of which no two neighbours are the same: those that are go up in steps of STEP_S."""
+    same = np.concatenate([[False], np.diff(t_s) == 0.0])
+    k = np.arange(t_s.size)
+    first = np.maximum.accumulate(np.where(same, 0, k))
+    return np.asarray(t_s + STEP_S * (k - first))
+
+
 def between_readings(told_s: FloatArray, before: IntArray, readings_s: FloatArray) -> FloatArray:
     """Put times (N,) of scans between those of the odometry's readings they were recorded between.
 

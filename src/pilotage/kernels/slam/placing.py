@@ -20,8 +20,13 @@ SPLIT = 0.1
 """Guesses farther apart than this are all tried, unless the scan lies where a trusted odometry guessed it:
 where the robot begins to turn, the first one fits nowhere or, worse, somewhere else."""
 OFF_M, OFF_ERRORS = 0.05, 10.0
-"""A match this far from all guesses, and so many of their usual errors more, counts half."""
+LONG_M, OFF_SHARE, MOST_MORE_M = 0.5, 0.2, 0.5
+"""A match counts half that is this far from all guesses, and so many of their usual errors farther. From
+those of an odometry also farther by this share of a motion longer than LONG_M (where a recording begins no
+error is usual yet), but by MOST_MORE_M at most: a corridor's walls fit a scan a metre off as well."""
 BETTER, BETTER_BY = 1.03, 0.005
+LONG_AGO_S = 1.5
+"""Between scans that are farther apart in time no velocity is kept."""
 MEMORY, MOST_OFF = 0.02, 1.0
 """Weight of the newest error in the running mean (fifty scans count), and the greatest error."""
 
@@ -50,10 +55,19 @@ def readings_differ(
 
 
 @kernel
+def _kept_s(dt_s: float) -> float:
+    """For how long a velocity is kept to: one of long ago is none."""
+    return dt_s if dt_s < LONG_AGO_S else 0.0
+
+
+@kernel
 def guessed_motions(
     errors: FloatArray, velocity: FloatArray, step: FloatArray, led: bool, dt_s: float
 ) -> tuple[FloatArray, int]:
     """Motions (G, 3) that a scan may have made, the most trusted first, and how many of them are credible.
+
+    One that denies a long motion of the odometry is thought to be off by a share of that at least: in the
+    beginning, when nothing has been right or wrong yet, the robot does not stand while its wheels turn.
 
     Parameters
     ----------
@@ -64,18 +78,21 @@ def guessed_motions(
     step, led
         (3,) by the odometry, and whether there is one.
     """
+    told = np.zeros((3, 3))
+    told[0], told[1] = step, _kept_s(dt_s) * velocity
+    usual = errors.copy()
+    if led:
+        for k in range(1, 3):
+            usual[k] = max(usual[k], OFF_SHARE * (distance(told[0], told[k]) - LONG_M))
     motions = np.zeros((3, 3))
-    # A velocity of long ago is none.
-    same = dt_s if dt_s < 1.5 else 0.0
-    most = CREDIBLE * errors.min() + CREDIBLE_OFF
+    most = CREDIBLE * usual.min() + CREDIBLE_OFF
     count = credible = 0
-    for k in np.argsort(errors, kind="mergesort"):
+    for k in np.argsort(usual, kind="mergesort"):
         if k == 0 and not led:
             continue
-        for a in range(3):
-            motions[count, a] = step[a] if k == 0 else same * velocity[a] if k == 1 else 0.0
+        motions[count] = told[k]
         count += 1
-        credible += errors[k] <= most
+        credible += usual[k] <= most
     return motions[:count], credible
 
 
@@ -85,7 +102,7 @@ def learn_motion(
 ) -> None:
     """Bring errors and velocity of ``guessed_motions`` up to date by a motion (3,) that a scan told."""
     standing = np.zeros(3)
-    guesses = (step if led else standing, velocity * dt_s, standing)
+    guesses = (step if led else standing, velocity * _kept_s(dt_s), standing)
     for k in range(3):
         errors[k] += MEMORY * (min(MOST_OFF, distance(guesses[k], motion)) - errors[k])
     for a in range(3):
@@ -93,15 +110,23 @@ def learn_motion(
 
 
 @kernel
-def plausibility(motion: FloatArray, guesses: FloatArray, error: float) -> tuple[float, float]:
+def plausibility(
+    motion: FloatArray, guesses: FloatArray, error: float, by_odometry: bool
+) -> tuple[float, float]:
     """What a fit counts by how far its motion (3,) is from all guesses (G, 3), and that distance.
 
-    ``error`` is the usual one of the most trusted guess.
+    ``error`` is the usual one of the most trusted guess, and ``by_odometry`` whether that is the odometry's.
     """
-    off = math.inf
+    off, size = math.inf, 0.0
+    standing = np.zeros(3)
     for k in range(guesses.shape[0]):
-        off = min(off, distance(motion, guesses[k]))
-    u = off / (OFF_M + OFF_ERRORS * error)
+        apart = distance(motion, guesses[k])
+        if apart < off:
+            off, size = apart, distance(guesses[k], standing)
+    more = OFF_ERRORS * error
+    if by_odometry:
+        more = min(more + OFF_SHARE * max(0.0, size - LONG_M), MOST_MORE_M)
+    u = off / (OFF_M + more)
     return 1.0 / (1.0 + u * u), off
 
 
@@ -166,7 +191,7 @@ def placed(
         )
         if status == TOO_FEW:
             continue
-        share, off = plausibility(between(last, pose), near, error)
+        share, off = plausibility(between(last, pose), near, error, led)
         value = share * fit[1] / source.shape[0]
         if told[0] < 0.0 or value > BETTER * told[0] + BETTER_BY:
             told[0], told[1], told[2], told[3] = value, off, fit[0], fit[1]

@@ -17,7 +17,15 @@ from pilotage.kernels.slam.branch_bound import NO_SEED, PASS_OVER_NONE, search_w
 from pilotage.kernels.slam.buckets import fused, sort_into_buckets
 from pilotage.kernels.slam.frames import between, carried, composed
 from pilotage.kernels.slam.match_grid import ScoreArray, max_pyramid, score_grid
-from pilotage.kernels.slam.placing import ITERATIONS, REACH_M, SCALE_M, distance, placed, plausibility
+from pilotage.kernels.slam.placing import (
+    ITERATIONS,
+    LONG_M,
+    REACH_M,
+    SCALE_M,
+    distance,
+    placed,
+    plausibility,
+)
 from pilotage.stack.mapping.slam.config import SlamConfig
 from pilotage.stack.mapping.slam.odometry import MotionGuess
 
@@ -46,6 +54,8 @@ OTHER_PLACE = np.array([0.5, 0.35, 0.0, 0.0])
 MOST_GAP_S = 2.5
 """The search window grows with the time since the last fit, up to this."""
 SEARCH_KEYFRAMES, SEARCH_LEVELS = 8, 4
+NEAR_M, NEAR_RAD = 0.5, 0.6
+"""The search window beside an odometry's motion that is longer than LONG_M."""
 BETTER_POOR, BETTER_GOOD = 1.1, 1.03
 """By how much a place that was searched must fit better than the guesses."""
 _NO_OTHERS = np.zeros((0, 3))
@@ -219,8 +229,10 @@ class LocalMatcher:
         other = np.array(others) if others else _NO_OTHERS
         led = step is not None and self._guess.odometry_leads
         best, split = self._placed(cloud, last, motions, count, led, other)
-        poor = best is None or best.value < POOR * self._usual
         credible = np.concatenate([motions[:count], other])
+        if led and distance(motions[0], np.zeros(3)) > LONG_M:
+            best = self._near(cloud, last, motions[0], credible, best)
+        poor = best is None or best.value < POOR * self._usual
         if poor or step is None:
             # Without odometry a scan may slide along a corridor and still fit: look around every time.
             self.searched += 1
@@ -228,7 +240,8 @@ class LocalMatcher:
             centres = [last, composed(last, motions[0])] if poor and split else [last]
             for centre in centres:
                 better = BETTER_POOR if poor else BETTER_GOOD
-                for fit in self._search(cloud, centre, gap_s, last, motions[0] if poor else None, best):
+                guess = composed(last, motions[0]) if poor else None
+                for fit in self._search(cloud, centre, *_window(gap_s), guess, best):
                     found = self._plausible(fit, last, credible)
                     if best is None or found.value > better * best.value + 0.01:
                         best = found
@@ -279,7 +292,12 @@ class LocalMatcher:
 
     def _plausible(self, fit: Fit, last: FloatArray, guesses: FloatArray) -> Fit:
         """Lower a fit's value by how far it is from all credible guesses, in units of their usual error."""
-        share, off = plausibility(between(last, fit.pose), guesses, self._guess.least_error)
+        share, off = plausibility(
+            between(last, fit.pose),
+            guesses,
+            self._guess.least_error,
+            self._led and self._guess.odometry_leads,
+        )
         return replace(fit, value=share * fit.value, off=off)
 
     def _align(
@@ -303,7 +321,7 @@ class LocalMatcher:
 
         ``credible`` are the guesses that speak against what is far from them; None where no odometry does.
         """
-        fits = self._search(cloud, last, MOST_GAP_S, last, motion)
+        fits = self._search(cloud, last, *_window(MOST_GAP_S), composed(last, motion))
         fits = [fit for fit in fits if fit.value >= FAR * self._usual]
         if credible is None:
             return min(fits, key=lambda fit: distance(between(last, fit.pose), motion), default=None)
@@ -311,19 +329,34 @@ class LocalMatcher:
         near = [fit for fit in found if fit.value >= LEAST_FAR * self._usual]
         return max(near, key=lambda fit: fit.value, default=None)
 
+    def _near(
+        self, cloud: FloatArray, last: FloatArray, motion: FloatArray, credible: FloatArray, best: Fit | None
+    ) -> Fit | None:
+        """Search beside where a long motion of the odometry leads, turns above all; return what fits better.
+
+        From a guess that is turned by a tenth of a radian an alignment may end in a wrong fit that is not
+        poor, and in a search all round the next corner of a room fits as well as the right one.
+        """
+        self.searched += 1
+        for fit in self._search(cloud, composed(last, motion), NEAR_M, NEAR_RAD, None, best):
+            found = self._plausible(fit, last, credible)
+            if best is None or found.value > BETTER_GOOD * best.value + 0.01:
+                best = found
+        return best
+
     def _search(
         self,
         cloud: FloatArray,
         centre: FloatArray,
-        gap_s: float,
-        last: FloatArray,
-        motion: FloatArray | None,
+        half_m: float,
+        half_rad: float,
+        guess: FloatArray | None,
         found: Fit | None = None,
     ) -> list[Fit]:
-        """Search the neighbourhood of a pose, the wider the longer ago it was; ``found``: the best so far.
+        """Search the neighbourhood of a pose; ``found``: the best so far.
 
-        With a motion the heading found is tried with the guess's position too: along a corridor the best
-        score may lie anywhere, but no turn does.
+        With a guess the heading found is tried at its position too: along a corridor the best score may lie
+        anywhere, but no turn does.
         """
         near = cloud[np.hypot(cloud[:, 0], cloud[:, 1]) < SEARCH_RANGE_M]
         if self._around is None:
@@ -331,7 +364,7 @@ class LocalMatcher:
         if self._around is None or near.shape[0] < 10:
             return []
         pyramid, margin, low = self._around
-        turns = round((0.3 + 0.8 * gap_s) / SEARCH_STEP_RAD)
+        turns = round(half_rad / SEARCH_STEP_RAD)
         best, _ = search_window(
             pyramid,
             margin,
@@ -340,7 +373,7 @@ class LocalMatcher:
             SEARCH_CELL_M,
             np.ascontiguousarray(near[::2, :2]),
             centre,
-            0.3 + 0.6 * gap_s,
+            half_m,
             SEARCH_STEP_RAD * np.arange(-turns, turns + 1, dtype=np.float64),
             0.2,
             PASS_OVER_NONE,
@@ -351,8 +384,7 @@ class LocalMatcher:
         if not np.isfinite(best[3]):
             return []
         starts = [best[:3].copy()]
-        if motion is not None:
-            guess = composed(last, motion)
+        if guess is not None:
             starts.append(np.array([guess[0], guess[1], best[2]]))
         fits = [self._align(cloud, start, 0.3) for start in starts]
         return [fit for fit in fits if fit is not None]
@@ -374,3 +406,8 @@ class LocalMatcher:
             0.0,
         )
         return (*max_pyramid(grid, SEARCH_LEVELS), low)
+
+
+def _window(gap_s: float) -> tuple[float, float]:
+    """Half a search window's side and turns, the wider the longer ago a place was."""
+    return 0.3 + 0.6 * gap_s, 0.3 + 0.8 * gap_s

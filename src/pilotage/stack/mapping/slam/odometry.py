@@ -40,11 +40,13 @@ class ScanMotions:
         self._anchor = None if at_scans is None else at_scans[0]
         self._readings = np.zeros((0, 3))
         self._differ = [False] * len(log)
-        if at_scans is not None and log.odometry is not None and log.odometry_t_s is not None:
+        if at_scans is None or _carried(log):
+            return
+        if log.odometry is not None and log.odometry_t_s is not None:
             self._readings = composed_all(log.odometry, mount_pose(log.mount))
             self._first = np.searchsorted(log.odometry_t_s, log.t_s - STAMP_OFF_S)
             self._end = np.searchsorted(log.odometry_t_s, log.t_s + STAMP_OFF_S)
-        if at_scans is not None and len(self._readings):
+        if len(self._readings):
             self._differ = readings_differ(
                 at_scans, self._readings, self._first, self._end, OTHER_READING_M
             ).tolist()
@@ -76,6 +78,11 @@ class ScanMotions:
             self._anchor = composed(self._anchor, best)
         else:
             self._anchor = self._at_scans[scan]
+
+
+def _carried(log: LaserLog) -> bool:
+    """Whether each scan has a reading of its own: what the odometry told then, whatever the stamps."""
+    return log.odometry_t_s is not None and np.array_equal(log.odometry_t_s, log.t_s)
 
 
 def _turn(angle: FloatArray) -> FloatArray:

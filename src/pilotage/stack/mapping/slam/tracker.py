@@ -27,7 +27,9 @@ SURE_GUESS = 0.035
 """Usual error of the guesses (a radian as half a metre) up to which people are told from walls by odometry:
 wrong stamps, and constant velocity alone, make movers of walls."""
 GUESSED_SCANS = 3
-"""So many scans in a row may hang by the odometry alone before the track breaks."""
+"""So many scans in a row may hang by the odometry alone before the track breaks,"""
+FAR_M, FAR_RAD = 0.5, 0.4
+"""and none that is so far from the one before: the next would see still less of the last keyframe's walls."""
 RIGID = 1e4 * np.eye(3)
 """Hessian of a break: its slip alone counts."""
 HEAL_SCANS, HEAL_KEYFRAMES = 10, 24
@@ -141,7 +143,7 @@ class Tracker:
             self._lost_run = 0 if fit is not None else self._lost_run + 1
             if fit is None:
                 pose, hessian = self._matcher.fallback(last, step, dt_s), RIGID
-                broken = step is None or self._lost_run > GUESSED_SCANS
+                broken = step is None or self._lost_run > GUESSED_SCANS or _is_far(step)
                 self._slip.add(BLIND_BREAK_SLIP if step is None else BREAK_SLIP if broken else GUESS_SLIP)
                 if broken:
                     self._tear()
@@ -188,7 +190,11 @@ class Tracker:
             return
         pose = self._poses[-1]
         half_m = min(HEAL_M + HEAL_M_PER_KEYFRAME * keyframes, HEAL_MOST_M)
-        fit = self._matcher.find(torn.aside, cloud, pose, half_m)
+        fit = None
+        if torn.candidate is not None and _is_new(between(torn.candidate[0], pose), self._config):
+            expected = np.asarray(composed(torn.candidate[1], pose))
+            fit = self._matcher.find(torn.aside, cloud, expected, HEAL_M)
+        fit = fit or self._matcher.find(torn.aside, cloud, pose, half_m)
         if fit is None:
             return
         moved = composed(fit.pose, between(pose, np.zeros(3)))
@@ -287,3 +293,8 @@ def _is_new(motion: FloatArray, config: SlamConfig) -> bool:
     """Whether a scan is far enough from the last keyframe to become one."""
     far = float(np.hypot(motion[0], motion[1])) > config.keyframe_distance_m
     return far or abs(float(motion[2])) > config.keyframe_turn_rad
+
+
+def _is_far(motion: FloatArray) -> bool:
+    """Whether scans are so far apart that one alone leads out of what the last keyframe saw."""
+    return bool(np.hypot(motion[0], motion[1]) > FAR_M or abs(motion[2]) > FAR_RAD)
