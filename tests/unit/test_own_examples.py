@@ -120,6 +120,15 @@ def test_a_tolerance_makes_slanted_walls_straight() -> None:
     assert max(coarse.distance_m(float(x), float(y)) for x, y in corners) <= 0.12 + 1e-9
 
 
+def test_cells_too_small_to_be_written_leave_no_map(tmp_path: Path) -> None:
+    (tmp_path / "cells.pgm").write_bytes(b"P5 4 4 255\n" + bytes([0] * 8 + [255] * 8))
+    about = "image: cells.pgm\norigin: [0, 0, 0]\nnegate: 0\noccupied_thresh: 0.6\nfree_thresh: 0.2\n"
+    (tmp_path / "cells.yaml").write_text(f"resolution: 5.0e-10\n{about}")
+    with pytest.raises(pl.InputError, match="cells of at least 1e-06 m"):
+        pl.vectorize(tmp_path / "cells.yaml", tmp_path / "walls.yaml")
+    assert not (tmp_path / "walls.yaml").exists()
+
+
 @given(arrays(np.bool_, (7, 9)), st.floats(0.0, 3.0))
 def test_no_corner_is_farther_than_the_tolerance(
     cells: np.ndarray[tuple[int, ...], np.dtype[np.bool_]], tolerance_m: float

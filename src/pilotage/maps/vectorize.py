@@ -18,6 +18,9 @@ from pilotage.maps.outlines import outlines
 
 Bounds = tuple[float, float, float, float]
 
+_LEAST_CELL_M = 1e-6
+"""A wall map's numbers are written to a tenth of it: walls along smaller cells would have no length there."""
+
 
 def wall_segments(grid: OccupancyGrid, tolerance_m: float = 0.0) -> FloatArray:
     """(N, 4) x0, y0, x1, y1 of the walls in the map frame.
@@ -29,10 +32,14 @@ def wall_segments(grid: OccupancyGrid, tolerance_m: float = 0.0) -> FloatArray:
     Raises
     ------
     InputError
-        Where nothing is occupied or the tolerance is no length.
+        Where nothing is occupied, cells are smaller than a micrometre, or the tolerance is no length.
     """
     if not (math.isfinite(tolerance_m) and tolerance_m >= 0.0):
         raise InputError(f"--tolerance: expected metres of 0 or more, found {tolerance_m:g}")
+    if grid.resolution_m < _LEAST_CELL_M:
+        raise InputError(
+            f"vectorize: expected cells of at least {_LEAST_CELL_M:g} m, found {grid.resolution_m:g} m"
+        )
     sides = outlines(grid)
     if not len(sides):
         raise InputError("vectorize: expected a map with occupied cells, found none; is the image negated?")
