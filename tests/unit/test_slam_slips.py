@@ -16,7 +16,7 @@ from pilotage.stack.mapping.slam.closures import (
     candidates,
     unproven,
 )
-from pilotage.stack.mapping.slam.local_matching import Fit
+from pilotage.stack.mapping.slam.fit import Fit
 from pilotage.stack.mapping.slam.matching import Match
 from pilotage.stack.mapping.slam.refinement import BESIDE, not_aligned
 from pilotage.stack.mapping.slam.slips import Slips

@@ -13,10 +13,9 @@ import numpy as np
 
 from pilotage.core.types import FloatArray, IntArray
 from pilotage.kernels.slam.align import TOO_FEW, align
-from pilotage.kernels.slam.branch_bound import NO_SEED, PASS_OVER_NONE, search_window
+from pilotage.kernels.slam.branch_bound import NO_SEED
 from pilotage.kernels.slam.buckets import fused, sort_into_buckets
 from pilotage.kernels.slam.frames import between, carried, composed
-from pilotage.kernels.slam.match_grid import ScoreArray, max_pyramid, score_grid
 from pilotage.kernels.slam.placing import (
     ITERATIONS,
     LONG_M,
@@ -27,7 +26,9 @@ from pilotage.kernels.slam.placing import (
     plausibility,
 )
 from pilotage.stack.mapping.slam.config import SlamConfig
+from pilotage.stack.mapping.slam.fit import Fit
 from pilotage.stack.mapping.slam.odometry import MotionGuess
+from pilotage.stack.mapping.slam.surroundings import Surroundings, every_second, in_range
 
 BUCKET_M = 0.1
 LOCAL_BUCKET_M, FUSED_M, FUSED_COSINE = 0.2, 0.1, 0.9
@@ -42,8 +43,7 @@ scan a little towards an odometry whose errors all have one sign."""
 POOR, NONE = 0.75, 0.3
 """Fit over its running mean below which there is a search, and below which it is no fit at all: what hangs by
 so few points hangs by chance."""
-SEARCH_RANGE_M, SEARCH_CELL_M, SEARCH_STD_M, SEARCH_STEP_RAD = 12.0, 0.05, 0.07, 0.02
-SEARCH_BUDGET = 200_000
+SEARCH_STEP_RAD = 0.02
 FAR, LEAST_FAR = 0.6, 0.12
 """Share of the usual fit that a place far from all guesses takes, and what its distance must leave of it."""
 LEAST_FOUND, FOUND, ALIKE = 40, 0.8, 0.8
@@ -53,7 +53,8 @@ OTHER_PLACE = np.array([0.5, 0.35, 0.0, 0.0])
 """where it is so far away and turned."""
 MOST_GAP_S = 2.5
 """The search window grows with the time since the last fit, up to this."""
-SEARCH_KEYFRAMES, SEARCH_LEVELS = 8, 4
+LEAST_SEARCHED, LEAST_SCORE, LEAST_SCORE_ROUND = 10, 0.2, 0.3
+"""Points of a scan that is searched for, and mean score a point of what is found near, or all round."""
 NEAR_M, NEAR_RAD = 0.5, 0.6
 """The search window beside an odometry's motion that is longer than LONG_M."""
 BETTER_POOR, BETTER_GOOD = 1.1, 1.03
@@ -65,43 +66,10 @@ Reference = tuple[FloatArray, IntArray, FloatArray]
 
 
 @dataclass(frozen=True, slots=True)
-class Fit:
-    """Where a scan lies.
-
-    Attributes
-    ----------
-    value
-        Sum of weights of the aligned points over all points, less where it is far from all guesses.
-    pose, hessian, start
-        (3,), (3, 3) of the alignment, and (3,) where it began.
-    rms_m
-        Root mean square of the weighted residuals.
-    off
-        Distance from the nearest credible guess.
-    weight
-        Sum of the points' weights.
-    guess_error, by_odometry
-        Usual error of the most trusted guess, and whether that is the odometry.
-    """
-
-    value: float
-    pose: FloatArray
-    hessian: FloatArray
-    start: FloatArray
-    rms_m: float
-    off: float = 0.0
-    weight: float = 0.0
-    guess_error: float = 0.0
-    by_odometry: bool = False
-
-
-@dataclass(frozen=True, slots=True)
 class Aside:
-    """Keyframes that the track tore from: their scores as ``_surroundings`` has them, and their points."""
+    """Keyframes that the track tore from: what they saw around the last place, and their points."""
 
-    pyramid: ScoreArray
-    margin: int
-    corner_xy_m: FloatArray
+    around: Surroundings
     reference: Reference | None
 
 
@@ -122,7 +90,7 @@ class LocalMatcher:
         self._local: list[FloatArray] = []
         self._usual = 0.6
         self._reference: Reference | None = None
-        self._around: tuple[ScoreArray, int, FloatArray] | None = None
+        self._around: Surroundings | None = None
         self._lost_s, self._led = 0.0, False
         self.searched = 0
         self.lost = 0
@@ -155,43 +123,23 @@ class LocalMatcher:
     def set_aside(self) -> Aside | None:
         """Begin anew without keyframes; what they were is handed out, to be found again."""
         seen = bool(self._local) and len(self._local[-1]) > 0
-        around = self._surroundings(self._local[-1][0, :2]) if seen else None
-        out = None if around is None else Aside(*around, self._reference)
+        around = Surroundings.of(self._local, self._local[-1][0, :2]) if seen else None
+        out = None if around is None else Aside(around, self._reference)
         self._local, self._reference, self._around = [], None, None
         self._guess.velocity = np.zeros(3)
         return out
 
     def find(self, aside: Aside, cloud: FloatArray, centre: FloatArray, half_m: float) -> Fit | None:
         """Look for a scan all round in what was set aside; None where it fits nowhere, or in two places."""
-        near = cloud[np.hypot(cloud[:, 0], cloud[:, 1]) < SEARCH_RANGE_M]
+        near = in_range(cloud)
         if near.shape[0] < LEAST_FOUND:
             return None
-        points = np.ascontiguousarray(near[::2, :2])
-        turns = np.arange(-np.pi, np.pi, SEARCH_STEP_RAD)
-
-        def search(least: float, away: FloatArray) -> FloatArray:
-            best, _ = search_window(
-                aside.pyramid,
-                aside.margin,
-                aside.corner_xy_m[0],
-                aside.corner_xy_m[1],
-                SEARCH_CELL_M,
-                points,
-                centre,
-                half_m,
-                turns,
-                least,
-                away,
-                SEARCH_BUDGET,
-                NO_SEED,
-                False,
-            )
-            return np.asarray(best)
-
-        best = search(0.3, PASS_OVER_NONE)
-        if not np.isfinite(best[3]):
+        points, turns = every_second(near), np.arange(-np.pi, np.pi, SEARCH_STEP_RAD)
+        best = aside.around.best(points, centre, half_m, turns, LEAST_SCORE_ROUND)
+        if best is None:
             return None
-        if np.isfinite(search(ALIKE * float(best[3]), np.concatenate([best[:3], OTHER_PLACE]))[3]):
+        other = np.concatenate([best[:3], OTHER_PLACE])
+        if aside.around.best(points, centre, half_m, turns, ALIKE * float(best[3]), other) is not None:
             return None
         fit = self._align(cloud, best[:3].copy(), 0.3, aside.reference)
         return fit if fit is not None and fit.value >= FOUND * self._usual else None
@@ -358,54 +306,22 @@ class LocalMatcher:
         With a guess the heading found is tried at its position too: along a corridor the best score may lie
         anywhere, but no turn does.
         """
-        near = cloud[np.hypot(cloud[:, 0], cloud[:, 1]) < SEARCH_RANGE_M]
+        near = in_range(cloud)
         if self._around is None:
-            self._around = self._surroundings(centre)
-        if self._around is None or near.shape[0] < 10:
+            self._around = Surroundings.of(self._local, centre)
+        if self._around is None or near.shape[0] < LEAST_SEARCHED:
             return []
-        pyramid, margin, low = self._around
-        turns = round(half_rad / SEARCH_STEP_RAD)
-        best, _ = search_window(
-            pyramid,
-            margin,
-            low[0],
-            low[1],
-            SEARCH_CELL_M,
-            np.ascontiguousarray(near[::2, :2]),
-            centre,
-            half_m,
-            SEARCH_STEP_RAD * np.arange(-turns, turns + 1, dtype=np.float64),
-            0.2,
-            PASS_OVER_NONE,
-            SEARCH_BUDGET,
-            NO_SEED if found is None else found.pose,
-            False,
-        )
-        if not np.isfinite(best[3]):
+        steps = round(half_rad / SEARCH_STEP_RAD)
+        turns = SEARCH_STEP_RAD * np.arange(-steps, steps + 1, dtype=np.float64)
+        seed = NO_SEED if found is None else found.pose
+        best = self._around.best(every_second(near), centre, half_m, turns, LEAST_SCORE, seed=seed)
+        if best is None:
             return []
         starts = [best[:3].copy()]
         if guess is not None:
             starts.append(np.array([guess[0], guess[1], best[2]]))
         fits = [self._align(cloud, start, 0.3) for start in starts]
         return [fit for fit in fits if fit is not None]
-
-    def _surroundings(self, last: FloatArray) -> tuple[ScoreArray, int, FloatArray] | None:
-        """Maxima of the score grid of the last keyframes' points around a pose, margin and corner."""
-        xy = np.concatenate(self._local[-SEARCH_KEYFRAMES:])[:, :2] if self._local else np.zeros((0, 2))
-        xy = np.ascontiguousarray(xy[np.hypot(*(xy - last[:2]).T) < SEARCH_RANGE_M])
-        if xy.shape[0] < 20:
-            return None
-        low, high = xy.min(axis=0) - 0.3, xy.max(axis=0) + 0.3
-        grid = score_grid(
-            xy,
-            np.zeros((1, 2)),
-            np.array([xy.shape[0]]),
-            np.concatenate([low, high]),
-            SEARCH_CELL_M,
-            SEARCH_STD_M,
-            0.0,
-        )
-        return (*max_pyramid(grid, SEARCH_LEVELS), low)
 
 
 def _window(gap_s: float) -> tuple[float, float]:

@@ -6,7 +6,8 @@ import numpy as np
 
 from pilotage.core.types import FloatArray
 from pilotage.kernels.slam.slips import slipped
-from pilotage.stack.mapping.slam.local_matching import PRIOR, Fit
+from pilotage.stack.mapping.slam.fit import Fit
+from pilotage.stack.mapping.slam.local_matching import PRIOR
 
 BREAK_SLIP = np.diag([0.2, 0.2, 0.3]) ** 2
 BLIND_BREAK_SLIP = np.diag([0.5, 0.5, 0.8]) ** 2
