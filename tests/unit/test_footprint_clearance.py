@@ -49,7 +49,7 @@ def ground_of(points: FloatArray) -> Ground:
         mean[row * n + column] = x, y
     half = n // 2
     far, none = np.full((half, half), 9.0), np.zeros((half, half))
-    nearest = nearest_marked(believed(hits) > 0)
+    _, nearest = nearest_marked(believed(hits) > 0)
     return Ground(hits, mean, nearest, far, none, -2.0, -2.0, 0.05, 0.1, 20.0, 10.0)
 
 

@@ -16,6 +16,7 @@ from pilotage.kernels.control.dynamic_window import choose_in_window, window
 from pilotage.kernels.control.footprint import discs_clearance
 from pilotage.kernels.control.ground import Ground
 from pilotage.kernels.control.ground_update import believed, evenly_spaced, insert_scan, rolled, sectors
+from pilotage.kernels.control.heading_vector import along_arc
 from pilotage.kernels.control.match import match_scan
 from pilotage.kernels.control.motion_limits import Drive, advance, approach, command_is_safe
 from pilotage.kernels.control.movers import (
@@ -34,6 +35,7 @@ from pilotage.kernels.control.movers import (
 )
 from pilotage.kernels.control.rollouts import weighted_mean
 from pilotage.kernels.control.togo import UNREACHED_S, descent_path, time_to_go
+from pilotage.kernels.geometry.motion import exact_arc
 from pilotage.kernels.grids.distance import nearest_marked
 from pilotage.stack.control.local.body import make_body
 
@@ -56,7 +58,7 @@ def ground_of(points: FloatArray, togo: FloatArray | None = None) -> Ground:
     half = n // 2
     far = np.full((half, half), 9.0)
     field = np.zeros((half, half)) if togo is None else togo
-    nearest = nearest_marked(believed(hits) > 0)
+    _, nearest = nearest_marked(believed(hits) > 0)
     return Ground(hits, mean, nearest, far, field, -4.0, -4.0, 0.05, 0.1, 20.0, 10.0)
 
 
@@ -123,7 +125,7 @@ def test_nearest_cell_is_the_nearest(marked: list[tuple[int, int]]) -> None:
     grid = np.zeros((15, 12), dtype=np.bool_)
     for row, column in marked:
         grid[row, column] = True
-    found = nearest_marked(grid)
+    _, found = nearest_marked(grid)
     rows, columns = np.nonzero(grid)
     for row in range(15):
         for column in range(12):
@@ -134,6 +136,17 @@ def test_nearest_cell_is_the_nearest(marked: list[tuple[int, int]]) -> None:
             mine = (at // 12 - row) ** 2 + (at % 12 - column) ** 2
             assert grid[at // 12, at % 12]
             assert mine == ((rows - row) ** 2 + (columns - column) ** 2).min()
+
+
+@given(st.floats(-3.0, 3.0), st.lists(st.tuples(st.floats(-0.4, 0.4), st.floats(-1.2, 1.2)), max_size=30))
+def test_a_turned_unit_vector_is_the_heading(theta: float, arcs: list[tuple[float, float]]) -> None:
+    """Piece after piece the same arc as with sines and cosines, also beyond small angles."""
+    x, y, heading = 0.3, -0.2, theta
+    at = (x, y, math.cos(theta), math.sin(theta))
+    for distance, angle in arcs:
+        x, y, heading = exact_arc(x, y, heading, distance, angle)
+        at = along_arc(*at, distance, angle)
+    assert at == pytest.approx((x, y, math.cos(heading), math.sin(heading)), abs=1e-13)
 
 
 @given(SPEED, SPEED, st.floats(0.01, 0.5))

@@ -83,3 +83,17 @@ def limit_errors(
         dv, dw = (there[3] - after[3]) / speed_std, (there[4] - after[4]) / turn_std
         out[h] = dv * dv + dw * dw
     return out
+
+
+@kernel
+def weigh(costs: FloatArray, prior: FloatArray, errors: FloatArray, forget: float, most: float) -> int:
+    """Add errors (H,), each ``most`` at most, to costs that fade towards ``prior``; in place.
+
+    Returns the index of the least. In one call: those of numpy cost more than the predictions themselves.
+    """
+    best = 0
+    for h in range(costs.shape[0]):
+        costs[h] = prior[h] + forget * (costs[h] - prior[h]) + min(errors[h], most)
+        if costs[h] < costs[best]:
+            best = h
+    return best

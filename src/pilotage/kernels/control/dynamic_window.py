@@ -67,7 +67,8 @@ def choose_in_window(
     at_rest = clearance_of(
         start[0],
         start[1],
-        start[2],
+        math.cos(start[2]),
+        math.sin(start[2]),
         polygon,
         outer,
         discs,
@@ -92,8 +93,9 @@ def choose_in_window(
             x, y, theta = start[0], start[1], start[2]
             for k in range(1, steps + 1):
                 x, y, theta = exact_arc(start[0], start[1], start[2], length * k / steps, angle * k / steps)
+                c, s = math.cos(theta), math.sin(theta)
                 here = clearance_of(
-                    x, y, theta, polygon, outer, discs, hits, nearest, mean, x0, y0, cell, per_cell, soft
+                    x, y, c, s, polygon, outer, discs, hits, nearest, mean, x0, y0, cell, per_cell, soft
                 )
                 if here < floor:
                     free = (k - 1) / steps

@@ -83,7 +83,8 @@ def clearance_m(x: float, y: float, theta: float, body: Body, ground: Ground, en
     return clearance_of(
         x,
         y,
-        theta,
+        math.cos(theta),
+        math.sin(theta),
         body.polygon,
         body.outer_m,
         body.discs,
@@ -139,7 +140,8 @@ def disc_seen(
 def clearance_of(
     x: float,
     y: float,
-    theta: float,
+    c: float,
+    s: float,
     polygon: FloatArray,
     outer: float,
     discs: FloatArray,
@@ -152,12 +154,11 @@ def clearance_of(
     per_cell: float,
     enough: float,
 ) -> float:
-    """``clearance_m`` for loops."""
+    """``clearance_m`` for loops, the heading by its cosine and sine."""
     n = nearest.shape[0]
     bound: float = disc_clearance(x, y, outer, nearest, mean, x0, y0, per_cell)
     if bound >= enough:
         return bound
-    c, s = math.cos(theta), math.sin(theta)
     covered = FAR_M
     found = FAR_M
     for k in range(discs.shape[0]):
@@ -181,7 +182,7 @@ def clearance_of(
         return max(bound, covered)
     if found < enough:
         return found
-    return exact_clearance(x, y, theta, polygon, outer, hits, mean, x0, y0, cell, enough)
+    return exact_clearance(x, y, c, s, polygon, outer, hits, mean, x0, y0, cell, enough)
 
 
 @kernel
@@ -211,14 +212,17 @@ def sure_clearance(
         bound = math.sqrt(dx * dx + dy * dy) - outer - DOUBT_CELLS * cell
         if bound >= enough:
             return bound
-    return exact_clearance(x, y, theta, polygon, outer, hits, mean, x0, y0, cell, enough)
+    return exact_clearance(
+        x, y, math.cos(theta), math.sin(theta), polygon, outer, hits, mean, x0, y0, cell, enough
+    )
 
 
 @kernel
 def exact_clearance(
     x: float,
     y: float,
-    theta: float,
+    c: float,
+    s: float,
     polygon: FloatArray,
     outer: float,
     hits: ByteArray,
@@ -230,7 +234,6 @@ def exact_clearance(
 ) -> float:
     """Least distance of a footprint to the obstacle points, at most ``enough``."""
     n = hits.shape[0]
-    c, s = math.cos(theta), math.sin(theta)
     low_x, high_x, low_y, high_y = x, x, y, y
     for k in range(polygon.shape[0]):
         qx, qy = x + c * polygon[k, 0] - s * polygon[k, 1], y + s * polygon[k, 0] + c * polygon[k, 1]
@@ -256,7 +259,8 @@ def exact_clearance(
 def seen_under(
     x: float,
     y: float,
-    theta: float,
+    c: float,
+    s: float,
     outer: float,
     discs: FloatArray,
     unseen: FloatArray,
@@ -265,14 +269,13 @@ def seen_under(
     coarse: float,
     per_coarse: float,
 ) -> bool:
-    """``is_seen`` for loops."""
+    """Whether all ground under a footprint has been seen, the heading by its cosine and sine."""
     m = unseen.shape[0]
     column, row = math.floor((x - x0) * per_coarse), math.floor((y - y0) * per_coarse)
     if not (0 <= row < m and 0 <= column < m):
         return False
     if unseen[row, column] >= outer:
         return True
-    c, s = math.cos(theta), math.sin(theta)
     for k in range(discs.shape[0]):
         px, py = discs[k, 0], discs[k, 1]
         column = math.floor((x + c * px - s * py - x0) * per_coarse)

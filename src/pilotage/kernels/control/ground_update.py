@@ -9,7 +9,8 @@ import numpy as np
 from pilotage.kernels.arrays import BoolArray, ByteArray, FloatArray, IntArray
 from pilotage.kernels.control.footprint import polygon_distance
 from pilotage.kernels.geometry.motion import TWO_PI
-from pilotage.kernels.grids.distance import CellIndex, near_distance, nearest_marked
+from pilotage.kernels.grids.distance import CellIndex, near_distance
+from pilotage.kernels.grids.nearest_changes import keep_nearest
 from pilotage.kernels.jit import kernel
 
 MOST_HITS = 60
@@ -157,16 +158,26 @@ def insert_scan(
 
 @kernel
 def looked_at(
-    hits: ByteArray, seen: BoolArray, coarse: float, outer: float
-) -> tuple[ByteArray, CellIndex, FloatArray]:
-    """What ``Ground`` keeps of the grids for a body of radius ``outer``: hits, nearest and unseen_m."""
-    shown = believed(hits)
+    hits: ByteArray,
+    seen: BoolArray,
+    coarse: float,
+    outer: float,
+    shown: ByteArray,
+    rise: CellIndex,
+    nearest: CellIndex,
+) -> FloatArray:
+    """What ``Ground`` keeps of the grids for a body of radius ``outer``: its ``unseen_m``.
+
+    Its hits (``shown``) and ``nearest`` with ``rise`` (``nearest_marked``) are brought up to date in place:
+    from step to step few cells change.
+    """
+    keep_nearest(believed(hits), shown, rise, nearest)
     squared = near_distance(~seen, math.ceil(outer / coarse))
     unseen = np.empty(seen.shape)
     for row in range(seen.shape[0]):
         for column in range(seen.shape[1]):
             unseen[row, column] = coarse * math.sqrt(float(squared[row, column]))
-    return shown, nearest_marked(shown > 0), unseen
+    return unseen
 
 
 @kernel
@@ -200,6 +211,9 @@ def believed(hits: ByteArray) -> ByteArray:
     out = np.zeros((n, m), np.uint8)
     for i in _occupied(hits):
         row, column = i // m, i % m
+        if hits[row, column] >= SCATTER * MOST_HITS:
+            out[row, column] = hits[row, column]
+            continue
         most = 0
         for r in range(max(0, row - 1), min(n, row + 2)):
             for c in range(max(0, column - 1), min(m, column + 2)):
@@ -319,7 +333,7 @@ def _add_points(
     n = hits.shape[0]
     for i in range(in_base.shape[0]):
         px, py = in_base[i, 0], in_base[i, 1]
-        if not math.hypot(px - from_x, py - from_y) < reach:
+        if not (px - from_x) ** 2 + (py - from_y) ** 2 < reach * reach:
             continue
         there_x, there_y = x + (c * px - s * py), y + (s * px + c * py)
         column, row = math.floor((there_x - x0) / cell), math.floor((there_y - y0) / cell)
@@ -399,9 +413,10 @@ def _mark_seen(
             if seen[row, column]:
                 continue
             dx = x0 + (column + 0.5) * coarse - x
-            distance = math.sqrt(dx * dx + dy * dy)
-            if distance > reach:
+            squared = dx * dx + dy * dy
+            if squared > reach * reach:
                 continue
+            distance = math.sqrt(squared)
             if far[_sector(c * dx + s * dy, c * dy - s * dx)] <= distance - slack:
                 continue
             low = math.floor(_turned(math.atan2(dy, dx) - theta - first) / step)

@@ -15,6 +15,7 @@ from pilotage.kernels.control.ground import (
     seen_under,
     sure_clearance,
 )
+from pilotage.kernels.control.heading_vector import along_arc
 from pilotage.kernels.control.movers import closes_in
 from pilotage.kernels.geometry.motion import exact_arc
 from pilotage.kernels.jit import kernel
@@ -67,22 +68,29 @@ def advance(
     x: float, y: float, theta: float, v: float, w: float, cv: float, cw: float, dt: float, drive: Drive
 ) -> tuple[float, float, float, float, float]:
     """Pose and rates after ``dt`` under a command (cv, cw): the arc of the mean rates of the step."""
+    nv, nw = rates_after(v, w, cv, cw, dt, drive)
+    px, py, ptheta = exact_arc(x, y, theta, 0.5 * (v + nv) * dt, 0.5 * (w + nw) * dt)
+    return px, py, ptheta, nv, nw
+
+
+@kernel
+def rates_after(v: float, w: float, cv: float, cw: float, dt: float, drive: Drive) -> tuple[float, float]:
+    """Speed and turn rate after ``dt`` under a command (cv, cw)."""
     cv = min(max(cv, -drive.reverse), drive.speed)
     cw = min(max(cw, -drive.turn_rate), drive.turn_rate)
     nv = approach(v, cv, drive.acceleration * dt, drive.deceleration * dt)
     if drive.least_radius > 0.0:
         sharpest = max(nv, 0.0) / drive.least_radius
         cw = min(max(cw, -sharpest), sharpest)
-    nw = approach(w, cw, drive.turn_acceleration * dt, drive.turn_acceleration * dt)
-    px, py, ptheta = exact_arc(x, y, theta, 0.5 * (v + nv) * dt, 0.5 * (w + nw) * dt)
-    return px, py, ptheta, nv, nw
+    return nv, approach(w, cw, drive.turn_acceleration * dt, drive.turn_acceleration * dt)
 
 
 @kernel
 def braking_is_free(
     x: float,
     y: float,
-    theta: float,
+    c: float,
+    s: float,
     v: float,
     w: float,
     deceleration: float,
@@ -92,6 +100,7 @@ def braking_is_free(
 ) -> bool:
     """Whether the arc on which a robot comes to rest, curvature kept, is free, and seen to be so.
 
+    The heading is given by its cosine and sine.
     Looks every 0.12 m or 0.25 rad; between them the body comes nearer by less than 2 cm.
     """
     polygon, outer, discs = body.polygon, body.outer_m, body.discs
@@ -105,18 +114,18 @@ def braking_is_free(
     sign = 1.0 if v >= 0.0 else -1.0
     for k in range(1, steps + 1):
         share = k / steps
-        px, py, ptheta = exact_arc(x, y, theta, sign * share * length, share * angle)
+        px, py, pc, ps = along_arc(x, y, c, s, sign * share * length, share * angle)
         if (
             disc_clearance(px, py, outer, nearest, mean, x0, y0, per_cell) < margin
             and clearance_of(
-                px, py, ptheta, polygon, outer, discs, hits, nearest, mean, x0, y0, cell, per_cell, margin
+                px, py, pc, ps, polygon, outer, discs, hits, nearest, mean, x0, y0, cell, per_cell, margin
             )
             < margin
         ):
             return False
         if not (
             disc_seen(px, py, outer, unseen, x0, y0, per_coarse)
-            or seen_under(px, py, ptheta, outer, discs, unseen, x0, y0, coarse, per_coarse)
+            or seen_under(px, py, pc, ps, outer, discs, unseen, x0, y0, coarse, per_coarse)
         ):
             return False
     return True
@@ -182,7 +191,8 @@ def command_is_safe(
         per_cell,
         least,
     )
-    seen_before = seen_under(start[0], start[1], start[2], outer, discs, unseen, x0, y0, coarse, per_coarse)
+    c, s = math.cos(start[2]), math.sin(start[2])
+    seen_before = seen_under(start[0], start[1], c, s, outer, discs, unseen, x0, y0, coarse, per_coarse)
     for model in range(2):
         limits = drive if model == 0 else worse
         x, y, theta, v, w = start[0], start[1], start[2], start[3], start[4]
@@ -204,7 +214,8 @@ def command_is_safe(
             least = min(least, here)
             if here < min(margin + margin_s * abs(v), begin - 1e-3):
                 return False, least
-            if seen_before and not seen_under(x, y, theta, outer, discs, unseen, x0, y0, coarse, per_coarse):
+            c, s = math.cos(theta), math.sin(theta)
+            if seen_before and not seen_under(x, y, c, s, outer, discs, unseen, x0, y0, coarse, per_coarse):
                 return False, least
             if movers.shape[1] > 0 and (v != 0.0 or w != 0.0):
                 at = min(k, movers.shape[0] - 1)

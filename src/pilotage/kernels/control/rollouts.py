@@ -10,7 +10,8 @@ import numpy as np
 from pilotage.kernels.arrays import FloatArray
 from pilotage.kernels.control.footprint import Body
 from pilotage.kernels.control.ground import Ground, clearance_of, disc_clearance, disc_seen, seen_under
-from pilotage.kernels.control.motion_limits import Drive, advance, braking_is_free
+from pilotage.kernels.control.heading_vector import along_arc
+from pilotage.kernels.control.motion_limits import Drive, advance, braking_is_free, rates_after
 from pilotage.kernels.control.movers import closes_in, movers_clearance
 from pilotage.kernels.control.togo import togo_at
 from pilotage.kernels.geometry.motion import wrap
@@ -18,6 +19,10 @@ from pilotage.kernels.jit import kernel
 
 HIT_COST = 1e3
 GRADIENT_M = 0.12
+FORGOTTEN = 6.0 * math.log(10.0)
+"""So many temperatures above the best a plan weighs less than a millionth, and is left out."""
+END, THERE = -1, -2
+"""A plan driven to its end, and one that reaches the goal."""
 CERTAIN_S = 1.0
 """So long a moving body is taken to be where it is foretold; later it only costs."""
 
@@ -60,91 +65,6 @@ def way_down(x: float, y: float, ground: Ground) -> tuple[float, float]:
 
 
 @kernel
-def _hit_cost(share: float, x: float, y: float, ground: Ground) -> float:
-    """Cost of a rollout that ends after a share of its steps: the later the better, then the time to go."""
-    rest: float = togo_at(x, y, ground.togo_s, ground.x0_m, ground.y0_m, ground.coarse_m)
-    return HIT_COST * (2.0 - share) + rest
-
-
-@kernel
-def rollout_cost(
-    start: FloatArray,
-    commands: FloatArray,
-    dt: float,
-    drive: Drive,
-    body: Body,
-    ground: Ground,
-    movers: FloatArray,
-    price: Price,
-) -> float:
-    """Cost of driving (N, 2) commands v, w of ``dt`` each from ``start`` (5,): seconds to the goal and more.
-
-    ``movers`` (N, M, 3) are moving discs at the end of each step; into one of them foretold for the first
-    second counts as touching. A rollout that touches something, or enters unseen ground, costs 1,000 and
-    more, less the later it does.
-    """
-    polygon, outer, discs = body.polygon, body.outer_m, body.discs
-    hits, nearest, mean, unseen = ground.hits, ground.nearest, ground.mean, ground.unseen_m
-    x0, y0 = ground.x0_m, ground.y0_m
-    cell, per_cell, coarse, per_coarse = ground.cell_m, ground.per_cell, ground.coarse_m, ground.per_coarse
-    togo = ground.togo_s
-    x, y, theta, v, w = start[0], start[1], start[2], start[3], start[4]
-    steps = commands.shape[0]
-    cost = 0.0
-    begin = clearance_of(
-        x, y, theta, polygon, outer, discs, hits, nearest, mean, x0, y0, cell, per_cell, price.margin + 0.1
-    )
-    seen = seen_under(x, y, theta, outer, discs, unseen, x0, y0, coarse, per_coarse)
-    for k in range(steps):
-        before, there = w, (x, y, theta)
-        x, y, theta, v, w = advance(x, y, theta, v, w, commands[k, 0], commands[k, 1], dt, drive)
-        need = price.margin + price.margin_s * abs(v)
-        here = disc_clearance(x, y, outer, nearest, mean, x0, y0, per_cell)
-        if here < need:
-            here = clearance_of(
-                x, y, theta, polygon, outer, discs, hits, nearest, mean, x0, y0, cell, per_cell, need
-            )
-        # From within the margin the way out is allowed, not the way in.
-        if here < need and here < begin - 1e-3:
-            return _hit_cost(k / steps, x, y, ground)
-        if disc_seen(x, y, outer, unseen, x0, y0, per_coarse) or seen_under(
-            x, y, theta, outer, discs, unseen, x0, y0, coarse, per_coarse
-        ):
-            seen = True
-        elif seen:
-            return _hit_cost(k / steps, x, y, ground)
-        begin = max(begin, here)
-        cost += dt
-        if here < price.soft:
-            lack = (price.soft - here) / price.soft
-            cost += dt * price.near * lack * lack * (0.2 + abs(v) / drive.speed)
-        if movers.shape[1] > 0:
-            away = movers_clearance(x, y, theta, polygon, outer, movers[k], price.comfort)
-            if (
-                away < price.margin
-                and (k + 1) * dt <= CERTAIN_S
-                and closes_in(there, (x, y, theta), polygon, outer, movers[k], price.margin)
-            ):
-                return _hit_cost(k / steps, x, y, ground)
-            if away < price.comfort:
-                cost += dt * price.people * min((price.comfort - away) / price.comfort, 2.0)
-        cost += price.turning * abs(w - before)
-        if v < 0.0:
-            cost += dt * price.reverse
-        gx, gy = x - price.goal_x, y - price.goal_y
-        if gx * gx + gy * gy < price.goal_m * price.goal_m:
-            return float(cost)
-    need = price.margin + 0.5 * price.margin_s * abs(v)
-    if not braking_is_free(x, y, theta, v, w, drive.deceleration * price.trust, body, ground, need):
-        cost += price.no_stop
-    cost += togo_at(x, y, togo, x0, y0, coarse)
-    down, slope = way_down(x, y, ground)
-    if slope > 0.0:
-        cost += price.heading * abs(wrap(down - theta))
-    return float(cost)
-
-
-@kernel
 def plan_costs(
     start: FloatArray,
     plans: FloatArray,
@@ -155,10 +75,90 @@ def plan_costs(
     movers: FloatArray,
     price: Price,
 ) -> FloatArray:
-    """Costs (K,) of plans (K, N, 2), each as ``rollout_cost`` has it."""
-    costs = np.empty(plans.shape[0])
-    for i in range(plans.shape[0]):
-        costs[i] = rollout_cost(start, plans[i], dt, drive, body, ground, movers, price)
+    """Costs (K,) of driving plans (K, N, 2) of commands v, w of ``dt`` each: seconds to the goal and more.
+
+    From ``start`` (5,). ``movers`` (N, M, 3) are moving discs at the end of each step; into one of them
+    foretold for the first second counts as touching. A plan that touches something, or enters unseen ground,
+    costs 1,000 and more, less the later it does.
+    """
+    polygon, outer, discs = body.polygon, body.outer_m, body.discs
+    hits, nearest, mean, unseen = ground.hits, ground.nearest, ground.mean, ground.unseen_m
+    x0, y0 = ground.x0_m, ground.y0_m
+    cell, per_cell, coarse, per_coarse = ground.cell_m, ground.per_cell, ground.coarse_m, ground.per_coarse
+    togo = ground.togo_s
+    rollouts, steps = plans.shape[0], plans.shape[1]
+    costs = np.empty(rollouts)
+    sx, sy, stheta, sv, sw = start[0], start[1], start[2], start[3], start[4]
+    sc, ss = math.cos(stheta), math.sin(stheta)
+    enough = price.margin + 0.1
+    at_first = clearance_of(
+        sx, sy, sc, ss, polygon, outer, discs, hits, nearest, mean, x0, y0, cell, per_cell, enough
+    )
+    seen_at_first = seen_under(sx, sy, sc, ss, outer, discs, unseen, x0, y0, coarse, per_coarse)
+    for i in range(rollouts):
+        x, y, theta, v, w = sx, sy, stheta, sv, sw
+        c, s = sc, ss
+        begin, seen = at_first, seen_at_first
+        cost = 0.0
+        driven = END
+        for k in range(steps):
+            before, there = (v, w), (x, y, theta)
+            v, w = rates_after(v, w, plans[i, k, 0], plans[i, k, 1], dt, drive)
+            angle = 0.5 * (before[1] + w) * dt
+            x, y, c, s = along_arc(x, y, c, s, 0.5 * (before[0] + v) * dt, angle)
+            theta += angle
+            need = price.margin + price.margin_s * abs(v)
+            here = disc_clearance(x, y, outer, nearest, mean, x0, y0, per_cell)
+            if here < need:
+                here = clearance_of(
+                    x, y, c, s, polygon, outer, discs, hits, nearest, mean, x0, y0, cell, per_cell, need
+                )
+            # From within the margin the way out is allowed, not the way in.
+            if here < need and here < begin - 1e-3:
+                driven = k
+                break
+            if disc_seen(x, y, outer, unseen, x0, y0, per_coarse) or seen_under(
+                x, y, c, s, outer, discs, unseen, x0, y0, coarse, per_coarse
+            ):
+                seen = True
+            elif seen:
+                driven = k
+                break
+            begin = max(begin, here)
+            cost += dt
+            if here < price.soft:
+                lack = (price.soft - here) / price.soft
+                cost += dt * price.near * lack * lack * (0.2 + abs(v) / drive.speed)
+            if movers.shape[1] > 0:
+                away = movers_clearance(x, y, theta, polygon, outer, movers[k], price.comfort)
+                if (
+                    away < price.margin
+                    and (k + 1) * dt <= CERTAIN_S
+                    and closes_in(there, (x, y, theta), polygon, outer, movers[k], price.margin)
+                ):
+                    driven = k
+                    break
+                if away < price.comfort:
+                    cost += dt * price.people * min((price.comfort - away) / price.comfort, 2.0)
+            cost += price.turning * abs(w - before[1])
+            if v < 0.0:
+                cost += dt * price.reverse
+            gx, gy = x - price.goal_x, y - price.goal_y
+            if gx * gx + gy * gy < price.goal_m * price.goal_m:
+                driven = THERE
+                break
+        if driven >= 0:
+            # It touches something: the later the better, then the time to go.
+            cost = HIT_COST * (2.0 - driven / steps) + togo_at(x, y, togo, x0, y0, coarse)
+        elif driven == END:
+            need = price.margin + 0.5 * price.margin_s * abs(v)
+            if not braking_is_free(x, y, c, s, v, w, drive.deceleration * price.trust, body, ground, need):
+                cost += price.no_stop
+            cost += togo_at(x, y, togo, x0, y0, coarse)
+            down, slope = way_down(x, y, ground)
+            if slope > 0.0:
+                cost += price.heading * abs(wrap(down - theta))
+        costs[i] = cost
     return costs
 
 
@@ -190,14 +190,11 @@ def rollout_costs(
     commands: FloatArray,
 ) -> FloatArray:
     """Costs (K,) of the mean commands (N, 2) plus each noise (K, N, 2); fills ``commands`` (K, N, 2)."""
-    rollouts, steps = noise.shape[0], noise.shape[1]
-    costs = np.empty(rollouts)
-    for i in range(rollouts):
-        for k in range(steps):
+    for i in range(noise.shape[0]):
+        for k in range(noise.shape[1]):
             commands[i, k, 0] = min(max(mean[k, 0] + noise[i, k, 0], -drive.reverse), drive.speed)
             commands[i, k, 1] = min(max(mean[k, 1] + noise[i, k, 1], -drive.turn_rate), drive.turn_rate)
-        costs[i] = rollout_cost(start, commands[i], dt, drive, body, ground, movers, price)
-    return costs
+    return plan_costs(start, commands, dt, drive, body, ground, movers, price)
 
 
 @kernel
@@ -207,9 +204,10 @@ def weighted_mean(commands: FloatArray, costs: FloatArray, temperature: float) -
     out = np.zeros((commands.shape[1], 2))
     total = 0.0
     for i in range(commands.shape[0]):
-        weight = math.exp(-(costs[i] - best) / temperature)
-        if weight < 1e-6:
+        above = (costs[i] - best) / temperature
+        if above > FORGOTTEN:
             continue
+        weight = math.exp(-above)
         total += weight
         for k in range(out.shape[0]):
             out[k, 0] += weight * commands[i, k, 0]

@@ -25,11 +25,12 @@ BLOCKED_EXTRA_S = 2.0
 
 @kernel
 def coarse_clearance(
-    nearest: CellIndex, mean: FloatArray, cells: int, x0: float, y0: float, coarse: float
+    nearest: CellIndex, mean: FloatArray, cells: int, x0: float, y0: float, coarse: float, enough: float
 ) -> FloatArray:
     """Distance (m, m) to the nearest obstacle point from the fine cell of each coarse one that is farthest.
 
-    A gap's middle need not lie on a coarse cell's centre: its best fine cell is off it by half of one.
+    Told apart from ``enough``: what is farther is at least as far as it says. A gap's middle need not lie on
+    a coarse cell's centre: its best fine cell is off it by half of one.
     """
     n = nearest.shape[0]
     per = n // cells
@@ -40,6 +41,8 @@ def coarse_clearance(
             best = 0.0
             for r in range(row * per, (row + 1) * per):
                 for c in range(column * per, (column + 1) * per):
+                    if best > enough * enough:
+                        break
                     at = nearest[r, c]
                     if at == NONE:
                         best = FAR_M * FAR_M

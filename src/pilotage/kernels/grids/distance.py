@@ -35,7 +35,7 @@ def squared_distance(marked: BoolArray) -> NDArray[np.uint32]:
         for column in range(columns):
             height[column] = np.int64(rise[row, column]) ** 2
         until = columns
-        for k in range(_envelope(height, site, begins), -1, -1):
+        for k in range(envelope(height, site, begins, 0, columns), -1, -1):
             base = height[site[k]]
             for column in range(begins[k], until):
                 away = column - site[k]
@@ -69,22 +69,25 @@ def near_distance(marked: BoolArray, cells: int) -> NDArray[np.int32]:
 
 
 @kernel
-def nearest_marked(marked: BoolArray) -> CellIndex:
-    """(rows, columns) flat index of the marked cell nearest to each cell's centre, ``NONE`` without any."""
+def nearest_marked(marked: BoolArray) -> tuple[CellIndex, CellIndex]:
+    """Rows from the nearest marked cell of the same column (``_rises``), and which one is nearest of all.
+
+    (rows, columns) each; the latter is the flat index of the cell whose centre is nearest to a cell's, of
+    those as near that of the lowest column and then row; ``NONE`` without any.
+    """
     rows, columns = marked.shape
-    out = _rises(marked)
-    rise = np.empty(columns, np.int64)
+    rise = _rises(marked)
+    out = np.empty((rows, columns), np.int32)
     height, site, begins = np.empty((3, columns), np.int64)
     for row in range(rows):
         for column in range(columns):
-            rise[column] = out[row, column]
-            height[column] = rise[column] ** 2
+            height[column] = np.int64(rise[row, column]) ** 2
         until = columns
-        for k in range(_envelope(height, site, begins), -1, -1):
-            out[row, begins[k] : until] = (row - rise[site[k]]) * columns + site[k]
+        for k in range(envelope(height, site, begins, 0, columns), -1, -1):
+            out[row, begins[k] : until] = (row - rise[row, site[k]]) * columns + site[k]
             until = begins[k]
         out[row, :until] = NONE
-    return out
+    return rise, out
 
 
 @kernel
@@ -117,15 +120,16 @@ def _rises(marked: BoolArray) -> CellIndex:
 
 
 @kernel
-def _envelope(height: IntArray, site: IntArray, begins: IntArray) -> int:
+def envelope(height: IntArray, site: IntArray, begins: IntArray, first: int, end: int) -> int:
     """Lower envelope of the parabolas over columns: fills whose it is and where each begins.
 
-    ``height`` are squared rises (columns,). Returns the last one's number, -1 without any.
+    ``height`` are squared rises (columns,); those from ``first`` to before ``end`` are looked at. Returns the
+    last one's number, -1 without any.
     """
     columns = height.shape[0]
     last = -1
     at, other, base = np.int64(0), np.int64(0), np.int64(0)
-    for column in range(columns):
+    for column in range(first, end):
         mine = height[column]
         if mine >= FAR * FAR:
             continue

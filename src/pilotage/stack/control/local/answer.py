@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from pilotage.core.types import FloatArray
-from pilotage.kernels.control.commands_sent import drive_out, limit_errors
+from pilotage.kernels.control.commands_sent import drive_out, limit_errors, weigh
 from pilotage.kernels.control.motion_limits import Drive
 
 SHARES = (1.15, 1.0, 0.9, 0.8, 0.7, 0.6, 0.5)
@@ -36,15 +36,16 @@ class Answer:
         self._sent = self._room[:0]
         """(N, 3) time, speed and turn rate: a part of the room."""
         self._begin = 0
-        self._hypotheses = np.array([(share, delay) for share in SHARES for delay in DELAYS])
+        self._pairs = [(share, delay) for share in SHARES for delay in DELAYS]
+        self._hypotheses = np.array(self._pairs)
         self._prior = PRIOR * np.abs(self._hypotheses - 1.0).sum(axis=1)
-        self._costs = self._prior
-        self._choose()
+        self._costs = self._prior.copy()
+        self._choose(int(np.argmin(self._costs)))
         self._before: tuple[float, FloatArray] | None = None
 
-    def _choose(self) -> None:
+    def _choose(self, likeliest: int) -> None:
         """``share`` of the data sheet's accelerations, ``delay_factor`` of its delay, as they seem."""
-        self.share, self.delay_factor = self._hypotheses[int(np.argmin(self._costs))].tolist()
+        self.share, self.delay_factor = self._pairs[likeliest]
 
     def sent(self, t_s: float, v_m_s: float, w_rad_s: float) -> None:
         """Remember a command."""
@@ -76,9 +77,7 @@ class Answer:
                 SPEED_STD,
                 TURN_STD,
             )
-            prior = self._prior
-            self._costs = prior + FORGET * (self._costs - prior) + np.minimum(errors, MOST_ERROR)
-            self._choose()
+            self._choose(weigh(self._costs, self._prior, errors, FORGET, MOST_ERROR))
         self._before = (t_s, state)
 
     def likely(self, drive: Drive) -> Drive:

@@ -70,7 +70,8 @@ class RegulatedPursuit(RollingController):
             if braking_is_free(
                 x,
                 y,
-                theta,
+                math.cos(theta),
+                math.sin(theta),
                 speed + drive.deceleration * scene.dt_s,
                 (speed + drive.deceleration * scene.dt_s) * curvature,
                 drive.deceleration,

@@ -16,6 +16,7 @@ from pilotage.kernels.control.footprint import Body
 from pilotage.kernels.control.ground import Ground
 from pilotage.kernels.control.motion_limits import Drive
 from pilotage.kernels.geometry.motion import wrap
+from pilotage.kernels.grids.distance import nearest_marked
 from pilotage.sensors.sensor import NonNegative, Positive
 from pilotage.stack.control.local.answer import Answer
 from pilotage.stack.control.local.body import make_body
@@ -129,6 +130,9 @@ class RollingGround:
         self._cell_m, self._coarse_m = config.cell_m, 2.0 * config.cell_m
         self._hits = np.zeros((self._cells, self._cells), dtype=np.uint8)
         self._mean = np.zeros((self._cells * self._cells, 2))
+        # Of what is shown of the hits, kept from step to step.
+        self._shown = np.zeros_like(self._hits)
+        self._rise, self._nearest = nearest_marked(self._shown > 0)
         self._seen = np.zeros((half, half), dtype=np.bool_)
         self._corner = (0, 0)
         self._togo = np.zeros((half, half))
@@ -337,18 +341,26 @@ class RollingGround:
     def _ground(self, body: Body, drive: Drive, rolled: bool, avoid: FloatArray | None) -> Ground:
         config = self._config
         x0, y0 = self._corner_m
-        shown, nearest, unseen = ground_update.looked_at(self._hits, self._seen, self._coarse_m, body.outer_m)
+        unseen = ground_update.looked_at(
+            self._hits, self._seen, self._coarse_m, body.outer_m, self._shown, self._rise, self._nearest
+        )
         self._since_plan += 1
         if rolled or self._since_plan >= config.replan_steps:
             self._since_plan = 0
             self._clearance = togo.coarse_clearance(
-                nearest, self._mean, self._seen.shape[0], x0, y0, self._coarse_m
+                self._nearest,
+                self._mean,
+                self._seen.shape[0],
+                x0,
+                y0,
+                self._coarse_m,
+                self._widths_m(body)[2],
             )
             self._togo = self._time_to_go(avoid, body, drive)
         self._last_ground = Ground(
-            shown,
+            self._shown,
             self._mean,
-            nearest,
+            self._nearest,
             unseen,
             self._togo,
             x0,
@@ -374,6 +386,12 @@ class RollingGround:
         """Time to go (m, m) where discs (N, 3), x, y, radius in the map frame, are closed as well."""
         return self._time_to_go(discs, scene.body, scene.sheet)
 
+    def _widths_m(self, body: Body) -> tuple[float, float, float]:
+        """Clearances from where on the footprint fits straight, may turn, and nothing slows it any more."""
+        blocked_m = body.inner_m + self._config.edge_m
+        tight_m = max(blocked_m, body.outer_m - self._config.cell_m)
+        return blocked_m, tight_m, max(self._config.easy_m, tight_m + 0.05)
+
     def _time_to_go(self, discs: FloatArray | None, body: Body, drive: Drive) -> FloatArray:
         config = self._config
         x0, y0 = self._corner_m
@@ -382,14 +400,10 @@ class RollingGround:
             clearance = _beside(clearance, np.array(self._closed), x0, y0, self._coarse_m)
         if discs is not None and discs.shape[0]:
             clearance = _beside(clearance, discs, x0, y0, self._coarse_m)
-        blocked_m = body.inner_m + config.edge_m
-        tight_m = max(blocked_m, body.outer_m - config.cell_m)
         speed = togo.travel_speed(
             clearance,
             self._seen,
-            blocked_m,
-            tight_m,
-            max(config.easy_m, tight_m + 0.05),
+            *self._widths_m(body),
             min(config.crawl_m_s, drive.speed),
             min(config.slow_m_s, drive.speed),
             drive.speed,
