@@ -11,6 +11,7 @@ from pilotage.core.types import FloatArray, Pose2, Twist
 from pilotage.experiments.barn_benchmark import course_base
 from pilotage.experiments.controller_benchmark import CourseRequest, course_run_mission
 from pilotage.experiments.course_families import Driver, make_course_of
+from pilotage.kernels.control.footprint import discs_clearance
 from pilotage.kernels.control.motion_limits import Drive, advance
 from pilotage.kernels.scans.rays import fan_ranges
 from pilotage.models.footprint import Footprint
@@ -67,6 +68,41 @@ def test_its_corners_come_nearer_to_nobody_whom_its_laser_does_not_see(heading_r
 
     assert swings(THREE_QUARTERS) < 0.05
     assert swings(WHOLE) > 0.3
+
+
+@pytest.mark.parametrize("bearing_rad", [-0.6, -0.3, 0.3, 0.6])
+def test_it_has_come_to_rest_before_who_runs_up_out_of_nothing_reaches_it(bearing_rad: float) -> None:
+    """4.6 m before a robot of 2 m/s somebody appears who runs at it at 3.9 m/s, faster and faster."""
+    config = LOCAL_CONTROLLERS.configure("gap-horizon", {"ground": {"movers": {"enabled": True}}}, "")
+    controller = LOCAL_CONTROLLERS.entry("gap-horizon").factory(config, np.random.default_rng(1))
+    walls = np.array([[-8, 6, 14, 6], [-8, -6, 14, -6], [14, -6, 14, 6], [-8, -6, -8, 6]], float)
+    corners = np.array([[2.0, 5.0, 2.3, 5.0], [5.0, -5.0, 5.3, -5.0], [7.0, 5.2, 7.4, 5.2]])
+    state, runner = (0.0, 0.0, 0.0, 2.0, 0.0), np.zeros((0, 3))
+    for k in range(80):
+        t_s = k * DT_S
+        x, y, theta, v, w = state
+        if t_s >= 1.0 and not runner.size:
+            runner = np.array([[x + 4.6 * math.cos(bearing_rad), y + 4.6 * math.sin(bearing_rad), 0.25]])
+        elif runner.size:
+            towards = np.array([x + 0.1, y]) - runner[0, :2]
+            runs_m_s = min(3.9 + 2.4 * (t_s - 1.0), 5.4)
+            runner[0, :2] += runs_m_s * DT_S * towards / np.hypot(*towards)
+        eye = x + MOUNT.x_m * math.cos(theta), y + MOUNT.x_m * math.sin(theta), theta - 0.75 * math.pi
+        step_rad = float(THREE_QUARTERS[1] - THREE_QUARTERS[0])
+        ranges = fan_ranges(
+            *eye, step_rad, THREE_QUARTERS.shape[0], 20.0, np.vstack([walls, corners]), runner
+        )
+        pose, twist = Pose2(x, y, theta), Twist(v, w)
+        view = LocalView(t_s, pose, twist, ranges, THREE_QUARTERS, MOUNT, 20.0, (12.0, 0.0), LIMITS, JACKAL)
+        command = controller.step(view)
+        state = advance(*state, command.v_m_s, command.w_rad_s, DT_S, DRIVE)
+        if discs_clearance(*state[:3], JACKAL, runner) < 0.02:
+            break
+    assert discs_clearance(*state[:3], JACKAL, runner) < 0.02
+    own_m_s = (
+        discs_clearance(x, y, theta, JACKAL, runner) - discs_clearance(*state[:3], JACKAL, runner)
+    ) / DT_S
+    assert own_m_s < 0.01
 
 
 def test_who_is_told_that_people_walk_keeps_the_other_settings_of_their_tracks() -> None:

@@ -161,6 +161,15 @@ class Movers:
         )
         return discs
 
+    def new_within(self, pose: FloatArray, reach_m: float) -> bool:
+        """Whether somebody of whom it cannot be told yet where he goes is so near ahead of a robot (3,)."""
+        if not self.tracks.shape[0]:
+            return False
+        new = self.tracks[~self._things & (self.tracks[:, kernels.VV] > self._config.unsure_std_m_s**2)]
+        dx, dy = new[:, kernels.X] - pose[0], new[:, kernels.Y] - pose[1]
+        ahead = dx * math.cos(pose[2]) + dy * math.sin(pose[2]) > 0.0
+        return bool((ahead & (np.hypot(dx, dy) < reach_m)).any())
+
     def unsure(self) -> BoolArray:
         """Of which of those foretold it cannot be told yet where they go."""
         unsure: BoolArray = self.tracks[~self._things, kernels.VV] > self._config.unsure_std_m_s**2

@@ -91,6 +91,8 @@ class GapHorizonConfig(Config):
     calm_rad_s: Positive = 2.0
     """With a moving body so near it drives and turns no faster: behind one there may be another, whom nobody
     sees, and corners that swing do not stop at once."""
+    new_m: NonNegative = 5.0
+    """Nor faster while somebody is so near ahead of whom it cannot tell yet where he goes: he may run."""
     backs_after_s: NonNegative = 10.0
     """For so long after it saw somebody it does not back where its laser does not look, unless it has come
     nowhere for as long: it may be shut in."""
@@ -147,6 +149,8 @@ class GapHorizon(RollingController):
             drive = drive._replace(
                 speed=min(drive.speed, config.calm_m_s), turn_rate=min(drive.turn_rate, config.calm_rad_s)
             )
+        elif scene.movers.new_within(scene.pose, config.new_m):
+            drive = drive._replace(speed=min(drive.speed, config.calm_m_s))
         if self._may_be_followed(view, scene):
             drive = drive._replace(reverse=0.0, least_radius=self._swings_m(view, scene))
         return scene if drive is scene.drive else replace(scene, drive=drive)
