@@ -14,9 +14,10 @@ from hypothesis import strategies as st
 from contract.patrol_examples import lattice
 from pilotage.evaluation.idleness import Idleness, idleness
 from pilotage.experiments.graph_patrol import GraphPatrol, Radio, patrol
+from pilotage.kernels.patrol.rounds import NEVER, judge_walk
 from pilotage.stack.patrol.graph import PatrolGraph
 from pilotage.stack.patrol.messages import PatrolMemory
-from pilotage.stack.patrol.partition import Plan, even_sizes, partition
+from pilotage.stack.patrol.partition import Plan, annealed, even_sizes, partition
 from pilotage.stack.patrol.strategies.adaptive_rounds import AdaptiveRoundsConfig, best_plan
 from pilotage.stack.patrol.strategy import STRATEGIES, PatrolSetting, Strategy
 from pilotage.stack.patrol.tours import Round, idleness_bound_s
@@ -123,6 +124,52 @@ def test_shares_hold_every_vertex_and_are_level(groups: int, seed: int) -> None:
     # farthest way.
     bound = Round.best(graph).length_m / groups + 2.0 * graph.shortest_m.max()
     assert max(walk.length_m for walk in plan.rounds) <= bound + 1e-9
+
+
+@settings(max_examples=15, deadline=None)
+@given(st.integers(1, 4), st.integers(0, 1000))
+def test_walks_are_judged_as_robots_that_go_round_visit(size: int, seed: int) -> None:
+    """By hand: who passes each place when, over some rounds."""
+    rng = np.random.default_rng(seed)
+    graph = random_graph(seed)
+    order = rng.permutation(len(graph))[: rng.integers(2, 12)].astype(np.int64)
+    walk = Round.through(graph, order)
+    worst, mean = np.empty(len(graph)), np.empty(len(graph))
+    judge_walk(order, size, (graph.next_hop.copy(), graph.edges_m.copy()), worst, mean)
+    for vertex in range(len(graph)):
+        passes = [at for stop, at in zip(walk.stops, walk.at_m, strict=True) if stop == vertex]
+        if not passes:
+            assert worst[vertex] == mean[vertex] == NEVER
+            continue
+        times = np.unique(
+            np.round([at + k * walk.length_m / size for at in passes for k in range(3 * size + 1)], 9)
+        )
+        # As often again in the time in which the next robot is where this one was.
+        begin = times[times >= walk.length_m][0]
+        times = times[(times >= begin) & (times <= begin + walk.length_m / size + 1e-6)]
+        gaps = np.diff(times)
+        assert worst[vertex] == pytest.approx(gaps.max(), abs=1e-6)
+        assert mean[vertex] == pytest.approx((gaps**2).sum() / (2.0 * gaps.sum()), rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("seed", "sizes", "gain"), [(1, (1,) * 16, 0.1), (4, (1,) * 6, 0.05), (2, (2, 1), 0.01)]
+)
+def test_walks_changed_at_random_cost_less(seed: int, sizes: tuple[int, ...], gain: float) -> None:
+    """Worst and twice the mean, against shares that were levelled."""
+    graph = random_graph(seed)
+
+    def cost(plan: Plan) -> float:
+        worst_m, mean_m = plan.expected_m(len(graph), 0.06)
+        return worst_m + 2.0 * mean_m
+
+    plan = annealed(graph, sizes, 2.0, 0.06)
+    assert cost(plan) < (1.0 - gain) * cost(partition(graph, sizes))
+    assert (
+        annealed.__wrapped__(graph, sizes, 2.0, 0.06).rounds[0].stops.tolist()
+        == plan.rounds[0].stops.tolist()
+    )
+    assert set(np.concatenate([walk.stops for walk in plan.rounds]).tolist()) == set(range(len(graph)))
 
 
 def test_without_noise_the_tour_keeps_what_it_promises() -> None:

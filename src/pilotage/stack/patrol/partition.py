@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
 
 from pilotage.core.types import FloatArray, IntArray
+from pilotage.kernels.patrol.rounds import anneal
 from pilotage.kernels.tours.search import cheapest_insertion, improve, tour_cost
 from pilotage.stack.patrol.graph import PatrolGraph
 from pilotage.stack.patrol.tours import Round
@@ -23,6 +24,8 @@ SOFT_MAX = 16.0
 BEGINNINGS = 8
 NEIGHBOURS = 8
 """A vertex changes to shares of so many nearest ones."""
+CHANGES, HEATS, COLD = 20_000, (0.05, 0.1, 0.2, 0.4), 0.0005
+"""Changes of a try at random, and the heats that tries begin and end with, in walks of a robot."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -59,7 +62,7 @@ def even_sizes(robots: int, groups: int) -> tuple[int, ...]:
 
 
 @lru_cache(maxsize=256)
-def partition(graph: PatrolGraph, sizes: tuple[int, ...], mean_weight: float = 0.0) -> Plan:
+def partition(graph: PatrolGraph, sizes: tuple[int, ...]) -> Plan:
     """Walks for groups of robots such that the longest, per robot, is short; the same for whoever asks.
 
     The best tour of all vertices is cut into pieces as long as the groups are large (Frederickson, Hecht and
@@ -70,15 +73,58 @@ def partition(graph: PatrolGraph, sizes: tuple[int, ...], mean_weight: float = 0
     ----------
     sizes
         Robots of each group; at most as many groups as vertices.
-    mean_weight
-        What the mean idleness counts beside the worst.
     """
+    return _plan(graph, [Round.best(graph, tuple(sorted(share))) for share in _shares(graph, sizes)], sizes)
+
+
+@lru_cache(maxsize=256)
+def annealed(graph: PatrolGraph, sizes: tuple[int, ...], mean_weight: float, sharing_cost: float) -> Plan:
+    """Walks whose worst and mean distances are short together; the same for whoever asks.
+
+    The shares of ``partition`` and their orders, changed at random: the best of several tries. No bound is
+    known of how far it is from the best.
+
+    Parameters
+    ----------
+    sizes
+        As ``partition``.
+    mean_weight
+        What the mean distance counts beside the worst.
+    sharing_cost
+        As ``Plan.expected_m``.
+    """
+    count = len(graph)
+    if len(sizes) == 1 or len(sizes) == count:
+        return partition(graph, sizes)
+    orders, counts = np.zeros((len(sizes), count), dtype=np.int64), np.zeros(len(sizes), dtype=np.int64)
+    for group, share in enumerate(_shares(graph, sizes)):
+        order = _order(graph.shortest_m, share)
+        orders[group, : len(order)], counts[group] = order, len(order)
+    near = np.ascontiguousarray(_near(graph))
+    each_m = Round.best(graph).length_m / sum(sizes)
+    ground = np.ascontiguousarray(graph.next_hop), np.ascontiguousarray(graph.edges_m)
+    # Every robot must come to the same plan: no stream of its own.
+    rng = np.random.default_rng(0)
+    best: tuple[float, IntArray, IntArray] | None = None
+    for heat in HEATS:
+        tried, number = orders.copy(), counts.copy()
+        draws, heats = rng.random((CHANGES, 6)), (heat * each_m, COLD * each_m)
+        cost = anneal(tried, number, np.array(sizes), near, draws, heats, mean_weight, sharing_cost, ground)
+        if best is None or cost < best[0]:
+            best = float(cost), tried, number
+    assert best is not None  # there are heats
+    walks = [Round.through(graph, order[:number]) for order, number in zip(best[1], best[2], strict=True)]
+    return _plan(graph, walks, sizes)
+
+
+@lru_cache(maxsize=256)
+def _shares(graph: PatrolGraph, sizes: tuple[int, ...]) -> tuple[frozenset[int], ...]:
+    """What each group visits."""
     order = Round.best(graph).stops
     order = order[np.sort(np.unique(order, return_index=True)[1])]
-    groups = len(sizes)
-    if groups == 1:
-        return _plan(graph, [set(order.tolist())], sizes)
-    search = _Levelling(graph, sizes, mean_weight)
+    if len(sizes) == 1:
+        return (frozenset(order.tolist()),)
+    search = _Levelling(graph, sizes)
     best: tuple[float, list[set[int]]] | None = None
     count = len(order)
     for begin in sorted({round(k * count / BEGINNINGS) % count for k in range(BEGINNINGS)}):
@@ -87,12 +133,16 @@ def partition(graph: PatrolGraph, sizes: tuple[int, ...], mean_weight: float = 0
         if best is None or cost < best[0] * (1.0 - 1e-9):
             best = cost, shares
     assert best is not None
-    return _plan(graph, best[1], sizes)
+    return tuple(frozenset(share) for share in best[1])
 
 
-def _plan(graph: PatrolGraph, shares: list[set[int]], sizes: tuple[int, ...]) -> Plan:
-    rounds = tuple(Round.best(graph, tuple(sorted(share))) for share in shares)
-    return Plan(rounds, sizes, *_promised(rounds, sizes, len(graph), 0.0))
+def _plan(graph: PatrolGraph, walks: Sequence[Round], sizes: tuple[int, ...]) -> Plan:
+    return Plan(tuple(walks), sizes, *_promised(tuple(walks), sizes, len(graph), 0.0))
+
+
+def _near(graph: PatrolGraph) -> IntArray:
+    """(V, K) the vertices that are nearest to each."""
+    return np.argsort(graph.shortest_m, axis=1, kind="stable")[:, 1 : 1 + NEIGHBOURS]
 
 
 def _promised(
@@ -136,37 +186,32 @@ def _cut(graph: PatrolGraph, order: IntArray, sizes: tuple[int, ...]) -> list[se
 class _Levelling:
     """Moves vertices between shares, and swaps them, while that lowers the cost."""
 
-    def __init__(self, graph: PatrolGraph, sizes: tuple[int, ...], mean_weight: float) -> None:
-        self._graph, self._sizes, self._mean_weight = graph, np.array(sizes), mean_weight
-        self._near = np.argsort(graph.shortest_m, axis=1, kind="stable")[:, 1 : 1 + NEIGHBOURS]
+    def __init__(self, graph: PatrolGraph, sizes: tuple[int, ...]) -> None:
+        self._graph, self._sizes = graph, np.array(sizes)
+        self._near = _near(graph)
         self._lengths: dict[frozenset[int], float] = {}
 
     def run(self, shares: list[set[int]]) -> float:
         """Change the shares in place; returns their cost, in metres."""
         lengths = np.array([self._length(share) for share in shares])
-        counts = np.array([len(share) for share in shares])
         for _ in range(MOST_STEPS):
-            now = self._cost(lengths, counts)
-            best = now * (1.0 - 1e-6)
-            change: tuple[int, int, set[int], set[int]] | None = None
+            best = self._cost(lengths) * (1.0 - 1e-6)
+            change: tuple[int, set[int], set[int]] | None = None
             owner = {vertex: group for group, share in enumerate(shares) for vertex in share}
-            # Without the mean only the longest share need give something away.
-            givers = range(len(shares)) if self._mean_weight else [int(np.argmax(lengths / self._sizes))]
-            for one in givers:
-                for other, mine, theirs in self._changes(one, shares, owner):
-                    new = lengths.copy()
-                    new[one], new[other] = self._length(mine), self._length(theirs)
-                    number = counts.copy()
-                    number[one], number[other] = len(mine), len(theirs)
-                    cost = self._cost(new, number)
-                    if cost < best:
-                        best, change = cost, (one, other, mine, theirs)
+            # Only the longest need give something away.
+            one = int(np.argmax(lengths / self._sizes))
+            for other, mine, theirs in self._changes(one, shares, owner):
+                new = lengths.copy()
+                new[one], new[other] = self._length(mine), self._length(theirs)
+                cost = self._cost(new)
+                if cost < best:
+                    best, change = cost, (other, mine, theirs)
             if change is None:
                 break
-            one, other, shares[one], shares[other] = change
+            other, shares[one], shares[other] = change
             for group in (one, other):
-                lengths[group], counts[group] = self._length(shares[group]), len(shares[group])
-        return self._cost(lengths, counts)
+                lengths[group] = self._length(shares[group])
+        return self._cost(lengths)
 
     def _changes(
         self, one: int, shares: list[set[int]], owner: dict[int, int]
@@ -184,27 +229,23 @@ class _Levelling:
                     yield other, without, shares[other] | {vertex}
                 yield other, without | {near}, (shares[other] - {near}) | {vertex}
 
-    def _cost(self, lengths: FloatArray, counts: IntArray) -> float:
+    def _cost(self, lengths: FloatArray) -> float:
         each = lengths / self._sizes
         longest = max(float(each.max()), 1e-9)
-        soft = longest * math.pow(float(((each / longest) ** SOFT_MAX).sum()), 1.0 / SOFT_MAX)
-        mean = 0.5 * float((each * counts).sum()) / len(self._graph)
-        return soft + self._mean_weight * mean
+        return longest * math.pow(float(((each / longest) ** SOFT_MAX).sum()), 1.0 / SOFT_MAX)
 
     def _length(self, share: set[int]) -> float:
         key = frozenset(share)
         if key not in self._lengths:
-            self._lengths[key] = _length(self._graph.shortest_m, key)
+            order = _order(self._graph.shortest_m, key)
+            self._lengths[key] = float(tour_cost(self._graph.shortest_m, order))
         return self._lengths[key]
 
 
-def _length(shortest_m: FloatArray, share: frozenset[int]) -> float:
-    """Of a good closed tour through a share."""
-    if len(share) < 2:
-        return 0.0
-    vertices = sorted(share)
+def _order(shortest_m: FloatArray, share: frozenset[int]) -> IntArray:
+    """A good closed tour through a share."""
+    vertices = np.array(sorted(share), dtype=np.int64)
+    if len(vertices) < 4:
+        return vertices
     costs = np.ascontiguousarray(shortest_m[np.ix_(vertices, vertices)])
-    order = cheapest_insertion(costs)
-    if len(vertices) > 3:
-        order = improve(costs, order, MOST_MOVES)
-    return float(tour_cost(costs, order))
+    return np.asarray(vertices[improve(costs, cheapest_insertion(costs), MOST_MOVES)])

@@ -12,7 +12,7 @@ from pilotage.core.config import Config
 from pilotage.core.types import FloatArray, IntArray
 from pilotage.sensors.sensor import NonNegative, Positive
 from pilotage.stack.patrol.messages import NOTHING, PatrolKnowledge, PatrolState
-from pilotage.stack.patrol.partition import Plan, even_sizes, partition
+from pilotage.stack.patrol.partition import Plan, annealed, even_sizes
 from pilotage.stack.patrol.strategy import STRATEGIES, PatrolSetting
 from pilotage.stack.patrol.tours import Round, spread
 
@@ -45,9 +45,8 @@ def best_plan(setting: PatrolSetting, robots: int, config: AdaptiveRoundsConfig)
     # What lies between is much alike: a few numbers of groups stand for all.
     numbers = {1, 2, 3, robots // 2, robots - 1, robots}
     plans = [
-        partition(graph, even_sizes(robots, groups), weight)
+        annealed(graph, even_sizes(robots, groups), config.mean_weight, config.sharing_cost)
         for groups in sorted(numbers)
-        for weight in sorted({0.0, config.mean_weight})
         if 1 <= groups <= most
     ]
 

@@ -1,0 +1,203 @@
+"""Closed walks for groups of robots, changed at random: who visits what, and in which order.
+
+Simulated annealing (Kirkpatrick, Gelatt and Vecchi 1983) over the orders of all groups at once; no bound is
+known of how far off it ends.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TypeAlias
+
+import numpy as np
+
+from pilotage.kernels.arrays import FloatArray, IntArray
+from pilotage.kernels.jit import kernel
+
+Ground: TypeAlias = tuple[IntArray, FloatArray]
+"""The vertex after the first on the shortest path to the second (V, V); lengths of edges (V, V)."""
+
+LONGEST_CHAIN = 3
+NEVER = 1e12
+REVERSED, MOVED, TURNED = 0.2, 0.5, 0.75
+"""Shares of the kinds of changes, added up; what is left exchanges two vertices."""
+
+
+@kernel
+def judge_walk(order: IntArray, size: int, ground: Ground, worst: FloatArray, mean: FloatArray) -> None:
+    """Fill in (V,) the longest distance between robots at each vertex, and the mean since the last.
+
+    The walk goes through vertices (N,) in order by shortest paths, and back to the first; ``size`` robots go
+    round, evenly spread. At a vertex that it passes several times the gaps g between visits make the mean
+    sum(g^2) / (2 sum(g)). Where the walk does not come by both are ``NEVER``.
+    """
+    hops, edges = ground
+    count = order.shape[0]
+    worst[:], mean[:] = NEVER, NEVER
+    if count == 1:
+        worst[order[0]] = mean[order[0]] = 0.0
+        return
+    passed, at = np.empty(count * worst.shape[0], np.int64), np.empty(count * worst.shape[0])
+    stops, length = 0, 0.0
+    for k in range(count):
+        here, there = int(order[k]), int(order[(k + 1) % count])
+        while here != there:
+            passed[stops], at[stops] = here, length
+            stops += 1
+            following = int(hops[here, there])
+            length += edges[here, following]
+            here = following
+    period = length / size
+    phase = at[:stops]
+    by_phase: IntArray = np.arange(stops)
+    if size > 1:
+        phase = np.mod(phase, period)
+        by_phase = np.argsort(phase)
+    first, last = np.full(worst.shape[0], -1.0), np.empty(worst.shape[0])
+    for k in by_phase:
+        vertex = passed[k]
+        if first[vertex] < 0.0:
+            first[vertex], worst[vertex], mean[vertex] = phase[k], 0.0, 0.0
+        else:
+            gap = phase[k] - last[vertex]
+            worst[vertex] = max(worst[vertex], gap)
+            mean[vertex] += gap * gap
+        last[vertex] = phase[k]
+    for vertex in range(worst.shape[0]):
+        if first[vertex] >= 0.0:
+            gap = first[vertex] + period - last[vertex]
+            worst[vertex] = max(worst[vertex], gap)
+            mean[vertex] = (mean[vertex] + gap * gap) / (2.0 * period)
+
+
+@kernel
+def plan_cost(
+    worst: FloatArray, mean: FloatArray, sizes: IntArray, mean_weight: float, sharing_cost: float
+) -> float:
+    """The worst over vertices (G, V), and with its weight the mean over them.
+
+    A vertex of several walks counts where it is visited more often.
+    """
+    most, total = 0.0, 0.0
+    for vertex in range(worst.shape[1]):
+        longest, usual = np.inf, np.inf
+        for group in range(worst.shape[0]):
+            extra = sharing_cost if sizes[group] > 1 else 0.0
+            longest = min(longest, worst[group, vertex] * (1.0 + extra))
+            usual = min(usual, mean[group, vertex] * (1.0 + 0.5 * extra))
+        most = max(most, longest)
+        total += usual
+    return float(most + mean_weight * total / worst.shape[1])
+
+
+@kernel
+def move_chain(
+    orders: IntArray, counts: IntArray, chain: tuple[int, int, int], other: int, to: int, turned: bool
+) -> None:
+    """Put a chain (group, first place, how many) before place ``to`` of another, or of what is left."""
+    one, first, number = chain
+    moved = orders[one, first : first + number].copy()
+    if turned:
+        moved = moved[::-1].copy()
+    orders[one, first : counts[one] - number] = orders[one, first + number : counts[one]].copy()
+    counts[one] -= number
+    orders[other, to + number : counts[other] + number] = orders[other, to : counts[other]].copy()
+    orders[other, to : to + number] = moved
+    counts[other] += number
+
+
+@kernel
+def change(orders: IntArray, counts: IntArray, near: IntArray, draw: FloatArray) -> tuple[int, int]:
+    """Change the orders in one way by lot (5,); which two groups were changed, -1 for none."""
+    kind, a, b, c, d = draw
+    groups = orders.shape[0]
+    vertex = int(a * near.shape[0])
+    beside = near[vertex, int(b * near.shape[1])]
+    one = i = other = j = -1
+    for group in range(groups):
+        for k in range(counts[group]):
+            if orders[group, k] == vertex:
+                one, i = group, k
+            elif orders[group, k] == beside:
+                other, j = group, k
+    if kind < REVERSED:  # the stretch between two of one order
+        low, high = min(i, j), max(i, j)
+        if one != other or counts[one] < 4:
+            return -1, -1
+        orders[one, low : high + 1] = orders[one, low : high + 1][::-1].copy()
+    elif kind < TURNED:  # a chain, put elsewhere beside a vertex that is near
+        number = 1 + int(c * LONGEST_CHAIN)
+        if i + number > counts[one] or (one == other and i <= j < i + number):
+            return -1, -1
+        if one != other and counts[one] == number:
+            return -1, -1
+        to = j + (1 if d < 0.5 else 0)
+        if one == other and j > i:
+            to -= number
+        move_chain(orders, counts, (one, i, number), other, to, kind >= MOVED)
+    else:
+        orders[one, i], orders[other, j] = beside, vertex
+    return one, other
+
+
+@kernel
+def anneal(
+    orders: IntArray,
+    counts: IntArray,
+    sizes: IntArray,
+    near: IntArray,
+    draws: FloatArray,
+    heats: tuple[float, float],
+    mean_weight: float,
+    sharing_cost: float,
+    ground: Ground,
+) -> float:
+    """Change orders (G, V), of which the first ``counts`` (G,) count, by Metropolis' rule; the best's cost.
+
+    Parameters
+    ----------
+    orders, counts
+        The vertices that each group's walk goes through; each vertex once. The best are left in them.
+    sizes
+        (G,) robots of each group.
+    near
+        (V, K) other vertices near to each; at least one.
+    draws
+        (R, 6) uniform in [0, 1), one row a change that is tried.
+    heats
+        Temperature at the first and at the last of them, in metres.
+    mean_weight, sharing_cost
+        What the mean counts beside the worst; what the worst of a walk with several robots grows by, as a
+        share of it, and its mean by half of that.
+    """
+    worst, mean = np.empty(orders.shape), np.empty(orders.shape)
+    for group in range(orders.shape[0]):
+        judge_walk(orders[group, : counts[group]], sizes[group], ground, worst[group], mean[group])
+    now = plan_cost(worst, mean, sizes, mean_weight, sharing_cost)
+    best, best_orders, best_counts = now, orders.copy(), counts.copy()
+    kept_orders, kept_counts = orders.copy(), counts.copy()
+    kept_worst, kept_mean = worst.copy(), mean.copy()
+    for r in range(draws.shape[0]):
+        heat = heats[0] * math.pow(heats[1] / heats[0], r / draws.shape[0])
+        one, other = change(orders, counts, near, draws[r, :5])
+        if one < 0:
+            continue
+        for group in (one, other):
+            judge_walk(orders[group, : counts[group]], sizes[group], ground, worst[group], mean[group])
+            if one == other:
+                break
+        new = plan_cost(worst, mean, sizes, mean_weight, sharing_cost)
+        is_taken = new <= now - heat * math.log(max(draws[r, 5], 1e-12))
+        for group in (one, other):
+            if is_taken:
+                kept_orders[group], kept_counts[group] = orders[group], counts[group]
+                kept_worst[group], kept_mean[group] = worst[group], mean[group]
+            else:
+                orders[group], counts[group] = kept_orders[group], kept_counts[group]
+                worst[group], mean[group] = kept_worst[group], kept_mean[group]
+        if is_taken:
+            now = new
+            if now < best:
+                best, best_orders[:], best_counts[:] = now, orders, counts
+    orders[:], counts[:] = best_orders, best_counts
+    return best
