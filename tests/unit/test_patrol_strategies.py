@@ -19,7 +19,7 @@ from pilotage.stack.patrol.graph import PatrolGraph
 from pilotage.stack.patrol.messages import PatrolMemory
 from pilotage.stack.patrol.partition import Plan, annealed, even_sizes, partition
 from pilotage.stack.patrol.strategies.adaptive_rounds import AdaptiveRoundsConfig, best_plan
-from pilotage.stack.patrol.strategy import STRATEGIES, PatrolSetting, Strategy
+from pilotage.stack.patrol.strategy import STRATEGIES, PatrolSetting, Strategy, following
 from pilotage.stack.patrol.tours import Round, idleness_bound_s
 
 GRAPH = lattice(5, 4, 3.0)
@@ -170,6 +170,21 @@ def test_walks_changed_at_random_cost_less(seed: int, sizes: tuple[int, ...], ga
         == plan.rounds[0].stops.tolist()
     )
     assert set(np.concatenate([walk.stops for walk in plan.rounds]).tolist()) == set(range(len(graph)))
+
+
+@pytest.mark.parametrize("name", ["cyclic", "msp-partition", "adaptive-rounds"])
+def test_who_goes_round_knows_where_it_goes_on(name: str) -> None:
+    setting = setting_for()
+    strategy, memory = builder(name)(setting), memory_at(0)
+    at, told = 0, -1
+    for k in range(30):
+        memory.visit(at, 10.0 * k)
+        named = strategy.next_vertex(memory.knowledge(10.0 * k))
+        if k > 12 and named != at and told >= 0:
+            assert named == told
+        at, told = named, following(strategy)
+    assert told >= 0
+    assert following(builder("sebs")(setting)) == -1
 
 
 def test_without_noise_the_tour_keeps_what_it_promises() -> None:

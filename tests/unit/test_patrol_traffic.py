@@ -12,11 +12,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from pilotage.core.errors import InputError
-from pilotage.core.types import FloatArray
+from pilotage.core.types import FloatArray, Pose2
 from pilotage.experiments.build.build import build
 from pilotage.experiments.loop import run_loop
 from pilotage.experiments.mission import load_mission, mission_of, read_mission
 from pilotage.kernels.control import eikonal, voronoi_window
+from pilotage.stack.navigator.patrol.context import NO_GATE
 from pilotage.stack.navigator.patrol.passage import claimed, precedes, relation, stretch_of
 from pilotage.stack.navigator.patrol.still import StillWatch
 
@@ -203,11 +204,61 @@ class TestStopping:
                 (NO_MAP, 0.0, 0.0, 0.1),
             )
             window = (0.9, 0.3, 0.5, 0.25, 6, 15)
-            v, w, _ = voronoi_window.choose(v, w, pose, limits, safety, seen, field, known, 0.0, window)
+            v, w, _ = voronoi_window.choose(
+                v, w, pose, limits, safety, seen, field, NO_GATE, known, 0.0, window
+            )
             pose = pose + 0.2 * np.array(
                 [v * math.cos(pose[2] + 0.1 * w), v * math.sin(pose[2] + 0.1 * w), w]
             )
         assert pose[0] > 1.0
+
+
+class TestDrivingThrough:
+    @pytest.mark.parametrize("bearing", [0.0, -0.8, 1.6])
+    def test_who_knows_the_way_on_need_not_slow_down_at_a_place(self, bearing: float) -> None:
+        """From 1.5 m before it to 1.5 m behind it in another direction."""
+        assert self._driven_s(bearing, knows=True) < 0.95 * self._driven_s(bearing, knows=False)
+
+    def test_who_turns_back_comes_to_the_place_first(self, tmp_path: Path) -> None:
+        """It drove through at full speed and took a loop of four seconds around furniture to come back."""
+        graph = tmp_path / "line.graph"
+        graph.write_text(
+            "3 160 60 0.1 0 0\n\n0 40 30 1\n1 E 40\n\n1 80 30 2\n0 W 40\n2 E 35\n\n2 115 30 1\n1 W 35\n"
+        )
+        values = corridor(3.0, 1, 10.0)
+        values["task"]["graph"] = str(graph)
+        context = build(mission_of(values, seed=0)).team[0].stack._context  # type: ignore[attr-defined]
+        context.came_from, context.hop, place = 0, 1, context.roadmap.places_xy_m[1]
+        context.pose = Pose2(float(place[0]) - 1.0, float(place[1]), 0.0)
+        assert context._gate(place, 2, NOBODY)[6] > 0.0
+        assert context._gate(place, 0, NOBODY)[6] < 0.0
+        assert context._gate(place, -1, NOBODY)[6] < 0.0
+        context.pose = Pose2(float(place[0]) - 3.0, float(place[1]), 0.0)
+        assert context._gate(place, 2, NOBODY)[6] < 0.0  # far yet
+
+    @staticmethod
+    def _driven_s(bearing: float, *, knows: bool) -> float:
+        limits, safety = np.array([1.0, 2.0, 2.0, 2.0, 8.0, 0.1]), np.array([REACTION, 0.3, 0.06, 0.1, 1.4])
+        window, seen = (0.9, 0.3, 0.5, 0.25, 6, 15), (NOBODY, NOBODY, NOBODY)
+        rows, columns = np.mgrid[:101, :101]
+        x, y = 0.1 * columns - 5.0, 0.1 * rows - 5.0
+        end = 2.0 * np.array([math.cos(bearing), math.sin(bearing)])
+        to_place, to_end = np.hypot(x, y), np.hypot(x - end[0], y - end[1])
+        grid, known = (-5.0, -5.0, 0.1), (NO_MAP, 0.0, 0.0, 0.1)
+        gate = (to_end, *grid, 0.0, 0.0, 0.5, 2.0 + 0.3 * abs(bearing)) if knows else NO_GATE
+        pose, v, w, came = np.array([-1.5, 0.0, 0.0]), 1.0, 0.0, False
+        for k in range(200):
+            came = came or math.hypot(*pose[:2]) <= 0.5
+            if came and math.hypot(*(pose[:2] - end)) <= 0.5:
+                return 0.1 * k
+            field = (to_end if came else to_place, *grid)
+            v, w, _ = voronoi_window.choose(
+                v, w, pose, limits, safety, seen, field, NO_GATE if came else gate, known, 0.0, window
+            )
+            pose = pose + 0.1 * np.array(
+                [v * math.cos(pose[2] + 0.05 * w), v * math.sin(pose[2] + 0.05 * w), w]
+            )
+        return math.inf
 
 
 class TestPassages:

@@ -19,9 +19,14 @@ Seen: TypeAlias = tuple[FloatArray, FloatArray, FloatArray]
 """Returns, base frame: the nearest around it (K, 2), of what may move (M, 2), of people (P, 2)."""
 Window: TypeAlias = tuple[float, float, float, float, int, int]
 """Horizon, cost of a heading off the field, cost of nearness and the distance it begins at, speeds, turns."""
+Gate: TypeAlias = tuple[FloatArray, float, float, float, float, float, float, float]
+"""A place to pass and where to go from there: values at nodes as of a field, the place's x and y, how near is
+there (below 0: there is no such place), and what is left from there on, the turn at it included."""
 
 ROLL_S, LOOK_M, MOST_STEPS = 0.05, 0.05, 200
 """A command is followed in steps of time, and looked at after so many metres; braking takes 10 s at most."""
+SAMPLES = 4
+"""An arc is looked at in so many places for whether it leads through a gate."""
 FREE, HELD = 0, 1
 HEADINGS, AHEAD_M, GAIN_S = 24, 0.4, 0.1
 """From a standstill so many headings are tried, for a place so far ahead that is so much nearer in time."""
@@ -234,6 +239,7 @@ def choose(
     safety: FloatArray,
     seen: Seen,
     field: Field,
+    gate: Gate,
     known: Field,
     lane_m: float,
     window: Window,
@@ -248,6 +254,8 @@ def choose(
         As ``stop_is_clear``.
     field
         Time to go, infinite where no place is.
+    gate
+        What an arc that leads through it is priced by, from there on: who goes on need not end at the place.
     lane_m
         The point so far to the left of the robot follows the field: the robot keeps to the right of it.
 
@@ -306,6 +314,8 @@ def choose(
             dx, dy = descent(qx, qy, time, x0, y0, spacing)
             if dx != 0.0 or dy != 0.0:
                 cost += heading_cost * abs(wrap(math.atan2(dy, dx) - heading))
+            if gate[6] > 0.0:
+                cost = min(cost + gate[7], through(v, w, pose, gate, lane_m, window))
             lack = (soft_m + radius - math.sqrt(least)) / soft_m
             cost += near_cost * lack * lack
             if cost < best:
@@ -322,6 +332,32 @@ def choose(
     # As fast as it can stop from there.
     w = math.copysign(math.sqrt(2.0 * turn_acceleration * abs(turn)), turn)
     return best_v, min(max(w, low_w), high_w), HELD
+
+
+@kernel
+def through(v: float, w: float, pose: FloatArray, gate: Gate, lane_m: float, window: Window) -> float:
+    """What is left at the horizon of an arc that leads through a gate; infinite for one that does not.
+
+    By the place on it, from the gate on, that is best for its time: nobody need follow the arc any farther.
+    """
+    time, x0, y0, spacing, gate_x, gate_y, near_m, _ = gate
+    horizon_s, heading_cost = window[0], window[1]
+    best, is_through = np.inf, False
+    cp, sp = math.cos(pose[2]), math.sin(pose[2])
+    for k in range(1, SAMPLES + 1):
+        t = horizon_s * k / SAMPLES
+        x, y, theta = exact_arc(0.0, 0.0, 0.0, v * t, w * t)
+        mx, my, heading = pose[0] + cp * x - sp * y, pose[1] + sp * x + cp * y, wrap(pose[2] + theta)
+        is_through = is_through or math.hypot(mx - gate_x, my - gate_y) <= near_m
+        if not is_through:
+            continue
+        qx, qy = mx - lane_m * math.sin(heading), my + lane_m * math.cos(heading)
+        cost = value_at(qx, qy, time, x0, y0, spacing, 2.0)
+        dx, dy = descent(qx, qy, time, x0, y0, spacing)
+        if dx != 0.0 or dy != 0.0:
+            cost += heading_cost * abs(wrap(math.atan2(dy, dx) - heading))
+        best = min(best, cost + t - horizon_s)
+    return best
 
 
 @kernel

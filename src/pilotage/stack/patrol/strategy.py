@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 
@@ -60,6 +60,20 @@ class Strategy(Protocol):
         Asked after every ``next_vertex``, with its answer as the target.
         """
         ...
+
+
+@runtime_checkable
+class Foresighted(Strategy, Protocol):
+    """A strategy that knows where it will go on to: who is told so need not stop at each vertex."""
+
+    def following(self) -> int:
+        """The vertex after the one that it named last; -1 where it has not decided yet."""
+        ...
+
+
+def following(strategy: Strategy) -> int:
+    """The vertex after the one that a strategy named last, of one that knows; else -1."""
+    return strategy.following() if isinstance(strategy, Foresighted) else -1
 
 
 STRATEGIES: Registry[Strategy] = Registry("strategy", "pilotage.stack.patrol.strategies")

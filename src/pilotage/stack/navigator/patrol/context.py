@@ -24,12 +24,14 @@ from pilotage.stack.navigator.patrol.passage import Pursuit
 from pilotage.stack.navigator.patrol.still import StillWatch
 from pilotage.stack.patrol.messages import PatrolMemory
 from pilotage.stack.patrol.roadmap import roadmap_of
+from pilotage.stack.patrol.strategy import following
 from pilotage.stack.patrol.task import PatrolTask
 from pilotage.stack.patrol.watch import IntruderWatch
 from pilotage.stack.patrol.word import Claim, Clearing, TeamWord
 
 NO_FIELD: FloatArray = np.zeros((1, 1))
 NO_POINTS: FloatArray = np.zeros((0, 2))
+NO_GATE: voronoi_window.Gate = (np.zeros((2, 2)), 0.0, 0.0, 1.0, 0.0, 0.0, -1.0, 0.0)
 SECTORS = 72
 NEAR_M = 1.6
 """Returns beyond this distance from the axle are out of the way of one decision."""
@@ -44,6 +46,8 @@ LANE_AHEAD_M, MERGE_S = 2.0, 1.0
 """A passage is as wide as its narrowest place so far ahead; the last part of a way leads to the middle."""
 HEARD_PERIODS = 4.0
 """Who said nothing for so many of its messages is silent."""
+THROUGH_RATIO, THROUGH_RAD = 0.5, 1.75
+"""It drives through a place, within so much of ``visit_m``, where it turns by no more than this."""
 PEOPLE_M_S = 1.4
 """Who is no mate may come on at a walk, and gives way to nobody."""
 SPEED_SHARE = 0.2
@@ -135,6 +139,7 @@ class Context:
         at = self.roadmap.nearest(start.x_m, start.y_m)
         self.memory = PatrolMemory(len(task.graph), task.robot, len(task.starts), at, speed)
         self.hop = self.target = self.came_from = at
+        self._then = -1
         self._left_s, self._kept_out_s = 0.0, math.inf
         self.t_s, self.pose, self.cov = 0.0, start, np.zeros((3, 3))
         self.near = self.strange = self.people = NO_POINTS
@@ -229,12 +234,15 @@ class Context:
         """Whether it is near enough to where it drives to; what blocks a vertex may be there in its place."""
         if self.homeward:
             return self.away_m(self.hop) <= DOCK_M
-        visit_m = self.task.visit_m
         if blocked or self.taken:
-            return self.away_m(self.hop) <= 0.9 * visit_m
+            return self.away_m(self.hop) <= 0.9 * self.task.visit_m
+        return self.away_m(self.hop) <= self._sure_m()
+
+    def _sure_m(self) -> float:
+        """How near it is to a place that it is at for sure."""
+        visit_m = self.task.visit_m
         spread_m = SIGMAS * math.sqrt(max(self.cov[0, 0], self.cov[1, 1]))
-        sure_m = min(self.task.near_m, 0.95 * visit_m - spread_m)
-        return self.away_m(self.hop) <= max(sure_m, 0.5 * visit_m)
+        return max(min(self.task.near_m, 0.95 * visit_m - spread_m), 0.5 * visit_m)
 
     def runs_low(self) -> bool:
         """Whether it has to go to its station from now on; tells the others that its share is theirs."""
@@ -289,6 +297,7 @@ class Context:
 
     def ask(self) -> bool:
         """Let the strategy say where to go, or the battery; False where the strategy says to wait."""
+        self._then = -1
         if self.battery is not None and (self.homeward or self.runs_low()):
             self.hop = self.target = self.battery.station
             return True
@@ -302,16 +311,24 @@ class Context:
             self.hop = at
             return self.away_m(at) > self.task.visit_m
         self.hop = int(graph.next_hop[at, target])
+        after = target if self.hop != target else following(self.task.strategy)
+        if after >= 0:
+            self._then = int(graph.next_hop[self.hop, after])
         return True
 
     def lead(self, vertex: int, *, first: bool = False) -> Twist:
         """The command that leads to a vertex; ``first`` as below."""
-        return self.descend(self.roadmap.time_s(vertex), self.roadmap.places_xy_m[vertex], first=first)
+        then = self._then if vertex == self.hop != self._then else -1
+        at = self.roadmap.places_xy_m[vertex]
+        return self.descend(self.roadmap.time_s(vertex), at, then=then, first=first)
 
-    def descend(self, time: FloatArray, at: FloatArray | None = None, *, first: bool = False) -> Twist:
+    def descend(
+        self, time: FloatArray, at: FloatArray | None = None, *, then: int = -1, first: bool = False
+    ) -> Twist:
         """The command that leads down a field of the roadmap, to a place (2,) to visit if it leads to one.
 
-        Between two scans the last command stands. Who goes ``first`` drives on towards mates who talk.
+        From there it is to go on to vertex ``then``; -1 where that is not known. Between two scans the last
+        command stands. Who goes ``first`` drives on towards mates who talk.
         """
         roadmap, pose = self.roadmap, self.pose
         (x0, y0), spacing = roadmap.origin_xy_m, roadmap.spacing_m
@@ -333,33 +350,28 @@ class Context:
             # Beside who stands where it wants to be it goes around him, on either side, and that will do.
             self.taken = at is not None and bool(np.hypot(*(still - at).T).min() < body_m)
             lane_m *= not self.taken
-        v, w, held = self._choose(time, discs, lane_m)
+        if at is None or self.taken:
+            then = -1
+        v, w, held = self._choose(time, at, then, discs, lane_m)
         if held and lane_m > 0.0:
             # Beside a corner the lane may lead into it; the middle does not.
-            v, w, held = self._choose(time, discs, 0.0)
+            v, w, held = self._choose(time, at, then, discs, 0.0)
         self._command = Twist(v, w)
         return self._command
 
-    def _choose(self, time: FloatArray, discs: FloatArray, lane_m: float) -> tuple[float, float, bool]:
+    def _choose(
+        self, time: FloatArray, at: FloatArray | None, then: int, discs: FloatArray, lane_m: float
+    ) -> tuple[float, float, bool]:
         """Speed, turn rate, and whether it stays where it is: down a field, around discs (M, 3)."""
         pose = self.pose
         (x0, y0), spacing = self.roadmap.origin_xy_m, self.roadmap.spacing_m
         if len(discs):
             dx, dy = eikonal.descent(pose.x_m, pose.y_m, time, x0, y0, spacing)
             # Who follows the field is the point to the left of the robot: so must be what it goes around.
-            time, x0, y0, around_s = eikonal.detour(
-                time,
-                self.roadmap.slowness,
-                x0,
-                y0,
-                spacing,
-                pose.x_m,
-                pose.y_m,
-                self.config.watch_m,
-                discs + lane_m * np.array([-dy, dx, 0.0]),
-                DETOUR_SLACK_S,
-                THERE_RATIO * self.task.visit_m / self.speed_m_s,
-            )
+            discs = discs + lane_m * np.array([-dy, dx, 0.0])
+        gate = self._gate(at, then, discs)
+        if len(discs):
+            time, x0, y0, around_s = self._detour(time, discs)
             self.blocked = not around_s < self.to_go_s + NO_DETOUR_S
         v, w, status = voronoi_window.choose(
             self._twist.v_m_s,
@@ -369,11 +381,43 @@ class Context:
             self._safety,
             (self.near, self.strange, self.people),
             (time, x0, y0, spacing),
+            gate,
             self._field(lost=False),
             lane_m,
             self._window,
         )
         return v, w, status == voronoi_window.HELD
+
+    def _detour(self, time: FloatArray, discs: FloatArray) -> tuple[FloatArray, float, float, float]:
+        """A field around discs (M, 3), near by: the window, its origin, and the time at the robot."""
+        (x0, y0), spacing = self.roadmap.origin_xy_m, self.roadmap.spacing_m
+        x, y, reach_m = self.pose.x_m, self.pose.y_m, self.config.watch_m
+        there_s = THERE_RATIO * self.task.visit_m / self.speed_m_s
+        slow = self.roadmap.slowness
+        return eikonal.detour(time, slow, x0, y0, spacing, x, y, reach_m, discs, DETOUR_SLACK_S, there_s)
+
+    def _gate(self, at: FloatArray | None, then: int, discs: FloatArray) -> voronoi_window.Gate:
+        """The place (2,) that it passes on its way to vertex ``then``, if it is near and no sharp turn."""
+        near_m = min(self._sure_m(), THROUGH_RATIO * self.task.visit_m)
+        origin, spacing = self.roadmap.origin_xy_m, self.roadmap.spacing_m
+        reach_m = near_m + self._window[0] * self.speed_m_s
+        if then < 0 or at is None or np.hypot(*(at - (self.pose.x_m, self.pose.y_m))) > reach_m:
+            return NO_GATE
+        x, y = at.tolist()
+        on = self.roadmap.time_s(then)
+        away = eikonal.descent(x, y, on, *origin, spacing)
+        back = eikonal.descent(x, y, self.roadmap.time_s(self.came_from), *origin, spacing)
+        turn_rad = math.acos(min(1.0, max(-1.0, -away[0] * back[0] - away[1] * back[1])))
+        if turn_rad > THROUGH_RAD:
+            return NO_GATE
+        x0, y0 = origin
+        if len(discs):
+            on, x0, y0, _ = self._detour(on, discs)
+        left_s = eikonal.value_at(x, y, on, x0, y0, spacing, 0.0)
+        if not math.isfinite(left_s):
+            return NO_GATE
+        # The turn is to be made, sooner or later: who puts it off has not been spared it.
+        return on, x0, y0, spacing, x, y, near_m, left_s + self._window[1] * turn_rad
 
     def _mute(self, beside: FloatArray) -> FloatArray:
         """(K, 2) middles, map frame, of bodies among returns that no mate who talks says it is."""

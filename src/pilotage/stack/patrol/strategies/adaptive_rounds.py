@@ -104,6 +104,10 @@ class AdaptiveRoundsStrategy:
         # A walk may pass a vertex twice, never twice in a row.
         return int(stops[self._place])
 
+    def following(self) -> int:
+        """The stop after the one that it is sent to."""
+        return int(self._round.stops[(self._place + 1) % len(self._round.stops)])
+
     def words(self, knowledge: PatrolKnowledge) -> FloatArray:
         """Its round, and where it was along it when; nothing before it is on it."""
         if not self._is_on_round:

@@ -39,6 +39,10 @@ class CyclicStrategy:
             self._place = (self._place + 1) % len(self._stops)
         return int(self._stops[self._place])
 
+    def following(self) -> int:
+        """The stop after the one that it is sent to."""
+        return int(self._stops[(self._place + 1) % len(self._stops)]) if self._under_way else -1
+
     def words(self, knowledge: PatrolKnowledge) -> FloatArray:
         """Nothing."""
         del knowledge
