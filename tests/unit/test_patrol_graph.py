@@ -182,9 +182,9 @@ def test_a_laser_that_sees_next_to_nothing_is_refused_at_once(reach_m: float) ->
         derive_graph(WORLD, Floor.of(WORLD, 0.3), DerivationConfig(reach_m=reach_m))
 
 
-def passage(width_m: float) -> WorldMap:
+def passage(width_m: float, low: float = 2.03) -> WorldMap:
     """Two rooms, and a passage of 2 m from one to the other, off the lattice of everything."""
-    low, high = 2.03, 2.03 + width_m
+    high = low + width_m
     walls = [[0, 0, 4, 0], [0, 0, 0, 5], [0, 5, 4, 5], [4, 0, 4, low], [4, high, 4, 5]]
     walls += [[4, low, 6, low], [4, high, 6, high]]
     walls += [[6, 0, 6, low], [6, high, 6, 5], [6, 0, 10, 0], [10, 0, 10, 5], [6, 5, 10, 5]]
@@ -201,6 +201,17 @@ def test_a_derived_graph_counts_on_what_can_be_driven(width_m: float, both: bool
     assert (vertices[:, 0].min() < 4.0 and vertices[:, 0].max() > 6.0) == both
     roadmap = Roadmap(world, vertices, np.zeros((0, 2)), 0.38, 1.0, 0.15, 0.5, 0.35)
     assert all(math.isfinite(roadmap.longest_s(vertex)) for vertex in range(len(vertices)))
+
+
+def test_a_passage_whose_middle_lies_between_two_cells_is_part_of_the_floor() -> None:
+    """Of a floor with corridors of 0.9 m all but one room was left out without a word."""
+    world = passage(0.88, low=1.96)
+    _, derived = derive_drivable(world, 0.3)
+    vertices = derived.graph.vertices_xy_m
+    assert vertices[:, 0].min() < 4.0
+    assert vertices[:, 0].max() > 6.0
+    # Who begins in it is on the floor as well.
+    assert len(derive_drivable(world, 0.3, (5.0, 2.4))[1].graph) == len(derived.graph)
 
 
 def test_a_passage_between_the_nodes_is_found_on_finer_ones() -> None:
