@@ -12,6 +12,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from PIL import Image
+from pydantic import ValidationError
 from scipy.interpolate import CubicSpline
 
 from pilotage.core.errors import InputError
@@ -173,6 +174,30 @@ class TestCraterTerrain:
         assert (one.landmarks.points_xy_m == two.landmarks.points_xy_m).all()
         assert not (one.elevation.elevation_m == other.elevation.elevation_m).all()
         assert (one.hazards.cells == one.elevation.hazards(SMALL.slope_limit_deg).cells).all()
+
+    @pytest.mark.parametrize(
+        ("change", "said"),
+        [
+            ({"least_crater_m": 8000.0}, "at most 5 times over"),
+            ({"crater_exponent": 1e-9}, "at most 5 times over"),
+            ({"craters_per_km2": 1000.0}, "at most 200000 craters"),
+            ({"resolution_m": 1e9}, "at most 200000 craters"),
+            ({"resolution_m": 1e-9}, "at most 20000 cells"),
+            ({"scarp_spacing_m": 1e9}, "at most 20000 cells"),
+        ],
+    )
+    def test_what_takes_minutes_is_refused_at_once(self, change: dict[str, float], said: str) -> None:
+        config = CraterTerrainConfig.model_validate(change)
+        with pytest.raises(InputError, match=said):
+            crater_terrain(config)
+
+    @pytest.mark.parametrize("name", ["mound_radius_m", "rim_radius_m"])
+    def test_a_radius_is_at_least_a_millimetre(self, name: str) -> None:
+        """Smaller ones are none in single precision."""
+        with pytest.raises(ValidationError, match=name):
+            CraterTerrainConfig.model_validate({name: 1e-40})
+        config = SMALL.model_copy(update={name: 1e-3})
+        assert np.isfinite(crater_terrain(config).elevation.elevation_m).all()
 
     def test_images_hold_what_was_made(self, tmp_path: Path) -> None:
         terrain = crater_terrain(SMALL)

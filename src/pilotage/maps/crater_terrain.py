@@ -22,8 +22,9 @@ from pydantic import Field
 from scipy import fft, ndimage
 
 from pilotage.core.config import Config
+from pilotage.core.errors import InputError
 from pilotage.core.random import RandomStreams
-from pilotage.core.types import FloatArray, Pose2
+from pilotage.core.types import FloatArray, IntArray, Pose2
 from pilotage.maps.elevation import ElevationModel
 from pilotage.maps.landmarks import Landmarks
 from pilotage.maps.memory import require_memory
@@ -36,6 +37,12 @@ EJECTA_RADII = 3.0
 
 
 COARSE = 8
+
+MOST_CRATERS, MOST_TIMES_OVER = 200_000, 5.0
+"""How many craters are dug, and how often they may cover the ground with what they throw out: long before
+that the younger ones have erased the older ones, and digging takes minutes."""
+MOST_SPACING_CELLS = 20_000
+"""Between scarps; a smooth field's filter is half as long."""
 
 
 class CraterTerrainConfig(Config):
@@ -57,9 +64,9 @@ class CraterTerrainConfig(Config):
     plain_slope_deg: float = Field(1.6, ge=0.0, lt=45.0)
     rough_slope_deg: float = Field(9.0, ge=0.0, lt=45.0)
     mound_m: tuple[float, float] = (20_000.0, 13_000.0)
-    mound_radius_m: float = Field(12_000.0, gt=0.0)
+    mound_radius_m: float = Field(12_000.0, ge=1e-3)
     mound_height_m: float = Field(3_200.0, ge=0.0)
-    rim_radius_m: float = Field(27_500.0, gt=0.0)
+    rim_radius_m: float = Field(27_500.0, ge=1e-3)
     rim_height_m: float = Field(1_200.0, ge=0.0)
     scarp_height_m: float = Field(90.0, ge=0.0)
     scarp_width_m: float = Field(160.0, gt=0.0)
@@ -80,21 +87,38 @@ class CraterTerrain:
     landmarks: Landmarks
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class _Craters:
+    """In cells: middles (N, 2) row and column, radii (N,), the first and end (N, 2) of what each changes."""
+
+    middles: FloatArray
+    radii: FloatArray
+    depths_m: FloatArray
+    first: IntArray
+    end: IntArray
+
+
 def crater_terrain(config: CraterTerrainConfig) -> CraterTerrain:
     """Make the terrain; the same config gives the same one, bit for bit on one machine.
 
     Raises
     ------
     InputError
-        Where it does not fit into memory.
+        Where it does not fit into memory, or its craters or the space between scarps are beyond what is dug.
     """
     cells = config.rows * config.columns
     require_memory(28 * cells, f"crater terrain of {config.columns} x {config.rows} cells")
+    if config.scarp_spacing_m > MOST_SPACING_CELLS * config.resolution_m:
+        raise InputError(
+            f"crater terrain: expected a scarp_spacing_m of at most {MOST_SPACING_CELLS} cells, "
+            f"found {config.scarp_spacing_m / config.resolution_m:.3g}"
+        )
     streams = RandomStreams(config.seed)
+    craters = _craters(config, streams.stream("craters"))
     heights, rough = _mound_and_rim(config, streams.stream("gullies"))
     heights += _roughness(config, rough, streams.stream("roughness"))
     heights += _scarps(config, streams.stream("scarps"))
-    _add_craters(heights, config, streams.stream("craters"))
+    _dig(heights, craters)
     origin = Pose2(*config.origin_m, 0.0)
     heights.flags.writeable = False
     elevation = ElevationModel(heights, config.resolution_m, origin)
@@ -191,10 +215,21 @@ def _stretched(coarse: HeightArray, config: CraterTerrainConfig) -> HeightArray:
     return np.asarray(wide[row] * (1.0 - part) + wide[row + 1] * part, dtype=np.float32)
 
 
-def _add_craters(heights: HeightArray, config: CraterTerrainConfig, rng: np.random.Generator) -> None:
-    """Dig craters into ``heights``, oldest first."""
-    rows, columns = heights.shape
+def _craters(config: CraterTerrainConfig, rng: np.random.Generator) -> _Craters:
+    """Draw the craters, oldest first.
+
+    Raises
+    ------
+    InputError
+        Where they are more than anybody could tell apart.
+    """
+    rows, columns = config.rows, config.columns
     area_km2 = rows * columns * (config.resolution_m / 1000.0) ** 2
+    if config.craters_per_km2 * area_km2 > MOST_CRATERS:
+        raise InputError(
+            f"crater terrain: expected at most {MOST_CRATERS} craters, "
+            f"found {config.craters_per_km2:g} per km2 on {area_km2:.3g} km2"
+        )
     count = int(rng.poisson(config.craters_per_km2 * area_km2))
     least, greatest = config.least_crater_m, max(config.least_crater_m, config.greatest_crater_m)
     # The inverse of a power law cut off at both ends.
@@ -202,10 +237,28 @@ def _add_craters(heights: HeightArray, config: CraterTerrainConfig, rng: np.rand
     radii = 0.5 * least * (1.0 - part) ** (-1.0 / config.crater_exponent) / config.resolution_m
     middles = rng.random((count, 2)) * (rows, columns)
     depths = 0.4 * radii * config.resolution_m * rng.uniform(0.15, 1.0, count)
-    for (row, column), radius, depth in zip(middles, radii, depths, strict=True):
-        reach = EJECTA_RADII * radius
-        top, bottom = max(0, math.floor(row - reach)), min(rows, math.ceil(row + reach) + 1)
-        left, right = max(0, math.floor(column - reach)), min(columns, math.ceil(column + reach) + 1)
+    reach = EJECTA_RADII * radii[:, None]
+    first = np.maximum(0.0, np.floor(middles - reach))
+    end = np.minimum([rows, columns], np.ceil(middles + reach) + 1.0)
+    times_over = float(np.prod(end - first, axis=1).sum()) / (rows * columns)
+    if times_over > MOST_TIMES_OVER:
+        raise InputError(
+            f"crater terrain: expected craters that cover the ground at most {MOST_TIMES_OVER:g} times over, "
+            f"found {times_over:.3g}; take fewer per km2, or smaller ones"
+        )
+    return _Craters(middles, radii, depths, first.astype(np.int64), end.astype(np.int64))
+
+
+def _dig(heights: HeightArray, craters: _Craters) -> None:
+    """Dig craters into ``heights``."""
+    for (row, column), radius, depth, (top, left), (bottom, right) in zip(
+        craters.middles,
+        craters.radii,
+        craters.depths_m,
+        craters.first.tolist(),
+        craters.end.tolist(),
+        strict=True,
+    ):
         y = (np.arange(top, bottom) + 0.5 - row) / radius
         x = (np.arange(left, right) + 0.5 - column) / radius
         away = np.hypot(y[:, None], x[None, :]).astype(np.float32)
