@@ -275,6 +275,23 @@ def test_an_obstacle_without_room_is_refused() -> None:
     assert math.isfinite(path.sum())
 
 
+@pytest.mark.parametrize(
+    ("kind", "key", "bounds", "said"),
+    [
+        ("u-trap", "width_m", [30.0, 3.6], "smaller bound first"),
+        ("u-trap", "depth_m", [2.6, 2.5], "smaller bound first"),
+        ("across-path", "length_m", [3.0, 1.5], "smaller bound first"),
+        ("across-path", "along", [0.8, 0.2], "smaller bound first"),
+        ("across-path", "along", [0.2, 7.0], "less than or equal to 1"),
+    ],
+)
+def test_ranges_that_nothing_can_be_drawn_from_are_refused(
+    kind: str, key: str, bounds: list[float], said: str
+) -> None:
+    with pytest.raises(InputError, match=said):
+        load_mission("museum-1", [f"world.obstacles=[{{kind: {kind}, {key}: {bounds}}}]"])
+
+
 def test_a_component_s_short_form_can_be_overridden() -> None:
     values: dict[str, Any] = {"world": {"map": "museum"}, "stack": {"planner": "astar"}}
     apply_override(values, "stack.planner.name=theta-star")

@@ -216,3 +216,17 @@ def _show(value: Any) -> str:
         return "nothing"
     text = repr(value) if isinstance(value, str) else str(value)
     return text if len(text) <= 80 else text[:77] + "..."
+
+
+def rising(bounds: tuple[float, float]) -> tuple[float, float]:
+    """Of a range from which something is drawn: the smaller bound first.
+
+    Raises
+    ------
+    ValueError
+        Where it is not.
+    """
+    low, high = bounds
+    if low > high:
+        raise ValueError(f"expected the smaller bound first, found {low:g} and {high:g}")
+    return bounds

@@ -4,14 +4,18 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal
 
-from pydantic import Discriminator, Field, Tag
+from pydantic import AfterValidator, Discriminator, Field, Tag
 
-from pilotage.core.config import Config
+from pilotage.core.config import Config, rising
 from pilotage.maps.map_file import LandmarkEntry
 from pilotage.missions.choice import ComponentChoice
 from pilotage.missions.map_choice import MapChoice
 from pilotage.missions.places import GoalConfig, Kidnap, Point, PoseConfig, RandomPlace
-from pilotage.sensors.sensor import NonNegative, Positive
+from pilotage.sensors.sensor import Positive
+
+Lengths = Annotated[tuple[Positive, Positive], AfterValidator(rising)]
+Share = Annotated[float, Field(ge=0.0, le=1.0)]
+Shares = Annotated[tuple[Share, Share], AfterValidator(rising)]
 
 
 class BoxObstacle(Config):
@@ -35,19 +39,19 @@ class AcrossPathObstacle(Config):
     """A box put across the planned path; place and size drawn from the run's seed."""
 
     kind: Literal["across-path"]
-    length_m: tuple[Positive, Positive] = (1.5, 3.0)
+    length_m: Lengths = (1.5, 3.0)
     thickness_m: Positive = 0.3
-    along: tuple[NonNegative, NonNegative] = (0.2, 0.8)
+    along: Shares = (0.2, 0.8)
 
 
 class TrapObstacle(Config):
     """A U-shaped trap open towards the robot, across the planned path; place and size from the seed."""
 
     kind: Literal["u-trap"]
-    width_m: tuple[Positive, Positive] = (3.0, 3.6)
-    depth_m: tuple[Positive, Positive] = (2.0, 2.5)
+    width_m: Lengths = (3.0, 3.6)
+    depth_m: Lengths = (2.0, 2.5)
     thickness_m: Positive = 0.2
-    along: tuple[NonNegative, NonNegative] = (0.15, 0.85)
+    along: Shares = (0.15, 0.85)
     head_on: bool = False
     """Only where the plan leads straight in through the mouth: whoever follows it cannot help entering."""
 

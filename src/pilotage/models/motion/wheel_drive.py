@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from pydantic import Field, model_validator
+from pydantic import AfterValidator, Field
 
-from pilotage.core.config import Config
+from pilotage.core.config import Config, rising
 from pilotage.models.motion.motion import MOTIONS, MotionConfig, Positive
 
 Share = Annotated[float, Field(ge=0.0, lt=0.5)]
+Shares = Annotated[tuple[Share, Share], AfterValidator(rising)]
 
 
 class WheelErrorsConfig(Config):
@@ -21,19 +22,11 @@ class WheelErrorsConfig(Config):
 
     radius_difference: Share = 0.005
     """Larger over smaller wheel, minus one."""
-    separation_error: tuple[Share, Share] = (0.01, 0.02)
-    slip: tuple[Share, Share] = (0.01, 0.02)
+    separation_error: Shares = (0.01, 0.02)
+    slip: Shares = (0.01, 0.02)
     """Each wheel rolls this much less far than it turns."""
     slip_std_m_sqrt_m: float = Field(default=0.0015, ge=0.0)
     """Random slip of each wheel: standard deviation over one metre."""
-
-    @model_validator(mode="after")
-    def _ordered(self) -> WheelErrorsConfig:
-        for name in ("separation_error", "slip"):
-            low, high = getattr(self, name)
-            if low > high:
-                raise ValueError(f"{name}: expected the smaller bound first, found {low:g} and {high:g}")
-        return self
 
 
 @MOTIONS.add_config("wheel-drive")
