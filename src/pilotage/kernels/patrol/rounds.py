@@ -18,26 +18,17 @@ Ground: TypeAlias = tuple[IntArray, FloatArray]
 """The vertex after the first on the shortest path to the second (V, V); lengths of edges (V, V)."""
 
 LONGEST_CHAIN = 3
-NEVER = 1e12
 REVERSED, MOVED, TURNED = 0.2, 0.5, 0.75
 """Shares of the kinds of changes, added up; what is left exchanges two vertices."""
 
 
 @kernel
 def judge_walk(order: IntArray, size: int, ground: Ground, worst: FloatArray, mean: FloatArray) -> None:
-    """Fill in (V,) the longest distance between robots at each vertex, and the mean since the last.
-
-    The walk goes through vertices (N,) in order by shortest paths, and back to the first; ``size`` robots go
-    round, evenly spread. At a vertex that it passes several times the gaps g between visits make the mean
-    sum(g^2) / (2 sum(g)). Where the walk does not come by both are ``NEVER``.
-    """
+    """Fill in ``visit_gaps`` of the walk through vertices (N,) in order, by shortest paths, and back."""
     hops, edges = ground
     count = order.shape[0]
-    worst[:], mean[:] = NEVER, NEVER
-    if count == 1:
-        worst[order[0]] = mean[order[0]] = 0.0
-        return
     passed, at = np.empty(count * worst.shape[0], np.int64), np.empty(count * worst.shape[0])
+    passed[0], at[0] = order[0], 0.0
     stops, length = 0, 0.0
     for k in range(count):
         here, there = int(order[k]), int(order[(k + 1) % count])
@@ -47,15 +38,33 @@ def judge_walk(order: IntArray, size: int, ground: Ground, worst: FloatArray, me
             following = int(hops[here, there])
             length += edges[here, following]
             here = following
+    stops = max(stops, 1)
+    visit_gaps(passed[:stops], at[:stops], length, size, worst, mean)
+
+
+@kernel
+def visit_gaps(
+    stops: IntArray, at: FloatArray, length: float, size: int, worst: FloatArray, mean: FloatArray
+) -> None:
+    """Fill in (V,) the longest distance between robots at each vertex, and the mean since the last.
+
+    ``size`` robots go round a closed walk, evenly spread; it passes vertices (K,) at distances (K,) along it.
+    At a vertex that it passes several times the gaps g between visits make the mean sum(g^2) / (2 sum(g)).
+    Where the walk does not come by both are infinite.
+    """
+    worst[:], mean[:] = np.inf, np.inf
+    if length == 0.0:
+        worst[stops[0]] = mean[stops[0]] = 0.0
+        return
     period = length / size
-    phase = at[:stops]
-    by_phase: IntArray = np.arange(stops)
+    phase = at
+    by_phase: IntArray = np.arange(stops.shape[0])
     if size > 1:
-        phase = np.mod(phase, period)
+        phase = np.mod(at, period)
         by_phase = np.argsort(phase)
     first, last = np.full(worst.shape[0], -1.0), np.empty(worst.shape[0])
     for k in by_phase:
-        vertex = passed[k]
+        vertex = stops[k]
         if first[vertex] < 0.0:
             first[vertex], worst[vertex], mean[vertex] = phase[k], 0.0, 0.0
         else:
@@ -71,12 +80,13 @@ def judge_walk(order: IntArray, size: int, ground: Ground, worst: FloatArray, me
 
 
 @kernel
-def plan_cost(
-    worst: FloatArray, mean: FloatArray, sizes: IntArray, mean_weight: float, sharing_cost: float
-) -> float:
-    """The worst over vertices (G, V), and with its weight the mean over them.
+def promised(
+    worst: FloatArray, mean: FloatArray, sizes: IntArray, sharing_cost: float
+) -> tuple[float, float]:
+    """The worst over vertices (G, V), and the mean over them.
 
-    A vertex of several walks counts where it is visited more often.
+    A vertex of several walks counts where it is visited more often. The worst of a walk with several robots
+    grows by ``sharing_cost``, as a share of it, and its mean by half of that.
     """
     most, total = 0.0, 0.0
     for vertex in range(worst.shape[1]):
@@ -87,7 +97,16 @@ def plan_cost(
             usual = min(usual, mean[group, vertex] * (1.0 + 0.5 * extra))
         most = max(most, longest)
         total += usual
-    return float(most + mean_weight * total / worst.shape[1])
+    return most, total / worst.shape[1]
+
+
+@kernel
+def plan_cost(
+    worst: FloatArray, mean: FloatArray, sizes: IntArray, mean_weight: float, sharing_cost: float
+) -> float:
+    """The worst that is ``promised``, and with its weight the mean."""
+    most, usual = promised(worst, mean, sizes, sharing_cost)
+    return float(most + mean_weight * usual)
 
 
 @kernel
@@ -167,8 +186,7 @@ def anneal(
     heats
         Temperature at the first and at the last of them, in metres.
     mean_weight, sharing_cost
-        What the mean counts beside the worst; what the worst of a walk with several robots grows by, as a
-        share of it, and its mean by half of that.
+        What the mean counts beside the worst, and as in ``promised``.
     """
     worst, mean = np.empty(orders.shape), np.empty(orders.shape)
     for group in range(orders.shape[0]):

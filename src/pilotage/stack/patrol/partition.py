@@ -10,7 +10,7 @@ from functools import lru_cache
 import numpy as np
 
 from pilotage.core.types import FloatArray, IntArray
-from pilotage.kernels.patrol.rounds import anneal
+from pilotage.kernels.patrol.rounds import anneal, promised, visit_gaps
 from pilotage.kernels.tours.search import cheapest_insertion, improve, tour_cost
 from pilotage.stack.patrol.graph import PatrolGraph
 from pilotage.stack.patrol.tours import Round
@@ -146,28 +146,13 @@ def _near(graph: PatrolGraph) -> IntArray:
 
 
 def _promised(
-    rounds: tuple[Round, ...], sizes: tuple[int, ...], vertices: int, sharing_cost: float
+    rounds: Sequence[Round], sizes: tuple[int, ...], vertices: int, sharing_cost: float
 ) -> tuple[float, float]:
-    worst, mean = np.full(vertices, np.inf), np.full(vertices, np.inf)
-    for walk, size in zip(rounds, sizes, strict=True):
-        extra = sharing_cost * (size > 1)
-        for vertex, (longest, usual) in _gaps(walk, size).items():
-            worst[vertex] = min(worst[vertex], (1.0 + extra) * longest)
-            mean[vertex] = min(mean[vertex], (1.0 + 0.5 * extra) * usual)
-    return float(worst.max()), float(mean.mean())
-
-
-def _gaps(walk: Round, size: int) -> dict[int, tuple[float, float]]:
-    """For each vertex of a walk the longest distance between robots, and the mean since the last."""
-    if walk.length_m == 0.0:
-        return {int(walk.stops[0]): (0.0, 0.0)}
-    period_m = walk.length_m / size
-    out = {}
-    for vertex in np.unique(walk.stops).tolist():
-        at_m = np.sort(np.mod(walk.at_m[walk.stops == vertex], period_m))
-        gaps = np.diff([*at_m, at_m[0] + period_m])
-        out[vertex] = float(gaps.max()), float((gaps**2).sum() / (2.0 * period_m))
-    return out
+    worst, mean = np.empty((len(rounds), vertices)), np.empty((len(rounds), vertices))
+    for group, walk in enumerate(rounds):
+        visit_gaps(walk.stops, walk.at_m, walk.length_m, sizes[group], worst[group], mean[group])
+    most_m, usual_m = promised(worst, mean, np.array(sizes), sharing_cost)
+    return float(most_m), float(usual_m)
 
 
 def _cut(graph: PatrolGraph, order: IntArray, sizes: tuple[int, ...]) -> list[set[int]]:

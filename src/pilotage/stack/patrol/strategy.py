@@ -47,7 +47,8 @@ class PatrolSetting:
 class Strategy(Protocol):
     """Decides for one robot, on what this robot knows. Built as ``cls(config, setting)``.
 
-    It is asked at every vertex that the robot comes to or passes, and about once a second while it waits.
+    It is asked at every vertex that the robot comes to or passes, and about once a second while it waits. One
+    that knows where it goes on to may say so as well: ``Foresighted``.
     """
 
     def next_vertex(self, knowledge: PatrolKnowledge) -> int:
