@@ -27,15 +27,15 @@ if TYPE_CHECKING:
     from pilotage.face import filters as filters
     from pilotage.face import lines as lines
     from pilotage.face import planners as planners
+    from pilotage.face.calibrating import calibrate as calibrate
+    from pilotage.face.evaluating import evaluate as evaluate
+    from pilotage.face.localizing import localize as localize
+    from pilotage.face.mapping import slam as slam
     from pilotage.face.maps import draw as draw
     from pilotage.face.maps import vectorize as vectorize
     from pilotage.face.missions import load as load
     from pilotage.face.planning import Plan as Plan
     from pilotage.face.planning import plan as plan
-    from pilotage.face.recordings import calibrate as calibrate
-    from pilotage.face.recordings import evaluate as evaluate
-    from pilotage.face.recordings import localize as localize
-    from pilotage.face.recordings import slam as slam
     from pilotage.face.runs import Run as Run
     from pilotage.face.runs import open_run as open_run
     from pilotage.face.runs import run as run
@@ -55,10 +55,10 @@ _PLACES = {
     "study": "face.studies",
     "draw": "face.maps",
     "vectorize": "face.maps",
-    "localize": "face.recordings",
-    "slam": "face.recordings",
-    "calibrate": "face.recordings",
-    "evaluate": "face.recordings",
+    "localize": "face.localizing",
+    "slam": "face.mapping",
+    "calibrate": "face.calibrating",
+    "evaluate": "face.evaluating",
     "export": "bridges.export",
     "track": "face.tracking",
     "Mission": "missions.mission",

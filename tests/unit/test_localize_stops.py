@@ -13,7 +13,7 @@ from pilotage.cli.main import main
 from pilotage.core.errors import InputError
 from pilotage.core.types import FloatArray
 from pilotage.experiments.recordings.stops import reckon, textbook
-from pilotage.face.recordings import localize
+from pilotage.face.localizing import localize
 from pilotage.logs.stops_csv import COLUMNS, read_stops
 
 

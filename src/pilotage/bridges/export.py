@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from os import PathLike
 from pathlib import Path
 
 import numpy as np
 
 from pilotage.core import given
 from pilotage.core.errors import InputError, unknown_name
+from pilotage.core.given import FilePath
 from pilotage.core.whole_file import draft_of
 from pilotage.face.runs import Run, open_run
 from pilotage.face.traces import Trace
@@ -35,7 +35,7 @@ class _Form:
     write: Callable[[Run, Path], None]
 
 
-def export(run: Run | str | PathLike[str], to: str, out: str | PathLike[str] | None = None) -> Path:
+def export(run: Run | FilePath, to: str, out: FilePath | None = None) -> Path:
     """Hand a run on to another program.
 
     Parameters

@@ -53,7 +53,7 @@ def evaluate(
         return _print(_relations(estimate, reference, tolerance, topics or ()), json)
     if tolerance is not None:
         raise InputError("evaluate: expected --tolerance together with --relations only")
-    from pilotage.face.recordings import evaluate as judged_by
+    from pilotage.face.evaluating import evaluate as judged_by
 
     errors = judged_by(estimate, reference, format=form, align=align, scale=scale, topics=topics or ())
     answer: dict[str, float | int | str | bool] = {

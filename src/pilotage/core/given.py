@@ -15,7 +15,7 @@ import os
 import reprlib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -23,6 +23,8 @@ from pilotage.core.config import LARGEST, LARGEST_WHOLE
 from pilotage.core.errors import InputError
 from pilotage.core.limits import DEPTH
 from pilotage.core.types import BoolArray, FloatArray, IntArray
+
+FilePath: TypeAlias = "str | os.PathLike[str]"
 
 
 def number(

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from os import PathLike
 from pathlib import Path
 from typing import Any
 
 from pilotage.core import given
 from pilotage.core.config import validate
 from pilotage.core.errors import InputError
+from pilotage.core.given import FilePath
 from pilotage.experiments.build.charts import load_chart
 from pilotage.maps.occupancy_grid import OCCUPIED_FROM
 from pilotage.maps.vectorize import wall_segments, write_wall_map
@@ -35,8 +35,8 @@ class Drawn:
 
 
 def draw(
-    map: str | PathLike[str],  # noqa: A002 - the word for it
-    out: str | PathLike[str] | None = None,
+    map: FilePath,  # noqa: A002 - the word for it
+    out: FilePath | None = None,
     *,
     resolution_m: float | None = None,
 ) -> Drawn:
@@ -79,8 +79,8 @@ def draw(
 
 
 def vectorize(
-    map: str | PathLike[str],  # noqa: A002 - the word for it
-    out: str | PathLike[str] | None = None,
+    map: FilePath,  # noqa: A002 - the word for it
+    out: FilePath | None = None,
     *,
     tolerance_m: float = 0.0,
     resolution_m: float | None = None,

@@ -6,7 +6,6 @@ import html
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from os import PathLike
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -14,6 +13,7 @@ import numpy as np
 
 from pilotage.core import given
 from pilotage.core.errors import InputError
+from pilotage.core.given import FilePath
 from pilotage.core.types import FloatArray, Pose2
 from pilotage.experiments.grid_planning import is_grid_map, plan_on_grid
 from pilotage.experiments.planning import plan_on_map
@@ -59,7 +59,7 @@ class Plan:
 
 
 def plan(
-    map: str | PathLike[str],  # noqa: A002 - the word for it
+    map: FilePath,  # noqa: A002 - the word for it
     start: Place,
     goal: Place,
     *,

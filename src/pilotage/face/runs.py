@@ -7,12 +7,12 @@ import shutil
 import tempfile
 import weakref
 from functools import cached_property
-from os import PathLike
 from pathlib import Path
 from typing import Any
 
 from pilotage.core import given
 from pilotage.core.errors import InputError
+from pilotage.core.given import FilePath
 from pilotage.core.types import Event
 from pilotage.experiments.run import run_mission
 from pilotage.face.metrics import Metrics
@@ -98,7 +98,7 @@ class Run:
         """Why the run ended as it did, in words; empty where there is nothing to say."""
         return str(self.metrics.as_dict().get("reason") or "")
 
-    def report(self, path: str | PathLike[str] | None = None) -> Path:
+    def report(self, path: FilePath | None = None) -> Path:
         """Write the run's page: one self-contained HTML file with replay, figures and every metric.
 
         Parameters
@@ -131,7 +131,7 @@ def run(
     mission: MissionLike,
     *,
     seed: int | None = None,
-    out: str | PathLike[str] = "runs",
+    out: FilePath = "runs",
     save: bool = True,
     progress: bool | None = None,
 ) -> Run:
@@ -182,7 +182,7 @@ def run(
     return Run(result.run_dir, passing)
 
 
-def open_run(folder: str | PathLike[str]) -> Run:
+def open_run(folder: FilePath) -> Run:
     """Open a run's folder: the object that ``run`` gave.
 
     Raises

@@ -7,13 +7,13 @@ import hashlib
 import json
 from collections.abc import Mapping, Sequence
 from functools import cached_property
-from os import PathLike
 from pathlib import Path
 from typing import Any
 
 from pilotage.core import given
 from pilotage.core.config import validate
 from pilotage.core.errors import InputError
+from pilotage.core.given import FilePath
 from pilotage.experiments.resolve import resolved_values
 from pilotage.experiments.studies.definition import StudyDefinition
 from pilotage.experiments.studies.engine import Listener, run_study
@@ -100,7 +100,7 @@ def study(
     metrics: Sequence[str] = (),
     workers: int | None = None,
     name: str | None = None,
-    out: str | PathLike[str] = "studies",
+    out: FilePath = "studies",
     resume: bool = True,
 ) -> Study:
     """Run a mission with every combination of settings, each with the same seeds.

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from pilotage.core import given
+from pilotage.core.given import FilePath
 from pilotage.core.types import FloatArray
-from pilotage.face.recordings import FilePath
 
 
 @dataclass(frozen=True, slots=True, eq=False)
