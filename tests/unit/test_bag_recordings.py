@@ -6,7 +6,6 @@ import json
 import math
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -23,131 +22,20 @@ from pilotage.logs.bag_series import LANDMARKS, POSES, read_series
 from pilotage.logs.laser_recordings import read_laser_log
 from pilotage.maps.ros_map import RosMap, write_ros_map
 from support.command_bags import commanded
+from support.landmark_bags import DETECTIONS, MOUNT, PLACES, circle, detected, noisy, steady, write_table
 
 pytest.importorskip("rosbags")
 
-PLACES = {1: (4.0, 0.0), 2: (0.0, 4.0), 3: (-4.0, -1.0), 4: (1.0, -4.0)}
-MOUNT = Pose2(0.2, 0.0, 0.0)
 WRITERS: dict[str, Callable[[Path, RunMessages], None]] = {
     "a.bag": write_ros1,
     "folder": write_ros2,
     "a.mcap": write_mcap,
 }
-POSE_IN = "geometry_msgs/PoseWithCovariance pose\n"
-DETECTIONS: dict[str, tuple[str, dict[str, str]]] = {
-    "vision": (
-        "vision_msgs/msg/Detection3DArray",
-        {
-            "vision_msgs/msg/ObjectHypothesis": "string class_id\nfloat64 score\n",
-            "vision_msgs/msg/ObjectHypothesisWithPose": "vision_msgs/ObjectHypothesis hypothesis\n" + POSE_IN,
-            "vision_msgs/msg/Detection3D": "std_msgs/Header header\n"
-            "vision_msgs/ObjectHypothesisWithPose[] results\nstring id\n",
-            "vision_msgs/msg/Detection3DArray": "std_msgs/Header header\n"
-            "vision_msgs/Detection3D[] detections\n",
-        },
-    ),
-    "apriltag": (
-        "apriltag_ros/msg/AprilTagDetectionArray",
-        {
-            "apriltag_ros/msg/AprilTagDetection": "int32[] id\n"
-            "geometry_msgs/PoseWithCovarianceStamped pose\n",
-            "apriltag_ros/msg/AprilTagDetectionArray": "std_msgs/Header header\n"
-            "apriltag_ros/AprilTagDetection[] detections\n",
-        },
-    ),
-    "aruco": (
-        "aruco_msgs/msg/MarkerArray",
-        {
-            "aruco_msgs/msg/Marker": "std_msgs/Header header\nuint32 id\n" + POSE_IN,
-            "aruco_msgs/msg/MarkerArray": "std_msgs/Header header\naruco_msgs/Marker[] markers\n",
-        },
-    ),
-    "ros2-aruco": (
-        "ros2_aruco_interfaces/msg/ArucoMarkers",
-        {
-            "ros2_aruco_interfaces/msg/ArucoMarkers": "std_msgs/Header header\nint64[] marker_ids\n"
-            "geometry_msgs/Pose[] poses\n"
-        },
-    ),
-    "fiducial": (
-        "fiducial_msgs/msg/FiducialTransformArray",
-        {
-            "fiducial_msgs/msg/FiducialTransform": "int32 fiducial_id\ngeometry_msgs/Transform transform\n",
-            "fiducial_msgs/msg/FiducialTransformArray": "std_msgs/Header header\n"
-            "fiducial_msgs/FiducialTransform[] transforms\n",
-        },
-    ),
-}
-
-
-def detected(form: str, header: Any, seen: Mapping[int, tuple[float, float]]) -> dict[str, Any]:
-    """One message: identities and places in the camera's frame."""
-    poses = {i: ros.pose(Pose2(x, y, 0.0)) for i, (x, y) in seen.items()}
-    if form == "vision":
-        many = [
-            {"results": [{"hypothesis": {"class_id": str(i), "score": 1.0}, "pose": {"pose": p}}]}
-            for i, p in poses.items()
-        ]
-        return {"header": header, "detections": many}
-    if form == "apriltag":
-        tags = [{"id": [i], "pose": {"header": header, "pose": {"pose": p}}} for i, p in poses.items()]
-        return {"header": header, "detections": tags}
-    if form == "aruco":
-        return {"header": header, "markers": [{"id": i, "pose": {"pose": p}} for i, p in poses.items()]}
-    if form == "ros2-aruco":
-        return {"header": header, "marker_ids": list(poses), "poses": list(poses.values())}
-    shifts = [
-        {"fiducial_id": i, "transform": {"translation": p["position"], "rotation": p["orientation"]}}
-        for i, p in poses.items()
-    ]
-    return {"header": header, "transforms": shifts}
-
-
-def truth_at(t_s: float) -> Pose2:
-    """A circle of 1 m at 0.3 m/s."""
-    angle = 0.3 * t_s
-    return Pose2(math.sin(angle), 1.0 - math.cos(angle), math.remainder(angle, math.tau))
-
-
-def circle(form: str = "vision", parts: str = "odometry landmarks truth") -> RunMessages:
-    """A minute on the circle; odometry and velocities turn 2 % too much, the rest is exact."""
-    out: list[Stamped] = []
-    msgtype, types = DETECTIONS[form]
-    claimed = Pose2(0.0, 0.0, 0.0)
-    start = 1000.0
-    tree = {"transforms": [ros.transform(start, "base_link", "camera", MOUNT)]}
-    out.append(Stamped("/tf_static", ros.nanoseconds(start), ros.TRANSFORMS, tree, kept=True))
-    for k in range(601):
-        t_s = start + 0.1 * k
-        at, now = truth_at(0.1 * k), ros.nanoseconds(t_s)
-        if k:
-            step = truth_at(0.1 * (k - 1)).inverse().compose(at)
-            claimed = claimed.compose(Pose2(step.x_m, step.y_m, 1.02 * step.theta_rad))
-        if "odometry" in parts:
-            fields = ros.odometry(t_s, "odom", "base_link", claimed, ros.twist(0.3, 0.3))
-            out.append(Stamped("/odom", now, ros.ODOMETRY, fields))
-        if "truth" in parts:
-            fields = ros.odometry(t_s, "map", "base_link", at, ros.twist(0.3, 0.3))
-            out.append(Stamped("/ground_truth", now, ros.ODOMETRY, fields))
-        if "twist" in parts:
-            out.append(Stamped("/cmd_vel", now, ros.TWIST, ros.twist(0.3, 0.306)))
-        if "imu" in parts:
-            rate = {"x": 0.0, "y": 0.0, "z": 0.3}
-            imu = {"header": ros.header(t_s, "imu"), "angular_velocity": rate}
-            out.append(Stamped("/imu", now, "sensor_msgs/msg/Imu", imu))
-        if "landmarks" in parts and k % 5 == 0:
-            camera = at.compose(MOUNT).inverse()
-            seen = {i: camera.compose(Pose2(x, y, 0.0)) for i, (x, y) in PLACES.items()}
-            where = {i: (p.x_m, p.y_m) for i, p in seen.items()}
-            out.append(Stamped("/tags", now, msgtype, detected(form, ros.header(t_s, "camera"), where)))
-    return RunMessages(out, types)
 
 
 @pytest.fixture(scope="module")
 def table(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    path = tmp_path_factory.mktemp("table") / "landmarks.csv"
-    path.write_text("id,x_m,y_m\n" + "".join(f"{i},{x},{y}\n" for i, (x, y) in PLACES.items()))
-    return path
+    return write_table(tmp_path_factory.mktemp("table") / "landmarks.csv")
 
 
 @pytest.fixture(scope="module")
@@ -223,114 +111,6 @@ def test_landmarks_of_every_message(form: str, table: Path, tmp_path: Path) -> N
     assert reckoned.metrics["position_rmse_m"] > 0.1
 
 
-def test_velocities_and_a_gyroscope_serve_as_odometry(table: Path, tmp_path: Path) -> None:
-    """Without odometry the velocities are integrated; a gyroscope corrects the heading, less its bias."""
-    write_mcap(tmp_path / "a.mcap", circle(parts="twist imu landmarks truth"))
-    bag, off = tmp_path / "a.mcap", {"stack.localizer.odometry.gyroscope": False}
-    plain = pl.localize(bag, landmarks=table, localizer="ekf-landmarks", set=off, out=tmp_path)
-    turned = pl.localize(
-        bag, landmarks=table, localizer="ekf-landmarks", topics=["/imu", "/cmd_vel"], out=tmp_path
-    )
-    assert turned.metrics["heading_rmse_rad"] < 0.7 * plain.metrics["heading_rmse_rad"]
-    assert turned.metrics["gyro_bias_rad_s"] == pytest.approx(0.0, abs=2e-3)
-    assert "gyro_bias_rad_s" not in plain.metrics
-    assert "gyro_bias_rad_s" not in plain.trace
-
-
-def noisy(rng: np.random.Generator, axis: str = "z", scale: float = 1.0) -> RunMessages:
-    """A winding drive of 80 s: odometry of a poor base, a gyroscope with a bias, landmarks half the time."""
-    _, types = DETECTIONS["vision"]
-    start, at, claimed = 1000.0, Pose2(0.0, 0.0, 0.0), Pose2(0.0, 0.0, 0.0)
-    out: list[Stamped] = []
-    tree = {"transforms": [ros.transform(start, "base_link", "camera", MOUNT)]}
-    out.append(Stamped("/tf_static", ros.nanoseconds(start), ros.TRANSFORMS, tree, kept=True))
-    for k in range(801):
-        t_s, now, turn = start + 0.1 * k, ros.nanoseconds(start + 0.1 * k), 0.0
-        if k > 30:  # it stands at first
-            turn = 0.03 + 0.04 * math.sin(0.02 * k)
-            at = at.compose(Pose2(0.03, 0.0, turn))
-            wrong = math.sqrt(5e-3 * 0.03 + 0.01 * abs(turn)) * rng.standard_normal()
-            claimed = claimed.compose(Pose2(0.03, 0.0, turn + wrong))
-        for topic, frame, pose in (("/odom", "odom", claimed), ("/ground_truth", "map", at)):
-            fields = ros.odometry(t_s, frame, "base_link", pose, ros.twist(0.3, 0.3))
-            out.append(Stamped(topic, now, ros.ODOMETRY, fields))
-        rate = dict.fromkeys("xyz", 0.0)
-        rate[axis[-1]] = scale * (turn / 0.1 + 0.015 + 0.005 * rng.standard_normal())
-        imu = {"header": ros.header(t_s - 0.05, "imu"), "angular_velocity": rate}
-        out.append(Stamped("/imu", ros.nanoseconds(t_s - 0.05), "sensor_msgs/msg/Imu", imu))
-        if k % 5 == 0 and k % 400 < 100:
-            camera = at.compose(MOUNT).inverse()
-            seen = {i: camera.compose(Pose2(x, y, 0.0)) for i, (x, y) in PLACES.items()}
-            where = {i: (p.x_m + 0.05 * rng.standard_normal(), p.y_m) for i, p in seen.items()}
-            message = detected("vision", ros.header(t_s, "camera"), where)
-            out.append(Stamped("/tags", now, DETECTIONS["vision"][0], message))
-    return RunMessages(out, types)
-
-
-def test_a_gyroscope_bridges_the_time_without_landmarks(table: Path, tmp_path: Path) -> None:
-    """Paired: the same recordings with and without it; the mean error is at most 0.6 times as large."""
-    errors: dict[bool, list[float]] = {True: [], False: []}
-    for seed in range(3):
-        bag = tmp_path / f"{seed}.mcap"
-        write_mcap(bag, noisy(np.random.default_rng(seed)))
-        for used, found in errors.items():
-            chosen = {"stack.localizer.odometry.gyroscope": used}
-            run = pl.localize(bag, landmarks=table, set=chosen, out=tmp_path / f"{seed}-{used}")
-            found.append(run.metrics["heading_rmse_rad"])
-            if used:
-                assert run.metrics["gyro_bias_rad_s"] == pytest.approx(0.015, abs=2e-3)
-    assert all(with_it < without for with_it, without in zip(errors[True], errors[False], strict=True))
-    assert np.mean(errors[True]) < 0.6 * np.mean(errors[False])
-
-
-@pytest.mark.parametrize(("axis", "scale"), [("x", 1.0), ("z", -1.0), ("z", 57.3)])
-def test_a_gyroscope_that_measures_other_turns_is_left_out(
-    axis: str, scale: float, table: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    """On its side, upside down, or in degrees: told, and refused where it was asked for by name."""
-    bag = tmp_path / "a.mcap"
-    write_mcap(bag, noisy(np.random.default_rng(0), axis, scale))
-    line = ["localize", str(bag), "--landmarks", str(table), "--out", str(tmp_path), "--json", "--no-report"]
-    assert dispatch(line) in (0, 1)
-    told = capsys.readouterr()
-    assert "gyroscope" not in json.loads(told.out)
-    assert "/imu does not turn as the odometry does (they are" in told.err
-    with pytest.raises(InputError, match="expected the robot's turn rates, found that /imu"):
-        dispatch([*line, "--topic", "/imu"])
-
-
-def test_a_localizer_without_use_for_a_gyroscope_says_so(
-    table: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    bag = tmp_path / "a.mcap"
-    write_mcap(bag, circle(parts="odometry imu landmarks truth"))
-    line = ["localize", str(bag), "--landmarks", str(table), "--out", str(tmp_path), "--no-report"]
-    dispatch([*line, "--localizer", "ekf-gauss-markov"])
-    assert "'ekf-gauss-markov' makes no use of the gyroscope /imu" in capsys.readouterr().err
-
-
-def test_a_gyroscope_is_turned_into_the_robots_frame(table: Path, tmp_path: Path) -> None:
-    """On its side, as the transforms tell: x looks down."""
-    messages = noisy(np.random.default_rng(0), "x", -1.0)
-    tree = {
-        "transforms": [
-            {
-                "header": ros.header(1000.0, "base_link"),
-                "child_frame_id": "imu",
-                "transform": {
-                    "translation": {"x": 0.0, "y": 0.0, "z": 0.0},
-                    "rotation": {"x": 0.0, "y": math.sqrt(0.5), "z": 0.0, "w": math.sqrt(0.5)},
-                },
-            }
-        ]
-    }
-    kept = Stamped("/tf_static", ros.nanoseconds(1000.0), ros.TRANSFORMS, tree, kept=True)
-    bag = tmp_path / "a.mcap"
-    write_mcap(bag, RunMessages([kept, *messages.stamped], messages.own_types))
-    run = pl.localize(bag, landmarks=table, out=tmp_path)
-    assert run.metrics["gyro_bias_rad_s"] == pytest.approx(0.015, abs=2e-3)
-
-
 def test_odometry_is_calibrated_as_from_the_run_itself(
     museum: tuple[pl.Run, dict[str, Path]], tmp_path: Path
 ) -> None:
@@ -344,81 +124,6 @@ def test_odometry_is_calibrated_as_from_the_run_itself(
         found = pl.calibrate("odometry", place, truth=truth, out=tmp_path)
         for key in ("distance_scale", "angle_scale"):
             assert found[key]["value"] == pytest.approx(whole[key]["value"], rel=1e-3)
-
-
-def steady(parts: str) -> RunMessages:
-    """Two minutes at rest."""
-    rng = np.random.default_rng(3)
-    out = []
-    for k in range(1200):
-        t_s = 10.0 + 0.1 * k
-        now, header = ros.nanoseconds(t_s), ros.header(t_s, "sensor")
-        if "imu" in parts:
-            rate = {"x": 0.0, "y": 0.0, "z": 0.02 + rng.normal(0.0, 0.01)}
-            out.append(
-                Stamped("/imu", now, "sensor_msgs/msg/Imu", {"header": header, "angular_velocity": rate})
-            )
-        if "range" in parts:
-            fields = {"header": header, "range": 2.0 + rng.normal(0.0, 0.03)}
-            out.append(Stamped("/sonar", now, "sensor_msgs/msg/Range", fields))
-        if "scan" in parts:
-            angles, ranges = np.linspace(-1.0, 1.0, 21), 3.0 + rng.normal(0.0, 0.03, 21)
-            ranges[0] = np.inf if k % 2 else 3.0
-            scan = ros.laser_scan(t_s, "laser", angles, ranges, 30.0)
-            out.append(Stamped("/scan", now, ros.SCAN, scan))
-    return RunMessages(out, {})
-
-
-def test_sensors_at_rest(tmp_path: Path) -> None:
-    write_ros2(tmp_path / "rest", steady("imu range"))
-    gyroscope = pl.calibrate("heading", tmp_path / "rest", out=tmp_path)
-    assert gyroscope["gyro_bias_rad_s"]["value"] == pytest.approx(0.02, abs=2e-3)
-    sonar = pl.calibrate("range", tmp_path / "rest", out=tmp_path)
-    assert sonar["rest_range_var_m2"]["value"] == pytest.approx(9e-4, rel=0.2)
-    write_ros1(tmp_path / "laser.bag", steady("scan"))
-    laser = pl.calibrate("range", tmp_path / "laser.bag", topics=["/scan"], out=tmp_path)
-    beams = [key for key in laser.answer if key.endswith("_var_m2")]
-    assert len(beams) == 8
-    assert "laser_beam_0_var_m2" not in beams, "it hits nothing now and then"
-
-
-def test_fiducials_at_rest_tell_range_and_bearing_noise(tmp_path: Path) -> None:
-    """Beside each other, one straight behind: its bearing does not jump by a turn."""
-    rng = np.random.default_rng(0)
-    msgtype, types = DETECTIONS["aruco"]
-    out = []
-    for k in range(300):
-        t_s = 10.0 + 0.1 * k
-        seen = {3: (2.0, 0.0), 4: (-1.0, 0.001)}
-        where = {i: (x + rng.normal(0.0, 0.02), y + rng.normal(0.0, 0.02)) for i, (x, y) in seen.items()}
-        message = detected("aruco", ros.header(t_s, "camera"), where)
-        out.append(Stamped("/tags", ros.nanoseconds(t_s), msgtype, message))
-    write_ros1(tmp_path / "tags.bag", RunMessages(out, types))
-    found = pl.calibrate("range", tmp_path / "tags.bag", out=tmp_path)
-    assert found["tags_landmark_3_range_var_m2"]["value"] == pytest.approx(4e-4, rel=0.3)
-    assert found["tags_landmark_3_bearing_var_rad2"]["value"] == pytest.approx(1e-4, rel=0.3)
-    assert found["tags_landmark_4_bearing_var_rad2"]["value"] == pytest.approx(4e-4, rel=0.3)
-    again = pl.calibrate("range", tmp_path / "tags.bag", topics=["/tags"], out=tmp_path / "named")
-    assert again["tags_landmark_3_range_var_m2"] == found["tags_landmark_3_range_var_m2"]
-
-
-def test_a_gyroscope_is_calibrated_against_the_truth_of_its_bag(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    """While driving, too; without a truth a drive is no log at rest, however evenly it turned."""
-    drive = noisy(np.random.default_rng(0))
-    write_mcap(tmp_path / "a.mcap", drive)
-    found = pl.calibrate("heading", tmp_path / "a.mcap", out=tmp_path)
-    (entry,) = found["gyroscope_while_driving"]
-    assert entry["bias_with_scale_rad_s"]["low"] < 0.015 < entry["bias_with_scale_rad_s"]["high"]
-    assert entry["scale"]["low"] < 1.0 < entry["scale"]["high"]
-    even = [s for s in circle(parts="odometry imu").stamped if s.topic != "/ground_truth"]
-    write_mcap(tmp_path / "b.mcap", RunMessages(even, {}))
-    assert dispatch(["calibrate", "heading", str(tmp_path / "b.mcap"), "--out", str(tmp_path)]) == 0
-    told = capsys.readouterr().out
-    assert "b_turn_rad" in told
-    assert "(--truth TOPIC) would tell" in told
-    assert "gyro_bias_rad_s" not in told
 
 
 def test_odometry_that_was_recorded_as_transforms(table: Path, tmp_path: Path) -> None:
