@@ -17,6 +17,7 @@ from pilotage.experiments.build.build import build
 from pilotage.experiments.loop import run_loop
 from pilotage.experiments.mission import load_mission, mission_of, read_mission
 from pilotage.kernels.control import eikonal, voronoi_window
+from pilotage.kernels.geometry.motion import exact_arc, wrap
 from pilotage.stack.navigator.patrol.context import NO_GATE
 from pilotage.stack.navigator.patrol.passage import claimed, precedes, relation, stretch_of
 from pilotage.stack.navigator.patrol.still import StillWatch
@@ -211,6 +212,84 @@ class TestStopping:
                 [v * math.cos(pose[2] + 0.1 * w), v * math.sin(pose[2] + 0.1 * w), w]
             )
         assert pose[0] > 1.0
+
+
+class TestTheBestArc:
+    """What is not looked at, because another arc is better or nothing is near, is not what is best."""
+
+    LIMITS = np.array([1.0, 2.0, 2.0, 2.0, 8.0, 0.2])
+    SAFETY = np.array([REACTION, 0.3, 0.06, 0.1, 1.4])
+    WINDOW = (0.9, 0.3, 0.5, 0.25, 6, 15)
+
+    @pytest.mark.parametrize("seed", range(40))
+    def test_is_the_best_of_all_that_can_be_braked(self, seed: int) -> None:
+        rng = np.random.default_rng(seed)
+        pose = np.array([*rng.uniform(-1.0, 1.0, 2), rng.uniform(-3.0, 3.0)])
+        v0, w0, lane_m = rng.uniform(0.0, 1.0), rng.uniform(-1.0, 1.0), 0.3 * (seed % 2)
+        near, strange, people = (rng.normal(0.0, 1.2, (n, 2)) for n in rng.integers(0, 4, 3))
+        near, strange = near[np.hypot(*near.T) > 0.4], strange[np.hypot(*strange.T) > 0.6]
+        rows, columns = np.mgrid[:101, :101]
+        x, y = 0.1 * columns - 5.0, 0.1 * rows - 5.0
+        time, beyond = np.hypot(x - 3.0, y), np.hypot(x - 3.0, y - 2.0)
+        known = np.hypot(x - pose[0], y - pose[1] - rng.uniform(0.5, 2.0)), -5.0, -5.0, 0.1
+        there = (*(pose[:2] + rng.uniform(-0.8, 0.8, 2)).tolist(), 0.5)
+        gate = (beyond, -5.0, -5.0, 0.1, *there, 2.0) if seed % 4 else NO_GATE
+        seen, field = (near, strange, people), (time, -5.0, -5.0, 0.1)
+        told = v0, w0, pose, self.LIMITS, self.SAFETY, seen
+        costs = {
+            (v, w): self._cost(v, w, pose, near, field, gate, lane_m)
+            for v in np.linspace(max(0.0, v0 - 0.4), min(1.0, v0 + 0.4), 6).tolist()
+            for w in np.linspace(max(-2.0, w0 - 1.6), min(2.0, w0 + 1.6), 15).tolist()
+            if voronoi_window.stop_is_clear(v0, w0, v, w, *told[3:], pose, known)
+        }
+        v, w, status = voronoi_window.choose(*told, field, gate, known, lane_m, self.WINDOW)
+        best = min(costs, key=lambda arc: costs[arc], default=(0.0, 0.0))
+        if best[0] > 1e-3:
+            assert status == voronoi_window.FREE
+            assert (v, w) == pytest.approx(best)
+        else:
+            assert status == voronoi_window.HELD or v > 1e-3
+
+    def _cost(
+        self,
+        v: float,
+        w: float,
+        pose: FloatArray,
+        near: FloatArray,
+        field: voronoi_window.Field,
+        gate: voronoi_window.Gate,
+        lane_m: float,
+    ) -> float:
+        """Of one arc, without leaving anything out."""
+        horizon_s, heading_cost, near_cost, soft_m, *_ = self.WINDOW
+        cost = self._at(v, w, horizon_s, pose, field, heading_cost, lane_m)
+        if gate[6] > 0.0:
+            cost += gate[7]
+            came = False
+            for t in (0.25 * horizon_s * np.arange(1, 5)).tolist():
+                x, y, _ = exact_arc(pose[0], pose[1], pose[2], v * t, w * t)
+                came = came or math.hypot(x - gate[4], y - gate[5]) <= gate[6]
+                if came:
+                    left = self._at(v, w, t, pose, gate[:4], heading_cost, lane_m)
+                    cost = min(cost, left + t - horizon_s)
+        x, y, _ = exact_arc(0.0, 0.0, 0.0, v * horizon_s, w * horizon_s)
+        least = min(np.hypot(near[:, 0] - x, near[:, 1] - y).min(initial=np.inf), soft_m + 0.3)
+        return cost + near_cost * float((soft_m + 0.3 - least) / soft_m) ** 2
+
+    @staticmethod
+    def _at(
+        v: float,
+        w: float,
+        t: float,
+        pose: FloatArray,
+        field: voronoi_window.Field,
+        heading_cost: float,
+        lane_m: float,
+    ) -> float:
+        x, y, theta = exact_arc(pose[0], pose[1], pose[2], v * t, w * t)
+        x, y = x - lane_m * math.sin(theta), y + lane_m * math.cos(theta)
+        dx, dy = eikonal.descent(x, y, *field)
+        return eikonal.value_at(x, y, *field, 2.0) + heading_cost * abs(wrap(math.atan2(dy, dx) - theta))
 
 
 class TestDrivingThrough:

@@ -12,8 +12,9 @@ from hypothesis import strategies as st
 from pilotage.core.angles import wrap_to_pi
 from pilotage.core.types import FloatArray, Pose2
 from pilotage.experiments.build.charts import load_chart
-from pilotage.kernels.filters.wall_line import innovation_distance
+from pilotage.kernels.filters.wall_line import innovation_distance, wall_innovation
 from pilotage.kernels.lines import joint_association
+from pilotage.kernels.lines.wall_candidates import overlap_share
 from pilotage.maps.segment_map import SegmentMap, box_segments
 from pilotage.maps.wall_lines import WallLines, normal_form
 from pilotage.models.wall_line import wall_line
@@ -248,3 +249,26 @@ def test_matching_changes_neither_pose_nor_covariance() -> None:
     matcher(MUSEUM).match(pose, cov, lines)
     assert pose.tolist() == [1.0, 1.0, 0.0]
     assert (cov == np.diag([0.01, 0.01, 0.01])).all()
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_walls_that_an_angle_alone_rules_out_change_no_distance(seed: int) -> None:
+    """The least of all walls that a line overlaps, beyond the gate as well, however they are ordered."""
+    rng = np.random.default_rng(seed)
+    true = Pose2(1.0 + 0.3 * seed, 1.0, rng.uniform(-3.0, 3.0))
+    lines = extractor(seed).extract(scan_of(MUSEUM, true, rng))
+    pose, cov = true.as_array() + rng.normal(0.0, [0.1, 0.1, 0.05]), np.diag([0.02, 0.02, 0.002])
+    config, found = WallMatchingConfig(), matcher(MUSEUM)
+    matches, walls = found.match(pose, cov, lines), found.walls
+    for k, (seen, R, end) in enumerate(zip(lines.rho_alpha, lines.covs, lines.ends_m, strict=True)):
+        least = math.inf
+        for normal, segment in zip(walls.normals, walls.segments_m, strict=True):
+            z, H, v = np.empty(2), np.empty((2, 3)), np.empty(2)
+            wall_innovation(pose, MOUNT, normal, seen, z, H, v)
+            share = overlap_share(pose, cov, MOUNT, end, normal[1], segment, config.slack_m, config.sigmas)
+            if share >= config.overlap:
+                least = min(least, innovation_distance(cov, H, v, R))
+        assert matches.distances[k] == least
+    assert matches.count == (matches.walls >= 0).sum() > 0
+    assert matches.farthest == matches.distances[matches.walls >= 0].max()
+    assert matches.placed == (np.isfinite(matches.distances) & (matches.walls != AMBIGUOUS)).sum()

@@ -14,6 +14,7 @@ from pilotage.sim.worlds.traffic import NOWHERE_M
 THERE_M = 1.0
 """An alarm is a true one where somebody is this near to the place that it names."""
 ALARM = ("alarm_t_s", "alarm_x_m", "alarm_y_m")
+"""Columns of the telemetry, one after the other."""
 
 
 class GuardLog:
@@ -21,19 +22,25 @@ class GuardLog:
 
     def __init__(self, robots: int) -> None:
         self._last_s = [math.nan] * robots
+        self._columns: list[int] | None = None
         self._came_s = self._detected_s = math.nan
         self._false = 0
 
     def step(self, t_s: float, attempts: Sequence[Attempt]) -> None:
         """Who is there, and who says so."""
-        people = _people(attempts[0])
-        if not math.isfinite(self._came_s) and len(people):
-            self._came_s = t_s
-        for index, attempt in enumerate(attempts):
-            raised_s, x, y = _alarm(attempt)
+        if self._columns is None:
+            self._columns = [_column(attempt) for attempt in attempts]
+        traffic = attempts[0].body.world.traffic
+        if len(traffic.circles_m) > traffic.first_person and not math.isfinite(self._came_s):
+            self._came_s = t_s if len(_people(attempts[0])) else math.nan
+        for index, (attempt, column) in enumerate(zip(attempts, self._columns, strict=True)):
+            if column < 0:
+                continue
+            raised_s = attempt.journal.row[column]
             if not math.isfinite(raised_s) or raised_s == self._last_s[index]:
                 continue
             self._last_s[index] = raised_s
+            people, (x, y) = _people(attempts[0]), attempt.journal.row[column + 1 : column + 3]
             near = np.hypot(*(people - [x, y]).T).min(initial=math.inf)
             if near > THERE_M:
                 self._false += 1
@@ -57,11 +64,7 @@ def _people(attempt: Attempt) -> FloatArray:
     return np.asarray(places[places[:, 0] < 0.5 * NOWHERE_M])
 
 
-def _alarm(attempt: Attempt) -> tuple[float, float, float]:
-    """When and where a robot raised its last alarm; NaN for one that cannot."""
-    journal = attempt.journal
-    if ALARM[0] not in journal.units:
-        return math.nan, math.nan, math.nan
-    first = list(journal.units).index(ALARM[0])
-    t_s, x, y = journal.row[first : first + 3]
-    return t_s, x, y
+def _column(attempt: Attempt) -> int:
+    """Where a robot tells of its alarms in its telemetry; -1 for one that cannot."""
+    units = attempt.journal.units
+    return list(units).index(ALARM[0]) if ALARM[0] in units else -1

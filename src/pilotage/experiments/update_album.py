@@ -57,6 +57,8 @@ class UpdateAlbum:
         self, kept: list[Picture], most: int, t_s: float, why: str, score: float, update: ExplainableUpdate
     ) -> None:
         """Keep the ``most`` highest scores above 0 that are apart from each other."""
+        if score <= 0.0:
+            return
         near = [k for k, picture in enumerate(kept) if t_s - picture.t_s < APART_S]
         rivals = near or ([] if len(kept) < most else [min(range(len(kept)), key=lambda k: kept[k].score)])
         if score <= max((kept[k].score for k in rivals), default=0.0):

@@ -214,6 +214,26 @@ def way_down(
 
 
 @kernel
+def narrowest_down(
+    x: float,
+    y: float,
+    time: FloatArray,
+    values: FloatArray,
+    x0: float,
+    y0: float,
+    spacing: float,
+    step: float,
+    steps: int,
+) -> float:
+    """The least of ``values`` on the way down from a place (``way_down``); infinite off the grid."""
+    way = way_down(x, y, time, values, x0, y0, spacing, step, steps)
+    least = np.inf
+    for k in range(way.shape[0]):
+        least = min(least, way[k, 2])
+    return least
+
+
+@kernel
 def first_met(way: FloatArray, points: FloatArray, reach: float) -> int:
     """Index of the first place of a way (N, 2 or more) that a point (M, 2) is this near to; -1 for none."""
     for k in range(way.shape[0]):

@@ -132,38 +132,121 @@ def stop_is_clear(
         Where it is on its map, and the map's distances: a thin wall seen end on returns nothing. Of one node
         for a robot that does not know where it is.
     """
-    acceleration, deceleration, turning = limits[1], limits[2], limits[4]
-    reaction, radius, margin, gap = safety[0], safety[1], safety[2], safety[3]
-    near, strange, people = seen
-    known_m, x0, y0, resolution = known
-    # Who is nearer than the margin already may slide along, and come no nearer.
-    apart = (radius + margin) * (radius + margin)
-    for i in range(near.shape[0]):
-        apart = min(apart, near[i, 0] * near[i, 0] + near[i, 1] * near[i, 1])
-    clearance = np.inf
-    if known_m.shape[0] > 1:
-        here = interpolate_at(pose[0], pose[1], known_m, x0, y0, resolution)
-        clearance = min(radius + margin, here) - 1e-3
-    cp, sp = math.cos(pose[2]), math.sin(pose[2])
-    x = y = theta = since = 0.0
-    told = max(1, round(reaction / ROLL_S))
-    steps = told + min(MOST_STEPS, math.ceil(max(abs(v0), abs(v)) / (deceleration * ROLL_S)))
-    for k in range(steps + 1):
+    most = steps_to_rest(v0, v, limits, safety)
+    lengths, speeds = np.empty(most), np.empty(most)
+    roll_speed(v0, v, limits, safety, lengths, speeds)
+    cosines, sines = np.empty(most), np.empty(most)
+    roll_turn(w0, w, limits, safety, cosines, sines)
+    limit = least_kept(safety, seen, pose, known)
+    own = own_halves(seen[1], safety)
+    return roll_is_clear(lengths, speeds, cosines, sines, safety, seen, own, limit, pose, known)
+
+
+@kernel
+def steps_to_rest(v0: float, v: float, limits: FloatArray, safety: FloatArray) -> int:
+    """In how many steps one that drives at v0 and is told v, and to stop after its reaction time, rests."""
+    told = max(1, round(safety[0] / ROLL_S))
+    return int(told + min(MOST_STEPS, math.ceil(max(abs(v0), abs(v)) / (limits[2] * ROLL_S))) + 1)
+
+
+@kernel
+def roll_speed(
+    v0: float, v: float, limits: FloatArray, safety: FloatArray, lengths: FloatArray, speeds: FloatArray
+) -> None:
+    """Fill in how far each step (K,) leads, and the speed at its end: it does not depend on the turn."""
+    acceleration, deceleration = limits[1], limits[2]
+    told = max(1, round(safety[0] / ROLL_S))
+    for k in range(lengths.shape[0]):
         if k < told:
             faster = acceleration if v * v0 >= 0.0 and abs(v) > abs(v0) else deceleration
-            new_v, new_w = toward(v0, v, faster * ROLL_S), toward(w0, w, turning * ROLL_S)
+            new_v = toward(v0, v, faster * ROLL_S)
         else:
-            new_v, new_w = toward(v0, 0.0, deceleration * ROLL_S), toward(w0, 0.0, turning * ROLL_S)
-        length, middle = 0.5 * (v0 + new_v) * ROLL_S, theta + 0.25 * (w0 + new_w) * ROLL_S
-        x += length * math.cos(middle)
-        y += length * math.sin(middle)
+            new_v = toward(v0, 0.0, deceleration * ROLL_S)
+        lengths[k], speeds[k] = 0.5 * (v0 + new_v) * ROLL_S, new_v
+        v0 = new_v
+
+
+@kernel
+def roll_turn(
+    w0: float, w: float, limits: FloatArray, safety: FloatArray, cosines: FloatArray, sines: FloatArray
+) -> None:
+    """Fill in the direction of each step (K,), which does not depend on the speed."""
+    turning = limits[4]
+    told = max(1, round(safety[0] / ROLL_S))
+    theta = 0.0
+    for k in range(cosines.shape[0]):
+        new_w = toward(w0, w if k < told else 0.0, turning * ROLL_S)
+        middle = theta + 0.25 * (w0 + new_w) * ROLL_S
+        cosines[k], sines[k] = math.cos(middle), math.sin(middle)
         theta += 0.5 * (w0 + new_w) * ROLL_S
-        v0, w0 = new_v, new_w
-        since += abs(length)
-        if since < (LOOK_M if k < steps and v0 != 0.0 else 1e-4):
+        w0 = new_w
+
+
+@kernel
+def least_kept(safety: FloatArray, seen: Seen, pose: FloatArray, known: Field) -> tuple[float, float]:
+    """What it keeps from returns of what stands, squared, and from its map's walls; -inf without a map.
+
+    Who is nearer than the margin already may slide along, and come no nearer.
+    """
+    near, reach = seen[0], safety[1] + safety[2]
+    known_m, x0, y0, resolution = known
+    apart = reach * reach
+    for i in range(near.shape[0]):
+        apart = min(apart, near[i, 0] * near[i, 0] + near[i, 1] * near[i, 1])
+    clearance = -np.inf
+    if known_m.shape[0] > 1:
+        clearance = min(reach, interpolate_at(pose[0], pose[1], known_m, x0, y0, resolution)) - 1e-3
+    return apart, clearance
+
+
+@kernel
+def own_halves(strange: FloatArray, safety: FloatArray) -> FloatArray:
+    """(M,) how far it may come towards each return of what may move, times the distance to it."""
+    halves = np.empty(strange.shape[0])
+    for i in range(strange.shape[0]):
+        px, py = strange[i, 0], strange[i, 1]
+        away = math.sqrt(px * px + py * py)
+        halves[i] = away * (max(0.5 * (away - safety[1] - safety[3]), 0.0) + 1e-6)
+    return halves
+
+
+@kernel
+def roll_is_clear(
+    lengths: FloatArray,
+    speeds: FloatArray,
+    cosines: FloatArray,
+    sines: FloatArray,
+    safety: FloatArray,
+    seen: Seen,
+    halves: FloatArray,
+    limit: tuple[float, float],
+    pose: FloatArray,
+    known: Field,
+) -> bool:
+    """Whether steps of these lengths, in these directions, keep clear of everything.
+
+    Parameters
+    ----------
+    lengths, speeds, cosines, sines
+        Of ``roll_speed`` and ``roll_turn``; the latter two may be of more steps.
+    halves, limit
+        Of ``own_halves`` and ``least_kept``.
+    """
+    near, strange, people = seen
+    known_m, x0, y0, resolution = known
+    radius, gap = safety[1], safety[3]
+    apart, clearance = limit
+    steps = lengths.shape[0] - 1
+    cp, sp = math.cos(pose[2]), math.sin(pose[2])
+    x = y = since = 0.0
+    for k in range(steps + 1):
+        x += lengths[k] * cosines[k]
+        y += lengths[k] * sines[k]
+        since += abs(lengths[k])
+        if since < (LOOK_M if k < steps and speeds[k] != 0.0 else 1e-4):
             continue
         since = 0.0
-        if clearance < np.inf:
+        if clearance > -np.inf:
             mx, my = pose[0] + cp * x - sp * y, pose[1] + sp * x + cp * y
             if interpolate_at(mx, my, known_m, x0, y0, resolution) < clearance:
                 return False
@@ -172,15 +255,33 @@ def stop_is_clear(
             if (px - x) * (px - x) + (py - y) * (py - y) < apart - 1e-5:
                 return False
         for i in range(strange.shape[0]):
-            px, py = strange[i, 0], strange[i, 1]
-            away = math.sqrt(px * px + py * py)
-            if (x * px + y * py) > away * (max(0.5 * (away - radius - gap), 0.0) + 1e-6):
+            if x * strange[i, 0] + y * strange[i, 1] > halves[i]:
                 return False
         come = safety[4] * min(k + 1, steps) * ROLL_S
         for i in range(people.shape[0]):
             px, py = people[i, 0], people[i, 1]
             away = math.sqrt(px * px + py * py)
             if (x * px + y * py) > away * (max(away - radius - gap - come, 0.0) + 1e-6):
+                return False
+    return True
+
+
+@kernel
+def open_floor(reach: float, clearance: float, pose: FloatArray, known: Field) -> bool:
+    """Whether the map shows nothing nearer than ``clearance`` to any place within ``reach``.
+
+    Between nodes distances are interpolated: they are no smaller than the least of the nodes around.
+    """
+    known_m, x0, y0, resolution = known
+    rows, columns = known_m.shape
+    c0, c1 = math.floor((pose[0] - reach - x0) / resolution), math.ceil((pose[0] + reach - x0) / resolution)
+    r0, r1 = math.floor((pose[1] - reach - y0) / resolution), math.ceil((pose[1] + reach - y0) / resolution)
+    if c0 < 0 or r0 < 0 or c1 >= columns or r1 >= rows:
+        return False
+    for r in range(r0, r1 + 1):
+        for c in range(c0, c1 + 1):
+            # A little more, so that rounding never decides.
+            if not known_m[r, c] > clearance + 1e-9:
                 return False
     return True
 
@@ -282,8 +383,8 @@ def choose(
         max(-top_turn, w0 - turn_acceleration * period),
         min(top_turn, w0 + turn_acceleration * period),
     )
-    best, best_v, best_w = np.inf, 0.0, 0.0
-    moves, moves_v, moves_w = np.inf, 0.0, 0.0
+    best, best_v, best_w, best_rank = np.inf, 0.0, 0.0, speeds * turns
+    moves, moves_v, moves_w, moves_rank = np.inf, 0.0, 0.0, speeds * turns
     # What no braking from here can come near is not asked about.
     longest = high_v * reaction + 0.5 * high_v * high_v / deceleration
     hard = within(near, longest + radius + margin)
@@ -291,18 +392,28 @@ def choose(
     coming = within(people, longest + radius + gap + safety[4] * (reaction + high_v / deceleration))
     within_reach = hard, moving, coming
     beside = within(near, high_v * horizon_s + radius + soft_m)
+    apart, clearance = least_kept(safety, within_reach, pose, known)
+    halves = own_halves(moving, safety)
+    fastest = max(abs(v0), max(abs(low_v), abs(high_v)))
+    most = steps_to_rest(fastest, fastest, limits, safety)
+    if clearance > -np.inf and open_floor(fastest * most * ROLL_S, clearance, pose, known):
+        clearance = -np.inf
+    is_open = clearance == -np.inf and hard.shape[0] + moving.shape[0] + coming.shape[0] == 0
+    lengths, ends = np.empty(most), np.empty(most)
+    cosines, sines, rolled = np.empty((turns, most)), np.empty((turns, most)), np.zeros(turns, np.bool_)
     cp, sp = math.cos(pose[2]), math.sin(pose[2])
-    for i in range(speeds):
+    # Fast ones first: they lead on best, and what leads on less than another that is clear need not be asked
+    # whether it is. Of equals the slower one, and the one more to the right.
+    for i in range(speeds - 1, -1, -1):
         v = low_v + (high_v - low_v) * i / (speeds - 1)
+        steps = steps_to_rest(v0, v, limits, safety)
+        roll_speed(v0, v, limits, safety, lengths[:steps], ends[:steps])
+        near_gate = gate[6] + abs(v) * horizon_s + 1e-6
+        by_gate = gate[6] > 0.0 and math.hypot(gate[4] - pose[0], gate[5] - pose[1]) <= near_gate
         for j in range(turns):
             w = low_w + (high_w - low_w) * j / (turns - 1)
-            if not stop_is_clear(v0, w0, v, w, limits, safety, within_reach, pose, known):
-                continue
+            bar = moves if v > 1e-3 else best
             x, y, theta = exact_arc(0.0, 0.0, 0.0, v * horizon_s, w * horizon_s)
-            least = (soft_m + radius) * (soft_m + radius)
-            for k in range(beside.shape[0]):
-                dx, dy = beside[k, 0] - x, beside[k, 1] - y
-                least = min(least, dx * dx + dy * dy)
             mx, my, heading = pose[0] + cp * x - sp * y, pose[1] + sp * x + cp * y, wrap(pose[2] + theta)
             # The field is followed by a point to the left.
             qx, qy = mx - lane_m * math.sin(heading), my + lane_m * math.cos(heading)
@@ -311,17 +422,47 @@ def choose(
                 cost = value_at(mx, my, time, x0, y0, spacing, 2.0) + 2.0
                 if not cost < np.inf:
                     continue
+            if not by_gate and cost > bar:
+                continue
             dx, dy = descent(qx, qy, time, x0, y0, spacing)
             if dx != 0.0 or dy != 0.0:
                 cost += heading_cost * abs(wrap(math.atan2(dy, dx) - heading))
             if gate[6] > 0.0:
-                cost = min(cost + gate[7], through(v, w, pose, gate, lane_m, window))
+                cost += gate[7]
+            if by_gate:
+                cost = min(cost, through(v, w, pose, gate, lane_m, window, min(cost, bar)))
+            if cost > bar:
+                continue
+            least = (soft_m + radius) * (soft_m + radius)
+            for k in range(beside.shape[0]):
+                dx, dy = beside[k, 0] - x, beside[k, 1] - y
+                least = min(least, dx * dx + dy * dy)
             lack = (soft_m + radius - math.sqrt(least)) / soft_m
             cost += near_cost * lack * lack
-            if cost < best:
-                best, best_v, best_w = cost, v, w
-            if v > 1e-3 and cost < moves:
-                moves, moves_v, moves_w = cost, v, w
+            if cost > bar:
+                continue
+            if not is_open:
+                if not rolled[j]:
+                    rolled[j] = True
+                    roll_turn(w0, w, limits, safety, cosines[j], sines[j])
+                if not roll_is_clear(
+                    lengths[:steps],
+                    ends[:steps],
+                    cosines[j],
+                    sines[j],
+                    safety,
+                    within_reach,
+                    halves,
+                    (apart, clearance),
+                    pose,
+                    known,
+                ):
+                    continue
+            rank = i * turns + j
+            if cost < best or (cost == best and rank < best_rank):
+                best, best_v, best_w, best_rank = cost, v, w, rank
+            if v > 1e-3 and (cost < moves or (cost == moves and rank < moves_rank)):
+                moves, moves_v, moves_w, moves_rank = cost, v, w, rank
     if best_v > 1e-3:
         return best_v, best_w, FREE
     turn = free_turn(pose, limits, safety, within_reach, field, known, heading_cost)
@@ -335,10 +476,13 @@ def choose(
 
 
 @kernel
-def through(v: float, w: float, pose: FloatArray, gate: Gate, lane_m: float, window: Window) -> float:
+def through(
+    v: float, w: float, pose: FloatArray, gate: Gate, lane_m: float, window: Window, most: float
+) -> float:
     """What is left at the horizon of an arc that leads through a gate; infinite for one that does not.
 
     By the place on it, from the gate on, that is best for its time: nobody need follow the arc any farther.
+    What is more than ``most`` may come out as infinite.
     """
     time, x0, y0, spacing, gate_x, gate_y, near_m, _ = gate
     horizon_s, heading_cost = window[0], window[1]
@@ -353,6 +497,8 @@ def through(v: float, w: float, pose: FloatArray, gate: Gate, lane_m: float, win
             continue
         qx, qy = mx - lane_m * math.sin(heading), my + lane_m * math.cos(heading)
         cost = value_at(qx, qy, time, x0, y0, spacing, 2.0)
+        if cost + t - horizon_s > min(most, best):
+            continue  # the heading only adds to it
         dx, dy = descent(qx, qy, time, x0, y0, spacing)
         if dx != 0.0 or dy != 0.0:
             cost += heading_cost * abs(wrap(math.atan2(dy, dx) - heading))

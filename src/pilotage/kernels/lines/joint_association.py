@@ -196,6 +196,21 @@ def update_walls(
 
 
 @kernel
+def tally(pairs: IntArray, distances: FloatArray) -> tuple[int, int, float]:
+    """Of lines (L,): how many are paired, how many lie beside a wall that is not ambiguous, and the largest
+    distance of a paired one, 0 without any."""
+    paired = placed = 0
+    largest = 0.0
+    for i in range(pairs.shape[0]):
+        if pairs[i] >= 0:
+            paired += 1
+            largest = max(largest, distances[i])
+        if math.isfinite(distances[i]) and pairs[i] != AMBIGUOUS:
+            placed += 1
+    return paired, placed, largest
+
+
+@kernel
 def pair_distances(
     pose: FloatArray,
     cov: FloatArray,

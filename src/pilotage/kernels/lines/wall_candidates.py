@@ -8,6 +8,7 @@ import numpy as np
 
 from pilotage.kernels.arrays import FloatArray, IntArray
 from pilotage.kernels.filters.wall_line import innovation_distance, wall_innovation
+from pilotage.kernels.geometry.motion import wrap
 from pilotage.kernels.geometry.plane import point_segment_distance, segments_cross
 from pilotage.kernels.jit import kernel
 
@@ -112,30 +113,43 @@ def candidates(
     """
     count = np.zeros(lines.shape[0], dtype=np.int64)
     z, H, v = np.empty(2), np.empty((2, 3)), np.empty(2)
+    alphas = np.empty(walls.shape[0])
+    for w in range(walls.shape[0]):
+        alphas[w] = walls[w, 1] - pose[2] - mount[2]
     shares = np.empty(out.shape[1])
     for i in range(lines.shape[0]):
         distance[i] = math.inf
-        for w in range(walls.shape[0]):
-            wall_innovation(pose, mount, walls[w], lines[i], z, H, v)
-            nis = innovation_distance(cov, H, v, covs[i])
-            if not nis <= max(gate, distance[i]):
-                continue
-            share = overlap_share(pose, cov, mount, ends[i], walls[w, 1], segments[w], slack, sigmas)
-            if share < least_overlap:
-                continue
-            distance[i] = min(distance[i], nis)
-            if nis > gate:
-                continue
-            place = count[i]
-            for k in range(count[i]):
-                if line_of[out[i, k]] == line_of[w]:
-                    place = k
-            if place == count[i]:
-                if count[i] == out.shape[1]:
+        # The angle's own share of a distance is no larger than the whole of it: first those that may pass
+        # the gate, then what is only to say how far the next wall is, once one is known.
+        angle_var = (cov[2, 2] + covs[i, 1, 1]) * (1.0 + 1e-6)
+        for within in (True, False):
+            for w in range(walls.shape[0]):
+                off = abs(wrap(alphas[w] - lines[i, 1]))
+                off = max(min(off, math.pi - off) - 1e-9, 0.0)
+                if (off * off > angle_var * gate) == within:
                     continue
-                count[i] += 1
-            elif share <= shares[place]:
-                continue
-            out[i, place] = w
-            shares[place] = share
+                if off * off > angle_var * max(gate, distance[i]):
+                    continue
+                wall_innovation(pose, mount, walls[w], lines[i], z, H, v)
+                nis = innovation_distance(cov, H, v, covs[i])
+                if not nis <= max(gate, distance[i]):
+                    continue
+                share = overlap_share(pose, cov, mount, ends[i], walls[w, 1], segments[w], slack, sigmas)
+                if share < least_overlap:
+                    continue
+                distance[i] = min(distance[i], nis)
+                if nis > gate:
+                    continue
+                place = count[i]
+                for k in range(count[i]):
+                    if line_of[out[i, k]] == line_of[w]:
+                        place = k
+                if place == count[i]:
+                    if count[i] == out.shape[1]:
+                        continue
+                    count[i] += 1
+                elif share <= shares[place]:
+                    continue
+                out[i, place] = w
+                shares[place] = share
     return count

@@ -4,8 +4,17 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from pilotage.kernels.arrays import FloatArray
 from pilotage.kernels.jit import kernel
+
+SECTORS = 192
+"""What a beam's whole neighbourhood shows, or does not, needs no angle."""
+MOST_BEAMS = 64
+"""In a sector; finer fans are looked at cell by cell."""
+SLACK = 1e-9
+"""Of ranges, so that rounding never decides."""
 
 
 @kernel
@@ -34,18 +43,69 @@ def mark_seen(
     """
     beams = ranges.shape[0]
     full = 2.0 * math.pi
+    least, most = np.empty(SECTORS), np.empty(SECTORS)
+    sector_ranges(first, step, ranges, half_m, least, most)
     for k in range(cells_xy.shape[0]):
         dx, dy = cells_xy[k, 0] - x, cells_xy[k, 1] - y
         squared = dx * dx + dy * dy
         if squared > reach * reach:
             continue
-        away = math.sqrt(squared)
-        if away > half_m:
-            turn = (math.atan2(dy, dx) - first) % full
-            beam = round(turn / step)
-            if beam >= beams:
-                # The fan does not close, or the last beam is the first one's neighbour.
-                beam = 0 if (full - turn) < 0.5 * step else -1
-            if beam < 0 or ranges[beam] + half_m < away:
-                continue
+        sector = sector_of(dx, dy)
+        if squared > most[sector]:
+            continue
+        if squared > least[sector]:
+            away = math.sqrt(squared)
+            if away > half_m:
+                turn = (math.atan2(dy, dx) - first) % full
+                beam = round(turn / step)
+                if beam >= beams:
+                    # The fan does not close, or the last beam is the first one's neighbour.
+                    beam = 0 if (full - turn) < 0.5 * step else -1
+                if beam < 0 or ranges[beam] + half_m < away:
+                    continue
         seen_s[k] = t
+
+
+@kernel
+def sector_of(dx: float, dy: float) -> int:
+    """One of ``SECTORS`` around the origin, by a measure that grows with the angle and needs none."""
+    both = abs(dx) + abs(dy)
+    if not both > 0.0:
+        return 0
+    turned = 1.0 - dx / both if dy >= 0.0 else 3.0 + dx / both
+    return min(int(turned * (0.25 * SECTORS)), SECTORS - 1)
+
+
+@kernel
+def sector_ranges(
+    first: float, step: float, ranges: FloatArray, half_m: float, least: FloatArray, most: FloatArray
+) -> None:
+    """Fill in, squared, up to where all of a sector is in view, and from where on nothing of it.
+
+    By the beams of the sector and one more to each side; ``least`` is below 0 where a part of it has no beam.
+    """
+    beams = ranges.shape[0]
+    full = 2.0 * math.pi
+    if full > step * (SECTORS * MOST_BEAMS):
+        least[:], most[:] = -1.0, np.inf
+        return
+    around = max(1, math.floor(full / step + 0.5))
+    begin = 0.0
+    for s in range(SECTORS):
+        turned = 4.0 * (s + 1) / SECTORS
+        # The direction at which a sector ends has 1 - |turned - 2| for its x, and the rest for its y.
+        cx = 1.0 - turned if turned <= 2.0 else turned - 3.0
+        cy = 1.0 - abs(cx) if turned <= 2.0 else abs(cx) - 1.0
+        end = math.atan2(cy, cx)
+        if end <= begin:
+            end += full
+        low, high = math.floor((begin - first) / step) - 1, math.ceil((end - first) / step) + 1
+        begin = end if s + 1 < SECTORS else 0.0
+        nearest, farthest = np.inf, 0.0
+        for k in range(low, high + 1):
+            beam = k % around
+            seen = ranges[beam] if beam < beams else -np.inf
+            nearest, farthest = min(nearest, seen), max(farthest, seen)
+        near_m, far_m = (nearest + half_m) * (1.0 - SLACK), (farthest + half_m) * (1.0 + SLACK)
+        least[s] = near_m * near_m if near_m > 0.0 else -1.0
+        most[s] = far_m * far_m

@@ -30,6 +30,7 @@ class SimulatedRadio:
         self.config, self.works = config, True
         self._name, self._state, self._rng = carrier.body.name, carrier.body.state, rng
         self._t_s, self._period_s = 0.0, carrier.period_s
+        self._reach_m = math.inf if config.range_m is None else config.range_m
         self._peers: tuple[SimulatedRadio, ...] = ()
         self._coming: deque[tuple[float, RadioMessage]] = deque()
 
@@ -40,17 +41,13 @@ class SimulatedRadio:
     def send(self, t_s: float, content: object) -> None:
         """Broadcast; whether it arrives is drawn from each receiver's own stream, whatever the distance."""
         message = RadioMessage(self._name, t_s, content)
+        x, y = self._state[:2].tolist()
         for peer in self._peers:
             lost = peer._rng.random() < max(self.config.loss, peer.config.loss)
-            if self.works and peer.works and not lost and self._reaches(peer):
-                peer._coming.append((t_s + peer.config.delay_s, message))
-
-    def _reaches(self, peer: SimulatedRadio) -> bool:
-        reach_m = min(
-            math.inf if radio.config.range_m is None else radio.config.range_m for radio in (self, peer)
-        )
-        away_m = math.hypot(self._state[0] - peer._state[0], self._state[1] - peer._state[1])
-        return away_m <= reach_m
+            if self.works and peer.works and not lost:
+                peer_x, peer_y = peer._state[:2].tolist()
+                if math.hypot(x - peer_x, y - peer_y) <= min(self._reach_m, peer._reach_m):
+                    peer._coming.append((t_s + peer.config.delay_s, message))
 
     def read(self) -> RadioMessages:
         """What has arrived since the last reading, in the order in which it was sent."""

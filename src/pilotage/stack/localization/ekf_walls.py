@@ -27,7 +27,7 @@ from pilotage.stack.localization.odometry_watch import LINEAR_RAD, OdometryWatch
 from pilotage.stack.localization.recovery import Recovery, RecoveryConfig
 from pilotage.stack.localization.self_check import SelfCheck
 from pilotage.stack.localization.wall_correction import correct
-from pilotage.stack.localization.wall_matching import AMBIGUOUS, LINE_DOF, WallMatcher, WallMatchingConfig
+from pilotage.stack.localization.wall_matching import LINE_DOF, WallMatcher, WallMatchingConfig
 from pilotage.stack.localization.wall_update import WallUpdate
 from pilotage.stack.perception.lines import DetectedLines, LineExtractionConfig, LineExtractor
 
@@ -147,7 +147,8 @@ class EkfWallsLocalizer:
         scan = readings.by_sensor.get(self._lidar)
         if isinstance(scan, LidarScan):
             lines = self._extractor.extract(scan.ranges_m)
-            lines.covs[:] *= self._var_scale
+            if self._var_scale != 1.0:
+                lines.covs[:] *= self._var_scale
             self._lost |= self._recovery is not None and self._blind
             if self._lost:
                 self._find(lines, scan.ranges_m)
@@ -184,12 +185,11 @@ class EkfWallsLocalizer:
         matches, total = correct(self._pose, self._cov, self._mount, lines, self._matcher)
         self._journal.update = WallUpdate(pose, cov, self._pose.copy(), lines, matches, self._matcher)
         # Lines beside no wall at all are of what is on no map; those that may be several walls say nothing.
-        placed = matches.walls[np.isfinite(matches.distances)]
-        known = int((placed != AMBIGUOUS).sum())
-        self._check.tell(self._t_s, known, matches.count, total, self._expected_nis[matches.count])
+        count = matches.count
+        self._check.tell(self._t_s, matches.placed, count, total, self._expected_nis[count])
         if self._recovery is not None:
             self._lost = self._recovery.gives_up(self._pose, self._cov, ranges_m, matches)
-        return matches.count, total
+        return count, total
 
     def _find(self, lines: DetectedLines, ranges_m: FloatArray) -> None:
         assert self._recovery is not None, "never lost without it"

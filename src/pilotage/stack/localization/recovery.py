@@ -147,5 +147,6 @@ def _median(values: FloatArray) -> float:
     half = len(values) // 2
     if len(values) % 2:
         return float(np.partition(values, half)[half])
-    low, high = np.partition(values, [half - 1, half])[half - 1 : half + 1]
-    return float(0.5 * (low + high))
+    parted = values.copy()
+    parted.partition((half - 1, half))
+    return float(0.5 * (parted[half - 1] + parted[half]))

@@ -49,15 +49,19 @@ class Matches:
         (L,) index into the map's ``WallLines``, ``UNMATCHED`` or ``AMBIGUOUS``.
     distances
         (L,) least squared Mahalanobis distance, before the update, to a wall that the line overlaps.
+    count
+        Number of matched lines.
+    placed
+        Number of lines beside some wall that may not be several.
+    farthest
+        Largest distance of a matched line; 0 without one.
     """
 
     walls: IntArray
     distances: FloatArray
-
-    @property
-    def count(self) -> int:
-        """Number of matched lines."""
-        return int((self.walls >= 0).sum())
+    count: int
+    placed: int
+    farthest: float
 
 
 class WallMatcher:
@@ -127,4 +131,4 @@ class WallMatcher:
             config.max_nodes,
             pairs,
         )
-        return Matches(pairs, distances)
+        return Matches(pairs, distances, *joint_association.tally(pairs, distances))

@@ -34,8 +34,7 @@ class WallUpdate:
     @property
     def largest_accepted(self) -> float:
         """Largest squared Mahalanobis distance of an accepted line; 0 without one."""
-        accepted = self.matches.distances[self.matches.walls >= 0]
-        return float(accepted.max()) if accepted.size else 0.0
+        return self.matches.farthest
 
     def explained(self) -> ScanUpdate:
         """Put the explanation together."""

@@ -69,6 +69,7 @@ class Roadmap:
     ) -> None:
         self.places_xy_m: FloatArray = np.concatenate([vertices_xy_m, stations_xy_m])
         self._vertices = len(vertices_xy_m)
+        self._places = [(float(x), float(y)) for x, y in self.places_xy_m]
         self._fields: dict[int, FloatArray] = {}
         near = [near_m] * self._vertices + [STATION_M] * len(stations_xy_m)
         for finer in FINER:
@@ -96,6 +97,8 @@ class Roadmap:
         self.slowness = np.where(free, (1.0 + TIGHT_FACTOR * tight**2) / speed_m_s, np.inf)
         # Who keeps to one side is so far from where the passage is widest.
         size = 2 * math.ceil(lane_m / spacing_m) + 1
+        # Where there is room for all fields nobody need know which of them was asked for last.
+        self._all_kept = len(self._places) * self.slowness.nbytes <= MOST_FIELD_BYTES
         self._room_m: FloatArray = maximum_filter(distance, size=size)
 
     def _joined(self, near_m: Sequence[float], clearance_m: float) -> list[tuple[int, int]]:
@@ -149,6 +152,8 @@ class Roadmap:
 
     def time_s(self, place: int) -> FloatArray:
         """(rows, columns) time to go to a place; worked out when asked for, and kept while there is room."""
+        if self._all_kept and (known := self._fields.get(place)) is not None:
+            return known
         field = self._fields.pop(place, None)
         if field is None:
             field = np.full(self.slowness.shape, np.inf)
@@ -265,6 +270,18 @@ class Roadmap:
         return eikonal.way_down(
             x_m, y_m, time_s, self._room_m, *self.origin_xy_m, self.spacing_m, STEP_M, steps
         )
+
+    def narrowest_m(self, x_m: float, y_m: float, time_s: FloatArray, reach_m: float) -> float:
+        """Half the width of the narrowest place of ``way``; infinite off the map."""
+        steps = math.ceil(reach_m / STEP_M)
+        return eikonal.narrowest_down(
+            x_m, y_m, time_s, self._room_m, *self.origin_xy_m, self.spacing_m, STEP_M, steps
+        )
+
+    def away_m(self, place: int, x_m: float, y_m: float) -> float:
+        """How far a place is from another as the crow flies."""
+        x, y = self._places[place]
+        return math.hypot(x_m - x, y_m - y)
 
 
 def _farthest(free: BoolArray, away_m: FloatArray) -> int:

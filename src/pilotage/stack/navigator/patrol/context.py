@@ -31,6 +31,7 @@ from pilotage.stack.patrol.word import Claim, Clearing, TeamWord
 
 NO_FIELD: FloatArray = np.zeros((1, 1))
 NO_POINTS: FloatArray = np.zeros((0, 2))
+NO_DISCS: FloatArray = np.zeros((0, 3))
 NO_GATE: voronoi_window.Gate = (np.zeros((2, 2)), 0.0, 0.0, 1.0, 0.0, 0.0, -1.0, 0.0)
 SECTORS = 72
 NEAR_M = 1.6
@@ -141,7 +142,7 @@ class Context:
         self.hop = self.target = self.came_from = at
         self._then = -1
         self._left_s, self._kept_out_s = 0.0, math.inf
-        self.t_s, self.pose, self.cov = 0.0, start, np.zeros((3, 3))
+        self.t_s, self.pose, self._spread_m = 0.0, start, 0.0
         self.near = self.strange = self.people = NO_POINTS
         self.fresh = False
         self._twist, self._command = STOP, STOP
@@ -154,7 +155,8 @@ class Context:
 
     def sense(self, readings: Readings, belief: Belief, *, lost: bool) -> None:
         """Take in one step's readings."""
-        self.t_s, self.pose, self.cov = readings.t_s, belief.pose, belief.cov
+        self.t_s, self.pose, cov = readings.t_s, belief.pose, belief.cov
+        self._spread_m = SIGMAS * math.sqrt(max(cov.item(0, 0), cov.item(1, 1)))
         odometry = readings.by_sensor.get(self._odometry)
         if isinstance(odometry, OdometryIncrement):
             self._twist = Twist(odometry.distance_m / self.dt_s, odometry.angle_rad / self.dt_s)
@@ -169,7 +171,6 @@ class Context:
         scan = readings.by_sensor.get(self._lidar)
         self.fresh = isinstance(scan, LidarScan)
         if isinstance(scan, LidarScan):
-            spread_m = SIGMAS * math.sqrt(max(belief.cov[0, 0], belief.cov[1, 1]))
             self.near, self.strange = voronoi_window.scan_returns(
                 scan.ranges_m,
                 self._directions,
@@ -177,8 +178,8 @@ class Context:
                 belief.pose.as_array(),
                 NEAR_M,
                 self.config.look_m,
-                self.config.tolerance_m + spread_m,
-                SIGMAS * math.sqrt(belief.cov[2, 2]),
+                self.config.tolerance_m + self._spread_m,
+                SIGMAS * math.sqrt(cov.item(2, 2)),
                 self._field(lost=lost),
                 SECTORS,
             )
@@ -222,8 +223,7 @@ class Context:
 
     def away_m(self, place: int) -> float:
         """Distance from a vertex or its station as the crow flies."""
-        x, y = self.roadmap.places_xy_m[place]
-        return math.hypot(self.pose.x_m - float(x), self.pose.y_m - float(y))
+        return self.roadmap.away_m(place, self.pose.x_m, self.pose.y_m)
 
     @property
     def homeward(self) -> bool:
@@ -241,8 +241,7 @@ class Context:
     def _sure_m(self) -> float:
         """How near it is to a place that it is at for sure."""
         visit_m = self.task.visit_m
-        spread_m = SIGMAS * math.sqrt(max(self.cov[0, 0], self.cov[1, 1]))
-        return max(min(self.task.near_m, 0.95 * visit_m - spread_m), 0.5 * visit_m)
+        return max(min(self.task.near_m, 0.95 * visit_m - self._spread_m), 0.5 * visit_m)
 
     def runs_low(self) -> bool:
         """Whether it has to go to its station from now on; tells the others that its share is theirs."""
@@ -336,14 +335,15 @@ class Context:
         self.to_go_s = eikonal.value_at(pose.x_m, pose.y_m, time, x0, y0, spacing, 0.0)
         if not self.fresh:
             return self._command
-        way = roadmap.way(pose.x_m, pose.y_m, time, LANE_AHEAD_M)
-        room_m = float(way[:, 2].min()) if len(way) else 0.0
-        lane_m = min(self.config.lane_m, max(0.0, room_m - self._clearance_m))
+        room_m = roadmap.narrowest_m(pose.x_m, pose.y_m, time, LANE_AHEAD_M)
+        lane_m = min(self.config.lane_m, max(0.0, room_m - self._clearance_m)) if room_m < math.inf else 0.0
         lane_m *= min(1.0, self.to_go_s / MERGE_S)
         self.blocked = self.taken = False
-        beside = voronoi_window.within(self.strange, self.config.watch_m)
+        beside = self.strange
+        if len(beside):
+            beside = voronoi_window.within(beside, self.config.watch_m)
         around_m, body_m = self._clearance_m + 0.5 * self.config.gap_m, self._clearance_m + self.radius_m
-        discs = _discs(self._on_map(beside[:0] if first else beside), around_m)
+        discs = _discs(self._on_map(beside), around_m) if len(beside) and not first else NO_DISCS
         still = self._still.step(self.t_s, self._mute(beside))
         if len(still):
             discs = np.concatenate([discs, _discs(still, body_m)])
@@ -401,9 +401,11 @@ class Context:
         near_m = min(self._sure_m(), THROUGH_RATIO * self.task.visit_m)
         origin, spacing = self.roadmap.origin_xy_m, self.roadmap.spacing_m
         reach_m = near_m + self._window[0] * self.speed_m_s
-        if then < 0 or at is None or np.hypot(*(at - (self.pose.x_m, self.pose.y_m))) > reach_m:
+        if then < 0 or at is None:
             return NO_GATE
         x, y = at.tolist()
+        if math.hypot(x - self.pose.x_m, y - self.pose.y_m) > reach_m:
+            return NO_GATE
         on = self.roadmap.time_s(then)
         away = eikonal.descent(x, y, on, *origin, spacing)
         back = eikonal.descent(x, y, self.roadmap.time_s(self.came_from), *origin, spacing)
@@ -425,11 +427,16 @@ class Context:
             return NO_POINTS
         # Whoever is met is as large as the robot itself; its near side alone is seen.
         middles = self._on_map(voronoi_window.bodies(beside, self.radius_m))
-        for sent_s, word in self.mates.values():
-            if self.t_s - sent_s < 3.0 * self.config.message_period_s:
-                away = np.hypot(middles[:, 0] - word.x_m, middles[:, 1] - word.y_m)
-                middles = middles[~(away < self.radius_m + self.speed_m_s * (self.t_s - sent_s))]
-        return middles
+        talk = [
+            (word.x_m, word.y_m, self.radius_m + self.speed_m_s * (self.t_s - sent_s))
+            for sent_s, word in self.mates.values()
+            if self.t_s - sent_s < 3.0 * self.config.message_period_s
+        ]
+        mute = [
+            not any(math.hypot(x - word_x, y - word_y) < reach_m for word_x, word_y, reach_m in talk)
+            for x, y in middles.tolist()
+        ]
+        return middles[np.array(mute, dtype=np.bool_)]
 
     def careful(self, command: Twist) -> Twist:
         """A command slowed down until its braking ends clear of everything, all of which may move."""
@@ -467,6 +474,8 @@ class Context:
 
     def _on_map(self, points: FloatArray) -> FloatArray:
         """Points (M, 2) of the base frame on the map."""
+        if not len(points):
+            return points
         c, s = math.cos(self.pose.theta_rad), math.sin(self.pose.theta_rad)
         return np.asarray(points @ np.array([[c, s], [-s, c]]) + np.array([self.pose.x_m, self.pose.y_m]))
 
@@ -492,6 +501,8 @@ class Context:
     def tell_claim(self, claim: Claim | None) -> None:
         """Claim a passage, or none any more; told at once where that is news."""
         old, self.claim = self.claim, claim
+        if old is None and claim is None:
+            return
         before, now = (None if c is None else (c.since_s, c.inside) for c in (old, claim))
         self._has_news |= before != now
 

@@ -20,6 +20,10 @@ class StillWatch:
 
     def step(self, t_s: float, middles_xy_m: FloatArray) -> FloatArray:
         """(K, 2) those of the bodies seen now (M, 2), map frame, that have stood for long."""
+        if not len(middles_xy_m):
+            if len(self._known):
+                self._known = self._known[t_s - self._known[:, 3] <= GONE_S]
+            return middles_xy_m
         known = self._known[t_s - self._known[:, 3] <= GONE_S]
         rows = np.empty((len(middles_xy_m), 4))
         fresh = np.ones(len(known), dtype=np.bool_)
