@@ -3,19 +3,46 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.ndimage import label
 
 from pilotage.core.types import FloatArray, Pose2
+from pilotage.kernels.scans.mounted import Fan
 from pilotage.kernels.scans.seen_cells import mark_seen
 from pilotage.maps.world_map import WorldMap
 from pilotage.sensors.lidar import LidarConfig
 from pilotage.sim.bodies.body import Body
+from pilotage.sim.worlds.world import fan_of
 
 MOST_CELLS = 40_000
 SPANS_S = (10.0, 30.0, 60.0)
 """What the floor that was seen within is told of."""
+
+
+@dataclass(frozen=True, slots=True)
+class Eye:
+    """A robot's scanner, made ready for looking again and again.
+
+    Attributes
+    ----------
+    mount
+        Where it sits on the body.
+    fan, step_rad
+        Its beams without noise, and the angle between them, above 0.
+    """
+
+    mount: Pose2
+    fan: Fan
+    step_rad: float
+
+    @staticmethod
+    def of(lidar: LidarConfig) -> Eye:
+        """Of its data sheet."""
+        mount = Pose2(lidar.mount.x_m, lidar.mount.y_m, lidar.mount.theta_rad)
+        fan = fan_of(lidar.beam_angles_rad(), lidar.max_range_m)
+        return Eye(mount, fan, max(lidar.beam_step_rad, 1e-9))
 
 
 class FloorAges:
@@ -48,22 +75,20 @@ class FloorAges:
         self._within: list[list[float]] = []
         self._sum_s = np.zeros(len(self.cells_xy_m))
 
-    def look(self, t_s: float, body: Body, lidar: LidarConfig) -> None:
+    def look(self, t_s: float, body: Body, eye: Eye) -> None:
         """What one robot sees now."""
-        mount = lidar.mount
-        pose = body.pose.compose(Pose2(mount.x_m, mount.y_m, mount.theta_rad))
-        angles = lidar.beam_angles_rad()
-        ranges = body.world.scan(pose.as_array()[None, :], angles, lidar.max_range_m, body.own[None, :])[0]
-        first = pose.theta_rad + float(angles[0])
+        pose = body.pose.compose(eye.mount)
+        place = np.array([[pose.x_m, pose.y_m, pose.theta_rad]])
+        first_rad, *_, reach_m = eye.fan
         mark_seen(
             self.seen_s,
             self.cells_xy_m,
             pose.x_m,
             pose.y_m,
-            first,
-            max(lidar.beam_step_rad, 1e-9),
-            ranges,
-            lidar.max_range_m,
+            pose.theta_rad + first_rad,
+            eye.step_rad,
+            body.world.scan_along(place, eye.fan, body.own[None, :])[0],
+            reach_m,
             self.cell_m * math.sqrt(0.5),
             t_s,
         )

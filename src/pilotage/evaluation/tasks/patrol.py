@@ -14,7 +14,7 @@ from pilotage.core.errors import InputError
 from pilotage.core.types import Event, FloatArray, IntArray
 from pilotage.evaluation.driving import driving_metrics, header
 from pilotage.evaluation.finished import FinishedRun, RobotRun, Verdict
-from pilotage.evaluation.floor_ages import FloorAges
+from pilotage.evaluation.floor_ages import Eye, FloorAges
 from pilotage.evaluation.guard_log import GuardLog
 from pilotage.evaluation.guards import guards_of
 from pilotage.evaluation.patrol_visits import VisitLog
@@ -82,6 +82,7 @@ class PatrolTask:
         self.events: list[Event] = []
         self._visits = VisitLog(graph.vertices_xy_m, config.visit_m, len(self._names))
         self._lidars = [_lidar(setting, index) for index in range(len(self._names))]
+        self._eyes = [None if lidar is None else Eye.of(lidar) for lidar in self._lidars]
         self._floor = FloorAges(setting.chart, graph.vertices_xy_m[0], CELL_M)
         self._warm_s = min(config.warm_s, 0.25 * min(config.duration_s, mission.run.time_limit_s))
         self._failed: frozenset[str] = frozenset()
@@ -110,9 +111,9 @@ class PatrolTask:
         if self._step % self._visits_every == 0:
             self._visits.add(t_s, places)
         if self._step % self._see_every == 0:
-            for attempt, lidar in zip(attempts, self._lidars, strict=True):
-                if lidar is not None:
-                    self._floor.look(t_s, attempt.body, lidar)
+            for attempt, eye in zip(attempts, self._eyes, strict=True):
+                if eye is not None:
+                    self._floor.look(t_s, attempt.body, eye)
         if self._step % self._look_every == 0:
             self._look(t_s, attempts)
         self._guards.step(t_s, attempts)

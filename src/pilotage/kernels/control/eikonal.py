@@ -224,13 +224,19 @@ def narrowest_down(
     spacing: float,
     step: float,
     steps: int,
-) -> float:
-    """The least of ``values`` on the way down from a place (``way_down``); infinite off the grid."""
+    few: int,
+) -> tuple[float, float]:
+    """The least of ``values`` on the way down from a place (``way_down``), and on its first ``few`` steps.
+
+    Infinite off the grid.
+    """
     way = way_down(x, y, time, values, x0, y0, spacing, step, steps)
-    least = np.inf
+    least = soon = np.inf
     for k in range(way.shape[0]):
         least = min(least, way[k, 2])
-    return least
+        if k <= few:
+            soon = least
+    return least, soon
 
 
 @kernel

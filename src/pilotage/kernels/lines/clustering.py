@@ -85,6 +85,11 @@ def scan_clusters(
             continue
         near_end, far_start = n, n
         if ranges[i] > cutoff and step > 0.0:
+            # No angle is larger than this share of its sine: most points have nobody but their own run near.
+            most = 0.5 * math.pi * cutoff / ranges[i]
+            alone = i + math.floor(most / step) + 2 <= run_end[i] + 1
+            if alone and i + math.ceil((TWO_PI - most) / step) - 1 >= n:
+                continue
             reach = math.asin(cutoff / ranges[i])
             # A beam more than the angle allows, against rounding; then those met the other way round.
             near_end = min(n, i + math.floor(reach / step) + 2)

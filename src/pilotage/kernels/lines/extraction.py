@@ -73,6 +73,10 @@ def sample_line(
     best_rho = best_alpha = 0.0
     best = 0
     tried = 0
+    # One after the other in memory they are held against a line several at a time.
+    xs, ys = np.empty(count), np.empty(count)
+    for k in range(count):
+        xs[k], ys[k] = points[rest[k], 0], points[rest[k], 1]
     needed = float(iterations)
     while tried < needed:
         u, v = uniforms[drawn % uniforms.shape[0]], uniforms[(drawn + 1) % uniforms.shape[0]]
@@ -81,17 +85,15 @@ def sample_line(
         first = int(u * (count - 1))
         span = min(MAX_SPAN, count - 1 - first)
         second = first + 1 + int(v * span)
-        i, j = rest[first], rest[second]
-        dx, dy = points[j, 0] - points[i, 0], points[j, 1] - points[i, 1]
+        dx, dy = xs[second] - xs[first], ys[second] - ys[first]
         length = math.hypot(dx, dy)
         if length == 0.0:
             continue
         nx, ny = dy / length, -dx / length
-        rho = points[i, 0] * nx + points[i, 1] * ny
+        rho = xs[first] * nx + ys[first] * ny
         near = 0
-        for k in range(count):
-            if abs(points[rest[k], 0] * nx + points[rest[k], 1] * ny - rho) <= threshold:
-                near += 1
+        for k in range(xs.shape[0]):
+            near += abs(xs[k] * nx + ys[k] * ny - rho) <= threshold
         if near > best:
             best, best_rho, best_alpha = near, rho, math.atan2(ny, nx)
             share = near / count

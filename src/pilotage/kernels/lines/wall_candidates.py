@@ -113,22 +113,30 @@ def candidates(
     """
     count = np.zeros(lines.shape[0], dtype=np.int64)
     z, H, v = np.empty(2), np.empty((2, 3)), np.empty(2)
-    alphas = np.empty(walls.shape[0])
+    c, s = math.cos(pose[2]), math.sin(pose[2])
+    ox, oy = c * mount[0] - s * mount[1], s * mount[0] + c * mount[1]
+    rhos, alphas, least = np.empty(walls.shape[0]), np.empty(walls.shape[0]), np.empty(walls.shape[0])
     for w in range(walls.shape[0]):
+        nx, ny = math.cos(walls[w, 1]), math.sin(walls[w, 1])
+        rhos[w] = walls[w, 0] - nx * (pose[0] + ox) - ny * (pose[1] + oy)
         alphas[w] = walls[w, 1] - pose[2] - mount[2]
+    # The variance of a sum of three is no larger than three times the sum of theirs.
+    place_var = 3.0 * (cov[0, 0] + cov[1, 1] + cov[2, 2] * (ox * ox + oy * oy))
     shares = np.empty(out.shape[1])
     for i in range(lines.shape[0]):
         distance[i] = math.inf
-        # The angle's own share of a distance is no larger than the whole of it: first those that may pass
-        # the gate, then what is only to say how far the next wall is, once one is known.
-        angle_var = (cov[2, 2] + covs[i, 1, 1]) * (1.0 + 1e-6)
+        # What the angle alone, or the range alone, is off by is no more than the distance of both: first
+        # those that may pass the gate, then what is only to say how far the next wall is, once one is known.
+        rho_var, angle_var = place_var + covs[i, 0, 0], cov[2, 2] + covs[i, 1, 1]
+        for w in range(walls.shape[0]):
+            off = abs(wrap(alphas[w] - lines[i, 1]))
+            off = max(min(off, math.pi - off) - 1e-9, 0.0)
+            # Seen from either side.
+            aside = max(abs(abs(lines[i, 0]) - abs(rhos[w])) - 1e-9, 0.0)
+            least[w] = max(off * off / angle_var, aside * aside / rho_var) * (1.0 - 1e-6)
         for within in (True, False):
             for w in range(walls.shape[0]):
-                off = abs(wrap(alphas[w] - lines[i, 1]))
-                off = max(min(off, math.pi - off) - 1e-9, 0.0)
-                if (off * off > angle_var * gate) == within:
-                    continue
-                if off * off > angle_var * max(gate, distance[i]):
+                if (least[w] > gate) == within or least[w] > max(gate, distance[i]):
                     continue
                 wall_innovation(pose, mount, walls[w], lines[i], z, H, v)
                 nis = innovation_distance(cov, H, v, covs[i])

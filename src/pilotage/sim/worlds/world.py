@@ -190,16 +190,12 @@ class World:
         ``max_range_m`` where nothing is hit.
         """
         places = np.ascontiguousarray(poses, dtype=np.float64).reshape(-1, 3)
-        step = float(angles_rad[1] - angles_rad[0]) if len(angles_rad) > 1 else 0.0
-        from_first = angles_rad - angles_rad[0]
-        return mounted.fans(
-            places,
-            np.tile(NOBODY, (len(places), 1)) if own is None else own,
-            np.zeros(3),
-            (float(angles_rad[0]), step, np.cos(from_first), np.sin(from_first), max_range_m),
-            self.fixed,
-            self.traffic.others,
-        )
+        nobody = np.tile(NOBODY, (len(places), 1)) if own is None else own
+        return self.scan_along(places, fan_of(angles_rad, max_range_m), nobody)
+
+    def scan_along(self, places: FloatArray, fan: mounted.Fan, own: IntArray) -> FloatArray:
+        """The same from poses (N, 3) of who scans again and again along one fan."""
+        return mounted.fans(places, own, np.zeros(3), fan, self.fixed, self.traffic.others)
 
     def beam(self, poses: FloatArray, max_range_m: float, own: IntArray = NOBODY) -> FloatArray:
         """Ranges (N,) of single beams along the headings of poses (N, 3); inf where nothing is hit."""
@@ -322,3 +318,10 @@ class World:
     def slopes_rad(self, points_xy_m: FloatArray) -> FloatArray:
         """Steepest slopes (K,) of the ground at points (K, 2), as ``heights_m``."""
         return np.zeros(len(points_xy_m)) if self.ground is None else self.ground.slopes_rad(points_xy_m)
+
+
+def fan_of(angles_rad: FloatArray, max_range_m: float) -> mounted.Fan:
+    """Beams at equal steps (B,), and how far they reach, as the kernels take them."""
+    step = float(angles_rad[1] - angles_rad[0]) if len(angles_rad) > 1 else 0.0
+    from_first = angles_rad - angles_rad[0]
+    return float(angles_rad[0]), step, np.cos(from_first), np.sin(from_first), max_range_m

@@ -271,11 +271,13 @@ class Roadmap:
             x_m, y_m, time_s, self._room_m, *self.origin_xy_m, self.spacing_m, STEP_M, steps
         )
 
-    def narrowest_m(self, x_m: float, y_m: float, time_s: FloatArray, reach_m: float) -> float:
-        """Half the width of the narrowest place of ``way``; infinite off the map."""
-        steps = math.ceil(reach_m / STEP_M)
+    def narrowest_m(
+        self, x_m: float, y_m: float, time_s: FloatArray, reach_m: float, soon_m: float
+    ) -> tuple[float, float]:
+        """Half the width of the narrowest place of ``way``, of all and up to ``soon_m``; inf off the map."""
+        steps, few = math.ceil(reach_m / STEP_M), math.ceil(soon_m / STEP_M)
         return eikonal.narrowest_down(
-            x_m, y_m, time_s, self._room_m, *self.origin_xy_m, self.spacing_m, STEP_M, steps
+            x_m, y_m, time_s, self._room_m, *self.origin_xy_m, self.spacing_m, STEP_M, steps, few
         )
 
     def away_m(self, place: int, x_m: float, y_m: float) -> float:

@@ -20,7 +20,7 @@ from pilotage.stack.knowledge import RobotKnowledge
 from pilotage.stack.navigator.patrol.battery import DOCK_M, Battery
 from pilotage.stack.navigator.patrol.config import Mode, PatrolNavigatorConfig
 from pilotage.stack.navigator.patrol.headway import Headway
-from pilotage.stack.navigator.patrol.passage import Pursuit
+from pilotage.stack.navigator.patrol.passage import CLAIM_M, Pursuit
 from pilotage.stack.navigator.patrol.still import StillWatch
 from pilotage.stack.patrol.messages import PatrolMemory
 from pilotage.stack.patrol.roadmap import roadmap_of
@@ -145,6 +145,7 @@ class Context:
         self.t_s, self.pose, self._spread_m = 0.0, start, 0.0
         self.near = self.strange = self.people = NO_POINTS
         self.fresh = False
+        self._room: tuple[FloatArray, Pose2, tuple[float, float]] | None = None
         self._twist, self._command = STOP, STOP
         self.mates: dict[int, tuple[float, TeamWord]] = {}
         self.mode, self.to_go_s = Mode.DRIVE, math.nan
@@ -321,6 +322,14 @@ class Context:
         at = self.roadmap.places_xy_m[vertex]
         return self.descend(self.roadmap.time_s(vertex), at, then=then, first=first)
 
+    def room_ahead_m(self, time: FloatArray) -> tuple[float, float]:
+        """Half the width of the narrowest place down a field, for claims and for lanes."""
+        known, pose = self._room, self.pose
+        if known is None or known[0] is not time or known[1] is not pose:
+            room_m = self.roadmap.narrowest_m(pose.x_m, pose.y_m, time, CLAIM_M, LANE_AHEAD_M)
+            self._room = known = time, pose, room_m
+        return known[2]
+
     def descend(
         self, time: FloatArray, at: FloatArray | None = None, *, then: int = -1, first: bool = False
     ) -> Twist:
@@ -335,7 +344,7 @@ class Context:
         self.to_go_s = eikonal.value_at(pose.x_m, pose.y_m, time, x0, y0, spacing, 0.0)
         if not self.fresh:
             return self._command
-        room_m = roadmap.narrowest_m(pose.x_m, pose.y_m, time, LANE_AHEAD_M)
+        room_m = self.room_ahead_m(time)[1]
         lane_m = min(self.config.lane_m, max(0.0, room_m - self._clearance_m)) if room_m < math.inf else 0.0
         lane_m *= min(1.0, self.to_go_s / MERGE_S)
         self.blocked = self.taken = False
