@@ -18,7 +18,7 @@ from pilotage.experiments.loop import run_loop
 from pilotage.experiments.mission import load_mission, mission_of, read_mission
 from pilotage.kernels.control import eikonal, voronoi_window
 from pilotage.kernels.geometry.motion import exact_arc, wrap
-from pilotage.stack.navigator.patrol.context import NO_GATE
+from pilotage.stack.navigator.patrol.gate import NO_GATE
 from pilotage.stack.navigator.patrol.passage import claimed, precedes, relation, stretch_of
 from pilotage.stack.navigator.patrol.still import StillWatch
 
@@ -309,11 +309,11 @@ class TestDrivingThrough:
         context = build(mission_of(values, seed=0)).team[0].stack._context  # type: ignore[attr-defined]
         context.came_from, context.hop, place = 0, 1, context.roadmap.places_xy_m[1]
         context.pose = Pose2(float(place[0]) - 1.0, float(place[1]), 0.0)
-        assert context._gate(place, 2, NOBODY)[6] > 0.0
-        assert context._gate(place, 0, NOBODY)[6] < 0.0
-        assert context._gate(place, -1, NOBODY)[6] < 0.0
+        assert context.motion.gate(place, 0, 2, NOBODY)[6] > 0.0
+        assert context.motion.gate(place, 0, 0, NOBODY)[6] < 0.0
+        assert context.motion.gate(place, 0, -1, NOBODY)[6] < 0.0
         context.pose = Pose2(float(place[0]) - 3.0, float(place[1]), 0.0)
-        assert context._gate(place, 2, NOBODY)[6] < 0.0  # far yet
+        assert context.motion.gate(place, 0, 2, NOBODY)[6] < 0.0  # far yet
 
     @staticmethod
     def _driven_s(bearing: float, *, knows: bool) -> float:

@@ -106,8 +106,8 @@ class PatrolNavigator:
             context.mode,
             context.hop,
             context.target,
-            context.to_go_s,
-            context.blocked,
+            context.motion.to_go_s,
+            context.motion.blocked,
             len(context.strange),
             *context.alarm,
         )

@@ -81,7 +81,7 @@ class Leading:
         if own in self.sent:
             return self._make_room(places)
         holds = self._waits_for(line[: math.ceil(AHEAD_M / STEP_M)], places)
-        return Move(self, context.stand() if holds else context.lead(context.hop, first=True))
+        return Move(self, context.motion.stand() if holds else context.lead(context.hop, first=True))
 
     def _waits_for(self, ahead: FloatArray, places: dict[int, Place]) -> bool:
         """Whether somebody on its path was told to go a moment ago, and is not there yet.
@@ -139,7 +139,7 @@ class Leading:
         ]
         if not late:
             del self.sent[own]
-            return Move(self, context.stand())
+            return Move(self, context.motion.stand())
         return Move(self, context.descend(context.roadmap.field_to(x, y)))
 
 
@@ -168,10 +168,10 @@ class Evacuating:
             return evacuate(context, place)
         command = context.descend(self.time)
         if context.fresh:
-            narrow = context.is_narrow() and context.to_go_s > THERE_S
+            narrow = context.is_narrow() and context.motion.to_go_s > THERE_S
             way = traffic.way_along(context, self.time) if narrow else context.here()
             traffic.look_along(context, way)
-        return Move(self, command if context.to_go_s > THERE_S else context.stand())
+        return Move(self, command if context.motion.to_go_s > THERE_S else context.motion.stand())
 
 
 def apart_m(context: Context) -> float:

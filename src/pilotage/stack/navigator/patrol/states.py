@@ -56,7 +56,7 @@ class Driving:
         del readings
         context = self.context
         context.mode = Mode.DRIVE
-        if context.arrived(blocked=context.blocked):
+        if context.arrived(blocked=context.motion.blocked):
             return arrive(context)
         if context.runs_low():
             return resume(context)
@@ -64,7 +64,7 @@ class Driving:
         if met is not None:
             return met
         command = context.lead(context.hop)
-        if self.watch.stalled(context.to_go_s, context.t_s):
+        if self.watch.stalled(context.motion.to_go_s, context.t_s):
             left = forgo(context, for_long=False)
             if left is not None and isinstance(left.state, Waiting) and not is_wanted(context):
                 return left
@@ -90,19 +90,19 @@ class Waiting:
         """Ask again from time to time."""
         del readings
         context = self.context
-        context.mode, context.blocked = Mode.WAIT, False
+        context.mode, context.motion.blocked = Mode.WAIT, False
         traffic.look_along(context, context.here())
         context.memory.visit(context.came_from, context.t_s)
         clear_s = self.clear_s if context.crowded(ASIDE_M) else context.t_s
         if context.t_s - self.since_s < context.config.ask_s:
-            return Move(replace(self, clear_s=clear_s), context.stand())
+            return Move(replace(self, clear_s=clear_s), context.motion.stand())
         move = resume(context)
         if isinstance(move.state, Driving):
             return move
         pressed = context.t_s - clear_s > context.config.patience_s
         if pressed or context.waits_for() or is_wanted(context):
             return give_way(context)
-        return Move(replace(self, since_s=context.t_s, clear_s=clear_s), context.stand())
+        return Move(replace(self, since_s=context.t_s, clear_s=clear_s), context.motion.stand())
 
 
 @dataclass(frozen=True, slots=True)
@@ -170,13 +170,13 @@ class Holding:
         """Stand until the passage is free, or for long enough."""
         del readings
         context = self.context
-        context.mode, context.blocked = Mode.HOLD, True
+        context.mode, context.motion.blocked = Mode.HOLD, True
         if context.arrived(blocked=True):
             return arrive(context)
         if context.t_s - self.since_s > context.config.hold_s:
             return give_way(context)
         if not context.fresh:
-            return Move(self, context.stand())
+            return Move(self, context.motion.stand())
         met = meet(context, traffic.look(context, context.hop), self.since_s)
         if met is not None:
             return met
@@ -219,13 +219,13 @@ class StandingAside:
         stretch = traffic.look(context, context.hop)
         if stretch is None or (context.hears_all() and not traffic.is_taken(context, stretch)):
             return resume(context)
-        if context.to_go_s > THERE_S:
+        if context.motion.to_go_s > THERE_S:
             # Somebody else may stand there now.
             kept_out = waited_s > SETTLED_S and context.moving_m_s < AT_REST_M_S
             return resume(context) if kept_out else Move(self, command)
         if context.t_s >= self.until_s and not traffic.is_taken(context, stretch):
             return resume(context)
-        return Move(self, context.stand())
+        return Move(self, context.motion.stand())
 
 
 @dataclass(frozen=True, slots=True)
@@ -246,18 +246,18 @@ class Charging:
         """Stand until the battery is full; there again where it was carried away."""
         del readings
         context = self.context
-        context.mode, context.blocked = Mode.CHARGE, False
+        context.mode, context.motion.blocked = Mode.CHARGE, False
         traffic.look_along(context, context.here())
         if context.away_m(self.battery.station) > 2.0 * DOCK_M:
             return resume(context)
         if context.away_m(context.came_from) <= context.task.visit_m:
             context.memory.visit(context.came_from, context.t_s)
         if context.moving_m_s > AT_REST_M_S:
-            return Move(Charging(context, self.battery, context.t_s), context.stand())
+            return Move(Charging(context, self.battery, context.t_s), context.motion.stand())
         if context.t_s - self.since_s >= self.battery.charge_s:
             context.charged()
             return resume(context)
-        return Move(self, context.stand())
+        return Move(self, context.motion.stand())
 
 
 @dataclass(frozen=True, slots=True)
@@ -271,7 +271,7 @@ class Lost:
         """Wander."""
         self.context.mode = Mode.LOST
         self.context.tell_claim(None)
-        return Move(self, self.context.careful(self.wandering.step(readings)))
+        return Move(self, self.context.motion.careful(self.wandering.step(readings)))
 
 
 def patience_s(context: Context) -> float:
@@ -291,7 +291,7 @@ def arrive(context: Context) -> Move:
     """At a vertex: told, and the strategy asked; or at its station."""
     battery = context.battery
     if battery is not None and battery.low:
-        return Move(Charging(context, battery, context.t_s), context.stand())
+        return Move(Charging(context, battery, context.t_s), context.motion.stand())
     context.visit(context.hop)
     context.headway.restart(context.t_s)
     return resume(context)
@@ -312,7 +312,7 @@ def resume(context: Context) -> Move:
 
 def wait(context: Context) -> Move:
     """Where it is."""
-    return Move(Waiting(context, context.t_s, context.t_s), context.stand())
+    return Move(Waiting(context, context.t_s, context.t_s), context.motion.stand())
 
 
 def forgo(context: Context, *, for_long: bool) -> Move | None:
@@ -384,7 +384,7 @@ def meet(context: Context, stretch: Stretch | None, since_s: float) -> Move | No
         goes, field = traffic.has_less_far(context, stretch)
         if goes:
             return back_out(context, field, stretch, since_s)
-    return Move(Holding(context, since_s), context.stand())
+    return Move(Holding(context, since_s), context.motion.stand())
 
 
 def stand_aside(context: Context, field: FloatArray | None, stretch: Stretch, since_s: float) -> Move:
@@ -393,7 +393,7 @@ def stand_aside(context: Context, field: FloatArray | None, stretch: Stretch, si
     if left is not None:
         return left
     if field is None:
-        return Move(Holding(context, since_s), context.stand())
+        return Move(Holding(context, since_s), context.motion.stand())
     through_s = (stretch.length_m / context.speed_m_s + SURE_S) * (0.5 + float(context.rng.random()))
     until_s = context.t_s + min(through_s, MOST_BLIND_S)
     return Move(StandingAside(context, field, context.t_s, until_s), context.descend(field))

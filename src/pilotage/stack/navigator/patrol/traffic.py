@@ -34,7 +34,7 @@ MOUTH_M = 1.2
 
 def look(context: Context, vertex: int) -> Stretch | None:
     """The passage for one on the path to a vertex and on, where it is near; claims it."""
-    if context.room_ahead_m(context.roadmap.time_s(vertex))[0] >= context.pass_m:
+    if context.motion.room_ahead_m(context.roadmap.time_s(vertex))[0] >= context.pass_m:
         context.tell_claim(None)
         return None
     return look_along(context, way_to(context, vertex))

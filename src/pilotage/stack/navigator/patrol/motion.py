@@ -1,0 +1,237 @@
+"""The choice of motion of a robot on patrol: down a field, around who stands in the way, through a place."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from pilotage.core.types import STOP, FloatArray, Pose2, Twist
+from pilotage.kernels.control import eikonal, voronoi_window
+from pilotage.models.motion.motion import MotionConfig
+from pilotage.stack.navigator.patrol.gate import NO_GATE, gate_at
+from pilotage.stack.navigator.patrol.passage import CLAIM_M
+from pilotage.stack.navigator.patrol.senses import NO_POINTS, Senses
+from pilotage.stack.navigator.patrol.still import StillWatch
+from pilotage.stack.patrol.roadmap import Roadmap
+
+NO_DISCS: FloatArray = np.zeros((0, 3))
+LATENCY_S = 0.05
+DETOUR_SLACK_S = 1.0
+NO_DETOUR_S = 6.0
+"""A detour that takes longer than this is none: it waits instead."""
+THERE_RATIO = 1.0
+"""Where somebody stands on the place to visit, so much of ``visit_m`` away is as good, in time to go."""
+LANE_AHEAD_M, MERGE_S = 2.0, 1.0
+"""A passage is as wide as its narrowest place so far ahead; the last part of a way leads to the middle."""
+THROUGH_RATIO = 0.5
+"""It drives through a place within so much of ``visit_m``."""
+PEOPLE_M_S = 1.4
+"""Who is no mate may come on at a walk, and gives way to nobody."""
+
+
+class Motion:
+    """Chooses commands by the dynamic window, of what its senses say.
+
+    Attributes
+    ----------
+    command
+        The last one: it stands between two scans.
+    to_go_s
+        Down the field that it follows.
+    blocked
+        Whether no way leads around who is in the way, or it holds for another reason.
+    taken
+        Whether somebody who does not go stands where it drives to.
+    """
+
+    def __init__(self, senses: Senses, motion: MotionConfig, roadmap: Roadmap, clearance_m: float) -> None:
+        self._senses, self._roadmap, self._clearance_m = senses, roadmap, clearance_m
+        config, period_s, speed = senses.config, senses.period_s, motion.top_speed_m_s
+        braking = min(motion.braking_m_s2, speed / senses.dt_s)
+        turn_rate = motion.top_turn_rate_rad_s
+        turning = min(motion.turn_acceleration_rad_s2, turn_rate / senses.dt_s)
+        self._limits = np.array([speed, braking, braking, turn_rate, turning, period_s])
+        self._safety = np.array(
+            [period_s + LATENCY_S, senses.radius_m, config.margin_m, config.gap_m, PEOPLE_M_S]
+        )
+        window = config.window
+        costs = window.heading_s_per_rad, window.near_cost_s, window.soft_m
+        self._window = window.horizon_s, *costs, window.speeds, window.turns
+        self._room: tuple[FloatArray, Pose2, tuple[float, float]] | None = None
+        self._still = StillWatch()
+        self.command, self.to_go_s = STOP, math.nan
+        self.blocked = self.taken = False
+
+    def room_ahead_m(self, time: FloatArray) -> tuple[float, float]:
+        """Half the width of the narrowest place down a field, for claims and for lanes."""
+        known, pose = self._room, self._senses.pose
+        if known is None or known[0] is not time or known[1] is not pose:
+            room_m = self._roadmap.narrowest_m(pose.x_m, pose.y_m, time, CLAIM_M, LANE_AHEAD_M)
+            self._room = known = time, pose, room_m
+        return known[2]
+
+    def sure_m(self) -> float:
+        """How near it is to a place that it is at for sure."""
+        task = self._senses.task
+        return max(min(task.near_m, 0.95 * task.visit_m - self._senses.spread_m), 0.5 * task.visit_m)
+
+    def descend(
+        self,
+        time: FloatArray,
+        at: FloatArray | None = None,
+        *,
+        came_from: int = -1,
+        then: int = -1,
+        first: bool = False,
+    ) -> Twist:
+        """The command that leads down a field of the roadmap, to a place (2,) to visit if it leads to one.
+
+        From there it is to go on to vertex ``then``, where it came from another one; -1 where that is not
+        known. Between two scans the last command stands. Who goes ``first`` drives on towards mates who talk.
+        """
+        senses, roadmap, config = self._senses, self._roadmap, self._senses.config
+        pose, (x0, y0) = senses.pose, roadmap.origin_xy_m
+        # Also between scans: the way to another vertex is not measured by what was left to the last one.
+        self.to_go_s = eikonal.value_at(pose.x_m, pose.y_m, time, x0, y0, roadmap.spacing_m, 0.0)
+        if not senses.fresh:
+            return self.command
+        room_m = self.room_ahead_m(time)[1]
+        lane_m = min(config.lane_m, max(0.0, room_m - self._clearance_m)) if room_m < math.inf else 0.0
+        lane_m *= min(1.0, self.to_go_s / MERGE_S)
+        self.blocked = self.taken = False
+        beside = senses.strange
+        if len(beside):
+            beside = voronoi_window.within(beside, config.watch_m)
+        around_m, body_m = self._clearance_m + 0.5 * config.gap_m, self._clearance_m + senses.radius_m
+        discs = _discs(senses.on_map(beside), around_m) if len(beside) and not first else NO_DISCS
+        still = self._still.step(senses.t_s, self._mute(beside))
+        if len(still):
+            discs = np.concatenate([discs, _discs(still, body_m)])
+            # Beside who stands where it wants to be it goes around him, on either side, and that will do.
+            self.taken = at is not None and bool(np.hypot(*(still - at).T).min() < body_m)
+            lane_m *= not self.taken
+        if at is None or self.taken:
+            then = -1
+        v, w, held = self._choose(time, at, came_from, then, discs, lane_m)
+        if held and lane_m > 0.0:
+            # Beside a corner the lane may lead into it; the middle does not.
+            v, w, held = self._choose(time, at, came_from, then, discs, 0.0)
+        self.command = Twist(v, w)
+        return self.command
+
+    def _choose(
+        self,
+        time: FloatArray,
+        at: FloatArray | None,
+        came_from: int,
+        then: int,
+        discs: FloatArray,
+        lane_m: float,
+    ) -> tuple[float, float, bool]:
+        """Speed, turn rate, and whether it stays where it is: down a field, around discs (M, 3)."""
+        senses, pose = self._senses, self._senses.pose
+        (x0, y0), spacing = self._roadmap.origin_xy_m, self._roadmap.spacing_m
+        if len(discs):
+            dx, dy = eikonal.descent(pose.x_m, pose.y_m, time, x0, y0, spacing)
+            # Who follows the field is the point to the left of the robot: so must be what it goes around.
+            discs = discs + lane_m * np.array([-dy, dx, 0.0])
+        gate = self.gate(at, came_from, then, discs)
+        if len(discs):
+            time, x0, y0, around_s = self._detour(time, discs)
+            self.blocked = not around_s < self.to_go_s + NO_DETOUR_S
+        v, w, status = voronoi_window.choose(
+            senses.twist.v_m_s,
+            senses.twist.w_rad_s,
+            pose.as_array(),
+            self._limits,
+            self._safety,
+            (senses.near, senses.strange, senses.people),
+            (time, x0, y0, spacing),
+            gate,
+            senses.field(lost=False),
+            lane_m,
+            self._window,
+        )
+        return v, w, status == voronoi_window.HELD
+
+    def _detour(self, time: FloatArray, discs: FloatArray) -> tuple[FloatArray, float, float, float]:
+        """A field around discs (M, 3), near by: the window, its origin, and the time at the robot."""
+        senses, roadmap = self._senses, self._roadmap
+        (x0, y0), spacing = roadmap.origin_xy_m, roadmap.spacing_m
+        x, y, reach_m = senses.pose.x_m, senses.pose.y_m, senses.config.watch_m
+        there_s, slow = THERE_RATIO * senses.task.visit_m / senses.speed_m_s, roadmap.slowness
+        return eikonal.detour(time, slow, x0, y0, spacing, x, y, reach_m, discs, DETOUR_SLACK_S, there_s)
+
+    def gate(
+        self, at: FloatArray | None, came_from: int, then: int, discs: FloatArray
+    ) -> voronoi_window.Gate:
+        """The place (2,) that it passes on its way to vertex ``then``, if it is near and no sharp turn."""
+        senses, (horizon_s, turn_s_per_rad, *_) = self._senses, self._window
+        near_m = min(self.sure_m(), THROUGH_RATIO * senses.task.visit_m)
+        if then < 0 or at is None:
+            return NO_GATE
+        x, y = at.tolist()
+        if math.hypot(x - senses.pose.x_m, y - senses.pose.y_m) > near_m + horizon_s * senses.speed_m_s:
+            return NO_GATE
+
+        def around(field: FloatArray) -> voronoi_window.Field:
+            x0, y0 = self._roadmap.origin_xy_m
+            if len(discs):
+                field, x0, y0, _ = self._detour(field, discs)
+            return field, x0, y0, self._roadmap.spacing_m
+
+        return gate_at(self._roadmap, at, came_from, then, near_m, turn_s_per_rad, around)
+
+    def _mute(self, beside: FloatArray) -> FloatArray:
+        """(K, 2) middles, map frame, of bodies among returns that no mate who talks says it is."""
+        senses = self._senses
+        if not len(beside):
+            return NO_POINTS
+        # Whoever is met is as large as the robot itself; its near side alone is seen.
+        middles = senses.on_map(voronoi_window.bodies(beside, senses.radius_m))
+        talk = [
+            (word.x_m, word.y_m, senses.radius_m + senses.speed_m_s * (senses.t_s - sent_s))
+            for sent_s, word in senses.mates.values()
+            if senses.t_s - sent_s < 3.0 * senses.config.message_period_s
+        ]
+        mute = [
+            not any(math.hypot(x - word_x, y - word_y) < reach_m for word_x, word_y, reach_m in talk)
+            for x, y in middles.tolist()
+        ]
+        return middles[np.array(mute, dtype=np.bool_)]
+
+    def careful(self, command: Twist) -> Twist:
+        """A command slowed down until its braking ends clear of everything, all of which may move."""
+        senses = self._senses
+        if not senses.fresh:
+            return self.command
+        v, now = command.v_m_s, senses.twist
+        for _ in range(4):
+            if voronoi_window.stop_is_clear(
+                now.v_m_s,
+                now.w_rad_s,
+                v,
+                command.w_rad_s,
+                self._limits,
+                self._safety,
+                (senses.near, senses.near, NO_POINTS),
+                senses.pose.as_array(),
+                senses.field(lost=True),
+            ):
+                break
+            v *= 0.5
+        else:
+            v = 0.0
+        self.command = Twist(v, command.w_rad_s)
+        return self.command
+
+    def stand(self) -> Twist:
+        """Stop."""
+        self.command = STOP
+        return STOP
+
+
+def _discs(middles_xy_m: FloatArray, radius_m: float) -> FloatArray:
+    """(M, 3) discs of one radius."""
+    return np.column_stack([middles_xy_m, np.full(len(middles_xy_m), radius_m)])

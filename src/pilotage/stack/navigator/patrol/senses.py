@@ -1,0 +1,204 @@
+"""What a robot on patrol senses: where it believes to be, who is around it, and what mates said last."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from pilotage.core.types import STOP, FloatArray, Pose2, Twist
+from pilotage.kernels.control import voronoi_window
+from pilotage.kernels.lines import clustering
+from pilotage.maps.world_map import WorldMap
+from pilotage.sensors.lidar import LidarConfig
+from pilotage.sensors.radio import RadioConfig
+from pilotage.sensors.readings import LidarScan, OdometryIncrement, RadioMessages, Readings
+from pilotage.sensors.wheel_odometry import WheelOdometryConfig
+from pilotage.stack.interface import Belief
+from pilotage.stack.journal import Journal
+from pilotage.stack.knowledge import RobotKnowledge
+from pilotage.stack.navigator.patrol.config import PatrolNavigatorConfig
+from pilotage.stack.patrol.task import PatrolTask
+from pilotage.stack.patrol.watch import IntruderWatch
+from pilotage.stack.patrol.word import TeamWord
+
+NO_FIELD: FloatArray = np.zeros((1, 1))
+NO_POINTS: FloatArray = np.zeros((0, 2))
+SECTORS = 72
+NEAR_M = 1.6
+"""Returns beyond this distance from the axle are out of the way of one decision."""
+SIGMAS = 3.0
+HEARD_PERIODS = 4.0
+"""Who said nothing for so many of its messages is silent."""
+
+
+class Senses:
+    """Takes in the readings of each step.
+
+    Attributes
+    ----------
+    t_s, pose, spread_m
+        Of this step; how far off it may be.
+    twist
+        By the odometry.
+    fresh
+        Whether this step has a scan.
+    near, strange
+        (K, 2) and (M, 2) returns of the last scan, base frame: what is near, and what is on no map.
+    people
+        (P, 2) those of ``strange`` that are of no mate.
+    alarm
+        When and where it last saw an intruder; NaN before.
+    mates
+        The last word of each team mate that was heard, by number, and when it was sent.
+    period_s
+        Between two scans.
+    radius_m, speed_m_s
+        Its own, at most.
+    """
+
+    def __init__(
+        self,
+        config: PatrolNavigatorConfig,
+        robot: RobotKnowledge,
+        chart: WorldMap,
+        task: PatrolTask,
+        start: Pose2,
+        journal: Journal,
+    ) -> None:
+        self.config, self.task, self.journal = config, task, journal
+        self.dt_s, self.radius_m, self.speed_m_s = robot.dt_s, robot.radius_m, robot.motion.top_speed_m_s
+        self._lidar, lidar = robot.one_sensor(LidarConfig, "navigator 'patrol'")
+        self._odometry, _ = robot.one_sensor(WheelOdometryConfig, "navigator 'patrol'")
+        self._radio = next(iter(robot.sensors_of(RadioConfig)), None)
+        self._directions = clustering.beam_directions(
+            float(lidar.beam_angles_rad()[0]), lidar.beam_step_rad, lidar.beams
+        )
+        self._mount = np.array([lidar.mount.x_m, lidar.mount.y_m, lidar.mount.theta_rad])
+        self._known = chart.wall_field
+        self.period_s = max(1.0 / lidar.rate_hz, robot.dt_s)
+        self.t_s, self.pose, self.spread_m, self.twist = 0.0, start, 0.0, STOP
+        self.fresh = False
+        self.near = self.strange = self.people = NO_POINTS
+        self.mates: dict[int, tuple[float, TeamWord]] = {}
+        self._watch = IntruderWatch(config.watch)
+        self.alarm = (math.nan, math.nan, math.nan)
+
+    @property
+    def talks(self) -> bool:
+        """Whether it has a radio."""
+        return self._radio is not None
+
+    def take_in(self, readings: Readings, belief: Belief, *, lost: bool) -> float:
+        """One step's readings; returns the distance driven since the last one."""
+        self.t_s, self.pose, cov = readings.t_s, belief.pose, belief.cov
+        self.spread_m = SIGMAS * math.sqrt(max(cov.item(0, 0), cov.item(1, 1)))
+        driven_m, odometry = 0.0, readings.by_sensor.get(self._odometry)
+        if isinstance(odometry, OdometryIncrement):
+            driven_m = odometry.distance_m
+            self.twist = Twist(driven_m / self.dt_s, odometry.angle_rad / self.dt_s)
+        said = None if self._radio is None else readings.by_sensor.get(self._radio)
+        if isinstance(said, RadioMessages):
+            for message in said.messages:
+                if isinstance(message.content, TeamWord):
+                    self.hear(message.sent_s, message.content)
+        scan = readings.by_sensor.get(self._lidar)
+        self.fresh = isinstance(scan, LidarScan)
+        if isinstance(scan, LidarScan):
+            self._look_around(scan.ranges_m, SIGMAS * math.sqrt(cov.item(2, 2)), lost=lost)
+        return driven_m
+
+    def hear(self, sent_s: float, word: TeamWord) -> None:
+        """A mate said something."""
+        self.mates[word.news.sender] = sent_s, word
+
+    def _look_around(self, ranges_m: FloatArray, spread_rad: float, *, lost: bool) -> None:
+        """Who is there, of a scan."""
+        self.near, self.strange = voronoi_window.scan_returns(
+            ranges_m,
+            self._directions,
+            self._mount,
+            self.pose.as_array(),
+            NEAR_M,
+            self.config.look_m,
+            self.config.tolerance_m + self.spread_m,
+            spread_rad,
+            self.field(lost=lost),
+            SECTORS,
+        )
+        self.people = self._strangers()
+        for x, y in self._watch.step(self.on_map(self.people)):
+            self.journal.count("alarms")
+            self.alarm = self.t_s, x, y
+            text = f"somebody at ({x:.1f}, {y:.1f}) who is neither on the map nor of the team"
+            self.say("intruder", text)
+
+    def _strangers(self) -> FloatArray:
+        """(P, 2) returns, base frame, that are of no mate; none while one is not heard: it may be it."""
+        words = list(self.mates.values())
+        if len(words) < len(self.task.starts) - 1 or not len(self.strange):
+            return NO_POINTS
+        there = self.on_map(self.strange)
+        nobody = np.ones(len(there), dtype=np.bool_)
+        for sent_s, word in words:
+            away = np.hypot(there[:, 0] - word.x_m, there[:, 1] - word.y_m)
+            # A mate that is lost may be anywhere, and is near to nothing that is NaN.
+            nobody &= away > self.config.watch.mate_m + self.speed_m_s * (self.t_s - sent_s)
+        return np.ascontiguousarray(self.strange[nobody])
+
+    def field(self, *, lost: bool) -> voronoi_window.Field:
+        """Distances on its map, their origin and resolution; none where it does not know where it is."""
+        x0, y0 = self._known.origin_xy_m
+        return NO_FIELD if lost else self._known.distance_m, x0, y0, self._known.resolution_m
+
+    def on_map(self, points: FloatArray) -> FloatArray:
+        """Points (M, 2) of the base frame on the map."""
+        if not len(points):
+            return points
+        c, s = math.cos(self.pose.theta_rad), math.sin(self.pose.theta_rad)
+        return np.asarray(points @ np.array([[c, s], [-s, c]]) + np.array([self.pose.x_m, self.pose.y_m]))
+
+    def strange_on_map(self) -> FloatArray:
+        """(M, 2) what is on no map, map frame."""
+        return self.on_map(self.strange)
+
+    def bodies_on_map(self) -> FloatArray:
+        """(K, 2) middles of those who are seen, map frame."""
+        return self.on_map(voronoi_window.bodies(self.strange, self.radius_m))
+
+    def crowded(self, reach_m: float) -> bool:
+        """Whether something that may move is so near to the body's edge."""
+        return bool((np.hypot(*self.strange.T) < reach_m + self.radius_m).any())
+
+    @property
+    def moving_m_s(self) -> float:
+        """By the odometry."""
+        return abs(self.twist.v_m_s)
+
+    def heard(self) -> list[tuple[int, TeamWord]]:
+        """The last words of mates that were heard lately, with their numbers."""
+        latest_s = self.t_s - HEARD_PERIODS * self.config.message_period_s
+        return [(number, word) for number, (sent_s, word) in self.mates.items() if sent_s > latest_s]
+
+    def hears_all(self) -> bool:
+        """Whether no mate is silent, or lost."""
+        words = self.heard()
+        return len(words) == len(self.task.starts) - 1 and all(math.isfinite(word.x_m) for _, word in words)
+
+    def mate_reach_m(self, number: int) -> float:
+        """Within so far of where a mate said it is, what is seen may be that mate."""
+        return self.config.watch.mate_m + self.speed_m_s * (self.t_s - self.mates[number][0])
+
+    def waits_for(self) -> bool:
+        """Whether a mate with a smaller number, that is blocked and near, is to go first."""
+        return any(
+            number < self.task.robot
+            and self.t_s - sent_s < 3.0 * self.config.message_period_s
+            and word.blocked
+            and math.hypot(word.x_m - self.pose.x_m, word.y_m - self.pose.y_m) < self.config.watch_m
+            for number, (sent_s, word) in self.mates.items()
+        )
+
+    def say(self, kind: str, text: str) -> None:
+        """Tell that something happened."""
+        self.journal.say(self.t_s, kind, text)
