@@ -11,10 +11,16 @@ from hypothesis import strategies as st
 
 from pilotage.core.types import FloatArray
 from pilotage.kernels.slam.buckets import fused, sort_into_buckets
-from pilotage.kernels.slam.frames import carried, composed
+from pilotage.kernels.slam.frames import between, between_all, carried, composed
 from pilotage.kernels.slam.match_grid import max_pyramid
 from pilotage.kernels.slam.movers import bearing_of
-from pilotage.kernels.slam.placing import guessed_motions, learn_motion, placed, plausibility
+from pilotage.kernels.slam.placing import (
+    distinct_readings,
+    guessed_motions,
+    learn_motion,
+    placed,
+    plausibility,
+)
 from pilotage.kernels.slam.scan_lines import scan_cloud
 from pilotage.kernels.slam.slips import told_by
 from support.laser_rooms import BEAMS, SPAN_RAD, furnished, ranges
@@ -156,3 +162,30 @@ def test_what_is_told_by_chance_tells_nothing() -> None:
     assert told[0, 0] == pytest.approx(0.0, abs=1e-9)
     assert told[1, 1] == pytest.approx(100.0 - 0.03 * 150.0)
     assert told == pytest.approx(told.T)
+
+
+@given(st.integers(0, 10**6))
+@settings(max_examples=60, deadline=None)
+def test_other_readings_are_apart_from_the_scans_and_from_one_another(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    scans, told = int(rng.integers(1, 6)), int(rng.integers(0, 20))
+    at = np.cumsum(rng.normal(0.0, 0.1, (scans, 3)), axis=0) + np.array([0.0, 0.0, math.pi])
+    readings = at[rng.integers(0, scans, told)] + rng.normal(0.0, 0.1, (told, 3))
+    readings[:, 2] += math.tau * rng.integers(-1, 2, told)
+    first = rng.integers(0, told + 1, scans)
+    end = first + rng.integers(0, told + 1 - first)
+    starts, others = distinct_readings(at, readings, first, end, 0.1)
+    assert starts[0] == 0
+    assert starts[-1] == len(others)
+
+    def apart(a: FloatArray, b: FloatArray) -> float:
+        return math.dist(a[:2], b[:2]) + 0.5 * abs(math.remainder(a[2] - b[2], math.tau))
+
+    for k in range(scans):
+        kept = [at[k]]
+        for reading in readings[first[k] : end[k]]:
+            if all(apart(reading, other) > 0.1 for other in kept):
+                kept.append(reading)
+        assert np.array_equal(others[starts[k] : starts[k + 1]], np.reshape(kept[1:], (-1, 3)))
+    relative = between_all(at[0], others)
+    assert all(np.array_equal(relative[k], between(at[0], other)) for k, other in enumerate(others))

@@ -47,6 +47,15 @@ def composed(a: FloatArray, b: FloatArray) -> FloatArray:
 
 
 @kernel
+def between_all(a: FloatArray, poses: FloatArray) -> FloatArray:
+    """(N, 3) poses in the frame of a (3,)."""
+    out = np.empty(poses.shape)
+    for k in range(poses.shape[0]):
+        out[k] = between(a, poses[k])
+    return out
+
+
+@kernel
 def composed_all(poses: FloatArray, b: FloatArray) -> FloatArray:
     """(N, 3) poses that have b (3,) in the frames of ``poses`` (N, 3)."""
     out = np.empty(poses.shape)

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from pilotage.kernels.arrays import BoolArray, FloatArray, IntArray
+from pilotage.kernels.arrays import FloatArray, IntArray
 from pilotage.kernels.jit import kernel
 from pilotage.kernels.slam.align import TOO_FEW, align
 from pilotage.kernels.slam.frames import between, composed
@@ -40,18 +40,56 @@ def distance(a: FloatArray, b: FloatArray) -> float:
 
 
 @kernel
-def readings_differ(
-    at_scans: FloatArray, readings: FloatArray, first: IntArray, end: IntArray, least_m: float
-) -> BoolArray:
-    """(N,) whether one of the readings ``first`` to ``end`` is ``least_m`` from where a scan (N, 3) was."""
-    out = np.zeros(at_scans.shape[0], np.bool_)
-    for k in range(at_scans.shape[0]):
-        for i in range(first[k], end[k]):
-            dx, dy = readings[i, 0] - at_scans[k, 0], readings[i, 1] - at_scans[k, 1]
-            turn = readings[i, 2] - at_scans[k, 2]
+def _distinct(
+    at: FloatArray, readings: FloatArray, first: int, end: int, least_m: float, kept: FloatArray
+) -> int:
+    """Fill ``kept`` (K, 3) with readings ``least_m`` from ``at`` (3,) and from one another; how many."""
+    count = 0
+    for i in range(first, end):
+        new = True
+        for k in range(-1, count):
+            other = at if k < 0 else kept[k]
+            turn = readings[i, 2] - other[2]
             turn -= 2.0 * math.pi * math.floor(turn / (2.0 * math.pi) + 0.5)
-            out[k] = out[k] or math.sqrt(dx * dx + dy * dy) + 0.5 * abs(turn) > least_m
-    return out
+            dx, dy = readings[i, 0] - other[0], readings[i, 1] - other[1]
+            new = new and math.sqrt(dx * dx + dy * dy) + 0.5 * abs(turn) > least_m
+        if new:
+            kept[count] = readings[i]
+            count += 1
+    return count
+
+
+@kernel
+def distinct_readings(
+    at_scans: FloatArray, readings: FloatArray, first: IntArray, end: IntArray, least_m: float
+) -> tuple[IntArray, FloatArray]:
+    """Where else each scan may have been by the odometry.
+
+    Parameters
+    ----------
+    at_scans
+        (N, 3) where the odometry has the scans.
+    readings, first, end
+        (R, 3) all that it told; those from ``first`` up to ``end`` (N,) are asked for each scan.
+    least_m
+        How far they must be from there and from one another, a radian counting as half a metre.
+
+    Returns
+    -------
+    starts, others
+        (N + 1,) and (M, 3): those of scan k are ``others[starts[k] : starts[k + 1]]``.
+    """
+    count, most = at_scans.shape[0], 0
+    for k in range(count):
+        most = max(most, end[k] - first[k])
+    kept, starts = np.empty((most, 3)), np.zeros(count + 1, np.int64)
+    for k in range(count):
+        starts[k + 1] = starts[k] + _distinct(at_scans[k], readings, first[k], end[k], least_m, kept)
+    others = np.empty((starts[count], 3))
+    for k in range(count):
+        if starts[k + 1] > starts[k]:
+            _distinct(at_scans[k], readings, first[k], end[k], least_m, others[starts[k] : starts[k + 1]])
+    return starts, others
 
 
 @kernel

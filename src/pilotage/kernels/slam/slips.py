@@ -33,32 +33,37 @@ def told_by(hessian: FloatArray, weight: float) -> FloatArray:
 
 
 @kernel
-def slipped(
-    start: FloatArray, pose: FloatArray, hessian: FloatArray, weight: float, error: float, prior: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """What a scan may have slipped, in its own frame.
+def add_slip(
+    total: FloatArray,
+    held: FloatArray,
+    start: FloatArray,
+    pose: FloatArray,
+    hessian: FloatArray,
+    weight: float,
+    error: float,
+    by_chance: bool,
+    prior: FloatArray,
+) -> None:
+    """Add what a scan may have slipped, in its own frame.
 
     Parameters
     ----------
+    total, held
+        (3, 3) covariance, and (3, 3) square root of one of what is the same from scan to scan.
     start, pose, hessian, weight
         (3,), (3,) and (3, 3) of the alignment, and the sum of its points' weights.
-    error
-        Usual error of the guess it began from.
+    error, by_chance
+        Usual error of the guess it began from, which is all that tells where the alignment leaves the pose
+        open; and whether it errs by chance, not the same all along.
     prior
         (3, 3) information of the start in the alignment.
-
-    Returns
-    -------
-    covariance
-        (3, 3) for how far the alignment moved it.
-    left
-        (3, 3) square root of the covariance of what only the guess tells.
     """
     off = between(start, pose)
     far, turned = math.hypot(off[0], off[1]), abs(off[2])
-    covariance = np.zeros((3, 3))
-    covariance[0, 0] = covariance[1, 1] = (SLIP_SHARE * far) ** 2 + (far * far / SLIP_M) ** 2
-    covariance[2, 2] = (SLIP_SHARE * turned) ** 2 + (turned * turned / (0.5 * SLIP_M)) ** 2
+    moved = (SLIP_SHARE * far) ** 2 + (far * far / SLIP_M) ** 2
+    total[0, 0] += moved
+    total[1, 1] += moved
+    total[2, 2] += (SLIP_SHARE * turned) ** 2 + (turned * turned / (0.5 * SLIP_M)) ** 2
     turn = np.eye(3)
     turn[0, 0] = turn[1, 1] = math.cos(pose[2])
     turn[1, 0] = math.sin(pose[2])
@@ -66,4 +71,8 @@ def slipped(
     told = told_by(turn.T @ hessian @ turn, weight)
     # Squared: what the map holds, however weakly, does not add up from scan to scan.
     share = np.linalg.solve(told + prior, prior)
-    return covariance, error * (share @ share)
+    left = error * (share @ share)
+    if by_chance:
+        total += left @ left.T
+    else:
+        held += left

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -59,8 +60,14 @@ def cloud_of(log: LaserLog, scan: int, max_range_m: float, spacing: float = 1.0)
     first, step = float(log.first_angle_rad[scan]), float(log.angle_step_rad[scan])
     # The middle stays where it is.
     first += 0.5 * (1.0 - spacing) * step * (beams - 1)
-    angles: FloatArray = first + spacing * step * np.arange(beams, dtype=np.float64)
+    angles = _angles(first, spacing * step, beams)
     return cloud_of_beams(log.ranges_m[scan, :beams], angles, step, max_range_m)
+
+
+@lru_cache(maxsize=4)
+def _angles(first_rad: float, step_rad: float, beams: int) -> FloatArray:
+    """(B,) directions, which are the same for all scans of most recordings."""
+    return first_rad + step_rad * np.arange(beams, dtype=np.float64)
 
 
 def cloud_of_beams(

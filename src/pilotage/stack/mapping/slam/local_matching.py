@@ -6,7 +6,6 @@ as good as usual, the neighbourhood is searched by branch and bound.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -27,7 +26,7 @@ from pilotage.kernels.slam.placing import (
 )
 from pilotage.stack.mapping.slam.config import SlamConfig
 from pilotage.stack.mapping.slam.fit import Fit
-from pilotage.stack.mapping.slam.odometry import MotionGuess
+from pilotage.stack.mapping.slam.odometry import NO_OTHERS, MotionGuess
 from pilotage.stack.mapping.slam.surroundings import Surroundings, every_second, in_range
 
 BUCKET_M = 0.1
@@ -59,7 +58,8 @@ NEAR_M, NEAR_RAD = 0.5, 0.6
 """The search window beside an odometry's motion that is longer than LONG_M."""
 BETTER_POOR, BETTER_GOOD = 1.1, 1.03
 """By how much a place that was searched must fit better than the guesses."""
-_NO_OTHERS = np.zeros((0, 3))
+
+_STANDING = np.zeros(3)
 
 Reference = tuple[FloatArray, IntArray, FloatArray]
 """Points in buckets, as ``align`` takes them."""
@@ -150,14 +150,19 @@ class LocalMatcher:
         self._around = None
         self._refer()
 
+    def guesses(self, step: FloatArray | None, dt_s: float) -> tuple[FloatArray, int]:
+        """Motions (G, 3) that a scan may have made, the most trusted first, and how many are credible."""
+        return self._guess.guesses(step, dt_s)
+
     def match(
         self,
         cloud: FloatArray,
         last: FloatArray,
         step: FloatArray | None,
+        guesses: tuple[FloatArray, int],
         dt_s: float,
         gap_s: float,
-        others: Sequence[FloatArray] = (),
+        others: FloatArray = NO_OTHERS,
     ) -> Fit | None:
         """Align a scan; None where it cannot be.
 
@@ -167,18 +172,19 @@ class LocalMatcher:
             (3,) pose of the scan before.
         step
             (3,) motion since by the odometry, if there is any.
+        guesses
+            What ``guesses`` makes of it.
         dt_s, gap_s
             Smoothed and stamped time since.
         others
-            (3,) each, what else the odometry may have meant: tried where the first fits less than well.
+            (M, 3) what else the odometry may have meant: tried where the first fits less than well.
         """
         self._led = step is not None
-        motions, count = self._guess.guesses(step, dt_s)
-        other = np.array(others) if others else _NO_OTHERS
-        led = step is not None and self._guess.odometry_leads
-        best, split = self._placed(cloud, last, motions, count, led, other)
-        credible = np.concatenate([motions[:count], other])
-        if led and distance(motions[0], np.zeros(3)) > LONG_M:
+        motions, count = guesses
+        led = self._led and self._guess.odometry_leads
+        best, split = self._placed(cloud, last, motions, count, led, others)
+        credible = motions[:count] if len(others) == 0 else np.concatenate([motions[:count], others])
+        if led and distance(motions[0], _STANDING) > LONG_M:
             best = self._near(cloud, last, motions[0], credible, best)
         poor = best is None or best.value < POOR * self._usual
         if poor or step is None:
@@ -202,13 +208,8 @@ class LocalMatcher:
         self._lost_s = 0.0
         self.rms_m += 0.05 * (best.rms_m - self.rms_m)
         self._usual += 0.02 * (best.value - self._usual)
-        out = replace(best, guess_error=self._guess.least_error, by_odometry=led)
         self._guess.learn(step, between(last, best.pose), dt_s)
-        return out
-
-    def fallback(self, last: FloatArray, step: FloatArray | None, dt_s: float) -> FloatArray:
-        """Pose by the most trusted guess alone."""
-        return np.asarray(composed(last, self._guess.guesses(step, dt_s)[0][0]))
+        return best
 
     def _placed(
         self,
@@ -236,7 +237,9 @@ class LocalMatcher:
             *reference,
         )
         value, off, rms_m, weight = told.tolist()
-        return None if value < 0.0 else Fit(value, pose, hessian, start, rms_m, off, weight), split
+        if value < 0.0:
+            return None, split
+        return Fit(value, pose, hessian, start, rms_m, off, weight, self._guess.least_error, led), split
 
     def _plausible(self, fit: Fit, last: FloatArray, guesses: FloatArray) -> Fit:
         """Lower a fit's value by how far it is from all credible guesses, in units of their usual error."""
@@ -260,7 +263,17 @@ class LocalMatcher:
         if status == TOO_FEW:
             return None
         pose[2] = (pose[2] + np.pi) % (2.0 * np.pi) - np.pi
-        return Fit(float(fit[1]) / cloud.shape[0], pose, hessian, start, float(fit[0]), weight=float(fit[1]))
+        return Fit(
+            float(fit[1]) / cloud.shape[0],
+            pose,
+            hessian,
+            start,
+            float(fit[0]),
+            0.0,
+            float(fit[1]),
+            self._guess.least_error,
+            self._led and self._guess.odometry_leads,
+        )
 
     def _far(
         self, cloud: FloatArray, last: FloatArray, motion: FloatArray, credible: FloatArray | None

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-
 import numpy as np
 
 from pilotage.core.types import FloatArray, Pose2
-from pilotage.kernels.slam.frames import between, composed, composed_all
-from pilotage.kernels.slam.placing import distance, guessed_motions, learn_motion, readings_differ
+from pilotage.kernels.slam.frames import between, between_all, composed, composed_all
+from pilotage.kernels.slam.placing import distance, distinct_readings, guessed_motions, learn_motion
 from pilotage.logs.laser_log import LaserLog
 
 _SMOOTHED = 4
@@ -16,6 +14,8 @@ _SMOOTHED = 4
 STAMP_OFF_S, OTHER_READING_M = 0.1, 0.08
 """A stamp may be off by so much; readings nearer together (a radian as half a metre) are one guess."""
 _NONE = np.zeros(3)
+NO_OTHERS = np.zeros((0, 3))
+"""Nothing else that the odometry may have meant."""
 
 
 def scanner_odometry(log: LaserLog, used: bool) -> FloatArray | None:
@@ -38,41 +38,38 @@ class ScanMotions:
         at_scans = scanner_odometry(log, used)
         self._at_scans = at_scans
         self._anchor = None if at_scans is None else at_scans[0]
-        self._readings = np.zeros((0, 3))
-        self._differ = [False] * len(log)
-        if at_scans is None or _carried(log):
+        self._starts: list[int] = [0] * (len(log) + 1)
+        self._others = NO_OTHERS
+        if at_scans is None or _carried(log) or log.odometry is None or log.odometry_t_s is None:
             return
-        if log.odometry is not None and log.odometry_t_s is not None:
-            self._readings = composed_all(log.odometry, mount_pose(log.mount))
-            self._first = np.searchsorted(log.odometry_t_s, log.t_s - STAMP_OFF_S)
-            self._end = np.searchsorted(log.odometry_t_s, log.t_s + STAMP_OFF_S)
-        if len(self._readings):
-            self._differ = readings_differ(
-                at_scans, self._readings, self._first, self._end, OTHER_READING_M
-            ).tolist()
+        starts, self._others = distinct_readings(
+            at_scans,
+            composed_all(log.odometry, mount_pose(log.mount)),
+            np.searchsorted(log.odometry_t_s, log.t_s - STAMP_OFF_S),
+            np.searchsorted(log.odometry_t_s, log.t_s + STAMP_OFF_S),
+            OTHER_READING_M,
+        )
+        self._starts = starts.tolist()
 
-    def of(self, scan: int) -> tuple[FloatArray | None, list[FloatArray]]:
-        """Return the motion (3,) since the last scan by the odometry, if any, and what else it may be."""
+    def of(self, scan: int) -> tuple[FloatArray | None, FloatArray]:
+        """Motion (3,) by the odometry since the last scan, if any, and what else (M, 3) it may be."""
         if self._at_scans is None or self._anchor is None:
-            return None, []
-        if not self._differ[scan]:
-            return between(self._anchor, self._at_scans[scan]), []
-        kept = [self._at_scans[scan]]
-        near = self._readings[self._first[scan] : self._end[scan]]
-        off = np.hypot(*(near[:, :2] - kept[0][:2]).T) + 0.5 * np.abs(_turn(near[:, 2] - kept[0][2]))
-        for reading in near[off > OTHER_READING_M]:
-            if min(_apart(reading, other) for other in kept) > OTHER_READING_M:
-                kept.append(reading)
-        return between(self._anchor, kept[0]), [between(self._anchor, reading) for reading in kept[1:]]
+            return None, NO_OTHERS
+        step, first, end = (
+            between(self._anchor, self._at_scans[scan]),
+            self._starts[scan],
+            self._starts[scan + 1],
+        )
+        return step, NO_OTHERS if first == end else between_all(self._anchor, self._others[first:end])
 
-    def learn(self, scan: int, motion: FloatArray, step: FloatArray | None, others: list[FloatArray]) -> None:
+    def learn(self, scan: int, motion: FloatArray, step: FloatArray | None, others: FloatArray) -> None:
         """Count the next motion from the reading that a match (3,) of this scan was nearest to."""
         if step is None or self._at_scans is None or self._anchor is None:
             return
-        if not others:
+        if len(others) == 0:
             self._anchor = self._at_scans[scan]
             return
-        best = min(others, key=lambda other: distance(other, motion), default=step)
+        best = min(others, key=lambda other: distance(other, motion))
         usual = distance(step, motion)
         if usual > OTHER_READING_M and distance(best, motion) < 0.5 * usual:
             self._anchor = composed(self._anchor, best)
@@ -83,15 +80,6 @@ class ScanMotions:
 def _carried(log: LaserLog) -> bool:
     """Whether each scan has a reading of its own: what the odometry told then, whatever the stamps."""
     return log.odometry_t_s is not None and np.array_equal(log.odometry_t_s, log.t_s)
-
-
-def _turn(angle: FloatArray) -> FloatArray:
-    return np.asarray((angle + np.pi) % (2.0 * np.pi) - np.pi)
-
-
-def _apart(a: FloatArray, b: FloatArray) -> float:
-    """Distance of two poses (3,), a radian counting as half a metre."""
-    return distance(between(a, b), np.zeros(3))
 
 
 def mount_pose(mount: Pose2) -> FloatArray:
@@ -107,34 +95,35 @@ def smoothed_times(t_s: FloatArray) -> FloatArray:
     return np.asarray((sums[2 * k + 1 :] - sums[: -2 * k - 1]) / (2 * k + 1))
 
 
-@dataclass(slots=True)
 class MotionGuess:
     """Guesses of the next relative motion, ordered by how far each was off lately.
 
     The odometry of some logs lacks the sign of a reverse, that of others is not there at all: none is
     believed before it has shown to be right, and a constant velocity is a guess like any other.
+
+    Attributes
+    ----------
+    velocity
+        (3,) in the scanner's frame, a second.
+    least_error, odometry_leads
+        Running mean error of the most trusted guess, and whether the odometry was nearest lately.
     """
 
-    errors: FloatArray = field(default_factory=lambda: np.array([0.0, 0.001, 0.002]))
-    velocity: FloatArray = field(default_factory=lambda: np.zeros(3))
-
-    @property
-    def least_error(self) -> float:
-        """Running mean error of the most trusted guess."""
-        return float(self.errors.min())
-
-    @property
-    def odometry_leads(self) -> bool:
-        """Whether the odometry was nearest lately."""
-        return int(self.errors.argmin()) == 0
+    def __init__(self) -> None:
+        self.velocity = np.zeros(3)
+        self._errors = np.array([0.0, 0.001, 0.002])
+        self.least_error, self.odometry_leads = 0.0, True
 
     def guesses(self, step: FloatArray | None, dt_s: float) -> tuple[FloatArray, int]:
         """Return the motions (G, 3), the most trusted first, and how many were about as good as that one."""
         return guessed_motions(
-            self.errors, self.velocity, _NONE if step is None else step, step is not None, dt_s
+            self._errors, self.velocity, _NONE if step is None else step, step is not None, dt_s
         )
 
     def learn(self, step: FloatArray | None, motion: FloatArray, dt_s: float) -> None:
         """Take in the motion that the scan told."""
         led = step is not None
-        learn_motion(self.errors, self.velocity, step if step is not None else _NONE, led, motion, dt_s)
+        learn_motion(self._errors, self.velocity, step if step is not None else _NONE, led, motion, dt_s)
+        errors = self._errors.tolist()
+        self.least_error = min(errors)
+        self.odometry_leads = errors[0] == self.least_error

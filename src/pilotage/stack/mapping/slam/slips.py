@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from pilotage.core.types import FloatArray
-from pilotage.kernels.slam.slips import slipped
+from pilotage.kernels.slam.slips import add_slip
 from pilotage.stack.mapping.slam.fit import Fit
 from pilotage.stack.mapping.slam.local_matching import PRIOR
 
@@ -30,12 +30,17 @@ class Slips:
 
     def matched(self, fit: Fit) -> None:
         """Take in a scan that was aligned."""
-        covariance, left = slipped(fit.start, fit.pose, fit.hessian, fit.weight, fit.guess_error, PRIOR)
-        self._sum += covariance
-        if fit.by_odometry:
-            self._sum += left @ left.T
-        else:
-            self._held += left
+        add_slip(
+            self._sum,
+            self._held,
+            fit.start,
+            fit.pose,
+            fit.hessian,
+            fit.weight,
+            fit.guess_error,
+            fit.by_odometry,
+            PRIOR,
+        )
 
     def add(self, covariance: FloatArray) -> None:
         """Take in a slip of another cause."""

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -14,7 +15,7 @@ from pilotage.stack.mapping.slam.clouds import Clouds, cloud_of
 from pilotage.stack.mapping.slam.config import SlamConfig
 from pilotage.stack.mapping.slam.local_matching import Aside, LocalMatcher
 from pilotage.stack.mapping.slam.movers import Movers
-from pilotage.stack.mapping.slam.odometry import ScanMotions, smoothed_times
+from pilotage.stack.mapping.slam.odometry import NO_OTHERS, ScanMotions, smoothed_times
 from pilotage.stack.mapping.slam.slips import (
     BLIND_BREAK_SLIP,
     BREAK_SLIP,
@@ -127,7 +128,7 @@ class Tracker:
         step: FloatArray | None,
         dt_s: float,
         gap_s: float,
-        others: Sequence[FloatArray] = (),
+        others: FloatArray = NO_OTHERS,
     ) -> bool:
         """Place the next scan (K, 6); True where it became a keyframe. As ``LocalMatcher.match``."""
         hessian, broken, led = np.zeros((3, 3)), False, None
@@ -136,13 +137,15 @@ class Tracker:
             pose = np.zeros(3)
         else:
             last = self._poses[-1]
+            guesses = self._matcher.guesses(step, dt_s)
+            expected = composed(last, guesses[0][0])
             if step is not None and self._matcher.guess_error < SURE_GUESS:
-                led = self._matcher.fallback(last, step, dt_s)
+                led = expected
                 light = self._movers.without(light, led)
-            fit = self._matcher.match(light, last, step, dt_s, gap_s, others)
+            fit = self._matcher.match(light, last, step, guesses, dt_s, gap_s, others)
             self._lost_run = 0 if fit is not None else self._lost_run + 1
             if fit is None:
-                pose, hessian = self._matcher.fallback(last, step, dt_s), RIGID
+                pose, hessian = expected, RIGID
                 broken = step is None or self._lost_run > GUESSED_SCANS or _is_far(step)
                 self._slip.add(BLIND_BREAK_SLIP if step is None else BREAK_SLIP if broken else GUESS_SLIP)
                 if broken:
@@ -276,13 +279,11 @@ def track(log: LaserLog, config: SlamConfig, on_scan: OnScan | None = None) -> L
     motions = ScanMotions(log, config.use_odometry)
     times = smoothed_times(log.t_s)
     tracker = Tracker(config)
-    for i in range(len(log)):
-        before = max(0, i - 1)
+    gaps_s = np.diff(log.t_s, prepend=log.t_s[0]).tolist()
+    for i, dt_s in enumerate(np.maximum(1e-3, np.diff(times, prepend=times[0])).tolist()):
         step, others = motions.of(i)
-        dt_s = max(1e-3, float(times[i] - times[before]))
-        gap_s = float(log.t_s[i] - log.t_s[before])
         last = tracker.pose if i else np.zeros(3)
-        tracker.add(cloud_of(log, i, config.max_range_m), step, dt_s, gap_s, others)
+        tracker.add(cloud_of(log, i, config.max_range_m), step, dt_s, gaps_s[i], others)
         motions.learn(i, between(last, tracker.pose), step, others)
         if on_scan is not None:
             on_scan(i)
@@ -291,10 +292,10 @@ def track(log: LaserLog, config: SlamConfig, on_scan: OnScan | None = None) -> L
 
 def _is_new(motion: FloatArray, config: SlamConfig) -> bool:
     """Whether a scan is far enough from the last keyframe to become one."""
-    far = float(np.hypot(motion[0], motion[1])) > config.keyframe_distance_m
+    far = math.hypot(motion[0], motion[1]) > config.keyframe_distance_m
     return far or abs(float(motion[2])) > config.keyframe_turn_rad
 
 
 def _is_far(motion: FloatArray) -> bool:
     """Whether scans are so far apart that one alone leads out of what the last keyframe saw."""
-    return bool(np.hypot(motion[0], motion[1]) > FAR_M or abs(motion[2]) > FAR_RAD)
+    return math.hypot(motion[0], motion[1]) > FAR_M or abs(float(motion[2])) > FAR_RAD
