@@ -28,8 +28,14 @@ THREE_QUARTERS = np.linspace(-0.75 * math.pi, 0.75 * math.pi, 541)
 WHOLE = np.linspace(-math.pi, math.pi, 721)
 
 
-def driven(beams: FloatArray, half_m: float, walks_m_s: float, heading_rad: float = 0.0) -> FloatArray:
-    """(80, 4) speed and turn rate commanded and driven, in a corridor with somebody who comes straight on."""
+def driven(
+    beams: FloatArray,
+    half_m: float,
+    walks_m_s: float,
+    heading_rad: float = 0.0,
+    begins_m: tuple[float, float] = (3.0, 0.02),
+) -> FloatArray:
+    """(80, 5) speed and turn rate commanded and driven, and the distance to somebody who walks towards -x."""
     config = LOCAL_CONTROLLERS.configure("gap-horizon", {"ground": {"movers": {"enabled": True}}}, "")
     controller = LOCAL_CONTROLLERS.entry("gap-horizon").factory(config, np.random.default_rng(1))
     walls = np.array([[-8.0, half_m, 8.0, half_m], [-8.0, -half_m, 8.0, -half_m]])
@@ -37,7 +43,7 @@ def driven(beams: FloatArray, half_m: float, walks_m_s: float, heading_rad: floa
     rows = []
     for k in range(80):
         t_s = k * DT_S
-        walker = np.array([[3.0 - walks_m_s * t_s, 0.02, 0.25]])
+        walker = np.array([[begins_m[0] - walks_m_s * t_s, begins_m[1], 0.25]])
         x, y, theta, v, w = state
         eye = x + MOUNT.x_m * math.cos(theta), y + MOUNT.x_m * math.sin(theta), theta + float(beams[0])
         ranges = fan_ranges(*eye, float(beams[1] - beams[0]), beams.shape[0], 20.0, walls, walker)
@@ -45,7 +51,8 @@ def driven(beams: FloatArray, half_m: float, walks_m_s: float, heading_rad: floa
         view = LocalView(t_s, pose, twist, ranges, beams, MOUNT, 20.0, (6.0, 0.0), LIMITS, JACKAL)
         command = controller.step(view)
         state = advance(*state, command.v_m_s, command.w_rad_s, DT_S, DRIVE)
-        rows.append((command.v_m_s, command.w_rad_s, *state[3:]))
+        away_m = math.hypot(walker[0, 0] - x, walker[0, 1] - y) - 0.25
+        rows.append((command.v_m_s, command.w_rad_s, *state[3:], away_m))
     return np.array(rows)
 
 
@@ -68,6 +75,18 @@ def test_its_corners_come_nearer_to_nobody_whom_its_laser_does_not_see(heading_r
 
     assert swings(THREE_QUARTERS) < 0.05
     assert swings(WHOLE) > 0.3
+
+
+def test_it_slows_for_people_near_ahead_and_not_for_those_whom_it_leaves_behind() -> None:
+    def fastest(begins_m: tuple[float, float], walks_m_s: float) -> float:
+        rows = driven(THREE_QUARTERS, 4.0, walks_m_s, begins_m=begins_m)
+        # Somebody is known after four readings; 2 m/s takes the robot two thirds of a second.
+        near = rows[(rows[:, 4] < GapHorizonConfig().calm_m) & (np.arange(len(rows)) >= 4)]
+        assert len(near) > 12
+        return float(near[:, 0].max())
+
+    assert fastest((-0.3, 1.6), 0.6) > 1.9
+    assert fastest((2.0, 1.6), -1.2) <= GapHorizonConfig().calm_m_s
 
 
 @pytest.mark.parametrize("bearing_rad", [-0.6, -0.3, 0.3, 0.6])

@@ -180,6 +180,16 @@ class Movers:
         rests: BoolArray = self.tracks[~self._things, kernels.READINGS] >= readings
         return rests
 
+    def nearest_ahead_m(self, pose: FloatArray) -> float:
+        """Distance from a robot's centre to the edge of the nearest body ahead of it; inf without any.
+
+        ``pose``: (3,). Ahead is all before the line across the robot.
+        """
+        bodies = self.tracks[self._count() & ~self._things]
+        dx, dy = bodies[:, kernels.X] - pose[0], bodies[:, kernels.Y] - pose[1]
+        ahead = dx * math.cos(pose[2]) + dy * math.sin(pose[2]) > 0.0
+        return float(np.hypot(dx, dy)[ahead].min(initial=math.inf)) - self._config.radius_m
+
     def nearest_m(self, x_m: float, y_m: float) -> float:
         """Distance from a point to the nearest body's edge; inf without any."""
         if not self.tracks.shape[0]:

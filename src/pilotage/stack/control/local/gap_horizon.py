@@ -89,10 +89,11 @@ class GapHorizonConfig(Config):
     calm_m: NonNegative = 2.5
     calm_m_s: Positive = 1.4
     calm_rad_s: Positive = 2.0
-    """With a moving body so near it drives and turns no faster: behind one there may be another, whom nobody
-    sees, and corners that swing do not stop at once."""
+    """With a moving body so near ahead it drives no faster: behind one there may be another, whom nobody
+    sees. With one so near anywhere it turns no faster: corners that swing do not stop at once."""
     new_m: NonNegative = 5.0
-    """Nor faster while somebody is so near ahead of whom it cannot tell yet where he goes: he may run."""
+    """Nor does it drive faster while somebody is so near ahead of whom it cannot tell yet where he goes: he
+    may run."""
     backs_after_s: NonNegative = 10.0
     """For so long after it saw somebody it does not back where its laser does not look, unless it has come
     nowhere for as long: it may be shut in."""
@@ -146,10 +147,9 @@ class GapHorizon(RollingController):
     def _careful(self, view: LocalView, scene: Scene) -> Scene:
         config, drive = self._config, scene.drive
         if self._people_are_near(scene):
-            drive = drive._replace(
-                speed=min(drive.speed, config.calm_m_s), turn_rate=min(drive.turn_rate, config.calm_rad_s)
-            )
-        elif scene.movers.new_within(scene.pose, config.new_m):
+            drive = drive._replace(turn_rate=min(drive.turn_rate, config.calm_rad_s))
+        ahead_m = scene.movers.nearest_ahead_m(scene.pose)
+        if ahead_m < config.calm_m or scene.movers.new_within(scene.pose, config.new_m):
             drive = drive._replace(speed=min(drive.speed, config.calm_m_s))
         if self._may_be_followed(view, scene):
             drive = drive._replace(reverse=0.0, least_radius=self._swings_m(view, scene))
