@@ -65,6 +65,24 @@ def test_a_mapper_is_shown_what_stands_and_not_who_walks() -> None:
     assert np.hypot(*(bodies.discs_m()[0, :2] - (2.5, 1.0))) < 0.15
 
 
+@pytest.mark.parametrize("seed", [0, 7, 12, 14])
+def test_nobody_walks_where_the_end_of_the_view_glides_along_a_wall(seed: int) -> None:
+    """A robot drives away from an unknown wall, of which its last beams show more or less as it sways."""
+    rng = np.random.default_rng(seed)
+    walls = np.vstack([WALLS, [-8.2, 2.85, -1.5, 2.85]])
+    bodies = MovingBodies(MovingBodiesConfig(), ROBOT, CHART)
+    first = float(LIDAR.beam_angles_rad()[0])
+    x, y = 0.0, 0.6
+    for k in range(30):
+        theta = -1.35 + 0.1 * math.sin(0.5 * k + seed) + 0.03 * float(rng.standard_normal())
+        x, y = x + 0.1 * math.cos(theta), y + 0.1 * math.sin(theta)
+        ranges = fan_ranges(x, y, theta + first, LIDAR.beam_step_rad, 539, 12.0, walls, NOTHING)
+        ranges = np.where(ranges < 12.0, ranges + 0.003 * rng.standard_normal(539), ranges)
+        belief = Belief(Pose2(x, y, theta), 1e-6 * np.eye(3))
+        bodies.step(Readings(0.1 * k, {"lidar": LidarScan(ranges)}), belief)
+        assert not bodies.about, f"step {k}"
+
+
 def test_it_gives_way_ahead_and_may_drive_away_and_never_backs_blindly() -> None:
     bodies = MovingBodies(MovingBodiesConfig(), ROBOT, CHART)
     gives_way = GiveWay(GiveWayConfig(), ROBOT, bodies)

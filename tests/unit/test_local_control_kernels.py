@@ -29,6 +29,7 @@ from pilotage.kernels.control.movers import (
     X,
     Y,
     closes_in,
+    cut_off,
     foretold,
     scan_clusters,
     track_step,
@@ -354,6 +355,22 @@ def test_clusters_end_at_gaps_and_wide_ones_are_none() -> None:
     assert np.all(of_point[:40] == -1)
     assert np.all(of_point[40:] == 0)
     assert math.hypot(*centres[0]) > math.hypot(2.0, 1.65)
+
+
+def test_what_the_end_of_the_view_cuts_off_is_no_whole_thing() -> None:
+    """Of three things the first beam cuts off one, and the reach another; the first and the last alike."""
+    angles = np.linspace(-0.5, 0.5, 101)
+    ranges = np.full(101, 20.0)
+    ranges[:8], ranges[40:50], ranges[80:90] = 3.0, 4.0, 5.9
+    ranges[90:93] = 6.02
+    beams = np.flatnonzero(ranges < 6.0)
+    points = ranges[beams, None] * np.column_stack([np.cos(angles[beams]), np.sin(angles[beams])])
+    cut = cut_off(points, beams, ranges, 6.0, 0.2, False)
+    assert cut.tolist() == [True] * 8 + [False] * 10 + [True] * 10
+    # All around there is no end; and what stands a step behind is another thing.
+    assert cut_off(points, beams, ranges, 6.0, 0.2, True).tolist() == [False] * 18 + [True] * 10
+    ranges[90:93] = 6.3
+    assert cut_off(points, beams, ranges, 6.0, 0.2, False).tolist() == [True] * 8 + [False] * 20
 
 
 def seen_discs(*discs: tuple[float, float]) -> FloatArray:

@@ -75,6 +75,36 @@ def scan_clusters(
 
 
 @kernel
+def cut_off(
+    points: FloatArray, beams: IntArray, ranges: FloatArray, reach: float, gap: float, around: bool
+) -> BoolArray:
+    """Which points (N, 2) belong to a thing of which no more is seen than the end of the view shows.
+
+    They are in the order of the ``beams`` (N,) of the scan (B,) that met them. A thing, points no farther
+    apart than ``gap``, is cut off by the first and the last beam of a scan that does not look all
+    ``around``, and by the ``reach`` where a beam beside it ends less than ``gap`` beyond that: what of it is
+    seen moves as the robot does.
+    """
+    count = points.shape[0]
+    out = np.zeros(count, np.bool_)
+    begin, cut = 0, False
+    for k in range(count):
+        for beside in (beams[k] - 1, beams[k] + 1):
+            if 0 <= beside < ranges.shape[0]:
+                cut = cut or reach <= ranges[beside] < reach + gap
+            else:
+                cut = cut or not around
+        ends = k == count - 1
+        if not ends:
+            dx, dy = points[k + 1, 0] - points[k, 0], points[k + 1, 1] - points[k, 1]
+            ends = dx * dx + dy * dy > gap * gap
+        if ends:
+            out[begin : k + 1] = cut
+            begin, cut = k + 1, False
+    return out
+
+
+@kernel
 def _notch(points: FloatArray, begin: int, end: int) -> int:
     """Where to cut a cluster that two round bodies make: the deepest point behind both their fronts.
 

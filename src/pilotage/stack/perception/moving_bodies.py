@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import Field
 
 from pilotage.core.config import Config
-from pilotage.core.types import BoolArray, FloatArray, Pose2
+from pilotage.core.types import BoolArray, FloatArray, IntArray, Pose2
 from pilotage.kernels.control import movers as kernels
 from pilotage.maps.world_map import WorldMap
 from pilotage.sensors.lidar import LidarConfig
@@ -115,7 +115,10 @@ class MovingBodies:
         if not len(points) and not len(self._movers.tracks):
             self._loose = points
             return readings
-        of_track = self._movers.track(x, y, pose.theta_rad, points, dt_s, self._field)
+        of_track = np.full(len(points), kernels.UNUSED)
+        # Before the first one is known nothing is taken for somebody of which only a moving part is seen.
+        whole = np.ones(len(points), np.bool_) if self.about else ~self._cut_off(points, beams, scan.ranges_m)
+        of_track[whole] = self._movers.track(x, y, pose.theta_rad, points[whole], dt_s, self._field)
         self._walks = self._told(x, y, first, scan.ranges_m)
         walks = np.append(self._walks, False)[of_track]
         self._loose = points[walks | (of_track < 0)]
@@ -131,6 +134,14 @@ class MovingBodies:
         ranges_m = scan.ranges_m.copy()
         ranges_m[dropped] = math.nan
         return replace(readings, by_sensor={**readings.by_sensor, self._lidar: LidarScan(ranges_m)})
+
+    def _cut_off(self, points: FloatArray, beams: IntArray, ranges_m: FloatArray) -> BoolArray:
+        """Which points belong to a thing that goes on beyond the field of view, or the reach."""
+        looks_around = self._field[1] - self._field[0] > 2.0 * math.pi - 1.5 * self._step
+        cut: BoolArray = kernels.cut_off(
+            points, beams, ranges_m, self._reach_m, self._config.tracks.gap_m, looks_around
+        )
+        return cut
 
     def _told(self, x_m: float, y_m: float, first_rad: float, ranges_m: FloatArray) -> BoolArray:
         """Which tracks do not stand; notes when somebody is there who walks beyond doubt, or did.
