@@ -6,6 +6,7 @@ import math
 import time
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -19,6 +20,7 @@ from pilotage.models.footprint import Footprint
 from pilotage.stack.interface import PlannedPath
 from pilotage.stack.journal import Journal
 from pilotage.stack.knowledge import RobotKnowledge
+from pilotage.stack.navigator.doubtful_gap import doubtful_gap
 from pilotage.stack.navigator.progress import PathProgress
 from pilotage.stack.planning.planner import (
     Path,
@@ -44,6 +46,14 @@ INSTEAD = " (stack.planner: hybrid-astar plans for outline and arcs)"
 """What does where a path for the centre does not."""
 BESIDE_M = 0.05
 """An outline that is driven along a path keeps this from walls, or what the path keeps where that is less."""
+
+
+class _Found(NamedTuple):
+    """A path, what the planner said of it, and the clearance at which it was found."""
+
+    result: PlanResult
+    path: Path
+    clearance_m: float
 
 
 class GlobalPlan:
@@ -99,24 +109,31 @@ class GlobalPlan:
         mapped_m: FloatArray,
         clearances_m: Sequence[float],
         detour_m: float = math.inf,
+        hidden_m: float = 0.0,
     ) -> PlanResult:
         """Plan on the map with what was found on it, at the first clearance that gives a path; adopt it.
 
         One of the later clearances is taken where it saves more than ``detour_m``; none is tried for inf.
+        What was found may reach by up to ``hidden_m`` farther than it was seen to.
         Returns the last result; its path is None where no clearance gave one.
         """
         begin = time.perf_counter()
         self._looked_at = mapped_m
         field = with_circles(self._chart.field, mapped_m)
-        result = self._try(t_s, start, goal, field, clearances_m, begin, detour_m)
+        result, found = self._search(start, goal, field, clearances_m, detour_m)
         self.turns_first = False
         if result.status is PlanStatus.NO_PATH and result.iterations and self._can_turn_first:
             for heading_rad in _free_headings(field, start, clearances_m[-1]):
                 turned = Pose2(start.x_m, start.y_m, heading_rad)
-                other = self._try(t_s, turned, goal, field, clearances_m, begin, detour_m)
-                if other.path is not None:
-                    result, self.turns_first = other, True
+                _, found = self._search(turned, goal, field, clearances_m, detour_m)
+                if found is not None:
+                    self.turns_first = True
                     break
+        if found is not None and hidden_m > 0.0 and len(mapped_m):
+            found = self._rather_around(found, start, goal, mapped_m, clearances_m, detour_m, hidden_m)
+        if found is not None:
+            result = found.result
+            self._adopt(t_s, found, time.perf_counter() - begin, field.circles_m)
         self._journal.planning_time_s += time.perf_counter() - begin
         return result
 
@@ -135,16 +152,14 @@ class GlobalPlan:
         least_m = min(least_m, self.progress.clearance_m - SLACK_M)
         return bool(plane.least_distance(ahead, plane.NO_SEGMENTS, new) < least_m)
 
-    def _try(
+    def _search(
         self,
-        t_s: float,
         start: Pose2,
         goal: Goal,
         field: DistanceField,
         clearances_m: Sequence[float],
-        begin: float,
         detour_m: float,
-    ) -> PlanResult:
+    ) -> tuple[PlanResult, _Found | None]:
         """Plan at the first clearance that gives a path, or at one that saves a detour.
 
         No path is shorter than at the last clearance: what is that short already needs no other.
@@ -154,9 +169,9 @@ class GlobalPlan:
         if detour_m < math.inf and len(clearances_m) > 1:
             last = self._at(start, goal, field, clearances_m[-1])
             if last[1] is None:
-                return last[0]
+                return last[0], None
             enough_m = last[1].length_m + detour_m
-        found: tuple[PlanResult, Path, float] | None = None
+        found: _Found | None = None
         for clearance_m in clearances_m:
             at_last = last if clearance_m == clearances_m[-1] else None
             result, path = at_last or self._at(start, goal, field, clearance_m)
@@ -164,14 +179,42 @@ class GlobalPlan:
                 if self.hopeless:
                     break
                 continue
-            if found is None or path.length_m < found[1].length_m - detour_m:
-                found = result, path, clearance_m
-            if found[1].length_m <= enough_m:
+            if found is None or path.length_m < found.path.length_m - detour_m:
+                found = _Found(result, path, clearance_m)
+            if found.path.length_m <= enough_m:
                 break
-        if found is None:
-            return result
-        self._adopt(t_s, found[1], found[0], found[2], time.perf_counter() - begin, field.circles_m)
-        return found[0]
+        return result, found
+
+    def _rather_around(
+        self,
+        found: _Found,
+        start: Pose2,
+        goal: Goal,
+        mapped_m: FloatArray,
+        clearances_m: Sequence[float],
+        detour_m: float,
+        hidden_m: float,
+    ) -> _Found:
+        """The path found, or the way around a gap on it that may prove closed, whichever is likely shorter.
+
+        If the gap is closed the robot finds out before it, and goes around from there. Ways around are those
+        that stay open however far what is hidden reaches.
+        """
+        known, points = self._chart.field, found.path.states[:, :2]
+        gap = doubtful_gap(points, mapped_m, known, self._least_clearance_m, hidden_m)
+        if gap is None:
+            return found
+        field = with_circles(known, mapped_m + np.array([0.0, 0.0, hidden_m]))
+        _, around = self._search(start, goal, field, clearances_m, detour_m)
+        if around is None or around.path.length_m <= found.path.length_m:
+            return found
+        there = Pose2.from_array(found.path.states[gap.before])
+        _, back = self._search(there, goal, field, clearances_m, detour_m)
+        if back is None:
+            return found
+        if_closed_m = gap.before_m + back.path.length_m
+        likely_m = gap.closed * if_closed_m + (1.0 - gap.closed) * found.path.length_m
+        return around if around.path.length_m < likely_m else found
 
     def _at(
         self, start: Pose2, goal: Goal, field: DistanceField, clearance_m: float
@@ -223,15 +266,8 @@ class GlobalPlan:
             return None, 0.0
         return self._robot.footprint, self._robot.motion.least_turning_radius_m
 
-    def _adopt(
-        self,
-        t_s: float,
-        path: Path,
-        result: PlanResult,
-        clearance_m: float,
-        planning_s: float,
-        circles_m: FloatArray,
-    ) -> None:
+    def _adopt(self, t_s: float, found: _Found, planning_s: float, circles_m: FloatArray) -> None:
+        path, result, clearance_m = found.path, found.result, found.clearance_m
         self.path = path
         self.progress = PathProgress(path.states, path.waypoints, clearance_m)
         self.circles_m = circles_m

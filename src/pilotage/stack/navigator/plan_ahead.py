@@ -36,6 +36,9 @@ class PlanAheadConfig(Config):
     """Where there is no plan at the planner's clearance: the body's radius plus these."""
     detour_m: NonNegative = 1.0
     """Nor does it go a longer way around for the sake of a greater clearance."""
+    hidden_m: NonNegative = 0.5
+    """By anything up to this what was mapped reaches farther than it was seen to: a gap with less room to
+    spare may prove closed. 0: whatever looks open is tried."""
     stall_s: Positive = 10.0
     stall_progress_m: Positive = 0.5
     most_stalls: int = Field(default=6, ge=0)
@@ -116,7 +119,8 @@ class PlanAhead:
         found = self._own_map.found_circles_m
         first = self._plan.progress is None
         clearances_m = sorted({c for c in asked if c <= own}, reverse=True)
-        result = self._plan.make(t_s, pose, self._goal, found, clearances_m, self._config.detour_m)
+        config = self._config
+        result = self._plan.make(t_s, pose, self._goal, found, clearances_m, config.detour_m, config.hidden_m)
         self._planned_s = t_s
         if not first:
             self._journal.count("replans")
