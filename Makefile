@@ -62,7 +62,7 @@ setup: core  ## the same with all extras and the tools of tests, types and docs
 	$(FINGERPRINT) > $(STAMP)
 
 demo: core  ## run the night watch and name the report to open
-	@$(PY) -m pilotage.cli.main run $(MISSION) $(ARGS)
+	@$(PY) -m pilotage run $(MISSION) $(ARGS)
 	@echo "open the report named above in any browser; it needs no network"
 
 test: setup  ## run the tests (ARGS="-k name" picks some, JOBS=4 takes more processes)

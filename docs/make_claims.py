@@ -143,7 +143,7 @@ def measure(name: str, entry: Mapping[str, Any], workers: int) -> dict[str, Any]
             command, found = entry["command"], Path(folder) / "values.json"
             words = command.replace("{json}", str(found)).split()
             if words[0] in ("python", "pilotage"):
-                module = [] if words[0] == "python" else ["-m", "pilotage.cli.main"]
+                module = [] if words[0] == "python" else ["-m", "pilotage"]
                 words = [sys.executable, *module, *words[1:]]
             done = subprocess.run(words, cwd=ROOT, check=False, stdout=subprocess.PIPE, text=True)
             if found.is_file():
@@ -182,7 +182,7 @@ def _told(metrics: Mapping[str, Any], where: str = "") -> dict[str, Any]:
 
 def _studied(words: list[str], folder: Path, workers: int) -> tuple[dict[str, Any], str, int]:
     """Every cell and metric of a study, its success, why trials ended, and the changes from the baselines."""
-    line = [sys.executable, "-m", "pilotage.cli.main", *words, "--out", str(folder), "--no-report"]
+    line = [sys.executable, "-m", "pilotage", *words, "--out", str(folder), "--no-report"]
     done = subprocess.run([*line, "--workers", str(workers)], cwd=folder, check=False)
     if done.returncode not in (0, 1):
         raise ClaimError(f"{' '.join(words)}: the study ended with exit code {done.returncode}")

@@ -154,7 +154,7 @@ def study_killed(folder: Path, rng: random.Random, times: int) -> list[str]:
     write_yaml(folder / "study.yaml", definition)
     known: dict[int, str] = {}
     wrong: list[str] = []
-    words = ("-m", "pilotage.cli.main", "study", "study.yaml", "--workers", "2", "--quiet", "--no-report")
+    words = ("-m", "pilotage", "study", "study.yaml", "--workers", "2", "--quiet", "--no-report")
     for k in range(times):
         child = children_of(folder, *words, *(("--resume",) if k else ()))
         begun, wait_s = time.monotonic(), rng.uniform(0.0, 3.0)

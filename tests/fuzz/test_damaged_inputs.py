@@ -121,7 +121,7 @@ def test_little_memory_is_enough_to_refuse(kind: str, healthy: Healthy, tmp_path
         resource.setrlimit(resource.RLIMIT_AS, (LIMIT_MB * 1_000_000, LIMIT_MB * 1_000_000))
 
     done = subprocess.run(
-        [sys.executable, "-m", "pilotage.cli.main", *target.words],
+        [sys.executable, "-m", "pilotage", *target.words],
         cwd=folder,
         capture_output=True,
         text=True,

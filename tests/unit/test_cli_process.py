@@ -166,16 +166,16 @@ print(code, called, gc.get_threshold()[0] >= 50 * before[0])
 def test_a_closed_pipe_is_quiet() -> None:
     reader, writer = os.pipe()
     os.close(reader)
-    command = [sys.executable, "-m", "pilotage.cli.main", "--help"]
+    command = [sys.executable, "-m", "pilotage", "--help"]
     done = subprocess.run(command, stdout=writer, stderr=subprocess.PIPE, text=True, check=False)
     os.close(writer)
     assert (done.returncode, done.stderr) == (141, "")
 
 
 def test_a_stream_that_was_closed_is_no_bug() -> None:
-    shell = f"'{sys.executable}' -m pilotage.cli.main zzz >&-; echo $? >&2; exec 2>&-; "
+    shell = f"'{sys.executable}' -m pilotage zzz >&-; echo $? >&2; exec 2>&-; "
     done = subprocess.run(
-        ["sh", "-c", shell + f"'{sys.executable}' -m pilotage.cli.main --version"],
+        ["sh", "-c", shell + f"'{sys.executable}' -m pilotage --version"],
         capture_output=True,
         text=True,
         check=False,
@@ -200,7 +200,7 @@ def test_a_terminal_that_lacks_a_character_shows_a_question_mark() -> None:
 
 def test_settings_of_others_libraries_break_nothing(tmp_path: Path) -> None:
     done = subprocess.run(
-        [sys.executable, "-m", "pilotage.cli.main", "draw", "museum", "--out", str(tmp_path / "a.png")],
+        [sys.executable, "-m", "pilotage", "draw", "museum", "--out", str(tmp_path / "a.png")],
         capture_output=True,
         text=True,
         check=False,

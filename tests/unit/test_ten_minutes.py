@@ -48,7 +48,7 @@ def shell(tmp_path: Path) -> dict[str, str]:
     """An environment in which ``pilotage`` and ``python`` are this code and this interpreter."""
     folder = tmp_path / "bin"
     folder.mkdir()
-    for name, words in (("pilotage", "-m pilotage.cli.main"), ("python", "")):
+    for name, words in (("pilotage", "-m pilotage"), ("python", "")):
         (folder / name).write_text(f'#!/bin/sh\nexec "{sys.executable}" {words} "$@"\n')
         (folder / name).chmod(0o755)
     return {

@@ -146,7 +146,3 @@ def _say(text: str, code: int) -> int:
 
     print(f"pilotage: {shown(text)}", file=sys.stderr)
     return code
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -7,8 +7,6 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import dijkstra
 
 from pilotage.core.errors import InputError
 from pilotage.core.types import FloatArray, IntArray
@@ -118,6 +116,9 @@ def _cheapest(
     ends: tuple[tuple[float, float], tuple[float, float]],
 ) -> ShortestPath | None:
     """Dijkstra over the graph of tangent points, and the polyline of what it found."""
+    from scipy.sparse import coo_array  # these load a lot of SciPy, which most runs never need
+    from scipy.sparse.csgraph import dijkstra
+
     count = len(points)
     # Each tangent has its own point at the start and at the goal: one more vertex for each joins them.
     at_ends = [np.flatnonzero(circle == end) for end in (0, 1)]

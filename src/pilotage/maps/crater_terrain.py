@@ -19,7 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
-from scipy import fft, ndimage
+from scipy import ndimage
 
 from pilotage.core.config import Config
 from pilotage.core.errors import InputError
@@ -163,6 +163,8 @@ def _smooth(t: HeightArray) -> HeightArray:
 
 def _roughness(config: CraterTerrainConfig, rough: HeightArray, rng: np.random.Generator) -> HeightArray:
     """Fractal heights whose root-mean-square slope is the plain's, more where the ground is rough."""
+    from scipy import fft  # loads what most runs never need
+
     rows, columns = config.rows, config.columns
     rows_fast, columns_fast = fft.next_fast_len(rows), fft.next_fast_len(columns, real=True)
     k = np.hypot(fft.fftfreq(rows_fast)[:, None], fft.rfftfreq(columns_fast)[None, :]).astype(np.float32)

@@ -6,7 +6,6 @@ import hashlib
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse.csgraph import shortest_path
 
 from pilotage.core.errors import InputError
 from pilotage.core.types import FloatArray, IntArray
@@ -70,6 +69,8 @@ class PatrolGraph:
                 f"{where}: expected edges of one length both ways, found {edges[a, b]:g} m "
                 f"from vertex {a} to {b} and {edges[b, a]:g} m back"
             )
+        from scipy.sparse.csgraph import shortest_path  # loads a lot of SciPy, for patrols alone
+
         shortest, before = shortest_path(edges, directed=False, return_predecessors=True)
         apart = np.flatnonzero(~np.isfinite(shortest[0]))
         if apart.size:
