@@ -22,6 +22,8 @@ from pilotage.models.pose_graph_covariance import PoseCovariances, covariances
 SHARED_EDGES = 2.0
 SCAN_STD = np.array([0.0097, 0.0097, 0.0034])
 MOUNT_STD_M = 0.03
+UNKNOWN_RAD2 = np.pi**2 / 3.0
+"""Variance of a heading of which nothing is known."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,7 +60,7 @@ class ScanCovariances:
         carry[:, 1, 2] = self.poses[:, 0] - keyframes[:, 0]
         shared = carry @ (SHARED_EDGES * graph[self.owner]) @ carry.transpose(0, 2, 1)
         own = self.own + np.diag(SCAN_STD**2)
-        return np.asarray(shared + own + self._of_mount(self.poses[:, 2] - self.poses[0, 2]))
+        return _at_most_unknown(shared + own + self._of_mount(self.poses[:, 2] - self.poses[0, 2]))
 
     def relative(self, i: IntArray, j: IntArray) -> FloatArray:
         """Return (K, 3, 3) of x, y, theta of scan j as seen from scan i."""
@@ -83,7 +85,7 @@ class ScanCovariances:
         out = rotation @ between @ rotation.transpose(0, 2, 1) + own[1]
         out += lever @ own[0] @ lever.transpose(0, 2, 1)
         out += self._of_mount(self.poses[j, 2] - self.poses[i, 2])
-        return np.asarray(0.5 * (out + out.transpose(0, 2, 1)))
+        return _at_most_unknown(0.5 * (out + out.transpose(0, 2, 1)))
 
     def _of_graph(self) -> PoseCovariances:
         return covariances(self.graph, weights=self.weights)
@@ -94,3 +96,12 @@ class ScanCovariances:
         variance = MOUNT_STD_M**2 + self.mount_m**2
         out[:, 0, 0] = out[:, 1, 1] = 2.0 * (1.0 - np.cos(turn_rad)) * variance
         return out
+
+
+def _at_most_unknown(covariance: FloatArray) -> FloatArray:
+    """Scale covariances (K, 3, 3) whose heading is less known than unknown, and what hangs on it alike.
+
+    After a break that nothing joins, linear errors add up to whole turns, and to kilometres at their ends.
+    """
+    share = np.minimum(1.0, UNKNOWN_RAD2 / covariance[:, 2, 2])
+    return np.asarray(share[:, None, None] * covariance)
