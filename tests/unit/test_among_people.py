@@ -89,6 +89,14 @@ def test_it_slows_for_people_near_ahead_and_not_for_those_whom_it_leaves_behind(
     assert fastest((2.0, 1.6), -1.2) <= GapHorizonConfig().calm_m_s
 
 
+@pytest.mark.parametrize("half_m", [0.6, 1.5, 4.0])
+def test_it_drives_on_once_who_walked_past_it_is_behind(half_m: float) -> None:
+    """He walks through the place where it stands; 2.5 s on he is out of sight, and may be near for long."""
+    rows = driven(THREE_QUARTERS, half_m, 0.9, begins_m=(1.6, 0.02))
+    assert np.abs(rows[24:40, 2]).max() < 0.05, "it did not stand: the test shows nothing"
+    assert rows[50:76, 2].max() > 0.5
+
+
 @pytest.mark.parametrize("bearing_rad", [-0.6, -0.3, 0.3, 0.6])
 def test_it_has_come_to_rest_before_who_runs_up_out_of_nothing_reaches_it(bearing_rad: float) -> None:
     """4.6 m before a robot of 2 m/s somebody appears who runs at it at 3.9 m/s, faster and faster."""

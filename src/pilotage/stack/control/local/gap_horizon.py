@@ -142,6 +142,7 @@ class GapHorizon(RollingController):
         self._tried: list[tuple[float, float]] = []
         self._since: tuple[float, float, float] | None = None
         self._saw_people_s = -math.inf
+        self._followed = False
         self._came: tuple[float, float, float] | None = None
 
     def _careful(self, view: LocalView, scene: Scene) -> Scene:
@@ -151,13 +152,14 @@ class GapHorizon(RollingController):
         ahead_m = scene.movers.nearest_ahead_m(scene.pose)
         if ahead_m < config.calm_m or scene.movers.new_within(scene.pose, config.new_m):
             drive = drive._replace(speed=min(drive.speed, config.calm_m_s))
-        if self._may_be_followed(view, scene):
+        self._followed = self._may_be_followed(view, scene)
+        if self._followed:
             drive = drive._replace(reverse=0.0, least_radius=self._swings_m(view, scene))
         return scene if drive is scene.drive else replace(scene, drive=drive)
 
     def _decide(self, view: LocalView, scene: Scene) -> Twist:
         config = self._config
-        if self._must_stand(scene, view.t_s):
+        if self._must_stand(view, scene):
             self._plan = None
             return STOP
         if self._passage is not None:
@@ -310,22 +312,31 @@ class GapHorizon(RollingController):
     def _people_are_near(self, scene: Scene) -> bool:
         return scene.movers.nearest_m(float(scene.pose[0]), float(scene.pose[1])) < self._config.calm_m
 
-    def _must_stand(self, scene: Scene, t_s: float) -> bool:
-        """Whether a robot that does not drive has somebody so near that it had better not start."""
+    def _must_stand(self, view: LocalView, scene: Scene) -> bool:
+        """Whether a robot that does not drive has somebody so near that it had better not start.
+
+        Somebody behind it, where its laser does not look, keeps it from nothing: it moves as if there were
+        one in any case, and the place of whom it does not see grows as fast as he leaves.
+        """
         config, body = self._config, scene.body
         if abs(scene.start[3]) > 0.05:
-            self._drove_s = t_s
+            self._drove_s = view.t_s
             return False
         now = scene.movers.foretold(0.0, scene.dt_s, 1, config.people_std)[0]
         if not now.shape[0]:
             return False
         x, y, theta = scene.pose
-        if t_s - self._drove_s < config.unsure_s:
-            unsure = np.hypot(now[:, 0] - x, now[:, 1] - y) - now[:, 2] - body.outer_m < config.unsure_m
-            if (unsure & scene.movers.unsure()).any():
+        dx, dy = now[:, 0] - x, now[:, 1] - y
+        seen = np.ones(len(now), np.bool_)
+        if self._followed:
+            back = dx * math.cos(theta) + dy * math.sin(theta)
+            seen = back > -math.cos(0.5 * _blind_rad(view)) * np.hypot(dx, dy)
+        if view.t_s - self._drove_s < config.unsure_s:
+            unsure = np.hypot(dx, dy) - now[:, 2] - body.outer_m < config.unsure_m
+            if (unsure & scene.movers.unsure() & seen).any():
                 return True
         keep = config.stand_m
-        now = now[~scene.movers.rests(config.rests_readings)]
+        now = now[~scene.movers.rests(config.rests_readings) & seen]
         near: float = movers_clearance(x, y, theta, body.polygon, body.outer_m, now, keep)
         return near < keep
 
