@@ -18,6 +18,9 @@ from pilotage.stack.patrol.tours import Round, spread
 
 KEY, PHASE_M, PHASE_S = range(3)
 """What a robot says: which round it goes, how far along it was, and when."""
+SURE_WORDS, LATE_SHARE = 3.0, 0.25
+"""Who has said so many is hardly expected any more to be out of reach for half a tour, where fewer of the
+others than this share are late."""
 
 
 class AdaptiveRoundsConfig(Config):
@@ -81,9 +84,9 @@ class AdaptiveRoundsStrategy:
         self._place = slot.place
         self._leaves_s = slot.leaves_s if len(mates) > 1 else setting.begin_s
         # Sums of the silences between words, and of half their squares (their quotient is a word's mean
-        # age), fading over half a tour; as if there had been one of that length.
+        # age), fading over half a tour; besides, one of that length that nobody has heard yet.
         self._memory_s = max(0.5 * Round.best(setting.graph).length_m / setting.speed_m_s, 1.0)
-        self._gaps_s = np.tile([self._memory_s, 0.5 * self._memory_s**2], (team, 1))
+        self._gaps_s, self._expected = np.zeros((team, 2)), np.ones((team, 2))
         self._off_s = np.full(team, math.inf)
         self._phase_s = setting.begin_s
         self._is_on_round, self._waited_s = False, 0.0
@@ -123,10 +126,17 @@ class AdaptiveRoundsStrategy:
                 gap_s = state.t_s - self._heard_s[robot]
                 kept = math.exp(-gap_s / self._memory_s)
                 self._gaps_s[robot] = kept * self._gaps_s[robot] + [gap_s, 0.5 * gap_s**2]
+                self._expected[robot] *= [kept, kept * math.exp(-1.0 / SURE_WORDS)]
                 self._heard_s[robot] = state.t_s
         heard = np.array([state is not None for state in knowledge.states])
         heard[knowledge.robot] = False
-        limit_s = self._config.silent_ratio * self._gaps_s[:, 1] / self._gaps_s[:, 0]
+        late = now_s - self._heard_s > self._config.silent_s
+        late[knowledge.robot] = False
+        # Where nearly all others are heard all the time a silence is no matter of being out of reach.
+        in_reach = np.count_nonzero(late) - late < LATE_SHARE * (len(late) - 2)
+        expected = np.where(in_reach, self._expected[:, 1], self._expected[:, 0])
+        usual = self._gaps_s + expected[:, None] * [self._memory_s, 0.5 * self._memory_s**2]
+        limit_s = self._config.silent_ratio * usual[:, 1] / usual[:, 0]
         # Of a robot that was never heard silence tells something only where all others are heard readily.
         readily = heard.any() and limit_s[heard].max() <= 2.0 * self._config.silent_s
         limit_s[~heard] = limit_s[heard].max() if readily else math.inf
