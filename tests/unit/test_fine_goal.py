@@ -16,7 +16,8 @@ from pilotage.sensors.readings import LidarScan, OdometryIncrement, Readings
 from pilotage.stack.control.local.drive import LocalDrive
 from pilotage.stack.control.local.fine_goal import approach, is_fine, rests_within
 from pilotage.stack.control.local.role import LOCAL_CONTROLLERS, LocalController, LocalLimits, LocalView
-from pilotage.stack.control.local.rolling import RollingConfig, RollingGround, Scene
+from pilotage.stack.control.local.rolling import RollingGround, Scene
+from pilotage.stack.control.local.rolling_config import RollingConfig
 from pilotage.stack.interface import Belief
 from support.robots import told_of
 

@@ -10,7 +10,8 @@ from pilotage.core.types import Twist
 from pilotage.kernels.control.dynamic_window import choose_in_window
 from pilotage.sensors.sensor import NonNegative, Positive
 from pilotage.stack.control.local.role import LOCAL_CONTROLLERS, LocalView
-from pilotage.stack.control.local.rolling import RollingConfig, Scene
+from pilotage.stack.control.local.rolling import Scene
+from pilotage.stack.control.local.rolling_config import RollingConfig
 from pilotage.stack.control.local.rolling_step import RollingController
 
 

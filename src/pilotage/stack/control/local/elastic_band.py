@@ -15,7 +15,8 @@ from pilotage.kernels.control.rollouts import follow_path
 from pilotage.kernels.control.togo import togo_at
 from pilotage.sensors.sensor import NonNegative, Positive
 from pilotage.stack.control.local.role import LOCAL_CONTROLLERS, LocalView
-from pilotage.stack.control.local.rolling import RollingConfig, Scene
+from pilotage.stack.control.local.rolling import Scene
+from pilotage.stack.control.local.rolling_config import RollingConfig
 from pilotage.stack.control.local.rolling_step import RollingController
 
 SPACING_M = 0.1

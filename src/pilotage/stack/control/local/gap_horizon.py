@@ -26,7 +26,8 @@ from pilotage.kernels.control.togo import UNREACHED_S, togo_at
 from pilotage.sensors.sensor import NonNegative, Positive
 from pilotage.stack.control.local.narrow_passage import THROUGH, NarrowPassage, find_narrow_passage
 from pilotage.stack.control.local.role import LOCAL_CONTROLLERS, LocalView
-from pilotage.stack.control.local.rolling import RollingConfig, Scene
+from pilotage.stack.control.local.rolling import Scene
+from pilotage.stack.control.local.rolling_config import RollingConfig
 from pilotage.stack.control.local.rolling_step import RollingController
 from pilotage.stack.control.local.sampling import NoiseBank
 

@@ -1,4 +1,4 @@
-"""The rolling ground: odometry corrected by the laser, obstacles and seen ground, time to go over them."""
+"""The rolling ground: odometry corrected by the laser, obstacles and seen ground."""
 
 from __future__ import annotations
 
@@ -6,9 +6,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from pydantic import Field
 
-from pilotage.core.config import Config
 from pilotage.core.errors import InputError
 from pilotage.core.types import FloatArray, IntArray, Pose2, Twist
 from pilotage.kernels.control import ground_update, match, togo
@@ -17,11 +15,12 @@ from pilotage.kernels.control.ground import Ground
 from pilotage.kernels.control.motion_limits import Drive
 from pilotage.kernels.geometry.motion import wrap
 from pilotage.kernels.grids.distance import nearest_marked
-from pilotage.sensors.sensor import NonNegative, Positive
 from pilotage.stack.control.local.answer import Answer
 from pilotage.stack.control.local.body import make_body
 from pilotage.stack.control.local.role import LocalLimits, LocalView
-from pilotage.stack.perception.movers import Movers, MoversConfig
+from pilotage.stack.control.local.rolling_config import PEOPLE_FADE_HITS, RollingConfig
+from pilotage.stack.control.local.time_to_go import TimeToGo
+from pilotage.stack.perception.movers import Movers
 
 INSIDE_M = 0.05
 """A point so deep inside the footprint is a mistake. Where people walk any inside is somebody who brushed
@@ -32,51 +31,6 @@ MANY_SHARE = 0.125
 """Where somebody may move, so many beams have to end near at things that stand to correct the odometry."""
 ROLL_M, MOST_OFF_M = 0.5, 1.0
 """The grids follow a robot so far from their middle: where the time to go is worked out, and at any time."""
-BEYOND_S = 6.0
-"""The time to go is worked out so far past the robot: no plan goes back farther."""
-
-
-class RollingMoversConfig(MoversConfig):
-    """Tracks as fast robots need them: of who turns within half a second, whatever the laser's rate."""
-
-    # A class of its own: as mere values of a default, whoever set another key of the part would lose them.
-    acceleration_lasts_s: NonNegative = 0.2
-    likeliest: bool = True
-
-
-class RollingConfig(Config):
-    """The grids, the matching, and with which speed the time to go reckons."""
-
-    width_m: float = Field(default=10.0, ge=4.0, le=40.0)
-    cell_m: float = Field(default=0.05, ge=0.02, le=0.2)
-    reach_m: Positive = 5.0
-    """Farther than this the laser does not add to the grid."""
-    replan_steps: int = Field(default=4, ge=1, le=100)
-    """The time to go is worked out anew every so many steps, and when the grid rolls."""
-    match: bool = True
-    match_reach_m: Positive = 0.2
-    match_points: int = Field(default=180, ge=20, le=5000)
-    point_std_m: Positive = 0.06
-    drift_m: Positive = 0.04
-    drift_rad: Positive = 0.05
-    """Odometry's error after one metre, or one metre or radian, driven; it grows with their square root."""
-    easy_m: Positive = 0.62
-    """From this distance between base and obstacle on, full speed is reckoned with."""
-    slow_m_s: Positive = 0.5
-    """From where the footprint may turn on, less than a cell's doubt."""
-    crawl_m_s: Positive = 0.08
-    """Where it fits only straight: stopping, backing off and turning are part of the way through."""
-    unseen_share: Positive = 0.7
-    edge_m: float = Field(default=-0.01, ge=-0.1, le=1.0)
-    """Kept beside the footprint's inner disc where the time to go looks for a way; below 0 for gaps whose
-    middle no cell hits: what then proves too narrow has to be found out by trying."""
-    movers: RollingMoversConfig = RollingMoversConfig()
-    fade_hits: int = Field(default=3, ge=0, le=60)
-    """Hits that a cell loses where the laser sees past it; 0 for a world in which nothing moves."""
-
-
-PEOPLE_FADE_HITS = 60
-"""Where people walk about, what a beam goes through is gone at once."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -135,8 +89,7 @@ class RollingGround:
         self._rise, self._nearest = nearest_marked(self._shown > 0)
         self._seen = np.zeros((half, half), dtype=np.bool_)
         self._corner = (0, 0)
-        self._togo = np.zeros((half, half))
-        self._since_plan = 10**6
+        self._togo = TimeToGo(config)
         self._odometry: Pose2 | None = None
         self._pose = np.zeros(3)
         self._goal_given: tuple[float, float] | None = None
@@ -144,7 +97,6 @@ class RollingGround:
         self._t_s = -math.inf
         self._dt_s = 0.05
         self._answer = Answer()
-        self._closed: list[tuple[float, float, float]] = []
         self._movers = Movers(config.movers)
         self._body: Body | None = None
         self._footprint: FloatArray | None = None
@@ -305,8 +257,7 @@ class RollingGround:
         if first_view:
             self._corner = wanted
             return True
-        due = self._since_plan + 1 >= self._config.replan_steps
-        if max(abs(dc), abs(dr)) * self._coarse_m < (ROLL_M if due else MOST_OFF_M):
+        if max(abs(dc), abs(dr)) * self._coarse_m < (ROLL_M if self._togo.is_due else MOST_OFF_M):
             return False
         ground_update.rolled(self._hits, self._mean, self._seen, dr, dc)
         self._corner = wanted
@@ -339,30 +290,28 @@ class RollingGround:
         return self._corner[0] * self._coarse_m, self._corner[1] * self._coarse_m
 
     def _ground(self, body: Body, drive: Drive, rolled: bool, avoid: FloatArray | None) -> Ground:
-        config = self._config
         x0, y0 = self._corner_m
         unseen = ground_update.looked_at(
             self._hits, self._seen, self._coarse_m, body.outer_m, self._shown, self._rise, self._nearest
         )
-        self._since_plan += 1
-        if rolled or self._since_plan >= config.replan_steps:
-            self._since_plan = 0
-            self._clearance = togo.coarse_clearance(
-                self._nearest,
-                self._mean,
-                self._seen.shape[0],
-                x0,
-                y0,
-                self._coarse_m,
-                self._widths_m(body)[2],
-            )
-            self._togo = self._time_to_go(avoid, body, drive)
+        field = self._togo.update(
+            self._nearest,
+            self._mean,
+            self._seen,
+            (x0, y0),
+            self._goal,
+            self._pose,
+            body,
+            drive,
+            rolled,
+            avoid,
+        )
         self._last_ground = Ground(
             self._shown,
             self._mean,
             self._nearest,
             unseen,
-            self._togo,
+            field,
             x0,
             y0,
             self._cell_m,
@@ -374,57 +323,15 @@ class RollingGround:
 
     def close(self, x_m: float, y_m: float, radius_m: float) -> None:
         """Lead no way through a disc of the map frame any more: it proved too narrow."""
-        self._closed.append((x_m, y_m, radius_m))
-        self._since_plan = 10**6
+        self._togo.close(x_m, y_m, radius_m)
 
     def open_all(self) -> None:
         """Forget what was closed: a way through it may be better than none."""
-        self._closed.clear()
-        self._since_plan = 10**6
+        self._togo.open_all()
 
     def time_to_go_beside(self, discs: FloatArray, scene: Scene) -> FloatArray:
         """Time to go (m, m) where discs (N, 3), x, y, radius in the map frame, are closed as well."""
-        return self._time_to_go(discs, scene.body, scene.sheet)
-
-    def _widths_m(self, body: Body) -> tuple[float, float, float]:
-        """Clearances from where on the footprint fits straight, may turn, and nothing slows it any more."""
-        blocked_m = body.inner_m + self._config.edge_m
-        tight_m = max(blocked_m, body.outer_m - self._config.cell_m)
-        return blocked_m, tight_m, max(self._config.easy_m, tight_m + 0.05)
-
-    def _time_to_go(self, discs: FloatArray | None, body: Body, drive: Drive) -> FloatArray:
-        config = self._config
-        x0, y0 = self._corner_m
-        clearance = self._clearance
-        if self._closed:
-            clearance = _beside(clearance, np.array(self._closed), x0, y0, self._coarse_m)
-        if discs is not None and discs.shape[0]:
-            clearance = _beside(clearance, discs, x0, y0, self._coarse_m)
-        speed = togo.travel_speed(
-            clearance,
-            self._seen,
-            *self._widths_m(body),
-            min(config.crawl_m_s, drive.speed),
-            min(config.slow_m_s, drive.speed),
-            drive.speed,
-            config.unseen_share,
-        )
-        # The robot is where it is: what was seen there, as somebody who brushed past, shall not shut it in.
-        row, column = (int((self._pose[1] - y0) / self._coarse_m), int((self._pose[0] - x0) / self._coarse_m))
-        speed[row, column] = max(speed[row, column], min(config.crawl_m_s, drive.speed))
-        field: FloatArray = togo.time_to_go(
-            speed,
-            x0,
-            y0,
-            self._coarse_m,
-            self._goal[0],
-            self._goal[1],
-            drive.speed,
-            self._pose[0],
-            self._pose[1],
-            BEYOND_S,
-        )
-        return field
+        return self._togo.beside(discs, scene.body, scene.sheet)
 
 
 def drive_of(limits: LocalLimits) -> Drive:
@@ -445,14 +352,3 @@ def _moved(point: tuple[float, float], seen_from: Pose2, now: FloatArray) -> Flo
     c, s = math.cos(turn), math.sin(turn)
     dx, dy = point[0] - seen_from.x_m, point[1] - seen_from.y_m
     return np.array([now[0] + c * dx - s * dy, now[1] + s * dx + c * dy])
-
-
-def _beside(clearance: FloatArray, discs: FloatArray, x0: float, y0: float, coarse: float) -> FloatArray:
-    """Clearance (m, m) with discs (N, 3) as further obstacles."""
-    m = clearance.shape[0]
-    centres = (np.arange(m) + 0.5) * coarse
-    out = clearance
-    for x, y, radius in discs:
-        away = np.hypot(x0 + centres[None, :] - x, y0 + centres[:, None] - y) - radius
-        out = np.minimum(out, np.maximum(away, 0.0))
-    return out

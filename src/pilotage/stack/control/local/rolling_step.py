@@ -5,7 +5,8 @@ from __future__ import annotations
 from pilotage.core.types import STOP, Twist
 from pilotage.stack.control.local.fine_goal import approach, is_fine, rests_within
 from pilotage.stack.control.local.role import LocalView
-from pilotage.stack.control.local.rolling import RollingConfig, RollingGround, Scene
+from pilotage.stack.control.local.rolling import RollingGround, Scene
+from pilotage.stack.control.local.rolling_config import RollingConfig
 
 
 class RollingController:

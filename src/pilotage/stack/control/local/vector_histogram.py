@@ -13,7 +13,8 @@ from pilotage.kernels.control.polar_histogram import best_opening, binary_histog
 from pilotage.kernels.geometry.motion import wrap
 from pilotage.sensors.sensor import NonNegative, Positive
 from pilotage.stack.control.local.role import LOCAL_CONTROLLERS, LocalView
-from pilotage.stack.control.local.rolling import RollingConfig, Scene
+from pilotage.stack.control.local.rolling import Scene
+from pilotage.stack.control.local.rolling_config import RollingConfig
 from pilotage.stack.control.local.rolling_step import RollingController
 
 
