@@ -16,7 +16,7 @@ from pilotage.core.types import FloatArray, Pose2
 from pilotage.experiments.build.build import build
 from pilotage.experiments.loop import run_loop
 from pilotage.experiments.mission import load_mission, mission_of, read_mission
-from pilotage.kernels.control import eikonal, voronoi_window
+from pilotage.kernels.control import disc_returns, eikonal, safe_stop, voronoi_window
 from pilotage.kernels.geometry.motion import exact_arc, wrap
 from pilotage.stack.navigator.patrol.gate import NO_GATE
 from pilotage.stack.navigator.patrol.passage import claimed, precedes, relation, stretch_of
@@ -43,7 +43,7 @@ def stops(
     safety = np.array([REACTION, 0.3, 0.04, 0.1, 1.4])
     now = w if turning is None else turning
     return bool(
-        voronoi_window.stop_is_clear(
+        safe_stop.stop_is_clear(
             v, now, v, w, limits, safety, (near, strange, people), np.zeros(3), (known, -2.0, -2.0, 0.1)
         )
     )
@@ -126,7 +126,7 @@ class TestStanding:
         rim = 0.3 * np.column_stack([np.cos(angles), np.sin(angles)])
         middles = np.array([[2.0, 0.4], [1.5, -1.2]])
         near = [m + rim[(rim @ m) < 0.0] for m in middles]
-        found = voronoi_window.bodies(np.concatenate(near), 0.3)
+        found = disc_returns.bodies(np.concatenate(near), 0.3)
         assert np.allclose(found, middles[::-1], atol=0.02) or np.allclose(found, middles, atol=0.02)
 
     def test_who_moves_does_not_stand_and_who_hides_for_a_moment_does(self) -> None:
@@ -197,7 +197,7 @@ class TestStopping:
         time = np.tile(6.0 - 0.1 * np.arange(61), (61, 1))
         pose, v, w = np.zeros(3), 0.0, 0.0
         for _ in range(25):
-            ahead = voronoi_window.rotated((corner - pose[:2])[None], -pose[2])
+            ahead = disc_returns.rotated((corner - pose[:2])[None], -pose[2])
             assert math.hypot(*ahead[0]) > 0.35
             seen, field, known = (
                 (ahead, NOBODY, NOBODY),
@@ -240,7 +240,7 @@ class TestTheBestArc:
             (v, w): self._cost(v, w, pose, near, field, gate, lane_m)
             for v in np.linspace(max(0.0, v0 - 0.4), min(1.0, v0 + 0.4), 6).tolist()
             for w in np.linspace(max(-2.0, w0 - 1.6), min(2.0, w0 + 1.6), 15).tolist()
-            if voronoi_window.stop_is_clear(v0, w0, v, w, *told[3:], pose, known)
+            if safe_stop.stop_is_clear(v0, w0, v, w, *told[3:], pose, known)
         }
         v, w, status = voronoi_window.choose(*told, field, gate, known, lane_m, self.WINDOW)
         best = min(costs, key=lambda arc: costs[arc], default=(0.0, 0.0))
@@ -256,7 +256,7 @@ class TestTheBestArc:
         w: float,
         pose: FloatArray,
         near: FloatArray,
-        field: voronoi_window.Field,
+        field: safe_stop.Field,
         gate: voronoi_window.Gate,
         lane_m: float,
     ) -> float:
@@ -282,7 +282,7 @@ class TestTheBestArc:
         w: float,
         t: float,
         pose: FloatArray,
-        field: voronoi_window.Field,
+        field: safe_stop.Field,
         heading_cost: float,
         lane_m: float,
     ) -> float:

@@ -55,11 +55,8 @@ class ScanMotions:
         """Motion (3,) by the odometry since the last scan, if any, and what else (M, 3) it may be."""
         if self._at_scans is None or self._anchor is None:
             return None, NO_OTHERS
-        step, first, end = (
-            between(self._anchor, self._at_scans[scan]),
-            self._starts[scan],
-            self._starts[scan + 1],
-        )
+        step = between(self._anchor, self._at_scans[scan])
+        first, end = self._starts[scan : scan + 2]
         return step, NO_OTHERS if first == end else between_all(self._anchor, self._others[first:end])
 
     def learn(self, scan: int, motion: FloatArray, step: FloatArray | None, others: FloatArray) -> None:

@@ -9,14 +9,14 @@ from typing import TypeAlias
 import numpy as np
 
 from pilotage.core.types import FloatArray
-from pilotage.kernels.control import eikonal, voronoi_window
+from pilotage.kernels.control import eikonal, safe_stop, voronoi_window
 from pilotage.stack.patrol.roadmap import Roadmap
 
 NO_GATE: voronoi_window.Gate = (np.zeros((2, 2)), 0.0, 0.0, 1.0, 0.0, 0.0, -1.0, 0.0)
 THROUGH_RAD = 1.75
 """It drives through a place where it turns by no more than this."""
 
-Around: TypeAlias = Callable[[FloatArray], voronoi_window.Field]
+Around: TypeAlias = Callable[[FloatArray], safe_stop.Field]
 """A field of the roadmap led around who is in the way."""
 
 

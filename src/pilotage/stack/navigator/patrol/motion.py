@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from pilotage.core.types import STOP, FloatArray, Pose2, Twist
-from pilotage.kernels.control import eikonal, voronoi_window
+from pilotage.kernels.control import disc_returns, eikonal, safe_stop, voronoi_window
 from pilotage.models.motion.motion import MotionConfig
 from pilotage.stack.navigator.patrol.gate import NO_GATE, gate_at
 from pilotage.stack.navigator.patrol.passage import CLAIM_M
@@ -102,7 +102,7 @@ class Motion:
         self.blocked = self.taken = False
         beside = senses.strange
         if len(beside):
-            beside = voronoi_window.within(beside, config.watch_m)
+            beside = disc_returns.within(beside, config.watch_m)
         around_m, body_m = self._clearance_m + 0.5 * config.gap_m, self._clearance_m + senses.radius_m
         discs = _discs(senses.on_map(beside), around_m) if len(beside) and not first else NO_DISCS
         still = self._still.step(senses.t_s, self._mute(beside))
@@ -175,7 +175,7 @@ class Motion:
         if math.hypot(x - senses.pose.x_m, y - senses.pose.y_m) > near_m + horizon_s * senses.speed_m_s:
             return NO_GATE
 
-        def around(field: FloatArray) -> voronoi_window.Field:
+        def around(field: FloatArray) -> safe_stop.Field:
             x0, y0 = self._roadmap.origin_xy_m
             if len(discs):
                 field, x0, y0, _ = self._detour(field, discs)
@@ -189,7 +189,7 @@ class Motion:
         if not len(beside):
             return NO_POINTS
         # Whoever is met is as large as the robot itself; its near side alone is seen.
-        middles = senses.on_map(voronoi_window.bodies(beside, senses.radius_m))
+        middles = senses.on_map(disc_returns.bodies(beside, senses.radius_m))
         talk = [
             (word.x_m, word.y_m, senses.radius_m + senses.speed_m_s * (senses.t_s - sent_s))
             for sent_s, word in senses.mates.values()
@@ -208,7 +208,7 @@ class Motion:
             return self.command
         v, now = command.v_m_s, senses.twist
         for _ in range(4):
-            if voronoi_window.stop_is_clear(
+            if safe_stop.stop_is_clear(
                 now.v_m_s,
                 now.w_rad_s,
                 v,

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from pilotage.core.types import STOP, FloatArray, Pose2, Twist
-from pilotage.kernels.control import voronoi_window
+from pilotage.kernels.control import disc_returns, safe_stop
 from pilotage.kernels.lines import clustering
 from pilotage.maps.world_map import WorldMap
 from pilotage.sensors.lidar import LidarConfig
@@ -114,7 +114,7 @@ class Senses:
 
     def _look_around(self, ranges_m: FloatArray, spread_rad: float, *, lost: bool) -> None:
         """Who is there, of a scan."""
-        self.near, self.strange = voronoi_window.scan_returns(
+        self.near, self.strange = disc_returns.scan_returns(
             ranges_m,
             self._directions,
             self._mount,
@@ -146,7 +146,7 @@ class Senses:
             nobody &= away > self.config.watch.mate_m + self.speed_m_s * (self.t_s - sent_s)
         return np.ascontiguousarray(self.strange[nobody])
 
-    def field(self, *, lost: bool) -> voronoi_window.Field:
+    def field(self, *, lost: bool) -> safe_stop.Field:
         """Distances on its map, their origin and resolution; none where it does not know where it is."""
         x0, y0 = self._known.origin_xy_m
         return NO_FIELD if lost else self._known.distance_m, x0, y0, self._known.resolution_m
@@ -164,7 +164,7 @@ class Senses:
 
     def bodies_on_map(self) -> FloatArray:
         """(K, 2) middles of those who are seen, map frame."""
-        return self.on_map(voronoi_window.bodies(self.strange, self.radius_m))
+        return self.on_map(disc_returns.bodies(self.strange, self.radius_m))
 
     def crowded(self, reach_m: float) -> bool:
         """Whether something that may move is so near to the body's edge."""

@@ -1,0 +1,126 @@
+"""Returns of a laser around a disc: what is near, what is on no map, whose bodies they are of."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from pilotage.kernels.arrays import FloatArray
+from pilotage.kernels.control.safe_stop import Field
+from pilotage.kernels.geometry.field import interpolate_at
+from pilotage.kernels.jit import kernel
+
+
+@kernel
+def scan_returns(
+    ranges: FloatArray,
+    directions: FloatArray,
+    mount: FloatArray,
+    pose: FloatArray,
+    near_m: float,
+    far_m: float,
+    tolerance_m: float,
+    tolerance_per_m: float,
+    known: Field,
+    sectors: int,
+) -> tuple[FloatArray, FloatArray]:
+    """Nearest returns by sector, and those that the known map does not explain.
+
+    Parameters
+    ----------
+    ranges, directions
+        (B,) and (B, 2) unit vectors of the beams in the sensor's frame.
+    known
+        Distances on the robot's own map; of no nodes for a robot that does not know where it is.
+    near_m, far_m
+        Returns nearer than this to the base are kept by sector; those nearer than that are looked at at all.
+
+    Returns
+    -------
+    near
+        (K, 2) base frame: the nearest return of each of ``sectors`` sectors around the base.
+    strange
+        (M, 2) base frame: returns farther from everything on the map than
+        ``tolerance_m + tolerance_per_m * range``; none without a map.
+    """
+    known_m, x0, y0, resolution = known
+    nearest = np.full(sectors, np.inf)
+    points = np.empty((sectors, 2))
+    strange = np.empty((ranges.shape[0], 2))
+    count = 0
+    cm, sm = math.cos(mount[2]), math.sin(mount[2])
+    cp, sp = math.cos(pose[2]), math.sin(pose[2])
+    for k in range(ranges.shape[0]):
+        r = ranges[k]
+        if r >= far_m:
+            continue
+        dx, dy = r * directions[k, 0], r * directions[k, 1]
+        x, y = mount[0] + cm * dx - sm * dy, mount[1] + sm * dx + cm * dy
+        away = math.hypot(x, y)
+        if away < near_m:
+            sector = min(int((math.atan2(y, x) + math.pi) / (2.0 * math.pi) * sectors), sectors - 1)
+            if away < nearest[sector]:
+                nearest[sector] = away
+                points[sector, 0], points[sector, 1] = x, y
+        if known_m.shape[0] > 1:
+            mx, my = pose[0] + cp * x - sp * y, pose[1] + sp * x + cp * y
+            if interpolate_at(mx, my, known_m, x0, y0, resolution) > tolerance_m + tolerance_per_m * r:
+                strange[count, 0], strange[count, 1] = x, y
+                count += 1
+    kept = 0
+    near = np.empty((sectors, 2))
+    for sector in range(sectors):
+        if nearest[sector] < np.inf:
+            near[kept] = points[sector]
+            kept += 1
+    return near[:kept].copy(), strange[:count].copy()
+
+
+@kernel
+def bodies(points: FloatArray, radius: float) -> FloatArray:
+    """(K, 2) middles of discs that returns (M, 2) are of: a body's near side alone is seen.
+
+    Of the returns that no body explains yet the one nearest to the origin is straight before its middle.
+    """
+    open_ = np.ones(points.shape[0], dtype=np.bool_)
+    found = np.empty_like(points)
+    count = 0
+    while True:
+        nearest, least = -1, np.inf
+        for k in range(points.shape[0]):
+            away = math.hypot(points[k, 0], points[k, 1])
+            if open_[k] and away < least:
+                nearest, least = k, away
+        if nearest < 0:
+            return found[:count].copy()
+        behind = 1.0 + radius / max(least, 1e-6)
+        x, y = behind * points[nearest, 0], behind * points[nearest, 1]
+        found[count, 0], found[count, 1] = x, y
+        count += 1
+        open_[nearest] = False
+        for k in range(points.shape[0]):
+            if open_[k] and math.hypot(points[k, 0] - x, points[k, 1] - y) < 1.2 * radius:
+                open_[k] = False
+
+
+@kernel
+def within(points: FloatArray, reach: float) -> FloatArray:
+    """Those of points (K, 2) that are nearer to the origin than ``reach``."""
+    kept = np.empty_like(points)
+    count = 0
+    for k in range(points.shape[0]):
+        if points[k, 0] * points[k, 0] + points[k, 1] * points[k, 1] < reach * reach:
+            kept[count] = points[k]
+            count += 1
+    return kept[:count]
+
+
+@kernel
+def rotated(points: FloatArray, angle: float) -> FloatArray:
+    """Points (K, 2) turned around the origin."""
+    c, s = math.cos(angle), math.sin(angle)
+    out = np.empty_like(points)
+    for k in range(points.shape[0]):
+        out[k, 0], out[k, 1] = c * points[k, 0] - s * points[k, 1], s * points[k, 0] + c * points[k, 1]
+    return out
