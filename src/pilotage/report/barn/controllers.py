@@ -12,7 +12,15 @@ from matplotlib.figure import Figure
 from pilotage.core.whole_file import write_whole
 from pilotage.evaluation.courses import CourseRun, CourseSummary, summarize_courses
 from pilotage.report.barn.figure import COLOURS, HEIGHT_PT, MARKS
-from pilotage.report.barn.pairs import number, outcome, pairs_section, percent, plain_table, replay_link
+from pilotage.report.barn.pairs import (
+    counted,
+    number,
+    outcome,
+    pairs_section,
+    percent,
+    plain_table,
+    replay_link,
+)
 from pilotage.report.markup import REPORT_FILE, Section, figure_sections, page, section
 from pilotage.report.style import WIDTH_PT, Illustration, Key, drawing_style, render
 
@@ -83,8 +91,8 @@ def controllers_page(shown: ControllersPage) -> str:
         title="Controllers",
         eyebrow="pilotage bench controllers",
         heading="Local controllers on courses of many kinds",
-        headline=f"{best}: {percent(found.success)} of {found.trials} runs on {found.courses} courses "
-        "arrive.",
+        headline=f"{best}: {percent(found.success)} of {counted(found.trials, 'run')} on "
+        f"{counted(found.courses, 'course')} arrive.",
         tiles=[
             ("success", percent(found.success)),
             ("collisions", percent(found.collision)),
@@ -102,7 +110,9 @@ def _family(shown: ControllersPage, position: int, family: str) -> Section:
     if any(math.isfinite(run.near_share) for runs in parts.values() for run in runs):
         body += plain_table(PEOPLE_HEAD, [_people_row(name, runs) for name, runs in parts.items()])
     if family in shown.without_way:
-        body += f"<p>{shown.without_way[family]} courses have no way for this robot and were not driven.</p>"
+        body += (
+            f"<p>{counted(shown.without_way[family], 'course')} with no way for this robot, not driven.</p>"
+        )
     return section(f"family-{position}", Path(family).stem if "/" in family else family, body)
 
 

@@ -11,7 +11,15 @@ from pilotage.core.whole_file import write_whole
 from pilotage.evaluation.barn import BarnRun, summarize
 from pilotage.evaluation.intervals import wilson
 from pilotage.report.barn.figure import difficulty_figure
-from pilotage.report.barn.pairs import number, outcome, pairs_section, percent, plain_table, replay_link
+from pilotage.report.barn.pairs import (
+    counted,
+    number,
+    outcome,
+    pairs_section,
+    percent,
+    plain_table,
+    replay_link,
+)
 from pilotage.report.markup import REPORT_FILE, Section, figure_sections, page, section
 from pilotage.report.style import drawing_style
 
@@ -75,7 +83,7 @@ def barn_page(shown: BarnPage) -> str:
     with drawing_style():
         figure = difficulty_figure(shown.runs, shown.clearance_m)
     skipped = (
-        f" {len(shown.without_way)} courses have no way for this robot and were not driven: "
+        f" {counted(len(shown.without_way), 'course')} with no way for this robot, not driven: "
         f"{', '.join(map(str, shown.without_way))}."
         if shown.without_way
         else ""
@@ -93,8 +101,8 @@ def barn_page(shown: BarnPage) -> str:
         title="BARN",
         eyebrow="pilotage bench barn",
         heading="Controllers on the BARN courses",
-        headline=f"{best}: metric {found.metric:.3f} (0.5 is the most there is) on {found.worlds} courses, "
-        f"{found.trials} runs.{skipped}",
+        headline=f"{best}: metric {found.metric:.3f} (0.5 is the most there is) on "
+        f"{counted(found.worlds, 'course')}, {counted(found.trials, 'run')}.{skipped}",
         tiles=[
             ("metric", f"{found.metric:.3f}"),
             ("success", percent(found.success)),
