@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import re
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -84,6 +85,7 @@ def test_time_is_up_after_100_s(tmp_path: Path, capsys: pytest.CaptureFixture[st
     answer = json.loads(capsys.readouterr().out)
     assert (answer["timeout"], answer["metric"], answer["time_s"]) == (1.0, 0.0, None)
     assert rows_of(tmp_path / "out")[0]["time_s"] == "100"
+    assert not re.search(r"\bnan\b", (tmp_path / "out/report.html").read_text())  # no time, no interval
 
 
 def test_a_course_without_a_way_is_said_and_counted_apart(
@@ -110,6 +112,7 @@ def test_a_course_without_a_way_is_said_and_counted_apart(
         "on 1 course, 1 run. 1 course with no way for this robot, not driven: 0",
     ):
         assert word in page
+    assert not re.search(r"\bnan\b", page)
     # What is replayed is the run of the row.
     replays = {path.parent: json.loads(path.read_text()) for path in (out / "replays").glob("*/metrics.json")}
     assert len(replays) == 2

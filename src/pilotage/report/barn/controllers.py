@@ -14,12 +14,14 @@ from pilotage.evaluation.courses import CourseRun, CourseSummary, summarize_cour
 from pilotage.report.barn.figure import COLOURS, HEIGHT_PT, MARKS
 from pilotage.report.barn.pairs import (
     counted,
+    interval,
     number,
     outcome,
     pairs_section,
     percent,
     plain_table,
     replay_link,
+    seconds,
 )
 from pilotage.report.markup import REPORT_FILE, Section, figure_sections, page, section
 from pilotage.report.style import WIDTH_PT, Illustration, Key, drawing_style, render
@@ -126,9 +128,9 @@ def _row(name: str, runs: Sequence[CourseRun]) -> list[str]:
         f"{percent(found.success_low)} to {percent(found.success_high)}",
         percent(found.collision),
         percent(found.timeout),
-        f"{number(found.time_s, 2)} s",
+        seconds(found.time_s, 2),
         number(found.over_bound, 3),
-        f"{number(found.over_bound_low, 3)} to {number(found.over_bound_high, 3)}",
+        interval(found.over_bound_low, found.over_bound_high, 3),
         str(found.trials),
         str(found.courses),
     ]
@@ -140,7 +142,7 @@ def _people_row(name: str, runs: Sequence[CourseRun]) -> list[str]:
         name,
         str(found.people_collisions),
         str(found.people_touches),
-        f"{number(found.closest_m, 2)} m",
+        f"{found.closest_m:.2f} m" if math.isfinite(found.closest_m) else "–",
         percent(found.near_share),
         percent(found.time_lost) if math.isfinite(found.time_lost) else "–",
         str(found.trials),

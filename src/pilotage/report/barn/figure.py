@@ -42,8 +42,10 @@ def difficulty_figure(
             metric,
             MARKS[number % len(MARKS)],
             color=colour,
-            markersize=4.0,
-            alpha=0.7,
+            # Rings about each other: where controllers do as well as each other, all can be seen.
+            markersize=4.0 + 3.0 * (len(runs) - 1 - number),
+            fillstyle="full" if number == len(runs) - 1 else "none",
+            alpha=0.8,
         )
         keys.append(Key(name, colour, "spot"))
     axes.set_xlabel("least distance between reference path and a post (m)")

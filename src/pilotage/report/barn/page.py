@@ -13,12 +13,14 @@ from pilotage.evaluation.intervals import wilson
 from pilotage.report.barn.figure import difficulty_figure
 from pilotage.report.barn.pairs import (
     counted,
+    interval,
     number,
     outcome,
     pairs_section,
     percent,
     plain_table,
     replay_link,
+    seconds,
 )
 from pilotage.report.markup import REPORT_FILE, Section, figure_sections, page, section
 from pilotage.report.style import drawing_style
@@ -107,7 +109,7 @@ def barn_page(shown: BarnPage) -> str:
             ("metric", f"{found.metric:.3f}"),
             ("success", percent(found.success)),
             ("collisions", percent(found.collision)),
-            ("mean time", f"{found.time_s:.1f} s"),
+            ("mean time", seconds(found.time_s, 1)),
         ],
         footer="Made by pilotage.",
     )
@@ -119,12 +121,12 @@ def _row(name: str, runs: Sequence[BarnRun]) -> list[str]:
     return [
         name,
         f"{found.metric:.4f}",
-        f"{found.metric_low:.4f} to {found.metric_high:.4f}",
+        interval(found.metric_low, found.metric_high, 4),
         percent(found.success),
         f"{percent(low)} to {percent(high)}",
         percent(found.collision),
         percent(found.timeout),
-        f"{found.time_s:.2f} s",
+        seconds(found.time_s, 2),
         number(found.over_bound, 3),
         str(found.trials),
         str(found.worlds),

@@ -47,8 +47,8 @@ def pairs_section(
             rows.append(
                 [
                     f"{what}: {name} minus {first}",
-                    f"{found.mean:+.{digits}f}",
-                    f"{found.low:+.{digits}f} to {found.high:+.{digits}f}",
+                    f"{found.mean:+.{digits}f}" if math.isfinite(found.mean) else "–",
+                    interval(found.low, found.high, digits, "+"),
                     f"{found.p_value:.2g}" if math.isfinite(found.p_value) else "–",
                     str(found.n),
                 ]
@@ -98,3 +98,14 @@ def counted(count: int, noun: str) -> str:
 def number(value: float, digits: int) -> str:
     """So many digits after the point; a dash for none."""
     return f"{value:.{digits}f}" if math.isfinite(value) else "–"
+
+
+def interval(low: float, high: float, digits: int, sign: str = "") -> str:
+    """From where to where; a dash for none, as of a single course; ``sign="+"`` writes that as well."""
+    known = math.isfinite(low) and math.isfinite(high)
+    return f"{low:{sign}.{digits}f} to {high:{sign}.{digits}f}" if known else "–"
+
+
+def seconds(value: float, digits: int) -> str:
+    """A time with its unit; a dash for none, as where nobody arrived."""
+    return f"{value:.{digits}f} s" if math.isfinite(value) else "–"
