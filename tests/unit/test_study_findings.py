@@ -94,6 +94,21 @@ def test_the_object_begins_with_what_was_found() -> None:
     assert not set(best["not_told_from_it"]) & {cell.name for cell in study.cells[4:]}
 
 
+@pytest.mark.parametrize(("pairing", "needed"), [("shared", 8), ("independent", 5)])
+def test_too_few_trials_for_any_two_settings_are_told(pairing: str, needed: int) -> None:
+    """Six settings, five comparisons: 0.05 / 5 against 2^(1 - n), and 2 n! n! / (2 n)! of seeds apart."""
+    apart = np.linspace(0.0, 500.0, 6)  # so that ranks never mix
+    for trials, said in ((needed - 1, needed), (needed, 0)):
+        study = a_study(trials=trials, seeds={"pairing": pairing})
+        table = a_table(study, np.random.default_rng(8), position_rmse_m=apart)
+        best = best_settings(table, table.judged())
+        first = next(entry for entry in best if entry.metric == "position_rmse_m")
+        assert (first.needed, len(first.also)) == (said, 5 if said else 0)
+        page = study_page(table, found=(findings_of(table), best))
+        assert (f"takes at least {needed} trials of each" in page) == bool(said)
+        assert ("trials_needed" in study_object(table)["best"][0]) == bool(said)
+
+
 def test_the_best_consistency_is_nearest_to_its_ideal() -> None:
     """Around 3 at the third setting; lower ones are no better."""
     shifts = np.array([-9.0, 9.0, -7.0, 0.0, 6.0, -12.0])

@@ -135,6 +135,19 @@ def corrected(p_values: Sequence[float]) -> list[float]:
     return [float(value) for value in out]
 
 
+def least_trials(comparisons: int, level: float, *, paired: bool) -> int:
+    """Fewest trials of each configuration with which a test by ranks can tell two of them apart at all.
+
+    Where every trial says the same, Wilcoxon's p of n pairs is 2^(1 - n), Mann and Whitney's of n and n
+    trials 2 n! n! / (2 n)!. The surest of so many comparisons has to stay below ``level`` divided by their
+    number (Holm).
+    """
+    count = 1
+    while (2.0 ** (1 - count) if paired else 2.0 / math.comb(2 * count, count)) >= level / comparisons:
+        count += 1
+    return count
+
+
 def _wilcoxon(change: FloatArray) -> float:
     if not np.any(change):
         return math.nan

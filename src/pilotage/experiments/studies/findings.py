@@ -14,7 +14,7 @@ from pilotage.evaluation.effects import SURE, Effect, effects, holm
 from pilotage.evaluation.intervals import Summary
 from pilotage.evaluation.judge import SUCCESS, Judgement
 from pilotage.evaluation.metrics import METRICS
-from pilotage.evaluation.paired import difference, difference_apart
+from pilotage.evaluation.paired import difference, difference_apart, least_trials
 from pilotage.experiments.studies.definition import CONFIGURATION
 from pilotage.experiments.studies.groups import CellGroup
 from pilotage.experiments.studies.table import StudyTable
@@ -59,13 +59,18 @@ class Finding:
 
 @dataclass(frozen=True, slots=True)
 class Best:
-    """The best setting of a group by one metric, and those that these trials do not tell from it."""
+    """The best setting of a group by one metric, and those that these trials do not tell from it.
+
+    ``needed`` trials of each setting are the fewest with which any two could be told apart, however much they
+    differ; 0 where there are as many.
+    """
 
     metric: str
     group: str
     cell: int
     summary: Summary
     also: tuple[int, ...]
+    needed: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -146,9 +151,13 @@ def best_settings(table: StudyTable, judgement: Judgement) -> list[Best]:
             best = min(known, key=lambda index: float(means[index]))
             others = [index for index in known if index != best]
             compare = difference if table.same_seeds else difference_apart
-            p_values = holm([compare(values[:, best], values[:, index]).p_value for index in others])
+            found = [compare(values[:, best], values[:, index]) for index in others]
+            p_values = holm([one.p_value for one in found])
             also = (i for i, p in zip(others, p_values, strict=True) if not (math.isfinite(p) and p < SURE))
-            out.append(Best(metric, group.name, best, judgement.summaries[metric][best], tuple(also)))
+            needed = least_trials(len(others), SURE, paired=table.same_seeds)
+            enough = max(one.n for one in found) >= needed
+            summary = judgement.summaries[metric][best]
+            out.append(Best(metric, group.name, best, summary, tuple(also), 0 if enough else needed))
     return out
 
 
@@ -217,6 +226,7 @@ def _found(table: StudyTable, judgement: Judgement) -> dict[str, Any]:
                 "low": best.summary.low,
                 "high": best.summary.high,
                 "not_told_from_it": [names[index] for index in best.also],
+                **({"trials_needed": best.needed} if best.needed else {}),
             }
             for best in best_settings(table, judgement)
         ],

@@ -7,6 +7,7 @@ from collections.abc import Iterable, Sequence
 from itertools import groupby
 from typing import Any
 
+from pilotage.evaluation.effects import FEWEST
 from pilotage.evaluation.metric import words_and_unit
 from pilotage.evaluation.metrics import METRICS
 from pilotage.experiments.studies.cells import show
@@ -28,13 +29,15 @@ HOW = (
     "twenty tells of one. The last column is the change from the first to the last level that as many "
     "trials show in four of five such studies."
 )
+TOO_FEW = f"Effects are looked for from {FEWEST} trials on that give a metric at every setting."
 PAIRED, APART = "Wilcoxon or Friedman, on the same seeds", "Mann and Whitney or Kruskal and Wallis"
 
 
 def effects_section(table: StudyTable, findings: Sequence[Finding], best: Sequence[Best]) -> Section:
-    """What the study found, in words and as a table; left out where nothing could be looked at."""
+    """What the study found, in words and as a table; left out where there is nothing to compare."""
     if not findings:
-        return section("effects", "Findings")
+        lines = [_best(table, entry) for entry in best if entry.metric == table.primary]
+        return section("effects", "Findings", _list([TOO_FEW, *lines]) if lines else "")
     sure = sorted((f for f in findings if f.is_sure), key=lambda f: -f.effect.share)
     sure.sort(key=lambda f: f.metric != table.primary)
     lines = [_shown(table, finding) for finding in sure[:MOST_LINES]]
@@ -134,6 +137,8 @@ def _best(table: StudyTable, best: Best) -> str:
     )
     if not best.also:
         return f"{text}; every other setting is worse beyond chance."
+    if best.needed:
+        return f"{text}; to tell any two settings apart takes at least {best.needed} trials of each."
     named = ", ".join(f"'{table.cells[index].text}'" for index in best.also)
     also = named if len(best.also) <= FEW_SETTINGS else f"{len(best.also)} other settings"
     return f"{text}; not told from it by these trials: {also}."
