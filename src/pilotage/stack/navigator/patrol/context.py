@@ -25,6 +25,8 @@ from pilotage.stack.patrol.word import Claim, Clearing, TeamWord
 
 SPEED_SHARE = 0.2
 """Weight of the newest edge in the speed made good."""
+SURELY_RATIO = 0.9
+"""Who is within so much of ``visit_m`` visits a place, though told places are a little off."""
 
 
 class Context(Senses):
@@ -126,7 +128,7 @@ class Context(Senses):
         if self.homeward:
             return self.away_m(self.hop) <= DOCK_M
         if blocked or self.motion.taken:
-            return self.away_m(self.hop) <= 0.9 * self.task.visit_m
+            return self.away_m(self.hop) <= SURELY_RATIO * self.task.visit_m
         return self.away_m(self.hop) <= self.motion.sure_m()
 
     def runs_low(self) -> bool:
@@ -172,7 +174,7 @@ class Context(Senses):
         heard, (x, y) = self.heard(), self.roadmap.places_xy_m[self.hop]
         since_s = max(self._left_s, self.t_s - self.config.hold_s)
         left = self.memory.visited_s(self.hop) > since_s or any(
-            math.hypot(word.x_m - x, word.y_m - y) <= self.task.visit_m for _, word in heard
+            math.hypot(word.x_m - x, word.y_m - y) <= SURELY_RATIO * self.task.visit_m for _, word in heard
         )
         if left or (for_long and not heard):
             self.came_from, self._left_s, self._kept_out_s = self.hop, self.t_s, math.inf

@@ -92,7 +92,9 @@ class Waiting:
         context = self.context
         context.mode, context.motion.blocked = Mode.WAIT, False
         traffic.look_along(context, context.here())
-        context.memory.visit(context.came_from, context.t_s)
+        # Who left it to mates waits elsewhere.
+        if context.away_m(context.came_from) <= context.task.visit_m:
+            context.memory.visit(context.came_from, context.t_s)
         clear_s = self.clear_s if context.crowded(ASIDE_M) else context.t_s
         if context.t_s - self.since_s < context.config.ask_s:
             return Move(replace(self, clear_s=clear_s), context.motion.stand())
