@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -71,6 +72,8 @@ class Roadmap:
         self._vertices = len(vertices_xy_m)
         self._places = [(float(x), float(y)) for x, y in self.places_xy_m]
         self._fields: dict[int, FloatArray] = {}
+        self._whole: Roadmap = self
+        self._cut_off: frozenset[int] = frozenset()
         near = [near_m] * self._vertices + [STATION_M] * len(stations_xy_m)
         for finer in FINER:
             self._lay(chart, clearance_m, speed_m_s, spacing_m / finer, lane_m)
@@ -135,6 +138,42 @@ class Roadmap:
             )
         return int(rows[best]), int(columns[best])
 
+    def around(
+        self, bodies_xy_m: FloatArray, keep_m: float, here_xy_m: tuple[float, float], near_m: float
+    ) -> Roadmap:
+        """The same roadmap without what is nearer than ``keep_m`` to bodies (K, 2) that stand.
+
+        A place is as good from the nearest node within ``near_m`` that can be reached from ``here_xy_m``; one
+        without such a node is cut off, and its field stays what it was.
+        """
+        found, nodes = copy.copy(self), self._nodes_xy_m()
+        found.slowness = self.slowness.copy()
+        for body in bodies_xy_m:
+            found.slowness[np.hypot(*(nodes - body).transpose(2, 0, 1)) < keep_m] = np.inf
+        free = np.isfinite(found.slowness)
+        regions, _ = label(free)
+        # The nearest node by time: as the crow flies it may lie behind a wall.
+        time = np.where(free, self._from(*here_xy_m, self.slowness), np.inf)
+        reached = free & (regions == regions[np.unravel_index(int(np.argmin(time)), time.shape)])
+        rows, columns = np.nonzero(reached)
+        cut_off = []
+        found._fields, found._whole, found._seeds = {}, self, list(self._seeds)
+        for place, seed in enumerate(self._seeds):
+            if reached[seed] or not len(rows):
+                continue
+            away = np.hypot(*(nodes[rows, columns] - self.places_xy_m[place]).T)
+            best = int(np.argmin(away))
+            if away[best] <= near_m:
+                found._seeds[place] = int(rows[best]), int(columns[best])
+            else:
+                cut_off.append(place)
+        found._cut_off = frozenset(cut_off)
+        return found
+
+    def is_cut_off(self, place: int) -> bool:
+        """Whether bodies that stand leave no path to a place."""
+        return place in self._cut_off
+
     def nearest(self, x_m: float, y_m: float) -> int:
         """The vertex that is reached soonest from a place, of the few that are nearest as the crow flies."""
         places = self.places_xy_m[: self._vertices]
@@ -152,6 +191,8 @@ class Roadmap:
 
     def time_s(self, place: int) -> FloatArray:
         """(rows, columns) time to go to a place; worked out when asked for, and kept while there is room."""
+        if place in self._cut_off:
+            return self._whole.time_s(place)
         if self._all_kept and (known := self._fields.get(place)) is not None:
             return known
         field = self._fields.pop(place, None)

@@ -60,6 +60,8 @@ class TeamWord:
         None unless it goes first.
     news
         Of the patrol.
+    standing
+        Places of bodies that it saw stand for long, who say nothing: it plans around them.
     """
 
     x_m: float
@@ -68,3 +70,4 @@ class TeamWord:
     claim: Claim | None
     clearing: Clearing | None
     news: PatrolMessage
+    standing: tuple[tuple[float, float], ...] = ()

@@ -21,6 +21,8 @@ class Battery:
 
     Attributes
     ----------
+    roadmap
+        By which it reckons what is left to go.
     station
         Its number among the roadmap's places.
     left_m
@@ -37,7 +39,7 @@ class Battery:
     """
 
     def __init__(self, supply: Supply, roadmap: Roadmap, station: int, speed_m_s: float) -> None:
-        self._supply, self._roadmap, self._speed_m_s = supply, roadmap, speed_m_s
+        self._supply, self.roadmap, self._speed_m_s = supply, roadmap, speed_m_s
         self.station, self.left_m, self.low = station, supply.range_m, False
         self.charge_s = supply.charge_s + SURE_S
         there_m = roadmap.longest_s(station) * speed_m_s
@@ -63,7 +65,7 @@ class Battery:
         The time to go is longer than the path over the speed wherever walls are near: no path is longer than
         what it says.
         """
-        roadmap = self._roadmap
+        roadmap = self.roadmap
         time = roadmap.time_s(self.station)
         to_go_s = eikonal.value_at(pose.x_m, pose.y_m, time, *roadmap.origin_xy_m, roadmap.spacing_m, 0.0)
         # Where the map has no floor the pose is a little off: the next one tells.

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from pilotage.core.types import FloatArray, Pose2, Twist
 from pilotage.kernels.control import eikonal
 from pilotage.maps.world_map import WorldMap
@@ -15,10 +17,11 @@ from pilotage.stack.navigator.patrol.battery import DOCK_M, Battery
 from pilotage.stack.navigator.patrol.config import Mode, PatrolNavigatorConfig
 from pilotage.stack.navigator.patrol.headway import Headway
 from pilotage.stack.navigator.patrol.motion import Motion
+from pilotage.stack.navigator.patrol.obstructions import Obstructions
 from pilotage.stack.navigator.patrol.passage import Pursuit
 from pilotage.stack.navigator.patrol.senses import NO_POINTS, Senses
 from pilotage.stack.patrol.messages import PatrolMemory
-from pilotage.stack.patrol.roadmap import roadmap_of
+from pilotage.stack.patrol.roadmap import Roadmap, roadmap_of
 from pilotage.stack.patrol.strategy import following
 from pilotage.stack.patrol.task import PatrolTask
 from pilotage.stack.patrol.word import Claim, Clearing, TeamWord
@@ -77,6 +80,8 @@ class Context(Senses):
             config.lane_m,
         )
         self.motion = Motion(self, robot.motion, self.roadmap, clearance_m)
+        self._open, self._obstructions = self.roadmap, Obstructions()
+        self._shut: Roadmap | None = None
         self.battery: Battery | None = None
         if task.supply is not None:
             station = len(task.graph) + task.robot
@@ -95,6 +100,50 @@ class Context(Senses):
         driven_m = self.take_in(readings, belief, lost=lost)
         if self.battery is not None:
             self.battery.spend(driven_m)
+        if self.fresh:
+            self.motion.watch()
+            if not lost:
+                self._look_who_shuts_paths()
+
+    def _look_who_shuts_paths(self) -> None:
+        """Plan around those who have stood for long, from where that leads anywhere."""
+        heard = dict(self.heard())
+        silent = [(w.x_m, w.y_m) for n, (_, w) in self.mates.items() if n not in heard]
+        told = [place for word in heard.values() for place in word.standing if self._may_stand(place)]
+        known = self._obstructions.known_xy_m
+        absent = np.array([self.sees_nothing_at(place, self.radius_m) for place in known], dtype=np.bool_)
+        places = (np.array(xy).reshape(-1, 2) for xy in (silent, told))
+        if self._obstructions.step(self.t_s, self.motion.standing, absent, *places):
+            self._shut_paths()
+        for roadmap in (self._shut, self._open) if self._shut is not None else ():
+            self._take(roadmap)
+            if not self.is_off_roadmap():
+                break
+
+    def _may_stand(self, place: tuple[float, float]) -> bool:
+        """Whether somebody may stand where a mate says so: nothing that it sees or hears speaks against it.
+
+        To whoever does not hear it a mate that stands is an obstruction; it may be this robot.
+        """
+        there = [(self.pose.x_m, self.pose.y_m), *((w.x_m, w.y_m) for _, w in self.heard())]
+        return not any(math.dist(place, xy) < 2.0 * self.radius_m for xy in there) and (
+            not self.sees_nothing_at(np.array(place), self.radius_m)
+        )
+
+    def _shut_paths(self) -> None:
+        """Who shuts paths has changed."""
+        bodies, here = self._obstructions.shutting_xy_m, (self.pose.x_m, self.pose.y_m)
+        self._shut, near_m = None, SURELY_RATIO * self.task.visit_m
+        if len(bodies):
+            self.say("shut", "plans around " + ", ".join(f"({x:.1f}, {y:.1f})" for x, y in bodies.tolist()))
+            self._shut = self._open.around(bodies, self.motion.body_m, here, near_m)
+        self._take(self._open)
+        self.headway.restart(self.t_s)  # by what is left to go on other paths
+
+    def _take(self, roadmap: Roadmap) -> None:
+        self.roadmap = self.motion.roadmap = roadmap
+        if self.battery is not None:
+            self.battery.roadmap = roadmap
 
     def hear(self, sent_s: float, word: TeamWord) -> None:
         """A mate said something: the patrol's news count too."""
@@ -112,7 +161,9 @@ class Context(Senses):
         x, y = (math.nan, math.nan) if lost else (self.pose.x_m, self.pose.y_m)
         self.memory.update(self.t_s, words=self.task.strategy.words(self.memory.knowledge(self.t_s)))
         news = self.memory.message(self.t_s)
-        self.journal.outbox.append(TeamWord(x, y, self.motion.blocked, self.claim, self.clearing, news))
+        self.journal.outbox.append(
+            TeamWord(x, y, self.motion.blocked, self.claim, self.clearing, news, self._obstructions.told())
+        )
 
     def away_m(self, place: int) -> float:
         """Distance from a vertex or its station as the crow flies."""
@@ -167,20 +218,28 @@ class Context(Senses):
     def leave_to_mates(self, *, for_long: bool) -> bool:
         """Go on as if it had been where it is kept out of, if a mate stands there or has been there since.
 
+        Or where nothing leads there past somebody who stands and says nothing.
         Who hears nobody takes it that who keeps it out ``for_long`` goes there.
         """
         if self.homeward:
             return False
+        if self.roadmap.is_cut_off(self.hop):
+            self._leave()
+            return True
         heard, (x, y) = self.heard(), self.roadmap.places_xy_m[self.hop]
         since_s = max(self._left_s, self.t_s - self.config.hold_s)
         left = self.memory.visited_s(self.hop) > since_s or any(
             math.hypot(word.x_m - x, word.y_m - y) <= SURELY_RATIO * self.task.visit_m for _, word in heard
         )
         if left or (for_long and not heard):
-            self.came_from, self._left_s, self._kept_out_s = self.hop, self.t_s, math.inf
-            self.memory.leave(self.hop, self.t_s)
+            self._leave()
             return True
         return False
+
+    def _leave(self) -> None:
+        """Go on as if it had been where it was sent."""
+        self.came_from, self._left_s, self._kept_out_s = self.hop, self.t_s, math.inf
+        self.memory.leave(self.hop, self.t_s)
 
     def ask(self) -> bool:
         """Let the strategy say where to go, or the battery; False where the strategy says to wait."""

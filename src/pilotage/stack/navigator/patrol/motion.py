@@ -35,6 +35,12 @@ class Motion:
 
     Attributes
     ----------
+    roadmap
+        Whose fields it follows.
+    body_m
+        What it keeps from the middle of who stands.
+    standing
+        (K, 2) bodies near by, map frame, that have stood for some seconds and say nothing.
     command
         The last one: it stands between two scans.
     to_go_s
@@ -46,7 +52,8 @@ class Motion:
     """
 
     def __init__(self, senses: Senses, motion: MotionConfig, roadmap: Roadmap, clearance_m: float) -> None:
-        self._senses, self._roadmap, self._clearance_m = senses, roadmap, clearance_m
+        self._senses, self.roadmap, self._clearance_m = senses, roadmap, clearance_m
+        self.body_m = clearance_m + senses.radius_m
         config, period_s, speed = senses.config, senses.period_s, motion.top_speed_m_s
         braking = min(motion.braking_m_s2, speed / senses.dt_s)
         turn_rate = motion.top_turn_rate_rad_s
@@ -60,14 +67,26 @@ class Motion:
         self._window = window.horizon_s, *costs, window.speeds, window.turns
         self._room: tuple[FloatArray, Pose2, tuple[float, float]] | None = None
         self._still = StillWatch()
+        self.standing = NO_POINTS
         self.command, self.to_go_s = STOP, math.nan
         self.blocked = self.taken = False
+
+    def watch(self) -> None:
+        """Look who stands, in a scan."""
+        self.standing = self._still.step(self._senses.t_s, self._mute(self._beside()))
+
+    def _beside(self) -> FloatArray:
+        """(M, 2) returns of what may move and is near, base frame."""
+        senses = self._senses
+        return (
+            disc_returns.within(senses.strange, senses.config.watch_m) if len(senses.strange) else NO_POINTS
+        )
 
     def room_ahead_m(self, time: FloatArray) -> tuple[float, float]:
         """Half the width of the narrowest place down a field, for claims and for lanes."""
         known, pose = self._room, self._senses.pose
         if known is None or known[0] is not time or known[1] is not pose:
-            room_m = self._roadmap.narrowest_m(pose.x_m, pose.y_m, time, CLAIM_M, LANE_AHEAD_M)
+            room_m = self.roadmap.narrowest_m(pose.x_m, pose.y_m, time, CLAIM_M, LANE_AHEAD_M)
             self._room = known = time, pose, room_m
         return known[2]
 
@@ -90,7 +109,7 @@ class Motion:
         From there it is to go on to vertex ``then``, where it came from another one; -1 where that is not
         known. Between two scans the last command stands. Who goes ``first`` drives on towards mates who talk.
         """
-        senses, roadmap, config = self._senses, self._roadmap, self._senses.config
+        senses, roadmap, config = self._senses, self.roadmap, self._senses.config
         pose, (x0, y0) = senses.pose, roadmap.origin_xy_m
         # Also between scans: the way to another vertex is not measured by what was left to the last one.
         self.to_go_s = eikonal.value_at(pose.x_m, pose.y_m, time, x0, y0, roadmap.spacing_m, 0.0)
@@ -100,12 +119,9 @@ class Motion:
         lane_m = min(config.lane_m, max(0.0, room_m - self._clearance_m)) if room_m < math.inf else 0.0
         lane_m *= min(1.0, self.to_go_s / MERGE_S)
         self.blocked = self.taken = False
-        beside = senses.strange
-        if len(beside):
-            beside = disc_returns.within(beside, config.watch_m)
-        around_m, body_m = self._clearance_m + 0.5 * config.gap_m, self._clearance_m + senses.radius_m
+        beside, still = self._beside(), self.standing
+        around_m, body_m = self._clearance_m + 0.5 * config.gap_m, self.body_m
         discs = _discs(senses.on_map(beside), around_m) if len(beside) and not first else NO_DISCS
-        still = self._still.step(senses.t_s, self._mute(beside))
         if len(still):
             discs = np.concatenate([discs, _discs(still, body_m)])
             # Beside who stands where it wants to be it goes around him, on either side, and that will do.
@@ -131,7 +147,7 @@ class Motion:
     ) -> tuple[float, float, bool]:
         """Speed, turn rate, and whether it stays where it is: down a field, around discs (M, 3)."""
         senses, pose = self._senses, self._senses.pose
-        (x0, y0), spacing = self._roadmap.origin_xy_m, self._roadmap.spacing_m
+        (x0, y0), spacing = self.roadmap.origin_xy_m, self.roadmap.spacing_m
         if len(discs):
             dx, dy = eikonal.descent(pose.x_m, pose.y_m, time, x0, y0, spacing)
             # Who follows the field is the point to the left of the robot: so must be what it goes around.
@@ -157,7 +173,7 @@ class Motion:
 
     def _detour(self, time: FloatArray, discs: FloatArray) -> tuple[FloatArray, float, float, float]:
         """A field around discs (M, 3), near by: the window, its origin, and the time at the robot."""
-        senses, roadmap = self._senses, self._roadmap
+        senses, roadmap = self._senses, self.roadmap
         (x0, y0), spacing = roadmap.origin_xy_m, roadmap.spacing_m
         x, y, reach_m = senses.pose.x_m, senses.pose.y_m, senses.config.watch_m
         there_s, slow = THERE_RATIO * senses.task.visit_m / senses.speed_m_s, roadmap.slowness
@@ -176,12 +192,12 @@ class Motion:
             return NO_GATE
 
         def around(field: FloatArray) -> safe_stop.Field:
-            x0, y0 = self._roadmap.origin_xy_m
+            x0, y0 = self.roadmap.origin_xy_m
             if len(discs):
                 field, x0, y0, _ = self._detour(field, discs)
-            return field, x0, y0, self._roadmap.spacing_m
+            return field, x0, y0, self.roadmap.spacing_m
 
-        return gate_at(self._roadmap, at, came_from, then, near_m, turn_s_per_rad, around)
+        return gate_at(self.roadmap, at, came_from, then, near_m, turn_s_per_rad, around)
 
     def _mute(self, beside: FloatArray) -> FloatArray:
         """(K, 2) middles, map frame, of bodies among returns that no mate who talks says it is."""

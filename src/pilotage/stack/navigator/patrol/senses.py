@@ -162,6 +162,22 @@ class Senses:
         """(M, 2) what is on no map, map frame."""
         return self.on_map(self.strange)
 
+    def sees_nothing_at(self, place: FloatArray, reach_m: float) -> bool:
+        """Whether nothing is seen at a place (2,) of the map, though it is near and nothing is before it."""
+        here = np.array([self.pose.x_m, self.pose.y_m])
+        to = place - here
+        away_m = float(np.hypot(*to))
+        if away_m > self.config.watch_m or away_m < 1e-6:
+            return False
+        along = to / away_m
+        offset = self.strange_on_map() - here
+        ahead, off = offset @ along, np.abs(offset @ np.array([-along[1], along[0]]))
+        if ((ahead > 0.0) & (ahead < away_m + reach_m) & (off < reach_m)).any():
+            return False
+        steps = np.linspace(0.0, 1.0, math.ceil(away_m / self._known.resolution_m) + 1)
+        line = here + steps[:, None] * to
+        return bool(self._known.at(line).min() > self._known.resolution_m)
+
     def bodies_on_map(self) -> FloatArray:
         """(K, 2) middles of those who are seen, map frame."""
         return self.on_map(disc_returns.bodies(self.strange, self.radius_m))

@@ -15,6 +15,7 @@ from pilotage.stack.navigator.patrol.context import Context
 from pilotage.stack.navigator.patrol.headway import PROGRESS_S
 from pilotage.stack.navigator.patrol.passage import Stretch
 from pilotage.stack.navigator.progress import StallWatch
+from pilotage.stack.patrol.roadmap import Roadmap
 
 MOUTH_M = 1.5
 """So far before a passage it stands aside."""
@@ -46,10 +47,17 @@ class Move(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Driving:
-    """Drives to the next vertex of its path, asks at each where to go on."""
+    """Drives to the next vertex of its path, asks at each where to go on.
+
+    Attributes
+    ----------
+    roadmap
+        By which its watch measures what is left to go.
+    """
 
     context: Context
     watch: StallWatch
+    roadmap: Roadmap
 
     def step(self, readings: Readings) -> Move:
         """Follow the field; give way where it does not get on."""
@@ -64,6 +72,8 @@ class Driving:
         if met is not None:
             return met
         command = context.lead(context.hop)
+        if context.roadmap is not self.roadmap:
+            return Move(set_out(context), command)
         if self.watch.stalled(context.motion.to_go_s, context.t_s):
             left = forgo(context, for_long=False)
             if left is not None and isinstance(left.state, Waiting) and not is_wanted(context):
@@ -286,7 +296,7 @@ def set_out(context: Context) -> Driving:
     """On to the hop."""
     watch = StallWatch(PROGRESS_S, patience_s(context))
     watch.restart(context.t_s)
-    return Driving(context, watch)
+    return Driving(context, watch, context.roadmap)
 
 
 def arrive(context: Context) -> Move:
@@ -303,6 +313,9 @@ def resume(context: Context) -> Move:
     """Where to now; it waits where all that it is sent to is visited from where it stands."""
     visited: set[int] = set()
     while context.ask() and context.hop not in visited:
+        if context.roadmap.is_cut_off(context.hop) and context.leave_to_mates(for_long=False):
+            visited.add(context.hop)
+            continue
         if context.homeward or not context.arrived(blocked=False):
             state = set_out(context)
             return Move(state, context.lead(context.hop))
