@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -13,13 +14,15 @@ from pilotage.kernels.control.footprint import discs_clearance
 from pilotage.kernels.control.motion_limits import Drive, advance
 from pilotage.kernels.scans.rays import fan_ranges
 from pilotage.stack.control.local.gap_horizon import GapHorizon
-from pilotage.stack.control.local.narrow_passage import NarrowPassage
+from pilotage.stack.control.local.narrow_passage import NarrowPassage, find_narrow_passage
 from pilotage.stack.control.local.role import (
     LOCAL_CONTROLLERS,
     LocalController,
     LocalLimits,
     LocalView,
 )
+from pilotage.stack.control.local.rolling import RollingGround
+from pilotage.stack.control.local.rolling_config import RollingConfig
 
 JACKAL = np.array([[0.254, 0.215], [-0.254, 0.215], [-0.254, -0.215], [0.254, -0.215]])
 LIMITS = LocalLimits(2.0, 0.5, 3.0, 3.0, 4.0, 6.0)
@@ -155,6 +158,42 @@ def test_lining_up_before_a_gap_it_swings_no_corner_by_more_closely_than_elsewhe
         least = min(least, discs_clearance(*state[:3], JACKAL, posts))
     assert state[2] > 0.1
     assert least > 0.0045
+
+
+@pytest.mark.parametrize("room_m", [0.012, 0.02])
+def test_where_a_post_keeps_it_from_turning_it_backs_straight_out(room_m: float) -> None:
+    """The point before the gap is to its left; it has come in between four posts, and any turn meets one."""
+    away = 0.215 + room_m + 0.075
+    posts = np.array([[x, side * away, 0.075] for x in (0.0, 0.12) for side in (-1.0, 1.0)])
+    controller = make("gap-horizon")
+    assert isinstance(controller, GapHorizon)
+    for k in range(20):
+        controller.step(view_of(0.05 * k - 1.0, Pose2(0.05 * k - 1.0, 0.0, 0.0), Twist(1.0, 0.0), posts))
+    controller._passage = NarrowPassage(0.6, 1.0, 0.0, 0.5, 0, 0.0)
+    state = (0.0, 0.0, 0.0, 0.0, 0.0)
+    true = Drive(2.0, 0.5, 3.0, 3.0, 4.0, 6.0)
+    least = math.inf
+    for k in range(80):
+        command = controller.step(view_of(0.05 * k, Pose2(*state[:3]), Twist(*state[3:]), posts))
+        state = advance(*state, command.v_m_s, command.w_rad_s, 0.05, true)
+        least = min(least, discs_clearance(*state[:3], JACKAL, posts))
+    # Backed out, turned, and on its way.
+    assert state[0] < -0.3
+    assert state[2] > 1.0
+    assert least > 0.0
+
+
+def test_posts_that_all_but_touch_are_no_gap_to_try() -> None:
+    """Two rows of posts with 6 cm between: nothing to line up for."""
+    posts = np.array(
+        [[0.7, side * (0.03 + 0.075 + 0.15 * k), 0.075] for k in range(3) for side in (-1.0, 1.0)]
+    )
+    scene = RollingGround(RollingConfig()).update(view_of(0.0, Pose2(0.0, 0.0, 0.0), Twist(0.0, 0.0), posts))
+    straight = replace(scene, path=np.column_stack([np.arange(0.0, 1.2, 0.1), np.zeros(12)]))
+    assert find_narrow_passage(straight, 1.2, 0.0) is None
+    wider = posts + np.sign(posts[:, 1:2]) * [0.0, 0.22, 0.0]
+    scene = RollingGround(RollingConfig()).update(view_of(0.0, Pose2(0.0, 0.0, 0.0), Twist(0.0, 0.0), wider))
+    assert find_narrow_passage(replace(scene, path=straight.path), 1.2, 0.0) is not None
 
 
 def test_it_stands_before_a_closed_wall() -> None:

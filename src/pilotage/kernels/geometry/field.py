@@ -71,10 +71,12 @@ def lower_by_circles(
     """Lower a field (ny, nx) in place to the distance from circles (M, 3), where these are nearer.
 
     A circle can be nearer to a node of a block only if it is nearer to the block than the block's largest
-    distance: of a few walls' field most circles are passed over at most blocks.
+    distance, and than the nearest circle by the block's diameter: most circles are passed over at most
+    blocks. Of the others a root is taken only where squares do not tell that the field stays.
     """
     ny, nx = distance.shape
     near = np.empty_like(circles)
+    circle_away = np.empty(circles.shape[0])
     for row0 in range(0, ny, BLOCK):
         row1 = min(ny, row0 + BLOCK)
         for col0 in range(0, nx, BLOCK):
@@ -82,20 +84,31 @@ def lower_by_circles(
             mx = x0 + 0.5 * (col0 + col1 - 1) * resolution
             my = y0 + 0.5 * (row0 + row1 - 1) * resolution
             reach = 0.5 * math.hypot(col1 - col0, row1 - row0) * resolution * (1.0 + 1e-9)
-            largest = distance[row0:row1, col0:col1].max()
+            largest = -math.inf
+            for row in range(row0, row1):
+                for col in range(col0, col1):
+                    largest = max(largest, distance[row, col])
+            for i in range(circles.shape[0]):
+                circle_away[i] = math.hypot(mx - circles[i, 0], my - circles[i, 1]) - circles[i, 2]
+                largest = min(largest, circle_away[i] + reach)
             m = 0
             for i in range(circles.shape[0]):
-                away = math.hypot(mx - circles[i, 0], my - circles[i, 1]) - circles[i, 2]
-                if away - reach < largest:
+                if circle_away[i] - reach <= largest:
                     near[m] = circles[i]
                     m += 1
             for row in range(row0, row1):
                 y = y0 + row * resolution
                 for col in range(col0, col1):
                     x = x0 + col * resolution
+                    value = distance[row, col]
                     for i in range(m):
-                        away = math.hypot(x - near[i, 0], y - near[i, 1]) - near[i, 2]
-                        distance[row, col] = min(distance[row, col], away)
+                        dx, dy = x - near[i, 0], y - near[i, 1]
+                        within = value + near[i, 2]
+                        # A little more, so that rounding never decides.
+                        if within > 0.0 and dx * dx + dy * dy > within * within * (1.0 + 1e-9):
+                            continue
+                        value = min(value, math.hypot(dx, dy) - near[i, 2])
+                    distance[row, col] = value
 
 
 @kernel

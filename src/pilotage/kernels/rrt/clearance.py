@@ -248,6 +248,44 @@ def curve_is_free(
 
 
 @kernel
+def middle_is_blocked(
+    x0: float,
+    y0: float,
+    th0: float,
+    radius: float,
+    word: int,
+    l0: float,
+    l1: float,
+    space: Space,
+    clearance: float,
+    min_step: float,
+) -> bool:
+    """Whether the field's nodes along a Dubins curve's straight piece tell that ``curve_is_free`` denies it.
+
+    A point is no farther from the geometry than a node is, plus the way to that node. Between two states
+    that are free the check lets a curve come nearer than the clearance by less than ``min_step``, so what
+    is nearer by more is between no such two. One node is looked up for each half clearance: a fraction of
+    what the check costs, and most long curves are blocked. False proves nothing.
+    """
+    if TURNS[word, 1] != 0 or not space.margin > 0.0:
+        return False
+    x, y, th = advance(x0, y0, th0, TURNS[word, 0], radius, l0)
+    count = int(2.0 * l1 / clearance) + 1
+    u, v = (x - space.x0) / space.resolution, (y - space.y0) / space.resolution
+    du, dv = l1 * math.cos(th) / (count * space.resolution), l1 * math.sin(th) / (count * space.resolution)
+    # A node is at most half a cell's diagonal away; a little less, so that rounding never decides.
+    near = clearance - min_step - 1e-6 - math.sqrt(0.5) * space.resolution
+    ny, nx = space.distance.shape
+    for _ in range(count):
+        u += du
+        v += dv
+        col, row = math.floor(u + 0.5), math.floor(v + 0.5)
+        if 0 <= row < ny and 0 <= col < nx and space.distance[row, col] < near:
+            return True
+    return False
+
+
+@kernel
 def first_blocked(states: FloatArray, space: Space, clearance: float) -> int:
     """Index of the first of the states (N, 3) that is nearer than ``clearance``; -1 where none is.
 

@@ -14,7 +14,7 @@ import numpy as np
 from pilotage.kernels.arrays import BoolArray, FloatArray, IntArray
 from pilotage.kernels.jit import kernel
 from pilotage.kernels.rrt import dubins
-from pilotage.kernels.rrt.clearance import Space, curve_is_free, slack_at
+from pilotage.kernels.rrt.clearance import Space, curve_is_free, middle_is_blocked, slack_at
 
 PATTERN = np.array(
     [
@@ -112,7 +112,13 @@ def best_chain(samples: FloatArray, s: FloatArray, space: Space, rules: Rules) -
             px, py, pth = samples[i, 0], samples[i, 1], samples[i, 2]
             word, l0, l1, l2 = connect(px, py, pth, x, y, th, free, rules.radius)
             reached = cost[i] + l0 + l1 + l2
-            if reached < best - 1e-9 and _is_free(px, py, pth, word, l0, l1, l2, space, rules):
+            if reached >= best - 1e-9:
+                continue
+            if middle_is_blocked(
+                px, py, pth, rules.radius, word, l0, l1, space, rules.clearance, rules.min_step
+            ):
+                continue
+            if _is_free(px, py, pth, word, l0, l1, l2, space, rules):
                 best = reached
                 before[j], own[j] = i, False
         cost[j] = best

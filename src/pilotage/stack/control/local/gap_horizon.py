@@ -11,7 +11,7 @@ from pydantic import Field
 from pilotage.core.config import Config
 from pilotage.core.types import STOP, FloatArray, Twist
 from pilotage.kernels.control.band import path_distances
-from pilotage.kernels.control.ground import sure_clearance
+from pilotage.kernels.control.ground import nearest_m, sure_clearance
 from pilotage.kernels.control.motion_limits import Drive, approach, command_is_safe
 from pilotage.kernels.control.movers import movers_clearance
 from pilotage.kernels.control.rollouts import (
@@ -24,7 +24,12 @@ from pilotage.kernels.control.rollouts import (
 )
 from pilotage.kernels.control.togo import UNREACHED_S, togo_at
 from pilotage.sensors.sensor import NonNegative, Positive
-from pilotage.stack.control.local.narrow_passage import THROUGH, NarrowPassage, find_narrow_passage
+from pilotage.stack.control.local.narrow_passage import (
+    SLOW_M_S,
+    THROUGH,
+    NarrowPassage,
+    find_narrow_passage,
+)
 from pilotage.stack.control.local.role import LOCAL_CONTROLLERS, LocalView
 from pilotage.stack.control.local.rolling import Scene
 from pilotage.stack.control.local.rolling_config import RollingConfig
@@ -35,6 +40,7 @@ MOST_BLIND_RAD = math.pi / 3.0
 """To either side of straight behind: with a wider blind sector no arc is safe, and this one is taken."""
 ROUND = 0.9
 """With an inner radius of this share of the outer one or more nothing swings when it turns."""
+BACK = -SLOW_M_S, 0.0
 TRIED_M = 0.3
 """Two narrow places nearer to each other than this are one."""
 Share = Field(default=0.65, gt=0.0, le=1.0)
@@ -139,6 +145,7 @@ class GapHorizon(RollingController):
         self._since_sampled = config.resample_steps
         self._keep_turning = True
         self._passage: NarrowPassage | None = None
+        self._backs_out = False
         self._moved_s = self._drove_s = 0.0
         self._tried: list[tuple[float, float]] = []
         self._since: tuple[float, float, float] | None = None
@@ -164,17 +171,7 @@ class GapHorizon(RollingController):
             self._plan = None
             return STOP
         if self._passage is not None:
-            self._passage, wanted = self._passage.step(scene, view.t_s)
-            # What lines up before the gap has no need to swing its corners by as closely as it is narrow.
-            inside = self._passage is None or self._passage.stage == THROUGH
-            margin_m = config.passage_margin_m if inside else config.least_margin_m
-            for share in (1.0, 0.5, 0.25):
-                command = self._checked(scene, share * np.array([wanted.v_m_s, wanted.w_rad_s]), margin_m)
-                if command is not None:
-                    if abs(command.v_m_s) + abs(command.w_rad_s) > 0.02:
-                        self._moved_s = view.t_s
-                    return command
-            return STOP
+            return self._squeeze(view, scene, self._passage)
         price = Price(
             config.margin_m,
             config.margin_s,
@@ -209,6 +206,34 @@ class GapHorizon(RollingController):
         turns = self._keep_turning and not self._people_are_near(scene)
         return Twist(0.0, curvature * math.copysign(slower, scene.start[3]) if turns else 0.0)
 
+    def _squeeze(self, view: LocalView, scene: Scene, passage: NarrowPassage) -> Twist:
+        """The next command of the manoeuvre through a gap, as fast as it is safe."""
+        config = self._config
+        self._passage, wanted = passage.step(scene, view.t_s)
+        # What lines up before the gap has no need to swing its corners by as closely as it is narrow.
+        inside = self._passage is None or self._passage.stage == THROUGH
+        margin_m = config.passage_margin_m if inside else config.least_margin_m
+        tried = [(share * wanted.v_m_s, share * wanted.w_rad_s) for share in (1.0, 0.5, 0.25)]
+        command = self._first_safe(scene, [BACK, *tried] if self._backs_out else tried, margin_m)
+        if command is None and not inside:
+            # A post beside it is in the way of its turn: straight back, until it can turn on the spot.
+            self._backs_out, command = True, self._first_safe(scene, [BACK], margin_m)
+        x, y = float(scene.pose[0]), float(scene.pose[1])
+        if inside or nearest_m(x, y, scene.ground) > scene.body.outer_m + config.margin_m:
+            self._backs_out = False
+        if command is None:
+            return STOP
+        if abs(command.v_m_s) + abs(command.w_rad_s) > 0.02:
+            self._moved_s = view.t_s
+        return command
+
+    def _first_safe(self, scene: Scene, commands: list[tuple[float, float]], margin_m: float) -> Twist | None:
+        for first in commands:
+            command = self._checked(scene, np.array(first), margin_m)
+            if command is not None:
+                return command
+        return None
+
     def _look_back(self, view: LocalView, scene: Scene) -> None:
         """Where the robot is stuck: try the narrowest place straight, or close it; reopen where all is."""
         config = self._config
@@ -223,7 +248,8 @@ class GapHorizon(RollingController):
         self._since = (view.t_s, x, y)
         self._plan = None
         if self._passage is not None:
-            self._passage, self._moved_s = self._passage.again(view.t_s), view.t_s
+            moved = self._moved_s > self._passage.begun_s
+            self._passage, self._moved_s = self._passage.again(view.t_s) if moved else None, view.t_s
             if self._passage is not None:
                 return
         here = togo_at(x, y, scene.ground.togo_s, scene.ground.x0_m, scene.ground.y0_m, scene.ground.coarse_m)

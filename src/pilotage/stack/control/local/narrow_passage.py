@@ -32,6 +32,8 @@ TURNS_RAD = np.linspace(-0.25, 0.25, 51)
 LONGEST_S = 25.0
 THROUGH = 2
 """The last stage."""
+CLOSED_M = 0.05
+"""Posts so much nearer to each other than the body is wide, as seen from afar, leave no gap."""
 TRIES = 3
 
 
@@ -115,7 +117,7 @@ def find_narrow_passage(scene: Scene, ahead_m: float, t_s: float) -> NarrowPassa
     """The narrowest place of the way ahead, if a footprint has to stand straight to pass it.
 
     Its axis is that of the widest strip between the points to the left and to the right of the way there.
-    None where the way is wide or one side is open.
+    None where the way is wide, one side is open, or the gap is closed.
     """
     path = np.ascontiguousarray(scene.path[: max(3, round(ahead_m / 0.1))])
     if path.shape[0] < 3:
@@ -136,6 +138,8 @@ def find_narrow_passage(scene: Scene, ahead_m: float, t_s: float) -> NarrowPassa
     found = _widest_strip(scene, middle, direction)
     if found is None:
         found = float(middle[0]), float(middle[1]), direction, float(np.hypot(*width))
+    if found[3] < 2.0 * scene.body.inner_m - CLOSED_M:
+        return None
     return NarrowPassage(*found, 0, t_s)
 
 
