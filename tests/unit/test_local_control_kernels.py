@@ -10,6 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pilotage.core.types import FloatArray
+from pilotage.kernels.arrays import ByteArray
 from pilotage.kernels.control.band import path_time, speed_profile
 from pilotage.kernels.control.commands_sent import drive_out, limit_errors
 from pilotage.kernels.control.dynamic_window import choose_in_window, window
@@ -18,6 +19,7 @@ from pilotage.kernels.control.ground import Ground
 from pilotage.kernels.control.ground_update import believed, evenly_spaced, insert_scan, rolled, sectors
 from pilotage.kernels.control.heading_vector import along_arc
 from pilotage.kernels.control.match import match_scan
+from pilotage.kernels.control.merged_means import merged_means
 from pilotage.kernels.control.motion_limits import Drive, advance, approach, command_is_safe
 from pilotage.kernels.control.movers import (
     COLUMNS,
@@ -417,3 +419,37 @@ def test_who_drives_away_from_somebody_who_comes_closes_no_gap() -> None:
     assert closes((0.05, 0.0, 0.0), 0.0, 0.47)  # past him: he may be nearer than he is believed to be
     both = np.array([[0.58, 0.0, 0.25], [-0.5, 0.0, 0.25]])
     assert closes_in((0.0, 0.0, 0.0), (0.05, 0.0, 0.0), body.polygon, body.outer_m, both, 0.05)
+
+
+def _stared_at(depth_m: float, seconds: float) -> tuple[ByteArray, FloatArray]:
+    """Hits and means after looking at a wall, noise 1 cm, its surface ``depth_m`` into a cell."""
+    rng = np.random.default_rng(3)
+    n, cell, beams = 60, 0.05, 61
+    hits, mean, seen = np.zeros((n, n), np.uint8), np.zeros((n * n, 2)), np.zeros((n // 2, n // 2), np.bool_)
+    angles = np.linspace(-0.3, 0.3, beams)
+    step = float(angles[1] - angles[0])
+    body = make_body(JACKAL)
+    still = np.zeros(3)
+    for _ in range(round(seconds / 0.05)):
+        ranges = (1.0 + depth_m) / np.cos(angles) + rng.normal(0.0, 0.01, beams)
+        points = np.column_stack([ranges * np.cos(angles), ranges * np.sin(angles)])
+        insert_scan(
+            hits, mean, seen, still, still, ranges, sectors(beams, step), float(angles[0]), step, 9.0, 4.0,
+            points, body.polygon, 0.05, 3, -1.5, -1.5, cell,
+        )  # fmt: skip
+    return believed(hits), mean
+
+
+def test_noise_in_front_of_a_wall_is_not_believed_however_long_it_is_looked_at() -> None:
+    """One beam in forty ends in the cell before the wall's; counts that only fill up made it an obstacle."""
+    hits, mean = _stared_at(0.02, 60.0)
+    assert mean[np.flatnonzero(hits), 0].min() > 1.01
+    assert np.count_nonzero(hits) >= 8
+
+
+def test_merged_means_lie_on_the_wall_that_cells_cut_in_two() -> None:
+    """At a cell's border halves of the noise are 8 mm before and behind; together they are on it."""
+    hits, mean = _stared_at(0.0, 5.0)
+    marked = np.flatnonzero(hits)
+    assert np.abs(mean[marked, 0] - 1.0).max() > 0.006
+    assert np.abs(merged_means(hits, mean, 0.03)[marked, 0] - 1.0).max() < 0.004

@@ -196,6 +196,64 @@ def test_posts_that_all_but_touch_are_no_gap_to_try() -> None:
     assert find_narrow_passage(replace(scene, path=straight.path), 1.2, 0.0) is not None
 
 
+@pytest.mark.parametrize("shift_m", [0.0, 0.012, 0.024, 0.036])
+def test_the_middle_between_two_wall_ends_is_found_wherever_cells_lie(shift_m: float) -> None:
+    """The mean of the cell that a wall ends in is up to 2.5 cm from its end, on either side another way."""
+    rng = np.random.default_rng(5)
+    right, left = -0.23 + shift_m, 0.26 + shift_m
+    walls = np.array([[0.8, -2.0, 0.8, right], [0.8, left, 0.8, 2.0]])
+    ground = RollingGround(RollingConfig())
+    passage = NarrowPassage(0.8, 0.5 * (left + right) + 0.02, 0.0, 0.5, 2, 0.0)
+    angles = np.linspace(-0.75 * math.pi, 0.75 * math.pi, 720)
+    step = float(angles[1] - angles[0])
+    for k in range(60):
+        ranges = fan_ranges(
+            MOUNT.x_m, 0.0, float(angles[0]), step, len(angles), 20.0, walls, np.zeros((0, 3))
+        )
+        ranges = ranges + rng.normal(0.0, 0.01, len(angles)) * (ranges < 20.0)
+        view = LocalView(
+            0.05 * k,
+            Pose2(0.0, 0.0, 0.0),
+            Twist(0.0, 0.0),
+            ranges,
+            angles,
+            MOUNT,
+            20.0,
+            (6.0, 0.0),
+            LIMITS,
+            JACKAL,
+        )
+        scene = ground.update(view)
+        seen = ranges < 20.0
+        points = np.column_stack([np.cos(angles), np.sin(angles)])[seen] * ranges[seen, None] + [
+            MOUNT.x_m,
+            0.0,
+        ]
+        after, _ = passage.step(scene, points + scene.pose[:2], view.t_s)
+        assert after is not None
+        passage = after
+    # On the axis, where it meets the walls.
+    along = 0.8 - passage.x_m
+    y = passage.y_m + along * math.tan(passage.direction_rad)
+    assert abs(y - 0.5 * (left + right)) < 0.008
+
+
+def test_it_does_not_go_into_a_gap_askew() -> None:
+    """Three centimetres off the axis, or at an angle, a corner meets what it is to pass between."""
+    gap = np.array([[0.8, side * (0.24 + 0.075), 0.075] for side in (-1.0, 1.0)])
+
+    def goes(y: float, theta: float) -> bool:
+        scene = RollingGround(RollingConfig()).update(
+            view_of(0.0, Pose2(0.45, y, theta), Twist(0.0, 0.0), gap)
+        )
+        _, command = NarrowPassage(0.8, 0.0, 0.0, 0.48, 2, 0.0).command(scene)
+        return command != Twist(0.0, 0.0)
+
+    assert goes(0.0, 0.0)
+    assert not goes(0.03, 0.0)
+    assert not goes(0.0, 0.1)
+
+
 def test_it_stands_before_a_closed_wall() -> None:
     y = np.arange(-4.5, 4.6, 0.15)
     wall = np.column_stack([np.full(y.shape[0], 2.5), y, np.full(y.shape[0], 0.08)])

@@ -14,7 +14,8 @@ from pilotage.kernels.grids.nearest_changes import keep_nearest
 from pilotage.kernels.jit import kernel
 
 MOST_HITS = 60
-"""Hits are counted so far; the mean goes on moving with this weight."""
+"""Hits are counted so far, then halved together with those of cells that the beam passed on its way: noise in
+front of a surface never catches up with it. The mean goes on moving with this weight."""
 SCATTER = 0.12
 """A cell with less than this share of its neighbour's hits is that neighbour's range noise."""
 SECTORS = 1024
@@ -331,6 +332,7 @@ def _add_points(
 ) -> None:
     """Count points (N, 2) of the base's frame in the cells they fall into, move the means; in place."""
     n = hits.shape[0]
+    beam_x, beam_y = x + (c * from_x - s * from_y), y + (s * from_x + c * from_y)
     for i in range(in_base.shape[0]):
         px, py = in_base[i, 0], in_base[i, 1]
         if not (px - from_x) ** 2 + (py - from_y) ** 2 < reach * reach:
@@ -341,11 +343,32 @@ def _add_points(
             continue
         if hits[row, column] == 0:
             mean[row * n + column, 0], mean[row * n + column, 1] = there_x, there_y
-        if hits[row, column] < MOST_HITS:
-            hits[row, column] += np.uint8(1)
+        if hits[row, column] >= MOST_HITS:
+            _halve_passed(hits, mean, row, column, there_x, there_y, beam_x, beam_y, cell)
+        hits[row, column] += np.uint8(1)
         share = 1.0 / hits[row, column]
         mean[row * n + column, 0] += share * (there_x - mean[row * n + column, 0])
         mean[row * n + column, 1] += share * (there_y - mean[row * n + column, 1])
+
+
+@kernel
+def _halve_passed(
+    hits: ByteArray, mean: FloatArray, row: int, column: int, to_x: float, to_y: float, from_x: float,
+    from_y: float, cell: float,
+) -> None:  # fmt: skip
+    """Halve the hits of a beam's last cell, and of the neighbours that it passed through; in place."""
+    n = hits.shape[0]
+    dx, dy = from_x - to_x, from_y - to_y
+    away = max(math.hypot(dx, dy), 1e-9)
+    dx, dy = dx / away, dy / away
+    hits[row, column] = np.uint8(int(hits[row, column]) // 2)
+    for r in range(max(0, row - 1), min(n, row + 2)):
+        for c in range(max(0, column - 1), min(n, column + 2)):
+            if hits[r, c] == 0 or (r == row and c == column):
+                continue
+            bx, by = mean[r * n + c, 0] - to_x, mean[r * n + c, 1] - to_y
+            if bx * dx + by * dy > 0.0 and abs(bx * dy - by * dx) < 0.5 * cell:
+                hits[r, c] = np.uint8(int(hits[r, c]) // 2)
 
 
 @kernel

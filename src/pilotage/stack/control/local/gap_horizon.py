@@ -12,6 +12,7 @@ from pilotage.core.config import Config
 from pilotage.core.types import STOP, FloatArray, Twist
 from pilotage.kernels.control.band import path_distances
 from pilotage.kernels.control.ground import nearest_m, sure_clearance
+from pilotage.kernels.control.ground_update import cleaned_ranges, scan_points
 from pilotage.kernels.control.motion_limits import Drive, approach, command_is_safe
 from pilotage.kernels.control.movers import movers_clearance
 from pilotage.kernels.control.rollouts import (
@@ -29,6 +30,7 @@ from pilotage.stack.control.local.narrow_passage import (
     THROUGH,
     NarrowPassage,
     find_narrow_passage,
+    without_noise,
 )
 from pilotage.stack.control.local.role import LOCAL_CONTROLLERS, LocalView
 from pilotage.stack.control.local.rolling import Scene
@@ -209,10 +211,12 @@ class GapHorizon(RollingController):
     def _squeeze(self, view: LocalView, scene: Scene, passage: NarrowPassage) -> Twist:
         """The next command of the manoeuvre through a gap, as fast as it is safe."""
         config = self._config
-        self._passage, wanted = passage.step(scene, view.t_s)
+        sharper = without_noise(scene)
+        self._passage, wanted = passage.step(sharper, _scanned(view, scene), view.t_s)
         # What lines up before the gap has no need to swing its corners by as closely as it is narrow.
         inside = self._passage is None or self._passage.stage == THROUGH
-        margin_m = config.passage_margin_m if inside else config.least_margin_m
+        margin_m = config.passage_margin_m if inside else config.margin_m
+        scene = sharper if inside else scene
         tried = [(share * wanted.v_m_s, share * wanted.w_rad_s) for share in (1.0, 0.5, 0.25)]
         command = self._first_safe(scene, [BACK, *tried] if self._backs_out else tried, margin_m)
         if command is None and not inside:
@@ -451,6 +455,19 @@ def _blind_rad(view: LocalView) -> float:
     first, looks = float(view.beam_angles_rad[0]), float(view.beam_angles_rad[-1] - view.beam_angles_rad[0])
     behind = (math.pi - view.mount.theta_rad - first) % (2.0 * math.pi)
     return 0.0 if behind <= looks else 2.0 * math.pi - looks
+
+
+def _scanned(view: LocalView, scene: Scene) -> FloatArray:
+    """(N, 2) where the scan's beams ended, in the order of the beams."""
+    ranges, _ = cleaned_ranges(view.ranges_m, view.max_range_m)
+    angles, mount = view.beam_angles_rad, view.mount
+    step = float(angles[-1] - angles[0]) / (len(angles) - 1)
+    in_base, _ = scan_points(
+        mount.x_m, mount.y_m, mount.theta_rad, ranges, float(angles[0]), step, view.max_range_m
+    )
+    x, y, theta = scene.pose
+    c, s = math.cos(theta), math.sin(theta)
+    return np.asarray([x, y] + in_base @ np.array([[c, s], [-s, c]]))
 
 
 def _fitted(plan: FloatArray, steps: int) -> FloatArray:

@@ -9,6 +9,7 @@ import numpy as np
 
 from pilotage.core.types import FloatArray, Twist
 from pilotage.kernels.control.band import path_distances
+from pilotage.kernels.control.merged_means import merged_means
 from pilotage.kernels.geometry.motion import wrap
 from pilotage.stack.control.local.rolling import Scene
 
@@ -22,19 +23,34 @@ TURN_RAD_S = 1.0
 """Beside posts that are millimetres away, corners swing no more than two centimetres in a step."""
 ROOM_M = 0.03
 """With less room than this on either side it drives at the slower speed."""
-LEAST_ROOM_M = 0.006
+LEAST_ROOM_M = 0.0135
 """With less than this on either side, as far as can be measured, it does not go in."""
-LOOK_M = 0.1
+LEAST_ENDS_M = 0.0025
+"""The same between the ends that scans show, which noise brings nearer to each other."""
+ASKEW = 0.65
+"""Nor does it go in farther off the axis than this share of the room on either side, or so much less straight
+that a corner is: it lines up anew."""
+ONTO_M = 0.15
+"""It comes back to the axis within about this much way."""
+LOOK_M = 0.05
 SIDES_M = 0.8
 ALONG_M = 0.35
 """Points so far before and behind the narrowest place are those that it has to pass between."""
-TURNS_RAD = np.linspace(-0.25, 0.25, 51)
+TURNS_RAD = np.concatenate([[0.0], np.linspace(-0.25, 0.25, 51)])
+KEEP_M = 0.004
+"""A direction is kept unless another strip is wider by this: between two posts many are as wide."""
 LONGEST_S = 25.0
 THROUGH = 2
 """The last stage."""
 CLOSED_M = 0.05
 """Posts so much nearer to each other than the body is wide, as seen from afar, leave no gap."""
 TRIES = 3
+NOISE_M = 0.03
+"""Points of neighbouring cells so near to each other are one surface, and its noise."""
+BEAMS = 3
+"""Neighbouring beams that are taken together where a scan is asked for the ends beside the gap."""
+NEW_SHARE = 0.15
+"""Weight of a new scan in where these ends are."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,18 +68,22 @@ class NarrowPassage:
     stage: int
     begun_s: float
     tries: int = 1
+    ends_m: FloatArray | None = None
 
     def again(self, t_s: float) -> NarrowPassage | None:
         """Once more from before the gap; None where it has been tried often enough."""
         return None if self.tries >= TRIES else replace(self, stage=0, begun_s=t_s, tries=self.tries + 1)
 
-    def step(self, scene: Scene, t_s: float) -> tuple[NarrowPassage | None, Twist]:
-        """The next command; None for itself when it is through or has taken too long."""
+    def step(self, scene: Scene, points_xy_m: FloatArray, t_s: float) -> tuple[NarrowPassage | None, Twist]:
+        """The next command; None for itself when it is through or has taken too long.
+
+        ``points_xy_m``: (N, 2) of the scan, in the order of its beams, where the scene has them.
+        """
         along, _ = self._place(float(scene.start[0]), float(scene.start[1]))
         if t_s - self.begun_s > LONGEST_S or along > BEYOND_M:
             return None, Twist(0.0, 0.0)
         if along < -scene.body.inner_m:
-            return self._measured(scene).command(scene)
+            return self._measured(scene, points_xy_m).command(scene)
         return self.command(scene)
 
     def command(self, scene: Scene) -> tuple[NarrowPassage, Twist]:
@@ -90,10 +110,18 @@ class NarrowPassage:
             return self, Twist(0.0, _limited(3.0 * off, TURN_RAD_S))
         along, across = self._place(x, y)
         too_narrow = self.width_m < 2.0 * (scene.body.inner_m + LEAST_ROOM_M)
-        if too_narrow and -scene.body.outer_m - LOOK_M < along < -scene.body.inner_m:
-            return self, Twist(0.0, 0.0)
+        if self.ends_m is not None:
+            apart = float(np.hypot(*(self.ends_m[0] - self.ends_m[1])))
+            too_narrow = too_narrow or apart < 2.0 * (scene.body.inner_m + LEAST_ENDS_M)
+        if -scene.body.outer_m - LOOK_M < along < -scene.body.inner_m:
+            if too_narrow:
+                return self, Twist(0.0, 0.0)
+            room = ASKEW * (0.5 * self.width_m - scene.body.inner_m)
+            corner = scene.body.outer_m * abs(wrap(self.direction_rad - theta))
+            if max(abs(across), corner) > room:
+                return replace(self, stage=0), Twist(0.0, 0.0)
         # Steers back onto the axis: a heading that falls with the distance to it.
-        wanted = self.direction_rad - math.atan2(across, 0.25)
+        wanted = self.direction_rad - math.atan2(across, ONTO_M)
         tight = 0.5 * self.width_m - scene.body.inner_m < ROOM_M
         return self, Twist(
             SLOWER_M_S if tight else SLOW_M_S, _limited(4.0 * wrap(wanted - theta), TURN_RAD_S)
@@ -104,13 +132,57 @@ class NarrowPassage:
         c, s = math.cos(self.direction_rad), math.sin(self.direction_rad)
         return c * (x - self.x_m) + s * (y - self.y_m), c * (y - self.y_m) - s * (x - self.x_m)
 
-    def _measured(self, scene: Scene) -> NarrowPassage:
-        """The same with the axis as the points are now."""
+    def _measured(self, scene: Scene, points: FloatArray) -> NarrowPassage:
+        """The same with the axis as the points are now: its direction from the ground, its middle from scans.
+
+        Where a wall ends within a cell, the cell's mean is up to half a cell's width from the end.
+        """
         found = _widest_strip(scene, np.array([self.x_m, self.y_m]), self.direction_rad)
         if found is None:
             return self
         x, y, direction, width = found
-        return replace(self, x_m=x, y_m=y, direction_rad=direction, width_m=width)
+        ends = _ends_beside(points, np.array([x, y]), direction, width)
+        if ends is None:
+            ends = self.ends_m
+        elif self.ends_m is not None:
+            ends = self.ends_m + NEW_SHARE * (ends - self.ends_m)
+        if ends is not None:
+            left = np.array([-math.sin(direction), math.cos(direction)])
+            to_middle = float((0.5 * (ends[0] + ends[1]) - [x, y]) @ left)
+            x, y = x + to_middle * float(left[0]), y + to_middle * float(left[1])
+        return replace(self, x_m=x, y_m=y, direction_rad=direction, width_m=width, ends_m=ends)
+
+
+def _ends_beside(
+    points: FloatArray, middle: FloatArray, direction_rad: float, width_m: float
+) -> FloatArray | None:
+    """(2, 2) the points of a scan (N, 2) to the left and to the right that are nearest to a gap's axis.
+
+    Each is the mean of a few neighbouring beams. None where one side has none.
+    """
+    c, s = math.cos(direction_rad), math.sin(direction_rad)
+    near = points[np.hypot(*(points - middle).T) < ALONG_M + width_m]
+    if len(near) < BEAMS:
+        return None
+    weights = np.full(BEAMS, 1.0 / BEAMS)
+    mean = np.column_stack([np.convolve(near[:, k], weights, mode="valid") for k in range(2)])
+    apart = np.hypot(*(near[BEAMS - 1 :] - near[: 1 - BEAMS]).T)
+    offset = mean - middle
+    along, across = offset @ np.array([c, s]), offset @ np.array([-s, c])
+    beside = (np.abs(along) < ALONG_M) & (apart < 2.0 * NEAR_M)
+    ends = []
+    for side in (1.0, -1.0):
+        of_side = np.flatnonzero(beside & (side * across > 0.25 * width_m))
+        if not of_side.size:
+            return None
+        ends.append(mean[of_side[int(np.argmin(side * across[of_side]))]])
+    return np.array(ends)
+
+
+def without_noise(scene: Scene) -> Scene:
+    """The scene with obstacle points without what cells make of noise, which narrows a gap on both sides."""
+    ground = scene.ground
+    return replace(scene, ground=ground._replace(mean=merged_means(ground.hits, ground.mean, NOISE_M)))
 
 
 def find_narrow_passage(scene: Scene, ahead_m: float, t_s: float) -> NarrowPassage | None:
@@ -160,7 +232,7 @@ def _widest_strip(
         if not (left.size and right.size):
             continue
         low, high = float(right.max()), float(left.min())
-        if best is None or high - low > best[3]:
+        if best is None or high - low > best[3] + KEEP_M:
             to_middle = 0.5 * (low + high)
             best = (
                 float(middle[0] - s * to_middle),
