@@ -142,7 +142,7 @@ class TestOrder:
 
     def test_of_two_who_tell_it_to_go_the_one_without_headway_for_longest_counts(self) -> None:
         context = build(mission_of(hall_and_dead_end(4, 10.0), seed=0)).team[3].stack._context  # type: ignore[attr-defined]
-        word = TeamWord(1.0, 1.0, False, None, None, context.memory.message(0.0))
+        word = TeamWord(1.0, 1.0, False, None, None, context.memory.message(0.0), 0.3)
         asks = {0: (9.0, 5.0), 1: (4.0, 6.0), 2: (4.0, 7.0)}
         for number, (since_s, x_m) in asks.items():
             clearing = Clearing(since_s, ((3, x_m, 1.0), (9, x_m, 2.0)))
@@ -258,7 +258,7 @@ def hear(context: Any, t_s: float, places: Places) -> None:
     """At a time all mates say where they are."""
     context.t_s = t_s
     for number, (x, y) in places.items():
-        word = TeamWord(x, y, False, None, None, context.memory.message(t_s))
+        word = TeamWord(x, y, False, None, None, context.memory.message(t_s), 0.3)
         context.mates[number] = t_s, word
 
 

@@ -197,6 +197,11 @@ class EkfWallsLocalizer:
         if found is not None:
             self._pose, self._cov, self._lost = found.pose, found.cov, False
 
+    def tell_mates(self, mates: FloatArray) -> None:
+        """Where mates (K, 4) say that they are, as of ``ScanFit.mates_in_sight``."""
+        if self._recovery is not None:
+            self._recovery.tell_mates(mates)
+
     def look_bearing_rad(self) -> float | None:
         """Direction, in the robot's frame, worth driving in to find out where it is; None where any is."""
         if not self._lost or self._recovery is None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from pydantic import Field
@@ -15,6 +15,7 @@ from pilotage.kernels.lines import pose_hypotheses
 from pilotage.maps.segment_map import SegmentMap
 from pilotage.sensors.readings import OdometryIncrement
 from pilotage.sensors.sensor import NonNegative, Positive
+from pilotage.stack.localization.mates import NO_MATES, MatesMet
 from pilotage.stack.localization.odometry_prediction import OdometryPrediction
 from pilotage.stack.localization.scan_fit import Fit, ScanFit
 from pilotage.stack.localization.wall_correction import correct
@@ -41,6 +42,8 @@ class GlobalSearchConfig(Config):
     contradicted_share: float = Field(default=0.02, ge=0.0, le=1.0)
     """So is one that more beams contradict, in ``patience`` scans one after the other."""
     patience: int = Field(default=2, ge=1)
+    missing_scans: int = Field(default=5, ge=1)
+    """A mate that would be seen where it says that it is, and is not in so many scans, speaks against one."""
     rival_share: float = Field(default=0.04, gt=0.0, lt=1.0)
     """So is one that explains this much less than the best."""
     believed_share: float = Field(default=0.75, ge=0.0, le=1.0)
@@ -71,6 +74,7 @@ class Hypothesis:
     strikes: int = 0
     driven_m: float = 0.0
     scans: int = 0
+    mates: MatesMet = field(default_factory=MatesMet)
 
 
 class GlobalSearch:
@@ -81,8 +85,17 @@ class GlobalSearch:
     pose; a beam cut short may be something unexpected. The poses left are followed by odometry and walls
     until one alone remains. Where all have fallen, the search starts anew from the scan at hand.
 
+    Mates who say where they are tell poses apart between which walls do not: from a wrong one the robot looks
+    through where they are. Only those poses are rivals that the fewest mates speak against. None is dropped
+    for it: a mate may be wrong about its own place, until it notices that.
+
     Fails where no two crossing walls are in sight (it waits), and in a map that repeats itself exactly
-    (it waits until the robot has seen where it does not).
+    (it waits until the robot has seen where it does not, or mates): mates of whom most are wrong mislead it.
+
+    Attributes
+    ----------
+    mates
+        (K, 4) where each is on the map, as of ``ScanFit.mates_in_sight``.
     """
 
     def __init__(
@@ -103,11 +116,17 @@ class GlobalSearch:
         self._prediction = prediction
         self._radius = body_radius_m
         self.hypotheses: list[Hypothesis] = []
+        self.mates = NO_MATES
         self._made = 0
 
     def reset(self) -> None:
         """Forget all hypotheses."""
         self.hypotheses = []
+
+    def rivals(self) -> list[Hypothesis]:
+        """The hypotheses that the fewest mates speak against, the best first."""
+        against = [h.mates.missing(self._config.missing_scans) for h in self.hypotheses]
+        return [h for h, count in zip(self.hypotheses, against, strict=True) if count == min(against)]
 
     def move(self, odometry: OdometryIncrement) -> None:
         """Carry all hypotheses along."""
@@ -123,9 +142,10 @@ class GlobalSearch:
         if not self.hypotheses:
             self.hypotheses = self._start(lines, ranges_m)
         self._prune()
-        if len(self.hypotheses) != 1:
+        rivals, config = self.rivals(), self._config
+        if len(rivals) != 1:
             return None
-        only, config = self.hypotheses[0], self._config
+        only = rivals[0]
         confirmed = only.driven_m >= config.confirm_m and only.scans >= config.confirm_scans
         return only if confirmed and only.explained >= config.believed_share else None
 
@@ -133,6 +153,7 @@ class GlobalSearch:
         correct(hypothesis.pose, hypothesis.cov, self._mount, lines, self._matcher)
         fit = self._fit.of(hypothesis.pose, ranges_m)
         hypothesis.scans += 1
+        hypothesis.mates.take_in(self.mates, self._fit.mates_in_sight(hypothesis.pose, ranges_m, self.mates))
         return self._holds(hypothesis, fit)
 
     def _holds(self, hypothesis: Hypothesis, fit: Fit) -> bool:

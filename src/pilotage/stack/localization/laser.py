@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pilotage.core.config import Config
+from pilotage.core.types import FloatArray
 from pilotage.maps.world_map import WorldMap
 from pilotage.sensors.readings import Readings
 from pilotage.stack.interface import Belief
@@ -40,10 +41,10 @@ class LaserLocalizer:
         self._chosen: Localizer
         if chart.geometry is not None:
             walls = EkfWallsLocalizer(config.walls, robot, chart, initial, journal)
-            self._chosen, self._look = walls, walls.look_bearing_rad
+            self._chosen, self._look, self._tell = walls, walls.look_bearing_rad, walls.tell_mates
         else:
             self._chosen = ParticleFilterLocalizer(config.cells, robot, chart, initial, journal)
-            self._look = _anywhere
+            self._look, self._tell = _anywhere, _nobody
 
     @property
     def belief(self) -> Belief:
@@ -57,6 +58,17 @@ class LaserLocalizer:
     def look_bearing_rad(self) -> float | None:
         """Where to look while lost, in the robot's frame; None where any direction is as good."""
         return self._look()
+
+    def tell_mates(self, mates: FloatArray) -> None:
+        """Where mates (K, 4) say that they are, as of ``ScanFit.mates_in_sight``.
+
+        On a map of cells they tell nothing yet.
+        """
+        self._tell(mates)
+
+
+def _nobody(mates: FloatArray) -> None:
+    del mates
 
 
 def _anywhere() -> float | None:

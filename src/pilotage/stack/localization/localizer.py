@@ -19,7 +19,8 @@ class Localizer(Protocol):
 
     One that knows, while it is lost, where to look has a method ``look_bearing_rad() -> float | None``
     besides: the direction, in the robot's frame, worth driving in, None where any is as good. Whether it
-    has is asked once, when the stack is put together.
+    has is asked once, when the stack is put together. So is whether it has ``tell_mates(mates)``:
+    told before each step where mates say that they are, (K, 4) as of ``ScanFit.mates_in_sight``.
     """
 
     @property

@@ -15,6 +15,7 @@ from pilotage.sensors.readings import OdometryIncrement
 from pilotage.sensors.sensor import Positive
 from pilotage.stack.knowledge import RobotKnowledge
 from pilotage.stack.localization.global_search import GlobalSearch, GlobalSearchConfig, Hypothesis
+from pilotage.stack.localization.mates import MatesMet
 from pilotage.stack.localization.odometry_prediction import OdometryPrediction
 from pilotage.stack.localization.scan_fit import ScanFit
 from pilotage.stack.localization.viewpoint import Viewpoint, ViewpointConfig
@@ -77,6 +78,7 @@ class Recovery:
         )
         self._viewpoint = Viewpoint(config.viewpoint, chart.walls, lidar, robot.radius_m)
         self._contradicted = self._unexplained = self._unplaced = 0
+        self._met = MatesMet()
 
     @property
     def hypotheses(self) -> int:
@@ -93,10 +95,20 @@ class Recovery:
         else:
             self._unplaced = 0
             wrong = self._contradicts(pose, ranges_m, spread_m, matches)
+        wrong |= self._is_outvoted(pose, ranges_m)
         if wrong:
             self._contradicted = self._unexplained = self._unplaced = 0
+            self._met = MatesMet()
             self._search.reset()
         return wrong
+
+    def _is_outvoted(self, pose: FloatArray, ranges_m: FloatArray) -> bool:
+        """The question to a belief in a map that repeats itself, which walls never contradict."""
+        mates = self._search.mates
+        if not len(mates):
+            return False
+        self._met.take_in(mates, self._fit.mates_in_sight(pose, ranges_m, mates))
+        return self._met.speak_against
 
     def _places_too_few(self, matches: Matches) -> bool:
         """The question to an unsure belief: where it is right, most walls in sight fit it together, were it
@@ -125,10 +137,14 @@ class Recovery:
     @property
     def look_bearing_rad(self) -> float | None:
         """Direction, in the robot's frame, of what would tell the hypotheses apart; None where unknown."""
-        hypotheses = self._search.hypotheses
+        hypotheses = self._search.rivals()
         names = tuple(hypothesis.name for hypothesis in hypotheses)
         poses = np.array([hypothesis.pose for hypothesis in hypotheses]).reshape(-1, 3)
         return self._viewpoint.bearing_rad(names, poses)
+
+    def tell_mates(self, mates: FloatArray) -> None:
+        """Where mates (K, 4) are on the map, as of ``ScanFit.mates_in_sight``."""
+        self._search.mates = mates
 
     def move(self, odometry: OdometryIncrement) -> None:
         """Carry the hypotheses along."""

@@ -7,8 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pilotage.core.types import FloatArray
+from pilotage.core.types import FloatArray, IntArray
 from pilotage.kernels.lines import pose_hypotheses
+from pilotage.kernels.scans.missing import bodies_in_sight
 from pilotage.maps.segment_map import SegmentMap
 from pilotage.sensors.lidar import LidarConfig
 
@@ -78,6 +79,20 @@ class ScanFit:
             self._world.circles_m,
         )
         return Fit(explained, contradicted)
+
+    def mates_in_sight(self, pose: FloatArray, ranges_m: FloatArray, mates: FloatArray) -> IntArray:
+        """What a scan from a pose (3,) of the robot says of mates, (K,) as of ``kernels.scans.missing``.
+
+        Parameters
+        ----------
+        mates
+            (K, 4) where each is on the map: x, y of a place, the distance from it within which its middle
+            is, and its radius (m); NaN for one that says nothing.
+        """
+        x, y, theta = self.sensor_pose(pose)
+        out = np.empty(len(mates), np.int64)
+        bodies_in_sight(x, y, theta + self._first, self._step, ranges_m, self._max_range, mates, out)
+        return out
 
     def best(
         self,

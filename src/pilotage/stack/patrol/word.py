@@ -60,6 +60,8 @@ class TeamWord:
         None unless it goes first.
     news
         Of the patrol.
+    radius_m
+        Of the disc around its body.
     standing
         Places of bodies that it saw stand for long, who say nothing: it plans around them.
     """
@@ -70,4 +72,5 @@ class TeamWord:
     claim: Claim | None
     clearing: Clearing | None
     news: PatrolMessage
+    radius_m: float
     standing: tuple[tuple[float, float], ...] = ()

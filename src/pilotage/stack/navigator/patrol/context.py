@@ -162,7 +162,16 @@ class Context(Senses):
         self.memory.update(self.t_s, words=self.task.strategy.words(self.memory.knowledge(self.t_s)))
         news = self.memory.message(self.t_s)
         self.journal.outbox.append(
-            TeamWord(x, y, self.motion.blocked, self.claim, self.clearing, news, self._obstructions.told())
+            TeamWord(
+                x,
+                y,
+                self.motion.blocked,
+                self.claim,
+                self.clearing,
+                news,
+                self.radius_m,
+                self._obstructions.told(),
+            )
         )
 
     def away_m(self, place: int) -> float:

@@ -28,6 +28,8 @@ SECTORS = 72
 NEAR_M = 1.6
 """Returns beyond this distance from the axle are out of the way of one decision."""
 SIGMAS = 3.0
+TOLD_M = 0.2
+"""What a mate may be wrong about its place by."""
 HEARD_PERIODS = 4.0
 """Who said nothing for so many of its messages is silent."""
 
@@ -195,6 +197,16 @@ class Senses:
         """The last words of mates that were heard lately, with their numbers."""
         latest_s = self.t_s - HEARD_PERIODS * self.config.message_period_s
         return [(number, word) for number, (sent_s, word) in self.mates.items() if sent_s > latest_s]
+
+    def mates_by_their_words(self, t_s: float) -> FloatArray:
+        """(N, 4) of all robots by number: where each is on the map, within what distance of that its middle
+        is by now, and its radius; NaN for who does not know, was not heard lately, or is itself."""
+        rows = np.full((len(self.task.starts), 4), math.nan)
+        for number, (sent_s, word) in self.mates.items():
+            age_s = t_s - sent_s
+            if age_s < HEARD_PERIODS * self.config.message_period_s and math.isfinite(word.x_m):
+                rows[number] = word.x_m, word.y_m, TOLD_M + self.speed_m_s * age_s, word.radius_m
+        return rows
 
     def hears_all(self) -> bool:
         """Whether no mate is silent, or lost."""
