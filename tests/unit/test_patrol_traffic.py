@@ -419,6 +419,17 @@ class TestPassages:
         assert not stops(1.0, 0.0, NOBODY, ahead, ahead)
         assert stops(1.0, 0.0, NOBODY, 1.25 * ahead, 1.25 * ahead)
 
+    def test_steps_finer_than_the_odometry_change_nothing(self) -> None:
+        """Its readings tell of the time since the last one; taken for a step's they doubled the speed."""
+        idle_s = []
+        for dt_s in (0.1, 0.05):
+            values = corridor(2.0, 2, 60.0)
+            values["run"]["dt_s"] = dt_s
+            metrics = judged(values, seed=1)
+            assert metrics["collisions"] == metrics["deadlocks"] == 0
+            idle_s.append(metrics["idleness_mean_s"])
+        assert idle_s[1] < 1.25 * idle_s[0]
+
 
 class TestMuseum:
     def test_who_begins_beside_a_wall_is_on_its_own_side_of_it(self) -> None:

@@ -80,6 +80,7 @@ class Senses:
         self._known = chart.wall_field
         self.period_s = max(1.0 / lidar.rate_hz, robot.dt_s)
         self.t_s, self.pose, self.spread_m, self.twist = 0.0, start, 0.0, STOP
+        self._moved_s = 0.0
         self.fresh = False
         self.near = self.strange = self.people = NO_POINTS
         self.mates: dict[int, tuple[float, TeamWord]] = {}
@@ -98,7 +99,10 @@ class Senses:
         driven_m, odometry = 0.0, readings.by_sensor.get(self._odometry)
         if isinstance(odometry, OdometryIncrement):
             driven_m = odometry.distance_m
-            self.twist = Twist(driven_m / self.dt_s, odometry.angle_rad / self.dt_s)
+            # It tells of the time since it last told, which may be several steps ago.
+            steps = max(1, round((self.t_s - self._moved_s) / self.dt_s))
+            self.twist = Twist(driven_m / (steps * self.dt_s), odometry.angle_rad / (steps * self.dt_s))
+            self._moved_s = self.t_s
         said = None if self._radio is None else readings.by_sensor.get(self._radio)
         if isinstance(said, RadioMessages):
             for message in said.messages:
