@@ -39,15 +39,16 @@ def view_of(
     circles: FloatArray,
     limits: LocalLimits = LIMITS,
     tolerance_m: float = 0.3,
+    angles: FloatArray = ANGLES,
 ) -> LocalView:
     """What a robot with true odometry and a perfect laser sees; the goal is 6 m ahead."""
     x = pose.x_m + math.cos(pose.theta_rad) * MOUNT.x_m
     y = pose.y_m + math.sin(pose.theta_rad) * MOUNT.x_m
-    step = float(ANGLES[1] - ANGLES[0])
+    step = float(angles[1] - angles[0])
     ranges = fan_ranges(
-        x, y, pose.theta_rad + float(ANGLES[0]), step, ANGLES.shape[0], 20.0, NO_SEGMENTS, circles
+        x, y, pose.theta_rad + float(angles[0]), step, angles.shape[0], 20.0, NO_SEGMENTS, circles
     )
-    return LocalView(t, pose, twist, ranges, ANGLES, MOUNT, 20.0, (6.0, 0.0), limits, JACKAL, tolerance_m)
+    return LocalView(t, pose, twist, ranges, angles, MOUNT, 20.0, (6.0, 0.0), limits, JACKAL, tolerance_m)
 
 
 def drive(
@@ -57,6 +58,7 @@ def drive(
     true_share: float = 1.0,
     seconds: float = 15.0,
     tolerance_m: float = 0.3,
+    angles: FloatArray = ANGLES,
 ) -> tuple[bool, float, list[Twist]]:
     """Whether it came to the goal, its least clearance, and its commands; with the delay of the limits."""
     true = Drive(
@@ -72,7 +74,7 @@ def drive(
     commands: list[Twist] = []
     late = round(limits.delay_s / 0.05)
     for k in range(round(seconds / 0.05)):
-        view = view_of(0.05 * k, Pose2(x, y, theta), Twist(v, w), circles, limits, tolerance_m)
+        view = view_of(0.05 * k, Pose2(x, y, theta), Twist(v, w), circles, limits, tolerance_m, angles)
         commands.append(controller.step(view))
         acting = commands[-1 - late] if len(commands) > late else Twist(0.0, 0.0)
         for _ in range(5):
@@ -101,6 +103,35 @@ def test_each_drives_around_posts(name: str) -> None:
     for command in commands:
         assert -LIMITS.reverse_m_s - 1e-9 <= command.v_m_s <= LIMITS.speed_m_s + 1e-9
         assert abs(command.w_rad_s) <= LIMITS.turn_rate_rad_s + 1e-9
+
+
+@pytest.mark.parametrize("name", ["dwa", "vfh", "teb", "mppi", "pure-pursuit", "gap-horizon"])
+def test_a_slow_robot_keeps_away_from_the_end_of_a_wall(name: str) -> None:
+    """No place is too narrow to be driven at 0.3 m/s: the way leads clear of obstacles all the same."""
+    slow = LocalLimits(0.3, 0.1, 0.5, 0.5, 1.5, 3.0)
+    y = np.arange(-4.0, 0.05, 0.1)
+    wall = np.column_stack([np.full(y.shape[0], 2.0), y, np.full(y.shape[0], 0.075)])
+    arrived, least, _ = drive(make(name), wall, slow, seconds=40.0)
+    assert arrived
+    assert least > 0.05
+
+
+@pytest.mark.parametrize("half_width_m", [0.5, 0.7])
+@pytest.mark.parametrize("name", ["dwa", "vfh", "teb", "mppi", "pure-pursuit", "gap-horizon"])
+def test_no_controller_backs_into_what_its_laser_does_not_see(name: str, half_width_m: float) -> None:
+    """In a pocket that is open behind, with a post there; the laser sees the half before the robot."""
+    x = np.arange(-0.5, 1.3, 0.1)
+    sides = [
+        np.column_stack([x, np.full(x.shape[0], side * half_width_m), np.full(x.shape[0], 0.05)])
+        for side in (-1.0, 1.0)
+    ]
+    y = np.arange(-0.7, 0.75, 0.1)
+    front = np.column_stack([np.full(y.shape[0], 1.0), y, np.full(y.shape[0], 0.05)])
+    behind = np.array([[-0.9, 0.0, 0.1]])
+    half = np.linspace(-0.5 * math.pi, 0.5 * math.pi, 181)
+    slow = LocalLimits(0.3, 0.2, 0.5, 0.5, 1.5, 3.0)
+    _, least, _ = drive(make(name), np.vstack([*sides, front, behind]), slow, seconds=20.0, angles=half)
+    assert least > 0.0
 
 
 @pytest.mark.parametrize("name", ["mppi", "gap-horizon"])

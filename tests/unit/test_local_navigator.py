@@ -101,7 +101,7 @@ def test_it_arrives_when_its_controller_says_so_and_stays() -> None:
     stack = navigator(noting, told)
     noting.status = "arrived"
     assert stack.step(readings(0.1, 0.0, 0.0)) == Twist(0.0, 0.0)
-    assert stack.status == (StackStatus.ARRIVED, "within 0.3 m of the goal")
+    assert stack.status == (StackStatus.ARRIVED, "within 0.15 m of the goal")
     assert stack.step(readings(0.2, 0.0, 0.0)) == Twist(0.0, 0.0)
     assert len(noting.views) == 1
     assert [event.kind for event in told.journal.events] == ["arrived"]

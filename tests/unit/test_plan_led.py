@@ -15,6 +15,7 @@ from pilotage.experiments.mission import load_mission, mission_of, read_mission
 from pilotage.experiments.run import run_mission
 from pilotage.maps.segment_map import SegmentMap, box_segments
 from pilotage.missions.mission import Mission
+from pilotage.stack.navigator.navigator import arrival_within_m
 
 WALLS = [[0, 0, 8, 0], [8, 0, 8, 6], [8, 6, 0, 6], [0, 6, 0, 0], [4, 0, 4, 4.4]]
 ROOMS = {
@@ -62,7 +63,7 @@ def test_without_a_plan_it_ends_and_says_so() -> None:
     closed = {**ROOMS, "walls_m": [*WALLS, [4, 4.4, 4, 6]]}
     metrics = driven(mission((), **{"world.map": closed}))
     assert not metrics["success"]
-    assert metrics["reason"] == "no plan leads to the goal"
+    assert metrics["reason"].startswith("no plan leads to the goal: ")
     assert "least_length_m" not in metrics
 
 
@@ -106,3 +107,23 @@ def test_goal_turns_away_from_what_it_sees_on_its_plan_where_it_is_told_to() -> 
     assert metrics["replans"] > 0
     assert metrics["attempts"] == 0
     assert metrics["driven_over_least"] < 1.05
+
+
+def test_before_a_wall_it_plans_from_another_heading() -> None:
+    """The robot turns where it stands; the planner's forward curves of 0.5 m would end in the wall."""
+    facing = {"x_m": 0.55, "y_m": 1.0, "theta_rad": math.pi}
+    metrics = driven(mission((), **{"world.start": facing, "stack.planner": {"name": "rrt-star-dubins"}}))
+    assert metrics["success"], metrics["reason"]
+
+
+def test_it_goes_within_half_the_tolerance_of_the_task_s_points() -> None:
+    task = {"name": "follow", "points_m": [[3.0, 1.0]], "tolerance_m": 0.2}
+    metrics = driven(mission((), **{"world.goal": None, "task": task, "stack.navigator.arrival_m": None}))
+    assert metrics["success"], metrics["reason"]
+    assert metrics["reason"] == "within 0.1 m of the goal"
+
+
+def test_how_near_it_has_to_believe_to_be() -> None:
+    assert arrival_within_m(None, 0.3) == pytest.approx(0.15)
+    assert arrival_within_m(0.05, 0.3) == pytest.approx(0.05)
+    assert arrival_within_m(0.5, 0.3) == pytest.approx(0.3)

@@ -87,7 +87,7 @@ class TaskKnowledge:
     goals
         Places to go to, in order; none where the task has none.
     goal_tolerance_m
-        A goal is reached this near to it.
+        A goal is reached this near to it: the least of the goals' tolerances.
     time_limit_s
         When the run ends at the latest.
     pose_given

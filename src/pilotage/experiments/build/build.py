@@ -301,7 +301,7 @@ def _member(
     task = TaskKnowledge(
         initial=initial,
         goals=tuple(map(goal_of, goals)),
-        goal_tolerance_m=np.inf if goal is None else goal.tolerance_m,
+        goal_tolerance_m=min((place.tolerance_m for place in goals), default=np.inf),
         time_limit_s=mission.run.time_limit_s,
         pose_given=truth.tell_pose if "localizer" in oracles else None,
     )

@@ -6,7 +6,7 @@ import math
 
 from pilotage.kernels.arrays import FloatArray
 from pilotage.kernels.control.footprint import Body
-from pilotage.kernels.control.ground import Ground, clearance_of
+from pilotage.kernels.control.ground import Ground, clearance_of, disc_seen, seen_under
 from pilotage.kernels.control.motion_limits import Drive
 from pilotage.kernels.control.rollouts import way_down
 from pilotage.kernels.control.togo import togo_at
@@ -15,6 +15,7 @@ from pilotage.kernels.jit import kernel
 
 ARC_STEP_M = 0.1
 ARC_STEP_RAD = 0.2
+ROUNDING_M = 1e-6
 
 
 @kernel
@@ -48,9 +49,9 @@ def choose_in_window(
 ) -> tuple[float, float, float]:
     """The best pair of speed and turn rate of a grid over the window.
 
-    A pair's arc is followed for the horizon or up to the first contact; it is admissible where the robot can
-    stop before that contact. The price: time to go from where the arc ends, lack of clearance on it, heading
-    off the way down, and speed left unused.
+    A pair's arc is followed for the horizon, up to the first contact or to where nothing was seen yet; it is
+    admissible where the robot can stop before that. The price: time to go from where the arc ends, lack of
+    clearance on it, heading off the way down, and speed left unused.
 
     Returns
     -------
@@ -61,6 +62,7 @@ def choose_in_window(
     hits, nearest, mean = ground.hits, ground.nearest, ground.mean
     x0, y0, cell, per_cell = ground.x0_m, ground.y0_m, ground.cell_m, ground.per_cell
     togo, coarse = ground.togo_s, ground.coarse_m
+    unseen, per_coarse = ground.unseen_m, ground.per_coarse
     low_v, high_v, low_w, high_w = window(start[3], start[4], dt, drive)
     best_v = max(low_v, 0.0) if start[3] >= 0.0 else min(high_v, 0.0)
     best_w, best = min(max(0.0, low_w), high_w), math.inf
@@ -81,7 +83,21 @@ def choose_in_window(
         per_cell,
         margin,
     )
-    floor = min(margin, at_rest - 1e-3)
+    seen_at_rest = seen_under(
+        start[0],
+        start[1],
+        math.cos(start[2]),
+        math.sin(start[2]),
+        outer,
+        discs,
+        unseen,
+        x0,
+        y0,
+        coarse,
+        per_coarse,
+    )
+    # No nearer at all from within the margin: by a millimetre a step it would be through in seconds.
+    floor = min(margin, at_rest - ROUNDING_M)
     for i in range(speeds):
         v = low_v + (high_v - low_v) * i / (speeds - 1)
         for j in range(turns):
@@ -97,7 +113,11 @@ def choose_in_window(
                 here = clearance_of(
                     x, y, c, s, polygon, outer, discs, hits, nearest, mean, x0, y0, cell, per_cell, soft
                 )
-                if here < floor:
+                blind = not (
+                    disc_seen(x, y, outer, unseen, x0, y0, per_coarse)
+                    or seen_under(x, y, c, s, outer, discs, unseen, x0, y0, coarse, per_coarse)
+                )
+                if here < floor or (blind and seen_at_rest):
                     free = (k - 1) / steps
                     x, y, theta = exact_arc(start[0], start[1], start[2], length * free, angle * free)
                     break

@@ -32,6 +32,7 @@ class GoalNavigatorConfig(Config):
     """When to watch, when to give up a plan, and when it is done."""
 
     arrival_m: Positive = 0.15
+    """How near it has to believe to be; never farther than half the goal's tolerance."""
     watch_ahead_m: NonNegative = 0.9
     """Where this much of the local path ahead comes too near a mapped obstacle: stop and replan; 0: never."""
     watch_margin_m: NonNegative = 0.03

@@ -20,7 +20,13 @@ from pilotage.stack.journal import Journal
 from pilotage.stack.knowledge import RobotKnowledge, TaskKnowledge
 from pilotage.stack.localization.dead_reckoning import DeadReckoningConfig, DeadReckoningLocalizer
 from pilotage.stack.localization.localizer import Localizer
-from pilotage.stack.navigator.navigator import LocalizingNavigator, Parts, check_for_centre, unexplained_of
+from pilotage.stack.navigator.navigator import (
+    LocalizingNavigator,
+    Parts,
+    arrival_within_m,
+    check_for_centre,
+    unexplained_of,
+)
 from pilotage.stack.navigator.plan_ahead import PlanAhead, PlanAheadConfig
 from pilotage.stack.perception.moving_bodies import MovingBodies, MovingBodiesConfig
 
@@ -34,7 +40,7 @@ class LocalConfig(Config):
     reverse_m_s: NonNegative = 0.5
     """Fastest backwards, never above the forward speed; 0 for a robot that does not see behind it."""
     arrival_m: float | None = Field(default=None, gt=0.0)
-    """How near it has to believe to be; None: the goal's tolerance."""
+    """How near it has to believe to be; None: half the goal's tolerance, its error may be the other half."""
     shift_m: Positive = 0.1
     """The goal is placed anew in the odometry's frame where the localizer's correction moves it farther."""
     plan: PlanAheadConfig = PlanAheadConfig()
@@ -108,7 +114,7 @@ class LocalNavigator(LocalizingNavigator):
                 self._localizer.belief,
                 journal,
             )
-        self._tolerance_m = min(config.arrival_m or math.inf, task.goal_tolerance_m)
+        self._tolerance_m = arrival_within_m(config.arrival_m, task.goal_tolerance_m)
         self._word = ""
         self._channel = journal.channel({"distance_to_go_m": "m"}, first=True)
 

@@ -40,6 +40,15 @@ class Parts:
     patrol: PatrolTask | None = None
 
 
+def arrival_within_m(arrival_m: float | None, goal_tolerance_m: float) -> float:
+    """How near the goal a robot has to believe to be: half the goal's tolerance where nothing is said.
+
+    It is never quite where it believes to be: one that stops where its belief comes within the tolerance
+    stands outside it in every second run. Nor does it help to say more than the tolerance.
+    """
+    return min(0.5 * goal_tolerance_m if arrival_m is None else arrival_m, goal_tolerance_m)
+
+
 class LocalizingNavigator:
     """What navigators show of themselves: their localizer's belief, and how the task stands and why."""
 

@@ -70,12 +70,13 @@ class PlanAhead:
         self._radius_m = robot.radius_m
         self._own_map = own_map = OwnMap(chart, mapper)
         rng = robot.streams.stream("planner")
-        self._plan = GlobalPlan(planner, smoother, chart, rng, journal, robot.radius_m, robot)
+        turns = robot.motion.least_turning_radius_m == 0.0
+        self._plan = GlobalPlan(planner, smoother, chart, rng, journal, robot.radius_m, robot, turns)
         self._stall = StallWatch(config.stall_progress_m, config.stall_s)
         self._stalls, self._planned_s = 0, -math.inf
         self._path: FloatArray = np.zeros((0, 2))
         self.to_go_m = math.inf
-        self.failure = ""
+        self.failure, self._why = "", ""
         journal.result("mapped_circles_m", lambda: own_map.found_circles_m)
         journal.counts["replans"] = 0
         if initial.status is not BeliefStatus.LOST:
@@ -99,7 +100,7 @@ class PlanAhead:
             elif t_s - self._planned_s >= self._config.every_s and self._is_blocked():
                 self._make(t_s, pose, "a mapped obstacle stands on the plan")
         if self._plan.progress is None:
-            self.failure = self.failure or "no plan leads to the goal"
+            self.failure = self.failure or f"no plan leads to the goal: {self._why}"
             return pose.x_m, pose.y_m
         return self._point_ahead()
 
@@ -125,6 +126,7 @@ class PlanAhead:
         if not first:
             self._journal.count("replans")
         if result.path is None:
+            self._why = result.reason
             self._journal.say(t_s, "no-plan", f"{why}: {result.status}, {result.reason}")
             return
         assert self._plan.path is not None

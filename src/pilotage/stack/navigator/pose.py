@@ -14,14 +14,14 @@ from pilotage.stack.control.polar_pose import PolarPoseConfig, PolarPoseControll
 from pilotage.stack.interface import NAVIGATORS, StackStatus
 from pilotage.stack.journal import Journal
 from pilotage.stack.knowledge import RobotKnowledge, TaskKnowledge
-from pilotage.stack.navigator.navigator import LocalizingNavigator, Parts, localizer_of
+from pilotage.stack.navigator.navigator import LocalizingNavigator, Parts, arrival_within_m, localizer_of
 
 
 class PoseConfig(PolarPoseConfig):
     """The law's gains, and when it is there."""
 
     arrival_m: float | None = Field(default=None, gt=0.0)
-    """How near it has to believe to be; None: the goal's tolerance."""
+    """How near it has to believe to be; None: half the goal's tolerance, its error may be the other half."""
 
 
 @NAVIGATORS.add("pose", PoseConfig)
@@ -48,7 +48,7 @@ class PoseNavigator(LocalizingNavigator):
         super().__init__(localizer_of(parts, "pose"), journal)
         pose = Pose2(goal.x_m, goal.y_m, goal.theta_rad)
         self._law = PolarPoseController(config, pose, robot.motion.top_speed_m_s)
-        self._tolerance_m = min(config.arrival_m or math.inf, task.goal_tolerance_m)
+        self._tolerance_m = arrival_within_m(config.arrival_m, task.goal_tolerance_m)
         self._channel = journal.channel({"distance_to_go_m": "m"})
 
     def step(self, readings: Readings) -> Twist:

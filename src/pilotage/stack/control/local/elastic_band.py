@@ -14,6 +14,7 @@ from pilotage.kernels.control import togo
 from pilotage.kernels.control.rollouts import follow_path
 from pilotage.kernels.control.togo import togo_at
 from pilotage.sensors.sensor import NonNegative, Positive
+from pilotage.stack.control.local.command_check import first_safe, slower
 from pilotage.stack.control.local.role import LOCAL_CONTROLLERS, LocalView
 from pilotage.stack.control.local.rolling import Scene
 from pilotage.stack.control.local.rolling_config import RollingConfig
@@ -50,7 +51,7 @@ class Teb(RollingController):
     After Roesmann et al. (2017), who choose among classes by time; here position and time are optimized one
     after the other, not in one graph. Classes come from the time to go: the way down, then the way down with
     the narrowest place of the bands so far closed. The band does not know of orientation and is followed by
-    pursuit: in places narrower than the outer disc a corner may touch.
+    pursuit, as fast as it can still stop: in places narrower than the outer disc it may stay before them.
     """
 
     def __init__(self, config: TebConfig, generator: np.random.Generator) -> None:
@@ -73,9 +74,10 @@ class Teb(RollingController):
             times -= config.change_s if kept else 0.0
             if times < best_s:
                 best, best_s, speeds = relaxed, times, profile
-        if best is None or best.shape[0] < 2:
-            return Twist(0.0, 0.0)
         self._band = best
+        if best is None or best.shape[0] < 2:
+            # None is free to its end, or the way down ends in the goal's cell.
+            best = scene.path if scene.path.shape[0] > 1 else np.vstack([scene.start[:2], scene.goal])
         # The speed a little ahead: from rest the profile begins at 0.
         wanted = float(speeds[min(2, speeds.shape[0] - 1)])
         command = follow_path(
@@ -89,7 +91,8 @@ class Teb(RollingController):
             scene.dt_s,
             scene.drive,
         )[0]
-        return Twist(float(command[0]), float(command[1]))
+        # The band is a disc's, and it leads over ground that was not seen yet.
+        return first_safe(scene, slower(Twist(float(command[0]), float(command[1]))), config.margin_m)
 
     def _guesses(self, scene: Scene) -> list[tuple[bool, FloatArray]]:
         """First guesses of bands, and whether each is that of the step before."""

@@ -8,26 +8,19 @@ import numpy as np
 
 from pilotage.core.types import Twist
 from pilotage.kernels.control.band import path_distances
-from pilotage.kernels.control.motion_limits import command_is_safe
 from pilotage.kernels.geometry.motion import wrap
+from pilotage.stack.control.local.command_check import BRAKE_TRUST, is_safe
 from pilotage.stack.control.local.rolling import Scene
 
 AIM = 0.3
 """Of the tolerance the robot has to come to rest within: its belief is off as well."""
 NEAR_M = 0.3
 """From so far on, and sooner where braking takes longer."""
-BRAKE_TRUST = 0.65
-"""Share of the data sheet's braking that the speed reckons with."""
 TURN_GAIN_PER_S = 3.0
 TURN_IN_PLACE_RAD = 0.35
 """Farther off than this it turns before it drives."""
 LEAST_SPEED_M_S = 0.01
 LEAST_TURN_RAD_S = 0.1
-CHECK_STEP_S, CHECK_STEPS = 0.05, 30
-MARGIN_M, MARGIN_S = 0.01, 0.015
-"""To what was seen, at rest, and more per m/s."""
-PEOPLE_MARGIN_M, PEOPLE_STD = 0.05, 1.5
-"""To where moving bodies are foretold, with so many standard deviations of the place."""
 
 
 def is_fine(scene: Scene, tolerance_m: float) -> bool:
@@ -77,25 +70,4 @@ def approach(scene: Scene, tolerance_m: float) -> Twist | None:
         speed = max(min(speed, drive.reverse if backwards else drive.speed), LEAST_SPEED_M_S)
         turn = 2.0 * speed * math.sin(off) / away
         command = Twist(-speed if backwards else speed, min(max(turn, -drive.turn_rate), drive.turn_rate))
-    return command if _is_safe(scene, command) else None
-
-
-def _is_safe(scene: Scene, command: Twist) -> bool:
-    discs = scene.movers.foretold(scene.delay_s + CHECK_STEP_S, CHECK_STEP_S, CHECK_STEPS, PEOPLE_STD)
-    safe, _ = command_is_safe(
-        scene.start,
-        command.v_m_s,
-        command.w_rad_s,
-        scene.dt_s,
-        CHECK_STEP_S,
-        True,
-        scene.drive,
-        scene.sheet.scaled(BRAKE_TRUST),
-        scene.body,
-        scene.ground,
-        discs,
-        MARGIN_M,
-        MARGIN_S,
-        PEOPLE_MARGIN_M,
-    )
-    return bool(safe)
+    return command if is_safe(scene, command) else None

@@ -15,6 +15,9 @@ BEYOND_S = 6.0
 """The time to go is worked out so far past the robot: no plan goes back farther."""
 AT_ONCE = 10**6
 """More steps than any plan is kept."""
+SLOW_SHARE, CRAWL_SHARE = 0.5, 0.16
+"""Of the robot's own speed, at most, near obstacles and between them: to whom all places are as fast, the way
+leads along the walls, no farther from them than its inner disc."""
 
 
 class TimeToGo:
@@ -89,14 +92,14 @@ class TimeToGo:
             clearance,
             self._seen,
             *self._widths_m(body),
-            min(config.crawl_m_s, drive.speed),
-            min(config.slow_m_s, drive.speed),
+            self._crawl_m_s(drive),
+            min(config.slow_m_s, SLOW_SHARE * drive.speed),
             drive.speed,
             config.unseen_share,
         )
         # The robot is where it is: what was seen there, as somebody who brushed past, shall not shut it in.
         row, column = (int((self._pose[1] - y0) / self._coarse_m), int((self._pose[0] - x0) / self._coarse_m))
-        speed[row, column] = max(speed[row, column], min(config.crawl_m_s, drive.speed))
+        speed[row, column] = max(speed[row, column], self._crawl_m_s(drive))
         field: FloatArray = togo.time_to_go(
             speed,
             x0,
@@ -110,6 +113,9 @@ class TimeToGo:
             BEYOND_S,
         )
         return field
+
+    def _crawl_m_s(self, drive: Drive) -> float:
+        return min(self._config.crawl_m_s, CRAWL_SHARE * drive.speed)
 
     def _widths_m(self, body: Body) -> tuple[float, float, float]:
         """Clearances from where on the footprint fits straight, may turn, and nothing slows it any more."""

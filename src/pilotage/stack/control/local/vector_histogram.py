@@ -8,7 +8,8 @@ import numpy as np
 from pydantic import Field
 
 from pilotage.core.config import Config
-from pilotage.core.types import Twist
+from pilotage.core.types import FloatArray, Twist
+from pilotage.kernels.control.band import path_distances
 from pilotage.kernels.control.polar_histogram import best_opening, binary_histogram, polar_histogram
 from pilotage.kernels.geometry.motion import wrap
 from pilotage.sensors.sensor import NonNegative, Positive
@@ -16,6 +17,9 @@ from pilotage.stack.control.local.role import LOCAL_CONTROLLERS, LocalView
 from pilotage.stack.control.local.rolling import Scene
 from pilotage.stack.control.local.rolling_config import RollingConfig
 from pilotage.stack.control.local.rolling_step import RollingController
+
+SPACING_M, NEAREST = 0.1, 3
+"""Of the path's points, and which of them is headed for where none farther is in sight."""
 
 
 class VfhConfig(Config):
@@ -57,10 +61,12 @@ class Vfh(RollingController):
         del view
         config = self._config
         x, y, theta = scene.start[0], scene.start[1], scene.start[2]
-        ahead = scene.path[min(round(config.lead_m / 0.1), scene.path.shape[0] - 1)]
+        ahead = self._in_sight(scene)
         target = math.atan2(ahead[1] - y, ahead[0] - x) if scene.path.shape[0] > 1 else theta
+        # What lies behind the target does not shut the way to it.
+        active_m = min(config.active_m, math.hypot(ahead[0] - x, ahead[1] - y) + scene.body.outer_m)
         histogram, distance = polar_histogram(
-            x, y, scene.ground, config.active_m, scene.body.outer_m + config.margin_m, config.sectors
+            x, y, scene.ground, active_m, scene.body.outer_m + config.margin_m, config.sectors
         )
         self._blocked = binary_histogram(histogram, self._blocked, config.low, config.high)
         if math.isnan(self._before):
@@ -84,11 +90,27 @@ class Vfh(RollingController):
             return Twist(0.0, self._turn(off, scene))
         width = 2.0 * math.pi / config.sectors
         facing = int(theta % (2.0 * math.pi) / width) % config.sectors
-        near = min(float(distance[facing]), config.active_m) - scene.body.outer_m - config.margin_m
+        near = min(float(distance[facing]), active_m) - scene.body.outer_m - config.margin_m
         braking = scene.drive.deceleration
         lag = braking * config.headway_s
         stops = math.sqrt(lag * lag + 2.0 * braking * max(near, 0.0)) - lag
         return Twist(min(scene.drive.speed, stops) * max(math.cos(off), 0.0), self._turn(off, scene))
+
+    def _in_sight(self, scene: Scene) -> FloatArray:
+        """The point of the path, up to the lead, that is the farthest to which the straight line is free.
+
+        One around a corner would be aimed at through the corner.
+        """
+        path, config = scene.path, self._config
+        keep_m = scene.body.inner_m + config.margin_m
+        seen = min(NEAREST, path.shape[0] - 1)
+        for last in range(min(round(config.lead_m / SPACING_M), path.shape[0] - 1), seen, -1):
+            line = np.linspace(path[0], path[last], 2 * last + 1)
+            if path_distances(line, scene.ground).min() >= keep_m:
+                seen = last
+                break
+        ahead: FloatArray = path[seen]
+        return ahead
 
     def _turn(self, off: float, scene: Scene) -> float:
         limit = scene.drive.turn_rate

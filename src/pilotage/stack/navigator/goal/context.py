@@ -22,7 +22,7 @@ from pilotage.stack.navigator.following import WaypointFollower
 from pilotage.stack.navigator.global_plan import GlobalPlan
 from pilotage.stack.navigator.goal.wandering import Wandering
 from pilotage.stack.navigator.goal_config import GoalNavigatorConfig, Mode
-from pilotage.stack.navigator.navigator import Parts, localizer_of, unexplained_of
+from pilotage.stack.navigator.navigator import Parts, arrival_within_m, localizer_of, unexplained_of
 from pilotage.stack.navigator.own_map import OwnMap
 from pilotage.stack.navigator.progress import PathProgress, StallWatch
 from pilotage.stack.perception.moving_bodies import MovingBodies
@@ -83,6 +83,7 @@ class Context:
         self.journal = journal
         self.goals: list[Goal] = list(task.goals)
         self._tolerance_m = task.goal_tolerance_m
+        self._arrival_m = min(config.arrival_m, arrival_within_m(None, task.goal_tolerance_m))
         self.turns_on_the_spot = robot.motion.least_turning_radius_m == 0.0
         # Without a mapper it minds nothing but its map: who shows it wrong scans shows it nobody.
         self._bodies = MovingBodies(
@@ -259,7 +260,7 @@ class Context:
         away = math.hypot(pose.x_m - goal.x_m, pose.y_m - goal.y_m)
         if self.to_go_m > away + self._tolerance_m:
             return False
-        return away <= self.config.arrival_m or (away <= self._tolerance_m and self.to_go_m < 0.02)
+        return away <= self._arrival_m or (away <= self._tolerance_m and self.to_go_m < 0.02)
 
     def turn_to_plan_rad(self, pose: Pose2) -> float:
         """How far to turn to head as the plan does here; 0 where the plan, or the robot, does not turn so."""
