@@ -13,6 +13,7 @@ from pilotage.kernels.control.motion_limits import Drive, advance
 from pilotage.kernels.scans.rays import fan_ranges
 from pilotage.sensors.lidar import LidarConfig
 from pilotage.sensors.readings import LidarScan, OdometryIncrement, Readings
+from pilotage.sensors.wheel_odometry import WheelOdometryConfig
 from pilotage.stack.control.local.drive import LocalDrive
 from pilotage.stack.control.local.fine_goal import approach, is_fine, rests_within
 from pilotage.stack.control.local.role import LOCAL_CONTROLLERS, LocalController, LocalLimits, LocalView
@@ -180,6 +181,22 @@ def test_a_goal_is_placed_anew_as_finely_as_it_has_to_be_met(
     first, second = controller.views
     assert (first.goal_xy_m != second.goal_xy_m) == moves
     assert second.goal_is_sure == sure
+
+
+def test_a_controller_is_told_how_noisy_its_measured_speed_is() -> None:
+    """Of 0.1 m and 0.05 rad in a tenth of a second."""
+    controller, robot = Recorded(), told_of().robot
+    drive = LocalDrive(controller, robot, Pose2(0.0, 0.0, 0.0), reverse_m_s=0.2, needed_by="test")
+    wheels = robot.one_sensor(WheelOdometryConfig, "test")[1]
+    ranges = np.full(robot.one_sensor(LidarConfig, "test")[1].beams, 5.0)
+    readings = Readings(0.1, {"lidar": LidarScan(ranges), "odometry": OdometryIncrement(0.1, 0.05)})
+    drive.move(readings)
+    drive.toward((0.5, 0.0), Belief(Pose2(0.1, 0.0, 0.05), 1e-6 * np.eye(3)), readings, 0.3)
+    (view,) = controller.views
+    assert view.twist.v_m_s == pytest.approx(1.0)
+    assert view.speed_var_m2_s2 == pytest.approx(wheels.distance_var_m2_per_m * 0.1 / 0.1**2)
+    angle_var = wheels.angle_var_rad2_per_rad * 0.05 + wheels.angle_var_rad2_per_m * 0.1
+    assert view.turn_rate_var_rad2_s2 == pytest.approx(angle_var / 0.1**2)
 
 
 def test_a_sure_goal_stays_where_the_odometry_has_it() -> None:

@@ -23,6 +23,7 @@ from pilotage.stack.control.local.role import (
 )
 from pilotage.stack.control.local.rolling import RollingGround
 from pilotage.stack.control.local.rolling_config import RollingConfig
+from pilotage.stack.control.local.turning_room import find_turning_room
 
 JACKAL = np.array([[0.254, 0.215], [-0.254, 0.215], [-0.254, -0.215], [0.254, -0.215]])
 LIMITS = LocalLimits(2.0, 0.5, 3.0, 3.0, 4.0, 6.0)
@@ -154,6 +155,31 @@ def test_our_own_hits_nothing_it_has_seen_with_weak_brakes_worse_than_told(seed:
     assert least > 0.0
 
 
+@pytest.mark.parametrize("y", [-0.1, 0.12])
+def test_our_own_steers_around_what_it_can_no_longer_brake_for(y: float) -> None:
+    """A post that comes to light 0.95 m before a robot that needs 1.6 m to stop."""
+    limits = LocalLimits(2.0, 0.5, 1.2, 1.2, 4.0, 6.0)
+    post = np.array([[3.0, y, 0.05]])
+    true = Drive(2.0, 0.5, 1.2, 1.2, 4.0, 6.0)
+    controller = make("gap-horizon")
+    state = 0.0, 0.0, 0.0, 0.0, 0.0
+    least = math.inf
+    fastest = 0.0
+    for k in range(120):
+        x, _, theta, v, w = state
+        hidden = x + 0.254 + 0.95 < 3.0
+        fastest = v if hidden else fastest
+        view = view_of(
+            0.05 * k, Pose2(x, state[1], theta), Twist(v, w), np.zeros((0, 3)) if hidden else post, limits
+        )
+        command = controller.step(view)
+        for _ in range(5):
+            state = advance(*state, command.v_m_s, command.w_rad_s, 0.01, true)
+            least = min(least, discs_clearance(*state[:3], JACKAL, post))
+    assert fastest > 1.6
+    assert least > 0.0
+
+
 @pytest.mark.parametrize("seed", [1, 10])
 def test_our_own_goes_on_to_a_goal_that_has_to_be_met_closely(seed: int) -> None:
     """Plans of a second alone stand still before it more often; longer ones come within 5 cm."""
@@ -267,6 +293,37 @@ def test_the_middle_between_two_wall_ends_is_found_wherever_cells_lie(shift_m: f
     along = 0.8 - passage.x_m
     y = passage.y_m + along * math.tan(passage.direction_rad)
     assert abs(y - 0.5 * (left + right)) < 0.008
+
+
+def test_a_robot_that_cannot_turn_where_it_stands_gets_room_first() -> None:
+    """A post beside its rear, its way behind it: plans of a second and a half stood there, turn and all."""
+    beside = np.array([[-0.09, -0.41, 0.075]])
+    scene = RollingGround(RollingConfig()).update(view_of(0.0, Pose2(0.0, 0.0, 0.0), Twist(0.0, 0.0), beside))
+    back = replace(scene, path=np.column_stack([np.arange(0.0, -2.0, -0.1), np.zeros(20)]))
+    room_m = scene.body.outer_m + 0.03
+    assert find_turning_room(scene, room_m, 0.015, 0.0) is None  # its way lies ahead
+    found = find_turning_room(back, room_m, 0.015, 0.0)
+    assert found is not None
+    assert 0.0 < found.x_m < 0.3
+    _, command = found.step(back, room_m, 0.1)
+    assert command.v_m_s > 0.05
+    assert command.w_rad_s == 0.0
+    there = replace(back, start=np.array([found.x_m, found.y_m, 0.0, 0.0, 0.0]))
+    then, command = found.step(there, room_m, 1.0)
+    assert command.v_m_s == 0.0
+    assert abs(command.w_rad_s) > 0.5
+    assert then is not None
+    assert (
+        then.step(replace(there, start=np.array([found.x_m, found.y_m, 3.0, 0.0, 0.0])), room_m, 2.0)[0]
+        is None
+    )
+    # A wall before it and one behind leave none.
+    y = np.arange(-0.5, 0.5, 0.02)
+    walls = [np.column_stack([np.full(y.shape, x), y, np.full(y.shape, 0.01)]) for x in (0.3, -0.3)]
+    scene = RollingGround(RollingConfig()).update(
+        view_of(0.0, Pose2(0.0, 0.0, 0.0), Twist(0.0, 0.0), np.vstack([beside, *walls]))
+    )
+    assert find_turning_room(replace(scene, path=back.path), room_m, 0.015, 0.0) is None
 
 
 def test_it_does_not_go_into_a_gap_askew() -> None:

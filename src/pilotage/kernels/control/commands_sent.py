@@ -1,6 +1,8 @@
-"""Commands under way: where a robot will be when they have acted, and which limits explain its answers."""
+"""Commands under way: where a robot will be when they have acted, its rates, limits that explain them."""
 
 from __future__ import annotations
+
+import math
 
 import numpy as np
 
@@ -11,6 +13,9 @@ from pilotage.kernels.jit import kernel
 PIECE_S = 0.05
 MOST_PIECES = 400
 EPSILON_S = 1e-9
+UNMODELLED = 0.2
+"""Share of the data sheet's accelerations by which rates change as no command told, from step to step."""
+BIAS_S = 0.25
 
 
 @kernel
@@ -46,28 +51,44 @@ def drive_out(
 
 
 @kernel
-def limit_errors(
-    before: FloatArray,
-    after: FloatArray,
+def filter_rates(
+    bank: FloatArray,
+    measured: FloatArray,
+    measured_var: FloatArray,
     begin: float,
     end: float,
     delay: float,
     sent: FloatArray,
     drive: Drive,
     hypotheses: FloatArray,
-    speed_std: float,
-    turn_std: float,
+    doubt_std: FloatArray,
 ) -> FloatArray:
-    """Squared errors (H,), in standard deviations, of the rates that hypotheses predict for ``after``.
+    """One step of a Kalman filter of speed and turn rate under each hypothesis about the limits; in place.
+
+    Between measurements rates go where the commands sent drive them, but for ``UNMODELLED`` of what the
+    acceleration could change, and for a part that has been wrong the same way for ``BIAS_S``: under limits
+    that no hypothesis names, as a top speed that is not reached, measurements then weigh more.
 
     Parameters
     ----------
-    before, after
-        (5,) states at ``begin`` and ``end``; only v and w are compared.
+    bank
+        (H, 6) by hypothesis: v, w, their variances, and the running means of their innovations.
+    measured, measured_var
+        (2,) v and w at ``end``, and their variances.
     hypotheses
         (H, 2) share of the accelerations and factor of the delay.
+    doubt_std
+        (2,) of v and w: closer than this no model need be.
+
+    Returns
+    -------
+    (H,) squared innovations in standard deviations, summed over both.
     """
-    out = np.empty(hypotheses.shape[0])
+    out = np.zeros(hypotheses.shape[0])
+    state = np.zeros(5)
+    elapsed = end - begin
+    fresh = 1.0 - math.exp(-elapsed / BIAS_S)
+    most = drive.acceleration, drive.turn_acceleration
     for h in range(hypotheses.shape[0]):
         share = hypotheses[h, 0]
         limits = Drive(
@@ -79,9 +100,21 @@ def limit_errors(
             drive.turn_acceleration * share,
             drive.least_radius,
         )
-        there = drive_out(before, begin, end, delay * hypotheses[h, 1], sent, limits)
-        dv, dw = (there[3] - after[3]) / speed_std, (there[4] - after[4]) / turn_std
-        out[h] = dv * dv + dw * dw
+        state[3], state[4] = bank[h, 0], bank[h, 1]
+        there = drive_out(state, begin, end, delay * hypotheses[h, 1], sent, limits)
+        for k in range(2):
+            foretold = there[3 + k]
+            off = measured[k] - foretold
+            var = bank[h, 2 + k] + (UNMODELLED * most[k] * elapsed) ** 2
+            # What the mean of white innovations is by chance tells of no bias.
+            bias = bank[h, 4 + k] + fresh * (off - bank[h, 4 + k])
+            var += max(0.0, bias * bias - 4.0 * (var + measured_var[k]) * fresh / (2.0 - fresh))
+            bank[h, 4 + k] = bias
+            of_off = var + measured_var[k]
+            gain = var / of_off if of_off > 0.0 else 1.0
+            bank[h, k] = foretold + gain * off
+            bank[h, 2 + k] = (1.0 - gain) * var
+            out[h] += off * off / (of_off + doubt_std[k] ** 2)
     return out
 
 

@@ -1,19 +1,19 @@
-"""How the robot answers to commands: which share of the data sheet's limits it has, and which delay."""
+"""How the robot answers to commands: its rates, its share of the data sheet's limits, and its delay."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from pilotage.core.types import FloatArray
-from pilotage.kernels.control.commands_sent import drive_out, limit_errors, weigh
+from pilotage.kernels.control.commands_sent import drive_out, filter_rates, weigh
 from pilotage.kernels.control.motion_limits import Drive
 
 SHARES = (1.15, 1.0, 0.9, 0.8, 0.7, 0.6, 0.5)
 DELAYS = (1.0, 1.25, 1.5, 1.75)
 FORGET = 0.99
 """Per step: the limits may change with the ground."""
-SPEED_STD = 0.03
-TURN_STD = 0.06
+DOUBT_STD = np.array([0.03, 0.06])
+"""Of speed (m/s) and turn rate (rad/s): closer than this no model of the limits need be."""
 MOST_ERROR = 25.0
 """Of one step, in squared standard deviations: a bump is no limit."""
 PRIOR = 4.0
@@ -26,9 +26,10 @@ ROOM = 256
 class Answer:
     """Keeps the commands sent and weighs hypotheses about the limits by the speeds measured since.
 
-    A bank of models, one for each share of the accelerations and each factor of the delay, each predicting
-    the rates one step ahead (multiple-model estimation: Magill 1965). Accelerating tells of braking here: one
-    share holds for both, which is wrong where brakes alone are worn.
+    A bank of models, one for each share of the accelerations and each factor of the delay, each with its own
+    Kalman filter of the rates (multiple-model estimation: Magill 1965). Accelerating tells of braking here:
+    one share holds for both, which is wrong where brakes alone are worn. Rates are those of the likeliest
+    model: what the odometry says of one step alone may be off by a tenth, and braking begins late by a fifth.
     """
 
     def __init__(self) -> None:
@@ -41,10 +42,12 @@ class Answer:
         self._prior = PRIOR * np.abs(self._hypotheses - 1.0).sum(axis=1)
         self._costs = self._prior.copy()
         self._choose(int(np.argmin(self._costs)))
-        self._before: tuple[float, FloatArray] | None = None
+        self._bank = np.zeros((len(self._pairs), 6))
+        self._learned_s: float | None = None
 
     def _choose(self, likeliest: int) -> None:
         """``share`` of the data sheet's accelerations, ``delay_factor`` of its delay, as they seem."""
+        self._likeliest = likeliest
         self.share, self.delay_factor = self._pairs[likeliest]
 
     def sent(self, t_s: float, v_m_s: float, w_rad_s: float) -> None:
@@ -61,24 +64,33 @@ class Answer:
             self._begin += 1
         self._sent = self._room[self._begin : end + 1]
 
-    def learn(self, t_s: float, state: FloatArray, delay_s: float, drive: Drive) -> None:
-        """Weigh the hypotheses by a measured state (5,)."""
-        if self._before is not None and len(self._sent):
-            then_s, before = self._before
-            errors = limit_errors(
-                before,
-                state,
-                then_s,
+    def learn(
+        self, t_s: float, measured: FloatArray, measured_var: FloatArray, delay_s: float, drive: Drive
+    ) -> None:
+        """Weigh the hypotheses by a measured speed and turn rate (2,) with their variances (2,)."""
+        if self._learned_s is None:
+            self._bank[:, :2], self._bank[:, 2:4] = measured, measured_var
+        else:
+            errors = filter_rates(
+                self._bank,
+                measured,
+                measured_var,
+                self._learned_s,
                 t_s,
                 delay_s,
                 self._sent,
                 drive,
                 self._hypotheses,
-                SPEED_STD,
-                TURN_STD,
+                DOUBT_STD,
             )
             self._choose(weigh(self._costs, self._prior, errors, FORGET, MOST_ERROR))
-        self._before = (t_s, state)
+        self._learned_s = t_s
+
+    @property
+    def rates(self) -> FloatArray:
+        """(2,) speed and turn rate when it last learned."""
+        rates: FloatArray = self._bank[self._likeliest, :2]
+        return rates
 
     def likely(self, drive: Drive) -> Drive:
         """The limits that explain the answers best, never above the data sheet's."""

@@ -10,6 +10,7 @@ from pilotage.core.errors import InputError
 from pilotage.core.types import STOP, FloatArray, Pose2, Twist
 from pilotage.kernels.geometry.motion import exact_arc
 from pilotage.models.footprint import Footprint
+from pilotage.models.odometry import increment_variances
 from pilotage.sensors.lidar import LidarConfig
 from pilotage.sensors.readings import LidarScan, OdometryIncrement, Readings
 from pilotage.sensors.wheel_odometry import WheelOdometryConfig
@@ -45,7 +46,7 @@ class LocalDrive:
     ) -> None:
         self._controller, self._shift_m = controller, shift_m
         self._lidar, self._scanner = robot.one_sensor(LidarConfig, needed_by)
-        self._odometry, _ = robot.one_sensor(WheelOdometryConfig, needed_by)
+        self._odometry, self._wheels = robot.one_sensor(WheelOdometryConfig, needed_by)
         self._limits = limits_of(robot, reverse_m_s, needed_by)
         self._outline = polygon_around(robot.footprint)
         self._angles = self._scanner.beam_angles_rad()
@@ -54,6 +55,7 @@ class LocalDrive:
         # In its own frame of the odometry it begins where it believes to be: a goal is there as on the map.
         self._pose, self._goal_there = start, goal_xy_m
         self._twist, self._command, self._moved_s = STOP, STOP, 0.0
+        self._twist_vars = 0.0, 0.0
 
     @property
     def status(self) -> str:
@@ -68,6 +70,16 @@ class LocalDrive:
         elapsed_s = readings.t_s - self._moved_s
         if elapsed_s > 0.0:
             self._twist = Twist(odometry.distance_m / elapsed_s, odometry.angle_rad / elapsed_s)
+            wheels = self._wheels
+            distance_var, angle_var = increment_variances(
+                odometry.distance_m,
+                odometry.angle_rad,
+                wheels.distance_var_m2_per_m,
+                wheels.distance_var_m2_per_rad,
+                wheels.angle_var_rad2_per_rad,
+                wheels.angle_var_rad2_per_m,
+            )
+            self._twist_vars = distance_var / elapsed_s**2, angle_var / elapsed_s**2
         self._moved_s = readings.t_s
         pose = self._pose
         self._pose = Pose2(
@@ -127,6 +139,8 @@ class LocalDrive:
             goal_tolerance_m=tolerance_m,
             people_about=people_about,
             goal_is_sure=goal_is_sure,
+            speed_var_m2_s2=self._twist_vars[0],
+            turn_rate_var_rad2_s2=self._twist_vars[1],
         )
 
 

@@ -11,6 +11,7 @@ from pydantic import Field
 from pilotage.core.config import Config
 from pilotage.core.types import STOP, FloatArray, Twist
 from pilotage.kernels.control.band import path_distances
+from pilotage.kernels.control.evasion import best_evasion
 from pilotage.kernels.control.ground import nearest_m, sure_clearance
 from pilotage.kernels.control.ground_update import cleaned_ranges, scan_points
 from pilotage.kernels.control.motion_limits import Drive, approach, command_is_safe
@@ -37,6 +38,7 @@ from pilotage.stack.control.local.rolling import Scene
 from pilotage.stack.control.local.rolling_config import RollingConfig
 from pilotage.stack.control.local.rolling_step import RollingController
 from pilotage.stack.control.local.sampling import NoiseBank
+from pilotage.stack.control.local.turning_room import TurningRoom, find_turning_room
 
 MOST_BLIND_RAD = math.pi / 3.0
 """To either side of straight behind: with a wider blind sector no arc is safe, and this one is taken."""
@@ -48,6 +50,10 @@ TRIED_M = 0.3
 Share = Field(default=0.65, gt=0.0, le=1.0)
 SPEEDS = np.array([1.0, 0.7, 0.45, 0.25])
 LOOKS = np.array([[0.3, 0.1], [0.45, 0.3]])
+TURNS_M_S = 0.1
+"""Slower than this it brakes before it could get around anything."""
+SWERVES = (0.0, -0.2, 0.2, -0.4, 0.4, -0.7, 0.7, -1.0, 1.0)
+HOLDS_S = (0.15, 0.4, 0.8)
 DODGES = np.array([(v, w) for v in (-0.5, 0.6, 1.2) for w in (-2.0, 0.0, 2.0)])
 """Speeds and turn rates held for a whole plan."""
 
@@ -131,7 +137,8 @@ class GapHorizon(RollingController):
        command takes effect; it must stay on seen ground, clear of every point, and end where the robot can
        still brake. So the speed follows from the limits and the sight.
     3. The first command of the best plan is checked with finer steps and worse brakes, followed by a stop;
-       where that fails, the next plan's, then slower ones, then the stop that was checked a step before.
+       where that fails, the next plan's, then slower ones. Where none is safe, what ends best: braking alone
+       or with a turn (``best_evasion``); near people just the brakes.
 
     Where nothing moves and limits are no worse than ``brake_trust`` of the data sheet, it cannot hit what it
     has seen beyond the map's errors (least margin against laser noise and odometry within a step). It does
@@ -147,6 +154,7 @@ class GapHorizon(RollingController):
         self._since_sampled = config.resample_steps
         self._keep_turning = True
         self._passage: NarrowPassage | None = None
+        self._room: TurningRoom | None = None
         self._backs_out = False
         self._moved_s = self._drove_s = 0.0
         self._tried: list[tuple[float, float]] = []
@@ -174,6 +182,12 @@ class GapHorizon(RollingController):
             return STOP
         if self._passage is not None:
             return self._squeeze(view, scene, self._passage)
+        if self._room is not None:
+            self._room, wanted = self._room.step(scene, self._room_m(scene), view.t_s)
+            command = self._checked(scene, np.array([wanted.v_m_s, wanted.w_rad_s]))
+            if self._room is not None and command is not None:
+                return command
+            self._room = None
         price = Price(
             config.margin_m,
             config.margin_s,
@@ -205,8 +219,26 @@ class GapHorizon(RollingController):
         self._plan = None
         curvature = scene.start[4] / scene.start[3] if abs(scene.start[3]) > 0.05 else 0.0
         slower = max(abs(scene.start[3]) - scene.drive.deceleration * scene.dt_s, 0.0)
-        turns = self._keep_turning and not self._people_are_near(scene)
-        return Twist(0.0, curvature * math.copysign(slower, scene.start[3]) if turns else 0.0)
+        if self._people_are_near(scene):
+            return STOP
+        along = curvature * math.copysign(slower, scene.start[3]) if self._keep_turning else 0.0
+        return self._evasion(scene, along) if abs(scene.start[3]) > TURNS_M_S else Twist(0.0, along)
+
+    def _evasion(self, scene: Scene, along_rad_s: float) -> Twist:
+        """The command that ends best where none is safe: braking alone, or with a turn, now or later."""
+        v, fastest = float(scene.start[3]), scene.drive.turn_rate
+        fan = [(0.0, along_rad_s, scene.dt_s)]
+        fan += [(u, share * fastest, hold) for u in (0.0, v) for share in SWERVES for hold in HOLDS_S]
+        best, _ = best_evasion(
+            scene.start,
+            np.array(fan),
+            self._config.check_step_s,
+            scene.drive,
+            self._worse(scene),
+            scene.body,
+            scene.ground,
+        )
+        return Twist(fan[best][0], fan[best][1])
 
     def _squeeze(self, view: LocalView, scene: Scene, passage: NarrowPassage) -> Twist:
         """The next command of the manoeuvre through a gap, as fast as it is safe."""
@@ -231,6 +263,10 @@ class GapHorizon(RollingController):
             self._moved_s = view.t_s
         return command
 
+    def _room_m(self, scene: Scene) -> float:
+        """What its middle has to keep from everything for a body to turn on the spot, and a little more."""
+        return scene.body.outer_m + 2.0 * self._config.margin_m
+
     def _first_safe(self, scene: Scene, commands: list[tuple[float, float]], margin_m: float) -> Twist | None:
         for first in commands:
             command = self._checked(scene, np.array(first), margin_m)
@@ -239,7 +275,7 @@ class GapHorizon(RollingController):
         return None
 
     def _look_back(self, view: LocalView, scene: Scene) -> None:
-        """Where the robot is stuck: try the narrowest place straight, or close it; reopen where all is."""
+        """Where it is stuck: the narrowest place straight, room to turn, or close it; reopen where all is."""
         config = self._config
         x, y = float(scene.pose[0]), float(scene.pose[1])
         if self._passage is not None and view.t_s - self._moved_s < config.stuck_s:
@@ -272,6 +308,9 @@ class GapHorizon(RollingController):
         ahead = np.ascontiguousarray(scene.path[: max(3, round(config.close_ahead_m / 0.1))])
         away = path_distances(ahead, scene.ground)
         narrow = int(np.argmin(away))
+        self._room = find_turning_room(scene, self._room_m(scene), config.margin_m, view.t_s)
+        if self._room is not None:
+            return
         if away[narrow] > scene.body.outer_m:
             self._ground.open_all()
             return

@@ -82,6 +82,8 @@ class LocalView:
         odometry does not move it.
     footprint_xy_m
         (K, 2) corners of a convex polygon in the base frame.
+    speed_var_m2_s2, turn_rate_var_rad2_s2
+        Variances of the measured ``twist``, as far as known.
     """
 
     t_s: float
@@ -97,6 +99,8 @@ class LocalView:
     goal_tolerance_m: float = 0.3
     people_about: bool = False
     goal_is_sure: bool = False
+    speed_var_m2_s2: float = 0.0
+    turn_rate_var_rad2_s2: float = 0.0
 
     def __post_init__(self) -> None:
         """Refuse a scan that does not fit its angles, and beams that are not evenly spaced."""

@@ -184,8 +184,14 @@ class RollingGround:
             self._cell_m,
         )
         ground = self._ground(body, drive, rolled, avoid)
-        state = np.array([*self._pose, view.twist.v_m_s, view.twist.w_rad_s])
-        self._answer.learn(view.t_s, state, view.limits.delay_s, drive)
+        self._answer.learn(
+            view.t_s,
+            np.array([view.twist.v_m_s, view.twist.w_rad_s]),
+            np.array([view.speed_var_m2_s2, view.turn_rate_var_rad2_s2]),
+            view.limits.delay_s,
+            drive,
+        )
+        state = np.concatenate([self._pose, self._answer.rates])
         likely = self._answer.likely(drive)
         start = self._answer.after_delay(view.t_s, state, view.limits.delay_s, likely)
         path = togo.descent_path(
