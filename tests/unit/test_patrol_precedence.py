@@ -220,7 +220,7 @@ def test_who_waits_lets_somebody_pass_and_makes_room_for_one_who_does_not(
     assert isinstance(state, Waiting) is stays
 
 
-@pytest.mark.parametrize("seed", [0, 2])
+@pytest.mark.parametrize("seed", [2, 3, 4, 7])
 def test_whoever_goes_first_arrives(monkeypatch: pytest.MonkeyPatch, seed: int) -> None:
     """Who is kept out for two seconds goes first: each is through in time, after those before it too."""
     began: dict[int, float] = {}

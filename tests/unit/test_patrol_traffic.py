@@ -213,6 +213,42 @@ class TestStopping:
             )
         assert pose[0] > 1.0
 
+    @pytest.mark.parametrize(("x_m", "y_m"), [(-0.222, 0.17), (-0.25, 0.19), (-0.222, -0.17)])
+    def test_who_came_to_rest_beside_the_edge_of_a_door_gets_through(self, x_m: float, y_m: float) -> None:
+        """The field knows one row of nodes in the door, and leads into its edge."""
+        limits, safety = np.array([1.0, 2.0, 2.0, 2.0, 8.0, 0.2]), np.array([REACTION, 0.3, 0.06, 0.1, 1.4])
+        half_m, row_m = 0.45, math.copysign(0.05, y_m)
+        beside = np.linspace(half_m, 2.0, 60)
+        wall = np.column_stack([np.zeros(120), np.concatenate([beside, -beside])])
+        rows, columns = np.mgrid[:41, :41]
+        x, y = 0.15 * (columns - 20), row_m + 0.15 * (rows - 20)
+        to_wall_m = np.hypot(x, np.maximum(half_m - np.abs(y), 0.0))
+        time = np.where(x < 0.0, 4.0 + np.hypot(x, y - row_m), 4.0 - x)
+        time[to_wall_m < 0.38] = np.inf
+        pose, v, w = np.array([x_m, y_m, 0.0]), 0.0, 0.0
+        for _ in range(40):
+            near = disc_returns.rotated(wall - pose[:2], -pose[2])
+            assert np.hypot(*near.T).min() > 0.34
+            v, w, _ = voronoi_window.choose(
+                v,
+                w,
+                pose,
+                limits,
+                safety,
+                (near, NOBODY, NOBODY),
+                (time, -3.0, row_m - 3.0, 0.15),
+                NO_GATE,
+                (NO_MAP, 0.0, 0.0, 0.1),
+                0.0,
+                (0.9, 0.3, 0.5, 0.25, 6, 15),
+            )
+            pose = pose + 0.2 * np.array(
+                [v * math.cos(pose[2] + 0.1 * w), v * math.sin(pose[2] + 0.1 * w), w]
+            )
+            if pose[0] > 0.5:
+                return
+        pytest.fail(f"it stands at {pose}")
+
 
 class TestTheBestArc:
     """What is not looked at, because another arc is better or nothing is near, is not what is best."""
