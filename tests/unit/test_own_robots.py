@@ -38,14 +38,14 @@ def floor(tmp_path: Path) -> Callable[[float], str]:
     return write
 
 
-def drive(floor: str, robot: dict[str, Any], **stack: Any) -> pl.Run:
+def drive(floor: str, robot: dict[str, Any], time_limit_s: float = 90.0, **stack: Any) -> pl.Run:
     """Run it on the given map; the pose is known so that driving alone is judged."""
     mission = {
         "mission": "own",
         "world": {"map": floor, "start": START, "goal": GOAL},
         "robot": robot | {"sensors": {"odometry": {"name": "wheel-odometry"}}},
         "stack": {"initial": {"x_var_m2": 0.0, "y_var_m2": 0.0, "theta_var_rad2": 0.0}} | stack,
-        "run": {"time_limit_s": 90, "oracles": ["localizer"]},
+        "run": {"time_limit_s": time_limit_s, "oracles": ["localizer"]},
     }
     return pl.run(mission, save=False, progress=False)
 
@@ -80,7 +80,11 @@ def test_it_drives_through_a_door_of_its_own_floor(
 
 def test_a_car_is_taken_for_a_disc_where_the_door_is_wide(floor: Callable[[float], str]) -> None:
     """Neither planner nor local planner is told a turning radius: they take what the motion can."""
-    stack = {"planner": "theta-star", "local_planner": "dubins", "controller": "kanayama"}
+    stack: dict[str, Any] = {
+        "planner": "theta-star",
+        "local_planner": "dubins",
+        "controller": "kanayama",
+    }
     assert drive(floor(1.5), CAR, navigator="goal", smoother="shortcut", **stack).success
     narrow = drive(floor(0.9), CAR, navigator="goal", smoother="shortcut", **stack)
     assert not narrow.success
@@ -125,3 +129,19 @@ def test_a_curve_that_no_car_can_drive_fails_before_the_start(floor: Callable[[f
     assert not run.success
     assert run.metrics["duration_s"] == 0.0
     assert "take navigator maneuver" in run.reason
+
+
+def test_a_robot_that_crawls_is_given_time(floor: Callable[[float], str]) -> None:
+    """At 2 cm/s it makes 0.4 m in the time in which others are taken to be stuck."""
+    slow = DISC | {"motion": {"name": "differential-drive", "max_speed_m_s": 0.02}}
+    local = {"name": "dubins", "speed_m_s": 0.02}
+    stack = {"planner": "theta-star", "local_planner": local, "controller": "kanayama"}
+    run = drive(floor(0.9), slow, 400.0, navigator="goal", **stack)
+    assert run.success, run.reason
+
+
+def test_who_is_left_behind_by_its_curve_does_not_say_that_it_arrived(floor: Callable[[float], str]) -> None:
+    lame = DISC | {"true_motion": {"max_speed_m_s": 0.1}}
+    run = drive(floor(0.9), lame, navigator="curve", planner="theta-star", controller="kanayama")
+    assert not run.success
+    assert run.reason.startswith("the reference is at the curve's end, the robot ")

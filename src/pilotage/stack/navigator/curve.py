@@ -18,7 +18,7 @@ from pilotage.stack.interface import NAVIGATORS, Belief, PlannedPath, StackStatu
 from pilotage.stack.journal import Journal
 from pilotage.stack.knowledge import RobotKnowledge, TaskKnowledge
 from pilotage.stack.navigator.cells import CellRoute, CostMapConfig, curve_along, grid_of, route_over_cells
-from pilotage.stack.navigator.navigator import DISC_HINT, Parts, check_keeps_time
+from pilotage.stack.navigator.navigator import DISC_HINT, Parts, arrival_within_m, check_keeps_time
 from pilotage.stack.navigator.timed_path import laid_out
 from pilotage.stack.planning.grid_planner import GridPlanner
 from pilotage.stack.planning.quintic_spline import QuinticSpline
@@ -57,8 +57,9 @@ class CurveNavigator:
     """Plans over the cells with the mission's planner, puts a quintic spline along the path, and tracks it.
 
     The reference moves along the curve, at constant speed where one is set (equations 5.1 to 5.6);
-    the controller follows it from the believed pose. Arrives when the reference does, or 5 s later where the
-    robot is not within the goal's tolerance yet. Fails at once where a car's curve is none that it can drive.
+    the controller follows it from the believed pose. Arrives when the reference does, or up to 5 s later
+    where the robot is not within half the goal's tolerance yet, but for one that is not within it even then.
+    Fails at once where a car's curve is none that it can drive.
     """
 
     def __init__(
@@ -84,6 +85,7 @@ class CurveNavigator:
         self._speed_m_s = None if asked_m_s is None else min(asked_m_s, robot.motion.top_speed_m_s)
         self._outline = robot.footprint
         self._tolerance_m, self._waited_s = task.goal_tolerance_m, 0.0
+        self._arrival_m = arrival_within_m(None, task.goal_tolerance_m)
         self._status, self._reason = StackStatus.RUNNING, ""
         self._references: FloatArray = np.zeros((0, 5))
         planner = cast(GridPlanner, parts.planner)
@@ -191,7 +193,7 @@ class CurveNavigator:
 
     @property
     def status(self) -> tuple[StackStatus, str]:
-        """Arrived where the reference has come to the curve's end."""
+        """Arrived where the reference has come to the curve's end, and the robot with it."""
         return self._status, self._reason
 
     def step(self, readings: Readings) -> Twist:
@@ -205,10 +207,16 @@ class CurveNavigator:
         if self._index >= last:
             x, y, *_ = self._references[-1].tolist()
             self._waited_s += self._dt_s
-            if math.hypot(x - pose.x_m, y - pose.y_m) > self._tolerance_m and self._waited_s <= CATCHES_UP_S:
+            away_m = math.hypot(x - pose.x_m, y - pose.y_m)
+            if away_m > self._arrival_m and self._waited_s <= CATCHES_UP_S:
                 return self._controller.step(pose, Pose2(x, y, pose.theta_rad), STOP).twist
-            self._status = StackStatus.ARRIVED
-            self._journal.say(readings.t_s, "arrived", self._reason)
+            if away_m > self._tolerance_m:
+                self._reason = f"the reference is at the curve's end, the robot {away_m:.2f} m from it"
+                self._status = StackStatus.FAILED
+                self._journal.say(readings.t_s, "failed", self._reason)
+            else:
+                self._status = StackStatus.ARRIVED
+                self._journal.say(readings.t_s, "arrived", self._reason)
             return STOP
         x, y, theta, curvature, to_go_m = self._references[self._index + 1].tolist()
         here = self._references[self._index]

@@ -23,6 +23,7 @@ from pilotage.stack.journal import Journal
 from pilotage.stack.knowledge import RobotKnowledge, TaskKnowledge
 from pilotage.stack.mapping.scan_grid import ScanGrid, echoes
 from pilotage.stack.navigator.navigator import LocalizingNavigator, Parts, localizer_of
+from pilotage.stack.navigator.progress import patience_s
 
 AHEAD_M = 2.5
 """The local controller is led by a point so far ahead on the path."""
@@ -127,6 +128,7 @@ class FloorExplorer(LocalizingNavigator):
             reverse_m_s=config.reverse_m_s,
             needed_by="navigator 'floor-frontier'",
         )
+        self._stall_s = patience_s(config.stall_s, STALL_M, robot.motion.top_speed_m_s)
         self._clearance_m = robot.radius_m + config.clearance_m
         # A frontier no longer than the robot is wide is one that a small robot fits through.
         self._least_m = min(config.least_frontier_m, 2.0 * self._clearance_m)
@@ -319,7 +321,7 @@ class FloorExplorer(LocalizingNavigator):
         """Give up a target that it gets no nearer to."""
         if float(np.hypot(*(here - self._moved_from))) > STALL_M:
             self._moved_from, self._moved_s = here, t_s
-        elif t_s - self._moved_s > self._config.stall_s:
+        elif t_s - self._moved_s > self._stall_s:
             self._moved_s = t_s
             if self._target is not None and self._doing is not Doing.RETURN:
                 what = "a frontier" if self._doing is Doing.EXPLORE else "the place of a loop"

@@ -18,7 +18,7 @@ from pilotage.stack.knowledge import RobotKnowledge
 from pilotage.stack.mapping.mapper import Mapper
 from pilotage.stack.navigator.global_plan import GlobalPlan
 from pilotage.stack.navigator.own_map import OwnMap
-from pilotage.stack.navigator.progress import StallWatch
+from pilotage.stack.navigator.progress import StallWatch, patience_s
 from pilotage.stack.perception.moving_bodies import MovingBodies
 from pilotage.stack.planning.planner import Planner, Smoother
 
@@ -72,7 +72,10 @@ class PlanAhead:
         rng = robot.streams.stream("planner")
         turns = robot.motion.least_turning_radius_m == 0.0
         self._plan = GlobalPlan(planner, smoother, chart, rng, journal, robot.radius_m, robot, turns)
-        self._stall = StallWatch(config.stall_progress_m, config.stall_s)
+        progress_m = config.stall_progress_m
+        self._stall = StallWatch(
+            progress_m, patience_s(config.stall_s, progress_m, robot.motion.top_speed_m_s)
+        )
         self._stalls, self._planned_s = 0, -math.inf
         self._path: FloatArray = np.zeros((0, 2))
         self.to_go_m = math.inf
@@ -96,7 +99,7 @@ class PlanAhead:
                 self._stalls += not self._bodies.about
                 if self._stalls > self._config.most_stalls:
                     self.failure = f"stuck: no progress on {self._stalls} plans"
-                self._make(t_s, pose, f"no progress for {self._config.stall_s:g} s")
+                self._make(t_s, pose, f"no progress for {self._stall.patience_s:.3g} s")
             elif t_s - self._planned_s >= self._config.every_s and self._is_blocked():
                 self._make(t_s, pose, "a mapped obstacle stands on the plan")
         if self._plan.progress is None:

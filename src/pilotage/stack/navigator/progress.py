@@ -13,6 +13,9 @@ from pilotage.stack.planning.local_planner import RouteAhead
 WINDOW_BACK_M = 1.0
 WINDOW_AHEAD_M = 4.0
 
+DETOURS = 10.0
+"""So many times as far as the progress asked for a robot has time to drive."""
+
 
 class PathProgress:
     """Projects the estimate on a path; the projection moves within a window, so crossings do not jump.
@@ -102,11 +105,19 @@ class PathProgress:
         return float(np.max(np.abs(turns)))
 
 
+def patience_s(stall_s: float, progress_m: float, top_speed_m_s: float) -> float:
+    """How long a robot may take for so much progress: ``stall_s``, and longer where it is slow.
+
+    It may have to drive several times as far for it, around a curve's beginning or an obstacle.
+    """
+    return max(stall_s, DETOURS * progress_m / top_speed_m_s)
+
+
 class StallWatch:
     """Says when the distance to go has not shrunk by ``progress_m`` for longer than ``patience_s``."""
 
     def __init__(self, progress_m: float, patience_s: float) -> None:
-        self._progress_m, self._patience_s = progress_m, patience_s
+        self._progress_m, self.patience_s = progress_m, patience_s
         self._best_m, self._best_t_s = math.inf, 0.0
 
     def restart(self, t_s: float) -> None:
@@ -117,7 +128,7 @@ class StallWatch:
         """Whether it has stalled; having said so it waits as long again."""
         if to_go_m < self._best_m - self._progress_m:
             self._best_m, self._best_t_s = to_go_m, t_s
-        stalled = t_s - self._best_t_s > self._patience_s
+        stalled = t_s - self._best_t_s > self.patience_s
         if stalled:
             self._best_t_s = t_s
         return stalled

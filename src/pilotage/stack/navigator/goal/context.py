@@ -24,7 +24,7 @@ from pilotage.stack.navigator.goal.wandering import Wandering
 from pilotage.stack.navigator.goal_config import GoalNavigatorConfig, Mode
 from pilotage.stack.navigator.navigator import Parts, arrival_within_m, localizer_of, unexplained_of
 from pilotage.stack.navigator.own_map import OwnMap
-from pilotage.stack.navigator.progress import PathProgress, StallWatch
+from pilotage.stack.navigator.progress import PathProgress, StallWatch, patience_s
 from pilotage.stack.perception.moving_bodies import MovingBodies
 from pilotage.stack.planning.local_planner import LocalPlanner
 from pilotage.stack.planning.planner import PlanResult
@@ -105,7 +105,10 @@ class Context:
         self.follower = WaypointFollower(local_planner, controller, robot.dt_s)
         self.guard = ArcGuard(config.guard, robot.radius_m)
         self.wandering = Wandering(config.wander, robot, localizer_of(parts, "goal"))
-        self._stall = StallWatch(config.stall_progress_m, config.stall_s)
+        progress_m = config.stall_progress_m
+        self.stall = StallWatch(
+            progress_m, patience_s(config.stall_s, progress_m, robot.motion.top_speed_m_s)
+        )
         self.t_s = 0.0
         self.status, self.reason = StackStatus.RUNNING, ""
         self.mode, self.reaction, self.to_go_m = Mode.FOLLOW, NO_REACTION, math.nan
@@ -162,7 +165,7 @@ class Context:
         if self._waits_s is None:
             self._waits_s = self.t_s
             self.journal.count("waits")
-        self._stall.restart(self.t_s)
+        self.stall.restart(self.t_s)
         return True
 
     @property
@@ -192,7 +195,7 @@ class Context:
     def take_plan(self, kind: str, why: str = "") -> None:
         """Drive by the plan just made from now on."""
         plan = self.journal.plans[-1]
-        self._stall.restart(self.t_s)
+        self.stall.restart(self.t_s)
         self._planned_s = self.t_s
         self.to_go_m = plan.length_m
         because = f"{why}: " if why else ""
@@ -213,7 +216,7 @@ class Context:
 
     def stalled(self) -> bool:
         """Whether the distance to go has not shrunk for too long."""
-        return self._stall.stalled(self.to_go_m, self.t_s)
+        return self.stall.stalled(self.to_go_m, self.t_s)
 
     def clearances_m(self, pose: Pose2) -> list[float]:
         """Clearances to try in turn: the planner's own, the fallbacks, and what there is where it stands."""

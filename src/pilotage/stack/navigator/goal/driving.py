@@ -123,7 +123,7 @@ def _next(context: Context, state: Driving, readings: Readings, pose: Pose2) -> 
         return begin_escape(context, _anew(context, resumes), pose, "turning found no way out")
     if context.stalled():
         return begin_escape(
-            context, _anew(context, resumes), pose, f"no progress for {context.config.stall_s:g} s"
+            context, _anew(context, resumes), pose, f"no progress for {context.stall.patience_s:.3g} s"
         )
     if kind is ReactionKind.AVOID:
         return _avoid(context, state, resumes)
