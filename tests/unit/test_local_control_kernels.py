@@ -20,7 +20,7 @@ from pilotage.kernels.control.ground import Ground
 from pilotage.kernels.control.ground_update import believed, evenly_spaced, insert_scan, rolled, sectors
 from pilotage.kernels.control.heading_vector import along_arc
 from pilotage.kernels.control.match import match_scan
-from pilotage.kernels.control.merged_means import merged_means
+from pilotage.kernels.control.merged_means import merged_means, without_passed
 from pilotage.kernels.control.motion_limits import Drive, advance, approach, command_is_safe
 from pilotage.kernels.control.movers import (
     COLUMNS,
@@ -41,6 +41,7 @@ from pilotage.kernels.control.rollouts import weighted_mean
 from pilotage.kernels.control.togo import UNREACHED_S, descent_path, time_to_go
 from pilotage.kernels.geometry.motion import exact_arc
 from pilotage.kernels.grids.distance import nearest_marked
+from pilotage.kernels.scans.rays import fan_ranges
 from pilotage.stack.control.local.body import make_body
 
 JACKAL = np.array([[0.254, 0.215], [-0.254, 0.215], [-0.254, -0.215], [0.254, -0.215]])
@@ -505,3 +506,24 @@ def test_merged_means_lie_on_the_wall_that_cells_cut_in_two() -> None:
     marked = np.flatnonzero(hits)
     assert np.abs(mean[marked, 0] - 1.0).max() > 0.006
     assert np.abs(merged_means(hits, mean, 0.03)[marked, 0] - 1.0).max() < 0.004
+
+
+def test_a_scan_from_nearby_takes_away_what_it_looks_past_and_nothing_else() -> None:
+    """Gone is what stood 6 cm beside the end of a wall as seen from afar; what is there stays, in noise."""
+    walls = np.array([[0.8, -2.0, 0.8, -0.24], [0.8, 0.24, 0.8, 2.0], [1.6, -2.0, 1.6, 2.0]])
+    posts = np.array([[0.9, 0.5, 0.06]])
+    angles = np.linspace(-0.75 * math.pi, 0.75 * math.pi, 720)
+    step = float(angles[1] - angles[0])
+    y = np.concatenate([np.arange(-1.0, -0.23, 0.04), np.arange(0.24, 1.0, 0.04)])
+    there = np.column_stack([np.full(y.shape, 0.8), y])
+    false = np.array([[0.8, 0.18], [0.83, -0.16], [0.78, 0.0]])
+    ground = ground_of(np.vstack([there, false]))
+    rng = np.random.default_rng(7)
+    for _ in range(50):
+        ranges = fan_ranges(0.12, 0.0, float(angles[0]), step, 720, 20.0, walls, posts)
+        ranges = ranges + rng.normal(0.0, 0.01, 720)
+        seen = ranges < 19.0
+        points = np.column_stack([np.cos(angles), np.sin(angles)])[seen] * ranges[seen, None] + [0.12, 0.0]
+        left = without_passed(ground.hits, ground.mean, points, 0.12, 0.0, 1.2, 0.015, 0.04)
+        gone = ground.mean[np.flatnonzero((ground.hits > 0) & (left == 0))]
+        assert {tuple(p) for p in gone.round(3)} == {tuple(p) for p in false}

@@ -31,7 +31,7 @@ from pilotage.stack.control.local.narrow_passage import (
     THROUGH,
     NarrowPassage,
     find_narrow_passage,
-    without_noise,
+    sharpened,
 )
 from pilotage.stack.control.local.role import LOCAL_CONTROLLERS, LocalView
 from pilotage.stack.control.local.rolling import Scene
@@ -243,8 +243,9 @@ class GapHorizon(RollingController):
     def _squeeze(self, view: LocalView, scene: Scene, passage: NarrowPassage) -> Twist:
         """The next command of the manoeuvre through a gap, as fast as it is safe."""
         config = self._config
-        sharper = without_noise(scene)
-        self._passage, wanted = passage.step(sharper, _scanned(view, scene), view.t_s)
+        points = _scanned(view, scene)
+        sharper = sharpened(scene, points, _laser_xy_m(view, scene))
+        self._passage, wanted = passage.step(sharper, points, view.t_s)
         # What lines up before the gap has no need to swing its corners by as closely as it is narrow.
         inside = self._passage is None or self._passage.stage == THROUGH
         margin_m = config.passage_margin_m if inside else config.margin_m
@@ -494,6 +495,12 @@ def _blind_rad(view: LocalView) -> float:
     first, looks = float(view.beam_angles_rad[0]), float(view.beam_angles_rad[-1] - view.beam_angles_rad[0])
     behind = (math.pi - view.mount.theta_rad - first) % (2.0 * math.pi)
     return 0.0 if behind <= looks else 2.0 * math.pi - looks
+
+
+def _laser_xy_m(view: LocalView, scene: Scene) -> tuple[float, float]:
+    x, y, theta = (float(value) for value in scene.pose)
+    c, s = math.cos(theta), math.sin(theta)
+    return x + c * view.mount.x_m - s * view.mount.y_m, y + s * view.mount.x_m + c * view.mount.y_m
 
 
 def _scanned(view: LocalView, scene: Scene) -> FloatArray:

@@ -9,7 +9,7 @@ import numpy as np
 
 from pilotage.core.types import FloatArray, Twist
 from pilotage.kernels.control.band import path_distances
-from pilotage.kernels.control.merged_means import merged_means
+from pilotage.kernels.control.merged_means import merged_means, without_passed
 from pilotage.kernels.geometry.motion import wrap
 from pilotage.stack.control.local.rolling import Scene
 
@@ -47,6 +47,10 @@ CLOSED_M = 0.05
 TRIES = 3
 NOISE_M = 0.03
 """Points of neighbouring cells so near to each other are one surface, and its noise."""
+PASSED_WITHIN_M = 1.2
+PASSED_ASIDE_M = 0.015
+PASSED_BEHIND_M = 0.04
+"""What a scan from so near looks past by so little to the side, and ends so far behind, is not there."""
 BEAMS = 3
 """Neighbouring beams that are taken together where a scan is asked for the ends beside the gap."""
 NEW_SHARE = 0.15
@@ -179,10 +183,17 @@ def _ends_beside(
     return np.array(ends)
 
 
-def without_noise(scene: Scene) -> Scene:
-    """The scene with obstacle points without what cells make of noise, which narrows a gap on both sides."""
+def sharpened(scene: Scene, points_xy_m: FloatArray, laser_xy_m: tuple[float, float]) -> Scene:
+    """The scene without points that narrow a gap and are not there.
+
+    That is what cells make of noise, on both sides, and what was seen from afar and the scan, whose beams end
+    at ``points_xy_m`` (N, 2), looks past.
+    """
     ground = scene.ground
-    return replace(scene, ground=ground._replace(mean=merged_means(ground.hits, ground.mean, NOISE_M)))
+    hits = without_passed(
+        ground.hits, ground.mean, points_xy_m, *laser_xy_m, PASSED_WITHIN_M, PASSED_ASIDE_M, PASSED_BEHIND_M
+    )
+    return replace(scene, ground=ground._replace(hits=hits, mean=merged_means(hits, ground.mean, NOISE_M)))
 
 
 def find_narrow_passage(scene: Scene, ahead_m: float, t_s: float) -> NarrowPassage | None:
