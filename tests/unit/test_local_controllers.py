@@ -21,7 +21,7 @@ from pilotage.stack.control.local.role import (
     LocalLimits,
     LocalView,
 )
-from pilotage.stack.control.local.rolling import RollingGround
+from pilotage.stack.control.local.rolling import RollingGround, Scene
 from pilotage.stack.control.local.rolling_config import RollingConfig
 from pilotage.stack.control.local.turning_room import find_turning_room
 
@@ -293,6 +293,23 @@ def test_the_middle_between_two_wall_ends_is_found_wherever_cells_lie(shift_m: f
     along = 0.8 - passage.x_m
     y = passage.y_m + along * math.tan(passage.direction_rad)
     assert abs(y - 0.5 * (left + right)) < 0.008
+
+
+def test_the_least_margin_holds_from_the_gap_on_and_what_proves_closed_is_left() -> None:
+    """Straight, but half a metre before the gap, it passes posts that are none of the gap's."""
+    gap = np.array([[0.8, side * (0.24 + 0.075), 0.075] for side in (-1.0, 1.0)])
+
+    def scene_at(x: float) -> Scene:
+        ground = RollingGround(RollingConfig())
+        return ground.update(view_of(0.0, Pose2(x, 0.0, 0.0), Twist(0.0, 0.0), gap))
+
+    passage = NarrowPassage(0.8, 0.0, 0.0, 0.48, 2, 0.0)
+    assert not passage.goes_in(scene_at(0.3))
+    assert passage.goes_in(scene_at(0.5))
+    assert not replace(passage, stage=1).goes_in(scene_at(0.5))
+    nothing = np.zeros((0, 2))
+    assert passage.step(scene_at(0.9), nothing, 1.0)[0] is not None
+    assert replace(passage, width_m=0.05).step(scene_at(0.9), nothing, 1.0)[0] is None
 
 
 def test_a_robot_that_cannot_turn_where_it_stands_gets_room_first() -> None:

@@ -28,7 +28,6 @@ from pilotage.kernels.control.togo import UNREACHED_S, togo_at
 from pilotage.sensors.sensor import NonNegative, Positive
 from pilotage.stack.control.local.narrow_passage import (
     SLOW_M_S,
-    THROUGH,
     NarrowPassage,
     find_narrow_passage,
     sharpened,
@@ -247,7 +246,7 @@ class GapHorizon(RollingController):
         sharper = sharpened(scene, points, _laser_xy_m(view, scene))
         self._passage, wanted = passage.step(sharper, points, view.t_s)
         # What lines up before the gap has no need to swing its corners by as closely as it is narrow.
-        inside = self._passage is None or self._passage.stage == THROUGH
+        inside = self._passage is None or self._passage.goes_in(scene)
         margin_m = config.passage_margin_m if inside else config.margin_m
         scene = sharper if inside else scene
         tried = [(share * wanted.v_m_s, share * wanted.w_rad_s) for share in (1.0, 0.5, 0.25)]

@@ -84,11 +84,17 @@ class NarrowPassage:
         ``points_xy_m``: (N, 2) of the scan, in the order of its beams, where the scene has them.
         """
         along, _ = self._place(float(scene.start[0]), float(scene.start[1]))
-        if t_s - self.begun_s > LONGEST_S or along > BEYOND_M:
+        closed = self.stage == THROUGH and self.width_m < 2.0 * scene.body.inner_m - CLOSED_M
+        if closed or t_s - self.begun_s > LONGEST_S or along > BEYOND_M:
             return None, Twist(0.0, 0.0)
         if along < -scene.body.inner_m:
             return self._measured(scene, points_xy_m).command(scene)
         return self.command(scene)
+
+    def goes_in(self, scene: Scene) -> bool:
+        """Whether it stands straight before the gap, or in it: what it lines up beside is not yet the gap."""
+        along, _ = self._place(float(scene.start[0]), float(scene.start[1]))
+        return self.stage == THROUGH and along > -scene.body.outer_m - LOOK_M
 
     def command(self, scene: Scene) -> tuple[NarrowPassage, Twist]:
         """What to do at this stage."""
