@@ -122,7 +122,7 @@ def planning_metrics(run: FinishedRun, robot: RobotRun, shortest: ShortestPath |
         "planned_length_m": plan.length_m,
         "planning_time_s": plan.planning_time_s,
         "first_solution_s": plan.first_solution_s,
-        "planned_clearance_m": clearance_m(plan.states, run.chart.walls, robot.footprint.radius_m),
+        "planned_clearance_m": clearance_m(plan.states, run.chart.walls, robot.footprint),
         "smoothness": smoothness(plan.waypoints[:, :2]),
     }
     if plan.first_waypoints is not None:

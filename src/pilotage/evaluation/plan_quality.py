@@ -7,8 +7,9 @@ import math
 import numpy as np
 
 from pilotage.core.types import FloatArray
-from pilotage.kernels.geometry import plane
+from pilotage.kernels.bodies.outline import least_along
 from pilotage.maps.segment_map import SegmentMap
+from pilotage.models.footprint import Footprint
 
 CHECK_M = 0.01
 
@@ -31,13 +32,16 @@ def smoothness(points_xy_m: FloatArray) -> float:
     return float(np.sum((2.0 * turns / (lengths[:-1] + lengths[1:])) ** 2))
 
 
-def clearance_m(states: FloatArray, walls: SegmentMap, body_radius_m: float) -> float:
-    """Least distance of the body's edge from the walls along a path, looked at every centimetre."""
-    points = states[:, :2]
-    lengths = np.hypot(*np.diff(points, axis=0).T)
+def clearance_m(states: FloatArray, walls: SegmentMap, body: Footprint) -> float:
+    """Least distance of the body's edge from the walls along a path, looked at every centimetre.
+
+    Between two states (x, y, theta) the heading turns evenly.
+    """
+    lengths = np.hypot(*np.diff(states[:, :2], axis=0).T)
     s = np.concatenate([[0.0], np.cumsum(lengths)])
     count = max(2, math.ceil(float(s[-1]) / CHECK_M) + 1)
     at = np.linspace(0.0, float(s[-1]), count)
-    fine = np.column_stack([np.interp(at, s, points[:, 0]), np.interp(at, s, points[:, 1])])
-    both = np.ascontiguousarray(np.vstack([fine, points]))
-    return float(plane.least_distance(both, walls.segments_m, walls.circles_m)) - body_radius_m
+    columns = states[:, 0], states[:, 1], np.unwrap(states[:, 2])
+    fine = np.column_stack([np.interp(at, s, column) for column in columns])
+    both = np.ascontiguousarray(np.vstack([fine, states[:, :3]]))
+    return float(least_along(both, body.points_m, body.radius_m, walls.segments_m, walls.circles_m))

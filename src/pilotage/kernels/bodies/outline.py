@@ -134,3 +134,21 @@ def outline_clearance(
             continue
         best = min(best, signed_distance(c * px + s * py, c * py - s * px, corners) - circles[i, 2])
     return best
+
+
+@kernel
+def least_along(
+    poses: FloatArray, corners: FloatArray, radius: float, segments: FloatArray, circles: FloatArray
+) -> float:
+    """Least clearance of an outline along poses (N, 3), where its disc's could be the least."""
+    best = math.inf
+    for k in range(poses.shape[0]):
+        x, y, theta = poses[k, 0], poses[k, 1], poses[k, 2]
+        here = distance_to_nearest(x, y, segments, circles) - radius
+        if here >= best:
+            continue
+        if corners.shape[0] > 0:
+            c, s = math.cos(theta), math.sin(theta)
+            here = outline_clearance(x, y, c, s, corners, radius, segments, circles)
+        best = min(best, here)
+    return best
