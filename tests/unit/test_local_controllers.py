@@ -13,6 +13,7 @@ from pilotage.core.types import FloatArray, Pose2, Twist
 from pilotage.kernels.control.footprint import discs_clearance
 from pilotage.kernels.control.motion_limits import Drive, advance
 from pilotage.kernels.scans.rays import fan_ranges
+from pilotage.stack.control.local.blind_side import blind_clearance_m
 from pilotage.stack.control.local.gap_horizon import GapHorizon
 from pilotage.stack.control.local.narrow_passage import NarrowPassage, find_narrow_passage
 from pilotage.stack.control.local.role import (
@@ -238,6 +239,21 @@ def test_where_a_post_keeps_it_from_turning_it_backs_straight_out(room_m: float)
     assert state[0] < -0.3
     assert state[2] > 1.0
     assert least > 0.0
+
+
+def test_what_its_laser_does_not_see_is_told_from_what_it_sees() -> None:
+    """A post that was seen from the front, and stands 1 cm behind the corner after the robot has turned."""
+    post = np.array([[-0.33, -0.225, 0.075]])
+    ground = RollingGround(RollingConfig())
+    ground.update(view_of(0.0, Pose2(0.0, 0.0, math.pi), Twist(0.0, 0.0), post))
+    behind = view_of(0.05, Pose2(0.0, 0.0, 0.0), Twist(0.0, 0.0), post)
+    room_m = blind_clearance_m(behind, ground.update(behind), 0.02)
+    assert room_m == pytest.approx(discs_clearance(0.0, 0.0, 0.0, JACKAL, post), abs=0.01)
+    assert room_m < 0.02
+    beside = np.array([[0.1, -0.305, 0.075]])
+    view = view_of(0.0, Pose2(0.0, 0.0, 0.0), Twist(0.0, 0.0), beside)
+    assert discs_clearance(0.0, 0.0, 0.0, JACKAL, beside) < 0.02
+    assert blind_clearance_m(view, RollingGround(RollingConfig()).update(view), 0.02) == 0.02
 
 
 def test_posts_that_all_but_touch_are_no_gap_to_try() -> None:

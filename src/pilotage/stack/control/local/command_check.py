@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 from pilotage.core.types import STOP, Twist
@@ -23,6 +24,8 @@ LESS = 0.8
 """Of the margin, where no command keeps all of it."""
 BACK_M_S = 0.1
 """Backwards, where nothing else is free."""
+BACK_M, GAIN = 0.05, 0.1
+"""From within the margin it backs where that brings it away by this share of the way."""
 
 
 def is_safe(scene: Scene, command: Twist, margin_m: float = MARGIN_M) -> bool:
@@ -31,23 +34,7 @@ def is_safe(scene: Scene, command: Twist, margin_m: float = MARGIN_M) -> bool:
     Nearer than ``margin_m`` to what was seen it may not come, and where it already is, no nearer at all:
     a millimetre in every step would end in a contact.
     """
-    x, y, theta, _, _ = scene.start
-    ground, body = scene.ground, scene.body
-    begin = sure_clearance(
-        x,
-        y,
-        theta,
-        body.polygon,
-        body.outer_m,
-        ground.hits,
-        ground.nearest,
-        ground.mean,
-        ground.x0_m,
-        ground.y0_m,
-        ground.cell_m,
-        ground.per_cell,
-        margin_m,
-    )
+    begin = _clearance_m(scene, 0.0, margin_m)
     discs = scene.movers.foretold(scene.delay_s + STEP_S, STEP_S, STEPS, PEOPLE_STD)
     safe, least = command_is_safe(
         scene.start,
@@ -68,6 +55,28 @@ def is_safe(scene: Scene, command: Twist, margin_m: float = MARGIN_M) -> bool:
     return bool(safe and least >= min(margin_m, begin) - ROUNDING_M)
 
 
+def _clearance_m(scene: Scene, ahead_m: float, enough_m: float) -> float:
+    """Of the footprint so far straight ahead, exact below ``enough_m``."""
+    x, y, theta, _, _ = scene.start
+    ground, body = scene.ground, scene.body
+    clearance_m: float = sure_clearance(
+        x + ahead_m * math.cos(theta),
+        y + ahead_m * math.sin(theta),
+        theta,
+        body.polygon,
+        body.outer_m,
+        ground.hits,
+        ground.nearest,
+        ground.mean,
+        ground.x0_m,
+        ground.y0_m,
+        ground.cell_m,
+        ground.per_cell,
+        enough_m,
+    )
+    return clearance_m
+
+
 def slower(command: Twist) -> list[Twist]:
     """A command and ever slower ones along the same arc."""
     return [Twist(share * command.v_m_s, share * command.w_rad_s) for share in SLOWER]
@@ -83,4 +92,7 @@ def first_safe(scene: Scene, commands: Sequence[Twist], margin_m: float = MARGIN
         for command in commands:
             if is_safe(scene, command, keep_m):
                 return command
-    return back if is_safe(scene, back, margin_m) else STOP
+    room_m = _clearance_m(scene, 0.0, margin_m)
+    # Along what it is nearer to than that it does not back: it would slide by, and touch what bulges out.
+    leaves = room_m >= LESS * margin_m or _clearance_m(scene, -BACK_M, margin_m) > room_m + GAIN * BACK_M
+    return back if leaves and is_safe(scene, back, margin_m) else STOP

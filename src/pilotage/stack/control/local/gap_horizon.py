@@ -26,6 +26,7 @@ from pilotage.kernels.control.rollouts import (
 )
 from pilotage.kernels.control.togo import UNREACHED_S, togo_at
 from pilotage.sensors.sensor import NonNegative, Positive
+from pilotage.stack.control.local.blind_side import blind_clearance_m, blind_rad
 from pilotage.stack.control.local.narrow_passage import (
     SLOW_M_S,
     NarrowPassage,
@@ -43,6 +44,8 @@ MOST_BLIND_RAD = math.pi / 3.0
 """To either side of straight behind: with a wider blind sector no arc is safe, and this one is taken."""
 ROUND = 0.9
 """With an inner radius of this share of the outer one or more nothing swings when it turns."""
+BLIND_M = 0.02
+"""So much, before a gap, from what its laser does not see: it may be nearer than it was seen to be."""
 BACK = -SLOW_M_S, 0.0
 TRIED_M = 0.3
 """Two narrow places nearer to each other than this are one."""
@@ -250,10 +253,11 @@ class GapHorizon(RollingController):
         margin_m = config.passage_margin_m if inside else config.margin_m
         scene = sharper if inside else scene
         tried = [(share * wanted.v_m_s, share * wanted.w_rad_s) for share in (1.0, 0.5, 0.25)]
-        command = self._first_safe(scene, [BACK, *tried] if self._backs_out else tried, margin_m)
+        back = [BACK] if inside or blind_clearance_m(view, scene, BLIND_M) >= BLIND_M else []
+        command = self._first_safe(scene, [*back, *tried] if self._backs_out else tried, margin_m)
         if command is None and not inside:
             # A post beside it is in the way of its turn: straight back, until it can turn on the spot.
-            self._backs_out, command = True, self._first_safe(scene, [BACK], margin_m)
+            self._backs_out, command = True, self._first_safe(scene, back, margin_m)
         x, y = float(scene.pose[0]), float(scene.pose[1])
         if inside or nearest_m(x, y, scene.ground) > scene.body.outer_m + config.margin_m:
             self._backs_out = False
@@ -368,7 +372,7 @@ class GapHorizon(RollingController):
             self._saw_people_s = view.t_s
         if self._came is None or math.hypot(x - self._came[1], y - self._came[2]) > self._config.stuck_m:
             self._came = (view.t_s, x, y)
-        if _blind_rad(view) <= 0.0:
+        if blind_rad(view) <= 0.0:
             return False
         return view.t_s - min(self._saw_people_s, self._came[0]) < self._config.backs_after_s
 
@@ -377,7 +381,7 @@ class GapHorizon(RollingController):
         body = scene.body
         if body.inner_m > ROUND * body.outer_m:
             return 0.0
-        return body.outer_m / math.cos(min(0.5 * _blind_rad(view), MOST_BLIND_RAD))
+        return body.outer_m / math.cos(min(0.5 * blind_rad(view), MOST_BLIND_RAD))
 
     def _people_are_near(self, scene: Scene) -> bool:
         return scene.movers.nearest_m(float(scene.pose[0]), float(scene.pose[1])) < self._config.calm_m
@@ -400,7 +404,7 @@ class GapHorizon(RollingController):
         seen = np.ones(len(now), np.bool_)
         if self._followed:
             back = dx * math.cos(theta) + dy * math.sin(theta)
-            seen = back > -math.cos(0.5 * _blind_rad(view)) * np.hypot(dx, dy)
+            seen = back > -math.cos(0.5 * blind_rad(view)) * np.hypot(dx, dy)
         if view.t_s - self._drove_s < config.unsure_s:
             unsure = np.hypot(dx, dy) - now[:, 2] - body.outer_m < config.unsure_m
             if (unsure & scene.movers.unsure() & seen).any():
@@ -487,13 +491,6 @@ class _Samples:
         self.commands = np.empty((config.rollouts, self.steps, 2))
         most = 1 + len(SPEEDS) * len(LOOKS) + 1 + len(DODGES) + 2
         self.plans = np.empty((most, self.steps, 2))
-
-
-def _blind_rad(view: LocalView) -> float:
-    """Width of the sector that no beam looks into, if it holds what is straight behind; else 0."""
-    first, looks = float(view.beam_angles_rad[0]), float(view.beam_angles_rad[-1] - view.beam_angles_rad[0])
-    behind = (math.pi - view.mount.theta_rad - first) % (2.0 * math.pi)
-    return 0.0 if behind <= looks else 2.0 * math.pi - looks
 
 
 def _laser_xy_m(view: LocalView, scene: Scene) -> tuple[float, float]:
