@@ -8,7 +8,8 @@ import numpy as np
 
 from pilotage.core.types import STOP, Pose2
 from pilotage.maps.occupancy_grid import FREE, OccupancyGrid
-from pilotage.stack.control.local.gap_horizon import GapHorizon, GapHorizonConfig
+from pilotage.stack.control.local.gap_horizon import GapHorizon
+from pilotage.stack.control.local.gap_horizon_config import GapHorizonConfig
 from pilotage.stack.interface import StackStatus
 from pilotage.stack.localization.dead_reckoning import DeadReckoningConfig, DeadReckoningLocalizer
 from pilotage.stack.navigator.navigator import Parts

@@ -16,7 +16,7 @@ from pilotage.kernels.control.motion_limits import Drive, advance
 from pilotage.kernels.scans.rays import fan_ranges
 from pilotage.models.footprint import Footprint
 from pilotage.models.motion.differential_drive import DifferentialDriveConfig
-from pilotage.stack.control.local.gap_horizon import GapHorizonConfig
+from pilotage.stack.control.local.gap_horizon_config import GapHorizonConfig
 from pilotage.stack.control.local.role import LOCAL_CONTROLLERS, LocalLimits, LocalView
 
 JACKAL = np.array([[0.254, 0.215], [-0.254, 0.215], [-0.254, -0.215], [0.254, -0.215]])

@@ -34,7 +34,8 @@ def is_safe(scene: Scene, command: Twist, margin_m: float = MARGIN_M) -> bool:
     Nearer than ``margin_m`` to what was seen it may not come, and where it already is, no nearer at all:
     a millimetre in every step would end in a contact.
     """
-    begin = _clearance_m(scene, 0.0, margin_m)
+    x, y, theta, _, _ = scene.start
+    begin = footprint_clearance_m(scene, x, y, theta, margin_m)
     discs = scene.movers.foretold(scene.delay_s + STEP_S, STEP_S, STEPS, PEOPLE_STD)
     safe, least = command_is_safe(
         scene.start,
@@ -55,13 +56,12 @@ def is_safe(scene: Scene, command: Twist, margin_m: float = MARGIN_M) -> bool:
     return bool(safe and least >= min(margin_m, begin) - ROUNDING_M)
 
 
-def _clearance_m(scene: Scene, ahead_m: float, enough_m: float) -> float:
-    """Of the footprint so far straight ahead, exact below ``enough_m``."""
-    x, y, theta, _, _ = scene.start
+def footprint_clearance_m(scene: Scene, x: float, y: float, theta: float, enough_m: float) -> float:
+    """Of the footprint at a pose from what was seen, exact below ``enough_m``."""
     ground, body = scene.ground, scene.body
     clearance_m: float = sure_clearance(
-        x + ahead_m * math.cos(theta),
-        y + ahead_m * math.sin(theta),
+        x,
+        y,
         theta,
         body.polygon,
         body.outer_m,
@@ -92,7 +92,14 @@ def first_safe(scene: Scene, commands: Sequence[Twist], margin_m: float = MARGIN
         for command in commands:
             if is_safe(scene, command, keep_m):
                 return command
-    room_m = _clearance_m(scene, 0.0, margin_m)
-    # Along what it is nearer to than that it does not back: it would slide by, and touch what bulges out.
-    leaves = room_m >= LESS * margin_m or _clearance_m(scene, -BACK_M, margin_m) > room_m + GAIN * BACK_M
-    return back if leaves and is_safe(scene, back, margin_m) else STOP
+    return back if _leaves(scene, margin_m) and is_safe(scene, back, margin_m) else STOP
+
+
+def _leaves(scene: Scene, margin_m: float) -> bool:
+    """Whether backing brings it away from what is within the margin; else it slides along, and touches it."""
+    x, y, theta, _, _ = scene.start
+    room_m = footprint_clearance_m(scene, x, y, theta, margin_m)
+    if room_m >= LESS * margin_m:
+        return True
+    x, y = x - BACK_M * math.cos(theta), y - BACK_M * math.sin(theta)
+    return footprint_clearance_m(scene, x, y, theta, margin_m) > room_m + GAIN * BACK_M

@@ -3,19 +3,15 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 import numpy as np
-from pydantic import Field
 
-from pilotage.core.config import Config
 from pilotage.core.types import STOP, FloatArray, Twist
 from pilotage.kernels.control.band import path_distances
 from pilotage.kernels.control.evasion import best_evasion
-from pilotage.kernels.control.ground import nearest_m, sure_clearance
+from pilotage.kernels.control.ground import nearest_m
 from pilotage.kernels.control.ground_update import cleaned_ranges, scan_points
 from pilotage.kernels.control.motion_limits import Drive, approach, command_is_safe
-from pilotage.kernels.control.movers import movers_clearance
 from pilotage.kernels.control.rollouts import (
     Price,
     later,
@@ -25,8 +21,10 @@ from pilotage.kernels.control.rollouts import (
     weighted_mean,
 )
 from pilotage.kernels.control.togo import UNREACHED_S, togo_at
-from pilotage.sensors.sensor import NonNegative, Positive
-from pilotage.stack.control.local.blind_side import blind_clearance_m, blind_rad
+from pilotage.stack.control.local.among_people import AmongPeople
+from pilotage.stack.control.local.blind_side import blind_clearance_m
+from pilotage.stack.control.local.command_check import footprint_clearance_m
+from pilotage.stack.control.local.gap_horizon_config import GapHorizonConfig
 from pilotage.stack.control.local.narrow_passage import (
     SLOW_M_S,
     NarrowPassage,
@@ -35,21 +33,15 @@ from pilotage.stack.control.local.narrow_passage import (
 )
 from pilotage.stack.control.local.role import LOCAL_CONTROLLERS, LocalView
 from pilotage.stack.control.local.rolling import Scene
-from pilotage.stack.control.local.rolling_config import RollingConfig
 from pilotage.stack.control.local.rolling_step import RollingController
 from pilotage.stack.control.local.sampling import NoiseBank
 from pilotage.stack.control.local.turning_room import TurningRoom, find_turning_room
 
-MOST_BLIND_RAD = math.pi / 3.0
-"""To either side of straight behind: with a wider blind sector no arc is safe, and this one is taken."""
-ROUND = 0.9
-"""With an inner radius of this share of the outer one or more nothing swings when it turns."""
 BLIND_M = 0.02
 """So much, before a gap, from what its laser does not see: it may be nearer than it was seen to be."""
 BACK = -SLOW_M_S, 0.0
 TRIED_M = 0.3
 """Two narrow places nearer to each other than this are one."""
-Share = Field(default=0.65, gt=0.0, le=1.0)
 SPEEDS = np.array([1.0, 0.7, 0.45, 0.25])
 LOOKS = np.array([[0.3, 0.1], [0.45, 0.3]])
 TURNS_M_S = 0.1
@@ -58,75 +50,6 @@ SWERVES = (0.0, -0.2, 0.2, -0.4, 0.4, -0.7, 0.7, -1.0, 1.0)
 HOLDS_S = (0.15, 0.4, 0.8)
 DODGES = np.array([(v, w) for v in (-0.5, 0.6, 1.2) for w in (-2.0, 0.0, 2.0)])
 """Speeds and turn rates held for a whole plan."""
-
-
-class GapHorizonConfig(Config):
-    """Horizon, samples and what a plan costs beside its time."""
-
-    ground: RollingConfig = RollingConfig()
-    horizon_s: Positive = 1.0
-    far_horizon_s: Positive = 1.6
-    """The same close to the goal, with a moving body in sight, or a place ahead that only an outline that
-    stands straight gets through: it has to be lined up for early. Elsewhere as many samples of a shorter plan
-    find a better one."""
-    step_s: Positive = 0.1
-    rollouts: int = Field(default=192, ge=8, le=20000)
-    resample_steps: int = Field(default=2, ge=1, le=100)
-    """New samples are drawn every so many steps; between them the last plan goes on, checked as ever."""
-    speed_std_m_s: Positive = 0.5
-    turn_std_rad_s: Positive = 1.0
-    temperature_s: Positive = 0.05
-    margin_m: NonNegative = 0.015
-    margin_s: NonNegative = 0.025
-    """Between footprint and obstacle points, in plans: at rest, and more per m/s."""
-    least_margin_m: NonNegative = 0.01
-    least_margin_s: NonNegative = 0.015
-    """The same in the last check of a command."""
-    passage_margin_m: NonNegative = 0.004
-    """The same in a gap that is driven straight and slowly, its axis measured again and again."""
-    squeezed_m_s: Positive = 0.35
-    """With an obstacle point nearer than ``least_margin_m`` it drives no faster: which side is nearer than
-    believed the next readings tell."""
-    soft_m: Positive = 0.15
-    near_cost: NonNegative = 1.0
-    heading_s_per_rad: NonNegative = 0.25
-    turning_cost_s: NonNegative = 0.01
-    reverse_cost: NonNegative = 1.0
-    no_stop_s: NonNegative = 30.0
-    brake_trust: float = Share
-    """Share of the data sheet's braking and turning that is relied on."""
-    people_margin_m: NonNegative = 0.05
-    """To where a moving body is foretold, in a command's last check: the robot brings itself no nearer."""
-    people_std: NonNegative = 1.5
-    """By so many standard deviations of the foretold place it may be nearer."""
-    people_hold_s: NonNegative = 0.3
-    """Near people a command that speeds up has to be good for so long before the braking begins."""
-    people_cost: NonNegative = 1.5
-    comfort_m: Positive = 0.5
-    calm_m: NonNegative = 2.5
-    calm_m_s: Positive = 1.4
-    calm_rad_s: Positive = 2.0
-    """With a moving body so near ahead it drives no faster: behind one there may be another, whom nobody
-    sees. With one so near anywhere it turns no faster: corners that swing do not stop at once."""
-    new_m: NonNegative = 5.0
-    """Nor does it drive faster while somebody is so near ahead of whom it cannot tell yet where he goes: he
-    may run."""
-    backs_after_s: NonNegative = 10.0
-    """For so long after it saw somebody it does not back where its laser does not look, unless it has come
-    nowhere for as long: it may be shut in."""
-    stuck_s: Positive = 2.0
-    stuck_m: Positive = 0.15
-    """Where it came no farther than this in that time, it tries the narrowest place ahead straight; where it
-    has tried that, it closes the place and looks elsewhere."""
-    close_ahead_m: Positive = 1.2
-    stand_m: NonNegative = 0.1
-    """A robot that does not drive does not start, nor turn, with a moving body nearer than this, ..."""
-    rests_readings: int = Field(default=50, ge=1, le=1000)
-    """... unless that has not moved for so many: its commands are checked all the same."""
-    unsure_m: NonNegative = 1.0
-    unsure_s: NonNegative = 0.5
-    """Nor, for so long, with one nearer than this of which it cannot tell yet where it goes."""
-    check_step_s: Positive = 0.05
 
 
 @LOCAL_CONTROLLERS.add("gap-horizon", GapHorizonConfig)
@@ -158,28 +81,17 @@ class GapHorizon(RollingController):
         self._passage: NarrowPassage | None = None
         self._room: TurningRoom | None = None
         self._backs_out = False
-        self._moved_s = self._drove_s = 0.0
+        self._moved_s = 0.0
         self._tried: list[tuple[float, float]] = []
         self._since: tuple[float, float, float] | None = None
-        self._saw_people_s = -math.inf
-        self._followed = False
-        self._came: tuple[float, float, float] | None = None
+        self._people = AmongPeople(config)
 
     def _careful(self, view: LocalView, scene: Scene) -> Scene:
-        config, drive = self._config, scene.drive
-        if self._people_are_near(scene):
-            drive = drive._replace(turn_rate=min(drive.turn_rate, config.calm_rad_s))
-        ahead_m = scene.movers.nearest_ahead_m(scene.pose)
-        if ahead_m < config.calm_m or scene.movers.new_within(scene.pose, config.new_m):
-            drive = drive._replace(speed=min(drive.speed, config.calm_m_s))
-        self._followed = self._may_be_followed(view, scene)
-        if self._followed:
-            drive = drive._replace(reverse=0.0, least_radius=self._swings_m(view, scene))
-        return scene if drive is scene.drive else replace(scene, drive=drive)
+        return self._people.careful(view, scene)
 
     def _decide(self, view: LocalView, scene: Scene) -> Twist:
         config = self._config
-        if self._must_stand(view, scene):
+        if self._people.must_stand(view, scene):
             self._plan = None
             return STOP
         if self._passage is not None:
@@ -221,7 +133,7 @@ class GapHorizon(RollingController):
         self._plan = None
         curvature = scene.start[4] / scene.start[3] if abs(scene.start[3]) > 0.05 else 0.0
         slower = max(abs(scene.start[3]) - scene.drive.deceleration * scene.dt_s, 0.0)
-        if self._people_are_near(scene):
+        if self._people.are_near(scene):
             return STOP
         along = curvature * math.copysign(slower, scene.start[3]) if self._keep_turning else 0.0
         return self._evasion(scene, along) if abs(scene.start[3]) > TURNS_M_S else Twist(0.0, along)
@@ -365,74 +277,10 @@ class GapHorizon(RollingController):
         ahead = np.ascontiguousarray(scene.path[: max(3, round(self._config.close_ahead_m / 0.1))])
         return bool(path_distances(ahead, scene.ground).min() < scene.body.outer_m)
 
-    def _may_be_followed(self, view: LocalView, scene: Scene) -> bool:
-        """Whether somebody whom nobody sees may be behind: where people walk, and the laser does not look."""
-        x, y = float(scene.pose[0]), float(scene.pose[1])
-        if math.isfinite(scene.movers.nearest_m(x, y)):
-            self._saw_people_s = view.t_s
-        if self._came is None or math.hypot(x - self._came[1], y - self._came[2]) > self._config.stuck_m:
-            self._came = (view.t_s, x, y)
-        if blind_rad(view) <= 0.0:
-            return False
-        return view.t_s - min(self._saw_people_s, self._came[0]) < self._config.backs_after_s
-
-    def _swings_m(self, view: LocalView, scene: Scene) -> float:
-        """Least radius of an arc on which no corner comes nearer to anybody in the sector behind."""
-        body = scene.body
-        if body.inner_m > ROUND * body.outer_m:
-            return 0.0
-        return body.outer_m / math.cos(min(0.5 * blind_rad(view), MOST_BLIND_RAD))
-
-    def _people_are_near(self, scene: Scene) -> bool:
-        return scene.movers.nearest_m(float(scene.pose[0]), float(scene.pose[1])) < self._config.calm_m
-
-    def _must_stand(self, view: LocalView, scene: Scene) -> bool:
-        """Whether a robot that does not drive has somebody so near that it had better not start.
-
-        Somebody behind it, where its laser does not look, keeps it from nothing: it moves as if there were
-        one in any case, and the place of whom it does not see grows as fast as he leaves.
-        """
-        config, body = self._config, scene.body
-        if abs(scene.start[3]) > 0.05:
-            self._drove_s = view.t_s
-            return False
-        now = scene.movers.foretold(0.0, scene.dt_s, 1, config.people_std)[0]
-        if not now.shape[0]:
-            return False
-        x, y, theta = scene.pose
-        dx, dy = now[:, 0] - x, now[:, 1] - y
-        seen = np.ones(len(now), np.bool_)
-        if self._followed:
-            back = dx * math.cos(theta) + dy * math.sin(theta)
-            seen = back > -math.cos(0.5 * blind_rad(view)) * np.hypot(dx, dy)
-        if view.t_s - self._drove_s < config.unsure_s:
-            unsure = np.hypot(dx, dy) - now[:, 2] - body.outer_m < config.unsure_m
-            if (unsure & scene.movers.unsure() & seen).any():
-                return True
-        keep = config.stand_m
-        now = now[~scene.movers.rests(config.rests_readings) & seen]
-        near: float = movers_clearance(x, y, theta, body.polygon, body.outer_m, now, keep)
-        return near < keep
-
     def _is_squeezed(self, scene: Scene) -> bool:
-        body, ground, enough = scene.body, scene.ground, self._config.least_margin_m
+        enough = self._config.least_margin_m
         x, y, theta = scene.pose
-        room_m: float = sure_clearance(
-            x,
-            y,
-            theta,
-            body.polygon,
-            body.outer_m,
-            ground.hits,
-            ground.nearest,
-            ground.mean,
-            ground.x0_m,
-            ground.y0_m,
-            ground.cell_m,
-            ground.per_cell,
-            enough,
-        )
-        return room_m < enough
+        return footprint_clearance_m(scene, x, y, theta, enough) < enough
 
     def _worse(self, scene: Scene) -> Drive:
         """Limits that are relied on: worse than the data sheet's, and than those that seem likely."""
@@ -453,7 +301,7 @@ class GapHorizon(RollingController):
             faster, slower = drive.acceleration * scene.dt_s, drive.deceleration * scene.dt_s
             most = max(approach(float(scene.start[3]), v, faster, slower), 0.0) / drive.least_radius
             w = min(max(w, -most), most)
-        if abs(v) > abs(scene.start[3]) and self._people_are_near(scene):
+        if abs(v) > abs(scene.start[3]) and self._people.are_near(scene):
             hold_s = max(hold_s, config.people_hold_s)
         for keep_turning in (True, False):
             safe, _ = command_is_safe(
