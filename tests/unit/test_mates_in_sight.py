@@ -182,9 +182,13 @@ def three_in_a_hall() -> dict[str, Any]:
     return values
 
 
-@pytest.mark.parametrize("radio", [{"delay_s": 0.0}, {"delay_s": 1.0, "loss": 0.3}])
-def test_a_robot_carried_away_in_a_bare_hall_comes_back(radio: dict[str, float]) -> None:
+@pytest.mark.parametrize(
+    ("radio", "within_s"), [({"delay_s": 0.0}, 30.0), ({"delay_s": 1.0, "loss": 0.3}, 150.0)]
+)
+def test_a_robot_carried_away_in_a_bare_hall_comes_back(radio: dict[str, float], within_s: float) -> None:
+    """Seeds 0 to 6: after 1 to 6 s with a good radio, after 3 to 84 s with a bad one."""
     values = three_in_a_hall()
+    values["task"]["duration_s"] = values["run"]["time_limit_s"] = within_s
     values["team"]["radio"] |= radio
     experiment = build(mission_of(values, seed=2))
     finished = run_loop(experiment).finished
