@@ -83,6 +83,45 @@ def test_nobody_walks_where_the_end_of_the_view_glides_along_a_wall(seed: int) -
         assert not bodies.about, f"step {k}"
 
 
+def _looks(bodies: MovingBodies, t_s: float, circles: list[list[float]]) -> bool:
+    """One scan from the origin; whether somebody is taken to walk about since."""
+    first = float(LIDAR.beam_angles_rad()[0])
+    discs = np.array(circles) if circles else NOTHING
+    ranges = fan_ranges(0.0, 0.0, first, LIDAR.beam_step_rad, 539, 12.0, WALLS, discs)
+    bodies.step(Readings(t_s, {"lidar": LidarScan(ranges)}), BELIEF)
+    return bodies.about
+
+
+@pytest.mark.parametrize("seconds", [0.3, 0.5, 0.8])
+def test_what_is_seen_no_more_does_not_walk_on(seconds: float) -> None:
+    """The visible end of a thing grows sideways and is hidden then: its drift alone makes no walker of it."""
+    bodies = MovingBodies(MovingBodiesConfig(), ROBOT, CHART)
+    for k in range(round(10 * seconds)):
+        assert not _looks(bodies, 0.1 * k, [[3.0, 0.07 * k, 0.25]])
+    for k in range(round(10 * seconds), 30):
+        assert not _looks(bodies, 0.1 * k, []), f"step {k}"
+
+
+@pytest.mark.parametrize("away_m", [1.0, 1.5, 2.0])
+def test_what_appears_far_from_what_went_out_of_sight_has_not_walked_there(away_m: float) -> None:
+    bodies = MovingBodies(MovingBodiesConfig(), ROBOT, CHART)
+    for k in range(4):
+        assert not _looks(bodies, 0.1 * k, [[3.0, 0.0, 0.25]])
+    for k in range(4, 11):
+        assert not _looks(bodies, 0.1 * k, [])
+    for k in range(11, 40):
+        assert not _looks(bodies, 0.1 * k, [[3.0, away_m, 0.25]]), f"step {k}"
+
+
+def test_who_is_hidden_for_a_moment_has_walked_all_the_same() -> None:
+    bodies = MovingBodies(MovingBodiesConfig(), ROBOT, CHART)
+    seen = [
+        _looks(bodies, 0.1 * k, [] if k in (5, 6, 7) else [[3.0, -1.0 + 0.12 * k, 0.25]]) for k in range(16)
+    ]
+    assert not seen[5]
+    assert seen[-1]
+
+
 def test_it_gives_way_ahead_and_may_drive_away_and_never_backs_blindly() -> None:
     bodies = MovingBodies(MovingBodiesConfig(), ROBOT, CHART)
     gives_way = GiveWay(GiveWayConfig(), ROBOT, bodies)

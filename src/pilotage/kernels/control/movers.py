@@ -289,7 +289,8 @@ def tell_walkers(
         fast = math.hypot(track[VX], track[VY]) > walks_speed
         fast_or_unsure[i] = fast or unsure
         known[i] = math.isnan(track[X0])
-        if fast and not unsure and not known[i]:
+        # Where nothing was seen it has gone by its own foretelling only.
+        if fast and not unsure and not known[i] and track[MISSED] == 0.0:
             went = math.hypot(track[X] - track[X0], track[Y] - track[Y0])
             if went > walked:
                 dx, dy = track[X0] - x, track[Y0] - y

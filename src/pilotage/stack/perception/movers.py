@@ -54,9 +54,10 @@ class Movers:
         self.tracks: FloatArray = np.zeros((0, kernels.COLUMNS))
         self._things: BoolArray = np.zeros(0, np.bool_)
 
-    def forget(self) -> None:
-        """Drop all tracks."""
-        self.tracks, self._things = self.tracks[:0], self._things[:0]
+    def forget(self, which: BoolArray | None = None) -> None:
+        """Drop ``which`` tracks (M,), or all."""
+        kept = np.zeros(len(self.tracks), np.bool_) if which is None else ~which
+        self.tracks, self._things = self.tracks[kept], self._things[kept]
 
     def update(
         self,

@@ -22,6 +22,8 @@ from pilotage.stack.perception.unexplained import UnexplainedReturns
 
 WALKED_M, THROUGH_M = 0.6, 0.25
 """So far from where it was first seen, which the laser sees through by so much: it walks beyond doubt."""
+VAGUE_M = 0.3
+"""Standard deviation of a track's place: what is found in the gate of a vaguer one may be another thing."""
 STRAIGHT = 0.8
 """Share of its motion by which somebody who comes straight on is nearer."""
 
@@ -116,6 +118,8 @@ class MovingBodies:
             self._loose = points
             return readings
         of_track = np.full(len(points), kernels.UNUSED)
+        if not self.about:
+            self._movers.forget(self._movers.tracks[:, kernels.PP] > VAGUE_M**2)
         # Before the first one is known nothing is taken for somebody of which only a moving part is seen.
         whole = np.ones(len(points), np.bool_) if self.about else ~self._cut_off(points, beams, scan.ranges_m)
         of_track[whole] = self._movers.track(x, y, pose.theta_rad, points[whole], dt_s, self._field)
