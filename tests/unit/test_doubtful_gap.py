@@ -14,11 +14,13 @@ from pilotage.maps.distance_field import DistanceField
 from pilotage.maps.segment_map import SegmentMap
 from pilotage.maps.world_map import WorldMap
 from pilotage.stack.journal import Journal
+from pilotage.stack.navigator.detours import Detours
 from pilotage.stack.navigator.doubtful_gap import doubtful_gap
 from pilotage.stack.navigator.global_plan import GlobalPlan
 from pilotage.stack.planning.planner import PLANNERS
 
 RADIUS_M, HIDDEN_M = 0.30, 0.5
+DOUBTS = Detours(wider_m=1.0, hidden_m=HIDDEN_M)
 NO_WALLS = np.array([[math.inf, 0.0, 0.0]])
 
 
@@ -55,7 +57,7 @@ def test_the_less_a_gap_spares_the_likelier_it_is_closed(spare_m: float) -> None
     lowest_m = 2.0 * RADIUS_M + spare_m + 0.03
     x = np.linspace(1.0, 9.0, 161)
     path = np.column_stack([x, np.full(161, 0.5 * (lowest_m - 0.03))])
-    gap = doubtful_gap(path, _row(lowest_m, 4.0), known, RADIUS_M, HIDDEN_M)
+    gap = doubtful_gap(path, _row(lowest_m, 4.0), known, RADIUS_M, DOUBTS)
     if spare_m >= HIDDEN_M:
         assert gap is None
         return
@@ -65,14 +67,28 @@ def test_the_less_a_gap_spares_the_likelier_it_is_closed(spare_m: float) -> None
     assert gap.before_m == pytest.approx(x[gap.before] - 1.0)
     assert math.dist(path[gap.before], (5.0, lowest_m)) > RADIUS_M + HIDDEN_M
     # Who stands in front of it already has nothing to lose.
-    assert doubtful_gap(path[gap.before + 1 :], _row(lowest_m, 4.0), known, RADIUS_M, HIDDEN_M) is None
+    assert doubtful_gap(path[gap.before + 1 :], _row(lowest_m, 4.0), known, RADIUS_M, DOUBTS) is None
 
 
-def _planned_m(chart: WorldMap, start: Pose2, mapped_m: FloatArray, hidden_m: float) -> tuple[float, float]:
+def _planned_m(
+    chart: WorldMap,
+    start: Pose2,
+    mapped_m: FloatArray,
+    hidden_m: float,
+    tight_m: float = 0.0,
+    squeezing_m: float = 0.0,
+) -> tuple[float, float]:
     """Length of the path adopted to (9, 1), and its highest y."""
     planner = PLANNERS.entry("theta-star").factory(PLANNERS.configure("theta-star", {}, ""))
     plan = GlobalPlan(planner, None, chart, np.random.default_rng(0), Journal(), RADIUS_M)
-    plan.make(0.0, start, Goal(9.0, 1.0), mapped_m, [0.40, 0.36, 0.32, 0.30], 1.0, hidden_m)
+    plan.make(
+        0.0,
+        start,
+        Goal(9.0, 1.0),
+        mapped_m,
+        [0.40, 0.36, 0.32, 0.30],
+        Detours(1.0, tight_m, squeezing_m, hidden_m),
+    )
     assert plan.path is not None
     return plan.path.length_m, float(plan.path.states[:, 1].max())
 
@@ -92,6 +108,26 @@ def test_the_way_around_is_taken_where_trying_a_gap_likely_costs_more() -> None:
     assert planned(narrow, 0.05) == planned(narrow, 0.0)
     closed_above = _row(0.70, 8.0)
     assert planned(closed_above, HIDDEN_M) == planned(closed_above, 0.0)
+
+
+def test_what_leaves_no_room_worth_the_name_is_as_good_as_closed() -> None:
+    known = DistanceField.from_map(_floor().walls)
+    lowest_m = 2.0 * RADIUS_M + 0.2 + 0.03
+    path = np.column_stack([np.linspace(1.0, 9.0, 161), np.full(161, 0.4)])
+    gap = doubtful_gap(path, _row(lowest_m, 4.0), known, RADIUS_M, Detours(1.0, 0.08, 0.0, HIDDEN_M))
+    assert gap is not None
+    assert gap.closed == pytest.approx(1.0 - 0.12 / HIDDEN_M, abs=0.03)
+
+
+def test_it_goes_a_longer_way_not_to_squeeze_but_not_any() -> None:
+    """A gap of 5 cm more than it needs at the side wall, seen to be so; 4 m farther around it."""
+    planned = partial(_planned_m, _floor(), Pose2(1.0, 1.0, 0.0), hidden_m=0.0, tight_m=0.08)
+    tight, roomy = _row(0.68, 5.0), _row(0.76, 5.0)
+    assert planned(tight)[0] < 8.5
+    assert 10.0 < planned(tight, squeezing_m=5.0)[0] < 14.0
+    assert planned(tight, squeezing_m=1.0)[0] < 8.5
+    # What spares more than that is driven through all the same, at less clearance than the planner's own.
+    assert planned(roomy, squeezing_m=5.0)[0] < 8.5
 
 
 def test_a_gap_that_is_likely_open_is_tried_where_the_way_around_is_long() -> None:

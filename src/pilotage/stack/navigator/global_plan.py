@@ -20,7 +20,8 @@ from pilotage.models.footprint import Footprint
 from pilotage.stack.interface import PlannedPath
 from pilotage.stack.journal import Journal
 from pilotage.stack.knowledge import RobotKnowledge
-from pilotage.stack.navigator.doubtful_gap import doubtful_gap
+from pilotage.stack.navigator.detours import AS_FAR_AS_IT_TAKES, Detours
+from pilotage.stack.navigator.doubtful_gap import doubtful_gap, is_tight
 from pilotage.stack.navigator.progress import PathProgress
 from pilotage.stack.planning.planner import (
     Path,
@@ -108,29 +109,27 @@ class GlobalPlan:
         goal: Goal,
         mapped_m: FloatArray,
         clearances_m: Sequence[float],
-        detour_m: float = math.inf,
-        hidden_m: float = 0.0,
+        detours: Detours = AS_FAR_AS_IT_TAKES,
     ) -> PlanResult:
         """Plan on the map with what was found on it, at the first clearance that gives a path; adopt it.
 
-        One of the later clearances is taken where it saves more than ``detour_m``; none is tried for inf.
-        What was found may reach by up to ``hidden_m`` farther than it was seen to.
+        One of the later clearances is taken where it saves more than the ``detours`` to which it leads.
         Returns the last result; its path is None where no clearance gave one.
         """
         begin = time.perf_counter()
         self._looked_at = mapped_m
         field = with_circles(self._chart.field, mapped_m)
-        result, found = self._search(start, goal, field, clearances_m, detour_m)
+        result, found = self._search(start, goal, field, mapped_m, clearances_m, detours)
         self.turns_first = False
         if result.status is PlanStatus.NO_PATH and result.iterations and self._can_turn_first:
             for heading_rad in _free_headings(field, start, clearances_m[-1]):
                 turned = Pose2(start.x_m, start.y_m, heading_rad)
-                _, found = self._search(turned, goal, field, clearances_m, detour_m)
+                _, found = self._search(turned, goal, field, mapped_m, clearances_m, detours)
                 if found is not None:
                     self.turns_first = True
                     break
-        if found is not None and hidden_m > 0.0 and len(mapped_m):
-            found = self._rather_around(found, start, goal, mapped_m, clearances_m, detour_m, hidden_m)
+        if found is not None and detours.hidden_m > 0.0 and len(mapped_m):
+            found = self._rather_around(found, start, goal, mapped_m, clearances_m, detours)
         if found is not None:
             result = found.result
             self._adopt(t_s, found, time.perf_counter() - begin, field.circles_m)
@@ -157,8 +156,9 @@ class GlobalPlan:
         start: Pose2,
         goal: Goal,
         field: DistanceField,
+        mapped_m: FloatArray,
         clearances_m: Sequence[float],
-        detour_m: float,
+        detours: Detours,
     ) -> tuple[PlanResult, _Found | None]:
         """Plan at the first clearance that gives a path, or at one that saves a detour.
 
@@ -166,11 +166,11 @@ class GlobalPlan:
         """
         last: tuple[PlanResult, Path | None] | None = None
         enough_m = math.inf
-        if detour_m < math.inf and len(clearances_m) > 1:
+        if detours.wider_m < math.inf and len(clearances_m) > 1:
             last = self._at(start, goal, field, clearances_m[-1])
             if last[1] is None:
                 return last[0], None
-            enough_m = last[1].length_m + detour_m
+            enough_m = last[1].length_m + detours.wider_m
         found: _Found | None = None
         for clearance_m in clearances_m:
             at_last = last if clearance_m == clearances_m[-1] else None
@@ -179,11 +179,19 @@ class GlobalPlan:
                 if self.hopeless:
                     break
                 continue
-            if found is None or path.length_m < found.path.length_m - detour_m:
+            if found is None or self._is_worth(path, found.path, mapped_m, detours):
                 found = _Found(result, path, clearance_m)
             if found.path.length_m <= enough_m:
                 break
         return result, found
+
+    def _is_worth(self, path: Path, wider: Path, mapped_m: FloatArray, detours: Detours) -> bool:
+        """Whether a path that keeps less is so much shorter than one that keeps more."""
+        saves_m = wider.length_m - path.length_m
+        if not detours.wider_m < saves_m <= detours.wider_m + detours.squeezing_m:
+            return saves_m > detours.wider_m
+        known, points = self._chart.field, path.states[:, :2]
+        return not is_tight(points, mapped_m, known, self._least_clearance_m, detours.tight_m)
 
     def _rather_around(
         self,
@@ -192,8 +200,7 @@ class GlobalPlan:
         goal: Goal,
         mapped_m: FloatArray,
         clearances_m: Sequence[float],
-        detour_m: float,
-        hidden_m: float,
+        detours: Detours,
     ) -> _Found:
         """The path found, or the way around a gap on it that may prove closed, whichever is likely shorter.
 
@@ -201,15 +208,16 @@ class GlobalPlan:
         that stay open however far what is hidden reaches.
         """
         known, points = self._chart.field, found.path.states[:, :2]
-        gap = doubtful_gap(points, mapped_m, known, self._least_clearance_m, hidden_m)
+        gap = doubtful_gap(points, mapped_m, known, self._least_clearance_m, detours)
         if gap is None:
             return found
-        field = with_circles(known, mapped_m + np.array([0.0, 0.0, hidden_m]))
-        _, around = self._search(start, goal, field, clearances_m, detour_m)
+        thicker_m = mapped_m + np.array([0.0, 0.0, detours.hidden_m])
+        field = with_circles(known, thicker_m)
+        _, around = self._search(start, goal, field, thicker_m, clearances_m, detours)
         if around is None or around.path.length_m <= found.path.length_m:
             return found
         there = Pose2.from_array(found.path.states[gap.before])
-        _, back = self._search(there, goal, field, clearances_m, detour_m)
+        _, back = self._search(there, goal, field, thicker_m, clearances_m, detours)
         if back is None:
             return found
         if_closed_m = gap.before_m + back.path.length_m

@@ -16,6 +16,7 @@ from pilotage.stack.interface import Belief, BeliefStatus
 from pilotage.stack.journal import Journal
 from pilotage.stack.knowledge import RobotKnowledge
 from pilotage.stack.mapping.mapper import Mapper
+from pilotage.stack.navigator.detours import Detours
 from pilotage.stack.navigator.global_plan import GlobalPlan
 from pilotage.stack.navigator.own_map import OwnMap
 from pilotage.stack.navigator.progress import StallWatch, patience_s
@@ -36,6 +37,10 @@ class PlanAheadConfig(Config):
     """Where there is no plan at the planner's clearance: the body's radius plus these."""
     detour_m: NonNegative = 1.0
     """Nor does it go a longer way around for the sake of a greater clearance."""
+    tight_m: NonNegative = 0.08
+    """Gaps that leave its body less than this to spare it squeezes through at a crawl."""
+    squeezing_s: NonNegative = 6.0
+    """It goes as much farther as it drives in this time not to."""
     hidden_m: NonNegative = 0.5
     """By anything up to this what was mapped reaches farther than it was seen to: a gap with less room to
     spare may prove closed. 0: whatever looks open is tried."""
@@ -76,6 +81,8 @@ class PlanAhead:
         self._stall = StallWatch(
             progress_m, patience_s(config.stall_s, progress_m, robot.motion.top_speed_m_s)
         )
+        squeezing_m = config.squeezing_s * robot.motion.top_speed_m_s
+        self._detours = Detours(config.detour_m, config.tight_m, squeezing_m, config.hidden_m)
         self._stalls, self._planned_s = 0, -math.inf
         self._path: FloatArray = np.zeros((0, 2))
         self.to_go_m = math.inf
@@ -123,8 +130,7 @@ class PlanAhead:
         found = self._own_map.found_circles_m
         first = self._plan.progress is None
         clearances_m = sorted({c for c in asked if c <= own}, reverse=True)
-        config = self._config
-        result = self._plan.make(t_s, pose, self._goal, found, clearances_m, config.detour_m, config.hidden_m)
+        result = self._plan.make(t_s, pose, self._goal, found, clearances_m, self._detours)
         self._planned_s = t_s
         if not first:
             self._journal.count("replans")
