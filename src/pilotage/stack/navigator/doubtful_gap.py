@@ -9,7 +9,6 @@ import numpy as np
 from pilotage.core.types import FloatArray
 from pilotage.kernels.geometry.gaps import gap_widths
 from pilotage.maps.distance_field import DistanceField
-from pilotage.stack.navigator.detours import Detours
 
 BEFORE_M = 0.05
 """A plan needs so much more room to begin than what may be there leaves it."""
@@ -35,13 +34,13 @@ class DoubtfulGap:
 
 
 def doubtful_gap(
-    path_xy_m: FloatArray, mapped_m: FloatArray, known: DistanceField, radius_m: float, detours: Detours
+    path_xy_m: FloatArray, mapped_m: FloatArray, known: DistanceField, radius_m: float, hidden_m: float
 ) -> DoubtfulGap | None:
     """The gap beside mapped discs (M, 3) that a disc may prove too wide for on a path (N, 2), if any.
 
     What is hidden reaches into a gap by anything from nothing to ``hidden_m``, each as likely: a gap with
-    s metres more to spare than what is ``tight_m`` is closed, or as good as closed, with probability
-    1 - s / ``hidden_m``. None as well where the path begins too near to it to turn back before it.
+    s metres to spare is closed with probability 1 - s / ``hidden_m``. None as well where the path begins too
+    near to it to turn back before it.
 
     Parameters
     ----------
@@ -51,11 +50,9 @@ def doubtful_gap(
         Of the disc that is to pass.
     """
     points = np.ascontiguousarray(path_xy_m)
-    hidden_m = detours.hidden_m
     clear_m = radius_m + hidden_m + BEFORE_M
-    enough_m = max(2.0 * radius_m + detours.tight_m + hidden_m, clear_m)
-    away_m, width_m = _gaps(points, mapped_m, known, enough_m)
-    spare_m = np.maximum(width_m - 2.0 * radius_m - detours.tight_m, 0.0)
+    away_m, width_m = _gaps(points, mapped_m, known, max(2.0 * radius_m + hidden_m, clear_m))
+    spare_m = width_m - 2.0 * radius_m
     doubtful = np.flatnonzero(spare_m < hidden_m)
     if not len(doubtful):
         return None

@@ -208,7 +208,7 @@ class GlobalPlan:
         that stay open however far what is hidden reaches.
         """
         known, points = self._chart.field, found.path.states[:, :2]
-        gap = doubtful_gap(points, mapped_m, known, self._least_clearance_m, detours)
+        gap = doubtful_gap(points, mapped_m, known, self._least_clearance_m, detours.hidden_m)
         if gap is None:
             return found
         thicker_m = mapped_m + np.array([0.0, 0.0, detours.hidden_m])

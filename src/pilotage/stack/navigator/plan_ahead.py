@@ -39,7 +39,7 @@ class PlanAheadConfig(Config):
     """Nor does it go a longer way around for the sake of a greater clearance."""
     tight_m: NonNegative = 0.08
     """Gaps that leave its body less than this to spare it squeezes through at a crawl."""
-    squeezing_s: NonNegative = 6.0
+    squeezing_s: NonNegative = 5.0
     """It goes as much farther as it drives in this time not to."""
     hidden_m: NonNegative = 0.5
     """By anything up to this what was mapped reaches farther than it was seen to: a gap with less room to

@@ -26,6 +26,7 @@ from pilotage.stack.control.local.blind_side import blind_clearance_m
 from pilotage.stack.control.local.command_check import footprint_clearance_m
 from pilotage.stack.control.local.gap_horizon_config import GapHorizonConfig
 from pilotage.stack.control.local.narrow_passage import (
+    PASSED_BEHIND_M,
     SLOW_M_S,
     NarrowPassage,
     find_narrow_passage,
@@ -40,6 +41,10 @@ from pilotage.stack.control.local.turning_room import TurningRoom, find_turning_
 BLIND_M = 0.02
 """So much, before a gap, from what its laser does not see: it may be nearer than it was seen to be."""
 BACK = -SLOW_M_S, 0.0
+FORESEEN_M = 0.9
+"""So far ahead it looks for gaps that leave it hardly any room."""
+LOOKS_PAST_M, LOOKS_ASIDE_M = 2.0, 0.025
+"""Where it is stuck it forgets what the scan looks past so near, and by so little to the side."""
 TRIED_M = 0.3
 """Two narrow places nearer to each other than this are one."""
 SPEEDS = np.array([1.0, 0.7, 0.45, 0.25])
@@ -94,6 +99,8 @@ class GapHorizon(RollingController):
         if self._people.must_stand(view, scene):
             self._plan = None
             return STOP
+        if self._passage is None and self._room is None:
+            self._passage = self._tight_ahead(view, scene)
         if self._passage is not None:
             return self._squeeze(view, scene, self._passage)
         if self._room is not None:
@@ -165,7 +172,9 @@ class GapHorizon(RollingController):
         margin_m = config.passage_margin_m if inside else config.margin_m
         scene = sharper if inside else scene
         tried = [(share * wanted.v_m_s, share * wanted.w_rad_s) for share in (1.0, 0.5, 0.25)]
-        back = [BACK] if inside or blind_clearance_m(view, scene, BLIND_M) >= BLIND_M else []
+        sees = inside or blind_clearance_m(view, scene, BLIND_M) >= BLIND_M
+        tried = [one for one in tried if sees or one[0] >= 0.0]
+        back = [BACK] if sees else []
         command = self._first_safe(scene, [*back, *tried] if self._backs_out else tried, margin_m)
         if command is None and not inside:
             # A post beside it is in the way of its turn: straight back, until it can turn on the spot.
@@ -178,6 +187,20 @@ class GapHorizon(RollingController):
         if abs(command.v_m_s) + abs(command.w_rad_s) > 0.02:
             self._moved_s = view.t_s
         return command
+
+    def _tight_ahead(self, view: LocalView, scene: Scene) -> NarrowPassage | None:
+        """A gap close ahead that leaves so little room that plans hardly get into it, if it is new."""
+        found = find_narrow_passage(scene, FORESEEN_M, view.t_s)
+        if found is None or not (found.is_tight(scene.body) and found.is_ahead(scene)):
+            return None
+        if self._has_tried(found):
+            return None
+        self._tried.append((found.x_m, found.y_m))
+        self._moved_s = view.t_s
+        return found
+
+    def _has_tried(self, found: NarrowPassage) -> bool:
+        return any(math.hypot(found.x_m - a, found.y_m - b) <= TRIED_M for a, b in self._tried)
 
     def _room_m(self, scene: Scene) -> float:
         """What its middle has to keep from everything for a body to turn on the spot, and a little more."""
@@ -203,6 +226,9 @@ class GapHorizon(RollingController):
             return
         self._since = (view.t_s, x, y)
         self._plan = None
+        self._ground.look_past(
+            _scanned(view, scene), _laser_xy_m(view, scene), LOOKS_PAST_M, LOOKS_ASIDE_M, PASSED_BEHIND_M
+        )
         if self._passage is not None:
             moved = self._moved_s > self._passage.begun_s
             self._passage, self._moved_s = self._passage.again(view.t_s) if moved else None, view.t_s
@@ -215,7 +241,7 @@ class GapHorizon(RollingController):
             self._ground.open_all()
             return
         found = find_narrow_passage(scene, config.close_ahead_m, view.t_s)
-        if found and all(math.hypot(found.x_m - a, found.y_m - b) > TRIED_M for a, b in self._tried):
+        if found and not self._has_tried(found):
             # Straight through it first; where that fails as well it is closed.
             self._tried.append((found.x_m, found.y_m))
             self._passage = found

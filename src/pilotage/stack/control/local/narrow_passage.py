@@ -9,20 +9,32 @@ import numpy as np
 
 from pilotage.core.types import FloatArray, Twist
 from pilotage.kernels.control.band import path_distances
+from pilotage.kernels.control.footprint import Body
 from pilotage.kernels.control.merged_means import merged_means, without_passed
 from pilotage.kernels.geometry.motion import wrap
+from pilotage.stack.control.local.gap_strip import (
+    FEW_TURNS_RAD,
+    TURNS_RAD,
+    ends_beside,
+    sides,
+    sides_begin_m,
+    widest_strip,
+)
 from pilotage.stack.control.local.rolling import Scene
 
 BEFORE_M = 0.6
 BEYOND_M = 0.35
 NEAR_M = 0.06
-STRAIGHT_RAD = 0.02
+STRAIGHT_RAD, HEADED_RAD, SKEW = 0.02, 0.3, 0.2
+"""Straight enough to set out; or headed for it, and corners take no more than this share of the room."""
 SLOW_M_S = 0.35
 SLOWER_M_S = 0.15
 TURN_RAD_S = 1.0
 """Beside posts that are millimetres away, corners swing no more than two centimetres in a step."""
+TIGHT_M = 0.045
+"""With less room than this on either side it had better line up before a gap than stumble into it."""
 ROOM_M = 0.03
-"""With less room than this on either side it drives at the slower speed."""
+"""With less room than this on either side it drives slower, with the least at the slower speed."""
 LEAST_ROOM_M = 0.0135
 """With less than this on either side, as far as can be measured, it does not go in."""
 LEAST_ENDS_M = 0.0025
@@ -31,14 +43,14 @@ ASKEW = 0.65
 """Nor does it go in farther off the axis than this share of the room on either side, or so much less straight
 that a corner is: it lines up anew."""
 ONTO_M = 0.15
-"""It comes back to the axis within about this much way."""
+"""It comes back to the axis within about this much way, or half of that to the gap ..."""
+LEFT_OVER = 0.5
+"""... and sets out from where no more is left of its offset before the gap than this share of the room."""
+BEHIND, FARTHER_M = 3.0, 0.4
+"""A little too far aside to, it first backs by about so many times its offset, the first time."""
+AHEAD_RAD = 0.6
+"""A gap is ahead that lies in this direction or nearer, and leads in such a one."""
 LOOK_M = 0.05
-SIDES_M = 0.8
-ALONG_M = 0.35
-"""Points so far before and behind the narrowest place are those that it has to pass between."""
-TURNS_RAD = np.concatenate([[0.0], np.linspace(-0.25, 0.25, 51)])
-KEEP_M = 0.004
-"""A direction is kept unless another strip is wider by this: between two posts many are as wide."""
 LONGEST_S = 25.0
 THROUGH = 2
 """The last stage."""
@@ -51,8 +63,6 @@ PASSED_WITHIN_M = 1.2
 PASSED_ASIDE_M = 0.015
 PASSED_BEHIND_M = 0.04
 """What a scan from so near looks past by so little to the side, and ends so far behind, is not there."""
-BEAMS = 3
-"""Neighbouring beams that are taken together where a scan is asked for the ends beside the gap."""
 NEW_SHARE = 0.15
 """Weight of a new scan in where these ends are."""
 
@@ -60,6 +70,8 @@ NEW_SHARE = 0.15
 @dataclass(frozen=True, slots=True)
 class NarrowPassage:
     """A gap's middle, the direction through it, its width, and how far the manoeuvre has come.
+
+    ``begins_m``: its sides reach so far before its middle.
 
     Stages: 0 drives to the point before the gap, backwards if that lies behind; 1 turns towards the gap;
     2 drives along its axis until beyond. The axis is measured anew until the robot is in the gap.
@@ -71,6 +83,7 @@ class NarrowPassage:
     width_m: float
     stage: int
     begun_s: float
+    begins_m: float = 0.0
     tries: int = 1
     ends_m: FloatArray | None = None
 
@@ -85,25 +98,45 @@ class NarrowPassage:
         """
         along, _ = self._place(float(scene.start[0]), float(scene.start[1]))
         closed = self.stage == THROUGH and self.width_m < 2.0 * scene.body.inner_m - CLOSED_M
-        if closed or t_s - self.begun_s > LONGEST_S or along > BEYOND_M:
+        if closed or t_s - self.begun_s > LONGEST_S:
             return None, Twist(0.0, 0.0)
-        if along < -scene.body.inner_m:
+        if along > BEYOND_M:
+            onward = self._onward(scene, t_s)
+            return (None, Twist(0.0, 0.0)) if onward is None else onward.command(scene)
+        if along + self.begins_m < -scene.body.inner_m:
             return self._measured(scene, points_xy_m).command(scene)
         return self.command(scene)
+
+    def is_tight(self, body: Body) -> bool:
+        """Whether a body has so little room in it that it had better line up before it."""
+        return self.width_m < 2.0 * (body.inner_m + TIGHT_M)
+
+    def is_ahead(self, scene: Scene) -> bool:
+        """Whether it is to be lined up for from here: about in front of the robot, and about straight."""
+        x, y, theta = float(scene.start[0]), float(scene.start[1]), float(scene.start[2])
+        along, across = self._place(x, y)
+        return (
+            abs(wrap(self.direction_rad - theta)) < AHEAD_RAD and abs(across) < -math.tan(AHEAD_RAD) * along
+        )
 
     def goes_in(self, scene: Scene) -> bool:
         """Whether it stands straight before the gap, or in it: what it lines up beside is not yet the gap."""
         along, _ = self._place(float(scene.start[0]), float(scene.start[1]))
-        return self.stage == THROUGH and along > -scene.body.outer_m - LOOK_M
+        return self.stage == THROUGH and along > -scene.body.outer_m - LOOK_M - self.begins_m
 
     def command(self, scene: Scene) -> tuple[NarrowPassage, Twist]:
         """What to do at this stage."""
         x, y, theta = float(scene.start[0]), float(scene.start[1]), float(scene.start[2])
         c, s = math.cos(self.direction_rad), math.sin(self.direction_rad)
         if self.stage == 0:
-            tx, ty = self.x_m - BEFORE_M * c, self.y_m - BEFORE_M * s
+            along, across = self._place(x, y)
+            before = BEFORE_M + self.begins_m
+            aside = BEHIND * abs(across)
+            if self.tries == 1 and aside < FARTHER_M and along > -before - BEFORE_M:
+                before = min(max(before, aside - along), before + FARTHER_M)
+            tx, ty = self.x_m - before * c, self.y_m - before * s
             away = math.hypot(tx - x, ty - y)
-            if away < NEAR_M:
+            if away < NEAR_M or self._lines_up_from(x, y, scene.body):
                 return replace(self, stage=1), Twist(0.0, 0.0)
             bearing = wrap(math.atan2(ty - y, tx - x) - theta)
             backwards = abs(bearing) > 0.5 * math.pi
@@ -115,7 +148,9 @@ class NarrowPassage:
             return self, Twist(-speed if backwards else speed, turn)
         if self.stage == 1:
             off = wrap(self.direction_rad - theta)
-            if abs(off) < STRAIGHT_RAD and abs(scene.start[4]) < 0.1:
+            headed = abs(off) < HEADED_RAD and _swing_m(scene.body, off) < SKEW * self._room_m(scene.body)
+            straight = abs(off) < STRAIGHT_RAD or headed
+            if straight and abs(scene.start[4]) < 0.1:
                 return replace(self, stage=THROUGH), Twist(0.0, 0.0)
             return self, Twist(0.0, _limited(3.0 * off, TURN_RAD_S))
         along, across = self._place(x, y)
@@ -123,35 +158,62 @@ class NarrowPassage:
         if self.ends_m is not None:
             apart = float(np.hypot(*(self.ends_m[0] - self.ends_m[1])))
             too_narrow = too_narrow or apart < 2.0 * (scene.body.inner_m + LEAST_ENDS_M)
-        if -scene.body.outer_m - LOOK_M < along < -scene.body.inner_m:
+        if -scene.body.outer_m - LOOK_M < along + self.begins_m < -scene.body.inner_m:
             if too_narrow:
                 return self, Twist(0.0, 0.0)
-            room = ASKEW * (0.5 * self.width_m - scene.body.inner_m)
-            corner = scene.body.outer_m * abs(wrap(self.direction_rad - theta))
+            room = ASKEW * self._room_m(scene.body)
+            corner = _swing_m(scene.body, wrap(self.direction_rad - theta))
             if max(abs(across), corner) > room:
                 return replace(self, stage=0), Twist(0.0, 0.0)
         # Steers back onto the axis: a heading that falls with the distance to it.
-        wanted = self.direction_rad - math.atan2(across, ONTO_M)
-        tight = 0.5 * self.width_m - scene.body.inner_m < ROOM_M
-        return self, Twist(
-            SLOWER_M_S if tight else SLOW_M_S, _limited(4.0 * wrap(wanted - theta), TURN_RAD_S)
-        )
+        way = -along - self.begins_m - scene.body.outer_m - LOOK_M
+        wanted = self.direction_rad - math.atan2(across, max(ONTO_M, 0.5 * way))
+        share = (self._room_m(scene.body) - LEAST_ROOM_M) / (ROOM_M - LEAST_ROOM_M)
+        speed = SLOWER_M_S + min(max(share, 0.0), 1.0) * (SLOW_M_S - SLOWER_M_S)
+        return self, Twist(speed, _limited(4.0 * wrap(wanted - theta), TURN_RAD_S))
+
+    def _room_m(self, body: Body) -> float:
+        """On either side of a body that stands straight in the middle."""
+        return 0.5 * self.width_m - body.inner_m
+
+    def _lines_up_from(self, x: float, y: float, body: Body) -> bool:
+        """Whether it is back on the axis before it is in the gap if it sets out from here."""
+        along, across = self._place(x, y)
+        way = -along - self.begins_m - body.outer_m - LOOK_M
+        if not ONTO_M < way < 2.0 * BEFORE_M:
+            return False
+        # Its offset shrinks with the square of the way that is left, in the end exponentially.
+        shrunk = min(2.0 * ONTO_M / way, 1.0) ** 2 * math.exp(-min(way / ONTO_M, 2.0))
+        return abs(across) * shrunk < LEFT_OVER * self._room_m(body)
 
     def _place(self, x: float, y: float) -> tuple[float, float]:
         """Along the axis from the gap's middle, and across it to the left."""
         c, s = math.cos(self.direction_rad), math.sin(self.direction_rad)
         return c * (x - self.x_m) + s * (y - self.y_m), c * (y - self.y_m) - s * (x - self.x_m)
 
+    def _onward(self, scene: Scene, t_s: float) -> NarrowPassage | None:
+        """The next piece of a passage that is longer than one gap; None where it widens."""
+        ahead_m = scene.body.inner_m + LOOK_M
+        along, _ = self._place(float(scene.start[0]), float(scene.start[1]))
+        c, s = math.cos(self.direction_rad), math.sin(self.direction_rad)
+        place = np.array([self.x_m, self.y_m]) + (along + ahead_m) * np.array([c, s])
+        found = widest_strip(scene, place, self.direction_rad)
+        if found is None:
+            return None
+        onward = NarrowPassage(*found, THROUGH, t_s, sides_begin_m(scene, *found), self.tries)
+        return onward if onward.is_tight(scene.body) else None
+
     def _measured(self, scene: Scene, points: FloatArray) -> NarrowPassage:
         """The same with the axis as the points are now: its direction from the ground, its middle from scans.
 
         Where a wall ends within a cell, the cell's mean is up to half a cell's width from the end.
         """
-        found = _widest_strip(scene, np.array([self.x_m, self.y_m]), self.direction_rad)
+        turns = FEW_TURNS_RAD if self.goes_in(scene) else TURNS_RAD
+        found = widest_strip(scene, np.array([self.x_m, self.y_m]), self.direction_rad, turns)
         if found is None:
             return self
         x, y, direction, width = found
-        ends = _ends_beside(points, np.array([x, y]), direction, width)
+        ends = ends_beside(points, np.array([x, y]), direction, width)
         if ends is None:
             ends = self.ends_m
         elif self.ends_m is not None:
@@ -160,33 +222,10 @@ class NarrowPassage:
             left = np.array([-math.sin(direction), math.cos(direction)])
             to_middle = float((0.5 * (ends[0] + ends[1]) - [x, y]) @ left)
             x, y = x + to_middle * float(left[0]), y + to_middle * float(left[1])
-        return replace(self, x_m=x, y_m=y, direction_rad=direction, width_m=width, ends_m=ends)
-
-
-def _ends_beside(
-    points: FloatArray, middle: FloatArray, direction_rad: float, width_m: float
-) -> FloatArray | None:
-    """(2, 2) the points of a scan (N, 2) to the left and to the right that are nearest to a gap's axis.
-
-    Each is the mean of a few neighbouring beams. None where one side has none.
-    """
-    c, s = math.cos(direction_rad), math.sin(direction_rad)
-    near = points[np.hypot(*(points - middle).T) < ALONG_M + width_m]
-    if len(near) < BEAMS:
-        return None
-    weights = np.full(BEAMS, 1.0 / BEAMS)
-    mean = np.column_stack([np.convolve(near[:, k], weights, mode="valid") for k in range(2)])
-    apart = np.hypot(*(near[BEAMS - 1 :] - near[: 1 - BEAMS]).T)
-    offset = mean - middle
-    along, across = offset @ np.array([c, s]), offset @ np.array([-s, c])
-    beside = (np.abs(along) < ALONG_M) & (apart < 2.0 * NEAR_M)
-    ends = []
-    for side in (1.0, -1.0):
-        of_side = np.flatnonzero(beside & (side * across > 0.25 * width_m))
-        if not of_side.size:
-            return None
-        ends.append(mean[of_side[int(np.argmin(side * across[of_side]))]])
-    return np.array(ends)
+        begins_m = sides_begin_m(scene, x, y, direction, width)
+        return replace(
+            self, x_m=x, y_m=y, direction_rad=direction, width_m=width, begins_m=begins_m, ends_m=ends
+        )
 
 
 def sharpened(scene: Scene, points_xy_m: FloatArray, laser_xy_m: tuple[float, float]) -> Scene:
@@ -216,69 +255,36 @@ def find_narrow_passage(scene: Scene, ahead_m: float, t_s: float) -> NarrowPassa
     if away[at] > scene.body.outer_m + 0.03:
         return None
     place, tangent = path[at], path[at + 1] - path[at - 1]
-    sides = _sides(scene, place, tangent / max(float(np.hypot(*tangent)), 1e-9))
-    if sides is None:
+    pair = sides(scene, place, tangent / max(float(np.hypot(*tangent)), 1e-9))
+    if pair is None:
         return None
-    left, right = sides
+    left, right = pair
     width = left - right
     # Square to the line between the sides, left on the left; from there the widest strip.
     direction = math.atan2(-width[0], width[1])
     middle = 0.5 * (left + right)
-    found = _widest_strip(scene, middle, direction)
+    found = widest_strip(scene, middle, direction)
     if found is None:
         found = float(middle[0]), float(middle[1]), direction, float(np.hypot(*width))
     if found[3] < 2.0 * scene.body.inner_m - CLOSED_M:
         return None
-    return NarrowPassage(*found, 0, t_s)
+    passage = NarrowPassage(*found, 0, t_s, sides_begin_m(scene, *found))
+    return replace(passage, stage=THROUGH) if _is_between(scene, passage) else passage
 
 
-def _widest_strip(
-    scene: Scene, middle: FloatArray, direction_rad: float
-) -> tuple[float, float, float, float] | None:
-    """Middle x, y, direction and width of the widest straight strip without a point in it, through a gap.
-
-    Directions up to a quarter of a radian to either side are tried. None where one side is open.
-    """
-    offset = _points(scene, middle) - middle
-    best: tuple[float, float, float, float] | None = None
-    for turn in TURNS_RAD:
-        c, s = math.cos(direction_rad + turn), math.sin(direction_rad + turn)
-        along, across = offset @ np.array([c, s]), offset @ np.array([-s, c])
-        beside = across[np.abs(along) < ALONG_M]
-        left, right = beside[beside > 0.0], beside[beside <= 0.0]
-        if not (left.size and right.size):
-            continue
-        low, high = float(right.max()), float(left.min())
-        if best is None or high - low > best[3] + KEEP_M:
-            to_middle = 0.5 * (low + high)
-            best = (
-                float(middle[0] - s * to_middle),
-                float(middle[1] + c * to_middle),
-                direction_rad + float(turn),
-                high - low,
-            )
-    return best
+def _is_between(scene: Scene, passage: NarrowPassage) -> bool:
+    """Whether the robot stands between the sides of a passage already, and along it."""
+    x, y, theta = float(scene.start[0]), float(scene.start[1]), float(scene.start[2])
+    here = widest_strip(scene, np.array([x, y]), passage.direction_rad)
+    if here is None or abs(wrap(here[2] - theta)) > TURNS_RAD.max():
+        return False
+    return replace(passage, width_m=here[3]).is_tight(scene.body)
 
 
-def _points(scene: Scene, place: FloatArray) -> FloatArray:
-    """(N, 2) obstacle points near a place."""
-    n = scene.ground.hits.shape[0]
-    rows, columns = np.nonzero(scene.ground.hits)
-    points = scene.ground.mean[rows * n + columns]
-    return np.asarray(points[np.hypot(*(points - place).T) < SIDES_M])
-
-
-def _sides(scene: Scene, place: FloatArray, tangent: FloatArray) -> tuple[FloatArray, FloatArray] | None:
-    """The nearest pair of obstacle points across a place, one on either side of the way."""
-    points = _points(scene, place)
-    offset = points - place
-    across = tangent[0] * offset[:, 1] - tangent[1] * offset[:, 0]
-    left, right = points[across > 0.02], points[across < -0.02]
-    if not (left.shape[0] and right.shape[0]):
-        return None
-    apart = np.hypot(left[:, None, 0] - right[None, :, 0], left[:, None, 1] - right[None, :, 1])
-    i, j = np.unravel_index(int(np.argmin(apart)), apart.shape)
-    return left[i], right[j]
+def _swing_m(body: Body, off_rad: float) -> float:
+    """By how much a body that is turned so far from straight reaches farther to its sides."""
+    across = math.sin(off_rad) * body.polygon[:, 0] + math.cos(off_rad) * body.polygon[:, 1]
+    return max(float(np.abs(across).max()) - body.inner_m, 0.0)
 
 
 def _limited(value: float, most: float) -> float:

@@ -12,6 +12,7 @@ from pilotage.core.types import FloatArray, IntArray, Pose2, Twist
 from pilotage.kernels.control import ground_update, match, togo
 from pilotage.kernels.control.footprint import Body
 from pilotage.kernels.control.ground import Ground
+from pilotage.kernels.control.merged_means import without_passed
 from pilotage.kernels.control.motion_limits import Drive
 from pilotage.kernels.geometry.motion import wrap
 from pilotage.kernels.grids.distance import nearest_marked
@@ -160,8 +161,10 @@ class RollingGround:
         # Not before the scan is matched: it is to the last ground, whose means roll as well.
         rolled = self._roll(predicted, first_view)
         if first_view:
-            # Where the robot stands at first it may turn: the laser does not see the ground under it.
-            (x, y), radius = self._pose[:2], body.outer_m + self._coarse_m
+            # Where the robot stands at first it may turn: the laser does not see the ground under it, nor,
+            # if it shows less than the half before it, what is beside that even after a turn.
+            narrow = float(angles[-1] - angles[0]) < math.pi - 1e-6
+            (x, y), radius = self._pose[:2], body.outer_m + narrow * self._coarse_m
             ground_update.mark_disc(self._seen, x, y, radius, *self._corner_m, self._coarse_m)
         config, mount = self._config, view.mount
         ground_update.insert_scan(
@@ -334,6 +337,15 @@ class RollingGround:
     def open_all(self) -> None:
         """Forget what was closed: a way through it may be better than none."""
         self._togo.open_all()
+
+    def look_past(
+        self, points_xy_m: FloatArray, laser_xy_m: tuple[float, float], reach_m: float, aside_m: float,
+        behind_m: float,
+    ) -> None:  # fmt: skip
+        """Forget what a scan with its ends at points (N, 2) looks past from nearby: ``without_passed``."""
+        self._hits[:] = without_passed(
+            self._hits, self._mean, points_xy_m, *laser_xy_m, reach_m, aside_m, behind_m
+        )
 
     def time_to_go_beside(self, discs: FloatArray, scene: Scene) -> FloatArray:
         """Time to go (m, m) where discs (N, 3), x, y, radius in the map frame, are closed as well."""

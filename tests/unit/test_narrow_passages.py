@@ -1,0 +1,177 @@
+"""Gaps that leave a robot centimetres: lined up for, driven through to the end, not taken for closed."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from pilotage.core.types import FloatArray, Pose2, Twist
+from pilotage.experiments.mission import mission_of, read_mission
+from pilotage.experiments.run import run_mission
+from pilotage.kernels.scans.rays import fan_ranges
+from pilotage.models.footprint import Footprint
+from pilotage.stack.control.local.drive import polygon_around
+from pilotage.stack.control.local.gap_horizon import LOOKS_ASIDE_M, LOOKS_PAST_M
+from pilotage.stack.control.local.gap_strip import sides_begin_m, widest_strip
+from pilotage.stack.control.local.narrow_passage import PASSED_BEHIND_M, NarrowPassage
+from pilotage.stack.control.local.role import LocalLimits, LocalView
+from pilotage.stack.control.local.rolling import RollingGround, Scene
+from pilotage.stack.control.local.rolling_config import RollingConfig
+
+ANGLES = np.linspace(-0.75 * math.pi, 0.75 * math.pi, 541)
+LIMITS = LocalLimits(1.0, 0.5, 2.0, 2.0, 2.0, 8.0)
+DISC = polygon_around(Footprint.disc(0.3))
+LONG = np.array([[0.255, 0.215], [-0.255, 0.215], [-0.255, -0.215], [0.255, -0.215]])
+
+
+def _view(
+    t_s: float, pose: Pose2, walls: FloatArray, outline_m: FloatArray = DISC, angles: FloatArray = ANGLES
+) -> LocalView:
+    step = float(angles[1] - angles[0])
+    ranges = fan_ranges(
+        pose.x_m,
+        pose.y_m,
+        pose.theta_rad + float(angles[0]),
+        step,
+        len(angles),
+        20.0,
+        walls,
+        np.zeros((0, 3)),
+    )
+    here = Pose2(0.0, 0.0, 0.0)
+    return LocalView(t_s, pose, Twist(0.0, 0.0), ranges, angles, here, 20.0, (6.0, 0.0), LIMITS, outline_m)
+
+
+def _scene(pose: Pose2, walls: FloatArray, outline_m: FloatArray = DISC) -> Scene:
+    return RollingGround(RollingConfig()).update(_view(0.0, pose, walls, outline_m))
+
+
+def _gap(width_m: float, depth_m: float) -> FloatArray:
+    """Walls of two boxes from x = 2 on that leave a gap about the x axis."""
+    half, end = 0.5 * width_m, 2.0 + depth_m
+    return np.array(
+        [
+            [2.0, side * half, 2.0, side * 3.0] if k == 0 else [2.0, side * half, end, side * half]
+            for side in (-1.0, 1.0)
+            for k in range(2)
+        ]
+    )
+
+
+def _hall(width_m: float, depth_m: float) -> dict[str, Any]:
+    """A hall that two unknown boxes divide but for a gap, which is not where the straight way leads."""
+    half = 0.5 * width_m
+    corners = [(0.05, 0.05), (11.95, 0.05), (11.95, 5.95), (0.05, 5.95), (0.05, 3.2), (11.95, 2.2)]
+    return {
+        "world.map": {
+            "map": "hall",
+            "bounds_m": [0, 0, 12, 6],
+            "walls_m": [[0, 0, 12, 0], [12, 0, 12, 6], [12, 6, 0, 6], [0, 6, 0, 0]],
+            "landmarks": [{"id": k, "x_m": x, "y_m": y} for k, (x, y) in enumerate(corners)],
+        },
+        "world.start": {"x_m": 1.5, "y_m": 4.0, "theta_rad": 0.0},
+        "world.goal": {"x_m": 10.5, "y_m": 4.0, "tolerance_m": 0.3},
+        "world.obstacles": [
+            {"kind": "box", "from_m": [6, 0.02], "to_m": [6, 3.0 - half], "thickness_m": depth_m},
+            {"kind": "box", "from_m": [6, 3.0 + half], "to_m": [6, 5.98], "thickness_m": depth_m},
+        ],
+        "run.time_limit_s": 60.0,
+    }
+
+
+@pytest.mark.parametrize(("width_m", "depth_m", "most_s"), [(0.66, 0.3, 18.0), (0.64, 1.0, 28.0)])
+def test_a_disc_of_60_cm_comes_through_what_leaves_it_centimetres(
+    width_m: float, depth_m: float, most_s: float
+) -> None:
+    """9 s without the boxes. Stumbling into the first took it twice as long, the other it mostly gave up."""
+    mission = mission_of(read_mission("museum-2-fast"), (), 3, _hall(width_m, depth_m))
+    metrics: dict[str, Any] = dict(run_mission(mission, save=False).metrics)
+    assert metrics["success"], metrics["reason"]
+    assert metrics["collisions"] == 0
+    assert metrics["duration_s"] < most_s
+
+
+def test_a_passage_is_as_deep_as_its_sides_reach() -> None:
+    scene = _scene(Pose2(1.0, 0.0, 0.0), _gap(0.66, 1.0))
+    strip = widest_strip(scene, np.array([2.4, 0.0]), 0.0)
+    assert strip is not None
+    assert abs(strip[1]) < 0.02
+    assert strip[3] == pytest.approx(0.66, abs=0.03)
+    assert sides_begin_m(scene, 2.4, 0.0, 0.0, 0.66) == pytest.approx(0.4, abs=0.05)
+
+
+def test_straight_is_what_an_outline_needs() -> None:
+    """A disc has no corners to swing: headed for the gap it sets out; a rectangle turns on first."""
+
+    def sets_out(outline_m: FloatArray, off_rad: float) -> bool:
+        scene = _scene(Pose2(1.0, 0.0, off_rad), _gap(0.64, 0.1), outline_m)
+        passage, _ = NarrowPassage(2.0, 0.0, 0.0, 2.0 * scene.body.inner_m + 0.04, 1, 0.0).command(scene)
+        return passage.stage == 2
+
+    assert sets_out(DISC, 0.2)
+    assert not sets_out(DISC, 0.6)
+    assert not sets_out(LONG, 0.2)
+    assert sets_out(LONG, 0.01)
+
+
+def test_it_goes_on_to_the_end_of_a_passage_and_no_farther() -> None:
+    """36 cm past the middle it began with, in a passage of 1 m, and behind it."""
+    walls = _gap(0.66, 1.0)
+    passage = NarrowPassage(2.2, 0.0, 0.0, 0.66, 2, 0.0)
+    inside = _scene(Pose2(1.0, 0.0, 0.0), walls)
+    there = replace(inside, start=np.array([2.56, 0.0, 0.0, 0.2, 0.0]))
+    onward, command = passage.step(there, np.zeros((0, 2)), 1.0)
+    assert onward is not None
+    assert onward.x_m > 2.56
+    assert command.v_m_s > 0.1
+    beyond = replace(inside, start=np.array([3.5, 0.0, 0.0, 0.2, 0.0]))
+    assert replace(passage, x_m=2.9).step(beyond, np.zeros((0, 2)), 1.0)[0] is None
+
+
+def test_it_lines_up_from_where_there_is_way_enough() -> None:
+    scene = _scene(Pose2(1.0, 0.0, 0.0), _gap(0.66, 0.1))
+    passage = NarrowPassage(2.0, 0.0, 0.0, 0.66, 0, 0.0)
+
+    def ready(x: float, y: float) -> bool:
+        return passage.command(replace(scene, start=np.array([x, y, 0.0, 0.0, 0.0])))[0].stage == 1
+
+    assert ready(1.2, 0.02)
+    assert not ready(1.2, 0.3)
+    assert not ready(1.6, 0.05)
+
+
+def test_where_it_is_stuck_it_forgets_what_the_scan_looks_past() -> None:
+    """A pane in the opening, seen once and gone, or what drift makes of an edge, closes it for good else."""
+    wall = np.array([[1.4, -2.0, 1.4, -0.25], [1.4, 0.25, 1.4, 2.0], [3.0, -2.0, 3.0, 2.0]])
+    pane = np.array([[1.36, 0.20, 1.36, 0.22]])
+    ground, here = RollingGround(RollingConfig()), Pose2(0.0, 0.0, 0.0)
+    ground.update(_view(0.0, here, np.vstack([wall, pane])))
+    view = _view(0.05, here, wall)
+    before = ground.update(view).ground.hits.copy()
+    points = np.column_stack([np.cos(ANGLES), np.sin(ANGLES)]) * np.minimum(view.ranges_m, 20.0)[:, None]
+    ground.look_past(points, (0.0, 0.0), LOOKS_PAST_M, LOOKS_ASIDE_M, PASSED_BEHIND_M)
+    scene = ground.update(_view(0.1, here, wall))
+    rows, columns = np.nonzero(scene.ground.hits)
+    means = scene.ground.mean[rows * scene.ground.hits.shape[0] + columns]
+    assert not np.any((means[:, 0] < 1.38) & (np.abs(means[:, 1]) < 0.5))
+    # Nothing of the wall is gone.
+    assert np.count_nonzero((before > 0) & (scene.ground.hits == 0)) < 4
+
+
+@pytest.mark.parametrize("field_deg", [60, 180, 270])
+def test_a_robot_may_turn_where_it_stands_at_first_whatever_its_laser_shows(field_deg: int) -> None:
+    """The half before it and more: what is beside the disc in which it turns it sees for itself."""
+    angles = np.radians(np.linspace(-0.5 * field_deg, 0.5 * field_deg, field_deg + 1))
+    ground = (
+        RollingGround(RollingConfig())
+        .update(_view(0.0, Pose2(0.02, 0.03, 0.0), np.zeros((0, 4)), LONG, angles))
+        .ground
+    )
+    behind = [int((y - ground.y0_m) * ground.per_coarse) for y in (0.03, 0.03 + 0.334 + ground.coarse_m)]
+    column = int((0.02 - ground.x0_m) * ground.per_coarse)
+    assert ground.unseen_m[behind[0], column] > 0.0
+    assert (ground.unseen_m[behind[1], column - 1] > 0.0) == (field_deg in (60, 270))
