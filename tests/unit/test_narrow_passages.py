@@ -102,6 +102,9 @@ def test_a_passage_is_as_deep_as_its_sides_reach() -> None:
     assert abs(strip[1]) < 0.02
     assert strip[3] == pytest.approx(0.66, abs=0.03)
     assert sides_begin_m(scene, 2.4, 0.0, 0.0, 0.66) == pytest.approx(0.4, abs=0.05)
+    # A wall that goes on along one side before the gap is no passage yet.
+    scene = _scene(Pose2(1.0, 0.0, 0.0), np.vstack([_gap(0.66, 1.0), [0.5, -0.33, 2.0, -0.33]]))
+    assert sides_begin_m(scene, 2.4, 0.0, 0.0, 0.66) == pytest.approx(0.4, abs=0.05)
 
 
 def test_straight_is_what_an_outline_needs() -> None:

@@ -189,7 +189,12 @@ class GapHorizon(RollingController):
         return command
 
     def _tight_ahead(self, view: LocalView, scene: Scene) -> NarrowPassage | None:
-        """A gap close ahead that leaves so little room that plans hardly get into it, if it is new."""
+        """A gap close ahead that leaves so little room that plans hardly get into it, if it is new.
+
+        Between people there is none: who stands now walks on before it has lined up.
+        """
+        if view.people_about or self._people.are_near(scene):
+            return None
         found = find_narrow_passage(scene, FORESEEN_M, view.t_s)
         if found is None or not (found.is_tight(scene.body) and found.is_ahead(scene)):
             return None
@@ -240,7 +245,8 @@ class GapHorizon(RollingController):
             self._passage = None
             self._ground.open_all()
             return
-        found = find_narrow_passage(scene, config.close_ahead_m, view.t_s)
+        found = find_narrow_passage(scene, FORESEEN_M, view.t_s)
+        found = found or find_narrow_passage(scene, config.close_ahead_m, view.t_s)
         if found and not self._has_tried(found):
             # Straight through it first; where that fails as well it is closed.
             self._tried.append((found.x_m, found.y_m))

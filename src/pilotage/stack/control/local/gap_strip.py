@@ -52,11 +52,13 @@ def widest_strip(
 
 
 def sides_begin_m(scene: Scene, x_m: float, y_m: float, direction_rad: float, width_m: float) -> float:
-    """How far before the middle of a strip there are points on its sides."""
+    """How far before the middle of a strip there are points on both of its sides."""
     offset = _points(scene, np.array([x_m, y_m])) - [x_m, y_m]
     c, s = math.cos(direction_rad), math.sin(direction_rad)
-    beside = np.abs(offset @ np.array([-s, c])) < 0.5 * width_m + BESIDE_M
-    return max(float(-(offset[beside] @ np.array([c, s])).min(initial=0.0)), 0.0)
+    along, across = offset @ np.array([c, s]), offset @ np.array([-s, c])
+    beside = np.abs(across) < 0.5 * width_m + BESIDE_M
+    begins = [float(-along[beside & (side * across > 0.0)].min(initial=0.0)) for side in (-1.0, 1.0)]
+    return min(begins)
 
 
 def ends_beside(

@@ -48,8 +48,8 @@ LEFT_OVER = 0.5
 """... and sets out from where no more is left of its offset before the gap than this share of the room."""
 BEHIND, FARTHER_M = 3.0, 0.4
 """A little too far aside to, it first backs by about so many times its offset, the first time."""
-AHEAD_RAD = 0.6
-"""A gap is ahead that lies in this direction or nearer, and leads in such a one."""
+AHEAD_RAD, ASIDE_M = 1.4, 0.1
+"""A gap is ahead that leads in such a direction or nearer, and is hardly farther aside than ahead."""
 LOOK_M = 0.05
 LONGEST_S = 25.0
 THROUGH = 2
@@ -98,7 +98,8 @@ class NarrowPassage:
         """
         along, _ = self._place(float(scene.start[0]), float(scene.start[1]))
         closed = self.stage == THROUGH and self.width_m < 2.0 * scene.body.inner_m - CLOSED_M
-        if closed or t_s - self.begun_s > LONGEST_S:
+        opened = self.stage < THROUGH and self.width_m > 2.0 * (scene.body.outer_m + TIGHT_M)
+        if closed or opened or t_s - self.begun_s > LONGEST_S:
             return None, Twist(0.0, 0.0)
         if along > BEYOND_M:
             onward = self._onward(scene, t_s)
