@@ -29,6 +29,7 @@ from pilotage.stack.interface import BeliefStatus
 from pilotage.stack.patrol.derive import DerivationConfig, derive_drivable
 from pilotage.stack.patrol.graph import PatrolGraph
 from pilotage.stack.patrol.graph_file import on_floor, read_patrol_graph
+from pilotage.stack.patrol.passages import Passages
 from pilotage.stack.patrol.task import PatrolSite
 from pilotage.stack.patrol.tours import Round, idleness_bound_s
 
@@ -77,7 +78,10 @@ class PatrolTask:
         self._site, graph = _site(config, setting)
         # From the vertices of a derived graph the floor is to be seen; at a given place somebody is to be.
         near_m = (0.5 if config.graph is None else 1.0) * config.visit_m
-        self.patrol = PatrolSite(graph, config.visit_m, near_m, _starts(graph, self._site, setting))
+        radius_m = max(footprint.radius_m for footprint in setting.footprints)
+        passages = Passages.of(self._site, graph, radius_m)
+        starts = _starts(graph, self._site, setting)
+        self.patrol = PatrolSite(graph, config.visit_m, near_m, starts, passages)
         self.columns, self.goals = {}, ()
         self.events: list[Event] = []
         self._visits = VisitLog(graph.vertices_xy_m, config.visit_m, len(self._names))

@@ -321,7 +321,12 @@ def _share(mission: Mission, index: int, sheet: RobotKnowledge, whole: Task) -> 
             raise InputError(f"team.battery: expected task 'patrol', found '{mission.task.name}'")
         return None
     setting = PatrolSetting(
-        site.graph, index, site.starts, sheet.motion.top_speed_m_s, sheet.streams.stream("strategy")
+        site.graph,
+        index,
+        site.starts,
+        sheet.motion.top_speed_m_s,
+        sheet.streams.stream("strategy"),
+        passages=site.passages,
     )
     assert mission.team.strategy is not None, "the task looked"
     strategy = build_component(STRATEGIES, mission.team.strategy, "strategy", setting)

@@ -11,6 +11,7 @@ from pilotage.core.registry import Registry
 from pilotage.core.types import FloatArray, IntArray
 from pilotage.stack.patrol.graph import PatrolGraph
 from pilotage.stack.patrol.messages import PatrolKnowledge
+from pilotage.stack.patrol.passages import OPEN, Passages
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -29,6 +30,8 @@ class PatrolSetting:
         When the patrol begins.
     rng
         This robot's own stream; what the whole team must agree on is not drawn from it.
+    passages
+        Where on their way there is room for one of them.
     """
 
     graph: PatrolGraph
@@ -37,6 +40,7 @@ class PatrolSetting:
     speed_m_s: float
     rng: np.random.Generator
     begin_s: float = 0.0
+    passages: Passages = OPEN
 
     @property
     def team_size(self) -> int:

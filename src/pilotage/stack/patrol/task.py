@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from pilotage.core.types import FloatArray, IntArray
 from pilotage.stack.patrol.graph import PatrolGraph
+from pilotage.stack.patrol.passages import Passages
 from pilotage.stack.patrol.strategy import Strategy
 
 
@@ -24,12 +25,15 @@ class PatrolSite:
         looked from nearer than to others.
     starts
         (N,) the vertex that each robot's starting place has the shortest path to.
+    passages
+        Where the largest of the robots has a passage to itself.
     """
 
     graph: PatrolGraph
     visit_m: float
     near_m: float
     starts: IntArray
+    passages: Passages
 
 
 @dataclass(frozen=True, slots=True, eq=False)

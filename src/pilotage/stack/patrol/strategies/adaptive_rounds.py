@@ -11,6 +11,7 @@ from pydantic import Field
 from pilotage.core.config import Config
 from pilotage.core.types import FloatArray, IntArray
 from pilotage.sensors.sensor import NonNegative, Positive
+from pilotage.stack.patrol.meetings import slowed
 from pilotage.stack.patrol.messages import NOTHING, PatrolKnowledge, PatrolState
 from pilotage.stack.patrol.partition import Plan, annealed, even_sizes
 from pilotage.stack.patrol.strategy import STRATEGIES, PatrolSetting
@@ -27,13 +28,15 @@ class AdaptiveRoundsConfig(Config):
     """How plans are weighed, and when a robot waits or gives another one up.
 
     A plan's cost is its worst idleness plus ``mean_weight`` times its mean; of a round that several robots
-    share the worst counts ``sharing_cost`` more and the mean half of that, for what keeping apart costs. A
-    robot waits while it is further ahead of its
-    place among those that share its round than ``slack`` of the distance between them.
+    share the worst counts ``sharing_cost`` more and the mean half of that, for what keeping apart costs. In a
+    passage that has room for one a meeting takes ``meeting_m`` of driving beside its length. A robot waits
+    while it is further ahead of its place among those that share its round than ``slack`` of the distance
+    between them.
     """
 
     mean_weight: NonNegative = 2.0
     sharing_cost: NonNegative = 0.06
+    meeting_m: NonNegative = 2.5
     slack: Positive = Field(default=0.05, le=0.5)
     silent_s: Positive = 30.0
     silent_ratio: Positive = 8.0
@@ -46,7 +49,7 @@ def best_plan(setting: PatrolSetting, robots: int, config: AdaptiveRoundsConfig)
     graph = setting.graph
     most = min(robots, len(graph))
     # What lies between is much alike: a few numbers of groups stand for all.
-    numbers = {1, 2, 3, robots // 2, robots - 1, robots}
+    numbers = {1, 2, 3, robots // 2, robots - 1, robots, most}
     plans = [
         annealed(graph, even_sizes(robots, groups), config.mean_weight, config.sharing_cost)
         for groups in sorted(numbers)
@@ -54,7 +57,8 @@ def best_plan(setting: PatrolSetting, robots: int, config: AdaptiveRoundsConfig)
     ]
 
     def cost(plan: Plan) -> float:
-        worst_m, mean_m = plan.expected_m(len(graph), config.sharing_cost)
+        driven = slowed(plan, setting.passages, config.meeting_m)
+        worst_m, mean_m = driven.expected_m(len(graph), config.sharing_cost)
         return worst_m + config.mean_weight * mean_m
 
     return min(plans, key=cost)

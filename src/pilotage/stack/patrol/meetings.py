@@ -1,0 +1,56 @@
+"""What robots on patrol wait for each other where there is room for one of them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import lru_cache
+
+import numpy as np
+
+from pilotage.core.types import FloatArray
+from pilotage.stack.patrol.partition import Plan
+from pilotage.stack.patrol.passages import Passages
+
+FULLEST = 0.9
+"""Share of the time that a passage is taken for at most: beyond, waits would have no end."""
+
+
+@lru_cache(maxsize=256)
+def waits_m(plan: Plan, passages: Passages, meeting_m: float) -> FloatArray:
+    """(G,) what a robot of each group waits in all, each time around: as a distance that it would drive.
+
+    Robots come to a passage at random, as those of different rounds do. Another one that comes through any
+    part of what this one passes keeps it out for as long as it takes itself; with rates r and times s of all
+    others the wait is sum(r s^2) / (2 (1 - sum(r s))) (Pollaczek 1930, Khinchine 1932). Those who come the
+    same way at the same time count as well, though they would follow each other.
+
+    Parameters
+    ----------
+    meeting_m
+        Beyond the passage's own length: waiting in front of it, braking and starting.
+    """
+    passed = [passages.passed(walk) for walk in plan.rounds]
+    group = np.repeat(np.arange(len(passed)), [len(taken_m) for _, taken_m in passed])
+    pieces = np.concatenate([marks for marks, _ in passed]).astype(np.int64)
+    taken_m = np.concatenate([taken_m for _, taken_m in passed]) + meeting_m
+    length_m = np.array([max(walk.length_m, 1e-9) for walk in plan.rounds])
+    same = pieces @ pieces.T > 0
+    # Of the robots that go its own round it does not meet itself.
+    others = np.array(plan.sizes)[group] - (group[:, None] == group)
+    rate = np.where(same, others / length_m[group], 0.0)
+    share = np.minimum((rate * taken_m).sum(axis=1), FULLEST)
+    wait_m = (rate * taken_m**2).sum(axis=1) / (2.0 * (1.0 - share))
+    return np.array([float(wait_m[group == number].sum()) for number in range(len(passed))])
+
+
+def slowed(plan: Plan, passages: Passages, meeting_m: float) -> Plan:
+    """The plan with rounds as long as they are with their waits."""
+    factors = [
+        1.0 + wait_m / max(walk.length_m, 1e-9)
+        for walk, wait_m in zip(plan.rounds, waits_m(plan, passages, meeting_m).tolist(), strict=True)
+    ]
+    rounds = tuple(
+        replace(walk, at_m=factor * walk.at_m, length_m=factor * walk.length_m)
+        for walk, factor in zip(plan.rounds, factors, strict=True)
+    )
+    return replace(plan, rounds=rounds)

@@ -1,0 +1,137 @@
+"""Where robots have a passage to themselves, what waiting there costs, and the plans taken for that."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from pilotage.experiments.build.build import build
+from pilotage.experiments.mission import mission_of, read_mission
+from pilotage.maps.floor import Floor
+from pilotage.maps.segment_map import SegmentMap
+from pilotage.maps.world_map import WorldMap
+from pilotage.stack.patrol.graph import PatrolGraph
+from pilotage.stack.patrol.meetings import slowed, waits_m
+from pilotage.stack.patrol.partition import Plan
+from pilotage.stack.patrol.passages import OPEN, Passages
+from pilotage.stack.patrol.strategies.adaptive_rounds import AdaptiveRoundsConfig, best_plan
+from pilotage.stack.patrol.strategy import PatrolSetting
+from pilotage.stack.patrol.tours import Round
+
+RADIUS_M, MEETING_M = 0.3, 2.0
+
+
+def walled(width_m: float, height_m: float, *walls: tuple[float, float, float, float]) -> WorldMap:
+    edge = [(0, 0, width_m, 0), (width_m, 0, width_m, height_m), (width_m, height_m, 0, height_m)]
+    segments = np.array([*edge, (0, height_m, 0, 0), *walls], dtype=float)
+    geometry = SegmentMap(segments, np.zeros((0, 3)), (0.0, 0.0, width_m, height_m))
+    return WorldMap("walled", geometry.bounds_m, geometry=geometry)
+
+
+def row(world: WorldMap, *places: tuple[float, float]) -> tuple[PatrolGraph, Passages]:
+    """Places one after the other, joined to the next."""
+    floor, count = Floor.of(world, RADIUS_M), len(places)
+    joined = np.abs(np.subtract.outer(np.arange(count), np.arange(count))) == 1
+    xy = np.array(places)
+    graph = PatrolGraph.of(xy, floor.lengths_m(xy, joined))
+    return graph, Passages.of(floor, graph, RADIUS_M)
+
+
+def with_door(width_m: float) -> WorldMap:
+    """Two rooms of 4 m x 5 m with a door."""
+    half_m = 0.5 * width_m
+    return walled(8, 5, (4, 0, 4, 2.5 - half_m), (4, 2.5 + half_m, 4, 5))
+
+
+def with_corridor() -> WorldMap:
+    """A corridor of 6 m with room for one between two rooms."""
+    low, high = 2.05, 2.95
+    walls = [(4, 0, 4, low), (4, high, 4, 5), (10, 0, 10, low), (10, high, 10, 5)]
+    return walled(14, 5, *walls, (4, low, 10, low), (4, high, 10, high))
+
+
+@pytest.mark.parametrize(("width_m", "pieces"), [(0.8, 1), (1.0, 1), (1.3, 1), (1.8, 0), (3.0, 0)])
+def test_a_door_has_room_for_one_or_for_two(width_m: float, pieces: int) -> None:
+    _, passages = row(with_door(width_m), (2.0, 2.5), (6.0, 2.5))
+    assert passages.pieces == pieces
+    if pieces:
+        (there,), (back,) = passages.stretches[0, 1], passages.stretches[1, 0]
+        assert there.begin_m <= 2.0 <= there.end_m
+        assert there.end_m - there.begin_m < 1.0
+        assert (back.begin_m, back.end_m) == pytest.approx((4.0 - there.end_m, 4.0 - there.begin_m))
+        assert back.piece == there.piece
+
+
+def test_who_turns_within_a_corridor_was_in_it_once() -> None:
+    graph, passages = row(with_corridor(), (2.0, 2.5), (7.0, 2.5), (12.0, 2.5))
+    assert passages.pieces == 2
+    through, short = Round.through(graph, np.array([0, 1, 2])), Round.through(graph, np.array([0, 1]))
+    marks, taken_m = passages.passed(through)
+    assert marks.all(axis=1).sum() == 2  # there and back, each through both halves
+    assert taken_m == pytest.approx([6.0, 6.0], abs=1.0)
+    for walk in (short, Round.through(graph, np.array([1, 0]))):  # also one that begins there
+        marks, taken_m = passages.passed(walk)
+        assert marks.sum(axis=1).tolist() == [1]
+        assert taken_m == pytest.approx([6.0], abs=1.0)
+
+
+def test_waits_by_hand() -> None:
+    """To and fro through a door, each by itself at random; nobody waits for himself, nor for other rooms."""
+    graph, passages = row(with_door(1.0), (1.0, 1.0), (2.0, 2.5), (6.0, 2.5), (7.0, 4.0))
+    walk, left, right = (Round.through(graph, np.array(v)) for v in ([1, 2], [0, 1], [2, 3]))
+    stretch = passages.stretches[1, 2][0]
+    time_m = stretch.end_m - stretch.begin_m + MEETING_M
+    rate = 2.0 / walk.length_m
+    wait_m = 2.0 * rate * time_m**2 / (2.0 * (1.0 - rate * time_m))
+    assert waits_m(Plan((walk,), (2,), 0.0, 0.0), passages, MEETING_M) == pytest.approx([wait_m])
+    both = Plan((walk, walk), (1, 1), 0.0, 0.0)
+    assert waits_m(both, passages, MEETING_M) == pytest.approx([wait_m, wait_m])
+    assert waits_m(Plan((walk,), (1,), 0.0, 0.0), passages, MEETING_M) == pytest.approx([0.0])
+    assert waits_m(Plan((left, right), (1, 3), 0.0, 0.0), passages, MEETING_M) == pytest.approx([0.0, 0.0])
+    assert slowed(both, passages, MEETING_M).rounds[1].length_m == pytest.approx(walk.length_m + wait_m)
+    assert slowed(both, OPEN, MEETING_M).rounds[1].length_m == walk.length_m
+    # Where a passage is always taken a wait is long, not without end nor below nothing.
+    crowd = waits_m(Plan((walk,), (12,), 0.0, 0.0), passages, MEETING_M)
+    assert wait_m < crowd[0] < 1000.0
+
+
+def rooms(across: int, up: int) -> dict[str, Any]:
+    """Rooms of 5 m, each with a door of 1 m to the next ones."""
+    side = 5.0
+    width, height = side * across, side * up
+    walls = [[0, 0, width, 0], [width, 0, width, height], [width, height, 0, height], [0, height, 0, 0]]
+    for k in range(1, across):
+        for j in range(up):
+            low, x = side * j, side * k
+            walls += [[x, low, x, low + 2.0], [x, low + 3.0, x, low + side]]
+    for j in range(1, up):
+        for k in range(across):
+            left, y = side * k, side * j
+            walls += [[left, y, left + 2.0, y], [left + 3.0, y, left + side, y]]
+    return {"map": {"map": "rooms", "bounds_m": [0, 0, width, height], "walls_m": walls}}
+
+
+def test_in_rooms_robots_do_not_follow_each_other_through_all_doors() -> None:
+    """A tour of all rooms promised as little idleness as shares; they met at every door of it: the worst was
+    ten times what it promised."""
+    values = read_mission("museum-patrol")
+    values["world"] = rooms(4, 3)
+    values["team"] = {"size": 8, "strategy": "adaptive-rounds", "radio": {}}
+    values["task"], values["run"]["time_limit_s"] = {"name": "patrol", "duration_s": 1.0}, 1.0
+    experiment = build(mission_of(values, seed=0))
+    task: Any = experiment.task
+    assert task.patrol.passages.pieces > 10
+    stack: Any = experiment.team[0].stack
+    assert len(stack._context.task.strategy._plan.sizes) >= 7
+    setting = PatrolSetting(task.patrol.graph, 0, np.arange(8), 1.0, np.random.default_rng(0))
+    assert best_plan(setting, 8, AdaptiveRoundsConfig()).sizes == (8,)  # as if two could meet everywhere
+
+
+def test_more_robots_than_places_stand_at_them() -> None:
+    graph, _ = row(walled(14, 5), (1.0, 2.5), (7.0, 2.5), (13.0, 2.5))
+    setting = PatrolSetting(graph, 0, np.arange(8) % 3, 1.0, np.random.default_rng(0))
+    plan = best_plan(setting, 8, AdaptiveRoundsConfig())
+    assert plan.worst_m == 0.0
+    assert sorted(plan.sizes) == [2, 3, 3]
