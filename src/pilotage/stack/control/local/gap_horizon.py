@@ -31,6 +31,7 @@ from pilotage.stack.control.local.narrow_passage import (
     NarrowPassage,
     find_narrow_passage,
     sharpened,
+    tight_m,
 )
 from pilotage.stack.control.local.role import LOCAL_CONTROLLERS, LocalView
 from pilotage.stack.control.local.rolling import Scene
@@ -195,7 +196,7 @@ class GapHorizon(RollingController):
         """
         if view.people_about or self._people.are_near(scene):
             return None
-        found = find_narrow_passage(scene, FORESEEN_M, view.t_s)
+        found = find_narrow_passage(scene, FORESEEN_M, view.t_s, tight_m(scene.body))
         if found is None or not (found.is_tight(scene.body) and found.is_ahead(scene)):
             return None
         if self._has_tried(found):

@@ -102,7 +102,12 @@ def sides(scene: Scene, place: FloatArray, tangent: FloatArray) -> tuple[FloatAr
 
 def _points(scene: Scene, place: FloatArray) -> FloatArray:
     """(N, 2) obstacle points near a place."""
-    n = scene.ground.hits.shape[0]
-    rows, columns = np.nonzero(scene.ground.hits)
-    points = scene.ground.mean[rows * n + columns]
+    ground = scene.ground
+    n, cells = ground.hits.shape[0], math.ceil(SIDES_M * ground.per_cell) + 1
+    row = math.floor((float(place[1]) - ground.y0_m) * ground.per_cell)
+    column = math.floor((float(place[0]) - ground.x0_m) * ground.per_cell)
+    first_row, first_column = max(row - cells, 0), max(column - cells, 0)
+    near = ground.hits[first_row : max(row + cells + 1, 0), first_column : max(column + cells + 1, 0)]
+    rows, columns = np.nonzero(near)
+    points = ground.mean[(rows + first_row) * n + columns + first_column]
     return np.asarray(points[np.hypot(*(points - place).T) < SIDES_M])

@@ -110,7 +110,7 @@ class NarrowPassage:
 
     def is_tight(self, body: Body) -> bool:
         """Whether a body has so little room in it that it had better line up before it."""
-        return self.width_m < 2.0 * (body.inner_m + TIGHT_M)
+        return self.width_m < tight_m(body)
 
     def is_ahead(self, scene: Scene) -> bool:
         """Whether it is to be lined up for from here: about in front of the robot, and about straight."""
@@ -242,11 +242,19 @@ def sharpened(scene: Scene, points_xy_m: FloatArray, laser_xy_m: tuple[float, fl
     return replace(scene, ground=ground._replace(hits=hits, mean=merged_means(hits, ground.mean, NOISE_M)))
 
 
-def find_narrow_passage(scene: Scene, ahead_m: float, t_s: float) -> NarrowPassage | None:
+def tight_m(body: Body) -> float:
+    """Width below which a gap is tight for a body."""
+    return 2.0 * (body.inner_m + TIGHT_M)
+
+
+def find_narrow_passage(
+    scene: Scene, ahead_m: float, t_s: float, widest_m: float = math.inf
+) -> NarrowPassage | None:
     """The narrowest place of the way ahead, if a footprint has to stand straight to pass it.
 
     Its axis is that of the widest strip between the points to the left and to the right of the way there.
-    None where the way is wide, one side is open, or the gap is closed.
+    None where the way is wide, one side is open, the gap is closed, or its sides are farther apart than
+    ``widest_m``.
     """
     path = np.ascontiguousarray(scene.path[: max(3, round(ahead_m / 0.1))])
     if path.shape[0] < 3:
@@ -261,6 +269,8 @@ def find_narrow_passage(scene: Scene, ahead_m: float, t_s: float) -> NarrowPassa
         return None
     left, right = pair
     width = left - right
+    if float(np.hypot(*width)) > widest_m:
+        return None
     # Square to the line between the sides, left on the left; from there the widest strip.
     direction = math.atan2(-width[0], width[1])
     middle = 0.5 * (left + right)
