@@ -76,6 +76,7 @@ def _planned_m(
     hidden_m: float,
     tight_m: float = 0.0,
     squeezing_m: float = 0.0,
+    look_m: float = 0.0,
 ) -> tuple[float, float]:
     """Length of the path adopted to (9, 1), and its highest y."""
     planner = PLANNERS.entry("theta-star").factory(PLANNERS.configure("theta-star", {}, ""))
@@ -86,7 +87,7 @@ def _planned_m(
         Goal(9.0, 1.0),
         mapped_m,
         [0.40, 0.36, 0.32, 0.30],
-        Detours(1.0, tight_m, squeezing_m, hidden_m),
+        Detours(1.0, tight_m, squeezing_m, hidden_m, look_m),
     )
     assert plan.path is not None
     return plan.path.length_m, float(plan.path.states[:, 1].max())
@@ -107,6 +108,14 @@ def test_the_way_around_is_taken_where_trying_a_gap_likely_costs_more() -> None:
     assert planned(narrow, 0.05) == planned(narrow, 0.0)
     closed_above = _row(0.70, 8.0)
     assert planned(closed_above, HIDDEN_M) == planned(closed_above, 0.0)
+
+
+def test_who_is_near_a_gap_that_may_be_closed_looks() -> None:
+    """7 cm to spare as it was seen, 6 m farther around: worth a look from nearby."""
+    row = _row(0.70, 5.0)
+    for x_m, look_m, through in ((3.1, 1.5, True), (3.1, 0.0, False), (1.0, 1.5, False)):
+        _, top_m = _planned_m(_floor(), Pose2(x_m, 1.0, 0.0), row, HIDDEN_M, look_m=look_m)
+        assert (top_m < 1.2) == through, (x_m, look_m)
 
 
 def test_it_goes_a_longer_way_not_to_squeeze_but_not_any() -> None:

@@ -209,7 +209,7 @@ class GlobalPlan:
         """
         known, points = self._chart.field, found.path.states[:, :2]
         gap = doubtful_gap(points, mapped_m, known, self._least_clearance_m, detours.hidden_m)
-        if gap is None:
+        if gap is None or gap.before_m < detours.look_m:
             return found
         thicker_m = mapped_m + np.array([0.0, 0.0, detours.hidden_m])
         field = with_circles(known, thicker_m)

@@ -44,6 +44,8 @@ class PlanAheadConfig(Config):
     hidden_m: NonNegative = 0.5
     """By anything up to this what was mapped reaches farther than it was seen to: a gap with less room to
     spare may prove closed. 0: whatever looks open is tried."""
+    look_m: NonNegative = 1.5
+    """So near to such a gap it drives up to it: it costs little more to know than to guess."""
     stall_s: Positive = 10.0
     stall_progress_m: Positive = 0.5
     most_stalls: int = Field(default=6, ge=0)
@@ -82,7 +84,7 @@ class PlanAhead:
             progress_m, patience_s(config.stall_s, progress_m, robot.motion.top_speed_m_s)
         )
         squeezing_m = config.squeezing_s * robot.motion.top_speed_m_s
-        self._detours = Detours(config.detour_m, config.tight_m, squeezing_m, config.hidden_m)
+        self._detours = Detours(config.detour_m, config.tight_m, squeezing_m, config.hidden_m, config.look_m)
         self._stalls, self._planned_s = 0, -math.inf
         self._path: FloatArray = np.zeros((0, 2))
         self.to_go_m = math.inf
