@@ -7,13 +7,17 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
+from types import FrameType
+from typing import Any
 
 import pytest
 
 from pilotage.cli.main import main
-from support.hostile_studies import TESTS, expected, rows_of
+from pilotage.experiments.studies.store import Store
+from support.hostile_studies import TESTS, expected, rows_of, study_of
 
 SLOW = f"""
 import sys
@@ -104,3 +108,45 @@ def test_a_signal_ends_it_without_orphans(
     assert main([*sweep, "--quiet"]) == 0
     assert [row["metrics"] for row in rows_of(tmp_path / "x")] == [expected(row) for row in range(18)]
     assert {row["attempts"] for row in rows_of(tmp_path / "x")} == {1}
+
+
+@contextmanager
+def interrupted_at(step: int) -> Iterator[None]:
+    """Ctrl-C at one step of the interpreter within a transaction of the store."""
+    steps = 0
+
+    def trace(frame: FrameType, event: str, _: Any) -> Any:
+        nonlocal steps
+        if frame.f_code is not Store._transaction.__wrapped__.__code__:  # type: ignore[attr-defined]
+            return trace if frame.f_code.co_name in {"claim", "_written", "__enter__", "__exit__"} else None
+        frame.f_trace_opcodes = True
+        steps += event == "opcode"
+        if steps == step:
+            steps += 1
+            raise KeyboardInterrupt
+        return trace
+
+    before = sys.gettrace()
+    sys.settrace(trace)
+    try:
+        yield
+    finally:
+        sys.settrace(before)
+
+
+def test_an_interrupt_gives_claims_back_wherever_it_strikes(tmp_path: Path) -> None:
+    struck, step = True, 0
+    while struck:
+        step += 1
+        folder = tmp_path / str(step)
+        store = Store(folder, study_of())
+        store.claim(2)
+        try:
+            with interrupted_at(step):
+                store.claim(1)
+            struck = False
+        except KeyboardInterrupt:
+            pass
+        store.close()
+        assert {row["status"] for row in rows_of(folder)} == {"pending"}, step
+    assert step > 10  # so many places there are at least

@@ -105,6 +105,8 @@ class Store:
         """Give back what this process has claimed."""
         ENDED.add(self._owner)
         try:
+            if self._db.in_transaction:  # Ctrl-C struck between its beginning and what would have ended it
+                self._db.execute("rollback")
             with telling(self.path), self._transaction():
                 self._db.execute(
                     "update trials set status = 'pending', owner = null, attempts = attempts - 1 "
