@@ -510,3 +510,24 @@ class TestMuseum:
         with pytest.raises(InputError, match=told) as caught:
             build(load_mission("museum-patrol", overrides))
         assert "\n" not in str(caught.value)
+
+
+def test_one_alone_drives_through_doors_without_stumbling() -> None:
+    """It kept to the right of the middle of doors for one, where a lane is of no use, 2 cm from what it keeps
+    from their edges: a round took 1.4 times as long as at full speed."""
+    values = read_mission("museum-patrol")
+    # Four rooms of 5 m, with doors of 1 m: none of them is driven through straight.
+    walls = [[0, 0, 10, 0], [10, 0, 10, 10], [10, 10, 0, 10], [0, 10, 0, 0]]
+    for low in (0, 5):
+        walls += [
+            [5, low, 5, low + 2],
+            [5, low + 3, 5, low + 5],
+            [low, 5, low + 2, 5],
+            [low + 3, 5, low + 5, 5],
+        ]
+    values["world"] = {"map": {"map": "rooms", "bounds_m": [0, 0, 10, 10], "walls_m": walls}}
+    values["team"] = {"size": 1, "strategy": "adaptive-rounds"}
+    values["task"], values["run"]["time_limit_s"] = {"name": "patrol", "duration_s": 120.0}, 120.0
+    metrics = judged(values, 1)
+    assert metrics["idleness_worst_s"] < 1.25 * metrics["idleness_bound_s"]
+    assert metrics["collisions"] == 0

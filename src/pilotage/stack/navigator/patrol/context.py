@@ -48,8 +48,6 @@ class Context(Senses):
         What it tells others to do while it goes first.
     pursuit, headway
         Of the one ahead in the passage; its own towards its hop.
-    pass_m
-        Half the width of what has room for two.
     battery
         What it reckons of its own; None where it never has to charge.
     """
@@ -65,7 +63,6 @@ class Context(Senses):
     ) -> None:
         super().__init__(config, robot, chart, task, start, journal)
         speed, clearance_m = self.speed_m_s, self.radius_m + config.plan_margin_m
-        self.pass_m = 2.0 * self.radius_m + config.plan_margin_m + 0.5 * config.gap_m
         self.claim: Claim | None = None
         self.clearing: Clearing | None = None
         self._has_news, self.pursuit, self.headway = False, Pursuit(), Headway()

@@ -116,7 +116,9 @@ class Motion:
         if not senses.fresh:
             return self.command
         room_m = self.room_ahead_m(time)[1]
-        lane_m = min(config.lane_m, max(0.0, room_m - self._clearance_m)) if room_m < math.inf else 0.0
+        # Where nobody can pass a lane would lead into the door's edge.
+        passable = senses.pass_m <= room_m < math.inf
+        lane_m = min(config.lane_m, max(0.0, room_m - self._clearance_m)) if passable else 0.0
         lane_m *= min(1.0, self.to_go_s / MERGE_S)
         self.blocked = self.taken = False
         beside, still = self._beside(), self.standing

@@ -57,6 +57,8 @@ class Senses:
         Between two scans.
     radius_m, speed_m_s
         Its own, at most.
+    pass_m
+        Half the width of what has room for two.
     """
 
     def __init__(
@@ -70,6 +72,7 @@ class Senses:
     ) -> None:
         self.config, self.task, self.journal = config, task, journal
         self.dt_s, self.radius_m, self.speed_m_s = robot.dt_s, robot.radius_m, robot.motion.top_speed_m_s
+        self.pass_m = 2.0 * self.radius_m + config.plan_margin_m + 0.5 * config.gap_m
         self._lidar, lidar = robot.one_sensor(LidarConfig, "navigator 'patrol'")
         self._odometry, _ = robot.one_sensor(WheelOdometryConfig, "navigator 'patrol'")
         self._radio = next(iter(robot.sensors_of(RadioConfig)), None)
