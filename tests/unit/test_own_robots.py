@@ -38,12 +38,20 @@ def floor(tmp_path: Path) -> Callable[[float], str]:
     return write
 
 
-def drive(floor: str, robot: dict[str, Any], time_limit_s: float = 90.0, **stack: Any) -> pl.Run:
+def drive(
+    floor: str,
+    robot: dict[str, Any],
+    time_limit_s: float = 90.0,
+    goal: dict[str, Any] | None = None,
+    task: Any = "reach",
+    **stack: Any,
+) -> pl.Run:
     """Run it on the given map; the pose is known so that driving alone is judged."""
     mission = {
         "mission": "own",
-        "world": {"map": floor, "start": START, "goal": GOAL},
-        "robot": robot | {"sensors": {"odometry": {"name": "wheel-odometry"}}},
+        "world": {"map": floor, "start": START, "goal": GOAL | (goal or {})},
+        "robot": robot | {"sensors": {"odometry": {"name": "wheel-odometry"}, "laser": {"name": "lidar"}}},
+        "task": task,
         "stack": {"initial": {"x_var_m2": 0.0, "y_var_m2": 0.0, "theta_var_rad2": 0.0}} | stack,
         "run": {"time_limit_s": time_limit_s, "oracles": ["localizer"]},
     }
@@ -135,7 +143,7 @@ def test_a_robot_that_crawls_is_given_time(floor: Callable[[float], str]) -> Non
     """At 2 cm/s it makes 0.4 m in the time in which others are taken to be stuck."""
     slow = DISC | {"motion": {"name": "differential-drive", "max_speed_m_s": 0.02}}
     local = {"name": "dubins", "speed_m_s": 0.02}
-    stack = {"planner": "theta-star", "local_planner": local, "controller": "kanayama"}
+    stack: dict[str, Any] = {"planner": "theta-star", "local_planner": local, "controller": "kanayama"}
     run = drive(floor(0.9), slow, 400.0, navigator="goal", **stack)
     assert run.success, run.reason
 
@@ -145,3 +153,40 @@ def test_who_is_left_behind_by_its_curve_does_not_say_that_it_arrived(floor: Cal
     run = drive(floor(0.9), lame, navigator="curve", planner="theta-star", controller="kanayama")
     assert not run.success
     assert run.reason.startswith("the reference is at the curve's end, the robot ")
+
+
+LOCAL: dict[str, Any] = {"navigator": "local", "planner": "theta-star", "local_controller": "pure-pursuit"}
+DRIVERS: list[dict[str, Any]] = [
+    LOCAL,
+    {"navigator": "goal", "planner": "theta-star", "local_planner": "dubins", "controller": "kanayama"},
+]
+
+
+@pytest.mark.parametrize("stack", DRIVERS, ids=lambda stack: stack["navigator"])
+@pytest.mark.parametrize("heading_rad", [-2.0, 2.9])
+def test_it_turns_to_the_heading_of_its_goal(
+    floor: Callable[[float], str], stack: dict[str, Any], heading_rad: float
+) -> None:
+    """It stopped as it came, and its run failed for that: 'stands 0.01 m from its goal'."""
+    goal = {"theta_rad": heading_rad, "tolerance_rad": 0.3}
+    run = drive(floor(0.9), DISC, goal=goal, **stack)
+    assert run.success, run.reason
+    assert abs(run.metrics["goal_error_rad"]) <= 0.3
+
+
+def test_who_stands_the_wrong_way_is_told_so(floor: Callable[[float], str]) -> None:
+    goal = {"theta_rad": -2.0, "tolerance_rad": 0.1}
+    run = drive(floor(1.5), CAR, goal=goal, **DRIVERS[1], smoother="shortcut")
+    assert not run.success
+    assert run.reason.endswith(" degrees off its goal's heading")
+
+
+@pytest.mark.parametrize("navigator", ["local", "maneuver", "curve", "pose"])
+def test_further_goals_are_refused_by_who_drives_to_one(
+    floor: Callable[[float], str], navigator: str
+) -> None:
+    """They were not visited, and nothing said why."""
+    task = {"name": "reach", "goals": [{"x_m": 1.5, "y_m": 3.0}]}
+    stack = LOCAL | {"navigator": navigator, "controller": "kanayama"}
+    with pytest.raises(pl.InputError, match=f"'{navigator}': expected one goal, found 2.*navigator goal"):
+        drive(floor(0.9), DISC, task=task, **stack)

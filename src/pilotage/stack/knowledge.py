@@ -88,6 +88,8 @@ class TaskKnowledge:
         Places to go to, in order; none where the task has none.
     goal_tolerance_m
         A goal is reached this near to it: the least of the goals' tolerances.
+    goal_tolerance_rad
+        Of the last goal's heading, where it has one; pi where any will do.
     time_limit_s
         When the run ends at the latest.
     pose_given
@@ -97,6 +99,7 @@ class TaskKnowledge:
     initial: Belief
     goals: tuple[Goal, ...] = ()
     goal_tolerance_m: float = math.inf
+    goal_tolerance_rad: float = math.pi
     time_limit_s: float = math.inf
     pose_given: Callable[[], Pose2] | None = None
 

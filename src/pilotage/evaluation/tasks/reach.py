@@ -106,11 +106,12 @@ class ReachTask(WatchedTask):
         last = robot.goals[-1]
         away_m = math.hypot(truth[-1, 0] - last.x_m, truth[-1, 1] - last.y_m)
         metrics["goal_error_m"] = away_m
-        reached = away_m <= last.tolerance_m
+        reached, off = away_m <= last.tolerance_m, f"{away_m:.2f} m from its goal"
         if last.theta_rad is not None:
             turned = wrap_to_pi(truth[-1, 2] - last.theta_rad)
             metrics["goal_error_rad"] = turned
-            reached = reached and abs(turned) <= last.tolerance_rad
+            if reached and abs(turned) > last.tolerance_rad:
+                reached, off = False, f"{math.degrees(abs(turned)):.0f} degrees off its goal's heading"
         missed: GoalConfig | None = None
         if len(robot.goals) > 1:
             metrics |= rounds_metrics(robot)
@@ -120,7 +121,7 @@ class ReachTask(WatchedTask):
         done = robot.arrived or (self._ends_there and run.ending == THERE)
         metrics["success"] = done and robot.collisions == 0 and reached and missed is None and not contacts
         if robot.arrived and not reached:
-            metrics["reason"] = f"the robot says it arrived, but stands {away_m:.2f} m from its goal"
+            metrics["reason"] = f"the robot says it arrived, but stands {off}"
         elif robot.arrived and missed is not None:
             metrics["reason"] = (
                 f"the robot says it arrived, but came not within {missed.tolerance_m:g} m of "

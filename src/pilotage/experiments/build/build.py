@@ -302,6 +302,7 @@ def _member(
         initial=initial,
         goals=tuple(map(goal_of, goals)),
         goal_tolerance_m=min((place.tolerance_m for place in goals), default=np.inf),
+        goal_tolerance_rad=goals[-1].tolerance_rad if goals else np.pi,
         time_limit_s=mission.run.time_limit_s,
         pose_given=truth.tell_pose if "localizer" in oracles else None,
     )

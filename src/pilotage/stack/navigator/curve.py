@@ -18,7 +18,13 @@ from pilotage.stack.interface import NAVIGATORS, Belief, PlannedPath, StackStatu
 from pilotage.stack.journal import Journal
 from pilotage.stack.knowledge import RobotKnowledge, TaskKnowledge
 from pilotage.stack.navigator.cells import CellRoute, CostMapConfig, curve_along, grid_of, route_over_cells
-from pilotage.stack.navigator.navigator import DISC_HINT, Parts, arrival_within_m, check_keeps_time
+from pilotage.stack.navigator.navigator import (
+    DISC_HINT,
+    Parts,
+    arrival_within_m,
+    check_keeps_time,
+    only_goal,
+)
 from pilotage.stack.navigator.timed_path import laid_out
 from pilotage.stack.planning.grid_planner import GridPlanner
 from pilotage.stack.planning.quintic_spline import QuinticSpline
@@ -71,7 +77,7 @@ class CurveNavigator:
         parts: Parts,
         journal: Journal,
     ) -> None:
-        goal = task.goal
+        goal = only_goal(task, "curve")
         check_keeps_time(parts, "curve")
         if goal is None or not hasattr(parts.planner, "search"):
             raise InputError(

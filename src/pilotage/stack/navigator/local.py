@@ -25,6 +25,9 @@ from pilotage.stack.navigator.navigator import (
     Parts,
     arrival_within_m,
     check_for_centre,
+    only_goal,
+    turn_at_goal_rad,
+    turned_by,
     unexplained_of,
 )
 from pilotage.stack.navigator.plan_ahead import PlanAhead, PlanAheadConfig
@@ -59,11 +62,11 @@ class LocalNavigator(LocalizingNavigator):
     """Hands laser, odometry and goal to the local controller, and its command on.
 
     The controller sees poses that are integrated from the odometry alone, which drift but do not jump.
-    Without a localizer the belief is dead reckoned; with one the goal stays where the localizer has it.
-    With a planner the controller is led along its plan on the robot's own map, to which a mapper adds what
-    it sees; without, it heads for the goal itself, which fails where the way leads far around. Between two
-    scans the last command stands. Fails where the robot cannot turn on the spot: the controllers reckon
-    with it.
+    Where the goal has a heading it turns to it on the spot, if its corners have room there. Without a
+    localizer the belief is dead reckoned; with one the goal stays where the localizer has it. With a planner
+    the controller is led along its plan on the robot's own map, to which a mapper adds what it sees; without,
+    it heads for the goal itself, which fails where the way leads far around. Between two scans the last
+    command stands. Fails where the robot cannot turn on the spot: the controllers reckon with it.
     """
 
     def __init__(
@@ -75,12 +78,14 @@ class LocalNavigator(LocalizingNavigator):
         parts: Parts,
         journal: Journal,
     ) -> None:
-        if task.goal is None:
+        goal = only_goal(task, "local")
+        if goal is None:
             raise InputError("navigator 'local': expected world.goal, found none")
         if parts.local_controller is None:
             raise InputError("navigator 'local': expected stack.local_controller, found none")
         check_for_centre(parts, "local")
-        self._goal_xy_m = (task.goal.x_m, task.goal.y_m)
+        self._goal_xy_m, self._task = (goal.x_m, goal.y_m), task
+        self._robot = robot
         self._drive = LocalDrive(
             parts.local_controller,
             robot,
@@ -106,7 +111,7 @@ class LocalNavigator(LocalizingNavigator):
                 config.plan,
                 robot,
                 chart,
-                task.goal,
+                goal,
                 parts.planner,
                 parts.smoother,
                 parts.mapper,
@@ -139,9 +144,12 @@ class LocalNavigator(LocalizingNavigator):
         command = self._drive.toward(
             point, belief, readings, min(PASSING_M, tolerance_m) if led else tolerance_m, self._bodies.about
         )
+        off_rad = turn_at_goal_rad(self._task, pose) if not led and self._has_room_to_turn() else 0.0
+        if off_rad and self._drive.status == "arrived":
+            command = turned_by(off_rad, self._robot.motion.top_turn_rate_rad_s)
         if self._plan is not None:
             command = self._among_people(readings.t_s, command, pose, self._plan.mapped_m)
-        self._tell(readings.t_s, led=led)
+        self._tell(readings.t_s, there=not (led or off_rad))
         return STOP if self._status is not StackStatus.RUNNING else command
 
     def _among_people(self, t_s: float, command: Twist, pose: Pose2, mapped_m: FloatArray) -> Twist:
@@ -162,9 +170,13 @@ class LocalNavigator(LocalizingNavigator):
                 command = room
         return command if self._gives_way.allows(command, pose, mapped_m) else STOP
 
-    def _tell(self, t_s: float, *, led: bool) -> None:
+    def _has_room_to_turn(self) -> bool:
+        """Whether no corner can touch what the last scan shows: a turn changes no distance from the axle."""
+        return self._robot.footprint.is_disc or self._drive.nearest_seen_m() > self._robot.radius_m
+
+    def _tell(self, t_s: float, *, there: bool) -> None:
         word = self._drive.status
-        if word == "arrived" and not led:
+        if word == "arrived" and there:
             self._end(t_s, StackStatus.ARRIVED, f"within {self._tolerance_m:g} m of the goal")
         elif word == "closed" and word != self._word:
             self._journal.count("closed")

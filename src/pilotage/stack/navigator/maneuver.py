@@ -20,7 +20,13 @@ from pilotage.stack.interface import NAVIGATORS, StackStatus
 from pilotage.stack.journal import Journal
 from pilotage.stack.knowledge import RobotKnowledge, TaskKnowledge
 from pilotage.stack.navigator.global_plan import GlobalPlan
-from pilotage.stack.navigator.navigator import LocalizingNavigator, Parts, check_keeps_time, localizer_of
+from pilotage.stack.navigator.navigator import (
+    LocalizingNavigator,
+    Parts,
+    check_keeps_time,
+    localizer_of,
+    only_goal,
+)
 from pilotage.stack.navigator.timed_path import laid_out, with_turns
 
 MOST_REPLANS = 8
@@ -64,13 +70,14 @@ class ManeuverNavigator(LocalizingNavigator):
         parts: Parts,
         journal: Journal,
     ) -> None:
-        if task.goal is None or parts.planner is None:
+        goal = only_goal(task, "maneuver")
+        if goal is None or parts.planner is None:
             raise InputError("navigator 'maneuver': expected world.goal and stack.planner, found one missing")
         super().__init__(localizer_of(parts, "maneuver"), journal)
         self._channel = journal.channel(
             {"ref_x_m": "m", "ref_y_m": "m", "ref_theta_rad": "rad", "distance_to_go_m": "m"}, first=True
         )
-        self._config, self._robot, self._goal = config, robot, task.goal
+        self._config, self._robot, self._goal = config, robot, goal
         check_keeps_time(parts, "maneuver")
         self._controller: Controller = parts.controller or KanayamaController(config.tracking, robot)
         rng = robot.streams.stream("planner")

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
+from pilotage.core.angles import wrap_to_pi
 from pilotage.core.errors import InputError
+from pilotage.core.types import Goal, Pose2, Twist
 from pilotage.stack.control.controller import Controller
 from pilotage.stack.control.escape import Escape
 from pilotage.stack.control.local.role import LocalController
 from pilotage.stack.control.reactive import Reactive
 from pilotage.stack.interface import Belief, StackStatus
 from pilotage.stack.journal import Journal
+from pilotage.stack.knowledge import TaskKnowledge
 from pilotage.stack.localization.heading_filter import HeadingFilter
 from pilotage.stack.localization.localizer import Localizer
 from pilotage.stack.mapping.mapper import Mapper
@@ -21,6 +25,8 @@ from pilotage.stack.planning.planner import Planner, Smoother
 
 DISC_HINT = " (for the disc around the robot; navigator maneuver and planner hybrid-astar drive its outline)"
 """Where a disc finds no path, and the body is none."""
+TURN_GAIN_PER_S, TURN_RATE_RAD_S = 2.0, 0.8
+"""Turned on the spot no faster than this, slower towards the end."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,6 +53,31 @@ def arrival_within_m(arrival_m: float | None, goal_tolerance_m: float) -> float:
     stands outside it in every second run. Nor does it help to say more than the tolerance.
     """
     return min(0.5 * goal_tolerance_m if arrival_m is None else arrival_m, goal_tolerance_m)
+
+
+def only_goal(task: TaskKnowledge, needed_by: str) -> Goal | None:
+    """The goal of a navigator that drives to one, None without; InputError where there are several."""
+    if len(task.goals) > 1:
+        raise InputError(
+            f"navigator '{needed_by}': expected one goal, found {len(task.goals)} (world.goal and the "
+            "task's); navigator goal drives to several, navigator chain with a navigator for each"
+        )
+    return task.goal
+
+
+def turn_at_goal_rad(task: TaskKnowledge, pose: Pose2) -> float:
+    """How far to turn for the last goal's heading; 0 within half its tolerance, and where any will do."""
+    asked_rad = task.goals[-1].theta_rad
+    if asked_rad is None or task.goal_tolerance_rad >= math.pi:
+        return 0.0
+    off_rad = wrap_to_pi(asked_rad - pose.theta_rad)
+    return off_rad if abs(off_rad) > 0.5 * task.goal_tolerance_rad else 0.0
+
+
+def turned_by(off_rad: float, top_rad_s: float) -> Twist:
+    """The command that turns on the spot by so much."""
+    most = min(TURN_RATE_RAD_S, top_rad_s)
+    return Twist(0.0, min(max(TURN_GAIN_PER_S * off_rad, -most), most))
 
 
 class LocalizingNavigator:

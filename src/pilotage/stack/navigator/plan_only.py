@@ -11,7 +11,7 @@ from pilotage.stack.interface import NAVIGATORS, StackStatus
 from pilotage.stack.journal import Journal
 from pilotage.stack.knowledge import RobotKnowledge, TaskKnowledge
 from pilotage.stack.navigator.global_plan import GlobalPlan
-from pilotage.stack.navigator.navigator import LocalizingNavigator, Parts, localizer_of
+from pilotage.stack.navigator.navigator import LocalizingNavigator, Parts, localizer_of, only_goal
 
 
 class PlanOnlyConfig(Config):
@@ -32,7 +32,8 @@ class PlanOnlyNavigator(LocalizingNavigator):
         journal: Journal,
     ) -> None:
         del config
-        if task.goal is None or parts.planner is None:
+        goal = only_goal(task, "plan-only")
+        if goal is None or parts.planner is None:
             raise InputError(
                 "navigator 'plan-only': expected world.goal and stack.planner, found one missing"
             )
@@ -41,7 +42,7 @@ class PlanOnlyNavigator(LocalizingNavigator):
         plan = GlobalPlan(parts.planner, parts.smoother, chart, rng, journal, robot=robot)
         nothing = chart.walls.circles_m[:0]
         journal.result("mapped_circles_m", lambda: nothing)
-        result = plan.make(0.0, self.belief.pose, task.goal, nothing, (plan.clearance_m,))
+        result = plan.make(0.0, self.belief.pose, goal, nothing, (plan.clearance_m,))
         if result.path is None:
             self._end(0.0, StackStatus.FAILED, f"{result.status}: {result.reason}")
         else:

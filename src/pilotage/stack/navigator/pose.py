@@ -14,7 +14,13 @@ from pilotage.stack.control.polar_pose import PolarPoseConfig, PolarPoseControll
 from pilotage.stack.interface import NAVIGATORS, StackStatus
 from pilotage.stack.journal import Journal
 from pilotage.stack.knowledge import RobotKnowledge, TaskKnowledge
-from pilotage.stack.navigator.navigator import LocalizingNavigator, Parts, arrival_within_m, localizer_of
+from pilotage.stack.navigator.navigator import (
+    LocalizingNavigator,
+    Parts,
+    arrival_within_m,
+    localizer_of,
+    only_goal,
+)
 
 
 class PoseConfig(PolarPoseConfig):
@@ -42,7 +48,7 @@ class PoseNavigator(LocalizingNavigator):
         journal: Journal,
     ) -> None:
         del chart
-        goal = task.goal
+        goal = only_goal(task, "pose")
         if goal is None or goal.theta_rad is None:
             raise InputError("navigator 'pose': expected world.goal with theta_rad, found none")
         super().__init__(localizer_of(parts, "pose"), journal)

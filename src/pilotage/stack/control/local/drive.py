@@ -56,6 +56,7 @@ class LocalDrive:
         self._pose, self._goal_there = start, goal_xy_m
         self._twist, self._command, self._moved_s = STOP, STOP, 0.0
         self._twist_vars = 0.0, 0.0
+        self._ranges_m: FloatArray = np.zeros(0)
 
     @property
     def status(self) -> str:
@@ -104,7 +105,17 @@ class LocalDrive:
             self._place(goal_xy_m, belief.pose, 0.0 if sure else min(self._shift_m, 0.5 * tolerance_m))
             view = self._view(readings.t_s, scan.ranges_m, tolerance_m, people_about, goal_is_sure=sure)
             self._command = self._controller.step(view)
+            self._ranges_m = scan.ranges_m
         return self._command
+
+    def nearest_seen_m(self) -> float:
+        """Distance from the axle to the nearest of what the last scan shows; nan without one."""
+        if not len(self._ranges_m):
+            return math.nan
+        angles = self._angles + self._mount.theta_rad
+        x_m = self._mount.x_m + self._ranges_m * np.cos(angles)
+        y_m = self._mount.y_m + self._ranges_m * np.sin(angles)
+        return float(np.fmin.reduce(np.hypot(x_m, y_m)))
 
     def _place(self, goal_xy_m: tuple[float, float], belief: Pose2, shift_m: float) -> None:
         """Place the goal in the odometry's frame as it lies from where the robot believes to be."""

@@ -22,7 +22,14 @@ from pilotage.stack.navigator.following import WaypointFollower
 from pilotage.stack.navigator.global_plan import GlobalPlan
 from pilotage.stack.navigator.goal.wandering import Wandering
 from pilotage.stack.navigator.goal_config import GoalNavigatorConfig, Mode
-from pilotage.stack.navigator.navigator import Parts, arrival_within_m, localizer_of, unexplained_of
+from pilotage.stack.navigator.navigator import (
+    TURN_RATE_RAD_S,
+    Parts,
+    arrival_within_m,
+    localizer_of,
+    turn_at_goal_rad,
+    unexplained_of,
+)
 from pilotage.stack.navigator.own_map import OwnMap
 from pilotage.stack.navigator.progress import PathProgress, StallWatch, patience_s
 from pilotage.stack.perception.moving_bodies import MovingBodies
@@ -37,9 +44,6 @@ MAPPED_TOLERANCE_M = 0.02
 
 SETTING_OUT_M = 0.1
 """A plan that begins with a turn on the spot is still at its beginning."""
-
-TURN_RATE_RAD_S = 0.8
-"""On the spot, where the plan does."""
 
 SOMEBODY_M = 2.0
 """With somebody who walks so near, what is close in front is a reason to give way, not to turn away."""
@@ -82,7 +86,7 @@ class Context:
         self.radius_m, self.is_disc = robot.radius_m, robot.footprint.is_disc
         self.journal = journal
         self.goals: list[Goal] = list(task.goals)
-        self._tolerance_m = task.goal_tolerance_m
+        self._task, self._tolerance_m = task, task.goal_tolerance_m
         self._arrival_m = min(config.arrival_m, arrival_within_m(None, task.goal_tolerance_m))
         self.turns_on_the_spot = robot.motion.least_turning_radius_m == 0.0
         # Without a mapper it minds nothing but its map: who shows it wrong scans shows it nobody.
@@ -264,6 +268,10 @@ class Context:
         if self.to_go_m > away + self._tolerance_m:
             return False
         return away <= self._arrival_m or (away <= self._tolerance_m and self.to_go_m < 0.02)
+
+    def turn_at_goal_rad(self, pose: Pose2) -> float:
+        """How far to turn at the last goal; 0 where its heading is met, or the robot cannot turn so."""
+        return turn_at_goal_rad(self._task, pose) if self.turns_on_the_spot else 0.0
 
     def turn_to_plan_rad(self, pose: Pose2) -> float:
         """How far to turn to head as the plan does here; 0 where the plan, or the robot, does not turn so."""

@@ -14,9 +14,10 @@ from pilotage.stack.navigator.goal.ended import arrive
 from pilotage.stack.navigator.goal.escaping import begin_escape, make_room, replan, set_out
 from pilotage.stack.navigator.goal.state import Move, State
 from pilotage.stack.navigator.goal_config import Mode
+from pilotage.stack.navigator.navigator import turned_by
 
-ALIGNED_RAD, TURN_GAIN_PER_S = 0.1, 2.0
-"""Turned on the spot until this near to the plan's heading, slower towards the end."""
+ALIGNED_RAD = 0.1
+"""Turned on the spot until this near to the plan's heading."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -176,7 +177,8 @@ def _follow(context: Context, state: Following, pose: Pose2) -> Move:
         if not context.replan_locally(pose):
             off_rad = context.turn_to_plan_rad(pose) if state.turns else 0.0
             if abs(off_rad) > ALIGNED_RAD:
-                return Move(state, _turn(context, off_rad))
+                context.mode = Mode.FOLLOW  # the plan turns here, and no curve leads on
+                return Move(state, turned_by(off_rad, context.turn_rate_rad_s))
             return replan(
                 context, Following(context), pose, "no next waypoint can be reached on the robot's own map"
             )
@@ -195,16 +197,13 @@ def _follow(context: Context, state: Following, pose: Pose2) -> Move:
     return Move(state, command)
 
 
-def _turn(context: Context, off_rad: float) -> Twist:
-    """On the spot: the plan does so here, and no curve leads on."""
-    context.mode = Mode.FOLLOW
-    most = context.turn_rate_rad_s
-    return Twist(0.0, min(max(TURN_GAIN_PER_S * off_rad, -most), most))
-
-
 def _reach(context: Context, state: Following, pose: Pose2) -> Move:
     """A goal is reached: on to the next, or the end."""
     if len(context.goals) == 1:
+        off_rad = context.turn_at_goal_rad(pose)
+        if off_rad:
+            context.mode = Mode.FOLLOW
+            return Move(state, turned_by(off_rad, context.turn_rate_rad_s))
         return arrive(context)
     context.goals.pop(0)
     reached = context.journal.count("goals")
