@@ -107,6 +107,17 @@ def test_it_arrives_when_its_controller_says_so_and_stays() -> None:
     assert [event.kind for event in told.journal.events] == ["arrived"]
 
 
+def test_who_went_astray_by_its_scans_is_shown_the_goal_anew() -> None:
+    """A controller slid along a bare aisle by its scans and said that it was there, 0.7 m away."""
+    noting = Noting()
+    stack = navigator(noting, told_of(start=START), Jumping())
+    noting.status = "arrived"
+    for step in range(1, 4):
+        stack.step(readings(0.1 * step, 0.0, 0.0))
+    assert stack.status[0] is StackStatus.RUNNING
+    assert [view.goal_is_sure for view in noting.views] == [False, True, True]
+
+
 def test_limits_are_those_of_the_data_sheet() -> None:
     robot = replace(
         told_of().robot,

@@ -35,6 +35,8 @@ from pilotage.stack.localization.self_check import NOISE_SHARE, SelfCheck
 
 NAME = "invariant-ekf-landmarks"
 NOTHING = np.zeros(0, dtype=np.int64), np.zeros(0), np.zeros(0)
+LEAST_VAR = 1e-12
+"""Of each coordinate (m^2) and the heading (rad^2) at the start."""
 
 
 class InvariantEkfConfig(Config):
@@ -86,6 +88,8 @@ class InvariantEkfLocalizer:
         self._gate = chi_square_quantile(config.gate, 2)
         self._expected_nis = gated_mean(self._gate, 2)
         self._state, self._cov = initial.pose.as_array(), initial.cov.copy()
+        # Sightings are weighed against the inverse: a start that is told exactly is so to a micrometre.
+        self._cov[np.diag_indices(3)] = np.maximum(self._cov.diagonal(), LEAST_VAR)
         self._anchor = np.full(1, -1, dtype=np.int64)
         self._mean: FloatArray = np.empty(3)
         self._spread: FloatArray = np.empty((3, 3))

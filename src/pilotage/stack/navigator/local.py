@@ -94,6 +94,7 @@ class LocalNavigator(LocalizingNavigator):
             shift_m=config.shift_m,
             needed_by="navigator 'local'",
             goal_xy_m=self._goal_xy_m,
+            localized=not isinstance(parts.localizer, DeadReckoningLocalizer | None),
         )
         localizer: Localizer = parts.localizer or DeadReckoningLocalizer(
             DeadReckoningConfig(), robot, chart, task.initial, journal

@@ -30,7 +30,8 @@ class LocalDrive:
     The controller sees poses that are integrated from the odometry alone, which drift but do not jump. The
     goal is placed anew in them where the localizer's correction moves it farther than ``shift_m``; one that
     has to be met more closely at every step once it is near, if the belief is as close, and else where the
-    correction is more than half its tolerance.
+    correction is more than half its tolerance. A controller that corrects its own pose by scans may go astray:
+    where it says that it is there and the belief, if ``localized``, says otherwise, the goal is placed anew.
     """
 
     def __init__(
@@ -43,6 +44,7 @@ class LocalDrive:
         shift_m: float = 0.1,
         needed_by: str,
         goal_xy_m: tuple[float, float] = (math.nan, math.nan),
+        localized: bool = False,
     ) -> None:
         self._controller, self._shift_m = controller, shift_m
         self._lidar, self._scanner = robot.one_sensor(LidarConfig, needed_by)
@@ -57,11 +59,12 @@ class LocalDrive:
         self._twist, self._command, self._moved_s = STOP, STOP, 0.0
         self._twist_vars = 0.0, 0.0
         self._ranges_m: FloatArray = np.zeros(0)
+        self._localized, self._astray = localized, False
 
     @property
     def status(self) -> str:
         """What the controller does, in a word."""
-        return self._controller.status
+        return "astray" if self._astray else self._controller.status
 
     def move(self, readings: Readings) -> None:
         """Integrate the odometry, and take the speeds from it; to be called at every step."""
@@ -101,11 +104,14 @@ class LocalDrive:
             # Farther off the heading's error counts as well.
             away_m = math.hypot(goal_xy_m[0] - belief.pose.x_m, goal_xy_m[1] - belief.pose.y_m)
             near = away_m < SURE_WITHIN_M and tolerance_m < self._shift_m
-            sure = near and _std_m(belief) < 0.5 * tolerance_m
-            self._place(goal_xy_m, belief.pose, 0.0 if sure else min(self._shift_m, 0.5 * tolerance_m))
+            sure = self._astray or (near and _std_m(belief) < 0.5 * tolerance_m)
+            off_m = min(self._shift_m, 0.5 * tolerance_m)
+            self._place(goal_xy_m, belief.pose, 0.0 if sure else off_m)
             view = self._view(readings.t_s, scan.ranges_m, tolerance_m, people_about, goal_is_sure=sure)
             self._command = self._controller.step(view)
             self._ranges_m = scan.ranges_m
+            arrived = self._controller.status == "arrived"
+            self._astray = self._localized and arrived and away_m > tolerance_m + off_m
         return self._command
 
     def nearest_seen_m(self) -> float:
