@@ -109,6 +109,11 @@ def test_a_car_is_taken_for_a_disc_where_the_door_is_wide(floor: Callable[[float
         ),
         (
             CAR,
+            {"navigator": "maneuver", "planner": "astar", "smoother": "none"},
+            "hybrid-astar.* or take rrt-star-dubins, or",
+        ),
+        (
+            CAR,
             {"navigator": "maneuver", "planner": "hybrid-astar", "controller": "pi-follower"},
             r"kanayama.*take navigator goal",
         ),

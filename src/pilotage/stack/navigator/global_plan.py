@@ -234,15 +234,16 @@ class GlobalPlan:
         if result.path is None:
             return result, None
         paths = [result.path]
-        smoothed = self._smoother is not None and not result.given
-        if self._smoother is not None and smoothed:
-            paths.insert(0, self._smoother.smooth(result.path, request, clearance_m))
+        if self._smoother is not None and not result.given:
+            smoothed = self._smoother.smooth(result.path, request, clearance_m)
+            if smoothed is not result.path:
+                paths.insert(0, smoothed)
         for path in paths:
             why = self._cannot_drive(path, request, clearance_m)
             if not why:
                 return result, path
         # Nearer to walls an outline fits no better; curves in place of corners may find more room there.
-        self.hopeless = not (self.too_tight and smoothed)
+        self.hopeless = not (self.too_tight and len(paths) > 1)
         return replace(result, status=PlanStatus.NO_PATH, reason=why, path=None), None
 
     def _cannot_drive(self, path: Path, request: PlanRequest, clearance_m: float) -> str:

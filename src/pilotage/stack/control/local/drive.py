@@ -30,8 +30,9 @@ class LocalDrive:
     The controller sees poses that are integrated from the odometry alone, which drift but do not jump. The
     goal is placed anew in them where the localizer's correction moves it farther than ``shift_m``; one that
     has to be met more closely at every step once it is near, if the belief is as close, and else where the
-    correction is more than half its tolerance. A controller that corrects its own pose by scans may go astray:
-    where it says that it is there and the belief, if ``localized``, says otherwise, the goal is placed anew.
+    correction is more than half its tolerance. A controller that corrects its own pose by scans may
+    go astray: where it says that it is there and the belief, if ``localized``, says otherwise, the goal is
+    placed anew.
     """
 
     def __init__(
