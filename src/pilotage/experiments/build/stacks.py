@@ -26,6 +26,7 @@ from pilotage.stack.control.reactive import REACTIVES
 from pilotage.stack.interface import NAVIGATORS, Belief, BeliefStatus, Stack
 from pilotage.stack.journal import Journal
 from pilotage.stack.knowledge import RobotKnowledge, TaskKnowledge
+from pilotage.stack.localization.between_increments import in_between
 from pilotage.stack.localization.heading_filter import HEADING_FILTERS, HeadingEstimate, HeadingFilter
 from pilotage.stack.localization.localizer import LOCALIZERS, Localizer
 from pilotage.stack.mapping.mapper import MAPPERS
@@ -169,7 +170,8 @@ def _localizer(
     """The mission's localizer; a navigator may bring its own, or the truth may stand in for it."""
     if config.localizer is None:
         return TrueLocalizer(truth) if truth is not None and "localizer" in oracles else None
-    return build_component(LOCALIZERS, config.localizer, "localizer", robot, chart, task.initial, journal)
+    built = build_component(LOCALIZERS, config.localizer, "localizer", robot, chart, task.initial, journal)
+    return in_between(built, robot)
 
 
 def first_belief(
