@@ -7,6 +7,7 @@ import json
 import math
 import zlib
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -16,10 +17,11 @@ import pytest
 from pilotage.core.errors import InputError
 from pilotage.experiments.sightings import MOST_SCANS, Sightings
 from pilotage.records.run_data import read_run
+from pilotage.records.trace import Trace
 from pilotage.report import write_report
 from pilotage.report.replay.floor import floor_scene
 from pilotage.report.replay.packing import pack
-from pilotage.report.replay.scene import PoseTrack, Raster, ReplayScene
+from pilotage.report.replay.scene import PoseTrack, Raster, ReplayScene, ScanTrack
 from pilotage.report.replay.section import replay_section
 from pilotage.sensors.beacon import BeaconConfig
 from pilotage.sensors.lidar import LidarConfig
@@ -99,6 +101,16 @@ def test_scene_survives_packing(tmp_path: Path) -> None:
     levels = array(scan["ranges"], body)
     ranges = np.where(levels == 65535, np.nan, levels * scan["step_m"])
     np.testing.assert_allclose(ranges, scene.scans[0].ranges_m.reshape(-1), atol=scan["step_m"])
+
+
+def test_scans_of_a_run_recorded_once_a_second_are_those_of_its_frames(tmp_path: Path) -> None:
+    folder = replayable_run(tmp_path / "run", steps=300)
+    run = read_run(folder)
+    seldom = Trace({name: run.trace[name][9::10] for name in run.trace.columns}, 30)
+    scene = floor_scene(replace(run, trace=seldom))
+    assert scene is not None
+    # Of five a second those that a frame has the pose of lie where they were seen.
+    np.testing.assert_allclose(scene.scans[0].t_s, scene.t_s, atol=0.11)
 
 
 def test_a_carried_robot_breaks_the_way(tmp_path: Path) -> None:
@@ -221,6 +233,20 @@ def test_a_lost_robot_has_no_ellipse_but_a_word(browser: Browser, tmp_path: Path
     assert browser.js(f"{PLAYER}.seek(7.0) || {said}") == "lost"
     assert browser.js(f"{PLAYER}.map.ellipse({PLAYER}.scene.poses[1], {PLAYER}.frame)") is None
     assert browser.js(f"{PLAYER}.seek(15.0) || {said}") == ""
+
+
+def test_a_scan_between_two_frames_is_drawn_from_between_them(browser: Browser, tmp_path: Path) -> None:
+    t_s, still, forward = np.arange(4.0), np.zeros(4), np.zeros(1)
+    scan = ScanTrack("scan", np.array([1.5]), np.array([[2.0]]), forward, np.zeros(3), 0, "ink")
+    robot = PoseTrack("robot", 4.0 * t_s, still, still, "ink")
+    page = tmp_path / "page.html"
+    scene = ReplayScene(t_s, (0.0, -5.0, 12.0, 5.0), poses=(robot,), scans=(scan,))
+    page.write_text(f"<!DOCTYPE html><body>{replay_section(scene).html}", encoding="utf-8")
+    browser.open(page, READY)
+    drawn = (
+        "const m = p.map; let at; m.drawScans({fillRect: (x) => { at = x + 2; }}, 2.2); return at - m.px(8);"
+    )
+    assert browser.js(f"(() => {{ const p = {PLAYER}; {drawn} }})()") == pytest.approx(0.0, abs=0.1)
 
 
 def test_cells_fill_in_and_empty_again(browser: Browser, tmp_path: Path) -> None:

@@ -57,7 +57,7 @@ def floor_scene(run: RunData) -> ReplayScene | None:
         return np.where(np.isfinite(values), values, np.nan)
 
     poses = _poses(run, column)
-    scan, thinned_scans = _scan(run, 0)
+    scan, thinned_scans = _scan(run, t_s[frames], 0)
     note = [
         f"One step in {stride} is shown." if stride > 1 else "",
         "Scans are thinned, in time and in beams." if thinned_scans else "",
@@ -188,15 +188,19 @@ def _evenly(n: int, most: int) -> IntArray:
     return np.unique(np.linspace(0, n - 1, min(n, most)).round().astype(np.int64))
 
 
-def _scan(run: RunData, seen_from: int) -> tuple[tuple[ScanTrack, ...], bool]:
+def _scan(run: RunData, frames_s: FloatArray, seen_from: int) -> tuple[tuple[ScanTrack, ...], bool]:
+    """Each frame's nearest scan, thinned: where the robot was between two frames is less sure."""
     seen = run.sightings
     if not seen.ranges_m.size:
         return (), False
-    stride = max(1, math.ceil(seen.ranges_m.size / MOST_SCAN_VALUES))
+    middles = 0.5 * (seen.scan_t_s[1:] + seen.scan_t_s[:-1])
+    nearest = np.unique(np.searchsorted(middles, frames_s - 1e-6))
+    stride = max(1, math.ceil(nearest.size * seen.ranges_m.shape[1] / MOST_SCAN_VALUES))
+    shown = nearest[::stride]
     track = ScanTrack(
         "scan",
-        seen.scan_t_s[::stride],
-        seen.ranges_m[::stride],
+        seen.scan_t_s[shown],
+        seen.ranges_m[shown],
         seen.angles_rad,
         seen.mount,
         seen_from,

@@ -319,13 +319,14 @@ class ReplayMap {
     });
   }
 
-  // A scan stays where it was taken until the next one.
+  // A scan stays where it was taken until the next one, between two frames where the robot was between them.
   drawScans(pen, t) {
     for (const track of this.scene.scans) {
       const k = lastBefore(track.t_s, t + 1e-6), poses = this.scene.poses[track.seen_from];
       if (k < 0 || !this.shows(track) || !poses) continue;
-      const i = Math.max(lastBefore(this.scene.t_s, track.t_s[k] + 1e-4), 0);
-      const x = poses.x_m[i], y = poses.y_m[i], th = poses.theta_rad[i];
+      const at = this.scene.t_s, i = Math.max(lastBefore(at, track.t_s[k] + 1e-4), 0);
+      const since = (track.t_s[k] - at[i]) / (at[i + 1] - at[i]);
+      const [x, y, th] = this.pose(poses, i, since > 1e-3 ? Math.min(since, 1) : 0);
       if (!(x === x && y === y && th === th)) continue;
       const c = Math.cos(th), s = Math.sin(th), beams = track.angles_rad.length;
       const sx = x + c * track.mount[0] - s * track.mount[1], sy = y + s * track.mount[0] + c * track.mount[1];
