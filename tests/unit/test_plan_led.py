@@ -59,6 +59,12 @@ def test_it_drives_around_what_is_on_no_map_and_is_held_against_the_least() -> N
     assert 1.0 <= metrics["time_over_least"] < 1.35
 
 
+def test_who_was_carried_is_held_against_no_least_way() -> None:
+    away = {"world.kidnaps": [{"at_s": 1.0, "to": {"x_m": 7.0, "y_m": 2.0, "theta_rad": 0.0}}]}
+    assert "driven_over_least" in driven(mission((), **{"run.time_limit_s": 3.0}))
+    assert "driven_over_least" not in driven(mission((), **away, **{"run.time_limit_s": 3.0}))
+
+
 def test_without_a_plan_it_ends_and_says_so() -> None:
     closed = {**ROOMS, "walls_m": [*WALLS, [4, 4.4, 4, 6]]}
     metrics = driven(mission((), **{"world.map": closed}))

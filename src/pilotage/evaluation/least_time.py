@@ -53,11 +53,11 @@ def least_drive_metrics(run: FinishedRun, robot: RobotRun) -> dict[str, object]:
 
     From the true start through the goals in the robot's order, each reached where its tolerance begins; the
     time from rest at full acceleration to full speed. Empty where the map has too many walls for the exact
-    path.
+    path, or somebody carried a robot a part of the way.
     """
     chart = run.chart
     walls = chart.walls
-    if chart.open_ground or not robot.goals:
+    if chart.open_ground or not robot.goals or any(event.kind == "kidnap" for event in run.events):
         return {}
     segments = np.concatenate([walls.segments_m, run.obstacle_segments_m])
     circles = np.concatenate([walls.circles_m, run.obstacle_circles_m])

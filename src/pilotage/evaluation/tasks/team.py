@@ -10,6 +10,8 @@ from pilotage.evaluation.finished import FinishedRun, Verdict
 
 SUMMED = frozenset(
     {
+        "alarms",
+        "gave_way",
         "charges",
         "collisions",
         "path_length_m",
@@ -22,7 +24,7 @@ SUMMED = frozenset(
     }
 )
 LEAST = frozenset({"min_clearance_m", "people_closest_m"})
-LARGEST = frozenset({"position_max_m"})
+LARGEST = frozenset({"position_max_m", "silently_wrong_s"})
 
 
 def verdict(each: Sequence[Verdict], run: FinishedRun) -> Verdict:
@@ -42,6 +44,7 @@ def combined(each: Sequence[dict[str, object]], run: FinishedRun) -> dict[str, o
     failed = next((entry for entry in each if not entry["success"]), None)
     metrics: dict[str, object] = dict(each[0] if failed is None else failed)
     metrics["success"] = failed is None
+    metrics.pop("final_error", None)  # of one robot, and no mean of several says anything
     names = [robot.name for robot in run.robots]
     if failed is not None and not run.ending:
         metrics["reason"] = f"{names[each.index(failed)]}: {failed['reason']}"
