@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 from pilotage.core.errors import InputError
+from pilotage.experiments.build.build import build
+from pilotage.experiments.loop import run_loop
 from pilotage.experiments.mission import load_mission
 from pilotage.experiments.run import run_mission
 from pilotage.stack.navigator.maneuver import ManeuverConfig, ManeuverNavigator
@@ -19,6 +22,14 @@ def test_it_parks(seed: int) -> None:
     assert metrics["collisions"] == 0
     assert float(str(metrics["goal_error_m"])) <= 0.15
     assert float(str(metrics["min_clearance_m"])) > 0.0
+
+
+def test_the_way_to_go_is_that_of_the_plan_and_only_grows_less() -> None:
+    experiment = build(load_mission("car-park", ["run.time_limit_s=20"]))
+    told = run_loop(experiment).finished.robots[0]
+    to_go_m = told.trace["distance_to_go_m"]
+    assert to_go_m[1] == pytest.approx(told.plans[0].length_m, rel=0.02)
+    assert (np.diff(to_go_m[np.isfinite(to_go_m)]) <= 0.0).all()
 
 
 def test_what_it_lacks_is_said() -> None:

@@ -222,6 +222,7 @@ class CurveNavigator:
                 self._journal.say(readings.t_s, "failed", self._reason)
             else:
                 self._status = StackStatus.ARRIVED
+                self._reason = f"driven to the curve's end, by its own estimate {away_m:.2f} m from it"
                 self._journal.say(readings.t_s, "arrived", self._reason)
             return STOP
         x, y, theta, curvature, to_go_m = self._references[self._index + 1].tolist()

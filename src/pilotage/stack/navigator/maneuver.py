@@ -85,6 +85,7 @@ class ManeuverNavigator(LocalizingNavigator):
             parts.planner, parts.smoother, chart, rng, journal, robot=robot, as_planned=True
         )
         self._references: FloatArray = np.zeros((0, 5))
+        self._to_go_m: FloatArray = np.zeros(0)
         self._index, self._replans = 0, 0
         self._think(0.0)
         if self._plan.hopeless and self._plan.too_tight:
@@ -112,6 +113,8 @@ class ManeuverNavigator(LocalizingNavigator):
         else:
             wheels, pause_s = motion.curvature_rate_per_m_s, 0.0 if turns else self._config.pause_s
             self._references = laid_out(states, speed, acceleration, wheels, pause_s, dt_s, rate)
+        ahead_m = dt_s * np.abs(self._references[::-1, 3]).cumsum()[::-1]
+        self._to_go_m = np.append(ahead_m[1:], 0.0)
         self._index = 0
         self._controller.reset()
         self._journal.say(t_s, "plan" if t_s == 0.0 else "replan", result.reason)
@@ -139,8 +142,8 @@ class ManeuverNavigator(LocalizingNavigator):
             self._journal.say(readings.t_s, "arrived", "the plan was driven to its end")
             return STOP
         x, y, theta, v, w = self._references[self._index].tolist()
+        self._channel.tell(x, y, theta, float(self._to_go_m[self._index]))
         self._index += 1
-        self._channel.tell(x, y, theta, self._robot.dt_s * (len(self._references) - self._index) * abs(v))
         if math.hypot(x - pose.x_m, y - pose.y_m) > self._config.astray_m:
             return self._astray(readings.t_s)
         if v == 0.0:
