@@ -42,6 +42,27 @@ def test_page_is_whole_and_well_formed(tmp_path: Path) -> None:
     assert "95 % band: 2.70 to 3.20" in text
 
 
+def test_captions_speak_of_what_the_run_has(tmp_path: Path) -> None:
+    page = page_of(fabricate_run(tmp_path / "run"))
+    assert "NIS each innovation with its own" in page
+    assert "feed-forward along the path" in page
+    assert "600 steps" in page
+    # Recorded once in ten steps, without beacons and a controller, settled from the start.
+    metrics = fabricate_metrics(600)
+    names = fabricate_columns(60, np.random.default_rng(1))
+    left_out = [name for name in names if name.startswith(("beacons", "nis", "w_", "path_", "us_"))]
+    folder = fabricate_run(tmp_path / "bare", steps=60, metrics=metrics, columns=dict.fromkeys(left_out))
+    page = page_of(folder)
+    for untrue in ("NIS each innovation", "turning costs certainty", "feed-forward"):
+        assert untrue not in page
+    assert "600 steps" in page
+    captions = re.findall(r"<figcaption><b>Figure \d+\.</b>(.*?)</figcaption>", page)
+    assert captions
+    assert all(caption.strip() for caption in captions)
+    # A number and its unit are not torn apart.
+    assert not re.search(r"\d (?:m|mm|s|%|mrad)\b", " ".join(captions))
+
+
 def test_layers_of_the_map_can_be_switched(tmp_path: Path) -> None:
     page = page_of(fabricate_run(tmp_path / "run"))
     layers = re.findall(r'id="map-show-([a-z]+)"', page)

@@ -114,6 +114,7 @@ def test_a_polygon_is_drawn_where_it_stands(car: Path) -> None:
     page = checked_page(car, "replay", *DRIVEN, "updates")
     assert "1.00\u00a0m long and 0.60\u00a0m wide" in page
     assert "Ultrasonic" not in page
+    assert "Walls are drawn grown by the 60.0\u00a0mm that the planner keeps" in page
     scene = scene_of(read_run(car))
     assert scene is not None
     assert [track.body_m.shape for track in scene.poses[:2]] == [(4, 2), (4, 2)]
@@ -130,6 +131,8 @@ def test_a_team_is_shown_whole(two: Path) -> None:
         assert f"</span> {name}</span></th>" in page
     assert "0 of 2 robots succeeded" in page
     assert "anna: " in page
+    assert "Of the whole team: metres driven" in page
+    assert "error at the end" not in page
     first = read_run(two)
     team = read_team(two, first)
     assert [run.outline.name for run in team] == ["anna", "bert"]

@@ -23,6 +23,7 @@ from pilotage.report.figures.consistency import chi_square_band
 from pilotage.report.figures.layers import ellipse_outlines
 from pilotage.report.figures.map_view import view_limits
 from pilotage.report.figures.placing import LabelPlacer, along
+from pilotage.report.headline import headline
 from pilotage.report.series import band, decimate, merge_spans, running_mean, spans
 from support.fabricated_run import fabricate_metrics, fabricate_run, fabricate_world
 from support.pages import page_of
@@ -44,6 +45,22 @@ def test_summary_table() -> None:
     assert "outcome not said" in _printed({})
 
 
+def test_the_headline_tells_what_the_mission_was_about() -> None:
+    found = headline({"success": True, "lost_s": 5.1, "found_after_s": 5.2}).replace("\u00a0", " ")
+    assert found == "Done; lost for 5.10 s and found itself."
+    gone = headline({"success": False, "reason": "time is up", "lost_s": 60.0}).replace("\u00a0", " ")
+    assert gone == "Failed: time is up; lost for 60.0 s and did not find itself."
+    mapped = headline({"success": True, "floor_mapped": 0.99, "wall_rms_m": 0.025}).replace("\u00a0", " ")
+    assert mapped == "Done; 99.0 % of the reachable floor mapped, its walls 25.0 mm off (RMS)."
+    missed = {"success": False, "reason": "the robot stands 312.36 m from its goal", "goal_error_m": 312.36}
+    assert headline(missed).count("312.36") == 1
+    team = {"success": True, "robots": {"a": {"success": True}, "b": {"success": True}}}
+    assert "intruder" not in headline(team)
+    seen = headline(team | {"detected": True, "detection_time_s": 18.1}).replace("\u00a0", " ")
+    assert seen == "All 2 robots succeeded; the intruder was detected after 18.1 s."
+    assert "the intruder was not detected" in headline(team | {"detected": False})
+
+
 def test_quantities_are_humane() -> None:
     assert quantities.length(0.00512) == "5.12\u00a0mm"
     assert quantities.length(66.3) == "66.30\u00a0m"
@@ -54,6 +71,9 @@ def test_quantities_are_humane() -> None:
     assert quantities.duration(-594.5) == "−9\u00a0min 54\u00a0s"
     assert quantities.share(0.5) == "50.0\u00a0%"
     assert quantities.significant(0.99996) == "1.00"
+    assert quantities.duration(9960.0) == "2\u00a0h 46\u00a0min"
+    assert quantities.moment(332.0) == "332.0\u00a0s"
+    assert quantities.moment(761640.0) == "8.815\u00a0days"
     for write in (quantities.length, quantities.angle, quantities.duration, quantities.count):
         assert write(math.nan) == quantities.NOTHING
 

@@ -56,8 +56,13 @@ def headline(metrics: Mapping[str, Any]) -> str:
         answer = f"Failed{after}: {reason}"
     details = []
     missed = number(metrics.get("goal_error_m"))
-    if not success and math.isfinite(missed):
+    if not success and math.isfinite(missed) and f"{missed:.2f} m" not in answer:
         details.append(f"{quantities.length(missed)} from the goal")
+    details += _charted(metrics)
+    lost, found = number(metrics.get("lost_s")), number(metrics.get("found_after_s"))
+    if lost > 0.0:
+        how = "and found itself" if math.isfinite(found) else "and did not find itself"
+        details.append(f"lost for {quantities.duration(lost)} {how}")
     rmse, worst = number(metrics.get("position_rmse_m")), number(metrics.get("position_max_m"))
     if math.isfinite(rmse):
         text = f"position known to {quantities.length(rmse)} (RMSE)"
@@ -94,7 +99,10 @@ def _team_headline(metrics: Mapping[str, Any]) -> str:
         reason = str(metrics.get("reason") or "no reason given").strip().rstrip(".")
         answer += f" ({reason})"
     collisions, driven = number(metrics.get("collisions")), number(metrics.get("path_length_m"))
-    details = []
+    details, detected = [], metrics.get("detected")
+    if isinstance(detected, bool):
+        soon = f"after {quantities.duration(number(metrics.get('detection_time_s')))}"
+        details.append(f"the intruder was detected {soon}" if detected else "the intruder was not detected")
     if math.isfinite(collisions):
         text = "no collision" if collisions == 0.0 else f"{quantities.count(collisions)} collisions"
         details.append("1 collision" if collisions == 1.0 else text)
@@ -104,6 +112,26 @@ def _team_headline(metrics: Mapping[str, Any]) -> str:
     if math.isfinite(rmse):
         details.append(f"positions known to {quantities.length(rmse)} (RMSE, mean of the robots)")
     return f"{answer}; {'; '.join(details)}." if details else f"{answer}."
+
+
+def _charted(metrics: Mapping[str, Any]) -> list[str]:
+    """What an explorer was sent for: how much of the floor its map shows, and how well."""
+    told = []
+    for key, what, right, how_right in (
+        ("floor_mapped", "of the reachable floor mapped", "wall_rms_m", "its walls {} off (RMS)"),
+        (
+            "coverage_reachable",
+            "of the reachable cells visited",
+            "feature_precision",
+            "{} of the features right",
+        ),
+    ):
+        done, well = number(metrics.get(key)), number(metrics.get(right))
+        if math.isfinite(done):
+            write = quantities.length if right.endswith("_m") else quantities.share
+            how = f", {how_right.format(write(well))}" if math.isfinite(well) else ""
+            told.append(f"{quantities.share(done)} {what}{how}")
+    return told
 
 
 def _planned(metrics: Mapping[str, Any]) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import html
+import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from importlib import resources
@@ -21,6 +22,7 @@ VALUE, PLAIN, ROW = "value", "value plain", "row"
 """How a column's cells look: numbers, numbers with something below, the row's own name; else plain text."""
 WHOLE = 9
 """Characters of a cell that stay on one line."""
+_BEFORE_UNIT = re.compile(r"(?<=\d) (?=(?:[kmµ]?m|m?s|min|h|%|m?rad|m/s|rad/s|Hz)(?!\w))")
 Columns = Sequence[tuple[str, str]]
 """Headings, each with how its cells look."""
 
@@ -89,6 +91,11 @@ def _escaped(text: str) -> str:
     return text if isinstance(text, Html) else escape(text)
 
 
+def _whole(text: str) -> str:
+    """A sentence escaped, its numbers on one line with their units."""
+    return escape(_BEFORE_UNIT.sub("\u00a0", text))
+
+
 def figure_sections(figures: Sequence[Illustration]) -> list[Section]:
     """The figures with legend and caption, numbered as they are drawn."""
     made, number = [], 0
@@ -98,7 +105,7 @@ def figure_sections(figures: Sequence[Illustration]) -> list[Section]:
         if figure.svg:
             inner = (
                 f'<figure>{legend(figure)}<div class="plot" tabindex="0">{figure.svg}</div><figcaption>'
-                f"<b>Figure {number}.</b> {escape(figure.caption)}</figcaption></figure>"
+                f"<b>Figure {number}.</b> {_whole(figure.caption)}</figcaption></figure>"
             )
         made.append(section(figure.slug, figure.title, inner))
     return made
@@ -144,14 +151,16 @@ def swatch(key: Key) -> str:
     return f'<svg class="swatch" viewBox="0 0 22 12" aria-hidden="true">{shape}</svg>'
 
 
-def metrics_section(groups: Sequence[tuple[str, Sequence[Row]]]) -> Section:
-    """The table of metrics with what each means."""
+def metrics_section(groups: Sequence[tuple[str, Sequence[Row]]], note: str = "") -> Section:
+    """The table of metrics with what each means, under a note."""
     columns = (("what", ROW), ("value", VALUE), ("what it means", ""))
     rows: list[tuple[str, ...]] = []
     for title, members in groups:
         rows.append((title,))
-        rows += [(row.name, row.value, Html(f"{escape(row.meaning)}{_band(row)}")) for row in members]
-    return section("metrics", "Numbers", table(columns, rows or [("The run left no numbers.",)], "metrics"))
+        rows += [(row.name, row.value, Html(f"{_whole(row.meaning)}{_band(row)}")) for row in members]
+    told = f"<p>{escape(note)}</p>" if note else ""
+    made = table(columns, rows or [("The run left no numbers.",)], "metrics")
+    return section("metrics", "Numbers", told, made)
 
 
 def _band(row: Row) -> str:
@@ -165,7 +174,7 @@ def events_section(events: Sequence[Event]) -> Section:
     rows = []
     for index, event in enumerate(events, start=1):
         kind = event_kind(event.kind)
-        time = f"{event.t_s:.1f} s" if event.t_s == event.t_s else quantities.NOTHING
+        time = quantities.moment(event.t_s)
         badge = Html(f'<span class="badge" style="border-color:{kind.colour}">{index}</span>')
         rows.append((badge, time, kind.name, event.text))
     columns = (("no.", ""), ("time", VALUE), ("kind", ""), ("what happened", ""))

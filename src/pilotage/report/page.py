@@ -32,6 +32,10 @@ from pilotage.report.team import team_section, team_tiles
 
 ESTIMATED = frozenset({"position_rmse_m", "position_max_m", "heading_rmse_rad", "nees_mean"})
 """What says nothing where the pose was given."""
+OF_A_TEAM = (
+    "Of the whole team: metres driven, alarms, contacts and changes of plan are sums; clearances are the "
+    "least, what is called worst or longest the largest; what else each robot has of its own is their mean."
+)
 _LONGEST_MISSION = 100_000
 
 
@@ -83,7 +87,10 @@ def run_page(run: RunData, damaged: Sequence[str] = (), team: Sequence[RunData] 
         if drawn.slug == "map":
             sections.append(rounds_section(run.metrics))
         if drawn.slug == explained:
-            sections += [events_section(run.events), metrics_section(metric_rows(run.metrics))]
+            sections += [
+                events_section(run.events),
+                metrics_section(metric_rows(run.metrics), OF_A_TEAM if several else ""),
+            ]
     if run.mission_text:
         sections.append(_mission_section(run.mission_text))
     description = str(run.mission.get("description") or "")
@@ -109,7 +116,9 @@ def _eyebrow(run: RunData) -> str:
     parts = ["pilotage run report"]
     if run.metrics.get("seed") is not None:
         parts.append(f"seed {run.metrics['seed']}")
-    parts.append(f"{quantities.count(run.trace.steps)} steps")
+    steps = number(run.metrics.get("steps"))
+    if steps > 0.0:
+        parts.append(f"{quantities.count(steps)} steps")
     return " · ".join(parts)
 
 
@@ -139,6 +148,9 @@ def _tiles(run: RunData) -> list[tuple[str, str]]:
         ("position RMSE", value("position_rmse_m"), quantities.length),
         ("worst position error", value("position_max_m"), quantities.length),
         ("heading RMSE", value("heading_rmse_rad"), quantities.angle),
+        ("floor mapped", value("floor_mapped"), quantities.share),
+        ("walls of its map, off", value("wall_rms_m"), quantities.length),
+        ("found itself after", value("found_after_s"), quantities.duration),
         ("visited, of the reachable", value("coverage_reachable"), quantities.share),
         ("features right", value("feature_precision"), quantities.share),
         ("plan over shortest", ratio, lambda x: f"{x:.3f} ×"),

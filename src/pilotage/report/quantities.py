@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Mapping
 
 NOTHING = "–"
+HOURS_FROM_S = 7200.0
 
 
 def significant(value: float, digits: int = 3) -> str:
@@ -37,7 +38,7 @@ def angle(value_rad: float) -> str:
 
 
 def duration(value_s: float) -> str:
-    """Write a duration in ms, s, minutes and seconds (from 2 min), hours (from 3 h), days (from 2 days)."""
+    """Write a duration in ms, s, minutes and seconds (from 2 min), hours (from 2 h), days (from 2 days)."""
     if not math.isfinite(value_s):
         return NOTHING
     if value_s < 0.0:
@@ -48,11 +49,16 @@ def duration(value_s: float) -> str:
         return f"{value_s:.2f}\u00a0s" if abs(value_s) < 10.0 else f"{value_s:.1f}\u00a0s"
     if abs(value_s) >= 2.0 * 86_400.0:
         return f"{significant(value_s / 86_400.0, 4)}\u00a0days"
-    if abs(value_s) >= 3.0 * 3600.0:
+    if abs(value_s) >= HOURS_FROM_S:
         hours, minutes = divmod(round(value_s / 60.0), 60)
         return f"{hours}\u00a0h {minutes:02d}\u00a0min"
     minutes, seconds = divmod(round(value_s), 60)
     return f"{minutes}\u00a0min {seconds:02d}\u00a0s"
+
+
+def moment(t_s: float) -> str:
+    """Write a time since the start: to a tenth of a second, in hours and days where there are hours."""
+    return f"{t_s:.1f}\u00a0s" if abs(t_s) < HOURS_FROM_S else duration(t_s)
 
 
 def share(value: float) -> str:

@@ -19,7 +19,10 @@ from pilotage.report.headline import own_metrics, succeeded
 from pilotage.report.markup import ROW, VALUE, Html, Section, escape, section, table
 from pilotage.report.style import BLUE, GREEN, INK, ORANGE, PURPLE, SKY, VERMILLION
 
-COLOURS = (BLUE, VERMILLION, GREEN, PURPLE, ORANGE, SKY, INK)
+COLOURS = (
+    *(BLUE, VERMILLION, GREEN, PURPLE, ORANGE, SKY, INK),
+    *("#8a5a2b", "#a8123e", "#6a4fb0", "#7d8a12", "#0e7c86"),
+)
 """Of the robots in their order, over and over."""
 SLUG, TITLE = "robots", "The robots"
 COLUMNS = (
@@ -63,6 +66,7 @@ def team_tiles(metrics: Mapping[str, Any]) -> list[tuple[str, str]]:
         ("worst position error", "position_max_m", quantities.length),
         ("least clearance", "min_clearance_m", quantities.length),
         ("collisions", "collisions", quantities.count),
+        ("intruder detected after", "detection_time_s", quantities.duration),
         ("mean idleness", "idleness_mean_s", quantities.duration),
         ("worst idleness", "idleness_worst_s", quantities.duration),
         ("cyclic reference", "idleness_bound_s", quantities.duration),

@@ -47,7 +47,7 @@ def pairs_section(
             rows.append(
                 [
                     f"{what}: {name} minus {first}",
-                    f"{found.mean:+.{digits}f}" if math.isfinite(found.mean) else "–",
+                    f"{found.mean:+.{digits}f}".replace("-", "−") if math.isfinite(found.mean) else "–",
                     interval(found.low, found.high, digits, "+"),
                     f"{found.p_value:.2g}" if math.isfinite(found.p_value) else "–",
                     str(found.n),

@@ -89,11 +89,14 @@ def consistency_figure(run: RunData) -> Illustration:
         if seen > 0
         else ""
     )
+    innovations, freedom = " on a logarithmic axis", ""
+    if bool(np.isfinite(nis).any()):
+        innovations = ", NIS each innovation with its own; both axes are logarithmic"
+        freedom = f"; for NIS two a {what[:-1]}, the band of the usual number in each second"
     caption = (
-        "NEES weighs the true error with the filter's covariance, NIS each innovation with its own; both "
-        f"axes are logarithmic. The band holds a single step's value with {_PERCENT} probability "
-        f"(chi-square, {POSE_DOF} degrees of freedom for the pose; for NIS two a {what[:-1]}, the band "
-        "of the usual number in each second). "
+        f"NEES weighs the true error with the filter's covariance{innovations}. The band holds a single "
+        f"step's value with {_PERCENT} probability (chi-square, {POSE_DOF} degrees of freedom for the "
+        f"pose{freedom}). "
         + ("Inside the band: " + ", ".join(text for text in shares if text) + ". " if any(shares) else "")
         + f"The dark line is the mean of the last {WINDOW_S:g} s. Above the band the filter is too sure of "
         f"itself, below it too modest. Neighbouring steps are correlated: one run alone "

@@ -67,11 +67,13 @@ def control_figure(run: RunData) -> Illustration:
             width = 2.2 if name == "true speed" else 0.9
             series(axes, t_s, trace[column] * scale, colour, linewidth=width)
     caption = (
-        ""
-        if not trace.has("path_error_m")
-        else "The lateral error is what the controller sees: how far its own estimate is from the reference. "
+        "The lateral error is what the controller sees: how far its own estimate is from the reference. "
         "While it follows the path the commanded turn rate is the sum of four parts: feed-forward along the "
         "path, proportional and integral on the error, and the reactive part that keeps off walls."
+        if trace.has("path_error_m")
+        else "The speed that was commanded, and the one that came of it."
+        if trace.has("v_cmd_m_s", "v_true_m_s")
+        else "How fast the robot truly drove; negative is backwards."
     )
     keys = tuple(
         Key(f"{name} part" if panel in (1, 2) else name, colour)
@@ -79,4 +81,5 @@ def control_figure(run: RunData) -> Illustration:
         if trace.has(column)
     )
     alt = "Path error, the parts of the turn rate, and commanded and true speed over time"
-    return Illustration(SLUG, TITLE, alt, caption, render(figure, SLUG, alt), keys)
+    title = TITLE if shown != [3] else "Speed"
+    return Illustration(SLUG, title, alt, caption, render(figure, SLUG, alt), keys)

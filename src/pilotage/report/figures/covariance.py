@@ -60,14 +60,15 @@ def covariance_figure(run: RunData) -> Illustration:
     caption = (
         "One standard deviation on a logarithmic scale"
         + (f"; after the start the median is {', '.join(typical)}" if typical else "")
-        + f". Grey where the robot turns faster than {TURNING_RAD_S:g} rad/s: turning costs certainty, and "
-        "every beacon seen buys some of it back."
+        + "."
+        + (
+            f" Grey where the robot turns faster than {TURNING_RAD_S:g} rad/s: turning costs certainty, "
+            "and what is seen buys some of it back."
+            if len(turns)
+            else ""
+        )
     )
-    keys = (
-        Key("σ of x", BLUE),
-        Key("σ of y", ORANGE),
-        Key("σ of heading", PURPLE),
-        Key("turning", SHADE, "band", opacity=1.0),
-    )
+    turning = (Key("turning", SHADE, "band", opacity=1.0),) if len(turns) else ()
+    keys = (Key("σ of x", BLUE), Key("σ of y", ORANGE), Key("σ of heading", PURPLE), *turning)
     alt = "Standard deviations of x, y and heading over time on logarithmic axes, turns shaded"
     return Illustration(SLUG, TITLE, alt, caption, render(figure, SLUG, alt), keys)

@@ -62,12 +62,15 @@ def _caption(run: RunData, grown: bool) -> str:
     text = f"{len(plan.waypoints)} waypoints on {quantities.length(plan.length_m)}"
     if not grown:
         return f"{text}."
-    radius = run.outline.radius_m
-    body = "" if radius is None else f": the body's radius of {quantities.length(radius)}, and room to spare"
-    return (
-        f"{text}. The planner moves a point; walls are drawn as it sees them, grown by the "
-        f"{quantities.length(plan.clearance_m)} that it keeps{body}. What is on no map is not drawn."
-    )
+    radius, kept = run.outline.radius_m or 0.0, quantities.length(plan.clearance_m)
+    if len(run.outline.polygon_m) or plan.clearance_m < radius:
+        seen = f"Walls are drawn grown by the {kept} that the planner keeps"
+    else:
+        body = f": the body's radius of {quantities.length(radius)}, and room to spare" if radius else ""
+        seen = (
+            f"The planner moves a point; walls are drawn as it sees them, grown by the {kept} it keeps{body}"
+        )
+    return f"{text}. {seen}. What is on no map is not drawn."
 
 
 def _keys(run: RunData, grown: bool) -> tuple[Key, ...]:

@@ -73,19 +73,19 @@ def pose_error_figure(run: RunData) -> Illustration:
         if bool(known.any()):
             within = float(np.mean(np.abs(error[known]) <= sigma2[known]))
             inside.append(f"{name} {quantities.share(within)}")
+    start = (
+        f"The grey start phase, {quantities.duration(run.settle_s)}, does not count: the start error is "
+        "drawn from the initial covariance."
+        + (" This run ended within it." if len(t_s) and t_s[-1] <= run.settle_s else "")
+    )
     caption = (
         "Estimate minus truth. The shaded band is two standard deviations as the filter believes them: "
         "a filter that knows how well it knows stays inside for 95.4 % of the time"
         + (f" (here: {', '.join(inside)} of the steps)" if inside else "")
-        + f". The grey start phase, {quantities.duration(run.settle_s)}, does not count: the start error is "
-        "drawn from the initial covariance. 1 mrad is 0.057°."
-        + (" This run ended within it." if len(t_s) and t_s[-1] <= run.settle_s else "")
+        + f".{f' {start}' if run.settle_s > 0.0 else ''} 1 mrad is 0.057°."
     )
-    keys = (
-        Key("error", BLUE),
-        Key("±2σ of the filter", SKY, "band"),
-        Key("start phase", SHADE, "band", opacity=1.0),
-    )
+    started = (Key("start phase", SHADE, "band", opacity=1.0),) if run.settle_s > 0.0 else ()
+    keys = (Key("error", BLUE), Key("±2σ of the filter", SKY, "band"), *started)
     alt = "Error of x, y and heading over time inside the two-sigma bands of the filter"
     return Illustration(SLUG, TITLE, alt, caption, render(figure, SLUG, alt), keys)
 

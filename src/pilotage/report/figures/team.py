@@ -77,9 +77,11 @@ def team_map_figure(team: Sequence[RunData]) -> Illustration:
     )
     keys = [Key(name, colour_of(k), "line", f"robot-{k}") for k, name in shown]
     keys += [key for there, key in candidates if there]
+    plans = " its first plan as a band," if any(run.plans for run in team) else ""
+    goals = ", its goal as a cross" if any(len(run.outline.goals) for run in team) else ""
     caption = (
-        "Each robot has its colour: its true path, its first plan as a band, its body to scale at the start "
-        "(open) and the end (filled), its goal as a cross. Numbers are those of the event list."
+        f"Each robot has its colour: its true path,{plans} its body to scale at the start (open) and the end "
+        f"(filled){goals}. Numbers are those of the event list."
     )
     alt = f"Map of the run {first.name} with the paths of {len(team)} robots"
     return Illustration(slug, title, alt, caption, render(figure, slug, alt), tuple(keys))

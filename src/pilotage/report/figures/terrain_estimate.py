@@ -95,7 +95,7 @@ def drive_figure(run: RunData) -> Illustration:
     names = ["Speed [cm/s]", "Heading [rad]", "Turn rate [mrad/s]", "Steering angle of a bicycle [°]"]
     figure, panels = stacked_axes(names, (90.0, 90.0, 90.0, 90.0))
     series(panels[0], hours, 100.0 * trace["v_true_m_s"], BLUE, linewidth=1.4)
-    series(panels[1], hours, trace["true_theta_rad"], GREEN, linewidth=1.4)
+    series(panels[1], hours, np.unwrap(trace["true_theta_rad"]), GREEN, linewidth=1.4)
     series(panels[2], hours, 1e3 * trace["w_true_rad_s"], ORANGE, linewidth=1.2)
     series(panels[3], hours, np.rad2deg(trace["steering_rad"]), PURPLE, linewidth=1.2)
     panels[0].set_ylim(0.0, 1.15 * float(np.fmax(100.0 * peak(trace["v_true_m_s"]), 1e-6)))

@@ -74,12 +74,10 @@ def hazard_distance_figure(run: RunData) -> Illustration:
     )
     alt = f"Distance from hazards along the path; the least is {quantities.length(float(away[least]))}"
     caption = (
-        ""
+        "How far the drive truly was from what is too steep; zero is on it."
         if trace.has("true_x_m")
-        else (
-            "A shortest path touches the corners that it turns around: half a cell is the least that a "
-            "path over cells' centres can keep without an inflation."
-        )
+        else "A shortest path touches the corners that it turns around: half a cell is the least that a "
+        "path over cells' centres can keep without an inflation."
     )
     return Illustration(
         slug, title, alt, caption, render(figure, slug, alt), (Key("distance from hazards", GREEN),)
