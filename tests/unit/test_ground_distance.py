@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import tracemalloc
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from hypothesis import strategies as st
 from pilotage.core.types import Goal, Pose2
 from pilotage.kernels.geometry import plane
 from pilotage.kernels.rrt.clearance import slack_at
+from pilotage.maps import ground_distance
 from pilotage.maps.distance_field import DistanceField
 from pilotage.maps.ground_distance import with_circles
 from pilotage.maps.occupancy_grid import OccupancyGrid
@@ -102,3 +104,36 @@ def test_paths_on_a_grid_keep_their_clearance_from_solid_and_unknown_cells(seed:
     inside = planner.plan(PlanRequest(start, Goal(x, y), chart.field, np.random.default_rng(seed)))
     assert inside.status is PlanStatus.GOAL_BLOCKED
     assert not math.isfinite(inside.first_solution_s)
+
+
+def coarse_chart(side: int = 20) -> WorldMap:
+    """So many cells of 2 m a side, with a block in the middle."""
+    cells = np.zeros((side, side), dtype=np.int8)
+    cells[8:12, 8:12] = 100
+    return WorldMap(
+        "coarse", (0.0, 0.0, 2.0 * side, 2.0 * side), grid=OccupancyGrid(cells, 2.0, Pose2(0.0, 0.0, 0.0))
+    )
+
+
+def test_the_field_of_a_large_map_takes_little_more_than_itself() -> None:
+    """A map of 600 m took 4 GB, fourteen times its field."""
+    chart = coarse_chart(60)
+    barriers = chart.barriers
+    grid = chart.grid
+    assert grid is not None
+    size = DistanceField.from_map(barriers).distance_m.nbytes
+    tracemalloc.start()
+    field = ground_distance.ground_distance(barriers, grid)
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert field.distance_m.nbytes == size
+    assert peak < 2.5 * size + 150 * ground_distance.ROWS_AT_ONCE * field.distance_m.shape[1]
+
+
+def test_a_map_too_large_for_fine_nodes_has_coarser_ones(monkeypatch: pytest.MonkeyPatch) -> None:
+    """It was refused: 'take a resolution coarser than 0.1 m', which nobody could say."""
+    fine = coarse_chart().field
+    monkeypatch.setattr(ground_distance, "MAX_NODES", 50_000)
+    coarse = coarse_chart().field
+    assert (fine.resolution_m, coarse.resolution_m) == (0.1, 0.2)
+    np.testing.assert_allclose(coarse.distance_m, fine.distance_m[::2, ::2], atol=1e-9)

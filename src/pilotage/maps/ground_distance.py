@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
 
 from pilotage.core.types import FloatArray
 from pilotage.kernels.geometry import field as kernels
-from pilotage.maps.distance_field import DistanceField
+from pilotage.maps.distance_field import MAX_NODES, DistanceField
 from pilotage.maps.occupancy_grid import OccupancyGrid
 from pilotage.maps.segment_map import SegmentMap
+
+SPACING_M, LEAST_NODES_A_CELL = 0.1, 4
+"""Between nodes; of maps too large for that twice as much, and again, while a cell's side has so many."""
+ROWS_AT_ONCE = 256
 
 
 def ground_distance(barriers: SegmentMap, grid: OccupancyGrid) -> DistanceField:
@@ -21,15 +26,30 @@ def ground_distance(barriers: SegmentMap, grid: OccupancyGrid) -> DistanceField:
     barriers
         The outlines of the grid's occupied and unknown cells.
     """
-    field = DistanceField.from_map(barriers)
-    ny, nx = field.distance_m.shape
+    field = DistanceField.from_map(barriers, _spacing_m(barriers, grid))
+    distance_m, blocked = field.distance_m.copy(), grid.blocked()
+    ny, nx = distance_m.shape
     (x0, y0), spacing = field.origin_xy_m, field.resolution_m
-    x, y = np.meshgrid(x0 + spacing * np.arange(nx), y0 + spacing * np.arange(ny))
-    cells = grid.cells_at(np.column_stack([x.ravel(), y.ravel()]))
-    inside = ((cells >= 0) & (cells < [grid.rows, grid.columns])).all(axis=1)
-    solid = np.zeros(nx * ny, dtype=np.bool_)
-    solid[inside] = grid.blocked()[cells[inside, 0], cells[inside, 1]]
-    return replace(field, distance_m=np.where(solid.reshape(ny, nx), -field.distance_m, field.distance_m))
+    for first in range(0, ny, ROWS_AT_ONCE):
+        band = distance_m[first : first + ROWS_AT_ONCE]
+        x, y = np.meshgrid(x0 + spacing * np.arange(nx), y0 + spacing * np.arange(first, first + len(band)))
+        cells = grid.cells_at(np.column_stack([x.ravel(), y.ravel()]))
+        inside = ((cells >= 0) & (cells < [grid.rows, grid.columns])).all(axis=1)
+        solid = np.zeros(band.size, dtype=np.bool_)
+        solid[inside] = blocked[cells[inside, 0], cells[inside, 1]]
+        np.negative(band, out=band, where=solid.reshape(band.shape))
+    return replace(field, distance_m=distance_m)
+
+
+def _spacing_m(barriers: SegmentMap, grid: OccupancyGrid) -> float:
+    """How far apart the nodes are: as near as memory allows."""
+    xmin, ymin, xmax, ymax = barriers.bounds_m
+    spacing_m = SPACING_M
+    while (math.ceil((xmax - xmin) / spacing_m) + 1) * (math.ceil((ymax - ymin) / spacing_m) + 1) > MAX_NODES:
+        if 2.0 * LEAST_NODES_A_CELL * spacing_m > grid.resolution_m:
+            break
+        spacing_m *= 2.0
+    return spacing_m
 
 
 def with_circles(field: DistanceField, circles_m: FloatArray) -> DistanceField:
