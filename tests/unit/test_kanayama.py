@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import pytest
 from hypothesis import given, settings
@@ -45,6 +46,19 @@ def test_errors_die_out_in_both_directions(
     error = pose.inverse().compose(reference)
     assert math.hypot(error.x_m, error.y_m) < 0.01
     assert abs(wrap_to_pi(error.theta_rad)) < 0.03
+
+
+@pytest.mark.parametrize(("speed", "dt_s"), [(2.0, 1.0), (1.0, 0.5), (0.04, 20.0)])
+def test_errors_die_out_in_long_steps(speed: float, dt_s: float) -> None:
+    """It threw a rover of 2 m/s at steps of 1 s from side to side, 170 m off its curve."""
+    law = KanayamaController(KanayamaConfig(), replace(told_of().robot, dt_s=dt_s))
+    reference, feed = Pose2(0.0, 0.0, 0.4), Twist(speed, 0.0)
+    pose = reference.compose(Pose2(-0.1, 0.1, 0.1))
+    for _ in range(60):
+        reference = driven(reference, feed, dt_s)
+        pose = driven(pose, law.step(pose, reference, feed).twist, dt_s)
+    error = pose.inverse().compose(reference)
+    assert math.hypot(error.x_m, error.y_m) < 0.01
 
 
 def test_an_error_across_asks_for_the_other_turn_backwards() -> None:

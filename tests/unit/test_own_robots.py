@@ -195,3 +195,21 @@ def test_further_goals_are_refused_by_who_drives_to_one(
     stack = LOCAL | {"navigator": navigator, "controller": "kanayama"}
     with pytest.raises(pl.InputError, match=f"'{navigator}': expected one goal, found 2.*navigator goal"):
         drive(floor(0.9), DISC, task=task, **stack)
+
+
+def test_landmarks_inside_walls_are_refused(floor: Callable[[float], str]) -> None:
+    """Nobody saw one, and the robot drove into a wall by its wheels alone."""
+    world = {"map": floor(0.9), "start": START, "goal": GOAL}
+    inside = [{"id": 1, "x_m": 0.025, "y_m": 2.0}, {"id": 2, "x_m": 3.0, "y_m": 0.5}]
+    mission = {
+        "mission": "hidden",
+        "world": world | {"landmarks": inside},
+        "robot": DISC | {"sensors": {"odometry": {"name": "wheel-odometry"}, "marks": {"name": "beacons"}}},
+        "task": "drive",
+        "stack": {"navigator": "open-loop", "localizer": "ekf-landmarks"},
+        "run": {"time_limit_s": 1.0},
+    }
+    with pytest.raises(pl.InputError, match="found all 2 inside walls; put them"):
+        pl.run(mission, save=False, progress=False)
+    mission["world"] = world | {"landmarks": [*inside, {"id": 3, "x_m": 0.15, "y_m": 2.0}]}
+    pl.run(mission, save=False, progress=False)

@@ -14,7 +14,7 @@ from pilotage.core.types import FloatArray, IntArray
 from pilotage.evaluation.tasks.task import TASKS, Task, TaskSetting
 from pilotage.experiments.build.charts import chart_of
 from pilotage.experiments.build.obstacles import Obstacles, place_obstacles
-from pilotage.experiments.build.places import check_place, pose_of, settle_places
+from pilotage.experiments.build.places import check_landmarks, check_place, pose_of, settle_places
 from pilotage.experiments.build.robots import faults_of, footprint_of, motion_of, sensors_of
 from pilotage.experiments.build.stacks import build_stack, first_belief, goal_of, rounds_of, told
 from pilotage.experiments.components import build_component
@@ -26,6 +26,7 @@ from pilotage.missions.mission import Mission
 from pilotage.missions.places import GoalConfig
 from pilotage.missions.robot import RobotConfig
 from pilotage.missions.stack import StackConfig
+from pilotage.sensors.beacon import BeaconConfig
 from pilotage.sim.people.people import PEOPLE, People, PeopleSetting
 from pilotage.sim.source import RobotSpec, Simulator
 from pilotage.sim.worlds.world import World
@@ -208,6 +209,8 @@ def _data_sheet(mission: Mission, index: int, streams: RandomStreams) -> RobotKn
 
 def _check_places(mission: Mission, chart: WorldMap, sheets: Sequence[RobotKnowledge]) -> None:
     """Starts, goals and where robots are carried to must be on the map and leave room; no two starts meet."""
+    if any(sheet.sensors_of(BeaconConfig) for sheet in sheets):
+        check_landmarks(chart)
     starts: list[FloatArray] = []
     for index, (robot, sheet) in enumerate(zip(mission.members, sheets, strict=True)):
         start, goal = mission.start_of(robot), mission.goal_of(robot)

@@ -288,3 +288,23 @@ class OpenFloor:
             if room_m(self._chart, float(x), float(y), self._clearance_m) >= self._clearance_m:
                 return PoseConfig(x_m=float(x), y_m=float(y), theta_rad=float(theta))
         return None
+
+
+def check_landmarks(chart: WorldMap) -> None:
+    """Refuse landmarks that all stand inside solid cells: no sensor ever sees one there.
+
+    Raises
+    ------
+    InputError
+        Where every landmark does.
+    """
+    grid, points = chart.grid, chart.landmarks.points_xy_m
+    if grid is None or chart.open_ground or not len(points):
+        return
+    solid = grid.blocked(unknown_is_free=True)
+    cells = [(int(row), int(column)) for row, column in grid.cells_at(points)]
+    if all(grid.contains(row, column) and solid[row, column] for row, column in cells):
+        raise InputError(
+            f"world.landmarks: expected landmarks that can be seen, found all {len(points)} inside walls; "
+            "put them onto free cells beside walls"
+        )

@@ -11,6 +11,9 @@ from pilotage.sensors.sensor import Positive
 from pilotage.stack.control.controller import CONTROLLERS, Control
 from pilotage.stack.knowledge import RobotKnowledge
 
+STEPS = 2.0
+"""An error across dies out over so many steps' way at least."""
+
 
 class KanayamaConfig(Config):
     """An error along the path dies out in ``1 / along_per_s``, one across it within some ``length_m``."""
@@ -26,13 +29,14 @@ class KanayamaController:
 
     With k_y = 1 / L^2 and k_theta = sqrt(2) / L the lateral error is damped by 1 / sqrt(2) over a way of L.
     The reference is meant for the step's end: the pose is predicted to that moment by what is fed forward.
+    A robot that drives farther in a step than half of L takes twice that way for L, and no more than a whole
+    error along the path at a step: sharper gains throw it from side to side, and off the path.
     Fails where the errors are of the size of L, and at standstill: heading errors are mended by driving.
     """
 
     def __init__(self, config: KanayamaConfig, robot: RobotKnowledge) -> None:
-        self._along = config.along_per_s
-        self._across = 1.0 / config.length_m**2
-        self._heading = math.sqrt(2.0) / config.length_m
+        self._along = min(config.along_per_s, 1.0 / robot.dt_s)
+        self._length_m = config.length_m
         self._dt_s = robot.dt_s
 
     def reset(self) -> None:
@@ -45,8 +49,10 @@ class KanayamaController:
         turn = wrap_to_pi(error.theta_rad)
         v = feedforward.v_m_s * math.cos(turn) + self._along * error.x_m
         speed = feedforward.v_m_s
+        length_m = max(self._length_m, STEPS * abs(speed) * self._dt_s)
         # Backwards an error across asks for the other turn, one of the heading for the same.
-        added = speed * self._across * error.y_m + abs(speed) * self._heading * math.sin(turn)
+        heading = math.sqrt(2.0) / length_m
+        added = speed * (1.0 / length_m**2) * error.y_m + abs(speed) * heading * math.sin(turn)
         return Control(Twist(v, feedforward.w_rad_s + added), error.y_m, added, 0.0)
 
 
