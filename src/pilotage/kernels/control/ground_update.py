@@ -225,19 +225,6 @@ def believed(hits: ByteArray) -> ByteArray:
 
 
 @kernel
-def mark_disc(
-    seen: BoolArray, x: float, y: float, radius: float, x0: float, y0: float, coarse: float
-) -> None:
-    """Mark the coarse cells whose centre lies in a disc; in place."""
-    m = seen.shape[0]
-    for row in range(m):
-        for column in range(m):
-            dx, dy = x0 + (column + 0.5) * coarse - x, y0 + (row + 0.5) * coarse - y
-            if dx * dx + dy * dy <= radius * radius:
-                seen[row, column] = True
-
-
-@kernel
 def _occupied(hits: ByteArray) -> IntArray:
     """Flat indices of the cells with hits, in order. Most have none: looked at four by four."""
     flat = hits.reshape(-1)

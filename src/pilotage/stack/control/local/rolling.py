@@ -9,7 +9,7 @@ import numpy as np
 
 from pilotage.core.errors import InputError
 from pilotage.core.types import FloatArray, IntArray, Pose2, Twist
-from pilotage.kernels.control import ground_update, match, togo
+from pilotage.kernels.control import first_ground, ground_update, match, togo
 from pilotage.kernels.control.footprint import Body
 from pilotage.kernels.control.ground import Ground
 from pilotage.kernels.control.merged_means import without_passed
@@ -163,9 +163,7 @@ class RollingGround:
         if first_view:
             # Where the robot stands at first it may turn: the laser does not see the ground under it, nor,
             # if it shows less than the half before it, what is beside that even after a turn.
-            narrow = float(angles[-1] - angles[0]) < math.pi - 1e-6
-            (x, y), radius = self._pose[:2], body.outer_m + narrow * self._coarse_m
-            ground_update.mark_disc(self._seen, x, y, radius, *self._corner_m, self._coarse_m)
+            self._mark_first(body, float(angles[-1] - angles[0]) < math.pi - 1e-6)
         config, mount = self._config, view.mount
         ground_update.insert_scan(
             self._hits,
@@ -216,6 +214,12 @@ class RollingGround:
             self._movers,
             blind,
         )
+
+    def _mark_first(self, body: Body, sees_little: bool) -> None:
+        (x, y), corner_m = self._pose[:2], self._corner_m
+        first_ground.mark_turn(self._seen, x, y, body, *corner_m, self._coarse_m)
+        if sees_little:
+            first_ground.mark_disc(self._seen, x, y, body.outer_m + self._coarse_m, *corner_m, self._coarse_m)
 
     def _are_many(self, points: FloatArray, beams: int) -> bool:
         """Whether enough is near that stands: in the open the few points left may be a group that walks."""
