@@ -226,11 +226,10 @@ def test_a_passage_between_the_nodes_is_found_on_finer_ones() -> None:
 def test_the_vertex_that_is_nearest_behind_a_wall_is_not_where_a_robot_begins() -> None:
     floor = Floor.of(WORLD, 0.25)
     places = np.array([[5.4, 4.4], [8.5, 2.5]])
-    assert (
-        floor.nearest_of(places, np.array([6.6, 4.4])) == 1
-    )  # the other one is 1.2 m away, through the wall
-    assert floor.nearest_of(places[::-1], np.array([6.6, 4.4])) == 0
-    assert floor.nearest_of(places, np.array([5.0, 2.5])) == 0
+    # The other one is 1.2 m away, through the wall.
+    assert np.argmin(floor.away_m(places, np.array([6.6, 4.4]))) == 1
+    assert np.argmin(floor.away_m(places[::-1], np.array([6.6, 4.4]))) == 0
+    assert np.argmin(floor.away_m(places, np.array([5.0, 2.5]))) == 0
 
 
 def test_graphs_of_the_same_floor_are_one() -> None:

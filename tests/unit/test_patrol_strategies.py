@@ -18,7 +18,11 @@ from pilotage.kernels.patrol.rounds import judge_walk
 from pilotage.stack.patrol.graph import PatrolGraph
 from pilotage.stack.patrol.messages import PatrolMemory
 from pilotage.stack.patrol.partition import Plan, annealed, even_sizes, partition
-from pilotage.stack.patrol.strategies.adaptive_rounds import AdaptiveRoundsConfig, best_plan
+from pilotage.stack.patrol.strategies.adaptive_rounds import (
+    AdaptiveRoundsConfig,
+    AdaptiveRoundsStrategy,
+    best_plan,
+)
 from pilotage.stack.patrol.strategy import STRATEGIES, PatrolSetting, Strategy, following
 from pilotage.stack.patrol.tours import Round, idleness_bound_s
 
@@ -319,3 +323,22 @@ def test_a_mate_that_stops_early_is_given_up_soon_where_everybody_is_heard() -> 
 
     assert given_up_s({1, 2, 3, 4}) < 60.0
     assert given_up_s({1}) > 500.0  # all but one are late: it may be that they are far away
+
+
+def test_of_those_who_begin_in_one_room_the_nearest_to_its_door_goes_farthest() -> None:
+    """Seated by the one vertex of their room they were sent past each other along the corridor."""
+    count = 8
+    edges = np.full((count, count), np.inf)
+    for k in range(count - 1):
+        edges[k, k + 1] = edges[k + 1, k] = 4.0
+    graph = PatrolGraph.of(np.column_stack([4.0 * np.arange(count), np.zeros(count)]), edges)
+    behind_m = np.array([1.5, 0.5, 2.0, 1.0])
+    starts_m = graph.shortest_m[0] + behind_m[:, None]
+    config, nearest_m = AdaptiveRoundsConfig(), []
+    for robot in range(4):
+        rng = np.random.default_rng(robot)
+        setting = PatrolSetting(graph, robot, np.zeros(4, dtype=np.int64), 1.0, rng, starts_m=starts_m)
+        strategy = AdaptiveRoundsStrategy(config, setting)
+        assert len(strategy._plan.sizes) == 4
+        nearest_m.append(float(graph.shortest_m[0, strategy._round.stops].min()))
+    assert np.argsort(nearest_m).tolist() == np.argsort(-behind_m).tolist()

@@ -152,8 +152,8 @@ class Floor:
         factor = np.where(self.reachable, 1.0, np.inf)
         return travel_costs(factor, row * factor.shape[1] + column, 1.0, 1.0)
 
-    def nearest_of(self, places_xy_m: FloatArray, point_xy_m: FloatArray, what: str = "place") -> int:
-        """Which of places (P, 2) has the shortest path to a point; the first of equal ones.
+    def away_m(self, places_xy_m: FloatArray, point_xy_m: FloatArray, what: str = "place") -> FloatArray:
+        """(P,) how long the path from a point to each of places (P, 2) is, by neighbouring cells.
 
         Raises
         ------
@@ -162,7 +162,7 @@ class Floor:
         """
         costs, _ = self.costs_from(point_xy_m, what)
         rows, columns = np.array([self.nearest_cell(place) for place in places_xy_m]).T
-        return int(np.argmin(costs[rows * self.reachable.shape[1] + columns]))
+        return np.asarray(self.cell_m * costs[rows * self.reachable.shape[1] + columns])
 
     def coarser(self) -> Floor:
         """The same floor in cells of twice the side, each reachable where any of its four is."""

@@ -11,7 +11,7 @@ import numpy as np
 
 from pilotage.core.config import Config
 from pilotage.core.errors import InputError
-from pilotage.core.types import Event, FloatArray, IntArray
+from pilotage.core.types import Event, FloatArray
 from pilotage.evaluation.driving import driving_metrics, header
 from pilotage.evaluation.finished import FinishedRun, RobotRun, Verdict
 from pilotage.evaluation.floor_ages import Eye, FloorAges
@@ -80,8 +80,8 @@ class PatrolTask:
         near_m = (0.5 if config.graph is None else 1.0) * config.visit_m
         radius_m = max(footprint.radius_m for footprint in setting.footprints)
         passages = Passages.of(self._site, graph, radius_m)
-        starts = _starts(graph, self._site, setting)
-        self.patrol = PatrolSite(graph, config.visit_m, near_m, starts, passages)
+        starts_m = _starts_m(graph, self._site, setting)
+        self.patrol = PatrolSite(graph, config.visit_m, near_m, starts_m, passages)
         self.columns, self.goals = {}, ()
         self.events: list[Event] = []
         self._visits = VisitLog(graph.vertices_xy_m, config.visit_m, len(self._names))
@@ -240,15 +240,15 @@ def _site(config: PatrolConfig, setting: TaskSetting) -> tuple[Floor, PatrolGrap
     return floor, on_floor(read_patrol_graph(Path(config.graph)), floor, config.graph)
 
 
-def _starts(graph: PatrolGraph, floor: Floor, setting: TaskSetting) -> IntArray:
-    """(N,) which vertex each robot comes to first: the nearest as the crow flies may lie behind a wall."""
+def _starts_m(graph: PatrolGraph, floor: Floor, setting: TaskSetting) -> FloatArray:
+    """(N, V) how far each robot's starting place is from each vertex, around walls."""
     found = []
     for index, robot in enumerate(setting.mission.members):
         start = setting.mission.start_of(robot)
         assert start is not None, "settled when the mission was built"
         place = np.array([start.x_m, start.y_m])
-        found.append(floor.nearest_of(graph.vertices_xy_m, place, f"start of robot {index}"))
-    return np.array(found, dtype=np.int64)
+        found.append(floor.away_m(graph.vertices_xy_m, place, f"start of robot {index}"))
+    return np.array(found)
 
 
 def _lidar(setting: TaskSetting, index: int) -> LidarConfig | None:

@@ -32,6 +32,8 @@ class PatrolSetting:
         This robot's own stream; what the whole team must agree on is not drawn from it.
     passages
         Where on their way there is room for one of them.
+    starts_m
+        (N, V) length of the path from each robot's starting place to each vertex; None: it is at its vertex.
     """
 
     graph: PatrolGraph
@@ -41,6 +43,7 @@ class PatrolSetting:
     rng: np.random.Generator
     begin_s: float = 0.0
     passages: Passages = OPEN
+    starts_m: FloatArray | None = None
 
     @property
     def team_size(self) -> int:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from pilotage.core.types import FloatArray, IntArray
 from pilotage.stack.patrol.graph import PatrolGraph
 from pilotage.stack.patrol.passages import Passages
@@ -23,8 +25,8 @@ class PatrolSite:
     near_m
         Whoever goes there comes so near, if it does not know its own place too badly: to places that are
         looked from nearer than to others.
-    starts
-        (N,) the vertex that each robot's starting place has the shortest path to.
+    starts_m
+        (N, V) length of the path from each robot's starting place to each vertex.
     passages
         Where the largest of the robots has a passage to itself.
     """
@@ -32,8 +34,13 @@ class PatrolSite:
     graph: PatrolGraph
     visit_m: float
     near_m: float
-    starts: IntArray
+    starts_m: FloatArray
     passages: Passages
+
+    @property
+    def starts(self) -> IntArray:
+        """(N,) the vertex that each robot's starting place has the shortest path to."""
+        return np.asarray(np.argmin(self.starts_m, axis=1))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import zlib
+from collections.abc import Mapping
 
 import numpy as np
 from pydantic import Field
@@ -80,7 +81,10 @@ class AdaptiveRoundsStrategy:
         self._team = frozenset(range(team))
         self._heard_s = np.full(team, setting.begin_s)
         self._plan = best_plan(setting, team, config)
-        groups = self._seats(dict(enumerate(setting.starts.tolist())))
+        from_starts_m = (
+            self._graph.shortest_m[setting.starts] if setting.starts_m is None else setting.starts_m
+        )
+        groups = self._seats(dict(enumerate(from_starts_m)))
         self._round = self._plan.rounds[groups[setting.robot]]
         mates = [robot for robot in sorted(groups) if groups[robot] == groups[setting.robot]]
         slots = spread(self._round, self._graph, setting.starts[mates], setting.speed_m_s, setting.begin_s)
@@ -153,18 +157,20 @@ class AdaptiveRoundsStrategy:
         if frozenset(team) != self._team:
             self._team = frozenset(team)
             self._plan = best_plan(self._setting, len(team), self._config)
-            groups = self._seats({robot: self._place_of(knowledge, robot) for robot in team})
+            places = {robot: self._place_of(knowledge, robot) for robot in team}
+            groups = self._seats({robot: self._graph.shortest_m[at] for robot, at in places.items()})
             self._join(self._plan.rounds[groups[knowledge.robot]], knowledge)
 
-    def _seats(self, places: dict[int, int]) -> dict[int, int]:
-        """Which group each robot belongs to: the least sum of squared distances to the rounds."""
+    def _seats(self, away_m: Mapping[int, FloatArray]) -> dict[int, int]:
+        """Which group each robot belongs to, by its distances to all vertices (V,).
+
+        The least sum of squared distances to the rounds: along a passage for one nobody is sent past another.
+        """
         from scipy.optimize import linear_sum_assignment  # loads 0.1 s of SciPy, which most runs never need
 
-        plan, robots = self._plan, sorted(places)
+        plan, robots = self._plan, sorted(away_m)
         seats = np.repeat(np.arange(len(plan.sizes)), plan.sizes)
-        away = np.array(
-            [[self._graph.shortest_m[places[r], walk.stops].min() for walk in plan.rounds] for r in robots]
-        )
+        away = np.array([[away_m[r][walk.stops].min() for walk in plan.rounds] for r in robots])
         row, column = linear_sum_assignment(away[:, seats] ** 2)
         return {robots[r]: int(seats[c]) for r, c in zip(row, column, strict=True)}
 
