@@ -21,7 +21,7 @@ from pilotage.stack.navigator.global_plan import GlobalPlan
 from pilotage.stack.navigator.own_map import OwnMap
 from pilotage.stack.navigator.progress import StallWatch, patience_s
 from pilotage.stack.perception.moving_bodies import MovingBodies
-from pilotage.stack.planning.planner import Planner, Smoother
+from pilotage.stack.planning.planner import Planner, PlanStatus, Smoother
 
 
 class PlanAheadConfig(Config):
@@ -46,6 +46,10 @@ class PlanAheadConfig(Config):
     spare may prove closed. 0: whatever looks open is tried."""
     look_m: NonNegative = 1.5
     """So near to such a gap it drives up to it: it costs little more to know than to guess."""
+    look_around_s: NonNegative = 2.0
+    """So long it looks around where it believes to begin inside something: a start is not known to the cm."""
+    lost_s: NonNegative = 20.0
+    """So long it waits to know where it is at all."""
     stall_s: Positive = 10.0
     stall_progress_m: Positive = 0.5
     most_stalls: int = Field(default=6, ge=0)
@@ -89,6 +93,7 @@ class PlanAhead:
         self._path: FloatArray = np.zeros((0, 2))
         self.to_go_m = math.inf
         self.failure, self._why = "", ""
+        self._status: PlanStatus | None = None
         journal.result("mapped_circles_m", lambda: own_map.found_circles_m)
         journal.counts["replans"] = 0
         if initial.status is not BeliefStatus.LOST:
@@ -101,7 +106,7 @@ class PlanAhead:
         if self._mapper is not None:
             self._mapper.step(readings, belief)
         if self._plan.progress is None:
-            self._make(t_s, pose, "plan")
+            self._begin(t_s, belief)
         else:
             self.to_go_m = self._plan.progress.update(pose)
             if self._stall.stalled(self.to_go_m, t_s):
@@ -111,10 +116,22 @@ class PlanAhead:
                 self._make(t_s, pose, f"no progress for {self._stall.patience_s:.3g} s")
             elif t_s - self._planned_s >= self._config.every_s and self._is_blocked():
                 self._make(t_s, pose, "a mapped obstacle stands on the plan")
-        if self._plan.progress is None:
-            self.failure = self.failure or f"no plan leads to the goal: {self._why}"
-            return pose.x_m, pose.y_m
-        return self._point_ahead()
+        return (pose.x_m, pose.y_m) if self._plan.progress is None else self._point_ahead()
+
+    def _begin(self, t_s: float, belief: Belief) -> None:
+        """Make the first plan, once it is known from where; say why there is none."""
+        config = self._config
+        if belief.status is BeliefStatus.LOST:
+            if t_s >= config.lost_s:
+                self.failure = "the robot does not know where it is; navigator goal wanders until it does"
+            return
+        blocked = self._status is PlanStatus.START_BLOCKED
+        if not blocked or t_s - self._planned_s >= config.every_s:
+            self._make(t_s, belief.pose, "plan")
+        if self._plan.progress is None and not (
+            self._status is PlanStatus.START_BLOCKED and t_s < config.look_around_s
+        ):
+            self.failure = f"no plan leads to the goal: {self._why}"
 
     @property
     def mapped_m(self) -> FloatArray:
@@ -133,7 +150,7 @@ class PlanAhead:
         first = self._plan.progress is None
         clearances_m = sorted({c for c in asked if c <= own}, reverse=True)
         result = self._plan.make(t_s, pose, self._goal, found, clearances_m, self._detours)
-        self._planned_s = t_s
+        self._planned_s, self._status = t_s, result.status
         if not first:
             self._journal.count("replans")
         if result.path is None:
