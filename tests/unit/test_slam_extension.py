@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -11,9 +12,11 @@ import pytest
 
 from pilotage.cli.main import main
 from pilotage.core.types import FloatArray
+from pilotage.experiments.slam_folder import write_slam_folder
 from pilotage.kernels.slam.branch_bound import search_window
 from pilotage.kernels.slam.frames import between, composed
 from pilotage.kernels.slam.match_grid import max_pyramid
+from pilotage.logs.trajectories import read_tum
 from pilotage.models.pose_graph_covariance import covariances
 from pilotage.stack.mapping.slam import matching
 from pilotage.stack.mapping.slam.config import SlamConfig
@@ -193,8 +196,6 @@ def test_bad_maps_to_extend_are_one_line(
     tmp_path: Path, first: SlamResult, capsys: pytest.CaptureFixture[str]
 ) -> None:
     log = write_carmen(tmp_path / "a.log", recording(two_rooms(), along(ROUND)[:9], np.random.default_rng(1)))
-    from pilotage.experiments.slam_folder import write_slam_folder
-
     simulated = recording(two_rooms(), along(ROUND), np.random.default_rng(1))
     folder = tmp_path / "runs" / "slam-a-extended"
     write_slam_folder(folder, simulated, CONFIG, first, {})
@@ -263,3 +264,14 @@ def test_rivals_are_looked_for_where_they_count_alone(
             assert (found.relative == plain.relative).all()
             assert (found.score, found.agreement) == (plain.score, plain.agreement)
             assert (found.second > 0.6 * found.score) == (worth and plain.second > 0.6 * plain.score)
+
+
+def test_scans_of_one_stamp_leave_a_folder_that_can_be_read(tmp_path: Path, first: SlamResult) -> None:
+    """A microsecond added to a time of day is rounded to less: the twelfth scan had the stamp before it."""
+    simulated = recording(two_rooms(), along(ROUND), np.random.default_rng(1))
+    same = replace(first, t_s=np.full(len(first.t_s), 976052857.337294))
+    write_slam_folder(tmp_path / "slam-a", simulated, CONFIG, same, {})
+    stamps = read_tum(tmp_path / "slam-a" / "before.tum").t_s
+    assert stamps is not None
+    assert len(stamps) == len(first.t_s)
+    assert bool(np.all(np.diff(stamps) > 0.0))

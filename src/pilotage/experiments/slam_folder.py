@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from decimal import Decimal
 from pathlib import Path
 
 import numpy as np
@@ -97,10 +98,12 @@ def _of_frame(log: LaserLog, config: SlamConfig, poses: FloatArray) -> FloatArra
 def _tum(t_s: FloatArray, poses: FloatArray) -> str:
     """Lines of TUM's format; two scans of one stamp keep theirs apart by a microsecond."""
     lines = []
-    last = -np.inf
+    last: int | None = None
     for t, (x, y, theta) in zip(t_s.tolist(), poses.tolist(), strict=True):
-        stamp = max(t, last + 1e-6)
-        last = stamp
+        # As whole numbers: added to a time of day a microsecond is rounded to less than one.
+        stamp_us = round(Decimal(t).scaleb(6))
+        last = stamp_us = stamp_us if last is None else max(stamp_us, last + 1)
+        stamp = Decimal(stamp_us).scaleb(-6)
         lines.append(
             f"{stamp:.6f} {x:.6f} {y:.6f} 0 0 0 {np.sin(0.5 * theta):.9f} {np.cos(0.5 * theta):.9f}\n"
         )
