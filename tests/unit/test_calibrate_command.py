@@ -105,6 +105,10 @@ def test_the_room_gives_back_the_sensors_variances(tmp_path: Path, capsys: Captu
     assert sensors["front", "range"]["expected_m"] == pytest.approx(1.8)
     assert {entry["readings"] for entry in answer["sensors"]} == {1000}
     check_page(Path(answer["report"]), figures=6)
+    page = Path(answer["report"]).read_text(encoding="utf-8")
+    told = re.search(r"lidar range mean</th>.*?95 %: (\S+) m to (\S+) m", page)
+    assert told is not None
+    assert float(told[1]) < float(told[2])
 
 
 def check_page(path: Path, figures: int) -> None:
@@ -193,6 +197,19 @@ def test_heading_sensors_give_bias_noise_and_offsets(tmp_path: Path, capsys: Cap
     assert ellipse["offset_gauss"]["y"]["value"] == pytest.approx(-0.1, abs=1e-3)
     assert ellipse["axis_ratio"]["value"] == pytest.approx(1.25, rel=0.01)
     check_page(Path(answer["report"]), figures=2)
+
+
+def test_a_gyroscope_that_only_turned_tells_its_turn(tmp_path: Path, capsys: Capture) -> None:
+    rates = 90.0 * (1.0 - np.cos(np.linspace(0.0, 2.0 * math.pi, 601)))
+    turning = ["t,x,y,z", *(f"{0.01 * k:.2f},0.1,0.2,{rate:.4f}" for k, rate in enumerate(rates))]
+    path = tmp_path / "gyroscope.csv"
+    path.write_text("\n".join(turning) + "\n")
+    answer = calibrate(capsys, "heading", str(path), "--out", str(tmp_path / "runs"))
+    page = Path(answer["report"]).read_text(encoding="utf-8")
+    assert "1 gyroscope axis, 0 magnetometers turned. About z the gyroscope" in page
+    assert "tells a turn of 540°" in page
+    assert '<dl class="tiles">' not in page
+    assert "<table" not in page
 
 
 def test_half_a_turn_is_too_little_for_a_magnetometer(tmp_path: Path, capsys: Capture) -> None:

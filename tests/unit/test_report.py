@@ -63,6 +63,17 @@ def test_captions_speak_of_what_the_run_has(tmp_path: Path) -> None:
     assert not re.search(r"\d (?:m|mm|s|%|mrad)\b", " ".join(captions))
 
 
+def test_a_run_of_days_is_drawn_over_days_and_in_metres(tmp_path: Path) -> None:
+    days = {"t_s": np.linspace(0.0, 60.0 * 86_400.0, 600), "cov_xx_m2": np.full(600, 1e4)}
+    events = [{"t_s": 30.0 * 86_400.0, "kind": "replan", "text": "elsewhere"}]
+    page = page_of(fabricate_run(tmp_path / "run", columns=days, events=events))
+    assert "time [d]" in page
+    assert "time [s]" not in page
+    assert "1e6" not in page
+    assert "30.00\u00a0days" in page
+    assert "σ of x and y [m]" in page
+
+
 def test_layers_of_the_map_can_be_switched(tmp_path: Path) -> None:
     page = page_of(fabricate_run(tmp_path / "run"))
     layers = re.findall(r'id="map-show-([a-z]+)"', page)

@@ -48,6 +48,8 @@ def test_summary_table() -> None:
 def test_the_headline_tells_what_the_mission_was_about() -> None:
     found = headline({"success": True, "lost_s": 5.1, "found_after_s": 5.2}).replace("\u00a0", " ")
     assert found == "Done; lost for 5.10 s and found itself."
+    done = headline({"success": True, "reason": "done: 442 cells visited", "collisions": 0})
+    assert done == "Done without a collision: 442 cells visited."
     gone = headline({"success": False, "reason": "time is up", "lost_s": 60.0}).replace("\u00a0", " ")
     assert gone == "Failed: time is up; lost for 60.0 s and did not find itself."
     mapped = headline({"success": True, "floor_mapped": 0.99, "wall_rms_m": 0.025}).replace("\u00a0", " ")

@@ -62,6 +62,8 @@ def test_the_page_says_of_every_closure_what_the_file_has(folder: Path, data: Sl
     page = write_report(folder).read_text("utf-8")
     check_self_contained(page)
     assert f"{data.metrics['closures_accepted']} of {data.metrics['closures_searched']} compared" in page
+    for raw in ("duration s", "path length m", "position std max m"):
+        assert raw not in page
     program = find_browser()
     if program is None:
         pytest.skip("no Chromium is installed: the page is not tried in a browser")

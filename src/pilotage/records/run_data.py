@@ -79,7 +79,7 @@ class RunData:
     @property
     def recorded(self) -> bool:
         """Whether it replays a recorded log instead of a simulation."""
-        return not self.mission and "localizer" in self.metrics
+        return not self.mission and ("localizer" in self.metrics or bool(self.localizer_text))
 
     @property
     def outline(self) -> RobotOutline:

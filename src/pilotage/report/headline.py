@@ -51,6 +51,9 @@ def headline(metrics: Mapping[str, Any]) -> str:
             answer += " without a collision"
         elif collisions > 0.0:
             answer += f" with {quantities.count(collisions)} collision{'s' if collisions > 1 else ''}"
+        reason = str(metrics.get("reason") or "").strip().rstrip(".").removeprefix("done: ")
+        if where == "Done" and " " in reason:
+            answer += f": {reason}"
     else:
         reason = str(metrics.get("reason") or "no reason given").strip().rstrip(".")
         answer = f"Failed{after}: {reason}"

@@ -221,13 +221,18 @@ def page(
         description="".join(f'<p class="description">{escape(text)}</p>' for text in descriptions),
         outcome=outcome,
         headline=escape(headline),
-        tiles="".join(f"<div><dt>{escape(name)}</dt><dd>{escape(value)}</dd></div>" for name, value in tiles),
+        tiles=_tiles(tiles),
         contents=f'<nav aria-label="Contents"><ol>{entries}</ol></nav>',
         body="\n".join(part.html for part in shown),
         footer=escape(footer),
         script_source=script_source,
         style=resources.files(__package__).joinpath("page.css").read_text("utf-8"),
     )
+
+
+def _tiles(tiles: Sequence[tuple[str, str]]) -> str:
+    parts = "".join(f"<div><dt>{escape(name)}</dt><dd>{escape(value)}</dd></div>" for name, value in tiles)
+    return f'<dl class="tiles">{parts}</dl>' if parts else ""
 
 
 _PAGE = Template(
@@ -250,7 +255,7 @@ $layers
 <h1>$heading</h1>
 $description
 <p class="headline">$outcome $headline</p>
-<dl class="tiles">$tiles</dl>
+$tiles
 $contents
 </header>
 <main>

@@ -21,6 +21,17 @@ def significant(value: float, digits: int = 3) -> str:
     return f"{value:,.{decimals}f}".replace(",", "\u00a0").replace("-", "−")
 
 
+def scientific(value: float, digits: int = 4) -> str:
+    """Write a number plainly where it is near 1, else with a power of ten."""
+    if not math.isfinite(value):
+        return NOTHING
+    if value == 0.0 or 1e-3 <= abs(value) < 1e4:
+        return f"{value:.{digits}g}".replace("-", "−")
+    mantissa, _, exponent = f"{value:.{digits - 1}e}".partition("e")
+    power = str(int(exponent)).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
+    return f"{mantissa} × 10{power}".replace("-", "−")
+
+
 def length(value_m: float) -> str:
     """Write a length in mm below 0.1 m, in m from there, in km from 10 km on."""
     if not math.isfinite(value_m):

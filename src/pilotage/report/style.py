@@ -22,9 +22,11 @@ from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 from matplotlib.patches import PathPatch
 from matplotlib.path import Path as Outline
+from matplotlib.ticker import MaxNLocator
 from matplotlib.transforms import Transform
 
 from pilotage.core.types import FloatArray
+from pilotage.report.quantities import HOURS_FROM_S
 from pilotage.report.series import decimate
 
 BLACK = "#000000"
@@ -165,6 +167,14 @@ def time_limits(panels: Sequence[Axes], t_s: FloatArray) -> None:
     end = float(t_s[-1]) if len(t_s) else 0.0
     for axes in panels:
         axes.set_xlim(min(start, 0.0), end if end > start else start + 1.0)
+    if end - start < HOURS_FROM_S:
+        return
+    unit, name = (3600.0, "h") if end - start < 48.0 * 3600.0 else (86_400.0, "d")
+    ticks = np.asarray(MaxNLocator(8, steps=[1, 2, 2.5, 5, 10]).tick_values(start / unit, end / unit))
+    ticks = ticks[(ticks >= start / unit) & (ticks <= end / unit)]
+    for axes in panels:
+        axes.set_xticks(unit * ticks, [f"{tick:g}" for tick in ticks])
+    panels[-1].set_xlabel(f"time [{name}]")
 
 
 def series(axes: Axes, t_s: FloatArray, values: FloatArray, colour: str, **look: Any) -> None:

@@ -9,6 +9,7 @@ import numpy as np
 
 from pilotage.records.calibration import CalibrationData
 from pilotage.report.calibration.plots import histogram, panels_in_a_row
+from pilotage.report.quantities import scientific
 from pilotage.report.style import (
     BLUE,
     MUTED,
@@ -67,8 +68,8 @@ def _log_figure(data: CalibrationData, index: int, log: Mapping[str, Any]) -> Il
 def _caption(log: Mapping[str, Any], told: Mapping[str, Any], quantity: str, unit: str) -> str:
     si = "rad" if unit == "mrad" else "m"
     parts = [
-        f"{log['steps']} steps. The {quantity} error of one step has the mean {told[f'mean_{si}']:.3g} {si} "
-        f"and the variance {told[f'var_{si}2']:.4g} {si}²."
+        f"{log['steps']} steps. The {quantity} error of one step has the mean "
+        f"{scientific(told[f'mean_{si}'], 3)} {si} and the variance {scientific(told[f'var_{si}2'])} {si}²."
     ]
     p = told.get("normality_p")
     if p is not None:

@@ -10,6 +10,7 @@ from typing import Any
 from pilotage.core.errors import InputError
 from pilotage.core.whole_file import write_whole
 from pilotage.records.calibration import CALIBRATION_FILE, CalibrationData, read_calibration
+from pilotage.report import quantities
 from pilotage.report.calibration.drive_figures import drive_figures
 from pilotage.report.calibration.heading_figures import heading_figures
 from pilotage.report.calibration.odometry_figures import odometry_figures
@@ -26,6 +27,7 @@ from pilotage.report.markup import (
     section,
     table,
 )
+from pilotage.report.quantities import scientific
 from pilotage.report.style import drawing_style
 
 _FIGURES = {
@@ -123,17 +125,6 @@ def calibration_page(data: CalibrationData) -> str:
     )
 
 
-def scientific(value: float, digits: int = 4) -> str:
-    """Write a number plainly where it is near 1, else with a power of ten."""
-    if not math.isfinite(value):
-        return "–"
-    if value == 0.0 or 1e-3 <= abs(value) < 1e4:
-        return f"{value:.{digits}g}".replace("-", "−")
-    mantissa, _, exponent = f"{value:.{digits - 1}e}".partition("e")
-    power = str(int(exponent)).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
-    return f"{mantissa} × 10{power}".replace("-", "−")
-
-
 def _found(answer: Mapping[str, Any]) -> list[tuple[str, Mapping[str, float]]]:
     """The estimates that were found, in the answer's order."""
     return [
@@ -154,24 +145,31 @@ def _name(key: str) -> str:
     return " ".join({"var": "variance", "cov": "covariance"}.get(word, word) for word in words)
 
 
-def _value(key: str, value: float) -> str:
-    """The number with its unit; ratios with enough digits to tell them from 1."""
-    return f"{scientific(value, 4 if _unit(key) else 5)} {_unit(key)}".strip()
+def _value(key: str, found: Mapping[str, float], which: str = "value") -> str:
+    """The number with its unit, enough digits to tell ratios from 1 and the interval's ends apart."""
+    low, high = found["low"], found["high"]
+    apart = max(abs(low), abs(high)) / (high - low) if high > low else 1.0
+    digits = max(4 if _unit(key) else 5, min(8, math.ceil(math.log10(max(apart, 1.0))) + 2))
+    return f"{scientific(found[which], digits)} {_unit(key)}".strip()
 
 
 def _estimates(data: CalibrationData) -> Section:
     rows = []
     for key, value in _found(data.answer):
-        low, high = (escape(_value(key, value[end])) for end in ("low", "high"))
+        low, high = (escape(_value(key, value, end)) for end in ("low", "high"))
         band = f'<span class="range">95 %: {low} to {high}.</span>'
         meaning = Html(f"{escape(_MEANINGS.get(key, ''))} {band}")
-        rows.append((_name(key), _value(key, value["value"]), meaning))
-    missing = [_name(key) for key, value in data.answer.items() if value is None]
+        rows.append((_name(key), _value(key, value), meaning))
+    missing = [
+        f"{_name(key)}{f' in {_unit(key)}' if _unit(key) else ''}"
+        for key, value in data.answer.items()
+        if value is None
+    ]
     told = [f"Not told by these logs: {', '.join(missing)}"] if missing else []
     told += data.answer.get("warnings", ())
     columns = (("what", ROW), ("value", VALUE), ("what it means", ""))
     notes = (f'<p class="absent">{escape(text)}.</p>' for text in told)
-    return section("estimates", "Estimates", table(columns, rows, "metrics"), *notes)
+    return section("estimates", "Estimates", table(columns, rows, "metrics") if rows else "", *notes)
 
 
 def _offset(data: CalibrationData) -> Section:
@@ -194,7 +192,7 @@ def _offset(data: CalibrationData) -> Section:
         ("BIC above the best (6 is strong, 10 decisive)", ""),
     )
     told = f"<p><b>{escape(str(offset['shape']))}</b>: {escape(str(offset['explanation']))}.</p>"
-    return section(slug, title, told, table(columns, rows))
+    return section(slug, title, told, table(columns, rows, box="wide"))
 
 
 def _parameters(data: CalibrationData) -> Section:
@@ -223,10 +221,20 @@ def _headline(answer: Mapping[str, Any]) -> str:
         )
     if kind == "range":
         count = len(answer["sensors"])
-        quantities = "1 quantity" if count == 1 else f"{count} quantities"
-        return f"{quantities} of sensors that look at the same thing all the time."
-    return f"{len(answer['gyroscope'])} gyroscope axes, {len(answer['magnetometer'])} magnetometers turned."
+        what = "1 quantity" if count == 1 else f"{count} quantities"
+        return f"{what} of sensors that look at the same thing all the time."
+    axes, turned = len(answer["gyroscope"]), len(answer["magnetometer"])
+    turns = [
+        f" About {entry['axis']} the gyroscope of {entry['log']} tells a turn of "
+        f"{quantities.angle(entry['turn_rad'])}."
+        for entry in answer["gyroscope"]
+        if "turn_rad" in entry
+    ]
+    return (
+        f"{axes} gyroscope {'axis' if axes == 1 else 'axes'}, {turned} "
+        f"magnetometer{'' if turned == 1 else 's'} turned.{''.join(turns)}"
+    )
 
 
 def _tiles(answer: Mapping[str, Any]) -> list[tuple[str, str]]:
-    return [(_name(key), _value(key, value["value"])) for key, value in _found(answer)[:4]]
+    return [(_name(key), _value(key, value)) for key, value in _found(answer)[:4]]

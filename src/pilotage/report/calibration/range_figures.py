@@ -9,6 +9,7 @@ import numpy as np
 
 from pilotage.records.calibration import CalibrationData
 from pilotage.report.calibration.plots import histogram, panels_in_a_row
+from pilotage.report.quantities import scientific
 from pilotage.report.style import BLUE, SKY, VERMILLION, Illustration, Key, render, series
 
 MOST_FIGURES = 24
@@ -57,16 +58,17 @@ def _figure(data: CalibrationData, index: int, entry: Mapping[str, Any], more: s
 def _caption(entry: Mapping[str, Any], unit: str) -> str:
     mean, var = entry[f"mean_{unit}"], entry[f"var_{unit}2"]
     parts = [
-        f"{entry['readings']} readings: mean {mean['value']:.6g} {unit} "
-        f"({mean['low']:.6g} to {mean['high']:.6g}), "
-        f"variance {var['value']:.4g} {unit}² ({var['low']:.4g} to {var['high']:.4g})."
+        f"{entry['readings']} readings: mean {scientific(mean['value'], 6)} {unit} "
+        f"({scientific(mean['low'], 6)} to {scientific(mean['high'], 6)}), "
+        f"variance {scientific(var['value'])} {unit}² "
+        f"({scientific(var['low'])} to {scientific(var['high'])})."
     ]
     if entry.get(f"expected_{unit}") is not None:
         parts.append(f"Expected: {entry[f'expected_{unit}']:.6g} {unit}.")
     if entry.get(f"given_var_{unit}2") is not None:
         verdict = "inside" if entry["recovered"] else "outside"
         parts.append(
-            f"The sensor was given {entry[f'given_var_{unit}2']:.4g} {unit}²: {verdict} the interval."
+            f"The sensor was given {scientific(entry[f'given_var_{unit}2'])} {unit}²: {verdict} the interval."
         )
     if entry.get("normality_p") is not None:
         parts.append(f"{entry['normality_test']}: p = {entry['normality_p']:.2g}.")

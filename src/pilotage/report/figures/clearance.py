@@ -38,7 +38,7 @@ def clearance_figure(run: RunData) -> Illustration:
     series(axes, t_s, clearance, BLUE, linewidth=1.0)
     axes.plot([t_s[least]], [least_m], "o", color=VERMILLION, markersize=5.0)
     # Said beside the title: over the curve it would hide what comes just before or after.
-    text = f"● least: {quantities.length(least_m)} at {t_s[least]:.1f} s"
+    text = f"● least: {quantities.length(least_m)} at {quantities.moment(t_s[least])}"
     axes.set_title(text, loc="right", color=VERMILLION, fontsize=9.0)
     caption = (
         "The true distance between the edge of the robot's body and the nearest wall or obstacle, known or "

@@ -79,8 +79,10 @@ def close_ups_figure(run: RunData) -> Illustration:
         axes.set_title(moment.title, fontsize=9.0)
         axes.locator_params(nbins=5)
         _draw(axes, _window(run, x, y, half_m, moment.step), run, moment.step, radius)
+    sides = [quantities.length(2.0 * max(least_m, 1.3 * moment.error_m)) for moment in moments]
     caption = (
-        f"Windows of {quantities.length(2.0 * least_m)}, larger for a larger error, in metres like the map, "
+        f"{'Windows' if len(sides) > 1 else 'A window'} of {' and '.join(dict.fromkeys(sides))}, in metres "
+        "like the map, "
         f"with the path of {PATH_S:g} s before and after. The body is the robot at that moment, dashed is "
         "where it believed to be; the small black ellipses hold it with 95 % probability and are to scale."
     )
@@ -128,7 +130,9 @@ def _moments(run: RunData, path: FloatArray) -> list[Moment]:
             math.dist(path[moment.step], path[other.step]) > 1.0 for other in apart
         ):
             off_m = float(np.nan_to_num(error[moment.step]))
-            apart.append(Moment(moment.step, f"{moment.title}, at {trace.t_s[moment.step]:.1f} s", off_m))
+            apart.append(
+                Moment(moment.step, f"{moment.title}, at {quantities.moment(trace.t_s[moment.step])}", off_m)
+            )
     return apart[:MOST]
 
 

@@ -16,6 +16,7 @@ from pilotage.report.style import (
     Key,
     logarithmic,
     note,
+    peak,
     render,
     series,
     shade,
@@ -33,13 +34,16 @@ def covariance_figure(run: RunData) -> Illustration:
     trace, t_s = run.trace, run.trace.t_s
     if not (trace.has("cov_xx_m2") or trace.has("cov_yy_m2") or trace.has("cov_tt_rad2")):
         return Illustration(SLUG, TITLE, "", "The run recorded no covariance.")
+    far = peak(np.concatenate([trace["cov_xx_m2"], trace["cov_yy_m2"]])) > 1.0
+    unit, factor = ("m", 1.0) if far else ("mm", 1000.0)
     sigmas = {
-        name: 1000.0 * np.sqrt(np.where(trace[column] > 0.0, trace[column], np.nan))
+        name: (1000.0 if name == "heading" else factor)
+        * np.sqrt(np.where(trace[column] > 0.0, trace[column], np.nan))
         for name, column in (("x", "cov_xx_m2"), ("y", "cov_yy_m2"), ("heading", "cov_tt_rad2"))
     }
     colours = {"x": BLUE, "y": ORANGE, "heading": PURPLE}
-    units = {"x": "mm", "y": "mm", "heading": "mrad"}
-    figure, panels = stacked_axes(["σ of x and y [mm]", "σ of heading [mrad]"], (130.0, 95.0))
+    units = {"x": unit, "y": unit, "heading": "mrad"}
+    figure, panels = stacked_axes([f"σ of x and y [{unit}]", "σ of heading [mrad]"], (130.0, 95.0))
     time_limits(panels, t_s)
     turns = merge_spans(spans(t_s, np.abs(trace["w_true_rad_s"]) > TURNING_RAD_S), 0.3)
     for axes, names in zip(panels, (("x", "y"), ("heading",)), strict=True):

@@ -18,6 +18,7 @@ POINTS = 900
 
 MEANINGS = {
     "accepted": "fits alone, with the graph and with the others around it",
+    "accepted across its course alone": "fits across its course, open along it; others bear it out",
     "no match": "nothing in the window was alike",
     "low score": "the best place in the window is not alike enough",
     "little overlap": "too few points fall where the other stretch saw",
@@ -26,6 +27,7 @@ MEANINGS = {
     "contradicts the graph": "farther off than the graph's uncertainty allows",
     "contradicts other closures": "does not go with the larger group of closures that agree",
     "no other closure seconds it": "no agreeing closure near it on both stretches",
+    "no full closure followed from it": "open along its course, and nothing near it bore it out",
 }
 
 

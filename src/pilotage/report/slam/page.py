@@ -8,7 +8,9 @@ from typing import Any
 
 from pilotage.core.memory import give_back
 from pilotage.core.whole_file import write_whole
+from pilotage.records.numbers import number
 from pilotage.records.slam_folder import SlamFolder, read_slam_folder
+from pilotage.report import quantities
 from pilotage.report.markup import (
     REPORT_FILE,
     ROW,
@@ -81,8 +83,9 @@ def slam_page(data: SlamFolder) -> str:
     sections.insert(1, replay_section(slam_scene(data)))
     sections += [_numbers(m), _warnings(m)]
     headline = (
-        f"{m['scans']} scans over {m['path_length_m']:.0f} m; {m['closures_accepted']} of "
-        f"{m['closures_searched']} compared pairs of stretches closed a loop."
+        f"{quantities.count(m['scans'])} scans over {m['path_length_m']:.0f}\u00a0m in "
+        f"{quantities.duration(m['duration_s'])}; {quantities.count(m['closures_accepted'])} of "
+        f"{quantities.count(m['closures_searched'])} compared pairs of stretches closed a loop."
     )
     if "extends" in m:
         headline += f" Joined to {Path(m['extends']).name} by {m['closures_joining']} of them."
@@ -101,16 +104,16 @@ def slam_page(data: SlamFolder) -> str:
 
 def _tiles(m: Mapping[str, Any]) -> list[tuple[str, str]]:
     return [
-        ("map", f"{m['map_columns'] * m['resolution_m']:.0f} x {m['map_rows'] * m['resolution_m']:.0f} m"),
+        ("map", f"{m['map_columns'] * m['resolution_m']:.0f} × {m['map_rows'] * m['resolution_m']:.0f} m"),
         ("closed loops", str(m["closures_accepted"])),
         ("least sure position", f"±{m['position_std_max_m']:.2f} m"),
-        ("faster than real time", f"{m['times_real_time']:.0f} x"),
+        ("faster than real time", f"{m['times_real_time']:.0f} ×"),
     ]
 
 
 def _numbers(m: Mapping[str, Any]) -> Section:
     rows = [
-        (key.replace("_", " "), _text(m.get(key)), meaning)
+        (_name(key), _text(key, m.get(key)), meaning)
         for key, meaning in MEANINGS.items()
         if key in m or key not in OF_EXTENSIONS
     ]
@@ -123,7 +126,15 @@ def _warnings(m: Mapping[str, Any]) -> Section:
     return section("warnings", "What the recording lacked", *lines)
 
 
-def _text(value: object) -> str:
-    if value is None:
-        return "–"
-    return f"{value:.4g}" if isinstance(value, float) else str(value)
+def _name(key: str) -> str:
+    words = (
+        "position_std_largest" if key == "position_std_max_m" else key.removesuffix("_m").removesuffix("_s")
+    )
+    return words.replace("_", " ")
+
+
+def _text(key: str, value: object) -> str:
+    told = number(value)
+    if key.endswith(("_m", "_s")):
+        return quantities.length(told) if key.endswith("_m") else quantities.duration(told)
+    return quantities.count(told) if isinstance(value, int) else quantities.significant(told, 4)

@@ -161,7 +161,11 @@ def _change(table: StudyTable, judgement: Judgement, index: int, word: str) -> s
     if change is None or change.n == 0:
         return text
     by = difference(table.primary, change)
-    seeds = f"on the same {change.n} seeds" if table.same_seeds else "on seeds of their own"
+    seeds = (
+        f"on the same {f'{change.n} seeds' if change.n > 1 else 'seed'}"
+        if table.same_seeds
+        else "on seeds of their own"
+    )
     return f"{text}, a change by {by} {seeds}, {evidence(change)}"
 
 
