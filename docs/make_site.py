@@ -58,8 +58,8 @@ def build(folder: Path, *, quick: bool = False) -> Path:
         _write(source / place, rewritten(page, places))
     for picture in (DOCS / "images").iterdir():
         _copy(picture, source / "images" / picture.name)
-    for style in ("site.css", "narrow.css"):
-        _copy(DOCS / style, source / style)
+    for beside in ("site.css", "narrow.css", "search-from-files.js"):
+        _copy(DOCS / beside, source / beside)
     _write(source / "decisions" / "index.md", _decisions())
     _write(source / "notebooks" / "index.md", _notebooks(source / "notebooks", quick=quick))
     _write(source / "gallery" / "index.md", _gallery(source / "gallery", () if quick else GALLERY))
@@ -70,6 +70,9 @@ def build(folder: Path, *, quick: bool = False) -> Path:
     done = subprocess.run(command, check=False, capture_output=True, text=True)
     if done.returncode != 0:
         raise SystemExit(done.stdout + done.stderr)
+    # A page that is opened from its file may load a script, and no other file.
+    index = site / "search" / "search_index.json"
+    _write(index.with_suffix(".js"), f"var __index = {index.read_text(encoding='utf-8')}")
     return site
 
 
