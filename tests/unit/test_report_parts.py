@@ -54,6 +54,8 @@ def test_the_headline_tells_what_the_mission_was_about() -> None:
     assert gone == "Failed: time is up; lost for 60.0 s and did not find itself."
     mapped = headline({"success": True, "floor_mapped": 0.99, "wall_rms_m": 0.025}).replace("\u00a0", " ")
     assert mapped == "Done; 99.0 % of the reachable floor mapped, its walls 25.0 mm off (RMS)."
+    swept = headline({"success": False, "reason": "time is up", "swept_fraction": 0.076})
+    assert swept.replace("\u00a0", " ") == "Failed: time is up; 7.6 % of the floor swept."
     missed = {"success": False, "reason": "the robot stands 312.36 m from its goal", "goal_error_m": 312.36}
     assert headline(missed).count("312.36") == 1
     team = {"success": True, "robots": {"a": {"success": True}, "b": {"success": True}}}

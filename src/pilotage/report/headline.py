@@ -121,18 +121,19 @@ def _charted(metrics: Mapping[str, Any]) -> list[str]:
     """What an explorer was sent for: how much of the floor its map shows, and how well."""
     told = []
     for key, what, right, how_right in (
-        ("floor_mapped", "of the reachable floor mapped", "wall_rms_m", "its walls {} off (RMS)"),
+        ("floor_mapped", "of the reachable floor mapped", "wall_rms_m", ", its walls {} off (RMS)"),
         (
             "coverage_reachable",
             "of the reachable cells visited",
             "feature_precision",
-            "{} of the features right",
+            ", {} of the features right",
         ),
+        ("swept_fraction", "of the floor swept", "", ""),
     ):
         done, well = number(metrics.get(key)), number(metrics.get(right))
         if math.isfinite(done):
             write = quantities.length if right.endswith("_m") else quantities.share
-            how = f", {how_right.format(write(well))}" if math.isfinite(well) else ""
+            how = how_right.format(write(well)) if math.isfinite(well) else ""
             told.append(f"{quantities.share(done)} {what}{how}")
     return told
 

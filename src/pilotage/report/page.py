@@ -148,6 +148,7 @@ def _tiles(run: RunData) -> list[tuple[str, str]]:
         ("position RMSE", value("position_rmse_m"), quantities.length),
         ("worst position error", value("position_max_m"), quantities.length),
         ("heading RMSE", value("heading_rmse_rad"), quantities.angle),
+        ("floor swept", value("swept_fraction"), quantities.share),
         ("floor mapped", value("floor_mapped"), quantities.share),
         ("walls of its map, off", value("wall_rms_m"), quantities.length),
         ("found itself after", value("found_after_s"), quantities.duration),

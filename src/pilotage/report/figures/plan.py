@@ -66,7 +66,8 @@ def _caption(run: RunData, grown: bool) -> str:
     if len(run.outline.polygon_m) or plan.clearance_m < radius:
         seen = f"Walls are drawn grown by the {kept} that the planner keeps"
     else:
-        body = f": the body's radius of {quantities.length(radius)}, and room to spare" if radius else ""
+        spare = ", and room to spare" if plan.clearance_m > radius + 0.005 else ""
+        body = f": the body's radius of {quantities.length(radius)}{spare}" if radius else ""
         seen = (
             f"The planner moves a point; walls are drawn as it sees them, grown by the {kept} it keeps{body}"
         )

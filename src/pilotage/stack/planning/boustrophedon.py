@@ -103,7 +103,9 @@ class BoustrophedonPlanner:
         took = time.perf_counter() - began
         area_m2 = np.count_nonzero(within_reach) * floor.cell_m**2
         ratio = path.length_m * width_m / area_m2
-        reason = f"{path.length_m:.1f} m for {area_m2:.1f} m2, {ratio:.3f} of area over width"
+        reason = (
+            f"{path.length_m:.1f} m for {area_m2:.1f} m², {ratio:.3f} times the area over the width of a pass"
+        )
         return PlanResult(PlanStatus.FOUND, reason, path, took, took)
 
 
