@@ -12,6 +12,7 @@ import pytest
 from pilotage.core.types import FloatArray, Pose2, Twist
 from pilotage.experiments.mission import mission_of, read_mission
 from pilotage.experiments.run import run_mission
+from pilotage.kernels.control.togo import UNREACHED_S, togo_at
 from pilotage.kernels.scans.rays import fan_ranges
 from pilotage.models.footprint import Footprint
 from pilotage.stack.control.local.drive import polygon_around
@@ -119,6 +120,43 @@ def test_straight_is_what_an_outline_needs() -> None:
     assert not sets_out(DISC, 0.6)
     assert not sets_out(LONG, 0.2)
     assert sets_out(LONG, 0.01)
+
+
+def test_it_lines_up_from_here_where_it_cannot_get_to_the_point_before() -> None:
+    """In a dead end that is shorter than that it drove to and fro for a minute; a turn is no such matter."""
+    passage = NarrowPassage(2.0, 0.0, 0.0, 0.7, 0, 0.0)
+    once = passage.from_here()
+    assert once is not None
+    assert (once.stage, once.tries) == (1, 2)
+    assert once.from_here() == once
+    again = replace(once, stage=0).from_here()
+    assert again is not None
+    assert replace(again, stage=0).from_here() is None
+
+
+def test_a_door_whose_middle_lies_between_cells_is_not_shut_for_good() -> None:
+    """One centimetre of room on either side of a Jackal, wherever it is; half as wide it stays shut."""
+
+    def has_way(ground: RollingGround, t_s: float, shift_m: float, width_m: float) -> bool:
+        ends = shift_m - 0.5 * width_m, shift_m + 0.5 * width_m
+        lane = [[-2.0, side, 3.0, side] for side in (-2.0, 2.0)]
+        lane.append([-2.0, -2.0, -2.0, 2.0])
+        walls = [[1.2, -2.0, 1.2, ends[0]], [1.3, -2.0, 1.3, ends[0]], [1.2, ends[0], 1.3, ends[0]]]
+        walls += [[1.2, 2.0, 1.2, ends[1]], [1.3, 2.0, 1.3, ends[1]], [1.2, ends[1], 1.3, ends[1]]]
+        field = ground.update(_view(t_s, Pose2(0.0, 0.0, 0.0), np.array(lane + walls), LONG, around)).ground
+        return togo_at(0.0, 0.0, field.togo_s, field.x0_m, field.y0_m, field.coarse_m) < UNREACHED_S
+
+    around, at_first = np.linspace(-math.pi, math.pi, 721), []
+    for shift_m in np.arange(0.0, 0.1, 0.01):
+        ground = RollingGround(RollingConfig())
+        at_first.append(has_way(ground, 0.0, shift_m, 0.45))
+        ground.open_all()
+        assert has_way(ground, 0.05, shift_m, 0.45)
+        ground = RollingGround(RollingConfig())
+        has_way(ground, 0.0, shift_m, 0.26)
+        ground.open_all()
+        assert not has_way(ground, 0.05, shift_m, 0.26)
+    assert not all(at_first)
 
 
 def test_it_goes_on_to_the_end_of_a_passage_and_no_farther() -> None:

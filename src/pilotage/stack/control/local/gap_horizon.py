@@ -182,6 +182,8 @@ class GapHorizon(RollingController):
             self._backs_out, command = True, self._first_safe(scene, back, margin_m)
         x, y = float(scene.pose[0]), float(scene.pose[1])
         if inside or nearest_m(x, y, scene.ground) > scene.body.outer_m + config.margin_m:
+            if self._backs_out and self._passage is not None:
+                self._passage = self._passage.from_here()
             self._backs_out = False
         if command is None:
             return STOP

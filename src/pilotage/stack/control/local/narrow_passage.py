@@ -91,6 +91,12 @@ class NarrowPassage:
         """Once more from before the gap; None where it has been tried often enough."""
         return None if self.tries >= TRIES else replace(self, stage=0, begun_s=t_s, tries=self.tries + 1)
 
+    def from_here(self) -> NarrowPassage | None:
+        """The same lined up for from here, where something keeps the robot from the point before it."""
+        if self.stage > 0:
+            return self
+        return None if self.tries >= TRIES else replace(self, stage=1, tries=self.tries + 1)
+
     def step(self, scene: Scene, points_xy_m: FloatArray, t_s: float) -> tuple[NarrowPassage | None, Twist]:
         """The next command; None for itself when it is through or has taken too long.
 

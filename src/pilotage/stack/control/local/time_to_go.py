@@ -26,6 +26,7 @@ class TimeToGo:
     def __init__(self, config: RollingConfig) -> None:
         self._config, self._coarse_m = config, 2.0 * config.cell_m
         self._closed: list[tuple[float, float, float]] = []
+        self._eased_m = 0.0
         self._since = AT_ONCE
 
     @property
@@ -72,10 +73,16 @@ class TimeToGo:
     def close(self, x_m: float, y_m: float, radius_m: float) -> None:
         """Lead no way through a disc of the map frame any more."""
         self._closed.append((x_m, y_m, radius_m))
+        self._eased_m = 0.0
         self._since = AT_ONCE
 
     def open_all(self) -> None:
-        """Forget what was closed."""
+        """Forget what was closed; where nothing was, a gap whose middle lies between cells is no longer shut.
+
+        The middle of a gap is off that of the nearest fine cell by half of one at most.
+        """
+        if not self._closed:
+            self._eased_m = 0.5 * self._config.cell_m
         self._closed.clear()
         self._since = AT_ONCE
 
@@ -119,7 +126,7 @@ class TimeToGo:
 
     def _widths_m(self, body: Body) -> tuple[float, float, float]:
         """Clearances from where on the footprint fits straight, may turn, and nothing slows it any more."""
-        blocked_m = body.inner_m + self._config.edge_m
+        blocked_m = body.inner_m + self._config.edge_m - self._eased_m
         tight_m = max(blocked_m, body.outer_m - self._config.cell_m)
         return blocked_m, tight_m, max(self._config.easy_m, tight_m + 0.05)
 
