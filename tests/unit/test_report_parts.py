@@ -61,18 +61,21 @@ def test_the_headline_tells_what_the_mission_was_about() -> None:
     team = {"success": True, "robots": {"a": {"success": True}, "b": {"success": True}}}
     assert "intruder" not in headline(team)
     seen = headline(team | {"detected": True, "detection_time_s": 18.1}).replace("\u00a0", " ")
-    assert seen == "All 2 robots succeeded; the intruder was detected after 18.1 s."
+    assert seen == "All 2 robots succeeded; the intruder was detected 18.1 s after he came in."
     assert "the intruder was not detected" in headline(team | {"detected": False})
 
 
 def test_quantities_are_humane() -> None:
     assert quantities.length(0.00512) == "5.12\u00a0mm"
+    assert quantities.length(2.6e-7) == "<0.001\u00a0mm"
+    assert quantities.measured(1.46e-6, "") == "1.46 × 10⁻⁶"
     assert quantities.length(66.3) == "66.30\u00a0m"
     assert quantities.angle(math.pi / 180.0) == "1.00°"
     assert quantities.duration(0.0123) == "12.3\u00a0ms"
     assert quantities.duration(119.99) == "120.0\u00a0s"
     assert quantities.duration(135.4) == "2\u00a0min 15\u00a0s"
     assert quantities.duration(-594.5) == "−9\u00a0min 54\u00a0s"
+    assert quantities.share(-0.0004) == "0.0\u00a0%"
     assert quantities.share(0.5) == "50.0\u00a0%"
     assert quantities.significant(0.99996) == "1.00"
     assert quantities.duration(9960.0) == "2\u00a0h 46\u00a0min"

@@ -104,7 +104,7 @@ def _team_headline(metrics: Mapping[str, Any]) -> str:
     collisions, driven = number(metrics.get("collisions")), number(metrics.get("path_length_m"))
     details, detected = [], metrics.get("detected")
     if isinstance(detected, bool):
-        soon = f"after {quantities.duration(number(metrics.get('detection_time_s')))}"
+        soon = f"{quantities.duration(number(metrics.get('detection_time_s')))} after he came in"
         details.append(f"the intruder was detected {soon}" if detected else "the intruder was not detected")
     if math.isfinite(collisions):
         text = "no collision" if collisions == 0.0 else f"{quantities.count(collisions)} collisions"

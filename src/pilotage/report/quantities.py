@@ -36,6 +36,8 @@ def length(value_m: float) -> str:
     """Write a length in mm below 0.1 m, in m from there, in km from 10 km on."""
     if not math.isfinite(value_m):
         return NOTHING
+    if 0.0 < abs(value_m) < 1e-6:
+        return "<0.001\u00a0mm" if value_m > 0.0 else "0\u00a0mm"
     if abs(value_m) < 0.1:
         return f"{significant(1000.0 * value_m)}\u00a0mm"
     if abs(value_m) >= 10_000.0:
@@ -74,7 +76,10 @@ def moment(t_s: float) -> str:
 
 def share(value: float) -> str:
     """Write a share of one in percent."""
-    return f"{100.0 * value:.1f}\u00a0%".replace("-", "−") if math.isfinite(value) else NOTHING
+    # Added to 0.0, what is rounded to -0.0 loses its sign.
+    return (
+        f"{round(100.0 * value, 1) + 0.0:.1f}\u00a0%".replace("-", "−") if math.isfinite(value) else NOTHING
+    )
 
 
 def count(value: float) -> str:
@@ -109,4 +114,5 @@ def measured(value: float, unit: str) -> str:
     write = BY_UNIT.get(unit)
     if write is not None:
         return write(value)
-    return f"{significant(value)} {unit}" if unit and math.isfinite(value) else significant(value)
+    text = scientific(value, 3) if 0.0 < abs(value) < 1e-4 else significant(value)
+    return f"{text} {unit}" if unit and math.isfinite(value) else text

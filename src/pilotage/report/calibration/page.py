@@ -166,7 +166,11 @@ def _estimates(data: CalibrationData) -> Section:
         if value is None
     ]
     told = [f"Not told by these logs: {', '.join(missing)}"] if missing else []
-    told += data.answer.get("warnings", ())
+    for line in data.answer.get("warnings", ()):
+        words = str(line)
+        for key, _ in _found(data.answer):
+            words = words.replace(key, _name(key))
+        told.append(words)
     columns = (("what", ROW), ("value", VALUE), ("what it means", ""))
     notes = (f'<p class="absent">{escape(text)}.</p>' for text in told)
     return section("estimates", "Estimates", table(columns, rows, "metrics") if rows else "", *notes)

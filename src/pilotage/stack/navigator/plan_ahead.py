@@ -161,7 +161,8 @@ class PlanAhead:
         self._path = np.ascontiguousarray(self._plan.path.states[:, :2])
         self._stall.restart(t_s)
         self.to_go_m = self._plan.path.length_m
-        self._journal.say(t_s, "plan" if first else "replan", f"{why}: {self.to_go_m:.2f} m to go")
+        to_go = f"{self.to_go_m:.2f} m to go"
+        self._journal.say(t_s, "plan" if first else "replan", to_go if first else f"{why}: {to_go}")
 
     def _index(self, ahead_m: float = 0.0) -> int:
         """Of the path's state so far ahead of the robot."""
