@@ -16,9 +16,12 @@ from pilotage.experiments.run import run_mission
 from pilotage.maps.occupancy_grid import UNKNOWN, OccupancyGrid
 from pilotage.records.run_data import read_run, read_team
 from pilotage.records.trace import Trace
+from pilotage.report import write_report
 from pilotage.report.drawn import pose_given, scene_of, without_given_pose
 from pilotage.report.figures.grid import FREE_CELL, OCCUPIED_CELL, UNKNOWN_CELL, cell_classes, known_corners
+from pilotage.report.page import run_page
 from pilotage.report.replay.team import team_scene
+from support.fabricated_run import fabricate_run
 from support.pages import Outline, page_of
 
 DRIVEN = ("map", "close-ups", "timeline", "pose-error", "covariance", "control", "clearance")
@@ -110,6 +113,20 @@ def test_a_run_on_a_grid(in_a_room: Path) -> None:
     assert not [line for line in scene.lines if line.name == "walls"]
 
 
+def test_the_map_that_an_explorer_made_is_drawn(tmp_path: Path) -> None:
+    folder = fabricate_run(tmp_path / "run")
+    assert '<section id="own-map">' not in page_of(folder)
+    ros_map(folder).rename(folder / "map.yaml")
+    page = page_of(folder)
+    assert '<section id="own-map">' in page
+    assert "cells of 0.1\u00a0m" in page
+    (folder / "room.pgm").unlink()
+    told: list[str] = []
+    assert "own-map" not in write_report(folder, told.append).read_text("utf-8")
+    assert len(told) == 1
+    assert "room.pgm" in told[0]
+
+
 def test_a_polygon_is_drawn_where_it_stands(car: Path) -> None:
     page = checked_page(car, "replay", *DRIVEN, "updates")
     assert "1.00\u00a0m long and 0.60\u00a0m wide" in page
@@ -188,3 +205,8 @@ def test_a_given_pose_is_no_estimate(car: Path) -> None:
     given = replace(run, trace=Trace({**run.trace.columns, **told}, run.trace.steps))
     assert pose_given(given)
     assert not without_given_pose(given).trace.has("est_x_m")
+    assert "position known to" in run_page(run)
+    page = run_page(given)
+    assert "position known to" not in page
+    assert "position error, RMSE" in run_page(run)
+    assert "position error, RMSE" not in page

@@ -8,9 +8,10 @@ import numpy as np
 
 from pilotage.core.types import Pose2
 from pilotage.maps.occupancy_grid import OCCUPIED, UNKNOWN, OccupancyGrid
+from pilotage.maps.ros_map import read_ros_map
 from pilotage.records.arrays import read_arrays, write_arrays
 from pilotage.records.numbers import FARTHEST_M
-from pilotage.records.reading import broken
+from pilotage.records.reading import broken, is_there
 
 GRID_FILE = "grid.npz"
 MOST_CELLS = 64_000_000
@@ -24,6 +25,12 @@ def write_grid(folder: Path, grid: OccupancyGrid) -> None:
         "origin": grid.origin.as_array(),
     }
     write_arrays(folder / GRID_FILE, arrays)
+
+
+def read_own_map(folder: Path) -> OccupancyGrid | None:
+    """Read the map that a robot made, as ROS keeps maps; None where it made none."""
+    path = folder / "map.yaml"
+    return read_ros_map(path).grid if is_there(path) else None
 
 
 def read_grid_layer(folder: Path) -> OccupancyGrid | None:

@@ -15,7 +15,7 @@ from pilotage.core.types import BoolArray, Event, FloatArray
 from pilotage.maps.occupancy_grid import OccupancyGrid
 from pilotage.records.cells import SheetData, read_cells
 from pilotage.records.events import read_events
-from pilotage.records.grid import read_grid_layer
+from pilotage.records.grid import read_grid_layer, read_own_map
 from pilotage.records.localizer import read_localizer
 from pilotage.records.metrics import METRICS_FILE, read_metrics
 from pilotage.records.mission import read_mission
@@ -46,6 +46,8 @@ class RunData:
     trace
         That robot's rows, finite or NaN; a lost robot claims no pose, so none is in ``est_*``, ``cov_*`` and
         ``nees``.
+    grid, own_map
+        The world's grid, and the map that the robot made; None where there is none.
     robot, robots
         Which robot it is, and the names of all; none where the run has one only.
     """
@@ -65,6 +67,7 @@ class RunData:
     sheet: SheetData | None = None
     terrain: TerrainPictures | None = None
     grid: OccupancyGrid | None = None
+    own_map: OccupancyGrid | None = None
     people: PeopleTracks = field(default_factory=PeopleTracks)
     patrol: PatrolRecord | None = None
     localizer_text: str = ""
@@ -167,6 +170,7 @@ def read_run(folder: Path, *, robot: int = 0, on_damage: OnDamage | None = None)
         sheet=part(lambda place: read_cells(place, world), None, own),
         terrain=part(read_terrain, None),
         grid=part(read_grid_layer, None),
+        own_map=part(read_own_map, None, own),
         people=part(read_people_tracks, PeopleTracks()),
         patrol=part(read_patrol, None),
         localizer_text=part(read_localizer, ""),

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
+from typing import Any
 
+from pilotage.evaluation.metrics import METRICS
 from pilotage.records.run_data import RunData
 from pilotage.records.trace import Trace
 from pilotage.report.figures.clearance import clearance_figure
@@ -14,6 +16,7 @@ from pilotage.report.figures.control import control_figure
 from pilotage.report.figures.covariance import covariance_figure
 from pilotage.report.figures.gauss_markov import gauss_markov_figure
 from pilotage.report.figures.map import map_figure
+from pilotage.report.figures.own_map import own_map_figure
 from pilotage.report.figures.patrol import patrol_figures
 from pilotage.report.figures.plan import plan_figure
 from pilotage.report.figures.pose_error import pose_error_figure
@@ -57,7 +60,7 @@ ON_A_SHEET: tuple[Draw, ...] = (
     accuracy_figure,
     printed_figure,
 )
-ON_A_MAP: tuple[Draw, ...] = (map_figure, plan_figure, close_ups_figure, timeline_figure)
+ON_A_MAP: tuple[Draw, ...] = (map_figure, own_map_figure, plan_figure, close_ups_figure, timeline_figure)
 OF_THE_DRIVE: tuple[Draw, ...] = (
     pose_error_figure,
     covariance_figure,
@@ -89,6 +92,14 @@ def pose_given(run: RunData) -> bool:
         return False
     told = (trace["est_x_m"] == trace["true_x_m"]) & (trace["est_y_m"] == trace["true_y_m"])
     return bool(told.all())
+
+
+def told_metrics(run: RunData) -> Mapping[str, Any]:
+    """The metrics without those of an estimate where the pose was given."""
+    if not pose_given(run):
+        return run.metrics
+    own = {m.key for m in METRICS if m.group in ("Localization", "Consistency")} | {"final_error"}
+    return {key: value for key, value in run.metrics.items() if key not in own}
 
 
 def without_given_pose(run: RunData) -> RunData:

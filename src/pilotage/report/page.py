@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 from pilotage.core.whole_file import write_whole
 from pilotage.records.numbers import number
 from pilotage.records.run_data import OnDamage, RunData, read_run, read_team
 from pilotage.report import quantities
-from pilotage.report.drawn import figures_of, pose_given, scene_of
+from pilotage.report.drawn import figures_of, scene_of, told_metrics
 from pilotage.report.figures.team import team_figures
 from pilotage.report.headline import headline, outcome
 from pilotage.report.markup import (
@@ -30,8 +31,6 @@ from pilotage.report.rounds import rounds_section
 from pilotage.report.style import drawing_style
 from pilotage.report.team import team_section, team_tiles
 
-ESTIMATED = frozenset({"position_rmse_m", "position_max_m", "heading_rmse_rad", "nees_mean"})
-"""What says nothing where the pose was given."""
 OF_A_TEAM = (
     "Of the whole team: metres driven, alarms, contacts and changes of plan are sums; clearances are the "
     "least, what is called worst or longest the largest; what else each robot has of its own is their mean."
@@ -73,6 +72,7 @@ def run_page(run: RunData, damaged: Sequence[str] = (), team: Sequence[RunData] 
     with drawing_style():
         figures = team_figures(team) if several else figures_of(run)
         scene = team_scene(team) if several else scene_of(run)
+    told = run.metrics if several else told_metrics(run)
     sections: list[Section] = []
     # What was only planned has nothing to replay, and nothing is missing.
     if scene is not None or run.trace.steps:
@@ -89,7 +89,7 @@ def run_page(run: RunData, damaged: Sequence[str] = (), team: Sequence[RunData] 
         if drawn.slug == explained:
             sections += [
                 events_section(run.events),
-                metrics_section(metric_rows(run.metrics), OF_A_TEAM if several else ""),
+                metrics_section(metric_rows(told), OF_A_TEAM if several else ""),
             ]
     if run.mission_text:
         sections.append(_mission_section(run.mission_text))
@@ -103,8 +103,8 @@ def run_page(run: RunData, damaged: Sequence[str] = (), team: Sequence[RunData] 
         eyebrow=_eyebrow(run),
         descriptions=[*([description] if description else []), *damaged],
         outcome=_outcome(run),
-        headline=headline(run.metrics),
-        tiles=team_tiles(run.metrics) if several else _tiles(run),
+        headline=headline(told),
+        tiles=team_tiles(told) if several else _tiles(run, told),
         rules=style(),
         script_source=script_source(),
         footer=f"Made by pilotage from the run folder {run.run_dir.name}. Angles are counter-clockwise; true "
@@ -130,13 +130,11 @@ def _outcome(run: RunData) -> str:
     return f'<span class="outcome {look}">{text}</span>'
 
 
-def _tiles(run: RunData) -> list[tuple[str, str]]:
+def _tiles(run: RunData, told: Mapping[str, Any]) -> list[tuple[str, str]]:
     """Return the handful of numbers that most readers came for."""
-    values = {key: number(value) for key, value in run.metrics.items()}
+    values = {key: number(value) for key, value in told.items()}
     if values.get("duration_s") == 0.0:
         del values["duration_s"]
-    if run.terrain is not None and pose_given(run):
-        values = {key: value for key, value in values.items() if key not in ESTIMATED}
 
     def value(key: str) -> float:
         return values.get(key, math.nan)
