@@ -82,9 +82,10 @@ class ReplayMap {
 
   fit() {
     const [x0, y0, x1, y1] = this.scene.bounds_m;
-    this.scale = 0.94 * Math.min(this.width / (x1 - x0), this.height / (y1 - y0));
+    const words = 36;  // what is said of the moment stands above the map, not on it
+    this.scale = 0.94 * Math.min(this.width / (x1 - x0), (this.height - words) / (y1 - y0));
     this.x = (x0 + x1) / 2;
-    this.y = (y0 + y1) / 2;
+    this.y = (y0 + y1) / 2 + words / 2 / this.scale;
   }
 
   zoom(by, px = this.width / 2, py = this.height / 2) {
