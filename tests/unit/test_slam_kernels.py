@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from pilotage.core.types import FloatArray
-from pilotage.kernels.slam.align import CAPPED, CONVERGED, TOO_FEW, align, normal_equations
+from pilotage.kernels.slam.align import CAPPED, CONVERGED, TOO_FEW, align, normal_equations, pair_up
 from pilotage.kernels.slam.branch_bound import NO_SEED, PASS_OVER_NONE, search_window
 from pilotage.kernels.slam.buckets import BEYOND_M, nearest, sort_into_buckets
 from pilotage.kernels.slam.frames import between, carried, composed
@@ -18,12 +18,13 @@ from pilotage.kernels.slam.scan_lines import scan_lines, scan_points
 from support.laser_rooms import BEAMS, SPAN_RAD, furnished, ranges
 
 ANGLES = np.linspace(-0.5 * SPAN_RAD, 0.5 * SPAN_RAD, BEAMS)
+RAYS = np.column_stack([np.cos(ANGLES), np.sin(ANGLES)])
 NO_PRIOR = 1e-9 * np.eye(3)
 HERE = np.array([2.0, 3.5, 0.2])
 
 
 def cloud(pose: FloatArray, noise: FloatArray | float = 0.0) -> FloatArray:
-    points, hit = scan_points(ranges(furnished(), pose, ANGLES) + noise, ANGLES, 0.1, 30.0)
+    points, hit = scan_points(ranges(furnished(), pose, ANGLES) + noise, RAYS, 0.1, 30.0)
     return scan_lines(points, hit, 0.0, 0.0, float(ANGLES[1] - ANGLES[0]))
 
 
@@ -49,24 +50,11 @@ def test_the_gradient_is_that_of_the_residuals() -> None:
     box, starts, _, points = sort_into_buckets(cloud(HERE), 0.25)
     source = cloud(HERE)[20:160]
     hessian, gradient = np.zeros((3, 3)), np.zeros(3)
-    none, unknown = np.full(len(source), -1), np.full((len(source), 3), -1.0)
+    paired, unknown = np.full(len(source), -1), np.full((len(source), 3), -1.0)
     at = np.array([1e-3, -5e-4, 2e-4])
+    pair_up(source, at[0], at[1], at[2], 0.2, box, starts, points, paired, unknown)
     # So wide a scale weighs all pairs with one.
-    normal_equations(
-        source,
-        at[0],
-        at[1],
-        at[2],
-        0.2,
-        1e6,
-        box,
-        starts,
-        points,
-        none.copy(),
-        unknown.copy(),
-        hessian,
-        gradient,
-    )
+    normal_equations(source, at[0], at[1], at[2], 0.2, 1e6, points, paired, hessian, gradient)
     numeric = np.zeros(3)
     for k in range(3):
         for sign in (1.0, -1.0):
@@ -74,19 +62,7 @@ def test_the_gradient_is_that_of_the_residuals() -> None:
             moved[k] += sign * 1e-7
             h, g = np.zeros((3, 3)), np.zeros(3)
             squares, _, _ = normal_equations(
-                source,
-                moved[0],
-                moved[1],
-                moved[2],
-                0.2,
-                1e6,
-                box,
-                starts,
-                points,
-                none.copy(),
-                unknown.copy(),
-                h,
-                g,
+                source, moved[0], moved[1], moved[2], 0.2, 1e6, points, paired, h, g
             )
             numeric[k] += sign * 0.5 * squares / 2e-7
     assert gradient == pytest.approx(numeric, rel=1e-3, abs=1e-4)
@@ -107,20 +83,9 @@ def test_a_pair_that_is_kept_is_the_one_that_would_be_found(seed: int, step: flo
         told = []
         for paired, stands in (kept, fresh):
             hessian, gradient = np.zeros((3, 3)), np.zeros(3)
+            pair_up(source, at[0], at[1], at[2], reach, box, starts, points, paired, stands)
             sums = normal_equations(
-                source,
-                at[0],
-                at[1],
-                at[2],
-                reach,
-                0.05,
-                box,
-                starts,
-                points,
-                paired,
-                stands,
-                hessian,
-                gradient,
+                source, at[0], at[1], at[2], reach, 0.05, points, paired, hessian, gradient
             )
             told.append([*sums, *hessian.ravel(), *gradient])
         assert told[0] == told[1]
@@ -150,7 +115,7 @@ def test_the_covariance_of_a_match_is_that_of_many_matches() -> None:
 
 def test_a_bare_corridor_leaves_its_direction_open() -> None:
     walls = np.array([(-60.0, -1.0, 60.0, -1.0), (-60.0, 1.0, 60.0, 1.0)])
-    points, hit = scan_points(ranges(walls, np.zeros(3), ANGLES), ANGLES, 0.1, 25.0)
+    points, hit = scan_points(ranges(walls, np.zeros(3), ANGLES), RAYS, 0.1, 25.0)
     lines = scan_lines(points, hit, 0.0, 0.0, float(ANGLES[1] - ANGLES[0]))
     _, hessian, _, _ = aligned(lines, np.zeros(3), lines)
     assert hessian[0, 0] < 1e-3 * hessian[1, 1]
@@ -324,7 +289,7 @@ def test_lines_go_on_over_beams_that_are_missing() -> None:
     wall = np.array([(2.0, -3.0, 2.0, 3.0)])
     measured = ranges(wall, np.zeros(3), ANGLES)
     lost = np.where(np.random.default_rng(9).random(measured.size) < 0.33, np.inf, measured)
-    points, hit = scan_points(lost, ANGLES, 0.1, 25.0)
+    points, hit = scan_points(lost, RAYS, 0.1, 25.0)
     lines = scan_lines(points, hit, 0.0, 0.0, float(ANGLES[1] - ANGLES[0]))
     assert (np.hypot(lines[:, 2], lines[:, 3]) > 0.5).mean() > 0.9
     middle = measured.size // 2
@@ -332,5 +297,5 @@ def test_lines_go_on_over_beams_that_are_missing() -> None:
     few[[middle - 3, middle - 2, middle + 2, middle + 3]] = measured[
         [middle - 3, middle - 2, middle + 2, middle + 3]
     ]
-    points, hit = scan_points(few, ANGLES, 0.1, 25.0)
+    points, hit = scan_points(few, RAYS, 0.1, 25.0)
     assert not scan_lines(points, hit, 0.0, 0.0, float(ANGLES[1] - ANGLES[0]))[:, 2:4].any()

@@ -7,10 +7,10 @@ import pytest
 
 from pilotage.core.types import BoolArray, FloatArray
 from pilotage.kernels.slam.frames import between
-from pilotage.kernels.slam.movers import polar, seen_through
+from pilotage.kernels.slam.local_map import add_to_map, empty_map
+from pilotage.kernels.slam.movers import VOTES, add_view, empty_views, seen_through, without_movers
 from pilotage.stack.mapping.slam.clouds import cloud_of_beams
 from pilotage.stack.mapping.slam.config import SlamConfig
-from pilotage.stack.mapping.slam.movers import Movers
 from pilotage.stack.mapping.slam.tracker import Tracker
 from support.laser_rooms import furnished, ranges, room
 
@@ -28,8 +28,10 @@ def seen(walls: FloatArray, pose: FloatArray, first_deg: float = -90.0, beams: i
 
 
 def through(points: FloatArray, pose: FloatArray, earlier: FloatArray) -> BoolArray:
-    view, at = polar(earlier)[None], np.zeros((1, 3))
-    return seen_through(points, pose, view, np.array([len(earlier)]), at, 1, 0.3, 0.2, 8.0)
+    views = empty_views(400)
+    for _ in range(3 * VOTES):
+        add_view(views, earlier, np.zeros(3))
+    return seen_through(points, pose, np.zeros(len(points), np.bool_), views)
 
 
 @pytest.mark.parametrize("first_deg", [-90.0, -180.0, 60.0])
@@ -62,17 +64,23 @@ def test_beams_that_hit_nothing_tell_nothing() -> None:
 
 
 def test_a_scan_of_which_most_seems_to_move_is_left_whole() -> None:
-    movers, hall = Movers(), np.array(room(0.0, 0.0, 10.0, 8.0))
-    for _ in range(6):
-        movers.add(seen(hall, HERE), HERE)
-    wrong = seen(box(2.0, 3.5, 1.0), HERE)
-    assert len(movers.without(wrong, HERE)) == len(wrong)
-    assert movers.crowded == 1
+    views, hall, nothing = empty_views(200), np.array(room(0.0, 0.0, 10.0, 8.0)), empty_map(200)
     few = seen(np.concatenate([hall, box(4.0, 4.0)]), HERE)
-    assert len(movers.without(few, HERE)) < len(few)
-    assert movers.crowded == 1
-    movers.forget()
-    assert len(movers.without(few, HERE)) == len(few)
+    kept, crowded = without_movers(few, HERE, nothing, views)
+    assert len(kept) == len(few)
+    for _ in range(6):
+        add_view(views, seen(hall, HERE), HERE)
+    wrong = seen(box(2.0, 3.5, 1.0), HERE)
+    kept, crowded = without_movers(wrong, HERE, nothing, views)
+    assert len(kept) == len(wrong)
+    assert crowded
+    kept, crowded = without_movers(few, HERE, nothing, views)
+    assert len(kept) < len(few)
+    assert not crowded
+    # What the map has there has not come.
+    known = empty_map(200)
+    add_to_map(known, few, HERE, 15, True)
+    assert len(without_movers(few, HERE, known, views)[0]) == len(few)
 
 
 def test_companions_do_not_stop_the_map() -> None:

@@ -10,8 +10,22 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from pilotage.core.types import FloatArray
-from pilotage.kernels.slam.buckets import fused, sort_into_buckets
+from pilotage.kernels.slam.align import CONVERGED, TOO_FEW, align
+from pilotage.kernels.slam.buckets import sort_into_buckets
 from pilotage.kernels.slam.frames import between, between_all, carried, composed
+from pilotage.kernels.slam.local_map import (
+    CELL_M,
+    CELLS,
+    LATER_M,
+    MET,
+    NOTHING_KNOWN,
+    REACH_M,
+    LocalMap,
+    add_to_map,
+    align_in_map,
+    empty_map,
+    looked_up,
+)
 from pilotage.kernels.slam.match_grid import max_pyramid
 from pilotage.kernels.slam.movers import bearing_of
 from pilotage.kernels.slam.placing import (
@@ -26,36 +40,42 @@ from pilotage.kernels.slam.slips import told_by
 from support.laser_rooms import BEAMS, SPAN_RAD, furnished, ranges
 
 ANGLES = np.linspace(-0.5 * SPAN_RAD, 0.5 * SPAN_RAD, BEAMS)
+RAYS = np.column_stack([np.cos(ANGLES), np.sin(ANGLES)])
 HERE = np.array([2.0, 3.5, 0.2])
 PRIOR = np.diag([2.0, 2.0, 20.0])
 
 
 def cloud(pose: FloatArray, noise: FloatArray | float = 0.0) -> FloatArray:
     return scan_cloud(
-        ranges(furnished(), pose, ANGLES) + noise, ANGLES, float(ANGLES[1] - ANGLES[0]), 0.1, 30.0
+        ranges(furnished(), pose, ANGLES) + noise, RAYS, float(ANGLES[1] - ANGLES[0]), 0.1, 30.0
     )
+
+
+def map_of(*scans: FloatArray, fuse: bool = True, kept: int = 15, at: FloatArray = HERE) -> LocalMap:
+    out = empty_map(20_000)
+    for scan in scans:
+        add_to_map(out, scan, at, kept, fuse)
+    return out
+
+
+def points_of(map_: LocalMap) -> FloatArray:
+    return map_.points[: map_.counts[0], :4]
 
 
 def test_what_several_scans_saw_of_a_wall_is_one_row_of_points_on_it() -> None:
     rng = np.random.default_rng(3)
-    scans = [carried(cloud(HERE, 0.01 * rng.standard_normal(BEAMS)), HERE) for _ in range(15)]
-    box, starts, _, points = sort_into_buckets(np.concatenate(scans), 0.2)
-    kept_starts, kept = fused(box, starts, points, 0.1, 0.9)
-    assert len(kept) < 0.2 * len(points)
-    assert kept_starts[-1] == len(kept)
-    for bucket in (np.flatnonzero(np.diff(kept_starts))[:20]).tolist():
-        row, column = divmod(bucket, int(box[3]))
-        own = kept[kept_starts[bucket] : kept_starts[bucket + 1]]
-        corner = box[:2] + 0.2 * np.array([column, row])
-        assert (own[:, :2] >= corner - 1e-9).all()
-        assert (own[:, :2] <= corner + 0.2 + 1e-9).all()
+    scans = [cloud(HERE, 0.01 * rng.standard_normal(BEAMS)) for _ in range(15)]
+    at = HERE + np.array([0.0, 0.05, 0.0])
+    all_, kept = (points_of(map_of(*scans, fuse=fuse, at=at)) for fuse in (False, True))
+    assert len(all_) == sum(map(len, scans))
+    assert len(kept) < 0.2 * len(all_)
     lined = kept[:, 2:].any(axis=1)
     assert np.allclose(np.hypot(kept[lined, 2], kept[lined, 3]), 1.0)
-    # On the room's outer wall the means lie nearer to the wall than single points do.
+    # On the outer wall, in the middle of a row of squares, means lie nearer to the wall than single points.
     spreads = []
-    for part in (points, kept):
-        wall = part[(np.abs(part[:, 1]) < 0.05) & (np.abs(part[:, 3]) > 0.95)]
-        spreads.append(float(np.sqrt(np.mean(wall[:, 1] ** 2))))
+    for part in (all_, kept):
+        wall = part[(np.abs(part[:, 1] - 0.05) < 0.05) & (np.abs(part[:, 3]) > 0.95)]
+        spreads.append(float(np.sqrt(np.mean((wall[:, 1] - 0.05) ** 2))))
     assert spreads[1] < 0.7 * spreads[0]
 
 
@@ -63,8 +83,80 @@ def test_walls_seen_from_both_sides_stay_two() -> None:
     front = np.array([[0.05, 0.05, 0.0, 1.0, 0.05, 0.05]])
     back = np.array([[0.06, 0.06, 0.0, -1.0, 0.06, 0.06]])
     bare = np.array([[0.05, 0.06, 0.0, 0.0, 0.05, 0.06]])
-    box, starts, _, points = sort_into_buckets(np.concatenate([front, back, bare, front]), 0.2)
-    assert len(fused(box, starts, points, 0.1, 0.9)[1]) == 3
+    map_ = empty_map(10)
+    add_to_map(map_, np.concatenate([front, back, bare, front]), np.zeros(3), 15, True)
+    assert len(points_of(map_)) == 3
+
+
+@settings(max_examples=20, deadline=None)
+@given(st.integers(0, 2**31), st.booleans())
+def test_the_point_that_is_looked_up_is_about_the_nearest(seed: int, fuse: bool) -> None:
+    """Against all of them: none is nearer by more than a cell's diagonal and what is allowed for age."""
+    rng = np.random.default_rng(seed)
+    map_ = map_of(*[cloud(HERE, 0.01 * rng.standard_normal(BEAMS)) for _ in range(10)], fuse=fuse)
+    asked = rng.uniform((-0.5, -0.5), (9.0, 8.0), (300, 2))
+    source, paired = np.zeros((300, 6)), np.empty(300, np.int64)
+    source[:, :2] = asked
+    looked_up(map_, source, 0.0, 0.0, 0.0, paired)
+    far = np.hypot(*(asked[:, None] - points_of(map_)[None, :, :2]).transpose(2, 0, 1))
+    found = paired >= 0
+    assert 20 < found.sum() < 300
+    told = far[np.flatnonzero(found), paired[found]]
+    assert (told - far[found].min(axis=1) < 1.5 * CELL_M + LATER_M).all()
+    assert (far[~found].min(axis=1) > REACH_M - 1.5 * CELL_M).all()
+
+
+def test_what_no_scan_saw_lately_is_not_there_any_more() -> None:
+    gone, stays = cloud(HERE)[:60], cloud(HERE)[90:]
+    map_ = map_of(gone, *[stays] * 4, kept=4)
+    paired = np.empty(60, np.int64)
+    looked_up(map_, np.concatenate([gone[:20], stays[:40]]), HERE[0], HERE[1], HERE[2], paired)
+    assert (paired[:20] == -1).mean() > 0.9
+    assert (paired[20:] >= 0).all()
+    # Seen again, it is where it is seen now, not the mean of then and now.
+    moved = gone.copy()
+    moved[:, :2] += 0.04
+    moved[:, 4:] += 0.04
+    add_to_map(map_, moved, HERE, 4, True)
+    looked_up(map_, moved, HERE[0], HERE[1], HERE[2], paired)
+    points = carried(moved, HERE)[:, 4:]
+    off = np.einsum("ka,ka->k", points - map_.points[paired, :2], map_.points[paired, 2:4])
+    assert (paired >= 0).all()
+    assert np.abs(off).max() < 0.03
+    assert np.abs(off).mean() < 0.005
+
+
+def test_maps_repeat_and_far_places_are_told_apart() -> None:
+    """Two rooms so far apart that they share the raster's cells: the later one has them."""
+    far = np.array([CELL_M * CELLS, 0.0, 0.0])
+    map_ = map_of(cloud(HERE))
+    add_to_map(map_, cloud(HERE), far + HERE, 15, True)
+    pose, _, fit, _ = align_in_map(
+        map_, cloud(HERE), far + HERE + np.array([0.05, 0.02, 0.01]), PRIOR, 0.3, 0.2, 0.05, 25, NOTHING_KNOWN
+    )
+    assert pose == pytest.approx(far + HERE, abs=4e-3)
+    assert fit[1] > 0.8 * BEAMS
+    assert align_in_map(map_, cloud(HERE), HERE, PRIOR, 0.3, 0.2, 0.05, 25, NOTHING_KNOWN)[3] == TOO_FEW
+
+
+@settings(max_examples=20, deadline=None)
+@given(st.floats(-0.12, 0.12), st.floats(-0.12, 0.12), st.floats(-0.06, 0.06), st.booleans())
+def test_an_alignment_in_the_map_finds_what_one_with_all_points_finds(
+    dx: float, dy: float, turn: float, fuse: bool
+) -> None:
+    rng = np.random.default_rng(7)
+    scans = [cloud(HERE, 0.01 * rng.standard_normal(BEAMS)) for _ in range(15)]
+    source, start = cloud(HERE, 0.01 * rng.standard_normal(BEAMS)), HERE + np.array([dx, dy, turn])
+    map_ = map_of(*scans, fuse=fuse)
+    pose, _, _, status = align_in_map(map_, source, start, PRIOR, 0.3, 0.2, 0.05, 25, NOTHING_KNOWN)
+    box, starts, _, points = sort_into_buckets(carried(np.concatenate(scans), HERE), 0.2)
+    exact = align(source, start, PRIOR, 0.3, 0.2, 0.05, 25, box, starts, points)[0]
+    assert status == CONVERGED
+    assert np.hypot(*(pose - exact)[:2]) < 0.006
+    assert abs(pose[2] - exact[2]) < 0.002
+    # What was found already is not found a second time.
+    again = align_in_map(map_, source, start, PRIOR, 0.3, 0.2, 0.05, 25, pose)
+    assert again[3] in {MET, CONVERGED}
 
 
 @settings(max_examples=20, deadline=None)
@@ -73,10 +165,9 @@ def test_the_guess_that_is_right_wins(right: int, dx: float, turn: float) -> Non
     motion = np.array([dx, 0.05, turn])
     wrong = np.array([[1.9, 0.4, 0.9], [-1.7, -0.6, -0.9]])
     motions = np.insert(wrong, right, motion, axis=0)
-    box, starts, _, points = sort_into_buckets(carried(cloud(HERE), HERE), 0.2)
     there = composed(HERE, motion)
     pose, hessian, start, told, split = placed(
-        cloud(there), HERE, motions, 3, False, np.zeros((0, 3)), 0.01, 0.9, PRIOR, box, starts, points
+        cloud(there), HERE, motions, 3, False, np.zeros((0, 3)), 0.01, 0.9, PRIOR, map_of(cloud(HERE))
     )
     assert split
     assert told[0] > 0.6
@@ -87,9 +178,8 @@ def test_the_guess_that_is_right_wins(right: int, dx: float, turn: float) -> Non
 
 
 def test_nothing_fits_where_nothing_is() -> None:
-    box, starts, _, points = sort_into_buckets(carried(cloud(HERE), HERE), 0.2)
     far = np.array([[90.0, 0.0, 0.0]])
-    told = placed(cloud(HERE), HERE, far, 1, False, np.zeros((0, 3)), 0.01, 0.9, PRIOR, box, starts, points)[
+    told = placed(cloud(HERE), HERE, far, 1, False, np.zeros((0, 3)), 0.01, 0.9, PRIOR, map_of(cloud(HERE)))[
         3
     ]
     assert told[0] == -1.0
@@ -162,6 +252,8 @@ def test_what_is_told_by_chance_tells_nothing() -> None:
     assert told[0, 0] == pytest.approx(0.0, abs=1e-9)
     assert told[1, 1] == pytest.approx(100.0 - 0.03 * 150.0)
     assert told == pytest.approx(told.T)
+    held = told_by(np.diag([60.0, 100.0, 900.0]), 150.0)
+    assert held == pytest.approx(np.diag([55.5, 95.5, 900.0]))
 
 
 @given(st.integers(0, 10**6))

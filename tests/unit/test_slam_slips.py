@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from pilotage.core.types import FloatArray
+from pilotage.kernels.slam.slips import add_slip
 from pilotage.stack.mapping.slam.closures import (
     FAR_SLIP,
     LEAST_PROOFS,
@@ -16,21 +17,28 @@ from pilotage.stack.mapping.slam.closures import (
     candidates,
     unproven,
 )
-from pilotage.stack.mapping.slam.fit import Fit
+from pilotage.stack.mapping.slam.local_matching import PRIOR
 from pilotage.stack.mapping.slam.matching import Match
 from pilotage.stack.mapping.slam.refinement import BESIDE, not_aligned
-from pilotage.stack.mapping.slam.slips import Slips
 from pilotage.stack.mapping.slam.uncertainty import Edges, JointCovariance
 
 POINTS = 150.0
 
 
-def fit(normals: FloatArray, heading: float, by_odometry: bool) -> Fit:
-    """A scan that lies where it was guessed, on walls with these normals (K, 2) in the map."""
-    hessian = np.diag([0.0, 0.0, 1500.0])
-    hessian[:2, :2] = normals.T @ normals * POINTS / len(normals)
-    pose = np.array([3.0, 1.0, heading])
-    return Fit(0.8, pose, hessian, pose, 0.01, weight=POINTS, guess_error=0.03, by_odometry=by_odometry)
+class Slips:
+    """Of scans that lie where they were guessed, on walls with the same normals (K, 2) in the map."""
+
+    def __init__(self) -> None:
+        self.total, self.held = np.zeros((3, 3)), np.zeros((3, 3))
+
+    def add(self, normals: FloatArray, heading: float, by_odometry: bool) -> None:
+        hessian = np.diag([0.0, 0.0, 1500.0])
+        hessian[:2, :2] = normals.T @ normals * POINTS / len(normals)
+        pose = np.array([3.0, 1.0, heading])
+        add_slip(self.total, self.held, pose, pose, hessian, POINTS, 0.03, by_odometry, PRIOR)
+
+    def covariance(self) -> FloatArray:
+        return self.total + self.held @ self.held.T
 
 
 @pytest.mark.parametrize("heading", [0.0, 0.7])
@@ -39,23 +47,22 @@ def test_a_corridor_leaves_its_course_open_and_nothing_else(heading: float, by_o
     slips = Slips()
     noise = np.random.default_rng(0).normal(0.0, 0.1, 200)
     for _ in range(16):
-        slips.matched(fit(np.column_stack([noise, np.sqrt(1.0 - noise**2)]), heading, by_odometry))
+        slips.add(np.column_stack([noise, np.sqrt(1.0 - noise**2)]), heading, by_odometry)
     # The corridor runs along x of the map; what is told is in the scanner's frame.
-    covariance = slips.taken()
+    covariance = slips.covariance()
     course = np.array([np.cos(heading), -np.sin(heading), 0.0])
     across = np.array([np.sin(heading), np.cos(heading), 0.0])
     scans = 4.0 if by_odometry else 16.0
     assert 0.5 * scans * 0.03 < np.sqrt(course @ covariance @ course) <= scans * 0.03
     assert np.sqrt(across @ covariance @ across) < 0.002
     assert np.sqrt(covariance[2, 2]) < 0.002
-    assert not slips.taken().any()
 
 
 def test_walls_on_all_sides_leave_nothing_open() -> None:
     slips = Slips()
     for _ in range(16):
-        slips.matched(fit(np.array([[1.0, 0.0], [0.0, 1.0]]), 0.3, False))
-    assert np.sqrt(np.linalg.eigvalsh(slips.taken())[-1]) < 0.002
+        slips.add(np.array([[1.0, 0.0], [0.0, 1.0]]), 0.3, False)
+    assert np.sqrt(np.linalg.eigvalsh(slips.covariance())[-1]) < 0.002
 
 
 def test_a_loop_that_is_too_long_is_searched_in_a_window_that_is_cut() -> None:

@@ -64,65 +64,6 @@ def sort_into_buckets(points: FloatArray, cell_m: float) -> tuple[FloatArray, In
 
 
 @kernel
-def fused(
-    box: FloatArray, starts: IntArray, points: FloatArray, spacing_m: float, least_cosine: float
-) -> tuple[IntArray, FloatArray]:
-    """Points of ``sort_into_buckets`` with those that scan after scan saw of one place made one.
-
-    Points of one bucket in one square become their mean where their normals are within an angle of each other
-    (``least_cosine``); points without a line are a kind of their own.
-
-    Parameters
-    ----------
-    spacing_m
-        Side of the squares; a bucket's side should be a multiple of it.
-
-    Returns
-    -------
-    ``starts`` and ``points`` of what is left, in the same buckets.
-    """
-    out = np.empty(points.shape)
-    first_of = np.zeros(starts.shape[0], np.int64)
-    count = np.empty(points.shape[0])
-    square = np.empty((points.shape[0], 2), np.int64)
-    k = 0
-    for b in range(starts.shape[0] - 1):
-        first = k
-        for i in range(starts[b], starts[b + 1]):
-            nx, ny = points[i, 2], points[i, 3]
-            column = int((points[i, 0] - box[0]) / spacing_m)
-            row = int((points[i, 1] - box[1]) / spacing_m)
-            at = first
-            while at < k:
-                if square[at, 0] == column and square[at, 1] == row:
-                    mx, my = out[at, 2], out[at, 3]
-                    lined = mx != 0.0 or my != 0.0
-                    if (nx != 0.0 or ny != 0.0) == lined and (
-                        not lined or nx * mx + ny * my >= least_cosine * math.sqrt(mx * mx + my * my)
-                    ):
-                        break
-                at += 1
-            if at == k:
-                out[k] = points[i]
-                count[k] = 1.0
-                square[k, 0], square[k, 1] = column, row
-                k += 1
-            else:
-                for a in range(4):
-                    out[at, a] += points[i, a]
-                count[at] += 1.0
-        for m in range(first, k):
-            out[m, 0] /= count[m]
-            out[m, 1] /= count[m]
-            length = math.sqrt(out[m, 2] * out[m, 2] + out[m, 3] * out[m, 3])
-            if length > 0.0:
-                out[m, 2] /= length
-                out[m, 3] /= length
-        first_of[b + 1] = k
-    return first_of, out[:k].copy()
-
-
-@kernel
 def nearest(
     x: float, y: float, reach_m: float, guess: int, box: FloatArray, starts: IntArray, points: FloatArray
 ) -> tuple[int, float, float]:

@@ -3,15 +3,26 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
 from pilotage.kernels.arrays import BoolArray, FloatArray, IntArray
 from pilotage.kernels.jit import kernel
 from pilotage.kernels.slam.frames import between
+from pilotage.kernels.slam.local_map import LocalMap, looked_up
 
 NEAREST_M, GAP_RAD, LEAST_BEAMS = 0.3, 0.06, 8
 """Nearer points are the robot's own; beams farther apart leave a gap; a scan of fewer tells nothing."""
+
+MARGIN_M, BESIDE_M, FARTHEST_M = 0.3, 0.2, 8.0
+"""How far beams must have gone on behind a point, how wide around it, and how far away it may be."""
+VIEWS, EVERY, VOTES = 15, 3, 2
+"""Of the last keyframes every third is asked, and so many must have looked through a point."""
+MOST = 0.4
+"""Share of a scan that may be movers: where more seems to move, the guess is wrong and not the world."""
+KNOWN_M = 0.1
+"""A point so near to one of the map's has not come there."""
 
 
 @kernel
@@ -77,55 +88,108 @@ def _went_on(
     return True
 
 
+class Views(NamedTuple):
+    """What the last keyframes saw, each written over the one ``VIEWS`` before it.
+
+    Attributes
+    ----------
+    polar, sizes
+        (VIEWS, M, 2) of ``polar``, in the order of the beams, and (VIEWS,) how many points each has.
+    poses
+        (VIEWS, 3) where they were taken.
+    added
+        (1,) how many were added in all.
+    """
+
+    polar: FloatArray
+    sizes: IntArray
+    poses: FloatArray
+    added: IntArray
+
+
+def empty_views(beams: int) -> Views:
+    """Room for scans of so many points."""
+    return Views(
+        np.zeros((VIEWS, beams + 1, 2)),
+        np.zeros(VIEWS, np.int64),
+        np.zeros((VIEWS, 3)),
+        np.zeros(1, np.int64),
+    )
+
+
 @kernel
-def seen_through(
-    points: FloatArray,
-    pose: FloatArray,
-    views: FloatArray,
-    counts: IntArray,
-    poses: FloatArray,
-    votes: int,
-    margin_m: float,
-    beside_m: float,
-    farthest_m: float,
-) -> BoolArray:
+def add_view(views: Views, cloud: FloatArray, pose: FloatArray) -> None:
+    """Take in a keyframe (K, 6), all of it, at a pose (3,)."""
+    v = views.added[0] % VIEWS
+    views.polar[v, : cloud.shape[0] + 1] = polar(cloud)
+    views.sizes[v] = cloud.shape[0]
+    views.poses[v] = pose
+    views.added[0] += 1
+
+
+@kernel
+def seen_through(points: FloatArray, pose: FloatArray, known: BoolArray, views: Views) -> BoolArray:
     """Whether points (K, 6) of ``scan_lines`` at a pose (3,) stand in what earlier scans saw empty.
 
-    For an earlier scan a point does where all its beams that pass the point within ``beside_m``, two at
-    least on either side, went on for ``margin_m`` and more. Beside a wall seen at a grazing angle some of
-    them did not; beams that hit nothing tell nothing.
-
-    Parameters
-    ----------
-    views, counts, poses
-        (V, M, 2) of ``polar``, in the order of the beams, padded; (V,) how many points each has, without the
-        last row; and (V, 3) where they were taken.
-    votes
-        How many of the views must say so.
-    farthest_m
-        Points farther from an earlier scan are not asked for.
+    For an earlier scan a point does where all its beams that pass the point within ``BESIDE_M``, two at
+    least on either side, went on for ``MARGIN_M`` and more. Beside a wall seen at a grazing angle some of
+    them did not; beams that hit nothing tell nothing. ``known`` (K,) points are not asked for.
     """
     out = np.zeros(points.shape[0], np.bool_)
     told = np.zeros(points.shape[0], np.int64)
-    for v in range(views.shape[0]):
-        count = counts[v]
+    open_ = np.flatnonzero(~known)
+    asked = -(-min(views.added[0], VIEWS) // EVERY)
+    for m in range(asked):
+        v = (views.added[0] - 1 - m * EVERY) % VIEWS
+        view, count = views.polar[v], views.sizes[v]
         if count < LEAST_BEAMS:
             continue
-        off = between(poses[v], pose)
+        off = between(views.poses[v], pose)
         c, s = math.cos(off[2]), math.sin(off[2])
-        for k in range(points.shape[0]):
+        for k in open_:
             # A point that the views that are left could not vote out any more is not asked for.
-            if out[k] or told[k] + views.shape[0] - v < votes:
+            if out[k] or told[k] + asked - m < VOTES:
                 continue
             x = off[0] + c * points[k, 0] - s * points[k, 1]
             y = off[1] + s * points[k, 0] + c * points[k, 1]
             square = x * x + y * y
-            if square > farthest_m * farthest_m or square < NEAREST_M * NEAREST_M:
+            if square > FARTHEST_M * FARTHEST_M or square < NEAREST_M * NEAREST_M:
                 continue
-            bearing = bearing_of(x, y) - views[v, count, 0]
+            bearing = bearing_of(x, y) - view[count, 0]
             if bearing < 0.0:
                 bearing += 2.0 * math.pi
-            if _went_on(views[v], count, bearing, math.sqrt(square), margin_m, beside_m):
+            if _went_on(view, count, bearing, math.sqrt(square), MARGIN_M, BESIDE_M):
                 told[k] += 1
-                out[k] = told[k] >= votes
+                out[k] = told[k] >= VOTES
     return out
+
+
+@kernel
+def without_movers(
+    cloud: FloatArray, pose: FloatArray, map_: LocalMap, views: Views
+) -> tuple[FloatArray, bool]:
+    """Return a scan (K, 6) at about a pose (3,) without the points that have come there.
+
+    Those where the map has a wall have not. Where ``MOST`` of the scan seem to move it is left whole, and
+    the second answer is true.
+    """
+    paired = np.empty(cloud.shape[0], np.int64)
+    looked_up(map_, cloud, pose[0], pose[1], pose[2], paired)
+    known = np.zeros(cloud.shape[0], np.bool_)
+    c, s = math.cos(pose[2]), math.sin(pose[2])
+    for k in range(cloud.shape[0]):
+        if paired[k] >= 0:
+            dx = pose[0] + c * cloud[k, 0] - s * cloud[k, 1] - map_.points[paired[k], 0]
+            dy = pose[1] + s * cloud[k, 0] + c * cloud[k, 1] - map_.points[paired[k], 1]
+            known[k] = dx * dx + dy * dy < KNOWN_M * KNOWN_M
+    moving = seen_through(cloud, pose, known, views)
+    count = int(np.count_nonzero(moving))
+    if count == 0 or count >= MOST * cloud.shape[0]:
+        return cloud, count > 0
+    out = np.empty((cloud.shape[0] - count, 6))
+    at = 0
+    for k in range(cloud.shape[0]):
+        if not moving[k]:
+            out[at] = cloud[k]
+            at += 1
+    return out, False

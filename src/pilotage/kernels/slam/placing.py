@@ -8,8 +8,9 @@ import numpy as np
 
 from pilotage.kernels.arrays import FloatArray, IntArray
 from pilotage.kernels.jit import kernel
-from pilotage.kernels.slam.align import TOO_FEW, align
+from pilotage.kernels.slam.align import TOO_FEW
 from pilotage.kernels.slam.frames import between, composed
+from pilotage.kernels.slam.local_map import MET, LocalMap, align_in_map
 
 START_REACH_M, REACH_M, SCALE_M, ITERATIONS = 0.4, 0.2, 0.05, 25
 CREDIBLE, CREDIBLE_OFF = 3.0, 0.003
@@ -179,9 +180,7 @@ def placed(
     error: float,
     usual: float,
     prior: FloatArray,
-    box: FloatArray,
-    starts: IntArray,
-    points: FloatArray,
+    map_: LocalMap,
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, bool]:
     """Align a scan from one guess after the other until it fits as well as usual.
 
@@ -199,8 +198,8 @@ def placed(
         (M, 3) what else the odometry may have meant: tried last.
     error, usual
         Usual error of the most trusted guess, and usual value of a fit.
-    prior, box, starts, points
-        As in ``align``.
+    prior, map_
+        As in ``align_in_map``.
 
     Returns
     -------
@@ -218,22 +217,23 @@ def placed(
     for k in range(1, count):
         split = split or distance(motions[0], motions[k]) > SPLIT
     told = np.array([-1.0, 0.0, 0.0, 0.0])
+    known = np.full(3, np.inf)
     best, hessian, start = np.zeros(3), np.zeros((3, 3)), np.zeros(3)
     for k in range(count + others.shape[0]):
         if told[0] > GOOD * usual and (k >= count or not split or (led and as_guessed)):
             break
         motion = motions[k] if k < count else others[k - count]
         began = composed(last, motion)
-        pose, system, fit, status = align(
-            source, began, prior, START_REACH_M, REACH_M, SCALE_M, ITERATIONS, box, starts, points
+        pose, system, fit, status = align_in_map(
+            map_, source, began, prior, START_REACH_M, REACH_M, SCALE_M, ITERATIONS, known
         )
-        if status == TOO_FEW:
+        if status in (TOO_FEW, MET):
             continue
         share, off = plausibility(between(last, pose), near, error, led)
         value = share * fit[1] / source.shape[0]
         if told[0] < 0.0 or value > BETTER * told[0] + BETTER_BY:
             told[0], told[1], told[2], told[3] = value, off, fit[0], fit[1]
-            best, hessian, start = pose, system, began
+            best, hessian, start, known = pose, system, began, pose
             as_guessed = distance(between(last, best), motions[0]) < CREDIBLE * error + CREDIBLE_OFF
     best[2] -= 2.0 * math.pi * math.floor(best[2] / (2.0 * math.pi) + 0.5)
     return best, hessian, start, told, split

@@ -15,15 +15,24 @@ _REACH = 4
 
 
 @kernel
+def rays_of(first_rad: float, step_rad: float, beams: int) -> FloatArray:
+    """(B, 2) unit vectors along the beams of a scan."""
+    out = np.empty((beams, 2))
+    for k in range(beams):
+        out[k, 0], out[k, 1] = math.cos(first_rad + k * step_rad), math.sin(first_rad + k * step_rad)
+    return out
+
+
+@kernel
 def scan_points(
-    ranges_m: FloatArray, angles_rad: FloatArray, nearest_m: float, farthest_m: float
+    ranges_m: FloatArray, rays: FloatArray, nearest_m: float, farthest_m: float
 ) -> tuple[FloatArray, BoolArray]:
     """Points (B, 2) of a scan in the scanner's frame, and which beams (B,) hit something.
 
     Parameters
     ----------
-    ranges_m, angles_rad
-        (B,) ranges, NaN or infinite where there was no echo, and directions in the scanner's frame.
+    ranges_m, rays
+        (B,) ranges, NaN or infinite where there was no echo, and (B, 2) unit vectors in the scanner's frame.
     nearest_m, farthest_m
         Ranges outside are no hits.
     """
@@ -34,8 +43,8 @@ def scan_points(
         r = ranges_m[i]
         if not (nearest_m <= r <= farthest_m):
             continue
-        points[i, 0] = r * math.cos(angles_rad[i])
-        points[i, 1] = r * math.sin(angles_rad[i])
+        points[i, 0] = r * rays[i, 0]
+        points[i, 1] = r * rays[i, 1]
         hit[i] = True
     return points, hit
 
@@ -132,8 +141,8 @@ def scan_lines(
 
 @kernel
 def scan_cloud(
-    ranges_m: FloatArray, angles_rad: FloatArray, step_rad: float, nearest_m: float, farthest_m: float
+    ranges_m: FloatArray, rays: FloatArray, step_rad: float, nearest_m: float, farthest_m: float
 ) -> FloatArray:
-    """Points (K, 6) of ``scan_lines`` from ranges (B,) in directions (B,)."""
-    points, hit = scan_points(ranges_m, angles_rad, nearest_m, farthest_m)
+    """Points (K, 6) of ``scan_lines`` from ranges (B,) along rays (B, 2)."""
+    points, hit = scan_points(ranges_m, rays, nearest_m, farthest_m)
     return scan_lines(points, hit, 0.0, 0.0, step_rad)

@@ -8,6 +8,7 @@ import numpy as np
 
 from pilotage.kernels.arrays import FloatArray
 from pilotage.kernels.jit import kernel
+from pilotage.kernels.slam.align import solve3
 from pilotage.kernels.slam.frames import between
 
 CHANCE = 0.03
@@ -23,6 +24,9 @@ def told_by(hessian: FloatArray, weight: float) -> FloatArray:
     system = hessian.copy()
     system[0, 0] -= CHANCE * weight
     system[1, 1] -= CHANCE * weight
+    minor = system[0, 0] * system[1, 1] - system[0, 1] * system[0, 1]
+    if system[0, 0] > 0.0 and minor > 0.0 and np.linalg.det(system) > 0.0:
+        return system
     told, axes = np.linalg.eigh(system)
     out = np.zeros((3, 3))
     for m in range(3):
@@ -70,7 +74,9 @@ def add_slip(
     turn[0, 1] = -turn[1, 0]
     told = told_by(turn.T @ hessian @ turn, weight)
     # Squared: what the map holds, however weakly, does not add up from scan to scan.
-    share = np.linalg.solve(told + prior, prior)
+    share = np.empty((3, 3))
+    for a in range(3):
+        solve3(told + prior, prior[:, a], share[:, a])
     left = error * (share @ share)
     if by_chance:
         total += left @ left.T

@@ -9,10 +9,10 @@ from functools import lru_cache
 import numpy as np
 
 from pilotage.core.types import FloatArray, IntArray
-from pilotage.kernels.slam.scan_lines import scan_cloud
+from pilotage.kernels.slam.scan_lines import rays_of, scan_cloud
 from pilotage.logs.laser_log import LaserLog
 
-_LEAST_RANGE_M = 0.1
+LEAST_RANGE_M = 0.1
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,18 +60,19 @@ def cloud_of(log: LaserLog, scan: int, max_range_m: float, spacing: float = 1.0)
     first, step = float(log.first_angle_rad[scan]), float(log.angle_step_rad[scan])
     # The middle stays where it is.
     first += 0.5 * (1.0 - spacing) * step * (beams - 1)
-    angles = _angles(first, spacing * step, beams)
-    return cloud_of_beams(log.ranges_m[scan, :beams], angles, step, max_range_m)
+    rays = _rays(first, spacing * step, beams)
+    return scan_cloud(log.ranges_m[scan, :beams], rays, step, LEAST_RANGE_M, max_range_m)
 
 
 @lru_cache(maxsize=4)
-def _angles(first_rad: float, step_rad: float, beams: int) -> FloatArray:
-    """(B,) directions, which are the same for all scans of most recordings."""
-    return first_rad + step_rad * np.arange(beams, dtype=np.float64)
+def _rays(first_rad: float, step_rad: float, beams: int) -> FloatArray:
+    """(B, 2) directions, which are the same for all scans of most recordings."""
+    return rays_of(first_rad, step_rad, beams)
 
 
 def cloud_of_beams(
     ranges_m: FloatArray, angles_rad: FloatArray, step_rad: float, max_range_m: float
 ) -> FloatArray:
     """Points (K, 6) of ranges (B,), infinite or NaN where nothing was hit, in their directions (B,)."""
-    return scan_cloud(ranges_m, angles_rad, step_rad, _LEAST_RANGE_M, max_range_m)
+    rays = np.column_stack([np.cos(angles_rad), np.sin(angles_rad)])
+    return scan_cloud(ranges_m, rays, step_rad, LEAST_RANGE_M, max_range_m)

@@ -19,12 +19,8 @@ class Fit:
         (3,), (3, 3) of the alignment, and (3,) where it began.
     rms_m
         Root mean square of the weighted residuals.
-    off
-        Distance from the nearest credible guess.
     weight
         Sum of the points' weights.
-    guess_error, by_odometry
-        Usual error of the most trusted guess, and whether that is the odometry.
     """
 
     value: float
@@ -32,7 +28,4 @@ class Fit:
     hessian: FloatArray
     start: FloatArray
     rms_m: float
-    off: float = 0.0
     weight: float = 0.0
-    guess_error: float = 0.0
-    by_odometry: bool = False

@@ -10,40 +10,46 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pilotage.core.types import FloatArray, IntArray
-from pilotage.kernels.slam.align import TOO_FEW, align
+from pilotage.core.types import FloatArray
+from pilotage.kernels.slam.align import TOO_FEW
 from pilotage.kernels.slam.branch_bound import NO_SEED
-from pilotage.kernels.slam.buckets import fused, sort_into_buckets
-from pilotage.kernels.slam.frames import between, carried, composed
-from pilotage.kernels.slam.placing import (
-    ITERATIONS,
-    LONG_M,
-    REACH_M,
-    SCALE_M,
-    distance,
-    placed,
-    plausibility,
+from pilotage.kernels.slam.following import (
+    POOR,
+    Look,
+    Track,
+    empty_keyframes,
+    has_room,
+    keep,
+    look,
+    settle,
+    thinned,
 )
+from pilotage.kernels.slam.frames import between, carried, composed
+from pilotage.kernels.slam.local_map import (
+    NOTHING_KNOWN,
+    LocalMap,
+    add_to_map,
+    align_in_map,
+    empty_map,
+)
+from pilotage.kernels.slam.movers import empty_views
+from pilotage.kernels.slam.placing import ITERATIONS, LONG_M, REACH_M, SCALE_M, distance, plausibility
 from pilotage.stack.mapping.slam.config import SlamConfig
 from pilotage.stack.mapping.slam.fit import Fit
-from pilotage.stack.mapping.slam.odometry import NO_OTHERS, MotionGuess
-from pilotage.stack.mapping.slam.surroundings import Surroundings, every_second, in_range
+from pilotage.stack.mapping.slam.surroundings import KEYFRAMES, Surroundings, every_second, in_range
 
 BUCKET_M = 0.1
-LOCAL_BUCKET_M, FUSED_M, FUSED_COSINE = 0.2, 0.1, 0.9
-"""What the last keyframes saw of a square in directions alike is one point: fewer to look through, and each
-the mean of several scans. Not without odometry, where single points are all that tells how far one came."""
-MOST_POINTS = 240
-"""Of a scan of more points every second, third, ... is aligned: beams nearer together than their lines are
-long tell little of their own."""
+FETCHED = 64
+"""After so many keyframes at most compiled code is left."""
+LEAST_ROOM = 4096
+"""Points that the map of the last keyframes has room for at least."""
 PRIOR = np.diag([2.0, 2.0, 20.0])
 """Holds the pose at the guess where the scan leaves it open, in squared residuals. More would pull every
 scan a little towards an odometry whose errors all have one sign."""
-POOR, NONE = 0.75, 0.3
-"""Fit over its running mean below which there is a search, and below which it is no fit at all: what hangs by
-so few points hangs by chance."""
+NONE = 0.3
+"""Fit over its running mean below which it is no fit at all: what hangs by so few points hangs by chance."""
 SEARCH_STEP_RAD = 0.02
-FAR, LEAST_FAR = 0.6, 0.12
+FAR, LEAST_FAR = 0.65, 0.12
 """Share of the usual fit that a place far from all guesses takes, and what its distance must leave of it."""
 LEAST_FOUND, FOUND, ALIKE = 40, 0.8, 0.8
 """Points and share of the usual fit that finding a place all round takes, and the share of its score from
@@ -61,16 +67,13 @@ BETTER_POOR, BETTER_GOOD = 1.1, 1.03
 
 _STANDING = np.zeros(3)
 
-Reference = tuple[FloatArray, IntArray, FloatArray]
-"""Points in buckets, as ``align`` takes them."""
-
 
 @dataclass(frozen=True, slots=True)
 class Aside:
-    """Keyframes that the track tore from: what they saw around the last place, and their points."""
+    """Keyframes that the track tore from: what they saw around the last place, and the map of them."""
 
     around: Surroundings
-    reference: Reference | None
+    map_: LocalMap
 
 
 class LocalMatcher:
@@ -78,55 +81,116 @@ class LocalMatcher:
 
     Attributes
     ----------
+    track, found
+        Where it has come to, and what the guesses alone made of the last scan.
+    map_, views
+        What the keyframes saw, as points and as beams.
+    keyframes
+        Those that were not fetched yet.
     searched, lost
         How many scans needed a search, and how many fitted nowhere.
-    rms_m
-        Running mean of the residuals.
     """
 
     def __init__(self, config: SlamConfig) -> None:
         self._config = config
-        self._guess = MotionGuess()
-        self._local: list[FloatArray] = []
-        self._usual = 0.6
-        self._reference: Reference | None = None
+        self.track = Track(
+            np.zeros(3),
+            np.zeros(3),
+            np.array([0.0, 0.001, 0.002]),
+            np.zeros(3),
+            np.array([0.6, SCALE_M]),
+            np.zeros((3, 3)),
+            np.zeros((3, 3)),
+            np.zeros(1, np.int64),
+        )
+        self.found = Look(
+            np.zeros((3, 3)), np.zeros(3, np.int64), np.zeros(3), np.zeros((3, 3)), np.zeros(3), np.zeros(4)
+        )
+        self.map_, self.views = empty_map(LEAST_ROOM), empty_views(0)
+        self.keyframes = empty_keyframes(FETCHED, 0)
+        self._local: list[tuple[FloatArray, FloatArray]] = []
         self._around: Surroundings | None = None
         self._lost_s, self._led = 0.0, False
         self.searched = 0
         self.lost = 0
-        self.rms_m = SCALE_M
 
-    @property
-    def guess_error(self) -> float:
-        """Usual error of the most trusted guess of the motion."""
-        return self._guess.least_error
+    def look(
+        self, cloud: FloatArray, step: FloatArray | None, others: FloatArray, dt_s: float
+    ) -> tuple[FloatArray, FloatArray, bool]:
+        """Place a scan by guesses alone, into ``found``.
 
-    @staticmethod
-    def thinned(cloud: FloatArray) -> FloatArray:
-        """Return as many points of a scan (K, 6) as are worth while, evenly spread."""
-        every = -(-cloud.shape[0] // MOST_POINTS)
-        return cloud if every <= 1 else np.ascontiguousarray(cloud[::every])
+        Returns
+        -------
+        As the kernel.
+        """
+        led = step is not None
+        step = _STANDING if step is None else step
+        return look(cloud, step, led, others, dt_s, PRIOR, self.track, self.map_, self.views, self.found)
 
-    def add_keyframe(self, cloud: FloatArray, pose: FloatArray) -> None:
-        """Let a scan lend its points to those that follow."""
-        self._local = [*self._local, carried(cloud, pose)][-self._config.local_keyframes :]
-        self._refer()
+    def found_again(self) -> None:
+        """Scans fitted: nothing is lost any more."""
+        self._lost_s = 0.0
 
-    def _refer(self) -> None:
-        side_m = LOCAL_BUCKET_M if self._led else BUCKET_M
-        box, starts, _, points = sort_into_buckets(np.concatenate(self._local), side_m)
-        if self._led:
-            starts, points = fused(box, starts, points, FUSED_M, FUSED_COSINE)
-        self._reference = box, starts, points
+    def found_fit(self) -> Fit | None:
+        """Where the guesses alone had the last scan, if it fitted anywhere."""
+        value, _, rms_m, weight = self.found.told.tolist()
+        if value < 0.0:
+            return None
+        pose, hessian, start = self.found.pose, self.found.hessian, self.found.start
+        return Fit(value, pose.copy(), hessian.copy(), start.copy(), rms_m, weight)
+
+    def settle(self, fit: Fit, step: FloatArray | None, dt_s: float) -> None:
+        """Go on to where a scan was found to lie."""
+        self._lost_s = 0.0
+        told = np.array([fit.value, 0.0, fit.rms_m, fit.weight])
+        led, step = step is not None, _STANDING if step is None else step
+        settle(fit.pose, fit.hessian, fit.start, told, step, led, dt_s, PRIOR, self.track)
+
+    def keep(self, scan: int, cloud: FloatArray, kept: FloatArray, hessian: FloatArray, led: bool) -> None:
+        """Make the last scan a keyframe; as the kernel."""
+        local = self._config.local_keyframes
+        keep(scan, cloud, kept, hessian, led, local, self.track, self.map_, self.views, self.keyframes)
+
+    def remember(self, kept: FloatArray, pose: FloatArray) -> None:
+        """Take note of a keyframe that was fetched from ``keyframes``."""
+        self._local = [*self._local, (kept, pose)][-self._config.local_keyframes :]
         self._around = None
+
+    def make_room(self, beams: int, led: bool) -> None:
+        """Let a scan of so many points be placed; all keyframes were fetched."""
+        self._led = led
+        if has_room(beams, self.map_, self.views, self.keyframes):
+            return
+        if len(self.keyframes.points) < beams:
+            self.keyframes = empty_keyframes(FETCHED, beams)
+        if self.map_.counts[0] + beams > len(self.map_.points):
+            self._map_anew(beams)
+        width = self.views.polar.shape[1]
+        if width <= beams:
+            polar = empty_views(2 * beams).polar
+            polar[:, :width] = self.views.polar
+            self.views = self.views._replace(polar=polar)
+
+    def _map_anew(self, beams: int = 0) -> None:
+        """Make the map of the last keyframes alone, with room for as many again and a scan."""
+        points = sum(len(cloud) for cloud, _ in self._local)
+        self.map_ = empty_map(2 * points + beams + LEAST_ROOM)
+        for cloud, pose in self._local:
+            add_to_map(self.map_, thinned(cloud), pose, self._config.local_keyframes, self._led)
+
+    def _clouds(self) -> list[FloatArray]:
+        """Points (K, 6) of the keyframes in the frame of the track, as many as are searched."""
+        return [carried(thinned(cloud), pose) for cloud, pose in self._local[-KEYFRAMES:]]
 
     def set_aside(self) -> Aside | None:
         """Begin anew without keyframes; what they were is handed out, to be found again."""
-        seen = bool(self._local) and len(self._local[-1]) > 0
-        around = Surroundings.of(self._local, self._local[-1][0, :2]) if seen else None
-        out = None if around is None else Aside(around, self._reference)
-        self._local, self._reference, self._around = [], None, None
-        self._guess.velocity = np.zeros(3)
+        seen = bool(self._local) and len(self._local[-1][0]) > 0
+        clouds = self._clouds() if seen else []
+        around = Surroundings.of(clouds, clouds[-1][0, :2]) if seen else None
+        out = None if around is None else Aside(around, self.map_)
+        self._local, self.map_, self._around = [], empty_map(LEAST_ROOM), None
+        self.track.velocity[:] = 0.0
+        self.views.added[0] = 0
         return out
 
     def find(self, aside: Aside, cloud: FloatArray, centre: FloatArray, half_m: float) -> Fit | None:
@@ -141,52 +205,38 @@ class LocalMatcher:
         other = np.concatenate([best[:3], OTHER_PLACE])
         if aside.around.best(points, centre, half_m, turns, ALIKE * float(best[3]), other) is not None:
             return None
-        fit = self._align(cloud, best[:3].copy(), 0.3, aside.reference)
-        return fit if fit is not None and fit.value >= FOUND * self._usual else None
+        fit = self._align(cloud, best[:3].copy(), 0.3, aside.map_)
+        return fit if fit is not None and fit.value >= FOUND * self.track.usual[0] else None
 
     def carry(self, moved: FloatArray) -> None:
         """Move the keyframes by a motion (3,) of the map."""
-        self._local = [carried(cloud, moved) for cloud in self._local]
+        self._local = [(cloud, composed(moved, pose)) for cloud, pose in self._local]
         self._around = None
-        self._refer()
+        self._map_anew()
+        for pose in (self.track.pose, self.track.keyframe, *self.views.poses):
+            pose[:] = composed(moved, pose)
 
-    def guesses(self, step: FloatArray | None, dt_s: float) -> tuple[FloatArray, int]:
-        """Motions (G, 3) that a scan may have made, the most trusted first, and how many are credible."""
-        return self._guess.guesses(step, dt_s)
-
-    def match(
-        self,
-        cloud: FloatArray,
-        last: FloatArray,
-        step: FloatArray | None,
-        guesses: tuple[FloatArray, int],
-        dt_s: float,
-        gap_s: float,
-        others: FloatArray = NO_OTHERS,
+    def search(
+        self, cloud: FloatArray, step: FloatArray | None, others: FloatArray, dt_s: float, gap_s: float
     ) -> Fit | None:
-        """Align a scan; None where it cannot be.
+        """Look farther than ``found`` for where a scan lies; None where it fits nowhere.
 
         Parameters
         ----------
-        last
-            (3,) pose of the scan before.
-        step
-            (3,) motion since by the odometry, if there is any.
-        guesses
-            What ``guesses`` makes of it.
+        step, others
+            (3,) motion since the last scan by the odometry, if there is any, and what else (M, 3) it may be.
         dt_s, gap_s
             Smoothed and stamped time since.
-        others
-            (M, 3) what else the odometry may have meant: tried where the first fits less than well.
         """
-        self._led = step is not None
-        motions, count = guesses
-        led = self._led and self._guess.odometry_leads
-        best, split = self._placed(cloud, last, motions, count, led, others)
-        credible = motions[:count] if len(others) == 0 else np.concatenate([motions[:count], others])
+        last, usual, found = self.track.pose.copy(), float(self.track.usual[0]), self.found
+        count, sure, split = found.counts.tolist()
+        motions = found.motions[:count]
+        led = self._odometry_leads(step)
+        best = self.found_fit()
+        credible = np.concatenate([motions[:sure], others])
         if led and distance(motions[0], _STANDING) > LONG_M:
             best = self._near(cloud, last, motions[0], credible, best)
-        poor = best is None or best.value < POOR * self._usual
+        poor = best is None or best.value < POOR * usual
         if poor or step is None:
             # Without odometry a scan may slide along a corridor and still fit: look around every time.
             self.searched += 1
@@ -196,98 +246,57 @@ class LocalMatcher:
                 better = BETTER_POOR if poor else BETTER_GOOD
                 guess = composed(last, motions[0]) if poor else None
                 for fit in self._search(cloud, centre, *_window(gap_s), guess, best):
-                    found = self._plausible(fit, last, credible)
-                    if best is None or found.value > better * best.value + 0.01:
-                        best = found
-        if best is None or best.value < NONE * self._usual:
-            best = self._far(cloud, last, motions[0], None if step is None else credible)
+                    judged = self._plausible(fit, last, credible, led)
+                    if best is None or judged.value > better * best.value + 0.01:
+                        best = judged
+        if best is None or best.value < NONE * usual:
+            best = self._far(cloud, last, motions[0], None if step is None else credible, led)
         if best is None:
             self.lost += 1
             self._lost_s += dt_s
-            return None
-        self._lost_s = 0.0
-        self.rms_m += 0.05 * (best.rms_m - self.rms_m)
-        self._usual += 0.02 * (best.value - self._usual)
-        self._guess.learn(step, between(last, best.pose), dt_s)
         return best
 
-    def _placed(
-        self,
-        cloud: FloatArray,
-        last: FloatArray,
-        motions: FloatArray,
-        count: int,
-        led: bool,
-        others: FloatArray,
-    ) -> tuple[Fit | None, bool]:
-        """Align from the guesses alone; and whether these are far apart."""
-        reference = self._reference
-        if reference is None or cloud.shape[0] == 0:
-            return None, False
-        pose, hessian, start, told, split = placed(
-            cloud,
-            last,
-            motions,
-            count,
-            led,
-            others,
-            self._guess.least_error,
-            self._usual,
-            PRIOR,
-            *reference,
-        )
-        value, off, rms_m, weight = told.tolist()
-        if value < 0.0:
-            return None, split
-        return Fit(value, pose, hessian, start, rms_m, off, weight, self._guess.least_error, led), split
+    def _odometry_leads(self, step: FloatArray | None) -> bool:
+        errors = self.track.errors
+        return step is not None and bool(errors[0] == errors.min())
 
-    def _plausible(self, fit: Fit, last: FloatArray, guesses: FloatArray) -> Fit:
+    def _plausible(self, fit: Fit, last: FloatArray, guesses: FloatArray, led: bool) -> Fit:
         """Lower a fit's value by how far it is from all credible guesses, in units of their usual error."""
-        share, off = plausibility(
-            between(last, fit.pose),
-            guesses,
-            self._guess.least_error,
-            self._led and self._guess.odometry_leads,
-        )
-        return replace(fit, value=share * fit.value, off=off)
+        share, _ = plausibility(between(last, fit.pose), guesses, float(self.track.errors.min()), led)
+        return replace(fit, value=share * fit.value)
 
     def _align(
-        self, cloud: FloatArray, start: FloatArray, reach_m: float, reference: Reference | None = None
+        self, cloud: FloatArray, start: FloatArray, reach_m: float, map_: LocalMap | None = None
     ) -> Fit | None:
-        reference = reference or self._reference
-        if reference is None or cloud.shape[0] == 0:
+        if cloud.shape[0] == 0:
             return None
-        pose, hessian, fit, status = align(
-            cloud, start, PRIOR, reach_m, REACH_M, SCALE_M, ITERATIONS, *reference
+        pose, hessian, fit, status = align_in_map(
+            map_ or self.map_, cloud, start, PRIOR, reach_m, REACH_M, SCALE_M, ITERATIONS, NOTHING_KNOWN
         )
         if status == TOO_FEW:
             return None
         pose[2] = (pose[2] + np.pi) % (2.0 * np.pi) - np.pi
-        return Fit(
-            float(fit[1]) / cloud.shape[0],
-            pose,
-            hessian,
-            start,
-            float(fit[0]),
-            0.0,
-            float(fit[1]),
-            self._guess.least_error,
-            self._led and self._guess.odometry_leads,
-        )
+        return Fit(float(fit[1]) / cloud.shape[0], pose, hessian, start, float(fit[0]), float(fit[1]))
 
     def _far(
-        self, cloud: FloatArray, last: FloatArray, motion: FloatArray, credible: FloatArray | None
+        self,
+        cloud: FloatArray,
+        last: FloatArray,
+        motion: FloatArray,
+        credible: FloatArray | None,
+        led: bool,
     ) -> Fit | None:
         """Search as far as any gap would have it: the stamps of scans may lie about how long it was.
 
         ``credible`` are the guesses that speak against what is far from them; None where no odometry does.
         """
+        usual = float(self.track.usual[0])
         fits = self._search(cloud, last, *_window(MOST_GAP_S), composed(last, motion))
-        fits = [fit for fit in fits if fit.value >= FAR * self._usual]
+        fits = [fit for fit in fits if fit.value >= FAR * usual]
         if credible is None:
             return min(fits, key=lambda fit: distance(between(last, fit.pose), motion), default=None)
-        found = [self._plausible(fit, last, credible) for fit in fits]
-        near = [fit for fit in found if fit.value >= LEAST_FAR * self._usual]
+        found = [self._plausible(fit, last, credible, led) for fit in fits]
+        near = [fit for fit in found if fit.value >= LEAST_FAR * usual]
         return max(near, key=lambda fit: fit.value, default=None)
 
     def _near(
@@ -300,7 +309,7 @@ class LocalMatcher:
         """
         self.searched += 1
         for fit in self._search(cloud, composed(last, motion), NEAR_M, NEAR_RAD, None, best):
-            found = self._plausible(fit, last, credible)
+            found = self._plausible(fit, last, credible, True)
             if best is None or found.value > BETTER_GOOD * best.value + 0.01:
                 best = found
         return best
@@ -321,7 +330,7 @@ class LocalMatcher:
         """
         near = in_range(cloud)
         if self._around is None:
-            self._around = Surroundings.of(self._local, centre)
+            self._around = Surroundings.of(self._clouds(), centre)
         if self._around is None or near.shape[0] < LEAST_SEARCHED:
             return []
         steps = round(half_rad / SEARCH_STEP_RAD)

@@ -2,31 +2,35 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from pilotage.core.types import FloatArray, IntArray
+from pilotage.kernels.slam.following import (
+    DOUBT,
+    FULL,
+    Recording,
+    follow,
+    is_new,
+    motion_of,
+    move_anchor,
+)
 from pilotage.kernels.slam.frames import between, composed
 from pilotage.logs.laser_log import LaserLog
-from pilotage.stack.mapping.slam.clouds import Clouds, cloud_of
+from pilotage.stack.mapping.slam.clouds import LEAST_RANGE_M, Clouds, cloud_of
 from pilotage.stack.mapping.slam.config import SlamConfig
-from pilotage.stack.mapping.slam.local_matching import Aside, LocalMatcher
-from pilotage.stack.mapping.slam.movers import Movers
-from pilotage.stack.mapping.slam.odometry import NO_OTHERS, ScanMotions, smoothed_times
-from pilotage.stack.mapping.slam.slips import (
-    BLIND_BREAK_SLIP,
-    BREAK_SLIP,
-    GUESS_SLIP,
-    HEALED_SLIP,
-    Slips,
-)
+from pilotage.stack.mapping.slam.fit import Fit
+from pilotage.stack.mapping.slam.local_matching import PRIOR, Aside, LocalMatcher
+from pilotage.stack.mapping.slam.odometry import NO_OTHERS, recording_of
 
-SURE_GUESS = 0.035
-"""Usual error of the guesses (a radian as half a metre) up to which people are told from walls by odometry:
-wrong stamps, and constant velocity alone, make movers of walls."""
+BREAK_SLIP = np.diag([0.2, 0.2, 0.3]) ** 2
+BLIND_BREAK_SLIP = np.diag([0.5, 0.5, 0.8]) ** 2
+HEALED_SLIP = np.diag([0.05, 0.05, 0.02]) ** 2
+GUESS_SLIP = np.diag([0.05, 0.05, 0.05]) ** 2
+"""Covariances where the track broke, with odometry and without, where it was joined again, and what each
+scan adds that hangs by the odometry alone."""
 GUESSED_SCANS = 3
 """So many scans in a row may hang by the odometry alone before the track breaks,"""
 FAR_M, FAR_RAD = 0.5, 0.4
@@ -40,6 +44,9 @@ AGREE_M, AGREE_RAD = 0.2, 0.1
 """Two scans must be found, the second one from another place, and agree."""
 SHORT = 5
 """A piece of fewer keyframes that breaks off again is no piece: its keyframes are dropped."""
+
+AT_ONCE = 500
+"""So many scans are placed before progress is told."""
 
 OnScan = Callable[[int], None]
 
@@ -109,7 +116,6 @@ class Tracker:
     def __init__(self, config: SlamConfig) -> None:
         self._config = config
         self._matcher = LocalMatcher(config)
-        self._movers = Movers()
         self._poses: list[FloatArray] = []
         self._owner: list[int] = []
         self._keyframes: list[int] = []
@@ -117,7 +123,6 @@ class Tracker:
         self._hessians: list[FloatArray] = []
         self._slips: list[FloatArray] = []
         self._breaks: list[int] = []
-        self._slip = Slips()
         self._torn: _Torn | None = None
         self._lost_run = 0
         self.healed = 0
@@ -130,51 +135,124 @@ class Tracker:
         gap_s: float,
         others: FloatArray = NO_OTHERS,
     ) -> bool:
-        """Place the next scan (K, 6); True where it became a keyframe. As ``LocalMatcher.match``."""
-        hessian, broken, led = np.zeros((3, 3)), False, None
-        light = self._matcher.thinned(cloud)
+        """Place the next scan (K, 6); True where it became a keyframe. As ``LocalMatcher.search``."""
+        self._matcher.make_room(len(cloud), step is not None)
+        kept, light, sure = self._matcher.look(cloud, step, others, dt_s)
         if not self._poses:
-            pose = np.zeros(3)
+            self._poses.append(np.zeros(3))
+            self._keep(cloud, kept, np.zeros((3, 3)), step is not None)
+            self._owner.append(0)
+            return True
+        fit = self._matcher.found_fit() if sure else self._matcher.search(light, step, others, dt_s, gap_s)
+        if fit is not None:
+            self._matcher.settle(fit, step, dt_s)
+        return self._take_in(cloud, kept, light, fit, step)
+
+    def follow(self, recording: Recording, gaps_s: FloatArray, on_scan: OnScan | None) -> None:
+        """Place all scans of a recording but the first, which was added."""
+        matcher, config = self._matcher, self._config
+        limits = np.array(
+            [LEAST_RANGE_M, config.max_range_m, config.keyframe_distance_m, config.keyframe_turn_rad]
+        )
+        count, led = len(recording.beams), len(recording.at_scans) > 0
+        poses, owners, first = np.empty((count, 3)), np.empty(count, np.int64), 1
+        while first < count:
+            # A break may be healed by any scan.
+            end = min(count, first + (AT_ONCE if self._torn is None else 1))
+            at, why, cloud, kept, light = follow(
+                recording,
+                first,
+                end,
+                limits,
+                config.local_keyframes,
+                PRIOR,
+                matcher.track,
+                matcher.map_,
+                matcher.views,
+                matcher.found,
+                matcher.keyframes,
+                poses,
+                owners,
+            )
+            self._poses.extend(poses[first:at])
+            self._owner.extend((owners[first:at] + len(self._keyframes)).tolist())
+            new = self._fetch()
+            if at > first:
+                self._lost_run = 0
+                matcher.found_again()
+            if why == FULL:
+                matcher.make_room(int(recording.beams[at]), led)
+            elif why == DOUBT:
+                step, others = motion_of(recording, at)
+                told, last, dt_s = step if led else None, self.pose, float(recording.dt_s[at])
+                fit = matcher.search(light, told, others, dt_s, float(gaps_s[at]))
+                moved = matcher.found.motions[0] if fit is None else between(last, fit.pose)
+                move_anchor(recording, at, moved)
+                if fit is not None:
+                    matcher.settle(fit, told, dt_s)
+                self._take_in(cloud, kept, light, fit, told)
+                at += 1
+            elif self._torn is not None:
+                self._heal(self._torn, light, new)
+            first = at
+            if on_scan is not None:
+                on_scan(at - 1)
+
+    def _take_in(
+        self, cloud: FloatArray, kept: FloatArray, light: FloatArray, fit: Fit | None, step: FloatArray | None
+    ) -> bool:
+        """Note where a scan lies, or hang it by its guess; True where it becomes a keyframe.
+
+        ``cloud``, ``kept`` and ``light`` are all of it, what is left without people, and what is aligned.
+        """
+        track, hessian, broken = self._matcher.track, RIGID, False
+        if fit is None:
+            self._lost_run += 1
+            track.pose[:] = composed(track.pose, self._matcher.found.motions[0])
+            broken = step is None or self._lost_run > GUESSED_SCANS or _is_far(step)
+            track.slip[:] += BLIND_BREAK_SLIP if step is None else BREAK_SLIP if broken else GUESS_SLIP
+            if broken:
+                self._tear()
         else:
-            last = self._poses[-1]
-            guesses = self._matcher.guesses(step, dt_s)
-            expected = composed(last, guesses[0][0])
-            if step is not None and self._matcher.guess_error < SURE_GUESS:
-                led = expected
-                light = self._movers.without(light, led)
-            fit = self._matcher.match(light, last, step, guesses, dt_s, gap_s, others)
-            self._lost_run = 0 if fit is not None else self._lost_run + 1
-            if fit is None:
-                pose, hessian = expected, RIGID
-                broken = step is None or self._lost_run > GUESSED_SCANS or _is_far(step)
-                self._slip.add(BLIND_BREAK_SLIP if step is None else BREAK_SLIP if broken else GUESS_SLIP)
-                if broken:
-                    self._tear()
-            else:
-                pose, hessian = fit.pose, fit.hessian
-                self._slip.matched(fit)
-        new = not self._poses or _is_new(between(self._poses[self._keyframes[-1]], pose), self._config)
-        self._poses.append(pose)
-        new = new and not (self._lost_run and not broken)
-        if new or broken:
-            self._keyframes.append(len(self._poses) - 1)
-            self._clouds.append(cloud if led is None else self._movers.without(cloud, led))
-            self._hessians.append(hessian)
-            self._slips.append(self._slip.taken())
-            self._matcher.add_keyframe(light, pose)
-            self._movers.add(cloud, pose)
+            self._lost_run, hessian = 0, fit.hessian
+        new = broken or (self._lost_run == 0 and self._is_new(between(track.keyframe, track.pose)))
+        self._poses.append(track.pose.copy())
+        if new:
+            self._keep(cloud, kept, hessian, step is not None)
         self._owner.append(len(self._keyframes) - 1)
         if self._torn is not None and not broken:
             self._heal(self._torn, light, new)
-        return new or broken
+        return new
+
+    def _keep(self, cloud: FloatArray, kept: FloatArray, hessian: FloatArray, led: bool) -> None:
+        """Make the last scan a keyframe."""
+        self._matcher.keep(len(self._poses) - 1, cloud, kept, hessian, led)
+        self._fetch()
+
+    def _fetch(self) -> bool:
+        """Take over what became keyframes, if anything did."""
+        new = self._matcher.keyframes
+        count = int(new.added[0])
+        for k in range(count):
+            scan, kept = int(new.scans[k]), new.points[new.starts[k] : new.starts[k + 1]].copy()
+            self._keyframes.append(scan)
+            self._clouds.append(kept)
+            self._hessians.append(new.hessians[k].copy())
+            self._slips.append(new.slips[k].copy())
+            self._matcher.remember(kept, self._poses[scan])
+        new.added[0] = 0
+        return count > 0
+
+    def _is_new(self, motion: FloatArray) -> bool:
+        """Whether a scan is far enough from the last keyframe to become one."""
+        return is_new(motion, self._config.keyframe_distance_m, self._config.keyframe_turn_rad)
 
     def _tear(self) -> None:
         """Begin a new piece; one that has hardly begun is dropped."""
         torn, count = self._torn, len(self._keyframes)
         aside = self._matcher.set_aside()
-        self._movers.forget()
         if torn is not None and count - torn.keyframe < SHORT:
-            self._slip.add(np.sum(self._slips[torn.keyframe :], axis=0))
+            self._matcher.track.slip[:] += np.sum(self._slips[torn.keyframe :], axis=0)
             for kept in (self._keyframes, self._clouds, self._hessians, self._slips):
                 del kept[torn.keyframe :]
             self._owner = [min(owner, torn.keyframe - 1) for owner in self._owner]
@@ -194,14 +272,14 @@ class Tracker:
         pose = self._poses[-1]
         half_m = min(HEAL_M + HEAL_M_PER_KEYFRAME * keyframes, HEAL_MOST_M)
         fit = None
-        if torn.candidate is not None and _is_new(between(torn.candidate[0], pose), self._config):
+        if torn.candidate is not None and self._is_new(between(torn.candidate[0], pose)):
             expected = np.asarray(composed(torn.candidate[1], pose))
             fit = self._matcher.find(torn.aside, cloud, expected, HEAL_M)
         fit = fit or self._matcher.find(torn.aside, cloud, pose, half_m)
         if fit is None:
             return
         moved = composed(fit.pose, between(pose, np.zeros(3)))
-        if torn.candidate is None or not _is_new(between(torn.candidate[0], pose), self._config):
+        if torn.candidate is None or not self._is_new(between(torn.candidate[0], pose)):
             if torn.candidate is None:
                 self._torn = replace(torn, candidate=(pose, moved))
             return
@@ -212,7 +290,6 @@ class Tracker:
         for k in range(torn.scan, len(self._poses)):
             self._poses[k] = np.asarray(composed(moved, self._poses[k]))
         self._matcher.carry(moved)
-        self._movers.carry(moved)
         self._hessians[torn.keyframe], self._slips[torn.keyframe] = fit.hessian, HEALED_SLIP.copy()
         self._breaks.remove(torn.keyframe)
         self._torn = None
@@ -231,7 +308,7 @@ class Tracker:
     @property
     def rms_m(self) -> float:
         """Running mean of the residuals of the alignments."""
-        return self._matcher.rms_m
+        return float(self._matcher.track.usual[1])
 
     @property
     def keyframes(self) -> int:
@@ -270,32 +347,19 @@ class Tracker:
             np.array(self._breaks, np.int64),
             self._matcher.searched,
             self._matcher.lost,
-            self._movers.crowded,
+            int(self._matcher.track.crowded[0]),
         )
 
 
 def track(log: LaserLog, config: SlamConfig, on_scan: OnScan | None = None) -> LocalTrack:
     """Run the front end over a log."""
-    motions = ScanMotions(log, config.use_odometry)
-    times = smoothed_times(log.t_s)
-    tracker = Tracker(config)
-    gaps_s = np.diff(log.t_s, prepend=log.t_s[0]).tolist()
-    for i, dt_s in enumerate(np.maximum(1e-3, np.diff(times, prepend=times[0])).tolist()):
-        step, others = motions.of(i)
-        last = tracker.pose if i else np.zeros(3)
-        tracker.add(cloud_of(log, i, config.max_range_m), step, dt_s, gaps_s[i], others)
-        motions.learn(i, between(last, tracker.pose), step, others)
-        if on_scan is not None:
-            on_scan(i)
+    recording, tracker = recording_of(log, config.use_odometry), Tracker(config)
+    step = np.zeros(3) if len(recording.at_scans) else None
+    tracker.add(cloud_of(log, 0, config.max_range_m), step, 1e-3, 0.0)
+    tracker.follow(recording, np.diff(log.t_s, prepend=log.t_s[0]), on_scan)
     return tracker.track()
-
-
-def _is_new(motion: FloatArray, config: SlamConfig) -> bool:
-    """Whether a scan is far enough from the last keyframe to become one."""
-    far = math.hypot(motion[0], motion[1]) > config.keyframe_distance_m
-    return far or abs(float(motion[2])) > config.keyframe_turn_rad
 
 
 def _is_far(motion: FloatArray) -> bool:
     """Whether scans are so far apart that one alone leads out of what the last keyframe saw."""
-    return math.hypot(motion[0], motion[1]) > FAR_M or abs(float(motion[2])) > FAR_RAD
+    return bool(np.hypot(motion[0], motion[1]) > FAR_M) or abs(float(motion[2])) > FAR_RAD

@@ -1,0 +1,354 @@
+"""Scan after scan placed by guesses of its motion; compiled code is left in doubt only."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from pilotage.kernels.arrays import FloatArray, IntArray
+from pilotage.kernels.jit import kernel
+from pilotage.kernels.slam.frames import between, between_all, composed
+from pilotage.kernels.slam.local_map import LocalMap, add_to_map
+from pilotage.kernels.slam.movers import Views, add_view, without_movers
+from pilotage.kernels.slam.placing import (
+    LONG_M,
+    distance,
+    guessed_motions,
+    learn_motion,
+    placed,
+)
+from pilotage.kernels.slam.scan_lines import rays_of, scan_cloud
+from pilotage.kernels.slam.slips import add_slip
+
+SURE_GUESS = 0.035
+"""Usual error of the guesses (a radian as half a metre) up to which people are told from walls by odometry:
+wrong stamps, and constant velocity alone, make movers of walls."""
+MOST_POINTS = 240
+"""Of a scan of more points every second, third, ... is aligned: beams nearer together than their lines are
+long tell little of their own."""
+POOR, POOR_AS_GUESSED = 0.75, 0.6
+"""Fit over its running mean below which there is a search, and below which there is one where the scan lies
+within the usual error of what a trusted odometry guessed."""
+OTHER_READING_M = 0.08
+"""Readings of the odometry nearer together (a radian as half a metre) are one guess."""
+ENDED, FULL, DOUBT = 0, 1, 2
+
+
+class Track(NamedTuple):
+    """What is known where a track has come to, brought up to date scan by scan.
+
+    Attributes
+    ----------
+    pose, keyframe
+        (3,) of the last scan and of the last keyframe.
+    errors, velocity
+        Of ``guessed_motions``.
+    usual
+        (2,) running means of a fit's value and of its residuals.
+    slip, held
+        (3, 3) of ``add_slip`` since the last keyframe.
+    crowded
+        (1,) in how many scans so much seemed to move that they were left whole.
+    """
+
+    pose: FloatArray
+    keyframe: FloatArray
+    errors: FloatArray
+    velocity: FloatArray
+    usual: FloatArray
+    slip: FloatArray
+    held: FloatArray
+    crowded: IntArray
+
+
+class Look(NamedTuple):
+    """What the guesses alone made of a scan.
+
+    Attributes
+    ----------
+    motions, counts
+        (3, 3) and (3,): the guesses of ``guessed_motions``, how many, how many credible, and whether they are
+        far apart.
+    pose, hessian, start, told
+        Of ``placed``.
+    """
+
+    motions: FloatArray
+    counts: IntArray
+    pose: FloatArray
+    hessian: FloatArray
+    start: FloatArray
+    told: FloatArray
+
+
+class Keyframes(NamedTuple):
+    """Scans that became keyframes and were not fetched yet.
+
+    Attributes
+    ----------
+    scans, hessians, slips
+        (C,), (C, 3, 3) of their alignments, and (C, 3, 3) of what may have slipped since the one before.
+    points, starts
+        (M, 6) without people, one after the other, and (C + 1,) where each begins.
+    added
+        (1,) how many there are.
+    """
+
+    scans: IntArray
+    hessians: FloatArray
+    slips: FloatArray
+    points: FloatArray
+    starts: IntArray
+    added: IntArray
+
+
+def empty_keyframes(count: int, beams: int) -> Keyframes:
+    """Room for so many scans of so many points."""
+    return Keyframes(
+        np.zeros(count, np.int64),
+        np.zeros((count, 3, 3)),
+        np.zeros((count, 3, 3)),
+        np.zeros((count * beams, 6)),
+        np.zeros(count + 1, np.int64),
+        np.zeros(1, np.int64),
+    )
+
+
+class Recording(NamedTuple):
+    """Scans of a log one after the other, and the odometry at them.
+
+    Attributes
+    ----------
+    ranges_m, beams, first_rad, step_rad
+        (N, B), (N,), (N,), (N,) as in ``LaserLog``.
+    dt_s
+        (N,) smoothed time since the scan before.
+    at_scans, starts, others
+        (N, 3) where the odometry has the scanner, and of ``distinct_readings``; (0, 3) where there is none.
+    anchor
+        (3,) from where the next motion is counted.
+    """
+
+    ranges_m: FloatArray
+    beams: IntArray
+    first_rad: FloatArray
+    step_rad: FloatArray
+    dt_s: FloatArray
+    at_scans: FloatArray
+    starts: IntArray
+    others: FloatArray
+    anchor: FloatArray
+
+
+@kernel
+def thinned(cloud: FloatArray) -> FloatArray:
+    """As many points of a scan (K, 6) as are worth while, evenly spread."""
+    every = -(-cloud.shape[0] // MOST_POINTS)
+    return cloud if every <= 1 else cloud[::every].copy()
+
+
+@kernel
+def look(
+    cloud: FloatArray,
+    step: FloatArray,
+    led: bool,
+    others: FloatArray,
+    dt_s: float,
+    prior: FloatArray,
+    track: Track,
+    map_: LocalMap,
+    views: Views,
+    out: Look,
+) -> tuple[FloatArray, FloatArray, bool]:
+    """Place a scan (K, 6) by the guesses of its motion.
+
+    Returns
+    -------
+    The scan without people, as much of it as was aligned, and whether it lies where ``out`` has it without a
+    doubt.
+    """
+    motions, credible = guessed_motions(track.errors, track.velocity, step, led, dt_s)
+    error = track.errors.min()
+    leads = led and track.errors[0] == error
+    kept = cloud
+    if led and error < SURE_GUESS:
+        kept, crowded = without_movers(cloud, composed(track.pose, motions[0]), map_, views)
+        track.crowded[0] += crowded
+    light = thinned(kept)
+    pose, hessian, start, told, split = placed(
+        light, track.pose, motions, credible, leads, others, error, track.usual[0], prior, map_
+    )
+    out.motions[: motions.shape[0]] = motions
+    out.counts[0], out.counts[1], out.counts[2] = motions.shape[0], credible, split
+    out.pose[:], out.hessian[:], out.start[:], out.told[:] = pose, hessian, start, told
+    # Seldom does a scan that lies where a trusted odometry has it fit better anywhere else; but from a long
+    # guess an alignment may end in a wrong fit that is not poor.
+    long = leads and distance(motions[0], np.zeros(3)) > LONG_M
+    as_guessed = leads and told[1] < error
+    least = POOR_AS_GUESSED if as_guessed else POOR
+    return (
+        kept,
+        light,
+        led and (as_guessed or not long) and told[0] >= (POOR if long else least) * track.usual[0],
+    )
+
+
+@kernel
+def settle(
+    pose: FloatArray,
+    hessian: FloatArray,
+    start: FloatArray,
+    told: FloatArray,
+    step: FloatArray,
+    led: bool,
+    dt_s: float,
+    prior: FloatArray,
+    track: Track,
+) -> None:
+    """Let a track go on to where a scan was found to lie; ``told`` as of ``placed``."""
+    error = track.errors.min()
+    leads = led and track.errors[0] == error
+    add_slip(track.slip, track.held, start, pose, hessian, told[3], error, leads, prior)
+    track.usual[0] += 0.02 * (told[0] - track.usual[0])
+    track.usual[1] += 0.05 * (told[2] - track.usual[1])
+    learn_motion(track.errors, track.velocity, step, led, between(track.pose, pose), dt_s)
+    track.pose[:] = pose
+
+
+@kernel
+def motion_of(recording: Recording, scan: int) -> tuple[FloatArray, FloatArray]:
+    """Motion (3,) by the odometry since the last scan, and what else (M, 3) it may be."""
+    if recording.at_scans.shape[0] == 0:
+        return np.zeros(3), np.zeros((0, 3))
+    first, end = recording.starts[scan], recording.starts[scan + 1]
+    step = between(recording.anchor, recording.at_scans[scan])
+    return step, between_all(recording.anchor, recording.others[first:end])
+
+
+@kernel
+def move_anchor(recording: Recording, scan: int, motion: FloatArray) -> None:
+    """Count the next motion from the reading that the one of a scan (3,) was nearest to.
+
+    Loggers stamp what they receive, in bursts, and late: that need not be the reading at the stamp.
+    """
+    if recording.at_scans.shape[0] == 0:
+        return
+    step, others = motion_of(recording, scan)
+    usual = distance(step, motion)
+    best, least = -1, 0.5 * usual
+    for k in range(others.shape[0]):
+        apart = distance(others[k], motion)
+        if usual > OTHER_READING_M and apart < least:
+            best, least = k, apart
+    recording.anchor[:] = recording.at_scans[scan] if best < 0 else composed(recording.anchor, others[best])
+
+
+@kernel
+def is_new(motion: FloatArray, distance_m: float, turn_rad: float) -> bool:
+    """Whether a scan is far enough from the last keyframe to become one."""
+    return math.hypot(motion[0], motion[1]) > distance_m or abs(motion[2]) > turn_rad
+
+
+@kernel
+def has_room(beams: int, map_: LocalMap, views: Views, kept: Keyframes) -> bool:
+    """Whether a scan of so many points may become a keyframe."""
+    number = kept.added[0]
+    fetched: bool = number < kept.scans.shape[0] and kept.starts[number] + beams <= kept.points.shape[0]
+    return bool(fetched and map_.counts[0] + beams <= map_.points.shape[0] and beams < views.polar.shape[1])
+
+
+@kernel
+def keep(
+    scan: int,
+    cloud: FloatArray,
+    kept: FloatArray,
+    hessian: FloatArray,
+    led: bool,
+    local: int,
+    track: Track,
+    map_: LocalMap,
+    views: Views,
+    out: Keyframes,
+) -> None:
+    """Make the last scan a keyframe.
+
+    Parameters
+    ----------
+    cloud, kept
+        (K, 6) all of it, and what is left without people.
+    led, local
+        Whether there is odometry, and how many keyframes lend their points to the scans that follow.
+    """
+    number = out.added[0]
+    end = out.starts[number] + kept.shape[0]
+    out.points[out.starts[number] : end] = kept
+    out.scans[number], out.starts[number + 1] = scan, end
+    out.hessians[number], out.slips[number] = hessian, track.slip + track.held @ track.held.T
+    out.added[0] += 1
+    track.slip[:], track.held[:], track.keyframe[:] = 0.0, 0.0, track.pose
+    # Single points are all that tells how far one came without odometry.
+    add_to_map(map_, thinned(kept), track.pose, local, led)
+    add_view(views, cloud, track.pose)
+
+
+@kernel
+def follow(
+    recording: Recording,
+    first: int,
+    end: int,
+    limits: FloatArray,
+    local: int,
+    prior: FloatArray,
+    track: Track,
+    map_: LocalMap,
+    views: Views,
+    out: Look,
+    keyframes: Keyframes,
+    poses: FloatArray,
+    owners: IntArray,
+) -> tuple[int, int, FloatArray, FloatArray, FloatArray]:
+    """Place scans from ``first`` on, up to the first doubt or before ``end``.
+
+    Parameters
+    ----------
+    limits
+        (4,) nearest and farthest hit that counts, and the distance and turn of a keyframe from the last.
+    local
+        As in ``keep``.
+    poses, owners
+        (N, 3) and (N,) which of the new keyframes is each scan's last, -1: none of them. Filled here.
+
+    Returns
+    -------
+    The scan at which it stopped, ``DOUBT`` (it is not placed: ``out`` has what the guesses made of it),
+    ``FULL`` (there is no room for another keyframe) or ``ENDED``, and of the last scan all points, those
+    without people, and those that are aligned.
+    """
+    led = recording.at_scans.shape[0] > 0
+    rays, seen_from = np.zeros((0, 2)), -1
+    cloud = kept = light = np.zeros((0, 6))
+    for i in range(first, end):
+        beams = recording.beams[i]
+        if not has_room(beams, map_, views, keyframes):
+            return i, FULL, cloud, kept, light
+        if (
+            seen_from < 0
+            or beams != rays.shape[0]
+            or recording.first_rad[i] != recording.first_rad[seen_from]
+            or recording.step_rad[i] != recording.step_rad[seen_from]
+        ):
+            rays, seen_from = rays_of(recording.first_rad[i], recording.step_rad[i], beams), i
+        cloud = scan_cloud(recording.ranges_m[i, :beams], rays, recording.step_rad[i], limits[0], limits[1])
+        step, others = motion_of(recording, i)
+        dt_s = recording.dt_s[i]
+        kept, light, sure = look(cloud, step, led, others, dt_s, prior, track, map_, views, out)
+        if not sure:
+            return i, DOUBT, cloud, kept, light
+        move_anchor(recording, i, between(track.pose, out.pose))
+        settle(out.pose, out.hessian, out.start, out.told, step, led, dt_s, prior, track)
+        if is_new(between(track.keyframe, track.pose), limits[2], limits[3]):
+            keep(i, cloud, kept, out.hessian, led, local, track, map_, views, keyframes)
+        poses[i], owners[i] = out.pose, keyframes.added[0] - 1
+    return end, ENDED, cloud, kept, light
