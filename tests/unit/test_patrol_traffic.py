@@ -97,6 +97,18 @@ class TestTimeToGo:
         _, dy = eikonal.descent(1.5, 1.5, time, 0.0, 0.0, 0.1)
         assert dy > 0.7
 
+    def test_a_way_ends_at_its_goal(self) -> None:
+        """It went to and fro over it until all its steps were made: claims ended there, with 90 turns."""
+        time = np.full((21, 61), np.inf)
+        time[10, 50] = 0.0
+        eikonal.sweep_down(time, np.full(time.shape, 1.0), 0.15)
+        for x in np.arange(0.6, 3.0, 0.1):
+            way = eikonal.way_down(x, 1.57, time, time, 0.0, 0.0, 0.15, 0.25, 100)
+            length_m = float(np.hypot(*np.diff(way[:, :2], axis=0).T).sum())
+            assert np.hypot(way[-1, 0] - 7.5, way[-1, 1] - 1.5) <= 0.2
+            assert length_m <= 7.5 - x + 0.25
+        assert len(eikonal.way_down(0.6, 1.57, time, time, 0.0, 0.0, 0.15, 0.25, 8)) == 9
+
     def test_a_disc_that_fills_the_only_door_leaves_no_way(self) -> None:
         slowness = np.ones((41, 61))
         slowness[:17, 30] = slowness[24:, 30] = np.inf
@@ -415,6 +427,17 @@ class TestPassages:
         assert relation(line, line[::-1] + np.array([0.2, 0.3])) == -1
         assert relation(line, line[7:8]) == -1  # somebody stands there
         assert relation(line, line + np.array([0.0, 2.0])) == 0
+
+    def test_who_leaves_through_a_door_beside_it_is_not_against_who_passes(self) -> None:
+        """Lines that cross agreed by rounding: who followed the one that left backed out of the corridor."""
+        line = np.column_stack([np.arange(0.0, 8.0, 0.5), np.full(16, 3.0)])
+        leaves = np.array([[4.0, 3.4], [3.95, 3.9], [3.9, 4.4], [3.9, 4.6]])
+        for passes in (line, line[::-1]):
+            assert relation(passes, leaves) == relation(leaves, passes) == 1
+        # Who comes towards it first, and would leave farther on, is.
+        turns = np.array([[6.0, 3.0], [5.5, 3.0], [5.0, 3.0], [4.5, 3.0], [4.0, 3.0], [4.0, 3.5], [4.0, 4.0]])
+        assert relation(line, turns) == relation(turns, line) == -1
+        assert relation(line[::-1], turns) == relation(turns, line[::-1]) == 1
 
     def test_who_claims_first_goes_first_and_who_turns_around_claims_anew(self) -> None:
         way = np.column_stack([np.arange(0.0, 6.0, 0.25), np.full(24, 3.0), np.full(24, 0.5)])

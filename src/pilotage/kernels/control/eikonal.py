@@ -13,6 +13,8 @@ MOST_ROUNDS = 60
 """Of four sweeps each; a maze with more turns than that is left with larger values at its far end."""
 NEAR_S = 1e-3
 """Values that change by less are settled."""
+PAST = 2
+"""A way down a field is over where so many steps lead no nearer."""
 
 
 @kernel
@@ -195,17 +197,24 @@ def way_down(
 ) -> FloatArray:
     """The way down from a place: (steps + 1, 3) x, y, and ``values`` (rows, columns) at the nearest node.
 
-    It ends earlier off the grid, and where the goal is.
+    It ends earlier off the grid, and where the goal is: where ``PAST`` steps lead no nearer to it.
     """
     rows, columns = time.shape
     out = np.empty((steps + 1, 3))
-    count = 0
+    count = nearest = 0
+    least = np.inf
     for _ in range(steps + 1):
         row, column = round((y - y0) / spacing), round((x - x0) / spacing)
         if not (0 <= row < rows and 0 <= column < columns):
             break
         out[count, 0], out[count, 1], out[count, 2] = x, y, values[row, column]
         count += 1
+        left = value_at(x, y, time, x0, y0, spacing, 0.0)
+        if left < least - NEAR_S:
+            least, nearest = left, count
+        elif count >= nearest + PAST:
+            count = nearest
+            break
         dx, dy = descent(x, y, time, x0, y0, spacing)
         if (dx == 0.0 and dy == 0.0) or time[row, column] < 0.5 * step:
             break

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pilotage.core.types import FloatArray
+from pilotage.core.types import BoolArray, FloatArray
 from pilotage.stack.patrol.roadmap import STEP_M
 from pilotage.stack.patrol.word import Claim
 
@@ -24,6 +24,8 @@ RENEW_S = 20.0
 """Who did not get in for so long claims anew: what keeps it out need not keep others."""
 SAME_M = 0.6
 """Two paths this near to each other are in the same passage."""
+ACROSS, LEAVES_M = 0.3, 0.75
+"""Paths whose headings agree by less, either way, cross; who is off the other's path so soon leaves it."""
 ASTRAY_S = 0.6
 """Who was not seen for so long is followed no more."""
 
@@ -87,15 +89,26 @@ def claimed(stretch: Stretch, old: Claim | None, t_s: float) -> Claim:
 
 
 def relation(line: FloatArray, other: FloatArray) -> int:
-    """How two paths (K, 2) and (L, 2) lie: 0 apart, 1 together in one direction, -1 against each other."""
+    """How two paths (K, 2) and (L, 2) lie: 0 apart, 1 together in one direction, -1 against each other.
+
+    Who turns off the other's path, through a door beside it, is not against the other.
+    """
     apart = np.hypot(*(line[:, None] - other[None]).transpose(2, 0, 1))
     near = apart < SAME_M
     if not near.any():
         return 0
     if len(line) < 2 or len(other) < 2:
         return -1
-    agree = _headings(line) @ _headings(other).T
-    return 1 if float(agree[near].sum()) > 0.0 else -1
+    agree = float((_headings(line) @ _headings(other).T)[near].mean())
+    if abs(agree) < ACROSS and (_leaves(line, near.any(axis=1)) or _leaves(other, near.any(axis=0))):
+        return 1
+    return 1 if agree > 0.0 else -1
+
+
+def _leaves(line: FloatArray, near: BoolArray) -> bool:
+    """Whether a path (K, 2) is near another (K,) at its beginning alone, where its robot is."""
+    last = int(np.flatnonzero(near)[-1])
+    return last < len(line) - 1 and float(np.hypot(*np.diff(line[: last + 1], axis=0).T).sum()) <= LEAVES_M
 
 
 def _headings(line: FloatArray) -> FloatArray:
