@@ -115,6 +115,8 @@ def test_only_what_the_grid_does_not_resolve_is_fine() -> None:
     scene = scene_at(Twist(0.0, 0.0), (0.5, 0.0))
     assert is_fine(scene, 0.02)
     assert not is_fine(scene, 0.15)
+    weak = scene_at(Twist(0.0, 0.0), (0.5, 0.0), limits=LocalLimits(1.5, 0.5, 0.3, 0.3, 4.0, 6.0))
+    assert is_fine(weak, 0.15)
 
 
 def test_who_would_slide_out_has_not_arrived() -> None:

@@ -164,6 +164,7 @@ LOCAL: dict[str, Any] = {"navigator": "local", "planner": "theta-star", "local_c
 DRIVERS: list[dict[str, Any]] = [
     LOCAL,
     {"navigator": "goal", "planner": "theta-star", "local_planner": "dubins", "controller": "kanayama"},
+    {"navigator": "curve", "planner": "theta-star", "controller": "kanayama"},
 ]
 
 
@@ -245,3 +246,18 @@ def test_who_never_finds_itself_says_so(floor: Callable[[float], str]) -> None:
     }
     run = pl.run(mission, save=False, progress=False)
     assert run.success or run.reason.startswith("the robot does not know where it is")
+
+
+@pytest.mark.parametrize("controller", ["mppi", "dwa", "gap-horizon"])
+def test_weak_brakes_do_not_carry_it_through_its_goal(floor: Callable[[float], str], controller: str) -> None:
+    """It said that it had arrived at 1 m/s, and rolled on for 2 m."""
+    fast = {"name": "differential-drive", "max_speed_m_s": 1.5, "max_acceleration_m_s2": 0.3}
+    goal = {"x_m": 2.2, "y_m": 3.6, "tolerance_m": 0.3}
+    run = drive(
+        floor(0.9), DISC | {"motion": fast}, goal=goal, navigator="local", local_controller=controller
+    )
+    assert run.success, run.reason
+    names = ("true_x_m", "true_y_m", "true_theta_rad", "v_true_m_s")
+    x_m, y_m, theta, v_m_s = (float(run.trace[name][-1]) for name in names)
+    rolls_m = v_m_s * abs(v_m_s) / 0.6
+    assert np.hypot(x_m + rolls_m * np.cos(theta) - 2.2, y_m + rolls_m * np.sin(theta) - 3.6) < 0.3

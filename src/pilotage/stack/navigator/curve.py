@@ -24,6 +24,8 @@ from pilotage.stack.navigator.navigator import (
     arrival_within_m,
     check_keeps_time,
     only_goal,
+    turn_at_goal_rad,
+    turned_by,
 )
 from pilotage.stack.navigator.timed_path import laid_out
 from pilotage.stack.planning.grid_planner import GridPlanner
@@ -85,7 +87,7 @@ class CurveNavigator:
                 "found one missing"
             )
         self._localizer, self._controller, self._journal = parts.localizer, parts.controller, journal
-        self._initial = task.initial
+        self._initial, self._task = task.initial, task
         self._index, self._dt_s, self._motion = 0, robot.dt_s, robot.motion
         asked_m_s = config.speed_m_s
         self._speed_m_s = None if asked_m_s is None else min(asked_m_s, robot.motion.top_speed_m_s)
@@ -220,10 +222,14 @@ class CurveNavigator:
                 self._reason = f"the reference is at the curve's end, the robot {away_m:.2f} m from it"
                 self._status = StackStatus.FAILED
                 self._journal.say(readings.t_s, "failed", self._reason)
-            else:
-                self._status = StackStatus.ARRIVED
-                self._reason = f"driven to the curve's end, by its own estimate {away_m:.2f} m from it"
-                self._journal.say(readings.t_s, "arrived", self._reason)
+                return STOP
+            turns = self._motion.least_turning_radius_m == 0.0
+            off_rad = turn_at_goal_rad(self._task, pose) if turns else 0.0
+            if off_rad:
+                return turned_by(off_rad, self._motion.top_turn_rate_rad_s)
+            self._status = StackStatus.ARRIVED
+            self._reason = f"driven to the curve's end, by its own estimate {away_m:.2f} m from it"
+            self._journal.say(readings.t_s, "arrived", self._reason)
             return STOP
         x, y, theta, curvature, to_go_m = self._references[self._index + 1].tolist()
         here = self._references[self._index]

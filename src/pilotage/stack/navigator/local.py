@@ -150,7 +150,9 @@ class LocalNavigator(LocalizingNavigator):
             command = turned_by(off_rad, self._robot.motion.top_turn_rate_rad_s)
         if self._plan is not None:
             command = self._among_people(readings.t_s, command, pose, self._plan.mapped_m)
-        self._tell(readings.t_s, there=not (led or off_rad))
+        # Weak brakes would carry it through the goal: it stops first, and comes back.
+        there = not (led or off_rad) and (abs(self._drive.rolls_m()) <= self._task.goal_tolerance_m)
+        self._tell(readings.t_s, there=there)
         return STOP if self._status is not StackStatus.RUNNING else command
 
     def _among_people(self, t_s: float, command: Twist, pose: Pose2, mapped_m: FloatArray) -> Twist:

@@ -115,6 +115,11 @@ class LocalDrive:
             self._astray = self._localized and arrived and away_m > tolerance_m + off_m
         return self._command
 
+    def rolls_m(self) -> float:
+        """How far it still rolls ahead, backwards less than 0, if it is told to stop now."""
+        speed, limits = self._twist.v_m_s, self._limits
+        return speed * limits.delay_s + math.copysign(speed * speed / (2.0 * limits.deceleration_m_s2), speed)
+
     def nearest_seen_m(self) -> float:
         """Distance from the axle to the nearest of what the last scan shows; nan without one."""
         if not len(self._ranges_m):

@@ -16,6 +16,8 @@ AIM = 0.3
 """Of the tolerance the robot has to come to rest within: its belief is off as well."""
 NEAR_M = 0.3
 """From so far on, and sooner where braking takes longer."""
+SLIDES = 8.0
+"""A robot that slides so many times the tolerance when it is told to stop is led to its goal."""
 TURN_GAIN_PER_S = 3.0
 TURN_IN_PLACE_RAD = 0.35
 """Farther off than this it turns before it drives."""
@@ -24,8 +26,12 @@ LEAST_TURN_RAD_S = 0.1
 
 
 def is_fine(scene: Scene, tolerance_m: float) -> bool:
-    """Whether the cell of the time to go that holds the goal may have its middle outside the tolerance."""
-    return tolerance_m < math.sqrt(2.0) * scene.ground.coarse_m
+    """Whether the cell of the time to go that holds the goal may have its middle outside the tolerance.
+
+    Or the brakes are so weak that at full speed they carry the robot right through it.
+    """
+    slide_m = scene.sheet.speed**2 / (2.0 * BRAKE_TRUST * scene.sheet.deceleration)
+    return bool(tolerance_m < math.sqrt(2.0) * scene.ground.coarse_m or slide_m > SLIDES * tolerance_m)
 
 
 def rests_within(scene: Scene, tolerance_m: float) -> bool:
