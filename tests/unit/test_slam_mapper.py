@@ -18,11 +18,13 @@ from pilotage.experiments.slam import read_slam_config
 from pilotage.kernels.slam.frames import between
 from pilotage.logs.laser_log import LaserLog, RawScan, assemble
 from pilotage.stack.mapping.slam.closures import Verdict
+from pilotage.stack.mapping.slam.clouds import cloud_of
 from pilotage.stack.mapping.slam.config import SlamConfig
 from pilotage.stack.mapping.slam.mapper import map_log
+from pilotage.stack.mapping.slam.odometry import scanner_odometry, smoothed_times
 from pilotage.stack.mapping.slam.result import SlamResult
 from pilotage.stack.mapping.slam.scan_poses import aligned_scans
-from pilotage.stack.mapping.slam.tracker import track
+from pilotage.stack.mapping.slam.tracker import Tracker, track
 from support import laser_rooms
 from support.laser_rooms import along, furnished, recording, room, write_carmen
 
@@ -60,6 +62,29 @@ def test_a_room_is_mapped_and_its_loop_closed() -> None:
     again = map_log(log, SlamConfig())
     assert np.array_equal(result.poses, again.poses)
     assert np.array_equal(result.grid.cells, again.grid.cells)
+
+
+@pytest.mark.parametrize("odometry", [True, False])
+def test_scans_one_by_one_lie_where_those_of_a_recording_do(odometry: bool) -> None:
+    """To the last bit, among them those of a blind stretch that hang by the odometry, or break the track."""
+    path = along(ROUND)
+    log = recording(furnished(), path, np.random.default_rng(8))
+    log.ranges_m[60:63] = np.nan
+    log = replace(log, odometry_t_s=log.t_s, odometry=log.odometry_at_scans())
+    whole, tracker, config = (
+        track(log, SlamConfig(use_odometry=odometry)),
+        Tracker(SlamConfig()),
+        SlamConfig(),
+    )
+    poses, dt_s = scanner_odometry(log, odometry), np.diff(smoothed_times(log.t_s), prepend=0.0)
+    for i, gap_s in enumerate(np.diff(log.t_s, prepend=log.t_s[0]).tolist()):
+        step = None if poses is None else between(poses[max(0, i - 1)], poses[i])
+        tracker.add(cloud_of(log, i, config.max_range_m), step, max(1e-3, float(dt_s[i])), gap_s)
+    one_by_one = tracker.track()
+    assert 5 < len(whole.keyframes) < len(log)
+    for name in ("poses", "keyframes", "owner", "hessians", "slips", "breaks"):
+        assert np.array_equal(getattr(whole, name), getattr(one_by_one, name)), name
+    assert np.array_equal(whole.clouds.points, one_by_one.clouds.points)
 
 
 @pytest.mark.parametrize("beams", [180, 90])
