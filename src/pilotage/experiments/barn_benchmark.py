@@ -227,8 +227,9 @@ def published_runs(folder: Path, worlds: Sequence[BarnWorld]) -> dict[str, tuple
 
 
 def summary_values(answer: BarnAnswer) -> dict[str, Any]:
-    """``metric success collision timeout time_s over_bound trials worlds``, of several by name."""
-    summaries = {name: _summary(runs) for name, runs in answer.runs.items()}
+    """What one controller reached, of several by name; ``worlds_without_way`` were not driven."""
+    shut = {"worlds_without_way": len(answer.without_way)}
+    summaries = {name: _summary(runs) | shut for name, runs in answer.runs.items()}
     return summaries[answer.request.controllers[0]] if len(summaries) == 1 else summaries
 
 
