@@ -125,13 +125,15 @@ def test_straight_is_what_an_outline_needs() -> None:
 def test_it_lines_up_from_here_where_it_cannot_get_to_the_point_before() -> None:
     """In a dead end that is shorter than that it drove to and fro for a minute; a turn is no such matter."""
     passage = NarrowPassage(2.0, 0.0, 0.0, 0.7, 0, 0.0)
-    once = passage.from_here()
-    assert once is not None
-    assert (once.stage, once.tries) == (1, 2)
-    assert once.from_here() == once
-    again = replace(once, stage=0).from_here()
-    assert again is not None
-    assert replace(again, stage=0).from_here() is None
+    before = _scene(Pose2(1.8, 0.0, math.pi), _gap(0.7, 0.1))
+    assert passage.backed_out(before, 10.0) == passage
+    end = np.array([[1.2, -1.0, 1.2, 1.0]])
+    before = _scene(Pose2(1.8, 0.0, math.pi), np.vstack([_gap(0.7, 0.1), end]))
+    here = passage.backed_out(before, 10.0)
+    assert here is not None
+    assert (here.stage, here.tries, here.begun_s) == (1, 2, 10.0)
+    assert here.backed_out(before, 30.0) == here
+    assert replace(here, stage=0, tries=3).backed_out(before, 30.0) is None
 
 
 def test_a_door_whose_middle_lies_between_cells_is_not_shut_for_good() -> None:

@@ -183,7 +183,7 @@ class GapHorizon(RollingController):
         x, y = float(scene.pose[0]), float(scene.pose[1])
         if inside or nearest_m(x, y, scene.ground) > scene.body.outer_m + config.margin_m:
             if self._backs_out and self._passage is not None:
-                self._passage = self._passage.from_here()
+                self._passage = self._passage.backed_out(scene, view.t_s)
             self._backs_out = False
         if command is None:
             return STOP

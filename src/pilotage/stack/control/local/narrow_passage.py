@@ -52,6 +52,10 @@ AHEAD_RAD, ASIDE_M = 1.4, 0.1
 """A gap is ahead that leads in such a direction or nearer, and is hardly farther aside than ahead."""
 LOOK_M = 0.05
 LONGEST_S = 25.0
+STEPS = 16
+"""Places on the way to the point before a gap that are looked at."""
+BARRED = 0.5
+"""What stands nearer to that way than this share of the inner disc bars it; by what is farther it gets."""
 THROUGH = 2
 """The last stage."""
 CLOSED_M = 0.05
@@ -91,11 +95,16 @@ class NarrowPassage:
         """Once more from before the gap; None where it has been tried often enough."""
         return None if self.tries >= TRIES else replace(self, stage=0, begun_s=t_s, tries=self.tries + 1)
 
-    def from_here(self) -> NarrowPassage | None:
-        """The same lined up for from here, where something keeps the robot from the point before it."""
+    def backed_out(self, scene: Scene, t_s: float) -> NarrowPassage | None:
+        """The same once it had to back; from here, where something stands before the point before the gap."""
         if self.stage > 0:
             return self
-        return None if self.tries >= TRIES else replace(self, stage=1, tries=self.tries + 1)
+        x, y = float(scene.start[0]), float(scene.start[1])
+        way = np.linspace([x, y], self._point_before(x, y), STEPS)
+        away = path_distances(np.ascontiguousarray(way), scene.ground)
+        if away.min() > BARRED * scene.body.inner_m and away[-1] > scene.body.inner_m:
+            return self
+        return None if self.tries >= TRIES else replace(self, stage=1, begun_s=t_s, tries=self.tries + 1)
 
     def step(self, scene: Scene, points_xy_m: FloatArray, t_s: float) -> tuple[NarrowPassage | None, Twist]:
         """The next command; None for itself when it is through or has taken too long.
@@ -134,14 +143,8 @@ class NarrowPassage:
     def command(self, scene: Scene) -> tuple[NarrowPassage, Twist]:
         """What to do at this stage."""
         x, y, theta = float(scene.start[0]), float(scene.start[1]), float(scene.start[2])
-        c, s = math.cos(self.direction_rad), math.sin(self.direction_rad)
         if self.stage == 0:
-            along, across = self._place(x, y)
-            before = BEFORE_M + self.begins_m
-            aside = BEHIND * abs(across)
-            if self.tries == 1 and aside < FARTHER_M and along > -before - BEFORE_M:
-                before = min(max(before, aside - along), before + FARTHER_M)
-            tx, ty = self.x_m - before * c, self.y_m - before * s
+            tx, ty = self._point_before(x, y)
             away = math.hypot(tx - x, ty - y)
             if away < NEAR_M or self._lines_up_from(x, y, scene.body):
                 return replace(self, stage=1), Twist(0.0, 0.0)
@@ -178,6 +181,16 @@ class NarrowPassage:
         share = (self._room_m(scene.body) - LEAST_ROOM_M) / (ROOM_M - LEAST_ROOM_M)
         speed = SLOWER_M_S + min(max(share, 0.0), 1.0) * (SLOW_M_S - SLOWER_M_S)
         return self, Twist(speed, _limited(4.0 * wrap(wanted - theta), TURN_RAD_S))
+
+    def _point_before(self, x: float, y: float) -> tuple[float, float]:
+        """Where it lines up, on its axis, as seen from a place."""
+        along, across = self._place(x, y)
+        before = BEFORE_M + self.begins_m
+        aside = BEHIND * abs(across)
+        if self.tries == 1 and aside < FARTHER_M and along > -before - BEFORE_M:
+            before = min(max(before, aside - along), before + FARTHER_M)
+        c, s = math.cos(self.direction_rad), math.sin(self.direction_rad)
+        return self.x_m - before * c, self.y_m - before * s
 
     def _room_m(self, body: Body) -> float:
         """On either side of a body that stands straight in the middle."""
