@@ -72,15 +72,15 @@ def in_between(localizer: Localizer, robot: RobotKnowledge) -> Localizer:
     if len(wheels) != 1:
         return localizer
     ((name, odometry),) = wheels.items()
-    every = odometry.every_steps(robot.dt_s, f"robot.sensors.{name}")
-    outward = [
-        sensor.every_steps(robot.dt_s, f"robot.sensors.{other}")
-        for other, sensor in robot.sensors.items()
+    # Rates that the steps do not bear are refused where the sensors are made, by their places in the mission.
+    apart = [
+        odometry.rate_hz / sensor.rate_hz
+        for sensor in robot.sensors.values()
         if isinstance(sensor, OUTWARD) and sensor.rate_hz * robot.dt_s <= 1.0 + 1e-6
     ]
-    if all(steps % every == 0 for steps in outward):
+    if all(round(increments) >= 1 and abs(increments - round(increments)) < 1e-6 for increments in apart):
         return localizer
-    return BetweenIncrements(localizer, name, every * robot.dt_s, robot.dt_s)
+    return BetweenIncrements(localizer, name, 1.0 / odometry.rate_hz, robot.dt_s)
 
 
 def _share(increment: OdometryIncrement, steps: int) -> OdometryIncrement:
