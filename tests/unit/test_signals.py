@@ -89,6 +89,28 @@ def test_a_second_signal_changes_nothing(number: int, code: int) -> None:
     assert err.count("\n") == 1
 
 
+HALF_MADE = """
+import os, signal, sys
+from llvmlite.binding.ffi import ObjectRef
+from pilotage.cli import app
+from pilotage.cli.main import main
+
+class HalfMade(ObjectRef):
+    def __init__(self):
+        os.kill(os.getpid(), signal.SIGTERM)
+
+sys.argv[1:] = ["missions"]
+app.dispatch = lambda _: HalfMade()
+sys.exit(main())
+"""
+
+
+def test_what_an_interruption_leaves_half_made_is_not_told() -> None:
+    """Compiled code that is just loaded: its destructor misses what its beginning was to make."""
+    child = subprocess.run([sys.executable, "-c", HALF_MADE], capture_output=True, text=True, check=False)
+    assert (child.returncode, child.stderr) == (143, "pilotage: ended by SIGTERM\n")
+
+
 def from_a_kernel() -> None:
     """As the interpreter does where a C function returns a result though an exception is set."""
     try:

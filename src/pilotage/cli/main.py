@@ -40,10 +40,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
             _steady_environment()
         with _ended_once(for_good=arguments is None):
             return _run(sys.argv[1:] if arguments is None else list(arguments))
-    except Terminated:
-        return _say("ended by SIGTERM", TERMINATED)
-    except KeyboardInterrupt:
-        return _say("interrupted", INTERRUPTED)
+    except KeyboardInterrupt as stop:
+        if arguments is None:
+            # The process ends: of objects left half made, whose destructors fail, there is nothing to tell.
+            sys.unraisablehook = lambda _: None
+        ended = isinstance(stop, Terminated)
+        return _say("ended by SIGTERM", TERMINATED) if ended else _say("interrupted", INTERRUPTED)
     except BrokenPipeError:
         # The interpreter flushes standard output once more at exit: give it somewhere to go.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
