@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +17,7 @@ from matplotlib.transforms import Affine2D
 from pilotage.core.shown import visible
 from pilotage.core.types import FloatArray
 from pilotage.core.whole_file import draft_of
+from pilotage.maps.landmarks import Landmarks
 from pilotage.maps.occupancy_grid import OCCUPIED_FROM, OccupancyGrid
 from pilotage.maps.world_map import WorldMap
 from pilotage.report.style import BLUE, FAINT, GREEN, INK, ORANGE, drawing_style
@@ -23,6 +25,10 @@ from pilotage.report.style import BLUE, FAINT, GREEN, INK, ORANGE, drawing_style
 FREE_COLOUR, OCCUPIED_COLOUR, UNKNOWN_COLOUR = "#ffffff", "#39434d", "#c9d1d9"
 MOST_PIXELS = 2000
 """Cells along a side that are drawn; of a finer grid every second, third, ... cell."""
+LABEL_SHARE = 0.012
+"""Landmarks closer than this share of the map's longer side have one label: that is how high a number is."""
+MOST_NUMBERS = 3
+"""Numbers in a label before it only says how many more there are."""
 
 
 def draw_map(chart: WorldMap, path: Path) -> None:
@@ -105,7 +111,25 @@ def _draw_geometry(axes: Axes, chart: WorldMap) -> None:
 def _draw_landmarks(axes: Axes, chart: WorldMap) -> None:
     points = chart.landmarks.points_xy_m
     axes.plot(points[:, 0], points[:, 1], "o", color=GREEN, markersize=4.0, zorder=4.0)
-    for number, (x, y) in zip(chart.landmarks.ids, points, strict=True):
-        axes.annotate(
-            str(int(number)), (x, y), (3, 3), textcoords="offset points", fontsize=7, color=BLUE, zorder=4.1
-        )
+    xmin, ymin, xmax, ymax = chart.bounds_m
+    for (x, y), label in landmark_labels(chart.landmarks, LABEL_SHARE * max(xmax - xmin, ymax - ymin)):
+        axes.annotate(label, (x, y), (3, 3), textcoords="offset points", fontsize=7, color=BLUE, zorder=4.1)
+
+
+def landmark_labels(landmarks: Landmarks, apart_m: float) -> list[tuple[tuple[float, float], str]]:
+    """One label for landmarks closer than ``apart_m``, whose numbers would cover each other: ``3, 17``."""
+    labels: list[tuple[tuple[float, float], list[int]]] = []
+    for number, (x, y) in zip(landmarks.ids, landmarks.points_xy_m, strict=True):
+        for at, numbers in labels:
+            if math.hypot(x - at[0], y - at[1]) < apart_m:
+                numbers.append(int(number))
+                break
+        else:
+            labels.append(((float(x), float(y)), [int(number)]))
+    return [(at, _numbers(numbers)) for at, numbers in labels]
+
+
+def _numbers(numbers: list[int]) -> str:
+    shown = ", ".join(str(number) for number in numbers[:MOST_NUMBERS])
+    more = len(numbers) - MOST_NUMBERS
+    return shown if more <= 0 else f"{shown} and {more} more"

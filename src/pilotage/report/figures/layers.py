@@ -36,7 +36,6 @@ OBSTACLE_EDGE = "#7a5400"
 # A tree of more edges is a grey cloud; its first edges show its shape just as well.
 MOST_TREE_EDGES = 5000
 _CIRCLE = np.stack([np.cos(np.linspace(0, 2 * np.pi, 33)), np.sin(np.linspace(0, 2 * np.pi, 33))])
-_ELLIPSE = _CIRCLE[:, ::2]
 
 
 def true_path(run: RunData) -> FloatArray:
@@ -148,7 +147,7 @@ def ellipse_outlines(run: RunData, steps: Iterable[int], magnification: float = 
             continue
         values, vectors = np.linalg.eigh(np.array([[xx, xy], [xy, yy]]))
         axes_m = magnification * _ELLIPSE_RADIUS * np.sqrt(np.maximum(values, 0.0))
-        rim = vectors @ (axes_m[:, None] * _ELLIPSE)
+        rim = vectors @ (axes_m[:, None] * _CIRCLE)
         outlines.append(Outline(rim.T + np.array([x, y]), closed=True))
     return outlines
 
