@@ -11,6 +11,7 @@ import pytest
 from pilotage.cli.options import parse_seed
 from pilotage.core.errors import InputError
 from pilotage.core.whole_number import whole_number
+from pilotage.experiments.build import build as build_module
 from pilotage.experiments.build.build import build_source
 from pilotage.experiments.build.charts import load_chart
 from pilotage.experiments.mission import load_mission
@@ -107,3 +108,29 @@ def test_a_landmark_beyond_all_integers_is_refused(tmp_path: Path) -> None:
     table.write_text(f"id,x_m,y_m\n1{'0' * 400},1,2\n")
     with pytest.raises(InputError, match="line 2: expected an id within"):
         build_source(load_mission("museum-1", [f"world.landmarks={table}"], 0))
+
+
+@pytest.mark.parametrize("mission", ["museum-1", "museum-2"])
+@pytest.mark.parametrize(
+    ("settings", "words"),
+    [
+        (
+            ["robot.sensors.lidar.rate_hz=7"],
+            "robot.sensors.lidar.rate_hz: expected a whole fraction of 10 Hz",
+        ),
+        (["robot.motion.delay_s=0.05"], "robot.motion.delay_s: expected a multiple of run.dt_s"),
+        (["robot.faults=[{name: drop, sensor: laser}]"], "robot.faults.0.sensor"),
+        (
+            ["robot.sensors.wheels={name: wheel-encoders}"],
+            "wheel-encoders need a motion whose wheels are known",
+        ),
+    ],
+)
+def test_what_no_simulator_serves_is_refused_before_anything_is_planned(
+    monkeypatch: pytest.MonkeyPatch, mission: str, settings: list[str], words: str
+) -> None:
+    """Plans took 6 to 12 s on terrain before a rate was found not to fit the clock."""
+    monkeypatch.setattr(build_module, "build_stack", lambda *_: pytest.fail("it planned first"))
+    with pytest.raises(InputError) as caught:
+        build_module.build(load_mission(mission, settings, 0))
+    assert words in str(caught.value)

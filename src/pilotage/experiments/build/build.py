@@ -101,7 +101,7 @@ def build_source(mission: Mission) -> Source:
     InputError
         As ``build``, of the world and the robots.
     """
-    if any(obstacle.kind in PUT_ACROSS for obstacle in mission.world.obstacles):
+    if _waits_for_plan(mission):
         built = build(mission)
         return Source(built.mission, built.chart, built.obstacles, built.simulator)
     chart = chart_of(mission.world)
@@ -111,6 +111,10 @@ def build_source(mission: Mission) -> Source:
     _check_places(mission, chart, sheets)
     obstacles = _obstacles(mission, chart, sheets, (), streams)
     return Source(mission, chart, obstacles, _simulator(mission, chart, obstacles, sheets))
+
+
+def _waits_for_plan(mission: Mission) -> bool:
+    return any(obstacle.kind in PUT_ACROSS for obstacle in mission.world.obstacles)
 
 
 def _simulator(
@@ -151,7 +155,8 @@ def _people(mission: Mission, world: World, robots: Sequence[RobotSpec]) -> list
 def build(mission: Mission) -> Experiment:
     """Build a mission.
 
-    The stacks plan before the world is finished, because some obstacles are put across the planned path.
+    What the world or the clock cannot serve is refused before the stacks plan, which may take long; where
+    obstacles are put across the planned path the world is finished after that.
 
     Raises
     ------
@@ -169,28 +174,40 @@ def build(mission: Mission) -> Experiment:
         for sheet in sheets:
             check_place(where, place.x_m, place.y_m, sheet.footprint, chart)
     oracles = frozenset(mission.run.oracles)
-    nothing = np.zeros((0, 4)), np.zeros((0, 3))
-    truths = [_truth(mission, index, chart, *nothing) for index in range(len(sheets))]
-    blind = oracles - {"mapper", "planner", "explorer"}
-    team = [
-        _member(mission, index, chart, sheet, truths[index], blind, task)
-        for index, sheet in enumerate(sheets)
-    ]
-    obstacles = _obstacles(mission, chart, sheets, team, streams)
-    if oracles:
-        # The obstacles stay where the robot without oracles meets them: only the modules differ.
-        placed = obstacles.segments_m, obstacles.circles_m
-        truths = [_truth(mission, index, chart, *placed) for index in range(len(sheets))]
-        team = [
-            _member(mission, index, chart, sheet, truths[index], oracles, task)
-            for index, sheet in enumerate(sheets)
-        ]
+    waits = _waits_for_plan(mission)
+    obstacles = Obstacles.none() if waits else _obstacles(mission, chart, sheets, (), streams)
+    simulator = _simulator(mission, chart, obstacles, sheets)
+    blind = oracles - {"mapper", "planner", "explorer"} if waits else oracles
+    truths, team = _team(mission, chart, sheets, obstacles, blind, task)
+    if waits:
+        obstacles = _obstacles(mission, chart, sheets, team, streams)
+        simulator = _simulator(mission, chart, obstacles, sheets)
+        if oracles:
+            # The obstacles stay where the robot without oracles meets them: only the modules differ.
+            truths, team = _team(mission, chart, sheets, obstacles, oracles, task)
     if not task.drives:
         _check_ended(mission, team)
-    simulator = _simulator(mission, chart, obstacles, sheets)
     for truth, body in zip(truths, simulator.bodies, strict=True):
         truth.body = body
     return Experiment(mission, chart, obstacles, simulator, tuple(team), task)
+
+
+def _team(
+    mission: Mission,
+    chart: WorldMap,
+    sheets: Sequence[RobotKnowledge],
+    obstacles: Obstacles,
+    oracles: frozenset[str],
+    task: Task,
+) -> tuple[list[Truth], list[Member]]:
+    """The robots with their stacks, which plan, and the truths that some of their modules may know."""
+    placed = obstacles.segments_m, obstacles.circles_m
+    truths = [_truth(mission, index, chart, *placed) for index in range(len(sheets))]
+    team = [
+        _member(mission, index, chart, sheet, truths[index], oracles, task)
+        for index, sheet in enumerate(sheets)
+    ]
+    return truths, team
 
 
 def _data_sheet(mission: Mission, index: int, streams: RandomStreams) -> RobotKnowledge:
