@@ -11,6 +11,8 @@ from pilotage.sensors.readings import LidarScan, OdometryIncrement, Reading, Rea
 from pilotage.sensors.wheel_odometry import WheelOdometryConfig
 from pilotage.stack.interface import Belief
 from pilotage.stack.localization.between_increments import BetweenIncrements, in_between
+from pilotage.stack.localization.dead_reckoning import DeadReckoningConfig, DeadReckoningLocalizer
+from pilotage.stack.localization.localizer import Abilities
 from support.robots import told_of
 
 
@@ -49,6 +51,11 @@ def test_each_reading_gets_its_share_of_the_increment() -> None:
     assert [step.by_sensor["wheels"] for step in noting.told[1:]] == [share, share]
     assert all(step.by_sensor["laser"] is SCAN for step in noting.told)
     assert localizer.look_bearing_rad() == 0.25
+    able = Abilities.of(localizer)
+    assert able.look_bearing_rad() == 0.25, "what the localizer can do besides"
+    assert able.scan_grid is None, "and nothing that it cannot"
+    assert able.close_loops() == 0
+    assert not hasattr(localizer, "told"), "its own affairs stay its own"
 
 
 def test_where_an_increment_is_late_nothing_is_held() -> None:
@@ -64,10 +71,13 @@ def test_where_an_increment_is_late_nothing_is_held() -> None:
 
 
 def test_who_reads_no_oftener_is_told_as_before() -> None:
-    robot, noting = told_of().robot, Noting()
+    told, noting = told_of(), Noting()
+    robot = told.robot
     assert in_between(noting, robot) is noting
     robot.sensors["odometry"] = WheelOdometryConfig(rate_hz=5.0)  # type: ignore[index]
     assert in_between(noting, robot) is not noting
+    reckoning = DeadReckoningLocalizer(DeadReckoningConfig(), robot, told.chart, told.initial, told.journal)
+    assert in_between(reckoning, robot) is reckoning, "navigators look whether anything corrects it"
 
 
 @pytest.mark.parametrize(

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
 
 from pilotage.sensors.beacon import BeaconConfig
 from pilotage.sensors.compass import CompassConfig
@@ -14,7 +13,8 @@ from pilotage.sensors.readings import OdometryIncrement, Reading, Readings
 from pilotage.sensors.wheel_odometry import WheelOdometryConfig
 from pilotage.stack.interface import Belief
 from pilotage.stack.knowledge import RobotKnowledge
-from pilotage.stack.localization.localizer import Localizer
+from pilotage.stack.localization.dead_reckoning import DeadReckoningLocalizer
+from pilotage.stack.localization.localizer import Abilities, Localizer
 
 OUTWARD = (BeaconConfig, CompassConfig, GpsConfig, LidarConfig, MagnetometerConfig)
 """Sensors that tell of the pose; what one reads between two increments was not seen from the last pose."""
@@ -27,7 +27,7 @@ class BetweenIncrements:
     it moves the belief by as much, and speaks against it. The belief waits meanwhile, as it does between
     increments anyway. Where an increment is late nothing is held: the localizer widens its belief by what may
     have been driven. The robot is taken to have driven evenly in between: fails where it brakes and speeds up
-    within a period, by half of the speed's change over it.
+    within a period, by half of the speed's change over it. What the localizer can do besides, this can.
     """
 
     def __init__(self, localizer: Localizer, odometry: str, period_s: float, dt_s: float) -> None:
@@ -35,10 +35,9 @@ class BetweenIncrements:
         self._waits_s = period_s - 0.5 * dt_s
         self._held: list[Readings] = []
         self._last_s: float | None = None
-
-    def __getattr__(self, name: str) -> Any:
-        """What a localizer may have besides: ``look_bearing_rad``, ``tell_mates``."""
-        return getattr(self._localizer, name)
+        able = Abilities.of(localizer)
+        self.look_bearing_rad, self.tell_mates = able.look_bearing_rad, able.tell_mates
+        self.scan_grid, self.close_loops, self.refine = able.scan_grid, able.close_loops, able.refine
 
     @property
     def belief(self) -> Belief:
@@ -69,8 +68,8 @@ class BetweenIncrements:
 def in_between(localizer: Localizer, robot: RobotKnowledge) -> Localizer:
     """The localizer, with readings held back for it where the robot's rates call for that."""
     wheels = robot.sensors_of(WheelOdometryConfig)
-    if len(wheels) != 1:
-        return localizer
+    if len(wheels) != 1 or isinstance(localizer, DeadReckoningLocalizer):
+        return localizer  # dead reckoning believes in nothing that is read in between
     ((name, odometry),) = wheels.items()
     # Rates that the steps do not bear are refused where the sensors are made, by their places in the mission.
     apart = [

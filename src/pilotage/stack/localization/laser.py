@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from pilotage.core.config import Config
-from pilotage.core.types import FloatArray
 from pilotage.maps.world_map import WorldMap
 from pilotage.sensors.readings import Readings
 from pilotage.stack.interface import Belief
 from pilotage.stack.journal import Journal
 from pilotage.stack.knowledge import RobotKnowledge
 from pilotage.stack.localization.ekf_walls import EkfWallsConfig, EkfWallsLocalizer
-from pilotage.stack.localization.localizer import LOCALIZERS, Localizer
+from pilotage.stack.localization.localizer import LOCALIZERS, Abilities, Localizer
 from pilotage.stack.localization.particle_filter import MclConfig, ParticleFilterLocalizer
 
 
@@ -40,11 +39,11 @@ class LaserLocalizer:
     ) -> None:
         self._chosen: Localizer
         if chart.geometry is not None:
-            walls = EkfWallsLocalizer(config.walls, robot, chart, initial, journal)
-            self._chosen, self._look, self._tell = walls, walls.look_bearing_rad, walls.tell_mates
+            self._chosen = EkfWallsLocalizer(config.walls, robot, chart, initial, journal)
         else:
             self._chosen = ParticleFilterLocalizer(config.cells, robot, chart, initial, journal)
-            self._look, self._tell = _anywhere, _nobody
+        able = Abilities.of(self._chosen)  # on a map of cells mates tell nothing yet
+        self.look_bearing_rad, self.tell_mates = able.look_bearing_rad, able.tell_mates
 
     @property
     def belief(self) -> Belief:
@@ -54,22 +53,3 @@ class LaserLocalizer:
     def step(self, readings: Readings) -> Belief:
         """Take in one step's readings."""
         return self._chosen.step(readings)
-
-    def look_bearing_rad(self) -> float | None:
-        """Where to look while lost, in the robot's frame; None where any direction is as good."""
-        return self._look()
-
-    def tell_mates(self, mates: FloatArray) -> None:
-        """Where mates (K, 4) say that they are, as of ``ScanFit.mates_in_sight``.
-
-        On a map of cells they tell nothing yet.
-        """
-        self._tell(mates)
-
-
-def _nobody(mates: FloatArray) -> None:
-    del mates
-
-
-def _anywhere() -> float | None:
-    return None

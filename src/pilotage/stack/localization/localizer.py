@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import dataclass, fields
 from typing import Protocol
 
 from pilotage.core.errors import InputError
 from pilotage.core.registry import Registry
+from pilotage.core.types import FloatArray
 from pilotage.sensors.readings import Readings
 from pilotage.stack.interface import Belief, BeliefStatus
+from pilotage.stack.mapping.scan_grid import ScanGrid
 
 
 class Localizer(Protocol):
@@ -17,10 +21,8 @@ class Localizer(Protocol):
     declares its telemetry in the journal at construction and tells it at every step; an update that it can
     explain it puts into ``journal.update``.
 
-    One that knows, while it is lost, where to look has a method ``look_bearing_rad() -> float | None``
-    besides: the direction, in the robot's frame, worth driving in, None where any is as good. Whether it
-    has is asked once, when the stack is put together. So is whether it has ``tell_mates(mates)``:
-    told before each step where mates say that they are, (K, 4) as of ``ScanFit.mates_in_sight``.
+    What it may have besides stands in ``Abilities``, by the same names; whether it has is asked once, when
+    the stack is put together.
     """
 
     @property
@@ -31,6 +33,51 @@ class Localizer(Protocol):
     def step(self, readings: Readings) -> Belief:
         """Take in one step's readings and return the belief after them."""
         ...
+
+
+def _anywhere() -> float | None:
+    return None
+
+
+def _to_nobody(mates: FloatArray) -> None:
+    del mates
+
+
+def _no_loops() -> int:
+    return 0
+
+
+def _nothing() -> None:
+    return None
+
+
+@dataclass(frozen=True, slots=True)
+class Abilities:
+    """What a localizer may have besides its role, and what stands in where it has not.
+
+    Attributes
+    ----------
+    look_bearing_rad
+        Where to drive to while it is lost, in the robot's frame; None where any direction is as good.
+    tell_mates
+        Told before each step where mates say that they are, (K, 4) as of ``ScanFit.mates_in_sight``.
+    scan_grid
+        The map that it draws; None where it draws none.
+    close_loops, refine
+        Of one that draws a map: look for loops here and now, how many closed; align all of it once more.
+    """
+
+    look_bearing_rad: Callable[[], float | None] = _anywhere
+    tell_mates: Callable[[FloatArray], None] = _to_nobody
+    scan_grid: ScanGrid | None = None
+    close_loops: Callable[[], int] = _no_loops
+    refine: Callable[[], None] = _nothing
+
+    @classmethod
+    def of(cls, localizer: Localizer) -> Abilities:
+        """Those of a localizer."""
+        names = (field.name for field in fields(cls))
+        return cls(**{name: getattr(localizer, name) for name in names if hasattr(localizer, name)})
 
 
 def require_initial_pose(initial: Belief, name: str) -> None:

@@ -21,6 +21,7 @@ from pilotage.stack.exploration.floor_frontiers import Frontier, SeenFloor
 from pilotage.stack.interface import NAVIGATORS, Belief, BeliefStatus, StackStatus
 from pilotage.stack.journal import Journal
 from pilotage.stack.knowledge import RobotKnowledge, TaskKnowledge
+from pilotage.stack.localization.localizer import Abilities
 from pilotage.stack.mapping.scan_grid import ScanGrid, echoes
 from pilotage.stack.navigator.navigator import LocalizingNavigator, Parts, localizer_of
 from pilotage.stack.navigator.progress import patience_s
@@ -132,7 +133,8 @@ class FloorExplorer(LocalizingNavigator):
         self._clearance_m = robot.radius_m + config.clearance_m
         # A frontier no longer than the robot is wide is one that a small robot fits through.
         self._least_m = min(config.least_frontier_m, 2.0 * self._clearance_m)
-        own = getattr(self._localizer, "scan_grid", None)
+        self._able = Abilities.of(self._localizer)
+        own = self._able.scan_grid
         self._draws = own is None
         self._grid: ScanGrid = ScanGrid(self._scanner, config.resolution_m) if own is None else own
         mount = self._scanner.mount
@@ -361,16 +363,13 @@ class FloorExplorer(LocalizingNavigator):
             path = np.concatenate([path[:-1], self._start[None]])
             self._target = Target(self._start, self._start, 0.0, False, path)
             return
-        close_loops = getattr(self._localizer, "close_loops", None)
-        if close_loops is not None and self._checked < RETURNS:
+        if not self._draws and self._checked < RETURNS:
             self._checked += 1
-            close_loops()
+            self._able.close_loops()
             pose = self._localizer.belief.pose
             if math.hypot(pose.x_m - self._start[0], pose.y_m - self._start[1]) >= self._config.arrival_m:
                 return
-        refine = getattr(self._localizer, "refine", None)
-        if refine is not None:
-            refine()
+        self._able.refine()
         left, wide = (self._journal.counts[key] for key in ("frontiers_left", "frontiers_given_up"))
         told = f"explored, {left} frontiers left, {wide} of them wide enough, back at the start"
         self._end(t_s, StackStatus.ARRIVED, told)

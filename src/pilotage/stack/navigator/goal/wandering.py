@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 from pilotage.core.types import STOP, Twist
 from pilotage.sensors.readings import Readings
 from pilotage.stack.control.wander import WanderConfig, Wanderer
 from pilotage.stack.knowledge import RobotKnowledge
-from pilotage.stack.localization.localizer import Localizer
+from pilotage.stack.localization.localizer import Abilities, Localizer
 
 LED_S, FREE_S = 15.0, 10.0
 """It is led for so long, then goes where it likes: what stands in the way may be on no map."""
@@ -25,7 +23,7 @@ class Wandering:
 
     def __init__(self, config: WanderConfig, robot: RobotKnowledge, localizer: Localizer) -> None:
         self._wanderer = Wanderer.of(config, robot)
-        self._look: Callable[[], float | None] | None = getattr(localizer, "look_bearing_rad", None)
+        self._look = Abilities.of(localizer).look_bearing_rad
         self.plan_at_s = 0.0
 
     def step(self, readings: Readings) -> Twist:
@@ -33,5 +31,5 @@ class Wandering:
         if self._wanderer is None:
             return STOP
         led = readings.t_s % (LED_S + FREE_S) < LED_S
-        bearing = self._look() if led and self._look is not None else None
+        bearing = self._look() if led else None
         return self._wanderer.step(readings, bearing)

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 from pilotage.core.errors import InputError
-from pilotage.core.types import FloatArray, Twist
+from pilotage.core.types import Twist
 from pilotage.maps.world_map import WorldMap
 from pilotage.sensors.readings import Readings
 from pilotage.stack.interface import NAVIGATORS, Belief, BeliefStatus, StackStatus
 from pilotage.stack.journal import Journal
 from pilotage.stack.knowledge import RobotKnowledge, TaskKnowledge
+from pilotage.stack.localization.localizer import Abilities
 from pilotage.stack.navigator.goal.wandering import Wandering
 from pilotage.stack.navigator.navigator import Parts, localizer_of
 from pilotage.stack.navigator.patrol.config import PatrolNavigatorConfig
@@ -64,7 +63,7 @@ class PatrolNavigator:
                 f"{robot.motion.least_turning_radius_m:.2f} m; take robot.motion.name: differential-drive"
             )
         self._localizer = localizer_of(parts, "patrol")
-        self._tell_mates: Callable[[FloatArray], None] | None = getattr(self._localizer, "tell_mates", None)
+        self._tell_mates = Abilities.of(self._localizer).tell_mates
         self._telemetry = journal.channel(COLUMNS, first=True)
         journal.counts |= {"gave_way": 0, "alarms": 0}
         if parts.patrol.supply is not None:
@@ -88,8 +87,7 @@ class PatrolNavigator:
     def step(self, readings: Readings) -> Twist:
         """One control step."""
         context = self._context
-        if self._tell_mates is not None:
-            self._tell_mates(context.mates_by_their_words(readings.t_s))
+        self._tell_mates(context.mates_by_their_words(readings.t_s))
         belief = self._localizer.step(readings)
         lost = belief.status is BeliefStatus.LOST
         context.sense(readings, belief, lost=lost)
