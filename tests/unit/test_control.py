@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,6 +12,8 @@ from pilotage.core.angles import wrap_to_pi
 from pilotage.core.errors import InputError
 from pilotage.core.types import FloatArray, Pose2, Twist
 from pilotage.maps.near_walls import NearWalls
+from pilotage.models.footprint import Footprint
+from pilotage.models.motion.bicycle import BicycleConfig
 from pilotage.models.odometry import OdometryModel, move
 from pilotage.sensors.readings import Readings, UltrasonicReading
 from pilotage.stack.control.back_out import BackOut, BackOutConfig
@@ -170,10 +173,24 @@ def test_a_second_escape_starts_where_the_first_one_ended() -> None:
 
 
 def test_the_guard_refuses_driving_into_the_map_but_not_away_from_it() -> None:
-    guard = ArcGuard(GuardConfig(horizon_s=0.5, margin_m=0.03), 0.3)
+    robot = replace(told_of().robot, footprint=Footprint.disc(0.3))
+    guard = ArcGuard(GuardConfig(horizon_s=0.5, margin_m=0.03), robot)
     wall = NearWalls(np.array([[1.0, -5.0, 1.0, 5.0]]))
     here = Pose2(0.6, 0.0, 0.0)
     assert not guard.allows(Twist(0.5, 0.0), here, wall, NO_CIRCLES, 1.0)
     assert guard.allows(Twist(0.0, 1.0), here, wall, NO_CIRCLES, 1.0)
     assert guard.allows(Twist(-0.5, 0.0), Pose2(0.69, 0.0, 0.0), wall, NO_CIRCLES, 1.0)
     assert guard.allows(Twist(0.5, 0.0), Pose2(0.2, 0.0, 0.0), wall, NO_CIRCLES, 1.0)
+
+
+def test_the_guard_knows_how_sharply_a_car_turns() -> None:
+    """A car that was told to turn away from a pillar in half of its least radius drove into it."""
+    robot = replace(told_of().robot, footprint=Footprint.disc(0.3), motion=BicycleConfig())
+    guards = [ArcGuard(GuardConfig(horizon_s=1.0), one) for one in (robot, told_of().robot)]
+    wall = NearWalls(np.array([[0.9, -5.0, 0.9, 5.0]]))
+    sharply = Twist(0.5, 3.0)
+    assert robot.motion.least_turning_radius_m > 0.7
+    assert [guard.allows(sharply, Pose2(0.4, 0.0, 0.0), wall, NO_CIRCLES, 1.0) for guard in guards] == [
+        False,
+        True,
+    ]

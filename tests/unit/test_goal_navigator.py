@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import cast
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -192,3 +192,67 @@ def test_it_turns_on_the_spot_where_no_curve_leads_on_from_its_heading() -> None
     stays = run_mission(mission_of(values), save=False)
     assert not stays.success
     assert "no path" in str(stays.metrics["reason"])
+
+
+def parked(start: list[float], goal: list[float]) -> dict[str, Any]:
+    """A robot of 0.51 x 0.43 m that drives through the car park by planned lines and a laser."""
+    laser = {"name": "lidar", "beams": 360, "field_of_view_rad": 2.0 * math.pi, "max_range_m": 12.0}
+    return {
+        "mission": "parked",
+        "world": {
+            "map": "car-park",
+            "start": dict(zip(["x_m", "y_m", "theta_rad"], start, strict=True)),
+            "goal": dict(zip(["x_m", "y_m"], goal, strict=True)) | {"tolerance_m": 0.3},
+        },
+        "robot": {
+            "footprint": {"points_m": [[0.255, 0.215], [-0.255, 0.215], [-0.255, -0.215], [0.255, -0.215]]},
+            "motion": {"name": "differential-drive", "max_speed_m_s": 0.8},
+            "sensors": {"odometry": {"name": "wheel-odometry"}, "lidar": laser},
+        },
+        "stack": {
+            "initial": {"x_var_m2": 0.01, "y_var_m2": 0.01, "theta_var_rad2": 0.01},
+            "navigator": {"name": "goal", "cruise_speed_m_s": 0.4},
+            "planner": {"name": "theta-star", "clearance_m": 0.3},
+            "smoother": "shortcut",
+            "local_planner": {"name": "dubins", "speed_m_s": 0.4, "turning_radius_m": 0.3},
+            "controller": "kanayama",
+            "localizer": "particle-filter",
+        },
+        "run": {"time_limit_s": 200.0},
+    }
+
+
+@pytest.mark.parametrize(
+    ("start", "seed"),
+    [((2.88, 2.44, -2.11), 77005), ((3.92, 3.07, 1.44), 77025), ((2.4, 2.62, 2.97), 77030)],
+)
+def test_beside_a_corner_it_goes_on_slowly(start: tuple[float, float, float], seed: int) -> None:
+    """Where the arc of a command leaves no room, the curve that begins with it may: it planned 30 times."""
+    values = parked(list(start), [7.5, 6.9])
+    found = run_mission(mission_of(values, seed=seed), save=False)
+    assert found.success, found.metrics["reason"]
+    assert found.metrics["collisions"] == 0
+
+
+@pytest.mark.parametrize(
+    ("start", "goal", "seed"),
+    [((2.33, 3.87, 0.11), (7.5, 3.0), 88010), ((2.28, 2.8, 0.71), (7.5, 5.5), 88013)],
+)
+def test_a_car_backs_out_where_new_plans_do_not_help(
+    start: tuple[float, float, float], goal: tuple[float, float], seed: int
+) -> None:
+    """They were made from where it stood, thirty in a row, and each was the last one again."""
+    values = parked(list(start), list(goal))
+    values["robot"]["footprint"] = {"points_m": [[0.5, 0.2], [-0.1, 0.2], [-0.1, -0.2], [0.5, -0.2]]}
+    values["robot"]["motion"] = {
+        "name": "bicycle",
+        "wheelbase_m": 0.4,
+        "max_speed_m_s": 0.8,
+        "max_steering_rad": 0.6,
+        "max_steering_rate_rad_s": 2.0,
+    }
+    values["stack"] |= {"planner": {"name": "theta-star", "clearance_m": 0.45}, "escape": "back-out"}
+    values["stack"]["local_planner"] = {"name": "dubins", "speed_m_s": 0.4}
+    backs = run_mission(mission_of(values, seed=seed), save=False)
+    assert backs.success, backs.metrics["reason"]
+    assert backs.metrics["collisions"] == 0

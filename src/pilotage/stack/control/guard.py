@@ -7,6 +7,7 @@ from pilotage.core.types import FloatArray, Pose2, Twist
 from pilotage.kernels.rrt import local_path
 from pilotage.maps.near_walls import NearWalls
 from pilotage.sensors.sensor import NonNegative, Positive
+from pilotage.stack.knowledge import RobotKnowledge
 
 PIECES = 4
 
@@ -23,12 +24,14 @@ class ArcGuard:
 
     A robot of any shape is taken for the disc around it. A disc turns on the spot without touching anything,
     so a refused command keeps its turn rate and loses its speed. The braking distance, v^2 / (2 a), has to
-    lie within the horizon.
+    lie within the horizon. Of a robot that cannot turn so sharply it is the sharpest arc that it can drive;
+    wheels that have yet to be turned there are not thought of.
     """
 
-    def __init__(self, config: GuardConfig, body_radius_m: float) -> None:
+    def __init__(self, config: GuardConfig, robot: RobotKnowledge) -> None:
         self._horizon_s = config.horizon_s
-        self._clearance_m = body_radius_m + config.margin_m
+        self._clearance_m = robot.radius_m + config.margin_m
+        self._least_radius_m = robot.motion.least_turning_radius_m
 
     def allows(
         self, command: Twist, pose: Pose2, walls: NearWalls, circles_m: FloatArray, most_m: float
@@ -37,6 +40,10 @@ class ArcGuard:
         if command.v_m_s == 0.0:
             return True
         clearance_m = min(self._clearance_m, most_m)
+        turn_rate = command.w_rad_s
+        if self._least_radius_m > 0.0:
+            most = abs(command.v_m_s) / self._least_radius_m
+            turn_rate = min(max(turn_rate, -most), most)
         reach_m = abs(command.v_m_s) * self._horizon_s + clearance_m
         return bool(
             local_path.arc_fits(
@@ -44,7 +51,7 @@ class ArcGuard:
                 pose.y_m,
                 pose.theta_rad,
                 command.v_m_s,
-                command.w_rad_s,
+                turn_rate,
                 self._horizon_s,
                 PIECES,
                 clearance_m,

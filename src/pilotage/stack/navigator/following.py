@@ -23,7 +23,7 @@ class WaypointFollower:
         self._dt_s = dt_s
         self._local: LocalPath | None = None
         self._points: list[list[float]] = []
-        self._index = 0
+        self._index, self._behind = 0, 0.0
         self.control = NO_CONTROL
         self.feedforward = STOP
         self.reference: Pose2 | None = None
@@ -43,15 +43,18 @@ class WaypointFollower:
         self.control = NO_CONTROL
         self.feedforward = STOP
 
-    def hold(self) -> None:
-        """The last command was not driven: its reference point is the next one's again."""
-        self._index = max(0, self._index - 1)
+    def hold(self, share: float = 1.0) -> None:
+        """That share of the last command was not driven: once it makes a step the reference stays for one."""
+        self._behind += share
+        if self._behind >= 1.0:
+            self._behind -= 1.0
+            self._index = max(0, self._index - 1)
 
     def replan(self, pose: Pose2, route: RouteAhead, walls: NearWalls, circles_m: FloatArray) -> bool:
         """Plan from the estimate to the next reachable waypoint; False where there is none."""
         self._local = self._local_planner.plan(pose, route, walls, circles_m)
         self._points = [] if self._local is None else self._local.states.tolist()
-        self._index = 0
+        self._index, self._behind = 0, 0.0
         return self._local is not None
 
     def clearance_ahead_m(self, reach_m: float, circles_m: FloatArray) -> float:

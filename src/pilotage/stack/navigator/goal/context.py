@@ -45,6 +45,9 @@ MAPPED_TOLERANCE_M = 0.02
 SETTING_OUT_M = 0.1
 """A plan that begins with a turn on the spot is still at its beginning."""
 
+SAME_PLACE_M = 0.3
+"""A plan made so near by would be the same again."""
+
 SOMEBODY_M = 2.0
 """With somebody who walks so near, what is close in front is a reason to give way, not to turn away."""
 
@@ -64,8 +67,8 @@ class Context:
         What is recorded of the last step.
     goals
         Places still to be visited, the current one first.
-    tries
-        New plans for which nobody who walks can be blamed.
+    tries, again
+        New plans for which nobody who walks can be blamed; those in a row that were made where the last was.
     trail
         Poses since the last plan that did not start on them, for an escape to go back along.
     """
@@ -102,12 +105,12 @@ class Context:
         self._waits_s: float | None = None
         self._planned_s = 0.0
         self._waited_at, self._waited = (math.inf, math.inf), 0
-        self.tries = 0
+        self.tries = self.again = 0
         self.turn_rate_rad_s = min(TURN_RATE_RAD_S, robot.motion.top_turn_rate_rad_s)
         self.reactive, self._mapper, self.escape = parts.reactive, parts.mapper, parts.escape
         self.own_map, self.plan = own_map, plan
         self.follower = WaypointFollower(local_planner, controller, robot.dt_s)
-        self.guard = ArcGuard(config.guard, robot.radius_m)
+        self.guard = ArcGuard(config.guard, robot)
         self.wandering = Wandering(config.wander, robot, localizer_of(parts, "goal"))
         progress_m = config.stall_progress_m
         self.stall = StallWatch(
@@ -260,6 +263,14 @@ class Context:
         if period_s is None or self.t_s - self._planned_s < period_s or self.among_people:
             return False
         return self.plan.is_blocked(self.own_map.found_circles_m, self.radius_m + self.config.watch_margin_m)
+
+    def planned_here(self, pose: Pose2) -> bool:
+        """Whether the plan was made about here: another one would be the same."""
+        path = self.plan.path
+        if path is None:
+            return False
+        x, y, _ = path.states[0]
+        return math.hypot(x - pose.x_m, y - pose.y_m) < SAME_PLACE_M
 
     def near_goal(self, pose: Pose2) -> bool:
         """Whether this is the end: near the goal, and not merely passing by it with path left to go."""

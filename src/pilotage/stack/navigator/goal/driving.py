@@ -19,6 +19,9 @@ from pilotage.stack.navigator.navigator import turned_by
 ALIGNED_RAD = 0.1
 """Turned on the spot until this near to the plan's heading."""
 
+SHARES = 0.5, 0.25, 0.125
+"""Of a command's speed, tried where the map leaves no room for all of it."""
+
 
 @dataclass(frozen=True, slots=True)
 class Following:
@@ -105,6 +108,10 @@ def _guarded(context: Context, state: Driving, readings: Readings, pose: Pose2) 
             return move
     if isinstance(move.state, Avoiding):
         return Move(move.state, Twist(0.0, move.command.w_rad_s))
+    tried = context.again > 0 and context.planned_here(pose)
+    slower = _slower(context, pose, move.command) if tried else None
+    if slower is not None:
+        return Move(move.state, slower)
     resumes = _anew(context, move.state)
     return replan(context, resumes, pose, "the robot's own map leaves no room for the command")
 
@@ -113,6 +120,19 @@ def _allows(context: Context, pose: Pose2, command: Twist) -> bool:
     """Whether the robot's own map leaves room for a command."""
     own, room_m = context.own_map, context.clearance_m - HERE_TOLERANCE_M
     return context.guard.allows(command, pose, own.barriers, own.circles_m, room_m)
+
+
+def _slower(context: Context, pose: Pose2, command: Twist) -> Twist | None:
+    """A share of the command for which there is room: what is looked at is the arc that it would go on with.
+
+    The curve that it follows keeps its distance; beside a corner the arc of its first metre need not.
+    """
+    for share in SHARES:
+        slower = Twist(share * command.v_m_s, share * command.w_rad_s, share * command.lateral_m_s)
+        if _allows(context, pose, slower):
+            context.follower.hold(1.0 - share)
+            return slower
+    return None
 
 
 def _next(context: Context, state: Driving, readings: Readings, pose: Pose2) -> Move:

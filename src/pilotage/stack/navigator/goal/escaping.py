@@ -15,6 +15,9 @@ from pilotage.stack.navigator.goal_config import Mode
 WAITS = 1
 """So often it waits before it makes room."""
 
+AGAIN = 3
+"""After so many new plans in one place it backs out, if it can: the next would be the same."""
+
 
 @dataclass(frozen=True, slots=True)
 class MakingRoom:
@@ -136,11 +139,19 @@ def begin_escape(context: Context, resumes: State, pose: Pose2, why: str, waits:
 
 
 def replan(context: Context, resumes: State, pose: Pose2, why: str) -> Move:
-    """Stop and plan anew on the robot's own map; back out where even that finds no path."""
+    """Stop and plan anew on the robot's own map; back out where that finds no path, or none that helps."""
     context.mode = Mode.REPLAN
     context.follower.drop()
     if context.tries >= context.config.max_replans:
-        return fail(context, f"stuck: gave up after {context.journal.counts['replans']} replans")
+        remedy = (
+            "" if context.escape is not None else ", and the stack has no escape (stack.escape: back-out)"
+        )
+        gave_up = f"stuck: gave up after {context.journal.counts['replans']} replans"
+        return fail(context, f"{gave_up}, the last because {why}{remedy}")
+    context.again = context.again + 1 if context.planned_here(pose) else 0
+    if context.again >= AGAIN and context.escape is not None:
+        context.again = 0
+        return begin_escape(context, resumes, pose, f"{why}, and new plans do not help")
     context.tries += not context.among_people
     context.journal.count("replans")
     return set_out(context, resumes, pose, "replan", why)
