@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -12,8 +12,21 @@ from pilotage.core.types import FloatArray
 from pilotage.experiments.build.build import build
 from pilotage.experiments.loop import run_loop
 from pilotage.experiments.mission import mission_of, read_mission
-from pilotage.stack.navigator.patrol.obstructions import ABSENT_S, KEPT_S, SHUTS_S, Obstructions
+from pilotage.stack.navigator.patrol.obstructions import (
+    ABSENT_S,
+    DENIED_S,
+    KEPT_S,
+    SHUTS_S,
+    Obstructions,
+    Told,
+)
+from pilotage.stack.patrol.graph import PatrolGraph
+from pilotage.stack.patrol.messages import PatrolState
+from pilotage.stack.patrol.partition import annealed
+from pilotage.stack.patrol.passages import OPEN
 from pilotage.stack.patrol.roadmap import Roadmap
+from pilotage.stack.patrol.shut_paths import NONE_SHUT, OpenGraph, ShutPaths, same_side
+from pilotage.stack.patrol.tours import Round
 
 NOBODY: FloatArray = np.zeros((0, 2))
 BODY: FloatArray = np.array([[3.0, 1.0]])
@@ -21,16 +34,16 @@ DOOR_Y_M = 1.0
 KEEP_M = 0.68
 
 
-def two_rooms(*doors_y_m: float) -> dict[str, Any]:
-    """Two rooms of 5 m x 6 m, with doors of 1 m between them; a robot fails in the one at the bottom."""
+def two_rooms(*doors_y_m: float, wall_x_m: float = 5.0) -> dict[str, Any]:
+    """Two rooms, 6 m deep, with doors of 1 m between them; a robot fails in the one at the bottom."""
     ends = [0.0, *(end for y in doors_y_m for end in (y - 0.5, y + 0.5)), 6.0]
     walls: list[list[float]] = [[0, 0, 10, 0], [10, 0, 10, 6], [10, 6, 0, 6], [0, 6, 0, 0]]
-    walls += [[5, low, 5, high] for low, high in zip(ends[::2], ends[1::2], strict=True)]
+    walls += [[wall_x_m, low, wall_x_m, high] for low, high in zip(ends[::2], ends[1::2], strict=True)]
     values = read_mission("museum-patrol")
     values["world"] = {"map": {"map": "two rooms", "bounds_m": [0, 0, 10, 6], "walls_m": walls}}
     values["task"] = {"name": "patrol", "duration_s": 120.0, "derive": {"reach_m": 3.0}}
     values["robots"] = [
-        {"start": {"x_m": 5.0, "y_m": DOOR_Y_M, "theta_rad": 0.0}},
+        {"start": {"x_m": wall_x_m, "y_m": DOOR_Y_M, "theta_rad": 0.0}},
         {"start": {"x_m": 2.0, "y_m": 3.0, "theta_rad": 0.0}},
         {"start": {"x_m": 1.0, "y_m": 5.0, "theta_rad": 0.0}},
     ]
@@ -53,7 +66,8 @@ def roadmap_of(*doors_y_m: float) -> Roadmap:
 def seen(kept: Obstructions, t_s: float, bodies: FloatArray, **more: Any) -> bool:
     """One scan; nothing is seen to be absent unless said."""
     absent = more.get("absent", np.zeros(len(kept.known_xy_m), dtype=np.bool_))
-    return kept.step(t_s, bodies, absent, more.get("silent", NOBODY), more.get("told", NOBODY))
+    told = [Told(7, place) for place in more.get("told", NOBODY)]
+    return kept.step(t_s, bodies, absent, more.get("silent", NOBODY), told, more.get("heard", ()))
 
 
 class TestWhoStands:
@@ -87,12 +101,44 @@ class TestWhoStands:
         seen(kept, SHUTS_S + 1.1 * KEPT_S, NOBODY, silent=BODY if failed else NOBODY)
         assert (len(kept.shutting_xy_m) == 1) is failed
 
+    def test_is_no_mate_that_talks_again(self) -> None:
+        kept = Obstructions()
+        for t_s in (0.0, 0.5, 1.0):
+            seen(kept, t_s, BODY, silent=BODY)
+        assert seen(kept, 1.5, NOBODY)
+        assert not len(kept.known_xy_m)
+
+    def test_is_none_where_a_mate_is_that_talks(self) -> None:
+        """One that failed before it ever said anything was nobody's mate."""
+        kept = Obstructions()
+        for t_s in (0.0, SHUTS_S):
+            seen(kept, t_s, BODY)
+        kept.is_of_mate(BODY[0] + 0.1, 0.3)
+        assert seen(kept, SHUTS_S + 0.1, NOBODY, told=BODY)
+        assert not len(kept.known_xy_m)
+
     def test_is_taken_from_mates_and_not_told_on(self) -> None:
         kept = Obstructions()
         assert seen(kept, 0.0, NOBODY, told=BODY)
         assert len(kept.shutting_xy_m) == 1
         assert kept.told() == ()
         assert seen(kept, 1.1 * KEPT_S, NOBODY)
+
+    def test_is_as_mates_tell_who_are_heard(self) -> None:
+        kept = Obstructions()
+        seen(kept, 0.0, NOBODY, told=BODY, heard={7})
+        assert not seen(kept, 0.5 * KEPT_S, NOBODY)  # out of reach
+        assert seen(kept, 0.6 * KEPT_S, NOBODY, heard={7})
+        assert not len(kept.known_xy_m)
+
+    def test_is_not_taken_back_from_those_who_do_not_know_yet(self) -> None:
+        kept = Obstructions()
+        seen(kept, 0.0, NOBODY, told=BODY, silent=BODY)
+        assert seen(kept, 1.0, NOBODY, told=BODY)  # the mate talks again
+        assert not seen(kept, 2.0, NOBODY, told=BODY)
+        assert seen(kept, 1.0 + 1.1 * DENIED_S, NOBODY, told=BODY)
+        kept.deny(BODY[0])
+        assert not seen(kept, 8.0, NOBODY, told=BODY)
 
 
 class TestPathsAround:
@@ -124,6 +170,105 @@ class TestPathsAround:
         x0, y0 = around.origin_xy_m
         away_m = math.hypot(x0 + column * around.spacing_m - x, y0 + row * around.spacing_m - y)
         assert KEEP_M <= away_m <= 0.9
+
+
+class TestPlans:
+    """On the graph without what bodies shut."""
+
+    @staticmethod
+    def shut(*doors_y_m: float, here: tuple[float, float] = (4.0, DOOR_Y_M)) -> tuple[ShutPaths, PatrolGraph]:
+        stack: Any = build(mission_of(two_rooms(*doors_y_m), seed=0)).team[1].stack
+        roadmap, graph = stack._context.roadmap, stack._context.task.graph
+        around = roadmap.around(np.array([[5.0, DOOR_Y_M]]), KEEP_M, here, 0.9)
+        return ShutPaths.of(around, graph), graph
+
+    def test_count_on_the_way_through_the_other_door(self) -> None:
+        shut, graph = self.shut(DOOR_Y_M, 5.0)
+        assert shut.unreached == ()
+        assert shut.detours
+        left = OpenGraph.of(graph, OPEN, shut)
+        x = graph.vertices_xy_m[:, 0]
+        through = (x[:, None] < 5.0) & (x > 5.0)
+        assert (left.away_m(graph)[through] >= graph.shortest_m[through] - 0.25).all()
+        a, b, length_m = max(shut.detours, key=lambda found: found[2])
+        assert left.away_m(graph)[a, b] > graph.shortest_m[a, b] + 2.0
+        assert length_m < graph.shortest_m[a, b] + 15.0
+        round_m = Round.best(left.graph).length_m
+        assert round_m > Round.best(graph).length_m + 2.0
+
+    @pytest.mark.parametrize("side", ["left", "right"])
+    def test_hold_what_is_reached_from_where_the_robot_is(self, side: str) -> None:
+        here = (4.0, DOOR_Y_M) if side == "left" else (6.0, DOOR_Y_M)
+        shut, graph = self.shut(DOOR_Y_M, here=here)
+        x = graph.vertices_xy_m[:, 0]
+        beyond = x > 6.0 if side == "left" else x < 4.0
+        assert set(np.flatnonzero(beyond)) <= set(shut.unreached)
+        left = OpenGraph.of(graph, OPEN, shut)
+        assert len(left.graph) == len(graph) - len(shut.unreached) > 0
+        plan = left.whole(annealed(left.graph, (1,), 2.0, 0.06))
+        assert set(plan.rounds[0].stops.tolist()) == set(range(len(graph))) - set(shut.unreached)
+
+    def test_are_of_those_on_one_side_and_of_one_word(self) -> None:
+        one, two = ShutPaths((3, 4), ((0, 1, 5.5),)), ShutPaths((3, 4), ((0, 1, 6.0),))
+        said = (NONE_SHUT, one, two, ShutPaths((0, 1, 2)))
+        states = [PatrolState(k, 0.0, 0, 0, 0.0, 1.0, shut=shut) for k, shut in enumerate(said)]
+        assert same_side(2, states, range(1, 4), 5) == (frozenset({1, 2}), one)
+        assert same_side(1, states, range(1, 4), 5) == (frozenset({1, 2}), one)
+        assert same_side(3, states, range(1, 4), 5) == (frozenset({3}), said[3])
+        # Who knows of nothing that is shut may be on any side, and says nothing.
+        assert same_side(2, states, range(4), 5) == (frozenset({0, 1, 2}), one)
+
+    def test_join_what_no_edge_joins_any_more(self) -> None:
+        """A place that is cut off was all that joined two others by edges."""
+        edges_m = np.full((3, 3), np.inf)
+        for a, b in ((0, 1), (1, 2)):
+            edges_m[a, b] = edges_m[b, a] = 2.0
+        graph = PatrolGraph.of(np.array([[0.0, 0.0], [2.0, 0.0], [4.0, 0.0]]), edges_m)
+
+        class Around:
+            def is_cut_off(self, place: int) -> bool:
+                return place == 1
+
+            def detour(self, one: int, other: int) -> float:
+                assert (one, other) == (0, 2)
+                return 1.5
+
+        shut = ShutPaths.of(cast("Roadmap", Around()), graph)
+        assert shut == ShutPaths((1,), ((0, 2, 6.0),))
+        assert OpenGraph.of(graph, OPEN, shut).graph.shortest_m[0, 1] == 6.0
+
+
+def test_each_side_of_a_door_that_a_mate_shuts_keeps_its_places() -> None:
+    """Shares went by the graph with the door: places of one beyond it were left by everybody."""
+    values = two_rooms(DOOR_Y_M, wall_x_m=3.0)
+    values["robots"][2]["start"] = {"x_m": 8.0, "y_m": 5.0, "theta_rad": 0.0}
+    values["task"]["derive"] = {"reach_m": 2.0}
+    values["team"]["strategy"] = "adaptive-rounds"
+    values["task"]["duration_s"] = values["run"]["time_limit_s"] = 180.0
+    experiment = build(mission_of(values, seed=2))
+    run = run_loop(experiment)
+    metrics = experiment.task.judge(run.finished).metrics
+    assert metrics["collisions"] == metrics["deadlocks"] == 0
+    task: Any = experiment.task
+    assert (180.0 - task._visits.last_s).max() < 40.0
+    said = [event.text for event in run.finished.events if event.kind == "shut"]
+    assert len({text.split("vertex ")[1] for text in said if "vertex " in text}) == 2
+
+
+def test_who_talks_again_shuts_nothing() -> None:
+    values = two_rooms(DOOR_Y_M)
+    values["robots"][2]["start"] = {"x_m": 8.0, "y_m": 5.0, "theta_rad": 0.0}
+    values["task"]["derive"] = {"reach_m": 2.0}
+    values["team"]["failures"][0]["for_s"] = 60.0
+    values["team"]["strategy"] = "adaptive-rounds"
+    experiment = build(mission_of(values, seed=2))
+    run = run_loop(experiment)
+    assert any(event.kind == "shut" and event.t_s < 70.0 for event in run.finished.events)
+    for robot in experiment.team:
+        stack: Any = robot.stack
+        assert stack._context.memory.own.shut == NONE_SHUT
+        assert len(stack._context.task.strategy._side) == 3
+    assert experiment.task.judge(run.finished).metrics["collisions"] == 0
 
 
 @pytest.mark.parametrize("doors", [(DOOR_Y_M, 5.0), (DOOR_Y_M,)])

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from pilotage.core.types import FloatArray
+from pilotage.stack.patrol.shut_paths import NONE_SHUT, ShutPaths
 
 NOTHING: FloatArray = np.zeros(0)
 NOTHING.flags.writeable = False
@@ -32,6 +33,8 @@ class PatrolState:
         False while it charges or looks for its place: others take its share.
     words
         (K,) what its strategy adds for its like on other robots: bids, say.
+    shut
+        What bodies that stand keep it from.
     """
 
     robot: int
@@ -42,6 +45,7 @@ class PatrolState:
     speed_m_s: float
     on_duty: bool = True
     words: FloatArray = field(default_factory=lambda: NOTHING)
+    shut: ShutPaths = NONE_SHUT
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -169,6 +173,7 @@ class PatrolMemory:
         speed_m_s: float | None = None,
         on_duty: bool | None = None,
         words: FloatArray | None = None,
+        shut: ShutPaths | None = None,
     ) -> None:
         """Something else about itself changed."""
         old = self._own
@@ -179,6 +184,7 @@ class PatrolMemory:
                 speed_m_s=old.speed_m_s if speed_m_s is None else speed_m_s,
                 on_duty=old.on_duty if on_duty is None else on_duty,
                 words=old.words if words is None else words,
+                shut=old.shut if shut is None else shut,
             )
         )
 

@@ -174,6 +174,20 @@ class Roadmap:
         """Whether bodies that stand leave no path to a place."""
         return place in self._cut_off
 
+    def detour(self, one: int, other: int) -> float:
+        """How many times as long as without bodies a path takes; 1 where no body is on it."""
+        whole = self._whole
+        field, seed = whole.time_s(other), whole._seeds[one]
+        if self._seeds[one] == seed and self._seeds[other] == whole._seeds[other]:
+            x0, y0 = self.origin_xy_m
+            x, y = x0 + seed[1] * self.spacing_m, y0 + seed[0] * self.spacing_m
+            steps = whole.way(x, y, field, float(field[seed]) / float(np.min(self.slowness)))
+            if all(np.isfinite(self.slowness[self._node(*place)]) for place in steps[:, :2].tolist()):
+                return 1.0
+        around_s = float(self.time_s(other)[self._seeds[one]])
+        before_s = float(field[seed])
+        return max(1.0, around_s / before_s) if before_s > 0.0 and math.isfinite(around_s) else 1.0
+
     def nearest(self, x_m: float, y_m: float) -> int:
         """The vertex that is reached soonest from a place, of the few that are nearest as the crow flies."""
         places = self.places_xy_m[: self._vertices]

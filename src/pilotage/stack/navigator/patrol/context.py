@@ -17,11 +17,12 @@ from pilotage.stack.navigator.patrol.battery import DOCK_M, Battery
 from pilotage.stack.navigator.patrol.config import Mode, PatrolNavigatorConfig
 from pilotage.stack.navigator.patrol.headway import Headway
 from pilotage.stack.navigator.patrol.motion import Motion
-from pilotage.stack.navigator.patrol.obstructions import Obstructions
+from pilotage.stack.navigator.patrol.obstructions import Obstructions, Told
 from pilotage.stack.navigator.patrol.passage import Pursuit
 from pilotage.stack.navigator.patrol.senses import NO_POINTS, Senses
 from pilotage.stack.patrol.messages import PatrolMemory
 from pilotage.stack.patrol.roadmap import Roadmap, roadmap_of
+from pilotage.stack.patrol.shut_paths import NONE_SHUT, ShutPaths
 from pilotage.stack.patrol.strategy import following
 from pilotage.stack.patrol.task import PatrolTask
 from pilotage.stack.patrol.word import Claim, Clearing, TeamWord
@@ -106,34 +107,45 @@ class Context(Senses):
         """Plan around those who have stood for long, from where that leads anywhere."""
         heard = dict(self.heard())
         silent = [(w.x_m, w.y_m) for n, (_, w) in self.mates.items() if n not in heard]
-        told = [place for word in heard.values() for place in word.standing if self._may_stand(place)]
-        known = self._obstructions.known_xy_m
+        told = [Told(n, np.array(place)) for n, word in heard.items() for place in word.standing]
+        for _, place in told:
+            if not self._may_stand(place):
+                self._obstructions.deny(place)
+        for word in heard.values():
+            self._obstructions.is_of_mate(np.array([word.x_m, word.y_m]), word.radius_m)
+        known, standing = self._obstructions.known_xy_m, self.motion.standing
         absent = np.array([self.sees_nothing_at(place, self.radius_m) for place in known], dtype=np.bool_)
-        places = (np.array(xy).reshape(-1, 2) for xy in (silent, told))
-        if self._obstructions.step(self.t_s, self.motion.standing, absent, *places):
+        if self._obstructions.step(self.t_s, standing, absent, np.array(silent).reshape(-1, 2), told, heard):
             self._shut_paths()
         for roadmap in (self._shut, self._open) if self._shut is not None else ():
             self._take(roadmap)
             if not self.is_off_roadmap():
                 break
 
-    def _may_stand(self, place: tuple[float, float]) -> bool:
+    def _may_stand(self, place: FloatArray) -> bool:
         """Whether somebody may stand where a mate says so: nothing that it sees or hears speaks against it.
 
         To whoever does not hear it a mate that stands is an obstruction; it may be this robot.
         """
         there = [(self.pose.x_m, self.pose.y_m), *((w.x_m, w.y_m) for _, w in self.heard())]
         return not any(math.dist(place, xy) < 2.0 * self.radius_m for xy in there) and (
-            not self.sees_nothing_at(np.array(place), self.radius_m)
+            not self.sees_nothing_at(place, self.radius_m)
         )
 
     def _shut_paths(self) -> None:
         """Who shuts paths has changed."""
         bodies, here = self._obstructions.shutting_xy_m, (self.pose.x_m, self.pose.y_m)
-        self._shut, near_m = None, SURELY_RATIO * self.task.visit_m
+        self._shut, shut = None, NONE_SHUT
         if len(bodies):
-            self.say("shut", "plans around " + ", ".join(f"({x:.1f}, {y:.1f})" for x, y in bodies.tolist()))
+            # Who keeps clear of a body ends up to a node short of the nearest one.
+            near_m = SURELY_RATIO * self.task.visit_m - self._open.spacing_m
             self._shut = self._open.around(bodies, self.motion.body_m, here, near_m)
+            shut = ShutPaths.of(self._shut, self.task.graph)
+            text = "plans around " + ", ".join(f"({x:.1f}, {y:.1f})" for x, y in bodies.tolist())
+            if shut.unreached:
+                text += "; finds no path to vertex " + ", ".join(map(str, shut.unreached))
+            self.say("shut", text)
+        self.memory.update(self.t_s, shut=shut)
         self._take(self._open)
         self.headway.restart(self.t_s)  # by what is left to go on other paths
 

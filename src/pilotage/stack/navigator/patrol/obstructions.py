@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 
@@ -16,9 +18,18 @@ ABSENT_S = 1.0
 """Who is not where it would be seen for so long has gone."""
 KEPT_S = 60.0
 """Who was not seen for so long may have gone: the robot goes and looks. A mate that fell silent has not."""
+DENIED_S = 5.0
+"""So long nothing is believed of a body that has gone, or is none: mates come to know that a little later."""
 
 
-@dataclass(slots=True)
+class Told(NamedTuple):
+    """That a mate, by its number, plans around a body at (2,)."""
+
+    mate: int
+    xy_m: FloatArray
+
+
+@dataclass(slots=True, eq=False)
 class _Body:
     xy_m: FloatArray
     first_s: float
@@ -26,6 +37,8 @@ class _Body:
     absent_s: float = 0.0
     shuts: bool = False
     seen: bool = True
+    failed: bool = False
+    tellers: set[int] = field(default_factory=set)
 
 
 class Obstructions:
@@ -33,6 +46,8 @@ class Obstructions:
 
     def __init__(self) -> None:
         self._bodies: list[_Body] = []
+        self._denied: list[tuple[float, FloatArray]] = []
+        self._shutting = self.shutting_xy_m
         self._t_s = 0.0
 
     @property
@@ -50,13 +65,25 @@ class Obstructions:
         fresh = [b.xy_m for b in self._bodies if b.shuts and b.seen and self._t_s - b.last_s < KEPT_S]
         return tuple((float(x), float(y)) for x, y in fresh)
 
+    def deny(self, place: FloatArray) -> None:
+        """Nobody who says nothing stands there, whatever mates tell."""
+        self._denied.append((self._t_s, place))
+
+    def is_of_mate(self, place: FloatArray, radius_m: float) -> None:
+        """A mate that talks is there: what stood there was that mate, or has gone."""
+        there = [body for body in self._bodies if _is_near(place, body.xy_m[None], radius_m)]
+        for body in there:
+            self.deny(body.xy_m)
+            self._bodies.remove(body)
+
     def step(
         self,
         t_s: float,
         standing_xy_m: FloatArray,
         absent: BoolArray,
         silent_xy_m: FloatArray,
-        told_xy_m: FloatArray,
+        told: Sequence[Told],
+        heard: Collection[int],
     ) -> bool:
         """Take in a scan.
 
@@ -68,8 +95,10 @@ class Obstructions:
             (K,) of which of ``known_xy_m`` nothing is seen though it would be.
         silent_xy_m
             (L, 2) where mates that are silent said last that they are: who stands there has failed.
-        told_xy_m
-            (T, 2) what mates say that they plan around.
+        told
+            What mates say that they plan around.
+        heard
+            Numbers of the mates that talk.
 
         Returns
         -------
@@ -77,29 +106,46 @@ class Obstructions:
             Whether others are planned around than before.
         """
         since_s, self._t_s = t_s - self._t_s, t_s
-        before = [id(body) for body in self._bodies if body.shuts]
         for body, gone in zip(self._bodies, absent.tolist(), strict=True):
             body.absent_s = body.absent_s + since_s if gone else 0.0
-        self._bodies = [
-            body
-            for body in self._bodies
-            if body.absent_s < ABSENT_S
-            and (t_s - body.last_s < KEPT_S or _is_near(body.xy_m, silent_xy_m, FAILED_M))
-        ]
         for place in standing_xy_m:
-            near = [body for body in self._bodies if _is_near(place, body.xy_m[None], SAME_M)]
-            body = near[0] if near else _Body(place.copy(), t_s, t_s)
-            if not near:
-                self._bodies.append(body)
+            body = self._near(place) or self._add(_Body(place.copy(), t_s, t_s))
             body.last_s, body.absent_s, body.seen = t_s, 0.0, True
             body.shuts |= t_s - body.first_s >= SHUTS_S or _is_near(place, silent_xy_m, FAILED_M)
-        for place in told_xy_m:
-            near = [body for body in self._bodies if _is_near(place, body.xy_m[None], SAME_M)]
-            if not near:
-                self._bodies.append(_Body(place.copy(), t_s, t_s, shuts=True, seen=False))
-            for body in near:
-                body.shuts, body.last_s = True, body.last_s if body.seen else t_s
-        return [id(body) for body in self._bodies if body.shuts] != before
+        self._forget(silent_xy_m, told, heard)
+        denied = np.array([place for _, place in self._denied]).reshape(-1, 2)
+        for mate, place in told:
+            if _is_near(place, denied, SAME_M):
+                continue
+            body = self._near(place) or self._add(_Body(place.copy(), t_s, t_s, seen=False))
+            body.shuts, body.last_s = True, body.last_s if body.seen else t_s
+            body.failed |= _is_near(place, silent_xy_m, FAILED_M)
+            body.tellers.add(mate)
+        before, self._shutting = self._shutting, self.shutting_xy_m
+        return not np.array_equal(self._shutting, before)
+
+    def _near(self, place: FloatArray) -> _Body | None:
+        """The body that is known at a place."""
+        return next((body for body in self._bodies if _is_near(place, body.xy_m[None], SAME_M)), None)
+
+    def _add(self, body: _Body) -> _Body:
+        self._bodies.append(body)
+        return body
+
+    def _forget(self, silent_xy_m: FloatArray, told: Sequence[Told], heard: Collection[int]) -> None:
+        """Who is seen to have gone, talks again, or may have gone; what mates told and tell no more."""
+        kept = []
+        self._denied = [(t_s, place) for t_s, place in self._denied if self._t_s - t_s < DENIED_S]
+        for body in self._bodies:
+            had_failed, body.failed = body.failed, _is_near(body.xy_m, silent_xy_m, FAILED_M)
+            gone = body.absent_s >= ABSENT_S or (had_failed and not body.failed)
+            still = any(_is_near(place, body.xy_m[None], SAME_M) for _, place in told)
+            held = body.seen or still or body.tellers.isdisjoint(heard)
+            if not gone and (body.failed or (held and self._t_s - body.last_s < KEPT_S)):
+                kept.append(body)
+            elif gone:
+                self.deny(body.xy_m)
+        self._bodies = kept
 
 
 def _is_near(place: FloatArray, others: FloatArray, reach_m: float) -> bool:

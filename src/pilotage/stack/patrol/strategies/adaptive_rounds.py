@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import zlib
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 from pydantic import Field
@@ -15,6 +16,7 @@ from pilotage.sensors.sensor import NonNegative, Positive
 from pilotage.stack.patrol.meetings import slowed
 from pilotage.stack.patrol.messages import NOTHING, PatrolKnowledge, PatrolState
 from pilotage.stack.patrol.partition import Plan, annealed, even_sizes
+from pilotage.stack.patrol.shut_paths import NONE_SHUT, OpenGraph, same_side
 from pilotage.stack.patrol.strategy import STRATEGIES, PatrolSetting
 from pilotage.stack.patrol.tours import Round, spread
 
@@ -72,13 +74,15 @@ class AdaptiveRoundsStrategy:
     Robots say how far along their round they are. Those who share one wait at vertices where they are ahead
     of the even spacing; positions told some time ago are carried on at the speed that was told. Where a
     robot falls silent or goes off duty the others plan for those who are left, and again when it is back;
-    who goes where is settled by distance, and by counting heads where news differ.
+    where bodies shut paths those who reach the same places plan for these, on the paths that are left. Who
+    goes where is settled by distance, and by counting heads where news differ.
     """
 
     def __init__(self, config: AdaptiveRoundsConfig, setting: PatrolSetting) -> None:
         self._config, self._setting, self._graph = config, setting, setting.graph
         team = setting.team_size
-        self._team = frozenset(range(team))
+        self._side, self._shut = frozenset(range(team)), NONE_SHUT
+        self._away_m = self._graph.shortest_m
         self._heard_s = np.full(team, setting.begin_s)
         self._plan = best_plan(setting, team, config)
         from_starts_m = (
@@ -154,12 +158,21 @@ class AdaptiveRoundsStrategy:
         silent |= now_s - self._off_s > self._config.silent_s
         silent[knowledge.robot] = False
         team = np.flatnonzero(~silent).tolist()
-        if frozenset(team) != self._team:
-            self._team = frozenset(team)
-            self._plan = best_plan(self._setting, len(team), self._config)
-            places = {robot: self._place_of(knowledge, robot) for robot in team}
-            groups = self._seats({robot: self._graph.shortest_m[at] for robot, at in places.items()})
-            self._join(self._plan.rounds[groups[knowledge.robot]], knowledge)
+        side, shut = same_side(knowledge.robot, knowledge.states, team, len(self._graph))
+        if (side, shut) != (self._side, self._shut) and len(shut.unreached) < len(self._graph):
+            self._side, self._shut = side, shut
+            self._plan_anew(knowledge)
+
+    def _plan_anew(self, knowledge: PatrolKnowledge) -> None:
+        """For those who are left on its side, on the paths that are."""
+        setting, side = self._setting, sorted(self._side)
+        left = OpenGraph.of(setting.graph, setting.passages, self._shut)
+        there = replace(setting, graph=left.graph, passages=left.passages)
+        self._plan = left.whole(best_plan(there, len(side), self._config))
+        self._away_m = left.away_m(self._graph)
+        places = {robot: self._place_of(knowledge, robot) for robot in side}
+        groups = self._seats({robot: self._away_m[at] for robot, at in places.items()})
+        self._join(self._plan.rounds[groups[knowledge.robot]], knowledge)
 
     def _seats(self, away_m: Mapping[int, FloatArray]) -> dict[int, int]:
         """Which group each robot belongs to, by its distances to all vertices (V,).
@@ -186,7 +199,7 @@ class AdaptiveRoundsStrategy:
         if _key(walk) == _key(self._round):
             return
         self._round, self._leaves_s, self._is_on_round = walk, -math.inf, False
-        self._place = int(np.argmin(self._graph.shortest_m[knowledge.at, walk.stops]))
+        self._place = int(np.argmin(self._away_m[knowledge.at, walk.stops]))
 
     def _change_rounds(self, knowledge: PatrolKnowledge) -> None:
         """Leave a round that has too many for one that has too few, if nobody else of it is nearer."""
@@ -204,15 +217,15 @@ class AdaptiveRoundsStrategy:
         for key, walk, size in zip(keys, plan.rounds, plan.sizes, strict=True):
             if key == own or len(on[key]) >= size:
                 continue
-            away = self._graph.shortest_m[:, walk.stops].min(axis=1)
+            away = self._away_m[:, walk.stops].min(axis=1)
             mine = float(away[knowledge.at]), knowledge.robot
             if all(mine < (float(away[state.target]), state.robot) for state in on[own]):
                 self._join(walk, knowledge)
                 return
 
     def _mates(self, knowledge: PatrolKnowledge) -> list[PatrolState]:
-        """Robots of the team that have said where they are."""
-        return [state for state in knowledge.others() if state.robot in self._team and len(state.words) == 3]
+        """Robots on its side that have said where they are."""
+        return [state for state in knowledge.others() if state.robot in self._side and len(state.words) == 3]
 
     def _is_ahead(self, knowledge: PatrolKnowledge) -> bool:
         """Whether to wait here: ahead of the even spacing, and not waited for long yet."""
