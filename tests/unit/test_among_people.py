@@ -77,6 +77,18 @@ def test_its_corners_come_nearer_to_nobody_whom_its_laser_does_not_see(heading_r
     assert swings(WHOLE) > 0.3
 
 
+def test_it_slows_sooner_for_who_runs_up_than_for_who_walks() -> None:
+    """3.5 m before it, a runner is as near as a walker at less than 2.5 m: he may sprint at once."""
+
+    def speed_m_s(walks_m_s: float, begins_m: float) -> float:
+        rows = driven(WHOLE, 2.5, walks_m_s, begins_m=(begins_m, 1.7))
+        rows = rows[: int(np.argmin(rows[:, 4]))]
+        return float(rows[(rows[:, 4] > 2.8) & (rows[:, 4] < 3.6), 0].max())
+
+    assert speed_m_s(1.0, 7.0) > 1.8
+    assert speed_m_s(4.5, 11.0) <= 1.4
+
+
 def test_it_slows_for_people_near_ahead_and_not_for_those_whom_it_leaves_behind() -> None:
     def fastest(begins_m: tuple[float, float], walks_m_s: float) -> float:
         rows = driven(THREE_QUARTERS, 4.0, walks_m_s, begins_m=begins_m)

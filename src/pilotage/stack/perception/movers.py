@@ -181,15 +181,19 @@ class Movers:
         rests: BoolArray = self.tracks[~self._things, kernels.READINGS] >= readings
         return rests
 
-    def nearest_ahead_m(self, pose: FloatArray) -> float:
+    def nearest_ahead_m(self, pose: FloatArray, walk_m_s: float, heed_s: float) -> float:
         """Distance from a robot's centre to the edge of the nearest body ahead of it; inf without any.
 
-        ``pose``: (3,). Ahead is all before the line across the robot.
+        ``pose``: (3,). Ahead is all before the line across the robot. Who comes faster than ``walk_m_s``
+        counts as nearer by what he gains on that in ``heed_s``.
         """
         bodies = self.tracks[self._count() & ~self._things]
         dx, dy = bodies[:, kernels.X] - pose[0], bodies[:, kernels.Y] - pose[1]
+        away = np.hypot(dx, dy)
+        comes = -(bodies[:, kernels.VX] * dx + bodies[:, kernels.VY] * dy) / np.maximum(away, 1e-6)
+        away = away - heed_s * np.maximum(comes - walk_m_s, 0.0)
         ahead = dx * math.cos(pose[2]) + dy * math.sin(pose[2]) > 0.0
-        return float(np.hypot(dx, dy)[ahead].min(initial=math.inf)) - self._config.radius_m
+        return float(away[ahead].min(initial=math.inf)) - self._config.radius_m
 
     def nearest_m(self, x_m: float, y_m: float) -> float:
         """Distance from a point to the nearest body's edge; inf without any."""

@@ -34,7 +34,7 @@ class AmongPeople:
         config, drive = self._config, scene.drive
         if self.are_near(scene):
             drive = drive._replace(turn_rate=min(drive.turn_rate, config.calm_rad_s))
-        ahead_m = scene.movers.nearest_ahead_m(scene.pose)
+        ahead_m = scene.movers.nearest_ahead_m(scene.pose, config.walk_m_s, config.heed_s)
         if ahead_m < config.calm_m or scene.movers.new_within(scene.pose, config.new_m):
             drive = drive._replace(speed=min(drive.speed, config.calm_m_s))
         self._followed = self._may_be_followed(view, scene)

@@ -59,6 +59,10 @@ class GapHorizonConfig(Config):
     calm_rad_s: Positive = 2.0
     """With a moving body so near ahead it drives no faster: behind one there may be another, whom nobody
     sees. With one so near anywhere it turns no faster: corners that swing do not stop at once."""
+    walk_m_s: NonNegative = 1.5
+    heed_s: NonNegative = 1.0
+    """Who comes faster than people walk is heeded from as much farther as he gains on a walker in this time:
+    from walk to sprint is half a second."""
     new_m: NonNegative = 5.0
     """Nor does it drive faster while somebody is so near ahead of whom it cannot tell yet where he goes: he
     may run."""
