@@ -30,6 +30,10 @@ BLIND_SHARE = 0.5
 """With more than this share of its ranges 0 the laser is covered."""
 MANY_SHARE = 0.125
 """Where somebody may move, so many beams have to end near at things that stand to correct the odometry."""
+DOUBT = 2.0
+"""Times the data sheet's standard deviation an odometry may be off."""
+STANDS = 1e-6
+"""Moved and turned by less, in metres and radians, it stands where it stood."""
 ROLL_M, MOST_OFF_M = 0.5, 1.0
 """The grids follow a robot so far from their middle: where the time to go is worked out, and at any time."""
 
@@ -281,8 +285,17 @@ class RollingGround:
         assert self._odometry is not None
         moved = math.hypot(view.pose.x_m - self._odometry.x_m, view.pose.y_m - self._odometry.y_m)
         turned = abs(wrap(view.pose.theta_rad - self._odometry.theta_rad))
-        position = config.drift_m * math.sqrt(moved) + 1e-3
-        pose_std = np.array([position, position, config.drift_rad * math.sqrt(moved + turned) + 1e-3])
+        if moved + turned < STANDS:
+            return
+        position, angle = (
+            config.drift_m * math.sqrt(moved) + 1e-3,
+            config.drift_rad * math.sqrt(moved + turned) + 1e-3,
+        )
+        if view.speed_var_m2_s2 > 0.0:
+            position = min(position, DOUBT * self._dt_s * math.sqrt(view.speed_var_m2_s2) + 1e-4)
+        if view.turn_rate_var_rad2_s2 > 0.0:
+            angle = min(angle, DOUBT * self._dt_s * math.sqrt(view.turn_rate_var_rad2_s2) + 1e-4)
+        pose_std = np.array([position, position, angle])
         ground = self._last_ground
         x, y, theta, self.partners = match.match_scan(
             self._pose[0],
