@@ -15,7 +15,7 @@ from pilotage.sensors.lidar import LidarConfig
 from pilotage.sensors.readings import LidarScan, OdometryIncrement, Readings
 from pilotage.sensors.wheel_odometry import WheelOdometryConfig
 from pilotage.stack.control.local.drive import LocalDrive
-from pilotage.stack.control.local.fine_goal import approach, is_fine, rests_within
+from pilotage.stack.control.local.fine_goal import approach, is_fine, is_led, rests_within
 from pilotage.stack.control.local.role import LOCAL_CONTROLLERS, LocalController, LocalLimits, LocalView
 from pilotage.stack.control.local.rolling import RollingGround, Scene
 from pilotage.stack.control.local.rolling_config import RollingConfig
@@ -115,8 +115,23 @@ def test_only_what_the_grid_does_not_resolve_is_fine() -> None:
     scene = scene_at(Twist(0.0, 0.0), (0.5, 0.0))
     assert is_fine(scene, 0.02)
     assert not is_fine(scene, 0.15)
-    weak = scene_at(Twist(0.0, 0.0), (0.5, 0.0), limits=LocalLimits(1.5, 0.5, 0.3, 0.3, 4.0, 6.0))
-    assert is_fine(weak, 0.15)
+
+
+def test_who_slides_through_its_goal_from_full_speed_is_led_to_it() -> None:
+    weak = scene_at(Twist(0.0, 0.0), (0.5, 0.0), limits=LocalLimits(1.5, 0.5, 1.0, 1.0, 4.0, 6.0))
+    assert not is_fine(weak, 0.25)
+    assert is_led(weak, 0.25)
+    slow = scene_at(Twist(0.0, 0.0), (0.5, 0.0), limits=LocalLimits(0.5, 0.5, 1.0, 1.0, 4.0, 6.0))
+    assert not is_led(slow, 0.25)
+
+
+@pytest.mark.parametrize("name", ["dwa", "vfh", "teb", "mppi", "pure-pursuit", "gap-horizon"])
+def test_each_rests_within_a_tolerance_that_it_slides_through(name: str) -> None:
+    """2 m from full speed with these brakes: they said that they had arrived as they came past."""
+    limits = LocalLimits(1.6, 0.5, 1.0, 1.0, 3.0, 6.0)
+    config = LOCAL_CONTROLLERS.configure(name, {}, name)
+    controller = LOCAL_CONTROLLERS.entry(name).factory(config, np.random.default_rng(1))
+    assert rest_of(controller, (3.0, 0.0), 0.25, limits, seconds=15.0) <= 0.25
 
 
 def test_who_would_slide_out_has_not_arrived() -> None:

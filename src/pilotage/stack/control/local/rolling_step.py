@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pilotage.core.types import STOP, Twist
-from pilotage.stack.control.local.fine_goal import approach, is_fine, rests_within
+from pilotage.stack.control.local.fine_goal import approach, is_led, rests_within
 from pilotage.stack.control.local.role import LocalView
 from pilotage.stack.control.local.rolling import RollingGround, Scene
 from pilotage.stack.control.local.rolling_config import RollingConfig
@@ -19,13 +19,13 @@ class RollingController:
     def step(self, view: LocalView) -> Twist:
         """Take the view in and give the next command."""
         scene = self._careful(view, self._ground.update(view))
-        fine = is_fine(scene, view.goal_tolerance_m)
-        if fine:
+        led = is_led(scene, view.goal_tolerance_m)
+        if led:
             arrived = rests_within(scene, view.goal_tolerance_m)
         else:
             arrived = scene.distance_m < view.goal_tolerance_m
         command: Twist | None = STOP if arrived or scene.blind else None
-        if command is None and fine:
+        if command is None and led:
             command = approach(scene, view.goal_tolerance_m)
         if command is None:
             command = self._decide(view, scene)
