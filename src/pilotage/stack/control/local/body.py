@@ -8,6 +8,9 @@ from pilotage.core.errors import InputError
 from pilotage.core.types import FloatArray
 from pilotage.kernels.control.footprint import Body, polygon_distance
 
+ROUND = 0.95
+"""With an inner radius of this share of the outer one or more a body is taken for a disc."""
+
 
 def make_body(footprint_xy_m: FloatArray) -> Body:
     """Check a convex footprint (K, 2) around the base's origin and bound it.
@@ -32,7 +35,9 @@ def make_body(footprint_xy_m: FloatArray) -> Body:
     if inner <= 0.0:
         raise InputError("footprint: expected the base's origin inside; shift the corners or the base")
     outer = float(np.hypot(polygon[:, 0], polygon[:, 1]).max())
-    return Body(polygon, inner, outer, _covering_discs(polygon))
+    # Discs over pieces stick out of a round body by up to 0.12 m, and turn: one stays where it stands.
+    round_one = np.array([[0.0, 0.0, outer]])
+    return Body(polygon, inner, outer, round_one if inner > ROUND * outer else _covering_discs(polygon))
 
 
 def _covering_discs(polygon: FloatArray) -> FloatArray:

@@ -48,7 +48,9 @@ LOOKS_PAST_M, LOOKS_ASIDE_M = 2.0, 0.025
 """Where it is stuck it forgets what the scan looks past so near, and by so little to the side."""
 TRIED_M = 0.3
 """Two narrow places nearer to each other than this are one."""
-SPEEDS = np.array([1.0, 0.7, 0.45, 0.25])
+SPEEDS = np.array([1.0, 0.7, 0.45, 0.25, 0.0])
+"""Shares of the top speed at which its way is pursued; with none it turns to it on the spot, which no sample
+does: who saw a quarter of the circle stood beside ground that it had but to turn to."""
 LOOKS = np.array([[0.3, 0.1], [0.45, 0.3]])
 TURNS_M_S = 0.1
 """Slower than this it brakes before it could get around anything."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pilotage.core.types import STOP, Twist
 from pilotage.stack.control.local.fine_goal import approach, is_led, rests_within
+from pilotage.stack.control.local.look_around import LookAround
 from pilotage.stack.control.local.role import LocalView
 from pilotage.stack.control.local.rolling import RollingGround, Scene
 from pilotage.stack.control.local.rolling_config import RollingConfig
@@ -14,6 +15,7 @@ class RollingController:
 
     def __init__(self, ground: RollingConfig, *, foresees: bool = False) -> None:
         self._ground = RollingGround(ground, foresees=foresees)
+        self._around = LookAround()
         self.status = "waiting"
 
     def step(self, view: LocalView) -> Twist:
@@ -27,6 +29,8 @@ class RollingController:
         command: Twist | None = STOP if arrived or scene.blind else None
         if command is None and led:
             command = approach(scene, view.goal_tolerance_m)
+        if command is None:
+            command = self._around.step(view, scene)
         if command is None:
             command = self._decide(view, scene)
         self._ground.sent(view.t_s, command)
