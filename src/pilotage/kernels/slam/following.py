@@ -21,6 +21,7 @@ from pilotage.kernels.slam.placing import (
 )
 from pilotage.kernels.slam.scan_lines import rays_of, scan_cloud
 from pilotage.kernels.slam.slips import add_slip
+from pilotage.kernels.slam.wheels import HELD, Wheels, learn_wheels, righted
 
 SURE_GUESS = 0.035
 """Usual error of the guesses (a radian as half a metre) up to which people are told from walls by odometry:
@@ -51,6 +52,8 @@ class Track(NamedTuple):
         (3, 3) of ``add_slip`` since the last keyframe.
     crowded
         (1,) in how many scans so much seemed to move that they were left whole.
+    wheels
+        What the odometry is always off by.
     """
 
     pose: FloatArray
@@ -61,6 +64,7 @@ class Track(NamedTuple):
     slip: FloatArray
     held: FloatArray
     crowded: IntArray
+    wheels: Wheels
 
 
 class Look(NamedTuple):
@@ -213,36 +217,46 @@ def settle(
     add_slip(track.slip, track.held, start, pose, hessian, told[3], error, leads, prior)
     track.usual[0] += 0.02 * (told[0] - track.usual[0])
     track.usual[1] += 0.05 * (told[2] - track.usual[1])
-    learn_motion(track.errors, track.velocity, step, led, between(track.pose, pose), dt_s)
+    motion = between(track.pose, pose)
+    if led:
+        c, s = math.cos(pose[2]), math.sin(pose[2])
+        holds = c * c * hessian[0, 0] + 2.0 * c * s * hessian[0, 1] + s * s * hessian[1, 1]
+        learn_wheels(track.wheels, step, motion, holds > HELD * told[3])
+    learn_motion(track.errors, track.velocity, step, led, motion, dt_s)
     track.pose[:] = pose
 
 
 @kernel
-def motion_of(recording: Recording, scan: int) -> tuple[FloatArray, FloatArray]:
-    """Motion (3,) by the odometry since the last scan, and what else (M, 3) it may be."""
+def motion_of(recording: Recording, scan: int, wheels: Wheels) -> tuple[FloatArray, FloatArray]:
+    """Motion (3,) by the odometry since the last scan, righted, and what else (M, 3) it may be."""
     if recording.at_scans.shape[0] == 0:
         return np.zeros(3), np.zeros((0, 3))
     first, end = recording.starts[scan], recording.starts[scan + 1]
-    step = between(recording.anchor, recording.at_scans[scan])
-    return step, between_all(recording.anchor, recording.others[first:end])
+    step = righted(wheels, between(recording.anchor, recording.at_scans[scan]))
+    others = between_all(recording.anchor, recording.others[first:end])
+    for k in range(others.shape[0]):
+        others[k] = righted(wheels, others[k])
+    return step, others
 
 
 @kernel
-def move_anchor(recording: Recording, scan: int, motion: FloatArray) -> None:
+def move_anchor(recording: Recording, scan: int, wheels: Wheels, motion: FloatArray) -> None:
     """Count the next motion from the reading that the one of a scan (3,) was nearest to.
 
     Loggers stamp what they receive, in bursts, and late: that need not be the reading at the stamp.
     """
     if recording.at_scans.shape[0] == 0:
         return
-    step, others = motion_of(recording, scan)
+    step, others = motion_of(recording, scan, wheels)
     usual = distance(step, motion)
     best, least = -1, 0.5 * usual
     for k in range(others.shape[0]):
         apart = distance(others[k], motion)
         if usual > OTHER_READING_M and apart < least:
             best, least = k, apart
-    recording.anchor[:] = recording.at_scans[scan] if best < 0 else composed(recording.anchor, others[best])
+    recording.anchor[:] = (
+        recording.at_scans[scan] if best < 0 else recording.others[recording.starts[scan] + best]
+    )
 
 
 @kernel
@@ -341,12 +355,12 @@ def follow(
         ):
             rays, seen_from = rays_of(recording.first_rad[i], recording.step_rad[i], beams), i
         cloud = scan_cloud(recording.ranges_m[i, :beams], rays, recording.step_rad[i], limits[0], limits[1])
-        step, others = motion_of(recording, i)
+        step, others = motion_of(recording, i, track.wheels)
         dt_s = recording.dt_s[i]
         kept, light, sure = look(cloud, step, led, others, dt_s, prior, track, map_, views, out)
         if not sure:
             return i, DOUBT, cloud, kept, light
-        move_anchor(recording, i, between(track.pose, out.pose))
+        move_anchor(recording, i, track.wheels, between(track.pose, out.pose))
         settle(out.pose, out.hessian, out.start, out.told, step, led, dt_s, prior, track)
         if is_new(between(track.keyframe, track.pose), limits[2], limits[3]):
             keep(i, cloud, kept, out.hessian, led, local, track, map_, views, keyframes)

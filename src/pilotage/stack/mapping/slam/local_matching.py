@@ -34,6 +34,7 @@ from pilotage.kernels.slam.local_map import (
 )
 from pilotage.kernels.slam.movers import empty_views
 from pilotage.kernels.slam.placing import ITERATIONS, LONG_M, REACH_M, SCALE_M, distance, plausibility
+from pilotage.kernels.slam.wheels import unknown_wheels
 from pilotage.stack.mapping.slam.config import SlamConfig
 from pilotage.stack.mapping.slam.fit import Fit
 from pilotage.stack.mapping.slam.surroundings import KEYFRAMES, Surroundings, every_second, in_range
@@ -102,6 +103,7 @@ class LocalMatcher:
             np.zeros((3, 3)),
             np.zeros((3, 3)),
             np.zeros(1, np.int64),
+            unknown_wheels(),
         )
         self.found = Look(
             np.zeros((3, 3)), np.zeros(3, np.int64), np.zeros(3), np.zeros((3, 3)), np.zeros(3), np.zeros(4)

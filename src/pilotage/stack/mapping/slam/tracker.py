@@ -18,6 +18,7 @@ from pilotage.kernels.slam.following import (
     move_anchor,
 )
 from pilotage.kernels.slam.frames import between, composed
+from pilotage.kernels.slam.wheels import righted
 from pilotage.logs.laser_log import LaserLog
 from pilotage.stack.mapping.slam.clouds import LEAST_RANGE_M, Clouds, cloud_of
 from pilotage.stack.mapping.slam.config import SlamConfig
@@ -137,6 +138,12 @@ class Tracker:
     ) -> bool:
         """Place the next scan (K, 6); True where it became a keyframe. As ``LocalMatcher.search``."""
         self._matcher.make_room(len(cloud), step is not None)
+        if step is not None:
+            wheels = self._matcher.track.wheels
+            step, others = (
+                righted(wheels, step),
+                np.array([righted(wheels, o) for o in others]).reshape(-1, 3),
+            )
         kept, light, sure = self._matcher.look(cloud, step, others, dt_s)
         if not self._poses:
             self._poses.append(np.zeros(3))
@@ -183,11 +190,11 @@ class Tracker:
             if why == FULL:
                 matcher.make_room(int(recording.beams[at]), led)
             elif why == DOUBT:
-                step, others = motion_of(recording, at)
+                step, others = motion_of(recording, at, matcher.track.wheels)
                 told, last, dt_s = step if led else None, self.pose, float(recording.dt_s[at])
                 fit = matcher.search(light, told, others, dt_s, float(gaps_s[at]))
                 moved = matcher.found.motions[0] if fit is None else between(last, fit.pose)
-                move_anchor(recording, at, moved)
+                move_anchor(recording, at, matcher.track.wheels, moved)
                 if fit is not None:
                     matcher.settle(fit, told, dt_s)
                 self._take_in(cloud, kept, light, fit, told)
