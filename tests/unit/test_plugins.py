@@ -169,3 +169,71 @@ def test_a_plugin_that_fails_is_told_as_the_plugins(tmp_path: Path) -> None:
     assert all("pilotage/" not in line for line in lines[:-1])
     assert lines[-1] == f"pilotage: plugin '{file}' line 14: ZeroDivisionError: float division by zero"
     assert not (tmp_path / "runs").exists()
+
+
+BAD_LOCALIZER = """
+import sys
+import numpy as np
+from pilotage.core.config import Config
+from pilotage.core.types import Pose2
+from pilotage.stack.interface import Belief
+from pilotage.stack.localization.localizer import LOCALIZERS
+print("good morning")
+class Mine(Config):
+    "Nothing."
+@LOCALIZERS.add("mine", Mine)
+class MyLocalizer:
+    def __init__(self, config, robot, chart, initial, journal):
+        self.belief = initial
+    def step(self, readings):
+        return {gives}
+"""
+BAD_CONTROLLER = """
+from pilotage.core.config import Config
+from pilotage.stack.control.controller import CONTROLLERS
+class Mine(Config):
+    "Nothing."
+@CONTROLLERS.add("mine", Mine)
+class MyController:
+    def __init__(self, config, robot):
+        pass
+    def reset(self):
+        pass
+    def step(self, pose, reference, feedforward):
+        return feedforward
+"""
+
+
+@pytest.mark.parametrize(
+    ("role", "text", "told"),
+    [
+        (
+            "localizer",
+            BAD_LOCALIZER.format(gives="Belief(Pose2(1.0, 1.0, 0.0), np.full((3, 3), np.nan))"),
+            "pilotage: localizer 'mine': expected a Belief of finite pose and finite covariance (3, 3)",
+        ),
+        ("localizer", BAD_LOCALIZER.format(gives="sys.exit(0)"), "line 16: SystemExit: 0"),
+        ("localizer", BAD_LOCALIZER.format(gives="open('/none/x')"), "line 16: FileNotFoundError: "),
+        ("controller", BAD_CONTROLLER, "is not what its role gives: AttributeError: 'Twist' object has no"),
+    ],
+)
+def test_a_plugin_that_gives_something_else_is_named(tmp_path: Path, role: str, text: str, told: str) -> None:
+    """They ended in a traceback as bugs of ours, in nothing at all, or drove about until the time limit."""
+    file = tmp_path / "mine.py"
+    file.write_text(text)
+    words = ("--plugin", str(file), "--set", f"stack.{role}.name=mine", "--json", "--out", "runs")
+    done = pilotage("run", "museum-hall", *words, folder=tmp_path)
+    assert (done.returncode, done.stdout) == (2, "")
+    last = done.stderr.splitlines()[-1]
+    assert told in last
+    assert "'mine'" in last or str(file) in last
+    assert not (tmp_path / "runs").exists()
+
+
+def test_what_a_plugin_says_as_it_is_read_stays_off_standard_output(tmp_path: Path) -> None:
+    file = tmp_path / "mine.py"
+    file.write_text("print('good morning')\n")
+    done = pilotage("components", "--json", "--plugin", str(file), folder=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert json.loads(done.stdout)
+    assert "good morning" in done.stderr

@@ -119,20 +119,26 @@ def _run(arguments: list[str]) -> int:
         return code
     except BrokenPipeError:
         raise
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         stopped = interruption_in(error)
         if stopped is not None:
             raise stopped from None
         if isinstance(error, InputError):
             return _say(str(error), BAD_INPUT)
+        from pilotage.core.plugins import consequence_of, fault_of
+
+        fault = fault_of(error)
+        if fault is not None:
+            print(fault.traceback, file=sys.stderr)
+            return _say(fault.line, BAD_INPUT)
+        if isinstance(error, SystemExit):
+            raise
         if isinstance(error, OSError):
             place = f"{error.filename}: " if error.filename else ""
             return _say(f"{place}{error.strerror or error}", BAD_INPUT)
         if isinstance(error, MemoryError):
             return _say("this needs more memory than there is; take a smaller or coarser input", BAD_INPUT)
-        from pilotage.core.plugins import fault_of
-
-        fault = fault_of(error)
+        fault = consequence_of(error)
         if fault is not None:
             print(fault.traceback, file=sys.stderr)
             return _say(fault.line, BAD_INPUT)

@@ -11,6 +11,7 @@ import os
 import sys
 import traceback
 from collections.abc import Iterable, Mapping
+from contextlib import redirect_stdout
 from dataclasses import dataclass
 from importlib.metadata import entry_points
 from pathlib import Path
@@ -26,6 +27,8 @@ _loaded: dict[str, str] = {}
 _packages: dict[str, str] = {}
 """Folder or file of each installed plugin's code, by the entry point's name."""
 _seen_entry_points = False
+_in_use: dict[str, None] = {}
+"""Modules from outside of which something was taken, in the order of that."""
 
 
 def add_plugins(files: Iterable[str]) -> None:
@@ -60,7 +63,8 @@ def load_plugins() -> None:
     _seen_entry_points = True
     for entry in entry_points(group=GROUP):
         try:
-            entry.load()
+            with redirect_stdout(sys.stderr):
+                entry.load()
             _packages[entry.name] = _home(entry.value)
         except InputError as error:
             raise InputError(f"plugin '{entry.name}': {error}") from None
@@ -88,7 +92,8 @@ def load_file(path: str) -> None:
     _loaded[path] = name
     sys.modules[name] = module
     try:
-        spec.loader.exec_module(module)
+        with redirect_stdout(sys.stderr):  # standard output may be for one JSON object alone
+            spec.loader.exec_module(module)
     except (Exception, SystemExit) as error:
         # Asked for once more it is refused once more.
         del _loaded[path], sys.modules[name]
@@ -119,6 +124,36 @@ def fault_of(error: BaseException) -> Fault | None:
     told = "".join(traceback.format_exception_only(error)).strip()
     text = "Traceback of the plugin (most recent call last):\n" + "".join(traceback.format_list(own)) + told
     return Fault(f"plugin {homes[home]} {place}: {type(error).__name__}: {error}", text)
+
+
+def take(module: str) -> None:
+    """Note that something of a module is used; of the package's own nothing is noted."""
+    if is_from_outside(module):
+        _in_use[module] = None
+
+
+def is_from_outside(module: str) -> bool:
+    """Whether a module is not one of the package's own."""
+    return module.partition(".")[0] != "pilotage"
+
+
+def consequence_of(error: BaseException) -> Fault | None:
+    """Blame what plugins gave for an error in our own code; None where nothing of theirs is in use.
+
+    One that gives a text for a number, or an array of another shape, is gone again when that is found out.
+    """
+    homes = {path: f"'{path}'" for path in _loaded}
+    homes |= {home: f"'{name}'" for name, home in _packages.items() if home}
+    files = [str(getattr(sys.modules.get(name), "__file__", "")) for name in _in_use]
+    used = dict.fromkeys(homes[home] for file in files if (home := _home_of(file, homes)) is not None)
+    if not used:
+        return None
+    text = "".join(traceback.format_exception(error)).rstrip()
+    whose = f"plugin {', '.join(used)}" if len(used) == 1 else f"plugins {', '.join(used)}"
+    told = traceback.format_exception_only(error)[-1].strip()
+    return Fault(
+        f"{whose}: something that it gave, by the lines above, is not what its role gives: {told}", text
+    )
 
 
 def _home_of(file: str, homes: Mapping[str, str]) -> str | None:

@@ -14,7 +14,7 @@ from typing import Any, Generic, TypeVar
 
 from pilotage.core.config import Config, validate
 from pilotage.core.errors import InputError, unknown_name
-from pilotage.core.plugins import load_plugins
+from pilotage.core.plugins import load_plugins, take
 
 RENAMED = {"ekf-slow-errors": "ekf-gauss-markov", "mcl-likelihood-field": "particle-filter"}
 """Components' old names, each with today's."""
@@ -77,7 +77,9 @@ class Registry(Generic[T]):
             raise InputError(f"{self.role} '{name}': is now '{RENAMED[name]}'")
         if name not in self._entries:
             raise unknown_name(self.role, name, self._entries)
-        return self._entries[name]
+        found = self._entries[name]
+        take(found.factory.__module__)
+        return found
 
     def configure(self, name: str, parameters: dict[str, Any], where: str) -> Config:
         """Validate ``parameters`` against the config of ``name``."""

@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import replace
 
 from pilotage.core.errors import InputError, nearest
+from pilotage.core.plugins import take
 from pilotage.core.types import FloatArray
 from pilotage.evaluation.metric import Clock, Compute, Metric, unnamed
 
@@ -52,6 +53,7 @@ class Metrics:
 
         def register(compute: Compute) -> Compute:
             self.add(replace(metric, compute=compute))
+            take(compute.__module__)
             return compute
 
         return register
