@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -254,3 +255,18 @@ def test_an_event_without_a_time_has_no_place_in_a_recording(
     with pytest.raises(InputError, match="expected the time of every event"):
         pl.export(str(folder), to, tmp_path / "out")
     assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("form", sorted(FORMS))
+def test_a_full_disk_is_told_with_the_file(
+    run: pl.Run, form: str, small_disk: Callable[[str], Path], capfd: pytest.CaptureFixture[str]
+) -> None:
+    """Nobody was told of which disk it was; SQLite's and Rerun's words for it were bugs of ours."""
+    if form == "rerun":
+        pytest.importorskip("rerun", reason="needs the extra 'rerun'")
+    place = small_disk("8k") / "it"
+    assert main(["export", str(run.folder), "--to", form, "--out", str(place)]) == 2
+    told = next(line for line in capfd.readouterr().err.splitlines() if line.startswith("pilotage: "))
+    assert told.startswith(f"pilotage: {place}: ")
+    assert "space left" in told or "room on the disk" in told
+    assert list(place.parent.iterdir()) == []

@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+import errno
+import os
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -50,7 +55,7 @@ def write_rerun(path: Path, folder: Path) -> None:
         raise InputError(f"{path}: expected a name of plain characters, as Rerun takes no other")
     first, whole = read_run(folder), read_trace(folder)
     require_times(first.events, folder)
-    with draft_of(path) as draft:
+    with draft_of(path) as draft, _errors_of_the_system():
         draft.touch()  # where nothing can be written the system says so, not Rerun by an error of its own
         stream = rr.RecordingStream("pilotage", recording_id=shown(folder.name))
         stream.save(draft)
@@ -65,6 +70,20 @@ def write_rerun(path: Path, folder: Path) -> None:
             stream.log("/events", rr.TextLog(f"{event.kind}: {event.text}"))
         stream.flush()
         stream.disconnect()
+
+
+@contextmanager
+def _errors_of_the_system() -> Iterator[None]:
+    """Rerun tells what the system refuses, such as room on the disk, in words of its own."""
+    try:
+        yield
+    except RuntimeError as error:
+        number = re.search(r"\(os error (\d+)\)", str(error))
+        if number is not None:
+            raise OSError(int(number[1]), os.strerror(int(number[1]))) from error
+        if "File-writer thread" not in str(error):
+            raise
+        raise OSError(errno.EIO, "Rerun stopped writing; is there room on the disk?") from error
 
 
 def _world(rr: Any, stream: Any, data: RunData) -> None:

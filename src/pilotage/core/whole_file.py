@@ -9,12 +9,25 @@ from pathlib import Path
 
 
 @contextmanager
+def named(path: Path, draft: Path) -> Iterator[None]:
+    """What fails inside and names no file, as writing to a full disk does, or the draft, names ``path``."""
+    try:
+        yield
+    except OSError as error:
+        told = error.filename
+        if error.errno is None or not (told is None or str(told).startswith(str(draft))):
+            raise
+        raise OSError(error.errno, error.strerror or str(error), str(path)) from error
+
+
+@contextmanager
 def draft_of(path: Path) -> Iterator[Path]:
     """A draft that takes the place of ``path`` when it is whole: two processes may write at once."""
     draft = path.with_name(f".{path.name}.{os.getpid()}")
     try:
-        yield draft
-        draft.replace(path)
+        with named(path, draft):
+            yield draft
+            draft.replace(path)
     finally:
         draft.unlink(missing_ok=True)
 

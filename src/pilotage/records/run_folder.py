@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from pilotage.core.types import Event
+from pilotage.core.whole_file import named
 from pilotage.maps.occupancy_grid import OccupancyGrid
 from pilotage.maps.ros_map import RosMap, write_ros_map
 from pilotage.records.cells import SheetData, write_cells
@@ -129,8 +130,9 @@ def draft_folder(final: Path) -> Iterator[Path]:
     draft = Path(tempfile.mkdtemp(prefix=f".{final.name}-", dir=final.parent))
     try:
         draft.chmod(0o777 & ~_umask())
-        yield draft
-        replace_folder(draft, final)
+        with named(final, draft):
+            yield draft
+            replace_folder(draft, final)
     except BaseException:
         shutil.rmtree(draft, ignore_errors=True)
         with suppress(OSError):  # another run is in one of them already

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import errno
+import os
+import sqlite3
 import tempfile
 from collections.abc import Mapping
 from pathlib import Path
@@ -38,7 +41,12 @@ def write_ros2(folder: Path, messages: RunMessages) -> None:
     rosbag2 = rosbags("rosbag2")
     with draft_folder(folder) as draft:
         inner = draft / folder.name
-        _write(rosbag2.Writer(inner, version=ROS2_VERSION), "LATEST", messages)
+        try:
+            _write(rosbag2.Writer(inner, version=ROS2_VERSION), "LATEST", messages)
+        except sqlite3.OperationalError as error:  # it writes into a database
+            full = error.sqlite_errorcode == sqlite3.SQLITE_FULL
+            number = errno.ENOSPC if full else errno.EIO
+            raise OSError(number, os.strerror(number)) from error
         for file in inner.iterdir():
             file.replace(draft / file.name)
         inner.rmdir()
