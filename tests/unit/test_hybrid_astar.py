@@ -120,3 +120,15 @@ def test_the_same_query_has_the_same_answer() -> None:
     assert first.path is not None
     assert second.path is not None
     assert (first.path.states == second.path.states).all()
+
+
+def test_a_small_table_of_cells_finds_the_same_path() -> None:
+    """On large maps only the cells that are reached are kept: all of one of 256 m took 3 GB."""
+    query = request(WORLDS["a wall to go around"], Pose2(1.5, 4.5, 0.0), Goal(7.5, 5.5, 0.0))
+    few, many = (
+        HybridAstarPlanner(HybridAstarConfig(most_expansions=most)).plan(query) for most in (4000, 150_000)
+    )
+    assert few.path is not None
+    assert many.path is not None
+    assert few.reason == many.reason, "as many expansions, as long a path"
+    assert np.array_equal(few.path.states, many.path.states)

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pilotage.kernels.arrays import FloatArray
+from pilotage.kernels.arrays import FloatArray, IntArray
 from pilotage.kernels.bodies.outline import outline_clearance
 from pilotage.kernels.geometry.field import interpolate_at
 from pilotage.kernels.jit import kernel
@@ -106,6 +106,16 @@ def path_fits(states: FloatArray, turns: bool, car: Car, ground: Ground) -> bool
 
 
 @kernel
+def _slot(keys: IntArray, place: int) -> int:
+    """Where a place is in a table of open addresses, -1 where none is; a power of two long, half empty."""
+    mask = keys.shape[0] - 1
+    at = ((place * -7046029254386353131) >> 20) & mask  # Fibonacci hashing (Knuth 1998, 6.4)
+    while keys[at] != -1 and keys[at] != place:
+        at = (at + 1) & mask
+    return int(at)
+
+
+@kernel
 def search(
     start: FloatArray,
     goal: FloatArray,
@@ -139,8 +149,15 @@ def search(
     ny, nx = to_go.shape
     columns = math.ceil((nx - 1) * ground.spacing / cell) + 1
     rows = math.ceil((ny - 1) * ground.spacing / cell) + 1
-    best = np.full(columns * rows * headings, np.inf)
-    closed = np.zeros(columns * rows * headings, np.bool_)
+    # No more cells are reached than there is room for nodes: of a large map only those are kept.
+    places = columns * rows * headings
+    table = 1
+    while table < 2 * nodes.shape[0]:
+        table *= 2
+    hashed = places > table
+    keys = np.full(table if hashed else 0, -1, np.int64)
+    best = np.full(table if hashed else places, np.inf)
+    closed = np.zeros(best.shape[0], np.bool_)
     cost = np.empty(nodes.shape[0])
     where = np.empty(nodes.shape[0], np.int64)
     nodes[0] = start
@@ -196,7 +213,8 @@ def search(
                 continue
             turns = eth - 2.0 * math.pi * math.floor(eth / (2.0 * math.pi))
             bin_ = min(int(turns / width), headings - 1)
-            key = (row * columns + col) * headings + bin_
+            place = (row * columns + col) * headings + bin_
+            key = _slot(keys, place) if hashed else place
             if closed[key]:
                 continue
             price = step * (prices.reverse if sign < 0.0 else 1.0)
@@ -208,6 +226,8 @@ def search(
             if new >= best[key]:
                 continue
             best[key] = new
+            if hashed:
+                keys[key] = place
             u, v = (ex - ground.x0) / ground.spacing, (ey - ground.y0) / ground.spacing
             iu, iv = min(max(int(u + 0.5), 0), nx - 1), min(max(int(v + 0.5), 0), ny - 1)
             around = to_go[iv, iu] - ground.spacing
