@@ -17,7 +17,7 @@ from pilotage.stack.patrol.roadmap import Roadmap
 if TYPE_CHECKING:
     from pilotage.stack.patrol.messages import PatrolState
 
-DETOUR_M = 0.5
+DETOUR_M = 1.0
 """Edges that are longer by less are as they were; longer ones are told in steps of this."""
 
 
