@@ -129,6 +129,26 @@ def test_in_rooms_robots_do_not_follow_each_other_through_all_doors() -> None:
     assert best_plan(setting, 8, AdaptiveRoundsConfig()).sizes == (8,)  # as if two could meet everywhere
 
 
+@pytest.mark.parametrize(
+    ("speed_m_s", "rate_rad_s", "turn_m"), [(1.0, 2.0, np.pi / 2 + 0.25 - 1.0), (0.2, 2.0, 0.0)]
+)
+def test_what_turning_back_costs_is_what_the_slowest_says(
+    speed_m_s: float, rate_rad_s: float, turn_m: float
+) -> None:
+    """Beyond the way of half a metre to the place and back, which who turns there is spared."""
+    values = read_mission("museum-patrol")
+    values["world"] = rooms(2, 1)
+    motion = {"name": "differential-drive", "max_speed_m_s": speed_m_s, "max_turn_rate_rad_s": rate_rad_s}
+    values["robot"]["motion"] = motion
+    values["team"] = {"size": 2, "strategy": "adaptive-rounds", "radio": {}}
+    values["task"], values["run"]["time_limit_s"] = {"name": "patrol", "duration_s": 1.0}, 1.0
+    experiment = build(mission_of(values, seed=0))
+    task: Any = experiment.task
+    assert task.patrol.turn_m == pytest.approx(turn_m)
+    stack: Any = experiment.team[1].stack
+    assert stack._context.task.strategy._setting.turn_m == task.patrol.turn_m
+
+
 def test_more_robots_than_places_stand_at_them() -> None:
     graph, _ = row(walled(14, 5), (1.0, 2.5), (7.0, 2.5), (13.0, 2.5))
     setting = PatrolSetting(graph, 0, np.arange(8) % 3, 1.0, np.random.default_rng(0))

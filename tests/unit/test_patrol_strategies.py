@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -14,7 +15,7 @@ from hypothesis import strategies as st
 from contract.patrol_examples import lattice
 from pilotage.evaluation.idleness import Idleness, idleness
 from pilotage.experiments.graph_patrol import GraphPatrol, Radio, patrol
-from pilotage.kernels.patrol.rounds import judge_walk
+from pilotage.kernels.patrol.rounds import BACK, judge_walk, plan_cost
 from pilotage.stack.patrol.graph import PatrolGraph
 from pilotage.stack.patrol.messages import PatrolMemory
 from pilotage.stack.patrol.partition import Plan, annealed, even_sizes, partition
@@ -131,15 +132,22 @@ def test_shares_hold_every_vertex_and_are_level(groups: int, seed: int) -> None:
 
 
 @settings(max_examples=15, deadline=None)
-@given(st.integers(1, 4), st.integers(0, 1000))
-def test_walks_are_judged_as_robots_that_go_round_visit(size: int, seed: int) -> None:
-    """By hand: who passes each place when, over some rounds."""
+@given(st.integers(1, 4), st.integers(0, 1000), st.sampled_from([0.0, 1.5]))
+def test_walks_are_judged_as_robots_that_go_round_visit(size: int, seed: int, turn_m: float) -> None:
+    """By hand: who passes each place when, over some rounds, some time lost wherever it turns back."""
     rng = np.random.default_rng(seed)
     graph = random_graph(seed)
     order = rng.permutation(len(graph))[: rng.integers(2, 12)].astype(np.int64)
     walk = Round.through(graph, order)
     worst, mean = np.empty(len(graph)), np.empty(len(graph))
-    judge_walk(order, size, (graph.next_hop.copy(), graph.edges_m.copy()), worst, mean)
+    places = graph.vertices_xy_m.copy()
+    judge_walk(order, size, (graph.next_hop.copy(), graph.edges_m.copy(), places, turn_m), worst, mean)
+    to_last = places[np.roll(walk.stops, 1)] - places[walk.stops]
+    to_next = places[np.roll(walk.stops, -1)] - places[walk.stops]
+    bearing = [np.arctan2(to[:, 1], to[:, 0]) for to in (to_last, to_next)]
+    back = np.cos(bearing[0] - bearing[1]) > BACK
+    at_m = walk.at_m + turn_m * np.concatenate([[0], np.cumsum(back)[:-1]])
+    walk = replace(walk, at_m=at_m, length_m=walk.length_m + turn_m * float(back.sum()))
     for vertex in range(len(graph)):
         passes = [at for stop, at in zip(walk.stops, walk.at_m, strict=True) if stop == vertex]
         if not passes:
@@ -154,6 +162,21 @@ def test_walks_are_judged_as_robots_that_go_round_visit(size: int, seed: int) ->
         gaps = np.diff(times)
         assert worst[vertex] == pytest.approx(gaps.max(), abs=1e-6)
         assert mean[vertex] == pytest.approx((gaps**2).sum() / (2.0 * gaps.sum()), rel=1e-6)
+
+
+@pytest.mark.parametrize(("seed", "sizes"), [(1, (1,) * 6), (5, (1,) * 6), (1, (2, 1))])
+def test_walks_turn_back_less_where_that_costs(seed: int, sizes: tuple[int, ...]) -> None:
+    """Judged with turns, against walks that are short by lengths alone."""
+    graph, turn_m = random_graph(seed), 2.0
+
+    def cost(plan: Plan) -> float:
+        gaps = np.empty((2, len(sizes), len(graph)))
+        ground = graph.next_hop.copy(), graph.edges_m.copy(), graph.vertices_xy_m.copy(), turn_m
+        for group, walk in enumerate(plan.rounds):
+            judge_walk(walk.stops, sizes[group], ground, gaps[0, group], gaps[1, group])
+        return float(plan_cost(gaps[0], gaps[1], np.array(sizes), 2.0, 0.0))
+
+    assert cost(annealed(graph, sizes, 2.0, 0.0, turn_m)) < 0.99 * cost(annealed(graph, sizes, 2.0, 0.0))
 
 
 @pytest.mark.parametrize(

@@ -23,6 +23,7 @@ from pilotage.evaluation.tasks.task import TASKS, Attempt, TaskSetting
 from pilotage.evaluation.tasks.team import verdict
 from pilotage.maps.floor import Floor
 from pilotage.missions.places import GoalConfig
+from pilotage.models.motion.motion import MOTIONS, MotionConfig
 from pilotage.sensors.lidar import LidarConfig
 from pilotage.sensors.sensor import SENSORS, NonNegative, Positive
 from pilotage.stack.interface import BeliefStatus
@@ -81,7 +82,8 @@ class PatrolTask:
         radius_m = max(footprint.radius_m for footprint in setting.footprints)
         passages = Passages.of(self._site, graph, radius_m)
         starts_m = _starts_m(graph, self._site, setting)
-        self.patrol = PatrolSite(graph, config.visit_m, near_m, starts_m, passages)
+        turn_m = max(_turn_m(setting, index, near_m) for index in range(len(self._names)))
+        self.patrol = PatrolSite(graph, config.visit_m, near_m, starts_m, passages, turn_m)
         self.columns, self.goals = {}, ()
         self.events: list[Event] = []
         self._visits = VisitLog(graph.vertices_xy_m, config.visit_m, len(self._names))
@@ -249,6 +251,20 @@ def _starts_m(graph: PatrolGraph, floor: Floor, setting: TaskSetting) -> FloatAr
         place = np.array([start.x_m, start.y_m])
         found.append(floor.away_m(graph.vertices_xy_m, place, f"start of robot {index}"))
     return np.array(found)
+
+
+def _turn_m(setting: TaskSetting, index: int, near_m: float) -> float:
+    """What a robot that turns back at a place loses by that, as a distance at full speed.
+
+    By its data sheet, turning while it brakes and gets up speed; the way to the place and back it drives but
+    to within ``near_m`` of it.
+    """
+    choice = setting.mission.members[index].motion
+    sheet = MOTIONS.configure(choice.name, choice.parameters, f"robot {index}")
+    assert isinstance(sheet, MotionConfig), "looked at when the robot was built"
+    speed_m_s, rate_rad_s = sheet.top_speed_m_s, sheet.top_turn_rate_rad_s
+    turn_s = math.pi / rate_rad_s + rate_rad_s / sheet.turn_acceleration_rad_s2
+    return max(0.0, speed_m_s * max(speed_m_s / sheet.braking_m_s2, turn_s) - 2.0 * near_m)
 
 
 def _lidar(setting: TaskSetting, index: int) -> LidarConfig | None:

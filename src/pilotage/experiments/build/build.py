@@ -349,6 +349,7 @@ def _share(mission: Mission, index: int, sheet: RobotKnowledge, whole: Task) -> 
         sheet.streams.stream("strategy"),
         passages=site.passages,
         starts_m=site.starts_m,
+        turn_m=site.turn_m,
     )
     assert mission.team.strategy is not None, "the task looked"
     strategy = build_component(STRATEGIES, mission.team.strategy, "strategy", setting)

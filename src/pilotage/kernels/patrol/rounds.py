@@ -14,8 +14,11 @@ import numpy as np
 from pilotage.kernels.arrays import FloatArray, IntArray
 from pilotage.kernels.jit import kernel
 
-Ground: TypeAlias = tuple[IntArray, FloatArray]
-"""The vertex after the first on the shortest path to the second (V, V); lengths of edges (V, V)."""
+Ground: TypeAlias = tuple[IntArray, FloatArray, FloatArray, float]
+"""The vertex after the first on the shortest path to the second (V, V); lengths of edges (V, V); places
+(V, 2); and what turning back at one costs, as a length."""
+BACK = 0.42
+"""Who comes from a direction and leaves by one whose cosine with it is no less turns back."""
 
 LONGEST_CHAIN = 3
 REVERSED, MOVED, TURNED = 0.2, 0.5, 0.75
@@ -23,9 +26,18 @@ REVERSED, MOVED, TURNED = 0.2, 0.5, 0.75
 
 
 @kernel
+def turns_back(before: int, here: int, after: int, places: FloatArray) -> bool:
+    """Whether the way from a place over another to a third turns back there, by straight lines."""
+    ax, ay = places[before, 0] - places[here, 0], places[before, 1] - places[here, 1]
+    bx, by = places[after, 0] - places[here, 0], places[after, 1] - places[here, 1]
+    return bool(ax * bx + ay * by > BACK * math.sqrt((ax * ax + ay * ay) * (bx * bx + by * by)))
+
+
+@kernel
 def judge_walk(order: IntArray, size: int, ground: Ground, worst: FloatArray, mean: FloatArray) -> None:
-    """Fill in ``visit_gaps`` of the walk through vertices (N,) in order, by shortest paths, and back."""
-    hops, edges = ground
+    """Fill in ``visit_gaps`` of the walk through vertices (N,) in order, by shortest paths, and back,
+    turns included."""
+    hops, edges, places, turn = ground
     count = order.shape[0]
     passed, at = np.empty(count * worst.shape[0], np.int64), np.empty(count * worst.shape[0])
     passed[0], at[0] = order[0], 0.0
@@ -39,6 +51,14 @@ def judge_walk(order: IntArray, size: int, ground: Ground, worst: FloatArray, me
             length += edges[here, following]
             here = following
     stops = max(stops, 1)
+    turned = 0.0
+    for k in range(stops):
+        at[k] += turned
+        if turn > 0.0 and turns_back(
+            passed[k - 1 if k else stops - 1], passed[k], passed[(k + 1) % stops], places
+        ):
+            turned += turn
+    length += turned
     visit_gaps(passed[:stops], at[:stops], length, size, worst, mean)
 
 

@@ -26,6 +26,8 @@ NEIGHBOURS = 8
 """A vertex changes to shares of so many nearest ones."""
 CHANGES, HEATS, COLD = 20_000, (0.05, 0.1, 0.2, 0.4), 0.0005
 """Changes of a try at random, and the heats that tries begin and end with, in walks of a robot."""
+TURNING = 2
+"""Tries in which turns count, from as many of the heats."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -78,7 +80,9 @@ def partition(graph: PatrolGraph, sizes: tuple[int, ...]) -> Plan:
 
 
 @lru_cache(maxsize=256)
-def annealed(graph: PatrolGraph, sizes: tuple[int, ...], mean_weight: float, sharing_cost: float) -> Plan:
+def annealed(
+    graph: PatrolGraph, sizes: tuple[int, ...], mean_weight: float, sharing_cost: float, turn_m: float = 0.0
+) -> Plan:
     """Walks whose worst and mean distances are short together; the same for whoever asks.
 
     The shares of ``partition`` and their orders, changed at random: the best of several tries. No bound is
@@ -92,6 +96,8 @@ def annealed(graph: PatrolGraph, sizes: tuple[int, ...], mean_weight: float, sha
         What the mean distance counts beside the worst.
     sharing_cost
         As ``Plan.expected_m``.
+    turn_m
+        What turning back at a place costs, as a distance.
     """
     count = len(graph)
     if len(sizes) == 1 or len(sizes) == count:
@@ -102,18 +108,23 @@ def annealed(graph: PatrolGraph, sizes: tuple[int, ...], mean_weight: float, sha
         orders[group, : len(order)], counts[group] = order, len(order)
     near = np.ascontiguousarray(_near(graph))
     each_m = Round.best(graph).length_m / sum(sizes)
-    ground = np.ascontiguousarray(graph.next_hop), np.ascontiguousarray(graph.edges_m)
+    hops, edges_m = np.ascontiguousarray(graph.next_hop), np.ascontiguousarray(graph.edges_m)
+    places_xy_m, many = np.ascontiguousarray(graph.vertices_xy_m), np.array(sizes)
     # Every robot must come to the same plan: no stream of its own.
     rng = np.random.default_rng(0)
-    best: tuple[float, IntArray, IntArray] | None = None
-    for heat in HEATS:
-        tried, number = orders.copy(), counts.copy()
-        draws, heats = rng.random((CHANGES, 6)), (heat * each_m, COLD * each_m)
-        cost = anneal(tried, number, np.array(sizes), near, draws, heats, mean_weight, sharing_cost, ground)
-        if best is None or cost < best[0]:
-            best = float(cost), tried, number
-    assert best is not None  # there are heats
-    walks = [Round.through(graph, order[:number]) for order, number in zip(best[1], best[2], strict=True)]
+    # Turns make walks hard to change: they count from where walks are short without them.
+    for costs_m in (0.0, turn_m) if turn_m > 0.0 else (0.0,):
+        ground = hops, edges_m, places_xy_m, costs_m
+        best: tuple[float, IntArray, IntArray] | None = None
+        for heat in HEATS if costs_m == 0.0 else HEATS[:TURNING]:
+            tried, number = orders.copy(), counts.copy()
+            draws, heats = rng.random((CHANGES, 6)), (heat * each_m, COLD * each_m)
+            cost = anneal(tried, number, many, near, draws, heats, mean_weight, sharing_cost, ground)
+            if best is None or cost < best[0]:
+                best = float(cost), tried, number
+        assert best is not None  # there are heats
+        _, orders, counts = best
+    walks = [Round.through(graph, order[:number]) for order, number in zip(orders, counts, strict=True)]
     return _plan(graph, walks, sizes)
 
 

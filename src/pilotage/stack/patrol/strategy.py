@@ -34,6 +34,8 @@ class PatrolSetting:
         Where on their way there is room for one of them.
     starts_m
         (N, V) length of the path from each robot's starting place to each vertex; None: it is at its vertex.
+    turn_m
+        What turning back at a vertex costs, as a distance.
     """
 
     graph: PatrolGraph
@@ -44,6 +46,7 @@ class PatrolSetting:
     begin_s: float = 0.0
     passages: Passages = OPEN
     starts_m: FloatArray | None = None
+    turn_m: float = 0.0
 
     @property
     def team_size(self) -> int:

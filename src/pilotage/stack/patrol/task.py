@@ -29,6 +29,8 @@ class PatrolSite:
         (N, V) length of the path from each robot's starting place to each vertex.
     passages
         Where the largest of the robots has a passage to itself.
+    turn_m
+        What turning back at a place costs the slowest to turn, as a distance.
     """
 
     graph: PatrolGraph
@@ -36,6 +38,7 @@ class PatrolSite:
     near_m: float
     starts_m: FloatArray
     passages: Passages
+    turn_m: float
 
     @property
     def starts(self) -> IntArray:

@@ -48,13 +48,17 @@ class AdaptiveRoundsConfig(Config):
 
 
 def best_plan(setting: PatrolSetting, robots: int, config: AdaptiveRoundsConfig) -> Plan:
-    """The cheapest plan for so many robots: one round for all, one for each, and what lies between."""
+    """The cheapest plan for so many robots: one round for all, one for each, and what lies between.
+
+    How many rounds is chosen by lengths and waits; its rounds are those that turn back least for that.
+    """
     graph = setting.graph
     most = min(robots, len(graph))
+    weights = config.mean_weight, config.sharing_cost
     # What lies between is much alike: a few numbers of groups stand for all.
     numbers = {1, 2, 3, robots // 2, robots - 1, robots, most}
     plans = [
-        annealed(graph, even_sizes(robots, groups), config.mean_weight, config.sharing_cost)
+        annealed(graph, even_sizes(robots, groups), *weights)
         for groups in sorted(numbers)
         if 1 <= groups <= most
     ]
@@ -64,7 +68,8 @@ def best_plan(setting: PatrolSetting, robots: int, config: AdaptiveRoundsConfig)
         worst_m, mean_m = driven.expected_m(len(graph), config.sharing_cost)
         return worst_m + config.mean_weight * mean_m
 
-    return min(plans, key=cost)
+    sizes = min(plans, key=cost).sizes
+    return annealed(graph, sizes, *weights, setting.turn_m)
 
 
 @STRATEGIES.add("adaptive-rounds", AdaptiveRoundsConfig)
