@@ -154,7 +154,10 @@ def test_a_broken_cell_file_is_one_line(tmp_path: Path, capsys: pytest.CaptureFi
         ("world.start={x_m: 0.4, y_m: 0.5}", "at least the body's radius"),
         ("world.start={x_m: 2.4, y_m: 0.5}", "expected a place on the map"),
         ("stack.navigator.fusion=perhaps", "fusion"),
-        ("robot.motion=differential-drive", "expected robot.motion.name: wheel-drive"),
+        (
+            "robot.motion=differential-drive",
+            "wheel-encoders need a motion whose wheels are known, such as wheel-drive",
+        ),
         ("world.map=museum", "expected a start pose"),
         ("robot.motion.errors.slip=[0.02, 0.01]", "smaller bound first"),
         ("stack.navigator.name=surround-chek", "surround-check"),
@@ -208,7 +211,8 @@ def test_fusion_needs_a_gyroscope() -> None:
 
 
 def test_exploring_needs_a_sheet() -> None:
-    elsewhere = ("world.map=museum", "world.start={x_m: 1, y_m: 1}")
+    blind = ("robot.sensors.line_left=null", "robot.sensors.line_right=null")
+    elsewhere = ("world.map=museum", "world.start={x_m: 1, y_m: 1}", *blind)
     with pytest.raises(InputError, match=r"expected a sheet with cells as world\.map, found 'museum'"):
         build(load_mission("romi-explore", elsewhere))
 

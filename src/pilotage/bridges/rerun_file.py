@@ -2,18 +2,13 @@
 
 from __future__ import annotations
 
-import errno
-import os
-import re
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from pilotage.core.errors import InputError
-from pilotage.core.shown import shown, visible
+from pilotage.core.shown import shown
 from pilotage.core.types import FloatArray
 from pilotage.core.whole_file import draft_of
 from pilotage.records.events import require_times
@@ -51,14 +46,13 @@ def write_rerun(path: Path, folder: Path) -> None:
         Where Rerun is not installed, or the folder is no run's.
     """
     rr = rerun()
-    if visible(str(path)) != str(path):
-        raise InputError(f"{path}: expected a name of plain characters, as Rerun takes no other")
     first, whole = read_run(folder), read_trace(folder)
     require_times(first.events, folder)
-    with draft_of(path) as draft, _errors_of_the_system():
-        draft.touch()  # where nothing can be written the system says so, not Rerun by an error of its own
+    with draft_of(path) as draft:
+        draft.touch()  # where nothing can be written that is told before all the work
         stream = rr.RecordingStream("pilotage", recording_id=shown(folder.name))
-        stream.save(draft)
+        # Rerun's own writer of files waits for ever, now and then, where the disk is full.
+        kept = stream.memory_recording()
         stream.log("/", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
         _world(rr, stream, first)
         for robot, data in enumerate(read_team(folder, first)):
@@ -68,22 +62,7 @@ def write_rerun(path: Path, folder: Path) -> None:
         for event in first.events:
             stream.set_time(CLOCK, duration=event.t_s)
             stream.log("/events", rr.TextLog(f"{event.kind}: {event.text}"))
-        stream.flush()
-        stream.disconnect()
-
-
-@contextmanager
-def _errors_of_the_system() -> Iterator[None]:
-    """Rerun tells what the system refuses, such as room on the disk, in words of its own."""
-    try:
-        yield
-    except RuntimeError as error:
-        number = re.search(r"\(os error (\d+)\)", str(error))
-        if number is not None:
-            raise OSError(int(number[1]), os.strerror(int(number[1]))) from error
-        if "File-writer thread" not in str(error):
-            raise
-        raise OSError(errno.EIO, "Rerun stopped writing; is there room on the disk?") from error
+        draft.write_bytes(kept.drain_as_bytes())
 
 
 def _world(rr: Any, stream: Any, data: RunData) -> None:

@@ -112,7 +112,9 @@ def _steady_environment() -> None:
 def _run(arguments: list[str]) -> int:
     from pilotage.cli.app import dispatch
     from pilotage.core.errors import InputError
+    from pilotage.core.plugins import consequence_of, fault_of, take_nothing
 
+    take_nothing()
     try:
         code = dispatch(arguments)
         sys.stdout.flush()
@@ -125,8 +127,6 @@ def _run(arguments: list[str]) -> int:
             raise stopped from None
         if isinstance(error, InputError):
             return _say(str(error), BAD_INPUT)
-        from pilotage.core.plugins import consequence_of, fault_of
-
         fault = fault_of(error)
         if fault is not None:
             print(fault.traceback, file=sys.stderr)

@@ -132,6 +132,11 @@ def take(module: str) -> None:
         _in_use[module] = None
 
 
+def take_nothing() -> None:
+    """A command begins: what one before it in this process used is not to blame."""
+    _in_use.clear()
+
+
 def is_from_outside(module: str) -> bool:
     """Whether a module is not one of the package's own."""
     return module.partition(".")[0] != "pilotage"
