@@ -12,7 +12,7 @@ from pilotage.stack.mapping.slam.scan_covariances import UNKNOWN_RAD2, ScanCovar
 STEPS = 40
 
 
-def chain(heading_std_rad: float) -> ScanCovariances:
+def chain(heading_std_rad: float, residual_m: float = 0.01) -> ScanCovariances:
     """A scan a metre, straight on, each known from the one before."""
     poses = np.column_stack([np.arange(STEPS + 1.0), np.zeros((STEPS + 1, 2))])
     i = np.arange(STEPS)
@@ -20,7 +20,7 @@ def chain(heading_std_rad: float) -> ScanCovariances:
     information = np.tile(np.diag([1e4, 1e4, heading_std_rad**-2]), (STEPS, 1, 1))
     graph = PoseGraph(poses, i, i + 1, motion, information)
     own = np.zeros((STEPS + 1, 3, 3))
-    return ScanCovariances(graph, np.ones(STEPS), np.arange(STEPS + 1), poses, own, 0.0)
+    return ScanCovariances(graph, np.ones(STEPS), np.arange(STEPS + 1), poses, own, 0.0, residual_m)
 
 
 def raw(known: ScanCovariances, monkeypatch: pytest.MonkeyPatch) -> FloatArray:
@@ -47,3 +47,12 @@ def test_no_heading_is_less_known_than_one_of_which_nothing_is(monkeypatch: pyte
 def test_what_is_known_stays_as_it_is(monkeypatch: pytest.MonkeyPatch) -> None:
     known = chain(0.02)
     assert np.array_equal(known.marginals(), raw(known, monkeypatch))
+
+
+def test_a_scan_is_as_unsure_as_scans_fit_badly() -> None:
+    """Between scans of one keyframe nothing else counts; no scan is surer than the least residual says."""
+    here = np.array([3])
+    fits = [chain(0.02, residual_m).relative(here, here)[0] for residual_m in (0.01, 0.02, 0.0, 1e-6)]
+    assert fits[1] == pytest.approx(4.0 * fits[0])
+    assert (fits[2] == fits[3]).all()
+    assert (np.diag(fits[2]) > 0.0).all()

@@ -57,7 +57,7 @@ def read_scan_covariances(path: Path) -> ScanCovariances:
             raise ValueError(f"owner: expected keyframes 0 to {len(graph) - 1}")
         weights, poses = file.floats("graph_weights", graph.i.size), file.floats("poses", owner.size, 3)
         own = file.floats("own", owner.size, 3, 3)
-        mount_m = float(file.floats("mount_m", 1)[0])
-        return ScanCovariances(graph, weights, owner, poses, own, mount_m)
+        mount_m, residual_m = (float(file.floats(name, 1)[0]) for name in ("mount_m", "residual_m"))
+        return ScanCovariances(graph, weights, owner, poses, own, mount_m, residual_m)
     except (ValueError, InputError) as error:
         raise InputError(f"{path}: expected covariances of 'pilotage slam', found {error}") from None

@@ -121,6 +121,7 @@ def _write_covariances(path: Path, result: SlamResult) -> None:
         owner=known.owner,
         own=known.own,
         mount_m=np.array([known.mount_m]),
+        residual_m=np.array([known.residual_m]),
         graph_poses=known.graph.poses,
         graph_i=known.graph.i,
         graph_j=known.graph.j,

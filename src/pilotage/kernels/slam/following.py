@@ -52,6 +52,8 @@ class Track(NamedTuple):
         (3, 3) of ``add_slip`` since the last keyframe.
     crowded
         (1,) in how many scans so much seemed to move that they were left whole.
+    residuals
+        (2,) sum of the residuals' root mean squares of all scans, and how many there were.
     wheels
         What the odometry is always off by.
     """
@@ -64,6 +66,7 @@ class Track(NamedTuple):
     slip: FloatArray
     held: FloatArray
     crowded: IntArray
+    residuals: FloatArray
     wheels: Wheels
 
 
@@ -217,6 +220,8 @@ def settle(
     add_slip(track.slip, track.held, start, pose, hessian, told[3], error, leads, prior)
     track.usual[0] += 0.02 * (told[0] - track.usual[0])
     track.usual[1] += 0.05 * (told[2] - track.usual[1])
+    track.residuals[0] += told[2]
+    track.residuals[1] += 1.0
     motion = between(track.pose, pose)
     if led:
         c, s = math.cos(pose[2]), math.sin(pose[2])

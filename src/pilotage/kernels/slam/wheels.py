@@ -2,9 +2,10 @@
 
 A body's wheels are never of the size that is told, nor of one size: motions are too long by one factor,
 turns by another, and who drives straight seems to turn by so much a metre (Borenstein and Feng, 1996). These
-three are found with a memory that fades, by what scans told as instruments: least squares would take motions
-between wrong stamps for motions that are too long. An alignment is held a little by the guess that it began
-from: some per cent of what an odometry is always off by would stay in the track, always to one side.
+three are found by least squares with a memory that fades. Motions between wrong stamps pass for motions that
+are far too long: who is off by more than wheels are is not righted. An alignment is held a little by the
+guess that it began from: some per cent of what an odometry is always off by would stay in the track, always
+to one side.
 """
 
 from __future__ import annotations
@@ -24,6 +25,8 @@ MOTION_STD_M, TURN_STD_RAD = 0.015, 0.006
 """What a motion between two scans is known to."""
 SCALE_STD, A_METRE_STD_RAD = 0.03, 0.03
 """What an odometry may be expected to be off by: its scales, and its turn a metre."""
+CREDIBLE_STDS = 4.0
+"""Who is off by more such standard deviations has no such wheels: stamps are wrong, nothing is righted."""
 HELD = 0.1
 """Share of the weights of a scan's points that must hold it along its motion for that to be told."""
 MOST_M, MOST_SHARE = 0.05, 0.2
@@ -76,22 +79,20 @@ def learn_wheels(wheels: Wheels, step: FloatArray, motion: FloatArray, held: boo
     turned = off[2] + wheels.off[1] * x + wheels.off[2] * turn
     a, b = 1.0 / MOTION_STD_M**2, 1.0 / TURN_STD_RAD**2
     information, told = wheels.information, wheels.told
-    # Weighed by the motion that was told, which wrong stamps of the wheels do not touch.
-    seen, swung = motion[0], motion[2]
     if held:
-        information[0, 0] = FADING * information[0, 0] + a * seen * x
-        told[0] = FADING * told[0] + a * seen * along
-    information[1, 1] = FADING * information[1, 1] + b * seen * x
-    information[1, 2] = FADING * information[1, 2] + b * seen * turn
-    information[2, 1] = FADING * information[2, 1] + b * swung * x
-    information[2, 2] = FADING * information[2, 2] + b * swung * turn
-    told[1] = FADING * told[1] + b * seen * turned
-    told[2] = FADING * told[2] + b * swung * turned
-    wheels.off[0] = told[0] / (max(information[0, 0], 0.0) + 1.0 / SCALE_STD**2)
-    p = max(information[1, 1], 0.0) + 1.0 / A_METRE_STD_RAD**2
-    q = max(information[2, 2], 0.0) + 1.0 / SCALE_STD**2
-    r, s = information[1, 2], information[2, 1]
-    if p * q <= 2.0 * r * s:  # not told apart
-        r = s = 0.0
-    wheels.off[1] = (q * told[1] - r * told[2]) / (p * q - r * s)
-    wheels.off[2] = (p * told[2] - s * told[1]) / (p * q - r * s)
+        information[0, 0] = FADING * information[0, 0] + a * x * x
+        told[0] = FADING * told[0] + a * x * along
+    information[1, 1] = FADING * information[1, 1] + b * x * x
+    information[1, 2] = FADING * information[1, 2] + b * x * turn
+    information[2, 2] = FADING * information[2, 2] + b * turn * turn
+    told[1] = FADING * told[1] + b * x * turned
+    told[2] = FADING * told[2] + b * turn * turned
+    longer = told[0] / (information[0, 0] + 1.0 / SCALE_STD**2)
+    p, q = information[1, 1] + 1.0 / A_METRE_STD_RAD**2, information[2, 2] + 1.0 / SCALE_STD**2
+    r = information[1, 2]
+    a_metre = (q * told[1] - r * told[2]) / (p * q - r * r)
+    turned_more = (p * told[2] - r * told[1]) / (p * q - r * r)
+    most = max(abs(longer) / SCALE_STD, abs(a_metre) / A_METRE_STD_RAD, abs(turned_more) / SCALE_STD)
+    wheels.off[:] = 0.0
+    if most <= CREDIBLE_STDS:
+        wheels.off[0], wheels.off[1], wheels.off[2] = longer, a_metre, turned_more

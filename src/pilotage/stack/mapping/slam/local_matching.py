@@ -103,6 +103,7 @@ class LocalMatcher:
             np.zeros((3, 3)),
             np.zeros((3, 3)),
             np.zeros(1, np.int64),
+            np.zeros(2),
             unknown_wheels(),
         )
         self.found = Look(

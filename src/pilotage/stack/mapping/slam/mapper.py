@@ -130,7 +130,7 @@ def result_of(config: SlamConfig, done: Mapped, state: Solved, joined: Joined | 
         warnings += joined.warnings
     scale, turn = _odometry_scales(log, poses, config)
     graph, owner = state.edges.graph(state.poses), since + local.owner
-    known = ScanCovariances(graph, state.weights, owner, poses, sure, _mount_m(log))
+    known = ScanCovariances(graph, state.weights, owner, poses, sure, _mount_m(log), local.residual_m)
     result = SlamResult(
         log.t_s,
         poses,
@@ -191,7 +191,13 @@ def _standing(log: LaserLog, config: SlamConfig, local: LocalTrack) -> SlamResul
         local.poses,
         local.poses,
         ScanCovariances(
-            graph, np.zeros(0), local.owner, local.poses, np.zeros((len(log), 3, 3)), _mount_m(log)
+            graph,
+            np.zeros(0),
+            local.owner,
+            local.poses,
+            np.zeros((len(log), 3, 3)),
+            _mount_m(log),
+            local.residual_m,
         ),
         local.keyframes,
         (),

@@ -2,11 +2,11 @@
 
 What the graph says holds given that its edges err independently; they do not, as each scan is in many of
 them, so its covariances are doubled. Every scan has an error of its own: stamps that are some milliseconds
-off, a body that moves while the mirror turns. And the place of the scanner on the robot is known to a few
-centimetres only: an error that all scans share, and that shows between poses as far as they are turned
-against each other. Whose frame somebody's reference speaks of is as unsure as the frames are apart that the
-recording tells. The numbers serve the Intel and the Freiburg 079 recordings together; see
-docs/decisions/0038, 0212 and 0216.
+off, a body that moves while the mirror turns, walls that are no lines. It is the larger the worse scans fit
+to their surroundings. And the place of the scanner on the robot is known to a few centimetres only: an error
+that all scans share, and that shows between poses as far as they are turned against each other. Whose frame
+somebody's reference speaks of is as unsure as the frames are apart that the recording tells. The numbers
+serve the Intel and the Freiburg 079 recordings together; see docs/decisions/0038, 0212, 0216 and 0321.
 """
 
 from __future__ import annotations
@@ -20,7 +20,9 @@ from pilotage.models.pose_graph import PoseGraph
 from pilotage.models.pose_graph_covariance import PoseCovariances, covariances
 
 SHARED_EDGES = 2.0
-SCAN_STD = np.array([0.0097, 0.0097, 0.0034])
+SCAN_STD_A_RESIDUAL = np.array([0.9, 0.9, 0.31])
+LEAST_RESIDUAL_M = 0.004
+"""A scan's own error [m, m, rad] over its points' usual residuals, which are this at least."""
 MOUNT_STD_M = 0.03
 UNKNOWN_RAD2 = np.pi**2 / 3.0
 """Variance of a heading of which nothing is known."""
@@ -42,6 +44,8 @@ class ScanCovariances:
         (N, 3, 3) in the map of what may be left, beside its keyframes, of a slip of the front end.
     mount_m
         How far the scanner is told to be from the robot's frame.
+    residual_m
+        Root mean square of the residuals by which a scan fits, as a rule.
     """
 
     graph: PoseGraph
@@ -50,6 +54,7 @@ class ScanCovariances:
     poses: FloatArray
     own: FloatArray
     mount_m: float
+    residual_m: float
 
     def marginals(self) -> FloatArray:
         """Return (N, 3, 3) in the map, the first keyframe being held."""
@@ -59,7 +64,7 @@ class ScanCovariances:
         carry[:, 0, 2] = -(self.poses[:, 1] - keyframes[:, 1])
         carry[:, 1, 2] = self.poses[:, 0] - keyframes[:, 0]
         shared = carry @ (SHARED_EDGES * graph[self.owner]) @ carry.transpose(0, 2, 1)
-        own = self.own + np.diag(SCAN_STD**2)
+        own = self.own + self._of_scan()
         return _at_most_unknown(shared + own + self._of_mount(self.poses[:, 2] - self.poses[0, 2]))
 
     def relative(self, i: IntArray, j: IntArray) -> FloatArray:
@@ -77,7 +82,7 @@ class ScanCovariances:
         into = np.tile(np.eye(3), (first.size, 1, 1))
         into[:, 0, 0] = into[:, 1, 1] = c
         into[:, 0, 1], into[:, 1, 0] = s, -s
-        own = into @ (self.own[[i, j]] + np.diag(SCAN_STD**2)) @ into.transpose(0, 2, 1)
+        own = into @ (self.own[[i, j]] + self._of_scan()) @ into.transpose(0, 2, 1)
         d = self.poses[j] - self.poses[i]
         lever = np.tile(np.eye(3), (first.size, 1, 1))
         lever[:, 0, 2] = -s * d[:, 0] + c * d[:, 1]
@@ -86,6 +91,11 @@ class ScanCovariances:
         out += lever @ own[0] @ lever.transpose(0, 2, 1)
         out += self._of_mount(self.poses[j, 2] - self.poses[i, 2])
         return _at_most_unknown(0.5 * (out + out.transpose(0, 2, 1)))
+
+    def _of_scan(self) -> FloatArray:
+        """(3, 3) of a scan's own error, the same in all directions."""
+        std = max(self.residual_m, LEAST_RESIDUAL_M) * SCAN_STD_A_RESIDUAL
+        return np.asarray(np.diag(std**2))
 
     def _of_graph(self) -> PoseCovariances:
         return covariances(self.graph, weights=self.weights)

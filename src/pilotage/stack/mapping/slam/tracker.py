@@ -75,6 +75,8 @@ class LocalTrack:
         How many scans needed a search, and how many could not be aligned (their pose is the guess).
     crowded
         Scans of which so much seemed to move that people may fill the view.
+    residual_m
+        Mean over all scans of the root mean square of an alignment's residuals.
     """
 
     poses: FloatArray
@@ -87,6 +89,7 @@ class LocalTrack:
     searched: int
     lost: int
     crowded: int = 0
+    residual_m: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -327,6 +330,10 @@ class Tracker:
         """How many scans could not be aligned."""
         return self._matcher.lost
 
+    def _mean_residual_m(self) -> float:
+        total, count = self._matcher.track.residuals.tolist()
+        return total / count if count else 0.0
+
     def last_step(self) -> LocalTrack:
         """Return the last two keyframes alone, without their points."""
         pair = self._keyframes[-2:]
@@ -355,6 +362,7 @@ class Tracker:
             self._matcher.searched,
             self._matcher.lost,
             int(self._matcher.track.crowded[0]),
+            self._mean_residual_m(),
         )
 
 
