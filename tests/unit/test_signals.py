@@ -10,6 +10,7 @@ import sys
 import time
 import weakref
 from collections.abc import Callable
+from pathlib import Path
 
 import pytest
 
@@ -68,11 +69,13 @@ def test_a_signal_at_any_moment_of_a_run_is_one_line() -> None:
             assert line == "ready\n", (line, child.poll())
             time.sleep(moments.uniform(0.0, LONGEST_WAIT_S))
             child.send_signal(number)
-            codes.append(int(child.stdout.readline()))
+            code = child.stdout.readline()
+            assert code, f"ended by itself: {child.wait()}"
+            codes.append(int(code))
     finally:
         child.kill()
         _, err = child.communicate()
-    assert codes == [130 if number == signal.SIGINT else 143 for number in sent]
+    assert codes == [130 if number == signal.SIGINT else 143 for number in sent], err
     lines = {130: "pilotage: interrupted", 143: "pilotage: ended by SIGTERM"}
     assert err.splitlines() == [lines[code] for code in codes]
 
@@ -109,6 +112,35 @@ def test_what_an_interruption_leaves_half_made_is_not_told() -> None:
     """Compiled code that is just loaded: its destructor misses what its beginning was to make."""
     child = subprocess.run([sys.executable, "-c", HALF_MADE], capture_output=True, text=True, check=False)
     assert (child.returncode, child.stderr) == (143, "pilotage: ended by SIGTERM\n")
+
+
+CAST = """
+import ctypes, os, signal, sys
+from pilotage.cli.main import main
+
+cast, struck = ctypes.cast, []
+striking = '''
+def strike(*arguments):
+    by = sys._getframe(1).f_code.co_filename
+    if not struck and by.endswith("rrt_star_dubins.py") and arguments[1] is ctypes.c_void_p:
+        struck.append(None)  # its kernel called, for the functions of a random generator
+        os.kill(os.getpid(), signal.SIGINT)
+    return cast(*arguments)
+'''
+names = dict(ctypes=ctypes, os=os, sys=sys, signal=signal, cast=cast, struck=struck)
+exec(compile(striking, ctypes.__file__, "exec"), names)
+ctypes.cast = names["strike"]
+code = main(["run", "museum-1", "--set", "run.time_limit_s=3", "--quiet", "--out", sys.argv[1]])
+sys.exit(code if struck else 3)
+"""
+
+
+def test_a_signal_in_what_a_kernel_calls_waits_until_it_is_over(tmp_path: Path) -> None:
+    """Numba goes on with what ``ctypes.cast`` did not return: one signal in a thousand ended the process."""
+    child = subprocess.run(
+        [sys.executable, "-c", CAST, str(tmp_path)], capture_output=True, text=True, check=False
+    )
+    assert (child.returncode, child.stderr) == (130, "pilotage: interrupted\n")
 
 
 def from_a_kernel() -> None:

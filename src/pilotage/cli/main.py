@@ -16,7 +16,6 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from types import FrameType
-from typing import NoReturn
 
 from pilotage.cli.stopped import INTERRUPTED, TERMINATED, Terminated, interruption_in, never_swallowed
 
@@ -63,23 +62,23 @@ def _ended_once(for_good: bool) -> Iterator[None]:
         yield
         return
 
-    def end(signum: int, frame: FrameType | None) -> NoReturn:  # noqa: ARG001 - as signal calls it
+    def end(signum: int, frame: FrameType | None) -> None:
         for number in before:
             signal.signal(number, signal.SIG_IGN)
-        raise Terminated if signum == signal.SIGTERM else KeyboardInterrupt
+        raise_in(Terminated() if signum == signal.SIGTERM else KeyboardInterrupt(), frame)
 
     before = {number: signal.getsignal(number) for number in (signal.SIGTERM, signal.SIGINT)}
     # Where Ctrl-C is ignored from the start (a shell's background job), it stays so.
     caught = [number for number in before if before[number] is not signal.SIG_IGN]
-    for number in caught:
-        signal.signal(number, end)
-    try:
-        with never_swallowed():
+    with never_swallowed() as raise_in:
+        try:
+            for number in caught:
+                signal.signal(number, end)
             yield
-    finally:
-        # Where the process ends now, nothing is left that a signal could spare it.
-        for number in caught:
-            signal.signal(number, signal.SIG_IGN if for_good else before[number])
+        finally:
+            # Where the process ends now, nothing is left that a signal could spare it.
+            for number in caught:
+                signal.signal(number, signal.SIG_IGN if for_good else before[number])
 
 
 def _steady_streams() -> None:

@@ -4,12 +4,17 @@ from __future__ import annotations
 
 import signal
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from pathlib import Path
+from types import FrameType
 
 INTERRUPTED = 130
 TERMINATED = 143
 _SOON_S = 0.01
+_UNGUARDED = str(Path("ctypes", "__init__.py")), str(Path("numba", "core", "serialize.py"))
+"""Files of Python's that compiled kernels call functions of, and go on with a null pointer where one raises:
+``ctypes.cast`` for a random generator's functions, and numba's own for the types of what they return."""
 
 
 class Terminated(KeyboardInterrupt):
@@ -37,14 +42,24 @@ def interruption_in(error: BaseException) -> KeyboardInterrupt | None:
     return None
 
 
+def _is_unguarded(frame: FrameType | None) -> bool:
+    """Whether an interruption in a frame would end the interpreter."""
+    while frame is not None:
+        if frame.f_code.co_filename.endswith(_UNGUARDED):
+            return True
+        frame = frame.f_back
+    return False
+
+
 @contextmanager
-def never_swallowed() -> Iterator[None]:
+def never_swallowed() -> Iterator[Callable[[KeyboardInterrupt, FrameType | None], None]]:
     """Raise an interruption once more where the interpreter could not: in a destructor or a C callback.
 
-    There it would be printed and forgotten, and the command would go on. For a process's main thread.
+    There it would be printed and forgotten, and the command would go on. For a process's main thread. What is
+    yielded raises an interruption that strikes in a frame, a little later where the frame cannot bear it.
     """
     if not hasattr(signal, "setitimer"):
-        yield
+        yield _raise_at_once
         return
     lost: list[KeyboardInterrupt] = []
 
@@ -53,18 +68,32 @@ def never_swallowed() -> Iterator[None]:
         if found is None:
             before_hook(unraisable)
             return
-        lost.append(found)
+        raise_later(found)
+
+    def raise_later(stop: KeyboardInterrupt) -> None:
+        lost.append(stop)
         signal.setitimer(signal.ITIMER_REAL, _SOON_S)
 
-    def again(signum: int, frame: object) -> None:  # noqa: ARG001 - as signal calls it
+    def raise_in(stop: KeyboardInterrupt, frame: FrameType | None) -> None:
+        if not _is_unguarded(frame):
+            raise stop
+        raise_later(stop)
+
+    def again(signum: int, frame: FrameType | None) -> None:  # noqa: ARG001 - as signal calls it
         if lost:
-            raise type(lost[-1])
+            raise_in(lost.pop(), frame)
 
     before_hook, before_alarm = sys.unraisablehook, signal.signal(signal.SIGALRM, again)
     sys.unraisablehook = hook
     try:
-        yield
+        yield raise_in
+        if lost:
+            raise lost.pop()
     finally:
         signal.setitimer(signal.ITIMER_REAL, 0.0)
         sys.unraisablehook = before_hook
         signal.signal(signal.SIGALRM, before_alarm)
+
+
+def _raise_at_once(stop: KeyboardInterrupt, frame: FrameType | None) -> None:  # noqa: ARG001 - as it is called
+    raise stop
