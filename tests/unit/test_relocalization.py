@@ -156,6 +156,6 @@ def test_the_laser_localizer_takes_the_filter_that_suits_the_map() -> None:
     cells = WorldMap("cells", walls.bounds_m, grid=rasterized(walls, 0.05))
     for chart, kind in ((told.chart, EkfWallsLocalizer), (cells, ParticleFilterLocalizer)):
         found = LaserLocalizer(LaserConfig(), told.robot, chart, told.initial, Journal())
-        assert isinstance(found._chosen, kind)
+        assert isinstance(found._localizer, kind)
         assert found.belief is told.initial
         assert found.look_bearing_rad() is None

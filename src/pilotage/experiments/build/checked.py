@@ -7,10 +7,10 @@ import numpy as np
 from pilotage.core.errors import InputError
 from pilotage.sensors.readings import Readings
 from pilotage.stack.interface import Belief
-from pilotage.stack.localization.localizer import Abilities, Localizer
+from pilotage.stack.localization.localizer import Localizer, WrappedLocalizer
 
 
-class CheckedLocalizer:
+class CheckedLocalizer(WrappedLocalizer):
     """A localizer whose beliefs are looked at: one of NaN would drive about until the time limit.
 
     Parameters
@@ -20,15 +20,8 @@ class CheckedLocalizer:
     """
 
     def __init__(self, localizer: Localizer, name: str) -> None:
-        self._localizer, self._name = localizer, name
-        able = Abilities.of(localizer)
-        self.look_bearing_rad, self.tell_mates = able.look_bearing_rad, able.tell_mates
-        self.scan_grid, self.close_loops, self.refine = able.scan_grid, able.close_loops, able.refine
-
-    @property
-    def belief(self) -> Belief:
-        """The localizer's."""
-        return self._localizer.belief
+        super().__init__(localizer)
+        self._name = name
 
     def step(self, readings: Readings) -> Belief:
         """Take in one step's readings.
@@ -38,7 +31,7 @@ class CheckedLocalizer:
         InputError
             Where what comes back is no belief.
         """
-        belief = self._localizer.step(readings)
+        belief = super().step(readings)
         wrong = _wrong(belief)
         if wrong:
             raise InputError(

@@ -14,35 +14,28 @@ from pilotage.sensors.wheel_odometry import WheelOdometryConfig
 from pilotage.stack.interface import Belief
 from pilotage.stack.knowledge import RobotKnowledge
 from pilotage.stack.localization.dead_reckoning import DeadReckoningLocalizer
-from pilotage.stack.localization.localizer import Abilities, Localizer
+from pilotage.stack.localization.localizer import Localizer, WrappedLocalizer
 
 OUTWARD = (BeaconConfig, CompassConfig, GpsConfig, LidarConfig, MagnetometerConfig)
 """Sensors that tell of the pose; what one reads between two increments was not seen from the last pose."""
 
 
-class BetweenIncrements:
+class BetweenIncrements(WrappedLocalizer):
     """Holds readings back until the next increment, and tells a localizer each with its share of it.
 
     A scan that comes 0.1 s after the odometry was seen from 5 cm farther on: taken for one from the last pose
     it moves the belief by as much, and speaks against it. The belief waits meanwhile, as it does between
     increments anyway. Where an increment is late nothing is held: the localizer widens its belief by what may
     have been driven. The robot is taken to have driven evenly in between: fails where it brakes and speeds up
-    within a period, by half of the speed's change over it. What the localizer can do besides, this can.
+    within a period, by half of the speed's change over it.
     """
 
     def __init__(self, localizer: Localizer, odometry: str, period_s: float, dt_s: float) -> None:
-        self._localizer, self._odometry = localizer, odometry
+        super().__init__(localizer)
+        self._odometry = odometry
         self._waits_s = period_s - 0.5 * dt_s
         self._held: list[Readings] = []
         self._last_s: float | None = None
-        able = Abilities.of(localizer)
-        self.look_bearing_rad, self.tell_mates = able.look_bearing_rad, able.tell_mates
-        self.scan_grid, self.close_loops, self.refine = able.scan_grid, able.close_loops, able.refine
-
-    @property
-    def belief(self) -> Belief:
-        """The localizer's."""
-        return self._localizer.belief
 
     def step(self, readings: Readings) -> Belief:
         """Hold back, or tell what was held and this."""

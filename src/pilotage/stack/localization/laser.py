@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from pilotage.core.config import Config
 from pilotage.maps.world_map import WorldMap
-from pilotage.sensors.readings import Readings
 from pilotage.stack.interface import Belief
 from pilotage.stack.journal import Journal
 from pilotage.stack.knowledge import RobotKnowledge
 from pilotage.stack.localization.ekf_walls import EkfWallsConfig, EkfWallsLocalizer
-from pilotage.stack.localization.localizer import LOCALIZERS, Abilities, Localizer
+from pilotage.stack.localization.localizer import LOCALIZERS, Localizer, WrappedLocalizer
 from pilotage.stack.localization.particle_filter import MclConfig, ParticleFilterLocalizer
 
 
@@ -21,7 +20,7 @@ class LaserConfig(Config):
 
 
 @LOCALIZERS.add("laser", LaserConfig)
-class LaserLocalizer:
+class LaserLocalizer(WrappedLocalizer):
     """What suits the map: `ekf-walls` where walls are given as lines, `particle-filter` where as cells.
 
     The outlines of cells that a robot has mapped are a thousand short steps, which no line of a scan is: the
@@ -37,19 +36,9 @@ class LaserLocalizer:
         initial: Belief,
         journal: Journal,
     ) -> None:
-        self._chosen: Localizer
+        chosen: Localizer
         if chart.geometry is not None:
-            self._chosen = EkfWallsLocalizer(config.walls, robot, chart, initial, journal)
-        else:
-            self._chosen = ParticleFilterLocalizer(config.cells, robot, chart, initial, journal)
-        able = Abilities.of(self._chosen)  # on a map of cells mates tell nothing yet
-        self.look_bearing_rad, self.tell_mates = able.look_bearing_rad, able.tell_mates
-
-    @property
-    def belief(self) -> Belief:
-        """That of the filter chosen."""
-        return self._chosen.belief
-
-    def step(self, readings: Readings) -> Belief:
-        """Take in one step's readings."""
-        return self._chosen.step(readings)
+            chosen = EkfWallsLocalizer(config.walls, robot, chart, initial, journal)
+        else:  # on a map of cells mates tell nothing yet
+            chosen = ParticleFilterLocalizer(config.cells, robot, chart, initial, journal)
+        super().__init__(chosen)

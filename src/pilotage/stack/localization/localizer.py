@@ -80,6 +80,24 @@ class Abilities:
         return cls(**{name: getattr(localizer, name) for name in names if hasattr(localizer, name)})
 
 
+class WrappedLocalizer:
+    """A localizer inside another one, which says what it believes and can do besides what it can."""
+
+    def __init__(self, localizer: Localizer) -> None:
+        self._localizer, able = localizer, Abilities.of(localizer)
+        self.look_bearing_rad, self.tell_mates = able.look_bearing_rad, able.tell_mates
+        self.scan_grid, self.close_loops, self.refine = able.scan_grid, able.close_loops, able.refine
+
+    @property
+    def belief(self) -> Belief:
+        """The localizer's."""
+        return self._localizer.belief
+
+    def step(self, readings: Readings) -> Belief:
+        """Take in one step's readings."""
+        return self._localizer.step(readings)
+
+
 def require_initial_pose(initial: Belief, name: str) -> None:
     """Refuse a start without a pose.
 

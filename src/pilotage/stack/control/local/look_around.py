@@ -1,4 +1,4 @@
-"""A turn all around of a robot that stands: it may but not have seen the ground that its way leads over."""
+"""A turn all around of a robot that stands: it may only not have seen the ground ahead."""
 
 from __future__ import annotations
 
