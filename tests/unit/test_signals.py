@@ -152,6 +152,16 @@ def from_a_kernel() -> None:
         raise SystemError("CPUDispatcher(<function f>) returned a result with an exception set") from stop
 
 
+def dropped_by_c() -> None:
+    """As NumPy does where it compares arrays of several fields."""
+    try:
+        os.kill(os.getpid(), signal.SIGTERM)
+        time.sleep(60.0)
+    except KeyboardInterrupt:
+        dropped = TypeError("Cannot compare structured arrays unless they have a common dtype.")
+    raise dropped
+
+
 def from_clearing_up() -> None:
     try:
         os.kill(os.getpid(), signal.SIGTERM)
@@ -178,7 +188,8 @@ def in_a_destructor() -> None:
 
 
 @pytest.mark.parametrize(
-    ("strike", "code"), [(from_a_kernel, 130), (from_clearing_up, 143), (in_a_destructor, 130)]
+    ("strike", "code"),
+    [(from_a_kernel, 130), (dropped_by_c, 143), (from_clearing_up, 143), (in_a_destructor, 130)],
 )
 def test_an_interruption_in_disguise_is_recognized(
     strike: Callable[[], None], code: int, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]

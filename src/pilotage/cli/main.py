@@ -37,8 +37,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         _steady_streams()
         if arguments is None:
             _steady_environment()
-        with _ended_once(for_good=arguments is None):
-            return _run(sys.argv[1:] if arguments is None else list(arguments))
+        with _ended_once(for_good=arguments is None) as struck:
+            return _run(sys.argv[1:] if arguments is None else list(arguments), struck)
     except KeyboardInterrupt as stop:
         if arguments is None:
             # The process ends: of objects left half made, whose destructors fail, there is nothing to tell.
@@ -52,20 +52,22 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 @contextmanager
-def _ended_once(for_good: bool) -> Iterator[None]:
-    """Let SIGTERM unwind as Ctrl-C does, and neither of them twice.
+def _ended_once(for_good: bool) -> Iterator[list[KeyboardInterrupt]]:
+    """Let SIGTERM unwind as Ctrl-C does, and neither of them twice; what struck, if anything did, is yielded.
 
     A second one must not cut the clearing away short, nor the interpreter's own end where the process ends
     with the command (``for_good``). Only a process's main thread can ask for that.
     """
+    struck: list[KeyboardInterrupt] = []
     if threading.current_thread() is not threading.main_thread():
-        yield
+        yield struck
         return
 
     def end(signum: int, frame: FrameType | None) -> None:
         for number in before:
             signal.signal(number, signal.SIG_IGN)
-        raise_in(Terminated() if signum == signal.SIGTERM else KeyboardInterrupt(), frame)
+        struck.append(Terminated() if signum == signal.SIGTERM else KeyboardInterrupt())
+        raise_in(struck[0], frame)
 
     before = {number: signal.getsignal(number) for number in (signal.SIGTERM, signal.SIGINT)}
     # Where Ctrl-C is ignored from the start (a shell's background job), it stays so.
@@ -74,7 +76,7 @@ def _ended_once(for_good: bool) -> Iterator[None]:
         try:
             for number in caught:
                 signal.signal(number, end)
-            yield
+            yield struck
         finally:
             # Where the process ends now, nothing is left that a signal could spare it.
             for number in caught:
@@ -108,7 +110,7 @@ def _steady_environment() -> None:
         del os.environ["NUMBA_NUM_THREADS"]
 
 
-def _run(arguments: list[str]) -> int:
+def _run(arguments: list[str], struck: list[KeyboardInterrupt]) -> int:
     from pilotage.cli.app import dispatch
     from pilotage.core.errors import InputError
     from pilotage.core.plugins import consequence_of, fault_of, take_nothing
@@ -121,7 +123,8 @@ def _run(arguments: list[str]) -> int:
     except BrokenPipeError:
         raise
     except (Exception, SystemExit) as error:
-        stopped = interruption_in(error)
+        # C code may drop an interruption for an error of its own, which tells nothing of it.
+        stopped = interruption_in(error) or (struck[0] if struck else None)
         if stopped is not None:
             raise stopped from None
         if isinstance(error, InputError):

@@ -12,9 +12,17 @@ from types import FrameType
 INTERRUPTED = 130
 TERMINATED = 143
 _SOON_S = 0.01
-_UNGUARDED = str(Path("ctypes", "__init__.py")), str(Path("numba", "core", "serialize.py"))
-"""Files of Python's that compiled kernels call functions of, and go on with a null pointer where one raises:
-``ctypes.cast`` for a random generator's functions, and numba's own for the types of what they return."""
+_UNGUARDED = tuple(
+    str(Path(*names))
+    for names in (
+        ("ctypes", "__init__.py"),
+        ("numba", "core", "serialize.py"),
+        ("numpy", "_core", "_internal.py"),
+    )
+)
+"""Files of Python's that C calls functions of, and takes their being interrupted for an answer. Compiled
+kernels go on with a null pointer: they ask ``ctypes.cast`` for a random generator's functions, and numba for
+the types of what they return. NumPy takes fields that are being compared for fields that cannot be."""
 
 
 class Terminated(KeyboardInterrupt):
