@@ -21,7 +21,6 @@ from pilotage.stack.navigator.patrol.obstructions import (
     Told,
 )
 from pilotage.stack.patrol.graph import PatrolGraph
-from pilotage.stack.patrol.messages import PatrolState
 from pilotage.stack.patrol.partition import annealed
 from pilotage.stack.patrol.passages import OPEN
 from pilotage.stack.patrol.roadmap import Roadmap
@@ -211,12 +210,13 @@ class TestPlans:
     def test_are_of_those_on_one_side_and_of_one_word(self) -> None:
         one, two = ShutPaths((3, 4), ((0, 1, 5.5),)), ShutPaths((3, 4), ((0, 1, 6.0),))
         said = (NONE_SHUT, one, two, ShutPaths((0, 1, 2)))
-        states = [PatrolState(k, 0.0, 0, 0, 0.0, 1.0, shut=shut) for k, shut in enumerate(said)]
-        assert same_side(2, states, range(1, 4), 5) == (frozenset({1, 2}), one)
-        assert same_side(1, states, range(1, 4), 5) == (frozenset({1, 2}), one)
-        assert same_side(3, states, range(1, 4), 5) == (frozenset({3}), said[3])
+        told = dict(enumerate(said))
         # Who knows of nothing that is shut may be on any side, and says nothing.
-        assert same_side(2, states, range(4), 5) == (frozenset({0, 1, 2}), one)
+        assert same_side(2, told, 5) == (frozenset({0, 1, 2}), one)
+        del told[0]
+        assert same_side(2, told, 5) == (frozenset({1, 2}), one)
+        assert same_side(1, told, 5) == (frozenset({1, 2}), one)
+        assert same_side(3, told, 5) == (frozenset({3}), said[3])
 
     def test_join_what_no_edge_joins_any_more(self) -> None:
         """A place that is cut off was all that joined two others by edges."""

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,9 +12,6 @@ from pilotage.stack.patrol.graph import PatrolGraph
 from pilotage.stack.patrol.partition import Plan
 from pilotage.stack.patrol.passages import Passages
 from pilotage.stack.patrol.roadmap import Roadmap
-
-if TYPE_CHECKING:
-    from pilotage.stack.patrol.messages import PatrolState
 
 DETOUR_M = 1.0
 """Edges that are longer by less are as they were; longer ones are told in steps of this."""
@@ -83,21 +79,18 @@ def _links(graph: PatrolGraph, left: IntArray) -> list[tuple[int, int]]:
     return found
 
 
-def same_side(
-    robot: int, states: Sequence[PatrolState | None], team: Collection[int], vertices: int
-) -> tuple[frozenset[int], ShutPaths]:
-    """Who of a team reaches most of what a robot reaches, and what they plan on.
+def same_side(robot: int, told: Mapping[int, ShutPaths], vertices: int) -> tuple[frozenset[int], ShutPaths]:
+    """Who of a team reaches most of what a robot reaches, and what they plan on; ``told``: what each says.
 
     That is what the one with the smallest number says of those who know of something that is shut: all come
     to the same plan, though each sees bodies a little elsewhere.
     """
-    told = {k: NONE_SHUT if (s := states[k]) is None else s.shut for k in sorted(team)}
     reached = {k: frozenset(shut.reached(vertices).tolist()) for k, shut in told.items()}
     own = reached[robot]
     side = [
         k for k, theirs in reached.items() if k == robot or 2 * len(own & theirs) > min(len(own), len(theirs))
     ]
-    return frozenset(side), next((told[k] for k in side if told[k] != NONE_SHUT), NONE_SHUT)
+    return frozenset(side), next((told[k] for k in sorted(side) if told[k] != NONE_SHUT), NONE_SHUT)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

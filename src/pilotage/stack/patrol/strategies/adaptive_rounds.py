@@ -163,7 +163,8 @@ class AdaptiveRoundsStrategy:
         silent |= now_s - self._off_s > self._config.silent_s
         silent[knowledge.robot] = False
         team = np.flatnonzero(~silent).tolist()
-        side, shut = same_side(knowledge.robot, knowledge.states, team, len(self._graph))
+        told = {k: NONE_SHUT if (s := knowledge.states[k]) is None else s.shut for k in team}
+        side, shut = same_side(knowledge.robot, told, len(self._graph))
         if (side, shut) != (self._side, self._shut) and len(shut.unreached) < len(self._graph):
             self._side, self._shut = side, shut
             self._plan_anew(knowledge)
