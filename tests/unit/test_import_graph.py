@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from graphlib import TopologicalSorter
 from pathlib import Path
 
 import grimp
@@ -29,3 +30,10 @@ def test_the_import_graph_sees_every_file() -> None:
     }
     assert files - graph.modules == set()
     assert graph.modules - files == set()
+
+
+def test_no_file_imports_itself_through_others() -> None:
+    """Nor for its types alone; the package's face, which all of it may name, is not asked."""
+    graph = grimp.build_graph("pilotage", cache_dir=None)
+    below = {m: graph.find_modules_directly_imported_by(m) - {"pilotage"} for m in graph.modules}
+    TopologicalSorter(below).prepare()  # names the circle in its error
