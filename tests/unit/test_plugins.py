@@ -210,11 +210,11 @@ class MyController:
         (
             "localizer",
             BAD_LOCALIZER.format(gives="Belief(Pose2(1.0, 1.0, 0.0), np.full((3, 3), np.nan))"),
-            "pilotage: localizer 'mine': expected a Belief of finite pose and finite covariance (3, 3)",
+            "expected a Belief of finite pose and positive covariance (3, 3), found Belief with cov nan",
         ),
         ("localizer", BAD_LOCALIZER.format(gives="sys.exit(0)"), "line 16: SystemExit: 0"),
         ("localizer", BAD_LOCALIZER.format(gives="open('/none/x')"), "line 16: FileNotFoundError: "),
-        ("controller", BAD_CONTROLLER, "is not what its role gives: AttributeError: 'Twist' object has no"),
+        ("controller", BAD_CONTROLLER, ": step: expected a Control of finite numbers, found Twist("),
     ],
 )
 def test_a_plugin_that_gives_something_else_is_named(tmp_path: Path, role: str, text: str, told: str) -> None:

@@ -1,4 +1,4 @@
-"""``pilotage components``: what can be named in a mission file."""
+"""``pilotage components``: what can be named in a mission file or a study."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ def components(
     json: Json = False,
     plugin: Plugins = None,  # noqa: ARG001 - loaded while the options are read
 ) -> None:
-    """List the components, or the parameters of one of them."""
+    """List the components and metrics, or what there is to know of one of them."""
     from pilotage.experiments.catalogue import components as registered
 
     rows = registered(name)

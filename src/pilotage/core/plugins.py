@@ -17,6 +17,7 @@ from importlib.metadata import entry_points
 from pathlib import Path
 
 from pilotage.core.errors import InputError
+from pilotage.core.shown import shown
 
 GROUP = "pilotage.plugins"
 """Entry points of this group are imported when a component is first looked for."""
@@ -25,22 +26,31 @@ VARIABLE = "PILOTAGE_PLUGINS"
 
 _loaded: dict[str, str] = {}
 _packages: dict[str, str] = {}
-"""Folder or file of each installed plugin's code, by the entry point's name."""
+"""Installed packages' names, by the folder or file of their code."""
 _seen_entry_points = False
 _in_use: dict[str, None] = {}
 """Modules from outside of which something was taken, in the order of that."""
 
 
 def add_plugins(files: Iterable[str]) -> None:
-    """Load plugin files now, and in every process that this one starts.
+    """Load plugin files now, and in every process that this one starts; packages must be there.
 
     Raises
     ------
     InputError
-        Where a file is missing, does not import, or registers a name that is taken.
+        Where a file is missing, does not import, or registers a name that is taken; where no such package is
+        installed.
     """
     named = named_plugins()
     for file in files:
+        if is_package(file):
+            load_plugins()
+            if file not in _packages.values():
+                raise InputError(
+                    f"plugins: expected a Python file or an installed package with plugins, found '{file}'; "
+                    f"install it, or take it off the list"
+                )
+            continue
         path = str(Path(file).absolute())
         load_file(path)
         if path not in named:
@@ -53,8 +63,16 @@ def named_plugins() -> list[str]:
     return [name for name in os.environ.get(VARIABLE, "").split(os.pathsep) if name]
 
 
+def is_package(name: str) -> bool:
+    """Whether a plugin is named as an installed package, not as a file."""
+    return not name.endswith(".py") and "/" not in name and os.sep not in name
+
+
 def load_plugins() -> None:
-    """Load the plugins that the environment names and those of installed packages, each once."""
+    """Load the plugins that the environment names and those of installed packages, each once.
+
+    An installed one that fails is told and left out: who did not ask for it need not mend it first.
+    """
     global _seen_entry_points
     for name in named_plugins():
         load_file(name)
@@ -62,14 +80,20 @@ def load_plugins() -> None:
         return
     _seen_entry_points = True
     for entry in entry_points(group=GROUP):
+        package = entry.dist.name if entry.dist is not None else entry.name
         try:
+            home = _home(entry.value)
+            if home:
+                _packages[home] = package
             with redirect_stdout(sys.stderr):
                 entry.load()
-            _packages[entry.name] = _home(entry.value)
-        except InputError as error:
-            raise InputError(f"plugin '{entry.name}': {error}") from None
-        except Exception as error:
-            raise InputError(f"plugin '{entry.name}' ({entry.value}): {_where(error)}") from None
+        except (Exception, SystemExit) as error:
+            told = str(error) if isinstance(error, InputError) else _where(error)
+            from multiprocessing import parent_process
+
+            if parent_process() is None:  # workers need not say it again
+                line = f"plugin '{entry.name}' of package '{package}' ({entry.value}) is left out: {told}"
+                sys.stderr.write(f"pilotage: {shown(line)}\n")
 
 
 def load_file(path: str) -> None:
@@ -112,8 +136,7 @@ class Fault:
 def fault_of(error: BaseException) -> Fault | None:
     """Tell whether an error came out of a plugin's code, or of ours as a plugin called it; None: neither."""
     frames = traceback.extract_tb(error.__traceback__)
-    homes = {path: f"'{path}'" for path in _loaded}
-    homes |= {home: f"'{name}'" for name, home in _packages.items() if home}
+    homes = _homes()
     own = [frame for frame in frames if _home_of(frame.filename, homes) is not None]
     if not own:
         return None
@@ -147,10 +170,7 @@ def consequence_of(error: BaseException) -> Fault | None:
 
     One that gives a text for a number, or an array of another shape, is gone again when that is found out.
     """
-    homes = {path: f"'{path}'" for path in _loaded}
-    homes |= {home: f"'{name}'" for name, home in _packages.items() if home}
-    files = [str(getattr(sys.modules.get(name), "__file__", "")) for name in _in_use]
-    used = dict.fromkeys(homes[home] for file in files if (home := _home_of(file, homes)) is not None)
+    used = dict.fromkeys(told for name in _in_use if (told := _told(name)))
     if not used:
         return None
     text = "".join(traceback.format_exception(error)).rstrip()
@@ -161,17 +181,41 @@ def consequence_of(error: BaseException) -> Fault | None:
     )
 
 
+def giver(module: str) -> str:
+    """Who brought a module, for messages: a plugin's file or package, or the module itself."""
+    return f"plugin {_told(module)}" if _told(module) else f"'{module}'"
+
+
+def package_of(module: str) -> str | None:
+    """The installed package that a module is part of; None where it came otherwise."""
+    return _packages.get(_home_of(_file_of(module), _packages) or "")
+
+
+def _told(module: str) -> str | None:
+    homes = _homes()
+    return homes.get(_home_of(_file_of(module), homes) or "")
+
+
+def _homes() -> dict[str, str]:
+    """How messages name plugins, by the folder or file of their code."""
+    named = {path: f"'{path}'" for path in _loaded}
+    return named | {home: f"'{name}'" for home, name in _packages.items()}
+
+
+def _file_of(module: str) -> str:
+    return str(getattr(sys.modules.get(module), "__file__", ""))
+
+
 def _home_of(file: str, homes: Mapping[str, str]) -> str | None:
     return next((home for home in homes if file == home or file.startswith(home + os.sep)), None)
 
 
 def _home(value: str) -> str:
-    """Where the code of an entry point lies; nowhere where it is built in."""
-    module = sys.modules[value.partition(":")[0].partition(".")[0]]
-    file = getattr(module, "__file__", None)
-    if file is None:
+    """Where the code of an entry point lies; nowhere where nobody can tell."""
+    spec = importlib.util.find_spec(value.partition(":")[0].partition(".")[0].strip())
+    if spec is None or spec.origin is None:
         return ""
-    return str(Path(file).parent) if Path(file).stem == "__init__" else file
+    return str(Path(spec.origin).parent) if spec.submodule_search_locations else spec.origin
 
 
 def _where(error: BaseException, path: str = "") -> str:

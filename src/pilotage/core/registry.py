@@ -12,9 +12,10 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any, Generic, TypeVar
 
+from pilotage.core.checked import Gives, checked
 from pilotage.core.config import Config, validate
 from pilotage.core.errors import InputError, unknown_name
-from pilotage.core.plugins import load_plugins, take
+from pilotage.core.plugins import giver, load_plugins, take
 
 RENAMED = {"ekf-slow-errors": "ekf-gauss-markov", "mcl-likelihood-field": "particle-filter"}
 """Components' old names, each with today's."""
@@ -41,10 +42,12 @@ class Registry(Generic[T]):
         What the entries are, as it is called in messages and mission files ("planner").
     packages
         Those whose modules register themselves here; imported at the first look-up.
+    gives
+        What its methods give: of a component from outside the package it is looked at.
     """
 
-    def __init__(self, role: str, *packages: str) -> None:
-        self.role = role
+    def __init__(self, role: str, *packages: str, gives: tuple[Gives, ...] = ()) -> None:
+        self.role, self._gives = role, gives
         self._packages = packages
         self._entries: dict[str, Entry[T]] = {}
         self._loaded = False
@@ -56,8 +59,11 @@ class Registry(Generic[T]):
             if not cls.__module__.startswith("pilotage."):
                 self._load()  # so that who comes from outside and takes a name of ours is the one refused
             if name in self._entries:
-                raise InputError(f"{self.role} '{name}': expected a new name, found it registered already")
-            self._entries[name] = Entry(name, cls, config)
+                whose = giver(self._entries[name].factory.__module__)
+                raise InputError(
+                    f"{self.role} '{name}': expected a new name, found it registered already by {whose}"
+                )
+            self._entries[name] = Entry(name, checked(cls, f"{self.role} '{name}'", *self._gives), config)
             return cls
 
         return register

@@ -1,4 +1,4 @@
-"""What can be named in a mission file: missions, components, their parameters, the schema."""
+"""What can be named in a mission or study file: missions, components, their parameters, the schema."""
 
 from __future__ import annotations
 
@@ -8,6 +8,8 @@ from pydantic_core import PydanticUndefined
 
 from pilotage.core.config import Config
 from pilotage.core.errors import unknown_name
+from pilotage.evaluation.metric import Direction
+from pilotage.evaluation.metrics import METRICS
 from pilotage.experiments.mission import read_mission, shipped_missions
 from pilotage.experiments.roles import ROLES
 from pilotage.missions.mission import Mission
@@ -21,7 +23,7 @@ def missions() -> list[tuple[str, str]]:
 
 
 def components(name: str | None = None) -> list[tuple[str, str, str]]:
-    """Role, name and first line of every component; or parameter, default and type of one of them.
+    """Role, name and first line of every component and metric; or parameter, default and type of one of them.
 
     Raises
     ------
@@ -30,10 +32,17 @@ def components(name: str | None = None) -> list[tuple[str, str, str]]:
     """
     entries = [(role, entry) for role, registry in ROLES.items() for entry in registry]
     if name is None:
-        return [(role, entry.name, _first_line(entry.factory.__doc__)) for role, entry in entries]
+        listed = [(role, entry.name, _first_line(entry.factory.__doc__)) for role, entry in entries]
+        return listed + [("metric", metric.key, metric.meaning) for metric in METRICS]
+    if name in METRICS:
+        metric = METRICS.find(name)
+        tasks = ", ".join(sorted(metric.tasks)) or "every task"
+        better = "" if metric.direction is Direction.NONE else f"{metric.direction} is better"
+        return [(f"metric '{name}'", metric.unit, metric.meaning), ("given by", tasks, better)]
     found = [(role, entry) for role, entry in entries if entry.name == name]
     if not found:
-        raise unknown_name("component", name, {entry.name for _, entry in entries})
+        names = {entry.name for _, entry in entries} | {metric.key for metric in METRICS}
+        raise unknown_name("component", name, names)
     rows: list[tuple[str, str, str]] = []
     for role, entry in found:
         rows.append((f"{role} '{name}'", "", _first_line(entry.factory.__doc__)))

@@ -10,7 +10,7 @@ from typing import Any
 
 from pilotage.core.config import validate
 from pilotage.core.errors import InputError, nearest, unknown_name
-from pilotage.core.plugins import add_plugins, named_plugins
+from pilotage.core.plugins import add_plugins, is_package, named_plugins
 from pilotage.experiments.resolve import check_components
 from pilotage.experiments.values import apply_override, apply_setting, merge, parse_yaml, read_text
 from pilotage.missions.mission import TOP_KEYS, Mission
@@ -79,8 +79,9 @@ def mission_of(
     refuse_old_keys(changed)
     plugins = changed.get("plugins", ())
     if isinstance(plugins, list | tuple):
-        add_plugins(str(file) for file in plugins)
-        changed["plugins"] = named_plugins()
+        names = [str(name) for name in plugins]
+        add_plugins(names)
+        changed["plugins"] = [*filter(is_package, names), *named_plugins()]
     mission = validate(Mission, changed, "")
     check_components(mission)
     return mission
@@ -154,7 +155,7 @@ def _anchor_map(values: dict[str, Any], folder: Path) -> None:
     if isinstance(stack, dict):
         places.append((stack, "map"))
     if isinstance(plugins, list):
-        values["plugins"] = [str(folder / str(file)) for file in plugins]
+        values["plugins"] = [name if is_package(str(name)) else str(folder / str(name)) for name in plugins]
     for holder, key in places:
         source = holder.get(key)
         if isinstance(source, str) and (folder / source).is_file():

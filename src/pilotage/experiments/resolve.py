@@ -10,6 +10,7 @@ from typing import Any
 import yaml
 
 from pilotage.core.errors import InputError
+from pilotage.core.plugins import is_package, package_of
 from pilotage.experiments.build.charts import inlined
 from pilotage.experiments.roles import ROLES
 from pilotage.maps.world_map import WorldMap
@@ -32,18 +33,23 @@ def resolved_values(mission: Mission, chart: WorldMap | None = None) -> dict[str
         Where a component or one of its parameters is not what it should be.
     """
     values = mission.model_dump(mode="json")
-    values["task"] = _resolved("task", values["task"], "task")
+    packages: set[str] = set()
+    values["task"] = _resolved("task", values["task"], "task", packages)
     people = values["world"]["people"]
     for index, choice in enumerate(people):
-        people[index] = _resolved("people", choice, f"world.people.{index}")
-    if values["team"]["strategy"] is not None:
-        values["team"]["strategy"] = _resolved("strategy", values["team"]["strategy"], "team.strategy")
-    if values["team"]["radio"] is not None:
-        values["team"]["radio"] = _resolved("sensor", values["team"]["radio"], "team.radio")
-    _resolve_stack(values["stack"], "stack")
-    _resolve_robot(values["robot"], "robot")
+        people[index] = _resolved("people", choice, f"world.people.{index}", packages)
+    team = values["team"]
+    if team["strategy"] is not None:
+        team["strategy"] = _resolved("strategy", team["strategy"], "team.strategy", packages)
+    if team["radio"] is not None:
+        team["radio"] = _resolved("sensor", team["radio"], "team.radio", packages)
+    _resolve_stack(values["stack"], "stack", packages)
+    _resolve_robot(values["robot"], "robot", packages)
     for index, robot in enumerate(values["robots"]):
-        _resolve_robot(robot, f"robots.{index}")
+        _resolve_robot(robot, f"robots.{index}", packages)
+    values["plugins"] = sorted(packages.union(filter(is_package, values["plugins"]))) + [
+        name for name in values["plugins"] if not is_package(name)
+    ]
     if chart is not None:
         values["world"]["map"] = inlined(mission.world.map, chart)
         for choice in people:
@@ -63,33 +69,36 @@ def check_components(mission: Mission) -> None:
     resolved_values(mission)
 
 
-def _resolve_stack(stack: dict[str, Any], where: str) -> None:
+def _resolve_stack(stack: dict[str, Any], where: str, packages: set[str]) -> None:
     for role, choice in stack.items():
         if role in ROLES and choice is not None:
-            stack[role] = _resolved(role, choice, f"{where}.{role}")
+            stack[role] = _resolved(role, choice, f"{where}.{role}", packages)
 
 
-def _resolve_robot(robot: dict[str, Any], where: str) -> None:
+def _resolve_robot(robot: dict[str, Any], where: str, packages: set[str]) -> None:
     truly = {**robot["motion"], **robot["true_motion"]}
-    robot["motion"] = _resolved("motion", robot["motion"], f"{where}.motion")
+    robot["motion"] = _resolved("motion", robot["motion"], f"{where}.motion", packages)
     if truly.get("name") != robot["motion"]["name"]:
         raise InputError(
             f"{where}.true_motion: expected parameters of the motion '{robot['motion']['name']}' alone, "
             f"found another name"
         )
-    _resolved("motion", truly, f"{where}.true_motion")
+    _resolved("motion", truly, f"{where}.true_motion", packages)
     for name, choice in robot["sensors"].items():
-        robot["sensors"][name] = _resolved("sensor", choice, f"{where}.sensors.{name}")
+        robot["sensors"][name] = _resolved("sensor", choice, f"{where}.sensors.{name}", packages)
     for index, fault in enumerate(robot["faults"]):
-        robot["faults"][index] = _resolved("fault", fault, f"{where}.faults.{index}")
+        robot["faults"][index] = _resolved("fault", fault, f"{where}.faults.{index}", packages)
     if robot["stack"] is not None:
-        _resolve_stack(robot["stack"], f"{where}.stack")
+        _resolve_stack(robot["stack"], f"{where}.stack", packages)
 
 
-def _resolved(role: str, choice: Mapping[str, Any], where: str) -> dict[str, Any]:
-    """A component's name with all its parameters, those left to their defaults too."""
+def _resolved(role: str, choice: Mapping[str, Any], where: str, packages: set[str]) -> dict[str, Any]:
+    """A component's name with all its parameters, those left out ones too; its package is noted."""
     parameters = {key: value for key, value in choice.items() if key != "name"}
     config = ROLES[role].configure(choice["name"], parameters, where)
+    package = package_of(ROLES[role].entry(choice["name"]).factory.__module__)
+    if package is not None:
+        packages.add(package)
     return {"name": choice["name"], **config.model_dump(mode="json")}
 
 

@@ -73,5 +73,6 @@ def judge(experiment: Experiment, run: Run) -> Verdict:
     verdict = experiment.task.judge(run.finished)
     trace: dict[str, FloatArray] = run.finished.robots[0].trace
     name = run.finished.mission.task.name
+    verdict.metrics["success"] = bool(verdict.metrics["success"])
     verdict.metrics.update(METRICS.computed(name, trace, verdict.metrics))
     return verdict

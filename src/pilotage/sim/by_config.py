@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Generic, TypeVar
 
+from pilotage.core.checked import Gives, checked
 from pilotage.core.config import Config
 from pilotage.core.errors import InputError
 from pilotage.core.registry import load_modules
@@ -22,10 +23,12 @@ class ByConfig(Generic[T]):
         What the entries are called in messages ("sensor").
     package
         The package whose modules register themselves here; imported at the first look-up.
+    gives
+        What their methods give: of one from outside the package it is looked at.
     """
 
-    def __init__(self, role: str, package: str) -> None:
-        self.role = role
+    def __init__(self, role: str, package: str, gives: Gives) -> None:
+        self.role, self._gives = role, gives
         self._package = package
         self._entries: dict[type[Config], Callable[..., T]] = {}
         self._loaded = False
@@ -36,7 +39,9 @@ class ByConfig(Generic[T]):
         def register(cls: C) -> C:
             if config in self._entries:
                 raise ValueError(f"{self.role} {config.__name__} is simulated twice")
-            self._entries[config] = cls
+            # Those that are read together have no method of their own.
+            gives = () if hasattr(cls, "together") else (self._gives,)
+            self._entries[config] = checked(cls, f"{self.role} {config.__name__}", *gives)
             return cls
 
         return register

@@ -9,10 +9,11 @@ from typing import Protocol
 
 import numpy as np
 
+from pilotage.core.checked import Gives, misfit
 from pilotage.core.registry import Registry
 from pilotage.core.scan_update import LineVerdict as LineVerdict
 from pilotage.core.scan_update import ScanUpdate as ScanUpdate
-from pilotage.core.types import Command, FloatArray, Pose2
+from pilotage.core.types import Command, FloatArray, Pose2, Twist, WheelSpeeds
 from pilotage.sensors.readings import Readings
 
 
@@ -106,8 +107,16 @@ class Stack(Protocol):
         ...
 
 
+def _unfit(given: object, stack: Stack, *_: object) -> str:
+    return misfit(given, (Twist, WheelSpeeds)) or misfit(stack.belief, Belief)
+
+
 NAVIGATORS: Registry[Stack] = Registry(
-    "navigator", "pilotage.stack.navigator", "pilotage.stack.exploration", "pilotage.replicas"
+    "navigator",
+    "pilotage.stack.navigator",
+    "pilotage.stack.exploration",
+    "pilotage.replicas",
+    gives=(Gives("step", "a Twist or WheelSpeeds, and a Belief, of finite numbers", _unfit),),
 )
 """Whole stacks; built as ``cls(config, robot, chart, task, parts, journal)``: a ``RobotKnowledge``, a
 ``WorldMap``, a ``TaskKnowledge``, the ``Parts`` that the mission names, and the ``Journal`` to write into."""

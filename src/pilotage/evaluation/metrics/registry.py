@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import math
+import numbers
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import replace
+from types import MappingProxyType
 
+from pilotage.core.checked import told
 from pilotage.core.errors import InputError, nearest
-from pilotage.core.plugins import take
+from pilotage.core.plugins import giver, take
 from pilotage.core.types import FloatArray
 from pilotage.evaluation.metric import Clock, Compute, Metric, unnamed
 
@@ -99,12 +102,33 @@ class Metrics:
     def computed(
         self, task: str, trace: Mapping[str, FloatArray], metrics: Mapping[str, object]
     ) -> dict[str, object]:
-        """What the declared functions give for a run; a number that is not finite is left out."""
+        """What the declared functions give for a run; what gives None is left out.
+
+        Raises
+        ------
+        InputError
+            Where one gives something else than a finite number or None.
+        """
         found: dict[str, object] = {}
+        trace, metrics = _to_look_at(trace), MappingProxyType(dict(metrics))
         for metric in self:
             if metric.compute is None or not metric.is_given_by(task):
                 continue
             value = metric.compute(trace, metrics)
-            if value is not None and math.isfinite(value):
-                found[metric.key] = float(value)
+            if value is None:
+                continue
+            if not isinstance(value, numbers.Real) or not math.isfinite(value):
+                raise InputError(
+                    f"metric '{metric.key}' of {giver(metric.compute.__module__)}: expected a finite number, "
+                    f"or None of a run that does not give it, found {told(value)}"
+                )
+            found[metric.key] = float(value)
         return found
+
+
+def _to_look_at(trace: Mapping[str, FloatArray]) -> Mapping[str, FloatArray]:
+    """Columns that whoever is handed them cannot write into: they are the run's record."""
+    views = {name: column.view() for name, column in trace.items()}
+    for view in views.values():
+        view.flags.writeable = False
+    return MappingProxyType(views)

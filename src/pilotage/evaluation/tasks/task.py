@@ -6,6 +6,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import ClassVar, Protocol
 
+import numpy as np
+
+from pilotage.core.checked import Gives, told
 from pilotage.core.registry import Registry
 from pilotage.core.types import Event
 from pilotage.evaluation.finished import FinishedRun, Verdict
@@ -80,7 +83,27 @@ class Task(Protocol):
         ...
 
 
-TASKS: Registry[Task] = Registry("task", "pilotage.evaluation.tasks")
+def _unfit_ending(given: object, *_: object) -> str:
+    return "" if given is None or isinstance(given, str) else told(given)
+
+
+def _unfit_verdict(given: object, *_: object) -> str:
+    if not isinstance(given, Verdict):
+        return told(given)
+    success, reason = (given.metrics.get(key) for key in ("success", "reason"))
+    if not isinstance(success, bool | np.bool_):
+        return f"success {told(success)}"
+    return "" if isinstance(reason, str) else f"reason {told(reason)}"
+
+
+TASKS: Registry[Task] = Registry(
+    "task",
+    "pilotage.evaluation.tasks",
+    gives=(
+        Gives("step", "why the run is over, or None", _unfit_ending),
+        Gives("judge", "a Verdict with success, true or false, and a reason", _unfit_verdict),
+    ),
+)
 
 
 def all_ended(attempts: Sequence[Attempt]) -> bool:

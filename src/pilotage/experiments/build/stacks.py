@@ -6,11 +6,9 @@ import numpy as np
 
 from pilotage.core.angles import wrap_to_pi
 from pilotage.core.errors import InputError
-from pilotage.core.plugins import is_from_outside
 from pilotage.core.random import RandomStreams
 from pilotage.core.types import Goal, Pose2
 from pilotage.experiments.build.charts import load_chart
-from pilotage.experiments.build.checked import CheckedLocalizer
 from pilotage.experiments.components import build_component, optional_component
 from pilotage.experiments.oracles.certain import exactly
 from pilotage.experiments.oracles.driver import WatchedLocalizer, WatchedStack
@@ -173,8 +171,6 @@ def _localizer(
     if config.localizer is None:
         return TrueLocalizer(truth) if truth is not None and "localizer" in oracles else None
     built = build_component(LOCALIZERS, config.localizer, "localizer", robot, chart, task.initial, journal)
-    if is_from_outside(type(built).__module__):
-        built = CheckedLocalizer(built, config.localizer.name)
     return in_between(built, robot)
 
 

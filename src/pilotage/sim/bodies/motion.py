@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Protocol
 
+from pilotage.core.checked import Gives, unfit_array
 from pilotage.core.errors import InputError
 from pilotage.core.types import Command, FloatArray, Twist
 from pilotage.sim.by_config import ByConfig
@@ -46,7 +47,13 @@ class SimulatedMotion(Protocol):
         ...
 
 
-SIMULATED_MOTIONS: ByConfig[SimulatedMotion] = ByConfig("motion", "pilotage.sim.bodies")
+def _unfit(_: None, motion: SimulatedMotion, *__: object) -> str:
+    return unfit_array(motion.moves, 3)
+
+
+SIMULATED_MOTIONS: ByConfig[SimulatedMotion] = ByConfig(
+    "motion", "pilotage.sim.bodies", Gives("command", "moves (K, 3) of finite numbers", _unfit)
+)
 """Data sheets to what they truly do."""
 
 

@@ -8,6 +8,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from pilotage.core.checked import Gives, misfit
 from pilotage.core.types import FloatArray
 from pilotage.sensors.readings import Reading
 from pilotage.sensors.sensor import Mount
@@ -67,7 +68,14 @@ class ReadTogether(Protocol):
         ...
 
 
-SIMULATED_SENSORS: ByConfig[SimulatedSensor | ReadTogether] = ByConfig("sensor", "pilotage.sim.sensing")
+def _unfit(given: object, *_: object) -> str:
+    """Readings of a type of their own are welcome, if they are numbers."""
+    return "" if given is None else misfit(given, type(given))
+
+
+SIMULATED_SENSORS: ByConfig[SimulatedSensor | ReadTogether] = ByConfig(
+    "sensor", "pilotage.sim.sensing", Gives("read", "a reading of finite numbers, or None", _unfit)
+)
 """Sensor configs to what they would read."""
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Protocol
 
+from pilotage.core.checked import Gives, misfit
 from pilotage.core.registry import Registry
 from pilotage.core.types import Pose2, Twist
 
@@ -35,4 +36,8 @@ class Controller(Protocol):
         ...
 
 
-CONTROLLERS: Registry[Controller] = Registry("controller", "pilotage.stack.control")
+CONTROLLERS: Registry[Controller] = Registry(
+    "controller",
+    "pilotage.stack.control",
+    gives=(Gives("step", "a Control of finite numbers", lambda given, *_: misfit(given, Control)),),
+)

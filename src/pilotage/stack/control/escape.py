@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Protocol
 
+from pilotage.core.checked import Gives, misfit
 from pilotage.core.registry import Registry
 from pilotage.core.types import Pose2, Twist
 
@@ -20,4 +21,10 @@ class Escape(Protocol):
         ...
 
 
-ESCAPES: Registry[Escape] = Registry("escape", "pilotage.stack.control")
+def _unfit(given: object, *_: object) -> str:
+    return "" if given is None else misfit(given, Twist)
+
+
+ESCAPES: Registry[Escape] = Registry(
+    "escape", "pilotage.stack.control", gives=(Gives("step", "a Twist of finite numbers, or None", _unfit),)
+)

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Protocol
 
+from pilotage.core.checked import Gives, misfit
 from pilotage.core.registry import Registry
 from pilotage.core.types import FloatArray, Pose2
 from pilotage.maps.near_walls import NearWalls
@@ -58,4 +59,10 @@ class Reactive(Protocol):
         ...
 
 
-REACTIVES: Registry[Reactive] = Registry("reactive", "pilotage.stack.control")
+def _unfit(given: object, *_: object) -> str:
+    return misfit(given, Reaction, ("speed_limit_m_s", "front_m"))
+
+
+REACTIVES: Registry[Reactive] = Registry(
+    "reactive", "pilotage.stack.control", gives=(Gives("step", "a Reaction of numbers", _unfit),)
+)

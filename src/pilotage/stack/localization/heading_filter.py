@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar, Protocol
 
+from pilotage.core.checked import Gives, misfit
 from pilotage.core.config import Config
 from pilotage.core.registry import Registry
 from pilotage.sensors.sensor import NonNegative, Positive
@@ -81,5 +82,12 @@ class HeadingErrors(Config):
 
 
 HEADING_FILTERS: Registry[HeadingFilter] = Registry(
-    "heading", "pilotage.stack.localization", "pilotage.replicas"
+    "heading",
+    "pilotage.stack.localization",
+    "pilotage.replicas",
+    gives=(
+        Gives(
+            "step", "a HeadingEstimate of finite numbers", lambda given, *_: misfit(given, HeadingEstimate)
+        ),
+    ),
 )

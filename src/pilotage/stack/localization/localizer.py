@@ -6,6 +6,9 @@ from collections.abc import Callable
 from dataclasses import dataclass, fields
 from typing import Protocol
 
+import numpy as np
+
+from pilotage.core.checked import Gives, misfit, told
 from pilotage.core.errors import InputError
 from pilotage.core.registry import Registry
 from pilotage.core.types import FloatArray
@@ -113,4 +116,29 @@ def require_initial_pose(initial: Belief, name: str) -> None:
         )
 
 
-LOCALIZERS: Registry[Localizer] = Registry("localizer", "pilotage.stack.localization", "pilotage.replicas")
+LEAST_EIGENVALUE = -1e-9
+"""Of a covariance, as a share of its largest: what rounding may leave below zero."""
+
+
+def _unfit(given: object, *_: object) -> str:
+    wrong = misfit(given, Belief)
+    if wrong or not isinstance(given, Belief):
+        return wrong
+    if not isinstance(given.status, BeliefStatus):
+        return f"a status {told(given.status)}"
+    cov = given.cov
+    if cov.shape != (3, 3):
+        return f"a covariance {cov.shape}"
+    if not np.allclose(cov, cov.T):
+        return "a covariance that is not symmetric"
+    values = np.linalg.eigvalsh(cov)
+    low, high = float(values[0]), float(values[-1])
+    return f"a covariance with an eigenvalue of {low:g}" if low < LEAST_EIGENVALUE * max(high, 0.0) else ""
+
+
+LOCALIZERS: Registry[Localizer] = Registry(
+    "localizer",
+    "pilotage.stack.localization",
+    "pilotage.replicas",
+    gives=(Gives("step", "a Belief of finite pose and positive covariance (3, 3)", _unfit),),
+)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Protocol
 
+from pilotage.core.checked import Gives, unfit_array
 from pilotage.core.registry import Registry
 from pilotage.core.types import FloatArray
 from pilotage.sensors.readings import Readings
@@ -26,4 +27,12 @@ class Mapper(Protocol):
         ...
 
 
-MAPPERS: Registry[Mapper] = Registry("mapper", "pilotage.stack.mapping")
+def _unfit(added: object, mapper: Mapper, *_: object) -> str:
+    return unfit_array(mapper.circles_m, 3) if added else ""
+
+
+MAPPERS: Registry[Mapper] = Registry(
+    "mapper",
+    "pilotage.stack.mapping",
+    gives=(Gives("step", "circles_m (M, 3) of finite numbers", _unfit),),
+)

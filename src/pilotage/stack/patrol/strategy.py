@@ -7,6 +7,7 @@ from typing import Protocol, runtime_checkable
 
 import numpy as np
 
+from pilotage.core.checked import Gives, told
 from pilotage.core.registry import Registry
 from pilotage.core.types import FloatArray, IntArray
 from pilotage.stack.patrol.graph import PatrolGraph
@@ -87,7 +88,17 @@ def following(strategy: Strategy) -> int:
     return strategy.following() if isinstance(strategy, Foresighted) else -1
 
 
-STRATEGIES: Registry[Strategy] = Registry("strategy", "pilotage.stack.patrol.strategies")
+def _unfit(given: object, _: Strategy, knowledge: PatrolKnowledge) -> str:
+    if isinstance(given, bool) or not isinstance(given, int | np.integer):
+        return told(given)
+    return "" if 0 <= given < len(knowledge.own_idleness_s) else f"{given}"
+
+
+STRATEGIES: Registry[Strategy] = Registry(
+    "strategy",
+    "pilotage.stack.patrol.strategies",
+    gives=(Gives("next_vertex", "a vertex's number", _unfit),),
+)
 
 
 def best_of(vertices: IntArray, values: FloatArray, rng: np.random.Generator) -> int:

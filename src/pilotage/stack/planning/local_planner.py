@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Protocol
 
+from pilotage.core.checked import Gives, misfit, unfit_array
 from pilotage.core.registry import Registry
 from pilotage.core.types import FloatArray, Pose2
 from pilotage.maps.near_walls import NearWalls
@@ -58,4 +59,15 @@ class LocalPlanner(Protocol):
         ...
 
 
-LOCAL_PLANNERS: Registry[LocalPlanner] = Registry("local planner", "pilotage.stack.planning")
+def _unfit(given: object, *_: object) -> str:
+    if given is None:
+        return ""
+    wrong = misfit(given, LocalPath)
+    return wrong or (unfit_array(given.states, 3) if isinstance(given, LocalPath) else "")
+
+
+LOCAL_PLANNERS: Registry[LocalPlanner] = Registry(
+    "local planner",
+    "pilotage.stack.planning",
+    gives=(Gives("plan", "a LocalPath of states (N, 3) of finite numbers, or None", _unfit),),
+)

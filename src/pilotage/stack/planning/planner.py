@@ -11,6 +11,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
+from pilotage.core.checked import Gives, misfit, told, unfit_array
 from pilotage.core.errors import InputError
 from pilotage.core.registry import Registry
 from pilotage.core.types import FloatArray, Goal, Pose2
@@ -158,5 +159,53 @@ class Smoother(Protocol):
         ...
 
 
-PLANNERS: Registry[Planner] = Registry("planner", "pilotage.stack.planning")
-SMOOTHERS: Registry[Smoother] = Registry("smoother", "pilotage.stack.planning")
+def _unfit_plan(given: object, _: Planner, request: PlanRequest) -> str:
+    wrong = misfit(given, PlanResult, ("first_solution_s", "planning_time_s"))
+    if wrong or not isinstance(given, PlanResult):
+        return wrong
+    if not isinstance(given.status, PlanStatus):
+        return f"a status {told(given.status)}"
+    if given.path is None:
+        return "none that is found" if given.status is PlanStatus.FOUND else ""
+    return _unfit_path(given.path, request)
+
+
+def _unfit_smoothed(given: object, _: Smoother, __: Path, request: PlanRequest, *___: object) -> str:
+    return _unfit_path(given, request)
+
+
+def _unfit_path(given: object, request: PlanRequest) -> str:
+    """Why nobody can drive a path: its numbers, its ends, its gaps, or what its robot's middle runs into."""
+    wrong = misfit(given, Path)
+    if wrong or not isinstance(given, Path):
+        return wrong
+    for what, array in (("states", given.states), ("waypoints", given.waypoints)):
+        unfit = unfit_array(array, 3) or ("" if len(array) > 1 else f"an array {array.shape}")
+        if unfit:
+            return f"{what}: {unfit}"
+    states, start, goal = given.states[:, :2], request.start, request.goal
+    for what, place, end in (("start", start, states[0]), ("goal", goal, states[-1])):
+        apart_m = math.hypot(end[0] - place.x_m, end[1] - place.y_m)
+        if apart_m > max(SPACING_M, request.field.resolution_m):
+            return f"a path whose {what} is {apart_m:.2f} m away from where it was asked for"
+    apart_m = float(np.hypot(*np.diff(states, axis=0).T).max())
+    if apart_m > SPACING_M * (1.0 + 1e-6):
+        return f"states {apart_m:.2f} m apart (at most {SPACING_M:g} m; Path.through puts them in between)"
+    # A robot may believe that it stands in a wall; what lies farther on its plan goes around.
+    inner_m = 0.0 if request.footprint is None else request.footprint.inner_radius_m
+    away = np.hypot(states[:, 0] - start.x_m, states[:, 1] - start.y_m) > inner_m
+    blocked = away & (request.field.at(states) <= max(inner_m - request.field.resolution_m, 0.0))
+    if blocked.any():
+        x_m, y_m = states[np.argmax(blocked)]
+        return f"a path through what stands at ({x_m:.2f}, {y_m:.2f})"
+    return ""
+
+
+PLANNERS: Registry[Planner] = Registry(
+    "planner",
+    "pilotage.stack.planning",
+    gives=(Gives("plan", "a PlanResult with a path to drive", _unfit_plan),),
+)
+SMOOTHERS: Registry[Smoother] = Registry(
+    "smoother", "pilotage.stack.planning", gives=(Gives("smooth", "a Path to drive", _unfit_smoothed),)
+)

@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import Protocol
 
+from pilotage.core.checked import Gives, misfit
 from pilotage.core.errors import InputError
 from pilotage.core.registry import Registry
 from pilotage.core.types import FloatArray, Pose2, Twist
@@ -127,4 +128,8 @@ class LocalController(Protocol):
         ...
 
 
-LOCAL_CONTROLLERS: Registry[LocalController] = Registry("local controller", "pilotage.stack.control.local")
+LOCAL_CONTROLLERS: Registry[LocalController] = Registry(
+    "local controller",
+    "pilotage.stack.control.local",
+    gives=(Gives("step", "a Twist of finite numbers", lambda given, *_: misfit(given, Twist)),),
+)

@@ -1,0 +1,329 @@
+"""What components from outside give is looked at where they give it; installed packages of plugins."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import subprocess
+import sys
+from dataclasses import dataclass
+from pathlib import Path as FilePath
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+import yaml
+
+from pilotage.core import plugins
+from pilotage.core.checked import Gives, checked
+from pilotage.core.errors import InputError
+from pilotage.core.types import Goal, Pose2, Twist
+from pilotage.evaluation.finished import Verdict
+from pilotage.evaluation.metric import Metric
+from pilotage.evaluation.metrics.registry import Metrics
+from pilotage.evaluation.tasks.task import TASKS
+from pilotage.maps.distance_field import DistanceField
+from pilotage.maps.segment_map import SegmentMap
+from pilotage.sensors.readings import GpsFix, LidarScan
+from pilotage.sim.bodies.motion import SIMULATED_MOTIONS
+from pilotage.sim.sensing.sensor import SIMULATED_SENSORS
+from pilotage.stack.control.controller import CONTROLLERS, Control
+from pilotage.stack.control.escape import ESCAPES
+from pilotage.stack.control.local.role import LOCAL_CONTROLLERS
+from pilotage.stack.control.reactive import REACTIVES, Reaction, ReactionKind
+from pilotage.stack.interface import NAVIGATORS, Belief, BeliefStatus
+from pilotage.stack.localization.heading_filter import HEADING_FILTERS, HeadingEstimate
+from pilotage.stack.localization.localizer import LOCALIZERS
+from pilotage.stack.mapping.mapper import MAPPERS
+from pilotage.stack.patrol.strategy import STRATEGIES
+from pilotage.stack.planning.local_planner import LOCAL_PLANNERS, LocalPath
+from pilotage.stack.planning.planner import PLANNERS, SMOOTHERS, Path, PlanRequest, PlanResult, PlanStatus
+
+NAN = math.nan
+ROUNDED = np.diag([0.1, 0.1, 0.0]) - 1e-14 * np.eye(3)
+ROOM = [[0, 0, 6, 0], [6, 0, 6, 4], [6, 4, 0, 4], [0, 4, 0, 0], [3, 0, 3, 2.5]]
+WALLS = SegmentMap.of(np.array(ROOM, dtype=np.float64), np.zeros((0, 3)))
+ASKED = PlanRequest(
+    Pose2(1.0, 1.0, 0.0), Goal(5.0, 1.0, None), DistanceField.from_map(WALLS), np.random.default_rng(0), 0.3
+)
+AROUND = Path.through([(1.0, 1.0), (2.0, 3.2), (4.0, 3.2), (5.0, 1.0)])
+THROUGH = Path.through([(1.0, 1.0), (5.0, 1.0)])
+SHORT = Path.through([(1.0, 1.0), (2.0, 3.2)])
+SPARSE = Path(AROUND.waypoints, AROUND.waypoints, AROUND.length_m, 0.0)
+NOWHERE = Path(np.full((9, 3), NAN), AROUND.waypoints, 1.0, 0.0)
+WHOLE = Path(AROUND.states.astype(int), AROUND.waypoints, 1.0, 0.0)
+EYE = np.eye(3)
+
+
+def found(path: object) -> PlanResult:
+    return PlanResult(PlanStatus.FOUND, "", path)  # type: ignore[arg-type]
+
+
+def belief(x_m: Any = 0.0, cov: Any = EYE) -> Belief:
+    return Belief(Pose2(x_m, 0.0, 0.0), cov)
+
+
+def control(v_m_s: Any) -> Control:
+    return Control(Twist(v_m_s, 0.0), 0.0, 0.0, 0.0)
+
+
+def verdict(**metrics: object) -> Verdict:
+    return Verdict(metrics, (), {})
+
+
+@dataclass(frozen=True)
+class OwnReading:
+    depth_m: float
+
+
+CORRELATED = np.array([[1.0, 2.0, 0.0], [2.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
+SKEW = np.array([[1.0, 0.5, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
+KNOWN = SimpleNamespace(own_idleness_s=np.zeros(4))
+GIVES: dict[str, tuple[Any, str]] = {
+    "planner": (PLANNERS, "plan"),
+    "smoother": (SMOOTHERS, "smooth"),
+    "local planner": (LOCAL_PLANNERS, "plan"),
+    "localizer": (LOCALIZERS, "step"),
+    "heading": (HEADING_FILTERS, "step"),
+    "controller": (CONTROLLERS, "step"),
+    "local controller": (LOCAL_CONTROLLERS, "step"),
+    "reactive": (REACTIVES, "step"),
+    "escape": (ESCAPES, "step"),
+    "navigator": (NAVIGATORS, "step"),
+    "mapper": (MAPPERS, "step"),
+    "strategy": (STRATEGIES, "next_vertex"),
+    "task": (TASKS, "judge"),
+    "sensor": (SIMULATED_SENSORS, "read"),
+    "motion": (SIMULATED_MOTIONS, "command"),
+}
+CALLED_WITH: dict[str, tuple[object, ...]] = {
+    "planner": (ASKED,),
+    "smoother": (AROUND, ASKED, 0.3),
+    "strategy": (KNOWN,),
+    "motion": (Twist(0.1, 0.0),),
+}
+
+
+def made(role: str, gives: object, **members: object) -> Any:
+    """A stranger's component of a role whose method gives this."""
+    registry, method = GIVES[role]
+    roles = registry._gives if isinstance(registry._gives, tuple) else (registry._gives,)
+    methods: dict[str, object] = {each.method: lambda *_: gives for each in roles}
+    cls = type("Mine", (), {"__module__": "somebodys", "__slots__": (), **methods, **members})
+    return getattr(checked(cls, f"{role} 'mine'", *roles)(), method)
+
+
+@pytest.mark.parametrize(
+    ("role", "gives"),
+    [
+        ("planner", found(AROUND)),
+        ("planner", PlanResult(PlanStatus.NO_PATH, "", None)),
+        ("smoother", AROUND),
+        ("local planner", None),
+        ("local planner", LocalPath(AROUND.states, 0.3)),
+        ("localizer", belief()),
+        ("localizer", Belief.anywhere((0.0, 0.0, 9.0, 9.0))),
+        ("localizer", belief(np.float32(1.0), np.zeros((3, 3)))),
+        ("localizer", belief(cov=ROUNDED)),
+        ("heading", HeadingEstimate(0.1, 0.0)),
+        ("controller", control(1)),
+        ("local controller", Twist(0.1, 0.2)),
+        ("reactive", Reaction(ReactionKind.NONE, 0.0, math.inf, math.inf)),
+        ("escape", None),
+        ("strategy", np.int64(3)),
+        ("task", verdict(success=np.bool_(True), reason="there")),
+        ("sensor", None),
+        ("sensor", GpsFix(1.0, 2.0)),
+        ("sensor", OwnReading(1.0)),
+    ],
+)
+def test_what_is_right_comes_through(role: str, gives: object) -> None:
+    assert made(role, gives)(*CALLED_WITH.get(role, ())) is gives
+
+
+@pytest.mark.parametrize(
+    ("role", "gives", "told"),
+    [
+        ("planner", "found", "found str 'found'"),
+        ("planner", None, "found none"),
+        ("planner", found(None), "found none that is found"),
+        ("planner", PlanResult("found", "", AROUND), "found a status str 'found'"),  # type: ignore[arg-type]
+        ("planner", found(NOWHERE), "Path with states nan in an array (9, 3)"),
+        ("planner", found(WHOLE), "Path with states an array of int64"),
+        ("planner", found(SPARSE), "states 2.42 m apart (at most 0.05 m"),
+        ("planner", found(SHORT), "a path whose goal is 3.72 m away from where it was asked for"),
+        ("planner", found(THROUGH), "a path through what stands at (3.0"),
+        ("smoother", THROUGH, "a path through what stands at (3.0"),
+        ("local planner", LocalPath(np.zeros(3), 0.3), "an array (3,) instead of (N, 3)"),
+        ("localizer", belief(NAN), "Belief with pose Pose2 with x_m nan"),
+        ("localizer", belief("1"), "Pose2 with x_m str '1'"),
+        ("localizer", belief(cov=np.eye(2)), "a covariance (2, 2)"),
+        ("localizer", belief(cov=EYE * NAN), "cov nan in an array (3, 3)"),
+        ("localizer", belief(cov=CORRELATED), "a covariance with an eigenvalue of -1"),
+        ("localizer", belief(cov=SKEW), "a covariance that is not symmetric"),
+        ("localizer", Belief(Pose2(0.0, 0.0, 0.0), EYE, "lost"), "a status str 'lost'"),  # type: ignore[arg-type]
+        ("heading", HeadingEstimate(NAN, 0.0), "HeadingEstimate with heading_rad nan"),
+        ("controller", Twist(0.1, 0.0), "found Twist(v_m_s="),
+        ("controller", control(math.inf), "twist Twist with v_m_s inf"),
+        ("local controller", None, "found none"),
+        ("local controller", Twist(NAN, 0.0), "Twist with v_m_s nan"),
+        ("reactive", Reaction(ReactionKind.AVOID, NAN, 1.0, 1.0), "Reaction with w_rad_s nan"),
+        ("escape", (0.1, 0.0), "found tuple (0.1, 0.0)"),
+        ("strategy", 4, "found 4"),
+        ("strategy", 1.0, "found float 1.0"),
+        ("task", verdict(success="yes", reason=""), "found success str 'yes'"),
+        ("task", verdict(reason=""), "found success none"),
+        ("task", verdict(success=True), "found reason none"),
+        ("sensor", "hello", "found str 'hello'"),
+        ("sensor", GpsFix(NAN, 0.0), "GpsFix with x_m nan"),
+        ("sensor", LidarScan([1.0]), "LidarScan with ranges_m list [1.0]"),  # type: ignore[arg-type]
+        ("sensor", OwnReading(NAN), "OwnReading with depth_m nan"),
+    ],
+)
+def test_what_is_not_is_refused_by_name(role: str, gives: object, told: str) -> None:
+    """It drove about until the time limit, ended deep in our own code, or went unseen."""
+    _, method = GIVES[role]
+    with pytest.raises(InputError) as refused:
+        made(role, gives)(*CALLED_WITH.get(role, ()))
+    assert str(refused.value).startswith(f"{role} 'mine' of 'somebodys': {method}: expected a")
+    assert told in str(refused.value)
+
+
+def test_what_a_component_keeps_is_looked_at_with_what_it_gives() -> None:
+    lost = Belief(Pose2(NAN, 0.0, 0.0), EYE, BeliefStatus.LOST)
+    for role, gives, kept in (
+        ("navigator", Twist(0.1, 0.0), {"belief": lost}),
+        ("mapper", True, {"circles_m": np.zeros((2, 2))}),
+        ("motion", None, {"moves": np.full((1, 3), NAN)}),
+    ):
+        with pytest.raises(InputError, match=f"{role} 'mine' of 'somebodys'"):
+            made(role, gives, **kept)(*CALLED_WITH.get(role, ()))
+
+
+def test_one_without_its_roles_method_is_refused_as_it_registers() -> None:
+    cls = type("Mine", (), {"__module__": "somebodys"})
+    with pytest.raises(InputError, match="expected a class with a method 'plan', found none"):
+        checked(cls, "planner 'mine'", *PLANNERS._gives)
+
+
+def test_our_own_are_left_as_they_are() -> None:
+    cls = type("Ours", (), {"__module__": "pilotage.stack.planning.ours"})
+    assert checked(cls, "planner 'ours'", Gives("plan", "", lambda *_: "wrong")) is cls
+
+
+@pytest.mark.parametrize("value", [NAN, math.inf, "5", np.arange(3.0)])
+def test_a_metric_that_gives_no_number_is_refused(value: Any) -> None:
+    metrics = Metrics([], {})
+    metrics.computed_by(Metric("mine_m", "mine", "m", ""))(lambda *_: value)
+    with pytest.raises(InputError, match=r"metric 'mine_m' of .*: expected a finite number, or None"):
+        metrics.computed("reach", {}, {})
+
+
+def test_metrics_look_at_a_run_and_leave_it_alone() -> None:
+    column, known = np.zeros(3), {"success": True}
+    for change in (lambda *given: given[0]["x_m"].fill(1.0), lambda *given: given[1].update(success=False)):
+        metrics = Metrics([], {})
+        metrics.computed_by(Metric("mine_m", "mine", "m", ""))(change)
+        with pytest.raises((ValueError, AttributeError)):
+            metrics.computed("reach", {"x_m": column}, known)
+    assert (column == 0.0).all()
+    assert known == {"success": True}
+
+
+# Installed packages
+
+RUN = "import sys; from pilotage.cli.main import main; sys.exit(main(sys.argv[1:]))"
+PLANNER = """
+from pilotage.core.config import Config
+from pilotage.evaluation.metric import Metric
+from pilotage.evaluation.metrics import METRICS
+from pilotage.stack.planning.planner import PLANNERS, Path, PlanResult, PlanStatus
+class Mine(Config):
+    "Nothing."
+@PLANNERS.add("somebodys", Mine)
+class MyPlanner:
+    "Straight on."
+    clearance_m = 0.3
+    def __init__(self, config):
+        pass
+    def plan(self, request):
+        start, goal = request.start, request.goal
+        return PlanResult(PlanStatus.FOUND, "", Path.through([(start.x_m, start.y_m), (goal.x_m, goal.y_m)]))
+METRICS.computed_by(Metric("somebodys_m", "mine", "m", "What I think of it."))(lambda trace, metrics: 1.0)
+"""
+
+
+def install(folder: FilePath, package: str, module: str, text: str) -> None:
+    """As an installer leaves it: a module, and beside it who brought it with which entry points."""
+    about = folder / f"{package}-1.0.dist-info"
+    about.mkdir(parents=True)
+    (about / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {package}\nVersion: 1.0\n")
+    (about / "entry_points.txt").write_text(f"[{plugins.GROUP}]\n{package}-entry = {module}\n")
+    (folder / f"{module}.py").write_text(text)
+
+
+def pilotage(*words: str, folder: FilePath, site: FilePath) -> subprocess.CompletedProcess[str]:
+    path = os.pathsep.join([str(site), *sys.path])
+    environment = {**os.environ, "PYTHONPATH": path}
+    environment.pop(plugins.VARIABLE, None)
+    return subprocess.run(
+        [sys.executable, "-c", RUN, *words],
+        cwd=folder,
+        env=environment,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+
+
+def test_an_installed_package_is_named_by_what_needs_it(tmp_path: FilePath) -> None:
+    """A run's mission named no package: without it, it was an unknown planner. Metrics were shown nowhere."""
+    site, none = tmp_path / "site", tmp_path / "none"
+    install(site, "some-lab", "some_lab", PLANNER)
+    none.mkdir()
+    shown = pilotage("components", "--json", folder=tmp_path, site=site)
+    rows = [tuple(row) for row in json.loads(shown.stdout)["components"]]
+    assert ("planner", "somebodys", "Straight on.") in rows
+    assert ("metric", "somebodys_m", "What I think of it.") in rows
+    words = ("--set", "stack.planner.name=somebodys", "--set", "stack.smoother.name=none", "--json")
+    mission = ("museum-plan", "--set", "world.goal={x_m: 1.0, y_m: 3.0}", "--out", "runs")
+    done = pilotage("run", *mission, *words, "--no-report", folder=tmp_path, site=site)
+    assert done.returncode == 0, done.stderr
+    answer = json.loads(done.stdout)
+    assert answer["somebodys_m"] == 1.0
+    resolved = f"{answer['run_dir']}/mission.yaml"
+    assert yaml.safe_load((tmp_path / resolved).read_text())["plugins"] == ["some-lab"]
+    again = pilotage("run", resolved, "--json", "--no-report", folder=tmp_path, site=site)
+    assert json.loads(again.stdout)["planned_length_m"] == answer["planned_length_m"]
+    without = pilotage("run", resolved, "--json", folder=tmp_path, site=none)
+    assert (without.returncode, without.stdout) == (2, "")
+    assert without.stderr == (
+        "pilotage: plugins: expected a Python file or an installed package with plugins, found 'some-lab'; "
+        "install it, or take it off the list\n"
+    )
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("x = 1 / 0\n", "ZeroDivisionError: division by zero"),
+        ("raise SystemExit(3)\n", "SystemExit: 3"),
+        (PLANNER, "planner 'somebodys': expected a new name, found it registered already by plugin "),
+        (PLANNER.replace("somebodys", "other").replace("def plan", "def go"), "a method 'plan', found none"),
+    ],
+)
+def test_an_installed_package_that_fails_is_told_and_left_out(
+    tmp_path: FilePath, text: str, told: str
+) -> None:
+    """Every run ended with exit code 2 for it, or with 3 and no word where it called ``sys.exit``."""
+    install(tmp_path / "site", "a-lab", "a_lab", PLANNER)
+    install(tmp_path / "site", "b-lab", "b_lab", text)
+    shown = pilotage("components", "--json", folder=tmp_path, site=tmp_path / "site")
+    assert shown.returncode == 0, shown.stderr
+    assert ["planner", "somebodys", "Straight on."] in json.loads(shown.stdout)["components"]
+    (line,) = shown.stderr.splitlines()
+    assert line.startswith("pilotage: plugin '")
+    assert "-lab' (" in line
+    assert told in line
