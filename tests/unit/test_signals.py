@@ -10,13 +10,14 @@ import sys
 import time
 import weakref
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
 
 from pilotage.cli import app
 from pilotage.cli.main import main
-from pilotage.cli.stopped import Terminated, interruption_in
+from pilotage.core.interruptions import Terminated, interruptible, interruption_in
 
 SIGNALS = 12
 LONGEST_WAIT_S = 0.15
@@ -116,6 +117,7 @@ def test_what_an_interruption_leaves_half_made_is_not_told() -> None:
 
 CAST = """
 import ctypes, os, signal, sys
+import pilotage
 from pilotage.cli.main import main
 
 cast, struck = ctypes.cast, []
@@ -130,6 +132,12 @@ def strike(*arguments):
 names = dict(ctypes=ctypes, os=os, sys=sys, signal=signal, cast=cast, struck=struck)
 exec(compile(striking, ctypes.__file__, "exec"), names)
 ctypes.cast = names["strike"]
+if len(sys.argv) > 2:
+    try:
+        pilotage.run(pilotage.load("museum-1", set={"run.time_limit_s": 3.0}), out=sys.argv[1])
+    except KeyboardInterrupt:
+        ours = signal.getsignal(signal.SIGINT) is signal.default_int_handler
+        sys.exit(f"interrupted, {len(struck)}, {ours}")
 code = main(["run", "museum-1", "--set", "run.time_limit_s=3", "--quiet", "--out", sys.argv[1]])
 sys.exit(code if struck else 3)
 """
@@ -141,6 +149,13 @@ def test_a_signal_in_what_a_kernel_calls_waits_until_it_is_over(tmp_path: Path) 
         [sys.executable, "-c", CAST, str(tmp_path)], capture_output=True, text=True, check=False
     )
     assert (child.returncode, child.stderr) == (130, "pilotage: interrupted\n")
+
+
+def test_so_it_does_in_a_script(tmp_path: Path) -> None:
+    child = subprocess.run(
+        [sys.executable, "-c", CAST, str(tmp_path), "script"], capture_output=True, text=True, check=False
+    )
+    assert (child.returncode, child.stderr) == (1, "interrupted, 1, True\n")
 
 
 def from_a_kernel() -> None:
@@ -213,3 +228,48 @@ def test_no_memory_is_one_line(monkeypatch: pytest.MonkeyPatch, capsys: pytest.C
     monkeypatch.setattr(app, "dispatch", swell)
     assert main(["run"]) == 2
     assert capsys.readouterr().err.startswith("pilotage: this needs more memory than there is")
+
+
+class TestInterruptible:
+    """For who calls from Python: Ctrl-C is a KeyboardInterrupt, in whatever guise libraries let it out."""
+
+    def test_what_comes_out_is_an_interruption(self) -> None:
+        with pytest.raises(KeyboardInterrupt), interruptible():
+            from_a_kernel()
+
+        @interruptible()
+        def dropped() -> None:
+            try:
+                os.kill(os.getpid(), signal.SIGINT)
+                time.sleep(60.0)
+            except KeyboardInterrupt:
+                pass
+            raise TypeError("of NumPy's own")
+
+        with pytest.raises(KeyboardInterrupt):
+            dropped()
+        assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+        assert signal.getsignal(signal.SIGALRM) is signal.SIG_DFL
+
+    def test_other_errors_are_what_they_were(self) -> None:
+        with pytest.raises(ZeroDivisionError), interruptible():
+            raise ZeroDivisionError
+
+    @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGALRM])
+    def test_a_handler_of_the_callers_stays(self, number: int) -> None:
+        def own(*_: object) -> None:
+            pass
+
+        before = signal.signal(number, own)
+        try:
+            with interruptible():
+                assert signal.getsignal(number) is own
+                assert signal.getsignal(signal.SIGINT) is (
+                    own if number == signal.SIGINT else signal.default_int_handler
+                )
+        finally:
+            signal.signal(number, before)
+
+    def test_another_thread_may_call(self) -> None:
+        with ThreadPoolExecutor(1) as pool:
+            assert pool.submit(interruptible()(lambda: 3)).result() == 3

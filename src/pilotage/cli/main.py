@@ -17,7 +17,13 @@ from contextlib import contextmanager
 from pathlib import Path
 from types import FrameType
 
-from pilotage.cli.stopped import INTERRUPTED, TERMINATED, Terminated, interruption_in, never_swallowed
+from pilotage.core.interruptions import (
+    INTERRUPTED,
+    TERMINATED,
+    Terminated,
+    interruption_in,
+    never_swallowed,
+)
 
 BAD_INPUT = 2
 BUG = 70

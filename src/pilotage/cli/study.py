@@ -12,9 +12,9 @@ import typer
 
 from pilotage.cli.options import Json, Overrides, Plugins, parse_out
 from pilotage.cli.output import print_columns, print_json, print_line, stdout_for_json
-from pilotage.cli.stopped import INTERRUPTED, TERMINATED, Terminated
 from pilotage.cli.study_line import StudyLine
 from pilotage.core.errors import InputError
+from pilotage.core.interruptions import INTERRUPTED, TERMINATED, Terminated
 from pilotage.core.shown import visible
 
 if TYPE_CHECKING:

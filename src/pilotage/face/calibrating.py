@@ -10,6 +10,7 @@ from typing import Any, Literal, TypeAlias
 from pilotage.core import given
 from pilotage.core.errors import unknown_name
 from pilotage.core.given import FilePath
+from pilotage.core.interruptions import interruptible
 
 Kind: TypeAlias = Literal["odometry", "range", "heading", "commands"]
 KINDS = ("odometry", "range", "heading", "commands")
@@ -51,6 +52,7 @@ class Calibration:
         return write_report(self.folder)
 
 
+@interruptible()
 def calibrate(
     what: Kind,
     logs: Sequence[FilePath] | FilePath = (),

@@ -9,10 +9,12 @@ from typing import Any, Literal
 from pilotage.core import given
 from pilotage.core.errors import unknown_name
 from pilotage.core.given import FilePath
+from pilotage.core.interruptions import interruptible
 from pilotage.core.types import FloatArray, Pose2
 from pilotage.face.runs import Run
 
 
+@interruptible()
 def localize(
     log: FilePath,
     *,

@@ -9,6 +9,7 @@ from pathlib import Path
 from pilotage.core import given
 from pilotage.core.errors import InputError
 from pilotage.core.given import FilePath
+from pilotage.core.interruptions import interruptible
 from pilotage.face.metrics import Metrics
 from pilotage.logs.trajectories import Trajectory3, TrajectoryFormat, read_trajectory
 
@@ -46,6 +47,7 @@ class MappedLog:
         return write_slam_report(self.folder)
 
 
+@interruptible()
 def slam(
     log: FilePath,
     *,

@@ -11,6 +11,7 @@ from pilotage.core import given
 from pilotage.core.config import validate
 from pilotage.core.errors import InputError
 from pilotage.core.given import FilePath
+from pilotage.core.interruptions import interruptible
 from pilotage.experiments.build.charts import load_chart
 from pilotage.maps.occupancy_grid import OCCUPIED_FROM
 from pilotage.maps.vectorize import wall_segments, write_wall_map
@@ -78,6 +79,7 @@ def draw(
     return Drawn(path, layers_of(chart))
 
 
+@interruptible()
 def vectorize(
     map: FilePath,  # noqa: A002 - the word for it
     out: FilePath | None = None,

@@ -14,6 +14,7 @@ import numpy as np
 from pilotage.core import given
 from pilotage.core.errors import InputError
 from pilotage.core.given import FilePath
+from pilotage.core.interruptions import interruptible
 from pilotage.core.types import FloatArray, Pose2
 from pilotage.experiments.grid_planning import is_grid_map, plan_on_grid
 from pilotage.experiments.planning import plan_on_map
@@ -58,6 +59,7 @@ class Plan:
         return f"<table>{rows}</table>"
 
 
+@interruptible()
 def plan(
     map: FilePath,  # noqa: A002 - the word for it
     start: Place,

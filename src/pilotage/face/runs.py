@@ -13,6 +13,7 @@ from typing import Any
 from pilotage.core import given
 from pilotage.core.errors import InputError
 from pilotage.core.given import FilePath
+from pilotage.core.interruptions import interruptible
 from pilotage.core.types import Event
 from pilotage.experiments.run import run_mission
 from pilotage.face.metrics import Metrics
@@ -127,6 +128,7 @@ class Run:
         return _summary_html(self) + _map_html(self.folder)
 
 
+@interruptible()
 def run(
     mission: MissionLike,
     *,

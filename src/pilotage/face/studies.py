@@ -14,6 +14,7 @@ from pilotage.core import given
 from pilotage.core.config import validate
 from pilotage.core.errors import InputError
 from pilotage.core.given import FilePath
+from pilotage.core.interruptions import interruptible
 from pilotage.experiments.resolve import resolved_values
 from pilotage.experiments.studies.definition import StudyDefinition
 from pilotage.experiments.studies.engine import Listener, run_study
@@ -92,6 +93,7 @@ class Study:
         return Table(tuple(columns), tuple(rows))
 
 
+@interruptible()
 def study(
     mission: MissionLike,
     vary: Mapping[str, Sequence[Any]],

@@ -11,6 +11,7 @@ import numpy as np
 
 from pilotage.core import given
 from pilotage.core.given import FilePath
+from pilotage.core.interruptions import interruptible
 from pilotage.core.types import FloatArray
 
 
@@ -38,6 +39,7 @@ class Tracked:
         return int(self.answer["visited_count"])
 
 
+@interruptible()
 def track(
     video: FilePath,
     *,

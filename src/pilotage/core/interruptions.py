@@ -1,16 +1,17 @@
-"""What ends a command from outside, its exit codes, and how it is recognized wherever it strikes."""
+"""What ends a computation from outside, and how it is recognized wherever it strikes."""
 
 from __future__ import annotations
 
 import signal
 import sys
+import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from types import FrameType
 
-INTERRUPTED = 130
-TERMINATED = 143
+INTERRUPTED, TERMINATED = 130, 143
+"""Exit codes of a process that Ctrl-C or SIGTERM ended."""
 _SOON_S = 0.01
 _UNGUARDED = tuple(
     str(Path(*names))
@@ -63,8 +64,9 @@ def _is_unguarded(frame: FrameType | None) -> bool:
 def never_swallowed() -> Iterator[Callable[[KeyboardInterrupt, FrameType | None], None]]:
     """Raise an interruption once more where the interpreter could not: in a destructor or a C callback.
 
-    There it would be printed and forgotten, and the command would go on. For a process's main thread. What is
-    yielded raises an interruption that strikes in a frame, a little later where the frame cannot bear it.
+    There it would be printed and forgotten, and what was to end would go on. For a process's main thread.
+    What is yielded raises an interruption that strikes in a frame, a little later where the frame cannot
+    bear it.
     """
     if not hasattr(signal, "setitimer"):
         yield _raise_at_once
@@ -105,3 +107,38 @@ def never_swallowed() -> Iterator[Callable[[KeyboardInterrupt, FrameType | None]
 
 def _raise_at_once(stop: KeyboardInterrupt, frame: FrameType | None) -> None:  # noqa: ARG001 - as it is called
     raise stop
+
+
+@contextmanager
+def interruptible() -> Iterator[None]:
+    """Let Ctrl-C be a KeyboardInterrupt wherever it strikes, for who calls from Python or a notebook.
+
+    Without it compiled kernels make a SystemError of it, and one of a thousand ends the interpreter. Nothing
+    is changed where Ctrl-C or SIGALRM is in other hands than Python's, or in another thread than the first.
+    """
+    mine = threading.current_thread() is threading.main_thread() and hasattr(signal, "setitimer")
+    if not (
+        mine
+        and signal.getsignal(signal.SIGINT) is signal.default_int_handler
+        and signal.getsignal(signal.SIGALRM) is signal.SIG_DFL
+    ):
+        yield
+        return
+    with never_swallowed() as raise_in:
+
+        def strike(signum: int, frame: FrameType | None) -> None:  # noqa: ARG001 - as signal calls it
+            struck.append(KeyboardInterrupt())
+            raise_in(struck[-1], frame)
+
+        struck: list[KeyboardInterrupt] = []
+        signal.signal(signal.SIGINT, strike)
+        try:
+            yield
+        except Exception as error:
+            # C code may drop an interruption for an error of its own, which tells nothing of it.
+            stopped = interruption_in(error) or (struck[0] if struck else None)
+            if stopped is None:
+                raise
+            raise stopped from None
+        finally:
+            signal.signal(signal.SIGINT, signal.default_int_handler)
