@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 from unittest.mock import Mock
@@ -19,7 +20,7 @@ from pilotage.sensors.readings import Readings
 from pilotage.stack.interface import BeliefStatus
 from pilotage.stack.navigator.patrol.headway import Headway
 from pilotage.stack.navigator.patrol.precedence import MOST_S, Leading, orders, precedence, told
-from pilotage.stack.navigator.patrol.states import Lost, Move, State, Waiting, set_out
+from pilotage.stack.navigator.patrol.states import Lost, Move, State, SteppingAside, Waiting, set_out
 from pilotage.stack.patrol.evacuation import Evacuation
 from pilotage.stack.patrol.messages import PatrolMemory
 from pilotage.stack.patrol.roadmap import Roadmap
@@ -191,9 +192,12 @@ def test_a_place_is_left_to_a_mate_that_is_there_for_sure(away_m: float, left: b
     assert context.leave_to_mates(for_long=False) is left
 
 
-def waiting_context(off_m: float) -> Any:
+def waiting_context(off_m: float, graph: Path | None = None) -> Any:
     """Of a robot so far from the place at which its strategy tells it to wait."""
-    context = build(mission_of(hall_and_dead_end(1, 10.0), seed=0)).team[0].stack._context  # type: ignore[attr-defined]
+    values = hall_and_dead_end(1, 10.0)
+    if graph is not None:
+        values["task"] = {"name": "patrol", "duration_s": 10.0, "graph": str(graph)}
+    context = build(mission_of(values, seed=0)).team[0].stack._context  # type: ignore[attr-defined]
     context.task = replace(context.task, strategy=SimpleNamespace(next_vertex=lambda knowledge: knowledge.at))
     at = int(np.argmin(context.roadmap.places_xy_m[:, 1]))
     context.hop = context.target = context.came_from = at
@@ -218,6 +222,26 @@ def test_who_waits_lets_somebody_pass_and_makes_room_for_one_who_does_not(
         if not isinstance(state, Waiting):
             break
     assert isinstance(state, Waiting) is stays
+
+
+def test_who_waits_steps_aside_where_it_can_drive_to_no_other_place(tmp_path: Path) -> None:
+    """It stood before the only door for 40 s: other places were beyond it, and it looked for a free one
+    among several robots alone."""
+    graph = tmp_path / "one.graph"
+    graph.write_text("1 80 70 0.1 0 0\n\n0 20 15 0\n")
+    context = waiting_context(0.0, graph)
+    context.memory.visit(context.came_from, 0.0)
+    context.fresh = True
+    state: State = Waiting(context, 0.0, 0.0)
+    while isinstance(state, Waiting):
+        context.t_s += 0.1
+        assert context.t_s < 6.0
+        context.strange = np.array([[0.6, 0.3]])
+        state = state.step(Readings(context.t_s, {})).state
+    assert isinstance(state, SteppingAside)
+    row, column = np.argwhere(state.time == 0.0).mean(axis=0)
+    place = context.roadmap.spacing_m * np.array([column, row])
+    assert np.hypot(*(place - [2.6, 1.8])) >= 2.0 * context.radius_m
 
 
 def test_whoever_goes_first_arrives(monkeypatch: pytest.MonkeyPatch) -> None:

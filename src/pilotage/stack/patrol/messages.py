@@ -152,6 +152,11 @@ class PatrolMemory:
         """When anybody was last there, as far as it knows."""
         return float(self._visited_s[vertex])
 
+    def waits(self, robot: int) -> bool:
+        """Whether a robot said that it waits where it is."""
+        state = self._states[robot]
+        return state is not None and state.at == state.target
+
     def leave(self, vertex: int, t_s: float) -> None:
         """It goes on as if it had been there: others visit it."""
         self._tell(replace(self._own, t_s=t_s, at=vertex))

@@ -19,7 +19,7 @@ from pilotage.stack.navigator.patrol.headway import Headway
 from pilotage.stack.navigator.patrol.motion import Motion
 from pilotage.stack.navigator.patrol.obstructions import Obstructions, Told
 from pilotage.stack.navigator.patrol.passage import Pursuit
-from pilotage.stack.navigator.patrol.senses import NO_POINTS, Senses
+from pilotage.stack.navigator.patrol.senses import NO_POINTS, TOLD_M, Senses
 from pilotage.stack.patrol.messages import PatrolMemory
 from pilotage.stack.patrol.roadmap import Roadmap, roadmap_of
 from pilotage.stack.patrol.shut_paths import NONE_SHUT, ShutPaths
@@ -244,15 +244,17 @@ class Context(Senses):
         if self.roadmap.is_cut_off(self.hop):
             self._leave()
             return True
-        heard, (x, y) = self.heard(), self.roadmap.places_xy_m[self.hop]
         since_s = max(self._left_s, self.t_s - self.config.hold_s)
-        left = self.memory.visited_s(self.hop) > since_s or any(
-            math.hypot(word.x_m - x, word.y_m - y) <= SURELY_RATIO * self.task.visit_m for _, word in heard
-        )
-        if left or (for_long and not heard):
+        left = self.memory.visited_s(self.hop) > since_s or self._has_mate(self.hop)
+        if left or (for_long and not self.heard()):
             self._leave()
             return True
         return False
+
+    def _has_mate(self, vertex: int) -> bool:
+        """Whether a mate that is heard is there."""
+        reach_m = SURELY_RATIO * self.task.visit_m
+        return any(self.roadmap.away_m(vertex, word.x_m, word.y_m) <= reach_m for _, word in self.heard())
 
     def _leave(self) -> None:
         """Go on as if it had been where it was sent."""
@@ -271,9 +273,9 @@ class Context(Senses):
         length_m = float(graph.shortest_m[at, target])
         self.memory.bound(target, self.t_s, self.t_s + length_m / max(self.memory.own.speed_m_s, 1e-3))
         if target == at:
-            # It may have begun beside it, or made room for somebody.
+            # It may have begun beside it, or made room for somebody; where a mate stands it is not needed.
             self.hop = at
-            return self.away_m(at) > self.task.visit_m
+            return self.away_m(at) > self.task.visit_m and not self._has_mate(at)
         self.hop = int(graph.next_hop[at, target])
         after = target if self.hop != target else following(self.task.strategy)
         if after >= 0:
@@ -299,6 +301,15 @@ class Context(Senses):
             return
         before, now = (None if c is None else (c.since_s, c.inside) for c in (old, claim))
         self._has_news |= before != now
+
+    def crowded(self, reach_m: float) -> bool:
+        """Whether something that may move is so near to the body's edge, and no mate that waits as well."""
+        near = self.on_map(self.strange[np.hypot(*self.strange.T) < reach_m + self.radius_m])
+        for number, word in self.heard():
+            if self.memory.waits(number) and not word.blocked:
+                away = np.hypot(near[:, 0] - word.x_m, near[:, 1] - word.y_m)
+                near = near[~(away < word.radius_m + TOLD_M)]
+        return len(near) > 0
 
     def here(self) -> FloatArray:
         """(1, 3) the place where it is, as a path; (0, 3) off the map."""

@@ -191,10 +191,6 @@ class Senses:
         """(K, 2) middles of those who are seen, map frame."""
         return self.on_map(disc_returns.bodies(self.strange, self.radius_m))
 
-    def crowded(self, reach_m: float) -> bool:
-        """Whether something that may move is so near to the body's edge."""
-        return bool((np.hypot(*self.strange.T) < reach_m + self.radius_m).any())
-
     @property
     def moving_m_s(self) -> float:
         """By the odometry."""

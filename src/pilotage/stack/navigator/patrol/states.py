@@ -355,15 +355,19 @@ def forgo(context: Context, *, for_long: bool) -> Move | None:
 def give_way(context: Context) -> Move:
     """Drive to a vertex near by, away from what is in the way; wait a little where there is none.
 
-    Among several who stand around, to where nobody stands: vertices may all lie beyond them.
+    Among several who stand around, or where no vertex is, to where nobody stands: vertices may all lie
+    beyond them.
     """
     until_s = context.t_s + context.config.yield_s * (0.5 + float(context.rng.random()))
-    field = traffic.free_place(context)
+    field, vertex = traffic.free_place(context, traffic.SEVERAL), -1
+    if field is None:
+        vertex = traffic.way_out(context)
+    if field is None and vertex < 0:
+        field = traffic.free_place(context, 1)
     if field is not None:
         context.journal.count("gave_way")
         context.say("give-way", f"no progress towards vertex {context.hop}: steps aside")
         return Move(SteppingAside(context, field, until_s), context.descend(field))
-    vertex = traffic.way_out(context)
     if vertex < 0:
         return wait(context)
     context.journal.count("gave_way")

@@ -197,11 +197,11 @@ def refuge(context: Context, mouth_xy_m: FloatArray, outwards: FloatArray) -> Fl
     return context.roadmap.refuge(pose.x_m, pose.y_m, mouth_xy_m, outwards, others, context.pass_m, keep_m)
 
 
-def free_place(context: Context) -> FloatArray | None:
-    """The field to a place off the line to the nearest of several near by; None where there are fewer."""
+def free_place(context: Context, least: int) -> FloatArray | None:
+    """The field to a place off the line to the nearest of those near by; None where there are fewer."""
     here, bodies = np.array([context.pose.x_m, context.pose.y_m]), context.bodies_on_map()
     away = np.hypot(*(bodies - here).T)
-    if np.count_nonzero(away < context.config.watch_m) < SEVERAL or context.is_narrow():
+    if np.count_nonzero(away < context.config.watch_m) < least or context.is_narrow():
         return None
     nearest = bodies[int(np.argmin(away))]
     return refuge(context, nearest, here - nearest)

@@ -114,6 +114,8 @@ class AdaptiveRoundsStrategy:
         self._listen(knowledge)
         self._change_rounds(knowledge)
         stops, here, now_s = self._round.stops, knowledge.at, knowledge.now_s
+        if len(stops) == 1 and self._is_held(knowledge):
+            return here
         if here != stops[self._place]:
             return int(stops[self._place])
         self._phase_s, self._is_on_round = now_s, True
@@ -232,6 +234,10 @@ class AdaptiveRoundsStrategy:
     def _mates(self, knowledge: PatrolKnowledge) -> list[PatrolState]:
         """Robots on its side that have said where they are."""
         return [state for state in knowledge.others() if state.robot in self._side and len(state.words) == 3]
+
+    def _is_held(self, knowledge: PatrolKnowledge) -> bool:
+        """Whether somebody who shares its round is on it: of a single place that is enough."""
+        return any(state.words[KEY] == _key(self._round) for state in self._mates(knowledge))
 
     def _is_ahead(self, knowledge: PatrolKnowledge) -> bool:
         """Whether to wait here: ahead of the even spacing, and not waited for long yet."""
