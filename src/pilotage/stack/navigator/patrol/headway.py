@@ -20,7 +20,7 @@ class Headway:
     since_s
         When it was at a place to visit, or nearer to the next one than ever before, last.
     stays_s
-        From when on it stays where it is, though nothing told it to wait: who leaves its places to mates may.
+        From when on it stays where it is, though it was sent elsewhere: who leaves its places to mates may.
     """
 
     def __init__(self) -> None:
@@ -29,8 +29,9 @@ class Headway:
         self._x_m = self._y_m = math.nan
 
     def restart(self, t_s: float) -> None:
-        """It is where it was sent."""
-        self.since_s, self._hop = t_s, -1
+        """It is where it was sent, or told to stay."""
+        self.since_s = self.stays_s = t_s
+        self._hop = -1
 
     def redirect(self, since_s: float) -> None:
         """Somebody else goes there: it has not got on yet, but the way to the next place may be open.
@@ -38,11 +39,6 @@ class Headway:
         It is taken to have got on at that time, if it did no later.
         """
         self.since_s = max(self.since_s, since_s)
-
-    def wait(self, t_s: float) -> None:
-        """It is told to stay."""
-        self.restart(t_s)
-        self.stays_s = t_s
 
     def step(self, t_s: float, hop: int, to_go_s: float, x_m: float, y_m: float) -> None:
         """It drives to a hop, is so far from it, and here."""

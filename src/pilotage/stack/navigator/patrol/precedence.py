@@ -212,7 +212,7 @@ def precedence(context: Context, state: State) -> State:
         return state
     leads = isinstance(state, Leading)
     if isinstance(state, (Waiting, Charging)):
-        context.headway.wait(context.t_s)
+        context.headway.restart(context.t_s)
     elif not leads:
         roadmap, pose = context.roadmap, context.pose
         grid = roadmap.time_s(context.hop), *roadmap.origin_xy_m, roadmap.spacing_m
