@@ -35,7 +35,7 @@ from pilotage.kernels.slam.placing import (
     placed,
     plausibility,
 )
-from pilotage.kernels.slam.scan_lines import scan_cloud
+from pilotage.kernels.slam.scan_lines import lines_of, scan_cloud, scan_points
 from pilotage.kernels.slam.slips import told_by
 from support.laser_rooms import BEAMS, SPAN_RAD, furnished, ranges
 
@@ -49,6 +49,33 @@ def cloud(pose: FloatArray, noise: FloatArray | float = 0.0) -> FloatArray:
     return scan_cloud(
         ranges(furnished(), pose, ANGLES) + noise, RAYS, float(ANGLES[1] - ANGLES[0]), 0.1, 30.0
     )
+
+
+def test_lines_of_some_beams_are_those_of_the_whole_scan() -> None:
+    seen = ranges(furnished(), HERE, ANGLES)
+    seen[40:44] = np.nan
+    points, hit = scan_points(seen, RAYS, 0.1, 30.0)
+    step, beams = float(ANGLES[1] - ANGLES[0]), np.flatnonzero(hit)
+    np.testing.assert_array_equal(
+        lines_of(points, hit, beams[1::3].copy(), 0.0, 0.0, step),
+        scan_cloud(seen, RAYS, step, 0.1, 30.0)[1::3],
+    )
+
+
+def test_what_is_written_row_by_row_is_what_is_nearest() -> None:
+    """Of all cells at most one in a hundred holds a point that is not the nearest of the fused ones."""
+    rng = np.random.default_rng(3)
+    noisy = map_of(*(cloud(HERE, 0.01 * rng.standard_normal(BEAMS)) for _ in range(6)))
+    points = noisy.points[: noisy.counts[0]]
+    cells = (np.floor(rng.uniform(0.0, 10.0, (4000, 2)) / CELL_M) + 0.5) * CELL_M
+    found = np.empty(len(cells), np.int64)
+    looked_up(noisy, cells, 0.0, 0.0, 0.0, found)
+    away = np.hypot(*np.moveaxis(cells[:, None] - points[:, :2], 2, 0))
+    near = away.min(axis=1) < REACH_M - 0.05
+    assert near.sum() > 400
+    told = np.where(found >= 0, away[np.arange(len(cells)), found], np.inf)
+    # What was written stays where running means moved the points by millimetres.
+    assert (told[near] > away.min(axis=1)[near] + 0.02).mean() < 0.01
 
 
 def map_of(*scans: FloatArray, fuse: bool = True, kept: int = 15, at: FloatArray = HERE) -> LocalMap:

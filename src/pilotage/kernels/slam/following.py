@@ -13,13 +13,15 @@ from pilotage.kernels.slam.frames import between, between_all, composed
 from pilotage.kernels.slam.local_map import LocalMap, add_to_map
 from pilotage.kernels.slam.movers import Views, add_view, without_movers
 from pilotage.kernels.slam.placing import (
+    CREDIBLE,
+    CREDIBLE_OFF,
     LONG_M,
     distance,
     guessed_motions,
     learn_motion,
     placed,
 )
-from pilotage.kernels.slam.scan_lines import rays_of, scan_cloud
+from pilotage.kernels.slam.scan_lines import lines_of, rays_of, scan_points
 from pilotage.kernels.slam.slips import add_slip
 from pilotage.kernels.slam.wheels import HELD, Wheels, learn_wheels, righted
 
@@ -31,7 +33,9 @@ MOST_POINTS = 240
 long tell little of their own."""
 POOR, POOR_AS_GUESSED = 0.75, 0.6
 """Fit over its running mean below which there is a search, and below which there is one where the scan lies
-within the usual error of what a trusted odometry guessed."""
+within the usual error of what a trusted odometry guessed, or near any guess where those are off by less than
+TRUSTED."""
+TRUSTED = 0.025
 OTHER_READING_M = 0.08
 """Readings of the odometry nearer together (a radian as half a metre) are one guess."""
 ENDED, FULL, DOUBT = 0, 1, 2
@@ -150,10 +154,66 @@ class Recording(NamedTuple):
 
 
 @kernel
+def _every(points: int) -> int:
+    """Every how manieth of so many points is aligned."""
+    return max(1, -(-points // MOST_POINTS))
+
+
+@kernel
 def thinned(cloud: FloatArray) -> FloatArray:
     """As many points of a scan (K, 6) as are worth while, evenly spread."""
-    every = -(-cloud.shape[0] // MOST_POINTS)
-    return cloud if every <= 1 else cloud[::every].copy()
+    every = _every(cloud.shape[0])
+    return cloud if every == 1 else cloud[::every].copy()
+
+
+@kernel
+def _walls(
+    points: FloatArray,
+    step: FloatArray,
+    led: bool,
+    dt_s: float,
+    track: Track,
+    map_: LocalMap,
+    views: Views,
+    out: Look,
+) -> IntArray:
+    """Guess a scan's motion, into ``out``, and tell which of its points (K, 2 or more) are no people (N,)."""
+    motions, credible = guessed_motions(track.errors, track.velocity, step, led, dt_s)
+    out.motions[: motions.shape[0]] = motions
+    out.counts[0], out.counts[1] = motions.shape[0], credible
+    if not led or track.errors.min() >= SURE_GUESS:
+        return np.arange(points.shape[0])
+    rows, crowded = without_movers(points, composed(track.pose, motions[0]), map_, views)
+    track.crowded[0] += crowded
+    return rows
+
+
+@kernel
+def _is_sure(
+    light: FloatArray,
+    led: bool,
+    others: FloatArray,
+    prior: FloatArray,
+    track: Track,
+    map_: LocalMap,
+    out: Look,
+) -> bool:
+    """Place a scan (K, 6) by the motions that were guessed, and tell whether there is no doubt of it."""
+    error = track.errors.min()
+    leads = led and track.errors[0] == error
+    motions, credible = out.motions[: out.counts[0]], out.counts[1]
+    pose, hessian, start, told, split = placed(
+        light, track.pose, motions, credible, leads, others, error, track.usual[0], prior, map_
+    )
+    out.counts[2] = split
+    out.pose[:], out.hessian[:], out.start[:], out.told[:] = pose, hessian, start, told
+    # Seldom does a scan that lies where a trusted odometry has it fit better anywhere else; but from a long
+    # guess an alignment may end in a wrong fit that is not poor.
+    long = leads and distance(motions[0], np.zeros(3)) > LONG_M
+    as_guessed = leads and told[1] < error
+    near = error < TRUSTED and told[1] < CREDIBLE * error + CREDIBLE_OFF
+    least = POOR_AS_GUESSED if as_guessed or near else POOR
+    return bool(led and (as_guessed or not long) and told[0] >= (POOR if long else least) * track.usual[0])
 
 
 @kernel
@@ -176,30 +236,10 @@ def look(
     The scan without people, as much of it as was aligned, and whether it lies where ``out`` has it without a
     doubt.
     """
-    motions, credible = guessed_motions(track.errors, track.velocity, step, led, dt_s)
-    error = track.errors.min()
-    leads = led and track.errors[0] == error
-    kept = cloud
-    if led and error < SURE_GUESS:
-        kept, crowded = without_movers(cloud, composed(track.pose, motions[0]), map_, views)
-        track.crowded[0] += crowded
+    rows = _walls(cloud, step, led, dt_s, track, map_, views, out)
+    kept = cloud if rows.shape[0] == cloud.shape[0] else cloud[rows]
     light = thinned(kept)
-    pose, hessian, start, told, split = placed(
-        light, track.pose, motions, credible, leads, others, error, track.usual[0], prior, map_
-    )
-    out.motions[: motions.shape[0]] = motions
-    out.counts[0], out.counts[1], out.counts[2] = motions.shape[0], credible, split
-    out.pose[:], out.hessian[:], out.start[:], out.told[:] = pose, hessian, start, told
-    # Seldom does a scan that lies where a trusted odometry has it fit better anywhere else; but from a long
-    # guess an alignment may end in a wrong fit that is not poor.
-    long = leads and distance(motions[0], np.zeros(3)) > LONG_M
-    as_guessed = leads and told[1] < error
-    least = POOR_AS_GUESSED if as_guessed else POOR
-    return (
-        kept,
-        light,
-        led and (as_guessed or not long) and told[0] >= (POOR if long else least) * track.usual[0],
-    )
+    return kept, light, _is_sure(light, led, others, prior, track, map_, out)
 
 
 @kernel
@@ -245,14 +285,15 @@ def motion_of(recording: Recording, scan: int, wheels: Wheels) -> tuple[FloatArr
 
 
 @kernel
-def move_anchor(recording: Recording, scan: int, wheels: Wheels, motion: FloatArray) -> None:
-    """Count the next motion from the reading that the one of a scan (3,) was nearest to.
+def move_anchor(
+    recording: Recording, scan: int, step: FloatArray, others: FloatArray, motion: FloatArray
+) -> None:
+    """Count the next motion from the reading of ``motion_of`` that the one of a scan (3,) was nearest to.
 
     Loggers stamp what they receive, in bursts, and late: that need not be the reading at the stamp.
     """
     if recording.at_scans.shape[0] == 0:
         return
-    step, others = motion_of(recording, scan, wheels)
     usual = distance(step, motion)
     best, least = -1, 0.5 * usual
     for k in range(others.shape[0]):
@@ -296,7 +337,7 @@ def keep(
     Parameters
     ----------
     cloud, kept
-        (K, 6) all of it, and what is left without people.
+        (K, 2 or more) all of it, and (K, 6) what is left without people.
     led, local
         Whether there is odometry, and how many keyframes lend their points to the scans that follow.
     """
@@ -342,16 +383,16 @@ def follow(
     Returns
     -------
     The scan at which it stopped, ``DOUBT`` (it is not placed: ``out`` has what the guesses made of it),
-    ``FULL`` (there is no room for another keyframe) or ``ENDED``, and of the last scan all points, those
-    without people, and those that are aligned.
+    ``FULL`` (there is no room for another keyframe) or ``ENDED``, and of the last scan all points (K, 2),
+    those without people (K, 6), of a doubt only, and those that are aligned (K, 6).
     """
     led = recording.at_scans.shape[0] > 0
     rays, seen_from = np.zeros((0, 2)), -1
-    cloud = kept = light = np.zeros((0, 6))
+    seen, kept, light = np.zeros((0, 2)), np.zeros((0, 6)), np.zeros((0, 6))
     for i in range(first, end):
         beams = recording.beams[i]
         if not has_room(beams, map_, views, keyframes):
-            return i, FULL, cloud, kept, light
+            return i, FULL, seen, kept, light
         if (
             seen_from < 0
             or beams != rays.shape[0]
@@ -359,15 +400,24 @@ def follow(
             or recording.step_rad[i] != recording.step_rad[seen_from]
         ):
             rays, seen_from = rays_of(recording.first_rad[i], recording.step_rad[i], beams), i
-        cloud = scan_cloud(recording.ranges_m[i, :beams], rays, recording.step_rad[i], limits[0], limits[1])
+        points, hit = scan_points(recording.ranges_m[i, :beams], rays, limits[0], limits[1])
         step, others = motion_of(recording, i, track.wheels)
         dt_s = recording.dt_s[i]
-        kept, light, sure = look(cloud, step, led, others, dt_s, prior, track, map_, views, out)
-        if not sure:
-            return i, DOUBT, cloud, kept, light
-        move_anchor(recording, i, track.wheels, between(track.pose, out.pose))
+        walls = np.flatnonzero(hit)
+        seen = points[walls]
+        walls = walls[_walls(seen, step, led, dt_s, track, map_, views, out)]
+        # A line is fitted where it is asked for: of a keyframe through every point.
+        every = _every(walls.shape[0])
+        light = lines_of(points, hit, walls[::every].copy(), 0.0, 0.0, recording.step_rad[i])
+        if not _is_sure(light, led, others, prior, track, map_, out):
+            kept = light if every == 1 else lines_of(points, hit, walls, 0.0, 0.0, recording.step_rad[i])
+            return i, DOUBT, seen, kept, light
+        move_anchor(recording, i, step, others, between(track.pose, out.pose))
         settle(out.pose, out.hessian, out.start, out.told, step, led, dt_s, prior, track)
         if is_new(between(track.keyframe, track.pose), limits[2], limits[3]):
-            keep(i, cloud, kept, out.hessian, led, local, track, map_, views, keyframes)
+            every_line = (
+                light if every == 1 else lines_of(points, hit, walls, 0.0, 0.0, recording.step_rad[i])
+            )
+            keep(i, seen, every_line, out.hessian, led, local, track, map_, views, keyframes)
         poses[i], owners[i] = out.pose, keyframes.added[0] - 1
-    return end, ENDED, cloud, kept, light
+    return end, ENDED, seen, kept, light

@@ -39,6 +39,9 @@ MET, MET_M, MET_RAD = 3, 0.01, 0.004
 """An alignment that comes so near to an earlier one's answer would end there too."""
 NOTHING_KNOWN = np.full(3, np.inf)
 
+BESIDE = 2
+"""So many cells around a point are looked at in any case: its own may belong to another one of its square."""
+
 _BLOCKS = CELLS // 8 + 1
 """Blocks of a row, one more than there are: rows of a power of two would share a processor's cache lines."""
 
@@ -89,33 +92,57 @@ def _cell(column: int, row: int) -> int:
 
 
 @kernel
-def _write(map_: LocalMap, i: int) -> None:
-    """Write a point into the raster wherever it is nearer than what is there."""
-    x, y = map_.points[i, 0], map_.points[i, 1]
-    oldest = map_.counts[2]
+def _write(map_: LocalMap, i: int, together: bool) -> None:
+    """Write a point into the raster wherever it is nearer than what is there.
+
+    Where points are a square apart (``together``) these cells hang together, as those of a point in a Voronoi
+    diagram do: from its own row, up and then down, only what adjoins those of the row before is looked at.
+    """
+    nearest, points, oldest = map_.nearest, map_.points, map_.counts[2]
+    x, y, seen = points[i, 0], points[i, 1], points[i, 4]
     reach = REACH_M + 0.5 * CELL_M
-    row0, row1 = math.floor((y - reach) / CELL_M), math.floor((y + reach) / CELL_M)
-    for row in range(row0, row1 + 1):
-        dy = (row + 0.5) * CELL_M - y
-        left = reach * reach - dy * dy
-        if left <= 0.0:
-            continue
-        half = math.sqrt(left)
-        for column in range(math.ceil((x - half) / CELL_M - 0.5), math.floor((x + half) / CELL_M - 0.5) + 1):
-            cx = (column + 0.5) * CELL_M
-            cell = _cell(column, row)
-            k = map_.nearest[cell] - 1
-            if k >= 0 and map_.points[k, 4] >= oldest:
-                ex, ey = map_.points[k, 0] - cx, map_.points[k, 1] - (row + 0.5) * CELL_M
-                dx = x - cx
-                own, other = dx * dx + dy * dy, ex * ex + ey * ey
-                if own >= other and (
-                    map_.points[i, 4] - map_.points[k, 4] < AGAIN
-                    or math.sqrt(own) - math.sqrt(other) > LATER_M
-                ):
-                    continue
-            map_.nearest[cell] = i + 1
-    map_.points[i, 6] = map_.counts[1]
+    own_column, own_row, most = math.floor(x / CELL_M), math.floor(y / CELL_M), math.ceil(reach / CELL_M)
+    middle0, middle1 = own_column - BESIDE, own_column + BESIDE
+    for way in (1, -1):
+        left, right = middle0, middle1
+        for m in range(0 if way == 1 else 1, most + 1):
+            row = own_row + way * m
+            cy = (row + 0.5) * CELL_M
+            dy = y - cy
+            square = reach * reach - dy * dy
+            if square <= 0.0:
+                break
+            half = math.sqrt(square)
+            low, high = math.ceil((x - half) / CELL_M - 0.5), math.floor((x + half) / CELL_M - 0.5)
+            first, last = (max(low, left - 1), min(high, right + 1)) if together else (low, high)
+            left, right = high + 1, low - 1
+            for side in (1, -1):
+                if side < 0 and left != first:
+                    break
+                column = first if side > 0 else first - 1
+                written = first <= last
+                while low <= column <= high and (written or (side > 0 and column <= last)):
+                    cx = (column + 0.5) * CELL_M
+                    cell = _cell(column, row)
+                    k = nearest[cell] - 1
+                    written = True
+                    if k >= 0 and points[k, 4] >= oldest:
+                        ex, ey, dx = points[k, 0] - cx, points[k, 1] - cy, x - cx
+                        own, other = dx * dx + dy * dy, ex * ex + ey * ey
+                        written = own < other or (
+                            seen - points[k, 4] >= AGAIN and math.sqrt(own) - math.sqrt(other) <= LATER_M
+                        )
+                    if written:
+                        nearest[cell] = i + 1
+                        left, right = min(left, column), max(right, column)
+                    column += side
+            if left > right:
+                if together and m >= BESIDE:
+                    break
+                left, right = own_column - BESIDE, own_column + BESIDE
+            if m == 0:
+                middle0, middle1 = left, right
+    points[i, 6] = map_.counts[1]
 
 
 @kernel
@@ -159,7 +186,7 @@ def add_to_map(map_: LocalMap, cloud: FloatArray, pose: FloatArray, kept: int, f
         points[i, 4] = number
         if seen < counts[2]:
             points[i, 0], points[i, 1], points[i, 2], points[i, 3], points[i, 5] = x, y, nx, ny, 1.0
-            _write(map_, i)
+            _write(map_, i, fuse)
             continue
         weight = min(MOST_WEIGHT, points[i, 5] + 1.0)
         points[i, 5] = weight
@@ -171,12 +198,12 @@ def add_to_map(map_: LocalMap, cloud: FloatArray, pose: FloatArray, kept: int, f
             length = math.sqrt(mx * mx + my * my)
             points[i, 2], points[i, 3] = mx / length, my / length
         if number - points[i, 6] >= AGAIN:
-            _write(map_, i)
+            _write(map_, i, fuse)
 
 
 @kernel
 def looked_up(map_: LocalMap, source: FloatArray, x: float, y: float, theta: float, paired: IntArray) -> None:
-    """Fill ``paired`` (K,) with the point nearest to each of a scan's (K, 6) at a pose, -1: none is near.
+    """Fill ``paired`` (K,) with the point nearest to each of a scan's (K, 2 or more) at a pose, -1: none.
 
     It is the one nearest to the middle of the raster's cell; half a cell's diagonal farther away is another.
     """

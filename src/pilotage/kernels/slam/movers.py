@@ -26,22 +26,6 @@ KNOWN_M = 0.1
 
 
 @kernel
-def polar(points: FloatArray) -> FloatArray:
-    """(K, 2) bearing from that of the first, from 0 to two pi, and range of points (K, 6) of ``scan_lines``.
-
-    The last row, (0, 0), is the first one's bearing and a zero.
-    """
-    count = points.shape[0]
-    out = np.zeros((count + 1, 2))
-    first = math.atan2(points[0, 1], points[0, 0]) if count else 0.0
-    for k in range(count):
-        out[k, 0] = (math.atan2(points[k, 1], points[k, 0]) - first) % (2.0 * math.pi)
-        out[k, 1] = math.hypot(points[k, 0], points[k, 1])
-    out[count, 0] = first
-    return out
-
-
-@kernel
 def bearing_of(x: float, y: float) -> float:
     """Direction of a vector to 1.2e-5 rad, in a fifth of the time of the exact one.
 
@@ -57,6 +41,23 @@ def bearing_of(x: float, y: float) -> float:
     if x < 0.0:
         angle = math.pi - angle
     return angle if y >= 0.0 else -angle
+
+
+@kernel
+def polar(points: FloatArray) -> FloatArray:
+    """(K, 2) bearing from that of the first, from 0 to two pi, and range of points (K, 2 or more).
+
+    The last row, (0, 0), is the first one's bearing and a zero.
+    """
+    count = points.shape[0]
+    out = np.zeros((count + 1, 2))
+    first = bearing_of(points[0, 0], points[0, 1]) if count else 0.0
+    for k in range(count):
+        x, y = points[k, 0], points[k, 1]
+        out[k, 0] = (bearing_of(x, y) - first) % (2.0 * math.pi)
+        out[k, 1] = math.sqrt(x * x + y * y)
+    out[count, 0] = first
+    return out
 
 
 @kernel
@@ -119,7 +120,7 @@ def empty_views(beams: int) -> Views:
 
 @kernel
 def add_view(views: Views, cloud: FloatArray, pose: FloatArray) -> None:
-    """Take in a keyframe (K, 6), all of it, at a pose (3,)."""
+    """Take in a keyframe's points (K, 2 or more), all of them, at a pose (3,)."""
     v = views.added[0] % VIEWS
     views.polar[v, : cloud.shape[0] + 1] = polar(cloud)
     views.sizes[v] = cloud.shape[0]
@@ -129,7 +130,7 @@ def add_view(views: Views, cloud: FloatArray, pose: FloatArray) -> None:
 
 @kernel
 def seen_through(points: FloatArray, pose: FloatArray, known: BoolArray, views: Views) -> BoolArray:
-    """Whether points (K, 6) of ``scan_lines`` at a pose (3,) stand in what earlier scans saw empty.
+    """Whether points (K, 2 or more) at a pose (3,) stand in what earlier scans saw empty.
 
     For an earlier scan a point does where all its beams that pass the point within ``BESIDE_M``, two at
     least on either side, went on for ``MARGIN_M`` and more. Beside a wall seen at a grazing angle some of
@@ -166,30 +167,24 @@ def seen_through(points: FloatArray, pose: FloatArray, known: BoolArray, views: 
 
 @kernel
 def without_movers(
-    cloud: FloatArray, pose: FloatArray, map_: LocalMap, views: Views
-) -> tuple[FloatArray, bool]:
-    """Return a scan (K, 6) at about a pose (3,) without the points that have come there.
+    points: FloatArray, pose: FloatArray, map_: LocalMap, views: Views
+) -> tuple[IntArray, bool]:
+    """Rows (N,) of a scan's points (K, 2 or more) at about a pose (3,) that have not come there.
 
     Those where the map has a wall have not. Where ``MOST`` of the scan seem to move it is left whole, and
     the second answer is true.
     """
-    paired = np.empty(cloud.shape[0], np.int64)
-    looked_up(map_, cloud, pose[0], pose[1], pose[2], paired)
-    known = np.zeros(cloud.shape[0], np.bool_)
+    paired = np.empty(points.shape[0], np.int64)
+    looked_up(map_, points, pose[0], pose[1], pose[2], paired)
+    known = np.zeros(points.shape[0], np.bool_)
     c, s = math.cos(pose[2]), math.sin(pose[2])
-    for k in range(cloud.shape[0]):
+    for k in range(points.shape[0]):
         if paired[k] >= 0:
-            dx = pose[0] + c * cloud[k, 0] - s * cloud[k, 1] - map_.points[paired[k], 0]
-            dy = pose[1] + s * cloud[k, 0] + c * cloud[k, 1] - map_.points[paired[k], 1]
+            dx = pose[0] + c * points[k, 0] - s * points[k, 1] - map_.points[paired[k], 0]
+            dy = pose[1] + s * points[k, 0] + c * points[k, 1] - map_.points[paired[k], 1]
             known[k] = dx * dx + dy * dy < KNOWN_M * KNOWN_M
-    moving = seen_through(cloud, pose, known, views)
+    moving = seen_through(points, pose, known, views)
     count = int(np.count_nonzero(moving))
-    if count == 0 or count >= MOST * cloud.shape[0]:
-        return cloud, count > 0
-    out = np.empty((cloud.shape[0] - count, 6))
-    at = 0
-    for k in range(cloud.shape[0]):
-        if not moving[k]:
-            out[at] = cloud[k]
-            at += 1
-    return out, False
+    if count == 0 or count >= MOST * points.shape[0]:
+        return np.arange(points.shape[0]), count > 0
+    return np.flatnonzero(~moving), False

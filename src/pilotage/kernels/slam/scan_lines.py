@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from pilotage.kernels.arrays import BoolArray, FloatArray
+from pilotage.kernels.arrays import BoolArray, FloatArray, IntArray
 from pilotage.kernels.jit import kernel
 
 _MOST_MISSED = 2
@@ -50,34 +50,14 @@ def scan_points(
 
 
 @kernel
-def scan_lines(
-    points: FloatArray, hit: BoolArray, origin_x: float, origin_y: float, step_rad: float
+def lines_of(
+    points: FloatArray, hit: BoolArray, beams: IntArray, origin_x: float, origin_y: float, step_rad: float
 ) -> FloatArray:
-    """Fit a line through the neighbours of every hit, by total least squares.
-
-    Neighbours are the beams beside it up to the first gap: a hit further from the one before than a surface
-    seen at a grazing angle explains, or more than two beams in a row that hit nothing. The point itself is
-    moved onto its line: that averages range errors.
-
-    Parameters
-    ----------
-    points, hit
-        (B, 2) and (B,) from ``scan_points``.
-    origin_x, origin_y
-        Where the scanner is; normals point to its side.
-    step_rad
-        Angle between beams.
-
-    Returns
-    -------
-    (K, 6): x, y as measured, the normal's x and y (both 0 where no line holds), x, y on the line.
-    """
+    """(K, 6) of ``scan_lines`` of some of the beams (K,) that hit something alone."""
     count = points.shape[0]
-    out = np.zeros((count, 6))
-    k = 0
-    for i in range(count):
-        if not hit[i]:
-            continue
+    out = np.empty((beams.shape[0], 6))
+    for k in range(beams.shape[0]):
+        i = beams[k]
         px, py = points[i, 0], points[i, 1]
         dx, dy = px - origin_x, py - origin_y
         r = math.sqrt(dx * dx + dy * dy)
@@ -112,10 +92,9 @@ def scan_lines(
                 syy += ey * ey
                 n += 1.0
                 lx, ly = qx, qy
-        out[k, 0] = px
-        out[k, 1] = py
-        out[k, 4] = px
-        out[k, 5] = py
+        out[k, 0] = out[k, 4] = px
+        out[k, 1] = out[k, 5] = py
+        out[k, 2] = out[k, 3] = 0.0
         if n >= 3.0:
             mx, my = sx / n, sy / n
             cxx, cxy, cyy = sxx / n - mx * mx, sxy / n - mx * my, syy / n - my * my
@@ -135,8 +114,33 @@ def scan_lines(
                 away = nx * mx + ny * my
                 out[k, 4] = px + away * nx
                 out[k, 5] = py + away * ny
-        k += 1
-    return out[:k].copy()
+    return out
+
+
+@kernel
+def scan_lines(
+    points: FloatArray, hit: BoolArray, origin_x: float, origin_y: float, step_rad: float
+) -> FloatArray:
+    """Fit a line through the neighbours of every hit, by total least squares.
+
+    Neighbours are the beams beside it up to the first gap: a hit further from the one before than a surface
+    seen at a grazing angle explains, or more than two beams in a row that hit nothing. The point itself is
+    moved onto its line: that averages range errors.
+
+    Parameters
+    ----------
+    points, hit
+        (B, 2) and (B,) from ``scan_points``.
+    origin_x, origin_y
+        Where the scanner is; normals point to its side.
+    step_rad
+        Angle between beams.
+
+    Returns
+    -------
+    (K, 6): x, y as measured, the normal's x and y (both 0 where no line holds), x, y on the line.
+    """
+    return lines_of(points, hit, np.flatnonzero(hit), origin_x, origin_y, step_rad)
 
 
 @kernel

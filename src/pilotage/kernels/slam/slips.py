@@ -19,13 +19,31 @@ SLIP_SHARE, SLIP_M = 0.15, 0.4
 
 
 @kernel
+def _product(a: FloatArray, b: FloatArray) -> FloatArray:
+    """Product of two matrices (3, 3), for which a library takes longer to be called."""
+    out = np.empty((3, 3))
+    for i in range(3):
+        for j in range(3):
+            out[i, j] = a[i, 0] * b[0, j] + a[i, 1] * b[1, j] + a[i, 2] * b[2, j]
+    return out
+
+
+@kernel
+def _is_definite(a: FloatArray) -> bool:
+    """Whether a symmetric matrix (3, 3) is positive definite, by its leading minors."""
+    minor = a[0, 0] * a[1, 1] - a[0, 1] * a[0, 1]
+    left = a[0, 1] * a[1, 2] - a[0, 2] * a[1, 1]
+    right = a[0, 0] * a[1, 2] - a[0, 1] * a[0, 2]
+    return bool(a[0, 0] > 0.0 and minor > 0.0 and a[0, 2] * left - a[1, 2] * right + a[2, 2] * minor > 0.0)
+
+
+@kernel
 def told_by(hessian: FloatArray, weight: float) -> FloatArray:
     """(3, 3) of an alignment's Hessian what does not come by chance; ``weight``: the sum of its points'."""
     system = hessian.copy()
     system[0, 0] -= CHANCE * weight
     system[1, 1] -= CHANCE * weight
-    minor = system[0, 0] * system[1, 1] - system[0, 1] * system[0, 1]
-    if system[0, 0] > 0.0 and minor > 0.0 and np.linalg.det(system) > 0.0:
+    if _is_definite(system):
         return system
     told, axes = np.linalg.eigh(system)
     out = np.zeros((3, 3))
@@ -72,13 +90,13 @@ def add_slip(
     turn[0, 0] = turn[1, 1] = math.cos(pose[2])
     turn[1, 0] = math.sin(pose[2])
     turn[0, 1] = -turn[1, 0]
-    told = told_by(turn.T @ hessian @ turn, weight)
+    told = told_by(_product(turn.T, _product(hessian, turn)), weight)
     # Squared: what the map holds, however weakly, does not add up from scan to scan.
     share = np.empty((3, 3))
     for a in range(3):
         solve3(told + prior, prior[:, a], share[:, a])
-    left = error * (share @ share)
+    left = error * _product(share, share)
     if by_chance:
-        total += left @ left.T
+        total += _product(left, left.T)
     else:
         held += left

@@ -197,7 +197,7 @@ class Tracker:
                 told, last, dt_s = step if led else None, self.pose, float(recording.dt_s[at])
                 fit = matcher.search(light, told, others, dt_s, float(gaps_s[at]))
                 moved = matcher.found.motions[0] if fit is None else between(last, fit.pose)
-                move_anchor(recording, at, matcher.track.wheels, moved)
+                move_anchor(recording, at, step, others, moved)
                 if fit is not None:
                     matcher.settle(fit, told, dt_s)
                 self._take_in(cloud, kept, light, fit, told)
