@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+from typing import cast
+
 import numpy as np
 import pytest
 
@@ -15,6 +18,7 @@ from pilotage.maps.world_map import WorldMap
 from pilotage.sensors.lidar import LidarConfig
 from pilotage.stack.exploration.floor_frontiers import SeenFloor
 from pilotage.stack.mapping.scan_grid import ScanGrid, echoes
+from pilotage.stack.navigator.floor_explorer import FloorExplorer
 from support.laser_rooms import furnished, ranges
 from support.missions import MISSIONS
 from support.robots import ROOM
@@ -74,6 +78,24 @@ def test_ways_keep_their_clearance() -> None:
     rows, columns = np.array([floor.cell_of(point) for point in path]).T
     assert floor.distance_m[rows, columns].min() >= 0.3
     assert path[:, 1].max() > 2.5
+
+
+def test_who_is_cut_off_by_its_clearance_is_led_back_by_what_its_body_takes() -> None:
+    """Behind a gap of 0.7 m a robot 0.6 m wide gets back to its start; behind one of 0.4 m it does not."""
+
+    def reached(cells: int) -> bool:
+        states = half_seen()
+        states[:, 78:82] = OCCUPIED
+        states[:, 82:] = FREE
+        states[34 : 34 + cells, 78:82] = FREE
+        grid = SimpleNamespace(states=states.astype(np.int8), corner_xy_m=np.zeros(2), resolution_m=0.05)
+        explorer = SimpleNamespace(_grid=grid, _start=HERE, _clearance_m=0.36, _radius_m=0.3)
+        floor = FloorExplorer._seen(cast(FloorExplorer, explorer), np.array([5.5, 2.0]))
+        return bool(np.isfinite(floor.cost_to(HERE)))
+
+    assert reached(20)
+    assert reached(14)
+    assert not reached(8)
 
 
 def test_a_grid_grows_and_follows_its_poses() -> None:

@@ -130,7 +130,7 @@ class FloorExplorer(LocalizingNavigator):
             needed_by="navigator 'floor-frontier'",
         )
         self._stall_s = patience_s(config.stall_s, STALL_M, robot.motion.top_speed_m_s)
-        self._clearance_m = robot.radius_m + config.clearance_m
+        self._radius_m, self._clearance_m = robot.radius_m, robot.radius_m + config.clearance_m
         # A frontier no longer than the robot is wide is one that a small robot fits through.
         self._least_m = min(config.least_frontier_m, 2.0 * self._clearance_m)
         self._able = Abilities.of(self._localizer)
@@ -207,9 +207,7 @@ class FloorExplorer(LocalizingNavigator):
 
     def _decide(self, t_s: float, belief: Belief, here: FloatArray) -> None:
         """Choose what to do, and where to go for it."""
-        floor = SeenFloor(
-            self._grid.states, self._grid.corner_xy_m, self._grid.resolution_m, self._clearance_m, here
-        )
+        floor = self._seen(here)
         self._watch(t_s, here)
         if self._doing is Doing.RETURN:
             self._come_back(t_s, floor, here)
@@ -224,6 +222,18 @@ class FloorExplorer(LocalizingNavigator):
             self._go_exploring(floor, found, here)
         else:
             self._set_out_home(t_s, floor, here)
+
+    def _seen(self, here: FloatArray) -> SeenFloor:
+        """What it has seen; where it came too near to walls to be led back, by what the body alone takes.
+
+        A wall on the map may be a cell off: that much less is the last try.
+        """
+        grid, floors = self._grid, []
+        for clearance_m in (self._clearance_m, self._radius_m, self._radius_m - grid.resolution_m):
+            floors.append(SeenFloor(grid.states, grid.corner_xy_m, grid.resolution_m, clearance_m, here))
+            if math.isfinite(floors[-1].cost_to(self._start)):
+                return floors[-1]
+        return floors[0]
 
     def _worth_it(self, floor: SeenFloor, belief: Belief, here: FloatArray) -> list[Target]:
         """Frontiers within reach that were not given up, the best first."""
