@@ -205,6 +205,17 @@ def test_a_stretch_of_blind_scans_does_not_cost_the_map() -> None:
     assert rms_m(result, path) < 0.04
 
 
+@pytest.mark.parametrize("mirrored", [True, False])
+def test_a_scanner_upside_down_that_the_log_does_not_tell_is_noticed(mirrored: bool) -> None:
+    log = recording(furnished(), along(ROUND), np.random.default_rng(4))
+    if mirrored:
+        log = replace(log, ranges_m=log.ranges_m[:, ::-1].copy())
+    result = map_log(log, SlamConfig())
+    told = [text for text in result.warnings if "turn against the odometry" in text]
+    assert len(told) == mirrored
+    assert not any("against" in text for text in map_log(log, SlamConfig(use_odometry=False)).warnings)
+
+
 def test_too_little_to_map_is_refused() -> None:
     path = along(ROUND)[:5]
     log = recording(furnished(), path, np.random.default_rng(4))

@@ -37,6 +37,8 @@ from pilotage.stack.mapping.slam.uncertainty import relative_poses
 LEAST_SCANS = 2
 MOST_CROWDED, MOST_FAR, FAR_S = 0.02, 0.1, 1.0
 """Shares of the scans from which it is told that much seemed to move, and that they are far apart."""
+LEAST_TURNED_RAD, MIRRORED = 3.0, -0.5
+"""After so many turns by the odometry it is told where scans turn the other way."""
 OnStage = Callable[[str, float], None]
 """Called with what is going on and the share of the recording that was matched."""
 
@@ -267,7 +269,33 @@ def _warnings(log: LaserLog, local: LocalTrack, config: SlamConfig) -> tuple[str
             f"{FAR_S:g} s behind the one before: where places look alike the track may be wrong, and "
             "the covariances do not count that"
         )
+    share, turned_rad = _turns_against_odometry(log, local, config)
+    if turned_rad > LEAST_TURNED_RAD and share < MIRRORED:
+        out.append(
+            f"scans turn against the odometry ({share:.2f} times its turns, over {turned_rad:.0f} rad): the "
+            "map is mirrored. The scanner hangs upside down, or counts its beams clockwise, and the log does not "
+            "say so; or it is the odometry that counts turns clockwise"
+        )
     return tuple(out)
+
+
+def _turns_against_odometry(log: LaserLog, local: LocalTrack, config: SlamConfig) -> tuple[float, float]:
+    """Turns from keyframe to keyframe over the odometry's, as a slope through the origin, and all of these.
+
+    The slope is 0 where the two do not go together: a correlation of less than a half tells nothing.
+    """
+    odometry = scanner_odometry(log, config.use_odometry)
+    if odometry is None or len(local.keyframes) < LEAST_SCANS:
+        return 0.0, 0.0
+    turns = [
+        relative_poses(poses[:-1], poses[1:])[:, 2]
+        for poses in (local.poses[local.keyframes], odometry[local.keyframes])
+    ]
+    true, told = (np.where(np.isin(np.arange(1, len(turns[0]) + 1), local.breaks), 0.0, t) for t in turns)
+    both, square = float(true @ told), float(told @ told)
+    if abs(both) <= 0.5 * float(np.linalg.norm(true) * np.linalg.norm(told)):
+        return 0.0, 0.0
+    return both / square, float(np.abs(told).sum())
 
 
 __all__ = ["SlamResult", "map_log"]
