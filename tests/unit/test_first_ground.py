@@ -27,21 +27,22 @@ OUTLINES = [
 
 
 def _scene(pose: Pose2, outline_m: FloatArray) -> Scene:
+    return RollingGround(RollingConfig()).update(_view(0.0, pose, outline_m))
+
+
+def _view(t_s: float, pose: Pose2, outline_m: FloatArray) -> LocalView:
     """In the open, where three quarters of the circle are looked at."""
-    ranges = np.full(len(ANGLES), 20.0)
-    return RollingGround(RollingConfig()).update(
-        LocalView(
-            0.0,
-            pose,
-            Twist(0.0, 0.0),
-            ranges,
-            ANGLES,
-            Pose2(0.0, 0.0, 0.0),
-            20.0,
-            (6.0, 0.0),
-            LIMITS,
-            outline_m,
-        )
+    return LocalView(
+        t_s,
+        pose,
+        Twist(0.0, 0.0),
+        np.full(len(ANGLES), 20.0),
+        ANGLES,
+        Pose2(0.0, 0.0, 0.0),
+        20.0,
+        (6.0, 0.0),
+        LIMITS,
+        outline_m,
     )
 
 
@@ -83,3 +84,21 @@ def test_it_does_not_back_over_ground_that_it_never_saw(outline_m: FloatArray) -
         scene = _scene(Pose2(x, y, theta), outline_m)
         back_m = scene.body.outer_m + 0.2 + outline_m[:, 0].min()
         assert not _is_seen(scene, x - back_m * math.cos(theta), y - back_m * math.sin(theta), theta)
+
+
+@pytest.mark.parametrize("outline_m", OUTLINES, ids=range(len(OUTLINES)))
+def test_who_stands_on_ground_that_it_never_saw_stands_on_seen_ground(outline_m: FloatArray) -> None:
+    """Backed a little too far it stood on unseen ground, and was then led over any of it."""
+    rng = np.random.default_rng(6)
+    for _ in range(20):
+        x, y, theta = rng.uniform([-0.1, -0.1, -math.pi], [0.1, 0.1, math.pi])
+        ground, back_m = RollingGround(RollingConfig()), 0.0
+        for k in range(4):
+            here = Pose2(x - back_m * math.cos(theta), y - back_m * math.sin(theta), theta)
+            scene = ground.update(_view(0.1 * k, here, outline_m))
+            assert _is_seen(scene, here.x_m, here.y_m, theta)
+            back_m += 0.04
+        length_m = scene.body.outer_m - outline_m[:, 0].min()
+        assert not _is_seen(
+            scene, here.x_m - length_m * math.cos(theta), here.y_m - length_m * math.sin(theta), theta
+        )

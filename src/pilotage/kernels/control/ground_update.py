@@ -173,6 +173,12 @@ def looked_at(
     from step to step few cells change.
     """
     keep_nearest(believed(hits), shown, rise, nearest)
+    return unseen_m(seen, coarse, outer)
+
+
+@kernel
+def unseen_m(seen: BoolArray, coarse: float, outer: float) -> FloatArray:
+    """``Ground.unseen_m`` of the coarse cells (m, m) that are seen, for a body of radius ``outer``."""
     squared = near_distance(~seen, math.ceil(outer / coarse))
     unseen = np.empty(seen.shape)
     for row in range(seen.shape[0]):

@@ -320,6 +320,7 @@ class RollingGround:
         unseen = ground_update.looked_at(
             self._hits, self._seen, self._coarse_m, body.outer_m, self._shown, self._rise, self._nearest
         )
+        unseen = first_ground.with_seen_under(self._seen, unseen, self._pose, body, x0, y0, self._coarse_m)
         field = self._togo.update(
             self._nearest,
             self._mean,
