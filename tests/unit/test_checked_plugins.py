@@ -327,3 +327,25 @@ def test_an_installed_package_that_fails_is_told_and_left_out(
     assert line.startswith("pilotage: plugin '")
     assert "-lab' (" in line
     assert told in line
+
+
+def test_a_studys_folder_names_its_plugins(tmp_path: FilePath) -> None:
+    """Given by a flag they stood nowhere: report and resume called the folder's mission unknown."""
+    site = tmp_path / "a place with spaces"
+    site.mkdir()
+    (site / "mine.py").write_text(PLANNER)
+    mission = {
+        "extends": "museum-plan",
+        "world": {"goal": {"x_m": 1.0, "y_m": 3.0}},
+        "stack": {"planner": {"name": "somebodys"}, "smoother": {"name": "none"}},
+    }
+    (tmp_path / "m.yaml").write_text(yaml.safe_dump(mission))
+    asked = ("--trials", "2", "--workers", "2", "--metrics", "success,somebodys_m", "--no-report", "--quiet")
+    words = ("sweep", "m.yaml", *asked, "--plugin", f"{site.name}/mine.py", "--name", "mine")
+    done = pilotage(*words, folder=tmp_path, site=tmp_path)
+    assert done.returncode == 0, done.stderr
+    kept = yaml.safe_load((tmp_path / "studies/mine/mission.yaml").read_text())
+    assert kept["plugins"] == [str(site / "mine.py")]
+    for again in (("report", "studies/mine"), ("study", "studies/mine", "--resume", "--quiet")):
+        done = pilotage(*again, folder=tmp_path, site=tmp_path)
+        assert done.returncode == 0, done.stderr

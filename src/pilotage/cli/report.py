@@ -8,6 +8,7 @@ from typing import Annotated
 
 import typer
 
+from pilotage.cli.options import Plugins
 from pilotage.core.shown import visible
 
 
@@ -19,6 +20,7 @@ def report(
             help="The folder of a run, a study, a calibration or a map, such as runs/museum-1-0-1a2b3c.",
         ),
     ],
+    plugin: Plugins = None,  # noqa: ARG001 - loaded while the options are read
 ) -> None:
     """Write report.html into the folder of a run, study, calibration or map and print its path."""
     from pilotage.experiments.studies.study import is_study_folder

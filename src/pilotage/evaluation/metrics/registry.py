@@ -10,7 +10,7 @@ from types import MappingProxyType
 
 from pilotage.core.checked import told
 from pilotage.core.errors import InputError, nearest
-from pilotage.core.plugins import giver, take
+from pilotage.core.plugins import giver, load_plugins, take
 from pilotage.core.types import FloatArray
 from pilotage.evaluation.metric import Clock, Compute, Metric, unnamed
 
@@ -79,6 +79,8 @@ class Metrics:
 
     def find(self, key: str) -> Metric:
         """The metric of a key; of one that nobody declared, words and unit by the key itself."""
+        if key not in self._by_key:
+            load_plugins()
         return self._by_key.get(key) or unnamed(key)
 
     def given_by(self, task: str, has: frozenset[str] | None = None) -> frozenset[str]:

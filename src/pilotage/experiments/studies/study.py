@@ -177,11 +177,14 @@ def make_study(
     cells = make_cells(definition, resolve)
     if len(cells) * definition.trials > MAX_ROWS:
         raise InputError(f"expected at most {MAX_ROWS} rows, found {len(cells)} cells of {definition.trials}")
+    plugins = dict.fromkeys(base.get("plugins") or ())
     for cell in cells:
         try:
-            resolve(cell.overrides)
+            plugins |= dict.fromkeys(resolve(cell.overrides)["plugins"])
         except InputError as error:
             raise InputError(f"cell '{cell.name}': {error}") from None
+    if plugins:  # those of the command line too: the study's folder runs again without them
+        base = {**base, "plugins": list(plugins)}
     names = [cell.name for cell in cells]
     if definition.baseline is not None and definition.baseline not in names:
         raise unknown_name("baseline", definition.baseline, names)

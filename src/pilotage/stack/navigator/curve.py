@@ -141,10 +141,10 @@ class CurveNavigator:
         off_rad = wrap_to_pi(float(samples.heading_rad[0]) - self.belief.pose.theta_rad)
         if bends_m >= least_m and abs(off_rad) <= MOST_OFF_RAD:
             return ""
+        bends = f"bends to {bends_m:.2f} m" if bends_m < curve.length_m else "is all but straight"
         return (
-            f"the curve begins {math.degrees(off_rad):.0f} degrees off the robot's heading and bends to "
-            f"{bends_m:.2f} m, it turns in {least_m:.2f} m at least: take navigator maneuver and planner "
-            "hybrid-astar"
+            f"the curve begins {math.degrees(off_rad):.0f} degrees off the robot's heading and {bends}, it "
+            f"turns in {least_m:.2f} m at least: take navigator maneuver and planner hybrid-astar"
         )
 
     def _follow(self, curve: QuinticSpline, route: CellRoute) -> None:
