@@ -273,8 +273,8 @@ def _warnings(log: LaserLog, local: LocalTrack, config: SlamConfig) -> tuple[str
     if turned_rad > LEAST_TURNED_RAD and share < MIRRORED:
         out.append(
             f"scans turn against the odometry ({share:.2f} times its turns, over {turned_rad:.0f} rad): the "
-            "map is mirrored. The scanner hangs upside down, or counts its beams clockwise, and the log does not "
-            "say so; or it is the odometry that counts turns clockwise"
+            "map is mirrored. The scanner hangs upside down, or counts its beams clockwise, and the log does "
+            "not say so; or it is the odometry that counts turns clockwise"
         )
     return tuple(out)
 
