@@ -151,6 +151,31 @@ def test_vertices_in_walls_are_refused(place: tuple[float, float]) -> None:
         on_floor(graph, floor, "my.graph")
 
 
+@pytest.mark.parametrize(
+    ("place", "in_wall"), [((6.0, 1.0), True), ((0.03, 2.0), True), ((0.25, 2.0), False)]
+)
+def test_vertices_in_thin_walls_are_refused_though_the_floor_is_near(
+    place: tuple[float, float], *, in_wall: bool
+) -> None:
+    """They were taken for what the robot comes to half a metre off; beside a wall that is what is meant."""
+    graph = PatrolGraph.of(np.array([[3.0, 2.0], place]), np.array([[0.0, 9.0], [9.0, 0.0]]))
+    floor = Floor.of(WORLD, 0.3)
+    if in_wall:
+        with pytest.raises(
+            InputError, match=r"my.graph: vertex 1 \(.*expected a place on the floor, found a wall"
+        ):
+            on_floor(graph, floor, "my.graph")
+    else:
+        assert len(on_floor(graph, floor, "my.graph")) == 2
+
+
+def test_two_vertices_at_one_place_are_told() -> None:
+    places, lengths_m = np.array([[3.0, 2.0], [3.0, 2.0]]), np.array([[0.0, 9.0], [9.0, 0.0]])
+    graph = PatrolGraph.of(places, lengths_m)
+    with pytest.raises(InputError, match="found 0 m from vertex 0 to 1, which are at one place"):
+        on_floor(graph, Floor.of(WORLD, 0.3))
+
+
 def test_every_point_of_a_derived_floor_is_seen_from_a_vertex() -> None:
     floor = Floor.of(WORLD, 0.3)
     derived = derive_graph(WORLD, floor, DerivationConfig(reach_m=5.0))

@@ -60,9 +60,15 @@ class PatrolGraph:
                 f"and lengths of shape {edges.shape}"
             )
         np.fill_diagonal(edges, 0.0)
-        off = edges[~np.eye(count, dtype=bool)]
-        if not np.isfinite(places).all() or not (off > 0.0).all():
-            raise InputError(f"{where}: expected finite places and lengths above 0 m, found others")
+        if not np.isfinite(places).all():
+            raise InputError(f"{where}: expected finite places, found others")
+        wrong = np.argwhere(~(edges > 0.0) & ~np.eye(count, dtype=bool))
+        if wrong.size:
+            a, b = wrong[0]
+            raise InputError(
+                f"{where}: expected edges longer than 0 m, found {edges[a, b]:g} m from vertex {a} to {b}"
+                + ", which are at one place" * bool(np.array_equal(places[a], places[b]))
+            )
         if not np.array_equal(edges, edges.T):
             a, b = np.argwhere(edges != edges.T)[0]
             raise InputError(

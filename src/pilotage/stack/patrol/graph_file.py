@@ -17,6 +17,8 @@ from pilotage.stack.patrol.graph import PatrolGraph
 
 MOST_VERTICES = 2000
 """All pairs of them have a shortest path."""
+IN_WALL = 0.5 * math.sqrt(2.0)
+"""So many cells from a cell's middle a wall may still pass through it."""
 
 
 def read_patrol_graph(path: Path) -> PatrolGraph:
@@ -77,10 +79,15 @@ def on_floor(graph: PatrolGraph, floor: Floor, where: str = "patrol graph") -> P
     InputError
         Where a vertex lies in a wall, off the reachable floor, or where the robot does not fit.
     """
-    edges = np.isfinite(graph.edges_m)
-    return PatrolGraph.of(
-        graph.vertices_xy_m, floor.lengths_m(graph.vertices_xy_m, edges, f"{where}: vertex"), where
-    )
+    xy = graph.vertices_xy_m
+    lengths_m = floor.lengths_m(xy, np.isfinite(graph.edges_m), f"{where}: vertex")
+    for vertex, (x, y) in enumerate(xy.tolist()):
+        # Beside a wall the nearest place where the robot fits will do; in one somebody erred.
+        if floor.clearance_m[floor.cell_of(xy[vertex])] < IN_WALL * floor.cell_m:
+            raise InputError(
+                f"{where}: vertex {vertex} ({x:g}, {y:g}): expected a place on the floor, found a wall"
+            )
+    return PatrolGraph.of(xy, lengths_m, where)
 
 
 _Words = Iterator[tuple[int, str]]
