@@ -115,3 +115,9 @@ class TestTeam:
         mission = load_mission("museum-1", [*MUSEUM, "team.size=9", "team.spacing_m=25"])
         with pytest.raises(InputError, match=r"team\.size: expected \d robots at most"):
             build_source(mission)
+
+    def test_robots_that_fit_nowhere_are_told_to_be_too_large(self) -> None:
+        """It said that 0 robots are the most, and to ask for less spacing."""
+        mission = load_mission("museum-1", [*MUSEUM, "team.size=2", "robot.footprint.radius_m=15"])
+        with pytest.raises(InputError, match=r"robot\.footprint: expected a starting place .* smaller robot"):
+            build_source(mission)

@@ -128,6 +128,11 @@ def _with_drawn_starts(mission: Mission, chart: WorldMap, about: tuple[float, fl
             if start is None:
                 full.add(clear_m)
                 start = floor.draw(rng, placed, spacing_m, floor.in_cells(placed[:1]))
+            if start is None and not placed:
+                raise InputError(
+                    f"robot.footprint: expected a starting place {clear_m:.2f} m from walls on "
+                    f"'{chart.name}', found none; take a smaller robot or a larger map"
+                )
             if start is None:
                 raise InputError(
                     f"team.size: expected {index} robots at most, as starting places {spacing_m:g} m "
