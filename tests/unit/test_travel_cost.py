@@ -5,10 +5,11 @@ from __future__ import annotations
 import math
 
 import numpy as np
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from pilotage.kernels.grids.travel_cost import travel_costs
+from pilotage.kernels.grids.travel_cost import some_travel_costs, travel_costs
 from pilotage.stack.planning.grid_space import GridSpace
 
 
@@ -41,3 +42,35 @@ def test_spacing_and_factors_count() -> None:
     cost, _ = travel_costs(factor, 0, 0.5, 2.0)
     np.testing.assert_allclose(cost[:3], [0.0, 0.5, 0.5 + 0.5 * 2.0])
     assert cost[3] == 2.0
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_costs_below_others_are_the_same_to_the_bit(seed: int) -> None:
+    rng = np.random.default_rng(7400 + seed)
+    factor = np.where(rng.random((23, 31)) < 0.3, np.inf, 1.0)
+    nearest = np.full(factor.size, np.inf)
+    for start in rng.choice(factor.size, 12):
+        whole, _ = travel_costs(factor, int(start), 0.7, 0.7)
+        cost, parent = some_travel_costs(factor, int(start), 0.7, 0.7, nearest, np.zeros(0, np.int64))
+        nearer = whole < nearest
+        nearer[start] = True
+        np.testing.assert_array_equal(cost[nearer], whole[nearer])
+        assert np.isinf(cost[~nearer]).all()
+        assert (parent[~nearer] == -1).all()
+        nearest = np.minimum(nearest, whole)
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_paths_to_some_are_those_to_all(seed: int) -> None:
+    rng = np.random.default_rng(7500 + seed)
+    factor = np.where(rng.random((23, 31)) < 0.3, np.inf, 1.0)
+    anything, free = np.full(factor.size, np.inf), np.flatnonzero(np.isfinite(factor))
+    start, until = int(free[0]), rng.choice(free, 5, replace=False)
+    whole, parents = travel_costs(factor, start, 0.7, 0.7)
+    cost, parent = some_travel_costs(factor, start, 0.7, 0.7, anything, until)
+    for node in until:
+        assert cost[node] == whole[node]
+        at = int(node)
+        while parents[at] >= 0:
+            assert parent[at] == parents[at]
+            at = int(parents[at])

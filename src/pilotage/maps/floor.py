@@ -13,7 +13,7 @@ from pilotage.core.errors import InputError
 from pilotage.core.types import BoolArray, FloatArray, IntArray
 from pilotage.kernels.arrays import ByteArray
 from pilotage.kernels.grids.theta import line_of_sight
-from pilotage.kernels.grids.travel_cost import travel_costs
+from pilotage.kernels.grids.travel_cost import some_travel_costs, travel_costs
 from pilotage.kernels.patrol.pull import pulled_corners
 from pilotage.maps.distance_field import DistanceField
 from pilotage.maps.world_map import WorldMap
@@ -152,6 +152,25 @@ class Floor:
         factor = np.where(self.reachable, 1.0, np.inf)
         return travel_costs(factor, row * factor.shape[1] + column, 1.0, 1.0)
 
+    def regions_of(self, places_xy_m: FloatArray, what: str = "place") -> IntArray:
+        """(rows, columns) which of places (P, 2) is nearest by neighbours, the first of several; -1: none.
+
+        Raises
+        ------
+        InputError
+            Where a place is off the reachable floor.
+        """
+        factor = np.where(self.reachable, 1.0, np.inf)
+        nearest = np.full(factor.size, np.inf)
+        region, everywhere = np.full(factor.size, -1, dtype=np.int64), np.zeros(0, np.int64)
+        for number, place in enumerate(places_xy_m):
+            row, column = self.nearest_cell(place, f"{what} {number}")
+            start = row * factor.shape[1] + column
+            cost, _ = some_travel_costs(factor, start, 1.0, 1.0, nearest, everywhere)
+            nearer = cost < nearest
+            nearest[nearer], region[nearer] = cost[nearer], number
+        return region.reshape(factor.shape)
+
     def away_m(self, places_xy_m: FloatArray, point_xy_m: FloatArray, what: str = "place") -> FloatArray:
         """(P,) how long the path from a point to each of places (P, 2) is, by neighbouring cells.
 
@@ -219,16 +238,18 @@ class Floor:
         count, columns = len(places_xy_m), self.reachable.shape[1]
         states = self._states
         cells = [self.nearest_cell(place, f"{what} {k}") for k, place in enumerate(places_xy_m)]
+        flat = np.array([row * columns + column for row, column in cells], dtype=np.int64)
+        factor = np.where(self.reachable, 1.0, np.inf)
+        anything = np.full(factor.size, np.inf)
         out = np.full((count, count), np.inf)
         np.fill_diagonal(out, 0.0)
         for a in range(count):
             others = np.flatnonzero(wanted[a] & (np.arange(count) > a))
             if len(others) == 0:
                 continue
-            _, parent = self.costs_from(places_xy_m[a], f"{what} {a}")
+            _, parent = some_travel_costs(factor, flat[a], 1.0, 1.0, anything, np.unique(flat[others]))
             for b in others:
-                end = cells[b][0] * columns + cells[b][1]
-                corners = pulled_corners(*states, parent, columns, end)
+                corners = pulled_corners(*states, parent, columns, flat[b])
                 steps = np.diff(np.column_stack([corners // columns, corners % columns]), axis=0)
                 pulled = self.cell_m * float(np.hypot(*steps.T).sum())
                 straight = float(np.hypot(*(places_xy_m[a] - places_xy_m[b])))

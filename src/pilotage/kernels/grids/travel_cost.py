@@ -33,6 +33,25 @@ def travel_costs(
     parent
         (rows * columns,) -1 for the start and where no path leads.
     """
+    size = factor.shape[0] * factor.shape[1]
+    everywhere = np.zeros(0, np.int64)
+    return some_travel_costs(factor, start, width_m, height_m, np.full(size, np.inf), everywhere)
+
+
+@kernel
+def some_travel_costs(
+    factor: FloatArray, start: int, width_m: float, height_m: float, below: FloatArray, until: IntArray
+) -> tuple[FloatArray, IntArray]:
+    """The same, to the bit, for some of the nodes; what there is of others is of no use.
+
+    Parameters
+    ----------
+    below
+        (rows * columns,) costs from somewhere else, the least of several or infinite: nodes that cost no less
+        than from there lie on no path to where it costs less, are not gone through, and stay infinite.
+    until
+        (K,) flat indices, each once; the search is over when it knows them all. Empty: when it knows all.
+    """
     rows, columns = factor.shape
     diagonal_m = math.hypot(width_m, height_m)
     size = rows * columns
@@ -42,7 +61,7 @@ def travel_costs(
     # Every improvement pushes an entry; stale ones are skipped when they come up.
     heap_cost = np.empty(8 * size + 8)
     heap_node = np.empty(8 * size + 8, np.int64)
-    length = 1
+    length, left = 1, len(until)
     heap_cost[0], heap_node[0] = 0.0, start
     cost[start] = 0.0
     while length > 0:
@@ -64,6 +83,11 @@ def travel_costs(
         if done[node]:
             continue
         done[node] = True
+        for wanted in until:
+            if wanted == node:
+                left -= 1
+        if left == 0 and len(until) > 0:
+            break
         row, column = node // columns, node % columns
         here = factor[row, column]
         if not here < np.inf:
@@ -83,7 +107,7 @@ def travel_costs(
                     step = diagonal_m
                 new = cost[node] + step * 0.5 * (here + there)
                 to = r * columns + c
-                if new < cost[to]:
+                if new < cost[to] and new < below[to]:
                     cost[to] = new
                     parent[to] = node
                     at = length

@@ -245,15 +245,8 @@ def _grown(floor: Floor, label: IntArray) -> IntArray:
 
 def _touching(floor: Floor, vertices: FloatArray) -> BoolArray:
     """(V, V) whose regions of nearest cells, by length of path, share a border."""
-    count = len(vertices)
-    nearest = np.full(floor.reachable.size, np.inf)
-    region = np.full(floor.reachable.size, -1, dtype=np.int64)
-    for vertex, place in enumerate(vertices):
-        cost, _ = floor.costs_from(place, f"vertex {vertex}")
-        nearer = cost < nearest
-        nearest[nearer], region[nearer] = cost[nearer], vertex
-    cells = region.reshape(floor.reachable.shape)
-    touch = np.zeros((count, count), np.bool_)
+    cells = floor.regions_of(vertices, "vertex")
+    touch = np.zeros((len(vertices), len(vertices)), np.bool_)
     for one, other in ((cells[:, :-1], cells[:, 1:]), (cells[:-1], cells[1:])):
         differ = (one >= 0) & (other >= 0) & (one != other)
         touch[one[differ], other[differ]] = True
