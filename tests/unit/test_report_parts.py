@@ -19,6 +19,7 @@ from pilotage.core.types import FloatArray
 from pilotage.records.run_data import read_run
 from pilotage.report import quantities, summary_table
 from pilotage.report.calibration.plots import MOST_BINS, histogram, panels_in_a_row
+from pilotage.report.event_kinds import event_kind
 from pilotage.report.figures.consistency import chi_square_band
 from pilotage.report.figures.layers import ellipse_outlines
 from pilotage.report.figures.map_view import view_limits
@@ -172,3 +173,8 @@ def test_values_nearly_all_of_which_are_equal_make_a_histogram_of_few_bars() -> 
     _, (axes,) = panels_in_a_row(["a"], ["b"])
     histogram(axes, values)
     assert 1 <= len(axes.patches) <= MOST_BINS
+
+
+def test_what_happens_every_few_metres_is_not_marked_on_the_map() -> None:
+    assert not event_kind("closure").on_map
+    assert all(event_kind(kind).on_map for kind in ("close", "stall", "explored", "of-a-plugin"))

@@ -32,6 +32,10 @@ _KINDS = {
     "look-around": EventKind("looks around first", ORANGE, False),
     "lost": EventKind("lost, wandering", ORANGE, True),
     "found": EventKind("found itself", GREEN, True),
+    "closure": EventKind("loops closed", BLUE, False),
+    "close": EventKind("goes back to close a loop", PURPLE, True),
+    "stall": EventKind("gives a place up", ORANGE, True),
+    "explored": EventKind("nothing left to explore", GREEN, True),
     "obstacle-mapped": EventKind("obstacle mapped", MUTED, False),
 }
 
