@@ -98,6 +98,29 @@ def test_who_is_cut_off_by_its_clearance_is_led_back_by_what_its_body_takes() ->
     assert not reached(8)
 
 
+def test_who_stalls_is_led_by_what_a_line_with_room_leads_to() -> None:
+    """Not through a gap beside the path: it got stuck there until it gave up."""
+    states = half_seen()
+    states[:, 80:] = FREE
+    states[:60, 78:80] = OCCUPIED
+    states[16:26, 78:80] = FREE
+    floor, here = floor_of(states), np.array([3.0, 1.0])
+    path = floor.path_to(np.array([5.0, 1.0]))
+    explorer = SimpleNamespace(_stalled_at=None, _floor=floor)
+
+    def led() -> tuple[float, float]:
+        return FloorExplorer._led_to(cast(FloorExplorer, explorer), path, here)
+
+    around = led()
+    assert not floor.has_room(here, np.array([5.0, 1.0]))
+    assert floor.has_room(here, np.array([1.0, 2.0]))
+    explorer._stalled_at = here
+    nearer = led()
+    assert np.hypot(*(np.array(nearer) - here)) > 0.3
+    assert floor.has_room(here, np.array(nearer))
+    assert not floor.has_room(here, np.array(around))
+
+
 def test_a_grid_grows_and_follows_its_poses() -> None:
     scanner = LidarConfig(beams=180, max_range_m=12.0)
     walls, angles = furnished(), LidarConfig(beams=180).beam_angles_rad()

@@ -67,7 +67,7 @@ class SeenFloor:
         clearance_m: float,
         here_xy_m: FloatArray,
     ) -> None:
-        self.cell_m = COARSE * resolution_m
+        self.cell_m, self._beside_m = COARSE * resolution_m, 0.5 * clearance_m
         rows, columns = _known_part(states)
         self._corner = corner_xy_m + resolution_m * np.array([columns.start, rows.start])
         states = states[rows, columns]
@@ -143,6 +143,14 @@ class SeenFloor:
         while cells[-1] != self._start and len(cells) < self.cost_m.size:
             cells.append(int(self._parent[cells[-1]]))
         return self.points_of(np.array(cells[::-1]))
+
+    def has_room(self, here_xy_m: FloatArray, there_xy_m: FloatArray) -> bool:
+        """Whether paths may lead over all cells of the line to a point, those beside the robot aside."""
+        far_m = float(np.hypot(*(there_xy_m - here_xy_m)))
+        shares = np.linspace(0.0, 1.0, 2 + int(2.0 * far_m / self.cell_m))
+        shares = shares[shares * far_m > self._beside_m]
+        cells = [self.cell_of(here_xy_m + share * (there_xy_m - here_xy_m)) for share in shares]
+        return all(np.isfinite(self._factor[cell]) for cell in cells)
 
     def _frontier(self, rows: IntArray, columns: IntArray) -> Frontier:
         length_m = rows.size * self.cell_m

@@ -26,9 +26,15 @@ from pilotage.stack.mapping.scan_grid import ScanGrid, echoes
 from pilotage.stack.navigator.navigator import LocalizingNavigator, Parts, localizer_of
 from pilotage.stack.navigator.progress import patience_s
 
+HOME_STALLS = 6
+"""So many times its patience ends on its way back before it gives up: there is no other place to go to, and a
+local controller tries three times for 25 s to get through a gap."""
 AHEAD_M = 2.5
 """The local controller is led by a point so far ahead on the path."""
 STALL_M = 0.3
+SHY_SHARE = 1.0 / 3.0
+"""Where it got no farther for this share of its patience it is led along the path itself: by a point that a
+line with room leads to, not by one around a corner, straight to which a gap may be too narrow for it."""
 SAME_M = 0.6
 """A frontier this near to one that was looked at is that one."""
 CROSSED_M, FAILED_M = 0.2, 0.6
@@ -147,6 +153,9 @@ class FloorExplorer(LocalizingNavigator):
         """Places on frontiers that it stood on or could not get to, and how much around them is given up."""
         self._sure_m, self._checked = 0.0, 0
         self._planned_s, self._moved_s, self._moved_from = -math.inf, 0.0, self._start
+        self._stalled_at: FloatArray | None = None
+        self._stalls = 0
+        self._floor: SeenFloor | None = None
         self._frontiers = 0
         journal.result("grid", self._left)
         journal.counts |= dict.fromkeys(COUNTS, 0)
@@ -207,7 +216,7 @@ class FloorExplorer(LocalizingNavigator):
 
     def _decide(self, t_s: float, belief: Belief, here: FloatArray) -> None:
         """Choose what to do, and where to go for it."""
-        floor = self._seen(here)
+        self._floor = floor = self._seen(here)
         self._watch(t_s, here)
         if self._doing is Doing.RETURN:
             self._come_back(t_s, floor, here)
@@ -331,9 +340,14 @@ class FloorExplorer(LocalizingNavigator):
 
     def _watch(self, t_s: float, here: FloatArray) -> None:
         """Give up a target that it gets no nearer to."""
+        if self._stalled_at is not None and float(np.hypot(*(here - self._stalled_at))) > AHEAD_M:
+            self._stalled_at = None
         if float(np.hypot(*(here - self._moved_from))) > STALL_M:
-            self._moved_from, self._moved_s = here, t_s
-        elif t_s - self._moved_s > self._stall_s:
+            self._moved_from, self._moved_s, self._stalls = here, t_s, 0
+            return
+        if t_s - self._moved_s > SHY_SHARE * self._stall_s:
+            self._stalled_at = here
+        if t_s - self._moved_s > self._stall_s:
             self._moved_s = t_s
             if self._target is not None and self._doing is not Doing.RETURN:
                 what = "a frontier" if self._doing is Doing.EXPLORE else "the place of a loop"
@@ -343,6 +357,8 @@ class FloorExplorer(LocalizingNavigator):
                 )
                 self._failed_to_reach(self._target)
                 self._target = None
+            elif self._doing is Doing.RETURN and self._stalls + 1 < HOME_STALLS:
+                self._stalls += 1
             elif self._doing is Doing.RETURN:
                 self._fail(t_s, "stuck on its way back to the start")
 
@@ -398,7 +414,11 @@ class FloorExplorer(LocalizingNavigator):
         nearest = int(np.hypot(*(path - here).T).argmin())
         steps = np.hypot(*np.diff(path[nearest:], axis=0).T)
         k = nearest + int(np.searchsorted(np.cumsum(steps), AHEAD_M))
-        point = path[min(k, len(path) - 1)]
+        k = min(k, len(path) - 1)
+        if self._stalled_at is not None and self._floor is not None:
+            while k > nearest + 1 and not self._floor.has_room(here, path[k]):
+                k -= 1
+        point = path[k]
         return float(point[0]), float(point[1])
 
 
