@@ -254,7 +254,7 @@ def test_matching_finds_a_small_displacement(dx: float, dy: float, turn: float) 
     # What a robot at (dx, dy, turn) sees of them, in its own frame.
     seen = np.ascontiguousarray((kept - [dx, dy]) @ np.array([[c, -s], [s, c]]))
     std = np.array([0.1, 0.1, 0.1])
-    x, y, theta, partners = match_scan(0.0, 0.0, 0.0, seen, 1, ground, 0.3, 0.02, std)
+    x, y, theta, partners = match_scan(0.0, 0.0, 0.0, seen, 1, ground, 0.3, 0.02, std, 0.0)
     assert partners > 50
     assert math.hypot(x - dx, y - dy) < 0.02
     assert abs(theta - turn) < 0.01
@@ -263,7 +263,7 @@ def test_matching_finds_a_small_displacement(dx: float, dy: float, turn: float) 
 def test_matching_leaves_the_odometry_alone_without_partners() -> None:
     ground = ground_of(np.array([[3.0, 3.0]]))
     seen = np.random.default_rng(1).uniform(-2.0, 0.0, (50, 2))
-    pose = match_scan(0.1, 0.2, 0.3, seen, 1, ground, 0.2, 0.05, np.full(3, 0.1))
+    pose = match_scan(0.1, 0.2, 0.3, seen, 1, ground, 0.2, 0.05, np.full(3, 0.1), 0.0)
     assert pose[:3] == (0.1, 0.2, 0.3)
 
 

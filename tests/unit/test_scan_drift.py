@@ -51,3 +51,23 @@ def test_an_odometry_is_corrected_by_what_its_data_sheet_lets_it_be_off() -> Non
 
     good, unknown = (np.mean([off_rad(var, seed) for seed in range(5)]) for var in (1e-5, 0.0))
     assert good < 0.5 * unknown
+
+
+def test_few_beams_along_walls_pull_nobody_back() -> None:
+    """Of sixty beams in a hall each had its partner where one ended before, farther back along the wall."""
+    angles = np.linspace(-math.pi, math.pi, 60, endpoint=False)
+    hall = np.array([[-2, -2, 8, -2], [8, -2, 8, 2], [8, 2, -2, 2], [-2, 2, -2, -2]], dtype=float)
+    step, behind_m = float(angles[1] - angles[0]), []
+    for seed in range(6):
+        ground, rng = RollingGround(RollingConfig()), np.random.default_rng(seed)
+        for k in range(60):
+            here = Pose2(0.08 * k, 0.1, 0.0)
+            ranges = fan_ranges(here.x_m, here.y_m, float(angles[0]), step, 60, 20.0, hall, np.zeros((0, 3)))
+            view = LocalView(
+                0.1 * k, here, Twist(0.8, 0.0), ranges + 0.01 * rng.standard_normal(60), angles,
+                Pose2(0.0, 0.0, 0.0), 20.0, (7.0, 0.0), LIMITS, JACKAL, speed_var_m2_s2=2e-3,
+                turn_rate_var_rad2_s2=2e-3,
+            )  # fmt: skip
+            scene = ground.update(view)
+        behind_m.append(here.x_m - float(scene.pose[0]))
+    assert abs(np.mean(behind_m)) < 0.1

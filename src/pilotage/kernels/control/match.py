@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from pilotage.kernels.arrays import FloatArray
+from pilotage.kernels.arrays import ByteArray, FloatArray
 from pilotage.kernels.control.ground import Ground
 from pilotage.kernels.jit import kernel
 
@@ -12,6 +12,8 @@ ITERATIONS = 6
 LEAST_POINTS = 12
 """Fewer points with a partner tell nothing that the odometry does not tell better."""
 SETTLED = 1e-4
+WINDOW, FLOOR_M2 = 2, 1e-4
+"""Cells to either side that a surface is told by, and the least spread of their points across it."""
 
 
 @kernel
@@ -25,8 +27,12 @@ def match_scan(
     reach: float,
     point_std: float,
     pose_std: FloatArray,
+    spacing: float,
 ) -> tuple[float, float, float, int]:
     """Point-to-point ICP (Besl and McKay 1992) as a damped least-squares problem with a prior.
+
+    Where beams are farther apart than half a cell the nearest point of a wall mostly lies behind: there
+    distances count across the wall more than along it, as in generalized ICP (Segal et al. 2009).
 
     Minimizes the squared distances of the points to their nearest obstacle points, those beyond ``reach``
     left out and the weights falling towards it (Cauchy), plus the squared distance of the pose to the
@@ -40,6 +46,8 @@ def match_scan(
         Of one point; neighbouring points share their errors, so take it several times the range noise.
     pose_std
         (3,) of the predicted x, y and theta.
+    spacing
+        Angle between two beams.
 
     Returns
     -------
@@ -56,6 +64,7 @@ def match_scan(
         hxx = 1.0 / pose_std[0] ** 2
         hyy = 1.0 / pose_std[1] ** 2
         htt = 1.0 / pose_std[2] ** 2
+        hxy = 0.0
         hxt = 0.0
         hyt = 0.0
         bx, by, bt = hxx * (x - px), hyy * (y - py), htt * (theta - ptheta)
@@ -78,24 +87,64 @@ def match_scan(
                 continue
             partners += 1
             w = weight / (1.0 + r2 / soft)
-            hxx += w
-            hyy += w
-            htt += w * (ax * ax + ay * ay)
-            hxt -= w * ay
-            hyt += w * ax
-            bx += w * rx
-            by += w * ry
-            bt += w * (ax * ry - ay * rx)
+            nx, ny, slip = _surface(at, ground.hits, ground.mean)
+            # Information slip I + (1 - slip) n n': along a line that beams leave gaps in its point may slide.
+            gaps = 2.0 * spacing * math.sqrt(ax * ax + ay * ay) / ground.cell_m - 1.0
+            slip = 1.0 - min(max(gaps, 0.0), 1.0) * (1.0 - slip)
+            ixx = w * (slip + (1.0 - slip) * nx * nx)
+            ixy = w * (1.0 - slip) * nx * ny
+            iyy = w * (slip + (1.0 - slip) * ny * ny)
+            jx, jy = -ay, ax
+            ux, uy = ixx * jx + ixy * jy, ixy * jx + iyy * jy
+            hxx += ixx
+            hxy += ixy
+            hyy += iyy
+            hxt += ux
+            hyt += uy
+            htt += ux * jx + uy * jy
+            fx, fy = ixx * rx + ixy * ry, ixy * rx + iyy * ry
+            bx += fx
+            by += fy
+            bt += jx * fx + jy * fy
         if partners < LEAST_POINTS:
             return x, y, theta, partners
-        # The arrow-shaped 3 x 3 system: x and y only meet in theta.
-        pivot = htt - hxt * hxt / hxx - hyt * hyt / hyy
-        dt = (bt - hxt * bx / hxx - hyt * by / hyy) / pivot
-        dx = (bx - hxt * dt) / hxx
-        dy = (by - hyt * dt) / hyy
+        det = hxx * hyy - hxy * hxy
+        cx, cy = (hyy * hxt - hxy * hyt) / det, (hxx * hyt - hxy * hxt) / det
+        dt = (bt - cx * bx - cy * by) / (htt - cx * hxt - cy * hyt)
+        dx = (hyy * (bx - hxt * dt) - hxy * (by - hyt * dt)) / det
+        dy = (hxx * (by - hyt * dt) - hxy * (bx - hxt * dt)) / det
         px += dx
         py += dy
         ptheta += dt
         if abs(dx) + abs(dy) + abs(dt) < SETTLED:
             break
     return px, py, ptheta, partners
+
+
+@kernel
+def _surface(at: int, hits: ByteArray, mean: FloatArray) -> tuple[float, float, float]:
+    """Normal of what the points around an obstacle cell lie on, and how little of a line that is.
+
+    0 for a line, 1 for a point by itself: the ratio of their spreads, with ``FLOOR_M2`` for their own noise.
+    """
+    n = hits.shape[0]
+    row, column = at // n, at % n
+    k, sx, sy, sxx, sxy, syy = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    for r in range(max(0, row - WINDOW), min(n, row + WINDOW + 1)):
+        for c in range(max(0, column - WINDOW), min(n, column + WINDOW + 1)):
+            if hits[r, c] == 0:
+                continue
+            x, y = mean[r * n + c, 0] - mean[at, 0], mean[r * n + c, 1] - mean[at, 1]
+            k += 1.0
+            sx += x
+            sy += y
+            sxx += x * x
+            sxy += x * y
+            syy += y * y
+    if k == 0.0:
+        return 1.0, 0.0, 1.0
+    sx, sy = sx / k, sy / k
+    cxx, cxy, cyy = sxx / k - sx * sx + FLOOR_M2, sxy / k - sx * sy, syy / k - sy * sy + FLOOR_M2
+    half, off = 0.5 * (cxx + cyy), math.hypot(0.5 * (cxx - cyy), cxy)
+    angle = 0.5 * math.atan2(2.0 * cxy, cxx - cyy)
+    return -math.sin(angle), math.cos(angle), (half - off) / (half + off)

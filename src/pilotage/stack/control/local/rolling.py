@@ -307,6 +307,7 @@ class RollingGround:
             config.match_reach_m,
             config.point_std_m,
             pose_std,
+            float(view.beam_angles_rad[1] - view.beam_angles_rad[0]),
         )
         self._pose = np.array([x, y, wrap(theta)])
 
