@@ -21,13 +21,14 @@ def stuck(
     waits: bool = False,
     visit_m: float = 1.0,
     places: FloatArray = PLACES,
+    bound: Callable[[int], int] = lambda _: -1,
 ) -> bool:
     watch = StuckWatch(places, 1, 60.0, visit_m)
     for t in range(180):
         xy = path(t)
         away = np.hypot(*(places - xy).T)
         place = int(np.argmin(away)) if away.min() <= visit_m else -1
-        watch.look(0, float(t), xy, place, waits=waits)
+        watch.look(0, float(t), xy, place, waits=waits, bound=bound(t))
     return 0 in watch.since_s
 
 
@@ -65,3 +66,20 @@ def test_what_is_told_is_when_it_came_to_a_stop() -> None:
     ]
     assert [robot for _, robot in told] == [0]
     assert 38.0 <= watch.since_s[0] <= 40.0
+
+
+def test_who_serves_two_places_almost_from_one_spot_gets_on_and_who_gives_one_up_does_not() -> None:
+    def circle(t: int) -> tuple[float, float]:
+        return 0.4 + 0.12 * math.cos(0.9 * t), 0.12 * math.sin(0.9 * t)
+
+    def turns(*places: int) -> Callable[[int], int]:
+        return lambda t: places[t // 4 % len(places)]
+
+    assert stuck(circle)
+    assert not stuck(circle, bound=turns(0, 1))
+    # One of them alone, one that it never is at, and both beside one that it gives up each time.
+    assert stuck(circle, bound=turns(0))
+    assert stuck(circle, bound=turns(0, 3))
+    assert stuck(circle, bound=turns(0, 1, 3))
+    # A charging station is numbered after the places.
+    assert stuck(circle, bound=turns(0, len(PLACES)))

@@ -148,7 +148,8 @@ class PatrolTask:
         """Note who stays where he is although nothing tells him to wait."""
         x, y = attempt.body.state[:2].tolist()
         waits = attempt.body.stopped or bool(attempt.stack.status[1])
-        if self._stuck.look(index, t_s, (x, y), self._visits.nearest(x, y), waits=waits):
+        place, bound = self._visits.nearest(x, y), _bound(attempt)
+        if self._stuck.look(index, t_s, (x, y), place, waits=waits, bound=bound):
             self.events.append(
                 Event(
                     t_s,
@@ -227,6 +228,13 @@ class PatrolTask:
             "patrol/age_s": self._floor.mean_s(),
             "patrol/last_seen_s": self._floor.seen_s,
         }
+
+
+def _bound(attempt: Attempt) -> int:
+    """The place that a robot says in its telemetry that it was sent to; -1 where it tells of none."""
+    units = list(attempt.journal.units)
+    said = attempt.journal.row[units.index("target")] if "target" in units else math.nan
+    return int(said) if math.isfinite(said) else -1
 
 
 def _site(config: PatrolConfig, setting: TaskSetting) -> tuple[Floor, PatrolGraph]:
