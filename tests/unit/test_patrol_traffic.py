@@ -131,6 +131,24 @@ class TestPassages:
         assert precedes(first, 0, first, 1)
         assert not precedes(first, 1, first, 0)
 
+    @pytest.mark.parametrize("into", [1, 2, 3, 4])
+    def test_who_goes_no_farther_than_into_a_door_goes_along_with_those_who_pass(self, into: int) -> None:
+        """A place in a door: the claim of it was a point, against everybody and by its turn before all: they
+        waited for it at the door, and it behind them."""
+        half_m = np.where(np.arange(40) // 4 == 5, 0.5, 2.0)
+        way = np.column_stack([np.arange(0.0, 10.0, 0.25), np.full(40, 3.0), half_m])
+        for path in (way, way * [-1.0, 1.0, 1.0]):
+            through, ends = stretch_of(path[10:], 0.7), stretch_of(path[10 : 20 + into], 0.7)
+            assert through is not None
+            assert ends is not None
+            assert ends.mouth_m == through.mouth_m
+            passes, enters = claimed(through, None, 3.0), claimed(ends, None, 4.0)
+            assert passes.turn == enters.turn
+            assert relation(passes.line_xy_m, enters.line_xy_m) == 1
+            back = stretch_of(path[::-1][6:30], 0.7)
+            assert back is not None
+            assert relation(claimed(back, None, 3.0).line_xy_m, enters.line_xy_m) == -1
+
     def test_who_waits_stands_where_those_who_come_out_do_not_pass(self) -> None:
         """Off the corridor's axis, and not where two others stand already."""
         roadmap = build(mission_of(corridor(0.9, 1, 10.0), seed=0)).team[0].stack._context.roadmap  # type: ignore[attr-defined]

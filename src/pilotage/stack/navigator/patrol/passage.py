@@ -41,7 +41,8 @@ class Stretch:
     mouth_m
         How far ahead it begins.
     line_xy_m
-        (N, 2) places every ``STEP_M`` from there, or from the robot, to its far end.
+        (N, 2) places every ``STEP_M`` from there, or from the robot, to its far end; from
+        farther before it where the path ends in it so soon that it would tell no direction.
     outwards
         (2,) direction out of it where it begins.
     """
@@ -68,9 +69,10 @@ def stretch_of(way: FloatArray, pass_m: float) -> Stretch | None:
         if k - last > BETWEEN_STEPS:
             break
         last = k
-    # And out of it: who leaves tells in which direction.
-    line = way[first : last + 1 + OUT_STEPS, :2]
-    return Stretch(first == 0, STEP_M * first, line, way[first, :2] - way[min(first + 2, last), :2])
+    # And out of it: who leaves tells in which direction; so does who goes no farther than into it.
+    begin = max(min(first, len(way) - 1 - OUT_STEPS), 0)
+    line = way[begin : last + 1 + OUT_STEPS, :2]
+    return Stretch(first == 0, STEP_M * first, line, way[begin, :2] - way[min(begin + 2, last), :2])
 
 
 def claimed(stretch: Stretch, old: Claim | None, t_s: float) -> Claim:
