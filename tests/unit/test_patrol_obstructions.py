@@ -286,3 +286,16 @@ def test_a_mate_that_failed_in_a_door_keeps_nobody(doors: tuple[float, ...]) -> 
     assert metrics["deadlocks"] == 0
     if len(doors) > 1:
         assert idle_s.max() < 40.0
+
+
+def test_who_failed_says_and_counts_nothing_until_it_is_mended() -> None:
+    """It told every few seconds that it made room, and was counted for it."""
+    values = two_rooms(DOOR_Y_M)
+    values["team"]["failures"] = [{"robot": 1, "at_s": 0.0}, {"robot": 2, "at_s": 10.0, "for_s": 60.0}]
+    experiment = build(mission_of(values, seed=2))
+    run = run_loop(experiment)
+    told = {n: [e for e in run.finished.events if e.text.startswith(f"robot-{n}: ")] for n in (1, 2)}
+    assert [event.kind for event in told[1]] == ["failure"]
+    assert experiment.team[1].journal.counts["gave_way"] == 0
+    assert not [e for e in told[2] if 10.0 < e.t_s < 70.0 and e.kind not in ("failure", "repair")]
+    assert not experiment.team[2].journal.silenced

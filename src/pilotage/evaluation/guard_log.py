@@ -40,6 +40,8 @@ class GuardLog:
             if not math.isfinite(raised_s) or raised_s == self._last_s[index]:
                 continue
             self._last_s[index] = raised_s
+            if attempt.body.stopped:  # it tells nobody
+                continue
             people, (x, y) = _people(attempts[0]), attempt.journal.row[column + 1 : column + 3]
             near = np.hypot(*(people - [x, y]).T).min(initial=math.inf)
             if near > THERE_M:

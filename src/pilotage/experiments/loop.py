@@ -67,7 +67,7 @@ def run_loop(experiment: Experiment, on_progress: OnProgress | None = None) -> R
     begin = last_told = time.perf_counter()
     step = 0
     stacks = [member.stack for member in team] if ending is None and limit > 0 else []
-    events += disturbances.due()
+    events += _disturbed(disturbances, attempts)
     for readings, commands in stepped(source, stacks) if stacks else ():
         step += 1
         for index, member in enumerate(team):
@@ -90,7 +90,7 @@ def run_loop(experiment: Experiment, on_progress: OnProgress | None = None) -> R
             trail.record(source.t_s)
         if ending is not None or step >= limit:
             break
-        events += disturbances.due()
+        events += _disturbed(disturbances, attempts)
     loop_s = time.perf_counter() - begin
     planning_s = sum(member.journal.planning_time_s for member in team) - planned_s
     if ending is None:
@@ -112,6 +112,14 @@ def run_loop(experiment: Experiment, on_progress: OnProgress | None = None) -> R
         ending,
     )
     return Run(finished, sightings, albums, trail)
+
+
+def _disturbed(disturbances: Disturbances, attempts: tuple[Attempt, ...]) -> list[Event]:
+    """Carry out what is due now; a robot that has stopped says nothing from then on."""
+    events = disturbances.due()
+    for attempt in attempts:
+        attempt.journal.silenced = attempt.body.stopped
+    return events
 
 
 def _events(member: Member, *, several: bool) -> list[Event]:

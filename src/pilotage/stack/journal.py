@@ -55,6 +55,8 @@ class Journal:
         What it sends by radio in this step; whoever runs it takes it out.
     update
         The last step's sensor update where it can be explained; whoever reads it sets it back to None.
+    silenced
+        Whether nothing that it says or counts is kept: a robot that failed does neither.
     """
 
     events: list[Event] = field(default_factory=list)
@@ -65,16 +67,19 @@ class Journal:
     row: array[float] = field(default_factory=lambda: array("d"))
     outbox: list[object] = field(default_factory=list)
     update: ExplainableUpdate | None = None
+    silenced: bool = False
     _results: dict[str, Callable[[], object]] = field(default_factory=dict)
     _channels: list[Channel] = field(default_factory=list)
 
     def say(self, t_s: float, kind: str, text: str) -> None:
         """Tell that something happened."""
+        if self.silenced:
+            return
         self.events.append(Event(t_s, kind, text))
 
     def count(self, name: str) -> int:
         """Count one more of ``name``; returns how many there are now."""
-        self.counts[name] = self.counts.get(name, 0) + 1
+        self.counts[name] = self.counts.get(name, 0) + (0 if self.silenced else 1)
         return self.counts[name]
 
     def channel(self, columns: Mapping[str, str], *, first: bool = False) -> Channel:
