@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from contract.patrol_examples import lattice
+from pilotage.core.types import FloatArray
 from pilotage.evaluation.idleness import Idleness, idleness
 from pilotage.experiments.graph_patrol import GraphPatrol, Radio, patrol
 from pilotage.kernels.patrol.rounds import BACK, judge_walk, plan_cost
@@ -22,6 +24,7 @@ from pilotage.stack.patrol.partition import Plan, annealed, even_sizes, partitio
 from pilotage.stack.patrol.strategies.adaptive_rounds import (
     AdaptiveRoundsConfig,
     AdaptiveRoundsStrategy,
+    _oldest_first,
     best_plan,
 )
 from pilotage.stack.patrol.strategy import STRATEGIES, PatrolSetting, Strategy, following
@@ -52,6 +55,17 @@ def memory_at(vertex: int, graph: PatrolGraph = GRAPH, team: int = 2) -> PatrolM
 
 def setting_for(graph: PatrolGraph = GRAPH, starts: tuple[int, ...] = (0, 5)) -> PatrolSetting:
     return PatrolSetting(graph, 0, np.array(starts), SPEED_M_S, np.random.default_rng(0))
+
+
+def two_rooms() -> PatrolGraph:
+    """Of six places each, far from each other."""
+    room = lattice(3, 2, 3.0)
+    count = len(room)
+    edges = np.full((2 * count, 2 * count), np.inf)
+    edges[:count, :count] = edges[count:, count:] = room.edges_m
+    edges[count - 1, count] = edges[count, count - 1] = 40.0
+    places = np.concatenate([room.vertices_xy_m, room.vertices_xy_m + np.array([45.0, 0.0])])
+    return PatrolGraph.of(places, edges)
 
 
 def test_reactive_robots_go_where_they_were_longest_ago() -> None:
@@ -246,14 +260,9 @@ def test_those_who_are_left_take_the_share_of_a_robot_that_stops() -> None:
 
 @pytest.mark.parametrize(("off_s", "all_its"), [(15.0, False), (500.0, True)])
 def test_only_who_is_off_duty_for_long_leaves_its_share_to_the_others(off_s: float, all_its: bool) -> None:
-    """Two rooms far from each other, a robot in each."""
-    room = lattice(3, 2, 3.0)
-    count = len(room)
-    edges = np.full((2 * count, 2 * count), np.inf)
-    edges[:count, :count] = edges[count:, count:] = room.edges_m
-    edges[count - 1, count] = edges[count, count - 1] = 40.0
-    places = np.concatenate([room.vertices_xy_m, room.vertices_xy_m + np.array([45.0, 0.0])])
-    graph = PatrolGraph.of(places, edges)
+    """A robot in each of two rooms."""
+    graph = two_rooms()
+    count = len(graph) // 2
     memory, other = memory_at(0, graph), PatrolMemory(2 * count, 1, 2, count, SPEED_M_S)
     strategy = builder("adaptive-rounds")(setting_for(graph, (0, count)))
     went = {0}
@@ -319,6 +328,50 @@ def test_a_pair_that_shares_a_short_round_keeps_no_plan_from_being_taken() -> No
     alone = partition(graph, (1, 1, 1, 1))
     assert plan.worst_m < alone.worst_m
     assert plan.mean_m < 0.97 * alone.mean_m
+
+
+def oldest_m(graph: PatrolGraph, walk: Round, enters: int, to_m: float, idle_m: FloatArray) -> float:
+    """How old, in metres of driving, the oldest vertex of a walk gets until who enters it there comes by."""
+    found: dict[int, float] = {}
+    stops = np.roll(walk.stops, -enters).tolist()
+    for here, there in zip(stops, stops[1:] + stops[:1], strict=True):
+        found.setdefault(here, to_m + float(idle_m[here]))
+        to_m += float(graph.edges_m[here, there])
+    return max(found.values())
+
+
+@given(seed=st.integers(0, 10_000))
+@settings(max_examples=30, deadline=None)
+def test_a_round_for_one_is_entered_where_no_place_gets_older_than_need_be(seed: int) -> None:
+    graph, rng = random_graph(seed), np.random.default_rng(seed)
+    walk, idle_m = Round.best(graph), rng.uniform(0.0, 200.0, len(graph))
+    to_m = graph.shortest_m[int(rng.integers(len(graph)))][walk.stops]
+    everywhere = [oldest_m(graph, walk, k, float(to_m[k]), idle_m) for k in range(len(walk.stops))]
+    assert everywhere[_oldest_first(walk, to_m, idle_m)] <= min(everywhere) + 1e-6
+
+
+@pytest.mark.parametrize("at", range(6))
+def test_who_is_left_alone_goes_first_where_nobody_was_for_longest(at: int) -> None:
+    """It entered the round of all at its nearest stop, and went by its own places once more before."""
+    graph = two_rooms()
+    count = len(graph) // 2
+    memory, other = memory_at(at, graph), PatrolMemory(2 * count, 1, 2, count, SPEED_M_S)
+    strategy: Any = builder("adaptive-rounds")(setting_for(graph, (0, count)))
+    target = at
+    for t_s, on_duty in ((10.0, True), (12.0, False), (60.0, False)):
+        other.update(t_s, on_duty=on_duty)
+        memory.receive(other.message(t_s))
+        for vertex in (*range(count), at):
+            memory.visit(vertex, t_s)
+        target = strategy.next_vertex(memory.knowledge(t_s))
+    walk, idle_m = strategy._round, memory.knowledge(60.0).idleness_s * SPEED_M_S
+    assert len(np.unique(walk.stops)) == len(graph)
+    to_m = graph.shortest_m[at][walk.stops]
+    ages_m = np.array([oldest_m(graph, walk, k, float(to_m[k]), idle_m) for k in range(len(walk.stops))])
+    best = np.flatnonzero(ages_m <= ages_m.min() + 1e-6)
+    # Where it is already it goes on at once.
+    after = walk.stops[(best + 1) % len(walk.stops)]
+    assert target in np.where(walk.stops[best] == at, after, walk.stops[best])
 
 
 def test_a_mate_that_stops_early_is_given_up_soon_where_everybody_is_heard() -> None:

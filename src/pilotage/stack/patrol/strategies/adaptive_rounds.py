@@ -203,11 +203,17 @@ class AdaptiveRoundsStrategy:
         return int(self._setting.starts[robot]) if state is None else state.target
 
     def _join(self, walk: Round, knowledge: PatrolKnowledge) -> None:
-        """Go to the nearest stop of another round; stay where it is the same one."""
+        """Go to another round; stay where it is the same one."""
         if _key(walk) == _key(self._round):
             return
         self._round, self._leaves_s, self._is_on_round = walk, -math.inf, False
-        self._place = int(np.argmin(self._away_m[knowledge.at, walk.stops]))
+        to_m = self._away_m[knowledge.at, walk.stops]
+        shared = any(
+            _key(other) == _key(walk) and size > 1
+            for other, size in zip(self._plan.rounds, self._plan.sizes, strict=True)
+        )
+        idle_m = knowledge.idleness_s * knowledge.speed_m_s
+        self._place = int(np.argmin(to_m)) if shared else _oldest_first(walk, to_m, idle_m)
 
     def _change_rounds(self, knowledge: PatrolKnowledge) -> None:
         """Leave a round that has too many for one that has too few, if nobody else of it is nearer."""
@@ -277,6 +283,23 @@ def _off_even(gap_m: FloatArray, apart_m: float, complete: bool) -> FloatArray:
     else:  # somebody is missing: the nearest place of the row
         rank = np.rint(gap_m / apart_m)
     return gap_m - rank * apart_m
+
+
+def _oldest_first(walk: Round, to_m: FloatArray, idle_m: FloatArray) -> int:
+    """At which stop to enter a round, (K,) so far away, that nobody else goes.
+
+    From there no vertex, visited last so long ago (V,) in metres of driving, gets as old until it is visited
+    as from elsewhere; of several such stops the nearest.
+    """
+    ahead_m = walk.at_m - walk.at_m[:, None]
+    ahead_m = np.where(ahead_m < 0.0, ahead_m + walk.length_m, ahead_m)
+    # A walk may pass a vertex twice: the first time counts.
+    first_m = np.full((len(walk.stops), len(idle_m)), math.inf)
+    for k, vertex in enumerate(walk.stops.tolist()):
+        first_m[:, vertex] = np.minimum(first_m[:, vertex], ahead_m[:, k])
+    visited = np.unique(walk.stops)
+    oldest_m = to_m + (first_m[:, visited] + idle_m[visited]).max(axis=1)
+    return int(np.lexsort((to_m, oldest_m))[0])
 
 
 def _key(walk: Round) -> float:
