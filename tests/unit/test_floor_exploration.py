@@ -14,6 +14,7 @@ from pilotage.experiments.mission import load_mission, mission_of
 from pilotage.experiments.run import run_mission
 from pilotage.kernels.slam.frames import composed
 from pilotage.maps.occupancy_grid import FREE, OCCUPIED, UNKNOWN, OccupancyGrid
+from pilotage.maps.segment_map import SegmentMap
 from pilotage.maps.world_map import WorldMap
 from pilotage.sensors.lidar import LidarConfig
 from pilotage.stack.exploration.floor_frontiers import SeenFloor
@@ -164,6 +165,20 @@ def test_a_true_map_has_all_of_the_floor_and_a_shifted_one_its_shift() -> None:
     assert metrics["wall_rms_m"] == pytest.approx(0.025, abs=1e-4)
     shifted = OccupancyGrid(cells, 0.05, Pose2(-0.2, 0.1, 0.0))
     assert float(str(floor_map_metrics(shifted, chart, 0.3, Pose2(2.0, 2.0, 0.0))["wall_rms_m"])) > 0.2
+
+
+@pytest.mark.parametrize("shift_m", [0.0, 0.013])
+def test_a_cell_of_a_thin_wall_is_as_far_off_as_its_nearer_side(shift_m: float) -> None:
+    """Half way between both sides the nearest was either: cells were 0.075 off, not 0.025."""
+    sides = np.array([[x, 1.0, x, 7.0] for x in (2.0, 2.1, 6.1, 6.0)])
+    walls = SegmentMap(np.concatenate([ROOM.segments_m, sides]), np.zeros((0, 3)), ROOM.bounds_m)
+    cells = np.full((160, 200), FREE, np.int8)
+    cells[40:120, [40, 41, 120, 121]] = OCCUPIED
+    grid = OccupancyGrid(cells, 0.05, Pose2(shift_m, 0.0, 0.0))
+    metrics = floor_map_metrics(grid, WorldMap("thin", ROOM.bounds_m, walls), 0.3, Pose2(4.0, 4.0, 0.0))
+    off = np.array([0.025 + shift_m, 0.025 - shift_m])
+    assert metrics["wall_rms_m"] == pytest.approx(np.sqrt((off**2).mean()), abs=1e-9)
+    assert metrics["wall_max_m"] == pytest.approx(off.max(), abs=1e-9)
 
 
 def test_an_unknown_floor_is_explored_and_mapped() -> None:

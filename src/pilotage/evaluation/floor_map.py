@@ -8,6 +8,7 @@ from scipy import ndimage
 from pilotage.core.types import FloatArray, Pose2
 from pilotage.maps.nearest_obstacles import NearestObstacles
 from pilotage.maps.occupancy_grid import FREE, OCCUPIED, OccupancyGrid
+from pilotage.maps.segment_map import SegmentMap
 from pilotage.maps.world_map import WorldMap
 
 LATTICE_M = 0.05
@@ -52,7 +53,19 @@ def floor_map_metrics(
         metrics["floor_area_m2"] = len(floor) * LATTICE_M**2
     walls = np.argwhere(grid.cells == OCCUPIED)
     if len(walls):
-        off = NearestObstacles.from_map(chart.walls).at(grid.centres_m(walls))
+        off = _off_m(grid.centres_m(walls), chart.walls, grid.resolution_m)
         metrics["wall_rms_m"] = float(np.sqrt((off**2).mean()))
         metrics["wall_max_m"] = float(off.max())
     return metrics
+
+
+def _off_m(middles_m: FloatArray, walls: SegmentMap, cell_m: float) -> FloatArray:
+    """Distance (N,) of middles (N, 2) of cells from the nearest wall.
+
+    The nearest is looked up at the middles themselves: at nodes anywhere else both sides of a wall of one or
+    two cells may be as near, and a cell on the one side be measured to the other.
+    """
+    low, high = middles_m.min(axis=0), middles_m.max(axis=0) + cell_m
+    bounds_m = float(low[0]), float(low[1]), float(high[0]), float(high[1])
+    around = SegmentMap(walls.segments_m, walls.circles_m, bounds_m)
+    return NearestObstacles.from_map(around, cell_m).at(middles_m)
