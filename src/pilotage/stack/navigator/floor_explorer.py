@@ -39,6 +39,8 @@ SAME_M = 0.6
 """A frontier this near to one that was looked at is that one."""
 CROSSED_M, FAILED_M = 0.2, 0.6
 """So much of a frontier around a place where it stood on it, or could not get to, is given up."""
+ROOM_M = 1.0
+"""A frontier this long is the edge of a room, not a shadow: worth a gap that its body alone takes."""
 COUNTS = ("frontiers_seen", "frontiers_left", "frontiers_given_up", "loops_sought")
 RETURNS = 4
 """How often it checks, with loops closed anew, that it truly stands where it began."""
@@ -111,6 +113,8 @@ class FloorExplorer(LocalizingNavigator):
     A frontier is looked at from near it first. One that stays (the edge of a shadow, beside a door post) and
     that the robot fits through is driven to, and given up only where it stood on it, or got no nearer. One
     that is too narrow is given up when it was looked at. What is given up is said, with the reason.
+
+    Rooms that are seen through gaps without room for its clearance come last, by paths that its body takes.
     """
 
     def __init__(
@@ -221,7 +225,12 @@ class FloorExplorer(LocalizingNavigator):
         if self._doing is Doing.RETURN:
             self._come_back(t_s, floor, here)
             return
-        found = self._worth_it(floor, belief, here)
+        found = self._worth_it(floor, belief, here, self._least_m)
+        if not found:
+            # Rooms may be left behind gaps that only its body fits through.
+            squeezed = self._floor_at(self._radius_m, here)
+            found = self._worth_it(squeezed, belief, here, max(ROOM_M, self._least_m))
+            self._floor = floor = squeezed if found else floor
         self._frontiers = len(found)
         if self._doing is Doing.CLOSE and self._still_unsure(belief, here):
             self._go(floor, self._target)
@@ -237,19 +246,26 @@ class FloorExplorer(LocalizingNavigator):
 
         A wall on the map may be a cell off: that much less is the last try.
         """
-        grid, floors = self._grid, []
-        for clearance_m in (self._clearance_m, self._radius_m, self._radius_m - grid.resolution_m):
-            floors.append(SeenFloor(grid.states, grid.corner_xy_m, grid.resolution_m, clearance_m, here))
-            if math.isfinite(floors[-1].cost_to(self._start)):
-                return floors[-1]
-        return floors[0]
+        first = self._floor_at(self._clearance_m, here)
+        if math.isfinite(first.cost_to(self._start)):
+            return first
+        for clearance_m in (self._radius_m, self._radius_m - self._grid.resolution_m):
+            floor = self._floor_at(clearance_m, here)
+            if math.isfinite(floor.cost_to(self._start)):
+                return floor
+        return first
 
-    def _worth_it(self, floor: SeenFloor, belief: Belief, here: FloatArray) -> list[Target]:
-        """Frontiers within reach that were not given up, the best first."""
+    def _floor_at(self, clearance_m: float, here: FloatArray) -> SeenFloor:
+        """What it has seen, for paths that keep a clearance."""
+        grid = self._grid
+        return SeenFloor(grid.states, grid.corner_xy_m, grid.resolution_m, clearance_m, here)
+
+    def _worth_it(self, floor: SeenFloor, belief: Belief, here: FloatArray, least_m: float) -> list[Target]:
+        """Frontiers of a length and within reach that were not given up, the best first."""
         config, out = self._config, []
         if self._target is not None and self._doing is Doing.EXPLORE and self._there(here):
             self._met(self._target)
-        for frontier in floor.frontiers(self._least_m):
+        for frontier in floor.frontiers(least_m):
             cell, crossing = self._place_for(floor, frontier)
             if cell < 0:
                 continue
