@@ -18,8 +18,9 @@ from pilotage.maps.segment_map import SegmentMap
 from pilotage.maps.world_map import WorldMap
 from pilotage.sensors.lidar import LidarConfig
 from pilotage.stack.exploration.floor_frontiers import SeenFloor
+from pilotage.stack.interface import Belief
 from pilotage.stack.mapping.scan_grid import ScanGrid, echoes
-from pilotage.stack.navigator.floor_explorer import FloorExplorer
+from pilotage.stack.navigator.floor_explorer import Doing, FloorExplorer
 from support.laser_rooms import furnished, ranges
 from support.missions import MISSIONS
 from support.robots import ROOM
@@ -232,3 +233,33 @@ def test_a_room_behind_a_gap_that_the_body_alone_takes_is_explored() -> None:
     assert metrics["success"] is True, metrics["reason"]
     assert float(str(metrics["floor_mapped"])) > 0.99
     assert metrics["collisions"] == 0
+
+
+def test_who_is_under_way_to_a_gap_goes_on_where_what_it_sees_behind_it_shrinks(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """It was 1.7 m from afar and under 1 m from before the gap, where the robot turned back."""
+    asked: list[float] = []
+    explorer = FloorExplorer.__new__(FloorExplorer)
+    floor, seen_m = floor_of(half_seen()), [1.7, 0.6]
+    found = SimpleNamespace(xy_m=np.array([2.0, 2.0]))
+
+    def worth_it(*asking: object) -> list[object]:
+        least_m = cast(float, asking[-1])
+        asked.append(least_m)
+        return [found] if len(asked) % 2 == 0 and seen_m[len(asked) // 2 - 1] >= least_m else []
+
+    belief = SimpleNamespace(cov=np.zeros((3, 3)))
+    vars(explorer).update(_doing=Doing.EXPLORE, _least_m=0.4, _squeezing=False, _radius_m=0.3)
+    vars(explorer).update(_config=SimpleNamespace(unsure_m=1.0), _sure_m=0.0, _target=None)
+    went: list[object] = []
+    monkeypatch.setattr(FloorExplorer, "_seen", lambda *_: floor)
+    monkeypatch.setattr(FloorExplorer, "_floor_at", lambda *_: floor)
+    monkeypatch.setattr(FloorExplorer, "_watch", lambda *_: None)
+    monkeypatch.setattr(FloorExplorer, "_worth_it", worth_it)
+    monkeypatch.setattr(FloorExplorer, "_go_exploring", lambda *_: went.append("on"))
+    monkeypatch.setattr(FloorExplorer, "_set_out_home", lambda *_: went.append("home"))
+    for _ in range(2):
+        explorer._decide(0.0, cast(Belief, belief), HERE)
+    assert went == ["on", "on"]
+    assert asked == [0.4, 1.0, 0.4, 0.4]

@@ -160,7 +160,7 @@ class FloorExplorer(LocalizingNavigator):
         self._stalled_at: FloatArray | None = None
         self._stalls = 0
         self._floor: SeenFloor | None = None
-        self._frontiers = 0
+        self._frontiers, self._squeezing = 0, False
         journal.result("grid", self._left)
         journal.counts |= dict.fromkeys(COUNTS, 0)
         self._channel = journal.channel(
@@ -220,6 +220,7 @@ class FloorExplorer(LocalizingNavigator):
 
     def _decide(self, t_s: float, belief: Belief, here: FloatArray) -> None:
         """Choose what to do, and where to go for it."""
+        squeezing, self._squeezing = self._squeezing, False
         self._floor = floor = self._seen(here)
         self._watch(t_s, here)
         if self._doing is Doing.RETURN:
@@ -229,8 +230,11 @@ class FloorExplorer(LocalizingNavigator):
         if not found:
             # Rooms may be left behind gaps that only its body fits through.
             squeezed = self._floor_at(self._radius_m, here)
-            found = self._worth_it(squeezed, belief, here, max(ROOM_M, self._least_m))
+            # What it looks at from before the gap shrinks, and may be short then.
+            least_m = self._least_m if squeezing else max(ROOM_M, self._least_m)
+            found = self._worth_it(squeezed, belief, here, least_m)
             self._floor = floor = squeezed if found else floor
+            self._squeezing = bool(found)
         self._frontiers = len(found)
         if self._doing is Doing.CLOSE and self._still_unsure(belief, here):
             self._go(floor, self._target)
