@@ -8,14 +8,12 @@ from enum import StrEnum
 
 import numpy as np
 
-from pilotage.core.config import Config
 from pilotage.core.errors import InputError
 from pilotage.core.types import STOP, FloatArray, Pose2, Twist
 from pilotage.maps.occupancy_grid import OccupancyGrid
 from pilotage.maps.world_map import WorldMap
 from pilotage.sensors.lidar import LidarConfig
 from pilotage.sensors.readings import LidarScan, Readings
-from pilotage.sensors.sensor import NonNegative, Positive
 from pilotage.stack.control.local.drive import LocalDrive
 from pilotage.stack.exploration.floor_frontiers import Frontier, SeenFloor
 from pilotage.stack.interface import NAVIGATORS, Belief, BeliefStatus, StackStatus
@@ -23,6 +21,7 @@ from pilotage.stack.journal import Journal
 from pilotage.stack.knowledge import RobotKnowledge, TaskKnowledge
 from pilotage.stack.localization.localizer import Abilities
 from pilotage.stack.mapping.scan_grid import ScanGrid, echoes
+from pilotage.stack.navigator.floor_explorer_config import FloorExplorerConfig
 from pilotage.stack.navigator.navigator import LocalizingNavigator, Parts, localizer_of
 from pilotage.stack.navigator.progress import patience_s
 
@@ -53,37 +52,6 @@ class Doing(StrEnum):
     CLOSE = "close"
     RETURN = "return"
     DONE = "done"
-
-
-class FloorExplorerConfig(Config):
-    """What is worth going to, when to close a loop, and when it is done."""
-
-    clearance_m: NonNegative = 0.06
-    """Beside the robot's radius, of the paths that it plans."""
-    least_frontier_m: Positive = 0.4
-    look_m: Positive = 0.35
-    """A frontier is looked at from this near to where it is best seen."""
-    cross_m: Positive = 0.1
-    """So near it comes to a place on a frontier that it drives to because looking did not do."""
-    replan_s: Positive = 1.0
-    switch_m: NonNegative = 2.0
-    """Another frontier must be nearer by this before it is gone to instead."""
-    turn_cost_m_per_rad: NonNegative = 0.4
-    length_gain: NonNegative = 0.3
-    """A metre of frontier is worth so many metres of path."""
-    unsure_m: Positive = 1.0
-    """Standard deviation of its position from which it goes back to close a loop first."""
-    stall_s: Positive = 15.0
-    arrival_m: Positive = 0.04
-    """How near to the start it has to believe to be in the end."""
-    resolution_m: Positive = 0.05
-    """Side of a cell of the map that it drives by, where the localizer makes none,"""
-    map_resolution_m: Positive | None = None
-    """and of the map that it leaves, drawn anew from the same scans: walls are known to half a cell."""
-    keyframe_m: Positive = 0.25
-    keyframe_rad: Positive = 0.2
-    """How far apart the scans of its map are, where the localizer makes none."""
-    reverse_m_s: NonNegative = 0.3
 
 
 @dataclass(slots=True)
