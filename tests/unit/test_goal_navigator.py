@@ -123,6 +123,15 @@ def test_a_goal_in_the_wall_fails_before_the_start() -> None:
     assert stack.step(Readings(0.1, {})) == Twist(0.0, 0.0)
 
 
+def test_a_goal_that_the_planners_clearance_does_not_leave_is_driven_to() -> None:
+    """A map drawn from scans has its walls up to a cell too near."""
+    low, _, _, _ = ROOM.bounds_m
+    told = told_of(start=START, goal=Goal(low + 0.38, 4.0))
+    stack = navigator(told, Stub(told.initial))
+    assert stack.status[0] is StackStatus.RUNNING
+    assert [event.kind for event in told.journal.events] == ["plan"]
+
+
 @pytest.mark.parametrize("heading", [0.0, 1.5, 3.0, -2.0])
 def test_a_plan_that_turns_on_the_spot_is_taken_up_by_turning(heading: float) -> None:
     """Between two walls there is no room for an arc."""

@@ -90,6 +90,7 @@ def lose(context: Context, state: State) -> State:
 def first_state(context: Context, belief: Belief) -> State:
     """Plan from the initial belief; without a path the task has failed before it starts.
 
+    Where the planner's own clearance leaves no path, or does not leave the goal, those below it are tried.
     A robot that is lost plans once it knows where it is. One that believes to stand where there is no
     room for a plan first looks around: the belief may be as far off as its covariance says.
     """
@@ -97,7 +98,7 @@ def first_state(context: Context, belief: Belief) -> State:
         return LookingAround(context)
     own, *less = context.first_clearances_m()
     result = context.make_plan(belief.pose, [own])
-    if result.status is PlanStatus.NO_PATH and less:
+    if result.status in (PlanStatus.NO_PATH, PlanStatus.GOAL_BLOCKED) and less:
         result = context.make_plan(belief.pose, less)
     if result.status is PlanStatus.START_BLOCKED:
         context.say("look-around", f"{result.reason}: looking around before planning")
