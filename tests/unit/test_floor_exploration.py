@@ -20,7 +20,7 @@ from pilotage.sensors.lidar import LidarConfig
 from pilotage.stack.exploration.floor_frontiers import SeenFloor
 from pilotage.stack.interface import Belief
 from pilotage.stack.mapping.scan_grid import ScanGrid, echoes
-from pilotage.stack.navigator.floor_explorer import Doing, FloorExplorer
+from pilotage.stack.navigator.floor_explorer import Doing, FloorExplorer, Target
 from support.laser_rooms import furnished, ranges
 from support.missions import MISSIONS
 from support.robots import ROOM
@@ -198,8 +198,9 @@ def test_an_unknown_floor_is_explored_and_mapped() -> None:
     assert float(str(metrics["return_error_m"])) < 0.1
 
 
-def test_a_frontier_that_a_look_does_not_move_is_driven_through() -> None:
+def test_a_frontier_that_a_look_does_not_move_is_driven_through(monkeypatch: pytest.MonkeyPatch) -> None:
     """The next room is in the shadow of a door post: with looks alone it came home with 47 % mapped."""
+    met = FloorExplorer._met
     unknown = load_mission("museum-unknown", ("robot.footprint.radius_m=0.15",), 1)
     values = unknown.model_dump(mode="json") | {"mission": "alcove"}
     sides = [[0, 1, 5, 1], [5, 1, 5, 5], [5, 5, 0, 5], [0, 5, 0, 1], [2.1, 1, 2.1, 4]]
@@ -210,11 +211,19 @@ def test_a_frontier_that_a_look_does_not_move_is_driven_through() -> None:
         "goal": None,
     }
     values["world"] = world
+    once: list[Target] = []
+
+    def noted(explorer: FloorExplorer, target: Target) -> None:
+        once.append(target)
+        met(explorer, target)
+
+    monkeypatch.setattr(FloorExplorer, "_met", noted)
     metrics = run_mission(mission_of(values), save=False).metrics
     assert metrics["success"] is True, metrics["reason"]
     assert float(str(metrics["floor_mapped"])) > 0.99
     assert metrics["frontiers_given_up"] == 0
     assert metrics["collisions"] == 0
+    assert len(once) == len({id(target) for target in once}) >= 2, "each target is met once"
 
 
 def test_a_room_behind_a_gap_that_the_body_alone_takes_is_explored() -> None:

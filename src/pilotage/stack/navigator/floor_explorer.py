@@ -194,6 +194,8 @@ class FloorExplorer(LocalizingNavigator):
         if self._doing is Doing.RETURN:
             self._come_back(t_s, floor, here)
             return
+        if self._target is not None and self._doing is Doing.EXPLORE and self._there(here):
+            self._met(self._target)
         found = self._worth_it(floor, belief, here, self._least_m)
         if not found:
             # Rooms may be left behind gaps that only its body fits through.
@@ -235,8 +237,6 @@ class FloorExplorer(LocalizingNavigator):
     def _worth_it(self, floor: SeenFloor, belief: Belief, here: FloatArray, least_m: float) -> list[Target]:
         """Frontiers of a length and within reach that were not given up, the best first."""
         config, out = self._config, []
-        if self._target is not None and self._doing is Doing.EXPLORE and self._there(here):
-            self._met(self._target)
         for frontier in floor.frontiers(least_m):
             cell, crossing = self._place_for(floor, frontier)
             if cell < 0:

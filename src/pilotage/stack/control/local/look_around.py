@@ -1,4 +1,4 @@
-"""A turn all around of a robot that stands: it may only not have seen the ground ahead."""
+"""A turn all around of a robot that stands: the ground ahead may be free and only unseen."""
 
 from __future__ import annotations
 
