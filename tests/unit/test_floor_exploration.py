@@ -16,6 +16,7 @@ from pilotage.kernels.slam.frames import composed
 from pilotage.maps.occupancy_grid import FREE, OCCUPIED, UNKNOWN, OccupancyGrid
 from pilotage.maps.segment_map import SegmentMap
 from pilotage.maps.world_map import WorldMap
+from pilotage.missions.mission import Mission
 from pilotage.sensors.lidar import LidarConfig
 from pilotage.stack.exploration.floor_frontiers import SeenFloor
 from pilotage.stack.interface import Belief
@@ -198,19 +199,23 @@ def test_an_unknown_floor_is_explored_and_mapped() -> None:
     assert float(str(metrics["return_error_m"])) < 0.1
 
 
+def unknown_floor(walls_m: list[list[float]], start: Pose2, radius_m: float, seed: int) -> Mission:
+    """The museum's explorer, of another size, between other walls."""
+    museum = load_mission("museum-unknown", (f"robot.footprint.radius_m={radius_m}",), seed)
+    values = museum.model_dump(mode="json") | {"mission": "unknown-floor"}
+    values["world"] = mission_of(MISSIONS["reach"]).world.model_dump(mode="json") | {
+        "map": {"map": "unknown-floor", "walls_m": walls_m},
+        "start": {"x_m": start.x_m, "y_m": start.y_m, "theta_rad": start.theta_rad},
+        "goal": None,
+    }
+    return mission_of(values)
+
+
 def test_a_frontier_that_a_look_does_not_move_is_driven_through(monkeypatch: pytest.MonkeyPatch) -> None:
     """The next room is in the shadow of a door post: with looks alone it came home with 47 % mapped."""
     met = FloorExplorer._met
-    unknown = load_mission("museum-unknown", ("robot.footprint.radius_m=0.15",), 1)
-    values = unknown.model_dump(mode="json") | {"mission": "alcove"}
     sides = [[0, 1, 5, 1], [5, 1, 5, 5], [5, 5, 0, 5], [0, 5, 0, 1], [2.1, 1, 2.1, 4]]
-    world = mission_of(MISSIONS["reach"]).world.model_dump(mode="json")
-    world |= {
-        "map": {"map": "alcove", "walls_m": sides},
-        "start": {"x_m": 0.53, "y_m": 2.73, "theta_rad": 2.03},
-        "goal": None,
-    }
-    values["world"] = world
+    mission = unknown_floor(sides, Pose2(0.53, 2.73, 2.03), 0.15, 1)
     once: list[Target] = []
 
     def noted(explorer: FloorExplorer, target: Target) -> None:
@@ -218,7 +223,7 @@ def test_a_frontier_that_a_look_does_not_move_is_driven_through(monkeypatch: pyt
         met(explorer, target)
 
     monkeypatch.setattr(FloorExplorer, "_met", noted)
-    metrics = run_mission(mission_of(values), save=False).metrics
+    metrics = run_mission(mission, save=False).metrics
     assert metrics["success"] is True, metrics["reason"]
     assert float(str(metrics["floor_mapped"])) > 0.99
     assert metrics["frontiers_given_up"] == 0
@@ -228,17 +233,8 @@ def test_a_frontier_that_a_look_does_not_move_is_driven_through(monkeypatch: pyt
 
 def test_a_room_behind_a_gap_that_the_body_alone_takes_is_explored() -> None:
     """0.50 m for a robot 0.40 m wide: its clearance asks for 0.52, and it came home with 63 % mapped."""
-    unknown = load_mission("museum-unknown", ("robot.footprint.radius_m=0.2",), 3)
-    values = unknown.model_dump(mode="json") | {"mission": "gap"}
     sides = [[0, 0, 8, 0], [8, 0, 8, 4], [8, 4, 0, 4], [0, 4, 0, 0], [4, 0, 4, 1.71], [4, 2.21, 4, 4]]
-    world = mission_of(MISSIONS["reach"]).world.model_dump(mode="json")
-    world |= {
-        "map": {"map": "gap", "walls_m": sides},
-        "start": {"x_m": 1.5, "y_m": 1.2, "theta_rad": 0.0},
-        "goal": None,
-    }
-    values["world"] = world
-    metrics = run_mission(mission_of(values), save=False).metrics
+    metrics = run_mission(unknown_floor(sides, Pose2(1.5, 1.2, 0.0), 0.2, 3), save=False).metrics
     assert metrics["success"] is True, metrics["reason"]
     assert float(str(metrics["floor_mapped"])) > 0.99
     assert metrics["collisions"] == 0
