@@ -214,7 +214,7 @@ def unknown_floor(walls_m: list[list[float]], start: Pose2, radius_m: float, see
 def test_a_frontier_that_a_look_does_not_move_is_driven_through(monkeypatch: pytest.MonkeyPatch) -> None:
     """The next room is in the shadow of a door post: with looks alone it came home with 47 % mapped."""
     met = FloorExplorer._met
-    sides = [[0, 1, 5, 1], [5, 1, 5, 5], [5, 5, 0, 5], [0, 5, 0, 1], [2.1, 1, 2.1, 4]]
+    sides: list[list[float]] = [[0, 1, 5, 1], [5, 1, 5, 5], [5, 5, 0, 5], [0, 5, 0, 1], [2.1, 1, 2.1, 4]]
     mission = unknown_floor(sides, Pose2(0.53, 2.73, 2.03), 0.15, 1)
     once: list[Target] = []
 
@@ -233,7 +233,14 @@ def test_a_frontier_that_a_look_does_not_move_is_driven_through(monkeypatch: pyt
 
 def test_a_room_behind_a_gap_that_the_body_alone_takes_is_explored() -> None:
     """0.50 m for a robot 0.40 m wide: its clearance asks for 0.52, and it came home with 63 % mapped."""
-    sides = [[0, 0, 8, 0], [8, 0, 8, 4], [8, 4, 0, 4], [0, 4, 0, 0], [4, 0, 4, 1.71], [4, 2.21, 4, 4]]
+    sides: list[list[float]] = [
+        [0, 0, 8, 0],
+        [8, 0, 8, 4],
+        [8, 4, 0, 4],
+        [0, 4, 0, 0],
+        [4, 0, 4, 1.71],
+        [4, 2.21, 4, 4],
+    ]
     metrics = run_mission(unknown_floor(sides, Pose2(1.5, 1.2, 0.0), 0.2, 3), save=False).metrics
     assert metrics["success"] is True, metrics["reason"]
     assert float(str(metrics["floor_mapped"])) > 0.99
