@@ -82,7 +82,8 @@ class Metric:
     ideal
         What a metric without a direction should be; nan where there is no such value.
     group
-        The heading under which tables show it; empty: it is no measure (a seed, a map's size).
+        The heading under which a run's tables show it; empty: they do not (a seed, a map's size, a share of
+        trials).
     compute
         Gives it, where the run itself does not.
     """

@@ -23,7 +23,7 @@ costs_of = METRICS.costs_of
         meaning="Whether the body touched anything at all; over trials, the share that did.",
         direction=Direction.LESS,
         aspect=Aspect.SAFETY,
-        group="Run",
+        group="",
     )
 )
 def collided(trace: Mapping[str, FloatArray], metrics: Mapping[str, object]) -> float | None:
