@@ -124,6 +124,19 @@ def test_a_ring_is_ordered_without_more_fill_than_it_needs() -> None:
     assert rows.size == 2 * n - 3
 
 
+@pytest.mark.parametrize("loops", [[], [(0, 1000), (100, 1100)]])
+def test_a_path_is_eliminated_all_along_its_length(loops: list[tuple[int, int]]) -> None:
+    """From its end on a column would be as far from the root of the tree as the path is long."""
+    n = 3000
+    i, j = np.array([(k, k + 1) for k in range(n - 1)] + loops).T
+    _, column_start, rows = minimum_degree(*adjacency(n, i, j))
+    depth = np.zeros(n, np.int64)
+    for c in range(n - 2, -1, -1):
+        depth[c] = depth[rows[column_start[c]]] + 1
+    assert depth.max() < 2.0 * np.log2(n)
+    assert rows.size < 2 * n
+
+
 def test_a_matrix_that_is_not_positive_is_told() -> None:
     none = np.empty(0, np.int64)
     diagonal = np.array([np.eye(3).ravel(), -np.eye(3).ravel()])
@@ -202,7 +215,9 @@ def test_covariances_are_those_of_the_dense_inverse() -> None:
     np.testing.assert_allclose(found.marginals(), expected, rtol=1e-6, atol=1e-12)
     chosen = np.array([40, 0, 7, 59, 7])
     places = (3 * chosen[:, None] + np.arange(3)).ravel()
-    np.testing.assert_allclose(found.joint(chosen), full[np.ix_(places, places)], rtol=1e-6, atol=1e-12)
+    joint = found.joint(chosen)
+    among = joint.among(np.arange(chosen.size))
+    np.testing.assert_allclose(among, full[np.ix_(places, places)], rtol=1e-6, atol=1e-12)
     i, j = np.array([0, 5, 5, 17, 30, 9]), np.array([4, 0, 40, 17, 12, 59])
     by_i, by_j = relative_jacobians(graph.poses[i], graph.poses[j])
     for k in range(i.size):
@@ -210,6 +225,9 @@ def test_covariances_are_those_of_the_dense_inverse() -> None:
         whole[:, 3 * i[k] : 3 * i[k] + 3] += by_i[k]
         whole[:, 3 * j[k] : 3 * j[k] + 3] += by_j[k]
         np.testing.assert_allclose(found.relative(i, j)[k], whole @ full @ whole.T, rtol=1e-6, atol=1e-12)
+    a, b = np.array([0, 1, 3, 2]), np.array([2, 3, 0, 4])
+    expected = found.relative(chosen[a], chosen[b])
+    np.testing.assert_allclose(joint.relative(a, b), expected, rtol=1e-9, atol=1e-15)
 
 
 def test_relative_jacobians() -> None:

@@ -7,6 +7,7 @@ import pytest
 
 from pilotage.core.types import FloatArray
 from pilotage.kernels.slam.slips import add_slip
+from pilotage.models.pose_graph_covariance import JointCovariance
 from pilotage.stack.mapping.slam.closures import (
     FAR_SLIP,
     LEAST_PROOFS,
@@ -20,7 +21,7 @@ from pilotage.stack.mapping.slam.closures import (
 from pilotage.stack.mapping.slam.local_matching import PRIOR
 from pilotage.stack.mapping.slam.matching import Match
 from pilotage.stack.mapping.slam.refinement import BESIDE, not_aligned
-from pilotage.stack.mapping.slam.uncertainty import Edges, JointCovariance
+from pilotage.stack.mapping.slam.uncertainty import Edges
 
 POINTS = 150.0
 
@@ -67,16 +68,21 @@ def test_walls_on_all_sides_leave_nothing_open() -> None:
 
 def test_a_loop_that_is_too_long_is_searched_in_a_window_that_is_cut() -> None:
     poses = np.array([[0.0, 0.0, 0.0], *([50.0, 5.0 * k, 0.0] for k in range(4)), [6.0, 0.0, 0.0]])
-    pairs = np.zeros((21, 3, 3))
-    pairs[-1] = np.diag([100.0, 100.0, 0.01])
-    joint = JointCovariance(pairs)
+
+    def joint(std: float) -> JointCovariance:
+        """All as sure as can be but the last."""
+        columns = np.zeros((6, 9))
+        columns[-1, [0, 4, 8]] = std * np.array([10.0, 10.0, 0.1])
+        return JointCovariance(poses, np.arange(7), np.arange(6), columns)
+
+    unsure = joint(1.0)
     pieces = np.zeros(6, np.int64)
-    assert candidates(poses, pieces, joint, 8.0, {}, USUAL_SLIP) == []
-    (found,) = candidates(poses, pieces, joint, 8.0, {}, FAR_SLIP)
+    assert candidates(unsure, pieces, 8.0, {}, USUAL_SLIP) == []
+    (found,) = candidates(unsure, pieces, 8.0, {}, FAR_SLIP)
     assert (found.earlier, found.later, found.half_m) == (0, 5, 8.0)
     # Once it was searched so, it is not again; what the usual windows hold is left to them.
-    assert candidates(poses, pieces, JointCovariance(1e-4 * pairs), 8.0, {}, FAR_SLIP) == []
-    assert candidates(poses, pieces, joint, 8.0, {(0, 5): 8.0}, FAR_SLIP) == []
+    assert candidates(joint(0.01), pieces, 8.0, {}, FAR_SLIP) == []
+    assert candidates(unsure, pieces, 8.0, {(0, 5): 8.0}, FAR_SLIP) == []
 
 
 def test_closures_stay_where_no_keyframes_could_be_aligned() -> None:

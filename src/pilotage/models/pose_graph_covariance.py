@@ -9,10 +9,44 @@ import numpy as np
 from pilotage.core.errors import InputError
 from pilotage.core.types import BoolArray, FloatArray, IntArray
 from pilotage.kernels.slam.block_cholesky import factorize
-from pilotage.kernels.slam.covariances import inverse_blocks, inverse_submatrix
+from pilotage.kernels.slam.covariances import column_products, inverse_blocks, inverse_columns
 from pilotage.kernels.slam.edges import SQUARE, normal_equations
 from pilotage.models.pose_graph import PoseGraph
 from pilotage.models.pose_graph_solver import Elimination, check_fixed, eliminate
+
+
+@dataclass(frozen=True, slots=True)
+class JointCovariance:
+    """Joint covariance of some poses of a graph, whose blocks are worked out when they are asked for.
+
+    Attributes
+    ----------
+    poses
+        (C, 3).
+    starts, path, columns
+        What their covariances are products of (``kernels.slam.covariances.inverse_columns``).
+    """
+
+    poses: FloatArray
+    starts: IntArray
+    path: IntArray
+    columns: FloatArray
+
+    def blocks(self, a: IntArray, b: IntArray) -> FloatArray:
+        """(M, 3, 3) rows of poses ``a`` (M,) and columns of ``b`` (M,), by their numbers among these."""
+        return column_products(self.starts, self.path, self.columns, a, b)
+
+    def among(self, chosen: IntArray) -> FloatArray:
+        """(3 K, 3 K) of some of the poses (K,)."""
+        count = chosen.size
+        out = self.blocks(np.repeat(chosen, count), np.tile(chosen, count)).reshape(count, count, 3, 3)
+        return np.asarray(out.transpose(0, 2, 1, 3).reshape(3 * count, 3 * count))
+
+    def relative(self, i: IntArray, j: IntArray) -> FloatArray:
+        """(M, 3, 3) of x, y, theta of pose j as seen from pose i."""
+        k = np.arange(self.poses.shape[0])
+        own = self.blocks(k, k)
+        return _seen(self.poses[i], self.poses[j], own[i], own[j], self.blocks(i, j))
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,22 +73,13 @@ class PoseCovariances:
     def relative(self, i: IntArray, j: IntArray) -> FloatArray:
         """Return (K, 3, 3) covariances of x, y, theta of pose j as seen from pose i."""
         i, j = np.asarray(i, dtype=np.int64), np.asarray(j, dtype=np.int64)
-        own_i, own_j, mixed = self._blocks(i, j)
-        by_i, by_j = relative_jacobians(self.graph.poses[i], self.graph.poses[j])
-        turned_i, turned_j = by_i.transpose(0, 2, 1), by_j.transpose(0, 2, 1)
-        cross = by_i @ mixed @ turned_j
-        out = by_i @ own_i @ turned_i + by_j @ own_j @ turned_j + cross + cross.transpose(0, 2, 1)
-        return np.asarray(0.5 * (out + out.transpose(0, 2, 1)))
+        return _seen(self.graph.poses[i], self.graph.poses[j], *self._blocks(i, j))
 
-    def joint(self, poses: IntArray) -> FloatArray:
-        """Return (3 C, 3 C) the joint covariance of x, y, theta in the map of some poses (C,)."""
-        return inverse_submatrix(
-            self.plan.column_start,
-            self.plan.rows,
-            self.diagonal,
-            self.below,
-            self.plan.column[self._checked(poses)],
-        )
+    def joint(self, poses: IntArray) -> JointCovariance:
+        """Return that of x, y, theta in the map of some poses (C,)."""
+        columns = self.plan.column[self._checked(poses)]
+        factor = self.plan.column_start, self.plan.rows, self.diagonal, self.below
+        return JointCovariance(self.graph.poses[poses], *inverse_columns(*factor, columns))
 
     def _checked(self, poses: IntArray) -> IntArray:
         index = np.asarray(poses, dtype=np.int64)
@@ -121,9 +146,27 @@ def covariances(
     return PoseCovariances(graph, plan, diagonal, below)
 
 
-def relative_jacobians(first: FloatArray, second: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Jacobians (K, 3, 3) of x, y, theta of ``second`` seen from ``first``, (K, 3) each, by the two poses."""
-    c, s = np.cos(first[:, 2]), np.sin(first[:, 2])
+def _seen(
+    first: FloatArray, second: FloatArray, own_first: FloatArray, own_second: FloatArray, mixed: FloatArray
+) -> FloatArray:
+    """Covariances (K, 3, 3) of poses (K, 3) as seen from others, by their blocks in the map (K, 3, 3)."""
+    by_first, by_second = relative_jacobians(first, second)
+    turned_first, turned_second = by_first.transpose(0, 2, 1), by_second.transpose(0, 2, 1)
+    cross = by_first @ mixed @ turned_second
+    out = by_first @ own_first @ turned_first + by_second @ own_second @ turned_second
+    out += cross + cross.transpose(0, 2, 1)
+    return np.asarray(0.5 * (out + out.transpose(0, 2, 1)))
+
+
+def relative_jacobians(
+    first: FloatArray, second: FloatArray, turn_rad: float | FloatArray = 0.0
+) -> tuple[FloatArray, FloatArray]:
+    """Jacobians (K, 3, 3) of x, y, theta of ``second`` seen from ``first``, (K, 3) each, by the two poses.
+
+    x and y may be seen in axes that are turned by ``turn_rad`` (K,) against those of ``first``.
+    """
+    axes = first[:, 2] + turn_rad
+    c, s = np.cos(axes), np.sin(axes)
     dx, dy = second[:, 0] - first[:, 0], second[:, 1] - first[:, 1]
     by_second = np.zeros((first.shape[0], 3, 3))
     by_second[:, 0, 0] = by_second[:, 1, 1] = c

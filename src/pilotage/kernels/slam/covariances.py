@@ -63,15 +63,19 @@ def inverse_blocks(
 
 
 @kernel
-def inverse_submatrix(
+def inverse_columns(
     column_start: IntArray, rows: IntArray, diagonal: FloatArray, below: FloatArray, chosen: IntArray
-) -> FloatArray:
-    """The rows and columns of the inverse that belong to ``chosen`` columns (C,): (3 C, 3 C).
+) -> tuple[IntArray, IntArray, FloatArray]:
+    """``L^-1 E_c`` of ``chosen`` columns (C,), each on its path alone. Arguments as in ``inverse_blocks``.
 
-    Negative columns are fixed poses: zeros. Arguments as in ``inverse_blocks``.
+    Returns
+    -------
+    starts
+        (C + 1,) where each one's path begins; a fixed pose has none.
+    path, columns
+        (P,) the paths, each from its column to the root, and (P, 9) the blocks there.
     """
-    count, n = chosen.size, len(diagonal)
-    out = np.zeros((3 * count, 3 * count))
+    count = chosen.size
     starts, total = np.zeros(count + 1, np.int64), 0
     for k in range(count):
         c = chosen[k]
@@ -79,25 +83,36 @@ def inverse_submatrix(
             total += 1
             c = _parent(column_start, rows, c)
         starts[k + 1] = total
-    path, kept = np.empty(total, np.int64), np.empty((total, 9))
-    y = np.zeros((n, 9))
-    block = np.empty((3, 3))
+    path, columns = np.empty(total, np.int64), np.empty((total, 9))
+    y = np.zeros((len(diagonal), 9))
     for k in range(count):
         _solve_path(column_start, rows, diagonal, below, chosen[k], y)
         c = chosen[k]
         for q in range(starts[k], starts[k + 1]):
-            path[q], kept[q] = c, y[c]
+            path[q], columns[q] = c, y[c]
             c = _parent(column_start, rows, c)
-        for m in range(k + 1):
-            block[:] = 0.0
-            for q in range(starts[m], starts[m + 1]):
-                v, w = y[path[q]], kept[q]
-                for r in range(3):
-                    for s in range(3):
-                        block[r, s] += v[r] * w[s] + v[3 + r] * w[3 + s] + v[6 + r] * w[6 + s]
-            out[3 * k : 3 * k + 3, 3 * m : 3 * m + 3] = block
-            out[3 * m : 3 * m + 3, 3 * k : 3 * k + 3] = block.T
         _clear_path(column_start, rows, chosen[k], y)
+    return starts, path, columns
+
+
+@kernel
+def column_products(
+    starts: IntArray, path: IntArray, columns: FloatArray, first: IntArray, second: IntArray
+) -> FloatArray:
+    """Blocks (K, 3, 3) of the inverse, rows of ``first`` (K,) and columns of ``second`` of those chosen.
+
+    Two paths that have met stay together to the root.
+    """
+    out = np.zeros((first.size, 3, 3))
+    for k in range(first.size):
+        a, b = starts[first[k] + 1] - 1, starts[second[k] + 1] - 1
+        while a >= starts[first[k]] and b >= starts[second[k]] and path[a] == path[b]:
+            v, w = columns[a], columns[b]
+            for r in range(3):
+                for s in range(3):
+                    out[k, r, s] += v[r] * w[s] + v[3 + r] * w[3 + s] + v[6 + r] * w[6 + s]
+            a -= 1
+            b -= 1
     return out
 
 

@@ -65,6 +65,15 @@ def composed_all(poses: FloatArray, b: FloatArray) -> FloatArray:
 
 
 @kernel
+def placed_all(a: FloatArray, poses: FloatArray) -> FloatArray:
+    """(N, 3) poses that are ``poses`` (N, 3) in the frame of a (3,): the inverse of ``between_all``."""
+    out = np.empty(poses.shape)
+    for k in range(poses.shape[0]):
+        out[k] = composed(a, poses[k])
+    return out
+
+
+@kernel
 def gathered(
     points: FloatArray, starts: IntArray, chosen: IntArray, poses: FloatArray, frame: FloatArray
 ) -> FloatArray:

@@ -6,6 +6,10 @@ left the one with (about) the fewest neighbours goes next, and its neighbours be
 *element* instead of as its edges. The element's variables are just the rows of the factor's column, so that
 the symbolic factorization comes with the ordering. Without that paper's supervariables: the blocks are few
 enough.
+
+Two neighbours count like one, and of equals the one that was touched last goes last: a path is then
+eliminated all along its length in turn, not from its end on, and of n poses none is further than some log n
+columns from the root of the elimination tree. That is what the inverse's blocks cost (``covariances``).
 """
 
 from __future__ import annotations
@@ -14,6 +18,9 @@ import numpy as np
 
 from pilotage.kernels.arrays import IntArray
 from pilotage.kernels.jit import kernel
+
+ALIKE = 2
+"""Poses with at most so many neighbours go first: none of them makes the graph have more edges."""
 
 
 @kernel
@@ -54,23 +61,31 @@ def adjacency(n: int, i: IntArray, j: IntArray) -> tuple[IntArray, IntArray]:
 
 
 @kernel
-def _unlink(i: int, degree: IntArray, head: IntArray, after: IntArray, before: IntArray) -> None:
+def _unlink(
+    i: int, degree: IntArray, head: IntArray, tail: IntArray, after: IntArray, before: IntArray
+) -> None:
     if before[i] >= 0:
         after[before[i]] = after[i]
     else:
         head[degree[i]] = after[i]
     if after[i] >= 0:
         before[after[i]] = before[i]
+    else:
+        tail[degree[i]] = before[i]
 
 
 @kernel
-def _link(i: int, degree: IntArray, head: IntArray, after: IntArray, before: IntArray) -> None:
-    first = head[degree[i]]
-    after[i] = first
-    before[i] = -1
-    if first >= 0:
-        before[first] = i
-    head[degree[i]] = i
+def _link(
+    i: int, degree: IntArray, head: IntArray, tail: IntArray, after: IntArray, before: IntArray
+) -> None:
+    last = tail[degree[i]]
+    before[i] = last
+    after[i] = -1
+    if last >= 0:
+        after[last] = i
+    else:
+        head[degree[i]] = i
+    tail[degree[i]] = i
 
 
 @kernel
@@ -90,10 +105,12 @@ def minimum_degree(start: IntArray, neighbours: IntArray) -> tuple[IntArray, Int
     items = neighbours.copy()
     elements = np.zeros(n, np.int64)
     length = start[1:] - start[:-1]
-    degree = length.copy()
-    head, after, before = np.full(n + 1, -1), np.full(n, -1), np.full(n, -1)
+    degree = np.maximum(length, ALIKE)
+    # Variables of the same degree, as queues.
+    head, tail = np.full(n + ALIKE + 1, -1), np.full(n + ALIKE + 1, -1)
+    after, before = np.full(n, -1), np.full(n, -1)
     for i in range(n):
-        _link(i, degree, head, after, before)
+        _link(i, degree, head, tail, after, before)
     pool = np.empty(max(16, 4 * neighbours.size), np.int64)  # the elements' variables
     pool_start, pool_end = np.zeros(n, np.int64), np.zeros(n, np.int64)
     size = np.zeros(n, np.int64)  # of an element; none of its variables goes before it is absorbed
@@ -106,7 +123,7 @@ def minimum_degree(start: IntArray, neighbours: IntArray) -> tuple[IntArray, Int
         while head[least] < 0:
             least += 1
         p = head[least]
-        _unlink(p, degree, head, after, before)
+        _unlink(p, degree, head, tail, after, before)
         order[step], rank[p] = p, step
         # The new element: all that p touches.
         first = used
@@ -143,7 +160,7 @@ def minimum_degree(start: IntArray, neighbours: IntArray) -> tuple[IntArray, Int
                     outside[e] -= 1
         for r in range(first, used):
             i = pool[r]
-            _unlink(i, degree, head, after, before)
+            _unlink(i, degree, head, tail, after, before)
             begin = start[i]
             middle, end = begin + elements[i], begin + length[i]
             kept, bound = begin, size[p] - 1
@@ -172,8 +189,8 @@ def minimum_degree(start: IntArray, neighbours: IntArray) -> tuple[IntArray, Int
                 items[kept] = p
             elements[i] = new_elements + 1
             length[i] = kept + 1 - begin
-            degree[i] = min(bound, degree[i] + size[p] - 1, n - step - 2)
-            _link(i, degree, head, after, before)
+            degree[i] = max(ALIKE, min(bound, degree[i] + size[p] - 1, n - step - 2))
+            _link(i, degree, head, tail, after, before)
             least = min(least, degree[i])
     column_start = np.zeros(n + 1, np.int64)
     rows = np.empty(used, np.int64)

@@ -6,7 +6,7 @@ import numpy as np
 
 from pilotage.core.types import FloatArray, Pose2
 from pilotage.kernels.geometry.motion import exact_arc
-from pilotage.kernels.slam.frames import between, composed
+from pilotage.kernels.slam.frames import between, composed, placed_all
 from pilotage.maps.world_map import WorldMap
 from pilotage.sensors.lidar import LidarConfig
 from pilotage.sensors.readings import LidarScan, OdometryIncrement, Readings
@@ -105,8 +105,7 @@ class SlamLocalizer:
 
     def _place(self) -> None:
         """Put the map's scans where the graph has their poses."""
-        poses = [composed(self._frame, pose) for pose in self._slam.keyframe_poses]
-        self.scan_grid.move(np.array(poses))
+        self.scan_grid.move(placed_all(self._frame, self._slam.keyframe_poses))
 
     def _told(self) -> Belief:
         base = composed(composed(composed(self._frame, self._slam.pose), self._unmount), self._moved)

@@ -12,6 +12,7 @@ import numpy as np
 from pilotage.core.memory import give_back
 from pilotage.core.types import BoolArray, FloatArray
 from pilotage.kernels.slam.frames import composed
+from pilotage.models.pose_graph_covariance import JointCovariance, PoseCovariances, covariances
 from pilotage.models.pose_graph_solver import Loss, Start, optimize
 from pilotage.stack.mapping.slam.closures import (
     COUNTING,
@@ -26,8 +27,7 @@ from pilotage.stack.mapping.slam.closures import (
     candidates,
     is_on_trial,
     judge,
-    relative_covariances,
-    spread,
+    spread_between,
     unproven,
 )
 from pilotage.stack.mapping.slam.clouds import Clouds
@@ -39,9 +39,7 @@ from pilotage.stack.mapping.slam.uncertainty import (
     NO_EDGES,
     TRACK_STD_M,
     Edges,
-    JointCovariance,
     edge_information,
-    joint_covariance,
     relative_poses,
 )
 
@@ -70,6 +68,10 @@ class Solved:
     edges: Edges
     weights: FloatArray
     objective: float
+
+    def covariances(self) -> PoseCovariances:
+        """How sure the poses are, the first being held."""
+        return covariances(self.edges.graph(self.poses), weights=self.weights)
 
 
 def track_edges(track: LocalTrack) -> Edges:
@@ -160,19 +162,17 @@ class LoopCloser:
 
     def close(self, window_m: float, slip: Slip) -> tuple[int, int]:
         """Search what may overlap within a window and solve; how many were searched, and how many closed."""
-        state, submaps = self.state, self.submaps
-        joint = self.joint()
-        places = state.poses[submaps.references]
+        state, submaps, joint = self.state, self.submaps, self.joint()
         if slip is LARGE_SLIP:
             self._searched = dict.fromkeys(self._searched, np.inf)
         closed_often = Counter(later for _, later in self._accepted)
         found = [
             c
-            for c in candidates(places, submaps.pieces, joint, window_m, self._searched, slip)
+            for c in candidates(joint, submaps.pieces, window_m, self._searched, slip)
             if (c.earlier, c.later) not in self._accepted
             and not (slip is LARGE_SLIP and closed_often[c.later] >= ATTACHED)
         ]
-        judged, edges = judge(submaps, places, joint, found, self._config, slip)
+        judged, edges = judge(submaps, joint, found, self._config, slip)
         for closure in judged:
             pair = closure.candidate.earlier, closure.candidate.later
             self._searched[pair] = closure.candidate.half_m
@@ -190,7 +190,6 @@ class LoopCloser:
         other = copy(self)
         other.closures, other._searched = self.closures.copy(), self._searched.copy()
         other._accepted = self._accepted.copy()
-        self._joint = None  # the copy has it; two of them would be the largest thing in memory
         return other
 
     def forget(self, window_m: float) -> None:
@@ -219,18 +218,15 @@ class LoopCloser:
 
     def joint(self) -> JointCovariance:
         """Covariance of the submaps' poses; computed anew only where the graph or they have changed."""
-        state, known, count = self.state, self._joint, len(self.submaps)
-        if known is None or known[0] is not state or len(known[1].pairs) != count * (count + 1) // 2:
-            known = self._joint = None
-            out = joint_covariance(state.edges, state.poses, state.weights, self.submaps.references)
-            self._joint = known = state, out
+        state, known = self.state, self._joint
+        if known is None or known[0] is not state or len(known[1].poses) != len(self.submaps):
+            self._joint = known = state, state.covariances().joint(self.submaps.references)
         return known[1]
 
     def sure(self) -> BoolArray:
         """(S, S) whether two submaps are known well enough against each other to align their keyframes."""
         if self._sure is None or self._sure[0] is not self.state:
-            places = self.state.poses[self.submaps.references]
-            self._sure = self.state, _sure(self.joint(), places)
+            self._sure = self.state, _sure(self.joint())
             # Nothing is closed any more, and these are the largest things in memory.
             self._joint = None
             self.submaps.forget()
@@ -347,13 +343,12 @@ def _owners(submaps: Submaps, count: int) -> np.ndarray[tuple[int], np.dtype[np.
     return np.searchsorted(middles, np.arange(count)).astype(np.int64)
 
 
-def _sure(joint: JointCovariance, places: FloatArray) -> BoolArray:
-    """(C, C) whether two poses (C, 3) are known well enough against each other."""
-    count = places.shape[0]
+def _sure(joint: JointCovariance) -> BoolArray:
+    """(C, C) whether two poses are known well enough against each other."""
+    count = joint.poses.shape[0]
     out = np.eye(count, dtype=np.bool_)
-    for k in range(count - 1):
-        # Row by row: the covariances of all pairs at once would be the largest thing in memory.
-        later = np.arange(k + 1, count)
-        std_m, std_rad = spread(relative_covariances(joint, places, np.full(later.size, k), later))
-        out[k, later] = out[later, k] = (std_m < SURE_M) & (std_rad < SURE_RAD) | (later - k <= 2)
+    first, second = np.triu_indices(count, 1)
+    std_m, std_rad = spread_between(joint, first, second)
+    known = (std_m < SURE_M) & (std_rad < SURE_RAD) | (second - first <= 2)
+    out[first, second] = out[second, first] = known
     return out

@@ -9,15 +9,14 @@ import numpy as np
 
 from pilotage.core.chi_square import chi_square_quantile
 from pilotage.core.types import BoolArray, FloatArray, IntArray
+from pilotage.models.pose_graph_covariance import JointCovariance, relative_jacobians
 from pilotage.stack.mapping.slam.config import SlamConfig
 from pilotage.stack.mapping.slam.matching import Match, match
 from pilotage.stack.mapping.slam.submaps import Submaps
 from pilotage.stack.mapping.slam.uncertainty import (
     Edges,
-    JointCovariance,
     edge_information,
     errors_of,
-    jacobians,
     relative_poses,
 )
 
@@ -28,6 +27,8 @@ WINDOW_STDS, MOST_TURN_RAD = 3.0, 0.8
 AGAIN = 1.5
 """A pair is searched again once its window has shrunk by this factor."""
 MOST_PER_LATER, MOST_PER_EARLIER = 3, 6
+PAIRS_AT_ONCE = 4096
+"""The covariances of all pairs at once would be the largest thing in memory."""
 CLOSURE_STD_M = 0.1
 LEAST_TOLD = 1e-4 * np.eye(3)
 """What a closure tells in any direction: nothing, but no zero."""
@@ -127,18 +128,6 @@ def moved(closure: Closure, by: int) -> Closure:
     return replace(closure, candidate=replace(c, earlier=c.earlier + by, later=c.later + by))
 
 
-def relative_covariances(
-    joint: JointCovariance, poses: FloatArray, first: IntArray, second: IntArray
-) -> FloatArray:
-    """Covariances (M, 3, 3) of poses (C, 3) seen from one another."""
-    theta = relative_poses(poses[first], poses[second])[:, 2]
-    a, b = jacobians(poses[first], poses[second], theta)
-    aa, bb, ab = (joint.blocks(*pair) for pair in ((first, first), (second, second), (first, second)))
-    at, bt = a.transpose(0, 2, 1), b.transpose(0, 2, 1)
-    cross = a @ ab @ bt
-    return np.asarray(a @ aa @ at + b @ bb @ bt + cross + cross.transpose(0, 2, 1))
-
-
 def spread(covariance: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Greatest standard deviation of position and that of heading, (M,) each, of covariances (M, 3, 3)."""
     xx, yy, xy = covariance[:, 0, 0], covariance[:, 1, 1], covariance[:, 0, 1]
@@ -146,10 +135,20 @@ def spread(covariance: FloatArray) -> tuple[FloatArray, FloatArray]:
     return np.sqrt(np.maximum(largest, 0.0)), np.sqrt(np.maximum(covariance[:, 2, 2], 0.0))
 
 
+def spread_between(
+    joint: JointCovariance, first: IntArray, second: IntArray
+) -> tuple[FloatArray, FloatArray]:
+    """``spread`` of poses (M,) as seen from others (M,)."""
+    std_m, std_rad = np.empty(first.size), np.empty(first.size)
+    for start in range(0, first.size, PAIRS_AT_ONCE):
+        some = slice(start, start + PAIRS_AT_ONCE)
+        std_m[some], std_rad[some] = spread(joint.relative(first[some], second[some]))
+    return std_m, std_rad
+
+
 def candidates(
-    poses: FloatArray,
-    pieces: IntArray,
     joint: JointCovariance,
+    pieces: IntArray,
     window_m: float,
     searched: dict[tuple[int, int], float],
     slip: Slip,
@@ -158,23 +157,17 @@ def candidates(
 
     Parameters
     ----------
-    poses, pieces
-        (C, 3) of their reference keyframes, and (C,) which piece of the track each belongs to.
+    joint, pieces
+        Of the submaps' reference keyframes (C,), and (C,) which piece of the track each belongs to.
     """
+    poses = joint.poses
     reach_m = window_m if slip.far else min(window_m, 2.0)
-    pairs, stds = [np.zeros((2, 0), np.int64)], [np.zeros((2, 0))]
-    # Row by row: the covariances of all pairs at once would be the largest thing in memory.
-    for row in range(poses.shape[0] - 1):
-        later = np.arange(row + 1, poses.shape[0])
-        close = np.hypot(*(poses[row, :2] - poses[later, :2]).T) < NEAR_M + reach_m
-        later = later[close & ((pieces[later] != pieces[row]) | (later - row >= LEAST_APART))]
-        rows = np.full(later.size, row)
-        pairs.append(np.stack([rows, later]))
-        stds.append(np.stack(spread(relative_covariances(joint, poses, rows, later))))
-    first, second = np.concatenate(pairs, axis=1)
-    std_m, std_rad = np.concatenate(stds, axis=1)
-    torn = pieces[first] != pieces[second]
+    first, second = np.triu_indices(poses.shape[0], 1)
     distance = np.hypot(*(poses[first, :2] - poses[second, :2]).T)
+    torn = pieces[first] != pieces[second]
+    close = (distance < NEAR_M + reach_m) & (torn | (second - first >= LEAST_APART))
+    first, second, distance, torn = first[close], second[close], distance[close], torn[close]
+    std_m, std_rad = spread_between(joint, first, second)
     half_m = WINDOW_STDS * std_m + slip.shift_m
     most_rad = np.where(torn, np.pi, MOST_TURN_RAD)
     half_rad = np.minimum(WINDOW_STDS * std_rad + slip.turn_rad, most_rad)
@@ -198,7 +191,6 @@ def candidates(
 
 def judge(
     submaps: Submaps,
-    poses: FloatArray,
     joint: JointCovariance,
     found: list[Candidate],
     config: SlamConfig,
@@ -208,14 +200,14 @@ def judge(
 
     Parameters
     ----------
-    poses
-        (C, 3) of the submaps' reference keyframes, and their joint covariance.
+    joint
+        Of the submaps' reference keyframes.
 
     Returns
     -------
     All closures with their verdicts, and the accepted ones as edges between keyframes.
     """
-    closures = []
+    closures, poses = [], joint.poses
     for c in found:
         predicted = relative_poses(poses[c.earlier][None], poses[c.later][None])[0]
         found_match = match(submaps, c.earlier, c.later, predicted, c.half_m, c.half_rad)
@@ -229,7 +221,7 @@ def judge(
     edges = _edges([closures[k] for k in sound + weak])
     if not sound:
         return closures, edges.chosen(np.zeros(len(weak), np.bool_))
-    chi_square, consistent = _joint_test(edges, poses, joint, config.gate_probability, slip)
+    chi_square, consistent = _joint_test(edges, joint, config.gate_probability, slip)
     gate = chi_square_quantile(config.gate_probability, 3)
     fits = chi_square <= gate
     taken = clique(consistent & fits[:, None] & fits[None, :], fits)
@@ -328,16 +320,16 @@ def _edges(closures: list[Closure]) -> Edges:
 
 
 def _joint_test(
-    edges: Edges, poses: FloatArray, joint: JointCovariance, probability: float, slip: Slip
+    edges: Edges, joint: JointCovariance, probability: float, slip: Slip
 ) -> tuple[FloatArray, BoolArray]:
     """Chi-square (M,) of each closure with the graph, and (M, M) which pairs agree.
 
     Two closures agree where each one's innovation is probable given the other's: joint compatibility
     (Neira and Tardos, 2001) pair by pair, as in pairwise consistency maximization (Mangelson et al., 2018).
     """
-    count = len(edges)
+    count, poses = len(edges), joint.poses
     innovation = errors_of(edges, poses)
-    a, b = jacobians(poses[edges.i], poses[edges.j], edges.relative[:, 2])
+    a, b = relative_jacobians(poses[edges.i], poses[edges.j], edges.relative[:, 2])
     used, at = np.unique(np.concatenate([edges.i, edges.j]), return_inverse=True)
     rows = np.zeros((count, 3, used.size, 3))
     k = np.arange(count)

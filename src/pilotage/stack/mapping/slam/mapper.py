@@ -10,7 +10,7 @@ import numpy as np
 from pilotage.core.errors import InputError
 from pilotage.core.memory import give_back
 from pilotage.core.types import FloatArray
-from pilotage.kernels.slam.frames import between, composed
+from pilotage.kernels.slam.frames import between_all, placed_all
 from pilotage.kernels.slam.placing import START_REACH_M
 from pilotage.logs.laser_log import LaserLog
 from pilotage.models.pose_graph import PoseGraph
@@ -128,7 +128,7 @@ def result_of(config: SlamConfig, done: Mapped, state: Solved, joined: Joined | 
         drawn_at = np.concatenate([state.poses[:since], poses])
         extents, clouds = joined.extents, joined.earlier.clouds.and_more(clouds)
         closures = [*(moved(closure, joined.submaps) for closure in closures), *joined.closures]
-        before = np.array([composed(poses[0], between(before[0], pose)) for pose in before])
+        before = placed_all(poses[0], between_all(before[0], before))
         warnings += joined.warnings
     scale, turn = _odometry_scales(log, poses, config)
     graph, owner = state.edges.graph(state.poses), since + local.owner

@@ -12,7 +12,7 @@ from pilotage.stack.mapping.slam.config import SlamConfig
 from pilotage.stack.mapping.slam.scan_covariances import SHARED_EDGES
 from pilotage.stack.mapping.slam.submaps import TURN_AS_PATH_M
 from pilotage.stack.mapping.slam.tracker import Tracker
-from pilotage.stack.mapping.slam.uncertainty import errors_of, joint_covariance
+from pilotage.stack.mapping.slam.uncertainty import errors_of
 
 WINDOWS_M = (1.0, 2.0, 4.0)
 """Half a search window's side at most, round by round, each time."""
@@ -138,9 +138,7 @@ class OnlineSlam:
         self._loops = int(state.edges.closes.sum())
         self.keyframe_poses = state.poses.copy()
         last = np.array([len(state.poses) - 1])
-        self.covariance = (
-            SHARED_EDGES * joint_covariance(state.edges, state.poses, state.weights, last).pairs[0]
-        )
+        self.covariance = SHARED_EDGES * state.covariances().marginals(last)[0]
 
     def _extend(self) -> None:
         """Hang the new keyframe on the one before."""

@@ -10,6 +10,7 @@ from pilotage.core.chi_square import chi_square_quantile
 from pilotage.core.types import BoolArray, FloatArray, IntArray
 from pilotage.kernels.slam.frames import composed
 from pilotage.kernels.slam.match_grid import max_pyramid
+from pilotage.models.pose_graph_covariance import covariances, relative_jacobians
 from pilotage.stack.mapping.slam.back_end import Solved
 from pilotage.stack.mapping.slam.closures import (
     CLOSURE_FLOOR,
@@ -18,7 +19,6 @@ from pilotage.stack.mapping.slam.closures import (
     Verdict,
     clique,
     judged_alone,
-    relative_covariances,
     spread,
     squared,
 )
@@ -30,8 +30,6 @@ from pilotage.stack.mapping.slam.submaps import LEVELS, Submap, Submaps, drawn, 
 from pilotage.stack.mapping.slam.uncertainty import (
     Edges,
     edge_information,
-    jacobians,
-    joint_covariance,
     relative_poses,
 )
 
@@ -158,23 +156,21 @@ def _agreeing_pairs(found: Places, earlier: EarlierMap, state: Solved, config: S
         return out
     own = found.keyframes[chosen]
     placed = found.poses()[chosen]
-    joint = joint_covariance(state.edges, state.poses, state.weights, own)
     near, at = np.unique(cKDTree(earlier.poses[:, :2]).query(placed[:, :2])[1], return_inverse=True)
-    ones = np.ones(len(earlier.edges))
-    map_joint = joint_covariance(earlier.edges, earlier.poses, ones, near)
+    in_map = covariances(earlier.edges.graph(earlier.poses)).joint(near)
     a, b = np.triu_indices(chosen.size, 1)
     told = relative_poses(state.poses[own[a]], state.poses[own[b]])
     seen = relative_poses(placed[a], placed[b])
     off = seen - told
     off[:, 2] = (off[:, 2] + np.pi) % (2.0 * np.pi) - np.pi
-    covariance = relative_covariances(joint, state.poses[own], a, b) + USUAL_SLIP.covariance()
-    std_m, std_rad = spread(relative_covariances(map_joint, earlier.poses[near], at[a], at[b]))
+    covariance = state.covariances().relative(own[a], own[b]) + USUAL_SLIP.covariance()
+    std_m, std_rad = spread(in_map.relative(at[a], at[b]))
     k = np.arange(3)
     covariance[:, k, k] += np.column_stack([std_m, std_m, std_rad]) ** 2
     hessian = np.array([found.matches[n].hessian for n in chosen])
     # Kept in the map's axes: a heading of zero turns nothing.
     each = np.linalg.inv(edge_information(hessian, np.zeros(chosen.size), CLOSURE_STD_M, MATCH_FLOOR))
-    by_first, by_second = jacobians(placed[a], placed[b], np.zeros(a.size))
+    by_first, by_second = relative_jacobians(placed[a], placed[b])
     covariance += by_first @ each[a] @ by_first.transpose(0, 2, 1)
     covariance += by_second @ each[b] @ by_second.transpose(0, 2, 1)
     fits = squared(off, covariance) <= chi_square_quantile(config.gate_probability, 3)
