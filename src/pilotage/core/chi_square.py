@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from scipy.special import chdtr, chdtri
+import scipy
 
 
 def chi_square_quantile(probability: float, dof: float) -> float:
     """Value that a chi-square variable with ``dof`` degrees of freedom stays below with ``probability``."""
-    return float(chdtri(dof, 1.0 - probability))
+    return float(scipy.special.chdtri(dof, 1.0 - probability))
 
 
 def chi_square_cdf(value: float, dof: float) -> float:
     """Probability that a chi-square variable with ``dof`` degrees of freedom stays below ``value``."""
-    return float(chdtr(dof, value))
+    return float(scipy.special.chdtr(dof, value))
 
 
 def gated_mean(gate: float, dof: float) -> float:

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.ndimage import label
+import scipy
 
 from pilotage.core.types import FloatArray, Pose2
 from pilotage.kernels.scans.mounted import Fan
@@ -64,7 +64,7 @@ class FloorAges:
         grid = np.stack(np.meshgrid(xs, ys), axis=-1)
         # A cell that a wall runs through is no floor of one side of it.
         open_floor = chart.field.at(grid.reshape(-1, 2)).reshape(grid.shape[:2]) > 0.5 * cell_m
-        regions, _ = label(open_floor)
+        regions, _ = scipy.ndimage.label(open_floor)
         free = grid[regions > 0]
         nearest = int(np.argmin(np.hypot(*(free - place_xy_m).T))) if len(free) else 0
         home = regions[regions > 0][nearest] if len(free) else 1

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy import ndimage
+import scipy
 
 from pilotage.core.types import FloatArray, Pose2
 from pilotage.maps.nearest_obstacles import NearestObstacles
@@ -23,13 +23,13 @@ def reachable_floor(chart: WorldMap, radius_m: float, start: Pose2) -> FloatArra
     y = np.arange(ymin + 0.5 * LATTICE_M, ymax, LATTICE_M)
     points = np.stack(np.meshgrid(x, y), axis=2).reshape(-1, 2)
     distance = chart.field.at(points).reshape(y.size, x.size)
-    labels, _ = ndimage.label(distance >= radius_m)
+    labels, _ = scipy.ndimage.label(distance >= radius_m)
     row = min(max(int((start.y_m - ymin) / LATTICE_M), 0), y.size - 1)
     column = min(max(int((start.x_m - xmin) / LATTICE_M), 0), x.size - 1)
     if labels[row, column] == 0:
         return np.zeros((0, 2))
     stands = labels == labels[row, column]
-    away = ndimage.distance_transform_edt(~stands, sampling=LATTICE_M)
+    away = scipy.ndimage.distance_transform_edt(~stands, sampling=LATTICE_M)
     covered = (away <= radius_m) & (distance >= BESIDE_M)
     return np.asarray(points[covered.ravel()])
 

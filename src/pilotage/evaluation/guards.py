@@ -6,7 +6,7 @@ import math
 from functools import lru_cache
 
 import numpy as np
-from scipy.sparse import csr_array
+import scipy
 
 from pilotage.core.types import BoolArray, FloatArray
 from pilotage.kernels.patrol.cover import greedy_cover
@@ -43,8 +43,6 @@ def fewest_guards(sees: BoolArray) -> tuple[int, int]:
         (P, M) as from ``stack.patrol.derive.views``; the answer is for these places and points, not for the
         plane.
     """
-    from scipy.optimize import LinearConstraint, milp  # loads 0.1 s of SciPy, which most runs never need
-
     some = sees[:, sees.any(axis=0)]
     if some.shape[1] == 0:
         return 0, 0
@@ -53,8 +51,11 @@ def fewest_guards(sees: BoolArray) -> tuple[int, int]:
     # no more is seen than from another is not needed.
     hard = some[:, _least(some.T)]
     kept = hard[_least(~hard)]
-    relaxed = milp(
-        np.ones(len(kept)), constraints=LinearConstraint(csr_array(kept.T.astype(np.float64)), lb=1.0)
+    relaxed = scipy.optimize.milp(
+        np.ones(len(kept)),
+        constraints=scipy.optimize.LinearConstraint(
+            scipy.sparse.csr_array(kept.T.astype(np.float64)), lb=1.0
+        ),
     )
     return 1 if relaxed.fun is None else max(1, math.ceil(float(relaxed.fun) - 1e-6)), enough
 

@@ -17,9 +17,9 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 from pydantic import Field
-from scipy import ndimage
 
 from pilotage.core.config import Config
 from pilotage.core.errors import InputError
@@ -195,7 +195,7 @@ def _scarps(config: CraterTerrainConfig, rng: np.random.Generator) -> HeightArra
     fields = []
     for scale in (0.25, 0.12):
         sigma = scale * config.scarp_spacing_m / cell_m
-        smooth = ndimage.gaussian_filter(rng.standard_normal(shape), sigma, mode="wrap")
+        smooth = scipy.ndimage.gaussian_filter(rng.standard_normal(shape), sigma, mode="wrap")
         fields.append(smooth / max(float(smooth.std()), 1e-12))
     down, right = np.gradient(fields[0], cell_m)
     # Distance from the contour, to first order.

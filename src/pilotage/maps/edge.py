@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from scipy.ndimage import label
+import scipy
 
 from pilotage.core.types import Pose2
 from pilotage.maps.occupancy_grid import FREE, OCCUPIED, OCCUPIED_FROM, OccupancyGrid
@@ -18,7 +18,7 @@ def closed(grid: OccupancyGrid) -> OccupancyGrid:
     pass these.
     """
     open_cells = grid.cells < OCCUPIED_FROM
-    pieces, count = label(open_cells)
+    pieces, count = scipy.ndimage.label(open_cells)
     rim = np.concatenate([pieces[0], pieces[-1], pieces[:, 0], pieces[:, -1]])
     leads_out = np.zeros(count + 1, np.bool_)
     leads_out[rim] = True

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy import ndimage
+import scipy
 
 from pilotage.core.errors import InputError
 from pilotage.core.types import BoolArray, FloatArray, IntArray
@@ -87,7 +87,7 @@ class Floor:
         # What lies past the bounds is no floor, though the field calls it as near as their edge.
         clearance[:, x > xmax] = clearance[y > ymax, :] = -1.0
         fits = clearance >= radius_m
-        pieces, _ = ndimage.label(fits)
+        pieces, _ = scipy.ndimage.label(fits)
         floor = Floor((xmin, ymin), cell_m, radius_m, clearance, fits)
         if inside_xy_m is not None:
             row, column = floor.nearest_cell(np.array(inside_xy_m), "the place inside")
@@ -259,5 +259,5 @@ class Floor:
 
 def sweepable(floor: Floor, width_m: float) -> BoolArray:
     """(rows, columns) cells that a pass of a width can sweep from where the robot's centre can be."""
-    away_m = floor.cell_m * ndimage.distance_transform_edt(~floor.reachable)
+    away_m = floor.cell_m * scipy.ndimage.distance_transform_edt(~floor.reachable)
     return np.asarray((away_m <= 0.5 * width_m) & (floor.clearance_m > 0.0))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-from scipy import ndimage
+import scipy
 
 from pilotage.core.errors import InputError
 from pilotage.core.types import Pose2
@@ -37,9 +37,9 @@ def read_landmark_image(
     with opened_image(path, size, lambda _: 12) as image:
         pixels = np.asarray(image.convert("RGB"))
     coloured = pixels.max(axis=2) - pixels.min(axis=2) >= COLOURED_FROM
-    labels, count = ndimage.label(coloured, np.ones((3, 3), dtype=np.int64))
+    labels, count = scipy.ndimage.label(coloured, np.ones((3, 3), dtype=np.int64))
     if count == 0:
         raise InputError(f"image '{path}': expected landmarks as coloured points, found grey pixels only")
-    middles = np.array(ndimage.center_of_mass(coloured, labels, np.arange(1, count + 1)))
+    middles = np.array(scipy.ndimage.center_of_mass(coloured, labels, np.arange(1, count + 1)))
     place = OccupancyGrid.of(np.zeros(coloured.shape, np.bool_), resolution_m, origin)
     return Landmarks(np.arange(count), place.centres_m(middles))

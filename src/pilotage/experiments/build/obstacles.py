@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import ndimage
+import scipy
 
 from pilotage.core.errors import InputError
 from pilotage.core.types import FloatArray, Goal, Pose2
@@ -230,7 +230,7 @@ def _free_of_walls(sides: FloatArray, world: SegmentMap) -> bool:
 def _passable(world: SegmentMap, start: Pose2, goal: Goal) -> bool:
     """Whether start and goal are connected for a disc of radius ``PASSAGE_M``."""
     field = DistanceField.from_map(world)
-    labels, _ = ndimage.label(field.distance_m >= PASSAGE_M)
+    labels, _ = scipy.ndimage.label(field.distance_m >= PASSAGE_M)
     x0, y0 = field.origin_xy_m
 
     def label(x: float, y: float) -> int:

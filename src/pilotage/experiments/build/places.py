@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from functools import cached_property
 
 import numpy as np
-from scipy.ndimage import binary_dilation, label
+import scipy
 
 from pilotage.core.angles import wrap_to_pi
 from pilotage.core.errors import InputError
@@ -219,7 +219,7 @@ class OpenFloor:
     def __init__(self, chart: WorldMap, clearance_m: float, reachable_from: PoseConfig | None) -> None:
         self._chart, self._clearance_m = chart, clearance_m
         self._field = chart.field if chart.geometry is None else DistanceField.from_map(chart.walls, GRID_M)
-        self._regions, count = label(self._field.distance_m >= clearance_m)
+        self._regions, count = scipy.ndimage.label(self._field.distance_m >= clearance_m)
         if reachable_from is None:
             sizes = np.bincount(self._regions.ravel(), minlength=2)
             self._home = int(np.argmax(sizes[1:])) + 1 if count else 0
@@ -235,12 +235,12 @@ class OpenFloor:
     def easy(self) -> BoolArray:
         """(rows, columns) of it what is beside its largest part whose passages have ``EASY_M`` more room."""
         home = self._regions == self._home
-        pieces, count = label(home & (self._field.distance_m >= self._clearance_m + EASY_M))
+        pieces, count = scipy.ndimage.label(home & (self._field.distance_m >= self._clearance_m + EASY_M))
         if not count:
             return np.asarray(home)
         largest = pieces == 1 + int(np.argmax(np.bincount(pieces.ravel())[1:]))
         steps = math.ceil(STEP_M / self._field.resolution_m)
-        return np.asarray(home & binary_dilation(largest, iterations=steps))
+        return np.asarray(home & scipy.ndimage.binary_dilation(largest, iterations=steps))
 
     def in_cells(self, first: Sequence[PoseConfig]) -> BoolArray:
         """(rows, columns) of it what a task's floor, in cells, reaches from the first who was placed."""

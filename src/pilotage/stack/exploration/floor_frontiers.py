@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import TypeVar
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import ndimage
 
 from pilotage.core.types import BoolArray, FloatArray, IntArray
 from pilotage.kernels.grids.distance import squared_distance
@@ -115,8 +115,8 @@ class SeenFloor:
 
     def frontiers(self, least_length_m: float) -> list[Frontier]:
         """All frontiers of at least a length, the cheapest to look at first; those out of reach last."""
-        beside = ndimage.binary_dilation(self._unseen, AROUND)
-        labels, count = ndimage.label(self._free & beside, AROUND)
+        beside = scipy.ndimage.binary_dilation(self._unseen, AROUND)
+        labels, count = scipy.ndimage.label(self._free & beside, AROUND)
         if count == 0:
             return []
         rows, columns = np.nonzero(labels)

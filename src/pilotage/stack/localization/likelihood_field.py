@@ -6,7 +6,7 @@ import math
 from weakref import WeakKeyDictionary
 
 import numpy as np
-from scipy.ndimage import binary_dilation
+import scipy
 
 from pilotage.core.errors import InputError
 from pilotage.core.types import BoolArray, FloatArray
@@ -167,7 +167,7 @@ def _known_of(chart: WorldMap) -> OccupancyGrid | None:
     """The grid with what lies right beside its known cells taken for known; None where all is."""
     if chart.geometry is not None or chart.grid is None or not (chart.grid.cells < 0).any():
         return None
-    near = binary_dilation(chart.grid.cells >= 0, iterations=BESIDE_CELLS)
+    near = scipy.ndimage.binary_dilation(chart.grid.cells >= 0, iterations=BESIDE_CELLS)
     return OccupancyGrid(
         np.where(near, FREE, UNKNOWN).astype(np.int8), chart.grid.resolution_m, chart.grid.origin
     )

@@ -7,8 +7,8 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+import scipy
 from pydantic import Field, model_validator
-from scipy.special import ndtri
 
 from pilotage.core.angles import wrap_array_to_pi, wrap_to_pi
 from pilotage.core.config import Config
@@ -159,7 +159,7 @@ class ParticleFilterLocalizer:
         self._mount_xy = np.array([lidar.mount.x_m, lidar.mount.y_m])
         self._max_range = min(config.max_range_m, lidar.max_range_m)
         self._rng = robot.streams.stream(NAME)
-        self._quantile = float(ndtri(config.kld_probability))
+        self._quantile = float(scipy.special.ndtri(config.kld_probability))
         self._poses = _draw(initial, config.most_particles, self._rng)
         self._wanted = config.most_particles
         self._rounds, self._effective = 0, float(config.most_particles)

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import ndimage
+import scipy
 
 from pilotage.core.config import Config
 from pilotage.core.errors import InputError
@@ -200,7 +200,7 @@ def _thinned(cells: BoolArray, floor: Floor, every_m: float) -> BoolArray:
 def _rooms_and_doors(floor: Floor, door_width_m: float) -> tuple[int, FloatArray]:
     """How many rooms, and the middles of the doors between them (D, 2)."""
     wide = floor.reachable & (floor.clearance_m >= 0.5 * door_width_m)
-    room, count = ndimage.label(wide)
+    room, count = scipy.ndimage.label(wide)
     if count < 2:
         return 1, np.zeros((0, 2))
     grown = _grown(floor, room.astype(np.int64))
@@ -217,7 +217,7 @@ def _rooms_and_doors(floor: Floor, door_width_m: float) -> tuple[int, FloatArray
         mark = np.zeros_like(floor.reachable)
         mark[tuple(np.array(cells).T)] = True
         # Two rooms may share several doors.
-        pieces, number = ndimage.label(mark, structure=np.ones((3, 3)))
+        pieces, number = scipy.ndimage.label(mark, structure=np.ones((3, 3)))
         for piece in range(1, number + 1):
             where = np.where(pieces == piece, floor.clearance_m, -np.inf)
             best = np.unravel_index(int(np.argmax(where)), where.shape)
@@ -234,9 +234,9 @@ def _only(shape: tuple[int, ...], cell: tuple[np.intp, ...]) -> BoolArray:
 def _grown(floor: Floor, label: IntArray) -> IntArray:
     """Labels spread over the reachable floor, ring after ring."""
     label = label.copy()
-    cross = ndimage.generate_binary_structure(2, 1)
+    cross = scipy.ndimage.generate_binary_structure(2, 1)
     while True:
-        ring = ndimage.grey_dilation(label, footprint=cross)
+        ring = scipy.ndimage.grey_dilation(label, footprint=cross)
         new = floor.reachable & (label == 0) & (ring > 0)
         if not new.any():
             return label

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
-from scipy import ndimage
+import scipy
 
 from pilotage.core.types import BoolArray, FloatArray, IntArray
 from pilotage.maps.floor import Floor
@@ -55,7 +55,7 @@ class Passages:
             Of a robot: a passage has room for two of them abreast, or for one.
         """
         narrow = narrow_cells(floor, 2.0 * radius_m + BESIDE_M)
-        label, _ = ndimage.label(narrow, structure=np.ones((3, 3)))
+        label, _ = scipy.ndimage.label(narrow, structure=np.ones((3, 3)))
         passage = label.astype(np.int64)
         found: dict[tuple[int, int], tuple[Stretch, ...]] = {}
         pieces = 0
@@ -119,8 +119,8 @@ def narrow_cells(floor: Floor, half_m: float) -> BoolArray:
     room = floor.reachable & (floor.clearance_m >= half_m)
     if not room.any():
         return floor.reachable.copy()
-    part, _ = ndimage.label(room)
-    away, nearest = ndimage.distance_transform_edt(~room, return_indices=True)
+    part, _ = scipy.ndimage.label(room)
+    away, nearest = scipy.ndimage.distance_transform_edt(~room, return_indices=True)
     part = np.where(floor.reachable, part[tuple(nearest)], 0)
     door = np.zeros_like(room)
     for one, other in ((np.s_[:, :-1], np.s_[:, 1:]), (np.s_[:-1], np.s_[1:])):

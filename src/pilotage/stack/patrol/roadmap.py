@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from weakref import WeakKeyDictionary
 
 import numpy as np
-from scipy.ndimage import distance_transform_edt, label, maximum_filter
+import scipy
 
 from pilotage.core.errors import InputError
 from pilotage.core.types import BoolArray, FloatArray, IntArray
@@ -102,13 +102,13 @@ class Roadmap:
         size = 2 * math.ceil(lane_m / spacing_m) + 1
         # Where there is room for all fields nobody need know which of them was asked for last.
         self._all_kept = len(self._places) * self.slowness.nbytes <= MOST_FIELD_BYTES
-        self._room_m: FloatArray = maximum_filter(distance, size=size)
+        self._room_m: FloatArray = scipy.ndimage.maximum_filter(distance, size=size)
 
     def _joined(self, near_m: Sequence[float], clearance_m: float) -> list[tuple[int, int]]:
         """The places' nodes, between all of which the body can drive."""
         free = np.argwhere(np.isfinite(self.slowness))
         seeds = [self._seed(free, k, within_m, clearance_m) for k, within_m in enumerate(near_m)]
-        regions, _ = label(np.isfinite(self.slowness))
+        regions, _ = scipy.ndimage.label(np.isfinite(self.slowness))
         of_place = [int(regions[seed]) for seed in seeds]
         apart = [k for k, region in enumerate(of_place) if region != of_place[0]]
         if apart:
@@ -151,7 +151,7 @@ class Roadmap:
         for body in bodies_xy_m:
             found.slowness[np.hypot(*(nodes - body).transpose(2, 0, 1)) < keep_m] = np.inf
         free = np.isfinite(found.slowness)
-        regions, _ = label(free)
+        regions, _ = scipy.ndimage.label(free)
         # The nearest node by time: as the crow flies it may lie behind a wall.
         time = np.where(free, self._from(*here_xy_m, self.slowness), np.inf)
         reached = free & (regions == regions[np.unravel_index(int(np.argmin(time)), time.shape)])
@@ -285,7 +285,7 @@ class Roadmap:
         if not free.any():
             return None
         off, ahead = np.abs(offset @ np.array([-axis[1], axis[0]])), offset @ axis
-        narrow_m = self.spacing_m * distance_transform_edt(wide | ~np.isfinite(self.slowness))
+        narrow_m = self.spacing_m * scipy.ndimage.distance_transform_edt(wide | ~np.isfinite(self.slowness))
         clear = (
             free & ((off >= OFF_RATIO * pass_m) | (ahead >= AHEAD_M)) & (narrow_m[rows, columns] >= pass_m)
         )

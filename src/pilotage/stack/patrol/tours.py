@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
+import scipy
 
 from pilotage.core.types import FloatArray, IntArray
 from pilotage.models.tour import closed_tour
@@ -78,8 +79,6 @@ def spread(walk: Round, graph: PatrolGraph, starts: IntArray, speed_m_s: float, 
     starts
         (N,) the vertex where each robot is at ``begin_s``.
     """
-    from scipy.optimize import linear_sum_assignment  # loads 0.1 s of SciPy, which most runs never need
-
     count, stops = len(starts), walk.stops
     best: tuple[float, list[Slot]] | None = None
     for first in range(len(stops)):
@@ -89,7 +88,7 @@ def spread(walk: Round, graph: PatrolGraph, starts: IntArray, speed_m_s: float, 
         place = np.searchsorted(walk.at_m, along_m + 1e-9, side="right") - 1
         beyond_s = np.maximum(0.0, along_m - walk.at_m[place]) / speed_m_s
         ready_s = graph.shortest_m[starts[:, None], stops[place][None, :]] / speed_m_s + beyond_s
-        robot, slot = linear_sum_assignment(ready_s**2)
+        robot, slot = scipy.optimize.linear_sum_assignment(ready_s**2)
         latest_s = float(ready_s[robot, slot].max())
         if best is None or latest_s < best[0] - 1e-9:
             slots = [

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from pydantic import Field
-from scipy.special import ndtri
 
 from pilotage.core.config import Config
 from pilotage.core.types import FloatArray, IntArray
@@ -102,7 +102,7 @@ class LineExtractor:
         self._directions = clustering.beam_directions(
             float(lidar.beam_angles_rad()[0]), lidar.beam_step_rad, lidar.beams
         )
-        self._straight_z = float(ndtri(config.straight))
+        self._straight_z = float(scipy.special.ndtri(config.straight))
         self._rng = rng
 
     def extract(self, ranges_m: FloatArray) -> DetectedLines:

@@ -7,8 +7,8 @@ import math
 import time
 
 import numpy as np
+import scipy
 from pydantic import Field
-from scipy import ndimage
 
 from pilotage.core.config import Config
 from pilotage.core.errors import InputError
@@ -194,7 +194,7 @@ def _parted(cells: BoolArray, parts: int) -> BoolArray:
 
 def _parted_floor(field: DistanceField, floor: Floor, parts: int) -> BoolArray:
     """The floor in cells of a part of the side, with its edge where distances to walls say."""
-    near = ndimage.binary_dilation(floor.reachable, np.ones((3, 3), np.bool_))
+    near = scipy.ndimage.binary_dilation(floor.reachable, np.ones((3, 3), np.bool_))
     out = _parted(near, parts)
     cell_m, (x0, y0) = floor.cell_m / parts, floor.origin_xy_m
     x = x0 + (np.arange(out.shape[1]) + 0.5) * cell_m
@@ -271,12 +271,12 @@ def _places_for(floor: Floor, path: FloatArray, missing: BoolArray, width_m: flo
     """(K, 2) places for the centre that together sweep what is missing, piece by piece, near to the path."""
     on_path = np.zeros_like(missing)
     mark_swept(np.ascontiguousarray(path), 0.71 * floor.cell_m, *floor.origin_xy_m, floor.cell_m, on_path)
-    away_m = floor.cell_m * ndimage.distance_transform_edt(~on_path)
+    away_m = floor.cell_m * scipy.ndimage.distance_transform_edt(~on_path)
     reach = math.ceil(0.5 * width_m / floor.cell_m)
-    pieces, _ = ndimage.label(missing, structure=np.ones((3, 3)))
+    pieces, _ = scipy.ndimage.label(missing, structure=np.ones((3, 3)))
     x0, y0 = floor.origin_xy_m
     found = []
-    for piece, (rows, columns) in enumerate(ndimage.find_objects(pieces), start=1):
+    for piece, (rows, columns) in enumerate(scipy.ndimage.find_objects(pieces), start=1):
         low = np.maximum(0, [rows.start - reach, columns.start - reach])
         window = slice(low[0], rows.stop + reach), slice(low[1], columns.stop + reach)
         left = np.argwhere(pieces[window] == piece)

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components, minimum_spanning_tree
+import scipy
 
 from pilotage.core.types import BoolArray, FloatArray, IntArray
 from pilotage.models.pose_graph_covariance import covariances
@@ -29,8 +28,10 @@ def without(edges: Edges, poses: FloatArray, leaving: BoolArray) -> Edges:
     out = Edges(number[out.i], number[out.j], out.relative, out.information, out.closes)
     both = leaving[edges.i] & leaving[edges.j]
     size = poses.shape[0]
-    links = coo_matrix((np.ones(int(both.sum())), (edges.i[both], edges.j[both])), shape=(size, size))
-    _, group = connected_components(links, directed=False)
+    links = scipy.sparse.coo_matrix(
+        (np.ones(int(both.sum())), (edges.i[both], edges.j[both])), shape=(size, size)
+    )
+    _, group = scipy.sparse.csgraph.connected_components(links, directed=False)
     of_edge = np.where(leaving[edges.i], group[edges.i], group[edges.j])
     for name in np.unique(of_edge[touches]):
         part = edges.chosen(touches & (of_edge == name))
@@ -46,8 +47,6 @@ def _tree(
     edges: Edges, poses: FloatArray, leaving: BoolArray
 ) -> tuple[IntArray, IntArray, FloatArray, FloatArray] | None:
     """Tree over the poses that stay of a group's edges; None where there is but one."""
-    from scipy.spatial import cKDTree  # loads 0.1 s of SciPy, which most runs never need
-
     members, ends = np.unique(np.concatenate([edges.i, edges.j]), return_inverse=True)
     stays = np.flatnonzero(~leaving[members])
     if stays.size < 2:
@@ -57,7 +56,9 @@ def _tree(
     fixed = np.zeros(members.size, np.bool_)
     fixed[stays[0]] = True
     known = covariances(local.graph(poses[members]), fixed=fixed)
-    _, near = cKDTree(poses[members[stays], :2]).query(poses[members[stays], :2], min(NEAR, stays.size))
+    _, near = scipy.spatial.cKDTree(poses[members[stays], :2]).query(
+        poses[members[stays], :2], min(NEAR, stays.size)
+    )
     first = np.repeat(np.arange(stays.size), near.shape[1])
     pairs = np.concatenate(
         [
@@ -71,7 +72,9 @@ def _tree(
     # The weight is what the pair does not know of each other, made positive: a zero would be no edge.
     unsure = np.linalg.slogdet(covariance)[1]
     weight = unsure - unsure.min() + 1.0
-    tree = minimum_spanning_tree(coo_matrix((weight, (pairs[:, 0], pairs[:, 1])), shape=(stays.size,) * 2))
+    tree = scipy.sparse.csgraph.minimum_spanning_tree(
+        scipy.sparse.coo_matrix((weight, (pairs[:, 0], pairs[:, 1])), shape=(stays.size,) * 2)
+    )
     row, column = tree.nonzero()
     chosen = np.searchsorted(pairs[:, 0] * stays.size + pairs[:, 1], row * stays.size + column)
     order = np.sort(chosen)

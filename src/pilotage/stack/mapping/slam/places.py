@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+import scipy
 
 from pilotage.core.chi_square import chi_square_quantile
 from pilotage.core.types import BoolArray, FloatArray, IntArray
@@ -148,15 +149,15 @@ def places(
 
 def _agreeing_pairs(found: Places, earlier: EarlierMap, state: Solved, config: SlamConfig) -> BoolArray:
     """(S, S) pairs of sound matches that lie to each other as they do in the recording."""
-    from scipy.spatial import cKDTree  # loads 0.1 s of SciPy, which most runs never need
-
     out = np.diag(found.sound)
     chosen = np.flatnonzero(found.sound)
     if chosen.size < 2:
         return out
     own = found.keyframes[chosen]
     placed = found.poses()[chosen]
-    near, at = np.unique(cKDTree(earlier.poses[:, :2]).query(placed[:, :2])[1], return_inverse=True)
+    near, at = np.unique(
+        scipy.spatial.cKDTree(earlier.poses[:, :2]).query(placed[:, :2])[1], return_inverse=True
+    )
     in_map = covariances(earlier.edges.graph(earlier.poses)).joint(near)
     a, b = np.triu_indices(chosen.size, 1)
     told = relative_poses(state.poses[own[a]], state.poses[own[b]])
@@ -180,10 +181,8 @@ def _agreeing_pairs(found: Places, earlier: EarlierMap, state: Solved, config: S
 
 def links(found: Places, chosen: IntArray, earlier: EarlierMap) -> Edges:
     """Edges from the map's keyframes nearest to chosen stretches to the stretches' own, by their numbers."""
-    from scipy.spatial import cKDTree  # loads 0.1 s of SciPy, which most runs never need
-
     placed = found.poses()[chosen]
-    near = np.asarray(cKDTree(earlier.poses[:, :2]).query(placed[:, :2])[1], np.int64)
+    near = np.asarray(scipy.spatial.cKDTree(earlier.poses[:, :2]).query(placed[:, :2])[1], np.int64)
     relative = relative_poses(earlier.poses[near], placed)
     hessian = np.array([found.matches[n].hessian for n in chosen])
     information = edge_information(hessian, placed[:, 2], CLOSURE_STD_M, CLOSURE_FLOOR)

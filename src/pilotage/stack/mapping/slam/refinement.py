@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import scipy
 
 from pilotage.core.types import FloatArray, IntArray
 from pilotage.kernels.slam.align import TOO_FEW
@@ -34,10 +35,8 @@ def neighbours(poses: FloatArray, since: int = 0) -> IntArray:
 
     With ``since`` they are pairs of one before it with one from it on alone.
     """
-    from scipy.spatial import cKDTree  # loads 0.1 s of SciPy, which most runs never need
-
     count = poses.shape[0]
-    tree = cKDTree(poses[:, :2])
+    tree = scipy.spatial.cKDTree(poses[:, :2])
     first = [np.arange(count - ahead) for ahead in ALONG if ahead < count and not since]
     second = [np.arange(ahead, count) for ahead in ALONG if ahead < count and not since]
     for i in range(since, count):
@@ -94,12 +93,10 @@ def pair_edges(clouds: Clouds, poses: FloatArray, pairs: IntArray) -> Edges:
 
 def not_aligned(closing: Edges, aligned: Edges) -> Edges:
     """Return the closures between stretches of which no two keyframes are aligned with each other."""
-    from scipy.spatial import cKDTree  # loads 0.1 s of SciPy, which most runs never need
-
     ends = np.column_stack([closing.i, closing.j])
     across = aligned.closes
     if len(closing) == 0 or not across.any():
         return closing
-    tree = cKDTree(np.column_stack([aligned.i[across], aligned.j[across]]))
+    tree = scipy.spatial.cKDTree(np.column_stack([aligned.i[across], aligned.j[across]]))
     far = np.asarray(tree.query(ends, p=np.inf)[0], np.float64)
     return closing.chosen(far > BESIDE)

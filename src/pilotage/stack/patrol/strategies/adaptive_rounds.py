@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
+import scipy
 from pydantic import Field
 
 from pilotage.core.config import Config
@@ -187,12 +188,10 @@ class AdaptiveRoundsStrategy:
 
         The least sum of squared distances to the rounds: along a passage for one nobody is sent past another.
         """
-        from scipy.optimize import linear_sum_assignment  # loads 0.1 s of SciPy, which most runs never need
-
         plan, robots = self._plan, sorted(away_m)
         seats = np.repeat(np.arange(len(plan.sizes)), plan.sizes)
         away = np.array([[away_m[r][walk.stops].min() for walk in plan.rounds] for r in robots])
-        row, column = linear_sum_assignment(away[:, seats] ** 2)
+        row, column = scipy.optimize.linear_sum_assignment(away[:, seats] ** 2)
         return {robots[r]: int(seats[c]) for r, c in zip(row, column, strict=True)}
 
     def _place_of(self, knowledge: PatrolKnowledge, robot: int) -> int:

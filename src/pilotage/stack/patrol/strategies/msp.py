@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import scipy
 
 from pilotage.core.config import Config
 from pilotage.core.types import FloatArray
@@ -24,15 +25,13 @@ class MspPartitionStrategy:
     """
 
     def __init__(self, config: MspPartitionConfig, setting: PatrolSetting) -> None:
-        from scipy.optimize import linear_sum_assignment  # loads 0.1 s of SciPy, which most runs never need
-
         del config
         graph, team = setting.graph, setting.team_size
         groups = min(team, len(graph))
         rounds = partition(graph, even_sizes(groups, groups)).rounds
         away = np.array([[graph.shortest_m[s, walk.stops].min() for walk in rounds] for s in setting.starts])
         seats = np.tile(np.arange(groups), -(-team // groups))[:team]
-        robots, seat = linear_sum_assignment(away[:, seats])
+        robots, seat = scipy.optimize.linear_sum_assignment(away[:, seats])
         walk = rounds[seats[seat[robots == setting.robot][0]]]
         self._stops = walk.stops
         self._place = int(np.argmin(graph.shortest_m[setting.starts[setting.robot], walk.stops]))
