@@ -17,7 +17,7 @@ from pilotage.kernels.control.footprint import (
     polygon_distance,
 )
 from pilotage.kernels.control.ground import Ground, clearance_m, sure_clearance
-from pilotage.kernels.control.ground_update import believed
+from pilotage.kernels.control.ground_shown import believed
 from pilotage.kernels.geometry.motion import exact_arc
 from pilotage.kernels.grids.distance import nearest_marked
 from pilotage.stack.control.local.body import make_body

@@ -16,40 +16,24 @@ from pilotage.kernels.control.commands_sent import drive_out, filter_rates
 from pilotage.kernels.control.dynamic_window import choose_in_window, window
 from pilotage.kernels.control.evasion import best_evasion
 from pilotage.kernels.control.footprint import discs_clearance
-from pilotage.kernels.control.ground import Ground
-from pilotage.kernels.control.ground_update import believed, evenly_spaced, insert_scan, rolled, sectors
+from pilotage.kernels.control.ground_shown import believed, rolled
+from pilotage.kernels.control.ground_update import insert_scan, sectors
 from pilotage.kernels.control.heading_vector import along_arc
 from pilotage.kernels.control.match import match_scan
 from pilotage.kernels.control.merged_means import merged_means, without_passed
 from pilotage.kernels.control.motion_limits import Drive, advance, approach, command_is_safe
 from pilotage.kernels.control.rollouts import weighted_mean
+from pilotage.kernels.control.scan_ends import evenly_spaced
 from pilotage.kernels.control.togo import UNREACHED_S, descent_path, time_to_go
 from pilotage.kernels.geometry.motion import exact_arc
 from pilotage.kernels.grids.distance import nearest_marked
 from pilotage.kernels.scans.rays import fan_ranges
 from pilotage.stack.control.local.body import make_body
+from seen_ground import DRIVE, JACKAL, ground_of
 
-JACKAL = np.array([[0.254, 0.215], [-0.254, 0.215], [-0.254, -0.215], [0.254, -0.215]])
-DRIVE = Drive(2.0, 0.5, 3.0, 2.0, 4.0, 6.0)
 NOBODY = np.zeros((1, 0, 3))
 SPEED = st.floats(-0.5, 2.0)
 TURN = st.floats(-4.0, 4.0)
-
-
-def ground_of(points: FloatArray, togo: FloatArray | None = None) -> Ground:
-    """All seen ground of 8 m about the origin with obstacle points."""
-    n = 160
-    hits = np.zeros((n, n), dtype=np.uint8)
-    mean = np.zeros((n * n, 2))
-    for x, y in points:
-        row, column = int((y + 4.0) / 0.05), int((x + 4.0) / 0.05)
-        hits[row, column] = 5
-        mean[row * n + column] = x, y
-    half = n // 2
-    far = np.full((half, half), 9.0)
-    field = np.zeros((half, half)) if togo is None else togo
-    _, nearest = nearest_marked(believed(hits) > 0)
-    return Ground(hits, mean, nearest, far, field, -4.0, -4.0, 0.05, 0.1, 20.0, 10.0)
 
 
 @pytest.mark.parametrize(("rows", "columns"), [(0, 3), (2, -1), (-5, 4), (9, 0)])

@@ -7,7 +7,7 @@ import math
 from pilotage.kernels.arrays import BoolArray, FloatArray
 from pilotage.kernels.control.footprint import Body, polygon_distance
 from pilotage.kernels.control.ground import seen_under
-from pilotage.kernels.control.ground_update import unseen_m
+from pilotage.kernels.control.ground_shown import unseen_m
 from pilotage.kernels.geometry.motion import TWO_PI
 from pilotage.kernels.jit import kernel
 

@@ -2,7 +2,7 @@
 
 Two square grids share one lower left corner: fine cells for obstacles, and coarse ones, twice as wide, for
 what has been seen at all and for the time to go. Rows go up in y, columns in x. Here they are asked;
-``ground_update`` fills them.
+``ground_update`` fills them, ``ground_shown`` tells what they show.
 """
 
 from __future__ import annotations

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from pilotage.kernels.arrays import ByteArray, FloatArray
 from pilotage.kernels.control.ground import Ground
 from pilotage.kernels.jit import kernel
@@ -59,6 +61,8 @@ def match_scan(
     partners = 0
     weight = 1.0 / (point_std * point_std)
     soft = (0.5 * reach) ** 2
+    # A point mostly keeps its partner from one iteration to the next.
+    surface_of, surfaces = np.full(points.shape[0], -1), np.empty((points.shape[0], 3))
     for _ in range(ITERATIONS):
         c, s = math.cos(ptheta), math.sin(ptheta)
         hxx = 1.0 / pose_std[0] ** 2
@@ -87,10 +91,14 @@ def match_scan(
                 continue
             partners += 1
             w = weight / (1.0 + r2 / soft)
-            nx, ny, slip = _surface(at, ground.hits, ground.mean)
             # Information slip I + (1 - slip) n n': along a line that beams leave gaps in its point may slide.
             gaps = 2.0 * spacing * math.sqrt(ax * ax + ay * ay) / ground.cell_m - 1.0
-            slip = 1.0 - min(max(gaps, 0.0), 1.0) * (1.0 - slip)
+            nx, ny, slip = 1.0, 0.0, 1.0
+            if gaps > 0.0:
+                if surface_of[k] != at:
+                    surface_of[k], surfaces[k] = at, _surface(at, ground.hits, ground.mean)
+                nx, ny, slip = surfaces[k, 0], surfaces[k, 1], surfaces[k, 2]
+                slip = 1.0 - min(gaps, 1.0) * (1.0 - slip)
             ixx = w * (slip + (1.0 - slip) * nx * nx)
             ixy = w * (1.0 - slip) * nx * ny
             iyy = w * (slip + (1.0 - slip) * ny * ny)

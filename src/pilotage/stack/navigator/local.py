@@ -145,8 +145,9 @@ class LocalNavigator(LocalizingNavigator):
         command = self._drive.toward(
             point, belief, readings, min(PASSING_M, tolerance_m) if led else tolerance_m, self._bodies.about
         )
-        off_rad = turn_at_goal_rad(self._task, pose) if not led and self._has_room_to_turn() else 0.0
-        if off_rad and self._drive.status == "arrived":
+        arrives = not led and self._drive.status == "arrived"
+        off_rad = turn_at_goal_rad(self._task, pose) if arrives and self._has_room_to_turn() else 0.0
+        if off_rad:
             command = turned_by(off_rad, self._robot.motion.top_turn_rate_rad_s)
         if self._plan is not None:
             command = self._among_people(readings.t_s, command, pose, self._plan.mapped_m)

@@ -56,6 +56,8 @@ class Movers:
 
     def forget(self, which: BoolArray | None = None) -> None:
         """Drop ``which`` tracks (M,), or all."""
+        if not len(self.tracks):
+            return
         kept = np.zeros(len(self.tracks), np.bool_) if which is None else ~which
         self.tracks, self._things = self.tracks[kept], self._things[kept]
 
@@ -187,6 +189,8 @@ class Movers:
         ``pose``: (3,). Ahead is all before the line across the robot. Who comes faster than ``walk_m_s``
         counts as nearer by what he gains on that in ``heed_s``.
         """
+        if not self.tracks.shape[0]:
+            return math.inf
         bodies = self.tracks[self._count() & ~self._things]
         dx, dy = bodies[:, kernels.X] - pose[0], bodies[:, kernels.Y] - pose[1]
         away = np.hypot(dx, dy)

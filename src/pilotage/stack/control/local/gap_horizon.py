@@ -10,16 +10,9 @@ from pilotage.core.types import STOP, FloatArray, Twist
 from pilotage.kernels.control.band import path_distances
 from pilotage.kernels.control.evasion import best_evasion
 from pilotage.kernels.control.ground import nearest_m
-from pilotage.kernels.control.ground_update import cleaned_ranges, scan_points
 from pilotage.kernels.control.motion_limits import Drive, approach, command_is_safe
-from pilotage.kernels.control.rollouts import (
-    Price,
-    later,
-    plan_costs,
-    pursuits,
-    rollout_costs,
-    weighted_mean,
-)
+from pilotage.kernels.control.rollouts import Price
+from pilotage.kernels.control.scan_ends import cleaned_ranges, scan_points
 from pilotage.kernels.control.togo import UNREACHED_S, togo_at
 from pilotage.stack.control.local.among_people import AmongPeople
 from pilotage.stack.control.local.blind_side import blind_clearance_m
@@ -33,10 +26,10 @@ from pilotage.stack.control.local.narrow_passage import (
     sharpened,
     tight_m,
 )
+from pilotage.stack.control.local.plan_pool import PlanPool
 from pilotage.stack.control.local.role import LOCAL_CONTROLLERS, LocalView
 from pilotage.stack.control.local.rolling import Scene
 from pilotage.stack.control.local.rolling_step import RollingController
-from pilotage.stack.control.local.sampling import NoiseBank
 from pilotage.stack.control.local.turning_room import TurningRoom, find_turning_room
 
 BLIND_M = 0.02
@@ -48,16 +41,10 @@ LOOKS_PAST_M, LOOKS_ASIDE_M = 2.0, 0.025
 """Where it is stuck it forgets what the scan looks past so near, and by so little to the side."""
 TRIED_M = 0.3
 """Two narrow places nearer to each other than this are one."""
-SPEEDS = np.array([1.0, 0.7, 0.45, 0.25, 0.0])
-"""Shares of the top speed at which its way is pursued; with none it turns to it on the spot, which no sample
-does: who saw a quarter of the circle stood beside ground that it had but to turn to."""
-LOOKS = np.array([[0.3, 0.1], [0.45, 0.3]])
 TURNS_M_S = 0.1
 """Slower than this it brakes before it could get around anything."""
 SWERVES = (0.0, -0.2, 0.2, -0.4, 0.4, -0.7, 0.7, -1.0, 1.0)
 HOLDS_S = (0.15, 0.4, 0.8)
-DODGES = np.array([(v, w) for v in (-0.5, 0.6, 1.2) for w in (-2.0, 0.0, 2.0)])
-"""Speeds and turn rates held for a whole plan."""
 
 
 @LOCAL_CONTROLLERS.add("gap-horizon", GapHorizonConfig)
@@ -81,10 +68,8 @@ class GapHorizon(RollingController):
     def __init__(self, config: GapHorizonConfig, generator: np.random.Generator) -> None:
         super().__init__(config.ground, foresees=True)
         self._config = config
-        self._near = _Samples(config, config.horizon_s, generator)
-        self._far = _Samples(config, config.far_horizon_s, generator)
+        self._pool = PlanPool(config, generator)
         self._plan: FloatArray | None = None
-        self._since_sampled = config.resample_steps
         self._keep_turning = True
         self._passage: NarrowPassage | None = None
         self._room: TurningRoom | None = None
@@ -128,7 +113,7 @@ class GapHorizon(RollingController):
             config.people_cost,
             config.comfort_m,
         )
-        plans, costs = self._plans(scene, price)
+        plans, costs = self._pool.priced(scene, price, self._plan)
         for i in np.argsort(costs)[:6]:
             command = self._checked(scene, plans[i][0])
             if command is not None:
@@ -269,51 +254,6 @@ class GapHorizon(RollingController):
             return
         self._ground.close(float(ahead[narrow, 0]), float(ahead[narrow, 1]), float(away[narrow]) + 0.05)
 
-    def _plans(self, scene: Scene, price: Price) -> tuple[FloatArray, FloatArray]:
-        """All plans (K, N, 2) worth a look with their costs, until the next call."""
-        config = self._config
-        samples = self._far if self._looks_far(scene) else self._near
-        plans, count = samples.plans, 0
-        if self._plan is not None:
-            plans[0] = _fitted(later(self._plan, scene.dt_s / config.step_s), samples.steps)
-            count = 1
-        chased = plans[count : count + len(SPEEDS) * len(LOOKS)]
-        speeds = SPEEDS * scene.drive.speed
-        pursuits(scene.start, scene.path, LOOKS, speeds, 1.0, config.step_s, scene.drive, chased)
-        count += len(chased)
-        plans[count] = 0.0
-        count += 1
-        movers = scene.movers.foretold(scene.delay_s + config.step_s, config.step_s, samples.steps)
-        if movers.shape[1]:
-            # Out of the way of whoever comes: what pursuit of the path does not think of.
-            plans[count : count + len(DODGES)] = DODGES[:, None]
-            count += len(DODGES)
-        fixed = config.step_s, scene.drive, scene.body, scene.ground, movers, price
-        costs = plan_costs(scene.start, plans[:count], *fixed)
-        self._since_sampled += 1
-        if self._since_sampled < config.resample_steps and self._plan is not None:
-            return plans[:count], costs
-        self._since_sampled = 0
-        mean = plans[int(np.argmin(costs))]
-        sampled = rollout_costs(scene.start, mean, samples.noise.draw(), *fixed, samples.commands)
-        more = plans[count : count + 2]
-        more[0] = samples.commands[int(np.argmin(sampled))]
-        more[1] = weighted_mean(samples.commands, sampled, config.temperature_s)
-        return plans[: count + 2], np.append(costs, plan_costs(scene.start, more, *fixed))
-
-    def _looks_far(self, scene: Scene) -> bool:
-        # Close to a goal of a narrow tolerance short plans stood still before it.
-        if scene.distance_m < self._config.close_ahead_m:
-            return True
-        # Somebody may walk here, by the mission's word or by what was seen.
-        people = self._config.ground.movers.enabled or math.isfinite(
-            scene.movers.nearest_m(float(scene.pose[0]), float(scene.pose[1]))
-        )
-        if people:
-            return True
-        ahead = np.ascontiguousarray(scene.path[: max(3, round(self._config.close_ahead_m / 0.1))])
-        return bool(path_distances(ahead, scene.ground).min() < scene.body.outer_m)
-
     def _is_squeezed(self, scene: Scene) -> bool:
         enough = self._config.least_margin_m
         x, y, theta = scene.pose
@@ -365,19 +305,6 @@ class GapHorizon(RollingController):
         return None
 
 
-class _Samples:
-    """Room for plans of one length: noise, what it makes of the best plan, and those worth a look."""
-
-    def __init__(self, config: GapHorizonConfig, horizon_s: float, generator: np.random.Generator) -> None:
-        self.steps = max(2, round(horizon_s / config.step_s))
-        self.noise = NoiseBank(
-            generator, config.rollouts, self.steps, config.speed_std_m_s, config.turn_std_rad_s
-        )
-        self.commands = np.empty((config.rollouts, self.steps, 2))
-        most = 1 + len(SPEEDS) * len(LOOKS) + 1 + len(DODGES) + 2
-        self.plans = np.empty((most, self.steps, 2))
-
-
 def _laser_xy_m(view: LocalView, scene: Scene) -> tuple[float, float]:
     x, y, theta = (float(value) for value in scene.pose)
     c, s = math.cos(theta), math.sin(theta)
@@ -395,8 +322,3 @@ def _scanned(view: LocalView, scene: Scene) -> FloatArray:
     x, y, theta = scene.pose
     c, s = math.cos(theta), math.sin(theta)
     return np.asarray([x, y] + in_base @ np.array([[c, s], [-s, c]]))
-
-
-def _fitted(plan: FloatArray, steps: int) -> FloatArray:
-    """A plan (N, 2) cut off, or going on with its last command."""
-    return plan[np.minimum(np.arange(steps), len(plan) - 1)]

@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from pilotage.core.types import FloatArray
+from pilotage.kernels.control.gap_points import nearest_pair, points_within
 from pilotage.stack.control.local.rolling import Scene
 
 BESIDE_M = 0.06
@@ -90,24 +91,23 @@ def ends_beside(
 def sides(scene: Scene, place: FloatArray, tangent: FloatArray) -> tuple[FloatArray, FloatArray] | None:
     """The nearest pair of obstacle points across a place, one on either side of the way."""
     points = _points(scene, place)
-    offset = points - place
-    across = tangent[0] * offset[:, 1] - tangent[1] * offset[:, 0]
-    left, right = points[across > 0.02], points[across < -0.02]
-    if not (left.shape[0] and right.shape[0]):
-        return None
-    apart = np.hypot(left[:, None, 0] - right[None, :, 0], left[:, None, 1] - right[None, :, 1])
-    i, j = np.unravel_index(int(np.argmin(apart)), apart.shape)
-    return left[i], right[j]
+    left, right, _ = nearest_pair(
+        points, float(place[0]), float(place[1]), float(tangent[0]), float(tangent[1])
+    )
+    return (points[left], points[right]) if left >= 0 else None
 
 
 def _points(scene: Scene, place: FloatArray) -> FloatArray:
     """(N, 2) obstacle points near a place."""
     ground = scene.ground
-    n, cells = ground.hits.shape[0], math.ceil(SIDES_M * ground.per_cell) + 1
-    row = math.floor((float(place[1]) - ground.y0_m) * ground.per_cell)
-    column = math.floor((float(place[0]) - ground.x0_m) * ground.per_cell)
-    first_row, first_column = max(row - cells, 0), max(column - cells, 0)
-    near = ground.hits[first_row : max(row + cells + 1, 0), first_column : max(column + cells + 1, 0)]
-    rows, columns = np.nonzero(near)
-    points = ground.mean[(rows + first_row) * n + columns + first_column]
-    return np.asarray(points[np.hypot(*(points - place).T) < SIDES_M])
+    points: FloatArray = points_within(
+        ground.hits,
+        ground.mean,
+        ground.x0_m,
+        ground.y0_m,
+        ground.per_cell,
+        float(place[0]),
+        float(place[1]),
+        SIDES_M,
+    )
+    return points

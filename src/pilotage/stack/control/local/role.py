@@ -10,7 +10,7 @@ from pilotage.core.checked import Gives, misfit
 from pilotage.core.errors import InputError
 from pilotage.core.registry import Registry
 from pilotage.core.types import FloatArray, Pose2, Twist
-from pilotage.kernels.control.ground_update import evenly_spaced
+from pilotage.kernels.control.scan_ends import evenly_spaced
 
 
 @dataclass(frozen=True, slots=True)

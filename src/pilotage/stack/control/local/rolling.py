@@ -9,7 +9,7 @@ import numpy as np
 
 from pilotage.core.errors import InputError
 from pilotage.core.types import FloatArray, IntArray, Pose2, Twist
-from pilotage.kernels.control import first_ground, ground_update, match, togo
+from pilotage.kernels.control import first_ground, ground_shown, ground_update, match, scan_ends, togo
 from pilotage.kernels.control.footprint import Body
 from pilotage.kernels.control.ground import Ground
 from pilotage.kernels.control.merged_means import without_passed
@@ -128,7 +128,7 @@ class RollingGround:
         self._t_s = view.t_s
         body = self._take_body(view)
         drive = self._take_limits(view.limits)
-        ranges, silent = ground_update.cleaned_ranges(view.ranges_m, view.max_range_m)
+        ranges, silent = scan_ends.cleaned_ranges(view.ranges_m, view.max_range_m)
         blind = silent > BLIND_SHARE * ranges.shape[0]
         angles = view.beam_angles_rad
         first = float(angles[0])
@@ -136,7 +136,7 @@ class RollingGround:
         first_view = self._odometry is None
         self._predict(view)
         predicted = self._pose
-        in_base, least_m = ground_update.scan_points(
+        in_base, least_m = scan_ends.scan_points(
             view.mount.x_m, view.mount.y_m, view.mount.theta_rad, ranges, first, step, view.max_range_m
         )
         still = things = in_base
@@ -276,7 +276,7 @@ class RollingGround:
             return True
         if max(abs(dc), abs(dr)) * self._coarse_m < (ROLL_M if self._togo.is_due else MOST_OFF_M):
             return False
-        ground_update.rolled(self._hits, self._mean, self._seen, dr, dc)
+        ground_shown.rolled(self._hits, self._mean, self._seen, dr, dc)
         self._corner = wanted
         return True
 
@@ -318,7 +318,7 @@ class RollingGround:
 
     def _ground(self, body: Body, drive: Drive, rolled: bool, avoid: FloatArray | None) -> Ground:
         x0, y0 = self._corner_m
-        unseen = ground_update.looked_at(
+        unseen = ground_shown.looked_at(
             self._hits, self._seen, self._coarse_m, body.outer_m, self._shown, self._rise, self._nearest
         )
         unseen = first_ground.with_seen_under(self._seen, unseen, self._pose, body, x0, y0, self._coarse_m)
