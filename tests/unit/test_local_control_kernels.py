@@ -29,7 +29,7 @@ from pilotage.kernels.geometry.motion import exact_arc
 from pilotage.kernels.grids.distance import nearest_marked
 from pilotage.kernels.scans.rays import fan_ranges
 from pilotage.stack.control.local.body import make_body
-from seen_ground import DRIVE, JACKAL, ground_of
+from support.seen_ground import DRIVE, JACKAL, ground_of
 
 NOBODY = np.zeros((1, 0, 3))
 SPEED = st.floats(-0.5, 2.0)

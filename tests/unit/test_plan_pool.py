@@ -19,7 +19,7 @@ from pilotage.kernels.control.rollouts import (
     weighted_mean,
 )
 from pilotage.stack.control.local.body import make_body
-from seen_ground import DRIVE, JACKAL, ground_of
+from support.seen_ground import DRIVE, JACKAL, ground_of
 
 PRICE = Price(0.05, 0.02, 0.2, 1.0, 0.25, 0.01, 1.0, 30.0, 3.0, 0.0, 0.3, 1.0, 1.5, 0.5)
 LOOKS, SPEEDS = np.array([[0.3, 0.1], [0.45, 0.3]]), np.array([1.0, 0.0])
@@ -72,7 +72,7 @@ def test_the_pair_across_a_way_is_the_nearest() -> None:
         c, s = math.cos(turn), math.sin(turn)
         across = c * (near[:, 1] + 0.2) - s * (near[:, 0] - 0.3)
         pairs = [
-            (math.dist(near[i], near[j]), i, j)
+            (math.dist(near[i], near[j]), int(i), int(j))
             for i in np.flatnonzero(across > 0.02)
             for j in np.flatnonzero(across < -0.02)
         ]
