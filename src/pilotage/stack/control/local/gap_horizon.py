@@ -16,8 +16,9 @@ from pilotage.kernels.control.scan_ends import cleaned_ranges, scan_points
 from pilotage.kernels.control.togo import UNREACHED_S, togo_at
 from pilotage.stack.control.local.among_people import AmongPeople
 from pilotage.stack.control.local.blind_side import blind_clearance_m
-from pilotage.stack.control.local.command_check import footprint_clearance_m
+from pilotage.stack.control.local.command_check import ROUNDING_M, footprint_clearance_m
 from pilotage.stack.control.local.gap_horizon_config import GapHorizonConfig
+from pilotage.stack.control.local.multi_point_turn import MultiPointTurn, find_multi_point_turn
 from pilotage.stack.control.local.narrow_passage import (
     PASSED_BEHIND_M,
     SLOW_M_S,
@@ -33,7 +34,7 @@ from pilotage.stack.control.local.rolling_step import RollingController
 from pilotage.stack.control.local.turning_room import TurningRoom, find_turning_room
 
 BLIND_M = 0.02
-"""So much, before a gap, from what its laser does not see: it may be nearer than it was seen to be."""
+"""So much from what its laser does not see, and where it backs: it may be nearer than it was seen to be."""
 BACK = -SLOW_M_S, 0.0
 FORESEEN_M = 0.9
 """So far ahead it looks for gaps that leave it hardly any room."""
@@ -73,11 +74,16 @@ class GapHorizon(RollingController):
         self._keep_turning = True
         self._passage: NarrowPassage | None = None
         self._room: TurningRoom | None = None
+        self._turn: MultiPointTurn | None = None
         self._backs_out = False
         self._moved_s = 0.0
         self._tried: list[tuple[float, float]] = []
         self._since: tuple[float, float, float] | None = None
         self._people = AmongPeople(config)
+
+    @property
+    def _is_busy(self) -> bool:
+        return self._turn is not None
 
     def _careful(self, view: LocalView, scene: Scene) -> Scene:
         return self._people.careful(view, scene)
@@ -87,7 +93,7 @@ class GapHorizon(RollingController):
         if self._people.must_stand(view, scene):
             self._plan = None
             return STOP
-        if self._passage is None and self._room is None:
+        if self._passage is None and self._room is None and self._turn is None:
             self._passage = self._tight_ahead(view, scene)
         if self._passage is not None:
             return self._squeeze(view, scene, self._passage)
@@ -97,6 +103,13 @@ class GapHorizon(RollingController):
             if self._room is not None and command is not None:
                 return command
             self._room = None
+        if self._turn is not None:
+            self._turn, wanted = self._turn.step(scene, view.t_s)
+            sharper = sharpened(scene, _scanned(view, scene), _laser_xy_m(view, scene))
+            command = self._checked(sharper, np.array([wanted.v_m_s, wanted.w_rad_s]))
+            if self._turn is not None and command is not None:
+                return command
+            self._turn = None
         price = Price(
             config.margin_m,
             config.margin_s,
@@ -212,7 +225,8 @@ class GapHorizon(RollingController):
         """Where it is stuck: the narrowest place straight, room to turn, or close it; reopen where all is."""
         config = self._config
         x, y = float(scene.pose[0]), float(scene.pose[1])
-        if self._passage is not None and view.t_s - self._moved_s < config.stuck_s:
+        squeezes = self._passage is not None and view.t_s - self._moved_s < config.stuck_s
+        if squeezes or self._turn is not None:
             self._since = (view.t_s, x, y)
             return
         if self._since is None or math.hypot(x - self._since[1], y - self._since[2]) > config.stuck_m:
@@ -235,6 +249,15 @@ class GapHorizon(RollingController):
             self._passage = None
             self._ground.open_all()
             return
+        self._room = find_turning_room(scene, self._room_m(scene), config.margin_m, view.t_s)
+        if self._room is not None:
+            return
+        sharper = sharpened(scene, _scanned(view, scene), _laser_xy_m(view, scene))
+        self._turn = find_multi_point_turn(
+            sharper, (config.margin_m, config.least_margin_m), BLIND_M, view.t_s
+        )
+        if self._turn is not None:
+            return
         found = find_narrow_passage(scene, FORESEEN_M, view.t_s)
         found = found or find_narrow_passage(scene, config.close_ahead_m, view.t_s)
         if found and not self._has_tried(found):
@@ -246,9 +269,6 @@ class GapHorizon(RollingController):
         ahead = np.ascontiguousarray(scene.path[: max(3, round(config.close_ahead_m / 0.1))])
         away = path_distances(ahead, scene.ground)
         narrow = int(np.argmin(away))
-        self._room = find_turning_room(scene, self._room_m(scene), config.margin_m, view.t_s)
-        if self._room is not None:
-            return
         if away[narrow] > scene.body.outer_m:
             self._ground.open_all()
             return
@@ -274,14 +294,20 @@ class GapHorizon(RollingController):
         if abs(v) > config.squeezed_m_s and self._is_squeezed(scene):
             v, w = math.copysign(config.squeezed_m_s, v), w * config.squeezed_m_s / abs(v)
         v, w = min(max(v, -drive.reverse), drive.speed), min(max(w, -drive.turn_rate), drive.turn_rate)
+        if v < 0.0:
+            # Behind it walls are where they were before its heading drifted.
+            margin_m = max(margin_m, BLIND_M)
         if drive.least_radius > 0.0:
             faster, slower = drive.acceleration * scene.dt_s, drive.deceleration * scene.dt_s
             most = max(approach(float(scene.start[3]), v, faster, slower), 0.0) / drive.least_radius
             w = min(max(w, -most), most)
         if abs(v) > abs(scene.start[3]) and self._people.are_near(scene):
             hold_s = max(hold_s, config.people_hold_s)
+        # From within the margin no nearer: a millimetre, which the check lets go, in every step is a contact.
+        x, y, theta = (float(value) for value in scene.start[:3])
+        least_m = min(margin_m, footprint_clearance_m(scene, x, y, theta, margin_m)) - ROUNDING_M
         for keep_turning in (True, False):
-            safe, _ = command_is_safe(
+            safe, clear_m = command_is_safe(
                 scene.start,
                 v,
                 w,
@@ -299,7 +325,7 @@ class GapHorizon(RollingController):
                 config.least_margin_s,
                 config.people_margin_m,
             )
-            if safe:
+            if safe and clear_m >= least_m:
                 self._keep_turning = keep_turning
                 return Twist(v, w)
         return None

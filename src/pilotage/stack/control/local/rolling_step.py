@@ -29,7 +29,7 @@ class RollingController:
         command: Twist | None = STOP if arrived or scene.blind else None
         if command is None and led:
             command = approach(scene, view.goal_tolerance_m)
-        if command is None:
+        if command is None and not self._is_busy:
             command = self._around.step(view, scene)
         if command is None:
             command = self._decide(view, scene)
@@ -37,6 +37,11 @@ class RollingController:
         self._look_back(view, scene)
         self.status = "arrived" if arrived else _word_of(command)
         return command
+
+    @property
+    def _is_busy(self) -> bool:
+        """Whether it is at a manoeuvre of its own that no look around shall interrupt."""
+        return False
 
     def _careful(self, view: LocalView, scene: Scene) -> Scene:  # noqa: ARG002
         """The scene with such limits as the place calls for; most controllers know the robot's own only."""

@@ -77,10 +77,15 @@ def _is_seen(scene: Scene, x: float, y: float, c: float, s: float) -> bool:
 
 def _off_the_way(scene: Scene) -> float:
     """Angle from the heading to the way down the time to go; 0 without any."""
-    path: FloatArray = scene.path
-    x, y, theta = (float(value) for value in scene.start[:3])
-    beyond = np.flatnonzero(np.hypot(path[:, 0] - x, path[:, 1] - y) > AHEAD_M)
-    if not beyond.size:
+    point = point_of_the_way(scene)
+    if point is None:
         return 0.0
-    px, py = path[int(beyond[0])]
-    return float(wrap(math.atan2(py - y, px - x) - theta))
+    x, y, theta = (float(value) for value in scene.start[:3])
+    return float(wrap(math.atan2(float(point[1]) - y, float(point[0]) - x) - theta))
+
+
+def point_of_the_way(scene: Scene) -> FloatArray | None:
+    """(2,) the first point down the time to go that is not right at the robot; None without any."""
+    path: FloatArray = scene.path
+    beyond = np.flatnonzero(np.hypot(path[:, 0] - scene.start[0], path[:, 1] - scene.start[1]) > AHEAD_M)
+    return path[int(beyond[0])] if beyond.size else None
