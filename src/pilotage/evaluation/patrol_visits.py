@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pilotage.core.types import FloatArray
+from pilotage.core.types import BoolArray, FloatArray
 from pilotage.evaluation.idleness import Idleness, idleness
 
 STAYS_S = 1.0
@@ -28,11 +28,11 @@ class VisitLog:
         self._stays: list[tuple[int, float]] = []
         self._said_s: FloatArray = np.full(len(vertices_xy_m), -np.inf)
 
-    def add(self, t_s: float, places_xy_m: FloatArray) -> None:
-        """Robots (N, 2) are here now."""
+    def add(self, t_s: float, places_xy_m: FloatArray, works: BoolArray) -> None:
+        """Robots (N, 2) are here now; the body of one that does not work (N,) guards no place."""
         dx = places_xy_m[:, :1] - self._places[:, 0]
         dy = places_xy_m[:, 1:] - self._places[:, 1]
-        there = dx * dx + dy * dy <= self._visit_m**2
+        there = (dx * dx + dy * dy <= self._visit_m**2) & works[:, None]
         changed = there != self._there
         if changed.any():
             for robot, vertex in np.argwhere(changed).tolist():

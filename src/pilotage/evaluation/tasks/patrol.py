@@ -113,12 +113,12 @@ class PatrolTask:
     def step(self, t_s: float, attempts: Sequence[Attempt]) -> str | None:
         """Look at everybody; over when the time is."""
         self._step += 1
-        places = np.array([attempt.body.state[:2] for attempt in attempts])
         if self._step % self._visits_every == 0:
-            self._visits.add(t_s, places)
+            works = np.array([not attempt.body.stopped for attempt in attempts])
+            self._visits.add(t_s, np.array([attempt.body.state[:2] for attempt in attempts]), works)
         if self._step % self._see_every == 0:
             for attempt, eye in zip(attempts, self._eyes, strict=True):
-                if eye is not None:
+                if eye is not None and not attempt.body.stopped:
                     self._floor.look(t_s, attempt.body, eye)
         if self._step % self._look_every == 0:
             self._look(t_s, attempts)
