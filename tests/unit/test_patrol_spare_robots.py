@@ -80,6 +80,18 @@ def test_a_mate_that_waits_as_well_wants_nobody_to_make_room(
     assert context.crowded(0.6) is crowded
 
 
+@pytest.mark.parametrize("long", [True, False])
+def test_a_body_that_is_planned_around_wants_nobody_to_make_room(tmp_path: Path, *, long: bool) -> None:
+    """A robot that held the place of one that failed made room for its body, again and again."""
+    values = two_rooms(tmp_path / "two.graph", 2)
+    context: Any = build(mission_of(values, seed=0)).team[0].stack._context  # type: ignore[attr-defined]
+    context.pose, context.strange = Pose2(2.5, 2.5, 0.0), np.array([[0.55, 0.0], [0.6, 0.1]])
+    body = np.array([[3.3, 2.5]])
+    for t_s in (0.0, 30.0 if long else 3.0):
+        context._obstructions.step(t_s, body, np.zeros(int(t_s > 0.0), dtype=bool), body[:0], (), ())
+    assert context.crowded(0.6) is not long
+
+
 @pytest.mark.parametrize("seed", [1, 2])
 def test_six_robots_hold_two_places(tmp_path: Path, seed: int) -> None:
     """They fought for them: a place with three robots about it was left for half a minute."""

@@ -88,6 +88,9 @@ class PatrolKnowledge:
         Its speed made good along edges.
     states
         (N,) the newest word of each robot by its number, its own included; None of one never heard.
+    silences_log
+        (N,) logarithm of the probability that a robot's own words were not heard for so long by chance; 0
+        where nothing tells.
     """
 
     now_s: float
@@ -98,6 +101,7 @@ class PatrolKnowledge:
     visited_s: FloatArray
     speed_m_s: float
     states: tuple[PatrolState | None, ...]
+    silences_log: FloatArray
 
     @property
     def own_idleness_s(self) -> FloatArray:
@@ -207,9 +211,10 @@ class PatrolMemory:
         states = tuple(state for state in self._states if state is not None)
         return PatrolMessage(self._own.robot, t_s, states, self._visited_s.copy())
 
-    def knowledge(self, t_s: float) -> PatrolKnowledge:
+    def knowledge(self, t_s: float, silences_log: FloatArray | None = None) -> PatrolKnowledge:
         """What its strategy is told."""
         own = self._own
+        chances = np.zeros(len(self._states)) if silences_log is None else silences_log
         return PatrolKnowledge(
             t_s,
             own.robot,
@@ -219,6 +224,7 @@ class PatrolMemory:
             self._visited_s.copy(),
             own.speed_m_s,
             tuple(self._states),
+            chances,
         )
 
     def _tell(self, own: PatrolState) -> None:

@@ -44,6 +44,26 @@ class Clearing:
     orders: tuple[tuple[int, float, float], ...]
 
 
+@dataclass(frozen=True, slots=True)
+class Talk:
+    """How a robot talks, by its data sheets: who hears it knows what to expect.
+
+    Attributes
+    ----------
+    period_s
+        At least one word in so long.
+    reach_m, loss
+        Of its radio.
+    speed_m_s
+        It drives no faster.
+    """
+
+    period_s: float
+    reach_m: float
+    loss: float
+    speed_m_s: float
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class TeamWord:
     """One broadcast.
@@ -64,6 +84,8 @@ class TeamWord:
         Of the disc around its body.
     standing
         Places of bodies that it saw stand for long, who say nothing: it plans around them.
+    talk
+        When to expect more; None: nothing is known of that.
     """
 
     x_m: float
@@ -74,3 +96,4 @@ class TeamWord:
     news: PatrolMessage
     radius_m: float
     standing: tuple[tuple[float, float], ...] = ()
+    talk: Talk | None = None

@@ -20,7 +20,7 @@ from pilotage.stack.navigator.patrol.motion import Motion
 from pilotage.stack.navigator.patrol.obstructions import Obstructions, Told
 from pilotage.stack.navigator.patrol.passage import Pursuit
 from pilotage.stack.navigator.patrol.senses import NO_POINTS, TOLD_M, Senses
-from pilotage.stack.patrol.messages import PatrolMemory
+from pilotage.stack.patrol.messages import PatrolKnowledge, PatrolMemory
 from pilotage.stack.patrol.roadmap import Roadmap, roadmap_of
 from pilotage.stack.patrol.shut_paths import NONE_SHUT, ShutPaths
 from pilotage.stack.patrol.strategy import following
@@ -168,7 +168,7 @@ class Context(Senses):
         if due:
             self._next_word_s += self.config.message_period_s
         x, y = (math.nan, math.nan) if lost else (self.pose.x_m, self.pose.y_m)
-        self.memory.update(self.t_s, words=self.task.strategy.words(self.memory.knowledge(self.t_s)))
+        self.memory.update(self.t_s, words=self.task.strategy.words(self._knowledge()))
         news = self.memory.message(self.t_s)
         self.journal.outbox.append(
             TeamWord(
@@ -180,8 +180,12 @@ class Context(Senses):
                 news,
                 self.radius_m,
                 self._obstructions.told(),
+                self.talk_habit,
             )
         )
+
+    def _knowledge(self) -> PatrolKnowledge:
+        return self.memory.knowledge(self.t_s, self.silences_log())
 
     def away_m(self, place: int) -> float:
         """Distance from a vertex or its station as the crow flies."""
@@ -268,7 +272,7 @@ class Context(Senses):
             self.hop = self.target = self.battery.station
             return True
         graph, at = self.task.graph, self.came_from
-        target = int(self.task.strategy.next_vertex(self.memory.knowledge(self.t_s)))
+        target = int(self.task.strategy.next_vertex(self._knowledge()))
         self.target = target
         length_m = float(graph.shortest_m[at, target])
         self.memory.bound(target, self.t_s, self.t_s + length_m / max(self.memory.own.speed_m_s, 1e-3))
@@ -303,12 +307,15 @@ class Context(Senses):
         self._has_news |= before != now
 
     def crowded(self, reach_m: float) -> bool:
-        """Whether something that may move is so near to the body's edge, and no mate that waits as well."""
+        """Whether something that may move is so near to the body's edge: no mate that waits as well, and
+        nobody who is planned around."""
         near = self.on_map(self.strange[np.hypot(*self.strange.T) < reach_m + self.radius_m])
+        stay = [(x, y, self.radius_m) for x, y in self._obstructions.shutting_xy_m.tolist()]
         for number, word in self.heard():
             if self.memory.waits(number) and not word.blocked:
-                away = np.hypot(near[:, 0] - word.x_m, near[:, 1] - word.y_m)
-                near = near[~(away < word.radius_m + TOLD_M)]
+                stay.append((word.x_m, word.y_m, word.radius_m))
+        for x, y, radius_m in stay:
+            near = near[~(np.hypot(near[:, 0] - x, near[:, 1] - y) < radius_m + TOLD_M)]
         return len(near) > 0
 
     def here(self) -> FloatArray:

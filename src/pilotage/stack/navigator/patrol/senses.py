@@ -18,9 +18,10 @@ from pilotage.stack.interface import Belief
 from pilotage.stack.journal import Journal
 from pilotage.stack.knowledge import RobotKnowledge
 from pilotage.stack.navigator.patrol.config import PatrolNavigatorConfig
+from pilotage.stack.patrol.silence import Silences
 from pilotage.stack.patrol.task import PatrolTask
 from pilotage.stack.patrol.watch import IntruderWatch
-from pilotage.stack.patrol.word import TeamWord
+from pilotage.stack.patrol.word import Talk, TeamWord
 
 NO_FIELD: FloatArray = np.zeros((1, 1))
 NO_POINTS: FloatArray = np.zeros((0, 2))
@@ -59,6 +60,8 @@ class Senses:
         Its own, at most.
     pass_m
         Half the width of what has room for two.
+    talk_habit
+        How it talks itself.
     """
 
     def __init__(
@@ -75,7 +78,10 @@ class Senses:
         self.pass_m = 2.0 * self.radius_m + config.plan_margin_m + 0.5 * config.gap_m
         self._lidar, lidar = robot.one_sensor(LidarConfig, "navigator 'patrol'")
         self._odometry, _ = robot.one_sensor(WheelOdometryConfig, "navigator 'patrol'")
-        self._radio = next(iter(robot.sensors_of(RadioConfig)), None)
+        radios = robot.sensors_of(RadioConfig)
+        self._radio = next(iter(radios), None)
+        self.talk_habit = _habit(next(iter(radios.values()), None), config.message_period_s, self.speed_m_s)
+        self._silences = Silences(len(task.starts), chart.bounds_m)
         self._directions = clustering.beam_directions(
             float(lidar.beam_angles_rad()[0]), lidar.beam_step_rad, lidar.beams
         )
@@ -111,6 +117,7 @@ class Senses:
             for message in said.messages:
                 if isinstance(message.content, TeamWord):
                     self.hear(message.sent_s, message.content)
+        self._silences.step(self.t_s, self.pose, self.talk_habit, lost=lost)
         scan = readings.by_sensor.get(self._lidar)
         self.fresh = isinstance(scan, LidarScan)
         if isinstance(scan, LidarScan):
@@ -120,6 +127,11 @@ class Senses:
     def hear(self, sent_s: float, word: TeamWord) -> None:
         """A mate said something."""
         self.mates[word.news.sender] = sent_s, word
+        self._silences.hear(word.news.sender, sent_s, word)
+
+    def silences_log(self) -> FloatArray:
+        """(N,) how unlikely each mate's silence is by chance: as ``Silences.chances_log``."""
+        return self._silences.chances_log(self.talk_habit)
 
     def _look_around(self, ranges_m: FloatArray, spread_rad: float, *, lost: bool) -> None:
         """Who is there, of a scan."""
@@ -233,3 +245,10 @@ class Senses:
     def say(self, kind: str, text: str) -> None:
         """Tell that something happened."""
         self.journal.say(self.t_s, kind, text)
+
+
+def _habit(radio: RadioConfig | None, period_s: float, speed_m_s: float) -> Talk:
+    """How a robot talks by its data sheets; nobody hears one without a radio."""
+    if radio is None:
+        return Talk(period_s, 0.0, 1.0, speed_m_s)
+    return Talk(period_s, math.inf if radio.range_m is None else radio.range_m, radio.loss, speed_m_s)

@@ -46,6 +46,8 @@ class AdaptiveRoundsConfig(Config):
     silent_ratio: Positive = 8.0
     """A robot is given up when its last word is so old, and so many times as old as it usually is; one that
     says that it is off duty when it has been for ``silent_s``: who lost its way is often back in seconds."""
+    by_chance: Positive = Field(default=1e-8, lt=1.0)
+    """Who surely is in reach is given up sooner: as soon as so long a silence by chance is less probable."""
 
 
 def best_plan(setting: PatrolSetting, robots: int, config: AdaptiveRoundsConfig) -> Plan:
@@ -160,7 +162,13 @@ class AdaptiveRoundsStrategy:
         # Of a robot that was never heard silence tells something only where all others are heard readily.
         readily = heard.any() and limit_s[heard].max() <= 2.0 * self._config.silent_s
         limit_s[~heard] = limit_s[heard].max() if readily else math.inf
-        silent = now_s - self._heard_s > np.maximum(limit_s, self._config.silent_s)
+        # Silence of who surely is in reach is no chance long before: one word after the other would be lost.
+        no_chance = knowledge.silences_log < math.log(self._config.by_chance)
+        usual_s = self._gaps_s[:, 1] / np.maximum(self._gaps_s[:, 0], 1e-9)
+        limit_s = np.where(
+            no_chance, self._config.silent_ratio * usual_s, np.maximum(limit_s, self._config.silent_s)
+        )
+        silent = now_s - self._heard_s > limit_s
         off = np.array([state is not None and not state.on_duty for state in knowledge.states])
         self._off_s = np.where(off, np.minimum(self._off_s, now_s), math.inf)
         silent |= now_s - self._off_s > self._config.silent_s

@@ -1,0 +1,99 @@
+"""A mate's silence: no chance where it surely is in reach, nothing where it may be out of it."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+from contract.patrol_examples import lattice
+from pilotage.core.types import Pose2
+from pilotage.stack.patrol.messages import PatrolMemory
+from pilotage.stack.patrol.silence import Silences
+from pilotage.stack.patrol.strategy import STRATEGIES, PatrolSetting
+from pilotage.stack.patrol.word import Talk, TeamWord
+
+NEWS = PatrolMemory(2, 1, 2, 0, 1.0).message(0.0)
+SURE = math.log(1e-8)
+FLOOR = (0.0, 0.0, 60.0, 20.0)
+
+
+def words(x_m: float, talk: Talk | None) -> TeamWord:
+    return TeamWord(x_m, 5.0, False, None, None, NEWS, 0.3, talk=talk)
+
+
+def given_up_s(own: Talk, theirs: Talk, x_m: float, end_s: float = 60.0, heard_s: float = 100.0) -> float:
+    """So long after its last word, at x_m, a mate's silence is no chance any more; heard without loss."""
+    silences, here = Silences(2, FLOOR), Pose2(2.0, 5.0, 0.0)
+    for k in range(round(10 * (heard_s + end_s))):
+        t_s = 0.1 * k
+        if k % 10 == 0 and t_s <= heard_s:
+            silences.hear(1, t_s, words(x_m, theirs))
+        silences.step(t_s, here, own, lost=False)
+        if silences.chances_log(own)[1] < SURE:
+            return t_s - heard_s
+    return math.inf
+
+
+def test_who_surely_is_in_reach_is_given_up_in_seconds() -> None:
+    talk = Talk(1.0, 80.0, 0.0, 1.0)
+    assert 6.0 < given_up_s(talk, talk, 50.0) < 10.0
+    assert (
+        14.0 < given_up_s(talk, Talk(1.0, 80.0, 0.3, 1.0), 50.0) < 18.0
+    )  # the worse radio of the two counts
+    assert given_up_s(talk, Talk(3.0, math.inf, 0.0, 1.0), 50.0, 40.0) > 20.0  # who talks less often
+
+
+@pytest.mark.parametrize("theirs", [10.0, 80.0])
+def test_who_may_have_driven_out_of_reach_is_not(theirs: float) -> None:
+    """Of two radios the weaker counts; a robot of 1 m/s is beyond 10 m before so many words were due."""
+    assert given_up_s(Talk(1.0, 10.0, 0.3, 1.0), Talk(1.0, theirs, 0.3, 1.0), 4.0) == math.inf
+    assert given_up_s(Talk(1.0, theirs, 0.3, 1.0), Talk(1.0, 10.0, 0.3, 1.0), 4.0) == math.inf
+
+
+def test_a_radio_that_is_worse_than_its_data_sheet_gives_up_nobody() -> None:
+    """Six words of ten are lost for an hour, by lot; the sheet says none."""
+    rng, talk = np.random.default_rng(5), Talk(1.0, math.inf, 0.0, 1.0)
+    silences, least, longest = Silences(2, FLOOR), 0.0, 0
+    silent = 0
+    for k in range(3600):
+        silences.step(float(k), Pose2(2.0, 5.0, 0.0), talk, lost=False)
+        silent += 1
+        # The share that is lost is learnt in the first minute.
+        if k > 60:
+            least = min(least, float(silences.chances_log(talk)[1]))
+            longest = max(longest, silent)
+        if rng.random() > 0.6 or k < 3:
+            silences.hear(1, float(k), words(5.0, talk))
+            silent = 0
+    assert longest > 10
+    assert least > SURE
+
+
+def test_nothing_is_expected_of_who_does_not_say_how_it_talks_or_where_it_is() -> None:
+    own = Talk(1.0, 30.0, 0.0, 1.0)
+    for word in (words(5.0, None), words(math.nan, own)):
+        silences = Silences(2, FLOOR)
+        for k in range(100):
+            if k < 5:
+                silences.hear(1, float(k), word)
+            silences.step(float(k), Pose2(2.0, 5.0, 0.0), own, lost=False)
+        assert silences.chances_log(own)[1] == 0.0
+
+
+@pytest.mark.parametrize(("chance", "left"), [(1e-9, True), (1e-7, False)])
+def test_of_two_the_other_takes_it_all_as_soon_as_silence_is_no_chance(chance: float, *, left: bool) -> None:
+    """It waited for 45 s, in which the other may have been out of reach."""
+    graph = lattice(5, 4, 3.0)
+    memory, other = (PatrolMemory(20, k, 2, at, 1.0) for k, at in ((0, 0), (1, 19)))
+    setting = PatrolSetting(graph, 0, np.array([0, 19]), 1.0, np.random.default_rng(0))
+    entry = STRATEGIES.entry("adaptive-rounds")
+    strategy: Any = entry.factory(entry.config(), setting)
+    for t_s in range(1, 60):
+        memory.receive(other.message(float(t_s)))
+        strategy.next_vertex(memory.knowledge(float(t_s)))
+    assert strategy._side == {0, 1}
+    strategy.next_vertex(memory.knowledge(68.0, np.array([0.0, math.log(chance)])))
+    assert strategy._side == ({0} if left else {0, 1})
