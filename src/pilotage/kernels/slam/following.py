@@ -3,27 +3,31 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 
 from pilotage.kernels.arrays import FloatArray, IntArray
 from pilotage.kernels.jit import kernel
-from pilotage.kernels.slam.frames import between, between_all, composed
+from pilotage.kernels.slam.frames import between, composed
 from pilotage.kernels.slam.local_map import LocalMap, add_to_map
 from pilotage.kernels.slam.movers import Views, add_view, without_movers
+from pilotage.kernels.slam.neighbourhood import is_best_near
 from pilotage.kernels.slam.placing import (
     CREDIBLE,
     CREDIBLE_OFF,
     LONG_M,
+    POOR,
+    POOR_AS_GUESSED,
     distance,
     guessed_motions,
     learn_motion,
     placed,
 )
+from pilotage.kernels.slam.recorded_motions import motion_of, move_anchor
 from pilotage.kernels.slam.scan_lines import lines_of, rays_of, scan_points
 from pilotage.kernels.slam.slips import add_slip
-from pilotage.kernels.slam.wheels import HELD, Wheels, learn_wheels, righted
+from pilotage.kernels.slam.track import Keyframes, Look, Recording, Track, has_room
+from pilotage.kernels.slam.wheels import HELD, learn_wheels
 
 SURE_GUESS = 0.035
 """Usual error of the guesses (a radian as half a metre) up to which people are told from walls by odometry:
@@ -31,126 +35,12 @@ wrong stamps, and constant velocity alone, make movers of walls."""
 MOST_POINTS = 240
 """Of a scan of more points every second, third, ... is aligned: beams nearer together than their lines are
 long tell little of their own."""
-POOR, POOR_AS_GUESSED = 0.75, 0.6
-"""Fit over its running mean below which there is a search, and below which there is one where the scan lies
-within the usual error of what a trusted odometry guessed, or near any guess where those are off by less than
-TRUSTED."""
 TRUSTED = 0.025
-OTHER_READING_M = 0.08
-"""Readings of the odometry nearer together (a radian as half a metre) are one guess."""
+"""Usual error of guesses up to which a scan near any of them is in doubt below POOR_AS_GUESSED alone."""
+STEADY = 5
+"""So many scans after the last keyframe one that fits poorly becomes the next, where there is no odometry:
+what it sees is not on the map, and the next ones would fit nowhere."""
 ENDED, FULL, DOUBT = 0, 1, 2
-
-
-class Track(NamedTuple):
-    """What is known where a track has come to, brought up to date scan by scan.
-
-    Attributes
-    ----------
-    pose, keyframe
-        (3,) of the last scan and of the last keyframe.
-    errors, velocity
-        Of ``guessed_motions``.
-    usual
-        (2,) running means of a fit's value and of its residuals.
-    slip, held
-        (3, 3) of ``add_slip`` since the last keyframe.
-    crowded
-        (1,) in how many scans so much seemed to move that they were left whole.
-    residuals
-        (2,) sum of the residuals' root mean squares of all scans, and how many there were.
-    wheels
-        What the odometry is always off by.
-    """
-
-    pose: FloatArray
-    keyframe: FloatArray
-    errors: FloatArray
-    velocity: FloatArray
-    usual: FloatArray
-    slip: FloatArray
-    held: FloatArray
-    crowded: IntArray
-    residuals: FloatArray
-    wheels: Wheels
-
-
-class Look(NamedTuple):
-    """What the guesses alone made of a scan.
-
-    Attributes
-    ----------
-    motions, counts
-        (3, 3) and (3,): the guesses of ``guessed_motions``, how many, how many credible, and whether they are
-        far apart.
-    pose, hessian, start, told
-        Of ``placed``.
-    """
-
-    motions: FloatArray
-    counts: IntArray
-    pose: FloatArray
-    hessian: FloatArray
-    start: FloatArray
-    told: FloatArray
-
-
-class Keyframes(NamedTuple):
-    """Scans that became keyframes and were not fetched yet.
-
-    Attributes
-    ----------
-    scans, hessians, slips
-        (C,), (C, 3, 3) of their alignments, and (C, 3, 3) of what may have slipped since the one before.
-    points, starts
-        (M, 6) without people, one after the other, and (C + 1,) where each begins.
-    added
-        (1,) how many there are.
-    """
-
-    scans: IntArray
-    hessians: FloatArray
-    slips: FloatArray
-    points: FloatArray
-    starts: IntArray
-    added: IntArray
-
-
-def empty_keyframes(count: int, beams: int) -> Keyframes:
-    """Room for so many scans of so many points."""
-    return Keyframes(
-        np.zeros(count, np.int64),
-        np.zeros((count, 3, 3)),
-        np.zeros((count, 3, 3)),
-        np.zeros((count * beams, 6)),
-        np.zeros(count + 1, np.int64),
-        np.zeros(1, np.int64),
-    )
-
-
-class Recording(NamedTuple):
-    """Scans of a log one after the other, and the odometry at them.
-
-    Attributes
-    ----------
-    ranges_m, beams, first_rad, step_rad
-        (N, B), (N,), (N,), (N,) as in ``LaserLog``.
-    dt_s
-        (N,) smoothed time since the scan before.
-    at_scans, starts, others
-        (N, 3) where the odometry has the scanner, and of ``distinct_readings``; (0, 3) where there is none.
-    anchor
-        (3,) from where the next motion is counted.
-    """
-
-    ranges_m: FloatArray
-    beams: IntArray
-    first_rad: FloatArray
-    step_rad: FloatArray
-    dt_s: FloatArray
-    at_scans: FloatArray
-    starts: IntArray
-    others: FloatArray
-    anchor: FloatArray
 
 
 @kernel
@@ -203,10 +93,12 @@ def _is_sure(
     leads = led and track.errors[0] == error
     motions, credible = out.motions[: out.counts[0]], out.counts[1]
     pose, hessian, start, told, split = placed(
-        light, track.pose, motions, credible, leads, others, error, track.usual[0], prior, map_
+        light, track.pose, motions, credible, leads, others, error, track.usual[0], not led, prior, map_
     )
     out.counts[2] = split
     out.pose[:], out.hessian[:], out.start[:], out.told[:] = pose, hessian, start, told
+    if not led:
+        return is_best_near(light, track.pose, motions[:credible], error, track.usual[0], prior, map_, out)
     # Seldom does a scan that lies where a trusted odometry has it fit better anywhere else; but from a long
     # guess an alignment may end in a wrong fit that is not poor.
     long = leads and distance(motions[0], np.zeros(3)) > LONG_M
@@ -262,6 +154,7 @@ def settle(
     track.usual[1] += 0.05 * (told[2] - track.usual[1])
     track.residuals[0] += told[2]
     track.residuals[1] += 1.0
+    track.since[0] += 1
     motion = between(track.pose, pose)
     if led:
         c, s = math.cos(pose[2]), math.sin(pose[2])
@@ -272,51 +165,15 @@ def settle(
 
 
 @kernel
-def motion_of(recording: Recording, scan: int, wheels: Wheels) -> tuple[FloatArray, FloatArray]:
-    """Motion (3,) by the odometry since the last scan, righted, and what else (M, 3) it may be."""
-    if recording.at_scans.shape[0] == 0:
-        return np.zeros(3), np.zeros((0, 3))
-    first, end = recording.starts[scan], recording.starts[scan + 1]
-    step = righted(wheels, between(recording.anchor, recording.at_scans[scan]))
-    others = between_all(recording.anchor, recording.others[first:end])
-    for k in range(others.shape[0]):
-        others[k] = righted(wheels, others[k])
-    return step, others
-
-
-@kernel
-def move_anchor(
-    recording: Recording, scan: int, step: FloatArray, others: FloatArray, motion: FloatArray
-) -> None:
-    """Count the next motion from the reading of ``motion_of`` that the one of a scan (3,) was nearest to.
-
-    Loggers stamp what they receive, in bursts, and late: that need not be the reading at the stamp.
-    """
-    if recording.at_scans.shape[0] == 0:
-        return
-    usual = distance(step, motion)
-    best, least = -1, 0.5 * usual
-    for k in range(others.shape[0]):
-        apart = distance(others[k], motion)
-        if usual > OTHER_READING_M and apart < least:
-            best, least = k, apart
-    recording.anchor[:] = (
-        recording.at_scans[scan] if best < 0 else recording.others[recording.starts[scan] + best]
-    )
-
-
-@kernel
 def is_new(motion: FloatArray, distance_m: float, turn_rad: float) -> bool:
     """Whether a scan is far enough from the last keyframe to become one."""
     return math.hypot(motion[0], motion[1]) > distance_m or abs(motion[2]) > turn_rad
 
 
 @kernel
-def has_room(beams: int, map_: LocalMap, views: Views, kept: Keyframes) -> bool:
-    """Whether a scan of so many points may become a keyframe."""
-    number = kept.added[0]
-    fetched: bool = number < kept.scans.shape[0] and kept.starts[number] + beams <= kept.points.shape[0]
-    return bool(fetched and map_.counts[0] + beams <= map_.points.shape[0] and beams < views.polar.shape[1])
+def leaves(track: Track, value: float, led: bool) -> bool:
+    """Whether a scan that was placed with a fit sees so much that is on no map that it is a keyframe."""
+    return bool(not led and track.since[0] >= STEADY and value < POOR * track.usual[0])
 
 
 @kernel
@@ -347,8 +204,7 @@ def keep(
     out.scans[number], out.starts[number + 1] = scan, end
     out.hessians[number], out.slips[number] = hessian, track.slip + track.held @ track.held.T
     out.added[0] += 1
-    track.slip[:], track.held[:], track.keyframe[:] = 0.0, 0.0, track.pose
-    # Single points are all that tells how far one came without odometry.
+    track.slip[:], track.held[:], track.keyframe[:], track.since[0] = 0.0, 0.0, track.pose, 0
     add_to_map(map_, thinned(kept), track.pose, local, led)
     add_view(views, cloud, track.pose)
 
@@ -414,7 +270,9 @@ def follow(
             return i, DOUBT, seen, kept, light
         move_anchor(recording, i, step, others, between(track.pose, out.pose))
         settle(out.pose, out.hessian, out.start, out.told, step, led, dt_s, prior, track)
-        if is_new(between(track.keyframe, track.pose), limits[2], limits[3]):
+        if is_new(between(track.keyframe, track.pose), limits[2], limits[3]) or leaves(
+            track, out.told[0], led
+        ):
             every_line = (
                 light if every == 1 else lines_of(points, hit, walls, 0.0, 0.0, recording.step_rad[i])
             )

@@ -25,6 +25,8 @@ REACH_M = 0.4
 """From how far away a point is found."""
 SQUARE_M, SQUARES, COSINE = 0.1, 512, 0.9
 """Side of the squares whose points are one where their normals are alike, and how many there are."""
+FUSED_M = 0.03
+"""Without odometry points that are farther apart stay apart."""
 MOST_WEIGHT = 30.0
 """So many of a point's sightings count at most: what was seen lately leads."""
 LAST_STEP_M = 5e-4
@@ -146,16 +148,18 @@ def _write(map_: LocalMap, i: int, together: bool) -> None:
 
 
 @kernel
-def add_to_map(map_: LocalMap, cloud: FloatArray, pose: FloatArray, kept: int, fuse: bool) -> None:
+def add_to_map(map_: LocalMap, cloud: FloatArray, pose: FloatArray, kept: int, led: bool) -> None:
     """Add a scan (K, 6) of ``scan_lines`` at a pose (3,); the map must have room for as many points.
 
     Parameters
     ----------
     kept
         For so many scans, this one included, a point is there.
-    fuse
-        Whether points of one square are one.
+    led
+        Whether there is odometry: then all points of one square whose normals are alike are one, else those
+        alone that are FUSED_M apart. Where a wall ends is then all that tells how far one came.
     """
+    most = math.inf if led else FUSED_M * FUSED_M
     c, s = math.cos(pose[2]), math.sin(pose[2])
     counts, points, links = map_.counts, map_.points, map_.links
     counts[1] += 1
@@ -169,9 +173,10 @@ def add_to_map(map_: LocalMap, cloud: FloatArray, pose: FloatArray, kept: int, f
         lined = nx != 0.0 or ny != 0.0
         column, row = math.floor(x / SQUARE_M), math.floor(y / SQUARE_M)
         head = map_.heads[row & (SQUARES - 1), column & (SQUARES - 1)]
-        i = (head if fuse else 0) - 1
+        i = head - 1
         while i >= 0:
-            if links[i, 0] == column and links[i, 1] == row:
+            dx, dy = x - points[i, 0], y - points[i, 1]
+            if links[i, 0] == column and links[i, 1] == row and dx * dx + dy * dy < most:
                 mx, my = points[i, 2], points[i, 3]
                 if (mx != 0.0 or my != 0.0) == lined and (not lined or nx * mx + ny * my >= COSINE):
                     break
@@ -186,7 +191,7 @@ def add_to_map(map_: LocalMap, cloud: FloatArray, pose: FloatArray, kept: int, f
         points[i, 4] = number
         if seen < counts[2]:
             points[i, 0], points[i, 1], points[i, 2], points[i, 3], points[i, 5] = x, y, nx, ny, 1.0
-            _write(map_, i, fuse)
+            _write(map_, i, led)
             continue
         weight = min(MOST_WEIGHT, points[i, 5] + 1.0)
         points[i, 5] = weight
@@ -198,7 +203,7 @@ def add_to_map(map_: LocalMap, cloud: FloatArray, pose: FloatArray, kept: int, f
             length = math.sqrt(mx * mx + my * my)
             points[i, 2], points[i, 3] = mx / length, my / length
         if number - points[i, 6] >= AGAIN:
-            _write(map_, i, fuse)
+            _write(map_, i, led)
 
 
 @kernel
@@ -214,6 +219,17 @@ def looked_up(map_: LocalMap, source: FloatArray, x: float, y: float, theta: flo
         qy = y + s * source[k, 0] + c * source[k, 1]
         i = map_.nearest[_cell(math.floor(qx * scale), math.floor(qy * scale))] - 1
         paired[k] = i if i >= 0 and map_.points[i, 4] >= oldest else -1
+
+
+@kernel
+def square_at(map_: LocalMap, x: float, y: float) -> float:
+    """Square of the distance of a point from the nearest one, infinite where none is within reach."""
+    i = map_.nearest[_cell(math.floor(x / CELL_M), math.floor(y / CELL_M))] - 1
+    if i < 0 or map_.points[i, 4] < map_.counts[2]:
+        return math.inf
+    dx, dy = x - map_.points[i, 0], y - map_.points[i, 1]
+    square: float = dx * dx + dy * dy
+    return square
 
 
 @kernel

@@ -15,6 +15,9 @@ from pilotage.kernels.slam.local_map import MET, LocalMap, align_in_map
 START_REACH_M, REACH_M, SCALE_M, ITERATIONS = 0.4, 0.2, 0.05, 25
 CREDIBLE, CREDIBLE_OFF = 3.0, 0.003
 """A guess is credible whose mean error is within this factor of the least, and this more."""
+POOR, POOR_AS_GUESSED = 0.75, 0.6
+"""Fit over its running mean below which there is a search, and below which there is one where the scan lies
+within the usual error of what a trusted guess has, or where its neighbourhood was looked at."""
 GOOD = 0.92
 """Fit over its running mean from which no further guess is tried."""
 SPLIT = 0.1
@@ -179,6 +182,7 @@ def placed(
     others: FloatArray,
     error: float,
     usual: float,
+    alone: bool,
     prior: FloatArray,
     map_: LocalMap,
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, bool]:
@@ -198,6 +202,8 @@ def placed(
         (M, 3) what else the odometry may have meant: tried last.
     error, usual
         Usual error of the most trusted guess, and usual value of a fit.
+    alone
+        Whether there is no odometry: then one good fit is enough, for its neighbourhood is looked at later.
     prior, map_
         As in ``align_in_map``.
 
@@ -220,7 +226,7 @@ def placed(
     known = np.full(3, np.inf)
     best, hessian, start = np.zeros(3), np.zeros((3, 3)), np.zeros(3)
     for k in range(count + others.shape[0]):
-        if told[0] > GOOD * usual and (k >= count or not split or (led and as_guessed)):
+        if told[0] > GOOD * usual and (k >= count or not split or alone or (led and as_guessed)):
             break
         motion = motions[k] if k < count else others[k - count]
         began = composed(last, motion)

@@ -13,17 +13,7 @@ import numpy as np
 from pilotage.core.types import FloatArray
 from pilotage.kernels.slam.align import TOO_FEW
 from pilotage.kernels.slam.branch_bound import NO_SEED
-from pilotage.kernels.slam.following import (
-    POOR,
-    Look,
-    Track,
-    empty_keyframes,
-    has_room,
-    keep,
-    look,
-    settle,
-    thinned,
-)
+from pilotage.kernels.slam.following import keep, look, settle, thinned
 from pilotage.kernels.slam.frames import between, carried, composed
 from pilotage.kernels.slam.local_map import (
     NOTHING_KNOWN,
@@ -33,7 +23,16 @@ from pilotage.kernels.slam.local_map import (
     empty_map,
 )
 from pilotage.kernels.slam.movers import empty_views
-from pilotage.kernels.slam.placing import ITERATIONS, LONG_M, REACH_M, SCALE_M, distance, plausibility
+from pilotage.kernels.slam.placing import (
+    ITERATIONS,
+    LONG_M,
+    POOR,
+    REACH_M,
+    SCALE_M,
+    distance,
+    plausibility,
+)
+from pilotage.kernels.slam.track import Look, Track, empty_keyframes, has_room
 from pilotage.kernels.slam.wheels import unknown_wheels
 from pilotage.stack.mapping.slam.config import SlamConfig
 from pilotage.stack.mapping.slam.fit import Fit
@@ -104,6 +103,7 @@ class LocalMatcher:
             np.zeros((3, 3)),
             np.zeros(1, np.int64),
             np.zeros(2),
+            np.zeros(1, np.int64),
             unknown_wheels(),
         )
         self.found = Look(
@@ -241,7 +241,6 @@ class LocalMatcher:
             best = self._near(cloud, last, motions[0], credible, best)
         poor = best is None or best.value < POOR * usual
         if poor or step is None:
-            # Without odometry a scan may slide along a corridor and still fit: look around every time.
             self.searched += 1
             gap_s = min(max(dt_s, gap_s, 0.2) + self._lost_s, MOST_GAP_S)
             centres = [last, composed(last, motions[0])] if poor and split else [last]

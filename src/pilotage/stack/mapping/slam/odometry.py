@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from pilotage.core.types import FloatArray, Pose2
-from pilotage.kernels.slam.following import OTHER_READING_M, Recording
 from pilotage.kernels.slam.frames import composed_all
 from pilotage.kernels.slam.placing import distinct_readings
+from pilotage.kernels.slam.recorded_motions import OTHER_READING_M
+from pilotage.kernels.slam.track import Recording
 from pilotage.logs.laser_log import LaserLog
 
 _SMOOTHED = 4

@@ -8,16 +8,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pilotage.core.types import FloatArray, IntArray
-from pilotage.kernels.slam.following import (
-    DOUBT,
-    FULL,
-    Recording,
-    follow,
-    is_new,
-    motion_of,
-    move_anchor,
-)
+from pilotage.kernels.slam.following import DOUBT, FULL, follow, is_new, leaves
 from pilotage.kernels.slam.frames import between, composed
+from pilotage.kernels.slam.recorded_motions import motion_of, move_anchor
+from pilotage.kernels.slam.track import Recording
 from pilotage.kernels.slam.wheels import righted
 from pilotage.logs.laser_log import LaserLog
 from pilotage.stack.mapping.slam.clouds import LEAST_RANGE_M, Clouds, cloud_of
@@ -225,7 +219,10 @@ class Tracker:
                 self._tear()
         else:
             self._lost_run, hessian = 0, fit.hessian
-        new = broken or (self._lost_run == 0 and self._is_new(between(track.keyframe, track.pose)))
+        far = fit is not None and (
+            self._is_new(between(track.keyframe, track.pose)) or leaves(track, fit.value, step is not None)
+        )
+        new = broken or far
         self._poses.append(track.pose.copy())
         if new:
             self._keep(cloud, kept, hessian, step is not None)
