@@ -254,7 +254,7 @@ class GapHorizon(RollingController):
             return
         sharper = sharpened(scene, _scanned(view, scene), _laser_xy_m(view, scene))
         self._turn = find_multi_point_turn(
-            sharper, (config.margin_m, config.least_margin_m), BLIND_M, view.t_s
+            sharper, self._room_m(scene), (config.margin_m, config.least_margin_m), BLIND_M, view.t_s
         )
         if self._turn is not None:
             return

@@ -11,7 +11,7 @@ from pilotage.core.types import FloatArray, Twist
 from pilotage.kernels.control.multi_point_turn import multi_point_turn
 from pilotage.kernels.geometry.motion import wrap
 from pilotage.stack.control.local.rolling import Scene
-from pilotage.stack.control.local.turning_room import point_of_the_way
+from pilotage.stack.control.local.turning_room import lacks_room_to_turn, point_of_the_way
 
 OFF_RAD = 0.35
 """Headed for its way within this it plans again."""
@@ -63,14 +63,18 @@ class MultiPointTurn:
 
 
 def find_multi_point_turn(
-    scene: Scene, margins_m: tuple[float, ...], behind_m: float, t_s: float
+    scene: Scene, room_m: float, margins_m: tuple[float, ...], behind_m: float, t_s: float
 ) -> MultiPointTurn | None:
     """The moves towards its way with the widest of these margins that leaves any; None without one.
 
-    Where it backs it keeps ``behind_m``. None as well for a robot that may not back, or not turn on the spot.
+    Where it backs it keeps ``behind_m``. None as well where its way lies ahead or nothing is nearer than
+    ``room_m``: there it is not the room to turn that it lacks. Nor for a robot that may not back, or turn on
+    the spot.
     """
     point = point_of_the_way(scene)
-    if point is None or scene.drive.reverse <= 0.0 or scene.drive.least_radius > 0.0:
+    if point is None or not lacks_room_to_turn(scene, room_m):
+        return None
+    if scene.drive.reverse <= 0.0 or scene.drive.least_radius > 0.0:
         return None
     for margin_m in margins_m:
         poses = multi_point_turn(

@@ -51,7 +51,7 @@ def find_turning_room(scene: Scene, room_m: float, margin_m: float, t_s: float) 
     that it gets to over seen ground with ``margin_m``, and within a metre.
     """
     x, y, theta = (float(value) for value in scene.start[:3])
-    if abs(_off_the_way(scene)) < AHEAD_RAD or nearest_m(x, y, scene.ground) >= room_m:
+    if not lacks_room_to_turn(scene, room_m):
         return None
     c, s = math.cos(theta), math.sin(theta)
     open_ways = [1.0, -1.0] if scene.drive.reverse > 0.0 else [1.0]
@@ -64,6 +64,12 @@ def find_turning_room(scene: Scene, room_m: float, margin_m: float, t_s: float) 
             elif nearest_m(px, py, scene.ground) >= room_m:
                 return TurningRoom(px, py, t_s)
     return None
+
+
+def lacks_room_to_turn(scene: Scene, room_m: float) -> bool:
+    """Whether its way does not lie ahead, and something is nearer than ``room_m``."""
+    x, y = float(scene.start[0]), float(scene.start[1])
+    return abs(_off_the_way(scene)) >= AHEAD_RAD and bool(nearest_m(x, y, scene.ground) < room_m)
 
 
 def _is_seen(scene: Scene, x: float, y: float, c: float, s: float) -> bool:
