@@ -234,6 +234,8 @@ class TestMuseum:
             (["task.graph=nowhere.graph"], r"nowhere\.graph"),
             (["team.failures=[{robot: 9, at_s: 1}]"], r"team\.failures: there is no robot 9 of 4"),
             (["robot.motion=bicycle"], "expected a robot that turns on the spot"),
+            (["team.size=null"], r"found none; .* drawn where team\.size is given"),
+            (["team.starts.0={x_m: 1, y_m: 1}"], r"'team\.starts' has no entry 0 yet; give the list whole"),
         ],
     )
     def test_what_cannot_be_is_refused_in_one_line(self, overrides: list[str], told: str) -> None:

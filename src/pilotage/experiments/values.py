@@ -130,6 +130,11 @@ def _apply(values: dict[str, Any], parts: list[str], value: Any, told: str) -> N
     for depth, part in enumerate(parts[:-1]):
         inner = _child(place, part, told)
         if inner is None:
+            if parts[depth + 1].isdigit():
+                whole = ".".join(parts[: depth + 1])
+                raise InputError(
+                    f"{told}: '{whole}' has no entry {parts[depth + 1]} yet; give the list whole"
+                )
             inner = {}
             _put(place, part, inner, told)
         if isinstance(inner, str) and _is_component(parts[: depth + 1]):

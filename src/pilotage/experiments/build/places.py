@@ -45,7 +45,9 @@ def start_pose(mission: Mission, index: int, chart: WorldMap) -> PoseConfig:
         return start
     sheet = None if chart.markings is None else chart.markings.source
     if sheet is None:
-        raise InputError("world.start: expected a start pose, found none")
+        strategy, size = mission.team.strategy, mission.team.size
+        hint = "" if strategy is None or size is not None else "; a team's are drawn where team.size is given"
+        raise InputError(f"world.start: expected a start pose, found none{hint}")
     if sheet.start_pose is None:
         return PoseConfig(x_m=0.5 * sheet.size_m[0], y_m=0.5 * sheet.size_m[1])
     x, y, theta = sheet.start_pose
