@@ -21,12 +21,14 @@ from pilotage.sensors.lidar import LidarConfig
 from pilotage.stack.exploration.floor_frontiers import SeenFloor
 from pilotage.stack.interface import Belief
 from pilotage.stack.mapping.scan_grid import ScanGrid, echoes
-from pilotage.stack.navigator.floor_explorer import Doing, FloorExplorer, Target
-from support.laser_rooms import furnished, ranges
+from pilotage.stack.navigator.floor_explorer import Doing, FloorExplorer
+from pilotage.stack.navigator.frontier_targets import Target
+from support.laser_rooms import furnished, ranges, room
 from support.missions import MISSIONS
 from support.robots import ROOM
 
 HERE = np.array([1.0, 1.0])
+BOUNDS_M = (0.0, 0.0, 8.0, 4.0)
 
 
 def floor_of(states: np.ndarray, here: np.ndarray = HERE) -> SeenFloor:
@@ -92,8 +94,9 @@ def test_who_is_cut_off_by_its_clearance_is_led_back_by_what_its_body_takes() ->
         states[:, 82:] = FREE
         states[34 : 34 + cells, 78:82] = FREE
         grid = SimpleNamespace(states=states.astype(np.int8), corner_xy_m=np.zeros(2), resolution_m=0.05)
+        grid.wall_points = lambda: np.zeros((0, 2))
         explorer = FloorExplorer.__new__(FloorExplorer)
-        vars(explorer).update(_grid=grid, _start=HERE, _clearance_m=0.36, _radius_m=0.3)
+        vars(explorer).update(_grid=grid, _start=HERE, _clearance_m=0.36, _radius_m=0.3, _squeeze_m=0.03)
         floor = explorer._seen(np.array([5.5, 2.0]))
         return bool(np.isfinite(floor.cost_to(HERE)))
 
@@ -261,17 +264,57 @@ def test_who_is_under_way_to_a_gap_goes_on_where_what_it_sees_behind_it_shrinks(
         asked.append(least_m)
         return [found] if len(asked) % 2 == 0 and seen_m[len(asked) // 2 - 1] >= least_m else []
 
-    belief = SimpleNamespace(cov=np.zeros((3, 3)))
+    belief = SimpleNamespace(cov=np.zeros((3, 3)), pose=Pose2(0.0, 0.0, 0.0))
     vars(explorer).update(_doing=Doing.EXPLORE, _least_m=0.4, _squeezing=False, _radius_m=0.3)
     vars(explorer).update(_config=SimpleNamespace(unsure_m=1.0), _sure_m=0.0, _target=None)
+    vars(explorer).update(_squeeze_m=0.0, _grid=SimpleNamespace(wall_points=lambda: None))
+    vars(explorer).update(_targets=SimpleNamespace(worth_it=worth_it))
     went: list[object] = []
     monkeypatch.setattr(FloorExplorer, "_seen", lambda *_: floor)
     monkeypatch.setattr(FloorExplorer, "_floor_at", lambda *_: floor)
     monkeypatch.setattr(FloorExplorer, "_watch", lambda *_: None)
-    monkeypatch.setattr(FloorExplorer, "_worth_it", worth_it)
     monkeypatch.setattr(FloorExplorer, "_go_exploring", lambda *_: went.append("on"))
     monkeypatch.setattr(FloorExplorer, "_set_out_home", lambda *_: went.append("home"))
     for _ in range(2):
         explorer._decide(0.0, cast(Belief, belief), HERE)
     assert went == ["on", "on"]
     assert asked == [0.4, 1.0, 0.4, 0.4]
+
+
+@pytest.mark.parametrize("turned_rad", [0.0, 0.4])
+@pytest.mark.parametrize(("spare_m", "through"), [(0.02, False), (0.045, True)])
+def test_gaps_are_told_by_where_walls_are_and_not_by_cells(
+    turned_rad: float, spare_m: float, through: bool
+) -> None:
+    """Cells of 0.1 m said of a gap with 0.065 m to spare that it is shut."""
+    half_m = 0.17 + spare_m
+    scanner = LidarConfig(beams=720, max_range_m=12.0, field_of_view_rad=2.0 * np.pi)
+    c, s = np.cos(turned_rad), np.sin(turned_rad)
+    turn = np.array([[c, s], [-s, c]])
+    posts = room(3.9, 0, 4.1, 2.03 - half_m) + room(3.9, 2.03 + half_m, 4.1, 4)
+    walls = np.array([*room(0, 0, 8, 4), *posts])
+    walls = np.concatenate([walls[:, :2] @ turn, walls[:, 2:] @ turn], axis=1)
+    grid = ScanGrid(scanner, 0.05)
+    for x in (2.0, 3.5, 4.0, 4.5, 6.0):
+        pose = np.array([*(np.array([x, 2.0]) @ turn), turned_rad])
+        grid.add(echoes(ranges(walls, pose, scanner.beam_angles_rad()), scanner), pose)
+    here, there = (np.array([x, 2.0]) @ turn for x in (2.0, 6.0))
+    floor = SeenFloor(grid.states, grid.corner_xy_m, 0.05, 0.17 + 0.03, here, grid.wall_points())
+    assert np.isfinite(floor.cost_to(there)) == through
+
+
+def test_floor_behind_a_gap_counts_by_the_gap_and_not_by_the_lattice() -> None:
+    """Wherever it lies; and cells that a map says nothing of are floor, as they are to bodies."""
+    start = Pose2(1.0, 1.0, 0.0)
+    for shift_m in (0.0, 0.01, 0.025, 0.04):
+        post = np.array([[4, 0, 4, 2 + shift_m - 0.25], [4, 2 + shift_m + 0.25, 4, 4]])
+        sides = np.concatenate([room(0, 0, 8, 4), post])
+        chart = WorldMap("gap", BOUNDS_M, SegmentMap(sides, np.zeros((0, 3)), BOUNDS_M))
+        through, shut = (len(reachable_floor(chart, 0.2, start, spare_m)) for spare_m in (0.045, 0.055))
+        assert through > 1.8 * shut > 0
+    cells = np.full((80, 160), FREE, np.int8)
+    cells[[0, -1], :] = cells[:, [0, -1]] = OCCUPIED
+    told = WorldMap("cells", BOUNDS_M, grid=OccupancyGrid(cells.copy(), 0.05))
+    cells[1:-1, 80:-1] = UNKNOWN
+    untold = WorldMap("cells", BOUNDS_M, grid=OccupancyGrid(cells, 0.05))
+    assert len(reachable_floor(untold, 0.2, start)) == len(reachable_floor(told, 0.2, start)) > 10_000

@@ -25,6 +25,8 @@ class ExploreConfig(Config):
     """Share of a floor that must be on the map,"""
     return_m: float = Field(default=0.1, gt=0.0)
     """and how near to its start the robot must be in the end."""
+    spare_m: float = Field(default=0.04, ge=0.0)
+    """Floor counts that the robot reaches with so much to spare all around its body."""
 
 
 @TASKS.add("explore", ExploreConfig)
@@ -45,7 +47,7 @@ class ExploreTask:
         if markings is not None and markings.source is not None:
             self._ground = SheetExploration(config.blocked_s, markings, setting)
         else:
-            self._ground = FloorExploration(config.least_mapped, config.return_m, setting)
+            self._ground = FloorExploration(config.least_mapped, config.return_m, config.spare_m, setting)
         self.columns, self.goals = self._ground.columns, ()
         self.events: list[Event] = self._ground.events
 

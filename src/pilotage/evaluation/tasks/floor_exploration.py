@@ -21,14 +21,14 @@ class FloorExploration(WatchedTask):
     done, stands where it began, and has enough of what can be reached on its map.
     """
 
-    def __init__(self, least_mapped: float, return_m: float, setting: TaskSetting) -> None:
+    def __init__(self, least_mapped: float, return_m: float, spare_m: float, setting: TaskSetting) -> None:
         if setting.chart.open_ground or setting.chart.walls.segments_m.shape[0] == 0:
             raise InputError(
                 "task 'explore': expected a sheet with cells or a floor with walls as world.map, "
                 f"found '{setting.chart.name}'"
             )
         super().__init__()
-        self._least_mapped, self._return_m = least_mapped, return_m
+        self._least_mapped, self._return_m, self._spare_m = least_mapped, return_m, spare_m
 
     def progress(self, attempts: Sequence[Attempt]) -> tuple[tuple[str, str], ...]:
         """How far the robots drove."""
@@ -41,7 +41,8 @@ class FloorExploration(WatchedTask):
         metrics = header(run, robot) | driven
         metrics["real_time_factor"] = run.duration_s / run.loop_s
         if isinstance(grid, OccupancyGrid):
-            metrics |= floor_map_metrics(grid, run.chart, robot.footprint.radius_m, robot.start)
+            radius_m = robot.footprint.radius_m
+            metrics |= floor_map_metrics(grid, run.chart, radius_m, robot.start, self._spare_m)
         mapped = metrics.get("floor_mapped", 0.0)
         truth = poses(robot.trace, "true")
         back_m = math.inf

@@ -14,6 +14,7 @@ from pilotage.core.types import BoolArray, FloatArray, IntArray
 from pilotage.kernels.grids.distance import squared_distance
 from pilotage.kernels.grids.travel_cost import travel_costs
 from pilotage.maps.occupancy_grid import FREE, OCCUPIED, UNKNOWN, OccupancyArray
+from pilotage.stack.exploration.narrow_places import with_narrow_places
 
 Scalar = TypeVar("Scalar", bound=np.generic)
 
@@ -56,7 +57,8 @@ class SeenFloor:
     """A map in cells as it is now, with what it costs to get from one place to any other.
 
     Frontiers are free cells beside unseen ones (Yamauchi, 1997), in groups that touch. Paths keep the
-    clearance to what is occupied and lead over free cells only.
+    clearance to what is occupied and lead over free cells only; with ``walls_xy_m``, points (M, 2) on the
+    walls, it is told in narrow places to a centimetre or two.
     """
 
     def __init__(
@@ -66,6 +68,7 @@ class SeenFloor:
         resolution_m: float,
         clearance_m: float,
         here_xy_m: FloatArray,
+        walls_xy_m: FloatArray | None = None,
     ) -> None:
         self.cell_m, self._beside_m = COARSE * resolution_m, 0.5 * clearance_m
         rows, columns = _known_part(states)
@@ -76,6 +79,10 @@ class SeenFloor:
         if occupied.any():
             away = resolution_m * np.sqrt(squared_distance(occupied))
         self.distance_m: FloatArray = _joined(np.minimum, away)
+        if walls_xy_m is not None:
+            self.distance_m = with_narrow_places(
+                self.distance_m, self._corner, self.cell_m, clearance_m, walls_xy_m
+            )
         seen: BoolArray = _joined(np.logical_or, states == FREE)
         self._solid: BoolArray = _joined(np.logical_or, occupied)
         self._free: BoolArray = seen & ~self._solid

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
 from enum import StrEnum
 
 import numpy as np
@@ -15,13 +14,14 @@ from pilotage.maps.world_map import WorldMap
 from pilotage.sensors.lidar import LidarConfig
 from pilotage.sensors.readings import LidarScan, Readings
 from pilotage.stack.control.local.drive import LocalDrive
-from pilotage.stack.exploration.floor_frontiers import Frontier, SeenFloor
+from pilotage.stack.exploration.floor_frontiers import SeenFloor
 from pilotage.stack.interface import NAVIGATORS, Belief, BeliefStatus, StackStatus
 from pilotage.stack.journal import Journal
 from pilotage.stack.knowledge import RobotKnowledge, TaskKnowledge
 from pilotage.stack.localization.localizer import Abilities
 from pilotage.stack.mapping.scan_grid import ScanGrid, echoes
 from pilotage.stack.navigator.floor_explorer_config import FloorExplorerConfig
+from pilotage.stack.navigator.frontier_targets import SAME_M, Target, Targets
 from pilotage.stack.navigator.navigator import LocalizingNavigator, Parts, localizer_of
 from pilotage.stack.navigator.progress import patience_s
 
@@ -34,10 +34,6 @@ STALL_M = 0.3
 SHY_SHARE = 1.0 / 3.0
 """Where it got no farther for this share of its patience it is led along the path itself: by a point that a
 line with room leads to, not by one around a corner, straight to which a gap may be too narrow for it."""
-SAME_M = 0.6
-"""A frontier this near to one that was looked at is that one."""
-CROSSED_M, FAILED_M = 0.2, 0.6
-"""So much of a frontier around a place where it stood on it, or could not get to, is given up."""
 ROOM_M = 1.0
 """A frontier this long is the edge of a room, not a shadow: worth a gap that its body alone takes."""
 COUNTS = ("frontiers_seen", "frontiers_left", "frontiers_given_up", "loops_sought")
@@ -52,18 +48,6 @@ class Doing(StrEnum):
     CLOSE = "close"
     RETURN = "return"
     DONE = "done"
-
-
-@dataclass(slots=True)
-class Target:
-    """A place to go to, why, and the path there."""
-
-    xy_m: FloatArray
-    frontier_xy_m: FloatArray
-    score: float
-    crossing: bool
-    """Whether it is on the frontier itself, not a place to look at it from."""
-    path: FloatArray = field(default_factory=lambda: np.zeros((0, 2)))
 
 
 @NAVIGATORS.add("floor-frontier", FloorExplorerConfig)
@@ -109,6 +93,7 @@ class FloorExplorer(LocalizingNavigator):
         )
         self._stall_s = patience_s(config.stall_s, STALL_M, robot.motion.top_speed_m_s)
         self._radius_m, self._clearance_m = robot.radius_m, robot.radius_m + config.clearance_m
+        self._squeeze_m = min(config.squeeze_m, config.clearance_m)
         # A frontier no longer than the robot is wide is one that a small robot fits through.
         self._least_m = min(config.least_frontier_m, 2.0 * self._clearance_m)
         self._able = Abilities.of(self._localizer)
@@ -120,9 +105,7 @@ class FloorExplorer(LocalizingNavigator):
         start = task.initial.pose
         self._start = np.array([start.x_m, start.y_m])
         self._doing, self._target = Doing.EXPLORE, None
-        self._looked: list[FloatArray] = []
-        self._tried: list[tuple[FloatArray, float]] = []
-        """Places on frontiers that it stood on or could not get to, and how much around them is given up."""
+        self._targets = Targets(config)
         self._sure_m, self._checked = 0.0, 0
         self._planned_s, self._moved_s, self._moved_from = -math.inf, 0.0, self._start
         self._stalled_at: FloatArray | None = None
@@ -196,14 +179,14 @@ class FloorExplorer(LocalizingNavigator):
             return
         if self._target is not None and self._doing is Doing.EXPLORE and self._there(here):
             self._met(self._target)
-        found = self._worth_it(floor, belief, here, self._least_m)
+        found, widest = self._targets.worth_it(floor, belief.pose, here, self._least_m), floor
         if not found:
             # Rooms may be left behind gaps that only its body fits through.
-            squeezed = self._floor_at(self._radius_m, here)
+            widest = self._floor_at(self._radius_m + self._squeeze_m, here, self._grid.wall_points())
             # What it looks at from before the gap shrinks, and may be short then.
             least_m = self._least_m if squeezing else max(ROOM_M, self._least_m)
-            found = self._worth_it(squeezed, belief, here, least_m)
-            self._floor = floor = squeezed if found else floor
+            found = self._targets.worth_it(widest, belief.pose, here, least_m)
+            self._floor = floor = widest if found else floor
             self._squeezing = bool(found)
         self._frontiers = len(found)
         if self._doing is Doing.CLOSE and self._still_unsure(belief, here):
@@ -213,7 +196,7 @@ class FloorExplorer(LocalizingNavigator):
         elif found:
             self._go_exploring(floor, found, here)
         else:
-            self._set_out_home(t_s, floor, here)
+            self._set_out_home(t_s, floor, widest, here)
 
     def _seen(self, here: FloatArray) -> SeenFloor:
         """What it has seen; where it came too near to walls to be led back, by what the body alone takes.
@@ -223,59 +206,33 @@ class FloorExplorer(LocalizingNavigator):
         first = self._floor_at(self._clearance_m, here)
         if math.isfinite(first.cost_to(self._start)):
             return first
-        for clearance_m in (self._radius_m, self._radius_m - self._grid.resolution_m):
-            floor = self._floor_at(clearance_m, here)
+        body_m, cell_m = self._radius_m, self._grid.resolution_m
+        # Where it squeezed in it can squeeze out again.
+        for clearance_m, walls_m in (
+            (body_m + self._squeeze_m, self._grid.wall_points()),
+            (body_m, None),
+            (body_m - cell_m, None),
+        ):
+            floor = self._floor_at(clearance_m, here, walls_m)
             if math.isfinite(floor.cost_to(self._start)):
                 return floor
         return first
 
-    def _floor_at(self, clearance_m: float, here: FloatArray) -> SeenFloor:
-        """What it has seen, for paths that keep a clearance."""
+    def _floor_at(self, clearance_m: float, here: FloatArray, walls_m: FloatArray | None = None) -> SeenFloor:
+        """What it has seen, for paths that keep a clearance; from points of walls where a gap is narrow."""
         grid = self._grid
-        return SeenFloor(grid.states, grid.corner_xy_m, grid.resolution_m, clearance_m, here)
-
-    def _worth_it(self, floor: SeenFloor, belief: Belief, here: FloatArray, least_m: float) -> list[Target]:
-        """Frontiers of a length and within reach that were not given up, the best first."""
-        config, out = self._config, []
-        for frontier in floor.frontiers(least_m):
-            cell, crossing = self._place_for(floor, frontier)
-            if cell < 0:
-                continue
-            xy_m = floor.point_of(cell)
-            bearing = math.atan2(xy_m[1] - here[1], xy_m[0] - here[0]) - belief.pose.theta_rad
-            turn = abs((bearing + math.pi) % (2.0 * math.pi) - math.pi)
-            score = float(floor.cost_m[cell]) + config.turn_cost_m_per_rad * turn
-            score -= config.length_gain * min(frontier.length_m, 4.0)
-            out.append(Target(xy_m, frontier.middle_xy_m, score, crossing))
-        return sorted(out, key=lambda target: target.score)
-
-    def _place_for(self, floor: SeenFloor, frontier: Frontier) -> tuple[int, bool]:
-        """The cell to go to for a frontier, -1 for none, and whether it is on the frontier itself."""
-        if frontier.view >= 0 and not self._is_looked(frontier):
-            return frontier.view, False
-        places = floor.points_of(frontier.crossings)
-        open_ = np.ones(len(places), np.bool_)
-        for place, around_m in self._tried:
-            open_ &= np.hypot(*(places - place).T) > around_m
-        return (int(frontier.crossings[open_.argmax()]), True) if open_.any() else (-1, False)
-
-    def _is_looked(self, frontier: Frontier) -> bool:
-        return any(float(np.hypot(*(frontier.middle_xy_m - place))) < SAME_M for place in self._looked)
+        return SeenFloor(grid.states, grid.corner_xy_m, grid.resolution_m, clearance_m, here, walls_m)
 
     def _met(self, target: Target) -> None:
-        """It stands where it was to go: what is still unseen from there stays so."""
-        if target.crossing:
-            self._tried.append((target.xy_m, CROSSED_M))
-        else:
-            self._looked.append(target.frontier_xy_m)
+        """It stands where it was to go."""
+        self._targets.met(target)
+        if not target.crossing:
             self._journal.count("frontiers_seen")
 
     def _failed_to_reach(self, target: Target) -> None:
-        """It cannot get to a target: the frontier counts as looked at, its cells around as tried."""
+        """It cannot get to a target."""
         if self._doing is Doing.EXPLORE:
-            self._looked.append(target.frontier_xy_m)
-            if target.crossing:
-                self._tried.append((target.xy_m, FAILED_M))
+            self._targets.failed(target)
 
     def _go_exploring(self, floor: SeenFloor, found: list[Target], here: FloatArray) -> None:
         """To the best frontier, or on to the one it is under way to while that is about as good."""
@@ -352,8 +309,9 @@ class FloorExplorer(LocalizingNavigator):
 
     # --- coming back --------------------------------------------------------------------------------
 
-    def _set_out_home(self, t_s: float, floor: SeenFloor, here: FloatArray) -> None:
-        left = floor.frontiers(self._least_m)
+    def _set_out_home(self, t_s: float, floor: SeenFloor, widest: SeenFloor, here: FloatArray) -> None:
+        """Say what is left, by the gaps that it fits through, and come back."""
+        left = widest.frontiers(self._least_m)
         unreached = sum(1 for frontier in left if frontier.view < 0 and not frontier.crossings.size)
         wide = sum(1 for frontier in left if frontier.crossings.size)
         self._journal.counts |= {"frontiers_left": len(left), "frontiers_given_up": wide}

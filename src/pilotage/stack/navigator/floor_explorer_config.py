@@ -11,6 +11,8 @@ class FloorExplorerConfig(Config):
 
     clearance_m: NonNegative = 0.06
     """Beside the robot's radius, of the paths that it plans."""
+    squeeze_m: NonNegative = 0.03
+    """The same through gaps to rooms that are left behind them: no narrower ones."""
     least_frontier_m: Positive = 0.4
     look_m: Positive = 0.35
     """A frontier is looked at from this near to where it is best seen."""
