@@ -281,13 +281,8 @@ def test_who_is_under_way_to_a_gap_goes_on_where_what_it_sees_behind_it_shrinks(
     assert asked == [0.4, 1.0, 0.4, 0.4]
 
 
-@pytest.mark.parametrize("turned_rad", [0.0, 0.4])
-@pytest.mark.parametrize(("spare_m", "through"), [(0.02, False), (0.045, True)])
-def test_gaps_are_told_by_where_walls_are_and_not_by_cells(
-    turned_rad: float, spare_m: float, through: bool
-) -> None:
-    """Cells of 0.1 m said of a gap with 0.065 m to spare that it is shut."""
-    half_m = 0.17 + spare_m
+def gap_seen(half_m: float, turned_rad: float) -> tuple[ScanGrid, np.ndarray, np.ndarray]:
+    """What was seen of two rooms with a gap between them, and a place in each."""
     scanner = LidarConfig(beams=720, max_range_m=12.0, field_of_view_rad=2.0 * np.pi)
     c, s = np.cos(turned_rad), np.sin(turned_rad)
     turn = np.array([[c, s], [-s, c]])
@@ -298,9 +293,27 @@ def test_gaps_are_told_by_where_walls_are_and_not_by_cells(
     for x in (2.0, 3.5, 4.0, 4.5, 6.0):
         pose = np.array([*(np.array([x, 2.0]) @ turn), turned_rad])
         grid.add(echoes(ranges(walls, pose, scanner.beam_angles_rad()), scanner), pose)
-    here, there = (np.array([x, 2.0]) @ turn for x in (2.0, 6.0))
+    return grid, np.array([2.0, 2.0]) @ turn, np.array([6.0, 2.0]) @ turn
+
+
+@pytest.mark.parametrize("turned_rad", [0.0, 0.4, 0.785])
+@pytest.mark.parametrize(("spare_m", "through"), [(0.015, False), (0.04, True)])
+def test_gaps_are_told_by_where_walls_are_and_not_by_cells(
+    turned_rad: float, spare_m: float, through: bool
+) -> None:
+    """Cells of 0.1 m said of a gap with 0.065 m to spare that it is shut."""
+    grid, here, there = gap_seen(0.17 + spare_m, turned_rad)
     floor = SeenFloor(grid.states, grid.corner_xy_m, 0.05, 0.17 + 0.03, here, grid.wall_points())
     assert np.isfinite(floor.cost_to(there)) == through
+
+
+@pytest.mark.parametrize("turned_rad", [0.4, 0.6])
+def test_who_squeezed_through_a_slanting_gap_is_led_back(turned_rad: float) -> None:
+    """Cells shut it even for a body smaller by one of them: one came home with "no path leads back"."""
+    grid, start, here = gap_seen(0.17 + 0.025, turned_rad)
+    explorer = FloorExplorer.__new__(FloorExplorer)
+    vars(explorer).update(_grid=grid, _start=start, _clearance_m=0.23, _radius_m=0.17, _squeeze_m=0.03)
+    assert np.isfinite(explorer._seen(here).cost_to(start))
 
 
 def test_floor_behind_a_gap_counts_by_the_gap_and_not_by_the_lattice() -> None:

@@ -206,13 +206,9 @@ class FloorExplorer(LocalizingNavigator):
         first = self._floor_at(self._clearance_m, here)
         if math.isfinite(first.cost_to(self._start)):
             return first
-        body_m, cell_m = self._radius_m, self._grid.resolution_m
+        body_m, walls_m = self._radius_m, self._grid.wall_points()
         # Where it squeezed in it can squeeze out again.
-        for clearance_m, walls_m in (
-            (body_m + self._squeeze_m, self._grid.wall_points()),
-            (body_m, None),
-            (body_m - cell_m, None),
-        ):
+        for clearance_m in (body_m + self._squeeze_m, body_m, body_m - self._grid.resolution_m):
             floor = self._floor_at(clearance_m, here, walls_m)
             if math.isfinite(floor.cost_to(self._start)):
                 return floor
