@@ -9,7 +9,10 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from pilotage.evaluation.effects import Effect, effects, holm, power
+from pilotage.core.types import FloatArray
+from pilotage.evaluation.drawn_studies import DrawnStudies
+from pilotage.evaluation.effects import Effect, effects, holm
+from pilotage.evaluation.rank_tests import rank_tests, signed_ranks
 
 STUDIES = 400
 NOISES: dict[str, Callable[[np.random.Generator, tuple[int, ...]], np.ndarray]] = {
@@ -64,20 +67,63 @@ def test_where_one_factor_matters_the_others_are_not_blamed(paired: bool) -> Non
     assert alarms <= stats.binom.isf(0.001, STUDIES, 0.05)
 
 
+def shifted(rng: np.random.Generator, shape: tuple[int, ...], noise: str, means: FloatArray) -> FloatArray:
+    """Values of a known law whose means differ by ``means`` along the last axis."""
+    if noise == "success":
+        return (rng.random(shape) < 0.6 + means - means.mean()).astype(np.float64)
+    if noise == "count":
+        return rng.poisson(3.0 + means - means.mean(), shape).astype(np.float64)
+    return (rng.exponential(size=shape) if noise == "skewed" else rng.normal(size=shape)) + means
+
+
 @pytest.mark.parametrize("paired", [True, False])
-@pytest.mark.parametrize(("levels", "shift"), [(2, 0.8), (3, 1.1), (5, 0.5), (5, 1.1)])
-def test_power_is_as_told_within_five_points(levels: int, paired: bool, shift: float) -> None:
-    """Of 1000 studies of 25 trials each, of which 1.6 points are one standard error at most."""
-    rng, trials, tests = np.random.default_rng(7), 25, 6
-    means = np.linspace(0.0, shift, levels)
-    spread = float(((means - means.mean()) ** 2).sum())
-    told = power(spread, levels, trials, 0.05 / tests, paired=paired)
-    shown = 0
-    for _ in range(1000):
-        values = means + rng.normal(size=(trials, levels))
-        (effect,) = effects(values, ordered=[True], paired=paired, tests=tests)
-        shown += effect.p_value < 0.05 / tests
-    assert abs(shown / 1000 - told) <= 0.05
+@pytest.mark.parametrize(
+    ("noise", "trials", "levels"),
+    [("normal", 10, 2), ("normal", 25, 4), ("skewed", 25, 4), ("success", 25, 2), ("count", 25, 4)],
+)
+def test_power_is_as_told_within_five_points(noise: str, trials: int, levels: int, paired: bool) -> None:
+    """The values of 1500 trials with half of a change tell how large one is that four of five studies show;
+    2000 others with it do.
+    """
+    rng, alpha = np.random.default_rng(7), 0.05 / 6
+    half = {"normal": 0.6, "skewed": 0.4, "success": 0.24, "count": 1.0}[noise]
+    known = shifted(rng, (1500, levels), noise, np.linspace(0.0, half, levels))
+    told = DrawnStudies(known[:, None, :], paired=paired, alpha=alpha, trials=trials).detectable(0.8)
+    values = shifted(rng, (2000, trials, levels), noise, np.linspace(0.0, told, levels))
+    shown = float((rank_tests(values, paired=paired) < alpha).mean())
+    assert abs(shown - 0.8) <= 0.05
+
+
+@pytest.mark.parametrize("paired", [True, False])
+@pytest.mark.parametrize("noise", ["normal", "skewed", "success"])
+def test_as_many_trials_as_told_show_the_change(noise: str, paired: bool) -> None:
+    rng, alpha, means = np.random.default_rng(8), 0.05 / 6, np.array([0.0, 0.15, 0.3])
+    (effect,) = effects(shifted(rng, (150_000, 3), noise, means), ordered=[True], paired=paired, tests=6)
+    values = shifted(rng, (1000, int(effect.needed()), 3), noise, means)
+    shown = float((rank_tests(values, paired=paired) < alpha).mean())
+    assert abs(shown - 0.8) <= 0.05
+
+
+@pytest.mark.parametrize("paired", [True, False])
+def test_an_interaction_of_three_by_three_is_shown_as_told(paired: bool) -> None:
+    """Told as a change between corners, not in the terms of the three contrasts of which any shows it."""
+    rng, rungs = np.random.default_rng(9), np.linspace(-0.5, 0.5, 3)
+
+    def contrasts(values: FloatArray) -> FloatArray:
+        return 1.5 * (values - values.mean(axis=-2, keepdims=True))
+
+    known = contrasts(rng.normal(size=(1500, 3, 3)))
+    told = DrawnStudies(known, paired=paired, alpha=0.05 / 18, trials=25).detectable(0.8)
+    fresh = contrasts(rng.normal(size=(2000, 25, 3, 3)) + told * np.multiply.outer(rungs, rungs))
+    each = [rank_tests(fresh[:, :, row], paired=paired) < 0.05 / 18 for row in range(3)]
+    assert abs(np.any(each, axis=0).mean() - 0.8) <= 0.05
+
+
+@pytest.mark.parametrize("digits", [0, 1, 8])
+def test_patterns_of_signs_are_counted_as_scipy_tries_them(digits: int) -> None:
+    change = np.round(np.random.default_rng(10).normal(0.4, 1.0, size=(3, 7)), digits)
+    expected = [stats.wilcoxon(row, zero_method="pratt").pvalue for row in change]
+    assert signed_ranks(change) == pytest.approx(expected)
 
 
 def test_an_interaction_is_found_and_its_size_told() -> None:
@@ -120,7 +166,7 @@ def test_what_was_not_shown_is_told_with_the_trials_it_takes() -> None:
     pairs = rng.normal(size=(20_000, 2)) / math.sqrt(2.0) + np.array([0.0, 0.3])
     (effect,) = effects(pairs, ordered=[True], paired=True, tests=1)
     assert effect.needed() == pytest.approx(92, abs=8)
-    assert effect.detectable() == pytest.approx(2.8016 * math.sqrt(math.pi / 3) / math.sqrt(20_000), rel=0.05)
+    assert effect.detectable() == pytest.approx(2.8016 * math.sqrt(math.pi / 3) / math.sqrt(20_000), rel=0.1)
 
 
 def test_too_few_trials_tell_nothing() -> None:

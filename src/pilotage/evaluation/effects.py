@@ -13,22 +13,22 @@ import itertools
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from functools import lru_cache
 
 import numpy as np
-from scipy import stats
 
 from pilotage.core.types import FloatArray
-from pilotage.evaluation.intervals import ROUNDING
-from pilotage.evaluation.paired import Difference, difference, difference_apart
+from pilotage.evaluation.drawn_studies import DrawnStudies
+from pilotage.evaluation.paired import Difference, difference, difference_apart, least_trials
+from pilotage.evaluation.rank_power import RankTest, seen_in
+from pilotage.evaluation.rank_tests import rank_tests
 
 FEWEST = 5
 """Of fewer complete trials nothing is tested."""
 SURE = 0.05
 """The chance of one false finding or more in a study without effects (Holm's correction)."""
 POWER = 0.8
-_EFFICIENCY = 3.0 / math.pi
-"""Of rank tests beside those of means, for normal errors (Pitman; Hollander and Wolfe 1999)."""
+MOST_TRIALS = 1e9
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -51,10 +51,9 @@ class Effect:
         Of the variance (with shared seeds: within the seeds) that the effect explains, 0 to 1 (eta squared).
     p_value
         Of the test that there is no effect; nan where nothing varies.
-    variance
-        Of one value (with shared seeds: without the seed's own mean); of an interaction of one contrast.
-    spread
-        Sum of the squared deviations of the levels' means over that variance, without what chance adds.
+    contrasts
+        (n, q, levels) what is tested: the values by level, of an interaction its contrasts; any of the q
+        tests shows it.
     alpha
         Of the test, after the strictest correction for the family.
     """
@@ -66,9 +65,7 @@ class Effect:
     columns: tuple[FloatArray, FloatArray]
     share: float
     p_value: float
-    levels: int
-    variance: float
-    spread: float
+    contrasts: FloatArray
     alpha: float
     paired: bool
 
@@ -78,28 +75,31 @@ class Effect:
 
     def detectable(self) -> float:
         """The change between the ends, the other levels evenly between, that as many trials show in four of
-        five studies; nan where nothing varies.
+        five studies; nan where nothing varies, or where they show no change whatever.
         """
-        if not self.variance > 0.0:
-            return math.nan
-        need = _root(lambda spread: self._power(spread, self.n))
-        # The sum of squares of an even ladder from 0 to 1.
-        ladder = self.levels * (self.levels + 1.0) / (12.0 * (self.levels - 1.0))
-        return math.sqrt(need * self.variance / ladder)
+        return _detectable(self) if math.isfinite(self.p_value) else math.nan
 
     def needed(self) -> float:
         """Trials that show a change like the one seen in four of five studies; nan where the one seen is no
         more than chance brings.
         """
-        if not self.spread > 0.0:
+        seen = seen_in(self.contrasts, paired=self.paired)
+        test = RankTest(self.contrasts.shape[2], self.paired, self.alpha, self.contrasts.shape[1])
+        if not (math.isfinite(self.p_value) and np.any(seen)):
             return math.nan
-        return float(max(math.ceil(_root(lambda trials: self._power(self.spread, trials))), FEWEST))
+        fewest = max(FEWEST, self._fewest())
+        return float(max(math.ceil(_trials(lambda trials: test.power(seen, trials))), fewest))
 
-    def _power(self, spread: float, trials: float) -> float:
-        return power(spread, self.levels, trials, self.alpha, paired=self.paired)
+    def among(self, tests: int) -> Effect:
+        """The same in a family of so many tests."""
+        return replace(self, alpha=SURE / max(tests, 1) / self.contrasts.shape[1])
+
+    def _fewest(self) -> int:
+        """Of two levels, trials of which fewer show nothing whatever they are."""
+        return least_trials(1, self.alpha, paired=self.paired) if self.contrasts.shape[2] == 2 else FEWEST
 
 
-def effects(values: FloatArray, *, ordered: Sequence[bool], paired: bool, tests: int) -> list[Effect]:
+def effects(values: FloatArray, *, ordered: Sequence[bool], paired: bool, tests: int = 1) -> list[Effect]:
     """Main effects of all factors and the interactions of every two, not corrected yet.
 
     Parameters
@@ -139,32 +139,19 @@ def holm(p_values: Sequence[float], parts: int = 1) -> list[float]:
     return [float(value) for value in out]
 
 
-def power(spread: float, levels: int, trials: float, alpha: float, *, paired: bool) -> float:
-    """Chance that the test of a factor shows its effect.
-
-    By the noncentral F distribution of the analysis of variance of the ranks (Iman and Davenport 1980;
-    Conover and Iman 1981) with the ranks' efficiency; within some points from about ten trials on.
-
-    Parameters
-    ----------
-    spread
-        Sum of the squared deviations of the levels' true means from their middle, over the variance of one
-        value (with shared seeds: of what is left without the seed's own mean).
-    alpha
-        Of the test, after the correction for the family.
-    """
-    efficiency = _EFFICIENCY * (levels / (levels + 1.0) if paired and levels > 2 else 1.0)
-    below = levels - 1.0
-    above = below * (trials - 1.0) if paired else levels * (trials - 1.0)
-    critical = float(stats.f.isf(alpha, below, above))
-    return float(stats.ncf.sf(critical, below, above, max(trials * efficiency * spread, 1e-12)))
+@lru_cache(maxsize=1024)
+def _detectable(effect: Effect) -> float:
+    """A page tells it more than once."""
+    return DrawnStudies(effect.contrasts, paired=effect.paired, alpha=effect.alpha).detectable(POWER)
 
 
-def _root(power_at: Callable[[float], float]) -> float:
-    """Where a power that grows reaches ``POWER``."""
+def _trials(power_at: Callable[[float], float]) -> float:
+    """Where a power that grows reaches ``POWER``; inf where it does not up to ``MOST_TRIALS``."""
     low, high = 0.0, 2.0
     while power_at(high) < POWER:
         low, high = high, 2.0 * high
+        if high > MOST_TRIALS:
+            return math.inf
     while high - low > 1e-3 * high:
         middle = 0.5 * (low + high)
         low, high = (low, middle) if power_at(middle) >= POWER else (middle, high)
@@ -213,18 +200,10 @@ def _tested(
     tests: int,
 ) -> Effect:
     """Test contrasts (n, q, levels): q tests of which any may show the effect."""
-    n, q, levels = contrasts.shape
-    found = [p for i in range(q) if math.isfinite(p := _p_value(contrasts[:, i], paired))]
+    n, q, _ = contrasts.shape
+    each = (float(rank_tests(contrasts[None, :, i], paired=paired)[0]) for i in range(q))
+    found = [p for p in each if math.isfinite(p)]
     p_value = min(1.0, q * min(found)) if found else math.nan
-    centred = contrasts - contrasts.mean(axis=0)
-    if paired:
-        centred = centred - centred.mean(axis=2, keepdims=True)
-    variances = (centred**2).sum(axis=(0, 2)) / ((n - 1) * (levels - 1 if paired else levels))
-    middle = contrasts.mean(axis=0)
-    spreads = ((middle - middle.mean(axis=1, keepdims=True)) ** 2).sum(axis=1)
-    noisy = variances > ROUNDING**2
-    # What chance alone makes of the levels' means is taken off.
-    seen = spreads[noisy] / variances[noisy] - (levels - 1.0) / n
     seeds = values.reshape(n, -1).mean(axis=1) if paired else np.full(n, values.mean())
     total = float(((values.reshape(n, -1) - seeds[:, None]) ** 2).sum())
     return Effect(
@@ -235,25 +214,10 @@ def _tested(
         columns=(contrasts[:, 0, ends[0]], contrasts[:, 0, ends[1]]),
         share=min(size / total, 1.0) if total > 0.0 else 0.0,
         p_value=p_value,
-        levels=levels,
-        variance=float(variances.max()) if noisy.any() else math.nan,
-        spread=float(seen.max()) if noisy.any() else math.nan,
+        contrasts=contrasts,
         alpha=SURE / max(tests, 1) / q,
         paired=paired,
     )
-
-
-def _p_value(by_level: FloatArray, paired: bool) -> float:
-    """Of no effect, from (n, levels); nan where nothing differs."""
-    columns = by_level.T
-    if np.ptp(by_level) == 0.0 or (paired and bool(np.all(np.ptp(by_level, axis=1) == 0.0))):
-        return math.nan
-    if columns.shape[0] == 2:
-        if paired:
-            return float(stats.wilcoxon(columns[1] - columns[0], zero_method="pratt").pvalue)
-        return float(stats.mannwhitneyu(columns[1], columns[0]).pvalue)
-    test: Any = stats.friedmanchisquare if paired else stats.kruskal
-    return float(test(*columns).pvalue)
 
 
 def _scaled(effect: Effect, scale: float) -> Effect:
@@ -262,5 +226,5 @@ def _scaled(effect: Effect, scale: float) -> Effect:
         effect,
         means=effect.means * scale,
         columns=(first * scale, other * scale),
-        variance=effect.variance * scale**2,
+        contrasts=effect.contrasts * scale,
     )

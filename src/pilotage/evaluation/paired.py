@@ -11,9 +11,7 @@ from scipy import stats
 
 from pilotage.core.types import FloatArray
 from pilotage.evaluation.intervals import ROUNDING, bootstrap_difference, bootstrap_mean
-
-MOST_SIGNS = 13
-"""Of so many pairs all patterns of signs are tried where some are alike or do not differ."""
+from pilotage.evaluation.rank_tests import signed_ranks
 
 
 @dataclass(frozen=True, slots=True)
@@ -151,19 +149,7 @@ def least_trials(comparisons: int, level: float, *, paired: bool) -> int:
 def _wilcoxon(change: FloatArray) -> float:
     if not np.any(change):
         return math.nan
-    sizes = np.abs(change)
-    if change.size > MOST_SIGNS or (sizes.all() and np.unique(sizes).size == change.size):
-        return float(stats.wilcoxon(change, zero_method="pratt").pvalue)
-    # With ties ``wilcoxon`` tries all patterns of signs as well, but one by one: half a second for twelve.
-    ranks = stats.rankdata(sizes)
-    found = stats.permutation_test(
-        (change,),
-        lambda pairs, axis: np.sum((pairs > 0.0) * ranks, axis=axis),
-        permutation_type="samples",
-        vectorized=True,
-        axis=-1,
-    )
-    return float(found.pvalue)
+    return float(signed_ranks(change[None])[0])
 
 
 def _mcnemar(change: FloatArray) -> float:

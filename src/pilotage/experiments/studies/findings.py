@@ -86,10 +86,6 @@ class _Design:
     def ordered(self) -> list[bool]:
         return [all(_is_number(level) for level in levels) for levels in self.levels]
 
-    @property
-    def tests(self) -> int:
-        return len(self.factors) + math.comb(len(self.factors), 2)
-
 
 def findings_of(table: StudyTable) -> list[Finding]:
     """Effects of the factors on every metric that matters, the metric that answers the question first.
@@ -101,13 +97,15 @@ def findings_of(table: StudyTable) -> list[Finding]:
     others = [metric for metric in dict.fromkeys([*table.telling, SUCCESS]) if metric != table.primary]
     out: list[Finding] = []
     for family in ([table.primary], others):
-        tests = PARTS * len(family) * sum(design.tests for design in designs)
         found = [
             (metric, design, effect)
             for metric in family
             for design in designs
-            for effect in _effects(table, metric, design, tests)
+            for effect in _effects(table, metric, design)
         ]
+        # What never varies is no test and takes nothing from the others.
+        tests = PARTS * sum(math.isfinite(effect.p_value) for _, _, effect in found)
+        found = [(metric, design, effect.among(tests)) for metric, design, effect in found]
         p_values = holm([effect.p_value for _, _, effect in found], PARTS)
         out += [
             Finding(
@@ -123,11 +121,11 @@ def findings_of(table: StudyTable) -> list[Finding]:
     return out
 
 
-def _effects(table: StudyTable, metric: str, design: _Design, tests: int) -> list[Effect]:
+def _effects(table: StudyTable, metric: str, design: _Design) -> list[Effect]:
     """The effects on one metric over the trials that give it at every setting of a design."""
     trials = by_trial(table, metric)[:, design.cells]
     complete = trials[np.isfinite(trials).reshape(trials.shape[0], -1).all(axis=1)]
-    return effects(complete, ordered=design.ordered, paired=table.same_seeds, tests=tests)
+    return effects(complete, ordered=design.ordered, paired=table.same_seeds)
 
 
 def best_settings(table: StudyTable, judgement: Judgement) -> list[Best]:

@@ -27,7 +27,7 @@ HOW = (
     "by ranks ({tests}). p is corrected for all effects of the study (Holm&#x27;s, half of the chance kept "
     "for the metric that answers the question): of studies in which nothing has an effect, at most one in "
     "twenty tells of one. The last column is the change from the first to the last level that as many "
-    "trials show in four of five such studies."
+    "trials show in four of five studies, drawn from these trials&#x27; own values."
 )
 TOO_FEW = f"Effects are looked for from {FEWEST} trials on that give a metric at every setting."
 PAIRED, APART = "Wilcoxon or Friedman, on the same seeds", "Mann and Whitney or Kruskal and Wallis"
