@@ -70,10 +70,13 @@ def test_where_one_factor_matters_the_others_are_not_blamed(paired: bool) -> Non
 def shifted(rng: np.random.Generator, shape: tuple[int, ...], noise: str, means: FloatArray) -> FloatArray:
     """Values of a known law whose means differ by ``means`` along the last axis."""
     if noise == "success":
-        return (rng.random(shape) < 0.6 + means - means.mean()).astype(np.float64)
+        return np.where(rng.random(shape) < 0.6 + means - means.mean(), 1.0, 0.0)
     if noise == "count":
-        return rng.poisson(3.0 + means - means.mean(), shape).astype(np.float64)
-    return (rng.exponential(size=shape) if noise == "skewed" else rng.normal(size=shape)) + means
+        return np.asarray(rng.poisson(3.0 + means - means.mean(), shape), dtype=np.float64)
+    values: FloatArray = (
+        rng.exponential(size=shape) if noise == "skewed" else rng.normal(size=shape)
+    ) + means
+    return values
 
 
 @pytest.mark.parametrize("paired", [True, False])
@@ -110,7 +113,8 @@ def test_an_interaction_of_three_by_three_is_shown_as_told(paired: bool) -> None
     rng, rungs = np.random.default_rng(9), np.linspace(-0.5, 0.5, 3)
 
     def contrasts(values: FloatArray) -> FloatArray:
-        return 1.5 * (values - values.mean(axis=-2, keepdims=True))
+        against: FloatArray = 1.5 * (values - values.mean(axis=-2, keepdims=True))
+        return against
 
     known = contrasts(rng.normal(size=(1500, 3, 3)))
     told = DrawnStudies(known, paired=paired, alpha=0.05 / 18, trials=25).detectable(0.8)
