@@ -53,10 +53,10 @@ def main() -> int:
         return again(asked.again)
     seed = int(time.time()) if asked.seed is None else asked.seed
     guided = importlib.util.find_spec("atheris") is not None and not (asked.only or asked.cases)
-    end = time.monotonic() + 60.0 * asked.minutes * (1.0 - GUIDED_SHARE if guided else 1.0)
+    lasts_s = 60.0 * asked.minutes * (1.0 - GUIDED_SHARE if guided else 1.0)
     targets = (*TARGETS, *FILM_TARGETS)
     chosen = [target for target in targets if asked.only in target.name]
-    broken = drawn(seed, end, asked.cases, chosen, not asked.only)
+    broken = drawn(seed, lasts_s, asked.cases, chosen, not asked.only)
     if not (asked.only or asked.cases):
         cut = kill_all(KILLS, seed)
         print("\n".join([*cut, f"{KILLS} kills, {len(cut)} things not whole"]), flush=True)
@@ -66,7 +66,7 @@ def main() -> int:
     return 1 if broken else 0
 
 
-def drawn(seed: int, end: float, most: int | None, targets: list[Target], with_words: bool) -> int:
+def drawn(seed: int, lasts_s: float, most: int | None, targets: list[Target], with_words: bool) -> int:
     """Damaged inputs and words until the time is over; returns how many broke something."""
     codes: Counter[int] = Counter()
     kinds: Counter[str] = Counter()
@@ -75,6 +75,8 @@ def drawn(seed: int, end: float, most: int | None, targets: list[Target], with_w
         healthy, case = Healthy(Path(place) / "healthy"), Path(place) / "case"
         for target in targets:  # what is compiled or imported once is not the damage's doing
             run(target.words, healthy.copy(target, case))
+        # Only now: on a busy machine with an empty cache half an hour went by before the first case.
+        end = time.monotonic() + lasts_s
         while time.monotonic() < end and number != most:
             rng = random.Random(f"{seed}-{number}")
             target = targets[number % len(targets)]
