@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from scipy.spatial import cKDTree
+import scipy
 
 from pilotage.core.types import FloatArray, IntArray
 
@@ -36,7 +36,7 @@ def with_narrow_places(
     rows, columns = np.nonzero(np.abs(distance_m - clearance_m) < OFF_CELLS * cell_m)
     if not len(walls_xy_m) or not len(rows):
         return distance_m
-    walls, out = cKDTree(walls_xy_m), distance_m.copy()
+    walls, out = scipy.spatial.cKDTree(walls_xy_m), distance_m.copy()
     out[rows, columns] = _away_m(walls, _middles(rows, columns, corner_xy_m, cell_m))
     lacking_m = clearance_m - out
     rows, columns = np.nonzero((lacking_m > 0.0) & (lacking_m < math.sqrt(0.5) * cell_m))
@@ -52,6 +52,6 @@ def _middles(rows: IntArray, columns: IntArray, corner_xy_m: FloatArray, cell_m:
     return np.asarray(corner_xy_m + cell_m * (np.stack([columns, rows], axis=1) + 0.5))
 
 
-def _away_m(walls: cKDTree, points_xy_m: FloatArray) -> FloatArray:
+def _away_m(walls: scipy.spatial.cKDTree, points_xy_m: FloatArray) -> FloatArray:
     """Distance (N,) of points (N, 2) from the nearest of the walls'."""
     return np.asarray(walls.query(points_xy_m)[0])
