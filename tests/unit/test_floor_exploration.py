@@ -138,8 +138,11 @@ def test_a_grid_grows_and_follows_its_poses() -> None:
         seen = ranges(walls, pose, angles)
         grid.add(echoes(np.where(np.isfinite(seen), seen, 12.0), scanner), pose)
     there = np.array([30.0, -20.0, 1.0])
+    on_walls = grid.wall_points()
     grid.move(np.array([composed(there, pose) for pose in poses]))
     moved = grid.grid()
+    centre = grid.wall_points().mean(axis=0)
+    np.testing.assert_allclose(centre, composed(there, np.array([*on_walls.mean(axis=0), 0.0]))[:2], atol=0.2)
     inner = composed(there, np.array([5.0, 5.5, 0.0]))
     assert moved.cells[moved.cell_at(inner[0], inner[1])] == FREE
     grid.move(poses)

@@ -49,6 +49,7 @@ class ScanGrid:
         self.poses = np.zeros((0, 3))
         self.corner_xy_m: FloatArray = np.zeros(2)
         self._odds: OddsArray = np.zeros((0, 0), np.int8)
+        self._walls: tuple[FloatArray, FloatArray] | None = None
 
     @property
     def states(self) -> OccupancyArray:
@@ -91,6 +92,12 @@ class ScanGrid:
 
     def wall_points(self) -> FloatArray:
         """(M, 2) where beams ended on average in each occupied cell: walls to a centimetre, not to a cell."""
+        # Whoever adds, forgets or moves scans puts other poses there; a robot that stands asks every second.
+        if self._walls is None or self._walls[0] is not self.poses:
+            self._walls = self.poses, self._beam_ends()
+        return self._walls[1]
+
+    def _beam_ends(self) -> FloatArray:
         if not self._scans:
             return np.zeros((0, 2))
         ranges = np.array(self._scans)
