@@ -130,7 +130,7 @@ def _apply(values: dict[str, Any], parts: list[str], value: Any, told: str) -> N
     for depth, part in enumerate(parts[:-1]):
         inner = _child(place, part, told)
         if inner is None:
-            if parts[depth + 1].isdigit():
+            if whole_number(parts[depth + 1]) is not None:
                 whole = ".".join(parts[: depth + 1])
                 raise InputError(
                     f"{told}: '{whole}' has no entry {parts[depth + 1]} yet; give the list whole"
