@@ -12,7 +12,6 @@ from pilotage.core.types import FloatArray
 from pilotage.experiments.build.build import build
 from pilotage.experiments.loop import run_loop
 from pilotage.experiments.mission import mission_of, read_mission
-from pilotage.kernels.control import safe_stop
 from pilotage.stack.navigator.patrol.obstructions import (
     ABSENT_S,
     DENIED_S,
@@ -237,20 +236,6 @@ class TestPlans:
         shut = ShutPaths.of(cast("Roadmap", Around()), graph)
         assert shut == ShutPaths((1,), ((0, 2, 6.0),))
         assert OpenGraph.of(graph, OPEN, shut).graph.shortest_m[0, 1] == 6.0
-
-
-def test_where_it_plans_past_a_body_it_may_drive() -> None:
-    """Plans came 2 cm nearer than commands may: it stood before the gap, and all counted on its share."""
-    motion: Any = build(mission_of(two_rooms(DOOR_Y_M), seed=0)).team[1].stack._context.motion  # type: ignore[attr-defined]
-    radius_m = motion._senses.radius_m
-    angles = np.linspace(0.0, 2.0 * np.pi, 200)
-    rim = radius_m * np.column_stack([np.cos(angles), np.sin(angles)])
-    for ahead_m in np.linspace(0.0, 1.0, 11):
-        body = rim + np.array([ahead_m, motion.body_m])
-        seen, no_map = (body, body, NOBODY), (np.zeros((1, 1)), 0.0, 0.0, 1.0)
-        assert safe_stop.stop_is_clear(
-            0.2, 0.0, 0.2, 0.0, motion._limits, motion._safety, seen, np.zeros(3), no_map
-        )
 
 
 def test_each_side_of_a_door_that_a_mate_shuts_keeps_its_places() -> None:

@@ -17,8 +17,6 @@ from pilotage.stack.patrol.roadmap import Roadmap
 
 NO_DISCS: FloatArray = np.zeros((0, 3))
 LATENCY_S = 0.05
-ROUNDED_M = 0.03
-"""Paths between nodes come nearer than these, and bodies are seen a little elsewhere."""
 DETOUR_SLACK_S = 1.0
 NO_DETOUR_S = 6.0
 """A detour that takes longer than this is none: it waits instead."""
@@ -55,8 +53,7 @@ class Motion:
 
     def __init__(self, senses: Senses, motion: MotionConfig, roadmap: Roadmap, clearance_m: float) -> None:
         self._senses, self.roadmap, self._clearance_m = senses, roadmap, clearance_m
-        # Who stands may move again: where the gap to it is kept no nearer path can be driven.
-        self.body_m = senses.radius_m + max(clearance_m, senses.radius_m + senses.config.gap_m + ROUNDED_M)
+        self.body_m = clearance_m + senses.radius_m
         config, period_s, speed = senses.config, senses.period_s, motion.top_speed_m_s
         braking = min(motion.braking_m_s2, speed / senses.dt_s)
         turn_rate = motion.top_turn_rate_rad_s
