@@ -41,6 +41,11 @@ def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+def test_a_finished_study_leaves_one_file_of_its_rows(finished: Path) -> None:
+    """Who copies it takes all of them along."""
+    assert [path.name for path in finished.glob(f"{DATABASE}*")] == [DATABASE]
+
+
 def spoil(how: str, content: bytearray) -> bytes:
     """Break a database's bytes."""
     middle = len(content) // 2
@@ -77,11 +82,6 @@ def test_a_broken_database_is_told_in_one_line_and_what_is_left_is_exported(
     folder = tmp_path / "x"
     shutil.copytree(finished, folder)
     database = folder / DATABASE
-    with sqlite3.connect(database) as connection:
-        connection.execute("pragma wal_checkpoint(truncate)")
-    connection.close()
-    for suffix in ("-wal", "-shm"):
-        database.with_name(DATABASE + suffix).unlink(missing_ok=True)
     database.write_bytes(spoil(how, bytearray(database.read_bytes())))
     broken = database.read_bytes()
     for _ in range(2):

@@ -170,9 +170,9 @@ def has_log(path: Path) -> bool:
 
 
 def drop_log(path: Path) -> None:
-    """Take away the log of who may only read, who makes one and cannot delete it.
+    """Take away a log that was left so that readers are not held off, or by who may only read and cannot.
 
-    SQLite does as the last connection that may write closes; where another process has come, it stays.
+    SQLite does as the last connection that may write closes; where another process is there, it stays.
     """
     with suppress(OSError, sqlite3.Error):
         if has_log(path) and os.access(path, os.W_OK):

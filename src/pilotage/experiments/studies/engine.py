@@ -105,6 +105,7 @@ def run_study(
         if error.errno != errno.ENOSPC:
             raise
         raise StudyStoppedError(f"{folder}: the disk is full; make room and go on with --resume") from None
+    drop_log(folder / DATABASE)
     return counts
 
 
