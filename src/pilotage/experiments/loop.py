@@ -12,7 +12,8 @@ from pilotage.core.angles import wrap_to_pi
 from pilotage.core.types import Event, Pose2
 from pilotage.evaluation.finished import FinishedRun, RobotRun
 from pilotage.evaluation.tasks.task import Attempt, all_ended
-from pilotage.experiments.build.build import Experiment, Member, build
+from pilotage.experiments.build.build import Experiment, build
+from pilotage.experiments.build.team import Member
 from pilotage.experiments.disturbances import Disturbances
 from pilotage.experiments.people_trail import PeopleTrail
 from pilotage.experiments.progress import EVERY_S, OnProgress, Progress, metres

@@ -9,7 +9,7 @@ import numpy as np
 
 from pilotage.core.types import Command, FloatArray, Twist, WheelSpeeds
 from pilotage.evaluation.tasks.task import Task
-from pilotage.experiments.build.build import Member
+from pilotage.experiments.build.team import Member
 from pilotage.models.motion.omnidirectional import OmnidirectionalConfig
 from pilotage.models.motion.wheel_drive import WheelDriveConfig
 from pilotage.sensors.readings import OdometryIncrement, Readings, UltrasonicReading
