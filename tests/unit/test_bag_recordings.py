@@ -18,7 +18,8 @@ from pilotage.cli.app import dispatch
 from pilotage.core.errors import InputError
 from pilotage.core.types import Pose2
 from pilotage.experiments.recordings.run_scans import read_run_scans
-from pilotage.logs.bag_series import LANDMARKS, POSES, read_series
+from pilotage.logs.bag_kinds import LANDMARKS, POSES
+from pilotage.logs.bag_series import read_series
 from pilotage.logs.laser_recordings import read_laser_log
 from pilotage.maps.ros_map import RosMap, write_ros_map
 from support.command_bags import commanded

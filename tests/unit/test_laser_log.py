@@ -11,7 +11,8 @@ import pytest
 
 from pilotage.core.errors import InputError
 from pilotage.core.types import FloatArray, Pose2
-from pilotage.logs.laser_log import RawScan, assemble, interpolate_poses, read_carmen_scans
+from pilotage.logs.carmen_laser import read_carmen_scans
+from pilotage.logs.laser_log import RawScan, assemble, interpolate_poses
 from pilotage.logs.laser_recordings import read_laser_log
 from support.laser_bags import drive, write_ros1
 

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from pilotage.cli.main import main
 from pilotage.kernels.slam.frames import between
 from pilotage.logs.carmen import read_carmen
-from pilotage.logs.laser_log import laser_log_of_carmen, read_carmen_scans
+from pilotage.logs.carmen_laser import laser_log_of_carmen, read_carmen_scans
 from pilotage.logs.stamps import between_readings, increasing, keeps_order
 from support.laser_rooms import along, furnished, recording, write_carmen
 

@@ -9,13 +9,8 @@ import numpy as np
 
 from pilotage.core.angles import wrap_array_to_pi
 from pilotage.core.errors import InputError
+from pilotage.logs.bag_kinds import FIELDS, LANDMARKS, RANGES, RATES, TRUTH, TWISTS
 from pilotage.logs.bag_series import (
-    FIELDS,
-    LANDMARKS,
-    RANGES,
-    RATES,
-    TRUTH,
-    TWISTS,
     Series,
     has,
     has_odometry,

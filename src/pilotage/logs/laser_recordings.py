@@ -8,7 +8,8 @@ from pathlib import Path
 from pilotage.core.errors import InputError
 from pilotage.logs.bag_messages import is_bag
 from pilotage.logs.bags import read_bag
-from pilotage.logs.laser_log import LaserLog, read_carmen_scans
+from pilotage.logs.carmen_laser import read_carmen_scans
+from pilotage.logs.laser_log import LaserLog
 
 
 def read_laser_log(

@@ -23,12 +23,9 @@ from pilotage.experiments.recordings.drive import (
     RecordedDrive,
     limits,
 )
+from pilotage.logs.bag_kinds import LANDMARKS, RATES, TRUTH, TWISTS
 from pilotage.logs.bag_messages import is_bag
 from pilotage.logs.bag_series import (
-    LANDMARKS,
-    RATES,
-    TRUTH,
-    TWISTS,
     Series,
     has,
     has_odometry,

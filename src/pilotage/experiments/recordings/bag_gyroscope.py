@@ -10,7 +10,8 @@ import numpy as np
 from pilotage.core.angles import wrap_array_to_pi
 from pilotage.core.errors import InputError
 from pilotage.core.types import FloatArray
-from pilotage.logs.bag_series import RATES, has, mount_matrix, read_series
+from pilotage.logs.bag_kinds import RATES
+from pilotage.logs.bag_series import has, mount_matrix, read_series
 from pilotage.logs.laser_log import interpolate_poses
 from pilotage.sensors.gyroscope import GyroscopeConfig
 
