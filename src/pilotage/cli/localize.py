@@ -91,7 +91,8 @@ def localize(
 ) -> int:
     """Run a localizer over a recording and score it, against its truth where that is known."""
     from pilotage.core.types import Pose2
-    from pilotage.experiments.recordings.localize import FORMATS, Setting, localize_log
+    from pilotage.experiments.recordings.localize import localize_log
+    from pilotage.experiments.recordings.reading import FORMATS, Setting
 
     if form is not None and form not in FORMATS:
         raise unknown_name("--format", form, FORMATS)

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import math
-import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,51 +11,24 @@ from typing import Any
 import numpy as np
 import yaml
 
-from pilotage.core.config import Config
 from pilotage.core.errors import InputError
-from pilotage.core.random import RandomStreams
-from pilotage.core.types import STOP, BoolArray, Command, Event, FloatArray, Pose2
+from pilotage.core.types import BoolArray, FloatArray
 from pilotage.evaluation.log_metrics import log_metrics
-from pilotage.experiments.build.charts import load_chart
 from pilotage.experiments.leavings import drawn_grid, drawn_walls
-from pilotage.experiments.mission import read_parameters
-from pilotage.experiments.recorder import BELIEF_COLUMNS, TRUTH_COLUMNS
-from pilotage.experiments.recordings.bag_drive import bag_drive
-from pilotage.experiments.recordings.drive import (
-    LIDAR,
-    RecordedDrive,
-    RecordedSource,
-    aer1513_drive,
-    mrclam_drive,
-)
-from pilotage.experiments.recordings.parameters import shipped_parameters
+from pilotage.experiments.recordings.drive import LIDAR, RecordedDrive
+from pilotage.experiments.recordings.follow import Followed, bounds_of, build_localizer, follow
+from pilotage.experiments.recordings.parameters import shipped_parameters, with_overrides
+from pilotage.experiments.recordings.reading import UNSET, Setting, read_drive, told_format
 from pilotage.experiments.recordings.stops import localize_stops
-from pilotage.experiments.sightings import Sightings
-from pilotage.experiments.source import stepped
-from pilotage.experiments.values import apply_override, merge
-from pilotage.logs.bag_messages import is_bag
 from pilotage.logs.trajectories import write_planar_tum
-from pilotage.maps.landmark_table import read_landmark_table
-from pilotage.maps.segment_map import SegmentMap
-from pilotage.maps.world_map import WorldMap
-from pilotage.models.footprint import Footprint
 from pilotage.records.run_folder import RobotFiles, RunFiles, write_run
 from pilotage.records.trace import trace_of
 from pilotage.records.world import RobotOutline, World, landmarks_of
-from pilotage.sensors.readings import Readings
-from pilotage.stack.interface import Belief, BeliefStatus, StackStatus
-from pilotage.stack.journal import Journal
-from pilotage.stack.knowledge import RobotKnowledge
-from pilotage.stack.localization.localizer import LOCALIZERS, Localizer
+from pilotage.stack.localization.localizer import LOCALIZERS
 
-FORMATS = ("bag", "mrclam", "aer1513", "stops")
-START_STDS = (0.05, 0.05, 0.03)
-"""Metres, metres and radians of the start, whose mean is the true pose."""
 DEFAULT, ON_WALLS, ON_LANDMARKS = "ekf-gauss-markov", "particle-filter", "ekf-landmarks"
 """Which localizer is taken: of robots with parameters learned, of a laser's recording, of one without."""
 TRAJECTORY = "trajectory.tum"
-SUMS = ("beacons_seen", "beacons_accepted", "nis", "nis_dof", "nis_expected")
-"""Telemetry that adds up between scored steps; of the rest the last value is kept."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,102 +38,6 @@ class LocalizedLog:
     metrics: dict[str, object]
     run_dir: Path
     left_out: list[str]
-
-
-@dataclass(frozen=True, slots=True)
-class Setting:
-    """What a bag does not say of itself, by the options of ``pilotage localize``.
-
-    Attributes
-    ----------
-    map
-        A shipped map's name or a map file; None where landmarks are all that is known.
-    landmarks
-        A CSV table id, x_m, y_m; None: those of the map.
-    start
-        Where the robot was; None: where the truth says.
-    topics, truth, from_s, to_s
-        As ``bag_drive`` has them.
-    """
-
-    map: str | None = None
-    landmarks: Path | None = None
-    start: Pose2 | None = None
-    topics: tuple[str, ...] = ()
-    truth: str | None = None
-    from_s: float = 0.0
-    to_s: float = math.inf
-
-
-UNSET = Setting()
-
-
-def told_format(log: Path) -> str:
-    """What a recording is, by what it holds.
-
-    Raises
-    ------
-    InputError
-        Where nothing is there.
-    """
-    if not log.exists():
-        raise InputError(f"{log}: expected a recording, found nothing there")
-    if log.is_dir():
-        return "mrclam" if (log / "Barcodes.dat").exists() else "bag"
-    if is_bag(log):
-        return "bag"
-    return {".mat": "aer1513", ".csv": "stops"}.get(log.suffix.lower(), "bag")
-
-
-def read_drive(
-    log: Path, form: str, robot: int | None, max_range_m: float | None = None, setting: Setting = UNSET
-) -> RecordedDrive:
-    """Read a recording.
-
-    Raises
-    ------
-    InputError
-        Where the options do not suit the format, or the recording is not what it should be.
-    """
-    if form != "bag" and setting != UNSET:
-        raise InputError(
-            "localize: --map, --landmarks, --start, --topic, --truth, --from and --to are for bags and laser "
-            f"logs, found --format {form}"
-        )
-    if max_range_m is not None and form != "aer1513":
-        raise InputError("localize: --max-range is for --format aer1513")
-    if form == "mrclam":
-        if robot is None:
-            raise InputError("localize: expected --robot N for a MRCLAM data set, found none")
-        return mrclam_drive(log, robot)
-    if robot is not None:
-        raise InputError(f"localize: --robot is for --format mrclam; '{log.name}' holds one robot")
-    if form == "aer1513":
-        return aer1513_drive(log, max_range_m)
-    return bag_drive(
-        log,
-        _chart(log, setting),
-        start=setting.start,
-        topics=setting.topics,
-        truth=setting.truth,
-        from_s=setting.from_s,
-        to_s=setting.to_s,
-    )
-
-
-def _chart(log: Path, setting: Setting) -> WorldMap:
-    marks = None if setting.landmarks is None else read_landmark_table(setting.landmarks)
-    if setting.map is not None:
-        chart = load_chart(setting.map)
-        return chart if marks is None else chart.with_landmarks(marks)
-    if marks is None or not len(marks.ids):
-        raise InputError(
-            f"{log}: expected --map MAP (for scans) or --landmarks TABLE (for landmarks) to localize in, "
-            "found neither; 'pilotage slam' makes a map"
-        )
-    (xmin, ymin), (xmax, ymax) = marks.points_xy_m.min(axis=0), marks.points_xy_m.max(axis=0)
-    bounds = (float(xmin) - 0.5, float(ymin) - 0.5, float(xmax) + 0.5, float(ymax) + 0.5)
-    return WorldMap("landmarks", bounds, landmarks=marks)
 
 
 def localize_log(
@@ -239,169 +114,6 @@ def _verdict(scores: dict[str, object], localized: BoolArray) -> dict[str, objec
     return {"success": bool(localized[-1]), "reason": told}
 
 
-def with_overrides(localizer: str, parameters: dict[str, Any], overrides: Sequence[str]) -> dict[str, Any]:
-    """Lay ``stack.localizer.key=value`` and ``@FILE`` over a localizer's parameters."""
-    values: dict[str, Any] = {"stack": {"localizer": {"name": localizer, **parameters}}}
-    for override in overrides:
-        if override.startswith("@"):
-            values = merge(values, _only_the_localizer(override[1:], read_parameters(override[1:])))
-        elif override.startswith("stack.localizer.") and not override.startswith("stack.localizer.name"):
-            apply_override(values, override)
-        else:
-            raise InputError(
-                f"--set {override}: expected stack.localizer.KEY=VALUE; the rest is the recording's, "
-                "the localizer's name comes by --localizer"
-            )
-    chosen = dict(values["stack"]["localizer"])
-    if chosen.pop("name") != localizer:
-        raise InputError(
-            f"--set: the parameters are of another localizer than '{localizer}'; use --localizer"
-        )
-    return chosen
-
-
-def _only_the_localizer(file: str, values: dict[str, Any]) -> dict[str, Any]:
-    """Refuse parameters that a recording has no use for, and what is no mapping."""
-    at: Any = values
-    for key in ("stack", "localizer"):
-        found = [str(name) for name in at] if isinstance(at, dict) else type(at).__name__
-        if not isinstance(at, dict) or list(at) != [key]:
-            raise InputError(f"{file}: expected parameters of stack.localizer and no others, found {found}")
-        at = at[key]
-    if not isinstance(at, dict):
-        raise InputError(f"{file}: stack.localizer: expected a mapping of keys, found {at!r}")
-    return values
-
-
-def build_localizer(drive: RecordedDrive, name: str, config: Config) -> tuple[Localizer, Journal]:
-    """The localizer with what the recorded robot knew before it started, and the journal that it writes."""
-    start = drive.truth[0] if drive.start is None else drive.start.as_array()
-    if not np.isfinite(start).all():
-        raise InputError(
-            f"{drive.name}: expected --start X,Y,TH or the truth at the begin, found neither"
-            if drive.chart is not None
-            else f"{drive.name}: expected the truth at the begin, found a gap there"
-        )
-    initial = Belief(Pose2.from_array(start), np.diag(np.square(START_STDS)))
-    dt_s = float(np.median(np.diff(drive.t_s))) if drive.chart is not None else float(drive.t_s[1])
-    robot = RobotKnowledge(Footprint.disc(0.2), drive.motion, drive.sensors, dt_s, RandomStreams(0))
-    bounds_m = _bounds(drive)
-    floor = SegmentMap(np.zeros((0, 4)), np.zeros((0, 3)), bounds_m)
-    chart = drive.chart or WorldMap(drive.name, bounds_m, floor, landmarks=drive.landmarks)
-    journal = Journal()
-    return LOCALIZERS.entry(name).factory(config, robot, chart, initial, journal), journal
-
-
-class _Listener:
-    """A stack that localizes and commands nothing: the recorded robot was driven by somebody else.
-
-    Attributes
-    ----------
-    took_s
-        Wall time in the localizer.
-    """
-
-    def __init__(self, localizer: Localizer) -> None:
-        self._localizer, self.took_s = localizer, 0.0
-        self.status = (StackStatus.RUNNING, "")
-
-    @property
-    def belief(self) -> Belief:
-        """The localizer's."""
-        return self._localizer.belief
-
-    def step(self, readings: Readings) -> Command:
-        """Localize."""
-        begin = time.perf_counter()
-        self._localizer.step(readings)
-        self.took_s += time.perf_counter() - begin
-        return STOP
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Followed:
-    """What a localizer made of a drive.
-
-    Attributes
-    ----------
-    trace
-        At the scored steps, by column.
-    localized
-        (N,) whether it held itself for localized, at the same steps.
-    events, took_s
-        What it told, and its wall time.
-    seen
-        Scans and landmarks, as a replay keeps them.
-    """
-
-    trace: dict[str, FloatArray]
-    localized: BoolArray
-    events: list[Event]
-    took_s: float
-    seen: Sightings
-
-
-def follow(
-    drive: RecordedDrive, localizer: Localizer, journal: Journal, steps: int | None = None
-) -> Followed:
-    """Step a localizer through a drive."""
-    names = tuple(journal.units)
-    told_recoveries = names.index("recoveries") if "recoveries" in names else None
-    sums = [name in SUMS for name in names]
-    rows: list[list[float]] = []
-    events: list[Event] = []
-    total = [math.nan] * len(names)
-    recoveries = 0.0
-    localized: list[bool] = []
-    seen = Sightings(dict(drive.sensors))
-    source, listener = RecordedSource(drive), _Listener(localizer)
-    for (readings,), _ in stepped(source, [listener]):
-        k = source.at
-        for i, value in enumerate(journal.row):
-            if not sums[i] or math.isnan(total[i]):
-                total[i] = value
-            elif not math.isnan(value):
-                total[i] += value
-        if told_recoveries is not None and journal.row[told_recoveries] > recoveries:
-            recoveries = journal.row[told_recoveries]
-            events.append(
-                Event(
-                    readings.t_s,
-                    "recovery",
-                    "several readings in a row were rejected: the pose is trusted less",
-                )
-            )
-        if drive.scored[k]:
-            pose, cov = listener.belief.pose, listener.belief.cov
-            upper = (cov[0, 0], cov[0, 1], cov[1, 1], cov[0, 2], cov[1, 2], cov[2, 2])
-            x, y, theta = drive.truth[k]
-            heading = (theta + math.pi) % (2.0 * math.pi) - math.pi
-            rows.append([readings.t_s, x, y, heading, *pose.as_array(), *upper, *total])
-            localized.append(listener.belief.status is BeliefStatus.LOCALIZED)
-            seen.record(readings)
-            total = [math.nan] * len(names)
-        if steps is not None and k >= steps:
-            break
-    columns = (*TRUTH_COLUMNS, *BELIEF_COLUMNS, *names)
-    table = np.array(rows, dtype=np.float64).reshape(-1, len(columns))
-    return Followed(
-        {name: np.ascontiguousarray(table[:, i]) for i, name in enumerate(columns)},
-        np.array(localized, dtype=np.bool_),
-        events,
-        listener.took_s,
-        seen,
-    )
-
-
-def _bounds(drive: RecordedDrive) -> tuple[float, float, float, float]:
-    if drive.chart is not None:
-        return drive.chart.bounds_m
-    known = drive.truth[np.isfinite(drive.truth).all(axis=1), :2]
-    points = np.concatenate([drive.landmarks.points_xy_m, known])
-    (xmin, ymin), (xmax, ymax) = points.min(axis=0) - 0.5, points.max(axis=0) + 0.5
-    return float(xmin), float(ymin), float(xmax), float(ymax)
-
-
 def _write(
     out: Path,
     drive: RecordedDrive,
@@ -417,7 +129,7 @@ def _write(
     world = World(
         segments_m=np.zeros((0, 4)) if chart is None else drawn_walls(chart),
         circles_m=np.zeros((0, 3)) if chart is None else chart.walls.circles_m,
-        bounds_m=_bounds(drive),
+        bounds_m=bounds_of(drive),
         landmarks=landmarks_of(drive.landmarks.ids, drive.landmarks.points_xy_m),
         robots=(RobotOutline(start=(x, y, theta)),),
     )

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from importlib import resources
 from typing import Any
 
 import numpy as np
 
+from pilotage.core.errors import InputError
 from pilotage.core.yaml_text import load_yaml
+from pilotage.experiments.mission import read_parameters
 from pilotage.experiments.recordings.drive import BEACONS, RecordedDrive
-from pilotage.experiments.values import merge
+from pilotage.experiments.values import apply_override, merge
 from pilotage.sensors.beacon import BeaconConfig
 
 LEARNED = "ekf-gauss-markov"
@@ -37,6 +40,40 @@ def shipped_parameters(drive: RecordedDrive, localizer: str, form: str) -> tuple
             names = [f"{source['recording']} robot {source['robot']}" for source in chosen["learned_from"]]
             return merge(content["common"], chosen["parameters"]), names
     return dict(content["common"]), []
+
+
+def with_overrides(localizer: str, parameters: dict[str, Any], overrides: Sequence[str]) -> dict[str, Any]:
+    """Lay ``stack.localizer.key=value`` and ``@FILE`` over a localizer's parameters."""
+    values: dict[str, Any] = {"stack": {"localizer": {"name": localizer, **parameters}}}
+    for override in overrides:
+        if override.startswith("@"):
+            values = merge(values, _only_the_localizer(override[1:], read_parameters(override[1:])))
+        elif override.startswith("stack.localizer.") and not override.startswith("stack.localizer.name"):
+            apply_override(values, override)
+        else:
+            raise InputError(
+                f"--set {override}: expected stack.localizer.KEY=VALUE; the rest is the recording's, "
+                "the localizer's name comes by --localizer"
+            )
+    chosen = dict(values["stack"]["localizer"])
+    if chosen.pop("name") != localizer:
+        raise InputError(
+            f"--set: the parameters are of another localizer than '{localizer}'; use --localizer"
+        )
+    return chosen
+
+
+def _only_the_localizer(file: str, values: dict[str, Any]) -> dict[str, Any]:
+    """Refuse parameters that a recording has no use for, and what is no mapping."""
+    at: Any = values
+    for key in ("stack", "localizer"):
+        found = [str(name) for name in at] if isinstance(at, dict) else type(at).__name__
+        if not isinstance(at, dict) or list(at) != [key]:
+            raise InputError(f"{file}: expected parameters of stack.localizer and no others, found {found}")
+        at = at[key]
+    if not isinstance(at, dict):
+        raise InputError(f"{file}: stack.localizer: expected a mapping of keys, found {at!r}")
+    return values
 
 
 def _shipped(form: str) -> dict[str, Any]:
