@@ -12,7 +12,7 @@ from pilotage.core.random import RandomStreams
 from pilotage.core.types import FloatArray, Pose2, Twist
 from pilotage.experiments.mission import mission_of, read_mission
 from pilotage.experiments.run import run_mission
-from pilotage.kernels.control.movers import drive_closes_in
+from pilotage.kernels.control.closing_in import drive_closes_in
 from pilotage.kernels.geometry.motion import exact_arc
 from pilotage.kernels.scans.rays import fan_ranges
 from pilotage.maps.segment_map import SegmentMap

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from pilotage.core.types import FloatArray
+from pilotage.kernels.control.closing_in import closes_in
 from pilotage.kernels.control.movers import (
     COLUMNS,
     MISSED,
@@ -17,12 +18,10 @@ from pilotage.kernels.control.movers import (
     VY,
     X,
     Y,
-    closes_in,
-    cut_off,
     foretold,
-    scan_clusters,
     track_step,
 )
+from pilotage.kernels.control.scan_clusters import cut_off, scan_clusters
 from pilotage.stack.control.local.body import make_body
 
 

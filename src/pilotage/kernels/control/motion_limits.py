@@ -6,6 +6,7 @@ import math
 from typing import NamedTuple
 
 from pilotage.kernels.arrays import FloatArray
+from pilotage.kernels.control.closing_in import closes_in
 from pilotage.kernels.control.footprint import Body
 from pilotage.kernels.control.ground import (
     Ground,
@@ -16,7 +17,6 @@ from pilotage.kernels.control.ground import (
     sure_clearance,
 )
 from pilotage.kernels.control.heading_vector import along_arc
-from pilotage.kernels.control.movers import closes_in
 from pilotage.kernels.geometry.motion import exact_arc
 from pilotage.kernels.jit import kernel
 

@@ -8,11 +8,11 @@ from typing import NamedTuple
 import numpy as np
 
 from pilotage.kernels.arrays import FloatArray
+from pilotage.kernels.control.closing_in import closes_in, movers_clearance
 from pilotage.kernels.control.footprint import Body
 from pilotage.kernels.control.ground import Ground, clearance_of, disc_clearance, disc_seen, seen_under
 from pilotage.kernels.control.heading_vector import along_arc
 from pilotage.kernels.control.motion_limits import Drive, advance, braking_is_free, rates_after
-from pilotage.kernels.control.movers import closes_in, movers_clearance
 from pilotage.kernels.control.togo import togo_at
 from pilotage.kernels.geometry.motion import wrap
 from pilotage.kernels.jit import kernel

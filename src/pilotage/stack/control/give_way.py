@@ -6,7 +6,7 @@ import math
 
 from pilotage.core.config import Config
 from pilotage.core.types import FloatArray, Pose2, Twist
-from pilotage.kernels.control.movers import drive_closes_in
+from pilotage.kernels.control.closing_in import drive_closes_in
 from pilotage.sensors.sensor import NonNegative, Positive
 from pilotage.stack.knowledge import RobotKnowledge
 from pilotage.stack.perception.moving_bodies import MovingBodies

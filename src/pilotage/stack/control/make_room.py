@@ -10,7 +10,7 @@ from pydantic import Field
 from pilotage.core.angles import wrap_to_pi
 from pilotage.core.config import Config
 from pilotage.core.types import STOP, BoolArray, FloatArray, Pose2, Twist
-from pilotage.kernels.control.movers import AWAY
+from pilotage.kernels.control.closing_in import AWAY
 from pilotage.maps.distance_field import DistanceField
 from pilotage.sensors.sensor import Positive
 from pilotage.stack.knowledge import RobotKnowledge

@@ -10,6 +10,7 @@ from pydantic import Field
 from pilotage.core.config import Config
 from pilotage.core.types import BoolArray, FloatArray, IntArray
 from pilotage.kernels.control import movers as kernels
+from pilotage.kernels.control.scan_clusters import UNUSED, scan_clusters
 from pilotage.sensors.sensor import NonNegative, Positive
 
 
@@ -106,7 +107,7 @@ class Movers:
         Returns the row of ``tracks`` of each point (N,), -1 of those of no cluster.
         """
         config = self._config
-        centres, of_point = kernels.scan_clusters(
+        centres, of_point = scan_clusters(
             x_m, y_m, points, config.gap_m, config.widest_m, config.least_points
         )
         kernels.keep_unseen(
@@ -132,7 +133,7 @@ class Movers:
             config.most_missed,
         )
         self._things = np.zeros(len(self.tracks), np.bool_)
-        of_track: IntArray = np.append(of_centre, kernels.UNUSED)[of_point]
+        of_track: IntArray = np.append(of_centre, UNUSED)[of_point]
         return of_track
 
     def _count(self) -> BoolArray:

@@ -11,6 +11,7 @@ from pydantic import Field
 from pilotage.core.config import Config
 from pilotage.core.types import BoolArray, FloatArray, IntArray, Pose2
 from pilotage.kernels.control import movers as kernels
+from pilotage.kernels.control.scan_clusters import UNUSED, cut_off
 from pilotage.maps.world_map import WorldMap
 from pilotage.sensors.lidar import LidarConfig
 from pilotage.sensors.readings import LidarScan, Readings
@@ -117,7 +118,7 @@ class MovingBodies:
         if not len(points) and not len(self._movers.tracks):
             self._loose = points
             return readings
-        of_track = np.full(len(points), kernels.UNUSED)
+        of_track = np.full(len(points), UNUSED)
         if not self.about:
             self._movers.forget(self._movers.tracks[:, kernels.PP] > VAGUE_M**2)
         # Before the first one is known nothing is taken for somebody of which only a moving part is seen.
@@ -142,7 +143,7 @@ class MovingBodies:
     def _cut_off(self, points: FloatArray, beams: IntArray, ranges_m: FloatArray) -> BoolArray:
         """Which points belong to a thing that goes on beyond the field of view, or the reach."""
         looks_around = self._field[1] - self._field[0] > 2.0 * math.pi - 1.5 * self._step
-        cut: BoolArray = kernels.cut_off(
+        cut: BoolArray = cut_off(
             points, beams, ranges_m, self._reach_m, self._config.tracks.gap_m, looks_around
         )
         return cut

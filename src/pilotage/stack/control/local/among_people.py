@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from pilotage.kernels.control.movers import movers_clearance
+from pilotage.kernels.control.closing_in import movers_clearance
 from pilotage.stack.control.local.blind_side import blind_rad
 from pilotage.stack.control.local.gap_horizon_config import GapHorizonConfig
 from pilotage.stack.control.local.role import LocalView
