@@ -113,6 +113,20 @@ def test_what_does_not_fit_is_a_status_with_its_reason() -> None:
     assert "outline" in nose_in.reason
 
 
+def test_a_goal_without_a_heading_is_reached_in_one_that_fits() -> None:
+    """Straight at it the car would stand across a lane that is narrower than the car is long."""
+    world = yard((2.6, 6.5, 4.0, 3.0), (7.4, 6.5, 2.8, 3.0))
+    assert world.segments_m.shape[0] > 4
+    ask = request(world, Pose2(1.5, 4.0, 0.0), Goal(5.3, 5.6))
+    result = HybridAstarPlanner(HybridAstarConfig()).plan(ask)
+    assert result.status is PlanStatus.FOUND, result.reason
+    assert result.path is not None
+    x, y, theta = result.path.states[-1].tolist()
+    assert (x, y) == pytest.approx((5.3, 5.6), abs=1e-6)
+    assert abs(math.sin(theta)) > 0.8, "along the lane"
+    assert least_clearance_m(result.path, world) > 0.0
+
+
 def test_the_same_query_has_the_same_answer() -> None:
     world = WORLDS["a narrow gate"]
     asked = request(world, Pose2(1.5, 4.5, 0.0), Goal(7.5, 5.5, 0.0))

@@ -46,7 +46,8 @@ class HybridAstarPlanner:
     """Drives forwards and backwards on arcs that the car can drive, its outline clear of everything.
 
     Resolution complete only: a bay that fits with less than a cell to spare may be missed. A goal without a
-    heading is taken to have that of the straight line to it.
+    heading is taken to have that of the straight line to it, or where the outline does not fit so the one
+    nearest to it in which it does; a path that only another heading has is missed.
     """
 
     FOR_OUTLINE: ClassVar[bool] = True
@@ -76,13 +77,14 @@ class HybridAstarPlanner:
         ground = hybrid.Ground(
             field.distance_m, *field.origin_xy_m, field.resolution_m, field.segments_m, field.circles_m
         )
-        start, goal = request.start.as_array(), _goal_pose(request)
+        start, goal = request.start.as_array(), _goal_pose(request, car, ground, config.headings)
         for name, pose, status in (
             ("start", start, PlanStatus.START_BLOCKED),
             ("goal", goal, PlanStatus.GOAL_BLOCKED),
         ):
             if not hybrid.pose_fits(pose[0], pose[1], pose[2], car, ground):
-                reason = f"the {name} leaves less than {clearance_m:g} m between the outline and something"
+                turned = name == "goal" and request.goal.theta_rad is None
+                reason = _blocked(name, "in any heading" if turned else "as it stands there", clearance_m)
                 return failure(status, reason, time.perf_counter() - began)
         to_go = _to_go(field, goal, car.inner)
         size = 6 * config.most_expansions + 8
@@ -112,12 +114,26 @@ class HybridAstarPlanner:
         return PlanResult(PlanStatus.FOUND, reason, path, took, time.perf_counter() - began, expanded)
 
 
-def _goal_pose(request: PlanRequest) -> FloatArray:
+def _goal_pose(request: PlanRequest, car: hybrid.Car, ground: hybrid.Ground, headings: int) -> FloatArray:
+    """Where no heading is asked for, the one nearest to the straight line's in which the outline fits."""
     goal, start = request.goal, request.start
-    theta = goal.theta_rad
-    if theta is None:
-        theta = math.atan2(goal.y_m - start.y_m, goal.x_m - start.x_m)
-    return np.array([goal.x_m, goal.y_m, theta])
+    if goal.theta_rad is not None:
+        return np.array([goal.x_m, goal.y_m, goal.theta_rad])
+    straight = math.atan2(goal.y_m - start.y_m, goal.x_m - start.x_m)
+    for number in range(headings):
+        turned = math.copysign((number + 1) // 2, 0.5 - number % 2) * 2.0 * math.pi / headings
+        if hybrid.pose_fits(goal.x_m, goal.y_m, straight + turned, car, ground):
+            return np.array([goal.x_m, goal.y_m, wrap_to_pi(straight + turned)])
+    return np.array([goal.x_m, goal.y_m, straight])
+
+
+def _blocked(name: str, how: str, clearance_m: float) -> str:
+    """Why a place is none for the outline."""
+    if clearance_m > 0.0:
+        return (
+            f"at the {name} the outline, {how}, leaves less than {clearance_m:g} m to a wall or an obstacle"
+        )
+    return f"at the {name} the outline, {how}, lies in a wall or an obstacle"
 
 
 def _to_go(field: DistanceField, goal: FloatArray, inner_m: float) -> FloatArray:
