@@ -26,7 +26,7 @@ MOST_TRIALS = 40
 """Of more trials as many are drawn: a change that is seen shrinks with the root of their number."""
 MOST_PERMUTED = 4
 """Levels whose orders are all tried; of more, each trial's values are turned round and mirrored."""
-COARSE = 0.25
+COARSE = 0.4
 """Steps between values, in standard deviations, that are coarse if most values are taken more than once."""
 APART = 1e-6
 """Standard deviations that part equal draws of values that are not coarse."""
@@ -34,6 +34,8 @@ MOST_ODDS = 30.0
 """Log odds up to which an effect is taken off: nothing is left to draw from beyond."""
 STEPS, STRONGEST = 5, 64.0
 """Tries until the strength is found, and standard deviations beyond which a change is none any more."""
+BEYOND = 0.2
+"""Deviates of the power by which more than the asked one is aimed at until one is known that shows more."""
 
 
 class DrawnStudies:
@@ -91,7 +93,8 @@ class DrawnStudies:
             else:
                 high, above = strength, (deviate, change)
             # The deviate of the power grows about evenly with the strength.
-            aimed = strength * (asked + sure) / max(deviate + sure, 0.3 * sure)
+            goal = asked if math.isfinite(high) else asked + BEYOND
+            aimed = strength * (goal + sure) / max(deviate + sure, 0.3 * sure)
             between = 0.5 * (low + high) if math.isfinite(high) else 2.0 * low
             strength = aimed if low < aimed < high else between
             if strength > STRONGEST:
