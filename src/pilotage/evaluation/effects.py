@@ -201,9 +201,9 @@ def _tested(
 ) -> Effect:
     """Test contrasts (n, q, levels): q tests of which any may show the effect."""
     n, q, _ = contrasts.shape
-    each = (float(rank_tests(contrasts[None, :, i], paired=paired)[0]) for i in range(q))
-    found = [p for p in each if math.isfinite(p)]
-    p_value = min(1.0, q * min(found)) if found else math.nan
+    each = rank_tests(np.moveaxis(contrasts, 1, 0), paired=paired)
+    found = each[np.isfinite(each)]
+    p_value = min(1.0, q * float(found.min())) if found.size else math.nan
     seeds = values.reshape(n, -1).mean(axis=1) if paired else np.full(n, values.mean())
     total = float(((values.reshape(n, -1) - seeds[:, None]) ** 2).sum())
     return Effect(
