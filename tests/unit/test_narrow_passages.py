@@ -16,7 +16,8 @@ from pilotage.kernels.control.togo import UNREACHED_S, togo_at
 from pilotage.kernels.scans.rays import fan_ranges
 from pilotage.models.footprint import Footprint
 from pilotage.stack.control.local.drive import polygon_around
-from pilotage.stack.control.local.gap_horizon import LOOKS_ASIDE_M, LOOKS_PAST_M
+from pilotage.stack.control.local.gap_horizon import LOOKS_ASIDE_M, LOOKS_PAST_M, GapHorizon
+from pilotage.stack.control.local.gap_horizon_config import GapHorizonConfig
 from pilotage.stack.control.local.gap_strip import sides_begin_m, widest_strip
 from pilotage.stack.control.local.narrow_passage import PASSED_BEHIND_M, NarrowPassage
 from pilotage.stack.control.local.role import LocalLimits, LocalView
@@ -218,3 +219,30 @@ def test_a_robot_may_turn_where_it_stands_at_first_whatever_its_laser_shows(fiel
     column = int((0.02 - ground.x0_m) * ground.per_coarse)
     assert ground.unseen_m[behind[0], column] > 0.0
     assert (ground.unseen_m[behind[1], column - 1] > 0.0) == (field_deg in (60, 270))
+
+
+def test_what_was_closed_on_the_way_to_one_goal_is_open_on_the_way_to_another() -> None:
+    """And lined up for anew: back at a gap that it had got through a robot did not try it again."""
+    walls = np.concatenate([_gap(0.8, 0.1), [[-1, -3, 5, -3], [-1, 3, 5, 3], [-1, -3, -1, 3], [5, -3, 5, 3]]])
+    there, ground = Pose2(0.5, 0.0, 0.0), RollingGround(RollingConfig())
+    view, before = _view(0.0, there, walls), (1.5, 0.0)
+
+    def takes_s(t_s: float, goal_xy_m: tuple[float, float]) -> float:
+        # The field is worked out every few steps.
+        for k in range(RollingConfig().replan_steps):
+            seen = ground.update(replace(view, t_s=t_s + 0.01 * k, goal_xy_m=goal_xy_m)).ground
+        return float(togo_at(0.5, 0.0, seen.togo_s, seen.x0_m, seen.y0_m, seen.coarse_m))
+
+    open_s = takes_s(0.0, (4.0, 0.0))
+    ground.close(2.05, 0.0, 0.4)
+    assert takes_s(0.1, (4.0, 0.0)) > 2.0 * open_s
+    assert takes_s(0.2, (4.0, 1.0)) > 2.0 * open_s
+    assert takes_s(0.3, before) < open_s
+    assert takes_s(0.4, (4.0, 0.0)) == pytest.approx(open_s, rel=0.05)
+    controller = GapHorizon(GapHorizonConfig(), np.random.default_rng(0))
+    scene = _scene(there, walls)
+    passage = NarrowPassage(2.05, 0.0, 0.0, 0.8, 0, 0.0)
+    controller._tried = [(passage.x_m, passage.y_m, scene.goal)]
+    assert controller._has_tried(passage, scene)
+    assert controller._has_tried(passage, replace(scene, goal=scene.goal + np.array([0.0, 1.0])))
+    assert not controller._has_tried(passage, replace(scene, goal=np.array(before)))

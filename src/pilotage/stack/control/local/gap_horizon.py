@@ -31,6 +31,7 @@ from pilotage.stack.control.local.plan_pool import PlanPool
 from pilotage.stack.control.local.role import LOCAL_CONTROLLERS, LocalView
 from pilotage.stack.control.local.rolling import Scene
 from pilotage.stack.control.local.rolling_step import RollingController
+from pilotage.stack.control.local.time_to_go import is_same_goal
 from pilotage.stack.control.local.turning_room import TurningRoom, find_turning_room
 
 BLIND_M = 0.02
@@ -77,7 +78,7 @@ class GapHorizon(RollingController):
         self._turn: MultiPointTurn | None = None
         self._backs_out = False
         self._moved_s = 0.0
-        self._tried: list[tuple[float, float]] = []
+        self._tried: list[tuple[float, float, FloatArray]] = []
         self._since: tuple[float, float, float] | None = None
         self._people = AmongPeople(config)
 
@@ -201,14 +202,16 @@ class GapHorizon(RollingController):
         found = find_narrow_passage(scene, FORESEEN_M, view.t_s, tight_m(scene.body))
         if found is None or not (found.is_tight(scene.body) and found.is_ahead(scene)):
             return None
-        if self._has_tried(found):
+        if self._has_tried(found, scene):
             return None
-        self._tried.append((found.x_m, found.y_m))
+        self._tried.append((found.x_m, found.y_m, scene.goal))
         self._moved_s = view.t_s
         return found
 
-    def _has_tried(self, found: NarrowPassage) -> bool:
-        return any(math.hypot(found.x_m - a, found.y_m - b) <= TRIED_M for a, b in self._tried)
+    def _has_tried(self, found: NarrowPassage, scene: Scene) -> bool:
+        """Whether it lined up before that gap already, on its way to this goal."""
+        self._tried = [one for one in self._tried if is_same_goal(one[2], scene.goal)]
+        return any(math.hypot(found.x_m - a, found.y_m - b) <= TRIED_M for a, b, _ in self._tried)
 
     def _room_m(self, scene: Scene) -> float:
         """What its middle has to keep from everything for a body to turn on the spot, and a little more."""
@@ -260,9 +263,9 @@ class GapHorizon(RollingController):
             return
         found = find_narrow_passage(scene, FORESEEN_M, view.t_s)
         found = found or find_narrow_passage(scene, config.close_ahead_m, view.t_s)
-        if found and not self._has_tried(found):
+        if found and not self._has_tried(found, scene):
             # Straight through it first; where that fails as well it is closed.
-            self._tried.append((found.x_m, found.y_m))
+            self._tried.append((found.x_m, found.y_m, scene.goal))
             self._passage = found
             self._moved_s = view.t_s
             return

@@ -15,6 +15,9 @@ BEYOND_S = 6.0
 """The time to go is worked out so far past the robot: no plan goes back farther."""
 AT_ONCE = 10**6
 """More steps than any plan is kept."""
+OTHER_GOAL_M = 2.0
+"""A goal this far from where it was is another one: what was closed on the way to the first may be the only
+way to it."""
 SLOW_SHARE, CRAWL_SHARE = 0.5, 0.16
 """Of the robot's own speed, at most, near obstacles and between them: to whom all places are as fast, the way
 leads along the walls, no farther from them than its inner disc."""
@@ -26,6 +29,7 @@ class TimeToGo:
     def __init__(self, config: RollingConfig) -> None:
         self._config, self._coarse_m = config, 2.0 * config.cell_m
         self._closed: list[tuple[float, float, float]] = []
+        self._closed_for: list[FloatArray] = []
         self._eased_m = 0.0
         self._since = AT_ONCE
 
@@ -62,6 +66,7 @@ class TimeToGo:
         """
         self._seen, self._corner_m, self._goal, self._pose = seen, corner_m, goal, pose
         self._since += 1
+        self._reopen()
         if rolled or self._since >= self._config.replan_steps:
             self._since = 0
             self._clearance = togo.coarse_clearance(
@@ -71,8 +76,9 @@ class TimeToGo:
         return self._field
 
     def close(self, x_m: float, y_m: float, radius_m: float) -> None:
-        """Lead no way through a disc of the map frame any more."""
+        """Lead no way to this goal through a disc of the map frame any more."""
         self._closed.append((x_m, y_m, radius_m))
+        self._closed_for.append(self._goal.copy())
         self._eased_m = 0.0
         self._since = AT_ONCE
 
@@ -84,7 +90,16 @@ class TimeToGo:
         if not self._closed:
             self._eased_m = 0.5 * self._config.cell_m
         self._closed.clear()
+        self._closed_for.clear()
         self._since = AT_ONCE
+
+    def _reopen(self) -> None:
+        """Forget what was closed on the way to another goal."""
+        kept = [k for k, goal in enumerate(self._closed_for) if is_same_goal(goal, self._goal)]
+        if len(kept) < len(self._closed):
+            self._closed = [self._closed[k] for k in kept]
+            self._closed_for = [self._closed_for[k] for k in kept]
+            self._since = AT_ONCE
 
     def beside(self, discs: FloatArray | None, body: Body, drive: Drive) -> FloatArray:
         """Time to go (m, m) on the ground as it is where discs (N, 3) are closed as well."""
@@ -129,6 +144,11 @@ class TimeToGo:
         blocked_m = body.inner_m + self._config.edge_m - self._eased_m
         tight_m = max(blocked_m, body.outer_m - self._config.cell_m)
         return blocked_m, tight_m, max(self._config.easy_m, tight_m + 0.05)
+
+
+def is_same_goal(one_xy_m: FloatArray, other_xy_m: FloatArray) -> bool:
+    """Whether what was learnt on the way to one goal (2,) holds for the way to another."""
+    return bool(np.hypot(*(one_xy_m - other_xy_m)) <= OTHER_GOAL_M)
 
 
 def _beside(clearance: FloatArray, discs: FloatArray, x0: float, y0: float, coarse: float) -> FloatArray:
