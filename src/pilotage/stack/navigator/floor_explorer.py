@@ -22,6 +22,7 @@ from pilotage.stack.localization.localizer import Abilities
 from pilotage.stack.mapping.scan_grid import ScanGrid, echoes
 from pilotage.stack.navigator.floor_explorer_config import FloorExplorerConfig
 from pilotage.stack.navigator.frontier_targets import SAME_M, Target, Targets
+from pilotage.stack.navigator.getting_on import STALL_M, GettingOn
 from pilotage.stack.navigator.navigator import LocalizingNavigator, Parts, localizer_of
 from pilotage.stack.navigator.progress import patience_s
 
@@ -30,7 +31,6 @@ HOME_STALLS = 6
 local controller tries three times for 25 s to get through a gap."""
 AHEAD_M = 2.5
 """The local controller is led by a point so far ahead on the path."""
-STALL_M = 0.3
 SHY_SHARE = 1.0 / 3.0
 """Where it got no farther for this share of its patience it is led along the path itself: by a point that a
 line with room leads to, not by one around a corner, straight to which a gap may be too narrow for it."""
@@ -107,9 +107,9 @@ class FloorExplorer(LocalizingNavigator):
         self._doing, self._target = Doing.EXPLORE, None
         self._targets = Targets(config)
         self._sure_m, self._checked = 0.0, 0
-        self._planned_s, self._moved_s, self._moved_from = -math.inf, 0.0, self._start
+        self._planned_s = -math.inf
+        self._getting_on = GettingOn(self._start, robot.motion.top_speed_m_s)
         self._stalled_at: FloatArray | None = None
-        self._stalls = 0
         self._floor: SeenFloor | None = None
         self._frontiers, self._squeezing = 0, False
         journal.result("grid", self._left)
@@ -283,13 +283,13 @@ class FloorExplorer(LocalizingNavigator):
         """Give up a target that it gets no nearer to."""
         if self._stalled_at is not None and float(np.hypot(*(here - self._stalled_at))) > AHEAD_M:
             self._stalled_at = None
-        if float(np.hypot(*(here - self._moved_from))) > STALL_M:
-            self._moved_from, self._moved_s, self._stalls = here, t_s, 0
-            return
-        if t_s - self._moved_s > SHY_SHARE * self._stall_s:
+        target = self._target
+        path, xy_m = (np.zeros((0, 2)), None) if target is None else (target.path, target.xy_m)
+        stalled_s = self._getting_on.stalled_s(t_s, here, xy_m, path)
+        if stalled_s > SHY_SHARE * self._stall_s:
             self._stalled_at = here
-        if t_s - self._moved_s > self._stall_s:
-            self._moved_s = t_s
+        if stalled_s > self._stall_s:
+            self._getting_on.stall(t_s)
             if self._target is not None and self._doing is not Doing.RETURN:
                 what = "a frontier" if self._doing is Doing.EXPLORE else "the place of a loop"
                 x_m, y_m = self._target.xy_m
@@ -298,9 +298,7 @@ class FloorExplorer(LocalizingNavigator):
                 )
                 self._failed_to_reach(self._target)
                 self._target = None
-            elif self._doing is Doing.RETURN and self._stalls + 1 < HOME_STALLS:
-                self._stalls += 1
-            elif self._doing is Doing.RETURN:
+            elif self._doing is Doing.RETURN and self._getting_on.stalls >= HOME_STALLS:
                 self._fail(t_s, "stuck on its way back to the start")
 
     # --- coming back --------------------------------------------------------------------------------
