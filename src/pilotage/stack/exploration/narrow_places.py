@@ -8,6 +8,7 @@ import numpy as np
 import scipy
 
 from pilotage.core.types import FloatArray, IntArray
+from pilotage.kernels.grids.most_room import most_room
 
 OFF_CELLS = 1.5
 """By so many cells what the cells say of a distance may be off."""
@@ -37,21 +38,19 @@ def with_narrow_places(
     if not len(walls_xy_m) or not len(rows):
         return distance_m
     walls, out = scipy.spatial.cKDTree(walls_xy_m), distance_m.copy()
-    out[rows, columns] = _away_m(walls, _middles(rows, columns, corner_xy_m, cell_m))
+    out[rows, columns] = walls.query(_middles(rows, columns, corner_xy_m, cell_m))[0]
+    corner_m = math.sqrt(0.5) * cell_m
     lacking_m = clearance_m - out
-    rows, columns = np.nonzero((lacking_m > 0.0) & (lacking_m < math.sqrt(0.5) * cell_m))
+    rows, columns = np.nonzero((lacking_m > 0.0) & (lacking_m < corner_m))
     if len(rows):
         steps = np.linspace(-0.5, 0.5, 2 + int(cell_m / STEP_M)) * cell_m
         within = np.stack(np.meshgrid(steps, steps), axis=2).reshape(-1, 2)
-        places = _middles(rows, columns, corner_xy_m, cell_m)[:, None] + within
-        out[rows, columns] = _away_m(walls, places.reshape(-1, 2)).reshape(len(rows), -1).max(axis=1)
+        middles = _middles(rows, columns, corner_xy_m, cell_m)
+        # From no place in the cell is the nearest point farther from the middle than this.
+        reach_m = clearance_m + 2.0 * corner_m
+        out[rows, columns] = most_room(middles, within, reach_m, walls_xy_m, cell_m)
     return out
 
 
 def _middles(rows: IntArray, columns: IntArray, corner_xy_m: FloatArray, cell_m: float) -> FloatArray:
     return np.asarray(corner_xy_m + cell_m * (np.stack([columns, rows], axis=1) + 0.5))
-
-
-def _away_m(walls: scipy.spatial.cKDTree, points_xy_m: FloatArray) -> FloatArray:
-    """Distance (N,) of points (N, 2) from the nearest of the walls'."""
-    return np.asarray(walls.query(points_xy_m)[0])

@@ -6,8 +6,9 @@ import numpy as np
 
 from pilotage.core.types import FloatArray
 from pilotage.kernels.slam.occupancy import OddsArray, add_scan
-from pilotage.maps.occupancy_grid import OCCUPIED, OccupancyArray, OccupancyGrid
+from pilotage.maps.occupancy_grid import OccupancyArray, OccupancyGrid
 from pilotage.sensors.lidar import LidarConfig
+from pilotage.stack.mapping.beam_ends import BeamEnds
 from pilotage.stack.mapping.slam.drawing import (
     HIT_ODDS,
     MISS_ODDS,
@@ -49,6 +50,7 @@ class ScanGrid:
         self.poses = np.zeros((0, 3))
         self.corner_xy_m: FloatArray = np.zeros(2)
         self._odds: OddsArray = np.zeros((0, 0), np.int8)
+        self._ends = BeamEnds(resolution_m, self._first, self._step)
         self._walls: tuple[FloatArray, FloatArray] | None = None
 
     @property
@@ -94,26 +96,9 @@ class ScanGrid:
         """(M, 2) where beams ended on average in each occupied cell: walls to a centimetre, not to a cell."""
         # Whoever adds, forgets or moves scans puts other poses there; a robot that stands asks every second.
         if self._walls is None or self._walls[0] is not self.poses:
-            self._walls = self.poses, self._beam_ends()
+            ends = self._ends.on_walls(self._scans, self.poses, self.states, self.corner_xy_m)
+            self._walls = self.poses, ends
         return self._walls[1]
-
-    def _beam_ends(self) -> FloatArray:
-        if not self._scans:
-            return np.zeros((0, 2))
-        ranges = np.array(self._scans)
-        scan, beam = np.nonzero(np.isfinite(ranges) & (ranges > 0.0))
-        at, angle = self.poses[scan], self._first + self._step * beam
-        course = at[:, 2] + angle
-        hits = at[:, :2] + ranges[scan, beam, None] * np.stack([np.cos(course), np.sin(course)], axis=1)
-        column, row = np.floor((hits - self.corner_xy_m) / self.resolution_m).astype(np.int64).T
-        rows, columns = self._odds.shape
-        inside = (column >= 0) & (column < columns) & (row >= 0) & (row < rows)
-        hits, cell = hits[inside], row[inside] * columns + column[inside]
-        on_wall = (self.states == OCCUPIED).ravel()[cell]
-        hits, cell = hits[on_wall], cell[on_wall]
-        found, cell, count = np.unique(cell, return_inverse=True, return_counts=True)
-        sums = [np.bincount(cell, hits[:, axis], len(found)) for axis in (0, 1)]
-        return np.stack(sums, axis=1) / count[:, None]
 
     def _redraw(self) -> None:
         self._odds[:] = 0
