@@ -11,10 +11,11 @@ import pytest
 from pilotage.core.types import FloatArray, Pose2, Twist
 from pilotage.kernels.control.motion_limits import Drive, advance
 from pilotage.kernels.scans.rays import fan_ranges
+from pilotage.models.footprint import Footprint
 from pilotage.sensors.lidar import LidarConfig
 from pilotage.sensors.readings import LidarScan, OdometryIncrement, Readings
 from pilotage.sensors.wheel_odometry import WheelOdometryConfig
-from pilotage.stack.control.local.drive import LocalDrive
+from pilotage.stack.control.local.drive import LocalDrive, polygon_around
 from pilotage.stack.control.local.fine_goal import approach, is_fine, is_led, rests_within
 from pilotage.stack.control.local.role import LOCAL_CONTROLLERS, LocalController, LocalLimits, LocalView
 from pilotage.stack.control.local.rolling import RollingGround, Scene
@@ -42,14 +43,15 @@ def view_of(
     tolerance_m: float,
     posts: FloatArray = NO_POSTS,
     limits: LocalLimits = LIMITS,
+    mount: Pose2 = MOUNT,
 ) -> LocalView:
     """What true odometry and a perfect laser show in a hall."""
-    x = pose.x_m + MOUNT.x_m * math.cos(pose.theta_rad)
-    y = pose.y_m + MOUNT.x_m * math.sin(pose.theta_rad)
+    x = pose.x_m + mount.x_m * math.cos(pose.theta_rad)
+    y = pose.y_m + mount.x_m * math.sin(pose.theta_rad)
     step = float(ANGLES[1] - ANGLES[0])
     ranges = fan_ranges(x, y, pose.theta_rad + float(ANGLES[0]), step, ANGLES.size, 20.0, HALL, posts)
     return LocalView(
-        t_s, pose, twist, ranges, ANGLES, MOUNT, 20.0, goal, limits, JACKAL, tolerance_m, goal_is_sure=True
+        t_s, pose, twist, ranges, ANGLES, mount, 20.0, goal, limits, JACKAL, tolerance_m, goal_is_sure=True
     )
 
 
@@ -153,6 +155,21 @@ def test_it_backs_to_what_lies_behind_and_turns_to_what_lies_beside() -> None:
     assert turned is not None
     assert turned.v_m_s == 0.0
     assert turned.w_rad_s > 0.0
+
+
+def test_it_faces_a_goal_behind_on_ground_that_it_has_not_seen() -> None:
+    """It turned its back on it, could not back, and plans turned it to face it: to and fro for 45 s."""
+    ground, goal, limits = RollingGround(RollingConfig()), (-0.05, -0.55), LocalLimits(1, 0.3, 2, 2, 2, 8)
+    outline, middle = polygon_around(Footprint.disc(0.147)), Pose2(0.0, 0.0, 0.0)
+    poses = [(-0.026, -0.068, 1.3), (0.035, -0.291, 1.79), (0.035, -0.291, 1.71), (0.035, -0.291, 1.54)]
+    for k, pose in enumerate(poses):
+        still = Twist(0.0, 0.0)
+        view = view_of(0.1 * k, Pose2(*pose), still, goal, 0.05, limits=limits, mount=middle)
+        scene = ground.update(replace(view, footprint_xy_m=outline))
+    facing = approach(scene, 0.05)
+    assert facing is not None
+    assert facing.v_m_s == 0.0
+    assert abs(facing.w_rad_s) > 1.0
 
 
 def test_it_is_no_approach_from_afar_nor_past_a_post() -> None:

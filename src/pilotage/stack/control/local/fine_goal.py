@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
@@ -23,6 +24,7 @@ passes it by a little, and hits nothing, for that is checked as ever. With 0.65 
 TURN_GAIN_PER_S = 3.0
 TURN_IN_PLACE_RAD = 0.35
 """Farther off than this it turns before it drives."""
+BACKS_M_S = 0.3
 LEAST_SPEED_M_S = 0.01
 LEAST_TURN_RAD_S = 0.1
 
@@ -52,9 +54,9 @@ def rests_within(scene: Scene, tolerance_m: float) -> bool:
 def approach(scene: Scene, tolerance_m: float) -> Twist | None:
     """The command straight to the goal; None where it is far, not to be seen from here, or not safe.
 
-    It turns on the spot, then follows the arc through the goal, backwards where that is nearer, at the
-    speed from which it can stop there. Fails where the goal is nearer to an obstacle than the footprint
-    allows, and for robots that neither back nor may turn where they are.
+    It turns on the spot, then follows the arc through the goal, backwards where that is nearer and the ground
+    there was seen, at the speed from which it can stop there. Fails where the goal is nearer to an obstacle
+    than the footprint allows, and for robots that neither back nor may turn where they are.
     """
     x, y, theta, v, _ = (float(value) for value in scene.start)
     drive, body, goal = scene.drive, scene.body, scene.goal
@@ -67,7 +69,7 @@ def approach(scene: Scene, tolerance_m: float) -> Twist | None:
     if path_distances(line, scene.ground).min() < body.inner_m:
         return None
     bearing = wrap(math.atan2(dy, dx) - theta)
-    backwards = abs(bearing) > 0.5 * math.pi and drive.reverse > 0.0
+    backwards = abs(bearing) > 0.5 * math.pi and drive.reverse > 0.0 and _can_back(scene, theta + bearing)
     off = wrap(bearing - math.pi) if backwards else bearing
     if away < 0.5 * AIM * tolerance_m:
         command = Twist(0.0, 0.0)
@@ -82,3 +84,14 @@ def approach(scene: Scene, tolerance_m: float) -> Twist | None:
         turn = 2.0 * speed * math.sin(off) / away
         command = Twist(-speed if backwards else speed, min(max(turn, -drive.turn_rate), drive.turn_rate))
     return command if is_safe(scene, command) else None
+
+
+def _can_back(scene: Scene, course_rad: float) -> bool:
+    """Whether it could begin to back in a direction, turned for it.
+
+    Else it would turn its back on a goal on unseen ground, could not back, and be turned to face it by what
+    decides then: to and fro for ever.
+    """
+    x, y = float(scene.start[0]), float(scene.start[1])
+    turned = np.array([x, y, wrap(course_rad + math.pi), 0.0, 0.0])
+    return is_safe(replace(scene, start=turned), Twist(-min(scene.drive.reverse, BACKS_M_S), 0.0))
