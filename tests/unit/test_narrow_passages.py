@@ -246,3 +246,16 @@ def test_what_was_closed_on_the_way_to_one_goal_is_open_on_the_way_to_another() 
     assert controller._has_tried(passage, scene)
     assert controller._has_tried(passage, replace(scene, goal=scene.goal + np.array([0.0, 1.0])))
     assert not controller._has_tried(passage, replace(scene, goal=np.array(before)))
+
+
+def test_who_is_bound_elsewhere_lines_up_no_more() -> None:
+    """It stood 30 s before a gap, for what it had gone there for had been seen, and its way led back."""
+    walls, there = _gap(0.66, 0.1), Pose2(1.4, 0.0, 0.0)
+    controller, view = GapHorizon(GapHorizonConfig(), np.random.default_rng(0)), _view(0.0, there, walls)
+    for k in range(3):
+        controller.step(replace(view, t_s=0.1 * k))
+    assert controller._passage is not None
+    controller.step(replace(view, t_s=0.3, goal_xy_m=(5.0, 0.5)))
+    assert controller._passage is not None
+    controller.step(replace(view, t_s=0.4, goal_xy_m=(-3.0, 0.0)))
+    assert controller._passage is None

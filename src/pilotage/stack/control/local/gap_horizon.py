@@ -74,6 +74,7 @@ class GapHorizon(RollingController):
         self._plan: FloatArray | None = None
         self._keep_turning = True
         self._passage: NarrowPassage | None = None
+        self._bound_for = np.zeros(2)
         self._room: TurningRoom | None = None
         self._turn: MultiPointTurn | None = None
         self._backs_out = False
@@ -94,6 +95,8 @@ class GapHorizon(RollingController):
         if self._people.must_stand(view, scene):
             self._plan = None
             return STOP
+        if self._passage is not None and not self._still_leads_through(self._passage, scene):
+            self._passage = None
         if self._passage is None and self._room is None and self._turn is None:
             self._passage = self._tight_ahead(view, scene)
         if self._passage is not None:
@@ -205,8 +208,12 @@ class GapHorizon(RollingController):
         if self._has_tried(found, scene):
             return None
         self._tried.append((found.x_m, found.y_m, scene.goal))
-        self._moved_s = view.t_s
+        self._moved_s, self._bound_for = view.t_s, scene.goal
         return found
+
+    def _still_leads_through(self, passage: NarrowPassage, scene: Scene) -> bool:
+        """Whether it is in the gap already, or bound for where it was when it began to line up."""
+        return passage.goes_in(scene) or is_same_goal(self._bound_for, scene.goal)
 
     def _has_tried(self, found: NarrowPassage, scene: Scene) -> bool:
         """Whether it lined up before that gap already, on its way to this goal."""
@@ -267,7 +274,7 @@ class GapHorizon(RollingController):
             # Straight through it first; where that fails as well it is closed.
             self._tried.append((found.x_m, found.y_m, scene.goal))
             self._passage = found
-            self._moved_s = view.t_s
+            self._moved_s, self._bound_for = view.t_s, scene.goal
             return
         ahead = np.ascontiguousarray(scene.path[: max(3, round(config.close_ahead_m / 0.1))])
         away = path_distances(ahead, scene.ground)
