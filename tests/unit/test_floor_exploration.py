@@ -19,10 +19,12 @@ from pilotage.maps.world_map import WorldMap
 from pilotage.missions.mission import Mission
 from pilotage.sensors.lidar import LidarConfig
 from pilotage.stack.exploration.floor_frontiers import SeenFloor
-from pilotage.stack.interface import Belief
+from pilotage.stack.interface import Belief, BeliefStatus
+from pilotage.stack.journal import Journal
 from pilotage.stack.mapping.scan_grid import ScanGrid, echoes
 from pilotage.stack.navigator.floor_explorer import Doing, FloorExplorer
-from pilotage.stack.navigator.frontier_targets import Target
+from pilotage.stack.navigator.floor_explorer_config import FloorExplorerConfig
+from pilotage.stack.navigator.frontier_targets import Target, Targets
 from support.laser_rooms import furnished, ranges, room
 from support.missions import MISSIONS
 from support.robots import ROOM
@@ -267,9 +269,9 @@ def test_who_is_under_way_to_a_gap_goes_on_where_what_it_sees_behind_it_shrinks(
         asked.append(least_m)
         return [found] if len(asked) % 2 == 0 and seen_m[len(asked) // 2 - 1] >= least_m else []
 
-    belief = SimpleNamespace(cov=np.zeros((3, 3)), pose=Pose2(0.0, 0.0, 0.0))
+    belief = Belief(Pose2(0.0, 0.0, 0.0), np.zeros((3, 3)), BeliefStatus.LOCALIZED)
     vars(explorer).update(_doing=Doing.EXPLORE, _least_m=0.4, _squeezing=False, _radius_m=0.3)
-    vars(explorer).update(_config=SimpleNamespace(unsure_m=1.0), _sure_m=0.0, _target=None)
+    vars(explorer).update(_config=SimpleNamespace(unsure_m=1.0), _sure_m=0.0, _target=None, _searched=0)
     vars(explorer).update(_squeeze_m=0.0, _grid=SimpleNamespace(wall_points=lambda: None))
     vars(explorer).update(_targets=SimpleNamespace(worth_it=worth_it))
     went: list[object] = []
@@ -279,9 +281,33 @@ def test_who_is_under_way_to_a_gap_goes_on_where_what_it_sees_behind_it_shrinks(
     monkeypatch.setattr(FloorExplorer, "_go_exploring", lambda *_: went.append("on"))
     monkeypatch.setattr(FloorExplorer, "_set_out_home", lambda *_: went.append("home"))
     for _ in range(2):
-        explorer._decide(0.0, cast(Belief, belief), HERE)
+        explorer._decide(0.0, belief, HERE)
     assert went == ["on", "on"]
     assert asked == [0.4, 1.0, 0.4, 0.4]
+
+
+def test_who_is_lost_goes_back_to_where_it_knew_its_place(monkeypatch: pytest.MonkeyPatch) -> None:
+    """With a laser of 3.5 m one left a house, saw nothing that it knew, and stood there to the end."""
+    explorer, floor = FloorExplorer.__new__(FloorExplorer), floor_of(half_seen(), np.array([3.4, 2.0]))
+    seen = Target(np.array([3.5, 2.5]), np.array([3.9, 2.5]), 0.0, True)
+    targets = Targets(FloorExplorerConfig())
+    monkeypatch.setattr(targets, "worth_it", lambda *_: [seen])
+    vars(explorer).update(
+        _doing=Doing.EXPLORE, _least_m=0.4, _squeezing=False, _target=seen, _targets=targets
+    )
+    vars(explorer).update(_config=FloorExplorerConfig(), _sure_m=0.0, _searched=0, _journal=Journal())
+    vars(explorer).update(_grid=SimpleNamespace(poses=np.tile([*HERE, 0.0], (4, 1))))
+    monkeypatch.setattr(FloorExplorer, "_seen", lambda *_: floor)
+    monkeypatch.setattr(FloorExplorer, "_watch", lambda *_: None)
+    pose, cov = Pose2(3.4, 2.0, 0.0), np.zeros((3, 3))
+    lost, known = (Belief(pose, cov, status) for status in (BeliefStatus.LOST, BeliefStatus.LOCALIZED))
+    here, doing = np.array([3.4, 2.0]), []
+    for belief in (known, lost, lost, known):
+        explorer._decide(0.0, belief, here)
+        doing.append(explorer._doing)
+        assert explorer._target is not None
+    assert doing == [Doing.EXPLORE, Doing.CLOSE, Doing.CLOSE, Doing.EXPLORE]
+    assert len(targets._tried) == 1
 
 
 def gap_seen(half_m: float, turned_rad: float) -> tuple[ScanGrid, np.ndarray, np.ndarray]:

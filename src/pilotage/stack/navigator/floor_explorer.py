@@ -37,6 +37,8 @@ line with room leads to, not by one around a corner, straight to which a gap may
 ROOM_M = 1.0
 """A frontier this long is the edge of a room, not a shadow: worth a gap that its body alone takes."""
 COUNTS = ("frontiers_seen", "frontiers_left", "frontiers_given_up", "loops_sought")
+LOST_TRIES = 4
+"""Places that it knew well it goes back to where it is lost; then it goes by what it believes."""
 RETURNS = 4
 """How often it checks, with loops closed anew, that it truly stands where it began."""
 
@@ -106,7 +108,7 @@ class FloorExplorer(LocalizingNavigator):
         self._start = np.array([start.x_m, start.y_m])
         self._doing, self._target = Doing.EXPLORE, None
         self._targets = Targets(config)
-        self._sure_m, self._checked = 0.0, 0
+        self._sure_m, self._checked, self._searched = 0.0, 0, 0
         self._planned_s = -math.inf
         self._getting_on = GettingOn(self._start, robot.motion.top_speed_m_s)
         self._stalled_at: FloatArray | None = None
@@ -139,7 +141,7 @@ class FloorExplorer(LocalizingNavigator):
         target = self._target
         goal = (math.nan, math.nan) if target is None else (float(target.xy_m[0]), float(target.xy_m[1]))
         self._channel.tell(*goal, float(self._frontiers), _std_m(belief))
-        if target is None or belief.status is BeliefStatus.LOST:
+        if target is None:
             return STOP
         tolerance_m = 0.5 * self._arrival_m()
         return self._drive.toward(self._led_to(target.path, here), belief, readings, tolerance_m)
@@ -177,6 +179,7 @@ class FloorExplorer(LocalizingNavigator):
         if self._doing is Doing.RETURN:
             self._come_back(t_s, floor, here)
             return
+        lost = self._is_lost(belief)
         if self._target is not None and self._doing is Doing.EXPLORE and self._there(here):
             self._met(self._target)
         found, widest = self._targets.worth_it(floor, belief.pose, here, self._least_m), floor
@@ -191,7 +194,8 @@ class FloorExplorer(LocalizingNavigator):
         self._frontiers = len(found)
         if self._doing is Doing.CLOSE and self._still_unsure(belief, here):
             self._go(floor, self._target)
-        elif _std_m(belief) > self._config.unsure_m + self._sure_m and self._go_closing(t_s, floor, here):
+        elif (lost or self._is_unsure(belief)) and self._go_closing(t_s, floor, here):
+            self._searched += int(lost)
             self._journal.count("loops_sought")
         elif found:
             self._go_exploring(floor, found, here)
@@ -253,9 +257,27 @@ class FloorExplorer(LocalizingNavigator):
 
     # --- closing loops ------------------------------------------------------------------------------
 
+    def _is_unsure(self, belief: Belief) -> bool:
+        return _std_m(belief) > self._config.unsure_m + self._sure_m
+
+    def _is_lost(self, belief: Belief) -> bool:
+        """Whether its scans fit nowhere, and places are left to find its way again from.
+
+        It gives up where it was going: with nothing in sight that it knows it maps nothing there. Who stands
+        still sees nothing else, and stays lost.
+        """
+        if belief.status is not BeliefStatus.LOST:
+            self._searched = 0
+            return False
+        if self._target is not None and self._doing is Doing.EXPLORE:
+            self._failed_to_reach(self._target)
+            self._target = None
+        return self._searched < LOST_TRIES
+
     def _still_unsure(self, belief: Belief, here: FloatArray) -> bool:
         """Whether to go on to where a loop may close."""
-        if self._target is None or _std_m(belief) < 0.5 * (self._config.unsure_m + self._sure_m):
+        sure = _std_m(belief) < 0.5 * (self._config.unsure_m + self._sure_m)
+        if self._target is None or (sure and belief.status is not BeliefStatus.LOST):
             return False
         if not self._there(here):
             return True
