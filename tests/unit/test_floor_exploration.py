@@ -310,6 +310,22 @@ def test_who_is_lost_goes_back_to_where_it_knew_its_place(monkeypatch: pytest.Mo
     assert len(targets._tried) == 1
 
 
+def test_who_turned_back_twice_on_its_way_to_a_frontier_gives_it_up() -> None:
+    """Over a plain it became unsure, came back to a wall, and set out again for the same place for ever."""
+    targets, floor = Targets(FloorExplorerConfig()), floor_of(half_seen())
+    pose = Pose2(1.0, 1.0, 0.0)
+    (view,) = targets.worth_it(floor, pose, HERE, 0.4)
+    targets.met(view)
+    (first,) = targets.worth_it(floor, pose, HERE, 0.4)
+    assert first.crossing
+    targets.unsure(first)
+    (again,) = targets.worth_it(floor, pose, HERE, 0.4)
+    np.testing.assert_array_equal(again.xy_m, first.xy_m)
+    targets.unsure(again)
+    left = targets.worth_it(floor, pose, HERE, 0.4)
+    assert all(np.hypot(*(other.xy_m - first.xy_m)) > 2.0 for other in left)
+
+
 def gap_seen(half_m: float, turned_rad: float) -> tuple[ScanGrid, np.ndarray, np.ndarray]:
     """What was seen of two rooms with a gap between them, and a place in each."""
     scanner = LidarConfig(beams=720, max_range_m=12.0, field_of_view_rad=2.0 * np.pi)

@@ -21,7 +21,7 @@ from pilotage.stack.knowledge import RobotKnowledge, TaskKnowledge
 from pilotage.stack.localization.localizer import Abilities
 from pilotage.stack.mapping.scan_grid import ScanGrid, echoes
 from pilotage.stack.navigator.floor_explorer_config import FloorExplorerConfig
-from pilotage.stack.navigator.frontier_targets import SAME_M, Target, Targets
+from pilotage.stack.navigator.frontier_targets import SAME_M, UNSURE_M, Target, Targets
 from pilotage.stack.navigator.getting_on import STALL_M, GettingOn
 from pilotage.stack.navigator.navigator import LocalizingNavigator, Parts, localizer_of
 from pilotage.stack.navigator.progress import patience_s
@@ -270,7 +270,7 @@ class FloorExplorer(LocalizingNavigator):
             self._searched = 0
             return False
         if self._target is not None and self._doing is Doing.EXPLORE:
-            self._failed_to_reach(self._target)
+            self._targets.failed(self._target, UNSURE_M)
             self._target = None
         return self._searched < LOST_TRIES
 
@@ -294,6 +294,8 @@ class FloorExplorer(LocalizingNavigator):
         if not (np.isfinite(costs) & far).any():
             return False
         place = early[int(np.where(far, costs, np.inf).argmin())]
+        if self._target is not None and self._doing is Doing.EXPLORE:
+            self._targets.unsure(self._target)
         self._doing = Doing.CLOSE
         self._go(floor, Target(place, place, 0.0, False))
         self._journal.say(

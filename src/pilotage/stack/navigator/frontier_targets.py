@@ -15,6 +15,8 @@ SAME_M = 0.6
 """A frontier this near to one that was looked at is that one."""
 CROSSED_M, FAILED_M = 0.2, 0.6
 """So much of a frontier around a place where it stood on it, or could not get to, is given up."""
+UNSURE_M = 2.0
+"""The same where it lost its way to it: over ground with nothing in sight the next place is no better."""
 
 
 @dataclass(slots=True)
@@ -37,6 +39,7 @@ class Targets:
         self._looked: list[FloatArray] = []
         self._tried: list[tuple[FloatArray, float]] = []
         """Places on frontiers that it stood on or could not get to, and how much around them is given up."""
+        self._unsure: list[FloatArray] = []
 
     def worth_it(self, floor: SeenFloor, pose: Pose2, here: FloatArray, least_m: float) -> list[Target]:
         """Frontiers of a length and within reach that were not given up, the best first."""
@@ -60,11 +63,17 @@ class Targets:
         else:
             self._looked.append(target.frontier_xy_m)
 
-    def failed(self, target: Target) -> None:
+    def failed(self, target: Target, around_m: float = FAILED_M) -> None:
         """It cannot get to a target: the frontier counts as looked at, its cells around as tried."""
         self._looked.append(target.frontier_xy_m)
         if target.crossing:
-            self._tried.append((target.xy_m, FAILED_M))
+            self._tried.append((target.xy_m, around_m))
+
+    def unsure(self, target: Target) -> None:
+        """It had to turn back on its way to a target, unsure of its place; the second time it is given up."""
+        if any(float(np.hypot(*(target.xy_m - place))) < 2.0 * SAME_M for place in self._unsure):
+            self.failed(target, UNSURE_M)
+        self._unsure.append(target.xy_m)
 
     def _place_for(self, floor: SeenFloor, frontier: Frontier) -> tuple[int, bool]:
         """The cell to go to for a frontier, -1 for none, and whether it is on the frontier itself."""
