@@ -206,7 +206,10 @@ def test_lining_up_before_a_gap_it_swings_no_corner_by_more_closely_than_elsewhe
     posts = np.array([[away * math.cos(-0.2), away * math.sin(-0.2), 0.075]])
     controller = make("gap-horizon")
     assert isinstance(controller, GapHorizon)
-    controller._passage = NarrowPassage(0.6, 1.0, 0.0, 0.5, 0, 0.0)
+    controller._passage, controller._bound_for = (
+        NarrowPassage(0.6, 1.0, 0.0, 0.5, 0, 0.0),
+        np.array([6.0, 0.0]),
+    )
     state = (0.0, 0.0, 0.0, 0.0, 0.0)
     true = Drive(2.0, 0.5, 3.0, 3.0, 4.0, 6.0)
     least = math.inf
@@ -227,7 +230,10 @@ def test_where_a_post_keeps_it_from_turning_it_backs_straight_out(room_m: float)
     assert isinstance(controller, GapHorizon)
     for k in range(20):
         controller.step(view_of(0.05 * k - 1.0, Pose2(0.05 * k - 1.0, 0.0, 0.0), Twist(1.0, 0.0), posts))
-    controller._passage = NarrowPassage(0.6, 1.0, 0.0, 0.5, 0, 0.0)
+    controller._passage, controller._bound_for = (
+        NarrowPassage(0.6, 1.0, 0.0, 0.5, 0, 0.0),
+        np.array([6.0, 0.0]),
+    )
     state = (0.0, 0.0, 0.0, 0.0, 0.0)
     true = Drive(2.0, 0.5, 3.0, 3.0, 4.0, 6.0)
     least = math.inf
