@@ -15,6 +15,7 @@ from pilotage.models.footprint import Footprint
 from pilotage.sensors.lidar import LidarConfig
 from pilotage.sensors.readings import LidarScan, OdometryIncrement, Readings
 from pilotage.sensors.wheel_odometry import WheelOdometryConfig
+from pilotage.stack.control.local import fine_goal
 from pilotage.stack.control.local.drive import LocalDrive, polygon_around
 from pilotage.stack.control.local.fine_goal import approach, is_fine, is_led, rests_within
 from pilotage.stack.control.local.role import LOCAL_CONTROLLERS, LocalController, LocalLimits, LocalView
@@ -170,6 +171,25 @@ def test_it_faces_a_goal_behind_on_ground_that_it_has_not_seen() -> None:
     assert facing is not None
     assert facing.v_m_s == 0.0
     assert abs(facing.w_rad_s) > 1.0
+
+
+def test_where_the_arc_is_not_safe_it_turns_on_until_the_line_is(monkeypatch: pytest.MonkeyPatch) -> None:
+    """It turned until it could begin the arc, could not, and was turned away again by its plans."""
+    safe = fine_goal.is_safe
+    monkeypatch.setattr(
+        fine_goal, "is_safe", lambda scene, one: (one.v_m_s * one.w_rad_s == 0.0) and safe(scene, one)
+    )
+    for goal in (
+        (0.28 * math.cos(0.3), 0.28 * math.sin(0.3)),
+        (-0.06 * math.cos(0.3), -0.06 * math.sin(0.3)),
+    ):
+        turning = approach(scene_at(Twist(0.0, 0.0), goal), 0.02)
+        assert turning is not None
+        assert turning.v_m_s == 0.0
+        assert turning.w_rad_s == pytest.approx(0.9, abs=0.01)
+    straight = approach(scene_at(Twist(0.0, 0.0), (0.28, 0.0)), 0.02)
+    assert straight is not None
+    assert straight.v_m_s > 0.0
 
 
 def test_it_is_no_approach_from_afar_nor_past_a_post() -> None:

@@ -24,6 +24,8 @@ passes it by a little, and hits nothing, for that is checked as ever. With 0.65 
 TURN_GAIN_PER_S = 3.0
 TURN_IN_PLACE_RAD = 0.35
 """Farther off than this it turns before it drives."""
+STRAIGHT_RAD = 0.03
+"""Turned for it by so much, there is no more to be had from turning."""
 BACKS_M_S = 0.3
 LEAST_SPEED_M_S = 0.01
 LEAST_TURN_RAD_S = 0.1
@@ -72,18 +74,20 @@ def approach(scene: Scene, tolerance_m: float) -> Twist | None:
     backwards = abs(bearing) > 0.5 * math.pi and drive.reverse > 0.0 and _can_back(scene, theta + bearing)
     off = wrap(bearing - math.pi) if backwards else bearing
     if away < 0.5 * AIM * tolerance_m:
-        command = Twist(0.0, 0.0)
-    elif abs(off) > TURN_IN_PLACE_RAD:
-        turn = max(TURN_GAIN_PER_S * abs(off), LEAST_TURN_RAD_S)
-        command = Twist(0.0, math.copysign(min(turn, drive.turn_rate), off))
-    else:
+        return Twist(0.0, 0.0) if is_safe(scene, Twist(0.0, 0.0)) else None
+    turn = max(TURN_GAIN_PER_S * abs(off), LEAST_TURN_RAD_S)
+    turned = Twist(0.0, math.copysign(min(turn, drive.turn_rate), off))
+    if abs(off) <= TURN_IN_PLACE_RAD:
         # One step is driven at this speed before it can fall.
         lag = braking * scene.dt_s
         speed = min(math.sqrt(lag * lag + 2.0 * braking * away) - lag, away / scene.dt_s)
         speed = max(min(speed, drive.reverse if backwards else drive.speed), LEAST_SPEED_M_S)
         turn = 2.0 * speed * math.sin(off) / away
-        command = Twist(-speed if backwards else speed, min(max(turn, -drive.turn_rate), drive.turn_rate))
-    return command if is_safe(scene, command) else None
+        along = Twist(-speed if backwards else speed, min(max(turn, -drive.turn_rate), drive.turn_rate))
+        if is_safe(scene, along):
+            return along
+    # Where the arc leads over what it has not seen, or past a corner, the straight line may not.
+    return turned if abs(off) > STRAIGHT_RAD and is_safe(scene, turned) else None
 
 
 def _can_back(scene: Scene, course_rad: float) -> bool:
