@@ -15,7 +15,7 @@ from pilotage.models.footprint import Footprint
 from pilotage.sensors.lidar import LidarConfig
 from pilotage.sensors.readings import LidarScan, OdometryIncrement, Readings
 from pilotage.sensors.wheel_odometry import WheelOdometryConfig
-from pilotage.stack.control.local import fine_goal
+from pilotage.stack.control.local.command_check import is_safe
 from pilotage.stack.control.local.drive import LocalDrive, polygon_around
 from pilotage.stack.control.local.fine_goal import approach, is_fine, is_led, rests_within
 from pilotage.stack.control.local.role import LOCAL_CONTROLLERS, LocalController, LocalLimits, LocalView
@@ -175,9 +175,9 @@ def test_it_faces_a_goal_behind_on_ground_that_it_has_not_seen() -> None:
 
 def test_where_the_arc_is_not_safe_it_turns_on_until_the_line_is(monkeypatch: pytest.MonkeyPatch) -> None:
     """It turned until it could begin the arc, could not, and was turned away again by its plans."""
-    safe = fine_goal.is_safe
     monkeypatch.setattr(
-        fine_goal, "is_safe", lambda scene, one: (one.v_m_s * one.w_rad_s == 0.0) and safe(scene, one)
+        "pilotage.stack.control.local.fine_goal.is_safe",
+        lambda scene, one: one.v_m_s * one.w_rad_s == 0.0 and is_safe(scene, one),
     )
     for goal in (
         (0.28 * math.cos(0.3), 0.28 * math.sin(0.3)),
