@@ -8,10 +8,11 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from pilotage.core.types import FloatArray
+from pilotage.core.types import FloatArray, Pose2
 from pilotage.experiments.build.build import build
 from pilotage.experiments.loop import run_loop
 from pilotage.experiments.mission import mission_of, read_mission
+from pilotage.kernels.control import safe_stop
 from pilotage.stack.navigator.patrol.obstructions import (
     ABSENT_S,
     DENIED_S,
@@ -236,6 +237,42 @@ class TestPlans:
         shut = ShutPaths.of(cast("Roadmap", Around()), graph)
         assert shut == ShutPaths((1,), ((0, 2, 6.0),))
         assert OpenGraph.of(graph, OPEN, shut).graph.shortest_m[0, 1] == 6.0
+
+
+def test_where_it_plans_past_a_body_it_may_drive() -> None:
+    """Plans came 2 cm nearer than commands may: it stood before the gap, and all counted on its share."""
+    motion: Any = build(mission_of(two_rooms(DOOR_Y_M), seed=0)).team[1].stack._context.motion  # type: ignore[attr-defined]
+    radius_m = motion._senses.radius_m
+    angles = np.linspace(0.0, 2.0 * np.pi, 200)
+    rim = radius_m * np.column_stack([np.cos(angles), np.sin(angles)])
+    for ahead_m in np.linspace(0.0, 1.0, 11):
+        body = rim + np.array([ahead_m, motion.shut_m])
+        seen, no_map = (body, body, NOBODY), (np.zeros((1, 1)), 0.0, 0.0, 1.0)
+        assert safe_stop.stop_is_clear(
+            0.2, 0.0, 0.2, 0.0, motion._limits, motion._safety, seen, np.zeros(3), no_map
+        )
+
+
+@pytest.mark.parametrize(("off_m", "there"), [(0.1, True), (0.6, False)])
+def test_where_the_way_around_a_body_ends_near_a_place_it_is_there(off_m: float, *, there: bool) -> None:
+    """It stood at the end of the way until it stalled, 0.51 m from the place, on every round."""
+    context: Any = build(mission_of(two_rooms(DOOR_Y_M), seed=0)).team[1].stack._context  # type: ignore[attr-defined]
+    place = context.roadmap.places_xy_m[context.hop]
+    body = place + np.array([[0.0, 0.05]])
+    near_m = 0.9 * context.task.visit_m - context.roadmap.spacing_m
+    away = place + np.array([0.0, 1.5])
+    around = context.roadmap.around(body, 0.6, (float(away[0]), float(away[1])), near_m)
+    x, y = around.origin_xy_m
+    row, column = around._seeds[context.hop]
+    end = np.array([x + column * around.spacing_m, y + row * around.spacing_m])
+    assert 0.5 < float(np.hypot(*(end - place))) <= near_m
+    out = (end - place) / float(np.hypot(*(end - place)))
+    here = end + off_m * out
+    context.roadmap = context._shut = around
+    context.pose = Pose2(float(here[0]), float(here[1]), 0.0)
+    assert context.arrived(blocked=False) is there
+    context._shut = None
+    assert not context.arrived(blocked=False)
 
 
 def test_each_side_of_a_door_that_a_mate_shuts_keeps_its_places() -> None:

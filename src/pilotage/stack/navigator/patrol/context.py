@@ -139,7 +139,7 @@ class Context(Senses):
         if len(bodies):
             # Who keeps clear of a body ends up to a node short of the nearest one.
             near_m = SURELY_RATIO * self.task.visit_m - self._open.spacing_m
-            self._shut = self._open.around(bodies, self.motion.body_m, here, near_m)
+            self._shut = self._open.around(bodies, self.motion.shut_m, here, near_m)
             shut = ShutPaths.of(self._shut, self.task.graph)
             text = "plans around " + ", ".join(f"({x:.1f}, {y:.1f})" for x, y in bodies.tolist())
             if shut.unreached:
@@ -200,9 +200,17 @@ class Context(Senses):
         """Whether it is near enough to where it drives to; what blocks a vertex may be there in its place."""
         if self.homeward:
             return self.away_m(self.hop) <= DOCK_M
-        if blocked or self.motion.taken:
+        if blocked or self.motion.taken or self._is_at_end():
             return self.away_m(self.hop) <= SURELY_RATIO * self.task.visit_m
         return self.away_m(self.hop) <= self.motion.sure_m()
+
+    def _is_at_end(self) -> bool:
+        """Whether its way around bodies leads no nearer to where it drives to."""
+        if self.roadmap is not self._shut:
+            return False
+        grid = self.roadmap.time_s(self.hop), *self.roadmap.origin_xy_m, self.roadmap.spacing_m
+        left_s = eikonal.value_at(self.pose.x_m, self.pose.y_m, *grid, 0.0)
+        return self.speed_m_s * left_s < self.roadmap.spacing_m
 
     def runs_low(self) -> bool:
         """Whether it has to go to its station from now on; tells the others that its share is theirs."""

@@ -17,6 +17,8 @@ from pilotage.stack.patrol.roadmap import Roadmap
 
 NO_DISCS: FloatArray = np.zeros((0, 3))
 LATENCY_S = 0.05
+ROUNDED_M = 0.03
+"""Paths between nodes come nearer than these, and bodies are seen a little elsewhere."""
 DETOUR_SLACK_S = 1.0
 NO_DETOUR_S = 6.0
 """A detour that takes longer than this is none: it waits instead."""
@@ -37,8 +39,8 @@ class Motion:
     ----------
     roadmap
         Whose fields it follows.
-    body_m
-        What it keeps from the middle of who stands.
+    body_m, shut_m
+        What it keeps from the middle of who stands, close by and in plans.
     standing
         (K, 2) bodies near by, map frame, that have stood for some seconds and say nothing.
     command
@@ -54,6 +56,8 @@ class Motion:
     def __init__(self, senses: Senses, motion: MotionConfig, roadmap: Roadmap, clearance_m: float) -> None:
         self._senses, self.roadmap, self._clearance_m = senses, roadmap, clearance_m
         self.body_m = clearance_m + senses.radius_m
+        # Who stands may move again: where commands keep the gap to it no nearer path can be driven.
+        self.shut_m = max(self.body_m, 2.0 * senses.radius_m + senses.config.gap_m + ROUNDED_M)
         config, period_s, speed = senses.config, senses.period_s, motion.top_speed_m_s
         braking = min(motion.braking_m_s2, speed / senses.dt_s)
         turn_rate = motion.top_turn_rate_rad_s
