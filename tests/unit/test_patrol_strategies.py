@@ -19,6 +19,7 @@ from pilotage.evaluation.idleness import Idleness, idleness
 from pilotage.experiments.graph_patrol import GraphPatrol, Radio, patrol
 from pilotage.kernels.patrol.rounds import BACK, judge_walk, plan_cost
 from pilotage.stack.patrol.graph import PatrolGraph
+from pilotage.stack.patrol.leg_times import LegTimes
 from pilotage.stack.patrol.messages import PatrolMemory
 from pilotage.stack.patrol.partition import Plan, annealed, even_sizes, partition
 from pilotage.stack.patrol.strategies.adaptive_rounds import (
@@ -418,3 +419,48 @@ def test_of_those_who_begin_in_one_room_the_nearest_to_its_door_goes_farthest() 
         assert len(strategy._plan.sizes) == 4
         nearest_m.append(float(graph.shortest_m[0, strategy._round.stops].min()))
     assert np.argsort(nearest_m).tolist() == np.argsort(-behind_m).tolist()
+
+
+def ring() -> PatrolGraph:
+    """Of eight places, 3 m from each to the next."""
+    angles = np.linspace(0.0, 2.0 * np.pi, 8, endpoint=False)
+    edges = np.full((8, 8), np.inf)
+    for k in range(8):
+        edges[k, (k + 1) % 8] = edges[(k + 1) % 8, k] = 3.0
+    return PatrolGraph.of(3.9 * np.column_stack([np.cos(angles), np.sin(angles)]), edges)
+
+
+def test_how_long_legs_take_is_learnt_and_one_that_was_held_up_counts_little() -> None:
+    walk = Round.best(ring())
+    legs = LegTimes(walk)
+    assert legs.along_s(SPEED_M_S) == pytest.approx(np.append(walk.at_m, walk.length_m) / SPEED_M_S)
+    legs.took(0, 9.0, SPEED_M_S)
+    legs.took(-1, 50.0, SPEED_M_S)
+    last_s = np.diff(legs.along_s(SPEED_M_S))
+    assert last_s[[0, 1, -1]] == pytest.approx([9.0, 6.0, 12.0])
+    legs.took(0, 12.0, SPEED_M_S)
+    assert 9.0 < np.diff(legs.along_s(SPEED_M_S))[0] < 12.0
+
+
+@pytest.mark.parametrize(("late_s", "waits"), [(0.0, False), (6.0, True)])
+def test_who_is_evenly_spaced_by_time_does_not_wait(late_s: float, *, waits: bool) -> None:
+    """Half of a round is three times as slow: by metres a mate in there seemed late, time after time."""
+    graph = ring()
+    setting = setting_for(graph, starts=(0, 0))
+    strategy = AdaptiveRoundsStrategy(AdaptiveRoundsConfig(), setting)
+    walk, memory = strategy._round, memory_at(0, graph)
+    assert len(strategy._plan.sizes) == 1
+    legs_s, t_s = np.repeat([12.0, 4.0], 4), strategy._leaves_s
+    while t_s < strategy._leaves_s + 2.0 * legs_s.sum() or strategy._place != 0:
+        stop = strategy._place
+        memory.visit(int(walk.stops[stop]), t_s)
+        assert strategy.next_vertex(memory.knowledge(t_s)) == walk.stops[(stop + 1) % 8]
+        t_s += legs_s[stop]
+    # The mate is half of the time around ahead, two legs and eight seconds; or it is late.
+    mate = PatrolMemory(len(graph), 1, 2, int(walk.stops[2]), SPEED_M_S)
+    words = np.array([strategy.words(memory.knowledge(t_s))[0], walk.at_m[2], t_s - 8.0 + late_s])
+    mate.update(t_s, words=words)
+    memory.receive(mate.message(t_s))
+    here = int(walk.stops[0])
+    memory.visit(here, t_s)
+    assert (strategy.next_vertex(memory.knowledge(t_s)) == here) is waits

@@ -14,6 +14,7 @@ from pydantic import Field
 from pilotage.core.config import Config
 from pilotage.core.types import FloatArray, IntArray
 from pilotage.sensors.sensor import NonNegative, Positive
+from pilotage.stack.patrol.leg_times import LegTimes
 from pilotage.stack.patrol.meetings import slowed
 from pilotage.stack.patrol.messages import NOTHING, PatrolKnowledge, PatrolState
 from pilotage.stack.patrol.partition import Plan, annealed, even_sizes
@@ -41,7 +42,7 @@ class AdaptiveRoundsConfig(Config):
     mean_weight: NonNegative = 2.0
     sharing_cost: NonNegative = 0.06
     meeting_m: NonNegative = 2.5
-    slack: Positive = Field(default=0.05, le=0.5)
+    slack: Positive = Field(default=0.1, le=0.5)
     silent_s: Positive = 30.0
     silent_ratio: Positive = 8.0
     """A robot is given up when its last word is so old, and so many times as old as it usually is; one that
@@ -101,6 +102,7 @@ class AdaptiveRoundsStrategy:
         mates = [robot for robot in sorted(groups) if groups[robot] == groups[setting.robot]]
         slots = spread(self._round, self._graph, setting.starts[mates], setting.speed_m_s, setting.begin_s)
         slot = slots[mates.index(setting.robot)]
+        self._legs, self._left_s = LegTimes(self._round), math.nan
         self._place = slot.place
         self._leaves_s = slot.leaves_s if len(mates) > 1 else setting.begin_s
         # Sums of the silences between words, and of half their squares (their quotient is a word's mean
@@ -121,10 +123,12 @@ class AdaptiveRoundsStrategy:
             return here
         if here != stops[self._place]:
             return int(stops[self._place])
+        self._reached(knowledge)
         self._phase_s, self._is_on_round = now_s, True
         if now_s < self._leaves_s or len(stops) == 1 or self._is_ahead(knowledge):
             return here
         self._waited_s, self._last_wait_s = 0.0, None
+        self._left_s = now_s
         self._place = (self._place + 1) % len(stops)
         # A walk may pass a vertex twice, never twice in a row.
         return int(stops[self._place])
@@ -139,6 +143,13 @@ class AdaptiveRoundsStrategy:
             return NOTHING
         before = self._place if knowledge.at == knowledge.target else self._place - 1
         return np.array([_key(self._round), self._round.at_m[before], self._phase_s])
+
+    def _reached(self, knowledge: PatrolKnowledge) -> None:
+        """It is at the stop that it was sent to; learn how long that took, the first time it is asked."""
+        if math.isfinite(self._left_s):
+            took_s = knowledge.now_s - self._left_s
+            self._legs.took(self._place - 1, took_s, knowledge.speed_m_s)
+            self._left_s = math.nan
 
     def _listen(self, knowledge: PatrolKnowledge) -> None:
         """Note who is heard and how often; plan anew where somebody has fallen silent or is back."""
@@ -214,6 +225,7 @@ class AdaptiveRoundsStrategy:
         if _key(walk) == _key(self._round):
             return
         self._round, self._leaves_s, self._is_on_round = walk, -math.inf, False
+        self._legs, self._left_s = LegTimes(walk), math.nan
         to_m = self._away_m[knowledge.at, walk.stops]
         shared = any(
             _key(other) == _key(walk) and size > 1
@@ -254,42 +266,49 @@ class AdaptiveRoundsStrategy:
 
     def _is_ahead(self, knowledge: PatrolKnowledge) -> bool:
         """Whether to wait here: ahead of the even spacing, and not waited for long yet."""
-        key, length_m = _key(self._round), self._round.length_m
+        key = _key(self._round)
         mates = [state for state in self._mates(knowledge) if state.words[KEY] == key]
         size = 1 + len(mates)
         for walk, planned in zip(self._plan.rounds, self._plan.sizes, strict=True):
             size = max(size, planned) if _key(walk) == key else size
         if not mates:
             return False
-        apart_m = length_m / size
-        now_s = knowledge.now_s
-        gap_m = np.array(
-            [state.words[PHASE_M] + state.speed_m_s * (now_s - state.words[PHASE_S]) for state in mates]
-        )
-        gap_m = np.mod(gap_m - self._round.at_m[self._place], length_m)
+        now_s, along_s = knowledge.now_s, self._legs.along_s(knowledge.speed_m_s)
+        apart_s = float(along_s[-1]) / size
+        gap_s = np.array([self._along_s(state, along_s, now_s) for state in mates])
+        gap_s = np.mod(gap_s - along_s[self._place], along_s[-1])
         # How much farther the others are than their places in the row say, as seen from here.
-        off_m = _off_even(gap_m, apart_m, complete=len(mates) + 1 == size)
+        off_s = _off_even(gap_s, apart_s, complete=len(mates) + 1 == size)
         # Measured from the last one of all: by neighbours' gaps or the mean, small errors add up along the
         # row.
-        ahead_m = -float(off_m.min())
-        patience_s = 0.5 * apart_m / self._setting.speed_m_s
-        if ahead_m <= self._config.slack * apart_m or self._waited_s > patience_s:
+        ahead_s = -float(off_s.min())
+        if ahead_s <= self._config.slack * apart_s or self._waited_s > 0.5 * apart_s:
             return False
         if self._last_wait_s is not None:
             self._waited_s += now_s - self._last_wait_s
         self._last_wait_s = now_s
         return True
 
+    def _along_s(self, mate: PatrolState, along_s: FloatArray, now_s: float) -> float:
+        """How far along its round a mate is by now, as the time (K + 1,) that it takes itself.
 
-def _off_even(gap_m: FloatArray, apart_m: float, complete: bool) -> FloatArray:
+        Who has not said that it is at the next stop was not there when it spoke.
+        """
+        stop = self._legs.stop_at(float(mate.words[PHASE_M]))
+        leg_s = float(along_s[stop + 1] - along_s[stop])
+        driven_s = min(mate.t_s - float(mate.words[PHASE_S]), leg_s)
+        return float(along_s[stop]) + driven_s + now_s - mate.t_s
+
+
+def _off_even(gap_s: FloatArray, apart_s: float, complete: bool) -> FloatArray:
     """(K,) how far others, so far ahead on the round (K,), are beyond the places of an even row."""
     rank: FloatArray | IntArray
     if complete:
-        rank = np.empty(len(gap_m))
-        rank[np.argsort(gap_m, kind="stable")] = np.arange(1, len(gap_m) + 1)
+        rank = np.empty(len(gap_s))
+        rank[np.argsort(gap_s, kind="stable")] = np.arange(1, len(gap_s) + 1)
     else:  # somebody is missing: the nearest place of the row
-        rank = np.rint(gap_m / apart_m)
-    return gap_m - rank * apart_m
+        rank = np.rint(gap_s / apart_s)
+    return gap_s - rank * apart_s
 
 
 def _oldest_first(walk: Round, to_m: FloatArray, idle_m: FloatArray) -> int:
