@@ -20,7 +20,12 @@ from pilotage.sensors.readings import Readings
 from pilotage.stack.interface import BeliefStatus
 from pilotage.stack.navigator.patrol.headway import Headway
 from pilotage.stack.navigator.patrol.precedence import MOST_S, Leading, orders, precedence, told
-from pilotage.stack.navigator.patrol.states import Lost, Move, State, SteppingAside, Waiting, set_out
+from pilotage.stack.navigator.patrol.states import transitions
+from pilotage.stack.navigator.patrol.states.driving import Waiting
+from pilotage.stack.navigator.patrol.states.lost import Lost
+from pilotage.stack.navigator.patrol.states.making_room import SteppingAside
+from pilotage.stack.navigator.patrol.states.state import Move, State, Transitions
+from pilotage.stack.navigator.patrol.states.transitions import set_out
 from pilotage.stack.patrol.evacuation import Evacuation
 from pilotage.stack.patrol.messages import PatrolMemory
 from pilotage.stack.patrol.roadmap import Roadmap
@@ -183,7 +188,7 @@ def test_who_waits_elsewhere_does_not_visit_the_place_that_it_left_to_mates(
     context = waiting_context(off_m)
     state = Waiting(context, 0.0, 0.0)
     context.t_s = 0.5
-    state.step(Readings(0.5, {}))
+    state.step(Readings(0.5, {}), transitions)
     assert (context.memory.visited_s(context.came_from) == 0.5) is there
 
 
@@ -222,7 +227,7 @@ def test_who_waits_lets_somebody_pass_and_makes_room_for_one_who_does_not(
     for k in range(1, 81):
         context.t_s = 0.1 * k
         context.strange = np.array([[0.6, 0.3]]) if 1.0 < context.t_s < 1.0 + passes_s else NOBODY
-        state = state.step(Readings(context.t_s, {})).state
+        state = state.step(Readings(context.t_s, {}), transitions).state
         if not isinstance(state, Waiting):
             break
     assert isinstance(state, Waiting) is stays
@@ -241,7 +246,7 @@ def test_who_waits_steps_aside_where_it_can_drive_to_no_other_place(tmp_path: Pa
         context.t_s += 0.1
         assert context.t_s < 6.0
         context.strange = np.array([[0.6, 0.3]])
-        state = state.step(Readings(context.t_s, {})).state
+        state = state.step(Readings(context.t_s, {}), transitions).state
     assert isinstance(state, SteppingAside)
     row, column = np.argwhere(state.time == 0.0).mean(axis=0)
     place = context.roadmap.spacing_m * np.array([column, row])
@@ -257,9 +262,9 @@ def test_whoever_goes_first_arrives(monkeypatch: pytest.MonkeyPatch) -> None:
     took_s: list[float] = []
     step = Leading.step
 
-    def watched(self: Leading, readings: Readings) -> Move:
+    def watched(self: Leading, readings: Readings, to: Transitions) -> Move:
         began.setdefault(self.context.task.robot, self.context.t_s)
-        move = step(self, readings)
+        move = step(self, readings, to)
         if move.state is not self:
             took_s.append(self.context.t_s - began.pop(self.context.task.robot))
         return move
@@ -303,7 +308,7 @@ class TestWhoeverGoesFirst:
         line = line_to(context.roadmap, 0.8, 1.5, tuple(context.roadmap.places_xy_m[context.hop]))
         hear(context, 0.0, {1: tuple(line[4])})
         state = Leading(context, 0.0)
-        assert state.step(Readings(0.0, {})).command == Twist(0.0, 0.0)
+        assert state.step(Readings(0.0, {}), transitions).command == Twist(0.0, 0.0)
         ((number, *place),) = context.clearing.orders
         assert number == 1
         # There, but for a hand's breadth, where no place farther off was left.
@@ -312,19 +317,19 @@ class TestWhoeverGoesFirst:
         state.sent[1] = tuple(line[4] + 0.8 * off)
         beside = line[4] + 0.65 * off
         hear(context, 4.0, {1: tuple(beside), 2: (4.0, 2.7)})
-        assert state.step(Readings(4.0, {})).command.v_m_s > 0.0
+        assert state.step(Readings(4.0, {}), transitions).command.v_m_s > 0.0
         assert {n for n, *_ in context.clearing.orders} == {1, 2}
 
     def test_lets_go_whom_it_has_passed_while_others_are_told(self) -> None:
         context = leader(5)
         hear(context, 0.0, {1: (2.0, 1.5)})
         state = Leading(context, 0.0)
-        state.step(Readings(0.0, {}))
+        state.step(Readings(0.0, {}), transitions)
         told_m = context.clearing.orders[0][1:]
         context.pose = Pose2(3.0, 2.1, 0.0)
         for t_s, others in ((6.0, {2: (4.0, 2.9)}), (11.0, {2: (4.0, 2.9), 3: (3.7, 2.1)})):
             hear(context, t_s, {1: told_m, **others})
-            state.step(Readings(t_s, {}))
+            state.step(Readings(t_s, {}), transitions)
         assert {n for n, *_ in context.clearing.orders} == {2, 3}
 
 

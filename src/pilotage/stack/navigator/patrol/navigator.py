@@ -15,7 +15,11 @@ from pilotage.stack.navigator.navigator import Parts, localizer_of
 from pilotage.stack.navigator.patrol.config import PatrolNavigatorConfig
 from pilotage.stack.navigator.patrol.context import Context
 from pilotage.stack.navigator.patrol.precedence import Leading, precedence
-from pilotage.stack.navigator.patrol.states import Charging, Lost, State, Waiting, resume
+from pilotage.stack.navigator.patrol.states import transitions
+from pilotage.stack.navigator.patrol.states.charging import Charging
+from pilotage.stack.navigator.patrol.states.driving import Waiting
+from pilotage.stack.navigator.patrol.states.lost import Lost
+from pilotage.stack.navigator.patrol.states.state import State
 
 COLUMNS = {
     "mode": "1",
@@ -102,7 +106,11 @@ class PatrolNavigator:
             context.memory.update(context.t_s, on_duty=not context.homeward)
             context.came_from = context.roadmap.nearest(belief.pose.x_m, belief.pose.y_m)
             state = None
-        self._state, command = resume(context) if state is None else precedence(context, state).step(readings)
+        self._state, command = (
+            transitions.resume(context)
+            if state is None
+            else precedence(context, state).step(readings, transitions)
+        )
         if not isinstance(self._state, Leading):
             context.clearing = None  # also where it lost its way meanwhile: nobody makes room for it any more
         context.talk(lost=lost)

@@ -19,7 +19,11 @@ from pilotage.sensors.readings import Readings
 from pilotage.stack.navigator.patrol import traffic
 from pilotage.stack.navigator.patrol.config import Mode
 from pilotage.stack.navigator.patrol.context import Context
-from pilotage.stack.navigator.patrol.states import Charging, Lost, Move, State, Waiting, arrive, forgo, resume
+from pilotage.stack.navigator.patrol.states.charging import Charging
+from pilotage.stack.navigator.patrol.states.driving import Waiting
+from pilotage.stack.navigator.patrol.states.lost import Lost
+from pilotage.stack.navigator.patrol.states.state import Move, State, Transitions
+from pilotage.stack.navigator.patrol.states.transitions import forgo
 from pilotage.stack.patrol.evacuation import Evacuation
 from pilotage.stack.patrol.roadmap import STEP_M
 from pilotage.stack.patrol.word import Clearing
@@ -54,13 +58,13 @@ class Leading:
     sent: dict[int, Place] = field(default_factory=dict)
     since_s: dict[int, float] = field(default_factory=dict)
 
-    def step(self, readings: Readings) -> Move:
+    def step(self, readings: Readings, to: Transitions) -> Move:
         """Look who is on the path; drive where nobody is."""
         del readings
         context = self.context
         context.mode, own = Mode.HOLD, context.task.robot
         if context.arrived(blocked=True):
-            return arrive(context)
+            return to.arrive(context)
         if not context.fresh:
             return Move(self, context.lead(context.hop))
         line = context.roadmap.way(
@@ -69,7 +73,7 @@ class Leading:
         if context.t_s - self.began_s > MOST_S or context.runs_low() or not len(line):
             context.headway.restart(context.t_s)
             context.say("gives-up", f"not at vertex {context.hop} for {MOST_S:.0f} s: lets others go first")
-            return resume(context)
+            return to.resume(context)
         traffic.look(context, context.hop)
         if context.claim is not None:
             context.tell_claim(replace(context.claim, turn=BEFORE_ALL))
@@ -157,13 +161,13 @@ class Evacuating:
     place: Place
     time: FloatArray
 
-    def step(self, readings: Readings) -> Move:
+    def step(self, readings: Readings, to: Transitions) -> Move:
         """Go there and stay until that one is through, or falls silent."""
         del readings
         context = self.context
         context.mode, place = Mode.YIELD, told(context)
         if place is None:
-            return resume(context)
+            return to.resume(context)
         if place != self.place:
             return evacuate(context, place)
         command = context.descend(self.time)

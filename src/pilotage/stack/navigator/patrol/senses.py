@@ -31,6 +31,7 @@ NEAR_M = 1.6
 SIGMAS = 3.0
 TOLD_M = 0.2
 """What a mate may be wrong about its place by."""
+AT_REST_M_S = 0.05
 HEARD_PERIODS = 4.0
 """Who said nothing for so many of its messages is silent."""
 
@@ -207,6 +208,11 @@ class Senses:
     def moving_m_s(self) -> float:
         """By the odometry."""
         return abs(self.twist.v_m_s)
+
+    @property
+    def at_rest(self) -> bool:
+        """Whether it stands, by the odometry."""
+        return self.moving_m_s <= AT_REST_M_S
 
     def heard(self) -> list[tuple[int, TeamWord]]:
         """The last words of mates that were heard lately, with their numbers."""

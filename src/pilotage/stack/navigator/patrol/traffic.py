@@ -88,6 +88,12 @@ def rivals(context: Context, line: FloatArray) -> list[tuple[int, Claim, int]]:
     return found
 
 
+def is_wanted(context: Context) -> bool:
+    """Whether it stands where mates want to pass who have room for one."""
+    claim = context.claim
+    return claim is not None and bool(rivals(context, claim.line_xy_m))
+
+
 def comes(context: Context, stretch: Stretch) -> float:
     """How far ahead somebody is seen in a passage who does not go ahead; infinite where nobody is."""
     seen = context.strange_on_map()

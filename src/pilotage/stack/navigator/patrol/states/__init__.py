@@ -1,0 +1,1 @@
+"""The states of a robot on patrol, one class each, and the transitions between them, one function each."""
