@@ -35,7 +35,7 @@ class AdaptiveRoundsConfig(Config):
     A plan's cost is its worst idleness plus ``mean_weight`` times its mean; of a round that several robots
     share the worst counts ``sharing_cost`` more and the mean half of that, for what keeping apart costs. In a
     passage that has room for one a meeting takes ``meeting_m`` of driving beside its length. A robot waits
-    while it is further ahead of its place among those that share its round than ``slack`` of the distance
+    while it is further ahead of its place among those that share its round than ``slack`` of the time
     between them.
     """
 
@@ -81,7 +81,7 @@ class AdaptiveRoundsStrategy:
     """Rounds for groups of robots, from one tour for all to a share for each, by the idleness they promise.
 
     Robots say how far along their round they are. Those who share one wait at vertices where they are ahead
-    of the even spacing; positions told some time ago are carried on at the speed that was told. Where a
+    of the even spacing, by the time that legs take; positions told some time ago are carried on. Where a
     robot falls silent or goes off duty the others plan for those who are left, and again when it is back;
     where bodies shut paths those who reach the same places plan for these, on the paths that are left. Who
     goes where is settled by distance, and by counting heads where news differ.
