@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from types import SimpleNamespace
 from typing import Any, cast
 
 import numpy as np
@@ -13,6 +14,7 @@ from pilotage.experiments.build.build import build
 from pilotage.experiments.loop import run_loop
 from pilotage.experiments.mission import mission_of, read_mission
 from pilotage.kernels.control import safe_stop
+from pilotage.stack.navigator.patrol import traffic
 from pilotage.stack.navigator.patrol.obstructions import (
     ABSENT_S,
     DENIED_S,
@@ -21,6 +23,7 @@ from pilotage.stack.navigator.patrol.obstructions import (
     Obstructions,
     Told,
 )
+from pilotage.stack.navigator.patrol.passage import Stretch
 from pilotage.stack.patrol.graph import PatrolGraph
 from pilotage.stack.patrol.partition import annealed
 from pilotage.stack.patrol.passages import OPEN
@@ -273,6 +276,27 @@ def test_where_the_way_around_a_body_ends_near_a_place_it_is_there(off_m: float,
     assert context.arrived(blocked=False) is there
     context._shut = None
     assert not context.arrived(blocked=False)
+
+
+@pytest.mark.parametrize("planned_around", [True, False])
+def test_who_is_planned_around_keeps_nobody_out_of_a_passage(*, planned_around: bool) -> None:
+    """Its body beside the path counted as somebody who comes: all waited before the door, on every round."""
+    context: Any = build(mission_of(two_rooms(DOOR_Y_M), seed=0)).team[1].stack._context  # type: ignore[attr-defined]
+    context.pose = Pose2(-1.0, 0.0, 0.0)
+    body = np.array([0.6, 0.65])
+    angles = np.linspace(np.pi, 2.0 * np.pi, 20)
+    rim = body + context.radius_m * np.column_stack([np.cos(angles), np.sin(angles)])
+    context.strange = rim - np.array([-1.0, 0.0])
+    line = np.column_stack([np.arange(0.5, 3.0, 0.25), np.zeros(10)])
+    stretch = Stretch(False, 1.5, line, np.array([-1.0, 0.0]))
+    context._obstructions = SimpleNamespace(shutting_xy_m=body[None])
+    if planned_around:
+        context._shut = context.roadmap
+    for t_s in (0.2, 0.4):
+        context.t_s = t_s
+        ahead_m = traffic.comes(context, stretch)
+    assert math.isinf(ahead_m) is planned_around
+    assert traffic._is_crowded(context, stretch) is not planned_around
 
 
 def test_each_side_of_a_door_that_a_mate_shuts_keeps_its_places() -> None:

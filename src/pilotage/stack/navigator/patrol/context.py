@@ -326,6 +326,13 @@ class Context(Senses):
             near = near[~(np.hypot(near[:, 0] - x, near[:, 1] - y) < radius_m + TOLD_M)]
         return len(near) > 0
 
+    def without_planned_around(self, places: FloatArray) -> FloatArray:
+        """Places (M, 2) but those of who is planned around: the path leads past, and nobody comes there."""
+        if self.roadmap is self._shut:
+            for body in self._obstructions.shutting_xy_m:
+                places = places[np.hypot(*(places - body).T) >= self.radius_m + TOLD_M]
+        return places
+
     def here(self) -> FloatArray:
         """(1, 3) the place where it is, as a path; (0, 3) off the map."""
         time = self.roadmap.time_s(self.came_from)

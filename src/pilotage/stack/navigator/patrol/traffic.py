@@ -96,7 +96,7 @@ def is_wanted(context: Context) -> bool:
 
 def comes(context: Context, stretch: Stretch) -> float:
     """How far ahead somebody is seen in a passage who does not go ahead; infinite where nobody is."""
-    seen = context.strange_on_map()
+    seen = context.without_planned_around(context.strange_on_map())
     followed = [n for n, claim, how in rivals(context, stretch.line_xy_m) if how > 0 and claim.inside]
     for number, word in context.heard():
         if number in followed:
@@ -140,7 +140,7 @@ def _is_crowded(context: Context, stretch: Stretch) -> bool:
     """Whether somebody who says nothing stands before the mouth, nearer to it."""
     mouth = stretch.line_xy_m[0]
     axis = stretch.outwards / max(float(np.hypot(*stretch.outwards)), 1e-9)
-    offset = context.bodies_on_map() - mouth
+    offset = context.without_planned_around(context.bodies_on_map()) - mouth
     ahead, off = offset @ axis, np.abs(offset @ np.array([-axis[1], axis[0]]))
     own_m = math.hypot(context.pose.x_m - mouth[0], context.pose.y_m - mouth[1])
     before = (ahead > -0.3) & (off < context.pass_m) & (np.hypot(*offset.T) < min(MOUTH_M, own_m - 0.2))
