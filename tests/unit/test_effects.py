@@ -72,7 +72,8 @@ def shifted(rng: np.random.Generator, shape: tuple[int, ...], noise: str, means:
     if noise == "success":
         return np.where(rng.random(shape) < 0.6 + means - means.mean(), 1.0, 0.0)
     if noise == "rate":
-        return np.asarray(rng.poisson(3.0 * np.exp(np.arcsinh((means - means.mean()) / 3.0)), shape)) * 1.0
+        rate = 3.0 * np.exp(np.arcsinh((means - means.mean()) / 3.0))
+        return np.asarray(rng.poisson(rate, shape), dtype=np.float64)
     if noise == "count":
         return np.asarray(rng.poisson(3.0 + means - means.mean(), shape), dtype=np.float64)
     values: FloatArray = (
