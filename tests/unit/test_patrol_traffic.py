@@ -62,9 +62,16 @@ class TestStanding:
             seen = [np.array([0.5 * t_s, 0.0])]
             if not 20 <= k < 25:
                 seen.append(parked + 0.02 * (-1) ** k)
-            found = watch.step(t_s, np.array(seen))
+            found = watch.step(t_s, np.array(seen), NOBODY)
             assert len(found) == (t_s >= 4.2 and len(seen) == 2)
         assert np.allclose(found, parked, atol=0.03)
+
+    def test_where_a_mate_fell_silent_who_stands_for_a_second_stands(self) -> None:
+        """Who drives past its body sees it for two or three, and nobody planned around it for a minute."""
+        watch, silent = StillWatch(), np.array([[3.2, 0.8]])
+        for k in range(12):
+            found = watch.step(0.2 * k, np.array([[3.0, 1.0], [5.0, 1.0]]), silent)
+            assert found.tolist() == ([[3.0, 1.0]] if k >= 5 else [])
 
 
 class TestPassages:

@@ -106,7 +106,6 @@ class Context(Senses):
     def _look_who_shuts_paths(self) -> None:
         """Plan around those who have stood for long, from where that leads anywhere."""
         heard = dict(self.heard())
-        silent = [(w.x_m, w.y_m) for n, (_, w) in self.mates.items() if n not in heard]
         told = [Told(n, np.array(place)) for n, word in heard.items() for place in word.standing]
         for _, place in told:
             if not self._may_stand(place):
@@ -115,7 +114,7 @@ class Context(Senses):
             self._obstructions.is_of_mate(np.array([word.x_m, word.y_m]), word.radius_m)
         known, standing = self._obstructions.known_xy_m, self.motion.standing
         absent = np.array([self.sees_nothing_at(place, self.radius_m) for place in known], dtype=np.bool_)
-        if self._obstructions.step(self.t_s, standing, absent, np.array(silent).reshape(-1, 2), told, heard):
+        if self._obstructions.step(self.t_s, standing, absent, self.silent_xy_m(), told, heard):
             self._shut_paths()
         for roadmap in (self._shut, self._open) if self._shut is not None else ():
             self._take(roadmap)

@@ -77,7 +77,9 @@ class Motion:
 
     def watch(self) -> None:
         """Look who stands, in a scan."""
-        self.standing = self._still.step(self._senses.t_s, self._mute(self._beside()))
+        self.standing = self._still.step(
+            self._senses.t_s, self._mute(self._beside()), self._senses.silent_xy_m()
+        )
 
     def _beside(self) -> FloatArray:
         """(M, 2) returns of what may move and is near, base frame."""

@@ -219,6 +219,12 @@ class Senses:
         latest_s = self.t_s - HEARD_PERIODS * self.config.message_period_s
         return [(number, word) for number, (sent_s, word) in self.mates.items() if sent_s > latest_s]
 
+    def silent_xy_m(self) -> FloatArray:
+        """(L, 2) where mates that were not heard lately said last that they are."""
+        heard = {number for number, _ in self.heard()}
+        silent = [(word.x_m, word.y_m) for number, (_, word) in self.mates.items() if number not in heard]
+        return np.array(silent).reshape(-1, 2)
+
     def mates_by_their_words(self, t_s: float) -> FloatArray:
         """(N, 4) of all robots by number: where each is on the map, within what distance of that its middle
         is by now, and its radius; NaN for who does not know, was not heard lately, or is itself."""

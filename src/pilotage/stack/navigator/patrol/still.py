@@ -5,9 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from pilotage.core.types import FloatArray
+from pilotage.stack.navigator.patrol.obstructions import FAILED_M
 
 STILL_S, STILL_M = 4.0, 0.25
 """Who stays within so far for so long stands."""
+FAILED_STILL_S = 1.0
+"""For so long where a mate fell silent: who passes by sees its body no longer."""
 GONE_S = 2.0
 """Who was not seen for so long is forgotten."""
 
@@ -18,8 +21,10 @@ class StillWatch:
     def __init__(self) -> None:
         self._known: FloatArray = np.zeros((0, 4))
 
-    def step(self, t_s: float, middles_xy_m: FloatArray) -> FloatArray:
-        """(K, 2) those of the bodies seen now (M, 2), map frame, that have stood for long."""
+    def step(self, t_s: float, middles_xy_m: FloatArray, silent_xy_m: FloatArray) -> FloatArray:
+        """(K, 2) those of the bodies seen now (M, 2), map frame, that have stood for long; for less long near
+        where mates fell silent (L, 2).
+        """
         if not len(middles_xy_m):
             if len(self._known):
                 self._known = self._known[t_s - self._known[:, 3] <= GONE_S]
@@ -34,4 +39,6 @@ class StillWatch:
                 row[:3] = known[int(np.argmin(away)), :3]
             fresh &= away >= STILL_M
         self._known = np.concatenate([rows, known[fresh]])
-        return np.asarray(rows[t_s - rows[:, 2] >= STILL_S, :2])
+        from_silent = np.hypot(*(rows[:, None, :2] - silent_xy_m).T)  # (L, M)
+        failed = (from_silent < FAILED_M).any(axis=0)
+        return np.asarray(rows[t_s - rows[:, 2] >= np.where(failed, FAILED_STILL_S, STILL_S), :2])
