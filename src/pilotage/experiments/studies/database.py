@@ -174,10 +174,16 @@ def drop_log(path: Path) -> None:
 
     SQLite does as the last connection that may write closes; where another process is there, it stays.
     """
-    with suppress(OSError, sqlite3.Error):
-        if has_log(path) and os.access(path, os.W_OK):
-            with closing(sqlite3.connect(path, timeout=0.0)) as database:
-                database.execute("select 1 from sqlite_master").fetchone()
+    if not (has_log(path) and os.access(path, os.W_OK)):
+        return
+    wrong = OSError, sqlite3.Error, UnicodeDecodeError
+    with suppress(*wrong), closing(sqlite3.connect(path, timeout=0.0)) as database:
+        database.execute("select 1 from sqlite_master").fetchone()
+    # Of what is broken SQLite leaves the log: without its index nobody is there, an empty one has no rows.
+    log, index = (path.with_name(path.name + suffix) for suffix in ("-wal", "-shm"))
+    with suppress(OSError):
+        if not index.exists() and log.stat().st_size == 0:
+            log.unlink()
 
 
 @contextmanager

@@ -40,18 +40,10 @@ def read_rows(path: Path) -> tuple[list[dict[str, Any]], str]:
     """
     if not path.is_file():
         raise InputError(f"{path}: expected a study's database, found none")
-    had_log = has_log(path)
-    try:
-        return _read_rows(path)
-    finally:
-        if not had_log:
-            drop_log(path)
-
-
-def _read_rows(path: Path) -> tuple[list[dict[str, Any]], str]:
     try:
         with reader(path) as database:
-            found = [_row(row) for row in database.execute("select * from trials order by row")]
+            # All at once: a cursor that an error keeps would keep the database open.
+            found = list(map(_row, database.execute("select * from trials order by row").fetchall()))
     except DAMAGED as error:
         return salvage(path), " ".join(str(error).split())
     broken = next((row["row"] for row in found if not row["whole"]), None)
@@ -121,6 +113,8 @@ def flat(metrics: Mapping[str, Any]) -> dict[str, float]:
 def reader(path: Path, *, forgiving: bool = False) -> Iterator[sqlite3.Connection]:
     """Open for reading; a folder that cannot be written has no other process at work in it either.
 
+    SQLite's log is left beside the database only where it was there before.
+
     Parameters
     ----------
     forgiving
@@ -132,25 +126,35 @@ def reader(path: Path, *, forgiving: bool = False) -> Iterator[sqlite3.Connectio
         Where it is no database, or one whose tables are not a study's: a view could compute for ever.
     """
     require_file(path, "a study's database")  # SQLite would wait for ever for who writes a pipe
+    had_log = has_log(path)
+    try:
+        with closing(_opened(path, forgiving)) as database:
+            database.row_factory = sqlite3.Row
+            database.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, LONGEST)
+            if foreign_tables(database):
+                raise sqlite3.DatabaseError("its tables are not a study's")
+            yield database
+    finally:
+        if not had_log:
+            drop_log(path)
+
+
+def _opened(path: Path, forgiving: bool) -> sqlite3.Connection:
     place = path.absolute().as_uri()
     database = sqlite3.connect(f"{place}?mode=ro", uri=True, timeout=BUSY_S)
     try:
         database.execute(f"pragma writable_schema = {int(forgiving)}")  # nothing is written: SQLite's word
         database.execute("select 1 from sqlite_master").fetchone()
-    except sqlite3.OperationalError as error:
+    except BaseException as error:
         database.close()
-        if getattr(error, "sqlite_errorcode", 0) & 0xFF not in (
-            sqlite3.SQLITE_CANTOPEN,
-            sqlite3.SQLITE_READONLY,
+        shut = sqlite3.SQLITE_CANTOPEN, sqlite3.SQLITE_READONLY
+        if (
+            not isinstance(error, sqlite3.OperationalError)
+            or getattr(error, "sqlite_errorcode", 0) & 0xFF not in shut
         ):
             raise
-        database = sqlite3.connect(f"{place}?immutable=1", uri=True)
-    database.row_factory = sqlite3.Row
-    database.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, LONGEST)
-    with closing(database):
-        if foreign_tables(database):
-            raise sqlite3.DatabaseError("its tables are not a study's")
-        yield database
+        return sqlite3.connect(f"{place}?immutable=1", uri=True)
+    return database
 
 
 def _row(found: sqlite3.Row) -> dict[str, Any]:
