@@ -11,8 +11,8 @@ import pytest
 from pilotage.cli.options import parse_seed
 from pilotage.core.errors import InputError
 from pilotage.core.whole_number import whole_number
-from pilotage.experiments.build import build as build_module
-from pilotage.experiments.build.build import build_source
+from pilotage.experiments.build import team
+from pilotage.experiments.build.build import build, build_source
 from pilotage.experiments.build.charts import load_chart
 from pilotage.experiments.mission import load_mission
 from pilotage.experiments.studies.engine import run_study
@@ -130,7 +130,7 @@ def test_what_no_simulator_serves_is_refused_before_anything_is_planned(
     monkeypatch: pytest.MonkeyPatch, mission: str, settings: list[str], words: str
 ) -> None:
     """Plans took 6 to 12 s on terrain before a rate was found not to fit the clock."""
-    monkeypatch.setattr(build_module, "build_stack", lambda *_: pytest.fail("it planned first"))
+    monkeypatch.setattr(team, "build_stack", lambda *_: pytest.fail("it planned first"))
     with pytest.raises(InputError) as caught:
-        build_module.build(load_mission(mission, settings, 0))
+        build(load_mission(mission, settings, 0))
     assert words in str(caught.value)
