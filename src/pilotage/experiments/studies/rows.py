@@ -24,6 +24,8 @@ AT_ONCE = 1024
 """Rows of a broken database that are asked for together before they are asked for one by one."""
 PROBES = 64
 """A table in which none of so many places can be looked at has lost them all."""
+SHUT = (sqlite3.SQLITE_CANTOPEN, sqlite3.SQLITE_READONLY)
+"""What SQLite says where it may not make its log."""
 LEAST_ROW = 16
 """Bytes that a row takes at least."""
 DAMAGED = (sqlite3.DatabaseError, ValueError, TypeError, InputError)
@@ -147,11 +149,7 @@ def _opened(path: Path, forgiving: bool) -> sqlite3.Connection:
         database.execute("select 1 from sqlite_master").fetchone()
     except BaseException as error:
         database.close()
-        shut = sqlite3.SQLITE_CANTOPEN, sqlite3.SQLITE_READONLY
-        if (
-            not isinstance(error, sqlite3.OperationalError)
-            or getattr(error, "sqlite_errorcode", 0) & 0xFF not in shut
-        ):
+        if getattr(error, "sqlite_errorcode", 0) & 0xFF not in SHUT:
             raise
         return sqlite3.connect(f"{place}?immutable=1", uri=True)
     return database

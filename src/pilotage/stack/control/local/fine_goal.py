@@ -27,6 +27,7 @@ TURN_IN_PLACE_RAD = 0.35
 STRAIGHT_RAD = 0.03
 """Turned for it by so much, there is no more to be had from turning."""
 BACKS_M_S = 0.3
+"""Speed at which it is asked whether there is room to back."""
 LEAST_SPEED_M_S = 0.01
 LEAST_TURN_RAD_S = 0.1
 

@@ -207,9 +207,13 @@ class GapHorizon(RollingController):
             return None
         if self._has_tried(found, scene):
             return None
+        self._take_on(found, view, scene)
+        return found
+
+    def _take_on(self, found: NarrowPassage, view: LocalView, scene: Scene) -> None:
+        """It lines up before that gap from now on, once for this goal."""
         self._tried.append((found.x_m, found.y_m, scene.goal))
         self._moved_s, self._bound_for = view.t_s, scene.goal
-        return found
 
     def _still_leads_through(self, passage: NarrowPassage, scene: Scene) -> bool:
         """Whether it is in the gap already, or bound for where it was when it began to line up."""
@@ -272,9 +276,8 @@ class GapHorizon(RollingController):
         found = found or find_narrow_passage(scene, config.close_ahead_m, view.t_s)
         if found and not self._has_tried(found, scene):
             # Straight through it first; where that fails as well it is closed.
-            self._tried.append((found.x_m, found.y_m, scene.goal))
+            self._take_on(found, view, scene)
             self._passage = found
-            self._moved_s, self._bound_for = view.t_s, scene.goal
             return
         ahead = np.ascontiguousarray(scene.path[: max(3, round(config.close_ahead_m / 0.1))])
         away = path_distances(ahead, scene.ground)
