@@ -9,6 +9,8 @@ import pytest
 
 from pilotage.core.types import FloatArray, Goal, Pose2
 from pilotage.kernels.bodies.outline import outline_clearance
+from pilotage.kernels.rrt import hybrid
+from pilotage.kernels.rrt.reeds_shepp import follow, shortest, word_length
 from pilotage.maps.distance_field import DistanceField
 from pilotage.maps.segment_map import SegmentMap, box_segments
 from pilotage.models.footprint import Footprint
@@ -146,3 +148,70 @@ def test_a_small_table_of_cells_finds_the_same_path() -> None:
     assert many.path is not None
     assert few.reason == many.reason, "as many expansions, as long a path"
     assert np.array_equal(few.path.states, many.path.states)
+
+
+CLEARANCE_M = 0.06
+
+
+def car_and_ground(world: SegmentMap) -> tuple[hybrid.Car, hybrid.Ground]:
+    field = DistanceField.from_map(world)
+    outline = np.ascontiguousarray(CAR.points_m)
+    car = hybrid.Car(outline, CAR.radius_m, CAR.inner_radius_m, CLEARANCE_M, TURNING_M)
+    ground = hybrid.Ground(
+        field.distance_m, *field.origin_xy_m, field.resolution_m, field.segments_m, field.circles_m
+    )
+    return car, ground
+
+
+@pytest.mark.parametrize("name", WORLDS)
+def test_curves_and_steps_fit_where_every_pose_of_them_does(name: str) -> None:
+    """What is passed over, as there is room for it, would have fitted."""
+    car, ground = car_and_ground(WORLDS[name])
+    rng = np.random.default_rng(5)
+    fitted = 0
+    for _ in range(400):
+        x, y, theta = rng.uniform([0.5, 0.5, -math.pi], [8.5, 8.5, math.pi])
+        gx, gy, gth = rng.uniform([0.5, 0.5, -math.pi], [8.5, 8.5, math.pi])
+        word, _ = shortest(x, y, theta, gx, gy, gth, TURNING_M, 1.5)
+        length = word_length(word, TURNING_M)
+        count = max(1, math.ceil(length / hybrid.CHECK_M))
+        c, s = math.cos(theta), math.sin(theta)
+        along = [follow(word, length * i / count, TURNING_M) for i in range(1, count + 1)]
+        every = all(
+            hybrid.pose_fits(x + c * wx - s * wy, y + s * wx + c * wy, theta + turned, car, ground)
+            for wx, wy, turned, _ in along
+        )
+        assert hybrid.word_fits(x, y, theta, word, car, ground) == every
+        spare = hybrid.spare_at(x, y, theta, car, ground)
+        for turn, step in ((0.0, 0.25), (1.0, 0.5), (-1.0, -0.5)):
+            count = math.ceil(abs(step) / hybrid.CHECK_M)
+            ends = [
+                hybrid.along_arc(x, y, theta, turn, step * i / count, TURNING_M) for i in range(1, count + 1)
+            ]
+            every = all(hybrid.pose_fits(*end, car, ground) for end in ends)
+            # Who has no room where it stands is asked for none: a search begins where it fits.
+            if spare >= 0.0:
+                assert hybrid.arc_fits(x, y, theta, turn, step, spare, car, ground) == every
+                fitted += every
+    assert 100 < fitted < 1200
+
+
+def test_whoever_has_room_may_move_by_as_much() -> None:
+    """Poses whose outline's points are no farther away than there is to spare fit as well."""
+    car, ground = car_and_ground(WORLDS["a narrow gate"])
+    rng = np.random.default_rng(6)
+    roomy = 0
+    for _ in range(2000):
+        x, y, theta = rng.uniform([0.5, 0.5, -math.pi], [8.5, 8.5, math.pi])
+        spare = hybrid.spare_at(x, y, theta, car, ground)
+        assert hybrid.pose_fits(x, y, theta, car, ground) == (spare >= 0.0)
+        if spare < 0.0:
+            continue
+        share, way = rng.uniform(), rng.uniform(-math.pi, math.pi)
+        turned = math.copysign(share * spare / car.radius, rng.uniform(-1.0, 1.0))
+        moved = (1.0 - share) * spare - 1e-9
+        assert hybrid.pose_fits(
+            x + moved * math.cos(way), y + moved * math.sin(way), theta + turned, car, ground
+        )
+        roomy += spare > 0.05
+    assert roomy > 300

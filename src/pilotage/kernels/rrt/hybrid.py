@@ -22,6 +22,12 @@ from pilotage.kernels.rrt.reeds_shepp import follow, shortest, word_length
 FOUND, NO_PATH, EXHAUSTED = range(3)
 CHECK_M = 0.04
 """Poses along a step are looked at this close together."""
+STRIDE = 16
+"""Of a long curve every so many of them are looked at first: most that do not fit end there."""
+
+
+SLACK = 0.75
+"""Interpolated distances of a 1-Lipschitz field are off by less than a node's diagonal: nodes apart."""
 
 
 class Ground(NamedTuple):
@@ -54,20 +60,26 @@ class Prices(NamedTuple):
 
 
 @kernel
-def pose_fits(x: float, y: float, theta: float, car: Car, ground: Ground) -> bool:
-    """Whether the outline keeps its clearance; exact geometry is asked only where the field cannot tell."""
+def spare_at(x: float, y: float, theta: float, car: Car, ground: Ground) -> float:
+    """How far the outline's points may surely move from a pose and keep the clearance; negative: they do not.
+
+    Exact geometry is asked only where the field cannot tell.
+    """
     away = interpolate_at(x, y, ground.distance, ground.x0, ground.y0, ground.spacing)
-    # Interpolated distances of a 1-Lipschitz field are off by less than a node's diagonal.
-    slack = 0.75 * ground.spacing
+    slack = SLACK * ground.spacing
     if away - slack >= car.radius + car.clearance:
-        return True
+        return float(away - slack - car.radius - car.clearance)
     if away + slack < car.inner + car.clearance:
-        return False
+        return float(away + slack - car.inner - car.clearance)
     c, s = math.cos(theta), math.sin(theta)
-    return bool(
-        outline_clearance(x, y, c, s, car.corners, car.radius, ground.segments, ground.circles)
-        >= car.clearance
-    )
+    clear = outline_clearance(x, y, c, s, car.corners, car.radius, ground.segments, ground.circles)
+    return float(clear - car.clearance)
+
+
+@kernel
+def pose_fits(x: float, y: float, theta: float, car: Car, ground: Ground) -> bool:
+    """Whether the outline keeps its clearance."""
+    return spare_at(x, y, theta, car, ground) >= 0.0
 
 
 @kernel
@@ -75,11 +87,49 @@ def word_fits(x: float, y: float, theta: float, word: FloatArray, car: Car, grou
     """Whether a word can be driven from a pose."""
     length = word_length(word, car.turning)
     count = max(1, math.ceil(length / CHECK_M))
+    # No point of the outline moves by more from one pose to the next.
+    moves = max(length, 1e-9) / count * (1.0 + car.radius / car.turning)
     c, s = math.cos(theta), math.sin(theta)
-    for i in range(1, count + 1):
-        wx, wy, wth, _ = follow(word, length * i / count, car.turning)
-        if not pose_fits(x + c * wx - s * wy, y + s * wx + c * wy, theta + wth, car, ground):
+    for stride in (STRIDE, 1):
+        i = stride
+        while i <= count:
+            wx, wy, wth, _ = follow(word, length * i / count, car.turning)
+            spare = spare_at(x + c * wx - s * wy, y + s * wx + c * wy, theta + wth, car, ground)
+            if spare < 0.0:
+                return False
+            i += stride * (1 + int(min(spare / (stride * moves), count)))
+    return True
+
+
+@kernel
+def along_arc(
+    x: float, y: float, theta: float, turn: float, d: float, radius: float
+) -> tuple[float, float, float]:
+    """The pose ``d`` metres along a straight line or an arc to the left (``turn`` 1) or right (-1)."""
+    if turn == 0.0:
+        return x + d * math.cos(theta), y + d * math.sin(theta), theta
+    end = theta + turn * d / radius
+    return (
+        x + turn * radius * (math.sin(end) - math.sin(theta)),
+        y - turn * radius * (math.cos(end) - math.cos(theta)),
+        end,
+    )
+
+
+@kernel
+def arc_fits(
+    x: float, y: float, theta: float, turn: float, length: float, spare: float, car: Car, ground: Ground
+) -> bool:
+    """Whether a step, signed, can be driven from a pose with so much to spare (``spare_at``)."""
+    count = max(1, math.ceil(abs(length) / CHECK_M))
+    moves = abs(length) / count * (1.0 + car.radius / car.turning)
+    i = 1 + int(min(max(spare, 0.0) / moves, count))
+    while i <= count:
+        px, py, angle = along_arc(x, y, theta, turn, length * i / count, car.turning)
+        spare = spare_at(px, py, angle, car, ground)
+        if spare < 0.0:
             return False
+        i += 1 + int(min(spare / moves, count))
     return True
 
 
@@ -189,25 +239,13 @@ def search(
             if word_fits(x, y, theta, word, car, ground):
                 return FOUND, node, word, expanded
         came = parents[node, 2]
+        spare = spare_at(x, y, theta, car, ground)
         for choice in range(6):
             turn = float(choice % 3 - 1)
             sign = 1.0 if choice < 3 else -1.0
-            ex, ey, eth = x, y, theta
-            parts = max(1, math.ceil(step / CHECK_M))
-            fits = True
-            for i in range(1, parts + 1):
-                d = sign * step * i / parts
-                if turn == 0.0:
-                    ex, ey, eth = x + d * math.cos(theta), y + d * math.sin(theta), theta
-                else:
-                    eth = theta + turn * d / car.turning
-                    ex = x + turn * car.turning * (math.sin(eth) - math.sin(theta))
-                    ey = y - turn * car.turning * (math.cos(eth) - math.cos(theta))
-                if not pose_fits(ex, ey, eth, car, ground):
-                    fits = False
-                    break
-            if not fits:
+            if not arc_fits(x, y, theta, turn, sign * step, spare, car, ground):
                 continue
+            ex, ey, eth = along_arc(x, y, theta, turn, sign * step, car.turning)
             col, row = int((ex - ground.x0) / cell), int((ey - ground.y0) / cell)
             if not (0 <= col < columns and 0 <= row < rows):
                 continue

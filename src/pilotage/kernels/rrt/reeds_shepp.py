@@ -44,13 +44,23 @@ def _set(out: FloatArray, row: int, turn: float, length: float) -> None:
 
 
 @kernel
-def _family(which: int, x: float, y: float, phi: float, out: FloatArray) -> bool:
-    """The word of one family that begins with a left arc, unit radius; fills (5, 2) turn and length."""
+def _family(
+    which: int,
+    phi: float,
+    xi: float,
+    eta: float,
+    rho_i: float,
+    xj: float,
+    ej: float,
+    rho_j: float,
+    out: FloatArray,
+) -> bool:
+    """The word of one family that begins with a left arc, unit radius; fills (5, 2) turn and length.
+
+    ``xi``, ``eta``, ``rho_i``: from the middle of the first arc's circle to that of a last one to the left,
+    and how far that is; ``xj``, ``ej``, ``rho_j`` to that of a last one to the right.
+    """
     out[:, :] = 0.0
-    s, c = math.sin(phi), math.cos(phi)
-    xi, eta = x - s, y - 1.0 + c
-    xj, ej = x + s, y - 1.0 - c
-    rho_i, rho_j = math.hypot(xi, eta), math.hypot(xj, ej)
     if which == 0:  # L+ S+ L+ (8.1)
         t = math.atan2(eta, xi)
         _set(out, 0, 1.0, t)
@@ -181,12 +191,22 @@ def shortest(
                     gx, gp = -gx, -gp
                 if reflected == 1:
                     gy, gp = -gy, -gp
+                side, front = math.sin(gp), math.cos(gp)
+                xi, eta = gx - side, gy - 1.0 + front
+                xj, ej = gx + side, gy - 1.0 - front
+                rho_i, rho_j = math.hypot(xi, eta), math.hypot(xj, ej)
                 for which in range(10):
-                    if not _family(which, gx, gy, gp, word):
+                    if not _family(which, gp, xi, eta, rho_i, xj, ej, rho_j, word):
                         continue
-                    used = PIECES
-                    while used > 0 and word[used - 1, 1] == 0.0:
-                        used -= 1
+                    cost, used = 0.0, 0
+                    for i in range(PIECES):
+                        length = -word[i, 1] if flipped == 1 else word[i, 1]
+                        cost += length if length >= 0.0 else -reverse_cost * length
+                        if length != 0.0:
+                            used = i + 1
+                    # Few are cheaper than the cheapest so far: only those are looked at.
+                    if not cost < best_cost - 1e-12:
+                        continue
                     trial[:, :] = 0.0
                     for i in range(used):
                         source = used - 1 - i if backwards == 1 else i
@@ -196,11 +216,6 @@ def shortest(
                     ex, ey, eth, _ = follow(trial, math.inf, 1.0)
                     if abs(ex - x) > MATCH or abs(ey - y) > MATCH or abs(_wrap(eth - phi)) > MATCH:
                         continue
-                    cost = 0.0
-                    for i in range(used):
-                        length = trial[i, 1]
-                        cost += length if length >= 0.0 else -reverse_cost * length
-                    if cost < best_cost - 1e-12:
-                        best_cost = cost
-                        best[:, :] = trial
+                    best_cost = cost
+                    best[:, :] = trial
     return best, best_cost * radius
