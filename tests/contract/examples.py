@@ -391,7 +391,9 @@ EXAMPLES: dict[tuple[str, str], Example] = {
     ("planner", "astar"): Example(planner_plans),
     ("planner", "dijkstra"): Example(planner_plans),
     ("planner", "theta-star"): Example(planner_plans),
-    ("planner", "hybrid-astar"): Example(hybrid_astar_plans, {}, frozenset({"reverse_cost", "turn_cost"})),
+    ("planner", "hybrid-astar"): Example(
+        hybrid_astar_plans, {}, frozenset({"reverse_cost", "turn_cost", "greed", "greedy_share"})
+    ),
     ("smoother", "shortcut"): Example(smoother_smooths),
     ("smoother", "none"): Example(smoother_smooths),
     ("local_planner", "dubins"): Example(local_planner_reaches_the_waypoint),

@@ -215,3 +215,33 @@ def test_whoever_has_room_may_move_by_as_much() -> None:
         )
         roomy += spare > 0.05
     assert roomy > 300
+
+
+HALL = yard(
+    *((6.0 * i + 3.0 * (k % 2), 3.0 * k, 0.3, 2.0) for i in range(1, 4) for k in range(1, 6)), side_m=18.0
+)
+ACROSS = Pose2(1.5, 1.5, 0.0), Goal(16.0, 16.0, 0.0)
+
+
+def test_a_large_floor_is_crossed_with_few_expansions() -> None:
+    """By estimates below the truth nearly every place is as good: patience alone gives up."""
+    patient = HybridAstarConfig(most_expansions=5000, greed=1.0)
+    given_up = HybridAstarPlanner(patient).plan(request(HALL, *ACROSS))
+    assert given_up.path is None
+    assert "given up after 5001" in given_up.reason
+    found = HybridAstarPlanner(HybridAstarConfig(most_expansions=5000)).plan(request(HALL, *ACROSS))
+    assert found.path is not None
+    assert found.iterations < 1000
+    assert found.path.length_m < 1.1 * math.hypot(14.5, 14.5)
+    assert least_clearance_m(found.path, HALL) > 0.0
+
+
+def test_where_greed_finds_nothing_patience_does() -> None:
+    world, start, goal = WORLDS["a narrow gate"], Pose2(1.5, 4.5, 0.0), Goal(7.5, 5.5, 0.0)
+    patient = HybridAstarPlanner(HybridAstarConfig(greed=1.0)).plan(request(world, start, goal))
+    # Enough for one expansion: the greedy search is stopped at the second.
+    both = HybridAstarPlanner(HybridAstarConfig(greedy_share=1e-5)).plan(request(world, start, goal))
+    assert patient.path is not None
+    assert both.path is not None
+    assert np.array_equal(both.path.states, patient.path.states)
+    assert both.iterations == patient.iterations + 2

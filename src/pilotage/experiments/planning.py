@@ -36,7 +36,8 @@ def plan_on_map(
     ----------
     overrides
         ``parameter=value`` for the planner, ``smoother.parameter=value`` for the smoother, or
-        ``smoother=none`` for the planner's path as it is.
+        ``smoother=none`` for the planner's path as it is, as that of a car's planner is in any case
+        unless a smoother is named.
     clearance_m
         Distance to keep from obstacles; None: the planner's own.
 
@@ -53,7 +54,9 @@ def plan_on_map(
     floor = load_chart(map_name_or_path)
     _check_on_map("--start", start, floor)
     _check_on_map("--goal", goal, floor)
-    own, smoothing, smoother_name = _split(overrides)
+    # Corners cut and rounded are no car's path any more.
+    usual = "none" if getattr(PLANNERS.entry(planner).factory, "FOR_OUTLINE", False) else SMOOTHER
+    own, smoothing, smoother_name = _split(overrides, usual)
     config = PLANNERS.configure(planner, own, f"planner '{planner}'")
     smoother_config = SMOOTHERS.configure(smoother_name, smoothing, f"smoother '{smoother_name}'")
     to = Goal(goal[0], goal[1], wrap_to_pi(goal[2]) if len(goal) > 2 else None)
@@ -79,7 +82,9 @@ def plan_on_map(
     if plan.path is None:
         return answer
     adopted = journal.plans[-1]
-    shortest = shortest_path(floor.walls, (start[0], start[1]), (goal[0], goal[1]), kept_m)
+    shortest = None
+    if not result.given:
+        shortest = shortest_path(floor.walls, (start[0], start[1]), (goal[0], goal[1]), kept_m)
     answer |= {
         "planned_length_m": adopted.length_m,
         "shortest_length_m": None if shortest is None else shortest.length_m,
@@ -93,7 +98,7 @@ def plan_on_map(
 
 def _reason(result: PlanResult, planned: PlannedPath | None) -> str:
     """How it ended; of a path its length as it is handed out, and what it was before smoothing."""
-    if planned is None or result.path is None:
+    if planned is None or result.path is None or result.given:
         return str(result.status) if not result.reason else f"{result.status}: {result.reason}"
     length = f"{planned.length_m:.2f} m"
     before = f"{result.path.length_m:.2f} m"
@@ -101,11 +106,10 @@ def _reason(result: PlanResult, planned: PlannedPath | None) -> str:
     return f"{result.status}: {length} after {result.iterations} iterations{smoothed}"
 
 
-def _split(overrides: Sequence[str]) -> tuple[dict[str, Any], dict[str, Any], str]:
+def _split(overrides: Sequence[str], name: str) -> tuple[dict[str, Any], dict[str, Any], str]:
     """Sort overrides into the planner's parameters, the smoother's, and the smoother's name."""
     own: dict[str, Any] = {}
     smoothing: dict[str, Any] = {}
-    name = SMOOTHER
     for override in overrides:
         parts, value = parse_override(override)
         if parts[:2] in (["stack", "planner"], ["stack", "smoother"]):

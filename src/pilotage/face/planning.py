@@ -18,6 +18,8 @@ from pilotage.core.interruptions import interruptible
 from pilotage.core.types import FloatArray, Pose2
 from pilotage.experiments.grid_planning import is_grid_map, plan_on_grid
 from pilotage.experiments.planning import plan_on_map
+from pilotage.stack.planning.grid_planner import GRID_PLANNERS
+from pilotage.stack.planning.planner import PLANNERS
 
 WALL_PLANNER, GRID_PLANNER = "rrt-star-dubins", "astar"
 Place: TypeAlias = "Sequence[float] | FloatArray | Pose2"
@@ -80,9 +82,11 @@ def plan(
     start, goal
         x, y in metres and, where given, theta in radians; without one any heading will do.
     planner
-        A registered name (``pilotage components``); by default ``rrt-star-dubins``, ``astar`` on grids.
+        A registered name (``pilotage components``); by default ``rrt-star-dubins``, ``astar`` on grids. On a
+        grid those that there are for cells (``astar``, ``dijkstra``, ``theta-star``) go from cell to cell,
+        all others as on a floor.
     clearance_m
-        Distance to keep from obstacles; None: the planner's own on walls, none on grids.
+        Distance to keep from obstacles; None: the planner's own on a floor, none from cell to cell.
     slope_limit_deg
         The map is an elevation model, and what is steeper is a hazard.
     seed
@@ -117,7 +121,7 @@ def plan(
         given.word("planner", planner)
     source, settings, seed = str(given.path("map", map)), _settings(set), given.whole("seed", seed)
     from_, to = _place("start", start), _place("goal", goal)
-    if Path(source).suffix and is_grid_map(source):
+    if Path(source).suffix and is_grid_map(source) and not _of_floors(planner, slope_limit_deg):
         if clearance_m is not None:
             settings = [*settings, f"map.inflation_m={clearance_m!r}"]
         answer = plan_on_grid(Path(source), from_, to, planner or GRID_PLANNER, settings, slope_limit_deg)
@@ -135,6 +139,12 @@ def plan(
         _number(answer.get("planning_time_s")),
         answer,
     )
+
+
+def _of_floors(planner: str | None, slope_limit_deg: float | None) -> bool:
+    """Whether a planner is one that robots on a floor have, and none over cells."""
+    of_cells = planner is None or slope_limit_deg is not None or planner in GRID_PLANNERS.names()
+    return not of_cells and planner in PLANNERS.names()
 
 
 def _place(name: str, place: Place) -> tuple[float, ...]:

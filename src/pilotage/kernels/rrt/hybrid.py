@@ -52,11 +52,16 @@ class Car(NamedTuple):
 
 
 class Prices(NamedTuple):
-    """What a metre backwards costs, a change of direction, and a metre of turning beside a straight one."""
+    """What a metre backwards costs, a change of direction, and a metre of turning beside a straight one.
+
+    What is left counts ``greed`` times (Pohl 1970): with more than 1 the search ends sooner, and less sure to
+    be cheapest.
+    """
 
     reverse: float
     switch: float
     turn: float
+    greed: float
 
 
 @kernel
@@ -273,6 +278,7 @@ def search(
             nodes[count, 0], nodes[count, 1], nodes[count, 2] = ex, ey, eth
             parents[count, 0], parents[count, 1], parents[count, 2] = float(node), turn, sign * step
             cost[count], where[count] = new, key
-            heapq.heappush(heap, (new + max(around if math.isfinite(around) else 0.0, free), count))
+            rest = max(around if math.isfinite(around) else 0.0, free)
+            heapq.heappush(heap, (new + prices.greed * rest, count))
             count += 1
     return NO_PATH, -1, empty, expanded

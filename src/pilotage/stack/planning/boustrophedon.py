@@ -106,7 +106,7 @@ class BoustrophedonPlanner:
         reason = (
             f"{path.length_m:.1f} m for {area_m2:.1f} m², {ratio:.3f} times the area over the width of a pass"
         )
-        return PlanResult(PlanStatus.FOUND, reason, path, took, took)
+        return PlanResult(PlanStatus.FOUND, reason, path, took, took, given=True)
 
 
 def _lines(

@@ -35,6 +35,12 @@ class HybridAstarConfig(Config):
     reverse_cost: float = Field(default=1.5, ge=1.0)
     switch_cost_m: NonNegative = 0.5
     turn_cost: float = Field(default=1.05, ge=1.0)
+    greed: float = Field(default=1.3, ge=1.0)
+    """So many times what is left counts in a first, short search: by estimates that stay below the truth
+    nearly all places of a large floor are as good. In tight places it may end in cells that it entered badly;
+    a second search counts it once."""
+    greedy_share: float = Field(default=0.2, ge=0.0, le=1.0)
+    """The first search has this share of the second one's expansions."""
     step_m: Positive = 0.25
     cell_m: Positive = 0.12
     headings: int = Field(default=72, ge=8, le=720)
@@ -86,23 +92,10 @@ class HybridAstarPlanner:
                 turned = name == "goal" and request.goal.theta_rad is None
                 reason = _blocked(name, "in any heading" if turned else "as it stands there", clearance_m)
                 return failure(status, reason, time.perf_counter() - began)
-        to_go = _to_go(field, goal, car.inner)
         size = 6 * config.most_expansions + 8
         nodes, parents = np.empty((size, 3)), np.empty((size, 3))
-        prices = hybrid.Prices(config.reverse_cost, config.switch_cost_m, config.turn_cost)
-        ended, last, word, expanded = hybrid.search(
-            start,
-            goal,
-            car,
-            ground,
-            prices,
-            to_go,
-            max(config.step_m, 1.5 * config.cell_m),
-            config.cell_m,
-            config.headings,
-            config.most_expansions,
-            nodes,
-            parents,
+        ended, last, word, expanded = self._searched(
+            start, goal, car, ground, _to_go(field, goal, car.inner), nodes, parents
         )
         took = time.perf_counter() - began
         if ended != hybrid.FOUND:
@@ -112,6 +105,43 @@ class HybridAstarPlanner:
         path = Path(states, spaced_waypoints(states, 1.0), length_m, turning_m)
         reason = f"{length_m:.2f} m after {expanded} expansions"
         return PlanResult(PlanStatus.FOUND, reason, path, took, time.perf_counter() - began, expanded)
+
+    def _searched(
+        self,
+        start: FloatArray,
+        goal: FloatArray,
+        car: hybrid.Car,
+        ground: hybrid.Ground,
+        to_go: FloatArray,
+        nodes: FloatArray,
+        parents: FloatArray,
+    ) -> tuple[int, int, FloatArray, int]:
+        """As ``hybrid.search``: greedily for a while, and where that finds nothing with patience."""
+        config = self._config
+        first = int(config.greedy_share * config.most_expansions) if config.greed > 1.0 else 0
+        step_m, expanded = max(config.step_m, 1.5 * config.cell_m), 0
+        for greed, most in ((config.greed, first), (1.0, config.most_expansions)):
+            if most == 0:
+                continue
+            prices = hybrid.Prices(config.reverse_cost, config.switch_cost_m, config.turn_cost, greed)
+            ended, last, word, count = hybrid.search(
+                start,
+                goal,
+                car,
+                ground,
+                prices,
+                to_go,
+                step_m,
+                config.cell_m,
+                config.headings,
+                most,
+                nodes,
+                parents,
+            )
+            expanded += count
+            if ended == hybrid.FOUND:
+                break
+        return ended, last, word, expanded
 
 
 def _goal_pose(request: PlanRequest, car: hybrid.Car, ground: hybrid.Ground, headings: int) -> FloatArray:

@@ -115,7 +115,8 @@ class PlanResult:
     tree_edges_m
         (E, 4) x0, y0, x1, y1 of the search tree's edges, for pictures; empty where there is no tree.
     given
-        Whether the path was prescribed rather than searched for: no shortest path is held against it.
+        Whether the path was prescribed, or sweeps a floor, rather than searched for between two places: no
+        shortest path is held against it, and it is not smoothed.
     first_solution_s, planning_time_s
         Wall time until the first valid solution and until the end; nan where there was none, or nobody
         looked at the clock.
