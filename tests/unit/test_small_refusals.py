@@ -36,6 +36,10 @@ WALL = "{kind: box, from_m: [4, 4], to_m: [5, 4]}"
             "world.kidnaps.0.to: expected room for the robot's footprint",
         ),
         (["robot.faults=[{name: drop, sensor: lidar, share: 3}]"], "robot.faults.0.share"),
+        (
+            ["stack.local_planner=null", "stack.controller=null"],
+            "no stack.local_planner and no stack.controller",
+        ),
         (["robot.footprint={points_m: [[0, 0], [1, 0], [1, 1, 2]]}"], "expected at most 2 items, found 3"),
     ],
 )

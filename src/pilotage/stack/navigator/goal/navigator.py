@@ -60,9 +60,12 @@ class GoalNavigator:
         if not task.goals:
             raise InputError("navigator 'goal': expected world.goal, found none")
         if parts.planner is None or parts.local_planner is None or parts.controller is None:
+            missing = [
+                role for role in ("planner", "local_planner", "controller") if getattr(parts, role) is None
+            ]
             raise InputError(
                 "navigator 'goal': expected stack.planner, stack.local_planner and stack.controller, "
-                "found one of them missing"
+                f"found no {' and no '.join(f'stack.{role}' for role in missing)}"
             )
         check_for_centre(parts, "goal")
         self._localizer = localizer_of(parts, "goal")
