@@ -36,10 +36,6 @@ WALL = "{kind: box, from_m: [4, 4], to_m: [5, 4]}"
             "world.kidnaps.0.to: expected room for the robot's footprint",
         ),
         (["robot.faults=[{name: drop, sensor: lidar, share: 3}]"], "robot.faults.0.share"),
-        (
-            ["stack.local_planner=null", "stack.controller=null"],
-            "no stack.local_planner and no stack.controller",
-        ),
         (["robot.footprint={points_m: [[0, 0], [1, 0], [1, 1, 2]]}"], "expected at most 2 items, found 3"),
     ],
 )
@@ -47,6 +43,12 @@ def test_missions(settings: list[str], words: str) -> None:
     with pytest.raises(InputError) as caught:
         build_source(load_mission("museum-1", ["world.obstacles=[]", *settings], 0))
     assert words in str(caught.value)
+
+
+def test_the_parts_that_a_navigator_misses_are_named() -> None:
+    settings = ["stack.local_planner=null", "stack.controller=null"]
+    with pytest.raises(InputError, match="found no stack.local_planner and no stack.controller"):
+        build(load_mission("museum-1", settings, 0))
 
 
 def test_a_ros_map_without_its_image_says_so(tmp_path: Path) -> None:
