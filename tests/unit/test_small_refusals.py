@@ -47,7 +47,7 @@ def test_missions(settings: list[str], words: str) -> None:
 
 def test_the_parts_that_a_navigator_misses_are_named() -> None:
     settings = ["stack.local_planner=null", "stack.controller=null"]
-    with pytest.raises(InputError, match="found no stack.local_planner and no stack.controller"):
+    with pytest.raises(InputError, match=r"found no stack\.local_planner and no stack\.controller"):
         build(load_mission("museum-1", settings, 0))
 
 
