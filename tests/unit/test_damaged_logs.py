@@ -17,6 +17,7 @@ from pilotage.core.errors import InputError
 from pilotage.logs.aer1513 import read_aer1513
 from pilotage.logs.carmen import read_carmen
 from pilotage.logs.heading_csv import read_heading_log
+from pilotage.logs.laser_recordings import read_laser_log
 from pilotage.logs.mat import load_mat
 from pilotage.logs.mrclam import read_mrclam
 from pilotage.logs.odometry_csv import COLUMNS, read_odometry_csv
@@ -88,9 +89,32 @@ def test_a_compressed_text_cut_at_any_byte(tmp_path: Path, name: str) -> None:
     packed = gzip.compress(text.encode(), mtime=0)
     for cut in range(0, len(packed), 3):
         path.write_bytes(packed[:cut])
-        assert judged(reader, path) is None
+        # A recording of scans is of use without its end: see below.
+        assert judged(reader, path) is None or name == "carmen.log"
     path.write_bytes(packed)
     assert judged(reader, path) is not None
+
+
+def test_a_gzipped_recording_cut_in_half_is_read_up_to_the_cut(tmp_path: Path) -> None:
+    """Every whole line before the cut, as of the plain file, and a word; damage within it is refused."""
+    drawn = RNG.uniform(0.5, 9.5, (400, 30))
+    lines = [
+        f"FLASER 30 {' '.join(f'{r:.4f}' for r in row)} 0 0 0 0 0 0 {i}.5 host {i}.5\n"
+        for i, row in enumerate(drawn)
+    ]
+    packed, path = gzip.compress("".join(lines).encode(), mtime=0), tmp_path / "carmen.log.gz"
+    for cut in (len(packed) // 2, len(packed) - 1):
+        path.write_bytes(packed[:cut])
+        log = read_laser_log(path)
+        assert len(log) > 0.9 * 400 * cut / len(packed)
+        np.testing.assert_allclose(log.ranges_m, drawn[: len(log)], atol=1e-4)
+        assert any("cut short" in said for said in log.warnings)
+    path.write_bytes(packed[: len(packed) // 2] + b"\xff" * 40 + packed[len(packed) // 2 + 40 :])
+    with pytest.raises(InputError, match=r"line \d+: the compressed file is cut short or damaged"):
+        read_laser_log(path)
+    path.write_bytes(packed[:12])
+    with pytest.raises(InputError, match="expected FLASER or ROBOTLASER1 lines, found the end"):
+        read_laser_log(path)
 
 
 @pytest.mark.parametrize("name", TEXTS)

@@ -22,9 +22,9 @@ from pathlib import Path
 import numpy as np
 
 from pilotage.core.errors import InputError
+from pilotage.core.files import read_cut_text
 from pilotage.core.types import FloatArray, IntArray
 from pilotage.core.whole_number import whole_number
-from pilotage.logs.text import read_text
 
 LARGEST = 1e12
 """Beyond any metre, radian or second of a log."""
@@ -54,7 +54,7 @@ class CarmenLog:
     backward_times
         How many scans carry a time before that of the scan before.
     cut_short
-        Whether the file ends within a line, which is left out then.
+        Whether the file ends within a line, which is left out then, or gzipped data have no end.
     """
 
     t_s: FloatArray
@@ -90,7 +90,7 @@ def read_carmen(path: Path) -> CarmenLog:
     """Read a log.
 
     Ranges that are no numbers are kept as NaN or infinity, scans may change their number of beams, and a last
-    line that the end of the file cuts is left out.
+    line that the end of the file, gzipped or not, cuts is left out.
 
     Raises
     ------
@@ -100,9 +100,8 @@ def read_carmen(path: Path) -> CarmenLog:
     scans: list[_Scan] = []
     readings_before: list[int] = []
     odometry: list[list[float]] = []
-    text = read_text(path)
+    text, cut_short = read_cut_text(path, "a readable file")
     lines = text.splitlines()
-    cut_short = False
     for number, line in enumerate(lines, start=1):
         words = line.split()
         if not words:

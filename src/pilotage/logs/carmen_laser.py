@@ -49,7 +49,7 @@ def laser_log_of_carmen(log: CarmenLog, name: str) -> LaserLog:
     ]
     said = []
     if log.cut_short:
-        said.append("the file is cut short: its last line was left out")
+        said.append("the file is cut short: it was read up to its last whole line")
     nothing = sum(int(np.count_nonzero(np.isnan(scan.ranges_m))) for scan in scans)
     if nothing:
         said.append(f"{nothing} ranges are not numbers: no measurement")

@@ -6,6 +6,7 @@ first (a pipe, a device or a folder is no file), unpacks up to a limit, and deco
     from pilotage.core.files import read_bytes, read_json, read_text, read_yaml
 
     text = read_text(path, "a trajectory")     # UTF-8, gzipped or not: file and line of what is none
+    text, cut = read_cut_text(path)            # the same of what a gzipped log has left before a cut
     values = read_yaml(path, "a mission")      # bounded nesting, aliases counted as written out, keys once
     entry = read_json(path, "a run's metrics")  # bounded nesting, finite numbers, whole surrogate pairs
     events = read_json_lines(path)             # one object a line
@@ -21,13 +22,22 @@ the environment variable ``PILOTAGE_LIMITS=N`` makes all of them N times as larg
 What is shown to people goes through ``core.shown`` (an ``InputError`` does so by itself).
 """
 
-from pilotage.core.files.plain import decoded, opened, read_bytes, read_text, require_file, unpacked
+from pilotage.core.files.plain import (
+    decoded,
+    opened,
+    read_bytes,
+    read_cut_text,
+    read_text,
+    require_file,
+    unpacked,
+)
 from pilotage.core.files.values import read_json, read_json_lines, read_values_text, read_yaml
 
 __all__ = [
     "decoded",
     "opened",
     "read_bytes",
+    "read_cut_text",
     "read_json",
     "read_json_lines",
     "read_text",

@@ -102,6 +102,19 @@ def read_text(path: Path, what: str = "a text file", most: int = TEXT_BYTES) -> 
     return decoded(unpacked(read_bytes(path, what, most), str(path), most), str(path))
 
 
+def read_cut_text(path: Path, what: str = "a text file", most: int = TEXT_BYTES) -> tuple[str, bool]:
+    """Read as ``read_text``, but gzipped text that is cut short up to its last whole line.
+
+    For logs that are of use without their end. Damage elsewhere is refused: anything may be behind it.
+
+    Returns
+    -------
+    The text, and whether the compressed data had no end.
+    """
+    data, cut = _unpacked(read_bytes(path, what, most), str(path), most)
+    return decoded(data[: data.rfind(b"\n") + 1] if cut else data, str(path)), cut
+
+
 def unpacked(data: bytes, where: str, most: int = TEXT_BYTES) -> bytes:
     """Unpack gzipped data up to the limit; what is not gzipped stays as it is.
 
@@ -110,8 +123,16 @@ def unpacked(data: bytes, where: str, most: int = TEXT_BYTES) -> bytes:
     InputError
         Where they end too early, are damaged, or unpack to more.
     """
+    whole, cut = _unpacked(data, where, most)
+    if cut:
+        raise _not_whole(where, [whole])
+    return whole
+
+
+def _unpacked(data: bytes, where: str, most: int) -> tuple[bytes, bool]:
+    """What gzipped data hold, and whether they have no end."""
     if data[:2] != _GZIP:
-        return data
+        return data, False
     room = limit(most)
     parts: list[bytes] = []
     try:
@@ -120,10 +141,16 @@ def unpacked(data: bytes, where: str, most: int = TEXT_BYTES) -> bytes:
             room -= len(part)
             if room < 0:
                 raise too_large(f"{where} (gzip, unpacked)", limit(most), None)
-    except (EOFError, zlib.error):
-        line = sum(part.count(b"\n") for part in parts) + 1
-        raise InputError(f"{where} line {line}: the compressed file is cut short or damaged") from None
-    return b"".join(parts)
+    except EOFError:
+        return b"".join(parts), True
+    except zlib.error:
+        raise _not_whole(where, parts) from None
+    return b"".join(parts), False
+
+
+def _not_whole(where: str, parts: list[bytes]) -> InputError:
+    line = sum(part.count(b"\n") for part in parts) + 1
+    return InputError(f"{where} line {line}: the compressed file is cut short or damaged")
 
 
 def _gzip_parts(data: bytes) -> Iterator[bytes]:
@@ -144,6 +171,7 @@ def _gzip_parts(data: bytes) -> Iterator[bytes]:
             yield unpacker.decompress(pending, _CHUNK)
             pending = unpacker.unused_data if unpacker.eof else unpacker.unconsumed_tail
     if not unpacker.eof:
+        yield unpacker.flush()  # a copied stretch may not have fitted into the last piece
         raise EOFError
 
 
