@@ -192,6 +192,22 @@ def test_a_cell_of_a_thin_wall_is_as_far_off_as_its_nearer_side(shift_m: float) 
     assert metrics["wall_max_m"] == pytest.approx(off.max(), abs=1e-9)
 
 
+def test_floor_in_a_thin_walls_cells_does_not_count_and_cells_beside_no_wall_do() -> None:
+    """Interpolated distances told 0.05 m of rows 0.025 m away, in cells that are rightly occupied."""
+    for wall_x_m in (3.95, 4.0):
+        sides = np.array([[x, 0.0, x, 6.0] for x in (wall_x_m, wall_x_m + 0.1)])
+        walls = SegmentMap(np.concatenate([ROOM.segments_m, sides]), np.zeros((0, 3)), ROOM.bounds_m)
+        chart, start = WorldMap("thin", ROOM.bounds_m, walls), Pose2(2.0, 2.0, 0.0)
+        cells, column = np.full((160, 200), FREE, np.int8), round(wall_x_m / 0.05)
+        cells[40:, column - 1 : column + 3] = OCCUPIED  # beams end on either side of its borders
+        grid = OccupancyGrid(cells.copy(), 0.05, Pose2(0.0, 0.0, 0.0))
+        assert floor_map_metrics(grid, chart, 0.3, start)["floor_mapped"] == 1.0
+        cells[40:80, 40] = OCCUPIED
+        missed = 40 / len(reachable_floor(chart, 0.3, start))
+        grid = OccupancyGrid(cells, 0.05, Pose2(0.0, 0.0, 0.0))
+        assert floor_map_metrics(grid, chart, 0.3, start)["floor_mapped"] == pytest.approx(1.0 - missed)
+
+
 def test_an_unknown_floor_is_explored_and_mapped() -> None:
     """The mission's stack in a small building: all of it, nothing touched, back, and a map left."""
     room = mission_of(MISSIONS["reach"]).world.model_dump(mode="json")
