@@ -205,6 +205,9 @@ def keep(
     out.hessians[number], out.slips[number] = hessian, track.slip + track.held @ track.held.T
     out.added[0] += 1
     track.slip[:], track.held[:], track.keyframe[:], track.since[0] = 0.0, 0.0, track.pose, 0
+    if kept.shape[0] == 0:
+        # Where nothing is in sight what was seen last stays what the next scans are looked for in.
+        return
     add_to_map(map_, thinned(kept), track.pose, local, led)
     add_view(views, cloud, track.pose)
 

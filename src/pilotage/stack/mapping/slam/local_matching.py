@@ -155,7 +155,9 @@ class LocalMatcher:
         keep(scan, cloud, kept, hessian, led, local, self.track, self.map_, self.views, self.keyframes)
 
     def remember(self, kept: FloatArray, pose: FloatArray) -> None:
-        """Take note of a keyframe that was fetched from ``keyframes``."""
+        """Take note of a keyframe that was fetched from ``keyframes``, unless it has no point."""
+        if len(kept) == 0:
+            return
         self._local = [*self._local, (kept, pose)][-self._config.local_keyframes :]
         self._around = None
 
@@ -180,6 +182,10 @@ class LocalMatcher:
         self.map_ = empty_map(2 * points + beams + LEAST_ROOM)
         for cloud, pose in self._local:
             add_to_map(self.map_, thinned(cloud), pose, self._config.local_keyframes, self._led)
+
+    def known(self) -> list[tuple[FloatArray, FloatArray]]:
+        """Points (K, 6) of the last keyframes in their frames, thinned, and their poses."""
+        return [(thinned(cloud), pose) for cloud, pose in self._local]
 
     def _clouds(self) -> list[FloatArray]:
         """Points (K, 6) of the keyframes in the frame of the track, as many as are searched."""

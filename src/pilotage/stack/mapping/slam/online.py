@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from pilotage.core.types import FloatArray
@@ -11,8 +13,9 @@ from pilotage.stack.mapping.slam.closures import USUAL_SLIP
 from pilotage.stack.mapping.slam.config import SlamConfig
 from pilotage.stack.mapping.slam.scan_covariances import SHARED_EDGES
 from pilotage.stack.mapping.slam.submaps import TURN_AS_PATH_M
-from pilotage.stack.mapping.slam.tracker import Tracker
+from pilotage.stack.mapping.slam.tracker import LocalTrack, Tracker
 from pilotage.stack.mapping.slam.uncertainty import errors_of
+from pilotage.stack.mapping.slam.unknown_ground import with_odometry
 
 WINDOWS_M = (1.0, 2.0, 4.0)
 """Half a search window's side at most, round by round, each time."""
@@ -42,7 +45,7 @@ class OnlineSlam:
         self._tracker = Tracker(config)
         self._closer = LoopCloser(config)
         self._misfit, self._loops = 0.0, 0
-        self._path_m, self._lost_before, self._lost_run, self._healed = 0.0, 0, 0, 0
+        self._path_m, self._healed, self._led = 0.0, 0, False
         self.keyframe_poses = np.zeros((0, 3))
         self.covariance = np.zeros((3, 3))
         self.accepted = 0
@@ -69,8 +72,8 @@ class OnlineSlam:
 
     @property
     def lost(self) -> bool:
-        """Whether the last scans fitted nowhere."""
-        return self._lost_run >= LOST_SCANS
+        """Whether the last scans fitted nowhere, though something known was to be seen."""
+        return self._tracker.lost_run >= LOST_SCANS
 
     def add(self, cloud: FloatArray, step: FloatArray | None, dt_s: float) -> bool:
         """Take in a scan; True where it became a keyframe, whose poses may all have moved.
@@ -84,11 +87,8 @@ class OnlineSlam:
         dt_s
             Time since the last scan.
         """
-        known = len(self.keyframe_poses)
+        known, self._led = len(self.keyframe_poses), step is not None
         new = self._tracker.add(cloud, step, max(dt_s, 1e-3), dt_s)
-        lost = self._tracker.lost
-        self._lost_run = self._lost_run + 1 if lost > self._lost_before else 0
-        self._lost_before = lost
         if self._tracker.healed > self._healed:
             self._healed = self._tracker.healed
             self.close()
@@ -113,7 +113,7 @@ class OnlineSlam:
             With the stretch of path that is not complete yet.
         """
         closer = self._closer
-        closer.grow(self._tracker.track(), ended)
+        closer.grow(self._track(), ended)
         if len(closer.submaps) == 0:
             return 0
         closer.look_again()
@@ -124,11 +124,23 @@ class OnlineSlam:
 
     def refine(self) -> None:
         """Align all keyframes that see the same walls: the last word on the map."""
-        track = self._tracker.track()
+        track = self._track()
         if len(self.keyframe_poses) < 2:
             return
         self.close(ended=True)
         self._take(refined(self._closer, track.clouds, weak_edges(track)))
+
+    def _track(self) -> LocalTrack:
+        return self._with_odometry(self._tracker.track(), 0)
+
+    def _with_odometry(self, track: LocalTrack, first: int) -> LocalTrack:
+        """What the odometry tells where scans leave a place open, in the track from a keyframe on."""
+        if not (self._led and self._config.use_odometry) or len(track.hessians) < 2:
+            return track
+        told = self._tracker.told_by_odometry(first)
+        return replace(
+            track, hessians=np.concatenate([track.hessians[:1], with_odometry(track.hessians[1:], told)])
+        )
 
     def _take(self, state: Solved) -> None:
         """Put the keyframes where the graph has them; note what its edges are off by, a loop's in all."""
@@ -142,7 +154,7 @@ class OnlineSlam:
 
     def _extend(self) -> None:
         """Hang the new keyframe on the one before."""
-        step = self._tracker.last_step()
+        step = self._with_odometry(self._tracker.last_step(), len(self.keyframe_poses) - 1)
         moved = between(step.poses[0], step.poses[1])
         here = self.keyframe_poses[-1]
         pose = composed(here, moved)

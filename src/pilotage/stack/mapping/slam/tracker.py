@@ -17,19 +17,18 @@ from pilotage.logs.laser_log import LaserLog
 from pilotage.stack.mapping.slam.clouds import LEAST_RANGE_M, Clouds, cloud_of
 from pilotage.stack.mapping.slam.config import SlamConfig
 from pilotage.stack.mapping.slam.fit import Fit
+from pilotage.stack.mapping.slam.guesses import (
+    BLIND_BREAK_SLIP,
+    BREAK_SLIP,
+    GUESS_SLIP,
+    GUESSED_SCANS,
+    HEALED_SLIP,
+    is_far,
+)
 from pilotage.stack.mapping.slam.local_matching import PRIOR, Aside, LocalMatcher
 from pilotage.stack.mapping.slam.odometry import NO_OTHERS, recording_of
+from pilotage.stack.mapping.slam.unknown_ground import FEW_POINTS, OdometryRecord, View
 
-BREAK_SLIP = np.diag([0.2, 0.2, 0.3]) ** 2
-BLIND_BREAK_SLIP = np.diag([0.5, 0.5, 0.8]) ** 2
-HEALED_SLIP = np.diag([0.05, 0.05, 0.02]) ** 2
-GUESS_SLIP = np.diag([0.05, 0.05, 0.05]) ** 2
-"""Covariances where the track broke, with odometry and without, where it was joined again, and what each
-scan adds that hangs by the odometry alone."""
-GUESSED_SCANS = 3
-"""So many scans in a row may hang by the odometry alone before the track breaks,"""
-FAR_M, FAR_RAD = 0.5, 0.4
-"""and none that is so far from the one before: the next would see still less of the last keyframe's walls."""
 RIGID = 1e4 * np.eye(3)
 """Hessian of a break: its slip alone counts."""
 HEAL_SCANS, HEAL_KEYFRAMES = 10, 24
@@ -103,17 +102,21 @@ class Tracker:
     """Places scans one after the other; the track so far is at hand at any time.
 
     Where a scan fits nowhere the track breaks: what follows is a piece of its own, whose scans are looked for
-    in what was before until two of them agree where it lies.
+    in what was before until two of them agree where it lies. Where nothing known is in sight a scan can fit
+    nowhere, and hangs by the odometry as surely as that was right before.
 
     Attributes
     ----------
     healed
         How many breaks were joined so.
+    lost_run
+        Scans in a row that fitted nowhere though something known was to be seen.
     """
 
     def __init__(self, config: SlamConfig) -> None:
         self._config = config
         self._matcher = LocalMatcher(config)
+        self._view, self._odometry = View(), OdometryRecord()
         self._poses: list[FloatArray] = []
         self._owner: list[int] = []
         self._keyframes: list[int] = []
@@ -122,7 +125,7 @@ class Tracker:
         self._slips: list[FloatArray] = []
         self._breaks: list[int] = []
         self._torn: _Torn | None = None
-        self._lost_run = 0
+        self.lost_run = 0
         self.healed = 0
 
     def add(
@@ -135,6 +138,8 @@ class Tracker:
     ) -> bool:
         """Place the next scan (K, 6); True where it became a keyframe. As ``LocalMatcher.search``."""
         self._matcher.make_room(len(cloud), step is not None)
+        if self._poses:
+            self._odometry.add(step)
         if step is not None:
             wheels = self._matcher.track.wheels
             step, others = (
@@ -159,6 +164,7 @@ class Tracker:
             [LEAST_RANGE_M, config.max_range_m, config.keyframe_distance_m, config.keyframe_turn_rad]
         )
         count, led = len(recording.beams), len(recording.at_scans) > 0
+        self._odometry.poses = list(recording.at_scans)
         poses, owners, first = np.empty((count, 3)), np.empty(count, np.int64), 1
         while first < count:
             # A break may be healed by any scan.
@@ -182,7 +188,7 @@ class Tracker:
             self._owner.extend((owners[first:at] + len(self._keyframes)).tolist())
             new = self._fetch()
             if at > first:
-                self._lost_run = 0
+                self.lost_run = 0
                 matcher.found_again()
             if why == FULL:
                 matcher.make_room(int(recording.beams[at]), led)
@@ -209,19 +215,25 @@ class Tracker:
 
         ``cloud``, ``kept`` and ``light`` are all of it, what is left without people, and what is aligned.
         """
-        track, hessian, broken = self._matcher.track, RIGID, False
-        if fit is None:
-            self._lost_run += 1
+        track, hessian, broken, far = self._matcher.track, RIGID, False, False
+        if fit is None and step is not None and self._is_on_unknown_ground(step):
+            self.lost_run = 0
+            track.pose[:] = composed(track.pose, step)
+            track.slip[:] += self._odometry.slip(len(self._poses), step, self._poses, track.wheels)
+            few = len(light) < FEW_POINTS
+            cloud, kept = (cloud[:0], kept[:0]) if few else (cloud, kept)
+            far = not few or self._is_new(between(track.keyframe, track.pose))
+        elif fit is None:
+            self.lost_run += 1
             track.pose[:] = composed(track.pose, self._matcher.found.motions[0])
-            broken = step is None or self._lost_run > GUESSED_SCANS or _is_far(step)
+            broken = step is None or self.lost_run > GUESSED_SCANS or is_far(step)
             track.slip[:] += BLIND_BREAK_SLIP if step is None else BREAK_SLIP if broken else GUESS_SLIP
             if broken:
                 self._tear()
         else:
-            self._lost_run, hessian = 0, fit.hessian
-        far = fit is not None and (
-            self._is_new(between(track.keyframe, track.pose)) or leaves(track, fit.value, step is not None)
-        )
+            self.lost_run, hessian = 0, fit.hessian
+            moved = between(track.keyframe, track.pose)
+            far = self._is_new(moved) or leaves(track, fit.value, step is not None)
         new = broken or far
         self._poses.append(track.pose.copy())
         if new:
@@ -230,6 +242,13 @@ class Tracker:
         if self._torn is not None and not broken:
             self._heal(self._torn, light, new)
         return new
+
+    def _is_on_unknown_ground(self, step: FloatArray) -> bool:
+        """Whether nothing known is to be seen from where the odometry leads: no scan can fit there."""
+        if self._torn is not None or is_far(step):
+            return False
+        pose = np.asarray(composed(self._matcher.track.pose, step))
+        return not self._view.shows_any(self._matcher.known(), pose)
 
     def _keep(self, cloud: FloatArray, kept: FloatArray, hessian: FloatArray, led: bool) -> None:
         """Make the last scan a keyframe."""
@@ -247,6 +266,7 @@ class Tracker:
             self._hessians.append(new.hessians[k].copy())
             self._slips.append(new.slips[k].copy())
             self._matcher.remember(kept, self._poses[scan])
+            self._view.grow(kept)
         new.added[0] = 0
         return count > 0
 
@@ -346,6 +366,11 @@ class Tracker:
             0,
         )
 
+    def told_by_odometry(self, first: int = 0) -> FloatArray:
+        """Information (K - 1, 3, 3) of the odometry between keyframes, from one of them on."""
+        scans = np.array(self._keyframes[first:], np.int64)
+        return self._odometry.told(scans, self._poses, self._matcher.track.wheels)
+
     def track(self) -> LocalTrack:
         """Everything so far."""
         return LocalTrack(
@@ -370,8 +395,3 @@ def track(log: LaserLog, config: SlamConfig, on_scan: OnScan | None = None) -> L
     tracker.add(cloud_of(log, 0, config.max_range_m), step, 1e-3, 0.0)
     tracker.follow(recording, np.diff(log.t_s, prepend=log.t_s[0]), on_scan)
     return tracker.track()
-
-
-def _is_far(motion: FloatArray) -> bool:
-    """Whether scans are so far apart that one alone leads out of what the last keyframe saw."""
-    return bool(np.hypot(motion[0], motion[1]) > FAR_M) or abs(float(motion[2])) > FAR_RAD
