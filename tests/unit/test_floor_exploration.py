@@ -306,7 +306,7 @@ def test_who_is_lost_goes_back_to_where_it_knew_its_place(monkeypatch: pytest.Mo
     """With a laser of 3.5 m one left a house, saw nothing that it knew, and stood there to the end."""
     explorer, floor = FloorExplorer.__new__(FloorExplorer), floor_of(half_seen(), np.array([3.4, 2.0]))
     seen = Target(np.array([3.5, 2.5]), np.array([3.9, 2.5]), 0.0, True)
-    targets = Targets(FloorExplorerConfig())
+    targets = Targets(FloorExplorerConfig(), 25.0)
     monkeypatch.setattr(targets, "worth_it", lambda *_: [seen])
     vars(explorer).update(
         _doing=Doing.EXPLORE, _least_m=0.4, _squeezing=False, _target=seen, _targets=targets
@@ -328,7 +328,7 @@ def test_who_is_lost_goes_back_to_where_it_knew_its_place(monkeypatch: pytest.Mo
 
 def test_who_turned_back_twice_on_its_way_to_a_frontier_gives_it_up() -> None:
     """Over a plain it became unsure, came back to a wall, and set out again for the same place for ever."""
-    targets, floor = Targets(FloorExplorerConfig()), floor_of(half_seen())
+    targets, floor = Targets(FloorExplorerConfig(), 25.0), floor_of(half_seen())
     pose = Pose2(1.0, 1.0, 0.0)
     (view,) = targets.worth_it(floor, pose, HERE, 0.4)
     targets.met(view)
@@ -340,6 +340,20 @@ def test_who_turned_back_twice_on_its_way_to_a_frontier_gives_it_up() -> None:
     targets.unsure(again)
     left = targets.worth_it(floor, pose, HERE, 0.4)
     assert all(np.hypot(*(other.xy_m - first.xy_m)) > 2.0 for other in left)
+
+
+def test_frontiers_without_a_wall_in_sight_come_last() -> None:
+    """With a laser of 3.5 m robots drove out of a house onto a plain before they had seen its rooms."""
+    states = half_seen()
+    states[56:58, 60:80] = OCCUPIED  # a wall: behind it a corridor goes on, before it the open floor
+    floor, pose = floor_of(states), Pose2(1.0, 1.0, 0.0)
+    near, far = (
+        Targets(FloorExplorerConfig(), reach_m).worth_it(floor, pose, HERE, 0.4) for reach_m in (25.0, 1.2)
+    )
+    assert len(near) == len(far) == 2
+    np.testing.assert_array_equal(near[0].xy_m, far[1].xy_m)
+    assert far[1].score == pytest.approx(near[0].score + FloorExplorerConfig().open_cost_m)
+    assert far[0].score == near[1].score
 
 
 def gap_seen(half_m: float, turned_rad: float) -> tuple[ScanGrid, np.ndarray, np.ndarray]:

@@ -120,6 +120,10 @@ class SeenFloor:
         """What it costs to get to a point, or to the nearest place with room beside it."""
         return float(self.cost_m[self._nearest_with_room(xy_m)])
 
+    def from_walls_m(self, xy_m: FloatArray) -> float:
+        """How far the nearest wall that was seen is from the cell of a point."""
+        return float(self.distance_m[self.cell_of(xy_m)])
+
     def frontiers(self, least_length_m: float) -> list[Frontier]:
         """All frontiers of at least a length, the cheapest to look at first; those out of reach last."""
         beside = scipy.ndimage.binary_dilation(self._unseen, AROUND)

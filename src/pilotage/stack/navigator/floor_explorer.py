@@ -68,7 +68,8 @@ class FloorExplorer(LocalizingNavigator):
     that the robot fits through is driven to, and given up only where it stood on it, or got no nearer. One
     that is too narrow is given up when it was looked at. What is given up is said, with the reason.
 
-    Rooms that are seen through gaps without room for its clearance come last, by paths that its body takes.
+    Frontiers with walls in sight come first, and rooms that are seen through gaps without room for its
+    clearance last, by paths that its body takes.
     """
 
     def __init__(
@@ -107,7 +108,7 @@ class FloorExplorer(LocalizingNavigator):
         start = task.initial.pose
         self._start = np.array([start.x_m, start.y_m])
         self._doing, self._target = Doing.EXPLORE, None
-        self._targets = Targets(config)
+        self._targets = Targets(config, self._scanner.max_range_m)
         self._sure_m, self._checked, self._searched = 0.0, 0, 0
         self._planned_s = -math.inf
         self._getting_on = GettingOn(self._start, robot.motion.top_speed_m_s)

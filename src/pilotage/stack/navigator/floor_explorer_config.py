@@ -24,6 +24,10 @@ class FloorExplorerConfig(Config):
     turn_cost_m_per_rad: NonNegative = 0.4
     length_gain: NonNegative = 0.3
     """A metre of frontier is worth so many metres of path."""
+    sight_share: Positive = 0.8
+    """A frontier farther from all walls than this share of the scanner's reach has none in sight,"""
+    open_cost_m: NonNegative = 50.0
+    """and is worth so many metres of path to others."""
     unsure_m: Positive = 1.0
     """Standard deviation of its position from which it goes back to close a loop first."""
     stall_s: Positive = 15.0

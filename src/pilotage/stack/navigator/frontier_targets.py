@@ -32,10 +32,14 @@ class Target:
 
 
 class Targets:
-    """Chooses among frontiers; remembers those that were looked at, stood on or out of reach."""
+    """Chooses among frontiers; remembers those that were looked at, stood on or out of reach.
 
-    def __init__(self, config: FloorExplorerConfig) -> None:
-        self._config = config
+    Frontiers without a wall in sight come last, as ground where the odometry alone tells the place: who went
+    around it along walls has closed loops by then.
+    """
+
+    def __init__(self, config: FloorExplorerConfig, reach_m: float) -> None:
+        self._config, self._sight_m = config, config.sight_share * reach_m
         self._looked: list[FloatArray] = []
         self._tried: list[tuple[FloatArray, float]] = []
         """Places on frontiers that it stood on or could not get to, and how much around them is given up."""
@@ -53,6 +57,8 @@ class Targets:
             turn = abs((bearing + math.pi) % (2.0 * math.pi) - math.pi)
             score = float(floor.cost_m[cell]) + config.turn_cost_m_per_rad * turn
             score -= config.length_gain * min(frontier.length_m, 4.0)
+            if floor.from_walls_m(frontier.middle_xy_m) > self._sight_m:
+                score += config.open_cost_m
             out.append(Target(xy_m, frontier.middle_xy_m, score, crossing))
         return sorted(out, key=lambda target: target.score)
 
