@@ -259,3 +259,36 @@ def test_who_is_bound_elsewhere_lines_up_no_more() -> None:
     assert controller._passage is not None
     controller.step(replace(view, t_s=0.4, goal_xy_m=(-3.0, 0.0)))
     assert controller._passage is None
+
+
+@pytest.mark.parametrize("aside_m", [0.08, 0.10, 0.12])
+def test_a_box_behind_a_gap_is_not_touched(aside_m: float) -> None:
+    """A disc of 0.21 m came through a gap of 0.5 m and touched the corner of a box 0.4 m behind it."""
+    half, radius_m = 0.25, 0.21
+    posts = [
+        edge
+        for s in (-1.0, 1.0)
+        for edge in (
+            [2.0, s * half, 2.0, s * 2.0],
+            [2.0, s * half, 2.2, s * half],
+            [2.2, s * half, 2.2, s * 2.0],
+        )
+    ]
+    box = [[2.55, -aside_m, 2.55, -0.35], [2.55, -aside_m, 2.8, -aside_m]]
+    far = [[-0.5, 2.0, 4.0, 2.0], [-0.5, -2.0, 4.0, -2.0], [4.0, -2.0, 4.0, 2.0]]
+    walls, outline_m = np.array(posts + box + far), polygon_around(Footprint.disc(radius_m))
+    controller = GapHorizon(GapHorizonConfig(), np.random.default_rng(0))
+    x, y, theta, v, w = 1.2, 0.05, 0.0, 0.0, 0.0
+    for k in range(90):
+        view = replace(_view(0.1 * k, Pose2(x, y, theta), walls, outline_m), twist=Twist(v, w))
+        told = controller.step(replace(view, goal_xy_m=(3.2, 0.3)))
+        v = min(max(told.v_m_s, v - 0.2), v + 0.2)
+        w = min(max(told.w_rad_s, w - 0.8), w + 0.8)
+        x, y, theta = x + 0.1 * v * math.cos(theta), y + 0.1 * v * math.sin(theta), theta + 0.1 * w
+        start, along = walls[:, :2], walls[:, 2:] - walls[:, :2]
+        share = np.clip((([x, y] - start) * along).sum(axis=1) / (along**2).sum(axis=1), 0.0, 1.0)
+        assert np.hypot(*(start + share[:, None] * along - [x, y]).T).min() > radius_m, k
+        if x > 2.9:
+            return
+    # Before the box it may stand and look around; it never touched it.
+    assert x > 2.1

@@ -174,7 +174,9 @@ class GapHorizon(RollingController):
         self._passage, wanted = passage.step(sharper, points, view.t_s)
         # What lines up before the gap has no need to swing its corners by as closely as it is narrow.
         inside = self._passage is None or self._passage.goes_in(scene)
-        margin_m = config.passage_margin_m if inside else config.margin_m
+        margin_m = config.margin_m
+        if inside:
+            margin_m = passage.margin_m(sharper, config.passage_margin_m, config.margin_m)
         scene = sharper if inside else scene
         tried = [(share * wanted.v_m_s, share * wanted.w_rad_s) for share in (1.0, 0.5, 0.25)]
         sees = inside or blind_clearance_m(view, scene, BLIND_M) >= BLIND_M
@@ -190,6 +192,9 @@ class GapHorizon(RollingController):
                 self._passage = self._passage.backed_out(scene, view.t_s)
             self._backs_out = False
         if command is None:
+            if inside and passage.is_past_middle(scene):
+                # What is ahead is not the gap: plans lead around it.
+                self._passage = None
             return STOP
         if abs(command.v_m_s) + abs(command.w_rad_s) > 0.02:
             self._moved_s = view.t_s

@@ -39,6 +39,8 @@ LEAST_ROOM_M = 0.0135
 """With less than this on either side, as far as can be measured, it does not go in."""
 LEAST_ENDS_M = 0.0025
 """The same between the ends that scans show, which noise brings nearer to each other."""
+CORNER_M = 0.025
+"""So much of the room on either side is left for errors of measures where more than the least is kept."""
 ASKEW = 0.65
 """Nor does it go in farther off the axis than this share of the room on either side, or so much less straight
 that a corner is: it lines up anew."""
@@ -191,6 +193,20 @@ class NarrowPassage:
             before = min(max(before, aside - along), before + FARTHER_M)
         c, s = math.cos(self.direction_rad), math.sin(self.direction_rad)
         return self.x_m - before * c, self.y_m - before * s
+
+    def margin_m(self, scene: Scene, least_m: float, most_m: float) -> float:
+        """What is kept from everything in the gap; beyond its middle more, where its sides leave as much.
+
+        What is ahead there is not the gap any more: a box behind one that left 4 cm was touched, for where
+        both sides of a corner lie in one cell their mean is behind it by a centimetre.
+        """
+        if not self.is_past_middle(scene):
+            return least_m
+        return min(max(self._room_m(scene.body) - CORNER_M, least_m), most_m)
+
+    def is_past_middle(self, scene: Scene) -> bool:
+        """Whether the robot has come beyond the middle of the gap."""
+        return self._place(float(scene.start[0]), float(scene.start[1]))[0] > 0.0
 
     def _room_m(self, body: Body) -> float:
         """On either side of a body that stands straight in the middle."""
