@@ -292,3 +292,12 @@ def test_a_box_behind_a_gap_is_not_touched(aside_m: float) -> None:
             return
     # Before the box it may stand and look around; it never touched it.
     assert x > 2.1
+
+
+def test_who_is_beside_a_gap_is_not_led_through_it() -> None:
+    """One was led around a gap, then back onto its axis, 4 mm from what it drove along: it touched that."""
+    outline_m, passage = polygon_around(Footprint.disc(0.21)), NarrowPassage(2.1, 0.0, 0.0, 0.446, 2, 0.0)
+    for x_m, y_m, led in ((2.25, 0.0, True), (2.25, 0.29, False), (1.5, 0.29, True)):
+        scene = _scene(Pose2(x_m, y_m, 0.0), _gap(0.446, 0.1), outline_m)
+        onward, _ = passage.step(scene, np.zeros((0, 2)), 0.1)
+        assert (onward is not None) == led

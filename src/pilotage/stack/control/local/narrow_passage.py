@@ -113,10 +113,13 @@ class NarrowPassage:
 
         ``points_xy_m``: (N, 2) of the scan, in the order of its beams, where the scene has them.
         """
-        along, _ = self._place(float(scene.start[0]), float(scene.start[1]))
+        along, across = self._place(float(scene.start[0]), float(scene.start[1]))
+        # Who was led around it meanwhile is not in it: its sides are not what it drives between.
+        aside = self.stage == THROUGH and abs(across) > 0.5 * self.width_m
+        beside = aside and along + self.begins_m > -scene.body.inner_m
         closed = self.stage == THROUGH and self.width_m < 2.0 * scene.body.inner_m - CLOSED_M
         opened = self.stage < THROUGH and self.width_m > 2.0 * (scene.body.outer_m + TIGHT_M)
-        if closed or opened or t_s - self.begun_s > LONGEST_S:
+        if closed or opened or beside or t_s - self.begun_s > LONGEST_S:
             return None, Twist(0.0, 0.0)
         if along > BEYOND_M:
             onward = self._onward(scene, t_s)
