@@ -14,6 +14,7 @@ from pilotage.experiments.build.build import build
 from pilotage.experiments.loop import run_loop
 from pilotage.experiments.mission import mission_of, read_mission
 from pilotage.kernels.control import safe_stop
+from pilotage.sensors.readings import Readings
 from pilotage.stack.navigator.patrol import traffic
 from pilotage.stack.navigator.patrol.obstructions import (
     ABSENT_S,
@@ -24,12 +25,18 @@ from pilotage.stack.navigator.patrol.obstructions import (
     Told,
 )
 from pilotage.stack.navigator.patrol.passage import Stretch
+from pilotage.stack.navigator.patrol.states import transitions
+from pilotage.stack.navigator.patrol.states.driving import Driving
+from pilotage.stack.navigator.patrol.states.making_room import SteppingAside
+from pilotage.stack.navigator.patrol.states.passages import StandingAside
+from pilotage.stack.navigator.patrol.states.state import State
 from pilotage.stack.patrol.graph import PatrolGraph
 from pilotage.stack.patrol.partition import annealed
 from pilotage.stack.patrol.passages import OPEN
 from pilotage.stack.patrol.roadmap import Roadmap
 from pilotage.stack.patrol.shut_paths import NONE_SHUT, OpenGraph, ShutPaths, same_side
 from pilotage.stack.patrol.tours import Round
+from pilotage.stack.patrol.word import Talk
 
 NOBODY: FloatArray = np.zeros((0, 2))
 BODY: FloatArray = np.array([[3.0, 1.0]])
@@ -70,7 +77,8 @@ def seen(kept: Obstructions, t_s: float, bodies: FloatArray, **more: Any) -> boo
     """One scan; nothing is seen to be absent unless said."""
     absent = more.get("absent", np.zeros(len(kept.known_xy_m), dtype=np.bool_))
     told = [Told(7, place) for place in more.get("told", NOBODY)]
-    return kept.step(t_s, bodies, absent, more.get("silent", NOBODY), told, more.get("heard", ()))
+    silent = np.insert(more.get("silent", NOBODY), 2, 0.5, axis=1)
+    return kept.step(t_s, bodies, absent, silent, told, more.get("heard", ()))
 
 
 class TestWhoStands:
@@ -86,6 +94,19 @@ class TestWhoStands:
         kept = Obstructions()
         assert seen(kept, 0.0, BODY, silent=BODY + 0.3)
         assert not seen(kept, 1.0, BODY, silent=BODY + 0.3)
+
+    def test_where_a_mate_may_have_come_since_its_last_word_is_its_body(self) -> None:
+        """It had driven 0.74 m since: robots waited, and made room for a body, for half a minute."""
+        context: Any = build(mission_of(two_rooms(DOOR_Y_M), seed=0)).team[1].stack._context  # type: ignore[attr-defined]
+        word = SimpleNamespace(x_m=3.0, y_m=1.0, talk=Talk(1.0, math.inf, 0.0, 1.0))
+        context.mates[0], context.t_s = (1.0, word), 3.0
+        assert not len(context.fell_silent())
+        context.t_s = 6.0
+        ((x, y, reach_m),) = context.fell_silent()
+        assert (x, y) == (3.0, 1.0)
+        assert 1.2 < reach_m < 1.5
+        kept, place = Obstructions(), np.array([[3.74, 1.0]])
+        assert kept.step(6.0, place, np.zeros(0, dtype=np.bool_), context.fell_silent(), [], {})
 
     def test_is_forgotten_where_nothing_is_seen_any_more(self) -> None:
         kept = Obstructions()
@@ -173,6 +194,43 @@ class TestPathsAround:
         x0, y0 = around.origin_xy_m
         away_m = math.hypot(x0 + column * around.spacing_m - x, y0 + row * around.spacing_m - y)
         assert KEEP_M <= away_m <= 0.9
+
+
+BESIDE_DOOR: FloatArray = np.array([[5.6, DOOR_Y_M + 0.6]])
+"""It leaves 0.14 m more than is kept from it and from the door's other edge: less than nodes are apart."""
+
+
+class TestGapsThatBodiesLeave:
+    @staticmethod
+    def context() -> Any:
+        stack: Any = build(mission_of(two_rooms(DOOR_Y_M), seed=0)).team[1].stack
+        return stack._context
+
+    def test_of_less_than_nodes_are_apart_are_planned_through(self) -> None:
+        """No node lay in 1.26 m between a body and a door's edge: a way of 3 m became one of 29 m."""
+        context = self.context()
+        context._obstructions = SimpleNamespace(shutting_xy_m=BESIDE_DOOR)
+        context._shut_paths()
+        assert context.memory.own.shut == NONE_SHUT
+        x, y = 4.0, DOOR_Y_M
+        behind = int(np.argmax(context.roadmap.places_xy_m[:, 0]))
+        way = context._shut.way(x, y, context._shut.time_s(behind), 10.0)[:, :2]
+        assert way[-1, 0] > 6.0
+        coarse = context._whole.around(BESIDE_DOOR, context.motion.shut_m, (x, y), 0.8)
+        assert ShutPaths.of(coarse, context.task.graph).unreached
+
+    def test_who_was_on_its_way_aside_looks_anew(self) -> None:
+        """Its field is over other nodes."""
+        context = self.context()
+        field = context.roadmap.field_to(2.0, 3.0)
+        states: tuple[State, ...] = (
+            SteppingAside(context, field, 9.0),
+            StandingAside(context, field, 0.0, 9.0),
+        )
+        context._obstructions = SimpleNamespace(shutting_xy_m=BESIDE_DOOR)
+        context._shut_paths()
+        for state in states:
+            assert isinstance(state.step(Readings(0.1, {}), transitions).state, Driving)
 
 
 class TestPlans:

@@ -18,7 +18,7 @@ from pilotage.kernels.control import disc_returns
 from pilotage.stack.navigator.patrol.passage import claimed, precedes, relation, stretch_of
 from pilotage.stack.navigator.patrol.still import StillWatch
 
-NOBODY = np.zeros((0, 2))
+NOBODY = np.zeros((0, 3))
 
 
 def corridor(width_m: float, size: int, duration_s: float, **team: Any) -> dict[str, Any]:
@@ -68,7 +68,7 @@ class TestStanding:
 
     def test_where_a_mate_fell_silent_who_stands_for_a_second_stands(self) -> None:
         """Who drives past its body sees it for two or three, and nobody planned around it for a minute."""
-        watch, silent = StillWatch(), np.array([[3.2, 0.8]])
+        watch, silent = StillWatch(), np.array([[3.2, 0.8, 0.5]])
         for k in range(12):
             found = watch.step(0.2 * k, np.array([[3.0, 1.0], [5.0, 1.0]]), silent)
             assert found.tolist() == ([[3.0, 1.0]] if k >= 5 else [])

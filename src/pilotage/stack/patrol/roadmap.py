@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import copy
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 from weakref import WeakKeyDictionary
 
@@ -15,9 +14,8 @@ from pilotage.core.errors import InputError
 from pilotage.core.types import BoolArray, FloatArray, IntArray
 from pilotage.kernels.control import eikonal
 from pilotage.maps.world_map import WorldMap
+from pilotage.stack.patrol.nodes import Ground
 
-EASY_M, TIGHT_FACTOR = 0.5, 1.0
-"""Nearer to walls than this, beyond the body, a metre takes longer: twice as long where it just fits."""
 STEP_M, ASIDE_REACH_M = 0.25, 6.0
 OFF_RATIO, AHEAD_M = 1.8, 3.5
 """Who waits beside a passage stands so many half widths of two off its axis, or so far before it."""
@@ -74,40 +72,44 @@ class Roadmap:
         self._fields: dict[int, FloatArray] = {}
         self._whole: Roadmap = self
         self._cut_off: frozenset[int] = frozenset()
-        near = [near_m] * self._vertices + [STATION_M] * len(stations_xy_m)
+        self._near_m = [near_m] * self._vertices + [STATION_M] * len(stations_xy_m)
+        self._ground = Ground(chart.field, chart.bounds_m, clearance_m, speed_m_s, lane_m)
+        self._finer: Roadmap | None = None
         for finer in FINER:
-            self._lay(chart, clearance_m, speed_m_s, spacing_m / finer, lane_m)
             try:
-                self._seeds = self._joined(near, clearance_m)
+                self._lay(spacing_m / finer)
                 return
             except InputError:
                 if finer == FINER[-1] or 4 * self.slowness.size > MOST_NODES:
                     raise
 
-    def _lay(
-        self, chart: WorldMap, clearance_m: float, speed_m_s: float, spacing_m: float, lane_m: float
-    ) -> None:
-        """Lay the nodes over the map."""
-        self.spacing_m = spacing_m
-        xmin, ymin, xmax, ymax = chart.bounds_m
-        self.origin_xy_m = (xmin, ymin)
-        xs = np.arange(xmin, xmax + 0.5 * spacing_m, spacing_m)
-        ys = np.arange(ymin, ymax + 0.5 * spacing_m, spacing_m)
-        grid = np.stack(np.meshgrid(xs, ys), axis=-1)
-        distance = chart.field.at(grid.reshape(-1, 2)).reshape(grid.shape[:2])
-        free = distance >= clearance_m
-        tight = np.clip(1.0 - (distance - clearance_m) / EASY_M, 0.0, 1.0)
-        self.slowness = np.where(free, (1.0 + TIGHT_FACTOR * tight**2) / speed_m_s, np.inf)
-        # Who keeps to one side is so far from where the passage is widest.
-        size = 2 * math.ceil(lane_m / spacing_m) + 1
+    def _lay(self, spacing_m: float) -> None:
+        """Lay the nodes over the ground."""
+        self.spacing_m, self.origin_xy_m = spacing_m, self._ground.bounds_m[:2]
+        self.slowness, self._room_m = self._ground.nodes(spacing_m)
         # Where there is room for all fields nobody need know which of them was asked for last.
         self._all_kept = len(self._places) * self.slowness.nbytes <= MOST_FIELD_BYTES
-        self._room_m: FloatArray = scipy.ndimage.maximum_filter(distance, size=size)
+        self._seeds = self._joined(self._ground.clearance_m)
 
-    def _joined(self, near_m: Sequence[float], clearance_m: float) -> list[tuple[int, int]]:
+    def finer(self) -> Roadmap:
+        """The same with nodes half as far from each other, worked out once: beside bodies there may be room
+        for one row of them or none. Itself where that were too many, or leaves a place without a node.
+        """
+        if self._finer is None and FINER[1] ** 2 * self.slowness.size > MOST_NODES:
+            self._finer = self
+        if self._finer is None:
+            self._finer = found = copy.copy(self)
+            found._fields, found._whole, found._finer = {}, found, found
+            try:
+                found._lay(self.spacing_m / FINER[1])
+            except InputError:
+                self._finer = self
+        return self._finer
+
+    def _joined(self, clearance_m: float) -> list[tuple[int, int]]:
         """The places' nodes, between all of which the body can drive."""
         free = np.argwhere(np.isfinite(self.slowness))
-        seeds = [self._seed(free, k, within_m, clearance_m) for k, within_m in enumerate(near_m)]
+        seeds = [self._seed(free, k, within_m, clearance_m) for k, within_m in enumerate(self._near_m)]
         regions, _ = scipy.ndimage.label(np.isfinite(self.slowness))
         of_place = [int(regions[seed]) for seed in seeds]
         apart = [k for k, region in enumerate(of_place) if region != of_place[0]]

@@ -78,7 +78,8 @@ class Context(Senses):
             config.lane_m,
         )
         self.motion = Motion(self, robot.motion, self.roadmap, clearance_m)
-        self._open, self._obstructions = self.roadmap, Obstructions()
+        self._whole, self._obstructions = self.roadmap, Obstructions()
+        self._open = self._whole
         self._shut: Roadmap | None = None
         self.battery: Battery | None = None
         if task.supply is not None:
@@ -114,7 +115,7 @@ class Context(Senses):
             self._obstructions.is_of_mate(np.array([word.x_m, word.y_m]), word.radius_m)
         known, standing = self._obstructions.known_xy_m, self.motion.standing
         absent = np.array([self.sees_nothing_at(place, self.radius_m) for place in known], dtype=np.bool_)
-        if self._obstructions.step(self.t_s, standing, absent, self.silent_xy_m(), told, heard):
+        if self._obstructions.step(self.t_s, standing, absent, self.fell_silent(), told, heard):
             self._shut_paths()
         for roadmap in (self._shut, self._open) if self._shut is not None else ():
             self._take(roadmap)
@@ -135,6 +136,7 @@ class Context(Senses):
         """Who shuts paths has changed."""
         bodies, here = self._obstructions.shutting_xy_m, (self.pose.x_m, self.pose.y_m)
         self._shut, shut = None, NONE_SHUT
+        self._open = self._whole.finer() if len(bodies) else self._whole
         if len(bodies):
             # Who keeps clear of a body ends up to a node short of the nearest one.
             near_m = SURELY_RATIO * self.task.visit_m - self._open.spacing_m
@@ -300,6 +302,10 @@ class Context(Senses):
         return self.motion.descend(
             self.roadmap.time_s(vertex), at, came_from=came_from, then=then, first=first
         )
+
+    def has(self, time: FloatArray) -> bool:
+        """Whether a field is over the roadmap's nodes; who knows of bodies lays them finer."""
+        return time.shape == self.roadmap.slowness.shape
 
     def descend(self, time: FloatArray) -> Twist:
         """The command that leads down a field of the roadmap, to no place to visit."""

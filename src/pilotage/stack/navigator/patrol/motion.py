@@ -78,7 +78,7 @@ class Motion:
     def watch(self) -> None:
         """Look who stands, in a scan."""
         self.standing = self._still.step(
-            self._senses.t_s, self._mute(self._beside()), self._senses.silent_xy_m()
+            self._senses.t_s, self._mute(self._beside()), self._senses.fell_silent()
         )
 
     def _beside(self) -> FloatArray:

@@ -12,8 +12,8 @@ from pilotage.core.types import BoolArray, FloatArray
 
 SHUTS_S = 15.0
 """Who was seen to stand for so long, besides the seconds until it counts as standing, is planned around."""
-SAME_M, FAILED_M = 0.35, 0.6
-"""What stands so near to where something stood is that; so near to where a mate fell silent, that mate."""
+SAME_M = 0.35
+"""What stands so near to where something stood is that."""
 ABSENT_S = 1.0
 """Who is not where it would be seen for so long has gone."""
 KEPT_S = 60.0
@@ -81,7 +81,7 @@ class Obstructions:
         t_s: float,
         standing_xy_m: FloatArray,
         absent: BoolArray,
-        silent_xy_m: FloatArray,
+        silent: FloatArray,
         told: Sequence[Told],
         heard: Collection[int],
     ) -> bool:
@@ -93,8 +93,8 @@ class Obstructions:
             (M, 2) bodies that are seen to stand and say nothing.
         absent
             (K,) of which of ``known_xy_m`` nothing is seen though it would be.
-        silent_xy_m
-            (L, 2) where mates that are silent said last that they are: who stands there has failed.
+        silent
+            (L, 3) discs where mates that are silent may be: who stands there has failed.
         told
             What mates say that they plan around.
         heard
@@ -111,15 +111,15 @@ class Obstructions:
         for place in standing_xy_m:
             body = self._near(place) or self._add(_Body(place.copy(), t_s, t_s))
             body.last_s, body.absent_s, body.seen = t_s, 0.0, True
-            body.shuts |= t_s - body.first_s >= SHUTS_S or _is_near(place, silent_xy_m, FAILED_M)
-        self._forget(silent_xy_m, told, heard)
+            body.shuts |= t_s - body.first_s >= SHUTS_S or _is_in(place, silent)
+        self._forget(silent, told, heard)
         denied = np.array([place for _, place in self._denied]).reshape(-1, 2)
         for mate, place in told:
             if _is_near(place, denied, SAME_M):
                 continue
             body = self._near(place) or self._add(_Body(place.copy(), t_s, t_s, seen=False))
             body.shuts, body.last_s = True, body.last_s if body.seen else t_s
-            body.failed |= _is_near(place, silent_xy_m, FAILED_M)
+            body.failed |= _is_in(place, silent)
             body.tellers.add(mate)
         before, self._shutting = self._shutting, self.shutting_xy_m
         return not np.array_equal(self._shutting, before)
@@ -132,12 +132,12 @@ class Obstructions:
         self._bodies.append(body)
         return body
 
-    def _forget(self, silent_xy_m: FloatArray, told: Sequence[Told], heard: Collection[int]) -> None:
+    def _forget(self, silent: FloatArray, told: Sequence[Told], heard: Collection[int]) -> None:
         """Who is seen to have gone, talks again, or may have gone; what mates told and tell no more."""
         kept = []
         self._denied = [(t_s, place) for t_s, place in self._denied if self._t_s - t_s < DENIED_S]
         for body in self._bodies:
-            had_failed, body.failed = body.failed, _is_near(body.xy_m, silent_xy_m, FAILED_M)
+            had_failed, body.failed = body.failed, _is_in(body.xy_m, silent)
             gone = body.absent_s >= ABSENT_S or (had_failed and not body.failed)
             still = any(_is_near(place, body.xy_m[None], SAME_M) for _, place in told)
             held = body.seen or still or body.tellers.isdisjoint(heard)
@@ -146,6 +146,10 @@ class Obstructions:
             elif gone:
                 self.deny(body.xy_m)
         self._bodies = kept
+
+
+def _is_in(place: FloatArray, discs: FloatArray) -> bool:
+    return bool((np.hypot(*(discs[:, :2] - place).T) < discs[:, 2]).any())
 
 
 def _is_near(place: FloatArray, others: FloatArray, reach_m: float) -> bool:

@@ -168,7 +168,7 @@ class Evacuating:
         context.mode, place = Mode.YIELD, told(context)
         if place is None:
             return to.resume(context)
-        if place != self.place:
+        if place != self.place or not context.has(self.time):
             return evacuate(context, place)
         command = context.descend(self.time)
         if context.fresh:

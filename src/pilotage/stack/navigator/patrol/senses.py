@@ -29,8 +29,8 @@ SECTORS = 72
 NEAR_M = 1.6
 """Returns beyond this distance from the axle are out of the way of one decision."""
 SIGMAS = 3.0
-TOLD_M = 0.2
-"""What a mate may be wrong about its place by."""
+TOLD_M, FAILED_M = 0.2, 0.35
+"""What a mate may be wrong about its place by, and how far off a body is seen besides."""
 AT_REST_M_S = 0.05
 HEARD_PERIODS = 4.0
 """Who said nothing for so many of its messages is silent."""
@@ -219,11 +219,15 @@ class Senses:
         latest_s = self.t_s - HEARD_PERIODS * self.config.message_period_s
         return [(number, word) for number, (sent_s, word) in self.mates.items() if sent_s > latest_s]
 
-    def silent_xy_m(self) -> FloatArray:
-        """(L, 2) where mates that were not heard lately said last that they are."""
+    def fell_silent(self) -> FloatArray:
+        """(L, 3) discs where mates that were not heard lately may stand: around where they said last that
+        they are, as far as they drive until the next word is due.
+        """
         heard = {number for number, _ in self.heard()}
-        silent = [(word.x_m, word.y_m) for number, (_, word) in self.mates.items() if number not in heard]
-        return np.array(silent).reshape(-1, 2)
+        silent = [word for number, (_, word) in self.mates.items() if number not in heard]
+        driven_m = [0.0 if (talk := word.talk) is None else talk.speed_m_s * talk.period_s for word in silent]
+        discs = [(w.x_m, w.y_m, FAILED_M + more_m) for w, more_m in zip(silent, driven_m, strict=True)]
+        return np.array(discs).reshape(-1, 3)
 
     def mates_by_their_words(self, t_s: float) -> FloatArray:
         """(N, 4) of all robots by number: where each is on the map, within what distance of that its middle

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from pilotage.core.types import FloatArray
-from pilotage.stack.navigator.patrol.obstructions import FAILED_M
 
 STILL_S, STILL_M = 4.0, 0.25
 """Who stays within so far for so long stands."""
@@ -21,9 +20,9 @@ class StillWatch:
     def __init__(self) -> None:
         self._known: FloatArray = np.zeros((0, 4))
 
-    def step(self, t_s: float, middles_xy_m: FloatArray, silent_xy_m: FloatArray) -> FloatArray:
-        """(K, 2) those of the bodies seen now (M, 2), map frame, that have stood for long; for less long near
-        where mates fell silent (L, 2).
+    def step(self, t_s: float, middles_xy_m: FloatArray, silent: FloatArray) -> FloatArray:
+        """(K, 2) those of the bodies seen now (M, 2), map frame, that have stood for long; for less long
+        where mates that fell silent may be, discs (L, 3).
         """
         if not len(middles_xy_m):
             if len(self._known):
@@ -39,6 +38,5 @@ class StillWatch:
                 row[:3] = known[int(np.argmin(away)), :3]
             fresh &= away >= STILL_M
         self._known = np.concatenate([rows, known[fresh]])
-        from_silent = np.hypot(*(rows[:, None, :2] - silent_xy_m).T)  # (L, M)
-        failed = (from_silent < FAILED_M).any(axis=0)
+        failed = (np.hypot(*(rows[:, None, :2] - silent[:, :2]).T) < silent[:, 2:]).any(axis=0)
         return np.asarray(rows[t_s - rows[:, 2] >= np.where(failed, FAILED_STILL_S, STILL_S), :2])

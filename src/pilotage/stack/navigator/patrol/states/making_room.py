@@ -53,7 +53,7 @@ class SteppingAside:
         del readings
         context = self.context
         context.mode = Mode.YIELD
-        if context.t_s >= self.until_s or context.runs_low():
+        if context.t_s >= self.until_s or context.runs_low() or not context.has(self.time):
             return to.resume(context)
         if context.fresh:
             traffic.look_along(context, context.here())

@@ -67,6 +67,8 @@ class StandingAside:
         del readings
         context = self.context
         context.mode = Mode.YIELD
+        if not context.has(self.time):
+            return to.resume(context)
         command = context.descend(self.time)
         waited_s = context.t_s - self.since_s
         if waited_s > context.config.hold_s:
