@@ -88,7 +88,7 @@ def test_a_body_that_is_planned_around_wants_nobody_to_make_room(tmp_path: Path,
     context.pose, context.strange = Pose2(2.5, 2.5, 0.0), np.array([[0.55, 0.0], [0.6, 0.1]])
     body = np.array([[3.3, 2.5]])
     for t_s in (0.0, 30.0 if long else 3.0):
-        context._obstructions.step(t_s, body, np.zeros(int(t_s > 0.0), dtype=bool), body[:0], (), ())
+        context._obstructions.step(t_s, body, np.zeros(int(t_s > 0.0), dtype=bool), np.zeros((0, 3)), (), ())
     assert context.crowded(0.6) is not long
 
 

@@ -20,11 +20,13 @@ from pilotage.missions.mission import Mission
 from pilotage.missions.places import GoalConfig
 from pilotage.missions.robot import RobotConfig
 from pilotage.missions.stack import StackConfig
-from pilotage.stack.interface import Stack
+from pilotage.stack.interface import NAVIGATORS, Stack
 from pilotage.stack.journal import Journal
 from pilotage.stack.knowledge import RobotKnowledge, TaskKnowledge
+from pilotage.stack.patrol.driven import as_driven
+from pilotage.stack.patrol.roadmap import Roadmap
 from pilotage.stack.patrol.strategy import STRATEGIES, PatrolSetting
-from pilotage.stack.patrol.task import PatrolSite, PatrolTask, Supply
+from pilotage.stack.patrol.task import PatrolPlaces, PatrolSite, PatrolTask, Supply
 from pilotage.stack.planning.rounds import Rounds
 
 
@@ -62,8 +64,9 @@ def make_team(
     """The robots with their stacks, which plan, and the truths that some of their modules may know."""
     placed = obstacles.segments_m, obstacles.circles_m
     truths = [_truth(mission, index, chart, *placed) for index in range(len(sheets))]
+    shares = _shares(mission, chart, sheets, task)
     team = [
-        _member(mission, index, chart, sheet, truths[index], oracles, task)
+        _member(mission, index, chart, sheet, truths[index], oracles, task, shares[index])
         for index, sheet in enumerate(sheets)
     ]
     return truths, team
@@ -85,6 +88,7 @@ def _member(
     truth: Truth,
     oracles: frozenset[str],
     whole: Task,
+    share: PatrolTask | None,
 ) -> Member:
     robot = mission.members[index]
     config = mission.stack_of(robot)
@@ -109,31 +113,56 @@ def _member(
     if "mapper" in oracles and config.map == "none":
         own = chart
     journal = Journal()
-    share = _share(mission, index, sheet, whole)
     stack = build_stack(config, sheet, own, task, journal, truth, oracles, share)
     return Member(robot, config, sheet, stack, journal, goals, rounds)
 
 
-def _share(mission: Mission, index: int, sheet: RobotKnowledge, whole: Task) -> PatrolTask | None:
-    """A robot's share of a task that has places to visit for all of the team."""
+def _shares(
+    mission: Mission, chart: WorldMap, sheets: Sequence[RobotKnowledge], whole: Task
+) -> Sequence[PatrolTask | None]:
+    """Each robot's share of a task that has places to visit for all of the team."""
     site: PatrolSite | None = getattr(whole, "patrol", None)
     if site is None:
         if mission.team.battery is not None:
             raise InputError(f"team.battery: expected task 'patrol', found '{mission.task.name}'")
-        return None
-    setting = PatrolSetting(
-        site.graph,
-        index,
-        site.starts,
-        sheet.motion.top_speed_m_s,
-        sheet.streams.stream("strategy"),
-        passages=site.passages,
-        starts_m=site.starts_m,
-        turn_m=site.turn_m,
-    )
+        return [None] * len(sheets)
+    supply = _supply(mission)
+    roadmaps = _roadmaps(mission, chart, sheets, PatrolPlaces.of(site.graph, supply, site.visit_m))
+    graph, passages = as_driven(site.graph, site.passages, roadmaps)
     assert mission.team.strategy is not None, "the task looked"
-    strategy = build_component(STRATEGIES, mission.team.strategy, "strategy", setting)
-    return PatrolTask(site.graph, site.visit_m, site.near_m, site.starts, index, strategy, _supply(mission))
+    shares = []
+    for index, sheet in enumerate(sheets):
+        setting = PatrolSetting(
+            graph,
+            index,
+            site.starts,
+            sheet.motion.top_speed_m_s,
+            sheet.streams.stream("strategy"),
+            passages=passages,
+            starts_m=site.starts_m,
+            turn_m=site.turn_m,
+        )
+        strategy = build_component(STRATEGIES, mission.team.strategy, "strategy", setting)
+        shares.append(PatrolTask(graph, site.visit_m, site.near_m, site.starts, index, strategy, supply))
+    return shares
+
+
+def _roadmaps(
+    mission: Mission, chart: WorldMap, sheets: Sequence[RobotKnowledge], places: PatrolPlaces
+) -> Sequence[Roadmap]:
+    """The different paths that robots follow, of navigators that tell."""
+    found: list[Roadmap] = []
+    for member, sheet in zip(mission.members, sheets, strict=True):
+        config = mission.stack_of(member)
+        choice = config.navigator
+        tells = getattr(NAVIGATORS.entry(choice.name).factory, "roadmap", None)
+        if tells is None:
+            continue
+        own = NAVIGATORS.configure(choice.name, choice.parameters, "stack.navigator")
+        roadmap = tells(own, sheet, told(config, chart), places)
+        if not any(roadmap is other for other in found):
+            found.append(roadmap)
+    return found
 
 
 def _supply(mission: Mission) -> Supply | None:

@@ -190,6 +190,14 @@ class Roadmap:
         before_s = float(field[seed])
         return max(1.0, around_s / before_s) if before_s > 0.0 and math.isfinite(around_s) else 1.0
 
+    def length_m(self, one: int, other: int) -> float:
+        """Of the path from one place to another."""
+        field, (row, column) = self.time_s(other), self._seeds[one]
+        (x0, y0), spacing_m = self.origin_xy_m, self.spacing_m
+        most_m = float(field[row, column]) / float(np.min(self.slowness)) + 2.0 * STEP_M
+        way = self.way(x0 + column * spacing_m, y0 + row * spacing_m, field, most_m)
+        return float(np.hypot(*np.diff(way[:, :2], axis=0).T).sum())
+
     def nearest(self, x_m: float, y_m: float) -> int:
         """The vertex that is reached soonest from a place, of the few that are nearest as the crow flies."""
         places = self.places_xy_m[: self._vertices]

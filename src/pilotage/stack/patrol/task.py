@@ -67,12 +67,29 @@ class Supply:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class PatrolPlaces:
+    """Where a robot's paths lead to: (V, 2) places to visit, (N, 2) charging stations."""
+
+    vertices_xy_m: FloatArray
+    stations_xy_m: FloatArray
+    visit_m: float
+
+    @staticmethod
+    def of(graph: PatrolGraph, supply: Supply | None, visit_m: float) -> PatrolPlaces:
+        """Without stations where nobody charges."""
+        stations = np.zeros((0, 2)) if supply is None else supply.stations_xy_m
+        return PatrolPlaces(graph.vertices_xy_m, stations, visit_m)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class PatrolTask:
     """Its share of a patrol.
 
     Attributes
     ----------
-    graph, visit_m, near_m, starts
+    graph
+        Its edges are as long as the team drives them.
+    visit_m, near_m, starts
         As ``PatrolSite``.
     robot
         Its number.
@@ -89,3 +106,8 @@ class PatrolTask:
     robot: int
     strategy: Strategy
     supply: Supply | None = None
+
+    @property
+    def places(self) -> PatrolPlaces:
+        """Where its paths lead to."""
+        return PatrolPlaces.of(self.graph, self.supply, self.visit_m)

@@ -19,18 +19,34 @@ from pilotage.stack.navigator.patrol.headway import Headway
 from pilotage.stack.navigator.patrol.motion import Motion
 from pilotage.stack.navigator.patrol.obstructions import Obstructions, Told
 from pilotage.stack.navigator.patrol.passage import Pursuit
-from pilotage.stack.navigator.patrol.senses import NO_POINTS, TOLD_M, Senses
+from pilotage.stack.navigator.patrol.senses import TOLD_M, Senses
 from pilotage.stack.patrol.messages import PatrolKnowledge, PatrolMemory
 from pilotage.stack.patrol.roadmap import Roadmap, roadmap_of
 from pilotage.stack.patrol.shut_paths import NONE_SHUT, ShutPaths
 from pilotage.stack.patrol.strategy import following
-from pilotage.stack.patrol.task import PatrolTask
+from pilotage.stack.patrol.task import PatrolPlaces, PatrolTask
 from pilotage.stack.patrol.word import Claim, Clearing, TeamWord
 
 SPEED_SHARE = 0.2
 """Weight of the newest edge in the speed made good."""
 SURELY_RATIO = 0.9
 """Who is within so much of ``visit_m`` visits a place, though told places are a little off."""
+
+
+def roadmap_for(
+    config: PatrolNavigatorConfig, robot: RobotKnowledge, chart: WorldMap, places: PatrolPlaces
+) -> Roadmap:
+    """The paths that a robot follows."""
+    return roadmap_of(
+        chart,
+        places.vertices_xy_m,
+        places.stations_xy_m,
+        robot.radius_m + config.plan_margin_m,
+        robot.motion.top_speed_m_s,
+        config.spacing_m,
+        0.5 * places.visit_m,
+        config.lane_m,
+    )
 
 
 class Context(Senses):
@@ -67,16 +83,7 @@ class Context(Senses):
         self.claim: Claim | None = None
         self.clearing: Clearing | None = None
         self._has_news, self.pursuit, self.headway = False, Pursuit(), Headway()
-        self.roadmap = roadmap_of(
-            chart,
-            task.graph.vertices_xy_m,
-            NO_POINTS if task.supply is None else task.supply.stations_xy_m,
-            clearance_m,
-            speed,
-            config.spacing_m,
-            0.5 * task.visit_m,
-            config.lane_m,
-        )
+        self.roadmap = roadmap_for(config, robot, chart, task.places)
         self.motion = Motion(self, robot.motion, self.roadmap, clearance_m)
         self._whole, self._obstructions = self.roadmap, Obstructions()
         self._open = self._whole

@@ -13,7 +13,7 @@ from pilotage.stack.localization.localizer import Abilities
 from pilotage.stack.navigator.goal.wandering import Wandering
 from pilotage.stack.navigator.navigator import Parts, localizer_of
 from pilotage.stack.navigator.patrol.config import PatrolNavigatorConfig
-from pilotage.stack.navigator.patrol.context import Context
+from pilotage.stack.navigator.patrol.context import Context, roadmap_for
 from pilotage.stack.navigator.patrol.precedence import Leading, precedence
 from pilotage.stack.navigator.patrol.states import transitions
 from pilotage.stack.navigator.patrol.states.charging import Charging
@@ -75,6 +75,9 @@ class PatrolNavigator:
         self._context = Context(config, robot, chart, parts.patrol, task.initial.pose, journal)
         self._wandering = Wandering(config.wander, robot, self._localizer)
         self._state: State | None = None
+
+    roadmap = staticmethod(roadmap_for)
+    """Its paths, for those who plan for it."""
 
     @property
     def belief(self) -> Belief:
