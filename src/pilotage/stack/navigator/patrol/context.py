@@ -118,8 +118,9 @@ class Context(Senses):
         for _, place in told:
             if not self._may_stand(place):
                 self._obstructions.deny(place)
-        for word in heard.values():
-            self._obstructions.is_of_mate(np.array([word.x_m, word.y_m]), word.radius_m)
+        if len(self._obstructions.known_xy_m):
+            for word in heard.values():
+                self._obstructions.is_of_mate(np.array([word.x_m, word.y_m]), word.radius_m)
         known, standing = self._obstructions.known_xy_m, self.motion.standing
         absent = np.array([self.sees_nothing_at(place, self.radius_m) for place in known], dtype=np.bool_)
         if self._obstructions.step(self.t_s, standing, absent, self.fell_silent(), told, heard):

@@ -11,11 +11,10 @@ from pilotage.kernels.control import disc_returns, eikonal, safe_stop, voronoi_w
 from pilotage.models.motion.motion import MotionConfig
 from pilotage.stack.navigator.patrol.gate import NO_GATE, gate_at
 from pilotage.stack.navigator.patrol.passage import CLAIM_M
-from pilotage.stack.navigator.patrol.senses import NO_POINTS, Senses
+from pilotage.stack.navigator.patrol.senses import NO_DISCS, NO_POINTS, Senses
 from pilotage.stack.navigator.patrol.still import StillWatch
 from pilotage.stack.patrol.roadmap import Roadmap
 
-NO_DISCS: FloatArray = np.zeros((0, 3))
 LATENCY_S = 0.05
 ROUNDED_M = 0.03
 """Paths between nodes come nearer than these, and bodies are seen a little elsewhere."""

@@ -25,6 +25,7 @@ from pilotage.stack.patrol.word import Talk, TeamWord
 
 NO_FIELD: FloatArray = np.zeros((1, 1))
 NO_POINTS: FloatArray = np.zeros((0, 2))
+NO_DISCS: FloatArray = np.zeros((0, 3))
 SECTORS = 72
 NEAR_M = 1.6
 """Returns beyond this distance from the axle are out of the way of one decision."""
@@ -225,6 +226,8 @@ class Senses:
         """
         heard = {number for number, _ in self.heard()}
         silent = [word for number, (_, word) in self.mates.items() if number not in heard]
+        if not silent:
+            return NO_DISCS
         driven_m = [0.0 if (talk := word.talk) is None else talk.speed_m_s * talk.period_s for word in silent]
         discs = [(w.x_m, w.y_m, FAILED_M + more_m) for w, more_m in zip(silent, driven_m, strict=True)]
         return np.array(discs).reshape(-1, 3)
