@@ -108,6 +108,17 @@ class TestWhoStands:
         kept, place = Obstructions(), np.array([[3.74, 1.0]])
         assert kept.step(6.0, place, np.zeros(0, dtype=np.bool_), context.fell_silent(), [], {})
 
+    def test_and_says_nothing_for_seconds_has_not_failed_where_words_are_often_lost(self) -> None:
+        """Of a radio that loses three words of ten some three in a row are lost every half a minute."""
+        settings = two_rooms(DOOR_Y_M)
+        settings["team"]["radio"] = {"range_m": 10.0, "loss": 0.3, "delay_s": 1.0}
+        context: Any = build(mission_of(settings, seed=0)).team[1].stack._context  # type: ignore[attr-defined]
+        word = SimpleNamespace(x_m=3.0, y_m=1.0, talk=Talk(1.0, 10.0, 0.3, 1.0))
+        context.mates[0], context.t_s = (1.0, word), 9.0
+        assert not len(context.fell_silent())
+        context.t_s = 10.0
+        assert len(context.fell_silent()) == 1
+
     def test_is_forgotten_where_nothing_is_seen_any_more(self) -> None:
         kept = Obstructions()
         seen(kept, 0.0, BODY, silent=BODY)

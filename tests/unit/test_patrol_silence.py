@@ -97,3 +97,25 @@ def test_of_two_the_other_takes_it_all_as_soon_as_silence_is_no_chance(chance: f
     assert strategy._side == {0, 1}
     strategy.next_vertex(memory.knowledge(68.0, np.array([0.0, math.log(chance)])))
     assert strategy._side == ({0} if left else {0, 1})
+
+
+def test_false_alarms_of_who_patrols_out_of_reach_get_rarer_and_rarer() -> None:
+    """Four places that four robots held, one of them out of reach: it was given up every minute or two."""
+    memory, other = (PatrolMemory(20, k, 2, at, 1.0) for k, at in ((0, 0), (1, 19)))
+    setting = PatrolSetting(lattice(5, 4, 3.0), 0, np.array([0, 19]), 1.0, np.random.default_rng(0))
+    entry = STRATEGIES.entry("adaptive-rounds")
+    strategy: Any = entry.factory(entry.config(), setting)
+    alarms_s: list[float] = []
+    talks_until_s, silent_s = 5.0, 0.0
+    for t_s in range(1, 4000):
+        if silent_s == 0.0 and t_s <= talks_until_s:
+            memory.receive(other.message(float(t_s)))
+        strategy.next_vertex(memory.knowledge(float(t_s)))
+        if strategy._side == {0} and (not alarms_s or t_s > talks_until_s):
+            # Whoever goes and looks is there after 15 s, finds it, and hears it for two rounds.
+            alarms_s.append(float(t_s))
+            silent_s, talks_until_s = 15.0, t_s + 135.0
+        silent_s = max(silent_s - 1.0, 0.0)
+    assert alarms_s[0] < 200.0
+    assert len(alarms_s) < 7
+    assert (np.diff(alarms_s[1:]) > 1.5 * np.diff(alarms_s[:-1])).all()

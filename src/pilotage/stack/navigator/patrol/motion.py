@@ -27,6 +27,8 @@ LANE_AHEAD_M, MERGE_S = 2.0, 1.0
 """A passage is as wide as its narrowest place so far ahead; the last part of a way leads to the middle."""
 THROUGH_RATIO = 0.5
 """It drives through a place within so much of ``visit_m``."""
+TALKS_PERIODS = 3.0
+"""A body is that of a mate who said so lately that it is there."""
 PEOPLE_M_S = 1.4
 """Who is no mate may come on at a walk, and gives way to nobody."""
 
@@ -213,10 +215,11 @@ class Motion:
             return NO_POINTS
         # Whoever is met is as large as the robot itself; its near side alone is seen.
         middles = senses.on_map(disc_returns.bodies(beside, senses.radius_m))
+        latest_s = senses.t_s - senses.patience_s(TALKS_PERIODS)
         talk = [
             (word.x_m, word.y_m, senses.radius_m + senses.speed_m_s * (senses.t_s - sent_s))
             for sent_s, word in senses.mates.values()
-            if senses.t_s - sent_s < 3.0 * senses.config.message_period_s
+            if sent_s > latest_s
         ]
         mute = [
             not any(math.hypot(x - word_x, y - word_y) < reach_m for word_x, word_y, reach_m in talk)

@@ -18,7 +18,7 @@ from pilotage.stack.interface import Belief
 from pilotage.stack.journal import Journal
 from pilotage.stack.knowledge import RobotKnowledge
 from pilotage.stack.navigator.patrol.config import PatrolNavigatorConfig
-from pilotage.stack.patrol.silence import Silences
+from pilotage.stack.patrol.silence import LEAST_LOSS, Silences
 from pilotage.stack.patrol.task import PatrolTask
 from pilotage.stack.patrol.watch import IntruderWatch
 from pilotage.stack.patrol.word import Talk, TeamWord
@@ -34,7 +34,10 @@ TOLD_M, FAILED_M = 0.2, 0.35
 """What a mate may be wrong about its place by, and how far off a body is seen besides."""
 AT_REST_M_S = 0.05
 HEARD_PERIODS = 4.0
-"""Who said nothing for so many of its messages is silent."""
+"""Who said nothing for so many of its messages is silent, where no more are lost than of good radios."""
+
+MOST_LOSS = 0.95
+"""Of a radio from which hardly anything arrives, as far as waiting for a word goes."""
 
 
 class Senses:
@@ -83,6 +86,7 @@ class Senses:
         radios = robot.sensors_of(RadioConfig)
         self._radio = next(iter(radios), None)
         self.talk_habit = _habit(next(iter(radios.values()), None), config.message_period_s, self.speed_m_s)
+        self._delay_s = max((radio.delay_s for radio in radios.values()), default=0.0)
         self._silences = Silences(len(task.starts), chart.bounds_m)
         self._directions = clustering.beam_directions(
             float(lidar.beam_angles_rad()[0]), lidar.beam_step_rad, lidar.beams
@@ -220,12 +224,21 @@ class Senses:
         latest_s = self.t_s - HEARD_PERIODS * self.config.message_period_s
         return [(number, word) for number, (sent_s, word) in self.mates.items() if sent_s > latest_s]
 
+    def patience_s(self, periods: float) -> float:
+        """How long after its last word was sent a mate's silence is no chance: so many words by a good radio.
+
+        By one that loses more as many words more as are as unlikely to be lost one after the other.
+        """
+        loss = min(max(self.talk_habit.loss, LEAST_LOSS), MOST_LOSS)
+        words = periods * math.log(LEAST_LOSS) / math.log(loss)
+        return self._delay_s + words * self.config.message_period_s
+
     def fell_silent(self) -> FloatArray:
-        """(L, 3) discs where mates that were not heard lately may stand: around where they said last that
+        """(L, 3) discs where mates that were not heard for too long may stand: around where they said last that
         they are, as far as they drive until the next word is due.
         """
-        heard = {number for number, _ in self.heard()}
-        silent = [word for number, (_, word) in self.mates.items() if number not in heard]
+        latest_s = self.t_s - self.patience_s(HEARD_PERIODS)
+        silent = [word for sent_s, word in self.mates.values() if sent_s <= latest_s]
         if not silent:
             return NO_DISCS
         driven_m = [0.0 if (talk := word.talk) is None else talk.speed_m_s * talk.period_s for word in silent]

@@ -28,6 +28,10 @@ SURE_WORDS, LATE_SHARE = 3.0, 0.25
 """Who has said so many is hardly expected any more to be out of reach for half a tour, where fewer of the
 others than this share are late."""
 
+LONGER = 2.0
+"""Where somebody was silent for long and was there all the same, as rounds keep out of reach of each other,
+a mate is given up when it is silent for so many times as long: false alarms get rarer and rarer."""
+
 
 class AdaptiveRoundsConfig(Config):
     """How plans are weighed, and when a robot waits or gives another one up.
@@ -109,6 +113,7 @@ class AdaptiveRoundsStrategy:
         # age), fading over half a tour; besides, one of that length that nobody has heard yet.
         self._memory_s = max(0.5 * Round.best(setting.graph).length_m / setting.speed_m_s, 1.0)
         self._gaps_s, self._expected = np.zeros((team, 2)), np.ones((team, 2))
+        self._longest_s = 0.0
         self._off_s = np.full(team, math.inf)
         self._phase_s = setting.begin_s
         self._is_on_round, self._waited_s = False, 0.0
@@ -160,6 +165,7 @@ class AdaptiveRoundsStrategy:
                 kept = math.exp(-gap_s / self._memory_s)
                 self._gaps_s[robot] = kept * self._gaps_s[robot] + [gap_s, 0.5 * gap_s**2]
                 self._expected[robot] *= [kept, kept * math.exp(-1.0 / SURE_WORDS)]
+                self._longest_s = max(gap_s, self._longest_s)
                 self._heard_s[robot] = state.t_s
         heard = np.array([state is not None for state in knowledge.states])
         heard[knowledge.robot] = False
@@ -174,6 +180,7 @@ class AdaptiveRoundsStrategy:
         readily = heard.any() and limit_s[heard].max() <= 2.0 * self._config.silent_s
         limit_s[~heard] = limit_s[heard].max() if readily else math.inf
         # Silence of who surely is in reach is no chance long before: one word after the other would be lost.
+        limit_s = np.maximum(limit_s, LONGER * self._longest_s)
         no_chance = knowledge.silences_log < math.log(self._config.by_chance)
         usual_s = self._gaps_s[:, 1] / np.maximum(self._gaps_s[:, 0], 1e-9)
         limit_s = np.where(
