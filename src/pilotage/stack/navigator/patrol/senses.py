@@ -234,8 +234,8 @@ class Senses:
         return self._delay_s + words * self.config.message_period_s
 
     def fell_silent(self) -> FloatArray:
-        """(L, 3) discs where mates that were not heard for too long may stand: around where they said last that
-        they are, as far as they drive until the next word is due.
+        """(L, 3) discs where mates that were not heard for too long may stand: around where they said last
+        that they are, as far as they drive until the next word is due.
         """
         latest_s = self.t_s - self.patience_s(HEARD_PERIODS)
         silent = [word for sent_s, word in self.mates.values() if sent_s <= latest_s]
