@@ -10,6 +10,7 @@ import pytest
 from pilotage.core.types import FloatArray, Goal, Pose2
 from pilotage.kernels.bodies.outline import outline_clearance
 from pilotage.kernels.rrt import hybrid
+from pilotage.kernels.rrt.dubins import advance
 from pilotage.kernels.rrt.reeds_shepp import follow, shortest, word_length
 from pilotage.maps.distance_field import DistanceField
 from pilotage.maps.segment_map import SegmentMap, box_segments
@@ -183,11 +184,9 @@ def test_curves_and_steps_fit_where_every_pose_of_them_does(name: str) -> None:
         )
         assert hybrid.word_fits(x, y, theta, word, car, ground) == every
         spare = hybrid.spare_at(x, y, theta, car, ground)
-        for turn, step in ((0.0, 0.25), (1.0, 0.5), (-1.0, -0.5)):
+        for turn, step in ((0, 0.25), (1, 0.5), (-1, -0.5)):
             count = math.ceil(abs(step) / hybrid.CHECK_M)
-            ends = [
-                hybrid.along_arc(x, y, theta, turn, step * i / count, TURNING_M) for i in range(1, count + 1)
-            ]
+            ends = [advance(x, y, theta, turn, TURNING_M, step * i / count) for i in range(1, count + 1)]
             every = all(hybrid.pose_fits(*end, car, ground) for end in ends)
             # Who has no room where it stands is asked for none: a search begins where it fits.
             if spare >= 0.0:

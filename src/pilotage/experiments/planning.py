@@ -43,8 +43,8 @@ def plan_on_map(
 
     Returns
     -------
-    success, reason, planned_length_m, shortest_length_m (exact, at the same clearance), planning_time_s,
-    first_solution_s, path_nodes and path, a list of [x, y, theta].
+    success, reason, planned_length_m, shortest_length_m (exact, at the same clearance; None of a sweep),
+    planning_time_s, first_solution_s, path_nodes and path, a list of [x, y, theta].
 
     Raises
     ------

@@ -119,4 +119,7 @@ NAVIGATORS: Registry[Stack] = Registry(
     gives=(Gives("step", "a Twist or WheelSpeeds, and a Belief, of finite numbers", _unfit),),
 )
 """Whole stacks; built as ``cls(config, robot, chart, task, parts, journal)``: a ``RobotKnowledge``, a
-``WorldMap``, a ``TaskKnowledge``, the ``Parts`` that the mission names, and the ``Journal`` to write into."""
+``WorldMap``, a ``TaskKnowledge``, the ``Parts`` that the mission names, and the ``Journal`` to write into.
+
+One that patrols may tell those who plan for it how long its paths are, by a static method ``roadmap(config,
+robot, chart, places)`` as ``PatrolNavigator`` has it; without one edges are as long as the graph says."""

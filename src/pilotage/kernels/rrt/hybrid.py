@@ -17,6 +17,7 @@ from pilotage.kernels.arrays import FloatArray, IntArray
 from pilotage.kernels.bodies.outline import outline_clearance
 from pilotage.kernels.geometry.field import interpolate_at
 from pilotage.kernels.jit import kernel
+from pilotage.kernels.rrt.dubins import advance
 from pilotage.kernels.rrt.reeds_shepp import follow, shortest, word_length
 
 FOUND, NO_PATH, EXHAUSTED = range(3)
@@ -107,30 +108,15 @@ def word_fits(x: float, y: float, theta: float, word: FloatArray, car: Car, grou
 
 
 @kernel
-def along_arc(
-    x: float, y: float, theta: float, turn: float, d: float, radius: float
-) -> tuple[float, float, float]:
-    """The pose ``d`` metres along a straight line or an arc to the left (``turn`` 1) or right (-1)."""
-    if turn == 0.0:
-        return x + d * math.cos(theta), y + d * math.sin(theta), theta
-    end = theta + turn * d / radius
-    return (
-        x + turn * radius * (math.sin(end) - math.sin(theta)),
-        y - turn * radius * (math.cos(end) - math.cos(theta)),
-        end,
-    )
-
-
-@kernel
 def arc_fits(
-    x: float, y: float, theta: float, turn: float, length: float, spare: float, car: Car, ground: Ground
+    x: float, y: float, theta: float, turn: int, length: float, spare: float, car: Car, ground: Ground
 ) -> bool:
     """Whether a step, signed, can be driven from a pose with so much to spare (``spare_at``)."""
     count = max(1, math.ceil(abs(length) / CHECK_M))
     moves = abs(length) / count * (1.0 + car.radius / car.turning)
     i = 1 + int(min(max(spare, 0.0) / moves, count))
     while i <= count:
-        px, py, angle = along_arc(x, y, theta, turn, length * i / count, car.turning)
+        px, py, angle = advance(x, y, theta, turn, car.turning, length * i / count)
         spare = spare_at(px, py, angle, car, ground)
         if spare < 0.0:
             return False
@@ -246,11 +232,11 @@ def search(
         came = parents[node, 2]
         spare = spare_at(x, y, theta, car, ground)
         for choice in range(6):
-            turn = float(choice % 3 - 1)
+            turn = choice % 3 - 1
             sign = 1.0 if choice < 3 else -1.0
             if not arc_fits(x, y, theta, turn, sign * step, spare, car, ground):
                 continue
-            ex, ey, eth = along_arc(x, y, theta, turn, sign * step, car.turning)
+            ex, ey, eth = advance(x, y, theta, turn, car.turning, sign * step)
             col, row = int((ex - ground.x0) / cell), int((ey - ground.y0) / cell)
             if not (0 <= col < columns and 0 <= row < rows):
                 continue
@@ -261,7 +247,7 @@ def search(
             if closed[key]:
                 continue
             price = step * (prices.reverse if sign < 0.0 else 1.0)
-            if turn != 0.0:
+            if turn != 0:
                 price *= prices.turn
             if came != 0.0 and came * sign < 0.0:
                 price += prices.switch
@@ -276,7 +262,7 @@ def search(
             around = to_go[iv, iu] - ground.spacing
             _, free = shortest(ex, ey, eth, goal[0], goal[1], goal[2], car.turning, prices.reverse)
             nodes[count, 0], nodes[count, 1], nodes[count, 2] = ex, ey, eth
-            parents[count, 0], parents[count, 1], parents[count, 2] = float(node), turn, sign * step
+            parents[count, 0], parents[count, 1], parents[count, 2] = float(node), float(turn), sign * step
             cost[count], where[count] = new, key
             rest = max(around if math.isfinite(around) else 0.0, free)
             heapq.heappush(heap, (new + prices.greed * rest, count))

@@ -35,7 +35,6 @@ TOLD_M, FAILED_M = 0.2, 0.35
 AT_REST_M_S = 0.05
 HEARD_PERIODS = 4.0
 """Who said nothing for so many of its messages is silent, where no more are lost than of good radios."""
-
 MOST_LOSS = 0.95
 """Of a radio from which hardly anything arrives, as far as waiting for a word goes."""
 

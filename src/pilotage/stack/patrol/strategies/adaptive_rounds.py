@@ -27,7 +27,6 @@ KEY, PHASE_M, PHASE_S = range(3)
 SURE_WORDS, LATE_SHARE = 3.0, 0.25
 """Who has said so many is hardly expected any more to be out of reach for half a tour, where fewer of the
 others than this share are late."""
-
 LONGER = 2.0
 """Where somebody was silent for long and was there all the same, as rounds keep out of reach of each other,
 a mate is given up when it is silent for so many times as long: false alarms get rarer and rarer."""
@@ -179,8 +178,8 @@ class AdaptiveRoundsStrategy:
         # Of a robot that was never heard silence tells something only where all others are heard readily.
         readily = heard.any() and limit_s[heard].max() <= 2.0 * self._config.silent_s
         limit_s[~heard] = limit_s[heard].max() if readily else math.inf
-        # Silence of who surely is in reach is no chance long before: one word after the other would be lost.
         limit_s = np.maximum(limit_s, LONGER * self._longest_s)
+        # Silence of who surely is in reach is no chance long before: one word after the other would be lost.
         no_chance = knowledge.silences_log < math.log(self._config.by_chance)
         usual_s = self._gaps_s[:, 1] / np.maximum(self._gaps_s[:, 0], 1e-9)
         limit_s = np.where(
