@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import itertools
 
 import numpy as np
@@ -9,18 +10,23 @@ import pytest
 
 from pilotage.core.errors import InputError
 from pilotage.core.types import BoolArray, FloatArray, Goal, Pose2
+from pilotage.experiments import warm_up
 from pilotage.experiments.build.build import build
 from pilotage.experiments.loop import run_loop
 from pilotage.experiments.mission import mission_of
-from pilotage.kernels.patrol.reshape import Ground, count_leg, is_free, reshape, straightened
+from pilotage.kernels.patrol.passes import Ground, recount
+from pilotage.kernels.patrol.reshape import is_free, reshape, straightened
 from pilotage.kernels.patrol.swept import mark_swept
 from pilotage.kernels.tours.entries import anneal_entries, entries_cost
-from pilotage.maps.floor import Floor
+from pilotage.maps.floor import Floor, sweepable
 from pilotage.maps.segment_map import SegmentMap, box_segments
 from pilotage.maps.world_map import WorldMap
+from pilotage.models.footprint import Footprint
 from pilotage.stack.navigator.timed_path import with_turns
-from pilotage.stack.planning.boustrophedon import BoustrophedonConfig, BoustrophedonPlanner, subdivided
+from pilotage.stack.planning.boustrophedon import BoustrophedonConfig, BoustrophedonPlanner
 from pilotage.stack.planning.planner import PlanRequest, PlanResult
+from pilotage.stack.planning.sweep_changes import subdivided
+from pilotage.stack.planning.sweep_floor import Sought, covered, rest_of
 from support.missions import MISSIONS
 
 ROOM = [[0, 0, 10, 0], [10, 0, 10, 8], [10, 8, 0, 8], [0, 8, 0, 0]]
@@ -57,6 +63,82 @@ def test_the_whole_floor_is_swept_and_nothing_is_touched(name: str) -> None:
     assert result.path.length_m * 0.8 / area_m2 <= MOST
 
 
+NO_DISCS = np.zeros((0, 3))
+NARROW_DOOR = np.array([*ROOM, [6, 0, 6, 3], [6, 3.7, 6, 8]], dtype=float)
+BODY = Footprint.disc(0.3)
+
+
+def test_where_there_is_no_room_for_its_clearance_it_goes_with_what_its_body_needs() -> None:
+    """A door of 0.7 m, a body of 0.3 m that keeps 0.42 m, and a room on either side."""
+    world = WorldMap(
+        "rooms", (0.0, 0.0, 10.0, 8.0), geometry=SegmentMap(NARROW_DOOR, NO_DISCS, (0, 0, 10, 8))
+    )
+    planner = BoustrophedonPlanner(BoustrophedonConfig(width_m=0.8, clearance_m=0.42))
+    rng = np.random.default_rng(0)
+    request = PlanRequest(Pose2(1.0, 1.0, 0.0), Goal(1.0, 1.0), world.field, rng, footprint=BODY)
+    result = planner.plan(request)
+    assert result.path is not None
+    assert result.covers
+    xy = np.ascontiguousarray(result.path.states[:, :2])
+    kept_m = np.array([world.walls.distance_m(x, y) for x, y in xy])
+    assert kept_m.min() >= 0.3
+    in_the_door = np.hypot(*(xy - [6.0, 3.35]).T) < 0.6
+    assert kept_m[~in_the_door].min() >= 0.419
+    floor = Floor.of(world, 0.3, 0.8 / 12, (1.0, 1.0))
+    assert not (floor.reachable & ~covered(floor, xy, 0.8)).any()
+    area_m2 = np.count_nonzero(sweepable(floor, 0.8)) * floor.cell_m**2
+    assert result.path.length_m * 0.8 / area_m2 <= 1.12
+
+
+def test_of_what_was_driven_the_rest_is_swept_and_no_more() -> None:
+    world, whole = swept(FLOORS["a room"])
+    planner = BoustrophedonPlanner(BoustrophedonConfig(width_m=0.8, clearance_m=0.4))
+    assert whole.path is not None
+
+    def rest_after(driven: FloatArray, std_m: FloatArray) -> PlanResult:
+        trail = np.column_stack([driven, std_m])
+        rng = np.random.default_rng(0)
+        here = Pose2(float(driven[-1, 0]), float(driven[-1, 1]), 0.0)
+        return planner.plan(PlanRequest(here, Goal(1.0, 1.0), world.field, rng, trail=trail))
+
+    xy = whole.path.states[:, :2]
+    sure = np.full(len(xy), 0.005)
+    nothing = rest_after(xy, sure)
+    assert not nothing.covers
+    assert nothing.path is not None
+    assert nothing.path.length_m < 0.1
+    # A third of the way through it was carried off: for four metres it drove its first lines again.
+    elsewhere, first = xy.copy(), len(xy) // 3
+    elsewhere[first : first + 80] = xy[:80]
+    floor = Floor.of(world, 0.4, 0.8 / 12, (1.0, 1.0))
+    left = floor.reachable & ~covered(floor, elsewhere, 0.8)
+    assert left.any()
+    rest = rest_after(elsewhere, sure)
+    assert rest.covers
+    assert rest.path is not None
+    assert not (left & ~covered(floor, rest.path.states[:, :2], 0.8)).any()
+    middle = floor.middles(left).mean(axis=0)
+    there_and_back_m = 2.0 * float(np.hypot(*(middle - [1.0, 1.0])))
+    assert rest.path.length_m < there_and_back_m + 5.0
+    # It drove all of it, but did not know where it was in the beginning.
+    unsure = np.where(np.arange(len(xy)) < 20, 0.1, 0.005)
+    assert rest_after(xy, unsure).covers
+
+
+def test_the_least_of_what_was_left_is_left_for_good() -> None:
+    world, whole = swept(FLOORS["a room"])
+    assert whole.path is not None
+    xy = whole.path.states[:, :2]
+    floor = Floor.of(world, 0.4, 0.8 / 12, (1.0, 1.0))
+    sought = Sought(floor, floor, floor.reachable, np.zeros_like(floor.reachable), 0.8)
+    driven = np.column_stack([xy[40:], np.zeros(len(xy) - 40)])
+    rest = rest_of(sought, driven, 0.8, 1.0).must
+    share = np.count_nonzero(rest) / np.count_nonzero(floor.reachable)
+    assert 0.0 < share < 0.1
+    assert not rest_of(sought, driven, 0.8, 1.0 - 1.01 * share).must.any()
+    assert (rest_of(sought, driven, 0.8, 1.0 - 0.99 * share / 2).must <= rest).all()
+
+
 def test_a_goal_that_is_walled_off_is_no_path() -> None:
     _, result = swept(np.array([*ROOM, [6, 0, 6, 8]], dtype=float), (8.0, 4.0))
     assert result.path is None
@@ -76,16 +158,16 @@ def test_a_disc_covers_what_is_within_its_radius_of_a_line() -> None:
 
 
 CELL_M, SHAPE, WIDTH_M = 0.04, (160, 260), 0.5
+NO_LEGS = np.zeros((0, 4))
 
 
 def ground_of(path: FloatArray, must: BoolArray, free: BoolArray | None = None) -> Ground:
     """Cells that a path has to sweep, with its counts."""
     grid = 0.0, 0.0, CELL_M
-    price = np.where(must, 60.0 * CELL_M**2 / WIDTH_M, 0.0)
-    counts = np.zeros(SHAPE, np.int64)
-    ground = WIDTH_M, grid, price, counts, grid, np.ones(SHAPE, np.bool_) if free is None else free
-    for a, b in itertools.pairwise(path):
-        count_leg(np.concatenate([a, b]), 1, ground)
+    kinds, counts = np.where(must, np.uint8(2), np.uint8(0)), np.zeros(SHAPE, np.int16)
+    prices = 0.0, 0.0, 60.0 * CELL_M**2 / WIDTH_M
+    ground = WIDTH_M, grid, kinds, prices, counts, grid, np.ones(SHAPE, np.bool_) if free is None else free
+    recount(NO_LEGS, np.hstack([path[:-1], path[1:]]), True, ground)
     return ground
 
 
@@ -104,10 +186,32 @@ def test_the_cells_that_a_leg_sweeps_are_those_near_to_it() -> None:
         ground = ground_of(path, np.ones(SHAPE, np.bool_))
         mark_swept(path, 0.5 * WIDTH_M, 0.0, 0.0, CELL_M, near)
         # On the very rim rounding decides.
-        assert np.count_nonzero((ground[3] == 1) != near) <= 4
-        gained = -60.0 * CELL_M**2 / WIDTH_M * np.count_nonzero(ground[3])
-        assert -count_leg(leg, -1, ground) == pytest.approx(gained)
-        assert not ground[3].any()
+        counts = ground[4]
+        assert np.count_nonzero((counts == 1) != near) <= 4
+        lost = 60.0 * CELL_M**2 / WIDTH_M * np.count_nonzero(counts)
+        assert recount(leg[None], NO_LEGS, False, ground) == pytest.approx(lost)
+        assert counts.any() or lost == 0.0
+        assert recount(leg[None], NO_LEGS, True, ground) == pytest.approx(lost)
+        assert not counts.any()
+
+
+def test_what_changes_is_counted_as_if_all_were_counted_anew() -> None:
+    """Some legs of a path take the place of others; the price is that of the cells that are left then."""
+    rng = np.random.default_rng(6)
+    must = rng.random(SHAPE) < 0.7
+    for number in range(40):
+        others, old, new = (rng.uniform(-0.3, 6.7, (rng.integers(0, 4), 4)) for _ in range(3))
+        # Most changes move one end of a leg by little.
+        new = np.vstack([new, old + rng.normal(0.0, 0.1, old.shape) * [1, 1, 0, 0]])
+        grounds = [ground_of(np.zeros((1, 2)), must) for _ in range(2)]
+        recount(NO_LEGS, np.vstack([others, old]), True, grounds[0])
+        recount(NO_LEGS, np.vstack([others, new]), True, grounds[1])
+        left = [np.count_nonzero(must & (ground[4] == 0)) * ground[3][2] for ground in grounds]
+        before = grounds[0][4].copy()
+        assert recount(old, new, False, grounds[0]) == pytest.approx(left[1] - left[0]), number
+        assert (grounds[0][4] == before).all()
+        assert recount(old, new, True, grounds[0]) == pytest.approx(left[1] - left[0])
+        assert (grounds[0][4] == grounds[1][4]).all()
 
 
 def test_a_path_is_changed_to_what_it_needs_and_leaves_nothing_out() -> None:
@@ -124,7 +228,7 @@ def test_a_path_is_changed_to_what_it_needs_and_leaves_nothing_out() -> None:
     mark_swept(np.ascontiguousarray(short), 0.5 * WIDTH_M, 0.0, 0.0, CELL_M, after)
     assert np.count_nonzero(must & ~after) <= 2
     # What it counts on the way is what there is in the end.
-    assert (ground_of(short, must)[3] == ground[3]).all()
+    assert (ground_of(short, must)[4] == ground[4]).all()
     lengths = [np.hypot(*np.diff(line, axis=0).T).sum() for line in (path, short)]
     # The detour is 10 m of it; the way back sweeps half a metre of each second pair of lines' ends.
     assert lengths[1] < lengths[0] - 12.0
@@ -172,11 +276,31 @@ class TestTask:
         metrics = experiment.task.judge(run).metrics
         assert metrics["success"], metrics["reason"]
         assert metrics["collisions"] == 0
-        assert len(run.robots[0].plans) == 1
+        kinds = [event.kind for event in run.events]
+        assert kinds in (["plan", "arrived"], ["plan", "rest", "arrived"])
         assert float(str(metrics["swept_fraction"])) >= 0.9999
         assert float(str(metrics["sweep_ratio"])) < 1.2
         end = run.robots[0].trace
         assert np.hypot(end["true_x_m"][-1] - 1.0, end["true_y_m"][-1] - 1.0) < 0.1
+
+    def test_what_it_left_it_sweeps_in_the_end(self) -> None:
+        """With a slack law it cuts corners, up to 0.1 m."""
+        values = copy.deepcopy(MISSIONS["sweep-floor"])
+        values["stack"]["navigator"]["tracking"] = {"along_per_s": 1.0, "length_m": 0.8}
+        experiment = build(mission_of(values, seed=0))
+        run = run_loop(experiment).finished
+        metrics = experiment.task.judge(run).metrics
+        assert [event.kind for event in run.events][:2] == ["plan", "rest"]
+        assert len(run.robots[0].plans) >= 2
+        assert metrics["success"], metrics["reason"]
+
+    def test_it_is_planned_once_before_it_is_driven(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        rehearsed: list[str] = []
+        monkeypatch.setattr(warm_up, "simulate", lambda mission: rehearsed.append(mission.task.name))
+        monkeypatch.setattr(warm_up, "_WARM", set())
+        for name in ("sweep-floor", "reach"):
+            warm_up.warm_up(mission_of(MISSIONS[name], seed=0))
+        assert rehearsed == ["reach"]
 
     def test_who_leaves_some_of_it_has_not_swept_the_floor(self) -> None:
         values = {**MISSIONS["sweep-floor"], "task": {"name": "sweep-floor", "width_m": 0.4}}

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from pilotage.experiments.loop import simulate
 from pilotage.kernels.jit import cache_is_cold
+from pilotage.missions.choice import ComponentChoice
 from pilotage.missions.mission import Mission
+from pilotage.stack.planning.planner import PLANNERS
 
 STEPS = 3
 FIRST_LIMIT_S = 300.0
@@ -16,15 +18,20 @@ def warm_up(mission: Mission) -> None:
     """Take the first steps of a mission once, so that its times are not those of a compiler.
 
     Done once a process for each set of components. With an empty cache the mission is rehearsed whole:
-    what its later course needs (a replan around an obstacle, say) is compiled then too.
+    what its later course needs (a replan around an obstacle, say) is compiled then too. One whose first plan
+    takes long is not rehearsed: its users would wait twice, and its times are those of planning anyway.
     """
     key = _components(mission)
-    if key in _WARM:
+    if key in _WARM or any(_takes_long(mission.stack_of(robot).planner) for robot in mission.members):
         return
     limit_s = FIRST_LIMIT_S if cache_is_cold() else STEPS * mission.run.dt_s
     short = mission.run.model_copy(update={"time_limit_s": min(limit_s, mission.run.time_limit_s)})
     simulate(mission.model_copy(update={"run": short}))
     _WARM.add(key)
+
+
+def _takes_long(planner: ComponentChoice | None) -> bool:
+    return planner is not None and getattr(PLANNERS.entry(planner.name).factory, "TAKES_LONG", False)
 
 
 def _components(mission: Mission) -> tuple[str, ...]:

@@ -220,6 +220,15 @@ class Floor:
             [x0 + (corners % columns + 0.5) * self.cell_m, y0 + (corners // columns + 0.5) * self.cell_m]
         )
 
+    def path_between_m(self, a_xy_m: FloatArray, b_xy_m: FloatArray) -> FloatArray:
+        """(K, 2) corners of the path from one place to another, pulled tight; InputError as ``path_m``."""
+        columns = self.reachable.shape[1]
+        start, end = (row * columns + column for row, column in map(self.nearest_cell, (b_xy_m, a_xy_m)))
+        factor = np.where(self.reachable, 1.0, np.inf)
+        nothing = np.full(factor.size, np.inf)
+        _, parent = some_travel_costs(factor, start, 1.0, 1.0, nothing, np.array([end]))
+        return self.path_m(parent, a_xy_m)
+
     @cached_property
     def _states(self) -> tuple[ByteArray, int]:
         padded = np.pad(np.where(self.reachable, 0, 128).astype(np.uint8), 1, constant_values=128)

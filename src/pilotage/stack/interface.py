@@ -32,6 +32,11 @@ class Belief:
     cov: FloatArray
     status: BeliefStatus = BeliefStatus.LOCALIZED
 
+    @property
+    def std_m(self) -> float:
+        """Standard deviation of the position, in the direction in which it is known worst."""
+        return math.sqrt(max(float(np.linalg.eigvalsh(self.cov[:2, :2])[-1]), 0.0))
+
     @staticmethod
     def anywhere(bounds_m: tuple[float, float, float, float]) -> Belief:
         """Lost: mean and covariance of a pose spread evenly over a floor (xmin, ymin, xmax, ymax)."""

@@ -8,23 +8,17 @@ far it ends from the best.
 from __future__ import annotations
 
 import math
-from typing import TypeAlias
 
 import numpy as np
 
-from pilotage.kernels.arrays import BoolArray, FloatArray, IntArray
+from pilotage.kernels.arrays import BoolArray, FloatArray
 from pilotage.kernels.geometry.plane import point_segment_distance
 from pilotage.kernels.jit import kernel
+from pilotage.kernels.patrol.passes import Grid, Ground, recount
 
 NEAR, LONGEST_LEG, LONGEST_CHAIN, LEAST_MOVE = 1.8, 2.6, 12, 0.02
 """In widths: vertices so near are joined in other ways, legs get no longer, and vertices move so little. So
 many vertices change their place together at most."""
-
-Grid: TypeAlias = tuple[float, float, float]
-"""x, y of the lower left corner, and side of the cells."""
-Ground: TypeAlias = tuple[float, Grid, FloatArray, IntArray, Grid, BoolArray]
-"""What is swept of which cells: the width of a pass; the cells; what it costs to leave each (rows, columns),
-as a length; and how many legs sweep it. Then coarser cells, and whether legs may lead through each."""
 
 
 @kernel
@@ -41,51 +35,12 @@ def is_free(a: FloatArray, b: FloatArray, free: BoolArray, grid: Grid) -> bool:
 
 
 @kernel
-def count_leg(leg: FloatArray, sign: int, ground: Ground) -> float:
-    """Count a leg (4,) in the cells that it sweeps, or take it back; how much more is left then, by price."""
-    width, grid, price, counts, _, _ = ground
-    x0, y0, cell = grid
-    radius = 0.5 * width
-    ax, ay, bx, by = leg
-    length = math.hypot(bx - ax, by - ay)
-    # The sides of what it sweeps, beside the leg; its ends are discs.
-    nx, ny = (0.0, 0.0) if length == 0.0 else (radius * (ay - by) / length, radius * (bx - ax) / length)
-    low_row = max(0, math.ceil((min(ay, by) - radius - y0) / cell - 0.5))
-    high_row = min(counts.shape[0] - 1, math.floor((max(ay, by) + radius - y0) / cell - 0.5))
-    cost = 0.0
-    for row in range(low_row, high_row + 1):
-        y = y0 + (row + 0.5) * cell
-        left, right = math.inf, -math.inf
-        for end in range(2):
-            x, off = (ax, y - ay) if end == 0 else (bx, y - by)
-            if abs(off) <= radius:
-                half = math.sqrt(radius * radius - off * off)
-                left, right = min(left, x - half), max(right, x + half)
-        for side in range(-1, 2, 2):
-            from_y, to_y = ay + side * ny, by + side * ny
-            if min(from_y, to_y) <= y <= max(from_y, to_y) and from_y != to_y:
-                x = ax + side * nx + (bx - ax) * (y - from_y) / (to_y - from_y)
-                left, right = min(left, x), max(right, x)
-        if left > right:
-            continue
-        low = max(0, math.ceil((left - x0) / cell - 0.5))
-        high = min(counts.shape[1] - 1, math.floor((right - x0) / cell - 0.5))
-        for column in range(low, high + 1):
-            if sign > 0 and counts[row, column] == 0:
-                cost -= price[row, column]
-            counts[row, column] += sign
-            if sign < 0 and counts[row, column] == 0:
-                cost += price[row, column]
-    return cost
-
-
-@kernel
 def is_taken(old: FloatArray, new: FloatArray, bar: float, ground: Ground) -> bool:
     """Whether legs ``new`` (K, 4) take the place of ``old`` (M, 4): free, and ``bar`` costlier at most.
 
     The ground counts the new ones then.
     """
-    width, _, _, _, grid, free = ground
+    width, _, _, _, _, grid, free = ground
     cost = 0.0
     for k in range(old.shape[0]):
         cost -= math.hypot(old[k, 2] - old[k, 0], old[k, 3] - old[k, 1])
@@ -100,17 +55,10 @@ def is_taken(old: FloatArray, new: FloatArray, bar: float, ground: Ground) -> bo
     for k in range(new.shape[0]):
         if not is_free(new[k, :2], new[k, 2:], free, grid):
             return False
-    for k in range(new.shape[0]):
-        cost += count_leg(new[k], 1, ground)
-    for k in range(old.shape[0]):
-        cost += count_leg(old[k], -1, ground)
-    if cost <= bar:
-        return True
-    for k in range(old.shape[0]):
-        count_leg(old[k], 1, ground)
-    for k in range(new.shape[0]):
-        count_leg(new[k], -1, ground)
-    return False
+    if cost + recount(old, new, False, ground) > bar:
+        return False
+    recount(old, new, True, ground)
+    return True
 
 
 @kernel
@@ -280,7 +228,7 @@ def straightened(path: FloatArray, off: float, ground: Ground) -> FloatArray:
 
     From each vertex on the line leads to the farthest one that may be next, tried one by one.
     """
-    _, _, _, _, grid, free = ground
+    _, _, _, _, _, grid, free = ground
     keep = np.zeros(path.shape[0], np.bool_)
     keep[0] = True
     first = 0

@@ -141,7 +141,7 @@ class FloorExplorer(LocalizingNavigator):
             self._decide(readings.t_s, belief, here)
         target = self._target
         goal = (math.nan, math.nan) if target is None else (float(target.xy_m[0]), float(target.xy_m[1]))
-        self._channel.tell(*goal, float(self._frontiers), _std_m(belief))
+        self._channel.tell(*goal, float(self._frontiers), belief.std_m)
         if target is None:
             return STOP
         tolerance_m = 0.5 * self._arrival_m()
@@ -259,7 +259,7 @@ class FloorExplorer(LocalizingNavigator):
     # --- closing loops ------------------------------------------------------------------------------
 
     def _is_unsure(self, belief: Belief) -> bool:
-        return _std_m(belief) > self._config.unsure_m + self._sure_m
+        return belief.std_m > self._config.unsure_m + self._sure_m
 
     def _is_lost(self, belief: Belief) -> bool:
         """Whether its scans fit nowhere, and places are left to find its way again from.
@@ -277,13 +277,13 @@ class FloorExplorer(LocalizingNavigator):
 
     def _still_unsure(self, belief: Belief, here: FloatArray) -> bool:
         """Whether to go on to where a loop may close."""
-        sure = _std_m(belief) < 0.5 * (self._config.unsure_m + self._sure_m)
+        sure = belief.std_m < 0.5 * (self._config.unsure_m + self._sure_m)
         if self._target is None or (sure and belief.status is not BeliefStatus.LOST):
             return False
         if not self._there(here):
             return True
         # It is there: what it is unsure by now cannot be helped.
-        self._sure_m = _std_m(belief)
+        self._sure_m = belief.std_m
         return False
 
     def _go_closing(self, t_s: float, floor: SeenFloor, here: FloatArray) -> bool:
@@ -385,8 +385,3 @@ class FloorExplorer(LocalizingNavigator):
                 k -= 1
         point = path[k]
         return float(point[0]), float(point[1])
-
-
-def _std_m(belief: Belief) -> float:
-    """Greatest standard deviation of the position."""
-    return math.sqrt(max(float(np.linalg.eigvalsh(belief.cov[:2, :2])[-1]), 0.0))

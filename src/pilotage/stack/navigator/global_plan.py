@@ -96,6 +96,7 @@ class GlobalPlan:
         self.progress: PathProgress | None = None
         self.circles_m: FloatArray = chart.barriers.circles_m
         self._looked_at: FloatArray | None = None
+        self._trail: FloatArray | None = None
 
     @property
     def clearance_m(self) -> float:
@@ -110,14 +111,18 @@ class GlobalPlan:
         mapped_m: FloatArray,
         clearances_m: Sequence[float],
         detours: Detours = AS_FAR_AS_IT_TAKES,
+        trail: FloatArray | None = None,
+        rest: bool = False,
     ) -> PlanResult:
         """Plan on the map with what was found on it, at the first clearance that gives a path; adopt it.
 
-        One of the later clearances is taken where it saves more than the ``detours`` to which it leads.
-        Returns the last result; its path is None where no clearance gave one.
+        ``trail`` (N, 3) is what was driven of a path that covers something; where a ``rest`` of that is asked
+        for and there is none, the path before stays. One of the later clearances is taken where it saves more
+        than the ``detours`` to which it leads. Returns the last result; its path is None where no clearance
+        gave one.
         """
         begin = time.perf_counter()
-        self._looked_at = mapped_m
+        self._looked_at, self._trail = mapped_m, trail
         field = with_circles(self._chart.field, mapped_m)
         result, found = self._search(start, goal, field, mapped_m, clearances_m, detours)
         self.turns_first = False
@@ -132,6 +137,7 @@ class GlobalPlan:
             found = self._rather_around(found, start, goal, mapped_m, clearances_m, detours)
         if found is not None:
             result = found.result
+        if found is not None and (result.covers or not rest):
             self._adopt(t_s, found, time.perf_counter() - begin, field.circles_m)
         self._journal.planning_time_s += time.perf_counter() - begin
         return result
@@ -228,7 +234,7 @@ class GlobalPlan:
         self, start: Pose2, goal: Goal, field: DistanceField, clearance_m: float
     ) -> tuple[PlanResult, Path | None]:
         """Plan and smooth at one clearance."""
-        request = PlanRequest(start, goal, field, self._rng, clearance_m, *self._shape())
+        request = PlanRequest(start, goal, field, self._rng, clearance_m, *self._shape(), self._trail)
         result = self._planner.plan(request)
         self.too_tight, self.hopeless = False, False
         if result.path is None:

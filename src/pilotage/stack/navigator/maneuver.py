@@ -28,8 +28,11 @@ from pilotage.stack.navigator.navigator import (
     only_goal,
 )
 from pilotage.stack.navigator.timed_path import laid_out, with_turns
+from pilotage.stack.navigator.trail import Trail
+from pilotage.stack.planning.planner import Path, PlanResult
 
-MOST_REPLANS = 8
+MOST_REPLANS, MOST_RESTS = 8, 5
+"""How often it plans anew where it went astray, and for what a path that covers a floor left of it."""
 BESIDE_INNER_M = (0.25, 0.2, 0.15, 0.08, 0.04, 0.01)
 """What paths planned for the centre keep beside the outline's inner disc, where they can keep no more."""
 HEADING_PER_S = 3.0
@@ -58,7 +61,8 @@ class ManeuverNavigator(LocalizingNavigator):
 
     A robot that turns on the spot does so at the path's corners, so that it drives the very lines of a sweep.
 
-    It looks at no obstacle that is not on its map. Where it cannot keep up with the plan it plans anew.
+    It looks at no obstacle that is not on its map. Where it cannot keep up with the plan it plans anew; what
+    a path that covers a floor left of it, as far as the robot knows, is driven in the end.
     """
 
     def __init__(
@@ -86,7 +90,8 @@ class ManeuverNavigator(LocalizingNavigator):
         )
         self._references: FloatArray = np.zeros((0, 5))
         self._to_go_m: FloatArray = np.zeros(0)
-        self._index, self._replans = 0, 0
+        self._index, self._replans, self._rests = 0, 0, 0
+        self._trail: Trail | None = None
         self._think(0.0)
         if self._plan.hopeless and self._plan.too_tight:
             raise InputError(
@@ -96,18 +101,32 @@ class ManeuverNavigator(LocalizingNavigator):
     def _think(self, t_s: float) -> None:
         """Plan from where it believes to be, and lay out the reference, one row a step."""
         plan = self._plan
-        nothing = np.zeros((0, 3))
-        result = plan.make(t_s, self.belief.pose, self._goal, nothing, self._clearances_m())
+        result = self._planned(t_s)
         if result.path is None or plan.path is None:
             self._end(t_s, StackStatus.FAILED, f"{result.status}: {result.reason}")
             return
+        if result.covers and self._trail is None:
+            self._trail = Trail()
+        self._lay_out(plan.path)
+        self._journal.say(t_s, "plan" if t_s == 0.0 else "replan", result.reason)
+
+    def _planned(self, t_s: float, rest: bool = False) -> PlanResult:
+        """What was found from where it believes to be."""
+        trail = None if self._trail is None else self._trail.rows
+        nothing = np.zeros((0, 3))
+        return self._plan.make(
+            t_s, self.belief.pose, self._goal, nothing, self._clearances_m(), trail=trail, rest=rest
+        )
+
+    def _lay_out(self, path: Path) -> None:
+        """The reference along a path, from its first row on."""
         braking = self._robot.motion.braking_m_s2
         acceleration = self._config.acceleration_share * (braking if math.isfinite(braking) else 2.0)
         speed = min(self._config.speed_m_s, self._robot.motion.top_speed_m_s)
-        states, dt_s, motion = plan.path.states, self._robot.dt_s, self._robot.motion
+        states, dt_s, motion = path.states, self._robot.dt_s, self._robot.motion
         turns = motion.least_turning_radius_m == 0.0
         rate = (self._config.turn_share if turns else 1.0) * motion.top_turn_rate_rad_s
-        if plan.path.turning_radius_m == 0.0:
+        if path.turning_radius_m == 0.0:
             heading = self.belief.pose.theta_rad
             self._references = with_turns(states, heading, rate, speed, acceleration, dt_s)
         else:
@@ -117,7 +136,6 @@ class ManeuverNavigator(LocalizingNavigator):
         self._to_go_m = np.append(ahead_m[1:], 0.0)
         self._index = 0
         self._controller.reset()
-        self._journal.say(t_s, "plan" if t_s == 0.0 else "replan", result.reason)
 
     def _clearances_m(self) -> list[float]:
         """Clearances to try in turn: the planner's own, and less.
@@ -137,6 +155,10 @@ class ManeuverNavigator(LocalizingNavigator):
         pose = self._localizer.step(readings).pose
         if self._status is not StackStatus.RUNNING:
             return STOP
+        if self._trail is not None:
+            self._trail.add(self.belief)
+        if self._index >= len(self._references) and self._goes_for_the_rest(readings.t_s):
+            return STOP
         if self._index >= len(self._references):
             self._status = StackStatus.ARRIVED
             self._journal.say(readings.t_s, "arrived", "the plan was driven to its end")
@@ -153,6 +175,18 @@ class ManeuverNavigator(LocalizingNavigator):
         # The way back along the path is the other direction's: a piece is driven in its own only.
         forward = max(control.twist.v_m_s, 0.0) if v > 0.0 else min(control.twist.v_m_s, 0.0)
         return Twist(forward, control.twist.w_rad_s)
+
+    def _goes_for_the_rest(self, t_s: float) -> bool:
+        """Whether what it drove along left something, and there is a path to that."""
+        if self._trail is None or self._rests == MOST_RESTS:
+            return False
+        self._rests += 1
+        result = self._planned(t_s, rest=True)
+        if result.path is None or not result.covers:
+            return False
+        self._lay_out(result.path)
+        self._journal.say(t_s, "rest", f"what was driven left some of it: {result.reason}")
+        return True
 
     def _astray(self, t_s: float) -> Twist:
         self._replans += 1

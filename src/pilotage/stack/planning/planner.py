@@ -91,6 +91,9 @@ class PlanRequest:
         Distance to keep from obstacles; None takes the planner's own setting.
     footprint, least_turning_radius_m
         The robot's outline and tightest arc, for planners that ask; the others plan for the centre.
+    trail
+        (N, 3) x, y and their standard deviation [m]: where the robot has been since it first asked, for
+        planners of paths that cover something; None at first.
     """
 
     start: Pose2
@@ -100,6 +103,7 @@ class PlanRequest:
     clearance_m: float | None = None
     footprint: Footprint | None = None
     least_turning_radius_m: float = 0.0
+    trail: FloatArray | None = None
 
 
 def _no_edges() -> FloatArray:
@@ -117,6 +121,8 @@ class PlanResult:
     given
         Whether the path was prescribed, or sweeps a floor, rather than searched for between two places: no
         shortest path is held against it, and it is not smoothed.
+    covers
+        Whether the path is for what lies along it: who has driven it asks for the rest, with its trail.
     first_solution_s, planning_time_s
         Wall time until the first valid solution and until the end; nan where there was none, or nobody
         looked at the clock.
@@ -133,13 +139,16 @@ class PlanResult:
     tree_edges_m: FloatArray = field(default_factory=_no_edges)
     given: bool = False
     first: Path | None = None
+    covers: bool = False
 
 
 class Planner(Protocol):
     """Finds a path for the robot's centre on its map. Built as ``cls(config)``.
 
     The clearance of a request holds the whole robot: of a polygon, the disc around it. One that keeps it from
-    the outline itself, or plans backwards, says so by a class attribute ``FOR_OUTLINE = True``.
+    the outline itself, or plans backwards, says so by a class attribute ``FOR_OUTLINE = True``. One that
+    takes seconds and more, beside which loading what is compiled takes nothing, says ``TAKES_LONG = True``:
+    no run is rehearsed with it.
     """
 
     @property

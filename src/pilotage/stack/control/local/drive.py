@@ -105,7 +105,7 @@ class LocalDrive:
             # Farther off the heading's error counts as well.
             away_m = math.hypot(goal_xy_m[0] - belief.pose.x_m, goal_xy_m[1] - belief.pose.y_m)
             near = away_m < SURE_WITHIN_M and tolerance_m < self._shift_m
-            sure = self._astray or (near and _std_m(belief) < 0.5 * tolerance_m)
+            sure = self._astray or (near and belief.std_m < 0.5 * tolerance_m)
             off_m = min(self._shift_m, 0.5 * tolerance_m)
             self._place(goal_xy_m, belief.pose, 0.0 if sure else off_m)
             view = self._view(readings.t_s, scan.ranges_m, tolerance_m, people_about, goal_is_sure=sure)
@@ -165,11 +165,6 @@ class LocalDrive:
             speed_var_m2_s2=self._twist_vars[0],
             turn_rate_var_rad2_s2=self._twist_vars[1],
         )
-
-
-def _std_m(belief: Belief) -> float:
-    """Of the position, in the direction in which it is known worst."""
-    return math.sqrt(max(float(np.linalg.eigvalsh(belief.cov[:2, :2])[-1]), 0.0))
 
 
 def limits_of(robot: RobotKnowledge, reverse_m_s: float, needed_by: str) -> LocalLimits:

@@ -1,0 +1,73 @@
+"""What a sweep leaves of a floor, and detours to it."""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy
+
+from pilotage.core.types import BoolArray, FloatArray
+from pilotage.kernels.patrol.swept import mark_swept
+from pilotage.maps.floor import Floor
+from pilotage.stack.planning.sweep_floor import Sought, covered
+
+DETOUR_ROUNDS = 6
+
+
+def completed(sought: Sought, path: FloatArray) -> FloatArray:
+    """(N, 2) the path with detours to what it leaves of a floor, through the inner one."""
+    floor, inner, width_m = sought.floor, sought.inner, sought.width_m
+    for _ in range(DETOUR_ROUNDS):
+        missing = sought.must & ~covered(floor, path, width_m)
+        places = _places_for(sought, path, missing)
+        if len(places) == 0:
+            break
+        path = _with_detours(inner, path, places)
+    return path
+
+
+def joined(floor: Floor, here: FloatArray, there: FloatArray) -> FloatArray:
+    """(K, 2) a path between two places: straight where nothing is in the way."""
+    if floor.is_clear(here, there):
+        return np.array([here, there])
+    return np.vstack([here, floor.path_between_m(here, there)[1:-1], there])
+
+
+def _places_for(sought: Sought, path: FloatArray, missing: BoolArray) -> FloatArray:
+    """(K, 2) places for the centre that together sweep what is missing, piece by piece, near to the path."""
+    floor, inner, reach_m = sought.floor, sought.inner, 0.5 * sought.width_m
+    on_path = np.zeros_like(inner.reachable)
+    mark_swept(np.ascontiguousarray(path), 0.71 * inner.cell_m, *inner.origin_xy_m, inner.cell_m, on_path)
+    away_m = inner.cell_m * scipy.ndimage.distance_transform_edt(~on_path)
+    pieces, number = scipy.ndimage.label(missing, structure=np.ones((3, 3)))
+    found = []
+    for piece in range(1, number + 1):
+        left = floor.middles(pieces == piece)
+        low, high = (
+            np.array(inner.cell_of(end)) for end in (left.min(axis=0) - reach_m, left.max(axis=0) + reach_m)
+        )
+        window = slice(low[0], high[0] + 1), slice(low[1], high[1] + 1)
+        cells = np.argwhere(inner.reachable[window])
+        stand = np.array(inner.origin_xy_m) + (cells + low + 0.5)[:, ::-1] * inner.cell_m
+        near = ((stand[:, None] - left[None]) ** 2).sum(axis=2) <= reach_m**2
+        worth = 1.0 / (0.5 * reach_m + away_m[window][tuple(cells.T)])
+        while near.any():
+            # What is swept by a metre of detour.
+            best = int(np.argmax(near.sum(axis=1) * worth))
+            found.append(stand[best])
+            near[:, near[best]] = False
+    return np.array(found).reshape(-1, 2)
+
+
+def _with_detours(floor: Floor, path: FloatArray, places: FloatArray) -> FloatArray:
+    """The path by way of further places: there and back from where it comes nearest to each in sight."""
+    for place in places:
+        a, step = path[:-1], np.diff(path, axis=0)
+        share = ((place - a) * step).sum(axis=1) / np.maximum((step**2).sum(axis=1), 1e-12)
+        foot = a + np.clip(share, 0.0, 1.0)[:, None] * step
+        there_m = np.hypot(*(foot - place).T)
+        near = np.argsort(there_m, kind="stable")[:30].tolist()
+        seen = next((k for k in near if floor.is_clear(foot[k], place)), None)
+        k = near[0] if seen is None else seen
+        out = joined(floor, a[k], place) if seen is None else np.vstack([foot[k], place])
+        path = np.insert(path, k + 1, np.vstack([out, out[-2::-1]]), axis=0)
+    return path
