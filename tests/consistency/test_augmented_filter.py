@@ -18,6 +18,7 @@ from pilotage.evaluation.driving import covariances, poses
 from pilotage.experiments.loop import simulate
 from pilotage.experiments.mission import load_mission
 from pilotage.stack.localization.ekf_augmented import SystematicErrors
+from support.bare_robots import ON_BEACONS
 
 RUNS, STEPS, SETTLE = 30, 300, 10
 FEW = 10
@@ -41,7 +42,13 @@ def sample(name: str, *overrides: str, runs: int = RUNS) -> tuple[FloatArray, Fl
         keys = [f"{key}={value + ('scale' in key)!r}" for key, value in given.items()]
         mission = load_mission(
             "museum-route",
-            [f"stack.localizer.name={name}", *keys, f"run.time_limit_s={STEPS / 10}", *overrides],
+            [
+                f"stack.localizer.name={name}",
+                *keys,
+                f"run.time_limit_s={STEPS / 10}",
+                *ON_BEACONS,
+                *overrides,
+            ],
             seed,
         )
         trace = simulate(mission).finished.robots[0].trace

@@ -14,6 +14,7 @@ from pilotage.evaluation.consistency import nees
 from pilotage.evaluation.driving import covariances, poses
 from pilotage.experiments.loop import simulate
 from pilotage.experiments.mission import load_mission
+from support.bare_robots import ON_BEACONS, ON_WALLS
 
 RUNS = 20
 SETTLE = 10
@@ -26,6 +27,7 @@ WHEELS = (
 )
 """Wheels of a base that nobody has calibrated, and an inertial unit."""
 GAP = "robot.faults=[{name: gap, sensor: beacons, from_s: 20, length_s: 20}]"
+BARE = {"museum-route": ON_BEACONS, "museum-walls": ON_WALLS}
 BIAS_RAD_S = np.radians(0.5)
 
 
@@ -33,7 +35,9 @@ def driven(mission: str, gyroscope: bool, *overrides: str) -> list[dict[str, Flo
     """The traces of ``RUNS`` seeds."""
     used = f"stack.localizer.odometry.gyroscope={str(gyroscope).lower()}"
     return [
-        simulate(load_mission(mission, (*WHEELS, *overrides, used), seed)).finished.robots[0].trace
+        simulate(load_mission(mission, (*WHEELS, *BARE[mission], *overrides, used), seed))
+        .finished.robots[0]
+        .trace
         for seed in range(RUNS)
     ]
 

@@ -17,12 +17,13 @@ from pilotage.evaluation.consistency import correlated_mean, fraction_in_band, n
 from pilotage.evaluation.driving import covariances, poses
 from pilotage.experiments.loop import simulate
 from pilotage.experiments.mission import load_mission
+from support.bare_robots import ON_BEACONS
 
 RUNS = 40
 STEPS = 850
 SETTLE = 10
-SHORT_S = 30
-"""A third of the route: enough to find out a wrong filter, and a right one passes on it, too."""
+FEW, SHORT_S = 12, 30
+"""Runs of a third of the route: enough to find out a wrong filter, and a right one passes on them, too."""
 
 
 @dataclass(frozen=True)
@@ -41,26 +42,32 @@ class Sample:
         )
 
     def beginning(self) -> Sample:
-        """What runs of ``SHORT_S`` would have given: a limit changes nothing before it."""
+        """What ``FEW`` runs of ``SHORT_S`` would have given: a limit changes nothing before it."""
         steps = 10 * SHORT_S - SETTLE
         return Sample(
-            self.nees[:, :steps],
-            tuple(run[:steps] for run in self.nis),
-            tuple(run[:steps] for run in self.expected),
+            self.nees[:FEW, :steps],
+            tuple(run[:steps] for run in self.nis[:FEW]),
+            tuple(run[:steps] for run in self.expected[:FEW]),
         )
 
     def passes(self) -> bool:
-        """All three checks of a right filter."""
+        """All three checks of a right filter on the few runs.
+
+        Of 4e4 innovations the NIS has a standard error of 0.005, and the mean NEES one of 0.1 (measured):
+        three of each, so the right filter fails on one of 200 fresh sets of seeds.
+        """
         nees_passes = fraction_in_band(self.nees, 3, 0.999) >= 0.95 and 2.7 <= self.nees.mean() <= 3.3
-        return bool(nees_passes) and abs(self.nis_ratio - 1.0) <= 0.01
+        return bool(nees_passes) and abs(self.nis_ratio - 1.0) <= 0.015
 
 
 @cache
-def sample(*overrides: str) -> Sample:
-    """Drive the museum route with ``RUNS`` seeds."""
+def sample(*overrides: str, runs: int = RUNS) -> Sample:
+    """Drive the museum route with so many seeds."""
     rows, nis, expected = [], [], []
-    for seed in range(RUNS):
-        trace = simulate(load_mission("museum-route", overrides, seed)).finished.robots[0].trace
+    for seed in range(runs):
+        trace = (
+            simulate(load_mission("museum-route", (*ON_BEACONS, *overrides), seed)).finished.robots[0].trace
+        )
         values = nees(poses(trace, "true"), poses(trace, "est"), covariances(trace))
         rows.append(values[SETTLE:STEPS])
         nis.append(trace["nis"][SETTLE:])
@@ -97,14 +104,15 @@ def test_nis_is_one_once_the_gate_is_allowed_for() -> None:
 )
 def test_a_filter_that_is_wrong_by_a_factor_of_two_is_found_out(overrides: tuple[str, ...]) -> None:
     assert sample().beginning().passes()
-    assert not sample(*overrides, f"run.time_limit_s={SHORT_S}").passes()
+    assert not sample(*overrides, f"run.time_limit_s={SHORT_S}", runs=FEW).passes()
 
 
 def test_the_reports_rotation_noise_is_found_out() -> None:
     # 0.01334 taken as rad^2 for a step of 0.1 rad: a density about 6800 times the calibrated one.
-    wrong = sample("stack.localizer.odometry.angle_var_rad2_per_rad=0.1334", f"run.time_limit_s={SHORT_S}")
+    limit = f"run.time_limit_s={SHORT_S}"
+    wrong = sample("stack.localizer.odometry.angle_var_rad2_per_rad=0.1334", limit, runs=FEW)
     assert wrong.nees.mean() < 2.9
-    assert abs(wrong.nis_ratio - 1.0) > 0.01
+    assert abs(wrong.nis_ratio - 1.0) > 0.015
 
 
 def test_a_correlated_series_gets_a_wider_band_than_an_independent_one() -> None:

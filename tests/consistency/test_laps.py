@@ -7,6 +7,7 @@ import numpy as np
 from pilotage.core.types import FloatArray
 from pilotage.experiments.loop import simulate
 from pilotage.experiments.mission import load_mission
+from support.bare_robots import ON_WALLS
 
 LAPS = 5
 SEEDS = 8
@@ -15,7 +16,7 @@ SETTLE = 10
 
 def lap_mean_squares(seed: int) -> FloatArray:
     """(LAPS,) mean squared position error of each lap."""
-    (run,) = simulate(load_mission("museum-laps", seed=seed)).finished.robots
+    (run,) = simulate(load_mission("museum-laps", ON_WALLS, seed)).finished.robots
     assert run.arrived, run.reason
     trace = run.trace
     squared = (trace["est_x_m"] - trace["true_x_m"]) ** 2 + (trace["est_y_m"] - trace["true_y_m"]) ** 2

@@ -18,9 +18,11 @@ from pilotage.evaluation.consistency import nees
 from pilotage.evaluation.driving import covariances, poses
 from pilotage.experiments.loop import simulate
 from pilotage.experiments.mission import load_mission
+from support.bare_robots import ON_BEACONS, ON_WALLS
 
 SEEDS, LIMIT_S, SETTLE = 6, 25, 10
 FILTERS = {"museum-route": "beacons", "museum-walls": "lines"}
+BARE = {"museum-route": ON_BEACONS, "museum-walls": ON_WALLS}
 UNDOUBTING = {"museum-route": ["doubt_after=null"], "museum-walls": []}
 """Missions, and what their filters call a measurement."""
 
@@ -40,7 +42,7 @@ def influence(mission: str, *overrides: str) -> Influence:
     """Drive ``SEEDS`` times, by the truth: a filter that says it is lost does not change what it is shown."""
     normalized, squared, nis, expected, seen, accepted = [], [], 0.0, 0.0, 0.0, 0.0
     for seed in range(SEEDS):
-        settings = ["run.oracles=[driver]", f"run.time_limit_s={LIMIT_S}"]
+        settings = ["run.oracles=[driver]", f"run.time_limit_s={LIMIT_S}", *BARE[mission]]
         settings += [f"stack.localizer.{entry}" for entry in overrides]
         trace = simulate(load_mission(mission, settings, seed)).finished.robots[0].trace
         truth, estimate = poses(trace, "true"), poses(trace, "est")

@@ -22,6 +22,7 @@ from pilotage.experiments.loop import simulate
 from pilotage.experiments.mission import load_mission
 from pilotage.maps.occupancy_grid import FREE, OCCUPIED, OccupancyGrid
 from pilotage.maps.ros_map import RosMap, write_ros_map
+from support.bare_robots import ON_WALLS
 
 RUNS, SETTLE = 24, 20
 FEW = 8
@@ -31,6 +32,7 @@ WORLD = (
     "stack.localizer.name=particle-filter",
     "stack.localizer.field_std_m=0",
     "robot.sensors.lidar.range_var_m2=4e-4",
+    *ON_WALLS,
     "run.time_limit_s=30",
 )
 
@@ -63,7 +65,7 @@ def test_a_filter_that_is_wrong_about_its_scanner_by_a_factor_of_two_is_found_ou
 def test_with_room_for_an_imperfect_map_it_is_cautious_never_overconfident() -> None:
     values = []
     for seed in range(4):
-        mission = load_mission("museum-walls", [WORLD[0], WORLD[-1]], seed)
+        mission = load_mission("museum-walls", [WORLD[0], *ON_WALLS, WORLD[-1]], seed)
         trace = simulate(mission).finished.robots[0].trace
         values.append(nees(poses(trace, "true"), poses(trace, "est"), covariances(trace))[SETTLE:])
     upper = np.array(values).mean(axis=0) <= 3.0 * 3.0
@@ -92,7 +94,7 @@ def test_cells_are_no_independent_witnesses(tmp_path: Path, walls_in: tuple[int,
     own = ("stack.localizer.name=particle-filter", f"stack.map={tmp_path / 'map.yaml'}")
     values = []
     for seed in range(2):
-        mission = load_mission("museum-walls", [*own, "run.time_limit_s=40"], seed)
+        mission = load_mission("museum-walls", [*own, *ON_WALLS, "run.time_limit_s=40"], seed)
         trace = simulate(mission).finished.robots[0].trace
         values.append(nees(poses(trace, "true"), poses(trace, "est"), covariances(trace))[SETTLE:])
     assert 0.5 < np.mean(values) < 8.0
