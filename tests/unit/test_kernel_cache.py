@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import importlib
 import os
 import subprocess
 import sys
@@ -72,6 +73,50 @@ def test_a_home_that_is_no_place_is_not_taken(
     assert folder.is_relative_to(tmp_path)
     assert folder.parent.name.startswith("pilotage-")
     assert [path.name for path in tmp_path.iterdir()] == [folder.parent.name]
+
+
+@pytest.mark.usefixtures("nothing_compiled")
+def test_a_kernel_that_nobody_calls_has_no_cache(monkeypatch: pytest.MonkeyPatch) -> None:
+    """To make one took a folder, a temporary file and the digest of a source for each of five hundred."""
+    made: list[str] = []
+    making = jit._Cache.__init__
+
+    def counted(self: Any, function: Any) -> None:
+        made.append(function.__name__)
+        making(self, function)
+
+    monkeypatch.setattr(jit._Cache, "__init__", counted)
+
+    @kernel
+    def called(x: float) -> float:
+        return x + 1.0
+
+    @kernel
+    def left(x: float) -> float:
+        return x - 1.0
+
+    assert not made
+    assert called(1.0) == 2.0
+    assert called(2.0) == 3.0
+    assert made == ["called"]
+    assert left(1.0) == 0.0
+    assert made == ["called", "left"]
+
+
+@pytest.mark.usefixtures("nothing_compiled")
+def test_a_source_that_is_edited_before_the_first_call_is_not_taken_for_what_was_imported(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    file = tmp_path / "edited_toy.py"
+    file.write_text(TOY)
+    monkeypatch.syspath_prepend(str(tmp_path))
+    toy = importlib.import_module("edited_toy")
+    file.write_text(TOY.replace("2 *", "3 *"))
+    assert toy.twice(21) == 42
+    jit._read.cache_clear()
+    jit._digest.cache_clear()
+    folder = toy.twice.stats.cache_path
+    assert folder != str(jit._folder_of(file)), "the new source would be given the old one's code"
 
 
 @pytest.fixture

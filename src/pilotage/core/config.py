@@ -21,6 +21,8 @@ class Config(BaseModel):
         allow_inf_nan=False,
         validate_default=True,
         strict=False,
+        # Of the hundred and more that a run imports it validates twenty: the others' validators are not made.
+        defer_build=True,
         # A component's parameters are written out before they are validated: not a number stays what it is.
         ser_json_inf_nan="constants",
     )

@@ -8,11 +8,12 @@ Clones and installations of one source share it; of processes that need a functi
 from __future__ import annotations
 
 import hashlib
+import inspect
 import re
 import tempfile
 import time
 from collections.abc import Callable, Iterable, Mapping
-from functools import cache
+from functools import cache, cached_property
 from pathlib import Path
 from typing import IO, Any, TypeVar, cast
 
@@ -51,15 +52,17 @@ _PATIENCE_S, _LOOK_S = 120.0, 0.02
 _IMPORTS = re.compile(r"^from pilotage\.kernels(?:\.([\w.]+))? import ([^\n(]+|\([^)]*\))", re.MULTILINE)
 
 
-def _imported(path: Path) -> set[Path]:
-    """The kernel modules that a kernel module names in its imports."""
+@cache
+def _read(path: Path) -> tuple[bytes, frozenset[Path]]:
+    """A kernel module's source, and the kernel modules that it names in its imports."""
     found: set[Path] = set()
-    for package, names in _IMPORTS.findall(path.read_text(encoding="utf-8")):
+    source = path.read_bytes()
+    for package, names in _IMPORTS.findall(source.decode("utf-8").replace("\r\n", "\n")):
         place = _ROOT.joinpath(*package.split(".")) if package else _ROOT
         modules = [place.with_suffix(".py")]
         modules += [place / f"{name.split(' as ')[0].strip()}.py" for name in names.strip("()").split(",")]
         found.update(module for module in modules if module.is_file())
-    return found
+    return source, frozenset(found)
 
 
 @cache
@@ -67,13 +70,13 @@ def _digest(path: Path) -> str:
     """Digest of a kernel module with all that it calls, and of the versions that compile them."""
     sources, open_paths = {path}, [path]
     while open_paths:
-        new = _imported(open_paths.pop()) - sources
+        new = _read(open_paths.pop())[1] - sources
         sources |= new
         open_paths += new
     sha = hashlib.sha256(f"{numba.__version__} {np.__version__}".encode())
     for source in sorted(sources):
         sha.update(source.name.encode())
-        sha.update(source.read_bytes())
+        sha.update(_read(source)[0])
     return sha.hexdigest()[:16]
 
 
@@ -159,6 +162,25 @@ class _Cache(FunctionCache):
             self._lock = None
 
 
+class _CacheWhenCalled:
+    """A kernel's cache, made when the kernel is first called: of five hundred that a run imports fifty are.
+
+    The digest is taken at once, of the source that was imported: it may be edited before the first call.
+    """
+
+    def __init__(self, function: Callable[..., Any]) -> None:
+        self._function = function
+        _digest(Path(inspect.getfile(function)))
+
+    @cached_property
+    def _made(self) -> _Cache:
+        return _Cache(self._function)  # type: ignore[no-untyped-call]
+
+    def __getattr__(self, name: str) -> Any:
+        """All that numba asks of it."""
+        return getattr(self._made, name)
+
+
 class _First(event.Listener):
     """Before the first function of a process is compiled, the compiler is made lighter."""
 
@@ -193,7 +215,7 @@ def kernel_without_lock(function: F) -> F:
 def _cached(dispatcher: Any, function: F) -> F:
     if not hasattr(dispatcher, "_cache"):  # a plain function where NUMBA_DISABLE_JIT is set
         return cast(F, dispatcher)
-    dispatcher._cache = _Cache(function)  # type: ignore[no-untyped-call]
+    dispatcher._cache = _CacheWhenCalled(function)
     resolve, compile_anew, versions = dispatcher.get_call_template, dispatcher.compile, dispatcher.overloads
 
     def compile_once(signature: Any) -> Any:
