@@ -12,12 +12,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
+from matplotlib.axis import YAxis
 from rich.console import Console
 from scipy.stats import chi2
 
 from pilotage.core.types import FloatArray
 from pilotage.records.run_data import read_run
-from pilotage.report import quantities, summary_table
+from pilotage.report import quantities, style, summary_table
 from pilotage.report.calibration.plots import MOST_BINS, histogram, panels_in_a_row
 from pilotage.report.event_kinds import event_kind
 from pilotage.report.figures.consistency import chi_square_band
@@ -178,3 +179,31 @@ def test_values_nearly_all_of_which_are_equal_make_a_histogram_of_few_bars() -> 
 def test_what_happens_every_few_metres_is_not_marked_on_the_map() -> None:
     assert not event_kind("closure").on_map
     assert all(event_kind(kind).on_map for kind in ("close", "stall", "explored", "of-a-plugin"))
+
+
+@pytest.mark.parametrize(("most", "looks"), [(1.5, False), (0.02, False), (3e7, True), (2e-7, True)])
+def test_titles_are_placed_without_laying_out_numbers_where_none_is_in_their_way(
+    most: float, looks: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A power of ten above an axis is: there matplotlib looks, as it did everywhere. The figure is the same."""
+
+    def drawn() -> str:
+        with style.drawing_style():
+            figure, (panel,) = style.stacked_axes(["what it is [m]"], [60.0])
+            panel.set_ylim(0.0, most)
+            style.time_limits([panel], np.arange(5.0))
+            style.series(panel, np.arange(5.0), most * np.linspace(0.1, 0.9, 5), style.BLUE)
+            return style.render(figure, "it", "it")
+
+    laid_out: list[str] = []
+    bounds = YAxis.get_tightbbox
+
+    def counted(self: Any, *words: Any, **named: Any) -> Any:
+        laid_out.append("y")
+        return bounds(self, *words, **named)
+
+    monkeypatch.setattr(YAxis, "get_tightbbox", counted)
+    now = drawn()
+    assert bool(laid_out) is looks
+    monkeypatch.setattr(style, "_let_titles_stay", lambda _: None)
+    assert drawn() == now
