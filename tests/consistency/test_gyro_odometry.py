@@ -6,6 +6,8 @@ ones.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 import pytest
 
@@ -31,15 +33,17 @@ BARE = {"museum-route": ON_BEACONS, "museum-walls": ON_WALLS}
 BIAS_RAD_S = np.radians(0.5)
 
 
-def driven(mission: str, gyroscope: bool, *overrides: str) -> list[dict[str, FloatArray]]:
-    """The traces of ``RUNS`` seeds."""
+def drives(mission: str, gyroscope: bool, *overrides: str) -> Iterator[dict[str, FloatArray]]:
+    """The traces of ``RUNS`` seeds, each driven when it is asked for."""
     used = f"stack.localizer.odometry.gyroscope={str(gyroscope).lower()}"
-    return [
-        simulate(load_mission(mission, (*WHEELS, *BARE[mission], *overrides, used), seed))
-        .finished.robots[0]
-        .trace
-        for seed in range(RUNS)
-    ]
+    settings = (*WHEELS, *BARE[mission], *overrides, used)
+    for seed in range(RUNS):
+        yield simulate(load_mission(mission, settings, seed)).finished.robots[0].trace
+
+
+def driven(mission: str, gyroscope: bool, *overrides: str) -> list[dict[str, FloatArray]]:
+    """All of them."""
+    return list(drives(mission, gyroscope, *overrides))
 
 
 def means(traces: list[dict[str, FloatArray]]) -> FloatArray:
@@ -102,5 +106,9 @@ def test_the_wall_filter_keeps_its_way_with_poor_wheels() -> None:
     found = means(traces)
     assert 2.4 <= found.mean() <= 3.6
     assert all(trace["localized"][-1] == 1.0 for trace in traces)
-    lost = means(driven("museum-walls", False))
-    assert (lost > 3.6).sum() >= 5
+    lost = 0
+    for trace in drives("museum-walls", False):
+        lost += int(means([trace])[0] > 3.6)
+        if lost == 5:  # of RUNS: the others cannot change it
+            break
+    assert lost >= 5

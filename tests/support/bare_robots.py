@@ -1,7 +1,7 @@
 """What a filter is not told, left off the museum's robot: its estimates keep every bit.
 
-Each sensor draws from a stream of its own, and on the programmed route nothing stands in the way that a mapper
-or an ultrasonic sensor would show. A step costs a quarter less.
+Each sensor draws from a stream of its own, and on the programmed route nothing stands in the way that a
+mapper or an ultrasonic sensor would show. A step costs a quarter less.
 """
 
 from __future__ import annotations
