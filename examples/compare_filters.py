@@ -1,5 +1,9 @@
-"""Which filter knows best where it is, and which knows how well it knows? Ten seeds of the museum route."""
+"""Which filter knows best where it is, and which knows how well it knows? Ten seeds of the museum route.
 
+The first argument is another number of seeds.
+"""
+
+import sys
 from statistics import mean
 
 from pilotage.experiments.mission import load_mission
@@ -13,10 +17,12 @@ FILTERS = {
     "dead reckoning, 10 s": ["stack.localizer.name=dead-reckoning", "run.time_limit_s=10"],
 }
 
+seeds = int(sys.argv[1]) if len(sys.argv) > 1 else 10
 print(f"{'':40s} {'RMSE [mm]':>10s} {'NEES (3)':>10s} {'NIS (1)':>10s}")
 for name, overrides in FILTERS.items():
     runs = [
-        run_mission(load_mission("museum-route", overrides, seed), save=False).metrics for seed in range(10)
+        run_mission(load_mission("museum-route", overrides, seed), save=False).metrics
+        for seed in range(seeds)
     ]
 
     def average(key: str, runs: list[dict[str, object]] = runs) -> float:

@@ -340,7 +340,7 @@ def test_a_studys_folder_names_its_plugins(tmp_path: FilePath) -> None:
         "stack": {"planner": {"name": "somebodys"}, "smoother": {"name": "none"}},
     }
     (tmp_path / "m.yaml").write_text(yaml.safe_dump(mission))
-    asked = ("--trials", "2", "--workers", "2", "--metrics", "success,somebodys_m", "--no-report", "--quiet")
+    asked = ("--trials", "2", "--workers", "1", "--metrics", "success,somebodys_m", "--no-report", "--quiet")
     words = ("sweep", "m.yaml", *asked, "--plugin", f"{site.name}/mine.py", "--name", "mine")
     done = pilotage(*words, folder=tmp_path, site=tmp_path)
     assert done.returncode == 0, done.stderr

@@ -185,7 +185,7 @@ def test_what_happens_every_few_metres_is_not_marked_on_the_map() -> None:
 def test_titles_are_placed_without_laying_out_numbers_where_none_is_in_their_way(
     most: float, looks: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A power of ten above an axis is: there matplotlib looks, as it did everywhere. The figure is the same."""
+    """A power of ten above an axis is: there matplotlib looks, as ever. The figure is the same."""
 
     def drawn() -> str:
         with style.drawing_style():

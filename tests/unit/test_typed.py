@@ -44,8 +44,13 @@ mypy_path = {ROOT / "src"}
 follow_imports = silent
 [mypy-numba.*,pyarrow.*]
 ignore_missing_imports = True
+[mypy-scipy.*,matplotlib.*,rich.*,typer.*,PIL.*,pandas.*,distributed.*,rosbags.*]
+follow_imports = skip
 """
-"""As where pilotage is installed: its signatures are read, the bodies of its functions are not checked."""
+"""As where pilotage is installed: its signatures are read, the bodies of its functions are not checked.
+
+What stands in no signature of the lines below is not read at all.
+"""
 
 
 def test_a_strict_user_is_told_what_is_wrong_and_nothing_else(tmp_path: Path) -> None:
