@@ -23,6 +23,7 @@ from pilotage.stack.localization.ekf_landmarks import EkfLandmarkLocalizer
 from pilotage.stack.localization.landmark_filter import LandmarkFilterConfig
 from pilotage.stack.localization.odometry_watch import OdometryWatch
 from pilotage.stack.localization.self_check import HOLD_S, NOISE_SHARE, ExplainedShare, SelfCheck
+from support.bare_robots import ON_BEACONS, ON_WALLS
 from support.robots import BEACONS, told_of
 
 STEPS = 2000
@@ -236,7 +237,8 @@ def test_bad_readings_make_no_filter_silently_wrong(
     localizer: str, faults: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """And without its check of itself it is: this test can fail."""
-    settings = ["run.oracles=[driver]", "stack.mapper=null", f"stack.localizer={{name: {localizer}}}"]
+    bare = ON_BEACONS if "landmarks" in localizer else ON_WALLS
+    settings = ["run.oracles=[driver]", *bare, f"stack.localizer={{name: {localizer}}}"]
 
     def silently_wrong_s() -> float:
         experiment = build(load_mission("museum-route", [*settings, f"robot.faults=[{faults}]"], 0))

@@ -79,7 +79,7 @@ def test_a_home_that_is_no_place_is_not_taken(
 def test_a_kernel_that_nobody_calls_has_no_cache(monkeypatch: pytest.MonkeyPatch) -> None:
     """To make one took a folder, a temporary file and the digest of a source for each of five hundred."""
     made: list[str] = []
-    making = jit._Cache.__init__
+    making: Any = jit._Cache.__init__
 
     def counted(self: Any, function: Any) -> None:
         made.append(function.__name__)
