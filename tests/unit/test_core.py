@@ -257,3 +257,15 @@ def test_a_truth_value_stays_one_where_it_is_asked_for() -> None:
 def test_configs_are_frozen() -> None:
     with pytest.raises(ValueError, match="frozen"):
         Inner().gate = 0.5  # type: ignore[misc]
+
+
+def test_a_config_that_nobody_validates_has_no_validator() -> None:
+    """A run imports a hundred and more."""
+
+    class Unused(Config):
+        length_m: float = 1.0
+
+    assert not Unused.__pydantic_complete__
+    assert Unused.model_fields.keys() == {"length_m"}
+    assert validate(Unused, {"length_m": 2}, "").length_m == 2.0
+    assert Unused.__pydantic_complete__
