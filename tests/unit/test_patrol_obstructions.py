@@ -12,9 +12,7 @@ import pytest
 from pilotage.core.types import FloatArray, Pose2
 from pilotage.experiments.build.build import build
 from pilotage.experiments.loop import run_loop
-from pilotage.experiments.mission import mission_of, read_mission
-from pilotage.kernels.control import safe_stop
-from pilotage.sensors.readings import Readings
+from pilotage.experiments.mission import mission_of
 from pilotage.stack.navigator.patrol import traffic
 from pilotage.stack.navigator.patrol.obstructions import (
     ABSENT_S,
@@ -25,11 +23,6 @@ from pilotage.stack.navigator.patrol.obstructions import (
     Told,
 )
 from pilotage.stack.navigator.patrol.passage import Stretch
-from pilotage.stack.navigator.patrol.states import transitions
-from pilotage.stack.navigator.patrol.states.driving import Driving
-from pilotage.stack.navigator.patrol.states.making_room import SteppingAside
-from pilotage.stack.navigator.patrol.states.passages import StandingAside
-from pilotage.stack.navigator.patrol.states.state import State
 from pilotage.stack.patrol.graph import PatrolGraph
 from pilotage.stack.patrol.partition import annealed
 from pilotage.stack.patrol.passages import OPEN
@@ -37,40 +30,11 @@ from pilotage.stack.patrol.roadmap import Roadmap
 from pilotage.stack.patrol.shut_paths import NONE_SHUT, OpenGraph, ShutPaths, same_side
 from pilotage.stack.patrol.tours import Round
 from pilotage.stack.patrol.word import Talk
+from support.two_rooms import DOOR_Y_M, discs, two_rooms
 
 NOBODY: FloatArray = np.zeros((0, 2))
 BODY: FloatArray = np.array([[3.0, 1.0]])
-DOOR_Y_M = 1.0
 KEEP_M = 0.68
-
-
-def two_rooms(*doors_y_m: float, wall_x_m: float = 5.0) -> dict[str, Any]:
-    """Two rooms, 6 m deep, with doors of 1 m between them; a robot fails in the one at the bottom."""
-    ends = [0.0, *(end for y in doors_y_m for end in (y - 0.5, y + 0.5)), 6.0]
-    walls: list[list[float]] = [[0, 0, 10, 0], [10, 0, 10, 6], [10, 6, 0, 6], [0, 6, 0, 0]]
-    walls += [[wall_x_m, low, wall_x_m, high] for low, high in zip(ends[::2], ends[1::2], strict=True)]
-    values = read_mission("museum-patrol")
-    values["world"] = {"map": {"map": "two rooms", "bounds_m": [0, 0, 10, 6], "walls_m": walls}}
-    values["task"] = {"name": "patrol", "duration_s": 120.0, "derive": {"reach_m": 3.0}}
-    values["robots"] = [
-        {"start": {"x_m": wall_x_m, "y_m": DOOR_Y_M, "theta_rad": 0.0}},
-        {"start": {"x_m": 2.0, "y_m": 3.0, "theta_rad": 0.0}},
-        {"start": {"x_m": 1.0, "y_m": 5.0, "theta_rad": 0.0}},
-    ]
-    values["team"] = {
-        "strategy": "cyclic",
-        "radio": {},
-        "failures": [{"robot": 0, "at_s": 0.0}],
-    }
-    values["run"]["time_limit_s"] = 120.0
-    return values
-
-
-def roadmap_of(*doors_y_m: float) -> Roadmap:
-    stack: Any = build(mission_of(two_rooms(*doors_y_m), seed=0)).team[1].stack
-    found = stack._context.roadmap
-    assert isinstance(found, Roadmap)
-    return found
 
 
 def seen(kept: Obstructions, t_s: float, bodies: FloatArray, **more: Any) -> bool:
@@ -87,8 +51,8 @@ class TestWhoStands:
         changes = [seen(kept, 0.5 * k, BODY + 0.01 * (k % 2)) for k in range(41)]
         assert changes.index(True) == round(SHUTS_S / 0.5)
         assert sum(changes) == 1
-        assert kept.shutting_xy_m.tolist() == BODY.tolist()
-        assert kept.told() == ((3.0, 1.0),)
+        assert kept.shutting_xy_m == pytest.approx(BODY + 0.005, abs=1e-3)
+        assert [told[2] for told in kept.told()] == [0.0]
 
     def test_where_a_mate_fell_silent_is_planned_around_at_once(self) -> None:
         kept = Obstructions()
@@ -152,6 +116,36 @@ class TestWhoStands:
         assert seen(kept, SHUTS_S + 0.1, NOBODY, told=BODY)
         assert not len(kept.known_xy_m)
 
+    def test_is_where_it_is_seen_by_and_by_and_where_mates_say_by_now(self) -> None:
+        """One that was seen 0.1 m beside where it stood left a path that no command led along."""
+        kept, told = Obstructions(), Obstructions()
+        assert seen(kept, 0.0, BODY + 0.1, silent=BODY)
+        assert seen(told, 0.0, NOBODY, told=BODY + 0.1)
+        changes = [seen(kept, 0.2 * k, BODY, silent=BODY) for k in range(1, 40)]
+        assert kept.shutting_xy_m == pytest.approx(BODY, abs=0.01)
+        assert 1 <= sum(changes) <= 4
+        assert seen(told, 1.0, NOBODY, told=BODY)
+        assert told.shutting_xy_m.tolist() == BODY.tolist()
+
+    def test_is_taken_for_wider_where_no_command_leads_past_and_mates_know_that(self) -> None:
+        kept, mate = Obstructions(), Obstructions()
+        seen(kept, 0.0, BODY, silent=BODY)
+        assert kept.widen(BODY[0])
+        assert seen(kept, 0.2, BODY, silent=BODY)
+        ((x, y, wider_m),) = kept.told()
+        assert wider_m > 0.0
+        assert mate.step(
+            0.0,
+            NOBODY,
+            np.zeros(0, dtype=np.bool_),
+            discs(NOBODY, 0.5),
+            [Told(1, np.array([x, y]), wider_m)],
+            (),
+        )
+        assert mate.shutting[0, 2] == wider_m
+        assert sum(kept.widen(BODY[0]) for _ in range(9)) <= 4
+        assert not mate.widen(BODY[0] + 1.0)
+
     def test_is_taken_from_mates_and_not_told_on(self) -> None:
         kept = Obstructions()
         assert seen(kept, 0.0, NOBODY, told=BODY)
@@ -176,74 +170,6 @@ class TestWhoStands:
         assert not seen(kept, 8.0, NOBODY, told=BODY)
 
 
-class TestPathsAround:
-    def test_lead_through_the_other_door(self) -> None:
-        roadmap = roadmap_of(DOOR_Y_M, 5.0)
-        place = int(np.argmax(roadmap.places_xy_m[:, 0] - roadmap.places_xy_m[:, 1]))
-        around = roadmap.around(np.array([[5.0, DOOR_Y_M]]), KEEP_M, (4.0, DOOR_Y_M), 0.9)
-        way = around.way(4.0, DOOR_Y_M, around.time_s(place), 20.0)[:, :2]
-        assert way[np.argmin(np.abs(way[:, 0] - 5.0)), 1] > 4.5
-        straight = roadmap.way(4.0, DOOR_Y_M, roadmap.time_s(place), 20.0)[:, :2]
-        assert straight[np.argmin(np.abs(straight[:, 0] - 5.0)), 1] < 1.5
-        assert not any(around.is_cut_off(k) for k in range(len(around.places_xy_m)))
-
-    def test_leave_out_what_is_behind_the_only_door(self) -> None:
-        roadmap = roadmap_of(DOOR_Y_M)
-        around = roadmap.around(np.array([[5.0, DOOR_Y_M]]), KEEP_M, (4.0, DOOR_Y_M), 0.9)
-        behind = roadmap.places_xy_m[:, 0] > 6.0
-        assert behind.any()
-        assert [around.is_cut_off(int(k)) for k in np.flatnonzero(behind)] == [True] * int(behind.sum())
-        assert not any(around.is_cut_off(int(k)) for k in np.flatnonzero(roadmap.places_xy_m[:, 0] < 4.0))
-        assert around.time_s(int(np.argmax(behind))) is roadmap.time_s(int(np.argmax(behind)))
-
-    def test_come_as_near_to_a_place_as_who_stands_on_it_allows(self) -> None:
-        roadmap = roadmap_of(DOOR_Y_M, 5.0)
-        place = 0
-        x, y = roadmap.places_xy_m[place].tolist()
-        around = roadmap.around(np.array([[x, y]]), KEEP_M, (x + 1.0 if x < 4.0 else x - 1.0, y), 0.9)
-        row, column = np.unravel_index(int(np.argmin(around.time_s(place))), around.slowness.shape)
-        x0, y0 = around.origin_xy_m
-        away_m = math.hypot(x0 + column * around.spacing_m - x, y0 + row * around.spacing_m - y)
-        assert KEEP_M <= away_m <= 0.9
-
-
-BESIDE_DOOR: FloatArray = np.array([[5.6, DOOR_Y_M + 0.6]])
-"""It leaves 0.14 m more than is kept from it and from the door's other edge: less than nodes are apart."""
-
-
-class TestGapsThatBodiesLeave:
-    @staticmethod
-    def context() -> Any:
-        stack: Any = build(mission_of(two_rooms(DOOR_Y_M), seed=0)).team[1].stack
-        return stack._context
-
-    def test_of_less_than_nodes_are_apart_are_planned_through(self) -> None:
-        """No node lay in 1.26 m between a body and a door's edge: a way of 3 m became one of 29 m."""
-        context = self.context()
-        context._obstructions = SimpleNamespace(shutting_xy_m=BESIDE_DOOR)
-        context._shut_paths()
-        assert context.memory.own.shut == NONE_SHUT
-        x, y = 4.0, DOOR_Y_M
-        behind = int(np.argmax(context.roadmap.places_xy_m[:, 0]))
-        way = context._shut.way(x, y, context._shut.time_s(behind), 10.0)[:, :2]
-        assert way[-1, 0] > 6.0
-        coarse = context._whole.around(BESIDE_DOOR, context.motion.shut_m, (x, y), 0.8)
-        assert ShutPaths.of(coarse, context.task.graph).unreached
-
-    def test_who_was_on_its_way_aside_looks_anew(self) -> None:
-        """Its field is over other nodes."""
-        context = self.context()
-        field = context.roadmap.field_to(2.0, 3.0)
-        states: tuple[State, ...] = (
-            SteppingAside(context, field, 9.0),
-            StandingAside(context, field, 0.0, 9.0),
-        )
-        context._obstructions = SimpleNamespace(shutting_xy_m=BESIDE_DOOR)
-        context._shut_paths()
-        for state in states:
-            assert isinstance(state.step(Readings(0.1, {}), transitions).state, Driving)
-
-
 class TestPlans:
     """On the graph without what bodies shut."""
 
@@ -251,7 +177,7 @@ class TestPlans:
     def shut(*doors_y_m: float, here: tuple[float, float] = (4.0, DOOR_Y_M)) -> tuple[ShutPaths, PatrolGraph]:
         stack: Any = build(mission_of(two_rooms(*doors_y_m), seed=0)).team[1].stack
         roadmap, graph = stack._context.roadmap, stack._context.task.graph
-        around = roadmap.around(np.array([[5.0, DOOR_Y_M]]), KEEP_M, here, 0.9)
+        around = roadmap.around(np.array([[5.0, DOOR_Y_M, KEEP_M]]), here, 0.9)
         return ShutPaths.of(around, graph), graph
 
     def test_count_on_the_way_through_the_other_door(self) -> None:
@@ -309,42 +235,6 @@ class TestPlans:
         shut = ShutPaths.of(cast("Roadmap", Around()), graph)
         assert shut == ShutPaths((1,), ((0, 2, 6.0),))
         assert OpenGraph.of(graph, OPEN, shut).graph.shortest_m[0, 1] == 6.0
-
-
-def test_where_it_plans_past_a_body_it_may_drive() -> None:
-    """Plans came 2 cm nearer than commands may: it stood before the gap, and all counted on its share."""
-    motion: Any = build(mission_of(two_rooms(DOOR_Y_M), seed=0)).team[1].stack._context.motion  # type: ignore[attr-defined]
-    radius_m = motion._senses.radius_m
-    angles = np.linspace(0.0, 2.0 * np.pi, 200)
-    rim = radius_m * np.column_stack([np.cos(angles), np.sin(angles)])
-    for ahead_m in np.linspace(0.0, 1.0, 11):
-        body = rim + np.array([ahead_m, motion.shut_m])
-        seen, no_map = (body, body, NOBODY), (np.zeros((1, 1)), 0.0, 0.0, 1.0)
-        assert safe_stop.stop_is_clear(
-            0.2, 0.0, 0.2, 0.0, motion._limits, motion._safety, seen, np.zeros(3), no_map
-        )
-
-
-@pytest.mark.parametrize(("off_m", "there"), [(0.1, True), (0.6, False)])
-def test_where_the_way_around_a_body_ends_near_a_place_it_is_there(off_m: float, *, there: bool) -> None:
-    """It stood at the end of the way until it stalled, 0.51 m from the place, on every round."""
-    context: Any = build(mission_of(two_rooms(DOOR_Y_M), seed=0)).team[1].stack._context  # type: ignore[attr-defined]
-    place = context.roadmap.places_xy_m[context.hop]
-    body = place + np.array([[0.0, 0.05]])
-    near_m = 0.9 * context.task.visit_m - context.roadmap.spacing_m
-    away = place + np.array([0.0, 1.5])
-    around = context.roadmap.around(body, 0.6, (float(away[0]), float(away[1])), near_m)
-    x, y = around.origin_xy_m
-    row, column = around._seeds[context.hop]
-    end = np.array([x + column * around.spacing_m, y + row * around.spacing_m])
-    assert 0.5 < float(np.hypot(*(end - place))) <= near_m
-    out = (end - place) / float(np.hypot(*(end - place)))
-    here = end + off_m * out
-    context.roadmap = context._shut = around
-    context.pose = Pose2(float(here[0]), float(here[1]), 0.0)
-    assert context.arrived(blocked=False) is there
-    context._shut = None
-    assert not context.arrived(blocked=False)
 
 
 @pytest.mark.parametrize("planned_around", [True, False])

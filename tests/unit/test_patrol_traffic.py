@@ -55,6 +55,32 @@ class TestStanding:
         found = disc_returns.bodies(np.concatenate(near), 0.3)
         assert np.allclose(found, middles[::-1], atol=0.02) or np.allclose(found, middles, atol=0.02)
 
+    def test_of_a_disc_all_returns_tell_the_middle(self) -> None:
+        """By the nearest return alone bodies were seen up to 0.2 m beside where they stand."""
+        rng, by_nearest_m, angles = np.random.default_rng(3), [], np.linspace(-math.pi, math.pi, 240)
+        for _ in range(30):
+            middle = rng.uniform(0.8, 2.5) * np.array([math.cos(a := rng.uniform(-3.0, 3.0)), math.sin(a)])
+            rays = np.column_stack([np.cos(angles), np.sin(angles)])
+            ahead = rays @ middle
+            hit = (ahead > 0.0) & (ahead**2 > middle @ middle - 0.09)
+            away_m = ahead[hit] - np.sqrt(0.09 - middle @ middle + ahead[hit] ** 2)
+            returns = rays[hit] * (away_m + 0.02 * rng.standard_normal(len(away_m)))[:, None]
+            (found,) = disc_returns.round_bodies(returns, 0.3, 0.06)
+            assert math.dist(found, middle) < 0.04
+            by_nearest_m.append(math.dist(disc_returns.bodies(returns, 0.3)[0], middle))
+        assert max(by_nearest_m) > 0.1
+
+    def test_of_what_is_not_round_the_nearest_return_tells_where_it_is(self) -> None:
+        wall = np.column_stack([np.full(30, 1.5), np.linspace(-0.5, 0.5, 30)])
+        for returns in (wall, wall[12:17]):
+            assert disc_returns.fitted(returns, 1.8, 0.0, 0.3, 0.5, 0.03) == (1.8, 0.0, disc_returns.NOT_ROUND)
+
+    def test_who_comes_to_rest_stands_where_it_is_and_not_where_it_was_seen_first(self) -> None:
+        watch, found = StillWatch(), NOBODY
+        for k in range(40):
+            found = watch.step(0.2 * k, np.array([[3.0 + min(0.04 * k, 0.2), 1.0]]), NOBODY)
+        assert found == pytest.approx(np.array([[3.2, 1.0]]), abs=0.02)
+
     def test_who_moves_does_not_stand_and_who_hides_for_a_moment_does(self) -> None:
         watch, parked = StillWatch(), np.array([3.0, 1.0])
         for k in range(40):

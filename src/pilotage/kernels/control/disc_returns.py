@@ -11,6 +11,9 @@ from pilotage.kernels.control.safe_stop import Field
 from pilotage.kernels.geometry.field import interpolate_at
 from pilotage.kernels.jit import kernel
 
+FITTED, NOT_ROUND = 0, 1
+MOST_FITS, FEWEST_RETURNS, FIT_M, FIT_REACH = 12, 6, 1e-3, 1.6
+
 
 @kernel
 def scan_returns(
@@ -78,11 +81,64 @@ def scan_returns(
 
 
 @kernel
+def fitted(
+    points: FloatArray, x: float, y: float, radius: float, reach: float, most_off: float
+) -> tuple[float, float, int]:
+    """The middle near (x, y) of a disc whose rim returns (M, 2) lie on, by least squares (Gauss and Newton).
+
+    The return nearest to the laser, which ``bodies`` goes by, lies anywhere within a hand's breadth of a
+    round body's front: its distance hardly changes there.
+
+    Parameters
+    ----------
+    reach
+        Returns so near to (x, y) count.
+    most_off
+        Of what is a disc the returns lie so near to its rim, root mean square.
+
+    Returns
+    -------
+    x, y, status
+        FITTED; NOT_ROUND and what was given where the returns are too few, or of something else.
+    """
+    cx, cy = x, y
+    for _ in range(MOST_FITS):
+        count, squares = 0, 0.0
+        axx = axy = ayy = bx = by = 0.0
+        for k in range(points.shape[0]):
+            if math.hypot(points[k, 0] - x, points[k, 1] - y) > reach:
+                continue
+            dx, dy = points[k, 0] - cx, points[k, 1] - cy
+            away = math.hypot(dx, dy)
+            if away < 1e-6:
+                return x, y, NOT_ROUND
+            ux, uy, off = dx / away, dy / away, away - radius
+            axx, axy, ayy = axx + ux * ux, axy + ux * uy, ayy + uy * uy
+            bx, by, squares, count = bx + ux * off, by + uy * off, squares + off * off, count + 1
+        determinant = axx * ayy - axy * axy
+        if count < FEWEST_RETURNS or determinant < 1e-3 * count * count:
+            return x, y, NOT_ROUND
+        mx, my = (ayy * bx - axy * by) / determinant, (axx * by - axy * bx) / determinant
+        if math.hypot(mx, my) < FIT_M:
+            if math.sqrt(squares / count) > most_off or math.hypot(cx - x, cy - y) > radius:
+                return x, y, NOT_ROUND
+            return cx, cy, FITTED
+        cx, cy = cx + mx, cy + my
+    return x, y, NOT_ROUND
+
+
+@kernel
 def bodies(points: FloatArray, radius: float) -> FloatArray:
     """(K, 2) middles of discs that returns (M, 2) are of: a body's near side alone is seen.
 
     Of the returns that no body explains yet the one nearest to the origin is straight before its middle.
     """
+    return round_bodies(points, radius, 0.0)
+
+
+@kernel
+def round_bodies(points: FloatArray, radius: float, most_off: float) -> FloatArray:
+    """(K, 2) as ``bodies``, but of what is round the middle that all its returns tell (``fitted``)."""
     open_ = np.ones(points.shape[0], dtype=np.bool_)
     found = np.empty_like(points)
     count = 0
@@ -96,6 +152,8 @@ def bodies(points: FloatArray, radius: float) -> FloatArray:
             return found[:count].copy()
         behind = 1.0 + radius / max(least, 1e-6)
         x, y = behind * points[nearest, 0], behind * points[nearest, 1]
+        if most_off > 0.0:
+            x, y, _ = fitted(points, x, y, radius, FIT_REACH * radius, most_off)
         found[count, 0], found[count, 1] = x, y
         count += 1
         open_[nearest] = False

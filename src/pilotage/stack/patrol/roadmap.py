@@ -140,18 +140,16 @@ class Roadmap:
             )
         return int(rows[best]), int(columns[best])
 
-    def around(
-        self, bodies_xy_m: FloatArray, keep_m: float, here_xy_m: tuple[float, float], near_m: float
-    ) -> Roadmap:
-        """The same roadmap without what is nearer than ``keep_m`` to bodies (K, 2) that stand.
+    def around(self, discs: FloatArray, here_xy_m: tuple[float, float], near_m: float) -> Roadmap:
+        """The same roadmap without discs (K, 3): what is near to the middles of bodies that stand.
 
         A place is as good from the nearest node within ``near_m`` that can be reached from ``here_xy_m``; one
         without such a node is cut off, and its field stays what it was.
         """
         found, nodes = copy.copy(self), self._nodes_xy_m()
         found.slowness = self.slowness.copy()
-        for body in bodies_xy_m:
-            found.slowness[np.hypot(*(nodes - body).transpose(2, 0, 1)) < keep_m] = np.inf
+        for disc in discs:
+            found.slowness[np.hypot(*(nodes - disc[:2]).transpose(2, 0, 1)) < disc[2]] = np.inf
         free = np.isfinite(found.slowness)
         regions, _ = scipy.ndimage.label(free)
         # The nearest node by time: as the crow flies it may lie behind a wall.

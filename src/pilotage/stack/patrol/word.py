@@ -83,7 +83,8 @@ class TeamWord:
     radius_m
         Of the disc around its body.
     standing
-        Places of bodies that it saw stand for long, who say nothing: it plans around them.
+        Places of bodies that it saw stand for long, who say nothing: it plans around them, and how much more
+        than from others it keeps from each.
     talk
         When to expect more; None: nothing is known of that.
     """
@@ -95,5 +96,5 @@ class TeamWord:
     clearing: Clearing | None
     news: PatrolMessage
     radius_m: float
-    standing: tuple[tuple[float, float], ...] = ()
+    standing: tuple[tuple[float, float, float], ...] = ()
     talk: Talk | None = None

@@ -7,7 +7,6 @@ import math
 import numpy as np
 
 from pilotage.core.types import FloatArray, Pose2, Twist
-from pilotage.kernels.control import eikonal
 from pilotage.maps.world_map import WorldMap
 from pilotage.sensors.readings import Readings
 from pilotage.stack.interface import Belief
@@ -16,49 +15,27 @@ from pilotage.stack.knowledge import RobotKnowledge
 from pilotage.stack.navigator.patrol.battery import DOCK_M, Battery
 from pilotage.stack.navigator.patrol.config import Mode, PatrolNavigatorConfig
 from pilotage.stack.navigator.patrol.headway import Headway
-from pilotage.stack.navigator.patrol.motion import Motion
-from pilotage.stack.navigator.patrol.obstructions import Obstructions, Told
 from pilotage.stack.navigator.patrol.passage import Pursuit
-from pilotage.stack.navigator.patrol.senses import TOLD_M, Senses
+from pilotage.stack.navigator.patrol.paths import SURELY_RATIO, Paths
+from pilotage.stack.navigator.patrol.senses import TOLD_M
 from pilotage.stack.patrol.messages import PatrolKnowledge, PatrolMemory
-from pilotage.stack.patrol.roadmap import Roadmap, roadmap_of
-from pilotage.stack.patrol.shut_paths import NONE_SHUT, ShutPaths
+from pilotage.stack.patrol.roadmap import Roadmap
+from pilotage.stack.patrol.shut_paths import ShutPaths
 from pilotage.stack.patrol.strategy import following
-from pilotage.stack.patrol.task import PatrolPlaces, PatrolTask
+from pilotage.stack.patrol.task import PatrolTask
 from pilotage.stack.patrol.word import Claim, Clearing, TeamWord
 
 SPEED_SHARE = 0.2
 """Weight of the newest edge in the speed made good."""
-SURELY_RATIO = 0.9
-"""Who is within so much of ``visit_m`` visits a place, though told places are a little off."""
 
 
-def roadmap_for(
-    config: PatrolNavigatorConfig, robot: RobotKnowledge, chart: WorldMap, places: PatrolPlaces
-) -> Roadmap:
-    """The paths that a robot follows."""
-    return roadmap_of(
-        chart,
-        places.vertices_xy_m,
-        places.stations_xy_m,
-        robot.radius_m + config.plan_margin_m,
-        robot.motion.top_speed_m_s,
-        config.spacing_m,
-        0.5 * places.visit_m,
-        config.lane_m,
-    )
-
-
-class Context(Senses):
+class Context(Paths):
     """What it senses, the parts that the states drive with, and what the record wants to know.
 
     Attributes
     ----------
-    motion
-        By what it chooses commands.
-    hop, target, came_from
-        The vertex that it drives to now, the one that the strategy named, and the one that it was at last;
-        the first two are the number of its charging station in the roadmap while it is on its way there.
+    target
+        The vertex that the strategy named; its charging station's number in the roadmap on its way there.
     claim
         Of the passage for one that it is in or about to enter.
     clearing
@@ -79,23 +56,17 @@ class Context(Senses):
         journal: Journal,
     ) -> None:
         super().__init__(config, robot, chart, task, start, journal)
-        speed, clearance_m = self.speed_m_s, self.radius_m + config.plan_margin_m
+        speed = self.speed_m_s
         self.claim: Claim | None = None
         self.clearing: Clearing | None = None
         self._has_news, self.pursuit, self.headway = False, Pursuit(), Headway()
-        self.roadmap = roadmap_for(config, robot, chart, task.places)
-        self.motion = Motion(self, robot.motion, self.roadmap, clearance_m)
-        self._whole, self._obstructions = self.roadmap, Obstructions()
-        self._open = self._whole
-        self._shut: Roadmap | None = None
         self.battery: Battery | None = None
         if task.supply is not None:
             station = len(task.graph) + task.robot
             self.battery = Battery(task.supply, self.roadmap, station, speed)
         self.rng = robot.streams.stream("patrol")
-        at = self.roadmap.nearest(start.x_m, start.y_m)
-        self.memory = PatrolMemory(len(task.graph), task.robot, len(task.starts), at, speed)
-        self.hop = self.target = self.came_from = at
+        self.target = self.came_from
+        self.memory = PatrolMemory(len(task.graph), task.robot, len(task.starts), self.came_from, speed)
         self._then = -1
         self._left_s, self._kept_out_s = 0.0, math.inf
         self.mode = Mode.DRIVE
@@ -109,57 +80,14 @@ class Context(Senses):
         if self.fresh:
             self.motion.watch()
             if not lost:
-                self._look_who_shuts_paths()
+                self.look_who_shuts_paths()
 
-    def _look_who_shuts_paths(self) -> None:
-        """Plan around those who have stood for long, from where that leads anywhere."""
-        heard = dict(self.heard())
-        told = [Told(n, np.array(place)) for n, word in heard.items() for place in word.standing]
-        for _, place in told:
-            if not self._may_stand(place):
-                self._obstructions.deny(place)
-        if len(self._obstructions.known_xy_m):
-            for word in heard.values():
-                self._obstructions.is_of_mate(np.array([word.x_m, word.y_m]), word.radius_m)
-        known, standing = self._obstructions.known_xy_m, self.motion.standing
-        absent = np.array([self.sees_nothing_at(place, self.radius_m) for place in known], dtype=np.bool_)
-        if self._obstructions.step(self.t_s, standing, absent, self.fell_silent(), told, heard):
-            self._shut_paths()
-        for roadmap in (self._shut, self._open) if self._shut is not None else ():
-            self._take(roadmap)
-            if not self.is_off_roadmap():
-                break
-
-    def _may_stand(self, place: FloatArray) -> bool:
-        """Whether somebody may stand where a mate says so: nothing that it sees or hears speaks against it.
-
-        To whoever does not hear it a mate that stands is an obstruction; it may be this robot.
-        """
-        there = [(self.pose.x_m, self.pose.y_m), *((w.x_m, w.y_m) for _, w in self.heard())]
-        return not any(math.dist(place, xy) < 2.0 * self.radius_m for xy in there) and (
-            not self.sees_nothing_at(place, self.radius_m)
-        )
-
-    def _shut_paths(self) -> None:
-        """Who shuts paths has changed."""
-        bodies, here = self._obstructions.shutting_xy_m, (self.pose.x_m, self.pose.y_m)
-        self._shut, shut = None, NONE_SHUT
-        self._open = self._whole.finer() if len(bodies) else self._whole
-        if len(bodies):
-            # Who keeps clear of a body ends up to a node short of the nearest one.
-            near_m = SURELY_RATIO * self.task.visit_m - self._open.spacing_m
-            self._shut = self._open.around(bodies, self.motion.shut_m, here, near_m)
-            shut = ShutPaths.of(self._shut, self.task.graph)
-            text = "plans around " + ", ".join(f"({x:.1f}, {y:.1f})" for x, y in bodies.tolist())
-            if shut.unreached:
-                text += "; finds no path to vertex " + ", ".join(map(str, shut.unreached))
-            self.say("shut", text)
+    def _others_are_shut(self, shut: ShutPaths) -> None:
         self.memory.update(self.t_s, shut=shut)
-        self._take(self._open)
         self.headway.restart(self.t_s)  # by what is left to go on other paths
 
     def _take(self, roadmap: Roadmap) -> None:
-        self.roadmap = self.motion.roadmap = roadmap
+        super()._take(roadmap)
         if self.battery is not None:
             self.battery.roadmap = roadmap
 
@@ -212,14 +140,6 @@ class Context(Senses):
         if blocked or self.motion.taken or self._is_at_end():
             return self.away_m(self.hop) <= SURELY_RATIO * self.task.visit_m
         return self.away_m(self.hop) <= self.motion.sure_m()
-
-    def _is_at_end(self) -> bool:
-        """Whether its way around bodies leads no nearer to where it drives to."""
-        if self.roadmap is not self._shut:
-            return False
-        grid = self.roadmap.time_s(self.hop), *self.roadmap.origin_xy_m, self.roadmap.spacing_m
-        left_s = eikonal.value_at(self.pose.x_m, self.pose.y_m, *grid, 0.0)
-        return self.speed_m_s * left_s < self.roadmap.spacing_m
 
     def runs_low(self) -> bool:
         """Whether it has to go to its station from now on; tells the others that its share is theirs."""
@@ -339,23 +259,10 @@ class Context(Senses):
             near = near[~(np.hypot(near[:, 0] - x, near[:, 1] - y) < radius_m + TOLD_M)]
         return len(near) > 0
 
-    def without_planned_around(self, places: FloatArray) -> FloatArray:
-        """Places (M, 2) but those of who is planned around: the path leads past, and nobody comes there."""
-        if self.roadmap is self._shut:
-            for body in self._obstructions.shutting_xy_m:
-                places = places[np.hypot(*(places - body).T) >= self.radius_m + TOLD_M]
-        return places
-
     def here(self) -> FloatArray:
         """(1, 3) the place where it is, as a path; (0, 3) off the map."""
         time = self.roadmap.time_s(self.came_from)
         return self.roadmap.way(self.pose.x_m, self.pose.y_m, time, 0.0)
-
-    def is_off_roadmap(self) -> bool:
-        """Whether nothing leads from where it is, nor from beside it, to where it was last."""
-        roadmap, (x, y) = self.roadmap, (self.pose.x_m, self.pose.y_m)
-        grid = roadmap.time_s(self.came_from), *roadmap.origin_xy_m, roadmap.spacing_m
-        return eikonal.value_at(x, y, *grid, 0.0) == math.inf and eikonal.descent(x, y, *grid) == (0.0, 0.0)
 
     def is_narrow(self) -> bool:
         """Whether there is room for one where it is."""

@@ -27,6 +27,8 @@ LANE_AHEAD_M, MERGE_S = 2.0, 1.0
 """A passage is as wide as its narrowest place so far ahead; the last part of a way leads to the middle."""
 THROUGH_RATIO = 0.5
 """It drives through a place within so much of ``visit_m``."""
+ROUND_M = 0.06
+"""Returns that lie so near to a rim as large as its own, on average, are of a mate's."""
 TALKS_PERIODS = 3.0
 """A body is that of a mate who said so lately that it is there."""
 PEOPLE_M_S = 1.4
@@ -40,8 +42,8 @@ class Motion:
     ----------
     roadmap
         Whose fields it follows.
-    body_m, shut_m
-        What it keeps from the middle of who stands, close by and in plans.
+    body_m, shut_m, wall_m
+        What it keeps from the middle of who stands, close by and in plans, and from a wall.
     standing
         (K, 2) bodies near by, map frame, that have stood for some seconds and say nothing.
     command
@@ -59,6 +61,7 @@ class Motion:
         self.body_m = clearance_m + senses.radius_m
         # Who stands may move again: where commands keep the gap to it no nearer path can be driven.
         self.shut_m = max(self.body_m, 2.0 * senses.radius_m + senses.config.gap_m + ROUNDED_M)
+        self.wall_m = clearance_m + ROUNDED_M
         config, period_s, speed = senses.config, senses.period_s, motion.top_speed_m_s
         braking = min(motion.braking_m_s2, speed / senses.dt_s)
         turn_rate = motion.top_turn_rate_rad_s
@@ -214,7 +217,7 @@ class Motion:
         if not len(beside):
             return NO_POINTS
         # Whoever is met is as large as the robot itself; its near side alone is seen.
-        middles = senses.on_map(disc_returns.bodies(beside, senses.radius_m))
+        middles = senses.on_map(disc_returns.round_bodies(beside, senses.radius_m, ROUND_M))
         latest_s = senses.t_s - senses.patience_s(TALKS_PERIODS)
         talk = [
             (word.x_m, word.y_m, senses.radius_m + senses.speed_m_s * (senses.t_s - sent_s))

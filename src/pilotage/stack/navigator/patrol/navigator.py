@@ -13,7 +13,8 @@ from pilotage.stack.localization.localizer import Abilities
 from pilotage.stack.navigator.goal.wandering import Wandering
 from pilotage.stack.navigator.navigator import Parts, localizer_of
 from pilotage.stack.navigator.patrol.config import PatrolNavigatorConfig
-from pilotage.stack.navigator.patrol.context import Context, roadmap_for
+from pilotage.stack.navigator.patrol.context import Context
+from pilotage.stack.navigator.patrol.paths import roadmap_for
 from pilotage.stack.navigator.patrol.precedence import Leading, precedence
 from pilotage.stack.navigator.patrol.states import transitions
 from pilotage.stack.navigator.patrol.states.charging import Charging

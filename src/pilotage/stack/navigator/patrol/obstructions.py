@@ -18,15 +18,20 @@ ABSENT_S = 1.0
 """Who is not where it would be seen for so long has gone."""
 KEPT_S = 60.0
 """Who was not seen for so long may have gone: the robot goes and looks. A mate that fell silent has not."""
+MEAN_OF, MOVED_M = 20, 0.04
+"""Where a body stands is the mean of so many scans; plans are made anew when it proves to be so far off."""
+WIDER_M, MOST_WIDER_M = 0.1, 0.4
+"""More is kept from a body each time that a path past it proves not to be one, and in all."""
 DENIED_S = 5.0
 """So long nothing is believed of a body that has gone, or is none: mates come to know that a little later."""
 
 
 class Told(NamedTuple):
-    """That a mate, by its number, plans around a body at (2,)."""
+    """That a mate, by its number, plans around a body at (2,), so much wider than around others."""
 
     mate: int
     xy_m: FloatArray
+    wider_m: float = 0.0
 
 
 @dataclass(slots=True, eq=False)
@@ -39,6 +44,13 @@ class _Body:
     seen: bool = True
     failed: bool = False
     tellers: set[int] = field(default_factory=set)
+    scans: int = 0
+    wider_m: float = 0.0
+
+    def see(self, place: FloatArray) -> None:
+        """Where it is by one more scan; it is seen better from near by, and while it stands."""
+        self.scans = min(self.scans + 1, MEAN_OF)
+        self.xy_m += (place - self.xy_m) / self.scans
 
 
 class Obstructions:
@@ -47,7 +59,7 @@ class Obstructions:
     def __init__(self) -> None:
         self._bodies: list[_Body] = []
         self._denied: list[tuple[float, FloatArray]] = []
-        self._shutting = self.shutting_xy_m
+        self._planned = self.shutting
         self._t_s = 0.0
 
     @property
@@ -60,10 +72,23 @@ class Obstructions:
         """(S, 2) those that are planned around."""
         return np.array([body.xy_m for body in self._bodies if body.shuts]).reshape(-1, 2)
 
-    def told(self) -> tuple[tuple[float, float], ...]:
+    @property
+    def shutting(self) -> FloatArray:
+        """(S, 3) the same, and how much more than from others is kept from each."""
+        return np.array([(*body.xy_m, body.wider_m) for body in self._bodies if body.shuts]).reshape(-1, 3)
+
+    def told(self) -> tuple[tuple[float, float, float], ...]:
         """What mates are told: those of them that this robot itself saw lately."""
-        fresh = [b.xy_m for b in self._bodies if b.shuts and b.seen and self._t_s - b.last_s < KEPT_S]
-        return tuple((float(x), float(y)) for x, y in fresh)
+        fresh = [b for b in self._bodies if b.shuts and b.seen and self._t_s - b.last_s < KEPT_S]
+        return tuple((float(b.xy_m[0]), float(b.xy_m[1]), b.wider_m) for b in fresh)
+
+    def widen(self, place: FloatArray) -> bool:
+        """No command leads past the body there; False where more is kept from it already than may help."""
+        body = self._near(place)
+        if body is None or not body.shuts or body.wider_m >= MOST_WIDER_M:
+            return False
+        body.wider_m += WIDER_M
+        return True
 
     def deny(self, place: FloatArray) -> None:
         """Nobody who says nothing stands there, whatever mates tell."""
@@ -110,19 +135,30 @@ class Obstructions:
             body.absent_s = body.absent_s + since_s if gone else 0.0
         for place in standing_xy_m:
             body = self._near(place) or self._add(_Body(place.copy(), t_s, t_s))
+            body.see(place)
             body.last_s, body.absent_s, body.seen = t_s, 0.0, True
             body.shuts |= t_s - body.first_s >= SHUTS_S or _is_in(place, silent)
         self._forget(silent, told, heard)
         denied = np.array([place for _, place in self._denied]).reshape(-1, 2)
-        for mate, place in told:
+        for mate, place, wider_m in told:
             if _is_near(place, denied, SAME_M):
                 continue
             body = self._near(place) or self._add(_Body(place.copy(), t_s, t_s, seen=False))
             body.shuts, body.last_s = True, body.last_s if body.seen else t_s
             body.failed |= _is_in(place, silent)
             body.tellers.add(mate)
-        before, self._shutting = self._shutting, self.shutting_xy_m
-        return not np.array_equal(self._shutting, before)
+            body.wider_m = max(body.wider_m, wider_m)
+            if not body.scans:
+                body.xy_m = place.copy()
+        return self._is_news()
+
+    def _is_news(self) -> bool:
+        """Whether bodies are planned around otherwise than by the last news."""
+        now, before = self.shutting, self._planned
+        if len(now) == len(before) and (np.abs(now - before) < [MOVED_M, MOVED_M, 0.5 * WIDER_M]).all():
+            return False
+        self._planned = now
+        return True
 
     def _near(self, place: FloatArray) -> _Body | None:
         """The body that is known at a place."""
@@ -139,7 +175,7 @@ class Obstructions:
         for body in self._bodies:
             had_failed, body.failed = body.failed, _is_in(body.xy_m, silent)
             gone = body.absent_s >= ABSENT_S or (had_failed and not body.failed)
-            still = any(_is_near(place, body.xy_m[None], SAME_M) for _, place in told)
+            still = any(_is_near(place, body.xy_m[None], SAME_M) for _, place, _ in told)
             held = body.seen or still or body.tellers.isdisjoint(heard)
             if not gone and (body.failed or (held and self._t_s - body.last_s < KEPT_S)):
                 kept.append(body)

@@ -44,8 +44,12 @@ class Driving:
             return met
         command = context.lead(context.hop)
         if context.roadmap is not self.roadmap:
+            if context.roadmap.is_cut_off(context.hop):
+                return to.resume(context)
             return Move(to.set_out(context), command)
         if self.watch.stalled(context.motion.to_go_s, context.t_s):
+            if context.finds_another_way():
+                return to.resume(context)
             left = to.forgo(context, for_long=False)
             if left is not None and isinstance(left.state, Waiting) and not traffic.is_wanted(context):
                 return left
