@@ -10,6 +10,10 @@ import pytest
 
 from contract.patrol_examples import lattice
 from pilotage.core.types import Pose2
+from pilotage.evaluation.idleness import idleness
+from pilotage.experiments.graph_patrol import GraphPatrol, Radio, patrol
+from pilotage.stack.patrol.graph import PatrolGraph
+from pilotage.stack.patrol.looking import Looking
 from pilotage.stack.patrol.messages import PatrolMemory
 from pilotage.stack.patrol.silence import Silences
 from pilotage.stack.patrol.strategy import STRATEGIES, PatrolSetting
@@ -111,11 +115,72 @@ def test_false_alarms_of_who_patrols_out_of_reach_get_rarer_and_rarer() -> None:
         if silent_s == 0.0 and t_s <= talks_until_s:
             memory.receive(other.message(float(t_s)))
         strategy.next_vertex(memory.knowledge(float(t_s)))
-        if strategy._side == {0} and (not alarms_s or t_s > talks_until_s):
-            # Whoever goes and looks is there after 15 s, finds it, and hears it for two rounds.
+        assert strategy._side == {0, 1}  # it goes and looks before
+        if strategy._looking.is_away and (not alarms_s or t_s > talks_until_s):
+            # It is there after 15 s, finds it, and hears it for two rounds.
             alarms_s.append(float(t_s))
             silent_s, talks_until_s = 15.0, t_s + 135.0
         silent_s = max(silent_s - 1.0, 0.0)
     assert alarms_s[0] < 200.0
     assert len(alarms_s) < 7
     assert (np.diff(alarms_s[1:]) > 1.5 * np.diff(alarms_s[:-1])).all()
+
+
+def far_place() -> PatrolGraph:
+    """Three places, and one from which a radio of 10 m does not reach them."""
+    places = np.array([[7.0, 6.0], [18.6, 4.0], [4.0, 4.0], [8.0, 8.6]])
+    away_m = np.hypot(*(places[:, None] - places).transpose(2, 0, 1))
+    np.fill_diagonal(away_m, np.inf)
+    return PatrolGraph.of(places, away_m)
+
+
+def test_who_is_out_of_reach_is_looked_after_before_all_take_its_share() -> None:
+    """All planned for one less, went to the far place, and back: mean idleness grew by up to four fifths."""
+    graph, entry = far_place(), STRATEGIES.entry("adaptive-rounds")
+
+    def mean_s(radio: Radio) -> float:
+        trial = GraphPatrol(graph, np.array([0, 2, 1]), 300.0, 1.0, radio=radio)
+        run = patrol(trial, lambda setting: entry.factory(entry.config(), setting), 2)
+        return idleness(run.vertices, run.times_s, len(graph), 300.0, warm_s=0.0).mean_s
+
+    assert mean_s(Radio(10.0, 0.3, 1.0, 1.0)) < 1.15 * mean_s(Radio(period_s=1.0))
+
+
+@pytest.mark.parametrize("looks", [True, False])
+def test_one_goes_to_look_and_the_others_take_its_word(*, looks: bool) -> None:
+    """Of two that miss a third the nearer goes; where it finds nobody both give it up."""
+    looking = Looking(3)
+    silent, sure = np.array([False, False, True]), np.zeros(3, dtype=np.bool_)
+    away_m = np.abs(np.subtract.outer(np.arange(9.0), np.arange(9.0)))
+    memory = PatrolMemory(9, 0, 3, 4 if looks else 0, 1.0)
+
+    def next_stop(t_s: float) -> int:
+        return looking.next_stop(memory.knowledge(t_s), lambda _: np.array([8, 7]), away_m, [2])
+
+    assert not looking.given_up(silent, sure, [0.0], 100.0).any()
+    if not looks:
+        assert next_stop(100.0) == -1
+        assert looking.given_up(silent, sure, [4.0], 120.0).tolist() == [False, False, True]
+        return
+    assert next_stop(100.0) == 7
+    assert looking.is_away
+    memory.visit(7, 103.0)
+    assert next_stop(103.0) == 8
+    memory.visit(8, 104.0)
+    assert next_stop(104.0) == -1
+    assert not looking.is_away
+    assert looking.given_up(silent, sure, [0.0], 104.0).tolist() == [False, False, True]
+    assert looking.gone == 4.0
+    looking.given_up(np.zeros(3, dtype=np.bool_), sure, [0.0], 110.0)  # heard again
+    assert looking.gone == 0.0
+
+
+def test_who_is_nearer_and_never_comes_back_is_not_waited_for() -> None:
+    looking, memory = Looking(3), PatrolMemory(9, 0, 3, 0, 1.0)
+    away_m = np.abs(np.subtract.outer(np.arange(9.0), np.arange(9.0)))
+    looking.given_up(np.array([False, False, True]), np.zeros(3, dtype=np.bool_), [0.0], 100.0)
+    stops = [
+        looking.next_stop(memory.knowledge(t_s), lambda _: np.array([8]), away_m, [4])
+        for t_s in np.arange(100.0, 200.0, 5.0).tolist()
+    ]
+    assert 3 <= stops.index(8) <= 10

@@ -73,7 +73,8 @@ class TestStanding:
     def test_of_what_is_not_round_the_nearest_return_tells_where_it_is(self) -> None:
         wall = np.column_stack([np.full(30, 1.5), np.linspace(-0.5, 0.5, 30)])
         for returns in (wall, wall[12:17]):
-            assert disc_returns.fitted(returns, 1.8, 0.0, 0.3, 0.5, 0.03) == (1.8, 0.0, disc_returns.NOT_ROUND)
+            found = disc_returns.fitted(returns, 1.8, 0.0, 0.3, 0.5, 0.03)
+            assert found == (1.8, 0.0, disc_returns.NOT_ROUND)
 
     def test_who_comes_to_rest_stands_where_it_is_and_not_where_it_was_seen_first(self) -> None:
         watch, found = StillWatch(), NOBODY

@@ -17,7 +17,7 @@ from pilotage.core.random import RandomStreams
 from pilotage.core.types import FloatArray, IntArray
 from pilotage.stack.patrol.graph import PatrolGraph
 from pilotage.stack.patrol.messages import PatrolMemory, PatrolMessage
-from pilotage.stack.patrol.strategy import PatrolSetting, Strategy
+from pilotage.stack.patrol.strategy import Attentive, PatrolSetting, Strategy
 
 WAIT_S = 1.0
 """A robot that waits is asked again so often."""
@@ -89,6 +89,7 @@ class _Robot:
     leaves_s: float = 0.0
     arrives_s: float = 0.0
     alive: bool = True
+    turned: bool = False
     goal: int = field(default=-1)
 
 
@@ -140,6 +141,8 @@ class _Run:
             if not robot.alive:
                 continue
             if kind == "arrive":
+                if t_s != robot.arrives_s:
+                    continue  # it turned back on its way
                 robot.here = robot.there
                 robot.memory.visit(robot.here, t_s)
                 self._visits.append((index, robot.here, t_s))
@@ -155,7 +158,7 @@ class _Run:
             elif kind == "fail":
                 robot.alive = False
             elif message is not None:
-                robot.memory.receive(message)
+                self._hear(index, message, t_s)
         robots, vertices, times = zip(*self._visits, strict=True)
         return Visits(np.array(robots), np.array(vertices), np.array(times))
 
@@ -166,7 +169,7 @@ class _Run:
     def _decide(self, index: int, robot: _Robot, t_s: float) -> None:
         """Ask the strategy, tell the others, drive the first edge towards its answer."""
         trial, memory = self._trial, robot.memory
-        here = robot.here
+        here, robot.turned = robot.here, False
         goal = robot.strategy.next_vertex(memory.knowledge(t_s))
         speed_m_s = memory.own.speed_m_s
         changed = goal != memory.own.target
@@ -201,7 +204,21 @@ class _Run:
             if radio.delay_s > 0.0:
                 self._push(t_s + radio.delay_s, "hear", index, message)
             else:
-                other.memory.receive(message)
+                self._hear(index, message, t_s)
+
+    def _hear(self, index: int, message: PatrolMessage, t_s: float) -> None:
+        """News; who was sent out for what has proved needless turns back."""
+        robot = self._robots[index]
+        robot.memory.receive(message)
+        strategy = robot.strategy
+        on_its_way = robot.leaves_s < t_s < robot.arrives_s and not robot.turned
+        if not (on_its_way and isinstance(strategy, Attentive)):
+            return
+        if strategy.calls_back(robot.memory.knowledge(t_s)):
+            robot.turned, left_s = True, robot.arrives_s - t_s
+            robot.here, robot.there = robot.there, robot.here
+            robot.arrives_s, robot.leaves_s = t_s + t_s - robot.leaves_s, t_s - left_s
+            self._push(robot.arrives_s, "arrive", index)
 
     def _place(self, robot: _Robot, t_s: float) -> tuple[float, float]:
         """On the straight line between its vertices."""

@@ -83,6 +83,15 @@ class Foresighted(Strategy, Protocol):
         ...
 
 
+@runtime_checkable
+class Attentive(Strategy, Protocol):
+    """A strategy that may want to be asked on the way, as what it was sent out for has proved needless."""
+
+    def calls_back(self, knowledge: PatrolKnowledge) -> bool:
+        """Whether it is to be asked now where to go."""
+        ...
+
+
 def following(strategy: Strategy) -> int:
     """The vertex after the one that a strategy named last, of one that knows; else -1."""
     return strategy.following() if isinstance(strategy, Foresighted) else -1

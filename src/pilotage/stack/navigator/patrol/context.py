@@ -21,7 +21,7 @@ from pilotage.stack.navigator.patrol.senses import TOLD_M
 from pilotage.stack.patrol.messages import PatrolKnowledge, PatrolMemory
 from pilotage.stack.patrol.roadmap import Roadmap
 from pilotage.stack.patrol.shut_paths import ShutPaths
-from pilotage.stack.patrol.strategy import following
+from pilotage.stack.patrol.strategy import Attentive, following
 from pilotage.stack.patrol.task import PatrolTask
 from pilotage.stack.patrol.word import Claim, Clearing, TeamWord
 
@@ -69,7 +69,8 @@ class Context(Paths):
         self.memory = PatrolMemory(len(task.graph), task.robot, len(task.starts), self.came_from, speed)
         self._then = -1
         self._left_s, self._kept_out_s = 0.0, math.inf
-        self.mode = Mode.DRIVE
+        self.mode, self._has_heard = Mode.DRIVE, False
+        self._attentive = task.strategy if isinstance(task.strategy, Attentive) else None
         self._next_word_s = float(self.rng.uniform(0.0, config.message_period_s))
 
     def sense(self, readings: Readings, belief: Belief, *, lost: bool) -> None:
@@ -94,6 +95,7 @@ class Context(Paths):
     def hear(self, sent_s: float, word: TeamWord) -> None:
         """A mate said something: the patrol's news count too."""
         self.memory.receive(word.news)
+        self._has_heard = True
         super().hear(sent_s, word)
 
     def talk(self, *, lost: bool) -> None:
@@ -222,6 +224,14 @@ class Context(Paths):
         if after >= 0:
             self._then = int(graph.next_hop[self.hop, after])
         return True
+
+    def is_called_back(self) -> bool:
+        """Whether its strategy wants to be asked on the way."""
+        strategy = self._attentive
+        if strategy is None or self.homeward or not self._has_heard:
+            return False
+        self._has_heard = False
+        return strategy.calls_back(self._knowledge())
 
     def lead(self, vertex: int, *, first: bool = False) -> Twist:
         """The command that leads to a vertex; who goes ``first`` drives on towards mates who talk."""

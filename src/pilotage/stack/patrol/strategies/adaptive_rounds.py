@@ -14,7 +14,9 @@ from pydantic import Field
 from pilotage.core.config import Config
 from pilotage.core.types import FloatArray, IntArray
 from pilotage.sensors.sensor import NonNegative, Positive
+from pilotage.stack.patrol.hearing import Hearing, Patience
 from pilotage.stack.patrol.leg_times import LegTimes
+from pilotage.stack.patrol.looking import Looking
 from pilotage.stack.patrol.meetings import slowed
 from pilotage.stack.patrol.messages import NOTHING, PatrolKnowledge, PatrolState
 from pilotage.stack.patrol.partition import Plan, annealed, even_sizes
@@ -22,14 +24,8 @@ from pilotage.stack.patrol.shut_paths import NONE_SHUT, OpenGraph, same_side
 from pilotage.stack.patrol.strategy import STRATEGIES, PatrolSetting
 from pilotage.stack.patrol.tours import Round, spread
 
-KEY, PHASE_M, PHASE_S = range(3)
-"""What a robot says: which round it goes, how far along it was, and when."""
-SURE_WORDS, LATE_SHARE = 3.0, 0.25
-"""Who has said so many is hardly expected any more to be out of reach for half a tour, where fewer of the
-others than this share are late."""
-LONGER = 2.0
-"""Where somebody was silent for long and was there all the same, as rounds keep out of reach of each other,
-a mate is given up when it is silent for so many times as long: false alarms get rarer and rarer."""
+KEY, PHASE_M, PHASE_S, GONE = range(4)
+"""What a robot says: which round it goes, how far along it was, when, and whom it looked for in vain."""
 
 
 class AdaptiveRoundsConfig(Config):
@@ -95,7 +91,6 @@ class AdaptiveRoundsStrategy:
         team = setting.team_size
         self._side, self._shut = frozenset(range(team)), NONE_SHUT
         self._away_m = self._graph.shortest_m
-        self._heard_s = np.full(team, setting.begin_s)
         self._plan = best_plan(setting, team, config)
         from_starts_m = (
             self._graph.shortest_m[setting.starts] if setting.starts_m is None else setting.starts_m
@@ -108,12 +103,9 @@ class AdaptiveRoundsStrategy:
         self._legs, self._left_s = LegTimes(self._round), math.nan
         self._place = slot.place
         self._leaves_s = slot.leaves_s if len(mates) > 1 else setting.begin_s
-        # Sums of the silences between words, and of half their squares (their quotient is a word's mean
-        # age), fading over half a tour; besides, one of that length that nobody has heard yet.
-        self._memory_s = max(0.5 * Round.best(setting.graph).length_m / setting.speed_m_s, 1.0)
-        self._gaps_s, self._expected = np.zeros((team, 2)), np.ones((team, 2))
-        self._longest_s = 0.0
-        self._off_s = np.full(team, math.inf)
+        half_a_tour_s = max(0.5 * Round.best(setting.graph).length_m / setting.speed_m_s, 1.0)
+        self._hearing, self._looking = Hearing(team, setting.begin_s, half_a_tour_s), Looking(team)
+        self._patience = Patience(config.silent_s, config.silent_ratio, config.by_chance)
         self._phase_s = setting.begin_s
         self._is_on_round, self._waited_s = False, 0.0
         self._last_wait_s: float | None = None
@@ -122,6 +114,9 @@ class AdaptiveRoundsStrategy:
         """The next stop of its round; where it stands, to let the others catch up."""
         self._listen(knowledge)
         self._change_rounds(knowledge)
+        looks_at = self._looks_at(knowledge)
+        if looks_at >= 0:
+            return looks_at
         stops, here, now_s = self._round.stops, knowledge.at, knowledge.now_s
         if len(stops) == 1 and self._is_held(knowledge):
             return here
@@ -138,7 +133,9 @@ class AdaptiveRoundsStrategy:
         return int(stops[self._place])
 
     def following(self) -> int:
-        """The stop after the one that it is sent to."""
+        """The stop after the one that it is sent to; not known while it looks after a mate."""
+        if self._looking.is_away:
+            return -1
         return int(self._round.stops[(self._place + 1) % len(self._round.stops)])
 
     def words(self, knowledge: PatrolKnowledge) -> FloatArray:
@@ -146,7 +143,32 @@ class AdaptiveRoundsStrategy:
         if not self._is_on_round:
             return NOTHING
         before = self._place if knowledge.at == knowledge.target else self._place - 1
-        return np.array([_key(self._round), self._round.at_m[before], self._phase_s])
+        return np.array([_key(self._round), self._round.at_m[before], self._phase_s, self._looking.gone])
+
+    def calls_back(self, knowledge: PatrolKnowledge) -> bool:
+        """Whether it is on its way to a mate that it has just heard."""
+        return self._looking.is_heard_again(knowledge, self._hearing.heard_s)
+
+    def _looks_at(self, knowledge: PatrolKnowledge) -> int:
+        """Where it goes to look after a mate that is silent; -1 where it goes round."""
+        lively_s = knowledge.now_s - self._config.silent_s
+        others = [s.target for s in self._mates(knowledge) if self._hearing.heard_s[s.robot] > lively_s]
+        was_away = self._looking.is_away
+        stop = self._looking.next_stop(knowledge, lambda k: self._places(knowledge, k), self._away_m, others)
+        if stop < 0 and was_away:
+            self._listen(knowledge)  # found nobody
+        if stop >= 0:
+            self._left_s = math.nan  # how long the next leg takes tells nothing
+        return stop
+
+    def _places(self, knowledge: PatrolKnowledge, robot: int) -> IntArray:
+        """What a mate goes round, or the place that it was bound for."""
+        state = knowledge.states[robot]
+        key = state.words[KEY] if state is not None and len(state.words) > GONE else math.nan
+        for walk in self._plan.rounds:
+            if key == _key(walk):
+                return walk.stops
+        return np.array([self._place_of(knowledge, robot)])
 
     def _reached(self, knowledge: PatrolKnowledge) -> None:
         """It is at the stop that it was sent to; learn how long that took, the first time it is asked."""
@@ -156,40 +178,15 @@ class AdaptiveRoundsStrategy:
             self._left_s = math.nan
 
     def _listen(self, knowledge: PatrolKnowledge) -> None:
-        """Note who is heard and how often; plan anew where somebody has fallen silent or is back."""
-        now_s = knowledge.now_s
-        for robot, state in enumerate(knowledge.states):
-            if robot != knowledge.robot and state is not None and state.t_s > self._heard_s[robot]:
-                gap_s = state.t_s - self._heard_s[robot]
-                kept = math.exp(-gap_s / self._memory_s)
-                self._gaps_s[robot] = kept * self._gaps_s[robot] + [gap_s, 0.5 * gap_s**2]
-                self._expected[robot] *= [kept, kept * math.exp(-1.0 / SURE_WORDS)]
-                self._longest_s = max(gap_s, self._longest_s)
-                self._heard_s[robot] = state.t_s
-        heard = np.array([state is not None for state in knowledge.states])
-        heard[knowledge.robot] = False
-        late = now_s - self._heard_s > self._config.silent_s
-        late[knowledge.robot] = False
-        # Where nearly all others are heard all the time a silence is no matter of being out of reach.
-        in_reach = np.count_nonzero(late) - late < LATE_SHARE * (len(late) - 2)
-        expected = np.where(in_reach, self._expected[:, 1], self._expected[:, 0])
-        usual = self._gaps_s + expected[:, None] * [self._memory_s, 0.5 * self._memory_s**2]
-        limit_s = self._config.silent_ratio * usual[:, 1] / usual[:, 0]
-        # Of a robot that was never heard silence tells something only where all others are heard readily.
-        readily = heard.any() and limit_s[heard].max() <= 2.0 * self._config.silent_s
-        limit_s[~heard] = limit_s[heard].max() if readily else math.inf
-        limit_s = np.maximum(limit_s, LONGER * self._longest_s)
-        # Silence of who surely is in reach is no chance long before: one word after the other would be lost.
-        no_chance = knowledge.silences_log < math.log(self._config.by_chance)
-        usual_s = self._gaps_s[:, 1] / np.maximum(self._gaps_s[:, 0], 1e-9)
-        limit_s = np.where(
-            no_chance, self._config.silent_ratio * usual_s, np.maximum(limit_s, self._config.silent_s)
-        )
-        silent = now_s - self._heard_s > limit_s
-        off = np.array([state is not None and not state.on_duty for state in knowledge.states])
-        self._off_s = np.where(off, np.minimum(self._off_s, now_s), math.inf)
-        silent |= now_s - self._off_s > self._config.silent_s
-        silent[knowledge.robot] = False
+        """Note who is heard and how often; plan anew where somebody is gone or back."""
+        self._hearing.listen(knowledge)
+        silent, sure = self._hearing.silent(knowledge, self._patience)
+        mates = self._mates(knowledge)
+        for state in mates:
+            # Who goes the same round never gets nearer to it by that.
+            sure[state.robot] |= state.words[KEY] == _key(self._round)
+        gone = [float(state.words[GONE]) for state in mates]
+        silent = self._looking.given_up(silent, sure, gone, knowledge.now_s)
         team = np.flatnonzero(~silent).tolist()
         told = {k: NONE_SHUT if (s := knowledge.states[k]) is None else s.shut for k in team}
         side, shut = same_side(knowledge.robot, told, len(self._graph))
@@ -264,7 +261,9 @@ class AdaptiveRoundsStrategy:
 
     def _mates(self, knowledge: PatrolKnowledge) -> list[PatrolState]:
         """Robots on its side that have said where they are."""
-        return [state for state in knowledge.others() if state.robot in self._side and len(state.words) == 3]
+        return [
+            state for state in knowledge.others() if state.robot in self._side and len(state.words) > GONE
+        ]
 
     def _is_held(self, knowledge: PatrolKnowledge) -> bool:
         """Whether somebody who shares its round is on it: of a single place that is enough."""

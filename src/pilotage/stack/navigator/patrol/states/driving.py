@@ -37,7 +37,7 @@ class Driving:
         context.mode = Mode.DRIVE
         if context.arrived(blocked=context.motion.blocked):
             return to.arrive(context)
-        if context.runs_low():
+        if context.runs_low() or context.is_called_back():
             return to.resume(context)
         met = to.meet(context, traffic.look(context, context.hop), context.t_s) if context.fresh else None
         if met is not None:
