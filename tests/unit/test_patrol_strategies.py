@@ -458,7 +458,7 @@ def test_who_is_evenly_spaced_by_time_does_not_wait(late_s: float, *, waits: boo
         t_s += legs_s[stop]
     # The mate is half of the time around ahead, two legs and eight seconds; or it is late.
     mate = PatrolMemory(len(graph), 1, 2, int(walk.stops[2]), SPEED_M_S)
-    words = np.array([strategy.words(memory.knowledge(t_s))[0], walk.at_m[2], t_s - 8.0 + late_s])
+    words = np.array([strategy.words(memory.knowledge(t_s))[0], walk.at_m[2], t_s - 8.0 + late_s, 0.0])
     mate.update(t_s, words=words)
     memory.receive(mate.message(t_s))
     here = int(walk.stops[0])

@@ -37,6 +37,7 @@ class Looking:
     def __init__(self, team: int) -> None:
         self._missing_s = np.full(team, math.inf)
         self._gone: set[int] = set()
+        self._given_up: BoolArray = np.zeros(team, dtype=np.bool_)
         self._look: _Look | None = None
 
     @property
@@ -60,7 +61,8 @@ class Looking:
         self._gone &= set(np.flatnonzero(silent).tolist())
         found = np.array([any(int(mask) >> k & 1 for mask in told) for k in range(len(silent))])
         mine = np.isin(np.arange(len(silent)), list(self._gone))
-        given_up = np.asarray(silent & (sure | found | mine))
+        # Once is enough: by then plans are others, and who went its round goes another.
+        self._given_up = given_up = np.asarray(silent & (sure | found | mine | self._given_up))
         self._missing_s = np.where(silent & ~given_up, np.minimum(self._missing_s, now_s), math.inf)
         if self._look is not None and not math.isfinite(self._missing_s[self._look.mate]):
             self._look = None  # heard, or given up
