@@ -184,3 +184,12 @@ def test_who_is_nearer_and_never_comes_back_is_not_waited_for() -> None:
         for t_s in np.arange(100.0, 200.0, 5.0).tolist()
     ]
     assert 3 <= stops.index(8) <= 10
+
+
+def test_who_is_on_its_way_to_look_is_not_followed() -> None:
+    """Three of four went one after the other: who was nearly there counted as late at once."""
+    looking, memory = Looking(3), PatrolMemory(9, 0, 3, 0, 1.0)
+    away_m = np.abs(np.subtract.outer(np.arange(9.0), np.arange(9.0)))
+    looking.given_up(np.array([False, False, True]), np.zeros(3, dtype=np.bool_), [0.0], 100.0)
+    for t_s, other in ((100.0, 2), (122.0, 6), (123.0, 8)):
+        assert looking.next_stop(memory.knowledge(t_s), lambda _: np.array([8]), away_m, [other]) == -1

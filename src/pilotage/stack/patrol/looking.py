@@ -36,6 +36,7 @@ class Looking:
 
     def __init__(self, team: int) -> None:
         self._missing_s = np.full(team, math.inf)
+        self._waits_s = np.zeros(team)
         self._gone: set[int] = set()
         self._given_up: BoolArray = np.zeros(team, dtype=np.bool_)
         self._look: _Look | None = None
@@ -64,6 +65,7 @@ class Looking:
         # Once is enough: by then plans are others, and who went its round goes another.
         self._given_up = given_up = np.asarray(silent & (sure | found | mine | self._given_up))
         self._missing_s = np.where(silent & ~given_up, np.minimum(self._missing_s, now_s), math.inf)
+        self._waits_s[np.isinf(self._missing_s)] = 0.0
         if self._look is not None and not math.isfinite(self._missing_s[self._look.mate]):
             self._look = None  # heard, or given up
         return given_up
@@ -87,7 +89,7 @@ class Looking:
         away_m
             (V, V) lengths of paths.
         others
-            Vertices that those of its side who are heard are bound for.
+            Vertices that those of its side who are heard were at last.
         """
         now_s, here = knowledge.now_s, knowledge.at
         if self._look is None:
@@ -113,9 +115,12 @@ class Looking:
             to_m = away_m[knowledge.at, stops]
             first = int(np.argmin(to_m))
             nearest_m = min((float(away_m[at, stops].min()) for at in others), default=math.inf)
-            late_s = LATE_RATIO * 2.0 * nearest_m / knowledge.speed_m_s + LATE_S
-            if nearest_m < to_m[first] and knowledge.now_s - self._missing_s[mate] < late_s:
-                continue
+            if nearest_m < to_m[first]:
+                # Who is on its way gets nearer: it has the time that it needs from where it was.
+                late_s = LATE_RATIO * 2.0 * nearest_m / knowledge.speed_m_s + LATE_S
+                self._waits_s[mate] = max(self._waits_s[mate], late_s)
+                if knowledge.now_s - self._missing_s[mate] < self._waits_s[mate]:
+                    continue
             found.append((float(to_m[first]), mate, stops[first:] + stops[:first]))
         if found:
             far_m, mate, stops = min(found)

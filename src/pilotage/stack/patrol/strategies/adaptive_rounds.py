@@ -152,7 +152,7 @@ class AdaptiveRoundsStrategy:
     def _looks_at(self, knowledge: PatrolKnowledge) -> int:
         """Where it goes to look after a mate that is silent; -1 where it goes round."""
         lively_s = knowledge.now_s - self._config.silent_s
-        others = [s.target for s in self._mates(knowledge) if self._hearing.heard_s[s.robot] > lively_s]
+        others = [s.at for s in self._mates(knowledge) if self._hearing.heard_s[s.robot] > lively_s]
         was_away = self._looking.is_away
         stop = self._looking.next_stop(knowledge, lambda k: self._places(knowledge, k), self._away_m, others)
         if stop < 0 and was_away:
