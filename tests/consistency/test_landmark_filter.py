@@ -53,7 +53,7 @@ class Sample:
     def passes(self) -> bool:
         """All three checks of a right filter on the few runs.
 
-        Of 4e4 innovations the NIS has a standard error of 0.005, and the mean NEES one of some 0.1 (reckoned):
+        Of 4e4 innovations the NIS has a standard error of 0.005, and the mean NEES one of 0.1 or so:
         three of each, so the right filter fails on one of 200 fresh sets of seeds.
         """
         nees_passes = fraction_in_band(self.nees, 3, 0.999) >= 0.95 and 2.7 <= self.nees.mean() <= 3.3
