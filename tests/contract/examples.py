@@ -387,7 +387,7 @@ EXAMPLES: dict[tuple[str, str], Example] = {
         planner_plans, {"iterations": 2000}, frozenset({"goal_bias", "guide_bias", "rewire_factor"})
     ),
     ("planner", "route"): Example(planner_plans, ROUTE),
-    ("planner", "boustrophedon"): Example(planner_plans, {"width_m": 1.0}),
+    ("planner", "boustrophedon"): Example(planner_plans, {"width_m": 1.0}, frozenset({"enough"})),
     ("planner", "astar"): Example(planner_plans),
     ("planner", "dijkstra"): Example(planner_plans),
     ("planner", "theta-star"): Example(planner_plans),

@@ -37,14 +37,15 @@ FLOORS = {
     "a slanted wall": np.array([*ROOM, [0, 5, 4, 8]], dtype=float),
 }
 MOST = 1.06
-"""Of area over width: 1.1 is what is asked for; the same lines without changes take more."""
+"""Of area over width: 1.1 is what is asked for; the same lines without changes take more. Without the overlap
+of passes that forgives what a robot drives beside them, which is 1.2 cm where nothing is said."""
 
 
 def swept(walls: FloatArray, goal: tuple[float, float] = (1.0, 1.0)) -> tuple[WorldMap, PlanResult]:
     world = WorldMap(
         "floor", (0.0, 0.0, 10.0, 8.0), geometry=SegmentMap(walls, np.zeros((0, 3)), (0, 0, 10, 8))
     )
-    planner = BoustrophedonPlanner(BoustrophedonConfig(width_m=0.8, clearance_m=0.4))
+    planner = BoustrophedonPlanner(BoustrophedonConfig(width_m=0.8, clearance_m=0.4, overlap_m=0.0024))
     request = PlanRequest(Pose2(1.0, 1.0, 0.0), Goal(*goal), world.field, np.random.default_rng(0))
     return world, planner.plan(request)
 
@@ -120,8 +121,14 @@ def test_of_what_was_driven_the_rest_is_swept_and_no_more() -> None:
     middle = floor.middles(left).mean(axis=0)
     there_and_back_m = 2.0 * float(np.hypot(*(middle - [1.0, 1.0])))
     assert rest.path.length_m < there_and_back_m + 5.0
-    # It drove all of it, but did not know where it was in the beginning.
-    unsure = np.where(np.arange(len(xy)) < 20, 0.1, 0.005)
+    # It went astray at once: all of a large room is left.
+    again = rest_after(xy[:4], sure[:4]).path
+    assert again is not None
+    assert not (floor.reachable & ~covered(floor, again.states[:, :2], 0.8)).any()
+    assert again.length_m < 1.05 * whole.path.length_m
+    # It drove all of it, but for those four metres did not know well where.
+    unsure = sure.copy()
+    unsure[first : first + 80] = 0.1
     assert rest_after(xy, unsure).covers
 
 

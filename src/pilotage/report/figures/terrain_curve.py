@@ -20,13 +20,14 @@ def curve_figure(run: RunData) -> Illustration:
     """Draw path and curve where they are farthest apart."""
     slug, title = "curve", "The planned path under the curve"
     pictures = run.terrain
-    if pictures is None or not len(pictures.route) or not run.trace.has("ref_x_m", "ref_y_m"):
-        return Illustration(slug, title, "", "No curve was laid along a planned path.")
+    nothing = Illustration(slug, title, "", "No curve was laid along a planned path.")
+    if pictures is None or not run.trace.has("ref_x_m", "ref_y_m"):
+        return nothing
+    route = pictures.route[np.isfinite(pictures.route).all(axis=1)]
     curve = np.column_stack([run.trace["ref_x_m"], run.trace["ref_y_m"]])
     curve = curve[np.isfinite(curve).all(axis=1)]
-    if len(curve) < 2:
-        return Illustration(slug, title, "", "No curve was laid along a planned path.")
-    route = pictures.route
+    if len(curve) < 2 or not len(route):
+        return nothing
     apart = _distances(curve, route)
     worst = curve[int(apart.argmax())]
     unit = unit_of(pictures)

@@ -31,7 +31,7 @@ from pilotage.stack.navigator.timed_path import laid_out, with_turns
 from pilotage.stack.navigator.trail import Trail
 from pilotage.stack.planning.planner import Path, PlanResult
 
-MOST_REPLANS, MOST_RESTS = 8, 5
+MOST_REPLANS, MOST_RESTS = 8, 3
 """How often it plans anew where it went astray, and for what a path that covers a floor left of it."""
 BESIDE_INNER_M = (0.25, 0.2, 0.15, 0.08, 0.04, 0.01)
 """What paths planned for the centre keep beside the outline's inner disc, where they can keep no more."""

@@ -25,9 +25,10 @@ from pilotage.stack.planning.sweep_lines import sweep_cell_m, sweep_lines
 
 TRIES_A_CELL = 3000
 """Changes that are tried to the order of cells."""
-
 MOST_CELLS_ORDERED = 100_000
 """Cells by which the lengths of paths from one cell of lines to another are told."""
+LITTLE = 0.05
+"""Share of the floor: where no more is to be swept, detours from the straight path may be shorter."""
 
 
 class BoustrophedonConfig(Config):
@@ -35,7 +36,7 @@ class BoustrophedonConfig(Config):
 
     width_m: Positive = 0.5
     clearance_m: float = Field(default=0.3, ge=0.0, le=100.0)
-    overlap_m: float = Field(default=0.01, ge=0.0)
+    overlap_m: float = Field(default=0.012, ge=0.0)
     """Of passes side by side: what is planned for stays swept where a robot drives half of it beside."""
     enough: float = Field(default=0.99995, gt=0.0, le=1.0)
     """Share of the floor: the smallest pieces that were left are left for good, down to this."""
@@ -76,14 +77,18 @@ class BoustrophedonPlanner:
         began = time.perf_counter()
         clearance_m, width_m = clearance_of(request, self._config.clearance_m), self._config.width_m
         start, goal = ((place.x_m, place.y_m) for place in (request.start, request.goal))
+        radius_m = clearance_m if request.footprint is None else min(request.footprint.radius_m, clearance_m)
+        status, why = _blocked(request, radius_m)
+        if status is not PlanStatus.FOUND:
+            return failure(status, why, time.perf_counter() - began)
         try:
-            radius_m = clearance_m if request.footprint is None else request.footprint.radius_m
-            keeping = Keeping(min(radius_m, clearance_m), clearance_m, start)
+            keeping = Keeping(radius_m, clearance_m, start)
             sought = whole_floor(request.field, keeping, width_m, self._config.overlap_m)
             if request.trail is not None:
                 sought = rest_of(sought, request.trail, width_m, self._config.enough)
             within_reach = sought.must | sought.may
-            paths = [_direct(sought, start, goal)] if request.trail is not None else []
+            little = np.count_nonzero(sought.must) <= LITTLE * np.count_nonzero(sought.floor.reachable)
+            paths = [_direct(sought, start, goal)] if little else []
             if within_reach.any():
                 paths += [_lines(sought, up, start, goal) for up in (False, True)]
         except InputError as error:
@@ -108,6 +113,16 @@ class BoustrophedonPlanner:
             reason += f", {ratio:.3f} times the area over the width of a pass"
         covers = bool((sought.must & covered(sought.floor, best, width_m)).any())
         return PlanResult(PlanStatus.FOUND, reason, path, took, took, given=True, covers=covers)
+
+
+def _blocked(request: PlanRequest, radius_m: float) -> tuple[PlanStatus, str]:
+    """Which end is too near to a wall, and how near: a body believed a little beside its place is let go."""
+    ends = np.array([[place.x_m, place.y_m] for place in (request.start, request.goal)])
+    blocked = PlanStatus.START_BLOCKED, PlanStatus.GOAL_BLOCKED
+    for found_m, status in zip(request.field.at(ends), blocked, strict=True):
+        if found_m < 0.5 * radius_m:
+            return status, f"{found_m:.2f} m from a wall, where the body needs {radius_m:.2f} m"
+    return PlanStatus.FOUND, ""
 
 
 def _direct(sought: Sought, start: tuple[float, float], goal: tuple[float, float]) -> FloatArray:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import scipy
 
@@ -38,10 +40,8 @@ def _places_for(sought: Sought, path: FloatArray, missing: BoolArray) -> FloatAr
     on_path = np.zeros_like(inner.reachable)
     mark_swept(np.ascontiguousarray(path), 0.71 * inner.cell_m, *inner.origin_xy_m, inner.cell_m, on_path)
     away_m = inner.cell_m * scipy.ndimage.distance_transform_edt(~on_path)
-    pieces, number = scipy.ndimage.label(missing, structure=np.ones((3, 3)))
     found = []
-    for piece in range(1, number + 1):
-        left = floor.middles(pieces == piece)
+    for left in _pieces(floor, missing, sought.width_m):
         low, high = (
             np.array(inner.cell_of(end)) for end in (left.min(axis=0) - reach_m, left.max(axis=0) + reach_m)
         )
@@ -56,6 +56,26 @@ def _places_for(sought: Sought, path: FloatArray, missing: BoolArray) -> FloatAr
             found.append(stand[best])
             near[:, near[best]] = False
     return np.array(found).reshape(-1, 2)
+
+
+def _pieces(floor: Floor, missing: BoolArray, width_m: float) -> list[FloatArray]:
+    """(K, 2) middles of the cells of each piece, in tiles of a width where it is larger than two."""
+    pieces, _ = scipy.ndimage.label(missing, structure=np.ones((3, 3)))
+    side = math.ceil(width_m / floor.cell_m)
+    tiles = (
+        np.arange(missing.shape[0])[:, None] // side * missing.shape[1] + np.arange(missing.shape[1]) // side
+    )
+    out = []
+    for piece, window in enumerate(scipy.ndimage.find_objects(pieces), start=1):
+        cells = np.zeros_like(missing)
+        cells[window] = pieces[window] == piece
+        if max(cells[window].shape) <= 2 * side:
+            out.append(floor.middles(cells))
+            continue
+        where = tiles[cells]
+        middles = floor.middles(cells)
+        out += [middles[where == tile] for tile in np.unique(where)]
+    return out
 
 
 def _with_detours(floor: Floor, path: FloatArray, places: FloatArray) -> FloatArray:
