@@ -26,7 +26,7 @@ from pilotage.stack.navigator.timed_path import with_turns
 from pilotage.stack.planning.boustrophedon import BoustrophedonConfig, BoustrophedonPlanner
 from pilotage.stack.planning.planner import PlanRequest, PlanResult
 from pilotage.stack.planning.sweep_changes import subdivided
-from pilotage.stack.planning.sweep_floor import Sought, covered, rest_of
+from pilotage.stack.planning.sweep_floor import Keeping, Sought, covered, path_floor, rest_of
 from support.missions import MISSIONS
 
 ROOM = [[0, 0, 10, 0], [10, 0, 10, 8], [10, 8, 0, 8], [0, 8, 0, 0]]
@@ -92,6 +92,15 @@ def test_where_there_is_no_room_for_its_clearance_it_goes_with_what_its_body_nee
     assert not (floor.reachable & ~covered(floor, xy, 0.8)).any()
     area_m2 = np.count_nonzero(sweepable(floor, 0.8)) * floor.cell_m**2
     assert result.path.length_m * 0.8 / area_m2 <= 1.12
+
+
+def test_a_clearance_that_would_shut_a_door_is_not_kept() -> None:
+    """A door of 0.48 m in a thin wall, and a body of 0.17 m that would keep 0.25 m."""
+    walls = np.array([*ROOM, [6, 0, 6, 3], [6, 3.48, 6, 8]], dtype=float)
+    world = WorldMap("rooms", (0.0, 0.0, 10.0, 8.0), geometry=SegmentMap(walls, NO_DISCS, (0, 0, 10, 8)))
+    floor = path_floor(world.field, Keeping(0.17, 0.25, (1.0, 1.0)), 0.24)
+    assert floor.reachable[floor.cell_of(np.array([1.0, 1.0]))]
+    assert floor.reachable[floor.cell_of(np.array([8.0, 4.0]))]
 
 
 def test_of_what_was_driven_the_rest_is_swept_and_no_more() -> None:

@@ -98,26 +98,14 @@ def path_floor(field: DistanceField, keeping: Keeping, width_m: float) -> Floor:
         return tight
     wide = tight.reachable & (tight.clearance_m >= radius_m + more_m + half_m)
     band_m = CORNER * more_m + cell_m
-    # From the middle of a door as narrow as can be to where there is room again, past its posts.
-    neck_m = math.sqrt(more_m * (more_m + 2.0 * (radius_m + half_m))) + 2.0 * cell_m
     narrow = tight.reachable & (cell_m * scipy.ndimage.distance_transform_edt(~wide) > band_m)
     near = cell_m * scipy.ndimage.distance_transform_edt(~narrow) <= band_m + 2.0 * cell_m
-    roomy = wide | (tight.reachable & near)
-    pieces, _ = scipy.ndimage.label(roomy | (tight.reachable & _necks(roomy, neck_m / cell_m)))
+    pieces, _ = scipy.ndimage.label(wide | (tight.reachable & near))
     both = replace(tight, reachable=pieces > 0)
     chosen = pieces == pieces[both.nearest_cell(np.array(inside), "the start")]
     # Where that cuts a part of the floor off, nothing is kept but what must be.
-    cut_off = tight.reachable & (cell_m * scipy.ndimage.distance_transform_edt(~chosen) > 2.0 * neck_m)
+    cut_off = tight.reachable & (cell_m * scipy.ndimage.distance_transform_edt(~chosen) > 2.0 * band_m)
     return tight if cut_off.any() else replace(tight, reachable=chosen)
-
-
-def _necks(cells: BoolArray, reach: float) -> BoolArray:
-    """(rows, columns) what is so near, in cells, to two pieces: doors in thin walls, narrow but not long."""
-    pieces, number = scipy.ndimage.label(cells)
-    near = np.zeros(cells.shape, np.int64)
-    for piece in range(1, number + 1):
-        near += scipy.ndimage.distance_transform_edt(pieces != piece) <= reach
-    return np.asarray(near >= 2)
 
 
 def _sampled_in(field: DistanceField, cell_m: float) -> DistanceField:
