@@ -39,7 +39,7 @@ KEEP_M = 0.68
 
 def seen(kept: Obstructions, t_s: float, bodies: FloatArray, **more: Any) -> bool:
     """One scan; nothing is seen to be absent unless said."""
-    absent = more.get("absent", np.zeros(len(kept.known_xy_m), dtype=np.bool_))
+    absent = more.get("absent", [False] * len(kept.known_xy_m))
     told = [Told(7, place) for place in more.get("told", NOBODY)]
     silent = np.insert(more.get("silent", NOBODY), 2, 0.5, axis=1)
     return kept.step(t_s, bodies, absent, silent, told, more.get("heard", ()))
@@ -70,7 +70,7 @@ class TestWhoStands:
         assert (x, y) == (3.0, 1.0)
         assert 1.2 < reach_m < 1.5
         kept, place = Obstructions(), np.array([[3.74, 1.0]])
-        assert kept.step(6.0, place, np.zeros(0, dtype=np.bool_), context.fell_silent(), [], {})
+        assert kept.step(6.0, place, [], context.fell_silent(), [], {})
 
     def test_and_says_nothing_for_seconds_has_not_failed_where_words_are_often_lost(self) -> None:
         """Of a radio that loses three words of ten some three in a row are lost every half a minute."""
@@ -137,7 +137,7 @@ class TestWhoStands:
         assert mate.step(
             0.0,
             NOBODY,
-            np.zeros(0, dtype=np.bool_),
+            [],
             discs(NOBODY, 0.5),
             [Told(1, np.array([x, y]), wider_m)],
             (),

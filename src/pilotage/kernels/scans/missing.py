@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from pilotage.kernels.arrays import FloatArray, IntArray
+from pilotage.kernels.arrays import BoolArray, FloatArray, IntArray
 from pilotage.kernels.geometry.motion import wrap
 from pilotage.kernels.jit import kernel
 
@@ -70,3 +70,32 @@ def bodies_in_sight(
             out[k] = THERE
         elif beyond == towards and towards * step >= 2.0 * (half - step) and towards > 0:
             out[k] = MISSING
+
+
+@kernel
+def count_meetings(bodies: FloatArray, seen: IntArray, most: int, missed: IntArray, met: BoolArray) -> None:
+    """Take what one more scan says of bodies (K,) into how many ``missed`` each, and whether it was ``met``.
+
+    One that is there takes back a scan that missed it; none counts more than ``most``. Of one that says
+    nothing any more (NaN in ``bodies``) all is forgotten.
+    """
+    for k in range(bodies.shape[0]):
+        if math.isnan(bodies[k, 0]):
+            missed[k], met[k] = 0, False
+            continue
+        if seen[k] == MISSING:
+            missed[k] = min(missed[k] + 1, most)
+        elif seen[k] == THERE:
+            missed[k], met[k] = max(missed[k] - 1, 0), True
+
+
+@kernel
+def meetings(missed: IntArray, met: BoolArray, scans: int) -> tuple[int, int]:
+    """How many bodies were missed in so many scans, and how many were met and not."""
+    missing = others = 0
+    for k in range(missed.shape[0]):
+        if missed[k] >= scans:
+            missing += 1
+        elif met[k]:
+            others += 1
+    return missing, others

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from pilotage.core.types import FloatArray, IntArray
-from pilotage.kernels.scans.missing import MISSING, THERE
+from pilotage.kernels.scans.missing import count_meetings, meetings
 
 NO_MATES: FloatArray = np.zeros((0, 4))
 """Rows as of ``ScanFit.mates_in_sight``."""
@@ -33,22 +33,14 @@ class MatesMet:
         order."""
         if len(self._missed) != len(mates):
             self._missed, self._met = np.zeros(len(mates), np.int64), np.zeros(len(mates), np.bool_)
-        there, gone = seen == THERE, np.isnan(mates[:, 0])
-        self._missed += np.where(seen == MISSING, 1, np.where(there, -1, 0))
-        self._missed = np.where(gone, 0, self._missed.clip(0, MOST_COUNTED))
-        self._met[there] = True
-        self._met[gone] = False
+        count_meetings(mates, seen, MOST_COUNTED, self._missed, self._met)
 
     @property
     def speak_against(self) -> bool:
         """Whether they outvote the pose, though scans fit it."""
-        missing = self.missing(MISSING_SCANS)
-        return missing >= LEAST_MISSING and missing > self.met(MISSING_SCANS)
+        missing, met = meetings(self._missed, self._met, MISSING_SCANS)
+        return missing >= LEAST_MISSING and missing > met
 
     def missing(self, scans: int) -> int:
         """How many were missing in so many scans."""
-        return int(np.count_nonzero(self._missed >= scans))
-
-    def met(self, scans: int) -> int:
-        """How many were met, and not missing in so many scans since."""
-        return int(np.count_nonzero(self._met & (self._missed < scans)))
+        return meetings(self._missed, self._met, scans)[0]

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
 
-from pilotage.core.types import BoolArray, FloatArray
+from pilotage.core.types import FloatArray
 
 SHUTS_S = 15.0
 """Who was seen to stand for so long, besides the seconds until it counts as standing, is planned around."""
@@ -75,7 +76,8 @@ class Obstructions:
     @property
     def shutting(self) -> FloatArray:
         """(S, 3) the same, and how much more than from others is kept from each."""
-        return np.array([(*body.xy_m, body.wider_m) for body in self._bodies if body.shuts]).reshape(-1, 3)
+        bodies = [(*body.xy_m, body.wider_m) for body in self._bodies if body.shuts]
+        return np.array(bodies) if bodies else np.zeros((0, 3))
 
     def told(self) -> tuple[tuple[float, float, float], ...]:
         """What mates are told: those of them that this robot itself saw lately."""
@@ -105,7 +107,7 @@ class Obstructions:
         self,
         t_s: float,
         standing_xy_m: FloatArray,
-        absent: BoolArray,
+        absent: Sequence[bool],
         silent: FloatArray,
         told: Sequence[Told],
         heard: Collection[int],
@@ -117,7 +119,7 @@ class Obstructions:
         standing_xy_m
             (M, 2) bodies that are seen to stand and say nothing.
         absent
-            (K,) of which of ``known_xy_m`` nothing is seen though it would be.
+            Of each of ``known_xy_m`` whether nothing is seen though it would be.
         silent
             (L, 3) discs where mates that are silent may be: who stands there has failed.
         told
@@ -131,7 +133,7 @@ class Obstructions:
             Whether others are planned around than before.
         """
         since_s, self._t_s = t_s - self._t_s, t_s
-        for body, gone in zip(self._bodies, absent.tolist(), strict=True):
+        for body, gone in zip(self._bodies, absent, strict=True):
             body.absent_s = body.absent_s + since_s if gone else 0.0
         for place in standing_xy_m:
             body = self._near(place) or self._add(_Body(place.copy(), t_s, t_s))
@@ -139,9 +141,8 @@ class Obstructions:
             body.last_s, body.absent_s, body.seen = t_s, 0.0, True
             body.shuts |= t_s - body.first_s >= SHUTS_S or _is_in(place, silent)
         self._forget(silent, told, heard)
-        denied = np.array([place for _, place in self._denied]).reshape(-1, 2)
         for mate, place, wider_m in told:
-            if _is_near(place, denied, SAME_M):
+            if any(math.dist(place, denied) < SAME_M for _, denied in self._denied):
                 continue
             body = self._near(place) or self._add(_Body(place.copy(), t_s, t_s, seen=False))
             body.shuts, body.last_s = True, body.last_s if body.seen else t_s
@@ -155,6 +156,8 @@ class Obstructions:
     def _is_news(self) -> bool:
         """Whether bodies are planned around otherwise than by the last news."""
         now, before = self.shutting, self._planned
+        if not len(now) and not len(before):
+            return False
         if len(now) == len(before) and (np.abs(now - before) < [MOVED_M, MOVED_M, 0.5 * WIDER_M]).all():
             return False
         self._planned = now

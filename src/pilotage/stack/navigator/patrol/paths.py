@@ -87,7 +87,7 @@ class Paths(Senses):
             for word in heard.values():
                 self._obstructions.is_of_mate(np.array([word.x_m, word.y_m]), word.radius_m)
         known, standing = self._obstructions.known_xy_m, self.motion.standing
-        absent = np.array([self.sees_nothing_at(place, self.radius_m) for place in known], dtype=np.bool_)
+        absent = [self.sees_nothing_at(place, self.radius_m) for place in known]
         other_bodies = self._obstructions.step(self.t_s, standing, absent, self.fell_silent(), told, heard)
         if self._impasses.step(self.t_s) or other_bodies:
             self._shut_paths()

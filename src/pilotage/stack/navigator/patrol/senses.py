@@ -18,7 +18,7 @@ from pilotage.stack.interface import Belief
 from pilotage.stack.journal import Journal
 from pilotage.stack.knowledge import RobotKnowledge
 from pilotage.stack.navigator.patrol.config import PatrolNavigatorConfig
-from pilotage.stack.patrol.silence import LEAST_LOSS, Silences
+from pilotage.stack.patrol.last_words import LEAST_LOSS, LastWords
 from pilotage.stack.patrol.task import PatrolTask
 from pilotage.stack.patrol.watch import IntruderWatch
 from pilotage.stack.patrol.word import Talk, TeamWord
@@ -86,7 +86,7 @@ class Senses:
         self._radio = next(iter(radios), None)
         self.talk_habit = _habit(next(iter(radios.values()), None), config.message_period_s, self.speed_m_s)
         self._delay_s = max((radio.delay_s for radio in radios.values()), default=0.0)
-        self._silences = Silences(len(task.starts), chart.bounds_m)
+        self._last_words = LastWords(len(task.starts), chart.bounds_m)
         self._directions = clustering.beam_directions(
             float(lidar.beam_angles_rad()[0]), lidar.beam_step_rad, lidar.beams
         )
@@ -122,7 +122,7 @@ class Senses:
             for message in said.messages:
                 if isinstance(message.content, TeamWord):
                     self.hear(message.sent_s, message.content)
-        self._silences.step(self.t_s, self.pose, self.talk_habit, lost=lost)
+        self._last_words.step(self.t_s, self.pose, self.talk_habit, lost=lost)
         scan = readings.by_sensor.get(self._lidar)
         self.fresh = isinstance(scan, LidarScan)
         if isinstance(scan, LidarScan):
@@ -132,11 +132,11 @@ class Senses:
     def hear(self, sent_s: float, word: TeamWord) -> None:
         """A mate said something."""
         self.mates[word.news.sender] = sent_s, word
-        self._silences.hear(word.news.sender, sent_s, word)
+        self._last_words.hear(word.news.sender, sent_s, word)
 
     def silences_log(self) -> FloatArray:
-        """(N,) how unlikely each mate's silence is by chance: as ``Silences.chances_log``."""
-        return self._silences.chances_log(self.talk_habit)
+        """(N,) how unlikely each mate's silence is by chance: as ``LastWords.chances_log``."""
+        return self._last_words.chances_log(self.talk_habit)
 
     def _look_around(self, ranges_m: FloatArray, spread_rad: float, *, lost: bool) -> None:
         """Who is there, of a scan."""
@@ -247,12 +247,8 @@ class Senses:
     def mates_by_their_words(self, t_s: float) -> FloatArray:
         """(N, 4) of all robots by number: where each is on the map, within what distance of that its middle
         is by now, and its radius; NaN for who does not know, was not heard lately, or is itself."""
-        rows = np.full((len(self.task.starts), 4), math.nan)
-        for number, (sent_s, word) in self.mates.items():
-            age_s = t_s - sent_s
-            if age_s < HEARD_PERIODS * self.config.message_period_s and math.isfinite(word.x_m):
-                rows[number] = word.x_m, word.y_m, TOLD_M + self.speed_m_s * age_s, word.radius_m
-        return rows
+        within_s = HEARD_PERIODS * self.config.message_period_s
+        return self._last_words.whereabouts(t_s, within_s, TOLD_M, self.speed_m_s)
 
     def hears_all(self) -> bool:
         """Whether no mate is silent, or lost."""

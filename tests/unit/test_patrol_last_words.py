@@ -13,9 +13,9 @@ from pilotage.core.types import Pose2
 from pilotage.evaluation.idleness import idleness
 from pilotage.experiments.graph_patrol import GraphPatrol, Radio, patrol
 from pilotage.stack.patrol.graph import PatrolGraph
+from pilotage.stack.patrol.last_words import LastWords
 from pilotage.stack.patrol.looking import Looking
 from pilotage.stack.patrol.messages import PatrolMemory
-from pilotage.stack.patrol.silence import Silences
 from pilotage.stack.patrol.strategy import STRATEGIES, PatrolSetting
 from pilotage.stack.patrol.word import Talk, TeamWord
 
@@ -30,7 +30,7 @@ def words(x_m: float, talk: Talk | None) -> TeamWord:
 
 def given_up_s(own: Talk, theirs: Talk, x_m: float, end_s: float = 60.0, heard_s: float = 100.0) -> float:
     """So long after its last word, at x_m, a mate's silence is no chance any more; heard without loss."""
-    silences, here = Silences(2, FLOOR), Pose2(2.0, 5.0, 0.0)
+    silences, here = LastWords(2, FLOOR), Pose2(2.0, 5.0, 0.0)
     for k in range(round(10 * (heard_s + end_s))):
         t_s = 0.1 * k
         if k % 10 == 0 and t_s <= heard_s:
@@ -60,7 +60,7 @@ def test_who_may_have_driven_out_of_reach_is_not(theirs: float) -> None:
 def test_a_radio_that_is_worse_than_its_data_sheet_gives_up_nobody() -> None:
     """Six words of ten are lost for an hour, by lot; the sheet says none."""
     rng, talk = np.random.default_rng(5), Talk(1.0, math.inf, 0.0, 1.0)
-    silences, least, longest = Silences(2, FLOOR), 0.0, 0
+    silences, least, longest = LastWords(2, FLOOR), 0.0, 0
     silent = 0
     for k in range(3600):
         silences.step(float(k), Pose2(2.0, 5.0, 0.0), talk, lost=False)
@@ -79,7 +79,7 @@ def test_a_radio_that_is_worse_than_its_data_sheet_gives_up_nobody() -> None:
 def test_nothing_is_expected_of_who_does_not_say_how_it_talks_or_where_it_is() -> None:
     own = Talk(1.0, 30.0, 0.0, 1.0)
     for word in (words(5.0, None), words(math.nan, own)):
-        silences = Silences(2, FLOOR)
+        silences = LastWords(2, FLOOR)
         for k in range(100):
             if k < 5:
                 silences.hear(1, float(k), word)
