@@ -226,7 +226,8 @@ class TestRosMaps:
     @pytest.mark.parametrize(
         ("change", "match"),
         [
-            ({"image": "missing.pgm"}, "missing.pgm"),
+            ({"image": "missing.pgm"}, "missing.pgm', found none$"),
+            ({"image": "/on/the/robot/a.pgm"}, "found none; take 'image: a.pgm', which lies beside it$"),
             ({"resolution": 0.0}, "resolution"),
             ({"resolution": math.nan}, "resolution"),
             ({"origin": [0.0]}, "origin"),

@@ -140,6 +140,12 @@ def test_edges_on_a_floor_are_as_long_as_the_path_that_is_driven() -> None:
     assert exact.length_m - 0.1 < length < 1.06 * exact.length_m
 
 
+def test_what_no_passage_leads_to_is_told() -> None:
+    """A door of 1.2 m: two robots of radius 0.7 m would fit behind it, and cannot come there."""
+    assert Floor.of(WORLD, 0.3).apart_fraction == 0.0
+    assert Floor.of(WORLD, 0.7, inside_xy_m=(3.0, 2.0)).apart_fraction == pytest.approx(0.5, abs=0.02)
+
+
 @pytest.mark.parametrize("place", [(6.0, 1.0), (20.0, 2.0), (6.0, 4.0)])
 def test_vertices_in_walls_are_refused(place: tuple[float, float]) -> None:
     graph = PatrolGraph.of(np.array([[3.0, 2.0], place]), np.array([[0.0, 9.0], [9.0, 0.0]]))

@@ -105,6 +105,12 @@ class Floor:
         x0, y0 = self.origin_xy_m
         return np.column_stack([x0 + (column + 0.5) * self.cell_m, y0 + (row + 0.5) * self.cell_m])
 
+    @property
+    def apart_fraction(self) -> float:
+        """Share of all that the centre could be on that no passage joins to ``reachable``."""
+        fits = np.count_nonzero(self.clearance_m >= self.radius_m)
+        return 1.0 - np.count_nonzero(self.reachable) / max(int(fits), 1)
+
     @cached_property
     def swept(self) -> BoolArray:
         """(rows, columns) cells that the robot's body can cover, from somewhere where its centre can be."""

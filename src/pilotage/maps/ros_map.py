@@ -150,7 +150,9 @@ def parse_ros_map(values: Any, path: Path) -> RosMap:
     file = validate(RosMapFile, values, str(path))
     image = path.parent / file.image
     if not image.is_file():
-        raise InputError(f"{path}: image: expected a file '{image}', found none")
+        beside = path.parent / image.name  # the path is often that on the robot which made the map
+        hint = f"; take 'image: {image.name}', which lies beside it" if beside.is_file() else ""
+        raise InputError(f"{path}: image: expected a file '{image}', found none{hint}")
     return RosMap(file, *read_grey(image))
 
 

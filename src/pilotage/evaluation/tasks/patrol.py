@@ -193,6 +193,7 @@ class PatrolTask:
         }
         metrics["idleness_bound_s"] = idleness_bound_s(graph, len(run.robots), speed_m_s)
         metrics |= self._guards.metrics(somebody=bool(run.mission.world.people))
+        metrics["floor_apart_fraction"] = self._site.apart_fraction
         metrics |= self._floor.metrics(math.ceil(self._warm_s / LOOK_EVERY_S))
         reach_m = max((lidar.max_range_m for lidar in self._lidars if lidar is not None), default=0.0)
         if reach_m > 0.0:

@@ -81,6 +81,7 @@ class SweepTask(WatchedTask):
         within_reach = sweepable(floor, self._width_m)
         area_m2 = np.count_nonzero(within_reach) * floor.cell_m**2
         metrics |= {
+            "floor_apart_fraction": floor.apart_fraction,
             "swept_fraction": swept,
             "swept_rim_fraction": self._share(within_reach & ~floor.reachable),
             "sweep_ratio": float(robot.driven_m * self._width_m / area_m2),
