@@ -146,6 +146,17 @@ def test_what_no_passage_leads_to_is_told() -> None:
     assert Floor.of(WORLD, 0.7, inside_xy_m=(3.0, 2.0)).apart_fraction == pytest.approx(0.5, abs=0.02)
 
 
+def test_what_is_behind_a_passage_with_too_little_to_spare_can_be_left_out() -> None:
+    """A door of 1.2 m leaves a body of 0.55 m 5 cm on either side."""
+    floor = Floor.of(WORLD, 0.55, 0.02, (3.0, 2.0), exact=True)
+    beside = floor.cell_of(np.array([9.0, 2.0]))
+    for spare_m, left in ((0.03, True), (0.07, False)):
+        roomy = floor.roomy(spare_m, 0.2, (3.0, 2.0))
+        assert roomy.reachable[beside] == left
+        here = floor.middles(floor.reachable)[:, 0] < 5.4
+        assert roomy.reachable[floor.reachable][here].all(), "all along the walls"
+
+
 @pytest.mark.parametrize("place", [(6.0, 1.0), (20.0, 2.0), (6.0, 4.0)])
 def test_vertices_in_walls_are_refused(place: tuple[float, float]) -> None:
     graph = PatrolGraph.of(np.array([[3.0, 2.0], place]), np.array([[0.0, 9.0], [9.0, 0.0]]))

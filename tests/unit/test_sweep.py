@@ -26,7 +26,8 @@ from pilotage.stack.navigator.timed_path import with_turns
 from pilotage.stack.planning.boustrophedon import BoustrophedonConfig, BoustrophedonPlanner
 from pilotage.stack.planning.planner import PlanRequest, PlanResult
 from pilotage.stack.planning.sweep_changes import subdivided
-from pilotage.stack.planning.sweep_floor import Keeping, Sought, covered, path_floor, rest_of
+from pilotage.stack.planning.sweep_floor import Sought, covered, rest_of
+from pilotage.stack.planning.sweep_room import Keeping, path_floor
 from support.missions import MISSIONS
 
 ROOM = [[0, 0, 10, 0], [10, 0, 10, 8], [10, 8, 0, 8], [0, 8, 0, 0]]
@@ -94,13 +95,17 @@ def test_where_there_is_no_room_for_its_clearance_it_goes_with_what_its_body_nee
     assert result.path.length_m * 0.8 / area_m2 <= 1.12
 
 
-def test_a_clearance_that_would_shut_a_door_is_not_kept() -> None:
+def test_a_clearance_that_would_shut_a_door_is_kept_everywhere_else() -> None:
     """A door of 0.48 m in a thin wall, and a body of 0.17 m that would keep 0.25 m."""
     walls = np.array([*ROOM, [6, 0, 6, 3], [6, 3.48, 6, 8]], dtype=float)
     world = WorldMap("rooms", (0.0, 0.0, 10.0, 8.0), geometry=SegmentMap(walls, NO_DISCS, (0, 0, 10, 8)))
     floor = path_floor(world.field, Keeping(0.17, 0.25, (1.0, 1.0)), 0.24)
     assert floor.reachable[floor.cell_of(np.array([1.0, 1.0]))]
     assert floor.reachable[floor.cell_of(np.array([8.0, 4.0]))]
+    for beside_a_wall in ((0.2, 4.0), (3.0, 0.2), (5.8, 6.0), (9.8, 4.0)):
+        assert not floor.reachable[floor.cell_of(np.array(beside_a_wall))]
+    through = floor.reachable & (np.abs(floor.clearance_m - 0.24) < 0.005)
+    assert np.abs(floor.middles(through)[:, 0] - 6.0).min() < 0.05, "the door's middle"
 
 
 def test_of_what_was_driven_the_rest_is_swept_and_no_more() -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -12,6 +12,7 @@ import scipy
 from pilotage.core.errors import InputError
 from pilotage.core.types import BoolArray, FloatArray, IntArray
 from pilotage.kernels.arrays import ByteArray
+from pilotage.kernels.geometry.field import sample_distance
 from pilotage.kernels.grids.theta import line_of_sight
 from pilotage.kernels.grids.travel_cost import some_travel_costs, travel_costs
 from pilotage.kernels.patrol.pull import pulled_corners
@@ -46,7 +47,12 @@ class Floor:
 
     @staticmethod
     def of(
-        world: WorldMap, radius_m: float, cell_m: float = 0.1, inside_xy_m: tuple[float, float] | None = None
+        world: WorldMap,
+        radius_m: float,
+        cell_m: float = 0.1,
+        inside_xy_m: tuple[float, float] | None = None,
+        *,
+        exact: bool = False,
     ) -> Floor:
         """Lay cells over a map.
 
@@ -56,6 +62,9 @@ class Floor:
             Side of a cell, coarser where the map is too large for it.
         inside_xy_m
             A place on the floor that is meant; else the largest piece where the robot fits.
+        exact
+            Distances are measured in the cells' middles where the walls are known; between nodes of the map's
+            field, farther apart than passages are wide, they are some centimetres off.
 
         Raises
         ------
@@ -63,7 +72,7 @@ class Floor:
             Where the robot fits nowhere, or not at the place.
         """
         return Floor.of_field(
-            world.field, world.bounds_m, radius_m, cell_m, inside_xy_m, f"map '{world.name}'"
+            world.field, world.bounds_m, radius_m, cell_m, inside_xy_m, f"map '{world.name}'", exact=exact
         )
 
     @staticmethod
@@ -74,16 +83,23 @@ class Floor:
         cell_m: float = 0.1,
         inside_xy_m: tuple[float, float] | None = None,
         where: str = "map",
+        *,
+        exact: bool = False,
+        most_cells: int = MOST_CELLS,
     ) -> Floor:
-        """Lay cells over distances to walls; as ``of``."""
+        """Lay so many cells at most over distances to walls; as ``of``."""
         xmin, ymin, xmax, ymax = bounds_m
         area_m2 = (xmax - xmin) * (ymax - ymin)
-        cell_m = max(cell_m, math.sqrt(area_m2 / MOST_CELLS))
+        cell_m = max(cell_m, math.sqrt(area_m2 / most_cells))
         rows, columns = math.ceil((ymax - ymin) / cell_m), math.ceil((xmax - xmin) / cell_m)
         x = xmin + (np.arange(columns) + 0.5) * cell_m
         y = ymin + (np.arange(rows) + 0.5) * cell_m
         points = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
-        clearance = field.at(points).reshape(rows, columns)
+        walls = field.segments_m, field.circles_m
+        if exact and len(walls[0]) + len(walls[1]):
+            clearance = sample_distance(float(x[0]), float(y[0]), cell_m, columns, rows, *walls)
+        else:
+            clearance = field.at(points).reshape(rows, columns)
         # What lies past the bounds is no floor, though the field calls it as near as their edge.
         clearance[:, x > xmax] = clearance[y > ymax, :] = -1.0
         fits = clearance >= radius_m
@@ -98,6 +114,17 @@ class Floor:
                 raise InputError(f"{where}: expected floor for a robot of radius {radius_m:g} m, found none")
             piece = 1 + int(np.argmax(sizes[1:]))
         return Floor((xmin, ymin), cell_m, radius_m, clearance, pieces == piece)
+
+    def roomy(self, spare_m: float, reach_m: float, inside_xy_m: tuple[float, float]) -> Floor:
+        """The floor without what only passages lead to that leave less than ``spare_m`` beside the body.
+
+        All of it within ``reach_m`` of where it has so much room is kept.
+        """
+        wide = replace(self, reachable=self.reachable & (self.clearance_m >= self.radius_m + spare_m))
+        pieces, _ = scipy.ndimage.label(wide.reachable)
+        piece = pieces[wide.nearest_cell(np.array(inside_xy_m), "the place inside")]
+        away_m = self.cell_m * scipy.ndimage.distance_transform_edt(pieces != piece)
+        return replace(self, reachable=self.reachable & (away_m <= reach_m))
 
     def middles(self, cells: BoolArray) -> FloatArray:
         """(K, 2) middles of marked cells, row after row."""

@@ -17,7 +17,7 @@ from pilotage.evaluation.tasks.watched import WatchedTask
 from pilotage.kernels.patrol.swept import mark_swept
 from pilotage.maps.floor import Floor, sweepable
 from pilotage.missions.places import GoalConfig
-from pilotage.sensors.sensor import Positive
+from pilotage.sensors.sensor import NonNegative, Positive
 
 CELLS_A_WIDTH = 12
 BACK_M = 0.5
@@ -31,6 +31,8 @@ class SweepConfig(Config):
     least: float = Field(default=0.9999, gt=0.0, le=1.0)
     """Share of the floor where the robot's centre can be that has to be swept for a success: plans are of
     cells too, and miss a few of these by millimetres."""
+    spare_m: NonNegative = 0.02
+    """What only passages lead to that leave the body less than this on either side is not asked for."""
 
 
 @TASKS.add("sweep-floor", SweepConfig)
@@ -38,8 +40,9 @@ class SweepTask(WatchedTask):
     """Done when the robot says that it is: back at its start, or at the goal.
 
     A success if it truly swept the floor: cells, twelve to a pass, whose middles came within half a width of
-    the centre's true path. Asked for are all cells where the centre can be; what the pass reaches beyond, the
-    rim along walls, is told besides. A second robot would have nothing left to do.
+    the centre's true path. Asked for are all cells where the centre can be and that no robot has to squeeze
+    itself to; what the pass reaches beyond, the rim along walls, is told besides. A second robot would have
+    nothing left to do.
     """
 
     def __init__(self, config: SweepConfig, setting: TaskSetting) -> None:
@@ -53,7 +56,10 @@ class SweepTask(WatchedTask):
         super().__init__((back,) if mission.goal_of(robot) is None else ())
         self._config, self._width_m = config, config.width_m or 2.0 * radius_m
         cell_m = self._width_m / CELLS_A_WIDTH
-        self._floor = Floor.of(setting.chart, radius_m, cell_m, (start.x_m, start.y_m))
+        place = start.x_m, start.y_m
+        floor = Floor.of(setting.chart, radius_m, cell_m, place, exact=True)
+        # By two cells less than a pass reaches: cells tell where a passage becomes narrow no better.
+        self._floor = floor.roomy(config.spare_m, 0.5 * self._width_m - 2.0 * floor.cell_m, place)
         self._swept: BoolArray = np.zeros_like(self._floor.reachable)
         self._last = np.array([start.x_m, start.y_m])
 

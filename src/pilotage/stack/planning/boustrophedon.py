@@ -20,8 +20,9 @@ from pilotage.stack.planning.node_search import line_length_m
 from pilotage.stack.planning.planner import PLANNERS, PlanRequest, PlanResult, PlanStatus
 from pilotage.stack.planning.sweep_changes import reshaped
 from pilotage.stack.planning.sweep_detours import completed, joined
-from pilotage.stack.planning.sweep_floor import Keeping, Sought, covered, in_cells_of, rest_of, whole_floor
+from pilotage.stack.planning.sweep_floor import Sought, covered, in_cells_of, rest_of, whole_floor
 from pilotage.stack.planning.sweep_lines import sweep_cell_m, sweep_lines
+from pilotage.stack.planning.sweep_room import Keeping
 
 TRIES_A_CELL = 3000
 """Changes that are tried to the order of cells."""

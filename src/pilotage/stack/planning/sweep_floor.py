@@ -10,17 +10,11 @@ import numpy as np
 import scipy
 
 from pilotage.core.types import BoolArray, FloatArray
-from pilotage.kernels.geometry.field import sample_distance
 from pilotage.kernels.patrol.swept import mark_swept
 from pilotage.maps.distance_field import DistanceField
 from pilotage.maps.floor import Floor, sweepable
+from pilotage.stack.planning.sweep_room import FINE_CELLS, Keeping, path_floor
 
-FINE_CELLS = 12
-"""Cells a width that tell what is swept; larger floors take coarser ones."""
-FINEST_M = 0.02
-"""Side of the cells of paths, larger on large floors: passages with less than this to spare may be missed."""
-CORNER = 1.5
-"""What keeps more from walls ends so much farther from a corner, in terms of the difference, or less."""
 STEP_M = 0.002
 """Stretches of a trail on which its radius differs by less are taken together, with the least of it."""
 
@@ -36,7 +30,8 @@ class Sought:
     inner
         Where the cells of its path are: as ``path_floor`` says; from the same corner on.
     must, may
-        (rows, columns) cells of the floor to be swept, and those of its rim that may be left.
+        (rows, columns) cells of the floor to be swept, where passages lead to them that paths find, and those
+        of its rim that may be left.
     width_m
         Of a pass.
     """
@@ -48,22 +43,24 @@ class Sought:
     width_m: float
 
 
-@dataclass(frozen=True)
-class Keeping:
-    """What a body needs around its centre, what it keeps of it where there is room, and where it starts."""
-
-    radius_m: float
-    clearance_m: float
-    start_xy_m: tuple[float, float]
-
-
 def whole_floor(field: DistanceField, keeping: Keeping, width_m: float, overlap_m: float) -> Sought:
     """All of the floor, and the rim that only the body reaches."""
     radius_m, inside = keeping.radius_m, keeping.start_xy_m
-    floor = Floor.of_field(field, field.bounds_m, radius_m, width_m / FINE_CELLS, inside)
+    floor = Floor.of_field(field, field.bounds_m, radius_m, width_m / FINE_CELLS, inside, exact=True)
     inner = path_floor(field, keeping, width_m)
     rim = sweepable(floor, width_m) & ~floor.reachable
-    return Sought(floor, inner, floor.reachable, rim, width_m - overlap_m)
+    must = floor.reachable & _within_reach(floor, inner, 0.5 * width_m - floor.cell_m)
+    return Sought(floor, inner, must, rim, width_m - overlap_m)
+
+
+def _within_reach(floor: Floor, inner: Floor, reach_m: float) -> BoolArray:
+    """(rows, columns) cells of a floor that are no farther from where its path may lead."""
+    away_m = inner.cell_m * scipy.ndimage.distance_transform_edt(~inner.reachable)
+    row, column = (
+        np.minimum(((np.arange(size) + 0.5) * floor.cell_m / inner.cell_m).astype(np.int64), most - 1)
+        for size, most in zip(floor.reachable.shape, away_m.shape, strict=True)
+    )
+    return np.asarray(away_m[np.ix_(row, column)] <= reach_m)
 
 
 def rest_of(whole: Sought, trail: FloatArray, width_m: float, enough: float) -> Sought:
@@ -78,45 +75,6 @@ def rest_of(whole: Sought, trail: FloatArray, width_m: float, enough: float) -> 
     must = _but_the_least(whole.must & ~swept, (1.0 - enough) * np.count_nonzero(whole.must))
     away_m = floor.cell_m * scipy.ndimage.distance_transform_edt(~must)
     return replace(whole, must=must, may=whole.may & ~swept & (away_m <= 0.5 * width_m))
-
-
-def path_floor(field: DistanceField, keeping: Keeping, width_m: float) -> Floor:
-    """Where the cells of a sweep's path are: they keep the clearance; where there is no room, what must be.
-
-    The latter is half a diagonal of a cell more than the body needs, as a line through cells' middles comes
-    so much nearer to walls: cells are finer here than those that tell what is swept, of which the former
-    keeps half a diagonal. Nobody keeps so much that what is beside a wall is out of a pass' reach.
-    """
-    bounds_m, inside, radius_m = field.bounds_m, keeping.start_xy_m, keeping.radius_m
-    told_m = Floor.of_field(field, bounds_m, radius_m, width_m / FINE_CELLS, inside).cell_m
-    cell_m = Floor.of_field(field, bounds_m, radius_m, min(FINEST_M, told_m), inside).cell_m
-    half_m = math.sqrt(0.5) * cell_m
-    tight = Floor.of_field(_sampled_in(field, cell_m), bounds_m, radius_m + half_m, cell_m, inside)
-    more_m = keeping.clearance_m - radius_m + math.sqrt(0.5) * (told_m - cell_m)
-    more_m = min(more_m, 0.5 * width_m - 1.5 * told_m)
-    if more_m <= 0.0:
-        return tight
-    wide = tight.reachable & (tight.clearance_m >= radius_m + more_m + half_m)
-    band_m = CORNER * more_m + cell_m
-    narrow = tight.reachable & (cell_m * scipy.ndimage.distance_transform_edt(~wide) > band_m)
-    near = cell_m * scipy.ndimage.distance_transform_edt(~narrow) <= band_m + 2.0 * cell_m
-    pieces, _ = scipy.ndimage.label(wide | (tight.reachable & near))
-    both = replace(tight, reachable=pieces > 0)
-    chosen = pieces == pieces[both.nearest_cell(np.array(inside), "the start")]
-    # Where that cuts a part of the floor off, nothing is kept but what must be.
-    cut_off = tight.reachable & (cell_m * scipy.ndimage.distance_transform_edt(~chosen) > 2.0 * band_m)
-    return tight if cut_off.any() else replace(tight, reachable=chosen)
-
-
-def _sampled_in(field: DistanceField, cell_m: float) -> DistanceField:
-    """The field with nodes in cells' middles, where walls are known: coarser nodes miss doors' middles."""
-    if len(field.segments_m) + len(field.circles_m) == 0:
-        return field
-    xmin, ymin, xmax, ymax = field.bounds_m
-    x0, y0 = xmin + 0.5 * cell_m, ymin + 0.5 * cell_m
-    size = math.ceil((xmax - xmin) / cell_m), math.ceil((ymax - ymin) / cell_m)
-    walls = field.segments_m, field.circles_m
-    return DistanceField(sample_distance(x0, y0, cell_m, *size, *walls), (x0, y0), cell_m, *walls)
 
 
 def in_cells_of(floor: Floor, cell_m: float) -> Floor:
