@@ -15,8 +15,6 @@ from pilotage.stack.mapping.slam.mapper import map_log
 from pilotage.stack.mapping.slam.odometry import scanner_odometry
 from pilotage.stack.mapping.slam.online import OnlineSlam
 from pilotage.stack.mapping.slam.tracker import track
-from pilotage.stack.mapping.slam.uncertainty import TRACK_STD_M
-from pilotage.stack.mapping.slam.unknown_ground import with_odometry
 from support.laser_rooms import along, furnished, recording, room
 
 REACH_M = 3.5
@@ -72,11 +70,3 @@ def test_a_covered_scanner_beside_known_walls_is_no_unknown_ground() -> None:
     before = int(np.searchsorted(covered.keyframes, 40))
     # Whether it is found again at once or not: nobody knows how far it came meanwhile.
     assert np.sqrt(covered.slips[before : before + 6, 0, 0]).max() > 0.04
-
-
-def test_odometry_tells_what_a_bare_wall_leaves_open_and_nothing_else() -> None:
-    wall, corner = np.diag([0.0, 90.0, 60.0]), np.diag([40.0, 90.0, 60.0])
-    told = np.broadcast_to(np.diag([1e4, 1e4, 1e5]), (2, 3, 3))
-    held = with_odometry(np.array([wall, corner]), told)
-    np.testing.assert_allclose(held[0], wall + TRACK_STD_M**2 * told[0])
-    np.testing.assert_array_equal(held[1], corner)

@@ -135,6 +135,14 @@ def look(
 
 
 @kernel
+def holds_along(pose: FloatArray, hessian: FloatArray, weight: float) -> bool:
+    """Whether an alignment at a pose (3,), by points of so much weight, holds it along its heading."""
+    c, s = math.cos(pose[2]), math.sin(pose[2])
+    holds = c * c * hessian[0, 0] + 2.0 * c * s * hessian[0, 1] + s * s * hessian[1, 1]
+    return bool(holds > HELD * weight)
+
+
+@kernel
 def settle(
     pose: FloatArray,
     hessian: FloatArray,
@@ -157,9 +165,7 @@ def settle(
     track.since[0] += 1
     motion = between(track.pose, pose)
     if led:
-        c, s = math.cos(pose[2]), math.sin(pose[2])
-        holds = c * c * hessian[0, 0] + 2.0 * c * s * hessian[0, 1] + s * s * hessian[1, 1]
-        learn_wheels(track.wheels, step, motion, holds > HELD * told[3])
+        learn_wheels(track.wheels, step, motion, holds_along(pose, hessian, told[3]))
     learn_motion(track.errors, track.velocity, step, led, motion, dt_s)
     track.pose[:] = pose
 

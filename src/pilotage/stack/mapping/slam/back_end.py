@@ -12,6 +12,7 @@ import numpy as np
 from pilotage.core.memory import give_back
 from pilotage.core.types import BoolArray, FloatArray
 from pilotage.kernels.slam.frames import composed
+from pilotage.kernels.slam.slips import CHANCE
 from pilotage.models.pose_graph_covariance import JointCovariance, PoseCovariances, covariances
 from pilotage.models.pose_graph_solver import Loss, Start, optimize
 from pilotage.stack.mapping.slam.closures import (
@@ -39,11 +40,16 @@ from pilotage.stack.mapping.slam.uncertainty import (
     NO_EDGES,
     TRACK_STD_M,
     Edges,
+    agreeing,
     edge_information,
+    fused,
     relative_poses,
 )
 
 TRACK_FLOOR = np.diag([0.004**2, 0.004**2, 0.0015**2])
+ODOMETRY_PROBABILITY, MISALIGNED = 0.9999, np.diag([0.05**2, 0.05**2, 0.015**2])
+"""Of the chi-square of an odometry with an alignment up to which wheels are not taken to have slipped, and
+what alignments are off by where little is in sight, which they do not know of: in doors, along bare walls."""
 ROBUST_STDS = 3.0
 REFINED_STDS = 3.5
 REFINED_TRACK = 0.02
@@ -74,8 +80,11 @@ class Solved:
         return covariances(self.edges.graph(self.poses), weights=self.weights)
 
 
-def track_edges(track: LocalTrack) -> Edges:
-    """Edges between consecutive keyframes, as sure as their alignment and their guesses leave them."""
+def track_edges(track: LocalTrack, share: float = 1.0) -> Edges:
+    """Edges between consecutive keyframes, as sure as their alignment, guesses and odometry leave them.
+
+    ``share``: of what alignments and guesses tell; the odometry's, which nothing else tells, is left whole.
+    """
     poses = track.poses[track.keyframes]
     count = poses.shape[0]
     relative = relative_poses(poses[:-1], poses[1:])
@@ -87,7 +96,20 @@ def track_edges(track: LocalTrack) -> Edges:
     hessian = turn.transpose(0, 2, 1) @ track.hessians[1:] @ turn
     k = np.arange(count - 1)
     information = edge_information(hessian, relative[:, 2], TRACK_STD_M, TRACK_FLOOR + track.slips[1:])
-    return Edges(k, k + 1, relative, information, np.zeros(count - 1, np.bool_))
+    aligned = Edges(k, k + 1, relative, information, np.zeros(count - 1, np.bool_))
+    if track.odometry is None:
+        return aligned.scaled(share)
+    # Slips and guesses tell nothing of the wheels: what scans are held by alone speaks against them.
+    held = edge_information(_without_chance(hessian), relative[:, 2], TRACK_STD_M, TRACK_FLOOR + MISALIGNED)
+    told = agreeing(replace(aligned, information=held), track.odometry.edges, ODOMETRY_PROBABILITY)
+    return fused(aligned.scaled(share), told.scaled(np.where(track.odometry.alone, 1.0 - share, 1.0)))
+
+
+def _without_chance(hessian: FloatArray) -> FloatArray:
+    """Hessians (K, 3, 3) of alignments without what comes by chance, as where a wall's points scatter."""
+    weight = hessian[:, 0, 0] + hessian[:, 1, 1]
+    told, axes = np.linalg.eigh(hessian - CHANCE * weight[:, None, None] * np.diag([1.0, 1.0, 0.0]))
+    return np.asarray((axes * np.maximum(told, 0.0)[:, None, :]) @ axes.transpose(0, 2, 1))
 
 
 def solved(edges: Edges, poses: FloatArray, scale: float, slipped: bool = False) -> Solved:
@@ -301,7 +323,7 @@ def closed(track: LocalTrack, config: SlamConfig, on_round: OnRound) -> LoopClos
 
 def weak_edges(track: LocalTrack) -> Edges:
     """Return the front end's edges as they count beside refined ones."""
-    return track_edges(track).scaled(REFINED_TRACK)
+    return track_edges(track, REFINED_TRACK)
 
 
 def refined(

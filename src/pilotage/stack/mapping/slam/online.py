@@ -15,7 +15,6 @@ from pilotage.stack.mapping.slam.scan_covariances import SHARED_EDGES
 from pilotage.stack.mapping.slam.submaps import TURN_AS_PATH_M
 from pilotage.stack.mapping.slam.tracker import LocalTrack, Tracker
 from pilotage.stack.mapping.slam.uncertainty import errors_of
-from pilotage.stack.mapping.slam.unknown_ground import with_odometry
 
 WINDOWS_M = (1.0, 2.0, 4.0)
 """Half a search window's side at most, round by round, each time."""
@@ -131,16 +130,16 @@ class OnlineSlam:
         self._take(refined(self._closer, track.clouds, weak_edges(track)))
 
     def _track(self) -> LocalTrack:
-        return self._with_odometry(self._tracker.track(), 0)
+        return self._with_odometry(self._tracker.track())
 
-    def _with_odometry(self, track: LocalTrack, first: int) -> LocalTrack:
-        """What the odometry tells where scans leave a place open, in the track from a keyframe on."""
-        if not (self._led and self._config.use_odometry) or len(track.hessians) < 2:
+    def _with_odometry(self, track: LocalTrack) -> LocalTrack:
+        """The track, or the end of it, with what the odometry tells beside the alignments.
+
+        For recordings they have to do alone, as stamps lie; on a robot odometry and scans belong together.
+        """
+        if not (self._led and self._config.use_odometry) or len(track.keyframes) < 2:
             return track
-        told = self._tracker.told_by_odometry(first)
-        return replace(
-            track, hessians=np.concatenate([track.hessians[:1], with_odometry(track.hessians[1:], told)])
-        )
+        return replace(track, odometry=self._tracker.by_odometry(len(track.keyframes)))
 
     def _take(self, state: Solved) -> None:
         """Put the keyframes where the graph has them; note what its edges are off by, a loop's in all."""
@@ -154,12 +153,12 @@ class OnlineSlam:
 
     def _extend(self) -> None:
         """Hang the new keyframe on the one before."""
-        step = self._with_odometry(self._tracker.last_step(), len(self.keyframe_poses) - 1)
-        moved = between(step.poses[0], step.poses[1])
+        edge = track_edges(self._with_odometry(self._tracker.last_step()))
+        moved = edge.relative[0]
         here = self.keyframe_poses[-1]
         pose = composed(here, moved)
         self._path_m += float(np.hypot(moved[0], moved[1])) + TURN_AS_PATH_M * abs(float(moved[2]))
-        own = SHARED_EDGES * np.linalg.inv(track_edges(step).information[0])
+        own = SHARED_EDGES * np.linalg.inv(edge.information[0])
         c, s = np.cos(pose[2]), np.sin(pose[2])
         turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
         self.covariance = carried_covariance(self.covariance, here, pose) + turn @ own @ turn.T

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pilotage.core.types import FloatArray, IntArray
-from pilotage.kernels.slam.following import DOUBT, FULL, follow, is_new, leaves
+from pilotage.kernels.slam.following import DOUBT, FULL, follow, holds_along, is_new, leaves
 from pilotage.kernels.slam.frames import between, composed
 from pilotage.kernels.slam.recorded_motions import motion_of, move_anchor
 from pilotage.kernels.slam.track import Recording
@@ -27,7 +27,8 @@ from pilotage.stack.mapping.slam.guesses import (
 )
 from pilotage.stack.mapping.slam.local_matching import PRIOR, Aside, LocalMatcher
 from pilotage.stack.mapping.slam.odometry import NO_OTHERS, recording_of
-from pilotage.stack.mapping.slam.unknown_ground import FEW_POINTS, OdometryRecord, View
+from pilotage.stack.mapping.slam.odometry_record import OdometryRecord, ToldByOdometry
+from pilotage.stack.mapping.slam.unknown_ground import FEW_POINTS, View
 
 RIGID = 1e4 * np.eye(3)
 """Hessian of a break: its slip alone counts."""
@@ -70,6 +71,8 @@ class LocalTrack:
         Scans of which so much seemed to move that people may fill the view.
     residual_m
         Mean over all scans of the root mean square of an alignment's residuals.
+    odometry
+        What an odometry tells between keyframes, where it is the robot's own and no stamp lies.
     """
 
     poses: FloatArray
@@ -79,10 +82,11 @@ class LocalTrack:
     hessians: FloatArray
     slips: FloatArray
     breaks: IntArray
-    searched: int
-    lost: int
+    searched: int = 0
+    lost: int = 0
     crowded: int = 0
     residual_m: float = 0.0
+    odometry: ToldByOdometry | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -219,12 +223,13 @@ class Tracker:
         if fit is None and step is not None and self._is_on_unknown_ground(step):
             self.lost_run = 0
             track.pose[:] = composed(track.pose, step)
-            track.slip[:] += self._odometry.slip(len(self._poses), step, self._poses, track.wheels)
+            track.slip[:] += self._odometry.slip(len(self._poses), step, self._poses)
             few = len(light) < FEW_POINTS
             cloud, kept = (cloud[:0], kept[:0]) if few else (cloud, kept)
             far = not few or self._is_new(between(track.keyframe, track.pose))
         elif fit is None:
             self.lost_run += 1
+            self._odometry.lose(len(self._poses))
             track.pose[:] = composed(track.pose, self._matcher.found.motions[0])
             broken = step is None or self.lost_run > GUESSED_SCANS or is_far(step)
             track.slip[:] += BLIND_BREAK_SLIP if step is None else BREAK_SLIP if broken else GUESS_SLIP
@@ -232,6 +237,8 @@ class Tracker:
                 self._tear()
         else:
             self.lost_run, hessian = 0, fit.hessian
+            if not holds_along(fit.pose, fit.hessian, fit.weight):
+                self._odometry.leave_open(len(self._poses))
             moved = between(track.keyframe, track.pose)
             far = self._is_new(moved) or leaves(track, fit.value, step is not None)
         new = broken or far
@@ -347,10 +354,6 @@ class Tracker:
         """How many scans could not be aligned."""
         return self._matcher.lost
 
-    def _mean_residual_m(self) -> float:
-        total, count = self._matcher.track.residuals.tolist()
-        return total / count if count else 0.0
-
     def last_step(self) -> LocalTrack:
         """Return the last two keyframes alone, without their points."""
         pair = self._keyframes[-2:]
@@ -362,17 +365,16 @@ class Tracker:
             np.array(self._hessians[-2:]),
             np.array(self._slips[-2:]),
             np.zeros(0, np.int64),
-            0,
-            0,
         )
 
-    def told_by_odometry(self, first: int = 0) -> FloatArray:
-        """Information (K - 1, 3, 3) of the odometry between keyframes, from one of them on."""
-        scans = np.array(self._keyframes[first:], np.int64)
-        return self._odometry.told(scans, self._poses, self._matcher.track.wheels)
+    def by_odometry(self, count: int) -> ToldByOdometry:
+        """What the odometry tells between the last so many keyframes."""
+        scans = np.array(self._keyframes[-count:], np.int64)
+        return self._odometry.told(scans, self._poses)
 
     def track(self) -> LocalTrack:
         """Everything so far."""
+        residuals_m, count = self._matcher.track.residuals.tolist()
         return LocalTrack(
             np.array(self._poses).reshape(-1, 3),
             np.array(self._keyframes, np.int64),
@@ -384,7 +386,7 @@ class Tracker:
             self._matcher.searched,
             self._matcher.lost,
             int(self._matcher.track.crowded[0]),
-            self._mean_residual_m(),
+            residuals_m / max(count, 1.0),
         )
 
 

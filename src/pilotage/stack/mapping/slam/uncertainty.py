@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from pilotage.core.chi_square import chi_square_quantile
 from pilotage.core.types import BoolArray, FloatArray, IntArray
 from pilotage.models.pose_graph import PoseGraph
 
@@ -38,9 +39,9 @@ class Edges:
             np.concatenate([self.closes, other.closes]),
         )
 
-    def scaled(self, factor: float) -> Edges:
-        """Return them with all information multiplied."""
-        return replace(self, information=self.information * factor)
+    def scaled(self, factor: float | FloatArray) -> Edges:
+        """Return them with all information multiplied, by one factor or by one each (M,)."""
+        return replace(self, information=self.information * np.reshape(factor, (-1, 1, 1)))
 
     def chosen(self, which: BoolArray) -> Edges:
         """Return some of them."""
@@ -111,3 +112,33 @@ def errors_of(edges: Edges, poses: FloatArray) -> FloatArray:
     """(M, 3) predicted minus measured, in the frame of each measurement."""
     predicted = relative_poses(poses[edges.i], poses[edges.j])
     return relative_poses(edges.relative, predicted)
+
+
+def agreeing(edges: Edges, others: Edges, probability: float) -> Edges:
+    """Return other edges between the same poses, which tell nothing where the two contradict each other.
+
+    ``probability``: of the chi-square of what they are apart, up to which they agree.
+    """
+    apart = relative_poses(edges.relative, others.relative)
+    tells = others.information.any(axis=(1, 2))
+    spread = np.linalg.inv(edges.information[tells]) + np.linalg.inv(others.information[tells])
+    squares = np.zeros(len(edges))
+    squares[tells] = np.einsum("mi,mij,mj->m", apart[tells], np.linalg.inv(spread), apart[tells])
+    agrees = squares <= chi_square_quantile(probability, 3)
+    return replace(others, information=np.where(agrees[:, None, None], others.information, 0.0))
+
+
+def fused(edges: Edges, others: Edges) -> Edges:
+    """Return one edge for two between the same poses each: their mean by their information.
+
+    The two are near each other: the frame of the one is taken for that of the other.
+    """
+    information = edges.information + others.information
+    apart = relative_poses(edges.relative, others.relative)
+    pull = np.einsum("mij,mj->mi", others.information, apart)
+    step = np.linalg.solve(information, pull[:, :, None])[:, :, 0]
+    c, s = np.cos(edges.relative[:, 2]), np.sin(edges.relative[:, 2])
+    moved = np.stack([c * step[:, 0] - s * step[:, 1], s * step[:, 0] + c * step[:, 1], step[:, 2]], axis=1)
+    relative = edges.relative + moved
+    relative[:, 2] = (relative[:, 2] + np.pi) % (2.0 * np.pi) - np.pi
+    return replace(edges, relative=relative, information=information)
