@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 from pathlib import Path
 
@@ -76,6 +77,11 @@ def test_a_clock_that_jitters_costs_no_map(tmp_path: Path) -> None:
     ideal = np.loadtxt(out / "slam-clean" / "trajectory.tum")
     off = [np.hypot(*(rows[:, 1:3] - true[which, :2]).T) for rows, which in ((ideal, ...), (told, order))]
     assert off[1].mean() < 1.5 * off[0].mean() + 0.001
+    told_by = [
+        json.loads((out / f"slam-{name}" / "metrics.json").read_text()) for name in ("clean", "jitter")
+    ]
+    lengths_m = [metrics["path_length_m"] for metrics in told_by]
+    assert abs(lengths_m[1] - lengths_m[0]) < 0.05 * lengths_m[0]  # not to and fro, as the stamps have it
     covariances = np.load(out / "slam-jitter" / "covariances.npz")
     np.testing.assert_allclose(covariances["poses"][:, :2], told[:, 1:3], atol=1e-6)
     scans = np.load(out / "slam-jitter" / "keyframes.npz")["scans"]

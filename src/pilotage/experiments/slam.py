@@ -136,7 +136,10 @@ def _not_joined(log: LaserLog, result: NotJoined, extend: Path | None) -> dict[s
 def slam_metrics(log: LaserLog, result: SlamResult) -> dict[str, object]:
     """Numbers of a mapped recording under their JSON keys."""
     verdicts = Counter(str(closure.verdict) for closure in result.closures)
-    moved = relative_poses(result.poses[:-1], result.poses[1:])
+    # Along the order in which the scans were taken: that of stamps which go back leads to and fro.
+    taken = slice(None) if log.stamps_s is None else np.argsort(np.argsort(log.stamps_s, kind="stable"))
+    poses = result.poses[taken]
+    moved = relative_poses(poses[:-1], poses[1:])
     std = np.sqrt(np.linalg.eigvalsh(result.known.marginals()[:, :2, :2])[:, -1])
     told = {
         "log": log.name,
