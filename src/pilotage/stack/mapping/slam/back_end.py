@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from pilotage.core.chi_square import chi_square_quantile
 from pilotage.core.memory import give_back
 from pilotage.core.types import BoolArray, FloatArray
 from pilotage.kernels.slam.frames import composed
@@ -33,6 +34,7 @@ from pilotage.stack.mapping.slam.closures import (
 )
 from pilotage.stack.mapping.slam.clouds import Clouds
 from pilotage.stack.mapping.slam.config import SlamConfig
+from pilotage.stack.mapping.slam.odometry_record import ToldByOdometry
 from pilotage.stack.mapping.slam.refinement import neighbours, not_aligned, pair_edges
 from pilotage.stack.mapping.slam.submaps import Extent, Submaps
 from pilotage.stack.mapping.slam.tracker import LocalTrack
@@ -50,6 +52,8 @@ TRACK_FLOOR = np.diag([0.004**2, 0.004**2, 0.0015**2])
 ODOMETRY_PROBABILITY, MISALIGNED = 0.9999, np.diag([0.05**2, 0.05**2, 0.015**2])
 """Of the chi-square of an odometry with an alignment up to which wheels are not taken to have slipped, and
 what alignments are off by where little is in sight, which they do not know of: in doors, along bare walls."""
+OPEN_M = 0.1
+"""An alignment leaves a direction open along which it tells a place to no better than this."""
 ROBUST_STDS = 3.0
 REFINED_STDS = 3.5
 REFINED_TRACK = 0.02
@@ -100,9 +104,29 @@ def track_edges(track: LocalTrack, share: float = 1.0) -> Edges:
     if track.odometry is None:
         return aligned.scaled(share)
     # Slips and guesses tell nothing of the wheels: what scans are held by alone speaks against them.
-    held = edge_information(_without_chance(hessian), relative[:, 2], TRACK_STD_M, TRACK_FLOOR + MISALIGNED)
+    surely = _without_chance(hessian)
+    held = edge_information(surely, relative[:, 2], TRACK_STD_M, TRACK_FLOOR + MISALIGNED)
     told = agreeing(replace(aligned, information=held), track.odometry.edges, ODOMETRY_PROBABILITY)
+    if share == 1.0:
+        told = told.scaled(_needed(track.odometry, relative, hessian, surely).astype(np.float64))
     return fused(aligned.scaled(share), told.scaled(np.where(track.odometry.alone, 1.0 - share, 1.0)))
+
+
+def _needed(told: ToldByOdometry, relative: FloatArray, hessian: FloatArray, surely: FloatArray) -> BoolArray:
+    """(M,) where the odometry is to be heard on the way.
+
+    Where an alignment leaves a direction open, or holds by chance what the odometry contradicts. Elsewhere a
+    good scanner is surer than it says, and any odometry would only add its noise.
+    """
+    apart = relative_poses(relative, told.edges.relative)
+    squares = np.einsum("mi,mij,mj->m", apart, told.edges.information, apart)
+    slid = _is_open(surely) & (squares > chi_square_quantile(ODOMETRY_PROBABILITY, 3))
+    return np.asarray(_is_open(hessian) | slid | told.alone)
+
+
+def _is_open(hessian: FloatArray) -> BoolArray:
+    weakest = np.linalg.eigvalsh(hessian[:, :2, :2])[:, 0] / TRACK_STD_M**2
+    return np.asarray(weakest < OPEN_M**-2)
 
 
 def _without_chance(hessian: FloatArray) -> FloatArray:
