@@ -11,13 +11,30 @@ from pathlib import Path
 import pytest
 
 from pilotage.experiments.studies import local_workers
+from pilotage.experiments.studies.engine import run_study
+from pilotage.experiments.studies.options import StudyOptions
 from support import hostile_trials
+from support.hostile_studies import study_of
 
 
 @pytest.fixture
 def order(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
     """Give rows their orders."""
-    marks = tmp_path / "marks"
+    return _giver(tmp_path, monkeypatch)
+
+
+@pytest.fixture(scope="session")
+def finished_study(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of a study that nothing befell, to be copied."""
+    place = tmp_path_factory.mktemp("finished")
+    with pytest.MonkeyPatch.context() as patch:
+        _giver(place, patch)
+        run_study(study_of(), place / "study", StudyOptions(workers=1))
+    return place / "study"
+
+
+def _giver(place: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
+    marks = place / "marks"
     marks.mkdir()
     monkeypatch.setenv(hostile_trials.MARKS, str(marks))
     monkeypatch.setattr(local_workers, "_work", hostile_trials.work)

@@ -305,28 +305,29 @@ def test_an_installed_package_is_named_by_what_needs_it(tmp_path: FilePath) -> N
     )
 
 
-@pytest.mark.parametrize(
-    ("text", "told"),
-    [
-        ("x = 1 / 0\n", "ZeroDivisionError: division by zero"),
-        ("raise SystemExit(3)\n", "SystemExit: 3"),
-        (PLANNER, "planner 'somebodys': expected a new name, found it registered already by plugin "),
-        (PLANNER.replace("somebodys", "other").replace("def plan", "def go"), "a method 'plan', found none"),
-    ],
-)
-def test_an_installed_package_that_fails_is_told_and_left_out(
-    tmp_path: FilePath, text: str, told: str
-) -> None:
-    """Every run ended with exit code 2 for it, or with 3 and no word where it called ``sys.exit``."""
-    install(tmp_path / "site", "a-lab", "a_lab", PLANNER)
-    install(tmp_path / "site", "b-lab", "b_lab", text)
+FAILING = {
+    "x = 1 / 0\n": "ZeroDivisionError: division by zero",
+    "raise SystemExit(3)\n": "SystemExit: 3",
+    PLANNER: "planner 'somebodys': expected a new name, found it registered already by plugin ",
+    PLANNER.replace("somebodys", "other").replace("def plan", "def go"): "a method 'plan', found none",
+}
+"""What is installed, and what is told of it."""
+
+
+def test_installed_packages_that_fail_are_told_and_left_out(tmp_path: FilePath) -> None:
+    """Every run ended with exit code 2 for one, or with 3 and no word where it called ``sys.exit``."""
+    for letter, text in zip("abcde", [PLANNER, *FAILING], strict=True):
+        install(tmp_path / "site", f"{letter}-lab", f"{letter}_lab", text)
     shown = pilotage("components", "--json", folder=tmp_path, site=tmp_path / "site")
     assert shown.returncode == 0, shown.stderr
-    assert ["planner", "somebodys", "Straight on."] in json.loads(shown.stdout)["components"]
-    (line,) = shown.stderr.splitlines()
-    assert line.startswith("pilotage: plugin '")
-    assert "-lab' (" in line
-    assert told in line
+    found = json.loads(shown.stdout)["components"]
+    assert ["planner", "somebodys", "Straight on."] in found
+    assert all(name != "other" for _, name, _ in found)
+    lines = shown.stderr.splitlines()
+    assert len(lines) == len(FAILING)
+    assert all(line.startswith("pilotage: plugin '") and "-lab' (" in line for line in lines)
+    for told in FAILING.values():
+        assert sum(told in line for line in lines) == 1
 
 
 def test_a_studys_folder_names_its_plugins(tmp_path: FilePath) -> None:
@@ -346,6 +347,7 @@ def test_a_studys_folder_names_its_plugins(tmp_path: FilePath) -> None:
     assert done.returncode == 0, done.stderr
     kept = yaml.safe_load((tmp_path / "studies/mine/mission.yaml").read_text())
     assert kept["plugins"] == [str(site / "mine.py")]
-    for again in (("report", "studies/mine"), ("study", "studies/mine", "--resume", "--quiet")):
+    resumed = ("study", "studies/mine", "--resume", "--quiet", "--no-report")
+    for again in (("report", "studies/mine"), resumed):
         done = pilotage(*again, folder=tmp_path, site=tmp_path)
         assert done.returncode == 0, done.stderr

@@ -68,7 +68,8 @@ def test_a_mission_of_plugins_alone(tmp_path: Path) -> None:
     assert answer["position_rmse_m"] < 0.03
     assert answer["wobble_rad"] > 0.0
     # It runs again from its folder alone: the resolved mission names the plugins.
-    again = pilotage("run", f"{answer['run_dir']}/mission.yaml", "--json", folder=tmp_path)
+    resolved = f"{answer['run_dir']}/mission.yaml"
+    again = pilotage("run", resolved, "--json", "--no-report", folder=tmp_path)
     assert again.returncode == 0, again.stderr
     assert json.loads(again.stdout)["wobble_rad"] == answer["wobble_rad"]
     # Without them it is refused in one line, with the nearest right name.
@@ -80,8 +81,12 @@ def test_a_mission_of_plugins_alone(tmp_path: Path) -> None:
 
 
 def test_they_are_shown_with_the_others(tmp_path: Path) -> None:
-    shown = pilotage("components", *named(FILES), "--json", folder=tmp_path)
+    """What one of them says as it is read stays off standard output."""
+    file = tmp_path / "mine.py"
+    file.write_text("print('good morning')\n")
+    shown = pilotage("components", *named([*FILES, str(file)]), "--json", folder=tmp_path)
     assert shown.returncode == 0, shown.stderr
+    assert "good morning" in shown.stderr
     rows = json.loads(shown.stdout)["components"]
     assert {(role, name) for role, name, _ in rows} >= REGISTERED | {("planner", "astar")}
     assert all(text for _, _, text in rows)
@@ -204,6 +209,7 @@ class MyController:
 """
 
 
+@pytest.mark.usefixtures("alone")
 @pytest.mark.parametrize(
     ("role", "text", "told"),
     [
@@ -217,23 +223,25 @@ class MyController:
         ("controller", BAD_CONTROLLER, ": step: expected a Control of finite numbers, found Twist("),
     ],
 )
-def test_a_plugin_that_gives_something_else_is_named(tmp_path: Path, role: str, text: str, told: str) -> None:
+def test_a_plugin_that_gives_something_else_is_named(
+    role: str, text: str, told: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     """They ended in a traceback as bugs of ours, in nothing at all, or drove about until the time limit."""
     file = tmp_path / "mine.py"
     file.write_text(text)
-    words = ("--plugin", str(file), "--set", f"stack.{role}.name=mine", "--json", "--out", "runs")
-    done = pilotage("run", "museum-hall", *words, folder=tmp_path)
-    assert (done.returncode, done.stdout) == (2, "")
-    last = done.stderr.splitlines()[-1]
+    words = (
+        "--plugin",
+        str(file),
+        "--set",
+        f"stack.{role}.name=mine",
+        "--json",
+        "--out",
+        str(tmp_path / "runs"),
+    )
+    assert main(["run", "museum-hall", *words]) == 2
+    answer = capsys.readouterr()
+    assert answer.out == ""
+    last = answer.err.splitlines()[-1]
     assert told in last
     assert "'mine'" in last or str(file) in last
     assert not (tmp_path / "runs").exists()
-
-
-def test_what_a_plugin_says_as_it_is_read_stays_off_standard_output(tmp_path: Path) -> None:
-    file = tmp_path / "mine.py"
-    file.write_text("print('good morning')\n")
-    done = pilotage("components", "--json", "--plugin", str(file), folder=tmp_path)
-    assert done.returncode == 0, done.stderr
-    assert json.loads(done.stdout)
-    assert "good morning" in done.stderr

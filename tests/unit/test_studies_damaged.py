@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 import sqlite3
 import time
 from collections.abc import Callable
@@ -91,10 +92,15 @@ def test_what_is_no_file_is_not_read(how: str, tmp_path: Path, capsys: pytest.Ca
     ],
 )
 def test_a_row_that_nobody_made_is_told_and_not_waited_for(
-    damage: str, told: str, order: Callable[..., None], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    damage: str,
+    told: str,
+    finished_study: Path,
+    order: Callable[..., None],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     order()
-    run_study(study_of(), tmp_path / "study", StudyOptions(workers=1))
+    shutil.copytree(finished_study, tmp_path / "study")
     _change(tmp_path / "study", damage)
     _never_waits(monkeypatch)
     before = {path.name for path in (tmp_path / "study").iterdir()}
@@ -117,10 +123,14 @@ def test_a_row_that_nobody_made_is_told_and_not_waited_for(
     ids=["nobody", "from the future", "no numbers", "no process"],
 )
 def test_a_claim_of_nobody_is_free(
-    owner: str, order: Callable[..., None], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    owner: str,
+    finished_study: Path,
+    order: Callable[..., None],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     order()
-    run_study(study_of(), tmp_path / "study", StudyOptions(workers=1))
+    shutil.copytree(finished_study, tmp_path / "study")
     _change(
         tmp_path / "study", f"update trials set status = 'running', owner = 'ghost' where row = 4; {owner}"
     )
