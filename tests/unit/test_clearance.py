@@ -72,7 +72,7 @@ def test_the_first_blocked_state_is_found_whatever_is_skipped(seed: int, cells: 
     turns = np.cumsum(rng.normal(0.0, 0.2, 600))
     steps = rng.choice([0.01, 0.05, 0.4]) * np.column_stack([np.cos(turns), np.sin(turns)])
     states = np.column_stack([rng.uniform(1.0, 15.0, 2) + np.cumsum(steps, axis=0), turns])
-    (blocked,) = np.nonzero(slacks_at(states[:, :2], space, 0.3) < 0.0)
+    (blocked,) = np.nonzero(slacks_at(np.ascontiguousarray(states[:, :2]), space, 0.3) < 0.0)
     assert first_blocked(states, space, 0.3) == (blocked[0] if blocked.size else -1)
 
 

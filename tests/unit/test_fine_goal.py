@@ -160,7 +160,11 @@ def test_it_backs_to_what_lies_behind_and_turns_to_what_lies_beside() -> None:
 
 def test_it_faces_a_goal_behind_on_ground_that_it_has_not_seen() -> None:
     """It turned its back on it, could not back, and plans turned it to face it: to and fro for 45 s."""
-    ground, goal, limits = RollingGround(RollingConfig()), (-0.05, -0.55), LocalLimits(1, 0.3, 2, 2, 2, 8)
+    ground, goal, limits = (
+        RollingGround(RollingConfig()),
+        (-0.05, -0.55),
+        LocalLimits(1.0, 0.3, 2.0, 2.0, 2.0, 8.0),
+    )
     outline, middle = polygon_around(Footprint.disc(0.147)), Pose2(0.0, 0.0, 0.0)
     poses = [(-0.026, -0.068, 1.3), (0.035, -0.291, 1.79), (0.035, -0.291, 1.71), (0.035, -0.291, 1.54)]
     for k, pose in enumerate(poses):

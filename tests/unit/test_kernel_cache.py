@@ -8,9 +8,12 @@ import os
 import subprocess
 import sys
 import tempfile
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, cast
+from unittest.mock import Mock
 
+import numba
 import numpy as np
 import pytest
 from numba.core import event, types
@@ -20,8 +23,18 @@ from numba.extending import overload
 
 from pilotage.core.types import FloatArray
 from pilotage.kernels import jit
+from pilotage.kernels.arrays import read_only
 from pilotage.kernels.jit import kernel
 from pilotage.kernels.user_cache import user_cache
+from pilotage.maps.segment_map import SegmentMap
+from pilotage.maps.world_map import WorldMap
+from pilotage.models.footprint import Footprint
+from pilotage.stack.control.local.body import make_body
+from pilotage.stack.mapping.slam.odometry import recording_of
+from pilotage.stack.navigator.own_map import OwnMap
+from support.laser_rooms import furnished, recording
+
+typeof: Any = numba.typeof
 
 TOY = """
 from pilotage.kernels.jit import kernel
@@ -228,3 +241,26 @@ def test_an_overload_that_refused_some_types_is_asked_for_others() -> None:
 def _doubled(x: Any) -> Any:
     """A function that a kernel cannot call but for its overload."""
     raise NotImplementedError(x)
+
+
+def test_bodies_and_walls_are_of_one_type_wherever_they_come_from() -> None:
+    """Kernels were compiled twice: for corners that a caller could write to, and in clockwise order."""
+    corners = np.array([[0.2, 0.1], [-0.2, 0.1], [-0.2, -0.1], [0.2, -0.1]])
+    bodies = [make_body(given) for given in (corners, corners[::-1], corners.tolist(), read_only(corners))]
+    (kind,) = {typeof(body) for body in bodies}
+    assert kind == typeof(make_body(Footprint.polygon(corners.copy()).points_m))
+    corners[0] = 0.3, 0.1
+    told = WorldMap("room", (0.0, 0.0, 4.0, 4.0), geometry=SegmentMap.of(np.array([[0.0, 0.0, 4.0, 4.0]])))
+    found = Mock(circles_m=np.zeros((0, 3)))
+    own = OwnMap(told, found)
+    before = typeof(own.circles_m)
+    found.circles_m = np.array([[1.0, 2.0, 0.1]])
+    assert own.circles_m.tolist() == [[1.0, 2.0, 0.1]]
+    assert typeof(own.circles_m) == before
+
+
+def test_a_recording_is_of_one_type_however_its_columns_lie() -> None:
+    log = recording(furnished(), np.array([[2.0, 4.0, 0.1 * k] for k in range(4)]), np.random.default_rng(0))
+    table = np.column_stack([log.first_angle_rad, log.angle_step_rad])
+    apart = replace(log, first_angle_rad=table[:, 0], angle_step_rad=table[:, 1])
+    assert typeof(recording_of(apart, used=True)) == typeof(recording_of(log, used=True))

@@ -22,6 +22,7 @@ from pilotage.experiments.loop import simulate
 from pilotage.experiments.mission import load_mission, mission_of, shipped_missions
 from pilotage.experiments.resolve import resolved_yaml
 from pilotage.experiments.values import apply_override, merge, parse_override
+from pilotage.kernels.arrays import read_only
 from pilotage.kernels.geometry import plane
 from pilotage.maps.map_file import MapFile, parse_map
 from pilotage.missions.mission import Mission
@@ -248,7 +249,8 @@ def test_drawn_obstacles_stand_on_the_path_free_of_walls_with_a_way_around(seed:
     start, goal = Pose2(12.0, 20.0, 0.0), Goal(37.0, 20.0)
     path = PATH[120:380]
     placed = place_obstacles([obstacle], walls, start, goal, path, 0.3, np.random.default_rng(seed))
-    on_path = [plane.distance_to_nearest(x, y, placed.segments_m, plane.NO_CIRCLES) for x, y, _ in path]
+    sides = read_only(placed.segments_m)
+    on_path = [plane.distance_to_nearest(x, y, sides, plane.NO_CIRCLES) for x, y, _ in path]
     assert min(on_path) < 0.1
     for polygon in placed.polygons_m:
         assert plane.least_distance(polygon, walls.segments_m, walls.circles_m) > 0.0

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from pilotage.core.types import FloatArray
+from pilotage.kernels.arrays import read_only
 from pilotage.kernels.geometry.field import lower_by_circles, sample_distance
 from pilotage.kernels.geometry.plane import distance_to_nearest
 from pilotage.kernels.rrt import dubins
@@ -21,7 +22,8 @@ def walls_of(rng: np.random.Generator) -> tuple[FloatArray, FloatArray]:
     """Six walls and six discs on 10 m x 10 m."""
     ends = rng.uniform(0.0, 10.0, (6, 2))
     segments = np.hstack([ends, ends + rng.uniform(-2.0, 2.0, (6, 2))])
-    return segments, np.column_stack([rng.uniform(0.0, 10.0, (6, 2)), rng.uniform(0.0, 0.5, 6)])
+    discs = np.column_stack([rng.uniform(0.0, 10.0, (6, 2)), rng.uniform(0.0, 0.5, 6)])
+    return read_only(segments), read_only(discs)
 
 
 def space_of(rng: np.random.Generator) -> Space:

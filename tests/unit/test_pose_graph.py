@@ -128,7 +128,7 @@ def test_a_ring_is_ordered_without_more_fill_than_it_needs() -> None:
 def test_a_path_is_eliminated_all_along_its_length(loops: list[tuple[int, int]]) -> None:
     """From its end on a column would be as far from the root of the tree as the path is long."""
     n = 3000
-    i, j = np.array([(k, k + 1) for k in range(n - 1)] + loops).T
+    i, j = np.ascontiguousarray(np.array([(k, k + 1) for k in range(n - 1)] + loops).T)
     _, column_start, rows = minimum_degree(*adjacency(n, i, j))
     depth = np.zeros(n, np.int64)
     for c in range(n - 2, -1, -1):

@@ -15,6 +15,7 @@ from pilotage.experiments.build.charts import load_chart
 from pilotage.experiments.build.places import random_pose
 from pilotage.experiments.mission import load_mission
 from pilotage.experiments.resolve import resolved_yaml
+from pilotage.kernels.arrays import read_only
 from pilotage.kernels.geometry import plane
 from pilotage.kernels.lines import viewpoints
 from pilotage.kernels.scans import wander
@@ -156,13 +157,25 @@ def test_the_telling_place_is_where_the_views_differ() -> None:
     free = field.distance_m >= 0.42
     poses = np.array([[8.0, 7.0, math.pi], [2.0, 1.0, 0.0]])
     path = viewpoints.telling_path(
-        free, 0.0, 0.0, 0.25, poses, 2.3, 28, 20.0, 0.5, 0.08, 6000, segments, np.zeros((0, 3))
+        free, 0.0, 0.0, 0.25, poses, 2.3, 28, 20.0, 0.5, 0.08, 6000, read_only(segments), plane.NO_CIRCLES
     )
     assert path.shape[0] >= 2
     assert np.hypot(*(path[0] - poses[0, :2])) < 0.25
     assert np.hypot(*np.diff(path, axis=0).T).max() < 0.36
     twins = viewpoints.telling_path(
-        free, 0.0, 0.0, 0.25, poses[[0, 0]], 2.3, 28, 20.0, 0.5, 0.08, 6000, segments, np.zeros((0, 3))
+        free,
+        0.0,
+        0.0,
+        0.25,
+        poses[[0, 0]],
+        2.3,
+        28,
+        20.0,
+        0.5,
+        0.08,
+        6000,
+        read_only(segments),
+        plane.NO_CIRCLES,
     )
     assert twins.shape[0] == 0
 

@@ -19,7 +19,8 @@ pose = st.tuples(coordinate, coordinate, angle)
 
 
 def length(a: Pose, b: Pose, r: float, reverse_cost: float = 1.0) -> float:
-    return float(reeds_shepp.shortest(*a, *b, r, reverse_cost)[1])
+    here, there = (float(a[0]), float(a[1]), float(a[2])), (float(b[0]), float(b[1]), float(b[2]))
+    return float(reeds_shepp.shortest(*here, *there, r, reverse_cost)[1])
 
 
 def end(a: Pose, word: np.ndarray[tuple[int, int], np.dtype[np.float64]], r: float) -> Pose:

@@ -10,10 +10,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from pilotage.core.types import FloatArray
+from pilotage.kernels.arrays import read_only
 from pilotage.kernels.geometry import plane
 from pilotage.kernels.scans import rays
 
-NO_CIRCLES = np.zeros((0, 3))
+NO_CIRCLES = plane.NO_CIRCLES
 coordinate = st.floats(-9.0, 9.0).map(lambda v: round(v, 3))
 
 
@@ -25,7 +26,8 @@ def scenes(draw: st.DrawFn) -> tuple[FloatArray, FloatArray]:
     walls = np.array(segments, dtype=float).reshape(-1, 4)
     discs = np.array(circles, dtype=float).reshape(-1, 3)
     away = [plane.point_segment_distance(0.0, 0.0, *wall) > 0.05 for wall in walls]
-    return walls[np.array(away, dtype=bool)], discs[np.hypot(discs[:, 0], discs[:, 1]) > discs[:, 2] + 0.3]
+    beside = discs[np.hypot(discs[:, 0], discs[:, 1]) > discs[:, 2] + 0.3]
+    return read_only(walls[np.array(away, dtype=bool)]), read_only(beside)
 
 
 def brute_force(angle: float, reach: float, walls: FloatArray, discs: FloatArray) -> float:
@@ -69,12 +71,12 @@ def test_fan_equals_brute_force(
 
 def test_fan_of_a_full_circle_sees_all_four_walls() -> None:
     room = np.array([[-2, -3, 2, -3], [2, -3, 2, 3], [2, 3, -2, 3], [-2, 3, -2, -3]], dtype=float)
-    ranges = rays.fan_ranges(0.0, 0.0, 0.0, math.pi / 2, 4, 20.0, room, NO_CIRCLES)
+    ranges = rays.fan_ranges(0.0, 0.0, 0.0, math.pi / 2, 4, 20.0, read_only(room), NO_CIRCLES)
     assert ranges == pytest.approx([2.0, 3.0, 2.0, 3.0])
 
 
 def test_fan_beyond_reach_reads_the_reach() -> None:
-    wall = np.array([[5.0, -1.0, 5.0, 1.0]])
+    wall = read_only(np.array([[5.0, -1.0, 5.0, 1.0]]))
     ranges = rays.fan_ranges(0.0, 0.0, -0.1, 0.1, 3, 4.0, wall, NO_CIRCLES)
     assert (ranges == 4.0).all()
 
@@ -95,7 +97,7 @@ def test_cone_reads_the_nearest_point_inside_it(
 
 
 def test_cone_sees_a_wall_end_inside_and_not_outside() -> None:
-    wall = np.array([[2.0, 0.3, 2.0, 5.0]])
+    wall = read_only(np.array([[2.0, 0.3, 2.0, 5.0]]))
     half = math.radians(5.0)
     assert rays.cone_range(0.0, 0.0, 0.0, half, wall, NO_CIRCLES) == math.inf
     looking_up = math.atan2(0.3, 2.0)

@@ -44,7 +44,7 @@ of passes that forgives what a robot drives beside them, which is 1.2 cm where n
 
 def swept(walls: FloatArray, goal: tuple[float, float] = (1.0, 1.0)) -> tuple[WorldMap, PlanResult]:
     world = WorldMap(
-        "floor", (0.0, 0.0, 10.0, 8.0), geometry=SegmentMap(walls, np.zeros((0, 3)), (0, 0, 10, 8))
+        "floor", (0.0, 0.0, 10.0, 8.0), geometry=SegmentMap(walls, np.zeros((0, 3)), (0.0, 0.0, 10.0, 8.0))
     )
     planner = BoustrophedonPlanner(BoustrophedonConfig(width_m=0.8, clearance_m=0.4, overlap_m=0.0024))
     request = PlanRequest(Pose2(1.0, 1.0, 0.0), Goal(*goal), world.field, np.random.default_rng(0))
@@ -76,7 +76,7 @@ def test_where_there_is_no_room_for_its_clearance_it_goes_with_what_its_body_nee
 ) -> None:
     """A door of 0.7 m, a body of 0.3 m that keeps more where it can, and a room on either side."""
     world = WorldMap(
-        "rooms", (0.0, 0.0, 10.0, 8.0), geometry=SegmentMap(NARROW_DOOR, NO_DISCS, (0, 0, 10, 8))
+        "rooms", (0.0, 0.0, 10.0, 8.0), geometry=SegmentMap(NARROW_DOOR, NO_DISCS, (0.0, 0.0, 10.0, 8.0))
     )
     planner = BoustrophedonPlanner(BoustrophedonConfig(width_m=0.8, clearance_m=clearance_m))
     rng = np.random.default_rng(0)
@@ -98,7 +98,9 @@ def test_where_there_is_no_room_for_its_clearance_it_goes_with_what_its_body_nee
 def test_a_clearance_that_would_shut_a_door_is_kept_everywhere_else() -> None:
     """A door of 0.48 m in a thin wall, and a body of 0.17 m that would keep 0.25 m."""
     walls = np.array([*ROOM, [6, 0, 6, 3], [6, 3.48, 6, 8]], dtype=float)
-    world = WorldMap("rooms", (0.0, 0.0, 10.0, 8.0), geometry=SegmentMap(walls, NO_DISCS, (0, 0, 10, 8)))
+    world = WorldMap(
+        "rooms", (0.0, 0.0, 10.0, 8.0), geometry=SegmentMap(walls, NO_DISCS, (0.0, 0.0, 10.0, 8.0))
+    )
     floor = path_floor(world.field, Keeping(0.17, 0.25, (1.0, 1.0)), 0.24)
     assert floor.reachable[floor.cell_of(np.array([1.0, 1.0]))]
     assert floor.reachable[floor.cell_of(np.array([8.0, 4.0]))]

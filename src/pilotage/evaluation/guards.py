@@ -43,7 +43,7 @@ def fewest_guards(sees: BoolArray) -> tuple[int, int]:
         (P, M) as from ``stack.patrol.derive.views``; the answer is for these places and points, not for the
         plane.
     """
-    some = sees[:, sees.any(axis=0)]
+    some = np.ascontiguousarray(sees[:, sees.any(axis=0)])
     if some.shape[1] == 0:
         return 0, 0
     enough = len(greedy_cover(some, np.zeros(len(some)), np.zeros(some.shape[1], np.bool_)))

@@ -7,6 +7,7 @@ from scipy.ndimage import label
 from scipy.spatial import cKDTree
 
 from pilotage.core.types import FloatArray
+from pilotage.kernels.arrays import read_only
 from pilotage.kernels.control.pose_search import CLOSED, passage
 from pilotage.logs.barn import GOAL_AHEAD_M, GOAL_TOLERANCE_M, START, BarnWorld
 
@@ -42,7 +43,7 @@ def has_way(world: BarnWorld, outline: FloatArray) -> bool:
         START[0],
         START[1] + GOAL_AHEAD_M,
         GOAL_TOLERANCE_M,
-        np.ascontiguousarray(outline),
+        read_only(outline),
         world.circles_m,
         low,
         high,

@@ -18,6 +18,7 @@ from pilotage.core.types import FloatArray
 from pilotage.evaluation.barn import lane_within
 from pilotage.evaluation.least_time import least_time_s, time_bound_s
 from pilotage.experiments.build.charts import load_chart
+from pilotage.kernels.arrays import read_only
 from pilotage.kernels.bodies.outline import outline_clearance
 from pilotage.kernels.control.pose_search import CLOSED, FOUND, passage
 from pilotage.logs.people import read_people
@@ -221,14 +222,14 @@ def _bottleneck(
 def _drives_straight(made: LaneCourse, driver: Driver) -> bool:
     """Whether the outline touches nothing on the straight way through the openings' middles."""
     corners = straight_way(made.openings, made.goal_xy_m)
-    outline, sides = np.ascontiguousarray(driver.outline), np.empty((0, 4))
+    outline, sides = read_only(driver.outline), read_only(np.empty((0, 4)))
     for here, there in itertools.pairwise(corners):
         length, angle = math.hypot(*(there - here)), math.atan2(*(there - here)[::-1])
         c, s = math.cos(angle), math.sin(angle)
         to_corner = np.hypot(*(made.circles_m[:, :2] - here).T) - made.circles_m[:, 2]
         if to_corner.min() < driver.footprint.radius_m:
             return False
-        near = made.circles_m[_beside(made.circles_m, here, there) < driver.footprint.radius_m]
+        near = read_only(made.circles_m[_beside(made.circles_m, here, there) < driver.footprint.radius_m])
         for along in np.arange(0.0, length, STEP_M):
             x, y = here[0] + along * c, here[1] + along * s
             if near.size and outline_clearance(x, y, c, s, outline, 0.0, sides, near) <= 0.0:

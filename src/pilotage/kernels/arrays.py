@@ -15,3 +15,13 @@ ByteArray: TypeAlias = NDArray[np.uint8]
 ShortArray: TypeAlias = NDArray[np.int16]
 UintArray: TypeAlias = NDArray[np.uint32]
 WordArray: TypeAlias = NDArray[np.uint64]
+
+
+def read_only(array: FloatArray) -> FloatArray:
+    """The same numbers in one piece, which nobody writes to through it: a view where that is possible.
+
+    Kernels are compiled apart for arrays that may be written to; walls and bodies are handed over like this.
+    """
+    view = np.ascontiguousarray(array, np.float64).view()
+    view.flags.writeable = False
+    return view

@@ -6,11 +6,11 @@ import math
 
 import numpy as np
 
-from pilotage.kernels.arrays import FloatArray
+from pilotage.kernels.arrays import FloatArray, read_only
 from pilotage.kernels.jit import kernel
 
-NO_SEGMENTS: FloatArray = np.zeros((0, 4))
-NO_CIRCLES: FloatArray = np.zeros((0, 3))
+NO_SEGMENTS: FloatArray = read_only(np.zeros((0, 4)))
+NO_CIRCLES: FloatArray = read_only(np.zeros((0, 3)))
 
 
 @kernel

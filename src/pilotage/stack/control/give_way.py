@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from pilotage.core.config import Config
 from pilotage.core.types import FloatArray, Pose2, Twist
 from pilotage.kernels.control.closing_in import drive_closes_in
@@ -64,6 +66,6 @@ class GiveWay:
             CHECK_STEP_S,
             self._radius_m,
             self._swings,
-            discs,
+            np.ascontiguousarray(discs),
             self._config.keep_m,
         )

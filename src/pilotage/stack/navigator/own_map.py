@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from pilotage.core.types import FloatArray, Pose2
+from pilotage.kernels.arrays import read_only
 from pilotage.kernels.geometry import plane
 from pilotage.maps.near_walls import NearWalls
 from pilotage.maps.world_map import WorldMap
@@ -47,7 +48,7 @@ class OwnMap:
         found = self.found_circles_m
         if found is not self._last_found:
             self._last_found = found
-            self._circles = np.concatenate([self.known_circles_m, found])
+            self._circles = read_only(np.concatenate([self.known_circles_m, found]))
         return self._circles
 
     def distance_m(self, pose: Pose2) -> float:

@@ -6,6 +6,7 @@ import numpy as np
 
 from pilotage.core.errors import InputError
 from pilotage.core.types import FloatArray
+from pilotage.kernels.arrays import read_only
 from pilotage.kernels.control.footprint import Body, polygon_distance
 
 ROUND = 0.95
@@ -20,7 +21,7 @@ def make_body(footprint_xy_m: FloatArray) -> Body:
     InputError
         Where it is no convex polygon or does not hold the origin.
     """
-    polygon = np.ascontiguousarray(footprint_xy_m, dtype=np.float64)
+    polygon = read_only(footprint_xy_m)
     if polygon.ndim != 2 or polygon.shape[1] != 2 or polygon.shape[0] < 3:
         raise InputError(f"footprint: expected three corners x, y or more, found shape {polygon.shape}")
     if not np.all(np.isfinite(polygon)):
@@ -28,7 +29,7 @@ def make_body(footprint_xy_m: FloatArray) -> Body:
     edges = np.roll(polygon, -1, axis=0) - polygon
     turns = edges[:, 0] * np.roll(edges[:, 1], -1) - edges[:, 1] * np.roll(edges[:, 0], -1)
     if np.all(turns < 0.0):
-        polygon = np.ascontiguousarray(polygon[::-1])
+        polygon = read_only(polygon[::-1])
     elif not np.all(turns > 0.0):
         raise InputError("footprint: expected a convex polygon, its corners in order; take its convex hull")
     inner = -float(polygon_distance(0.0, 0.0, polygon))

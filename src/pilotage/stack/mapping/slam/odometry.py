@@ -46,9 +46,9 @@ def recording_of(log: LaserLog, used: bool) -> Recording:
     times = smoothed_times(log.t_s)
     return Recording(
         np.ascontiguousarray(log.ranges_m, np.float64),
-        np.asarray(log.beams, np.int64),
-        np.asarray(log.first_angle_rad, np.float64),
-        np.asarray(log.angle_step_rad, np.float64),
+        np.ascontiguousarray(log.beams, np.int64),
+        np.ascontiguousarray(log.first_angle_rad, np.float64),
+        np.ascontiguousarray(log.angle_step_rad, np.float64),
         np.maximum(1e-3, np.diff(times, prepend=times[0])),
         NO_OTHERS if at_scans is None else at_scans,
         starts,
