@@ -218,6 +218,15 @@ class TestRosMaps:
         )
         assert RosMap(file, np.array([[0, 50, 142, 220, 254]], np.uint8)).grid.cells.tolist() == [expected]
 
+    @pytest.mark.parametrize(("grey", "expected"), [(205, UNKNOWN), (206, FREE)])
+    def test_what_map_saver_wrote_as_unknown_is(self, grey: int, expected: int) -> None:
+        """By the threshold that Navigation 2 writes both are free: robots patrolled around buildings."""
+        file = RosMapFile(image="a.pgm", mode="trinary", resolution=1.0, origin=(0, 0, 0), free_thresh=0.25)
+        pixels = np.array([[0, grey, 254, 255]], np.uint8)
+        assert RosMap(file, pixels, None).grid.cells.tolist() == [[OCCUPIED, expected, FREE, FREE]]
+        painted = np.array([[0, grey, 254, 230]], np.uint8)
+        assert RosMap(file, painted, None).grid.cells.tolist() == [[OCCUPIED, FREE, FREE, FREE]]
+
     def test_what_is_not_opaque_is_unknown_in_scale(self) -> None:
         file = RosMapFile(image="a.png", mode="scale", resolution=1.0, origin=(0, 0, 0))
         pixels, alpha = np.array([[255, 255, 0]], np.uint8), np.array([[255, 254, 0]], np.uint8)

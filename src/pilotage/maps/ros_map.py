@@ -4,6 +4,9 @@ The rules are those of the Navigation 2 map server: lightness s in [0, 1] means 
 p = s with ``negate``. ``trinary``: occupied above ``occupied_thresh``, free below ``free_thresh``, else
 unknown. ``scale``: the same, but between the thresholds from 0 to 100 in proportion, and what is not
 opaque is unknown. ``raw``: the pixel's value itself from 0 to 100, others unknown.
+
+But for one thing: where an image has the greys alone that map_saver writes, 205 is what it was for map_saver,
+unknown. With the threshold that Navigation 2 writes beside it, 0.25, its own map server calls that free.
 """
 
 from __future__ import annotations
@@ -23,6 +26,9 @@ from pilotage.core.files import read_yaml
 from pilotage.core.types import Pose2
 from pilotage.maps.grid_image import ByteArray, read_grey, write_grey
 from pilotage.maps.occupancy_grid import FREE, OCCUPIED, UNKNOWN, OccupancyArray, OccupancyGrid
+
+SAVED_UNKNOWN, SAVED = 205, frozenset({0, 205, 254, 255})
+"""Grey of what is unknown, and all greys, of a map that map_saver wrote; some programs paint with 255."""
 
 Entry = TypeVar("Entry", bound=np.generic)
 
@@ -82,7 +88,7 @@ class RosMap:
         # 205 is what map_saver writes for unknown: just above its threshold for free.
         values = np.arange(256, dtype=np.uint8)
         if trinary:
-            values[[FREE, OCCUPIED, UNKNOWN]] = 254, 0, 205
+            values[[FREE, OCCUPIED, UNKNOWN]] = 254, 0, SAVED_UNKNOWN
         file = RosMapFile(
             image=image,
             mode="trinary" if trinary else "raw",
@@ -107,7 +113,10 @@ class RosMap:
             # map_server counts transparency as one more channel beside red, green and blue.
             shade = (3.0 * self.pixels + self.alpha) / (4.0 * 255.0)
             return self._occupancy(shade)
-        cells = _looked_up(self._occupancy(np.arange(256) / 255.0), self.pixels)
+        table = self._occupancy(np.arange(256) / 255.0)
+        if file.mode == "trinary" and not file.negate and SAVED.issuperset(np.unique(self.pixels).tolist()):
+            table[SAVED_UNKNOWN] = UNKNOWN
+        cells = _looked_up(table, self.pixels)
         if file.mode == "scale" and self.alpha is not None:
             cells[self.alpha < 255] = UNKNOWN
         return cells
