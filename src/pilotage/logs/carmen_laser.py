@@ -50,9 +50,6 @@ def laser_log_of_carmen(log: CarmenLog, name: str) -> LaserLog:
     said = []
     if log.cut_short:
         said.append("the file is cut short: it was read up to its last whole line")
-    nothing = sum(int(np.count_nonzero(np.isnan(scan.ranges_m))) for scan in scans)
-    if nothing:
-        said.append(f"{nothing} ranges are not numbers: no measurement")
     if log.odometry_t_s.size == 0:
         said.append("no ODOM lines: odometry is what the scans carry")
     return assemble(name, scans, _mount(log, said), False, log.odometry_t_s, log.odometry, said)

@@ -181,6 +181,10 @@ def assemble(
     if beams.min() < beams.max():
         sizes = ", ".join(str(size) for size in np.unique(beams)[:8])
         said.append(f"the number of beams changes from scan to scan ({sizes})")
+    nothing = sum(int(np.count_nonzero(np.isnan(scan.ranges_m))) for scan in with_beams)
+    if nothing:
+        share = nothing / int(beams.sum())
+        said.append(f"{nothing} ranges are not numbers ({share:.1%}): no measurement")
     first = np.array([scan.first_angle_rad for scan in with_beams])
     told = np.array([scan.angle_step_rad for scan in with_beams])
     step = _without_the_last_post(told, beams, said)
