@@ -55,32 +55,37 @@ def path_floor(field: DistanceField, keeping: Keeping, width_m: float) -> Floor:
         return tight
     levels = [tight.reachable & (tight.clearance_m >= tight.radius_m + share * more_m) for share in SHARES]
     start = tight.nearest_cell(np.array(inside), "the start")
-    return replace(tight, reachable=_opened(levels, start, reach_m / cell_m))
+    reach = reach_m / cell_m
+    # Into a nook the body's centre can come farther than lines through cells' middles lead.
+    sought = (tight.clearance_m >= radius_m) & _within(tight.reachable, reach)
+    return replace(tight, reachable=_opened(levels, sought, start, reach))
 
 
-def _opened(levels: list[BoolArray], start: tuple[int, int], reach: float) -> BoolArray:
-    """(rows, columns) the cells of the first of levels from which, and from the start, all is within reach.
+def _opened(levels: list[BoolArray], sought: BoolArray, start: tuple[int, int], reach: float) -> BoolArray:
+    """(rows, columns) the cells of the first of levels from which all is within reach, and the start's.
 
     Parameters
     ----------
     levels
         Cells (rows, columns) that keep less and less; the last are joined with one another.
+    sought
+        What is to be within reach, all of which is from the last.
     start
         Row and column of the start, a cell of the last level.
     reach
         As a number of cells: what is no farther from the path is swept by it. From a level only that is taken
         which reaches what those before do not, and what joins it to them.
     """
-    whole, opened = levels[-1], _largest(levels[0])
+    opened = _largest(levels[0])
     for number, level in enumerate(levels):
         pieces, _ = scipy.ndimage.label(level | opened)
         joined = (pieces == pieces[_some_of(opened)]) if opened.any() else _largest(level)
         taken = opened | (joined & levels[0])
         for better in levels[1 : number + 1]:
-            taken |= joined & better & _within(whole & ~_within(taken, reach), reach)
+            taken |= joined & better & _within(sought & ~_within(taken, reach), reach)
         taken[start] |= joined[start]
         opened = _with_paths(taken, joined, opened)
-        if opened[start] and not (whole & ~_within(opened, reach)).any():
+        if opened[start] and not (sought & ~_within(opened, reach)).any():
             break
     return opened
 
