@@ -25,6 +25,14 @@ SNAP_M = 0.5
 """A place whose cell is too near to a wall stands for the nearest one that is not, this near."""
 
 
+def cell_side_m(
+    bounds_m: tuple[float, float, float, float], finest_m: float, most_cells: int = MOST_CELLS
+) -> float:
+    """Side of the cells over bounds: the finest of which there are no more than so many."""
+    xmin, ymin, xmax, ymax = bounds_m
+    return max(finest_m, math.sqrt((xmax - xmin) * (ymax - ymin) / most_cells))
+
+
 @dataclass(frozen=True, eq=False)
 class Floor:
     """Square cells over the bounds of a map; row 0 has the lowest y.
@@ -89,8 +97,7 @@ class Floor:
     ) -> Floor:
         """Lay so many cells at most over distances to walls; as ``of``."""
         xmin, ymin, xmax, ymax = bounds_m
-        area_m2 = (xmax - xmin) * (ymax - ymin)
-        cell_m = max(cell_m, math.sqrt(area_m2 / most_cells))
+        cell_m = cell_side_m(bounds_m, cell_m, most_cells)
         rows, columns = math.ceil((ymax - ymin) / cell_m), math.ceil((xmax - xmin) / cell_m)
         x = xmin + (np.arange(columns) + 0.5) * cell_m
         y = ymin + (np.arange(rows) + 0.5) * cell_m

@@ -11,7 +11,7 @@ import scipy
 from pilotage.core.types import BoolArray
 from pilotage.kernels.grids.travel_cost import travel_costs
 from pilotage.maps.distance_field import DistanceField
-from pilotage.maps.floor import Floor
+from pilotage.maps.floor import Floor, cell_side_m
 
 FINE_CELLS = 12
 """Cells a width that tell what is swept; larger floors take coarser ones."""
@@ -42,9 +42,8 @@ def path_floor(field: DistanceField, keeping: Keeping, width_m: float) -> Floor:
     keeps half a diagonal. Nobody keeps so much that what is beside a wall is out of a pass' reach.
     """
     bounds_m, inside, radius_m = field.bounds_m, keeping.start_xy_m, keeping.radius_m
-    told_m = Floor.of_field(field, bounds_m, radius_m, width_m / FINE_CELLS, inside).cell_m
-    xmin, ymin, xmax, ymax = bounds_m
-    cell_m = max(min(FINEST_M, told_m), math.sqrt((xmax - xmin) * (ymax - ymin) / MOST_CELLS))
+    told_m = cell_side_m(bounds_m, width_m / FINE_CELLS)
+    cell_m = cell_side_m(bounds_m, min(FINEST_M, told_m), MOST_CELLS)
     half_m = math.sqrt(0.5) * cell_m
     tight = Floor.of_field(
         field, bounds_m, radius_m + half_m, cell_m, inside, exact=True, most_cells=MOST_CELLS
