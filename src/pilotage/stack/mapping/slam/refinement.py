@@ -8,6 +8,7 @@ import scipy
 from pilotage.core.types import FloatArray, IntArray
 from pilotage.kernels.slam.align import TOO_FEW
 from pilotage.kernels.slam.pairs import align_pairs
+from pilotage.kernels.slam.seen_again import passes_near
 from pilotage.stack.mapping.slam.clouds import Clouds
 from pilotage.stack.mapping.slam.uncertainty import Edges, edge_information, relative_poses
 
@@ -36,28 +37,18 @@ def neighbours(poses: FloatArray, since: int = 0) -> IntArray:
     With ``since`` they are pairs of one before it with one from it on alone.
     """
     count = poses.shape[0]
-    tree = scipy.spatial.cKDTree(poses[:, :2])
-    first = [np.arange(count - ahead) for ahead in ALONG if ahead < count and not since]
-    second = [np.arange(ahead, count) for ahead in ALONG if ahead < count and not since]
-    for i in range(since, count):
-        near = np.array(tree.query_ball_point(poses[i, :2], RADIUS_M, return_sorted=True), np.int64)
-        near = near[near < (since or i - LEAST_BEHIND)]
-        turn = np.abs((poses[near, 2] - poses[i, 2] + np.pi) % (2.0 * np.pi) - np.pi)
-        near, turn = near[turn < MOST_TURN_RAD], turn[turn < MOST_TURN_RAD]
-        if near.size == 0:
-            continue
-        cost = np.hypot(*(poses[near, :2] - poses[i, :2]).T) + TURN_AS_DISTANCE_M * turn
-        chosen: list[int] = []
-        for k in near[np.argsort(cost, kind="stable")].tolist():
-            if all(abs(k - other) > APART for other in chosen):
-                chosen.append(k)
-                if len(chosen) == NEIGHBOURS:
-                    break
-        first.append(np.array(chosen, np.int64))
-        second.append(np.full(len(chosen), i))
-    if not first:
-        return np.zeros((0, 2), np.int64)
-    pairs = np.column_stack([np.concatenate(first), np.concatenate(second)])
+    again = passes_near(
+        poses,
+        since,
+        LEAST_BEHIND,
+        RADIUS_M,
+        MOST_TURN_RAD,
+        TURN_AS_DISTANCE_M,
+        APART,
+        NEIGHBOURS,
+    )
+    along = [np.arange(count - ahead)[:, None] + [0, ahead] for ahead in ALONG if ahead < count and not since]
+    pairs = np.concatenate([*along, again])
     return np.asarray(pairs[np.lexsort(pairs.T[::-1])])
 
 
