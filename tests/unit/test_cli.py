@@ -83,6 +83,7 @@ def lab(monkeypatch: pytest.MonkeyPatch) -> Lab:
         "pilotage.experiments.catalogue",
         missions=lambda: [("museum-1", "the night watch"), ("museum-hall", "a corridor")],
         components=lambda name: [("gate", "float", "0.99")] if name else [("planner", "a-star", "a grid")],
+        roles=lambda: ["planner"],
         mission_schema=lambda: {"title": "Mission"},
     )
     module("pilotage.experiments.studies.study", is_study_folder=lambda _place: False)

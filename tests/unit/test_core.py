@@ -231,7 +231,7 @@ def test_a_wrong_config_is_one_line(values: object, message: str) -> None:
         ({"size_m": True}, "world.size_m: input should be a valid number", "found 'true'"),
         ({"size_m": 1, "steps": False}, "world.steps: input should be a valid integer", "found 'false'"),
         ({"size_m": 1, "limit": True}, "world.limit: input should be a valid number", "found 'true'"),
-        ({"size_m": 1, "inner": 3}, "world.inner: input should be a mapping", "found 3"),
+        ({"size_m": 1, "inner": 3}, "world.inner: expected a mapping with keys of gate, name", "found 3"),
         ({"size_m": 1, "steps": "x" * 500}, "world.steps: input should be a valid integer", "..."),
     ],
 )

@@ -117,7 +117,9 @@ def describe(error: ValidationError, model: type[BaseModel], where: str) -> str:
         hint = f"did you mean '{close}'?" if close else "known keys: " + ", ".join(sorted(known))
         return f"{place}: unknown key; {hint}"
     if first["type"] == "missing":
-        return f"{place}: missing; it has to be given"
+        where_listed = getattr(_model_at(model, path), "where_listed", None)
+        hint = f"; {where_listed(path[-1])}" if where_listed else ""
+        return f"{place}: missing; it has to be given{hint}"
     known = _choices_of(first)
     if known:
         key, found = first.get("ctx", {}).get("discriminator", ""), first["input"]
@@ -128,6 +130,8 @@ def describe(error: ValidationError, model: type[BaseModel], where: str) -> str:
         hint = f"did you mean '{close}'?" if close else "known: " + ", ".join(known)
         return f"{place}: unknown value {_show(found)}; {hint}"
     message = first["msg"].removeprefix("Value error, ")
+    if first["type"] == "model_type":
+        message = "expected a mapping with keys of " + ", ".join(sorted(_fields_at(model, path)))
     if first["type"] in {"too_long", "too_short"}:
         bound, key = ("at most", "max_length") if first["type"] == "too_long" else ("at least", "min_length")
         message = f"expected {bound} {first['ctx'][key]} items, found {first['ctx']['actual_length']}"
@@ -153,6 +157,11 @@ def _choices_of(error: Mapping[str, Any]) -> list[str]:
 
 def _fields_at(model: type[BaseModel], path: list[str]) -> list[str]:
     """Names of the fields of the model that ``path`` leads to."""
+    return list(_model_at(model, path).model_fields)
+
+
+def _model_at(model: type[BaseModel], path: list[str]) -> type[BaseModel]:
+    """The model that ``path`` leads to, or the last one on the way there."""
     current: type[BaseModel] = model
     annotation: Any = None
     for part in path:
@@ -163,7 +172,7 @@ def _fields_at(model: type[BaseModel], path: list[str]) -> list[str]:
         if inner is None:
             continue
         current = inner
-    return list(current.model_fields)
+    return current
 
 
 def _without_tags(model: type[BaseModel], path: list[str]) -> list[str]:

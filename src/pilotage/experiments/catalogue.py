@@ -7,7 +7,7 @@ from typing import Any
 from pydantic_core import PydanticUndefined
 
 from pilotage.core.config import Config
-from pilotage.core.errors import unknown_name
+from pilotage.core.errors import InputError, nearest
 from pilotage.evaluation.metric import Direction
 from pilotage.evaluation.metrics import METRICS
 from pilotage.experiments.mission import read_mission, shipped_missions
@@ -15,6 +15,7 @@ from pilotage.experiments.roles import ROLES
 from pilotage.missions.mission import Mission
 
 TEMPLATE = "#/$defs/{model}"
+METRIC = "metric"
 
 
 def missions() -> list[tuple[str, str]]:
@@ -22,18 +23,29 @@ def missions() -> list[tuple[str, str]]:
     return [(name, str(read_mission(name).get("description", ""))) for name in shipped_missions()]
 
 
+def roles() -> list[str]:
+    """What a component can be to a mission."""
+    return [*ROLES, METRIC]
+
+
 def components(name: str | None = None) -> list[tuple[str, str, str]]:
     """Role, name and first line of every component and metric; or parameter, default and type of one of them.
+
+    Parameters
+    ----------
+    name
+        Of a component or metric; or of a role, for all that can take it.
 
     Raises
     ------
     InputError
-        If there is no component of that name.
+        If there is neither of that name.
     """
     entries = [(role, entry) for role, registry in ROLES.items() for entry in registry]
-    if name is None:
+    if name is None or name in roles():
         listed = [(role, entry.name, _first_line(entry.factory.__doc__)) for role, entry in entries]
-        return listed + [("metric", metric.key, metric.meaning) for metric in METRICS]
+        listed += [(METRIC, metric.key, metric.meaning) for metric in METRICS]
+        return [row for row in listed if name in (None, row[0])]
     if name in METRICS:
         metric = METRICS.find(name)
         tasks = ", ".join(sorted(metric.tasks)) or "every task"
@@ -41,8 +53,10 @@ def components(name: str | None = None) -> list[tuple[str, str, str]]:
         return [(f"metric '{name}'", metric.unit, metric.meaning), ("given by", tasks, better)]
     found = [(role, entry) for role, entry in entries if entry.name == name]
     if not found:
-        names = {entry.name for _, entry in entries} | {metric.key for metric in METRICS}
-        raise unknown_name("component", name, names)
+        names = [entry.name for _, entry in entries] + [metric.key for metric in METRICS] + roles()
+        close = nearest(name, names)
+        hint = f"did you mean '{close}'?" if close else "known roles: " + ", ".join(roles())
+        raise InputError(f"unknown component '{name}'; {hint}")
     rows: list[tuple[str, str, str]] = []
     for role, entry in found:
         rows.append((f"{role} '{name}'", "", _first_line(entry.factory.__doc__)))

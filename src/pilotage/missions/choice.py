@@ -28,6 +28,12 @@ class ComponentChoice(Config):
         """A bare name stands for the component with its defaults."""
         return {"name": data} if isinstance(data, str) else data
 
+    @staticmethod
+    def where_listed(key: str) -> str:
+        """What tells all that can stand at a mission's ``key``."""
+        role = "" if key == "name" else f" {key}"
+        return f"'pilotage components{role}' lists what it can be"
+
     @property
     def parameters(self) -> dict[str, Any]:
         """All keys but the name."""
