@@ -52,8 +52,9 @@ def run_loop(experiment: Experiment, on_progress: OnProgress | None = None) -> R
     attempts = tuple(
         Attempt(body, member.stack, member.journal) for body, member in zip(source.bodies, team, strict=True)
     )
+    every = max(1, round(mission.run.record_every_s / mission.run.dt_s))
     recorders = tuple(
-        Recorder(member, body, task, index)
+        Recorder(member, body, task, index, every > 1)
         for index, (member, body) in enumerate(zip(team, source.bodies, strict=True))
     )
     sightings = tuple(Sightings(dict(member.known.sensors)) for member in team)
@@ -61,7 +62,6 @@ def run_loop(experiment: Experiment, on_progress: OnProgress | None = None) -> R
     trail = PeopleTrail(source.crowd)
     events: list[Event] = []
     planned_s = sum(member.journal.planning_time_s for member in team)
-    every = max(1, round(mission.run.record_every_s / mission.run.dt_s))
     limit = math.ceil(mission.run.time_limit_s / mission.run.dt_s) if task.drives else 0
     disturbances = Disturbances(mission, source)
     ending = "" if not task.drives or all_ended(attempts) else None
@@ -79,6 +79,8 @@ def run_loop(experiment: Experiment, on_progress: OnProgress | None = None) -> R
         for index, member in enumerate(team):
             if step % every == 0 or ending is not None:
                 recorders[index].record(readings[index], commands[index])
+            else:
+                recorders[index].pass_over(readings[index])
             sightings[index].record(readings[index])
             update = member.journal.update
             if update is not None:

@@ -10,6 +10,7 @@ import numpy as np
 from pilotage.core.types import Command, FloatArray, Twist, WheelSpeeds
 from pilotage.evaluation.tasks.task import Task
 from pilotage.experiments.build.team import Member
+from pilotage.experiments.odometry_since import OdometrySince
 from pilotage.models.motion.omnidirectional import OmnidirectionalConfig
 from pilotage.models.motion.wheel_drive import WheelDriveConfig
 from pilotage.sensors.readings import OdometryIncrement, Readings, UltrasonicReading
@@ -33,23 +34,30 @@ TWIST_COLUMNS = ("v_cmd_m_s", "w_cmd_rad_s")
 WHEEL_COLUMNS = ("left_cmd_rad_s", "right_cmd_rad_s")
 BODY_COLUMNS = ("v_true_m_s", "w_true_rad_s", "clearance_m", "collisions")
 ODOMETRY_COLUMNS = ("odom_distance_m", "odom_angle_rad")
-"""The wheel odometry's reading of the step; nan where there was none."""
-SIDEWAYS_COLUMNS = ("lateral_cmd_m_s", "odom_lateral_m")
-"""Of a base that drives sideways besides."""
+"""The wheel odometry's readings since the row before; nan where there were none."""
+LATERAL_COLUMNS = ("odom_lateral_m",)
+"""Of readings that are told as one, and of a base that drives sideways."""
+SIDEWAYS_COLUMNS = ("lateral_cmd_m_s",)
 
 
 class Recorder:
-    """Collects one robot's rows as plain numbers; columns are made once at the end."""
+    """Collects one robot's rows as plain numbers; columns are made once at the end.
 
-    def __init__(self, member: Member, body: Body, task: Task, index: int) -> None:
+    Where rows are ``thinned`` the steps between two of them are passed over, and a row tells the odometry of
+    all of them.
+    """
+
+    def __init__(self, member: Member, body: Body, task: Task, index: int, thinned: bool) -> None:
         self._stack, self._journal, self._body = member.stack, member.journal, body
         self._task, self._index = task, index
         sensors = member.known.sensors
         self._sonars = [name for name, config in sensors.items() if isinstance(config, UltrasonicConfig)]
         wheels = [name for name, config in sensors.items() if isinstance(config, WheelOdometryConfig)]
         self._odometer = wheels[0] if wheels else None
+        self._driven = OdometrySince()
         self._by_wheels = isinstance(member.known.motion, WheelDriveConfig)
         self._sideways = isinstance(member.known.motion, OmnidirectionalConfig)
+        self._lateral = self._sideways or (thinned and self._odometer is not None)
         self._rows = array("d")
         self.names = (
             *TRUTH_COLUMNS,
@@ -58,13 +66,23 @@ class Recorder:
             *BODY_COLUMNS,
             *ODOMETRY_COLUMNS,
             *(SIDEWAYS_COLUMNS if self._sideways else ()),
+            *(LATERAL_COLUMNS if self._lateral else ()),
             *(f"us_{name}_m" for name in self._sonars),
             *task.columns,
             *member.journal.units,
         )
 
+    def pass_over(self, readings: Readings) -> None:
+        """Take note of a step that gets no row."""
+        if self._odometer is not None:
+            reading = readings.by_sensor.get(self._odometer)
+            if isinstance(reading, OdometryIncrement):
+                self._driven.add(reading)
+
     def record(self, readings: Readings, command: Command) -> None:
         """Record the step that has just been taken."""
+        self.pass_over(readings)
+        distance_m, angle_rad, lateral_m = self._driven.take()
         body, belief = self._body, self._stack.belief
         truth, pose, cov, twist = body.pose, belief.pose, belief.cov, body.twist
         self._rows.extend(
@@ -87,8 +105,10 @@ class Recorder:
                 twist.w_rad_s,
                 body.clearance_m,
                 body.collisions,
-                *_odometry(readings, self._odometer),
-                *(self._lateral(readings, command) if self._sideways else ()),
+                distance_m,
+                angle_rad,
+                *(_lateral(command) if self._sideways else ()),
+                *((lateral_m,) if self._lateral else ()),
                 *[_sonar_m(readings, name) for name in self._sonars],
                 *self._task.row(self._index),
             )
@@ -105,26 +125,15 @@ class Recorder:
             return command.v_m_s, command.w_rad_s
         return math.nan, math.nan
 
-    def _lateral(self, readings: Readings, command: Command) -> tuple[float, float]:
-        """Speed asked for and distance read to the left."""
-        reading = None if self._odometer is None else readings.by_sensor.get(self._odometer)
-        return (
-            command.lateral_m_s if isinstance(command, Twist) else math.nan,
-            reading.lateral_m if isinstance(reading, OdometryIncrement) else math.nan,
-        )
-
     def trace(self) -> dict[str, FloatArray]:
         """Columns by name, each (rows,)."""
         table = np.frombuffer(self._rows, dtype=np.float64).reshape(-1, len(self.names))
         return {name: np.ascontiguousarray(table[:, i]) for i, name in enumerate(self.names)}
 
 
-def _odometry(readings: Readings, name: str | None) -> tuple[float, float]:
-    """Distance and angle of the odometry increment; nan where there is none."""
-    reading = None if name is None else readings.by_sensor.get(name)
-    if isinstance(reading, OdometryIncrement):
-        return reading.distance_m, reading.angle_rad
-    return math.nan, math.nan
+def _lateral(command: Command) -> tuple[float]:
+    """Speed to the left that was asked for."""
+    return (command.lateral_m_s if isinstance(command, Twist) else math.nan,)
 
 
 def _sonar_m(readings: Readings, name: str) -> float:

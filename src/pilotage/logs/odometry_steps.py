@@ -85,14 +85,20 @@ def arc_lengths(start: FloatArray, end: FloatArray) -> FloatArray:
     return np.asarray(chord / np.sinc(turn / (2.0 * np.pi)))
 
 
-def arc_ends(start: FloatArray, arc_m: FloatArray, turn_rad: FloatArray) -> FloatArray:
-    """Poses (N, 3) after driving arcs of ``arc_m`` (N,) that turn by ``turn_rad`` (N,) from ``start``."""
+def arc_ends(
+    start: FloatArray, arc_m: FloatArray, turn_rad: FloatArray, left_m: FloatArray | float = 0.0
+) -> FloatArray:
+    """Poses (N, 3) after arcs of ``arc_m`` (N,) that turn by ``turn_rad`` (N,) from ``start`` (N, 3).
+
+    Each goes to the left by ``left_m`` (N,) all the while, as a base does that drives sideways.
+    """
     middle = start[:, 2] + 0.5 * turn_rad
-    chord = arc_m * np.sinc(turn_rad / (2.0 * np.pi))
+    share = np.sinc(turn_rad / (2.0 * np.pi))
+    chord, left = arc_m * share, left_m * share
     return np.column_stack(
         [
-            start[:, 0] + chord * np.cos(middle),
-            start[:, 1] + chord * np.sin(middle),
+            start[:, 0] + chord * np.cos(middle) - left * np.sin(middle),
+            start[:, 1] + chord * np.sin(middle) + left * np.cos(middle),
             wrap_array_to_pi(start[:, 2] + turn_rad),
         ]
     )

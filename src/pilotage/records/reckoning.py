@@ -28,11 +28,7 @@ def odometry_increments(trace: Trace) -> FloatArray | None:
 def reckoned(increments: FloatArray) -> FloatArray:
     """(N, 3) poses at the ends of increments, from the origin on: arcs, sideways where an axle moves so."""
     steps = np.nan_to_num(increments)
-    nowhere = np.zeros((len(steps), 3))
-    moves = arc_ends(nowhere, steps[:, 0], steps[:, 1])
-    sideways = arc_ends(nowhere, steps[:, 2], steps[:, 1])
-    moves[:, 0] -= sideways[:, 1]
-    moves[:, 1] += sideways[:, 0]
+    moves = arc_ends(np.zeros((len(steps), 3)), steps[:, 0], steps[:, 1], steps[:, 2])
     here, poses = Pose2(0.0, 0.0, 0.0), np.empty((len(steps), 3))
     for k, move in enumerate(moves):
         here = here.compose(Pose2.from_array(move))

@@ -20,7 +20,11 @@ _MOST_COLUMNS = 10_000
 
 
 def read_parquet(
-    path: Path, names: Sequence[str] | None = None, what: str = "a Parquet file", most: int = DATA_BYTES
+    path: Path,
+    names: Sequence[str] | None = None,
+    what: str = "a Parquet file",
+    most: int = DATA_BYTES,
+    perhaps: Sequence[str] = (),
 ) -> dict[str, Array]:
     """Read columns as arrays of equal length.
 
@@ -30,6 +34,8 @@ def read_parquet(
     ----------
     names
         The columns that are wanted; None for all.
+    perhaps
+        Columns that are wanted besides where they are there.
     most
         Limit in bytes, packed and unpacked, before the user's setting.
 
@@ -49,7 +55,7 @@ def read_parquet(
             thrift_string_size_limit=_HEADER_BYTES,
             thrift_container_size_limit=_HEADER_BYTES,
         ) as file:
-            wanted = _wanted(file, names, str(path))
+            wanted = _wanted(file, names, perhaps, str(path))
             _require_room(file.metadata, len(wanted), str(path), limit(most))
             # Text stays a dictionary until its letters are counted: one long word may stand in every row.
             text = [name for name in wanted if _is_text(file.schema_arrow.field(name).type)]
@@ -104,11 +110,11 @@ def parquet_metadata(path: Path, what: str = "a Parquet file", most: int = DATA_
         raise InputError(f"{path}: expected {what}, found: {said}") from None
 
 
-def _wanted(file: Any, names: Sequence[str] | None, where: str) -> list[str]:
+def _wanted(file: Any, names: Sequence[str] | None, perhaps: Sequence[str], where: str) -> list[str]:
     there = list(file.schema_arrow.names)
     if len(there) > _MOST_COLUMNS:
         raise too_large(where, _MOST_COLUMNS, len(there), "columns")
-    wanted = there if names is None else list(dict.fromkeys(names))
+    wanted = there if names is None else list(dict.fromkeys([*names, *(n for n in perhaps if n in there)]))
     missing = [name for name in wanted if name not in there]
     if missing:
         raise InputError(f"{where}: expected the columns {', '.join(wanted)}; missing: {', '.join(missing)}")
