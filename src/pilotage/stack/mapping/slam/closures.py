@@ -9,6 +9,7 @@ import numpy as np
 
 from pilotage.core.chi_square import chi_square_quantile
 from pilotage.core.types import BoolArray, FloatArray, IntArray
+from pilotage.kernels.slam.compatibility import compatible_pairs, innovation_covariances
 from pilotage.models.pose_graph_covariance import JointCovariance, relative_jacobians
 from pilotage.stack.mapping.slam.config import SlamConfig
 from pilotage.stack.mapping.slam.matching import Match, match
@@ -331,30 +332,15 @@ def _joint_test(
     innovation = errors_of(edges, poses)
     a, b = relative_jacobians(poses[edges.i], poses[edges.j], edges.relative[:, 2])
     used, at = np.unique(np.concatenate([edges.i, edges.j]), return_inverse=True)
-    rows = np.zeros((count, 3, used.size, 3))
-    k = np.arange(count)
-    rows[k, :, at[:count]] += a
-    rows[k, :, at[count:]] += b
-    flat = rows.reshape(3 * count, -1)
-    covariance = (flat @ joint.among(used) @ flat.T).reshape(count, 3, count, 3)
-    covariance[k, :, k] += np.linalg.inv(edges.information)
-    own = covariance[k, :, k]
-    alone = squared(innovation, own)
+    measured = a, b, joint.among(used), at[:count], at[count:]
+    own = innovation_covariances(*measured) + np.linalg.inv(edges.information)
     chi_square = squared(innovation, own + slip.covariance())
-    first, second = np.triu_indices(count, 1)
-    both = np.empty((first.size, 6, 6))
-    both[:, :3, :3], both[:, 3:, 3:] = own[first], own[second]
-    both[:, :3, 3:] = covariance[first, :, second]
-    both[:, 3:, :3] = both[:, :3, 3:].transpose(0, 2, 1)
-    errors = np.concatenate([innovation[first], innovation[second]], axis=1)
-    together = squared(errors, both)
-    given = together - np.minimum(alone[first], alone[second])
-    agree = np.zeros((count, count), np.bool_)
-    agreeing = given <= chi_square_quantile(probability, 3)
+    gate = chi_square_quantile(probability, 3)
+    agree = compatible_pairs(*measured, innovation, own, np.linalg.inv(own), gate)
     if slip.support:
         # Of a large slip only closures around it can tell the size: far ones need not agree on it.
-        agreeing |= ~_near(edges)[first, second]
-    agree[first, second] = agree[second, first] = agreeing
+        agree |= ~_near(edges)
+    np.fill_diagonal(agree, False)
     return np.asarray(chi_square), agree
 
 
