@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -13,7 +14,7 @@ from pilotage.maps.floor import Floor
 from pilotage.maps.segment_map import SegmentMap
 from pilotage.maps.world_map import WorldMap
 from pilotage.stack.patrol.graph import PatrolGraph
-from pilotage.stack.patrol.meetings import slowed, waits_m
+from pilotage.stack.patrol.meetings import keeps_apart, slowed, waits_m
 from pilotage.stack.patrol.partition import Plan
 from pilotage.stack.patrol.passages import OPEN, Passages
 from pilotage.stack.patrol.strategies.adaptive_rounds import AdaptiveRoundsConfig, best_plan
@@ -113,20 +114,40 @@ def rooms(across: int, up: int) -> dict[str, Any]:
     return {"map": {"map": "rooms", "bounds_m": [0, 0, width, height], "walls_m": walls}}
 
 
-def test_in_rooms_robots_do_not_follow_each_other_through_all_doors() -> None:
-    """A tour of all rooms promised as little idleness as shares; they met at every door of it: the worst was
-    ten times what it promised."""
+def planned(across: int, up: int, size: int) -> PatrolSetting:
+    """What robots in so many rooms are told."""
     values = read_mission("museum-patrol")
-    values["world"] = rooms(4, 3)
-    values["team"] = {"size": 8, "strategy": "adaptive-rounds", "radio": {}}
+    values["world"] = rooms(across, up)
+    values["team"] = {"size": size, "strategy": "adaptive-rounds", "radio": {}}
     values["task"], values["run"]["time_limit_s"] = {"name": "patrol", "duration_s": 1.0}, 1.0
-    experiment = build(mission_of(values, seed=0))
-    task: Any = experiment.task
-    assert task.patrol.passages.pieces > 10
-    stack: Any = experiment.team[0].stack
-    assert len(stack._context.task.strategy._plan.sizes) >= 7
-    setting = PatrolSetting(task.patrol.graph, 0, np.arange(8), 1.0, np.random.default_rng(0))
-    assert best_plan(setting, 8, AdaptiveRoundsConfig()).sizes == (8,)  # as if two could meet everywhere
+    stack: Any = build(mission_of(values, seed=0)).team[0].stack
+    setting: PatrolSetting = stack._context.task.strategy._setting
+    return setting
+
+
+def test_in_rooms_robots_go_round_one_way() -> None:
+    """A tour comes through each door once. Shares are to and fro: half turns, at 1.4 times the bound."""
+    setting = planned(4, 3, 8)
+    assert setting.passages.pieces > 10
+    assert best_plan(setting, 8, AdaptiveRoundsConfig()).sizes == (8,)
+    # Where turning back costs nothing they are weighed as meetings alone have it.
+    free = replace(setting, turn_m=0.0)
+    assert len(best_plan(free, 8, AdaptiveRoundsConfig()).sizes) >= 7
+
+
+def test_who_meets_mates_head_on_in_a_passage_shares_no_round_there() -> None:
+    """Two rooms and a door between: whoever comes through comes back, half a round later."""
+    graph, passages = row(with_door(1.0), (1.0, 2.5), (7.0, 2.5))
+    walk = Round.best(graph)
+    assert passages.pieces == 1
+    # One is in one room when the other is in the other, but both want through the door at once.
+    assert not keeps_apart(walk, 2, passages, 0.0, 2.5)
+    assert keeps_apart(walk, 1, passages, 0.0, 2.5)
+    assert keeps_apart(walk, 2, OPEN, 0.5 * walk.length_m, 2.5)
+    assert not keeps_apart(walk, 2, OPEN, 0.6 * walk.length_m, 2.5)
+    # Nearer to one end its times there and back are no half a round apart.
+    graph, passages = row(with_door(1.0), (3.0, 2.5), (7.0, 2.5))
+    assert keeps_apart(Round.best(graph), 2, passages, 0.0, 0.5)
 
 
 @pytest.mark.parametrize(

@@ -30,6 +30,7 @@ from pilotage.stack.patrol.strategies.adaptive_rounds import (
 )
 from pilotage.stack.patrol.strategy import STRATEGIES, PatrolSetting, Strategy, following
 from pilotage.stack.patrol.tours import Round, idleness_bound_s
+from pilotage.stack.patrol.turns import with_turns
 
 GRAPH = lattice(5, 4, 3.0)
 SPEED_M_S = 0.5
@@ -329,6 +330,33 @@ def test_a_pair_that_shares_a_short_round_keeps_no_plan_from_being_taken() -> No
     alone = partition(graph, (1, 1, 1, 1))
     assert plan.worst_m < alone.worst_m
     assert plan.mean_m < 0.97 * alone.mean_m
+
+
+def test_rounds_that_only_turn_back_are_not_taken_for_short() -> None:
+    """Around a court shares of two places promise the tour's worst and mean; each of them is half turns."""
+    xy = np.array(
+        [[0.0, 0.0], [3.0, 0.0], [6.0, 0.0], [6.0, 3.0], [6.0, 6.0], [3.0, 6.0], [0.0, 6.0], [0.0, 3.0]]
+    )
+    edges = np.full((8, 8), math.inf)
+    for a in range(8):
+        edges[a, (a + 1) % 8] = edges[(a + 1) % 8, a] = 3.0
+    setting = setting_for(PatrolGraph.of(xy, edges), (0, 2, 4, 6))
+    assert best_plan(setting, 4, AdaptiveRoundsConfig()).sizes == (1, 1, 1, 1)
+    assert best_plan(replace(setting, turn_m=0.8), 4, AdaptiveRoundsConfig()).sizes == (4,)
+
+
+def test_a_plan_with_turns_is_as_long_as_its_walks_are_judged() -> None:
+    """By hand: to and fro over 10 m it turns back at both ends, around a square nowhere."""
+    xy = np.array([[0.0, 0.0], [10.0, 0.0], [20.0, 0.0], [26.0, 0.0], [26.0, 6.0], [20.0, 6.0]])
+    edges = np.full((6, 6), math.inf)
+    for a, b in ((0, 1), (1, 2), (2, 3), (3, 4), (4, 5), (5, 2)):
+        edges[a, b] = edges[b, a] = math.dist(xy[a], xy[b])
+    graph = PatrolGraph.of(xy, edges)
+    rounds = Round.best(graph, (0, 1)), Round.best(graph, (2, 3, 4, 5))
+    plan = with_turns(Plan(rounds, (1, 1), 24.0, 11.0), graph, 1.5)
+    assert [walk.length_m for walk in plan.rounds] == [23.0, 24.0]
+    assert plan.rounds[0].at_m.tolist() == [0.0, 11.5]
+    assert with_turns(plan, graph, 0.0) is plan
 
 
 def oldest_m(graph: PatrolGraph, walk: Round, enters: int, to_m: float, idle_m: FloatArray) -> float:

@@ -34,6 +34,17 @@ def turns_back(before: int, here: int, after: int, places: FloatArray) -> bool:
 
 
 @kernel
+def turned_m(stops: IntArray, places: FloatArray, turn: float) -> FloatArray:
+    """(K + 1,) what turning back has cost before each stop of a closed walk (K,), and in all of it."""
+    count = stops.shape[0]
+    before = np.zeros(count + 1)
+    for k in range(count):
+        back = turns_back(stops[k - 1 if k else count - 1], stops[k], stops[(k + 1) % count], places)
+        before[k + 1] = before[k] + (turn if back else 0.0)
+    return before
+
+
+@kernel
 def judge_walk(order: IntArray, size: int, ground: Ground, worst: FloatArray, mean: FloatArray) -> None:
     """Fill in ``visit_gaps`` of the walk through vertices (N,) in order, by shortest paths, and back,
     turns included."""
@@ -51,14 +62,10 @@ def judge_walk(order: IntArray, size: int, ground: Ground, worst: FloatArray, me
             length += edges[here, following]
             here = following
     stops = max(stops, 1)
-    turned = 0.0
-    for k in range(stops):
-        at[k] += turned
-        if turn > 0.0 and turns_back(
-            passed[k - 1 if k else stops - 1], passed[k], passed[(k + 1) % stops], places
-        ):
-            turned += turn
-    length += turned
+    if turn > 0.0:
+        before = turned_m(passed[:stops], places, turn)
+        at[:stops] += before[:stops]
+        length += before[stops]
     visit_gaps(passed[:stops], at[:stops], length, size, worst, mean)
 
 

@@ -10,6 +10,7 @@ import numpy as np
 from pilotage.core.types import FloatArray
 from pilotage.stack.patrol.partition import Plan
 from pilotage.stack.patrol.passages import Passages
+from pilotage.stack.patrol.tours import Round
 
 FULLEST = 0.9
 """Share of the time that a passage is taken for at most: beyond, waits would have no end."""
@@ -41,6 +42,31 @@ def waits_m(plan: Plan, passages: Passages, meeting_m: float) -> FloatArray:
     share = np.minimum((rate * taken_m).sum(axis=1), FULLEST)
     wait_m = (rate * taken_m**2).sum(axis=1) / (2.0 * (1.0 - share))
     return np.array([float(wait_m[group == number].sum()) for number in range(len(passed))])
+
+
+def keeps_apart(walk: Round, size: int, passages: Passages, headway_m: float, meeting_m: float) -> bool:
+    """Whether robots evenly spread on a round follow each other at a distance, and never meet head-on where
+    there is room for one.
+
+    A passage that the round comes back through is met in where the phases of both times, a robot's share of
+    the round taken for one turn, are nearer than it takes to pass it, and ``meeting_m``.
+    """
+    if size == 1 or walk.length_m == 0.0:
+        return True
+    period_m = walk.length_m / size
+    times = passages.times(walk)
+    for k, (begin_m, end_m, ways) in enumerate(times):
+        back = {(piece, -way) for piece, way in ways}
+        for since_m, until_m, others in times[k:]:
+            if back.isdisjoint(others):
+                continue
+            taken_m = 0.5 * (end_m - begin_m + until_m - since_m) + meeting_m
+            apart_m = (0.5 * (since_m + until_m - begin_m - end_m)) % period_m
+            # Who turns within it meets nobody but the next one.
+            apart_m = period_m if since_m == begin_m else min(apart_m, period_m - apart_m)
+            if apart_m < taken_m:
+                return False
+    return period_m >= headway_m
 
 
 def slowed(plan: Plan, passages: Passages, meeting_m: float) -> Plan:

@@ -85,25 +85,31 @@ class Passages:
         -------
         Which pieces it comes through then (K, P), and how long that is (K,), in metres.
         """
-        times: list[tuple[int, float, float, set[int]]] = []
+        times = self.times(walk)
+        marks = np.zeros((len(times), self.pieces), dtype=np.bool_)
+        for row, (*_, ways) in enumerate(times):
+            marks[row, sorted({piece for piece, _ in ways})] = True
+        return marks, np.array([end_m - begin_m for begin_m, end_m, _ in times])
+
+    def times(self, walk: Round) -> list[tuple[float, float, set[tuple[int, int]]]]:
+        """The same: from where to where along the walk, and which pieces in which direction, 1 or -1."""
+        times: list[tuple[int, float, float, set[tuple[int, int]]]] = []
         for k, here in enumerate(walk.stops.tolist()):
             there = int(walk.stops[(k + 1) % len(walk.stops)])
             for piece, number, begin_m, end_m in self.stretches.get((here, there), ()):
                 begin_m, end_m = walk.at_m[k] + begin_m, walk.at_m[k] + end_m
+                way = piece, 1 if here < there else -1
                 if times and times[-1][0] == number and begin_m - times[-1][2] < ASIDE_M:
-                    _, since_m, _, pieces = times[-1]
-                    times[-1] = number, since_m, end_m, pieces | {piece}
+                    _, since_m, _, ways = times[-1]
+                    times[-1] = number, since_m, end_m, ways | {way}
                 else:
-                    times.append((number, begin_m, end_m, {piece}))
+                    times.append((number, begin_m, end_m, {way}))
         if len(times) > 1 and times[0][0] == times[-1][0]:
-            number, since_m, _, pieces = times[-1]
+            number, since_m, _, ways = times[-1]
             if times[0][1] + walk.length_m - times[-1][2] < ASIDE_M:  # the walk begins within it
-                times[0] = number, since_m - walk.length_m, times[0][2], pieces | times[0][3]
+                times[0] = number, since_m - walk.length_m, times[0][2], ways | times[0][3]
                 times.pop()
-        marks = np.zeros((len(times), self.pieces), dtype=np.bool_)
-        for row, (*_, pieces) in enumerate(times):
-            marks[row, sorted(pieces)] = True
-        return marks, np.array([end_m - begin_m for _, begin_m, end_m, _ in times])
+        return [(begin_m, end_m, ways) for _, begin_m, end_m, ways in times]
 
 
 OPEN = Passages()

@@ -17,12 +17,13 @@ from pilotage.sensors.sensor import NonNegative, Positive
 from pilotage.stack.patrol.hearing import Hearing, Patience
 from pilotage.stack.patrol.leg_times import LegTimes
 from pilotage.stack.patrol.looking import Looking
-from pilotage.stack.patrol.meetings import slowed
+from pilotage.stack.patrol.meetings import keeps_apart, slowed
 from pilotage.stack.patrol.messages import NOTHING, PatrolKnowledge, PatrolState
 from pilotage.stack.patrol.partition import Plan, annealed, even_sizes
 from pilotage.stack.patrol.shut_paths import NONE_SHUT, OpenGraph, same_side
 from pilotage.stack.patrol.strategy import STRATEGIES, PatrolSetting
 from pilotage.stack.patrol.tours import Round, spread
+from pilotage.stack.patrol.turns import with_turns
 
 KEY, PHASE_M, PHASE_S, GONE = range(4)
 """What a robot says: which round it goes, how far along it was, when, and whom it looked for in vain."""
@@ -33,7 +34,10 @@ class AdaptiveRoundsConfig(Config):
 
     A plan's cost is its worst idleness plus ``mean_weight`` times its mean; of a round that several robots
     share the worst counts ``sharing_cost`` more and the mean half of that, for what keeping apart costs. In a
-    passage that has room for one a meeting takes ``meeting_m`` of driving beside its length. A robot waits
+    passage that has room for one a meeting takes ``meeting_m`` of driving beside its length. Turning back
+    takes ``late_m`` more than data sheets say, for decisions are made a few times a second. Where that would
+    lead to a worst idleness of more than ``worst_ratio`` times the bound, plans are weighed with it, among
+    those in which robots on one round are ``headway_m`` apart and do not meet in passages. A robot waits
     while it is further ahead of its place among those that share its round than ``slack`` of the time
     between them.
     """
@@ -41,6 +45,9 @@ class AdaptiveRoundsConfig(Config):
     mean_weight: NonNegative = 2.0
     sharing_cost: NonNegative = 0.06
     meeting_m: NonNegative = 2.5
+    late_m: NonNegative = 0.4
+    worst_ratio: Positive = 1.25
+    headway_m: NonNegative = 6.0
     slack: Positive = Field(default=0.1, le=0.5)
     silent_s: Positive = 30.0
     silent_ratio: Positive = 8.0
@@ -53,26 +60,43 @@ class AdaptiveRoundsConfig(Config):
 def best_plan(setting: PatrolSetting, robots: int, config: AdaptiveRoundsConfig) -> Plan:
     """The cheapest plan for so many robots: one round for all, one for each, and what lies between.
 
-    How many rounds is chosen by lengths and waits; its rounds are those that turn back least for that.
+    How many rounds is chosen by lengths and waits, and its rounds are those that turn back least for that.
+    Where they promise more than the worst that is asked for, turning back included, it is chosen by lengths,
+    waits and turns, among plans whose robots go one way where there is room for one.
     """
     graph = setting.graph
     most = min(robots, len(graph))
     weights = config.mean_weight, config.sharing_cost
     # What lies between is much alike: a few numbers of groups stand for all.
     numbers = {1, 2, 3, robots // 2, robots - 1, robots, most}
-    plans = [
-        annealed(graph, even_sizes(robots, groups), *weights)
-        for groups in sorted(numbers)
-        if 1 <= groups <= most
-    ]
+    sizes = [even_sizes(robots, groups) for groups in sorted(numbers) if 1 <= groups <= most]
 
-    def cost(plan: Plan) -> float:
+    def promises(plan: Plan) -> tuple[float, float]:
         driven = slowed(plan, setting.passages, config.meeting_m)
         worst_m, mean_m = driven.expected_m(len(graph), config.sharing_cost)
-        return worst_m + config.mean_weight * mean_m
+        return worst_m, worst_m + config.mean_weight * mean_m
 
-    sizes = min(plans, key=cost).sizes
-    return annealed(graph, sizes, *weights, setting.turn_m)
+    usual = min((annealed(graph, even, *weights) for even in sizes), key=lambda plan: promises(plan)[1])
+    usual = annealed(graph, usual.sizes, *weights, setting.turn_m)
+    if setting.turn_m <= 0.0:
+        return usual
+
+    def turning(plan: Plan) -> tuple[float, float]:
+        return promises(with_turns(plan, graph, setting.turn_m + config.late_m))
+
+    if turning(usual)[0] <= config.worst_ratio * Round.best(graph).length_m / robots:
+        return usual
+    others = [annealed(graph, even, *weights, setting.turn_m) for even in sizes]
+    distances = config.headway_m, config.meeting_m
+    apart = [
+        plan
+        for plan in others
+        if all(
+            keeps_apart(walk, size, setting.passages, *distances)
+            for walk, size in zip(plan.rounds, plan.sizes, strict=True)
+        )
+    ]
+    return min([usual, *apart], key=lambda plan: turning(plan)[1])
 
 
 @STRATEGIES.add("adaptive-rounds", AdaptiveRoundsConfig)
