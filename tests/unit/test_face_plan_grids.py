@@ -9,6 +9,7 @@ import pytest
 from PIL import Image
 
 import pilotage as pl
+from pilotage.experiments import rehearsal
 
 
 @pytest.fixture
@@ -48,3 +49,24 @@ def test_a_sweep_is_not_smoothed_away(room: Path) -> None:
     assert swept.length_m > 12.0
     assert "times the area over the width" in swept.reason
     assert np.isnan(swept.shortest_length_m)
+
+
+def test_planning_takes_no_time_of_a_compiler(room: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A first query told how long kernels took to compile: 18 s for 34 expansions on a new machine."""
+    asked: list[str] = []
+
+    def ask() -> str:
+        asked.append("once")
+        return f"time {len(asked)}"
+
+    monkeypatch.setattr(rehearsal, "cache_is_cold", lambda: False)
+    assert [rehearsal.rehearsed(("a planner", str(room)), ask) for _ in range(2)] == ["time 2", "time 3"]
+    monkeypatch.setattr(rehearsal, "LONG_S", -1.0)
+    assert rehearsal.rehearsed(("a slow planner", str(room)), ask) == "time 4"
+    monkeypatch.setattr(rehearsal, "cache_is_cold", lambda: True)
+    assert rehearsal.rehearsed(("a planner, nothing compiled", str(room)), ask) == "time 6"
+    for planner in ("dijkstra", "rrt-star-dubins"):
+        found = pl.plan(room, START, GOAL, planner=planner)
+        assert any(planner in key for key in rehearsal._REHEARSED)
+        again = pl.plan(room, START, GOAL, planner=planner)
+        assert np.array_equal(found.path, again.path)

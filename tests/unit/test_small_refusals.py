@@ -140,3 +140,14 @@ def test_what_no_simulator_serves_is_refused_before_anything_is_planned(
     with pytest.raises(InputError) as caught:
         build(load_mission(mission, settings, 0))
     assert words in str(caught.value)
+
+
+def test_a_strategy_without_a_patrol_is_refused() -> None:
+    """It was taken, and nothing ever asked it."""
+    with pytest.raises(InputError, match=r"team\.strategy: expected task 'patrol', found 'reach'"):
+        build(load_mission("museum-1", ["team.strategy=cyclic"], 0))
+
+
+def test_starts_of_a_team_are_told_by_the_name_they_were_given_under() -> None:
+    with pytest.raises(InputError, match=r"^team\.starts\.0: input should be a mapping, found \[1, 1\]"):
+        load_mission("museum-patrol", ["team.size=2", "team.starts=[[1, 1], [3, 3]]"], 0)

@@ -113,7 +113,7 @@ class TestTeam:
 
     def test_more_robots_than_the_floor_has_places_are_refused(self) -> None:
         mission = load_mission("museum-1", [*MUSEUM, "team.size=9", "team.spacing_m=25"])
-        with pytest.raises(InputError, match=r"team\.size: expected \d robots at most"):
+        with pytest.raises(InputError, match=r"team\.size: expected at most \d, for"):
             build_source(mission)
 
     def test_robots_that_fit_nowhere_are_told_to_be_too_large(self) -> None:

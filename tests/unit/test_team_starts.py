@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
-import numpy as np
+import math
 
+import numpy as np
+import pytest
+
+from pilotage.experiments.build import places
 from pilotage.experiments.build.places import OpenFloor
 from pilotage.maps.segment_map import SegmentMap
 from pilotage.maps.world_map import WorldMap
+from pilotage.missions.places import PoseConfig
 
 # A room of 8 m x 5 m and one of 3 m x 5 m, a gap of 0.84 m between them.
 WALLS = SegmentMap(
@@ -33,3 +38,32 @@ def test_where_no_passage_has_more_room_all_of_the_floor_will_do() -> None:
     floor = OpenFloor(WORLD, 2.45, None)
     assert floor.easy.any()
     assert floor.draw(np.random.default_rng(0), part=floor.easy) is not None
+
+
+def test_places_are_drawn_as_if_one_by_one_however_many_are_thrown_away() -> None:
+    floor, rng, other = OpenFloor(WORLD, 2.3, None), np.random.default_rng(5), np.random.default_rng(5)
+    place = floor.draw(rng)
+    assert place is not None
+    thrown_away = -1
+    drawn = (0.0, 0.0, 0.0)
+    while drawn != (place.x_m, place.y_m, place.theta_rad):
+        x, y, theta = other.uniform([0.0, 0.0, -math.pi], [11.0, 5.0, math.pi])
+        drawn, thrown_away = (float(x), float(y), float(theta)), thrown_away + 1
+    assert thrown_away > 5
+    assert rng.random() == other.random()
+
+
+def test_a_floor_that_is_full_is_found_so_by_arrays(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A hundred thousand draws were made one by one: the refusal took ten seconds."""
+
+    class Counted(np.random.Generator):
+        calls = 0
+
+        def uniform(self, *given: object, **named: object) -> object:
+            Counted.calls += 1
+            return super().uniform(*given, **named)
+
+    monkeypatch.setattr(places, "room_m", lambda *_: pytest.fail("nobody fits 20 m from the middle"))
+    rng = Counted(np.random.PCG64(0))
+    assert OpenFloor(WORLD, 0.4, None).draw(rng, [PoseConfig(x_m=4.0, y_m=2.0)], 20.0) is None
+    assert 0 < Counted.calls <= 1000

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from pilotage.core.errors import InputError
+from pilotage.core.extras import missing
 from pilotage.core.shown import shown
 from pilotage.core.types import FloatArray
 from pilotage.core.whole_file import draft_of
@@ -31,9 +31,7 @@ def rerun() -> Any:
     try:
         import rerun
     except ImportError:
-        raise InputError(
-            "Rerun files need the library rerun-sdk, which is not installed: pip install pilotage[rerun]"
-        ) from None
+        raise missing("Rerun files need the library rerun-sdk, which is not installed", "rerun") from None
     return rerun
 
 

@@ -56,6 +56,14 @@ def print_columns(rows: Iterable[Sequence[str]]) -> None:
         print("  ".join(padded).rstrip())
 
 
+def tell_if_cold() -> None:
+    """Tell who watches why it takes so long where nothing is compiled yet."""
+    from pilotage.kernels.jit import cache_is_cold
+
+    if sys.stderr.isatty() and cache_is_cold():
+        print("compiling the kernels; only the first run takes this long", file=sys.stderr)
+
+
 def print_line(text: str, stream: TextIO | None = None) -> None:
     """Print one line of what came from outside: names, paths, reasons."""
     print(visible(text), file=stream)

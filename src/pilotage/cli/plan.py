@@ -8,7 +8,7 @@ from typing import Annotated, Any
 import typer
 
 from pilotage.cli.options import Json, Overrides, Plugins, Seed
-from pilotage.cli.output import print_columns, print_json, stdout_for_json
+from pilotage.cli.output import print_columns, print_json, stdout_for_json, tell_if_cold
 from pilotage.core.errors import InputError
 
 
@@ -40,6 +40,7 @@ def plan(
     from_, to = parse_pose(start, "--start"), parse_pose(goal, "--goal")
     from pilotage.face.planning import plan as planned_by
 
+    tell_if_cold()
     with stdout_for_json(json):
         answer = planned_by(
             map_,

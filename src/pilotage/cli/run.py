@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from pilotage.cli.options import Json, Out, Overrides, Plugins, Seed
-from pilotage.cli.output import print_json, print_line, progress_line, stdout_for_json
+from pilotage.cli.output import print_json, print_line, progress_line, stdout_for_json, tell_if_cold
 from pilotage.core.errors import InputError
 from pilotage.core.shown import visible
 
@@ -37,8 +37,8 @@ def run(
     from pilotage.experiments.run import run_mission
 
     loaded = _mission(mission, overrides or (), seed, row)
-    if not quiet and sys.stderr.isatty():
-        _tell_if_cold()
+    if not quiet:
+        tell_if_cold()
     with stdout_for_json(json), progress_line(not quiet) as on_progress:
         result = run_mission(loaded, out=out, on_progress=on_progress)
     page = _write_report(result.run_dir, json) if report and result.run_dir is not None else None
@@ -66,13 +66,6 @@ def _mission(name: str | None, overrides: Sequence[str], seed: int | None, row: 
     from pilotage.experiments.studies.replay import mission_from
 
     return mission_from(row)
-
-
-def _tell_if_cold() -> None:
-    from pilotage.kernels.jit import cache_is_cold
-
-    if cache_is_cold():
-        print("compiling the kernels; only the first run takes this long", file=sys.stderr)
 
 
 def _write_report(run_dir: Path, json: bool) -> Path:

@@ -15,6 +15,7 @@ from pilotage.core.config import Config, validate
 from pilotage.core.errors import InputError
 from pilotage.core.types import FloatArray, Pose2
 from pilotage.evaluation.relief import relief
+from pilotage.experiments.rehearsal import rehearsed
 from pilotage.experiments.values import parse_override, parse_yaml, read_text
 from pilotage.maps.elevation import ElevationModel
 from pilotage.maps.elevation_file import read_elevation
@@ -108,7 +109,9 @@ def plan_on_grid(
     hazard = "an obstacle" if slope_limit_deg is None else f"steeper than {slope_limit_deg:g} deg"
     ends = ("--start", start), ("--goal", goal)
     from_, to = (free_cell(option, place, grid, space, hazard) for option, place in ends)
-    result = GRID_PLANNERS.entry(planner).factory(config).search(GridRequest(space, from_, to))
+    key = (planner, "costs" if ground.cost_factors is not None else "cells")
+    request = GridRequest(space, from_, to)
+    result = rehearsed(key, lambda: GRID_PLANNERS.entry(planner).factory(config).search(request))
     answer: dict[str, Any] = {
         "success": result.path is not None,
         "reason": f"{result.status}: {result.reason}",

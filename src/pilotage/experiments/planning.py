@@ -11,6 +11,7 @@ from pilotage.core.random import RandomStreams
 from pilotage.core.types import Goal, Pose2
 from pilotage.evaluation.shortest_path import shortest_path
 from pilotage.experiments.build.charts import load_chart
+from pilotage.experiments.rehearsal import rehearsed
 from pilotage.experiments.values import parse_override
 from pilotage.maps.world_map import WorldMap
 from pilotage.stack.interface import PlannedPath
@@ -60,17 +61,21 @@ def plan_on_map(
     config = PLANNERS.configure(planner, own, f"planner '{planner}'")
     smoother_config = SMOOTHERS.configure(smoother_name, smoothing, f"smoother '{smoother_name}'")
     to = Goal(goal[0], goal[1], wrap_to_pi(goal[2]) if len(goal) > 2 else None)
-    journal = Journal()
-    plan = GlobalPlan(
-        PLANNERS.entry(planner).factory(config),
-        SMOOTHERS.entry(smoother_name).factory(smoother_config),
-        floor,
-        RandomStreams(seed).stream("planner"),
-        journal,
-    )
     pose = Pose2(start[0], start[1], wrap_to_pi(start[2]) if len(start) > 2 else 0.0)
-    kept_m = plan.clearance_m if clearance_m is None else clearance_m
-    result = plan.make(0.0, pose, to, floor.walls.circles_m[:0], (kept_m,))
+
+    def ask() -> tuple[GlobalPlan, Journal, float, PlanResult]:
+        journal = Journal()
+        plan = GlobalPlan(
+            PLANNERS.entry(planner).factory(config),
+            SMOOTHERS.entry(smoother_name).factory(smoother_config),
+            floor,
+            RandomStreams(seed).stream("planner"),
+            journal,
+        )
+        kept_m = plan.clearance_m if clearance_m is None else clearance_m
+        return plan, journal, kept_m, plan.make(0.0, pose, to, floor.walls.circles_m[:0], (kept_m,))
+
+    plan, journal, kept_m, result = rehearsed((planner, smoother_name), ask)
     answer: dict[str, Any] = {
         "success": result.path is not None,
         "reason": _reason(result, journal.plans[-1] if journal.plans else None),

@@ -5,7 +5,7 @@ from __future__ import annotations
 import importlib
 from typing import Any
 
-from pilotage.core.errors import InputError
+from pilotage.core.extras import missing
 
 
 def rosbags(module: str) -> Any:
@@ -19,6 +19,4 @@ def rosbags(module: str) -> Any:
     try:
         return importlib.import_module(f"rosbags.{module}")
     except ImportError:
-        raise InputError(
-            "bags need the library rosbags, which is not installed: pip install pilotage[ros]"
-        ) from None
+        raise missing("bags need the library rosbags, which is not installed", "ros") from None

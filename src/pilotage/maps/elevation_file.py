@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from pilotage.core.errors import InputError
+from pilotage.core.extras import missing
 from pilotage.core.files import read_bytes, read_json, require_file
 from pilotage.core.limits import DATA_BYTES, limit, too_large
 from pilotage.core.types import Pose2
@@ -130,8 +131,8 @@ def _read_geotiff(path: Path, origin: Pose2 | None) -> ElevationModel:
     try:
         import rasterio
     except ImportError:
-        raise InputError(
-            f"elevation '{path}': GeoTIFF needs rasterio; install pilotage with the extra 'terrain'"
+        raise missing(
+            f"elevation '{path}': GeoTIFF needs rasterio, which is not installed", "terrain"
         ) from None
     try:
         # Its other drivers follow what a file says to other files, on the network too.

@@ -82,8 +82,10 @@ def with_team(values: dict[str, Any]) -> dict[str, Any]:
     if not isinstance(team, Mapping):
         return values
     size, robots, starts = team.get("size"), values.get("robots"), team.get("starts") or ()
+    if not isinstance(starts, list | tuple) or not all(isinstance(start, Mapping) for start in starts):
+        return values
     if isinstance(size, int) and not isinstance(size, bool) and 1 <= size <= LARGEST_TEAM and not robots:
-        placed = [{"start": start} for start in starts[:size]] if isinstance(starts, list | tuple) else []
+        placed = [{"start": start} for start in starts[:size]]
         robots = placed + [{} for _ in range(size - len(placed))]
         values = {**values, "robots": robots}
     radio = team.get("radio")

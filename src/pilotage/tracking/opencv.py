@@ -6,7 +6,7 @@ import importlib
 import os
 from typing import Any
 
-from pilotage.core.errors import InputError
+from pilotage.core.extras import missing
 
 
 def opencv() -> Any:
@@ -23,6 +23,4 @@ def opencv() -> Any:
     try:
         return importlib.import_module("cv2")
     except ImportError:
-        raise InputError(
-            "tracking needs OpenCV, which is not installed: pip install pilotage[vision]"
-        ) from None
+        raise missing("tracking needs OpenCV, which is not installed", "vision") from None

@@ -10,7 +10,7 @@ from typing import Any
 
 from pilotage.bridges.ros.messages import TRANSFORMS
 from pilotage.bridges.ros.transforms import TransformTopic
-from pilotage.core.errors import InputError
+from pilotage.core.extras import missing
 
 DEPTH = 1000
 """Messages that wait for a slow listener before the oldest is lost."""
@@ -87,9 +87,8 @@ def ros_node(name: str) -> Iterator[Node]:
         for msgtype in ("sensor_msgs/msg/LaserScan", "nav_msgs/msg/Odometry", "geometry_msgs/msg/Twist"):
             _type(msgtype)
     except ImportError:
-        raise InputError(
-            "live topics need rclpy and the usual messages of ROS 2, which are not installed: "
-            "pip install pilotage[ros2]"
+        raise missing(
+            "live topics need rclpy and the usual messages of ROS 2, which are not installed", "ros2"
         ) from None
     rclpy.init(args=[], signal_handler_options=rclpy.signals.SignalHandlerOptions.NO)
     node = rclpy.create_node(name)

@@ -123,8 +123,12 @@ def _shares(
     """Each robot's share of a task that has places to visit for all of the team."""
     site: PatrolSite | None = getattr(whole, "patrol", None)
     if site is None:
-        if mission.team.battery is not None:
-            raise InputError(f"team.battery: expected task 'patrol', found '{mission.task.name}'")
+        for part in ("battery", "strategy"):
+            if getattr(mission.team, part) is not None:
+                raise InputError(
+                    f"team.{part}: expected task 'patrol', found '{mission.task.name}', which has no use for "
+                    f"it; take team.{part}=null"
+                )
         return [None] * len(sheets)
     supply = _supply(mission)
     roadmaps = _roadmaps(mission, chart, sheets, PatrolPlaces.of(site.graph, supply, site.visit_m))

@@ -12,6 +12,7 @@ from contextlib import contextmanager, suppress
 from typing import Any
 
 from pilotage.core.errors import InputError
+from pilotage.core.extras import missing
 from pilotage.experiments.studies.database import StudyStoppedError
 from pilotage.experiments.studies.trial import Outcome, Task, TrialRunner
 from pilotage.experiments.studies.workers import AHEAD, WAIT_S, hung
@@ -38,9 +39,7 @@ class DaskWorkers:
             import distributed
             from distributed.comm.addressing import resolve_address
         except ImportError:
-            raise InputError(
-                "--dask: expected the extra 'cluster'; pip install 'pilotage[cluster]'"
-            ) from None
+            raise missing("--dask needs the library distributed, which is not installed", "cluster") from None
         # A cluster that is lost is told in one line, not at length.
         logging.getLogger("distributed.client").setLevel(logging.CRITICAL)
         try:
