@@ -137,6 +137,6 @@ def test_how_near_it_has_to_believe_to_be() -> None:
 
 def test_a_given_route_is_held_against_no_shortest_path() -> None:
     """The programmed route ends beside where it begins: it was 164 times the least way."""
-    metrics = dict(run_mission(load_mission("museum-route", ["run.time_limit_s=2"], 0), save=False).metrics)
+    metrics = driven(load_mission("museum-route", ["run.time_limit_s=2"], 0))
     assert metrics["planned_length_m"] > 60.0
     assert "driven_over_least" not in metrics

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -59,7 +60,7 @@ def test_a_floor_that_is_full_is_found_so_by_arrays(monkeypatch: pytest.MonkeyPa
     class Counted(np.random.Generator):
         calls = 0
 
-        def uniform(self, *given: object, **named: object) -> object:
+        def uniform(self, *given: Any, **named: Any) -> Any:
             Counted.calls += 1
             return super().uniform(*given, **named)
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import multiprocessing
-import signal
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
@@ -11,6 +10,7 @@ from typing import Any, TypeVar
 
 from pilotage.core.errors import InputError
 from pilotage.core.memory import look_seldom
+from pilotage.experiments.worker_processes import interrupts_held, obey_the_parent
 
 J = TypeVar("J", bound=tuple[Any, ...])
 R = TypeVar("R")
@@ -29,16 +29,24 @@ def all_done(work: Callable[..., R], jobs: Sequence[J], workers: int, what: str)
             yield job, work(*job)
         return
     pool = ProcessPoolExecutor(min(workers, len(jobs)), multiprocessing.get_context("spawn"), _begin)
+    others = set(multiprocessing.active_children())
+    done = False
     try:
-        waiting = {pool.submit(work, *job): job for job in jobs}
+        with interrupts_held():
+            waiting = {pool.submit(work, *job): job for job in jobs}
         for future in as_completed(waiting):
             yield waiting[future], future.result()
+        done = True
     except BrokenProcessPool:
         raise InputError(f"{what}: a worker died; take fewer --workers, or more memory") from None
     finally:
+        if not done:
+            # Whoever stops here does not wait for runs that take minutes; a worker leaves nothing behind.
+            for worker in set(multiprocessing.active_children()) - others:
+                worker.terminate()
         pool.shutdown(cancel_futures=True)
 
 
 def _begin() -> None:
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent decides
+    obey_the_parent()
     look_seldom()

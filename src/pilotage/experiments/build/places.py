@@ -277,7 +277,7 @@ class OpenFloor:
         at = at.astype(np.int64)[:, ::-1]
         inside = np.all((at >= 0) & (at < nodes.shape), axis=1)
         row, column = np.where(inside[:, None], at, 0).T
-        return nodes[row, column] * inside
+        return np.asarray(nodes[row, column] * inside)
 
     def draw(
         self,

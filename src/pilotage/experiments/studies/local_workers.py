@@ -6,14 +6,11 @@ import contextlib
 import multiprocessing
 import os
 import pickle
-import signal
 import sys
-import threading
 import time
 import types
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
-from multiprocessing import resource_tracker
 from multiprocessing.connection import Connection, wait
 from multiprocessing.context import SpawnProcess
 from typing import Any
@@ -22,6 +19,7 @@ from pilotage.core.memory import look_seldom
 from pilotage.experiments.studies.database import StudyStoppedError
 from pilotage.experiments.studies.trial import Outcome, Task, TrialRunner
 from pilotage.experiments.studies.workers import AHEAD, WAIT_S, hung
+from pilotage.experiments.worker_processes import interrupts_held, obey_the_parent
 from pilotage.kernels.jit import cache_is_cold
 
 ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
@@ -131,7 +129,7 @@ class LocalWorkers:
         kept = {name: os.environ.get(name) for name in ONE_THREAD}
         os.environ.update(dict.fromkeys(ONE_THREAD, "1"))
         try:
-            with _interrupts_held(), _main_left_alone():
+            with interrupts_held(), _main_left_alone():
                 process.start()
         finally:
             for name, value in kept.items():
@@ -187,29 +185,11 @@ def _main_left_alone() -> Iterator[None]:
         sys.modules["__main__"] = main
 
 
-@contextlib.contextmanager
-def _interrupts_held() -> Iterator[None]:
-    """Keep Ctrl-C waiting while a worker starts, which inherits that and so never sees one."""
-    if not hasattr(signal, "pthread_sigmask"):  # pragma: no cover - Windows
-        yield
-        return
-    resource_tracker.ensure_running()  # a process of its own, which undoes the hold when it starts
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
-
-
 def _work(pipe: Connection, base: Mapping[str, Any], memory_bytes: int) -> None:
     """A worker's life: run what comes, until the pipe closes."""
     _bound_memory(memory_bytes)
     look_seldom()
-    # Ctrl-C goes to the whole group: the parent decides.
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    if hasattr(signal, "pthread_sigmask"):
-        signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
-    threading.Thread(target=_end_with_parent, daemon=True).start()
+    obey_the_parent()
     runner = TrialRunner(base)
     try:
         pipe.send(None)  # ready
@@ -227,11 +207,3 @@ def _bound_memory(most_bytes: int) -> None:
         _, hard = resource.getrlimit(resource.RLIMIT_DATA)
         most = most_bytes if hard == resource.RLIM_INFINITY else min(most_bytes, hard)
         resource.setrlimit(resource.RLIMIT_DATA, (most, hard))
-
-
-def _end_with_parent() -> None:
-    """End at once when the parent is gone, however it went: nobody wants what this one still computes."""
-    parent = multiprocessing.parent_process()
-    if parent is not None:
-        wait([parent.sentinel])
-        os._exit(1)
