@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
-import numpy as np
+from pathlib import Path
 
+import numpy as np
+import pytest
+from PIL import Image
+
+import pilotage as pl
 from pilotage.maps.landmarks import Landmarks
 from pilotage.report.map_picture import landmark_labels
 
@@ -30,3 +35,15 @@ def test_the_labels_of_a_map_stand_apart_and_hold_every_landmark() -> None:
         for _, label in labels
     )
     assert counted == 40
+
+
+def test_a_map_is_drawn_beside_its_own_image(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A ROS map's image has the map's name, and a second drawing the first one's: both were refused."""
+    cells = np.full((40, 60), 254, np.uint8)
+    cells[[0, -1]] = 0
+    Image.fromarray(cells).save(tmp_path / "hall.png")
+    image = (tmp_path / "hall.png").read_bytes()
+    (tmp_path / "hall.yaml").write_text("image: hall.png\nresolution: 0.05\norigin: [0, 0, 0]\nnegate: 0\n")
+    monkeypatch.chdir(tmp_path)
+    assert [str(pl.draw("hall.yaml").path) for _ in range(2)] == ["hall-2.png", "hall-3.png"]
+    assert (tmp_path / "hall.png").read_bytes() == image

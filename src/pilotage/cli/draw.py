@@ -20,7 +20,8 @@ Resolution: TypeAlias = Annotated[
 def draw(
     map_: Annotated[str, typer.Argument(metavar="MAP", help=MAP_HELP)],
     out: Annotated[
-        Path | None, typer.Option(metavar="FILE.png", help="The picture; default the map's name, .png.")
+        Path | None,
+        typer.Option(metavar="FILE.png", help="The picture; default MAP.png, or the next number."),
     ] = None,
     resolution: Resolution = None,
     json: Json = False,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,6 +18,9 @@ from pilotage.maps.occupancy_grid import OCCUPIED_FROM
 from pilotage.maps.vectorize import wall_segments, write_wall_map
 from pilotage.maps.world_map import WorldMap
 from pilotage.missions.map_choice import GridMap
+
+MOST_PICTURES = 1000
+"""Of one name in a folder."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,7 +52,8 @@ def draw(
     map
         A shipped map's name or a file of any format that ``plan`` and missions take.
     out
-        A PNG file; None: the map's name in the working folder.
+        A PNG file; None: the map's name in the working folder, with a number behind it where that name is
+        taken, as it often is by the image of a ROS map.
     resolution_m
         Metres a cell of a file that does not say, such as an image.
 
@@ -68,15 +73,24 @@ def draw(
 
     source = given.path("map", map)
     chart = _chart(source, resolution_m)
-    path = Path(f"{source.stem}.png") if out is None else given.path("--out", out)
+    path = _unused(source.stem) if out is None else given.path("--out", out)
     if path.suffix.lower() != ".png":
         raise InputError(f"--out: expected a PNG file, found '{path}'")
-    if path.is_dir() or (out is None and path.exists()):
+    if path.is_dir():
         raise InputError(f"--out: expected a file that can be written, found '{path}' there; name another")
     if not path.parent.is_dir():
         raise InputError(f"--out: expected a folder that is there, found none: '{path.parent}'")
     draw_map(chart, path)
     return Drawn(path, layers_of(chart))
+
+
+def _unused(stem: str) -> Path:
+    """A picture's name in the working folder that nothing there has."""
+    names = (f"{stem}.png", *(f"{stem}-{number}.png" for number in range(2, MOST_PICTURES + 1)))
+    free = next((path for path in map(Path, names) if not os.path.lexists(path)), None)
+    if free is None:
+        raise InputError(f"--out: expected a name, found {names[0]} to {names[-1]} all taken; name another")
+    return free
 
 
 @interruptible()
