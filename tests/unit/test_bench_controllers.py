@@ -170,6 +170,7 @@ def test_it_drives_judges_and_writes(tmp_path: Path, capsys: pytest.CaptureFixtu
         (("doors", "doors"), "found one twice"),
         (("doors", "--controller", "dwaa"), "did you mean 'dwa'"),
         (("bottleneck-0.36",), "found the robot too wide"),
+        (("doors", "corridor", "--set", "robot.footprint={radius_m: 0.9}"), "found the robot too wide"),
         (("doors", "--set", "stack.local_controller.name=vfh"), "say --controller NAME"),
     ],
 )

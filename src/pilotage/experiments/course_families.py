@@ -115,18 +115,24 @@ def _walled(
     goal: tuple[float, float],
     driver: Driver,
     people: tuple[Mapping[str, Any], ...] = (),
-) -> Course:
-    """A course of straight walls."""
+) -> Course | None:
+    """A course of straight walls; None where the body's inner disc fits not at its ends, or not between."""
     low, high = walls.reshape(-1, 2).min(axis=0) - 0.5, walls.reshape(-1, 2).max(axis=0) + 0.5
     bounds = (float(low[0]), float(low[1]), float(high[0]), float(high[1]))
     floor = SegmentMap(walls, np.zeros((0, 3)), bounds)
+    inner, motion = driver.footprint.inner_radius_m, driver.motion
+    if min(floor.distance_m(*start[:2]), floor.distance_m(*goal)) < inner:
+        return None
+    limits = motion.top_speed_m_s, motion.braking_m_s2
+    bound = time_bound_s(floor, start[:2], goal, TOLERANCE_M, inner, *limits)
+    if bound is None:
+        return None
     drawn = {
         "map": f"{family}-{number}",
         "bounds_m": list(bounds),
         "walls_m": walls.tolist(),
         "circles_m": [],
     }
-    bound = _bound_s(floor, start, goal, driver)
     return Course(family, number, {"world.map": drawn, **_places(start, goal)}, bound, people)
 
 
@@ -179,7 +185,7 @@ def _corridor(rng: np.random.Generator) -> tuple[FloatArray, tuple[float, float,
     return np.vstack([*rows, caps]), (0.0, 0.0, 0.5 * math.pi), (float(goal[0]), float(goal[1]))
 
 
-def _crowd(number: int, rng: np.random.Generator, driver: Driver) -> Course:
+def _crowd(number: int, rng: np.random.Generator, driver: Driver) -> Course | None:
     """Across a hall with four pillars in which twelve people walk between its sides."""
     walls = _hall(12.0, 12.0)
     for x, y in ((4.0, 4.0), (8.0, 4.0), (4.0, 8.0), (8.0, 8.0)):
@@ -244,7 +250,7 @@ def _beside(circles_m: FloatArray, here: FloatArray, there: FloatArray) -> Float
     return np.asarray(np.hypot(*(here + t[:, None] * step - circles_m[:, :2]).T) - circles_m[:, 2])
 
 
-def _crossing(file: str, number: int, rng: np.random.Generator, driver: Driver) -> Course:
+def _crossing(file: str, number: int, rng: np.random.Generator, driver: Driver) -> Course | None:
     """Across the middle of where recorded people walk, in any direction, at a time when somebody is there."""
     tracks = read_people(Path(file))
     middle = np.median(tracks.places_xy_m, axis=0)
