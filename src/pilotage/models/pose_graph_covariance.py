@@ -9,7 +9,7 @@ import numpy as np
 from pilotage.core.errors import InputError
 from pilotage.core.types import BoolArray, FloatArray, IntArray
 from pilotage.kernels.slam.block_cholesky import factorize
-from pilotage.kernels.slam.covariances import column_products, inverse_blocks, inverse_columns
+from pilotage.kernels.slam.covariances import column_products, inverse_blocks, inverse_columns, joint_products
 from pilotage.kernels.slam.edges import SQUARE, normal_equations
 from pilotage.models.pose_graph import PoseGraph
 from pilotage.models.pose_graph_solver import Elimination, check_fixed, eliminate
@@ -38,9 +38,7 @@ class JointCovariance:
 
     def among(self, chosen: IntArray) -> FloatArray:
         """(3 K, 3 K) of some of the poses (K,)."""
-        count = chosen.size
-        out = self.blocks(np.repeat(chosen, count), np.tile(chosen, count)).reshape(count, count, 3, 3)
-        return np.asarray(out.transpose(0, 2, 1, 3).reshape(3 * count, 3 * count))
+        return joint_products(self.starts, self.path, self.columns, chosen)
 
     def relative(self, i: IntArray, j: IntArray) -> FloatArray:
         """(M, 3, 3) of x, y, theta of pose j as seen from pose i."""

@@ -117,6 +117,22 @@ def column_products(
 
 
 @kernel
+def joint_products(starts: IntArray, path: IntArray, columns: FloatArray, chosen: IntArray) -> FloatArray:
+    """Covariance (3 K, 3 K) of some (K,) of the chosen columns, by ``column_products`` of each two."""
+    count = chosen.size
+    out = np.empty((3 * count, 3 * count))
+    others = np.empty(count, np.int64)
+    for k in range(count):
+        others[:] = chosen[k]
+        blocks = column_products(starts, path, columns, others[k:], chosen[k:])
+        for m in range(k, count):
+            for r in range(3):
+                for s in range(3):
+                    out[3 * k + r, 3 * m + s] = out[3 * m + s, 3 * k + r] = blocks[m - k, r, s]
+    return out
+
+
+@kernel
 def _parent(column_start: IntArray, rows: IntArray, c: int) -> int:
     """The next column on the path to the root of the elimination tree, or -1."""
     return rows[column_start[c]] if column_start[c] < column_start[c + 1] else -1

@@ -368,6 +368,8 @@ def _support(edges: Edges, taken: BoolArray) -> IntArray:
 
 def _near(edges: Edges) -> BoolArray:
     """(M, M) which closures lie near each other along the path on both sides."""
-    near_i = np.abs(edges.i[:, None] - edges.i[None, :]) <= NEIGHBOURHOOD
-    near_j = np.abs(edges.j[:, None] - edges.j[None, :]) <= NEIGHBOURHOOD
+    # There may be thousands of them: no wider numbers than needed.
+    i, j = edges.i.astype(np.int32), edges.j.astype(np.int32)
+    near_i = np.abs(i[:, None] - i[None, :]) <= NEIGHBOURHOOD
+    near_j = np.abs(j[:, None] - j[None, :]) <= NEIGHBOURHOOD
     return np.asarray(near_i & near_j)
