@@ -286,7 +286,7 @@ def test_without_the_library(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
     for name in [name for name in sys.modules if name.split(".")[0] == "rosbags"]:
         monkeypatch.delitem(sys.modules, name)
     monkeypatch.setitem(sys.modules, "rosbags", None)
-    with pytest.raises(InputError, match=r"pip install pilotage\[ros\]"):
+    with pytest.raises(InputError, match=r"pip install -e '\.\[ros\]'"):
         read_bag(path)
 
 

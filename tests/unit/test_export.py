@@ -189,7 +189,7 @@ def test_a_missing_extra_is_one_line_and_leaves_nothing(
     assert main(["export", str(run.folder), "--to", to, "--out", str(tmp_path / "out")]) == 2
     said = capsys.readouterr()
     assert said.err.count("\n") == 1
-    assert f"pip install pilotage[{extra}]" in said.err
+    assert f"pip install -e '.[{extra}]'" in said.err
     assert list(tmp_path.iterdir()) == []
 
 

@@ -171,4 +171,4 @@ def test_without_ros_the_remedy_is_said(
     assert main(words) == 2
     said = capsys.readouterr()
     assert said.err.count("\n") == 1
-    assert "pip install pilotage[ros2]" in said.err
+    assert "pip install -e '.[ros2]'" in said.err

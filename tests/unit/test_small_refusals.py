@@ -149,5 +149,8 @@ def test_a_strategy_without_a_patrol_is_refused() -> None:
 
 
 def test_starts_of_a_team_are_told_by_the_name_they_were_given_under() -> None:
-    with pytest.raises(InputError, match=r"^team\.starts\.0: input should be a mapping, found \[1, 1\]"):
+    with pytest.raises(
+        InputError,
+        match=r"^team\.starts\.0: expected a mapping with keys of theta_rad, x_m, y_m, found \[1, 1\]",
+    ):
         load_mission("museum-patrol", ["team.size=2", "team.starts=[[1, 1], [3, 3]]"], 0)

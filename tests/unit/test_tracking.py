@@ -249,7 +249,7 @@ def test_films_without_a_map_are_refused_in_one_line(
 
 def test_without_opencv_the_remedy_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "cv2", None)
-    with pytest.raises(InputError, match=r"pilotage\[vision\]"):
+    with pytest.raises(InputError, match=r"pip install -e '\.\[vision\]'"):
         opencv()
 
 
