@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from pilotage.core.angles import wrap_to_pi
+from pilotage.kernels.geometry.motion import chord_ratio
 from pilotage.sensors.readings import OdometryIncrement
 
 NONE = (math.nan, math.nan, math.nan)
@@ -27,7 +28,7 @@ class OdometrySince:
         self._last = reading
         self._count += 1
         half = 0.5 * reading.angle_rad
-        chord = math.sin(half) / half if half != 0.0 else 1.0
+        chord = chord_ratio(reading.angle_rad)
         ahead, left = chord * reading.distance_m, chord * reading.lateral_m
         c, s = math.cos(self._theta + half), math.sin(self._theta + half)
         self._x += c * ahead - s * left
@@ -39,8 +40,7 @@ class OdometrySince:
         if self._last is None:
             return NONE
         last, count, theta = self._last, self._count, wrap_to_pi(self._theta)
-        half = 0.5 * theta
-        chord = math.sin(half) / half if half != 0.0 else 1.0
+        half, chord = 0.5 * theta, chord_ratio(theta)
         c, s = math.cos(half), math.sin(half)
         ahead, left = (c * self._x + s * self._y) / chord, (c * self._y - s * self._x) / chord
         self._last, self._count = None, 0
