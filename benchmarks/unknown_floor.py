@@ -3,7 +3,7 @@
 Each seed is run three times: ``museum-unknown`` (or the same stack on another map), the same with a perfect
 pose, and a mission from another random start to a goal with the built map as its own and a particle filter.
 On another map all starts are drawn on its largest floor, and the goal is where the exploration began.
-``python -m benchmarks.unknown_floor --seeds 5 [--map FILE --radius 0.2 --goal X Y]``.
+``python -m benchmarks.unknown_floor [--first 0] --seeds 5 [--map FILE --radius 0.2 --goal X Y]``.
 """
 
 from __future__ import annotations
@@ -25,18 +25,19 @@ ROOM_M = 0.3
 def main() -> None:
     """Print a line a seed, and how many succeeded; bad input is one line and exit 2."""
     parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--first", type=int, default=0)
     parser.add_argument("--seeds", type=int, default=5)
     parser.add_argument("--map", default=None)
     parser.add_argument("--radius", type=float, default=0.3)
     parser.add_argument("--goal", type=float, nargs=2, default=None)
     asked = parser.parse_args()
     try:
-        explore(asked.seeds, asked.map, asked.radius, asked.goal)
+        explore(range(asked.first, asked.first + asked.seeds), asked.map, asked.radius, asked.goal)
     except InputError as error:
         parser.exit(2, f"unknown_floor: {error}\n")
 
 
-def explore(seeds: int, chart: str | None, radius_m: float, goal_xy_m: tuple[float, float] | None) -> None:
+def explore(seeds: range, chart: str | None, radius_m: float, goal_xy_m: tuple[float, float] | None) -> None:
     """Run every seed three times.
 
     Raises
@@ -51,7 +52,7 @@ def explore(seeds: int, chart: str | None, radius_m: float, goal_xy_m: tuple[flo
     if chart is not None:
         place += [f"world.map={chart}", "world.start=null"]
     done = second = 0
-    for seed in range(seeds):
+    for seed in seeds:
         with tempfile.TemporaryDirectory() as folder:
             run = run_mission(load_mission("museum-unknown", place, seed), out=Path(folder))
             told = run.metrics
@@ -83,7 +84,7 @@ def explore(seeds: int, chart: str | None, radius_m: float, goal_xy_m: tuple[flo
             f"path over the oracle's {ratio:.2f}; second mission {again['success']} ({again['reason']})",
             flush=True,
         )
-    print(f"explored {done} of {seeds}; second missions {second} of {seeds}")
+    print(f"explored {done} of {len(seeds)}; second missions {second} of {len(seeds)}")
 
 
 def _start_of(run_dir: Path) -> tuple[float, float]:

@@ -10,7 +10,7 @@ from pilotage.kernels.arrays import FloatArray, IntArray
 from pilotage.kernels.jit import kernel
 from pilotage.kernels.slam.frames import between, composed
 from pilotage.kernels.slam.local_map import LocalMap, add_to_map
-from pilotage.kernels.slam.movers import Views, add_view, without_movers
+from pilotage.kernels.slam.movers import MOST, Views, add_view, without_movers
 from pilotage.kernels.slam.neighbourhood import is_best_near
 from pilotage.kernels.slam.placing import (
     CREDIBLE,
@@ -71,10 +71,11 @@ def _walls(
     motions, credible = guessed_motions(track.errors, track.velocity, step, led, dt_s)
     out.motions[: motions.shape[0]] = motions
     out.counts[0], out.counts[1] = motions.shape[0], credible
+    track.moving[1] = np.nan
     if not led or track.errors.min() >= SURE_GUESS:
         return np.arange(points.shape[0])
-    rows, crowded = without_movers(points, composed(track.pose, motions[0]), map_, views)
-    track.crowded[0] += crowded
+    rows, track.moving[1] = without_movers(points, composed(track.pose, motions[0]), map_, views)
+    track.crowded[0] += track.moving[1] >= MOST
     return rows
 
 
@@ -163,6 +164,7 @@ def settle(
     track.residuals[0] += told[2]
     track.residuals[1] += 1.0
     track.since[0] += 1
+    track.moving[0] = track.moving[1]
     motion = between(track.pose, pose)
     if led:
         learn_wheels(track.wheels, step, motion, holds_along(pose, hessian, told[3]))

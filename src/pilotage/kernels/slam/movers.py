@@ -166,13 +166,47 @@ def seen_through(points: FloatArray, pose: FloatArray, known: BoolArray, views: 
 
 
 @kernel
+def looked_through(
+    points: FloatArray, pose: FloatArray, known: FloatArray, at: FloatArray
+) -> tuple[int, int]:
+    """How many of an earlier scan's points (N, 2 or more) a scan (K, 2 or more) sees something behind.
+
+    Both at their poses (3,). Nobody sees through a wall: many that do speak against where the scan lies.
+
+    Returns
+    -------
+    That, and how many of the points lie between the scan's outer beams and are near enough to be told.
+    """
+    view, count = polar(points), points.shape[0]
+    through = asked = 0
+    if count < LEAST_BEAMS:
+        return through, asked
+    last = 0.0
+    for k in range(count):
+        last = max(last, view[k, 0])
+    off = between(pose, at)
+    c, s = math.cos(off[2]), math.sin(off[2])
+    for k in range(known.shape[0]):
+        x = off[0] + c * known[k, 0] - s * known[k, 1]
+        y = off[1] + s * known[k, 0] + c * known[k, 1]
+        square = x * x + y * y
+        if square > FARTHEST_M * FARTHEST_M or square < NEAREST_M * NEAREST_M:
+            continue
+        bearing = (bearing_of(x, y) - view[count, 0]) % (2.0 * math.pi)
+        if bearing <= last:
+            asked += 1
+            through += _went_on(view, count, bearing, math.sqrt(square), MARGIN_M, BESIDE_M)
+    return through, asked
+
+
+@kernel
 def without_movers(
     points: FloatArray, pose: FloatArray, map_: LocalMap, views: Views
-) -> tuple[IntArray, bool]:
+) -> tuple[IntArray, float]:
     """Rows (N,) of a scan's points (K, 2 or more) at about a pose (3,) that have not come there.
 
-    Those where the map has a wall have not. Where ``MOST`` of the scan seem to move it is left whole, and
-    the second answer is true.
+    Those where the map has a wall have not. Where ``MOST`` of the scan seem to move it is left whole. The
+    second answer is the share that seems to.
     """
     paired = np.empty(points.shape[0], np.int64)
     looked_up(map_, points, pose[0], pose[1], pose[2], paired)
@@ -185,6 +219,7 @@ def without_movers(
             known[k] = dx * dx + dy * dy < KNOWN_M * KNOWN_M
     moving = seen_through(points, pose, known, views)
     count = int(np.count_nonzero(moving))
-    if count == 0 or count >= MOST * points.shape[0]:
-        return np.arange(points.shape[0]), count > 0
-    return np.flatnonzero(~moving), False
+    share = count / max(points.shape[0], 1)
+    if count == 0 or share >= MOST:
+        return np.arange(points.shape[0]), share
+    return np.flatnonzero(~moving), share

@@ -32,6 +32,9 @@ class Track(NamedTuple):
         (2,) sum of the residuals' root mean squares of all scans, and how many there were.
     since
         (1,) how many scans were placed since the last keyframe.
+    moving
+        (2,) which share of the scan that was placed last, and of the one looked at, seemed to have come where
+        it stands; not a number where that was not asked.
     wheels
         What the odometry is always off by.
     """
@@ -46,6 +49,7 @@ class Track(NamedTuple):
     crowded: IntArray
     residuals: FloatArray
     since: IntArray
+    moving: FloatArray
     wheels: Wheels
 
 

@@ -22,11 +22,12 @@ from pilotage.kernels.slam.local_map import (
     align_in_map,
     empty_map,
 )
-from pilotage.kernels.slam.movers import empty_views
+from pilotage.kernels.slam.movers import empty_views, looked_through
 from pilotage.kernels.slam.placing import (
     ITERATIONS,
     LONG_M,
     POOR,
+    POOR_AS_GUESSED,
     REACH_M,
     SCALE_M,
     distance,
@@ -48,6 +49,9 @@ PRIOR = np.diag([2.0, 2.0, 20.0])
 scan a little towards an odometry whose errors all have one sign."""
 NONE = 0.3
 """Fit over its running mean below which it is no fit at all: what hangs by so few points hangs by chance."""
+CHANGED, LEAST_ASKED = 0.2, 40
+"""Shares of a scan that came all at once, and of what was last seen that it sees through (of so many points
+at least), from which on together a poor fit is none: in recorded buildings 0.07 at most."""
 SEARCH_STEP_RAD = 0.02
 FAR, LEAST_FAR = 0.65, 0.12
 """Share of the usual fit that a place far from all guesses takes, and what its distance must leave of it."""
@@ -104,6 +108,7 @@ class LocalMatcher:
             np.zeros(1, np.int64),
             np.zeros(2),
             np.zeros(1, np.int64),
+            np.full(2, np.nan),
             unknown_wheels(),
         )
         self.found = Look(
@@ -259,10 +264,21 @@ class LocalMatcher:
                         best = judged
         if best is None or best.value < NONE * usual:
             best = self._far(cloud, last, motions[0], None if step is None else credible, led)
-        if best is None:
+        if best is None or self._is_contradicted(best, cloud):
+            best = None
             self.lost += 1
             self._lost_s += dt_s
         return best
+
+    def _is_contradicted(self, fit: Fit, cloud: FloatArray) -> bool:
+        """Whether the world looks so different from where a scan fits poorly that it lies elsewhere."""
+        if fit.value >= POOR_AS_GUESSED * self.track.usual[0]:
+            return False
+        before, now = self.track.moving.tolist()
+        came = max(now - before, 0.0) if now >= before else 0.0
+        known, at = self._local[-1] if self._local else (cloud[:0], fit.pose)
+        through, asked = looked_through(cloud, fit.pose, known, np.asarray(at))
+        return came + through / max(asked, LEAST_ASKED) > CHANGED
 
     def _odometry_leads(self, step: FloatArray | None) -> bool:
         errors = self.track.errors
