@@ -51,7 +51,7 @@ NONE = 0.3
 """Fit over its running mean below which it is no fit at all: what hangs by so few points hangs by chance."""
 CHANGED, LEAST_ASKED = 0.2, 40
 """Shares of a scan that came all at once, and of what was last seen that it sees through (of so many points
-at least), from which on together a poor fit is none: in recorded buildings 0.07 at most."""
+at least), from which on together a poor fit is none (decision 0372)."""
 SEARCH_STEP_RAD = 0.02
 FAR, LEAST_FAR = 0.65, 0.12
 """Share of the usual fit that a place far from all guesses takes, and what its distance must leave of it."""
