@@ -17,6 +17,7 @@ from pilotage.stack.patrol.graph import PatrolGraph
 from pilotage.stack.patrol.meetings import keeps_apart, slowed, waits_m
 from pilotage.stack.patrol.partition import Plan
 from pilotage.stack.patrol.passages import OPEN, Passages
+from pilotage.stack.patrol.roadmap import Roadmap
 from pilotage.stack.patrol.strategies.adaptive_rounds import AdaptiveRoundsConfig, best_plan
 from pilotage.stack.patrol.strategy import PatrolSetting
 from pilotage.stack.patrol.tours import Round
@@ -63,6 +64,28 @@ def test_a_door_has_room_for_one_or_for_two(width_m: float, pieces: int) -> None
         assert there.end_m - there.begin_m < 1.0
         assert (back.begin_m, back.end_m) == pytest.approx((4.0 - there.end_m, 4.0 - there.begin_m))
         assert back.piece == there.piece
+
+
+@pytest.mark.parametrize(
+    ("width_m", "is_for_one"), [(0.9, 1), (1.0, 1), (1.2, 1), (1.35, 1), (1.6, 0), (3.0, 0)]
+)
+def test_for_lanes_a_door_is_as_wide_as_it_is(width_m: float, is_for_one: int) -> None:
+    """In a thin wall, wherever it lies between the nodes; nothing else is narrow, no corner of a room."""
+    clearance_m, lane_m, pass_m = 0.38, 0.35, 0.73
+    for shift_m in (0.0, 0.04, 0.07, 0.11):
+        x, low, high = 4.0 + shift_m, 2.5 + shift_m - 0.5 * width_m, 2.5 + shift_m + 0.5 * width_m
+        world = walled(8, 5, (x, 0, x, low), (x, high, x, 5))
+        places = np.array([[2.0, 2.5], [6.0, 2.5]])
+        roadmap = Roadmap(world, places, np.zeros((0, 2)), clearance_m, 1.0, 0.15, 0.5, lane_m)
+        told = [
+            roadmap.narrowest_m(x - ahead_m, 2.5 + off_m, roadmap.time_s(1), 5.0, 2.0)[1] < pass_m
+            for ahead_m in (0.5, 0.7, 0.9, 1.1)
+            for off_m in (-0.6, 0.0, 0.6)
+        ]
+        assert all(told) if is_for_one else not any(told)
+        rows, columns = np.nonzero(np.isfinite(roadmap.slowness) & (roadmap._width_m < pass_m))
+        off = np.hypot(0.15 * columns - x, 0.15 * rows - 2.5 - shift_m)
+        assert len(off) == 0 or (is_for_one and off.max() < 0.8)
 
 
 def test_who_turns_within_a_corridor_was_in_it_once() -> None:

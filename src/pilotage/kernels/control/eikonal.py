@@ -228,6 +228,7 @@ def narrowest_down(
     y: float,
     time: FloatArray,
     values: FloatArray,
+    soon_values: FloatArray,
     x0: float,
     y0: float,
     spacing: float,
@@ -235,7 +236,7 @@ def narrowest_down(
     steps: int,
     few: int,
 ) -> tuple[float, float]:
-    """The least of ``values`` on the way down from a place (``way_down``), and on its first ``few`` steps.
+    """The least of ``values`` on the way down from a place (``way_down``); of others on its first steps.
 
     Infinite off the grid.
     """
@@ -244,7 +245,8 @@ def narrowest_down(
     for k in range(way.shape[0]):
         least = min(least, way[k, 2])
         if k <= few:
-            soon = least
+            row, column = round((way[k, 1] - y0) / spacing), round((way[k, 0] - x0) / spacing)
+            soon = min(soon, soon_values[row, column])
     return least, soon
 
 

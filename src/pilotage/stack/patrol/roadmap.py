@@ -86,7 +86,7 @@ class Roadmap:
     def _lay(self, spacing_m: float) -> None:
         """Lay the nodes over the ground."""
         self.spacing_m, self.origin_xy_m = spacing_m, self._ground.bounds_m[:2]
-        self.slowness, self._room_m = self._ground.nodes(spacing_m)
+        self.slowness, self._room_m, self._width_m = self._ground.nodes(spacing_m)
         # Where there is room for all fields nobody need know which of them was asked for last.
         self._all_kept = len(self._places) * self.slowness.nbytes <= MOST_FIELD_BYTES
         self._seeds = self._joined(self._ground.clearance_m)
@@ -337,11 +337,13 @@ class Roadmap:
     def narrowest_m(
         self, x_m: float, y_m: float, time_s: FloatArray, reach_m: float, soon_m: float
     ) -> tuple[float, float]:
-        """Half the width of the narrowest place of ``way``, of all and up to ``soon_m``; inf off the map."""
+        """Half the width of the narrowest place of ``way``, and how narrow it is itself up to ``soon_m``.
+
+        Infinite off the map.
+        """
         steps, few = math.ceil(reach_m / STEP_M), math.ceil(soon_m / STEP_M)
-        return eikonal.narrowest_down(
-            x_m, y_m, time_s, self._room_m, *self.origin_xy_m, self.spacing_m, STEP_M, steps, few
-        )
+        ground = self._room_m, self._width_m, *self.origin_xy_m, self.spacing_m
+        return eikonal.narrowest_down(x_m, y_m, time_s, *ground, STEP_M, steps, few)
 
     def away_m(self, place: int, x_m: float, y_m: float) -> float:
         """How far a place is from another as the crow flies."""
