@@ -14,6 +14,8 @@ from pilotage.records import scans as records
 from pilotage.sensors.beacon import BeaconConfig
 from pilotage.sensors.lidar import LidarConfig
 from pilotage.sensors.readings import BeaconReadings, LidarScan, Readings
+from pilotage.sensors.sensor import SensorConfig
+from pilotage.stack.perception.joint_scan import JointScan
 
 APART_S = 0.2
 """Scans at least so far apart: at five a second the eye sees them move with the robot."""
@@ -23,10 +25,13 @@ MOST_SCANS = 4000
 
 
 class Sightings:
-    """Collects scans of the first lidar and the ids that the first beacon sensor saw, step by step."""
+    """Collects the lidar's scans, of several the joint ones, and the ids that the first beacon sensor saw."""
 
-    def __init__(self, sensors: dict[str, object]) -> None:
-        self._lidar, self._config = _first(sensors, LidarConfig)
+    def __init__(self, sensors: dict[str, SensorConfig]) -> None:
+        self._join = JointScan.of(sensors)
+        name, sheet = _first(sensors, LidarConfig)
+        self._lidar: str | None = name if self._join is None else self._join.name
+        self._config: LidarConfig | None = sheet if self._join is None else self._join.sheet
         self._beacons, _ = _first(sensors, BeaconConfig)
         self._stride = 1 if self._config is None else max(1, math.ceil(self._config.beams / MOST_BEAMS))
         self._apart_s = APART_S
@@ -45,10 +50,11 @@ class Sightings:
         self._seen.append(seen)
         if self._lidar is None:
             return
-        scan = readings.by_sensor.get(self._lidar)
         # A microsecond of slack: step times are sums of dt.
-        due = not self._scan_t_s or readings.t_s - self._scan_t_s[-1] >= self._apart_s - 1e-6
-        if isinstance(scan, LidarScan) and due:
+        if self._scan_t_s and readings.t_s - self._scan_t_s[-1] < self._apart_s - 1e-6:
+            return
+        scan = (readings if self._join is None else self._join.add(readings)).by_sensor.get(self._lidar)
+        if isinstance(scan, LidarScan):
             self._scan_t_s.append(readings.t_s)
             self._scans.append(scan.ranges_m[:: self._stride].astype(np.float32))
             if len(self._scans) > MOST_SCANS:
@@ -77,6 +83,6 @@ class Sightings:
         return records.sighting_arrays(self.seen())
 
 
-def _first(sensors: dict[str, object], config: type[Any]) -> tuple[str | None, Any]:
+def _first(sensors: dict[str, SensorConfig], config: type[Any]) -> tuple[str | None, Any]:
     """Name and config of the first sensor of a kind."""
     return next(((name, c) for name, c in sensors.items() if isinstance(c, config)), (None, None))

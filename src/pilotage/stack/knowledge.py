@@ -20,6 +20,7 @@ from pilotage.missions.explorer import ExplorerConfig, FirmwareConfig
 from pilotage.models.footprint import Footprint
 from pilotage.models.motion.motion import MotionConfig
 from pilotage.models.motion.wheel_drive import WheelDriveConfig
+from pilotage.sensors.joint_lidar import JointLidarConfig
 from pilotage.sensors.sensor import SensorConfig
 from pilotage.sensors.wheel_encoders import WheelEncodersConfig
 from pilotage.stack.interface import Belief
@@ -36,7 +37,7 @@ class RobotKnowledge:
     name
         As the mission calls it.
     footprint, motion, sensors
-        Its outline, how it moves, and what it carries, by name.
+        Its outline, how it moves, and what it carries, by name; with several lasers their joint one besides.
     dt_s
         The period of a step.
     streams
@@ -56,8 +57,15 @@ class RobotKnowledge:
         return self.footprint.radius_m
 
     def sensors_of(self, kind: type[S]) -> dict[str, S]:
-        """All sensors of one kind by name."""
-        return {name: config for name, config in self.sensors.items() if isinstance(config, kind)}
+        """All sensors of one kind by name; of lasers that are joined to one, that one alone."""
+        joined = {
+            of for config in self.sensors.values() if isinstance(config, JointLidarConfig) for of in config.of
+        }
+        return {
+            name: config
+            for name, config in self.sensors.items()
+            if isinstance(config, kind) and name not in joined
+        }
 
     def one_sensor(self, kind: type[S], needed_by: str) -> tuple[str, S]:
         """Return the only sensor of one kind.

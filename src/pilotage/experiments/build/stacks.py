@@ -32,6 +32,7 @@ from pilotage.stack.localization.localizer import LOCALIZERS, Localizer
 from pilotage.stack.mapping.mapper import MAPPERS
 from pilotage.stack.navigator.navigator import Parts
 from pilotage.stack.patrol.task import PatrolTask
+from pilotage.stack.perception.joint_scan import JoiningStack, with_joint_lidar
 from pilotage.stack.planning.local_planner import LOCAL_PLANNERS
 from pilotage.stack.planning.planner import PLANNERS, SMOOTHERS
 from pilotage.stack.planning.rounds import Rounds, best_rounds
@@ -120,6 +121,7 @@ def build_stack(
     """
     if "explorer" in oracles and truth is not None:
         return knowing_explorer(robot, task, truth, journal)
+    robot, join = with_joint_lidar(robot)
     localizer = _localizer(config, robot, chart, task, journal, truth, oracles)
     parts = Parts(
         localizer=localizer,
@@ -140,7 +142,8 @@ def build_stack(
         parts = with_oracles(parts, oracles, truth, robot)
     stack = build_component(NAVIGATORS, config.navigator, "navigator", robot, chart, task, parts, journal)
     watched = parts.localizer
-    return WatchedStack(stack, watched.watched) if isinstance(watched, WatchedLocalizer) else stack
+    stack = WatchedStack(stack, watched.watched) if isinstance(watched, WatchedLocalizer) else stack
+    return stack if join is None else JoiningStack(stack, join)
 
 
 def _heading(config: StackConfig, task: TaskKnowledge) -> HeadingFilter | None:

@@ -1,0 +1,166 @@
+"""A robot with several lidars: all that runs on it takes them as one."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pilotage.core.errors import InputError
+from pilotage.core.types import FloatArray, Pose2
+from pilotage.experiments.build.build import build
+from pilotage.experiments.loop import run_loop
+from pilotage.experiments.mission import load_mission
+from pilotage.kernels.scans.rays import narrow_fan
+from pilotage.missions.mission import Mission
+from pilotage.sensors.joint_lidar import joint_lidar
+from pilotage.sensors.lidar import LidarConfig
+from pilotage.sensors.readings import LidarScan, Readings
+from pilotage.sensors.sensor import Mount, SensorConfig
+from pilotage.stack.perception.joint_scan import JointScan
+
+TWO = """
+extends: {mission}
+robot:
+  sensors:
+    lidar: null
+    front: {{name: lidar, rate_hz: 10, beams: 240, field_of_view_rad: 3.4, mount: {{x_m: 0.2}}}}
+    back: {{name: lidar, rate_hz: 10, beams: 240, field_of_view_rad: 3.4,
+           mount: {{x_m: -0.2, theta_rad: 3.14159}}}}
+"""
+CORNERS: dict[str, SensorConfig] = {
+    "front": LidarConfig(beams=541, mount=Mount(x_m=0.3, y_m=0.2, theta_rad=0.25 * math.pi)),
+    "back": LidarConfig(beams=541, mount=Mount(x_m=-0.3, y_m=-0.2, theta_rad=-0.75 * math.pi)),
+}
+# A long hall, seen aslant to its end, and a post in it.
+HALL = np.array(
+    [[-9.0, -1.0, 18.0, -1.0], [18.0, -1.0, 18.0, 1.4], [18.0, 1.4, -9.0, 1.4], [-9.0, 1.4, -9.0, -1.0]]
+)
+POST = np.array([[3.0, 0.5, 0.05]])
+
+
+def seen(sheet: LidarConfig, body: Pose2) -> FloatArray:
+    """What a laser without noise reads in the hall."""
+    mount = sheet.mount
+    at = body.compose(Pose2(mount.x_m, mount.y_m, mount.theta_rad))
+    angles, out = sheet.beam_angles_rad(), np.full(sheet.beams, sheet.max_range_m)
+    turned = angles - angles[0]
+    first_rad = at.theta_rad + float(angles[0])
+    looks = (np.cos(turned), np.sin(turned))
+    narrow_fan(out, at.x_m, at.y_m, first_rad, sheet.beam_step_rad, *looks, sheet.max_range_m, HALL, POST)
+    return out
+
+
+def joined(sensors: dict[str, SensorConfig], body: Pose2) -> tuple[JointScan, FloatArray]:
+    """The joint scan in the hall."""
+    join = JointScan.of(sensors)
+    assert join is not None
+    scans = {
+        name: LidarScan(seen(sheet, body))
+        for name, sheet in sensors.items()
+        if isinstance(sheet, LidarConfig)
+    }
+    scan = join.add(Readings(0.1, scans)).by_sensor[join.name]
+    assert isinstance(scan, LidarScan)
+    return join, scan.ranges_m
+
+
+def mission_of(tmp_path: Path, base: str, *overrides: str) -> Mission:
+    """A shipped mission whose robot has two lidars instead of one."""
+    file = tmp_path / "two.yaml"
+    file.write_text(TWO.format(mission=base))
+    return load_mission(str(file), overrides=list(overrides), seed=1)
+
+
+@pytest.mark.parametrize("turn_rad", [0.0, 0.03, 0.7, 2.5])
+def test_a_joint_scan_is_what_a_laser_between_them_would_see(turn_rad: float) -> None:
+    join, ranges_m = joined(CORNERS, Pose2(0.0, 0.0, turn_rad))
+    truth_m = seen(join.sheet, Pose2(0.0, 0.0, turn_rad))
+    told = ~np.isnan(ranges_m)
+    assert told.mean() > 0.98
+    off_m = np.abs(ranges_m - truth_m)[told]
+    # Walls aslant to the very end: beams that took the nearest return's range would be decimetres off there.
+    assert np.percentile(off_m, 97) < 0.002
+    angles = join.sheet.beam_angles_rad() + join.sheet.mount.theta_rad + turn_rad
+    towards = np.abs(np.remainder(angles - math.atan2(0.5, 3.0) + math.pi, 2 * math.pi) - math.pi) < 0.01
+    assert np.nanmin(ranges_m[towards]) == pytest.approx(math.hypot(3.0, 0.5) - 0.05, abs=0.02)
+
+
+def test_where_no_laser_looks_nothing_is_told() -> None:
+    narrow: dict[str, SensorConfig] = {
+        "front": LidarConfig(beams=91, field_of_view_rad=2.0),
+        "back": LidarConfig(beams=91, field_of_view_rad=2.0, mount=Mount(theta_rad=math.pi)),
+    }
+    join, ranges_m = joined(narrow, Pose2(0.0, 0.0, 0.0))
+    looks = (
+        np.remainder(join.sheet.beam_angles_rad() + join.sheet.mount.theta_rad + math.pi, 2 * math.pi)
+        - math.pi
+    )
+    sideways = np.abs(np.abs(looks) - 0.5 * math.pi) < 0.5 * math.pi - 1.05
+    assert sideways.any()
+    assert np.isnan(ranges_m[sideways]).all()
+    assert not np.isnan(ranges_m[np.abs(looks) < 0.95]).any()
+
+
+def test_two_lasers_that_look_ahead_do_not_see_what_is_behind() -> None:
+    ahead: dict[str, SensorConfig] = {
+        "left": LidarConfig(field_of_view_rad=2.0, mount=Mount(y_m=0.2, theta_rad=0.4)),
+        "right": LidarConfig(field_of_view_rad=2.0, mount=Mount(y_m=-0.2, theta_rad=-0.4)),
+    }
+    sheet = joint_lidar(ahead)
+    assert sheet is not None
+    assert sheet.field_of_view_rad == pytest.approx(2.8)
+    assert (sheet.mount.x_m, sheet.mount.y_m, sheet.mount.theta_rad) == pytest.approx(
+        (0.0, 0.0, 0.0), abs=1e-9
+    )
+    assert joint_lidar({"left": ahead["left"]}) is None
+
+
+def test_a_laser_that_reaches_less_says_nothing_of_what_is_beyond() -> None:
+    short = {**CORNERS, "back": LidarConfig(beams=541, max_range_m=3.0, mount=CORNERS["back"].mount)}
+    join, ranges_m = joined(short, Pose2(0.0, 0.0, 0.0))
+    looks = join.sheet.beam_angles_rad() + join.sheet.mount.theta_rad
+    behind = np.abs(np.remainder(looks, 2 * math.pi) - 3.27) < 0.06  # where the other does not look
+    assert behind.any()
+    assert np.isnan(ranges_m[behind]).all()  # the hall ends 9 m behind
+
+
+def test_the_particle_filter_weighs_both(tmp_path: Path) -> None:
+    base = ("stack.localizer=particle-filter", "stack.reactive=null", "run.time_limit_s=12")
+    off_m = []
+    for more in ((), ("robot.sensors.front=null",)):
+        run = run_loop(build(mission_of(tmp_path, "museum-1", *base, *more))).finished
+        trace = run.robots[0].trace
+        off = np.hypot(trace["est_x_m"] - trace["true_x_m"], trace["est_y_m"] - trace["true_y_m"])[20:]
+        cov = np.array([[trace["cov_xx_m2"], trace["cov_xy_m2"]], [trace["cov_xy_m2"], trace["cov_yy_m2"]]])[
+            ..., 20:
+        ]
+        wide = np.sqrt(np.linalg.eigvalsh(cov.transpose(2, 0, 1))[:, -1])
+        assert (off < 5.0 * wide + 0.002).all()  # it is as sure as it may be
+        off_m.append(float(np.sqrt((off**2).mean())))
+    assert off_m[0] < 0.004
+    assert off_m[0] < off_m[1] + 0.001  # no worse than by one alone
+
+
+@pytest.mark.parametrize(
+    ("base", "more"),
+    [
+        ("museum-walls", ()),
+        ("museum-1-fast", ()),
+        ("museum-unknown", ("stack.localizer=slam",)),
+        ("museum-patrol", ("team.size=1", "run.time_limit_s=3")),
+    ],
+)
+def test_whoever_asks_for_the_scan_takes_both(tmp_path: Path, base: str, more: tuple[str, ...]) -> None:
+    limit = () if base == "museum-patrol" else ("run.time_limit_s=3",)
+    finished = run_loop(build(mission_of(tmp_path, base, *more, *limit))).finished
+    trace = finished.robots[0].trace
+    assert finished.robots[0].collisions == 0
+    assert np.hypot(trace["est_x_m"] - trace["true_x_m"], trace["est_y_m"] - trace["true_y_m"])[-1] < 0.02
+
+
+def test_lasers_that_scan_at_other_times_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"one rate_hz.*front 10 Hz, back 5 Hz.*robot.sensors.back=null"):
+        build(mission_of(tmp_path, "museum-walls", "robot.sensors.back.rate_hz=5"))
