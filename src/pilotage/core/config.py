@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping
-from typing import Any, Self, TypeVar
+from collections.abc import Callable, Mapping
+from typing import Any, Self, TypeAlias, TypeVar, get_origin
 
 from pydantic import BaseModel, ConfigDict, ValidationError, model_validator
 
@@ -62,16 +62,28 @@ def _takes(annotation: Any, *kinds: type) -> bool:
 SMALLEST, LARGEST, LARGEST_WHOLE = 1e-100, 1e15, 2**63 - 1
 """Sizes of the numbers in files: metres, radians, seconds, their variances and counts are far within."""
 
+_DEEPEST = 4
+"""Levels of a file in which a key is looked for that stands at the wrong place."""
+_LISTS = (list, tuple, dict)
+
 ConfigT = TypeVar("ConfigT", bound=BaseModel)
 
 
-def validate(model: type[ConfigT], values: Any, where: str) -> ConfigT:
+Places: TypeAlias = Mapping[str, type[BaseModel]]
+"""What can be set at dotted places of a file beside what its model has."""
+
+
+def validate(
+    model: type[ConfigT], values: Any, where: str, more: Callable[[], Places] | None = None
+) -> ConfigT:
     """Validate ``values`` against ``model``.
 
     Parameters
     ----------
     where
         Dotted place of the values in the user's file, put before each key in the message.
+    more
+        Asked where a key is unknown: where else it may belong.
 
     Raises
     ------
@@ -84,7 +96,7 @@ def validate(model: type[ConfigT], values: Any, where: str) -> ConfigT:
     try:
         return model.model_validate(values)
     except ValidationError as error:
-        raise InputError(describe(error, model, where)) from None
+        raise InputError(describe(error, model, where, more)) from None
 
 
 def _out_of_range(value: Any, place: str) -> str | None:
@@ -103,7 +115,9 @@ def _out_of_range(value: Any, place: str) -> str | None:
     return None
 
 
-def describe(error: ValidationError, model: type[BaseModel], where: str) -> str:
+def describe(
+    error: ValidationError, model: type[BaseModel], where: str, more: Callable[[], Places] | None = None
+) -> str:
     """Turn a pydantic error into one line: place, expected, found, nearest right name."""
     errors = error.errors(include_url=False)
     # An unknown key is the likelier slip and explains a missing one: say it first.
@@ -114,6 +128,8 @@ def describe(error: ValidationError, model: type[BaseModel], where: str) -> str:
     if first["type"] == "extra_forbidden":
         known = _fields_at(model, path[:-1])
         close = nearest(path[-1], known)
+        away = elsewhere(model, path[-1], more() if more else {}, exactly=close is not None)
+        close = (f"{where}.{away}" if where else away) if away else close
         hint = f"did you mean '{close}'?" if close else "known keys: " + ", ".join(sorted(known))
         return f"{place}: unknown key; {hint}"
     if first["type"] == "missing":
@@ -143,6 +159,28 @@ def describe(error: ValidationError, model: type[BaseModel], where: str) -> str:
     if place and ", found " not in message:
         message += f", found {_show(first['input'])}"
     return f"{place}: {message}" if place else message
+
+
+def elsewhere(model: type[BaseModel], key: str, more: Places, *, exactly: bool = False) -> str | None:
+    """The dotted place at which a key belongs that stands where it is unknown, the one nearest to the top.
+
+    A key that begins as the asked one goes on counts for it (``radius`` is ``radius_m``) unless it has to be
+    named ``exactly``.
+    """
+    places, level = [], [("", model), *((f"{place}.", other) for place, other in more.items())]
+    for _ in range(_DEEPEST):
+        inner: list[tuple[str, type[BaseModel]]] = []
+        for place, owner in level:
+            for name, field in owner.model_fields.items():
+                places.append((name, place + name))
+                found = _model_in(field.annotation)
+                if found is not None and get_origin(field.annotation) not in _LISTS:
+                    inner.append((f"{place}{name}.", found))
+        level = inner
+    same = [place for name, place in places if name == key]
+    if not same and not exactly:
+        same = [place for name, place in places if len(key) > 2 and name.startswith(f"{key.lower()}_")]
+    return min(same, key=lambda place: place.count(".")) if same else None
 
 
 def _choices_of(error: Mapping[str, Any]) -> list[str]:

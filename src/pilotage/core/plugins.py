@@ -17,6 +17,7 @@ from importlib.metadata import entry_points
 from pathlib import Path
 
 from pilotage.core.errors import InputError
+from pilotage.core.neighbours import hint_beside
 from pilotage.core.shown import shown
 
 GROUP = "pilotage.plugins"
@@ -107,7 +108,8 @@ def load_file(path: str) -> None:
     if path in _loaded:
         return
     if not Path(path).is_file() or Path(path).suffix != ".py":
-        raise InputError(f"plugin '{path}': expected a Python file, found none there")
+        beside = hint_beside(Path(path), {".py"})
+        raise InputError(f"plugin '{path}': expected a Python file, found none there{beside}")
     name = f"pilotage_plugin_{len(_loaded)}_{Path(path).stem}"
     spec = importlib.util.spec_from_file_location(name, path)
     if spec is None or spec.loader is None:

@@ -10,8 +10,9 @@ from typing import Any
 
 from pilotage.core.config import validate
 from pilotage.core.errors import InputError, nearest, unknown_name
+from pilotage.core.neighbours import hint_beside
 from pilotage.core.plugins import add_plugins, is_package, named_plugins
-from pilotage.experiments.resolve import check_components
+from pilotage.experiments.resolve import check_components, component_places
 from pilotage.experiments.values import apply_override, apply_setting, merge, parse_yaml, read_text
 from pilotage.missions.mission import TOP_KEYS, Mission
 from pilotage.missions.old_keys import refuse_old_keys
@@ -82,7 +83,7 @@ def mission_of(
         names = [str(name) for name in plugins]
         add_plugins(names)
         changed["plugins"] = [*filter(is_package, names), *named_plugins()]
-    mission = validate(Mission, changed, "")
+    mission = validate(Mission, changed, "", more=lambda: component_places(changed))
     check_components(mission)
     return mission
 
@@ -91,7 +92,8 @@ def read_parameters(file: str) -> dict[str, Any]:
     """Read a file of parameters that is laid over a mission; only what a mission knows may be in it."""
     path = Path(file)
     if not path.is_file():
-        raise InputError(f"--set '@{file}': expected a YAML file of parameters, found none there")
+        beside = hint_beside(path, {".yaml", ".yml"})
+        raise InputError(f"--set '@{file}': expected a YAML file of parameters, found none there{beside}")
     values = parse_yaml(read_text(path), file)
     unknown = [str(key) for key in values if key not in TOP_KEYS]
     if unknown:
@@ -111,7 +113,8 @@ def read_mission(name_or_path: str, extended_by: tuple[str, ...] = ()) -> dict[s
     looks_like_file = path.suffix in {".yaml", ".yml"} or "/" in name_or_path
     if looks_like_file:
         if not path.is_file():
-            raise InputError(f"mission file '{name_or_path}': expected a YAML file, found none there")
+            beside = hint_beside(path, {".yaml", ".yml"})
+            raise InputError(f"mission file '{name_or_path}': expected a YAML file, found none there{beside}")
         values = parse_yaml(read_text(path), str(path))
         _anchor_map(values, path.parent)
     elif name_or_path in shipped_missions():

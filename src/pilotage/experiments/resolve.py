@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import yaml
+from pydantic import BaseModel
 
 from pilotage.core.errors import InputError
 from pilotage.core.plugins import is_package, package_of
@@ -67,6 +68,28 @@ def check_components(mission: Mission) -> None:
         With the nearest right name.
     """
     resolved_values(mission)
+
+
+def component_places(values: Mapping[str, Any]) -> dict[str, type[BaseModel]]:
+    """Where the components of a mission that is not validated yet take parameters, and which."""
+    found: dict[str, type[BaseModel]] = {}
+
+    def look(role: str, choice: Any, place: str) -> None:
+        name = choice.get("name") if isinstance(choice, Mapping) else choice
+        if isinstance(name, str) and name in ROLES[role].names():
+            found[place] = ROLES[role].entry(name).config
+
+    robot, stack = values.get("robot"), values.get("stack")
+    look("task", values.get("task"), "task")
+    if isinstance(robot, Mapping):
+        look("motion", robot.get("motion"), "robot.motion")
+        sensors = robot.get("sensors")
+        for name, choice in sensors.items() if isinstance(sensors, Mapping) else ():
+            look("sensor", choice, f"robot.sensors.{name}")
+    for role, choice in stack.items() if isinstance(stack, Mapping) else ():
+        if role in ROLES:
+            look(role, choice, f"stack.{role}")
+    return found
 
 
 def _resolve_stack(stack: dict[str, Any], where: str, packages: set[str]) -> None:

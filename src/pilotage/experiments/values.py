@@ -7,13 +7,14 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from pilotage.core.config import elsewhere
 from pilotage.core.errors import InputError, nearest
 from pilotage.core.files import read_values_text
 from pilotage.core.limits import DEPTH
 from pilotage.core.whole_number import whole_number
 from pilotage.core.yaml_text import load_yaml
 from pilotage.missions.choice import EXCLUSIVE
-from pilotage.missions.mission import TOP_KEYS
+from pilotage.missions.mission import TOP_KEYS, Mission
 
 
 def read_text(path: Path) -> str:
@@ -124,6 +125,7 @@ def _apply(values: dict[str, Any], parts: list[str], value: Any, told: str) -> N
     top = list(TOP_KEYS)
     if parts[0] not in top:
         close = nearest(parts[0], top)
+        close = elsewhere(Mission, parts[0], {}, exactly=close is not None) or close
         hint = f"did you mean '{close}'?" if close else "known: " + ", ".join(top)
         raise InputError(f"{told}: unknown key '{parts[0]}'; {hint}")
     place: Any = values

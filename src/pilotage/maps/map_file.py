@@ -40,6 +40,13 @@ class MapFile(Config):
     landmarks_count: int | None = None
     """Where given, how many the file must hold: a file cut in half is noticed."""
 
+    @staticmethod
+    def where_listed(key: str) -> str:
+        """What to give for a key that is missing."""
+        return (
+            "the map's own name, such as 'map: room', beside its walls" if key == "map" else f"{key} of a map"
+        )
+
     @model_validator(mode="after")
     def _something_solid(self) -> MapFile:
         if not self.walls_m and not self.circles_m:

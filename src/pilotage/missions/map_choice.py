@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Discriminator, Field, Tag
 
 from pilotage.core.config import Config
-from pilotage.core.errors import unknown_name
+from pilotage.core.errors import InputError, unknown_name
 from pilotage.maps.crater_terrain import CraterTerrainConfig
 from pilotage.maps.map_file import MapFile
 from pilotage.maps.true_cells import SheetFile
@@ -82,6 +82,16 @@ def _which(value: Any) -> str:
             if name not in BY_NAME:
                 raise unknown_name("world.map.name", name, BY_NAME)
             return name
+        if "file" in value:
+            raise InputError(
+                f"world.map.name: missing; expected grid or elevation beside file, or the file alone "
+                f"(world.map: {value['file']})"
+            )
+        if "image" in value:
+            raise InputError(
+                "world.map: expected a ROS map by its own file (world.map: FILE.yaml), found its keys here; "
+                "or take name: grid and file, resolution_m, origin"
+            )
         return "sheet" if "size_m" in value and "walls_m" not in value else "walls"
     return "file"
 

@@ -13,6 +13,7 @@ import numpy as np
 
 from pilotage.core.config import Config, validate
 from pilotage.core.errors import InputError, unknown_name
+from pilotage.core.neighbours import hint_beside
 from pilotage.core.types import Pose2
 from pilotage.experiments.values import parse_yaml, read_text
 from pilotage.maps.crater_cache import cached_crater_terrain
@@ -130,7 +131,8 @@ def _named(source: str, markings: MarkingsConfig) -> WorldMap:
             raise unknown_name("map", source, shipped_maps())
         return _of_values(parse_yaml((SHIPPED / f"{source}.yaml").read_text(), source), source, markings)
     if not path.is_file():
-        raise InputError(f"map '{source}': expected a map file, found none there")
+        beside = hint_beside(path, {".yaml", ".yml", *GRID_SUFFIXES, *ELEVATION_SUFFIXES})
+        raise InputError(f"map '{source}': expected a map file, found none there{beside}")
     if suffix in ELEVATION_SUFFIXES and suffix == ".json":
         return load_chart(validate(ElevationMap, {"name": "elevation", "file": source}, "map"))
     if suffix in {".yaml", ".yml"}:

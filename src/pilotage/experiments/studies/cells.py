@@ -7,6 +7,7 @@ import json
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 from pilotage.core.errors import InputError, nearest
@@ -72,13 +73,14 @@ def make_cells(definition: StudyDefinition, resolve: Resolve) -> tuple[Cell, ...
         raise InputError(f"study '{definition.study}': expected at most {MAX_CELLS} cells, found {count}")
     common = as_overrides(definition.set)
     # With the names that it sets: another ground or localizer has keys of its own.
-    _check_keys(definition.set, resolve(common), "set")
+    _check_keys(definition.set, resolve(common), "set", lambda: resolve(()))
     cells: list[Cell] = []
     for configuration in definition.configurations or (None,):
         base = common if configuration is None else (*common, *as_overrides(configuration.set))
         resolved = resolve(base)
         if configuration is not None:
-            _check_keys(configuration.set, resolved, f"configuration '{configuration.name}'")
+            where = f"configuration '{configuration.name}'"
+            _check_keys(configuration.set, resolved, where, lambda: resolve(common))
         for row in rows:
             cells.append(_cell(len(cells), configuration, row, base, resolved, resolve))
     _unique(cells)
@@ -129,9 +131,10 @@ def _cell(
         row, key=lambda pair: pair[0].levels is None and not _names_component(pair[0].keys)
     ):
         if factor.levels is not None:
+            before = resolved
             overrides = (*overrides, *as_overrides(factor.levels[value]))
             resolved = resolve(overrides)
-            _check_keys(factor.levels[value], resolved, f"level '{value}'")
+            _check_keys(factor.levels[value], resolved, f"level '{value}'", partial(dict, before))
             continue
         for key in factor.keys:
             place = _check_key(key, resolved, "factor")
@@ -156,9 +159,20 @@ def _times(base: Any, factor: float, key: str) -> Any:
     return base * factor
 
 
-def _check_keys(settings: Mapping[str, Any], resolved: Mapping[str, Any], where: str) -> None:
-    for key in settings:
-        _check_key(key, resolved, where)
+def _check_keys(
+    settings: Mapping[str, Any],
+    resolved: Mapping[str, Any],
+    where: str,
+    before: Callable[[], Mapping[str, Any]],
+) -> None:
+    """Refuse keys that the mission does not know; what is taken off (null) it has to know ``before``."""
+    for key, value in settings.items():
+        try:
+            _check_key(key, resolved, where)
+        except InputError:
+            if value is not None:
+                raise
+            _check_key(key, before(), where)
 
 
 def _check_key(key: str, resolved: Mapping[str, Any], where: str) -> Any:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import errno
+import shutil
 import signal
 import threading
 import time
@@ -37,10 +38,13 @@ from pilotage.experiments.studies.study import (
     mission_yaml,
     study_yaml,
 )
+from pilotage.experiments.studies.unbuilt import NothingBuiltError, Unbuilt
 from pilotage.experiments.studies.workers import Workers
 
 HEAR_EVERY_S = 5.0
 TELL_EVERY_S = 0.1
+QUIET_S = 10.0
+"""For so long nothing is told of a study of which no trial has shown yet that it can be."""
 ENOUGH_TO_TELL = 20
 """A metric that none of so many trials gives is given by none."""
 
@@ -78,7 +82,8 @@ def run_study(
     Raises
     ------
     InputError
-        A metric that no mission of the study's tasks gives (nothing is run or written then), or that no
+        Of no cell anything can be built (nothing is left behind then);
+        a metric that no mission of the study's tasks gives (nothing is run or written then), or that no
         trial gives; the folder holds another definition, was begun and ``resume`` is not said, or was not
         and it is; a corrupt database, after what can be read of it was saved.
     StudyStoppedError
@@ -93,8 +98,17 @@ def run_study(
     if not (folder / DATABASE).is_file():
         check_worlds(study)
     had_log = has_log(folder / DATABASE)
+    made = [place for place in (folder, *folder.parents) if not place.exists()]
     try:
-        counts = _run(study, folder, options, listener)
+        try:
+            counts = _run(study, folder, options, listener)
+        except NothingBuiltError:  # nothing is left of what cannot be
+            if made:
+                shutil.rmtree(folder, ignore_errors=True)
+            for parent in made[1:]:
+                with contextlib.suppress(OSError):  # somebody else has put something there
+                    parent.rmdir()
+            raise
         check_metrics(study, folder)
     except CorruptDatabaseError as error:
         saved = save_what_is_left(folder, study, error.trouble)
@@ -158,33 +172,38 @@ def _run(study: Study, folder: Path, options: StudyOptions, listener: Listener) 
                 memory = options.worker_memory_bytes(count)
                 crew = LocalWorkers(study.base, count, options.trial_timeout_s, memory)
                 stack.callback(_put_away, crew.stop)
-            _loop(study, store, crew, folder, listener)
+            fresh = not begun and not store.others()
+            _loop(study, store, crew, folder, listener, fresh=fresh)
         return store.counts()
 
 
-def _loop(study: Study, store: Store, crew: Workers, folder: Path, listener: Listener) -> None:
+def _loop(
+    study: Study, store: Store, crew: Workers, folder: Path, listener: Listener, *, fresh: bool
+) -> None:
     began = heard = time.monotonic()
     shown, finished = 0.0, 0
-    held: set[int] = set()
+    held: dict[int, int] = {}  # rows under way, and their cells
+    unbuilt = Unbuilt(study, listener.trouble, fresh=fresh)
     checked = False
     while True:
         room = crew.room
         for task in store.claim(room) if room else ():
-            held.add(task.row)
+            held[task.row] = task.cell
             crew.give(replace(task, overrides=study.cells[task.cell].overrides))
         if not held:
             if not store.counts().missing:
+                unbuilt.let_go()
                 return
             time.sleep(0.2)  # the rest is run by another process
             store.hear()
             continue
         for outcome in crew.outcomes():
-            held.discard(outcome.row)
+            cell = held.pop(outcome.row)
             again = store.finish(outcome)
             finished += not outcome.reason
-            if outcome.reason:
-                then = "tried once more" if again else "given up"
-                listener.trouble(f"row {outcome.row}: {outcome.reason}; {then}")
+            then = "tried once more" if again else "given up"
+            told = f"row {outcome.row}: {outcome.reason}; {then}" if outcome.reason else ""
+            unbuilt.hear(cell, outcome, told)
         now = time.monotonic()
         if now - heard > HEAR_EVERY_S:
             store.hear()
@@ -192,7 +211,7 @@ def _loop(study: Study, store: Store, crew: Workers, folder: Path, listener: Lis
         if not checked and finished >= ENOUGH_TO_TELL:
             check_metrics(study, folder)
             checked = True
-        if now - shown > TELL_EVERY_S:
+        if now - shown > TELL_EVERY_S and not (unbuilt.asks and now - began < QUIET_S):
             counts = store.counts()
             rate = finished / max(now - began, 1e-9)
             left = counts.missing / rate if rate > 0.0 else float("inf")
