@@ -42,11 +42,13 @@ class SimulatedRadio:
         """Broadcast; whether it arrives is drawn from each receiver's own stream, whatever the distance."""
         message = RadioMessage(self._name, t_s, content)
         x, y = self._state[:2].tolist()
+        loss = self.config.loss
         for peer in self._peers:
-            lost = peer._rng.random() < max(self.config.loss, peer.config.loss)
+            lost = peer._rng.random() < max(loss, peer.config.loss)
             if self.works and peer.works and not lost:
-                peer_x, peer_y = peer._state[:2].tolist()
-                if math.hypot(x - peer_x, y - peer_y) <= min(self._reach_m, peer._reach_m):
+                state = peer._state
+                away_m = math.hypot(x - state.item(0), y - state.item(1))
+                if away_m <= self._reach_m and away_m <= peer._reach_m:
                     peer._coming.append((t_s + peer.config.delay_s, message))
 
     def read(self) -> RadioMessages:

@@ -34,7 +34,13 @@ class LastWords:
     def hear(self, number: int, sent_s: float, word: TeamWord) -> None:
         """A mate said something itself."""
         row, talk = self._words[number], word.talk
-        row[words.SENT : words.REACH] = sent_s, word.x_m, word.y_m, word.radius_m
+        # One by one: a slice filled from a tuple takes as long as eight entries, and a large team says much.
+        row[words.SENT], row[words.X], row[words.Y], row[words.RADIUS] = (
+            sent_s,
+            word.x_m,
+            word.y_m,
+            word.radius_m,
+        )
         if talk is None:
             row[words.REACH :] = math.nan
             return
@@ -44,7 +50,8 @@ class LastWords:
             kept = math.exp(-due / COUNTED)
             expected = kept * row.item(words.EXPECTED) + due
             lost = kept * row.item(words.LOST) + max(0.0, due - 1.0)
-        row[words.REACH :] = talk.reach_m, talk.period_s, talk.speed_m_s, talk.loss, 0.0, expected, lost
+        row[words.REACH], row[words.PERIOD], row[words.SPEED] = talk.reach_m, talk.period_s, talk.speed_m_s
+        row[words.LOSS], row[words.DUE], row[words.EXPECTED], row[words.LOST] = talk.loss, 0.0, expected, lost
 
     def step(self, t_s: float, pose: Pose2, own: Talk, *, lost: bool) -> None:
         """Time has passed; who is ``lost`` does not know how far from a mate it is."""

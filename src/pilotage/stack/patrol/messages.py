@@ -200,10 +200,18 @@ class PatrolMemory:
     def receive(self, message: PatrolMessage) -> None:
         """Take in what somebody else sent: the newer word of each robot, the later visit of each vertex."""
         np.maximum(self._visited_s, message.visited_s, out=self._visited_s)
-        for state in message.states:
-            known = self._states[state.robot]
-            if state.robot != self._own.robot and (known is None or state.t_s > known.t_s):
-                self._states[state.robot] = state
+        states, own = self._states, self._own.robot
+        whole = len(message.states) == len(states)  # then both are in the order of the robots' numbers
+        for known, state in zip(states, message.states, strict=True) if whole else self._beside(message):
+            # Most of what mates pass on has been heard before: of a large team nearly all.
+            if known is state or state.robot == own:
+                continue
+            if known is None or state.t_s > known.t_s:
+                states[state.robot] = state
+
+    def _beside(self, message: PatrolMessage) -> list[tuple[PatrolState | None, PatrolState]]:
+        """What it knows of each robot that a message tells of, and what that tells."""
+        return [(self._states[state.robot], state) for state in message.states]
 
     def message(self, t_s: float) -> PatrolMessage:
         """What it sends now."""

@@ -53,6 +53,8 @@ class ShutPaths:
 
     def reached(self, vertices: int) -> IntArray:
         """(R,) the others of so many vertices."""
+        if not self.unreached:
+            return np.arange(vertices)
         return np.setdiff1d(np.arange(vertices), self.unreached)
 
 
@@ -85,6 +87,8 @@ def same_side(robot: int, told: Mapping[int, ShutPaths], vertices: int) -> tuple
     That is what the one with the smallest number says of those who know of something that is shut: all come
     to the same plan, though each sees bodies a little elsewhere.
     """
+    if all(shut == NONE_SHUT for shut in told.values()):
+        return frozenset(told), NONE_SHUT
     reached = {k: frozenset(shut.reached(vertices).tolist()) for k, shut in told.items()}
     own = reached[robot]
     side = [

@@ -98,6 +98,7 @@ class Senses:
         self.fresh = False
         self.near = self.strange = self.people = NO_POINTS
         self.mates: dict[int, tuple[float, TeamWord]] = {}
+        self._heard: tuple[float, list[tuple[int, TeamWord]]] | None = None  # when it was asked, and who
         self._watch = IntruderWatch(config.watch)
         self.alarm = (math.nan, math.nan, math.nan)
 
@@ -131,7 +132,7 @@ class Senses:
 
     def hear(self, sent_s: float, word: TeamWord) -> None:
         """A mate said something."""
-        self.mates[word.news.sender] = sent_s, word
+        self.mates[word.news.sender], self._heard = (sent_s, word), None
         self._last_words.hear(word.news.sender, sent_s, word)
 
     def silences_log(self) -> FloatArray:
@@ -165,11 +166,10 @@ class Senses:
         if len(words) < len(self.task.starts) - 1 or not len(self.strange):
             return NO_POINTS
         there = self.on_map(self.strange)
-        nobody = np.ones(len(there), dtype=np.bool_)
-        for sent_s, word in words:
-            away = np.hypot(there[:, 0] - word.x_m, there[:, 1] - word.y_m)
-            # A mate that is lost may be anywhere, and is near to nothing that is NaN.
-            nobody &= away > self.config.watch.mate_m + self.speed_m_s * (self.t_s - sent_s)
+        told = np.array([(word.x_m, word.y_m, self.t_s - sent_s) for sent_s, word in words]).reshape(-1, 3, 1)
+        away = np.hypot(there[:, 0] - told[:, 0], there[:, 1] - told[:, 1])
+        # A mate that is lost may be anywhere, and is near to nothing that is NaN.
+        nobody = (away > self.config.watch.mate_m + self.speed_m_s * told[:, 2]).all(axis=0)
         return np.ascontiguousarray(self.strange[nobody])
 
     def field(self, *, lost: bool) -> safe_stop.Field:
@@ -220,8 +220,11 @@ class Senses:
 
     def heard(self) -> list[tuple[int, TeamWord]]:
         """The last words of mates that were heard lately, with their numbers."""
-        latest_s = self.t_s - HEARD_PERIODS * self.config.message_period_s
-        return [(number, word) for number, (sent_s, word) in self.mates.items() if sent_s > latest_s]
+        if self._heard is None or self._heard[0] != self.t_s:
+            latest_s = self.t_s - HEARD_PERIODS * self.config.message_period_s
+            words = [(number, word) for number, (sent_s, word) in self.mates.items() if sent_s > latest_s]
+            self._heard = self.t_s, words
+        return self._heard[1]
 
     def patience_s(self, periods: float) -> float:
         """How long after its last word was sent a mate's silence is no chance: so many words by a good radio.
