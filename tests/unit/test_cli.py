@@ -86,7 +86,6 @@ def lab(monkeypatch: pytest.MonkeyPatch) -> Lab:
         roles=lambda: ["planner"],
         mission_schema=lambda: {"title": "Mission"},
     )
-    module("pilotage.experiments.studies.study", is_study_folder=lambda _place: False)
     module("pilotage.report", write_report=lab.write_report, summary_table=lambda metrics: str(metrics))
     return lab
 

@@ -22,8 +22,9 @@ from numba.core.typing import templates
 from numba.extending import overload
 
 from pilotage.core.types import FloatArray
-from pilotage.kernels import jit
+from pilotage.kernels import code_cache, dispatchers
 from pilotage.kernels.arrays import read_only
+from pilotage.kernels.geometry import plane
 from pilotage.kernels.jit import kernel
 from pilotage.kernels.user_cache import user_cache
 from pilotage.maps.segment_map import SegmentMap
@@ -92,13 +93,13 @@ def test_a_home_that_is_no_place_is_not_taken(
 def test_a_kernel_that_nobody_calls_has_no_cache(monkeypatch: pytest.MonkeyPatch) -> None:
     """To make one took a folder, a temporary file and the digest of a source for each of five hundred."""
     made: list[str] = []
-    making: Any = jit._Cache.__init__
+    making: Any = dispatchers._Cache.__init__
 
     def counted(self: Any, function: Any) -> None:
         made.append(function.__name__)
         making(self, function)
 
-    monkeypatch.setattr(jit._Cache, "__init__", counted)
+    monkeypatch.setattr(dispatchers._Cache, "__init__", counted)
 
     @kernel
     def called(x: float) -> float:
@@ -126,15 +127,22 @@ def test_a_source_that_is_edited_before_the_first_call_is_not_taken_for_what_was
     toy = importlib.import_module("edited_toy")
     file.write_text(TOY.replace("2 *", "3 *"))
     assert toy.twice(21) == 42
-    jit._read.cache_clear()
-    jit._digest.cache_clear()
+    code_cache._read.cache_clear()
+    code_cache.sources_of.cache_clear()
+    code_cache._digest.cache_clear()
     folder = toy.twice.stats.cache_path
-    assert folder != str(jit._folder_of(file)), "the new source would be given the old one's code"
+    assert folder != str(code_cache.folder_of(file)), "the new source would be given the old one's code"
+
+
+def test_how_numba_compiles_is_part_of_what_compiled_code_is_named_by() -> None:
+    file = Path(str(plane.__file__))
+    names = {source.name for source in code_cache.sources_of(file)}
+    assert {"plane.py", "jit.py", "dispatchers.py"} <= names
 
 
 @pytest.fixture
 def nothing_compiled(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(jit, "_CACHE", tmp_path)
+    monkeypatch.setattr(code_cache, "_CACHE", tmp_path)
 
 
 @pytest.mark.usefixtures("nothing_compiled")

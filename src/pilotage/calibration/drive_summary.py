@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from scipy import stats
+import scipy
 
 from pilotage.calibration.drive_commands import DriveCommands
 from pilotage.calibration.intervals import Estimate
@@ -59,4 +59,4 @@ def _disagree(estimates: Sequence[Estimate]) -> bool:
     weights = [(_HALVES / max(one.high - one.low, LEAST_WIDTH)) ** 2 for one in estimates]
     mean = sum(w * one.value for w, one in zip(weights, estimates, strict=True)) / sum(weights)
     q = sum(w * (one.value - mean) ** 2 for w, one in zip(weights, estimates, strict=True))
-    return float(stats.chi2.sf(q, len(estimates) - 1)) < DISAGREE_P
+    return float(scipy.stats.chi2.sf(q, len(estimates) - 1)) < DISAGREE_P

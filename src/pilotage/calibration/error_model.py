@@ -11,7 +11,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import optimize, stats
+import scipy
 
 from pilotage.calibration.intervals import LEVEL, Estimate, normal_estimate, variance_estimate
 from pilotage.core.types import BoolArray, FloatArray
@@ -93,14 +93,14 @@ def fit_densities(residual: FloatArray, Z: FloatArray, correction: float) -> lis
         v = Zs @ q * unit + 1e-9 * unit * Zs.sum(axis=1)
         return float(np.sum(np.log(v) + r2 / v)), unit * Zs.T @ (1.0 / v - r2 / v**2)
 
-    found = optimize.minimize(
+    found = scipy.optimize.minimize(
         cost, np.ones(Z.shape[1]), jac=True, method="L-BFGS-B", bounds=[(0.0, None)] * Z.shape[1]
     )
     q = correction * unit * np.asarray(found.x, dtype=np.float64)
     v = np.maximum(Zs @ q, 1e-12 * float((Zs @ q).max()))
     information = 0.5 * (Zs / v[:, None]).T @ (Zs / v[:, None])
     std = np.sqrt(np.maximum(np.diag(np.linalg.pinv(information)), 0.0))
-    z = float(stats.norm.ppf(0.5 + 0.5 * LEVEL))
+    z = float(scipy.stats.norm.ppf(0.5 + 0.5 * LEVEL))
     return [
         Estimate(float(a), max(0.0, float(a - z * s)), float(a + z * s)) for a, s in zip(q, std, strict=True)
     ]

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import stats
+import scipy
 
 from pilotage.calibration.intervals import LEVEL, Estimate, mean_estimate
 from pilotage.core.errors import InputError
@@ -157,8 +157,8 @@ def allan_deviation(t_s: FloatArray, rate_rad_s: FloatArray) -> AllanDeviation:
         variance = float(np.mean(second**2)) / (2.0 * (m * step) ** 2)
         dof = max(1.0, (1.5 * (n - 1) / m - 2.0 * (n - 2) / n) * 4.0 * m**2 / (4.0 * m**2 + 5.0))
         deviations.append(math.sqrt(variance))
-        lows.append(math.sqrt(variance * dof / float(stats.chi2.ppf(0.5 + 0.5 * LEVEL, dof))))
-        highs.append(math.sqrt(variance * dof / float(stats.chi2.ppf(0.5 - 0.5 * LEVEL, dof))))
+        lows.append(math.sqrt(variance * dof / float(scipy.stats.chi2.ppf(0.5 + 0.5 * LEVEL, dof))))
+        highs.append(math.sqrt(variance * dof / float(scipy.stats.chi2.ppf(0.5 - 0.5 * LEVEL, dof))))
     return AllanDeviation(
         step * sizes.astype(np.float64), np.array(deviations), np.array(lows), np.array(highs)
     )

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import stats
+import scipy
 
 from pilotage.core.types import FloatArray
 
@@ -42,14 +42,14 @@ def mean_estimate(values: FloatArray) -> Estimate:
 
 def normal_estimate(value: float, std: float, dof: float) -> Estimate:
     """Interval of an estimate whose standard deviation was estimated with ``dof`` degrees of freedom."""
-    half = float(stats.t.ppf(0.5 + 0.5 * LEVEL, dof)) * std
+    half = float(scipy.stats.t.ppf(0.5 + 0.5 * LEVEL, dof)) * std
     return Estimate(value, value - half, value + half)
 
 
 def variance_estimate(variance: float, dof: float) -> Estimate:
     """Interval of a variance of independent normal values: ``dof s^2 / sigma^2`` is chi-square."""
-    above = float(stats.chi2.ppf(0.5 + 0.5 * LEVEL, dof))
-    below = float(stats.chi2.ppf(0.5 - 0.5 * LEVEL, dof))
+    above = float(scipy.stats.chi2.ppf(0.5 + 0.5 * LEVEL, dof))
+    below = float(scipy.stats.chi2.ppf(0.5 - 0.5 * LEVEL, dof))
     return Estimate(variance, variance * dof / above, variance * dof / below)
 
 
@@ -73,8 +73,8 @@ def normality(values: FloatArray) -> Normality | None:
     if values.shape[0] < 8 or not float(np.ptp(values)) > 0.0:
         return None
     if values.shape[0] <= SHAPIRO_MOST:
-        return Normality("Shapiro-Wilk", float(stats.shapiro(values).pvalue))
-    return Normality("D'Agostino-Pearson", float(stats.normaltest(values).pvalue))
+        return Normality("Shapiro-Wilk", float(scipy.stats.shapiro(values).pvalue))
+    return Normality("D'Agostino-Pearson", float(scipy.stats.normaltest(values).pvalue))
 
 
 def lag_one_correlation(values: FloatArray) -> float:

@@ -10,7 +10,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import optimize
+import scipy
 
 from pilotage.calibration.intervals import Estimate, mean_estimate, normal_estimate
 from pilotage.core.errors import InputError
@@ -138,7 +138,7 @@ def _fit(points: FloatArray, weight: FloatArray, start: FloatArray) -> FloatArra
     def cost(p: FloatArray) -> FloatArray:
         return np.asarray(weight * _residual(p, points))
 
-    return np.asarray(optimize.least_squares(cost, start).x, dtype=np.float64)
+    return np.asarray(scipy.optimize.least_squares(cost, start).x, dtype=np.float64)
 
 
 def _half_axes(p: FloatArray) -> tuple[float, float]:

@@ -91,8 +91,7 @@ def localize(
 ) -> int:
     """Run a localizer over a recording and score it, against its truth where that is known."""
     from pilotage.core.types import Pose2
-    from pilotage.experiments.recordings.localize import localize_log
-    from pilotage.experiments.recordings.reading import FORMATS, Setting
+    from pilotage.experiments.recordings.form import FORMATS, Setting, told_format
 
     if form is not None and form not in FORMATS:
         raise unknown_name("--format", form, FORMATS)
@@ -110,6 +109,9 @@ def localize(
         from_s,
         math.inf if to_s is None else to_s,
     )
+    form = told_format(log) if form is None else form
+    from pilotage.experiments.recordings.localize import localize_log
+
     with stdout_for_json(json):
         result = localize_log(
             log,

@@ -58,7 +58,7 @@ def print_columns(rows: Iterable[Sequence[str]]) -> None:
 
 def tell_if_cold() -> None:
     """Tell who watches why it takes so long where nothing is compiled yet."""
-    from pilotage.kernels.jit import cache_is_cold
+    from pilotage.kernels.code_cache import cache_is_cold
 
     if sys.stderr.isatty() and cache_is_cold():
         print("compiling the kernels; only the first run takes this long", file=sys.stderr)

@@ -23,7 +23,7 @@ def report(
     plugin: Plugins = None,  # noqa: ARG001 - loaded while the options are read
 ) -> None:
     """Write report.html into the folder of a run, study, calibration or map and print its path."""
-    from pilotage.experiments.studies.study import is_study_folder
+    from pilotage.records.folder import is_study_folder
 
     if is_study_folder(str(run)):
         from pilotage.cli.study_page import write_study_report

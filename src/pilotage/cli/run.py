@@ -34,9 +34,9 @@ def run(
     ] = None,
 ) -> int:
     """Run a mission and report on it."""
+    loaded = _mission(mission, overrides or (), seed, row)
     from pilotage.experiments.run import run_mission
 
-    loaded = _mission(mission, overrides or (), seed, row)
     if not quiet:
         tell_if_cold()
     with stdout_for_json(json), progress_line(not quiet) as on_progress:

@@ -83,7 +83,8 @@ def study(
 ) -> int:
     """Run a study: every setting times many seeds, finished trials never lost."""
     from pilotage.experiments.studies.options import StudyOptions
-    from pilotage.experiments.studies.study import is_study_folder, load_study
+    from pilotage.experiments.studies.study import load_study
+    from pilotage.records.folder import is_study_folder
 
     if shipped:
         return _list(json)

@@ -15,7 +15,7 @@ import itertools
 import math
 
 import numpy as np
-from scipy import stats
+import scipy
 
 from pilotage.core.types import FloatArray, IntArray
 from pilotage.evaluation.intervals import ROUNDING
@@ -81,13 +81,13 @@ class DrawnStudies:
         """
         if not self._varies:
             return math.nan
-        asked, sure = float(stats.norm.isf(1.0 - power)), float(stats.norm.isf(0.5 * self._alpha))
+        asked, sure = float(scipy.stats.norm.isf(1.0 - power)), float(scipy.stats.norm.isf(0.5 * self._alpha))
         strength = (asked + sure) * 2.0 / math.sqrt(self._drawn)
         below, above = (-sure, 0.0), (math.inf, math.inf)  # deviate of the power, change
         low, high = 0.0, math.inf
         for _ in range(STEPS):
             shown, change = self._shown(strength)
-            deviate = float(stats.norm.ppf(min(max(shown, 0.5 / STUDIES), 1.0 - 0.5 / STUDIES)))
+            deviate = float(scipy.stats.norm.ppf(min(max(shown, 0.5 / STUDIES), 1.0 - 0.5 / STUDIES)))
             if deviate < asked:
                 low, below = strength, (deviate, change)
             else:

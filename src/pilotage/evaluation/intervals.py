@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy import stats
+import scipy
 
 from pilotage.core.types import FloatArray
 
@@ -60,7 +60,7 @@ def _resampled(
 ) -> tuple[float, float]:
     """Of samples as shares of their scale: squares of very small numbers would vanish."""
     for method in ("BCa", "percentile"):  # BCa has no acceleration where almost all values are equal
-        found = stats.bootstrap(
+        found = scipy.stats.bootstrap(
             tuple(values / scale for values in samples),
             statistic,
             vectorized=True,
@@ -110,5 +110,5 @@ def wilson(successes: int, trials: int) -> tuple[float, float]:
     """95 % Wilson interval of a success rate; (nan, nan) without trials."""
     if trials == 0:
         return math.nan, math.nan
-    found = stats.binomtest(successes, trials).proportion_ci(LEVEL, method="wilson")
+    found = scipy.stats.binomtest(successes, trials).proportion_ci(LEVEL, method="wilson")
     return float(found.low), float(found.high)

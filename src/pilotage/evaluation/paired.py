@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import stats
+import scipy
 
 from pilotage.core.types import FloatArray
 from pilotage.evaluation.intervals import ROUNDING, bootstrap_difference, bootstrap_mean
@@ -106,7 +106,7 @@ def difference_apart(first: FloatArray, other: FloatArray, *, binary: bool = Fal
     low, high = bootstrap_difference(first, other)
     p_value = math.nan
     if np.any(change):
-        p_value = _fisher(first, other) if binary else float(stats.mannwhitneyu(other, first).pvalue)
+        p_value = _fisher(first, other) if binary else float(scipy.stats.mannwhitneyu(other, first).pvalue)
     return Difference(
         n=int(min(first.size, other.size)),
         mean=float(change.mean()),
@@ -129,7 +129,7 @@ def corrected(p_values: Sequence[float]) -> list[float]:
     tested = np.isfinite(values)
     out = np.full(values.shape, math.nan)
     if tested.any():
-        out[tested] = stats.false_discovery_control(values[tested], method="by")
+        out[tested] = scipy.stats.false_discovery_control(values[tested], method="by")
     return [float(value) for value in out]
 
 
@@ -154,12 +154,12 @@ def _wilcoxon(change: FloatArray) -> float:
 
 def _mcnemar(change: FloatArray) -> float:
     grew, differ = int((change > 0.0).sum()), int((change != 0.0).sum())
-    return float(stats.binomtest(grew, differ).pvalue) if differ else math.nan
+    return float(scipy.stats.binomtest(grew, differ).pvalue) if differ else math.nan
 
 
 def _fisher(first: FloatArray, other: FloatArray) -> float:
     table = np.array([[int(side.sum()), int(side.size - side.sum())] for side in (first, other)])
-    return float(stats.fisher_exact(table).pvalue)
+    return float(scipy.stats.fisher_exact(table).pvalue)
 
 
 def _rank_biserial(change: FloatArray) -> float:
@@ -167,5 +167,5 @@ def _rank_biserial(change: FloatArray) -> float:
     moved = change[change != 0.0]
     if moved.size == 0:
         return 0.0
-    ranks = stats.rankdata(np.abs(moved))
+    ranks = scipy.stats.rankdata(np.abs(moved))
     return float(np.sum(np.sign(moved) * ranks) / ranks.sum())

@@ -11,8 +11,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import stats
-from scipy.stats import qmc
+import scipy
 
 from pilotage.core.types import FloatArray
 
@@ -50,19 +49,19 @@ class RankTest:
             return 0.0
         if self.tests == 1:
             noncentral = min(trials * float((effects**2).sum()), _TOO_FAR)
-            return float(stats.ncf.sf(critical, below, above, max(noncentral, 1e-12)))
+            return float(scipy.stats.ncf.sf(critical, below, above, max(noncentral, 1e-12)))
         return self._any(effects * math.sqrt(trials), critical, below, above)
 
     def _critical(self, trials: float) -> tuple[float, float, float]:
         """F of the ranks beyond which the test shows something, and its degrees of freedom."""
         below = self.levels - 1.0
         if self.levels == 2:
-            limit = float(stats.norm.isf(0.5 * self.alpha))
+            limit = float(scipy.stats.norm.isf(0.5 * self.alpha))
             if not self.paired and trials > EXACT_TO:  # continuity
                 limit += 0.5 / math.sqrt(trials**2 * (2.0 * trials + 1.0) / 12.0)
             limit **= 2
         else:
-            limit = float(stats.chi2.isf(self.alpha, below))
+            limit = float(scipy.stats.chi2.isf(self.alpha, below))
         if self.paired:
             above, left = below * (trials - 1.0), trials * below - limit
         else:
@@ -98,10 +97,12 @@ def _shown(values: FloatArray, paired: bool) -> FloatArray:
     n, levels = values.shape
     if paired and levels == 2:
         change = values[:, 1] - values[:, 0]
-        scores = np.sign(change) * stats.rankdata(np.abs(change))
+        scores = np.sign(change) * scipy.stats.rankdata(np.abs(change))
         mean, variance = float(scores.mean()), 2.0 * float(scores.var(ddof=1))
         return np.array([-mean, mean]) / math.sqrt(max(variance, 1.0 / _TOO_FAR))
-    ranks = stats.rankdata(values, axis=1) if paired else stats.rankdata(values).reshape(values.shape)
+    ranks = (
+        scipy.stats.rankdata(values, axis=1) if paired else scipy.stats.rankdata(values).reshape(values.shape)
+    )
     means = ranks.mean(axis=0)
     variance = float(((ranks - means) ** 2).sum()) / ((n - 1.0) * (levels - 1.0 if paired else levels))
     shown: FloatArray = (means - means.mean()) / math.sqrt(max(variance, 1.0 / _TOO_FAR))
@@ -110,6 +111,6 @@ def _shown(values: FloatArray, paired: bool) -> FloatArray:
 
 def _deviates(dimensions: int) -> FloatArray:
     """Normal deviates spread evenly (Sobol's sequence), the same every time: power then grows smoothly."""
-    points = qmc.Sobol(dimensions, scramble=False).random_base2(_DRAWS)
-    deviates: FloatArray = stats.norm.ppf(np.clip(points + 0.5 ** (_DRAWS + 1), 1e-9, 1.0 - 1e-9))
+    points = scipy.stats.qmc.Sobol(dimensions, scramble=False).random_base2(_DRAWS)
+    deviates: FloatArray = scipy.stats.norm.ppf(np.clip(points + 0.5 ** (_DRAWS + 1), 1e-9, 1.0 - 1e-9))
     return deviates

@@ -6,7 +6,7 @@ import warnings
 from typing import Any
 
 import numpy as np
-from scipy import stats
+import scipy
 
 from pilotage.core.types import FloatArray
 
@@ -24,10 +24,10 @@ def rank_tests(values: FloatArray, *, paired: bool) -> FloatArray:
     test: Any
     if paired:
         alike = (np.ptp(values, axis=2) == 0.0).all(axis=1)
-        test = stats.friedmanchisquare
+        test = scipy.stats.friedmanchisquare
     else:
         alike = np.ptp(values, axis=(1, 2)) == 0.0
-        test = stats.kruskal
+        test = scipy.stats.kruskal
     with warnings.catch_warnings(), np.errstate(all="ignore"):
         warnings.simplefilter("ignore")  # of studies in which nothing differs, whose p is set below
         if levels.shape[0] > 2:
@@ -35,7 +35,7 @@ def rank_tests(values: FloatArray, *, paired: bool) -> FloatArray:
         elif paired:
             p_values = signed_ranks(levels[1] - levels[0])
         else:
-            p_values = stats.mannwhitneyu(levels[1], levels[0], axis=1).pvalue
+            p_values = scipy.stats.mannwhitneyu(levels[1], levels[0], axis=1).pvalue
     return np.where(alike, np.nan, p_values)
 
 
@@ -47,9 +47,9 @@ def signed_ranks(change: FloatArray) -> FloatArray:
     """
     studies, n = change.shape
     if n > MOST_SIGNS:
-        return np.asarray(stats.wilcoxon(change, zero_method="pratt", axis=1).pvalue)
+        return np.asarray(scipy.stats.wilcoxon(change, zero_method="pratt", axis=1).pvalue)
     # Twice the ranks, which are whole numbers; what does not differ counts on neither side.
-    ranks = np.rint(2.0 * stats.rankdata(np.abs(change), axis=1)).astype(np.int64) * (change != 0.0)
+    ranks = np.rint(2.0 * scipy.stats.rankdata(np.abs(change), axis=1)).astype(np.int64) * (change != 0.0)
     sums = np.zeros((studies, n * (n + 1) + 1))
     sums[:, 0] = 1.0
     places = np.arange(sums.shape[1])

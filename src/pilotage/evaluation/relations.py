@@ -12,7 +12,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial.transform import Rotation
+import scipy
 
 from pilotage.core.angles import wrap_array_to_pi
 from pilotage.core.errors import InputError
@@ -98,8 +98,10 @@ def relation_errors(
     first, second = first[used], second[used]
     turned = estimate.rotations[first].transpose(0, 2, 1)
     shift = np.einsum("kab,kb->ka", turned, estimate.points_xyz_m[second] - estimate.points_xyz_m[first])
-    turn = Rotation.from_matrix(turned @ estimate.rotations[second])
-    true_turn = Rotation.from_euler("ZYX", relations.roll_pitch_yaw_rad[used][:, ::-1])
+    turn = scipy.spatial.transform.Rotation.from_matrix(turned @ estimate.rotations[second])
+    true_turn = scipy.spatial.transform.Rotation.from_euler(
+        "ZYX", relations.roll_pitch_yaw_rad[used][:, ::-1]
+    )
     difference = shift - relations.points_xyz_m[used]
     yaw = turn.as_euler("ZYX")[:, 0] - relations.roll_pitch_yaw_rad[used][:, 2]
     return RelationErrors(

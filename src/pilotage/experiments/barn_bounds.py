@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.ndimage import label
-from scipy.spatial import cKDTree
+import scipy
 
 from pilotage.core.types import FloatArray
 from pilotage.kernels.arrays import read_only
@@ -58,9 +57,9 @@ def _disc_has_way(world: BarnWorld, radius_m: float, low: FloatArray, high: Floa
     x = np.arange(low[0], high[0] + CELL_M, CELL_M)
     y = np.arange(low[1], high[1] + CELL_M, CELL_M)
     cells = np.stack(np.meshgrid(x, y), axis=-1)
-    away, nearest = cKDTree(world.circles_m[:, :2]).query(cells.reshape(-1, 2))
+    away, nearest = scipy.spatial.cKDTree(world.circles_m[:, :2]).query(cells.reshape(-1, 2))
     clearance = (away - world.circles_m[nearest, 2]).reshape(cells.shape[:2])
-    regions, _ = label(clearance >= radius_m + 0.5 * CELL_M)
+    regions, _ = scipy.ndimage.label(clearance >= radius_m + 0.5 * CELL_M)
 
     def region(at_x: float, at_y: float) -> int:
         row, column = round((at_y - low[1]) / CELL_M), round((at_x - low[0]) / CELL_M)

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.ndimage import label
+import scipy
 
 from pilotage.core.errors import InputError
 from pilotage.core.types import FloatArray
@@ -284,8 +284,8 @@ def _two_places(
         Where there are none.
     """
     shape, spacing = driver.footprint, field.resolution_m
-    wide, _ = label(field.distance_m > shape.radius_m)
-    narrow, _ = label(field.distance_m > shape.inner_radius_m)
+    wide, _ = scipy.ndimage.label(field.distance_m > shape.radius_m)
+    narrow, _ = scipy.ndimage.label(field.distance_m > shape.inner_radius_m)
     cells = np.argwhere(field.distance_m > shape.radius_m + CLEAR_M)
     if not len(cells):
         raise InputError(f"{file}: expected a map with room for the robot, found none")

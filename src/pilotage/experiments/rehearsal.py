@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable
 from typing import TypeVar
 
-from pilotage.kernels.jit import cache_is_cold
+from pilotage.kernels.code_cache import cache_is_cold
 
 Answer = TypeVar("Answer")
 

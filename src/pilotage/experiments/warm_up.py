@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pilotage.experiments.loop import simulate
-from pilotage.kernels.jit import cache_is_cold
+from pilotage.kernels.code_cache import cache_is_cold
 from pilotage.missions.choice import ComponentChoice
 from pilotage.missions.mission import Mission
 from pilotage.stack.planning.planner import PLANNERS

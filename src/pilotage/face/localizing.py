@@ -74,8 +74,8 @@ def localize(
         Where the recording is not what it should be; of a bag without what is needed the message tells what
         it holds.
     """
+    from pilotage.experiments.recordings.form import FORMATS, Setting
     from pilotage.experiments.recordings.localize import localize_log
-    from pilotage.experiments.recordings.reading import FORMATS, Setting
 
     if format is not None and given.word("format", format) not in FORMATS:
         raise unknown_name("format", format, FORMATS)

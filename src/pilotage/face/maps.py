@@ -69,8 +69,6 @@ def draw(
     >>> drawn.layers["walls"], drawn.layers["landmarks"]
     (32, 35)
     """
-    from pilotage.report.map_picture import draw_map
-
     source = given.path("map", map)
     chart = _chart(source, resolution_m)
     path = _unused(source.stem) if out is None else given.path("--out", out)
@@ -80,6 +78,8 @@ def draw(
         raise InputError(f"--out: expected a file that can be written, found '{path}' there; name another")
     if not path.parent.is_dir():
         raise InputError(f"--out: expected a folder that is there, found none: '{path.parent}'")
+    from pilotage.report.map_picture import draw_map
+
     draw_map(chart, path)
     return Drawn(path, layers_of(chart))
 

@@ -1,7 +1,8 @@
 """What numba compiles with less processor time: steps left out whose outcome does not depend on them.
 
-``jit`` asks for it before the first kernel is compiled. It reaches into numba's compiler, for the whole
-process: each part stands by itself and does nothing where a version of numba has not got what it changes.
+``dispatchers`` asks for it before the first kernel is compiled. It reaches into numba's compiler, for the
+whole process: each part stands by itself and does nothing where a version of numba has not got what it
+changes.
 """
 
 from __future__ import annotations

@@ -1,232 +1,122 @@
-"""The ``kernel`` decorator: compiled on first call, cached on disk, safe against stale callees.
+"""The ``kernel`` decorator: a function that numba compiles at its first call and keeps on disk.
 
-numba's own cache does not notice an edited callee in another module, so each kernel module's cache folder is
-keyed to a digest of its source, of all kernel modules that it imports, and of the numba and numpy versions.
-Clones and installations of one source share it; of processes that need a function at once one compiles.
+numba takes a second of processor time to load, and most of what reads, refuses or lists needs no kernel: it
+is loaded when the first kernel of a process is called (``dispatchers``).
 """
 
 from __future__ import annotations
 
-import hashlib
+import functools
 import inspect
-import re
-import tempfile
-import time
-from collections.abc import Callable, Iterable, Mapping
-from functools import cache, cached_property
+import sys
+import threading
+from collections.abc import Callable, Iterable
 from pathlib import Path
-from typing import IO, Any, TypeVar, cast
+from types import ModuleType
+from typing import Any, TypeVar, cast
 
-import numba
 import numpy as np
-from numba.core import event, types
-from numba.core.caching import (
-    CompileResultCacheImpl,
-    FunctionCache,
-    _CacheLocator,
-    _SourceFileBackedLocatorMixin,
-)
-from numba.cpython.unsafe import numbers as _bits
 
-from pilotage.kernels.compiling import FewCollections, lighten
-from pilotage.kernels.user_cache import user_cache
+from pilotage.kernels.code_cache import sources_of
 
-__all__ = ["cache_is_cold", "kernel", "kernel_without_lock", "leading_zeros", "trailing_zeros"]
-
-try:
-    import fcntl
-except ImportError:  # not there on Windows: every process compiles for itself
-    fcntl = None  # type: ignore[assignment]
+__all__ = ["kernel", "kernel_without_lock", "leading_zeros", "trailing_zeros"]
 
 F = TypeVar("F", bound=Callable[..., Any])
 
 
-leading_zeros = cast(Callable[[np.uint64], int], _bits.leading_zeros)
-trailing_zeros = cast(Callable[[np.uint64], int], _bits.trailing_zeros)
-"""How many bits of a word, not 0, are 0 before the highest and after the lowest one set: one instruction."""
+class _Deferred:
+    """A kernel before the first of any is called; all of numba's attributes are there when asked for.
 
-
-_ROOT = Path(__file__).parent
-_PATIENCE_S, _LOOK_S = 120.0, 0.02
-"""How long another process may take to compile a function, and how often it is looked whether it has."""
-_IMPORTS = re.compile(r"^from pilotage\.kernels(?:\.([\w.]+))? import ([^\n(]+|\([^)]*\))", re.MULTILINE)
-
-
-@cache
-def _read(path: Path) -> tuple[bytes, frozenset[Path]]:
-    """A kernel module's source, and the kernel modules that it names in its imports."""
-    found: set[Path] = set()
-    source = path.read_bytes()
-    for package, names in _IMPORTS.findall(source.decode("utf-8").replace("\r\n", "\n")):
-        place = _ROOT.joinpath(*package.split(".")) if package else _ROOT
-        modules = [place.with_suffix(".py")]
-        modules += [place / f"{name.split(' as ')[0].strip()}.py" for name in names.strip("()").split(",")]
-        found.update(module for module in modules if module.is_file())
-    return source, frozenset(found)
-
-
-@cache
-def _digest(path: Path) -> str:
-    """Digest of a kernel module with all that it calls, and of the versions that compile them."""
-    sources, open_paths = {path}, [path]
-    while open_paths:
-        new = _read(open_paths.pop())[1] - sources
-        sources |= new
-        open_paths += new
-    sha = hashlib.sha256(f"{numba.__version__} {np.__version__}".encode())
-    for source in sorted(sources):
-        sha.update(source.name.encode())
-        sha.update(_read(source)[0])
-    return sha.hexdigest()[:16]
-
-
-_CACHE = user_cache("kernels") or Path(tempfile.mkdtemp(prefix="pilotage-kernels-"))
-
-
-def _folder_of(path: Path) -> Path:
-    """Where the compiled code of one kernel module is kept."""
-    return _CACHE / f"{path.stem}-{_digest(path)}"
-
-
-def cache_is_cold() -> bool:
-    """Whether nothing has been compiled yet: the first run will take its time.
-
-    Told by the plane geometry, which every run needs.
-    """
-    return next(_folder_of(_ROOT / "geometry" / "plane.py").rglob("*.nbi"), None) is None
-
-
-class _Locator(_SourceFileBackedLocatorMixin, _CacheLocator):
-    """The folder of a module's digest, wherever the module lies: clones and installations share it."""
-
-    def __init__(self, py_func: Callable[..., Any], py_file: str) -> None:
-        self._py_file, self._lineno = py_file, py_func.__code__.co_firstlineno
-
-    def get_cache_path(self) -> str:
-        return str(_folder_of(Path(self._py_file)))
-
-
-class _Compiled(CompileResultCacheImpl):
-    def __init__(self, py_func: Callable[..., Any]) -> None:
-        self._locator_classes = [_Locator]
-        super().__init__(py_func)  # type: ignore[no-untyped-call]
-
-
-class _Cache(FunctionCache):
-    """numba's own cache, in which a function that another process compiles just now is waited for.
-
-    Workers that begin together would each compile the same; two that save at once could mix their files up.
+    Once numba is loaded, modules hold the dispatchers themselves (``_load``); what still holds one of these
+    pays a Python call for each of its own.
     """
 
-    _impl_class = _Compiled
-    _lock: IO[bytes] | None = None
+    dispatcher: Any = None
 
-    def load_overload(self, sig: object, target_context: object) -> object:
-        """From the disk; None where this process is to compile it."""
-        found = super().load_overload(sig, target_context)  # type: ignore[no-untyped-call]
-        if found is None and self._lock is None and fcntl is not None:
-            self._lock = self._wait()
-            found = super().load_overload(sig, target_context)  # type: ignore[no-untyped-call]
-            if found is not None:
-                self._release()
-        return found
+    def __init__(self, function: Callable[..., Any], options: dict[str, Any]) -> None:
+        functools.update_wrapper(self, function)
+        self.function, self.options = function, options
 
-    def save_overload(self, sig: object, data: object) -> None:
-        """Write it and let the others go on."""
-        try:
-            super().save_overload(sig, data)  # type: ignore[no-untyped-call]
-        finally:
-            self._release()
-
-    def _wait(self) -> IO[bytes] | None:
-        """The lock of this function, held; None where nobody gives it free in time or it cannot be taken."""
-        path = Path(self.cache_path) / f"{self._impl.filename_base}.lock"
-        until = time.monotonic() + _PATIENCE_S
-        try:
-            file = path.open("ab")
-        except OSError:
-            return None
-        while time.monotonic() < until:
-            try:
-                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except OSError:
-                time.sleep(_LOOK_S)
-            else:
-                return file
-        file.close()
-        return None
-
-    def _release(self) -> None:
-        if self._lock is not None:
-            self._lock.close()
-            self._lock = None
-
-
-class _CacheWhenCalled:
-    """A kernel's cache, made when the kernel is first called: of five hundred that a run imports fifty are.
-
-    The digest is taken at once, of the source that was imported: it may be edited before the first call.
-    """
-
-    def __init__(self, function: Callable[..., Any]) -> None:
-        self._function = function
-        _digest(Path(inspect.getfile(function)))
-
-    @cached_property
-    def _made(self) -> _Cache:
-        return _Cache(self._function)  # type: ignore[no-untyped-call]
+    def __call__(self, *args: Any) -> Any:
+        if self.dispatcher is None:
+            _load()
+        return self.dispatcher(*args)
 
     def __getattr__(self, name: str) -> Any:
-        """All that numba asks of it."""
-        return getattr(self._made, name)
+        """What numba's dispatcher has: statistics, versions, ``_numba_type_`` where a kernel calls this."""
+        if name.startswith("__"):
+            raise AttributeError(name)
+        if self.dispatcher is None:
+            _load()
+        return getattr(self.dispatcher, name)
+
+    def __reduce__(self) -> str:
+        """Found again by its name, as a function is."""
+        return self.function.__qualname__
 
 
-class _First(event.Listener):
-    """Before the first function of a process is compiled, the compiler is made lighter."""
+class _Bits:
+    """One of numba's functions on bits before numba is loaded; only kernels call it."""
 
-    _done = False
-
-    def on_start(self, start: Any) -> None:
-        """Within numba's lock, so one thread at a time."""
-        if not self._done:
-            self._done = True
-            lighten(start.data["dispatcher"].targetctx)
-
-    def on_end(self, _: object) -> None:
-        """Nothing: it is once and for all."""
+    def __init__(self, name: str) -> None:
+        self.name = name
 
 
-event.register("numba:compile", _First())  # type: ignore[no-untyped-call]
-event.register("numba:compile", FewCollections())  # type: ignore[no-untyped-call]
+_BITS = _Bits("leading_zeros"), _Bits("trailing_zeros")
+leading_zeros, trailing_zeros = (cast(Callable[[np.uint64], int], bits) for bits in _BITS)
+"""How many bits of a word, not 0, are 0 before the highest and after the lowest one set: one instruction."""
 
-_OPTIONS: dict[str, Any] = {"error_model": "numpy", "no_cfunc_wrapper": True}
+_LOADING = threading.RLock()
+_deferred: list[_Deferred] | None = []
+"""Kernels that wait for numba; None once it is there."""
+
+
+def _load() -> None:
+    """Load numba, make a dispatcher of each kernel, and put it where the kernel is named."""
+    global _deferred
+    with _LOADING:
+        if _deferred is None:
+            return
+        from pilotage.kernels.dispatchers import bits_of, dispatcher_of
+
+        named = {id(bits): bits_of(bits.name) for bits in _BITS}
+        for made in _deferred:
+            made.dispatcher = named[id(made)] = dispatcher_of(made.function, made.options)
+        own = (vars(module) for name, module in list(sys.modules.items()) if _is_ours(name, module))
+        _name(named, [*own, *(made.function.__globals__ for made in _deferred)])
+        _deferred = None
+
+
+def _is_ours(name: str, module: ModuleType | None) -> bool:
+    return name.startswith("pilotage.") and isinstance(module, ModuleType)
+
+
+def _name(made: dict[int, Any], places: Iterable[dict[str, Any]]) -> None:
+    """In each namespace, what was made instead of what waited for it."""
+    for place in places:
+        for name, value in list(place.items()):
+            if isinstance(value, _Deferred | _Bits) and id(value) in made:
+                place[name] = made[id(value)]
 
 
 def kernel(function: F) -> F:
     """Compile ``function`` with numba: cached, no fast-math, no parallel threads, errors as in numpy."""
-    return _cached(numba.njit(**_OPTIONS)(function), function)
+    return _kernel(function, {})
 
 
 def kernel_without_lock(function: F) -> F:
     """As ``kernel``; other threads of Python run meanwhile, so that each core may step its share."""
-    return _cached(numba.njit(nogil=True, **_OPTIONS)(function), function)
+    return _kernel(function, {"nogil": True})
 
 
-def _cached(dispatcher: Any, function: F) -> F:
-    if not hasattr(dispatcher, "_cache"):  # a plain function where NUMBA_DISABLE_JIT is set
-        return cast(F, dispatcher)
-    dispatcher._cache = _CacheWhenCalled(function)
-    resolve, compile_anew, versions = dispatcher.get_call_template, dispatcher.compile, dispatcher.overloads
+def _kernel(function: F, options: dict[str, Any]) -> F:
+    # As it was imported: the file may be edited before the first call.
+    sources_of(Path(inspect.getfile(function)))
+    with _LOADING:
+        if _deferred is not None:
+            made = _Deferred(function, options)
+            _deferred.append(made)
+            return cast(F, made)
+    from pilotage.kernels.dispatchers import dispatcher_of
 
-    def compile_once(signature: Any) -> Any:
-        """What is there is taken without numba's lock and timers: each call in a kernel asks for it."""
-        known = versions.get(signature) if isinstance(signature, tuple) else None
-        return compile_anew(signature) if known is None else known.entry_point
-
-    def resolve_once(args: Iterable[Any], kws: Mapping[str, Any]) -> Any:
-        """Compile for a number, not for each number that some kernel has written in its call."""
-        wide: Callable[[Any], Any] = types.unliteral
-        return resolve([wide(arg) for arg in args], {key: wide(kws[key]) for key in kws})
-
-    dispatcher.compile, dispatcher.get_call_template = compile_once, resolve_once
-    return cast(F, dispatcher)
+    return cast(F, dispatcher_of(function, options))

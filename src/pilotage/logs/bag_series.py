@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.spatial.transform import Rotation
+import scipy
 
 from pilotage.core.errors import InputError
 from pilotage.core.types import FloatArray
@@ -162,7 +162,9 @@ def trajectory_of_bag(path: Path, topic: str | None = None) -> Trajectory3:
         As ``read_poses``.
     """
     found = read_poses(path, topic)
-    turns = np.asarray(Rotation.from_quat(found.values[:, 3:]).as_matrix(), dtype=np.float64)
+    turns = np.asarray(
+        scipy.spatial.transform.Rotation.from_quat(found.values[:, 3:]).as_matrix(), dtype=np.float64
+    )
     return Trajectory3(found.t_s, found.values[:, :3].copy(), turns)
 
 

@@ -11,7 +11,7 @@ from enum import StrEnum
 from pathlib import Path
 
 import numpy as np
-from scipy.spatial.transform import Rotation
+import scipy
 
 from pilotage.core.errors import InputError
 from pilotage.core.types import FloatArray
@@ -100,7 +100,7 @@ def read_tum(path: Path) -> Trajectory3:
     null = np.flatnonzero(norms < 1e-6)
     if null.size:
         raise InputError(f"{table.place(int(null[0]))}: expected a unit quaternion, found zeros")
-    rotations = Rotation.from_quat(table.values[:, 4:]).as_matrix()
+    rotations = scipy.spatial.transform.Rotation.from_quat(table.values[:, 4:]).as_matrix()
     return Trajectory3(t_s, table.values[:, 1:4].copy(), np.asarray(rotations, dtype=np.float64))
 
 

@@ -15,6 +15,7 @@ from pilotage.core.types import BoolArray, Event, FloatArray
 from pilotage.maps.occupancy_grid import OccupancyGrid
 from pilotage.records.cells import SheetData, read_cells
 from pilotage.records.events import read_events
+from pilotage.records.folder import check_folder
 from pilotage.records.grid import read_grid_layer, read_own_map
 from pilotage.records.localizer import read_localizer
 from pilotage.records.metrics import METRICS_FILE, read_metrics
@@ -131,10 +132,7 @@ def read_run(folder: Path, *, robot: int = 0, on_damage: OnDamage | None = None)
     InputError
         One line, where the folder is not a run folder or one of its files cannot be read.
     """
-    if not folder.is_dir():
-        raise InputError(
-            f"{folder}: expected a run folder, found {'a file' if folder.exists() else 'nothing'}"
-        )
+    check_folder(folder)
     missing = [name for name in (METRICS_FILE, TRACE_FILE) if not (folder / name).exists()]
     if missing:
         raise InputError(f"{folder}: not a run folder; expected {' and '.join(missing)} in it")

@@ -38,6 +38,9 @@ def write_report(run_dir: Path, on_damage: Callable[[str], None] | None = None) 
     InputError
         One line, where the folder is not a run folder or one of its files is broken.
     """
+    from pilotage.records.folder import check_folder
+
+    check_folder(run_dir)
     from pilotage.records.calibration import is_calibration
 
     if is_calibration(run_dir):

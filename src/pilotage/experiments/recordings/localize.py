@@ -17,8 +17,9 @@ from pilotage.evaluation.log_metrics import log_metrics
 from pilotage.experiments.leavings import drawn_grid, drawn_walls
 from pilotage.experiments.recordings.drive import LIDAR, RecordedDrive
 from pilotage.experiments.recordings.follow import Followed, bounds_of, build_localizer, follow
+from pilotage.experiments.recordings.form import UNSET, Setting, told_format
 from pilotage.experiments.recordings.parameters import shipped_parameters, with_overrides
-from pilotage.experiments.recordings.reading import UNSET, Setting, read_drive, told_format
+from pilotage.experiments.recordings.reading import read_drive
 from pilotage.experiments.recordings.stops import localize_stops
 from pilotage.logs.trajectories import write_planar_tum
 from pilotage.records.run_folder import RobotFiles, RunFiles, write_run

@@ -1,66 +1,16 @@
-"""Which recording is read, and what a bag does not say of itself."""
+"""A recording read by its kind, in the map that is said to be its own."""
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass
 from pathlib import Path
 
 from pilotage.core.errors import InputError
-from pilotage.core.types import Pose2
 from pilotage.experiments.build.charts import load_chart
 from pilotage.experiments.recordings.bag_drive import bag_drive
 from pilotage.experiments.recordings.drive import RecordedDrive, aer1513_drive, mrclam_drive
-from pilotage.logs.bag_messages import is_bag
+from pilotage.experiments.recordings.form import UNSET, Setting
 from pilotage.maps.landmark_table import read_landmark_table
 from pilotage.maps.world_map import WorldMap
-
-FORMATS = ("bag", "mrclam", "aer1513", "stops")
-
-
-@dataclass(frozen=True, slots=True)
-class Setting:
-    """What a bag does not say of itself, by the options of ``pilotage localize``.
-
-    Attributes
-    ----------
-    map
-        A shipped map's name or a map file; None where landmarks are all that is known.
-    landmarks
-        A CSV table id, x_m, y_m; None: those of the map.
-    start
-        Where the robot was; None: where the truth says.
-    topics, truth, from_s, to_s
-        As ``bag_drive`` has them.
-    """
-
-    map: str | None = None
-    landmarks: Path | None = None
-    start: Pose2 | None = None
-    topics: tuple[str, ...] = ()
-    truth: str | None = None
-    from_s: float = 0.0
-    to_s: float = math.inf
-
-
-UNSET = Setting()
-
-
-def told_format(log: Path) -> str:
-    """What a recording is, by what it holds.
-
-    Raises
-    ------
-    InputError
-        Where nothing is there.
-    """
-    if not log.exists():
-        raise InputError(f"{log}: expected a recording, found nothing there")
-    if log.is_dir():
-        return "mrclam" if (log / "Barcodes.dat").exists() else "bag"
-    if is_bag(log):
-        return "bag"
-    return {".mat": "aer1513", ".csv": "stops"}.get(log.suffix.lower(), "bag")
 
 
 def read_drive(

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+import scipy
 import yaml
-from scipy.stats import t as student
 
 from pilotage.calibration.stop_legs import LENGTHS_M, TURNS_RAD, ComplexArray, LegModel, Legs
 from pilotage.core.chi_square import chi_square_quantile
@@ -163,7 +163,7 @@ def _metrics(stops: Stops, legs: Legs, found: Reckoned) -> dict[str, object]:
     # Jackknife: stretches left out one at a time tell how sure the share is.
     count = found.shares.shape[0]
     mean, std = float(found.shares.mean()), math.sqrt((count - 1) * float(found.shares.var()))
-    half = float(student.ppf(0.975, count - 1)) * std
+    half = float(scipy.stats.t.ppf(0.975, count - 1)) * std
     ends = np.flatnonzero(np.diff(found.stretch, append=-1))
     return {
         "success": bool(held.low <= PROBABILITY <= held.high),

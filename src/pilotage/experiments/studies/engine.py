@@ -33,13 +33,13 @@ from pilotage.experiments.studies.rows import flat, read_rows
 from pilotage.experiments.studies.store import Counts, Store
 from pilotage.experiments.studies.study import (
     MISSION_FILE,
-    STUDY_FILE,
     Study,
     mission_yaml,
     study_yaml,
 )
 from pilotage.experiments.studies.unbuilt import NothingBuiltError, Unbuilt
 from pilotage.experiments.studies.workers import Workers
+from pilotage.records.folder import STUDY_FILE
 
 HEAR_EVERY_S = 5.0
 TELL_EVERY_S = 0.1

@@ -20,7 +20,7 @@ from pilotage.experiments.studies.database import StudyStoppedError
 from pilotage.experiments.studies.trial import Outcome, Task, TrialRunner
 from pilotage.experiments.studies.workers import AHEAD, WAIT_S, hung
 from pilotage.experiments.worker_processes import interrupts_held, obey_the_parent
-from pilotage.kernels.jit import cache_is_cold
+from pilotage.kernels.code_cache import cache_is_cold
 
 ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 STILLBORN = 4

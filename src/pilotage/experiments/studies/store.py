@@ -34,8 +34,9 @@ from pilotage.experiments.studies.database import (
     telling,
 )
 from pilotage.experiments.studies.owners import ENDED, hear, others
-from pilotage.experiments.studies.study import STUDY_FILE, Study, changes_told
+from pilotage.experiments.studies.study import Study, changes_told
 from pilotage.experiments.studies.trial import Outcome, Task
+from pilotage.records.folder import STUDY_FILE
 
 MAX_ATTEMPTS = 2
 """A trial that broke, and not by its mission's fault, is tried once more."""

@@ -25,9 +25,10 @@ from pilotage.experiments.studies.files import anchored, digests
 from pilotage.experiments.studies.groups import cell_groups
 from pilotage.experiments.studies.labels import labelled
 from pilotage.experiments.values import parse_yaml
+from pilotage.records.folder import STUDY_FILE, is_study_folder
 
 SHIPPED = resources.files("pilotage.missions") / "studies"
-STUDY_FILE, MISSION_FILE = "study.yaml", "mission.yaml"
+MISSION_FILE = "mission.yaml"
 PRESENTATION = (
     "question",
     "description",
@@ -104,11 +105,6 @@ def shipped_studies() -> list[str]:
     return sorted(
         entry.name.removesuffix(".yaml") for entry in SHIPPED.iterdir() if entry.name.endswith(".yaml")
     )
-
-
-def is_study_folder(name_or_path: str) -> bool:
-    """Whether that is the folder of a study that was begun."""
-    return (Path(name_or_path) / STUDY_FILE).is_file()
 
 
 def load_study(name_or_path: str, changes: Mapping[str, Any] | None = None) -> Study:

@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
+import scipy
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from scipy import stats
 
 from pilotage.core.types import FloatArray
 from pilotage.report.style import BLUE, SKY, VERMILLION, WIDTH_PT, note
@@ -44,11 +44,11 @@ def histogram(axes: Axes, values: FloatArray, expected: float | None = None) -> 
     mean = float(values.mean())
     # Freedman and Diaconis 1981, with a bound: where nearly all values are equal and a few are not, the bars
     # would fill the memory.
-    width = 2.0 * float(stats.iqr(values)) / np.cbrt(values.size)
+    width = 2.0 * float(scipy.stats.iqr(values)) / np.cbrt(values.size)
     bins = min(MOST_BINS, math.ceil(min(np.ptp(values) / max(width, NO_SCATTER), MOST_BINS)))
     axes.hist(values, bins=bins, density=True, color=SKY, edgecolor="white", linewidth=0.4)
     x = np.linspace(mean - 4.0 * std, mean + 4.0 * std, 121)
-    axes.plot(x, stats.norm.pdf(x, mean, std), color=VERMILLION, linewidth=1.6)
+    axes.plot(x, scipy.stats.norm.pdf(x, mean, std), color=VERMILLION, linewidth=1.6)
     if expected is not None:
         axes.axvline(expected, color=BLUE, linewidth=1.0, linestyle=(0, (4, 3)))
     axes.set_xlim(mean - 4.2 * std, mean + 4.2 * std)

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
+import scipy
 from matplotlib.axes import Axes
 from matplotlib.ticker import MaxNLocator
-from scipy.special import gammaincinv
 
 from pilotage.core.types import FloatArray
 from pilotage.records.run_data import RunData
@@ -44,7 +44,9 @@ def chi_square_band(
     """
     half = np.asarray(dof, dtype=np.float64) / 2.0
     tail = (1.0 - probability) / 2.0
-    low, high = (np.asarray(2.0 * gammaincinv(half, p), dtype=np.float64) for p in (tail, 1.0 - tail))
+    low, high = (
+        np.asarray(2.0 * scipy.special.gammaincinv(half, p), dtype=np.float64) for p in (tail, 1.0 - tail)
+    )
     return low, high
 
 

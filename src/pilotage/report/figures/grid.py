@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 
 import numpy as np
+import scipy
 from matplotlib.axes import Axes
 from matplotlib.colors import to_rgba
 from matplotlib.transforms import Affine2D
-from scipy import ndimage
 
 from pilotage.core.types import FloatArray, IntArray
 from pilotage.maps.occupancy_grid import OCCUPIED_FROM, UNKNOWN, OccupancyGrid
@@ -81,7 +81,7 @@ def draw_grown_grid(axes: Axes, grid: OccupancyGrid, by_m: float, colour: str) -
     """Draw what lies within ``by_m`` of occupied or unknown cells."""
     classes, (width, height) = cell_classes(grid)
     cell_m = width / classes.shape[1]
-    away_m = cell_m * (ndimage.distance_transform_edt(classes == FREE_CELL) - 0.5)
+    away_m = cell_m * (scipy.ndimage.distance_transform_edt(classes == FREE_CELL) - 0.5)
     picture = np.zeros((*classes.shape, 4))
     picture[away_m < by_m] = to_rgba(colour)
     limits = axes.get_xlim(), axes.get_ylim()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.spatial import cKDTree
+import scipy
 
 from pilotage.core.types import FloatArray
 from pilotage.records.run_data import RunData
@@ -55,4 +55,4 @@ def _distances(curve: FloatArray, route: FloatArray) -> FloatArray:
     along = np.concatenate([[0.0], np.cumsum(steps)])
     fine = np.linspace(0.0, along[-1], min(200_000, 10 * len(route)))
     points = np.column_stack([np.interp(fine, along, route[:, i]) for i in range(2)])
-    return np.asarray(cKDTree(points).query(curve)[0], dtype=np.float64)
+    return np.asarray(scipy.spatial.cKDTree(points).query(curve)[0], dtype=np.float64)

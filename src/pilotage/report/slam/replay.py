@@ -6,7 +6,7 @@ import itertools
 import math
 
 import numpy as np
-from scipy.spatial import KDTree
+import scipy
 
 from pilotage.core.types import BoolArray, FloatArray
 from pilotage.kernels.scans.seen_cells import mark_seen
@@ -110,7 +110,7 @@ def _first_seen(data: SlamFolder, middles: FloatArray, side_m: float) -> FloatAr
     # Floor that only beams without a return told of.
     left = ~np.isfinite(seen_s)
     if bool(left.any()):
-        seen_s[left] = times[KDTree(data.keyframe_poses[:, :2]).query(middles[left])[1]]
+        seen_s[left] = times[scipy.spatial.KDTree(data.keyframe_poses[:, :2]).query(middles[left])[1]]
     return seen_s
 
 

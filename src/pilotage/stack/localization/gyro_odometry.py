@@ -21,7 +21,7 @@ from pilotage.stack.localization.odometry_watch import increment_of
 
 COLUMNS = {"gyro_bias_rad_s": "rad/s", "gyro_bias_std_rad_s": "rad/s"}
 """Of the trace, where a gyroscope is used: its bias as believed, and the standard deviation."""
-GATE = chi_square_quantile(0.9999, 1)
+GATE_PROBABILITY = 0.9999
 """Wheels and gyroscope that differ by more do not both say what the robot did."""
 MOST_DISAGREEING_S = 1.0
 """Wheels slip for a moment; differing for longer, the gyroscope's bias is another than believed."""
@@ -65,6 +65,7 @@ class GyroOdometry:
         self._state, self._P = np.zeros(2), np.diag([0.0, self._bias_var])
         self._last_s: float | None = None
         self._disagreed_s = 0.0
+        self._gate = chi_square_quantile(GATE_PROBABILITY, 1)
         self._begin()
         self._channel = journal.channel(COLUMNS)
         self._tell()
@@ -132,7 +133,7 @@ class GyroOdometry:
         before, after = float(P[0, 0]), float(belief.cov[2, 2])
         step = wrap_to_pi(belief.pose.theta_rad - float(state[0]))
         corrected = max(before - after, 0.0) + SAMPLED * before
-        if belief.status is BeliefStatus.LOST or step * step > GATE * corrected:
+        if belief.status is BeliefStatus.LOST or step * step > self._gate * corrected:
             # Of a heading that was found otherwise than by correcting this one it says nothing.
             P[0, 1] = P[1, 0] = self._wheels_cov = 0.0
         elif after < before:
@@ -160,7 +161,7 @@ class GyroOdometry:
         scale = getattr(self._sheet, "scale_error", 0.0)
         gyro_var = self._rate_var * over_s + scale * scale * abs(self._heard_rad) * ONE_TURN_RAD
         least = 0.0
-        if apart * apart > GATE * (self._wheels_var + wheels_var + gyro_var + bias_var * over_s**2):
+        if apart * apart > self._gate * (self._wheels_var + wheels_var + gyro_var + bias_var * over_s**2):
             # One of them is wrong by so much. Wheels slip, or missed a moment; a gyroscope rarely does.
             wheels_var = least = apart * apart
             self._disagreed_s += over_s

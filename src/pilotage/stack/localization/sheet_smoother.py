@@ -30,7 +30,7 @@ from pilotage.stack.localization.observations import Observations
 RELAXED, STRICT = 30.0, 3.0
 """Standard deviations at which a residual weighs a quarter: just after landmarks were merged, and always."""
 
-JUMP_GATE = chi_square_quantile(0.9999, 3)
+JUMP_PROBABILITY = 0.9999
 GROWN_M, GROWN_RAD = 0.012, math.radians(1.5)
 """What a position and a heading may lose, at most, between two solutions (standard deviations)."""
 DISTRUST = 10.0
@@ -93,6 +93,7 @@ class SheetSmoother:
         if given is not None:
             config = surely(config)
         self._config, self._gyro, self._separation = config, gyro, separation_m
+        self._jump_gate = chi_square_quantile(JUMP_PROBABILITY, 3)
         self._start = np.array([start.x_m, start.y_m, start.theta_rad, 0.0])
         first = (start.x_m, start.y_m, start.theta_rad)
         self.keyframes = (
@@ -165,7 +166,7 @@ class SheetSmoother:
     def _is_plausible(self, jump: FloatArray, cov: FloatArray) -> bool:
         """Whether the newest pose moved no farther than it may, given how sure it was before."""
         grown = cov + np.diag([GROWN_M**2, GROWN_M**2, GROWN_RAD**2])
-        return float(jump[:3] @ np.linalg.solve(grown, jump[:3])) < JUMP_GATE
+        return float(jump[:3] @ np.linalg.solve(grown, jump[:3])) < self._jump_gate
 
     def _iterate(self, steps: int, merge: bool) -> None:
         relaxed = 0
