@@ -1,8 +1,8 @@
 """A corpus of damaged run folders through ``pilotage report``: a page or one line, never more than that.
 
-Of all the ways some are drawn, and up to six of them befall six files of one folder: a page tells of each file
-that it was made without, and to draw a page is what takes time. Where one makes the folder no run at all, the
-others are tried again without it. ``PILOTAGE_DAMAGED_RUNS=1`` takes all ways, each by itself.
+Of all the ways some are drawn, and up to six of them befall six files of one folder: a page tells of each
+file that it was made without, and to draw a page is what takes time. Where one makes the folder no run at
+all, the others are tried again without it. ``PILOTAGE_DAMAGED_RUNS=1`` takes all ways, each by itself.
 """
 
 from __future__ import annotations
