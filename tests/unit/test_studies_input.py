@@ -20,7 +20,6 @@ from pilotage.experiments.studies.rows import read_rows
 from pilotage.experiments.studies.store import Store
 from pilotage.experiments.studies.study import (
     MISSION_FILE,
-    STUDY_FILE,
     Study,
     load_study,
     make_study,
@@ -28,6 +27,7 @@ from pilotage.experiments.studies.study import (
     study_yaml,
 )
 from pilotage.experiments.studies.trial import TrialRunner
+from pilotage.records.folder import STUDY_FILE
 
 RADIUS = "stack.planner.turning_radius_m"
 
