@@ -159,6 +159,7 @@ def settle(
     error = track.errors.min()
     leads = led and track.errors[0] == error
     add_slip(track.slip, track.held, start, pose, hessian, told[3], error, leads, prior)
+    track.fitted[0] = told[0] / track.usual[0]
     track.usual[0] += 0.02 * (told[0] - track.usual[0])
     track.usual[1] += 0.05 * (told[2] - track.usual[1])
     track.residuals[0] += told[2]

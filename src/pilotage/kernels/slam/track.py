@@ -35,6 +35,8 @@ class Track(NamedTuple):
     moving
         (2,) which share of the scan that was placed last, and of the one looked at, seemed to have come where
         it stands; not a number where that was not asked.
+    fitted
+        (1,) the last placed scan's fit over its running mean.
     wheels
         What the odometry is always off by.
     """
@@ -50,6 +52,7 @@ class Track(NamedTuple):
     residuals: FloatArray
     since: IntArray
     moving: FloatArray
+    fitted: FloatArray
     wheels: Wheels
 
 

@@ -49,9 +49,9 @@ PRIOR = np.diag([2.0, 2.0, 20.0])
 scan a little towards an odometry whose errors all have one sign."""
 NONE = 0.3
 """Fit over its running mean below which it is no fit at all: what hangs by so few points hangs by chance."""
-CHANGED, LEAST_ASKED = 0.2, 40
-"""Shares of a scan that came all at once, and of what was last seen that it sees through (of so many points
-at least), from which on together a poor fit is none (decision 0372)."""
+GONE, CHANGED, LEAST_ASKED = 0.1, 0.2, 40
+"""Share of what was last seen that a scan sees through (of so many points at least), and the same together
+with the share of the scan that came all at once, from which on a poor fit is none (decision 0372)."""
 SEARCH_STEP_RAD = 0.02
 FAR, LEAST_FAR = 0.65, 0.12
 """Share of the usual fit that a place far from all guesses takes, and what its distance must leave of it."""
@@ -109,6 +109,7 @@ class LocalMatcher:
             np.zeros(2),
             np.zeros(1, np.int64),
             np.full(2, np.nan),
+            np.ones(1),
             unknown_wheels(),
         )
         self.found = Look(
@@ -272,13 +273,14 @@ class LocalMatcher:
 
     def _is_contradicted(self, fit: Fit, cloud: FloatArray) -> bool:
         """Whether the world looks so different from where a scan fits poorly that it lies elsewhere."""
-        if fit.value >= POOR_AS_GUESSED * self.track.usual[0]:
+        if fit.value >= POOR_AS_GUESSED * self.track.usual[0] or self.track.fitted[0] < POOR:
             return False
         before, now = self.track.moving.tolist()
         came = max(now - before, 0.0) if now >= before else 0.0
         known, at = self._local[-1] if self._local else (cloud[:0], fit.pose)
         through, asked = looked_through(cloud, fit.pose, known, np.asarray(at))
-        return came + through / max(asked, LEAST_ASKED) > CHANGED
+        gone = through / max(asked, LEAST_ASKED)
+        return gone > GONE or came + gone > CHANGED
 
     def _odometry_leads(self, step: FloatArray | None) -> bool:
         errors = self.track.errors
