@@ -265,7 +265,8 @@ class LocalMatcher:
                         best = judged
         if best is None or best.value < NONE * usual:
             best = self._far(cloud, last, motions[0], None if step is None else credible, led)
-        if best is None or self._is_contradicted(best, cloud):
+        # Without odometry a scan that fits nowhere breaks the track at once: worse than a poor fit.
+        if best is None or (step is not None and self._is_contradicted(best, cloud)):
             best = None
             self.lost += 1
             self._lost_s += dt_s
