@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -61,8 +62,8 @@ def test_who_made_room_does_not_go_back_where_a_mate_stands(tmp_path: Path) -> N
     context.hop = context.target = context.came_from = 0
     context.pose = Pose2(2.5, 4.2, 0.0)
     assert context.ask()
-    word = TeamWord(2.5, 2.6, False, None, None, context.memory.message(0.0), 0.3)
-    context.mates[1] = 0.0, word
+    news = replace(context.memory.message(0.0), sender=1)
+    context.hear(0.0, TeamWord(2.5, 2.6, False, None, None, news, 0.3))
     assert not context.ask()
 
 
