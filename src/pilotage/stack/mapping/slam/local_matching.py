@@ -277,7 +277,7 @@ class LocalMatcher:
         if fit.value >= POOR_AS_GUESSED * self.track.usual[0] or self.track.fitted[0] < POOR:
             return False
         before, now = self.track.moving.tolist()
-        came = max(now - before, 0.0) if now >= before else 0.0
+        came = now - before if now > before else 0.0  # also where either was not asked
         known, at = self._local[-1] if self._local else (cloud[:0], fit.pose)
         through, asked = looked_through(cloud, fit.pose, known, np.asarray(at))
         gone = through / max(asked, LEAST_ASKED)
