@@ -63,7 +63,8 @@ class TestWhoStands:
         """It had driven 0.74 m since: robots waited, and made room for a body, for half a minute."""
         context: Any = build(mission_of(two_rooms(DOOR_Y_M), seed=0)).team[1].stack._context  # type: ignore[attr-defined]
         word = SimpleNamespace(x_m=3.0, y_m=1.0, talk=Talk(1.0, math.inf, 0.0, 1.0))
-        context.mates[0], context.t_s = (1.0, word), 3.0
+        context.mates.hear(0, 1.0, word)
+        context.t_s = 3.0
         assert not len(context.fell_silent())
         context.t_s = 6.0
         ((x, y, reach_m),) = context.fell_silent()
@@ -78,7 +79,8 @@ class TestWhoStands:
         settings["team"]["radio"] = {"range_m": 10.0, "loss": 0.3, "delay_s": 1.0}
         context: Any = build(mission_of(settings, seed=0)).team[1].stack._context  # type: ignore[attr-defined]
         word = SimpleNamespace(x_m=3.0, y_m=1.0, talk=Talk(1.0, 10.0, 0.3, 1.0))
-        context.mates[0], context.t_s = (1.0, word), 9.0
+        context.mates.hear(0, 1.0, word)
+        context.t_s = 9.0
         assert not len(context.fell_silent())
         context.t_s = 10.0
         assert len(context.fell_silent()) == 1

@@ -135,7 +135,7 @@ class TestWhereNoCommandLeadsOn:
     def test_it_stays_where_mates_settle_who_goes_or_where_it_gets_on(self, spoils: str) -> None:
         context = self.before_a_gap()
         if spoils == "mate":
-            context.mates[2] = context.t_s, SimpleNamespace(x_m=5.0, y_m=DOOR_Y_M)
+            context.mates.hear(2, context.t_s, SimpleNamespace(x_m=5.0, y_m=DOOR_Y_M))
         else:
             context.twist = Twist(0.3, 0.0)
         assert not context.finds_another_way()

@@ -156,7 +156,7 @@ class TestOrder:
         asks = {0: (9.0, 5.0), 1: (4.0, 6.0), 2: (4.0, 7.0)}
         for number, (since_s, x_m) in asks.items():
             clearing = Clearing(since_s, ((3, x_m, 1.0), (9, x_m, 2.0)))
-            context.mates[number] = 0.0, replace(word, clearing=clearing)
+            context.mates.hear(number, 0.0, replace(word, clearing=clearing))
         assert told(context) == (6.0, 1.0)
         assert orders(context, 3.0) == {}
         assert orders(context, 4.0) == {3: (6.0, 1.0), 9: (6.0, 2.0)}
@@ -298,7 +298,7 @@ def hear(context: Any, t_s: float, places: Places) -> None:
     context.t_s = t_s
     for number, (x, y) in places.items():
         word = TeamWord(x, y, False, None, None, context.memory.message(t_s), 0.3)
-        context.mates[number] = t_s, word
+        context.mates.hear(number, t_s, word)
 
 
 class TestWhoeverGoesFirst:

@@ -212,7 +212,7 @@ class _Run:
         robot.memory.receive(message)
         strategy = robot.strategy
         on_its_way = robot.leaves_s < t_s < robot.arrives_s and not robot.turned
-        if not (on_its_way and isinstance(strategy, Attentive)):
+        if not (on_its_way and isinstance(strategy, Attentive) and strategy.is_away):
             return
         if strategy.calls_back(robot.memory.knowledge(t_s)):
             robot.turned, left_s = True, robot.arrives_s - t_s

@@ -175,6 +175,28 @@ def within(points: FloatArray, reach: float) -> FloatArray:
 
 
 @kernel
+def is_near_beside(
+    points: FloatArray, pose: FloatArray, near: float, discs: FloatArray, margin: float
+) -> bool:
+    """Whether one of the returns (M, 2), in the frame of ``pose``, is so near to it and in none of discs.
+
+    The discs (K, 3) are in the frame that ``pose`` is in, and wider by a margin.
+    """
+    c, s = math.cos(pose[2]), math.sin(pose[2])
+    for i in range(points.shape[0]):
+        if math.hypot(points[i, 0], points[i, 1]) >= near:
+            continue
+        x = pose[0] + c * points[i, 0] - s * points[i, 1]
+        y = pose[1] + s * points[i, 0] + c * points[i, 1]
+        is_beside = True
+        for k in range(discs.shape[0]):
+            is_beside &= not math.hypot(x - discs[k, 0], y - discs[k, 1]) < discs[k, 2] + margin
+        if is_beside:
+            return True
+    return False
+
+
+@kernel
 def rotated(points: FloatArray, angle: float) -> FloatArray:
     """Points (K, 2) turned around the origin."""
     c, s = math.cos(angle), math.sin(angle)

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pilotage.core.types import BoolArray, FloatArray
+from pilotage.kernels.patrol import words
 from pilotage.stack.patrol.messages import PatrolKnowledge
 
 SURE_WORDS, LATE_SHARE = 3.0, 0.25
@@ -47,14 +48,11 @@ class Hearing:
 
     def listen(self, knowledge: PatrolKnowledge) -> None:
         """Note who is heard and how often, and who is off duty since when."""
-        for robot, state in enumerate(knowledge.states):
-            if robot != knowledge.robot and state is not None and state.t_s > self.heard_s[robot]:
-                gap_s = state.t_s - self.heard_s[robot]
-                kept = math.exp(-gap_s / self._memory_s)
-                self._gaps_s[robot] = kept * self._gaps_s[robot] + [gap_s, 0.5 * gap_s**2]
-                self._expected[robot] *= [kept, kept * math.exp(-1.0 / SURE_WORDS)]
-                self._longest_s = max(gap_s, self._longest_s)
-                self.heard_s[robot] = state.t_s
+        said_s = np.array([-math.inf if s is None else s.t_s for s in knowledge.states])
+        said_s[knowledge.robot] = -math.inf
+        known = self.heard_s, self._gaps_s, self._expected
+        gap_s = words.count_silences(said_s, *known, self._memory_s, SURE_WORDS)
+        self._longest_s = max(self._longest_s, gap_s)
         off = np.array([state is not None and not state.on_duty for state in knowledge.states])
         self._off_s = np.where(off, np.minimum(self._off_s, knowledge.now_s), math.inf)
 

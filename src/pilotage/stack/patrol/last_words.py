@@ -14,8 +14,7 @@ PRIOR_WORDS, PRIOR_LOST = 10.0, 1.0
 """Before words were counted it is taken that so many of so many were lost."""
 LEAST_LOSS = 0.1
 """However good a radio is, silences of a few words happen."""
-COUNTED = 200.0
-"""Words are forgotten after so many."""
+UNTOLD = (math.nan, math.nan, math.nan, math.nan)
 
 
 class LastWords:
@@ -33,25 +32,15 @@ class LastWords:
 
     def hear(self, number: int, sent_s: float, word: TeamWord) -> None:
         """A mate said something itself."""
-        row, talk = self._words[number], word.talk
-        # One by one: a slice filled from a tuple takes as long as eight entries, and a large team says much.
-        row[words.SENT], row[words.X], row[words.Y], row[words.RADIUS] = (
-            sent_s,
-            word.x_m,
-            word.y_m,
-            word.radius_m,
-        )
-        if talk is None:
-            row[words.REACH :] = math.nan
-            return
-        expected, lost = PRIOR_WORDS, PRIOR_LOST
-        due = row.item(words.DUE)
-        if not math.isnan(due):
-            kept = math.exp(-due / COUNTED)
-            expected = kept * row.item(words.EXPECTED) + due
-            lost = kept * row.item(words.LOST) + max(0.0, due - 1.0)
-        row[words.REACH], row[words.PERIOD], row[words.SPEED] = talk.reach_m, talk.period_s, talk.speed_m_s
-        row[words.LOSS], row[words.DUE], row[words.EXPECTED], row[words.LOST] = talk.loss, 0.0, expected, lost
+        talk, place = word.talk, (word.x_m, word.y_m, word.radius_m)
+        habit = UNTOLD if talk is None else (talk.reach_m, talk.period_s, talk.speed_m_s, talk.loss)
+        words.hear(self._words, number, sent_s, place, habit, PRIOR_WORDS, PRIOR_LOST)
+
+    def of_nobody(
+        self, points: FloatArray, pose: Pose2, own: int, t_s: float, told_m: float, speed_m_s: float
+    ) -> FloatArray:
+        """Those of returns (M, 2), base frame, that are of no mate; none while one may be anywhere."""
+        return words.of_nobody(points, pose.as_array(), self._words, own, t_s, told_m, speed_m_s)
 
     def step(self, t_s: float, pose: Pose2, own: Talk, *, lost: bool) -> None:
         """Time has passed; who is ``lost`` does not know how far from a mate it is."""

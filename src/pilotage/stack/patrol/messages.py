@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
+from itertools import compress
+from operator import is_not
 
 import numpy as np
 
@@ -163,7 +165,7 @@ class PatrolMemory:
 
     def leave(self, vertex: int, t_s: float) -> None:
         """It goes on as if it had been there: others visit it."""
-        self._tell(replace(self._own, t_s=t_s, at=vertex))
+        self._tell(t_s, at=vertex)
 
     def visit(self, vertex: int, t_s: float) -> None:
         """It is at a vertex, to stay or on its way."""
@@ -173,7 +175,7 @@ class PatrolMemory:
 
     def bound(self, target: int, t_s: float, arrives_s: float) -> None:
         """It drives to a target, or waits there."""
-        self._tell(replace(self._own, t_s=t_s, target=target, arrives_s=arrives_s))
+        self._tell(t_s, target=target, arrives_s=arrives_s)
 
     def update(
         self,
@@ -185,37 +187,23 @@ class PatrolMemory:
         shut: ShutPaths | None = None,
     ) -> None:
         """Something else about itself changed."""
-        old = self._own
-        self._tell(
-            replace(
-                old,
-                t_s=t_s,
-                speed_m_s=old.speed_m_s if speed_m_s is None else speed_m_s,
-                on_duty=old.on_duty if on_duty is None else on_duty,
-                words=old.words if words is None else words,
-                shut=old.shut if shut is None else shut,
-            )
-        )
+        self._tell(t_s, speed_m_s=speed_m_s, on_duty=on_duty, words=words, shut=shut)
 
     def receive(self, message: PatrolMessage) -> None:
         """Take in what somebody else sent: the newer word of each robot, the later visit of each vertex."""
         np.maximum(self._visited_s, message.visited_s, out=self._visited_s)
-        states, own = self._states, self._own.robot
-        whole = len(message.states) == len(states)  # then both are in the order of the robots' numbers
-        for known, state in zip(states, message.states, strict=True) if whole else self._beside(message):
-            # Most of what mates pass on has been heard before: of a large team nearly all.
-            if known is state or state.robot == own:
-                continue
-            if known is None or state.t_s > known.t_s:
+        states, told = self._states, message.states
+        if len(told) == len(states):
+            # In the order of the robots' numbers, and of a large team nearly all has been heard before.
+            told = tuple(compress(told, map(is_not, told, states)))
+        for state in told:
+            known = states[state.robot]
+            if state.robot != self._own.robot and (known is None or state.t_s > known.t_s):
                 states[state.robot] = state
-
-    def _beside(self, message: PatrolMessage) -> list[tuple[PatrolState | None, PatrolState]]:
-        """What it knows of each robot that a message tells of, and what that tells."""
-        return [(self._states[state.robot], state) for state in message.states]
 
     def message(self, t_s: float) -> PatrolMessage:
         """What it sends now."""
-        self._tell(replace(self._own, t_s=t_s))
+        self._tell(t_s)
         states = tuple(state for state in self._states if state is not None)
         return PatrolMessage(self._own.robot, t_s, states, self._visited_s.copy())
 
@@ -235,5 +223,28 @@ class PatrolMemory:
             chances,
         )
 
-    def _tell(self, own: PatrolState) -> None:
-        self._own = self._states[own.robot] = own
+    def _tell(
+        self,
+        t_s: float,
+        *,
+        at: int | None = None,
+        target: int | None = None,
+        arrives_s: float | None = None,
+        speed_m_s: float | None = None,
+        on_duty: bool | None = None,
+        words: FloatArray | None = None,
+        shut: ShutPaths | None = None,
+    ) -> None:
+        """It says something new of itself; the rest stays."""
+        old = self._own
+        self._own = self._states[old.robot] = PatrolState(
+            old.robot,
+            t_s,
+            old.at if at is None else at,
+            old.target if target is None else target,
+            old.arrives_s if arrives_s is None else arrives_s,
+            old.speed_m_s if speed_m_s is None else speed_m_s,
+            old.on_duty if on_duty is None else on_duty,
+            old.words if words is None else words,
+            old.shut if shut is None else shut,
+        )

@@ -87,6 +87,11 @@ class Foresighted(Strategy, Protocol):
 class Attentive(Strategy, Protocol):
     """A strategy that may want to be asked on the way, as what it was sent out for has proved needless."""
 
+    @property
+    def is_away(self) -> bool:
+        """Whether it was sent out for such a thing; if not it is not asked."""
+        ...
+
     def calls_back(self, knowledge: PatrolKnowledge) -> bool:
         """Whether it is to be asked now where to go."""
         ...

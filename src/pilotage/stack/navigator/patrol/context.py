@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from pilotage.core.types import FloatArray, Pose2, Twist
+from pilotage.kernels.control import disc_returns
 from pilotage.maps.world_map import WorldMap
 from pilotage.sensors.readings import Readings
 from pilotage.stack.interface import Belief
@@ -17,7 +18,7 @@ from pilotage.stack.navigator.patrol.config import Mode, PatrolNavigatorConfig
 from pilotage.stack.navigator.patrol.headway import Headway
 from pilotage.stack.navigator.patrol.passage import Pursuit
 from pilotage.stack.navigator.patrol.paths import SURELY_RATIO, Paths
-from pilotage.stack.navigator.patrol.senses import TOLD_M
+from pilotage.stack.navigator.patrol.senses import NO_DISCS, TOLD_M
 from pilotage.stack.patrol.messages import PatrolKnowledge, PatrolMemory
 from pilotage.stack.patrol.roadmap import Roadmap
 from pilotage.stack.patrol.shut_paths import ShutPaths
@@ -231,7 +232,7 @@ class Context(Paths):
         if strategy is None or self.homeward or not self._has_heard:
             return False
         self._has_heard = False
-        return strategy.calls_back(self._knowledge())
+        return strategy.is_away and strategy.calls_back(self._knowledge())
 
     def lead(self, vertex: int, *, first: bool = False) -> Twist:
         """The command that leads to a vertex; who goes ``first`` drives on towards mates who talk."""
@@ -260,14 +261,15 @@ class Context(Paths):
     def crowded(self, reach_m: float) -> bool:
         """Whether something that may move is so near to the body's edge: no mate that waits as well, and
         nobody who is planned around."""
-        near = self.on_map(self.strange[np.hypot(*self.strange.T) < reach_m + self.radius_m])
+        pose, near_m = self.pose.as_array(), reach_m + self.radius_m
+        if not disc_returns.is_near_beside(self.strange, pose, near_m, NO_DISCS, 0.0):
+            return False  # as nearly always
         stay = [(x, y, self.radius_m) for x, y in self._obstructions.shutting_xy_m.tolist()]
         for number, word in self.heard():
             if self.memory.waits(number) and not word.blocked:
                 stay.append((word.x_m, word.y_m, word.radius_m))
-        for x, y, radius_m in stay:
-            near = near[~(np.hypot(near[:, 0] - x, near[:, 1] - y) < radius_m + TOLD_M)]
-        return len(near) > 0
+        discs = np.array(stay).reshape(-1, 3)
+        return disc_returns.is_near_beside(self.strange, pose, near_m, discs, TOLD_M)
 
     def here(self) -> FloatArray:
         """(1, 3) the place where it is, as a path; (0, 3) off the map."""

@@ -221,7 +221,7 @@ class Motion:
         latest_s = senses.t_s - senses.patience_s(TALKS_PERIODS)
         talk = [
             (word.x_m, word.y_m, senses.radius_m + senses.speed_m_s * (senses.t_s - sent_s))
-            for sent_s, word in senses.mates.values()
+            for _, (sent_s, word) in senses.mates.items()
             if sent_s > latest_s
         ]
         mute = [

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pilotage.core.types import BoolArray, FloatArray
+from pilotage.core.types import FloatArray
+from pilotage.kernels.patrol import along
 from pilotage.stack.patrol.roadmap import STEP_M
 from pilotage.stack.patrol.word import Claim
 
@@ -60,15 +61,9 @@ class Stretch:
 
 def stretch_of(way: FloatArray, pass_m: float) -> Stretch | None:
     """The first passage for one on a path (N, 3) of places and half widths, if it is near."""
-    narrow = way[:, 2] < pass_m
-    if not narrow[: math.ceil(CLAIM_M / STEP_M)].any():
+    first, last = along.first_narrow(way, pass_m, math.ceil(CLAIM_M / STEP_M), BETWEEN_STEPS)
+    if first < 0:
         return None
-    first = int(np.argmax(narrow))
-    last = first
-    for k in np.flatnonzero(narrow).tolist():
-        if k - last > BETWEEN_STEPS:
-            break
-        last = k
     # And out of it: who leaves tells in which direction; so does who goes no farther than into it.
     begin = max(min(first, len(way) - 1 - OUT_STEPS), 0)
     line = way[begin : last + 1 + OUT_STEPS, :2]
@@ -83,8 +78,8 @@ def claimed(stretch: Stretch, old: Claim | None, t_s: float) -> Claim:
         # Who turns around claims anew: nobody counted on that.
         if how > 0 or (how < 0 and min(len(line), len(old.line_xy_m)) < 2):
             return Claim(line, old.turn, old.since_s, stretch.inside)
-    along = line[-1] - line[0]
-    forwards = int(along[int(np.argmax(np.abs(along)))] > 0.0)
+    to = line[-1] - line[0]
+    forwards = int(to[int(np.argmax(np.abs(to)))] > 0.0)
     number = math.floor(t_s / TURN_S)
     # By turns those of either direction go first.
     return Claim(line, 2 * number + (forwards ^ (number & 1)), t_s, stretch.inside)
@@ -95,27 +90,8 @@ def relation(line: FloatArray, other: FloatArray) -> int:
 
     Who turns off the other's path, through a door beside it, is not against the other.
     """
-    apart = np.hypot(*(line[:, None] - other[None]).transpose(2, 0, 1))
-    near = apart < SAME_M
-    if not near.any():
-        return 0
-    if len(line) < 2 or len(other) < 2:
-        return -1
-    agree = float((_headings(line) @ _headings(other).T)[near].mean())
-    if abs(agree) < ACROSS and (_leaves(line, near.any(axis=1)) or _leaves(other, near.any(axis=0))):
-        return 1
-    return 1 if agree > 0.0 else -1
-
-
-def _leaves(line: FloatArray, near: BoolArray) -> bool:
-    """Whether a path (K, 2) is near another (K,) at its beginning alone, where its robot is."""
-    last = int(np.flatnonzero(near)[-1])
-    return last < len(line) - 1 and float(np.hypot(*np.diff(line[: last + 1], axis=0).T).sum()) <= LEAVES_M
-
-
-def _headings(line: FloatArray) -> FloatArray:
-    steps = np.gradient(line, axis=0)
-    return np.asarray(steps / np.maximum(np.hypot(*steps.T), 1e-9)[:, None])
+    own, others = np.ascontiguousarray(line), np.ascontiguousarray(other)
+    return along.relation(own, others, SAME_M, ACROSS, LEAVES_M)
 
 
 def precedes(one: Claim, robot: int, other: Claim, number: int) -> bool:

@@ -153,7 +153,7 @@ class Paths(Senses):
     def _near_mates(self) -> list[tuple[float, float]]:
         """Where mates said last that they are, but those that are silent for too long."""
         latest_s = self.t_s - self.patience_s(HEARD_PERIODS)
-        return [(w.x_m, w.y_m) for sent_s, w in self.mates.values() if sent_s > latest_s]
+        return [(w.x_m, w.y_m) for _, (sent_s, w) in self.mates.items() if sent_s > latest_s]
 
     def _is_too_near_a_body(self, ahead: FloatArray) -> bool:
         """Whether a path (N, 2) leads past a body that is planned around, from which more is kept now."""

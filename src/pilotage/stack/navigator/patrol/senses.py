@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import ItemsView
 
 import numpy as np
 
@@ -18,6 +19,7 @@ from pilotage.stack.interface import Belief
 from pilotage.stack.journal import Journal
 from pilotage.stack.knowledge import RobotKnowledge
 from pilotage.stack.navigator.patrol.config import PatrolNavigatorConfig
+from pilotage.stack.navigator.patrol.mates import Mates
 from pilotage.stack.patrol.last_words import LEAST_LOSS, LastWords
 from pilotage.stack.patrol.task import PatrolTask
 from pilotage.stack.patrol.watch import IntruderWatch
@@ -86,6 +88,7 @@ class Senses:
         self._radio = next(iter(radios), None)
         self.talk_habit = _habit(next(iter(radios.values()), None), config.message_period_s, self.speed_m_s)
         self._delay_s = max((radio.delay_s for radio in radios.values()), default=0.0)
+        self._patience_s = self.patience_s(HEARD_PERIODS)
         self._last_words = LastWords(len(task.starts), chart.bounds_m)
         self._directions = clustering.beam_directions(
             float(lidar.beam_angles_rad()[0]), lidar.beam_step_rad, lidar.beams
@@ -97,8 +100,7 @@ class Senses:
         self._moved_s = 0.0
         self.fresh = False
         self.near = self.strange = self.people = NO_POINTS
-        self.mates: dict[int, tuple[float, TeamWord]] = {}
-        self._heard: tuple[float, list[tuple[int, TeamWord]]] | None = None  # when it was asked, and who
+        self.mates = Mates()
         self._watch = IntruderWatch(config.watch)
         self.alarm = (math.nan, math.nan, math.nan)
 
@@ -132,8 +134,9 @@ class Senses:
 
     def hear(self, sent_s: float, word: TeamWord) -> None:
         """A mate said something."""
-        self.mates[word.news.sender], self._heard = (sent_s, word), None
-        self._last_words.hear(word.news.sender, sent_s, word)
+        number = word.news.sender
+        self.mates.hear(number, sent_s, word)
+        self._last_words.hear(number, sent_s, word)
 
     def silences_log(self) -> FloatArray:
         """(N,) how unlikely each mate's silence is by chance: as ``LastWords.chances_log``."""
@@ -162,15 +165,10 @@ class Senses:
 
     def _strangers(self) -> FloatArray:
         """(P, 2) returns, base frame, that are of no mate; none while one is not heard: it may be it."""
-        words = list(self.mates.values())
-        if len(words) < len(self.task.starts) - 1 or not len(self.strange):
+        if not len(self.strange):
             return NO_POINTS
-        there = self.on_map(self.strange)
-        told = np.array([(word.x_m, word.y_m, self.t_s - sent_s) for sent_s, word in words]).reshape(-1, 3, 1)
-        away = np.hypot(there[:, 0] - told[:, 0], there[:, 1] - told[:, 1])
-        # A mate that is lost may be anywhere, and is near to nothing that is NaN.
-        nobody = (away > self.config.watch.mate_m + self.speed_m_s * told[:, 2]).all(axis=0)
-        return np.ascontiguousarray(self.strange[nobody])
+        told_m, own = self.config.watch.mate_m, self.task.robot
+        return self._last_words.of_nobody(self.strange, self.pose, own, self.t_s, told_m, self.speed_m_s)
 
     def field(self, *, lost: bool) -> safe_stop.Field:
         """Distances on its map, their origin and resolution; none where it does not know where it is."""
@@ -218,13 +216,9 @@ class Senses:
         """Whether it stands, by the odometry."""
         return self.moving_m_s <= AT_REST_M_S
 
-    def heard(self) -> list[tuple[int, TeamWord]]:
+    def heard(self) -> ItemsView[int, TeamWord]:
         """The last words of mates that were heard lately, with their numbers."""
-        if self._heard is None or self._heard[0] != self.t_s:
-            latest_s = self.t_s - HEARD_PERIODS * self.config.message_period_s
-            words = [(number, word) for number, (sent_s, word) in self.mates.items() if sent_s > latest_s]
-            self._heard = self.t_s, words
-        return self._heard[1]
+        return self.mates.lately(self.t_s, HEARD_PERIODS * self.config.message_period_s)
 
     def patience_s(self, periods: float) -> float:
         """How long after its last word was sent a mate's silence is no chance: so many words by a good radio.
@@ -239,8 +233,7 @@ class Senses:
         """(L, 3) discs where mates that were not heard for too long may stand: around where they said last
         that they are, as far as they drive until the next word is due.
         """
-        latest_s = self.t_s - self.patience_s(HEARD_PERIODS)
-        silent = [word for sent_s, word in self.mates.values() if sent_s <= latest_s]
+        silent = self.mates.silent(self.t_s - self._patience_s)
         if not silent:
             return NO_DISCS
         driven_m = [0.0 if (talk := word.talk) is None else talk.speed_m_s * talk.period_s for word in silent]

@@ -169,6 +169,11 @@ class AdaptiveRoundsStrategy:
         before = self._place if knowledge.at == knowledge.target else self._place - 1
         return np.array([_key(self._round), self._round.at_m[before], self._phase_s, self._looking.gone])
 
+    @property
+    def is_away(self) -> bool:
+        """Whether it looks after a mate."""
+        return self._looking.is_away
+
     def calls_back(self, knowledge: PatrolKnowledge) -> bool:
         """Whether it is on its way to a mate that it has just heard."""
         return self._looking.is_heard_again(knowledge, self._hearing.heard_s)
