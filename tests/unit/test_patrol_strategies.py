@@ -449,13 +449,13 @@ def test_of_those_who_begin_in_one_room_the_nearest_to_its_door_goes_farthest() 
     assert np.argsort(nearest_m).tolist() == np.argsort(-behind_m).tolist()
 
 
-def ring() -> PatrolGraph:
-    """Of eight places, 3 m from each to the next."""
-    angles = np.linspace(0.0, 2.0 * np.pi, 8, endpoint=False)
-    edges = np.full((8, 8), np.inf)
-    for k in range(8):
-        edges[k, (k + 1) % 8] = edges[(k + 1) % 8, k] = 3.0
-    return PatrolGraph.of(3.9 * np.column_stack([np.cos(angles), np.sin(angles)]), edges)
+def ring(count: int = 8) -> PatrolGraph:
+    """Of places, 3 m from each to the next."""
+    angles = np.linspace(0.0, 2.0 * np.pi, count, endpoint=False)
+    edges = np.full((count, count), np.inf)
+    for k in range(count):
+        edges[k, (k + 1) % count] = edges[(k + 1) % count, k] = 3.0
+    return PatrolGraph.of(0.49 * count * np.column_stack([np.cos(angles), np.sin(angles)]), edges)
 
 
 def test_how_long_legs_take_is_learnt_and_one_that_was_held_up_counts_little() -> None:
@@ -470,23 +470,31 @@ def test_how_long_legs_take_is_learnt_and_one_that_was_held_up_counts_little() -
     assert 9.0 < np.diff(legs.along_s(SPEED_M_S))[0] < 12.0
 
 
-@pytest.mark.parametrize(("late_s", "waits"), [(0.0, False), (6.0, True)])
-def test_who_is_evenly_spaced_by_time_does_not_wait(late_s: float, *, waits: bool) -> None:
-    """Half of a round is three times as slow: by metres a mate in there seemed late, time after time."""
-    graph = ring()
+@pytest.mark.parametrize(
+    ("places", "late_s", "waits"),
+    [(8, 0.0, False), (8, 6.0, True), (8, 2.0, False), (32, 0.0, False), (32, 3.0, False), (32, 5.0, True)],
+)
+def test_who_is_evenly_spaced_by_time_does_not_wait(places: int, late_s: float, *, waits: bool) -> None:
+    """Half of a round is three times as slow: by metres a mate in there seemed late, time after time.
+
+    Of 32 places legs tell where the mate is to 4 s; a tenth of the time between the two is 13 s.
+    """
+    graph = ring(places)
     setting = setting_for(graph, starts=(0, 0))
     strategy = AdaptiveRoundsStrategy(AdaptiveRoundsConfig(), setting)
     walk, memory = strategy._round, memory_at(0, graph)
     assert len(strategy._plan.sizes) == 1
-    legs_s, t_s = np.repeat([12.0, 4.0], 4), strategy._leaves_s
+    legs_s, t_s = np.repeat([12.0, 4.0], places // 2), strategy._leaves_s
     while t_s < strategy._leaves_s + 2.0 * legs_s.sum() or strategy._place != 0:
         stop = strategy._place
         memory.visit(int(walk.stops[stop]), t_s)
-        assert strategy.next_vertex(memory.knowledge(t_s)) == walk.stops[(stop + 1) % 8]
+        assert strategy.next_vertex(memory.knowledge(t_s)) == walk.stops[(stop + 1) % places]
         t_s += legs_s[stop]
-    # The mate is half of the time around ahead, two legs and eight seconds; or it is late.
-    mate = PatrolMemory(len(graph), 1, 2, int(walk.stops[2]), SPEED_M_S)
-    words = np.array([strategy.words(memory.knowledge(t_s))[0], walk.at_m[2], t_s - 8.0 + late_s, 0.0])
+    # The mate is half of the time around ahead, a third of the legs; or it is late.
+    last = places // 4 + places // 12
+    since_s = 0.5 * legs_s.sum() - legs_s[:last].sum()
+    mate = PatrolMemory(len(graph), 1, 2, int(walk.stops[last]), SPEED_M_S)
+    words = np.array([strategy.words(memory.knowledge(t_s))[0], walk.at_m[last], t_s - since_s + late_s, 0.0])
     mate.update(t_s, words=words)
     memory.receive(mate.message(t_s))
     here = int(walk.stops[0])

@@ -38,8 +38,8 @@ class AdaptiveRoundsConfig(Config):
     takes ``late_m`` more than data sheets say, for decisions are made a few times a second. Where that would
     lead to a worst idleness of more than ``worst_ratio`` times the bound, plans are weighed with it, among
     those in which robots on one round are ``headway_m`` apart and do not meet in passages. A robot waits
-    while it is further ahead of its place among those that share its round than ``slack`` of the time
-    between them.
+    while it is further ahead of its place among those that share its round than ``slack`` of a mean leg
+    between stops, within which nobody knows where the others are, or ``most_slack`` of the time between them.
     """
 
     mean_weight: NonNegative = 2.0
@@ -48,7 +48,8 @@ class AdaptiveRoundsConfig(Config):
     late_m: NonNegative = 0.4
     worst_ratio: Positive = 1.25
     headway_m: NonNegative = 6.0
-    slack: Positive = Field(default=0.1, le=0.5)
+    slack: Positive = 0.5
+    most_slack: Positive = Field(default=0.1, le=0.5)
     silent_s: Positive = 30.0
     silent_ratio: Positive = 8.0
     """A robot is given up when its last word is so old, and so many times as old as it usually is; one that
@@ -316,7 +317,9 @@ class AdaptiveRoundsStrategy:
         # Measured from the last one of all: by neighbours' gaps or the mean, small errors add up along the
         # row.
         ahead_s = -float(off_s.min())
-        if ahead_s <= self._config.slack * apart_s or self._waited_s > 0.5 * apart_s:
+        leg_s, config = float(along_s[-1]) / len(self._round.stops), self._config
+        slack_s = min(config.slack * leg_s, config.most_slack * apart_s)
+        if ahead_s <= slack_s or self._waited_s > 0.5 * apart_s:
             return False
         if self._last_wait_s is not None:
             self._waited_s += now_s - self._last_wait_s
