@@ -383,6 +383,11 @@ EXAMPLES: dict[tuple[str, str], Example] = {
     ("localizer", "ekf-walls-report"): Example(
         localizer_runs, {"threshold_chi2": 2.0, "distance_var_m2": 5.0}, frozenset({"threshold_chi2"})
     ),
+    ("planner", "rrt-star-reeds-shepp"): Example(
+        planner_plans,
+        {"iterations": 2000, "further_iterations": 200},
+        frozenset({"reverse_cost", "goal_bias", "guide_bias", "rewire_factor"}),
+    ),
     ("planner", "rrt-star-dubins"): Example(
         planner_plans, {"iterations": 2000}, frozenset({"goal_bias", "guide_bias", "rewire_factor"})
     ),

@@ -7,100 +7,37 @@ import math
 import numpy as np
 import pytest
 
-from pilotage.core.types import FloatArray, Goal, Pose2
-from pilotage.kernels.bodies.outline import outline_clearance
+from pilotage.core.types import Goal, Pose2
 from pilotage.kernels.rrt import hybrid
 from pilotage.kernels.rrt.dubins import advance
 from pilotage.kernels.rrt.reeds_shepp import follow, shortest, word_length
 from pilotage.maps.distance_field import DistanceField
-from pilotage.maps.segment_map import SegmentMap, box_segments
-from pilotage.models.footprint import Footprint
+from pilotage.maps.segment_map import SegmentMap
 from pilotage.stack.planning.hybrid_astar import HybridAstarConfig, HybridAstarPlanner
-from pilotage.stack.planning.planner import Path, PlanRequest, PlanStatus
-
-CAR = Footprint.polygon(np.array([[0.8, 0.3], [-0.2, 0.3], [-0.2, -0.3], [0.8, -0.3]]))
-TURNING_M = 0.9
+from pilotage.stack.planning.planner import PlanStatus
+from support.yards import BAY, CAR, TURNING_M, YARDS, check_car_path, gears, least_clearance_m, request, yard
 
 
-def yard(*boxes: tuple[float, float, float, float], side_m: float = 9.0) -> SegmentMap:
-    """A square yard with boxes x, y, width, height."""
-    walls = [box_segments(0.5 * side_m, 0.5 * side_m, side_m, side_m, 0.0)]
-    walls += [box_segments(x, y, width, height, 0.0) for x, y, width, height in boxes]
-    return SegmentMap(np.concatenate(walls), np.array([[6.5, 2.5, 0.4]]), (0.0, 0.0, side_m, side_m))
-
-
-def request(world: SegmentMap, start: Pose2, goal: Goal, clearance_m: float | None = None) -> PlanRequest:
-    rng = np.random.default_rng(0)
-    field = DistanceField.from_map(world)
-    return PlanRequest(start, goal, field, rng, clearance_m, CAR, TURNING_M)
-
-
-def least_clearance_m(path: Path, world: SegmentMap) -> float:
-    """Exact, of the outline at states halfway between those of the path as well."""
-    states: FloatArray = path.states
-    steps = np.diff(states, axis=0)
-    steps[:, 2] = (steps[:, 2] + math.pi) % (2.0 * math.pi) - math.pi
-    poses = np.concatenate([states, states[:-1] + 0.5 * steps])
-    return min(
-        float(
-            outline_clearance(
-                x,
-                y,
-                math.cos(theta),
-                math.sin(theta),
-                np.ascontiguousarray(CAR.points_m),
-                CAR.radius_m,
-                world.segments_m,
-                world.circles_m,
-            )
-        )
-        for x, y, theta in poses.tolist()
-    )
-
-
-WORLDS = {
-    "an empty yard": yard(),
-    "a wall to go around": yard((4.5, 3.0, 0.2, 4.0)),
-    "a narrow gate": yard((4.5, 2.0, 0.3, 4.0), (4.5, 7.0, 0.3, 4.0)),
-}
-
-
-@pytest.mark.parametrize("name", WORLDS)
+@pytest.mark.parametrize("name", YARDS)
 @pytest.mark.parametrize("theta", [0.0, math.pi / 2, -2.5])
 def test_the_whole_path_is_clear_smooth_and_ends_at_the_goal(name: str, theta: float) -> None:
-    world = WORLDS[name]
+    world = YARDS[name]
     start, goal = Pose2(1.5, 4.5, theta), Goal(7.5, 5.5, -theta)
     planner = HybridAstarPlanner(HybridAstarConfig(clearance_m=0.08))
     result = planner.plan(request(world, start, goal))
     assert result.path is not None, result.reason
-    states = result.path.states
     # Between two looks, 4 cm apart, a corner moves little: a chord's sagitta and the outline's turn.
     assert least_clearance_m(result.path, world) >= 0.08 - 0.02 * (1.0 + CAR.radius_m / TURNING_M) - 1e-9
     assert least_clearance_m(result.path, world) > 0.0
-    assert states[0] == pytest.approx(start.as_array())
-    assert math.hypot(states[-1, 0] - goal.x_m, states[-1, 1] - goal.y_m) < 1e-4
-    assert abs(math.sin(0.5 * (states[-1, 2] + theta))) < 1e-4
-    chords = np.hypot(*np.diff(states[:, :2], axis=0).T)
-    assert chords.max() < 0.03
-    assert chords.sum() == pytest.approx(result.path.length_m, rel=1e-3)
-    turned = np.abs((np.diff(states[:, 2]) + math.pi) % (2.0 * math.pi) - math.pi)
-    assert (turned * 1.1 * TURNING_M <= chords * 1.001 + 1e-6).all()
-    # Along its own heading, forwards or backwards: never sideways.
-    middle = states[:-1, 2] + 0.5 * ((np.diff(states[:, 2]) + math.pi) % (2.0 * math.pi) - math.pi)
-    dx, dy = np.diff(states[:, 0]), np.diff(states[:, 1])
-    assert np.abs(dy * np.cos(middle) - dx * np.sin(middle)).max() < 1e-6
+    check_car_path(result.path, start, goal, 1.1 * TURNING_M)
 
 
 def test_it_backs_into_a_bay() -> None:
-    bay = yard((3.0, 8.0, 2.0, 2.0), (6.0, 8.0, 2.0, 2.0))
     start, goal = Pose2(1.5, 5.5, 0.0), Goal(4.5, 8.5, -math.pi / 2)
-    result = HybridAstarPlanner(HybridAstarConfig()).plan(request(bay, start, goal))
+    result = HybridAstarPlanner(HybridAstarConfig()).plan(request(BAY, start, goal))
     assert result.path is not None, result.reason
-    assert least_clearance_m(result.path, bay) > 0.02
-    states = result.path.states
-    delta = np.diff(states[:, :2], axis=0)
-    backwards = delta[:, 0] * np.cos(states[1:, 2]) + delta[:, 1] * np.sin(states[1:, 2]) < 0.0
-    assert backwards[-1], "its nose looks out"
+    assert least_clearance_m(result.path, BAY) > 0.02
+    assert gears(result.path)[-1] < 0.0, "its nose looks out"
 
 
 def test_what_does_not_fit_is_a_status_with_its_reason() -> None:
@@ -131,7 +68,7 @@ def test_a_goal_without_a_heading_is_reached_in_one_that_fits() -> None:
 
 
 def test_the_same_query_has_the_same_answer() -> None:
-    world = WORLDS["a narrow gate"]
+    world = YARDS["a narrow gate"]
     asked = request(world, Pose2(1.5, 4.5, 0.0), Goal(7.5, 5.5, 0.0))
     first, second = (HybridAstarPlanner(HybridAstarConfig()).plan(asked) for _ in range(2))
     assert first.path is not None
@@ -141,7 +78,7 @@ def test_the_same_query_has_the_same_answer() -> None:
 
 def test_a_small_table_of_cells_finds_the_same_path() -> None:
     """On large maps only the cells that are reached are kept: all of one of 256 m took 3 GB."""
-    query = request(WORLDS["a wall to go around"], Pose2(1.5, 4.5, 0.0), Goal(7.5, 5.5, 0.0))
+    query = request(YARDS["a wall to go around"], Pose2(1.5, 4.5, 0.0), Goal(7.5, 5.5, 0.0))
     few, many = (
         HybridAstarPlanner(HybridAstarConfig(most_expansions=most)).plan(query) for most in (4000, 150_000)
     )
@@ -164,10 +101,10 @@ def car_and_ground(world: SegmentMap) -> tuple[hybrid.Car, hybrid.Ground]:
     return car, ground
 
 
-@pytest.mark.parametrize("name", WORLDS)
+@pytest.mark.parametrize("name", YARDS)
 def test_curves_and_steps_fit_where_every_pose_of_them_does(name: str) -> None:
     """What is passed over, as there is room for it, would have fitted."""
-    car, ground = car_and_ground(WORLDS[name])
+    car, ground = car_and_ground(YARDS[name])
     rng = np.random.default_rng(5)
     fitted = 0
     for _ in range(400):
@@ -182,7 +119,7 @@ def test_curves_and_steps_fit_where_every_pose_of_them_does(name: str) -> None:
             hybrid.pose_fits(x + c * wx - s * wy, y + s * wx + c * wy, theta + turned, car, ground)
             for wx, wy, turned, _ in along
         )
-        assert hybrid.word_fits(x, y, theta, word, car, ground) == every
+        assert hybrid.word_fits(x, y, theta, word, car, ground, hybrid.CHECK_M) == every
         spare = hybrid.spare_at(x, y, theta, car, ground)
         for turn, step in ((0, 0.25), (1, 0.5), (-1, -0.5)):
             count = math.ceil(abs(step) / hybrid.CHECK_M)
@@ -197,7 +134,7 @@ def test_curves_and_steps_fit_where_every_pose_of_them_does(name: str) -> None:
 
 def test_whoever_has_room_may_move_by_as_much() -> None:
     """Poses whose outline's points are no farther away than there is to spare fit as well."""
-    car, ground = car_and_ground(WORLDS["a narrow gate"])
+    car, ground = car_and_ground(YARDS["a narrow gate"])
     rng = np.random.default_rng(6)
     roomy = 0
     for _ in range(2000):
@@ -236,7 +173,7 @@ def test_a_large_floor_is_crossed_with_few_expansions() -> None:
 
 
 def test_where_greed_finds_nothing_patience_does() -> None:
-    world, start, goal = WORLDS["a narrow gate"], Pose2(1.5, 4.5, 0.0), Goal(7.5, 5.5, 0.0)
+    world, start, goal = YARDS["a narrow gate"], Pose2(1.5, 4.5, 0.0), Goal(7.5, 5.5, 0.0)
     patient = HybridAstarPlanner(HybridAstarConfig(greed=1.0)).plan(request(world, start, goal))
     # Enough for one expansion: the greedy search is stopped at the second.
     both = HybridAstarPlanner(HybridAstarConfig(greedy_share=1e-5)).plan(request(world, start, goal))

@@ -62,6 +62,8 @@ def drive(
     ("robot", "stack"),
     [
         (CAR, {"navigator": "maneuver", "planner": "hybrid-astar"}),
+        (CAR, {"navigator": "maneuver", "planner": "rrt-star-reeds-shepp"}),
+        (CAR, {"navigator": "maneuver", "planner": "rrt-star-dubins"}),
         (CAR, {"navigator": "maneuver", "planner": "rrt-star-dubins", "smoother": "shortcut"}),
         (CAR, {"navigator": "maneuver", "planner": "theta-star", "smoother": "shortcut"}),
         (DISC, {"navigator": "maneuver", "planner": "hybrid-astar"}),
@@ -84,6 +86,13 @@ def test_it_drives_through_a_door_of_its_own_floor(
     run = drive(floor(0.9), robot, **stack)
     assert run.success, run.reason
     assert run.metrics["collisions"] == 0
+
+
+def test_what_a_planner_keeps_beside_the_outline_is_no_disc_s(floor: Callable[[float], str]) -> None:
+    """More than the disc inside the outline measures: it was taken for the clearance of the centre."""
+    planner = {"name": "hybrid-astar", "clearance_m": 0.3}
+    run = drive(floor(0.6), CAR, navigator="maneuver", planner=planner)
+    assert run.success, run.reason
 
 
 def test_a_car_is_taken_for_a_disc_where_the_door_is_wide(floor: Callable[[float], str]) -> None:
@@ -126,6 +135,11 @@ def test_a_car_is_taken_for_a_disc_where_the_door_is_wide(floor: Callable[[float
                 "local_planner": "dubins",
                 "controller": "kanayama",
             },
+            "take navigator maneuver",
+        ),
+        (
+            DISC,
+            {"navigator": "local", "planner": "rrt-star-reeds-shepp", "local_controller": "pure-pursuit"},
             "take navigator maneuver",
         ),
     ],

@@ -89,10 +89,12 @@ def pose_fits(x: float, y: float, theta: float, car: Car, ground: Ground) -> boo
 
 
 @kernel
-def word_fits(x: float, y: float, theta: float, word: FloatArray, car: Car, ground: Ground) -> bool:
-    """Whether a word can be driven from a pose."""
+def word_fits(
+    x: float, y: float, theta: float, word: FloatArray, car: Car, ground: Ground, look: float
+) -> bool:
+    """Whether a word can be driven from a pose that fits; poses are looked at ``look`` metres apart."""
     length = word_length(word, car.turning)
-    count = max(1, math.ceil(length / CHECK_M))
+    count = max(1, math.ceil(length / look))
     # No point of the outline moves by more from one pose to the next.
     moves = max(length, 1e-9) / count * (1.0 + car.radius / car.turning)
     c, s = math.cos(theta), math.sin(theta)
@@ -227,7 +229,7 @@ def search(
         if left < 12.0 * car.turning or shots >= int(left / car.turning):
             shots = 0
             word, _ = shortest(x, y, theta, goal[0], goal[1], goal[2], car.turning, prices.reverse)
-            if word_fits(x, y, theta, word, car, ground):
+            if word_fits(x, y, theta, word, car, ground, CHECK_M):
                 return FOUND, node, word, expanded
         came = parents[node, 2]
         spare = spare_at(x, y, theta, car, ground)

@@ -23,6 +23,7 @@ from pilotage.stack.knowledge import RobotKnowledge
 from pilotage.stack.navigator.detours import AS_FAR_AS_IT_TAKES, Detours
 from pilotage.stack.navigator.doubtful_gap import doubtful_gap, is_tight
 from pilotage.stack.navigator.progress import PathProgress
+from pilotage.stack.planning.outline import car_of, ground_of
 from pilotage.stack.planning.planner import (
     Path,
     Planner,
@@ -30,6 +31,7 @@ from pilotage.stack.planning.planner import (
     PlanResult,
     PlanStatus,
     Smoother,
+    outline_clearance_m,
 )
 
 HEADINGS, TRIED = 16, 4
@@ -88,6 +90,8 @@ class GlobalPlan:
         self.turns_first = False
         self._least_clearance_m = least_clearance_m
         self._planner = planner
+        outline = None if robot is None else robot.footprint
+        self._beside_m = outline_clearance_m(planner, outline, as_planned)
         self._smoother = smoother
         self._chart = chart
         self._journal = journal
@@ -101,7 +105,13 @@ class GlobalPlan:
     @property
     def clearance_m(self) -> float:
         """What the planner keeps from obstacles of its own accord, and at least what the body needs."""
-        return max(self._planner.clearance_m, self._least_clearance_m)
+        own_m = self._planner.clearance_m if self._beside_m is None else self._beside_m
+        return max(own_m, self._least_clearance_m)
+
+    @property
+    def beside_outline(self) -> bool:
+        """Whether that is kept beside the robot's outline, and not from its centre."""
+        return self._beside_m is not None
 
     def make(
         self,
@@ -234,7 +244,9 @@ class GlobalPlan:
         self, start: Pose2, goal: Goal, field: DistanceField, clearance_m: float
     ) -> tuple[PlanResult, Path | None]:
         """Plan and smooth at one clearance."""
-        request = PlanRequest(start, goal, field, self._rng, clearance_m, *self._shape(), self._trail)
+        request = PlanRequest(
+            start, goal, field, self._rng, clearance_m, *self._shape(), self._trail, self.beside_outline
+        )
         result = self._planner.plan(request)
         self.too_tight, self.hopeless = False, False
         if result.path is None:
@@ -261,17 +273,12 @@ class GlobalPlan:
         self.too_tight = path.turning_radius_m < least_m * (1.0 - 1e-9)
         if self.too_tight:
             return f"the path's corners are too tight, the robot turns in {least_m:.2f} m at least{INSTEAD}"
-        outline, field = robot.footprint, request.field
-        if clearance_m >= outline.radius_m:
+        outline = robot.footprint
+        if not self.beside_outline and clearance_m >= outline.radius_m:
             return ""
-        car = hybrid.Car(
-            outline.points_m, outline.radius_m, outline.inner_radius_m, min(BESIDE_M, clearance_m), 1.0
-        )
-        ground = hybrid.Ground(
-            field.distance_m, *field.origin_xy_m, field.resolution_m, field.segments_m, field.circles_m
-        )
+        car = car_of(outline, min(BESIDE_M, clearance_m), 1.0)
         states = np.vstack([request.start.as_array(), path.states])
-        if hybrid.path_fits(states, path.turning_radius_m == 0.0, car, ground):
+        if hybrid.path_fits(states, path.turning_radius_m == 0.0, car, ground_of(request.field)):
             return ""
         return f"the robot's outline does not fit along the path, which keeps {clearance_m:.2f} m{INSTEAD}"
 

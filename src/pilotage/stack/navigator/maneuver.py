@@ -146,7 +146,7 @@ class ManeuverNavigator(LocalizingNavigator):
         full, outline = self._plan.clearance_m, self._robot.footprint
         inner_m = outline.inner_radius_m
         tried = [0.6 * full, 0.3 * full, 0.0]
-        if full >= inner_m:
+        if not self._plan.beside_outline:
             tried = [outline.radius_m, *(inner_m + margin for margin in BESIDE_INNER_M)]
         return [full, *sorted({clearance for clearance in tried if clearance < full}, reverse=True)]
 

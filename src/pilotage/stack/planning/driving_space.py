@@ -89,8 +89,7 @@ def spaced_waypoints(states: FloatArray, spacing_m: float) -> FloatArray:
     s = np.concatenate([[0.0], np.cumsum(steps)])
     count = max(1, round(float(s[-1]) / spacing_m))
     picked = np.unique(np.searchsorted(s, np.linspace(0.0, s[-1], count + 1) - 1e-9).clip(0, len(s) - 1))
-    picked[0], picked[-1] = 0, len(s) - 1
-    return np.ascontiguousarray(states[np.unique(picked)])
+    return np.ascontiguousarray(states[np.unique([0, *picked[1:-1], len(s) - 1])])
 
 
 __all__ = [

@@ -2,25 +2,22 @@
 
 from __future__ import annotations
 
-import math
 import time
 from typing import ClassVar
 
 import numpy as np
 from pydantic import Field
 
-from pilotage.core.angles import wrap_to_pi
 from pilotage.core.config import Config
 from pilotage.core.types import FloatArray
 from pilotage.kernels.grids.travel_cost import travel_costs
 from pilotage.kernels.rrt import hybrid, reeds_shepp
 from pilotage.maps.distance_field import DistanceField
-from pilotage.models.footprint import Footprint
 from pilotage.sensors.sensor import NonNegative, Positive
 from pilotage.stack.planning.driving_space import SPARE, failure, spaced_waypoints
+from pilotage.stack.planning.outline import blocked_pose, car_of, goal_pose, ground_of, word_states
 from pilotage.stack.planning.planner import PLANNERS, Path, PlanRequest, PlanResult, PlanStatus
 
-STATE_SPACING_M = 0.025
 LEAST_RADIUS_M = 0.3
 """Of who turns on the spot: tighter arcs would be driven slowly."""
 
@@ -71,27 +68,12 @@ class HybridAstarPlanner:
         began = time.perf_counter()
         config, field = self._config, request.field
         clearance_m = config.clearance_m if request.clearance_m is None else request.clearance_m
-        outline = request.footprint or Footprint.disc(0.0)
         turning_m = config.turning_radius_m or max(SPARE * request.least_turning_radius_m, LEAST_RADIUS_M)
-        car = hybrid.Car(
-            np.ascontiguousarray(outline.points_m),
-            outline.radius_m,
-            outline.inner_radius_m,
-            clearance_m,
-            turning_m,
-        )
-        ground = hybrid.Ground(
-            field.distance_m, *field.origin_xy_m, field.resolution_m, field.segments_m, field.circles_m
-        )
-        start, goal = request.start.as_array(), _goal_pose(request, car, ground, config.headings)
-        for name, pose, status in (
-            ("start", start, PlanStatus.START_BLOCKED),
-            ("goal", goal, PlanStatus.GOAL_BLOCKED),
-        ):
-            if not hybrid.pose_fits(pose[0], pose[1], pose[2], car, ground):
-                turned = name == "goal" and request.goal.theta_rad is None
-                reason = _blocked(name, "in any heading" if turned else "as it stands there", clearance_m)
-                return failure(status, reason, time.perf_counter() - began)
+        car, ground = car_of(request.footprint, clearance_m, turning_m), ground_of(field)
+        start, goal = request.start.as_array(), goal_pose(request, car, ground, config.headings)
+        blocked = blocked_pose(start, goal, request, car, ground)
+        if blocked is not None:
+            return failure(*blocked, time.perf_counter() - began)
         size = 6 * config.most_expansions + 8
         nodes, parents = np.empty((size, 3)), np.empty((size, 3))
         ended, last, word, expanded = self._searched(
@@ -144,28 +126,6 @@ class HybridAstarPlanner:
         return ended, last, word, expanded
 
 
-def _goal_pose(request: PlanRequest, car: hybrid.Car, ground: hybrid.Ground, headings: int) -> FloatArray:
-    """Where no heading is asked for, the one nearest to the straight line's in which the outline fits."""
-    goal, start = request.goal, request.start
-    if goal.theta_rad is not None:
-        return np.array([goal.x_m, goal.y_m, goal.theta_rad])
-    straight = math.atan2(goal.y_m - start.y_m, goal.x_m - start.x_m)
-    for number in range(headings):
-        turned = math.copysign((number + 1) // 2, 0.5 - number % 2) * 2.0 * math.pi / headings
-        if hybrid.pose_fits(goal.x_m, goal.y_m, straight + turned, car, ground):
-            return np.array([goal.x_m, goal.y_m, wrap_to_pi(straight + turned)])
-    return np.array([goal.x_m, goal.y_m, straight])
-
-
-def _blocked(name: str, how: str, clearance_m: float) -> str:
-    """Why a place is none for the outline."""
-    if clearance_m > 0.0:
-        return (
-            f"at the {name} the outline, {how}, leaves less than {clearance_m:g} m to a wall or an obstacle"
-        )
-    return f"at the {name} the outline, {how}, lies in a wall or an obstacle"
-
-
 def _to_go(field: DistanceField, goal: FloatArray, inner_m: float) -> FloatArray:
     """(ny, nx) path of the outline's inner disc to the goal, over the field's nodes."""
     ny, nx = field.distance_m.shape
@@ -193,20 +153,11 @@ def _states(
     while parents[node, 0] >= 0.0:
         steps.append((parents[node, 1], parents[node, 2] / turning_m))
         node = int(parents[node, 0])
-    # Piece by piece: where the curvature or the direction changes there is a state.
-    words = [np.array([step]) for step in reversed(steps)] + [piece[None, :] for piece in word]
-    x, y, theta = start.tolist()
+    words = [np.array([step]) for step in reversed(steps)] + [word]
     states, total = [start[None, :]], 0.0
     for part in words:
-        length = reeds_shepp.word_length(part, turning_m)
-        count = max(1, math.ceil(length / STATE_SPACING_M))
-        c, s = math.cos(theta), math.sin(theta)
-        rows = np.empty((count, 3))
-        for i in range(count):
-            wx, wy, wth, _ = reeds_shepp.follow(part, length * (i + 1) / count, turning_m)
-            rows[i] = x + c * wx - s * wy, y + s * wx + c * wy, wrap_to_pi(theta + wth)
-        if length > 0.0:
-            states.append(rows)
-            x, y, theta = rows[-1].tolist()
-            total += length
-    return np.concatenate(states), total
+        states.append(word_states(states[-1][-1], part, turning_m))
+        for piece in part:
+            total += reeds_shepp.word_length(piece[None, :], turning_m)
+    along = np.concatenate(states)
+    return (along if len(along) > 1 else np.repeat(along, 2, axis=0)), total

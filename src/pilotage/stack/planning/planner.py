@@ -91,6 +91,9 @@ class PlanRequest:
         Distance to keep from obstacles; None takes the planner's own setting.
     footprint, least_turning_radius_m
         The robot's outline and tightest arc, for planners that ask; the others plan for the centre.
+    beside_outline
+        Whether the clearance is kept beside the footprint's outline, driven along the very path; else
+        it holds the whole robot: of a polygon, the disc around it. Planners for outlines always take it so.
     trail
         (N, 3) x, y and their standard deviation [m]: where the robot has been since it first asked, for
         planners of paths that cover something; None at first.
@@ -104,6 +107,7 @@ class PlanRequest:
     footprint: Footprint | None = None
     least_turning_radius_m: float = 0.0
     trail: FloatArray | None = None
+    beside_outline: bool = False
 
 
 def _no_edges() -> FloatArray:
@@ -146,9 +150,10 @@ class Planner(Protocol):
     """Finds a path for the robot's centre on its map. Built as ``cls(config)``.
 
     The clearance of a request holds the whole robot: of a polygon, the disc around it. One that keeps it from
-    the outline itself, or plans backwards, says so by a class attribute ``FOR_OUTLINE = True``. One that
-    takes seconds and more, beside which loading what is compiled takes nothing, says ``TAKES_LONG = True``:
-    no run is rehearsed with it.
+    the outline itself, or plans backwards, says so by a class attribute ``FOR_OUTLINE = True``. One that can
+    do either has a method ``outline_clearance_m(footprint)``, and is told by ``PlanRequest.beside_outline``.
+    One that takes seconds and more, beside which loading what is compiled takes nothing, says
+    ``TAKES_LONG = True``: no run is rehearsed with it.
     """
 
     @property
@@ -159,6 +164,19 @@ class Planner(Protocol):
     def plan(self, request: PlanRequest) -> PlanResult:
         """Answer one query; never raises for what can fail in the field."""
         ...
+
+
+def outline_clearance_m(planner: Planner, outline: Footprint | None, as_planned: bool) -> float | None:
+    """What a planner keeps beside the outline itself; None where it keeps its clearance from the centre.
+
+    ``as_planned``: whether the robot drives the very path; who leaves it needs room in any heading.
+    """
+    if getattr(planner, "FOR_OUTLINE", False):
+        return planner.clearance_m
+    own = getattr(planner, "outline_clearance_m", None)
+    if own is None or not as_planned or outline is None or outline.is_disc:
+        return None
+    return float(own(outline))
 
 
 class Smoother(Protocol):

@@ -13,12 +13,13 @@ from pilotage.core.angles import wrap_array_to_pi
 from pilotage.core.config import Config
 from pilotage.core.errors import InputError
 from pilotage.core.types import FloatArray
-from pilotage.kernels.geometry.field import sample_distance
-from pilotage.kernels.rrt import dubins, guide, guide_moves
+from pilotage.kernels.rrt import dubins
 from pilotage.kernels.rrt import samples as rrt_samples
 from pilotage.kernels.rrt import star as rrt_star
 from pilotage.kernels.rrt import tree as rrt_tree
 from pilotage.kernels.rrt.clearance import Space, first_blocked, least_step, skin, slack_at
+from pilotage.kernels.rrt.steering import Steering
+from pilotage.models.footprint import Footprint
 from pilotage.stack.planning.driving_space import (
     CHECK_SPACING_M,
     STATE_SPACING_M,
@@ -28,19 +29,20 @@ from pilotage.stack.planning.driving_space import (
     space_for,
     usual_radius_m,
 )
-from pilotage.stack.planning.planner import PLANNERS, Path, PlanRequest, PlanResult, PlanStatus
+from pilotage.stack.planning.planner import (
+    PLANNERS,
+    Path,
+    PlanRequest,
+    PlanResult,
+    PlanStatus,
+)
+from pilotage.stack.planning.rough_path import Around, look_around
+from pilotage.stack.planning.rrt_star import MAX_TREE_NODES, directly
+from pilotage.stack.planning.rrt_star import search as grown
+from pilotage.stack.planning.rrt_star_outline import plan_for_outline
 
-MAX_GUIDE_NODES = 1_000_000
-"""A field finer than this would cost more than the guide saves."""
-
-MAX_TREE_NODES = 500_000
-"""A full tree ends the search: this many nodes take 80 MB."""
-
-CHUNK = 256
-"""Iterations between looks at the clock and at the incumbent."""
-
-NO_BOUND = rrt_samples.Bound(np.zeros((1, 1)), 0.0, 0.0, 1.0)
-NO_GUIDE = np.zeros((0, 3))
+BESIDE_OUTLINE_M = 0.06
+"""What a polygon keeps where the clearance of its centre leaves less."""
 
 
 class RrtStarDubinsConfig(Config):
@@ -54,6 +56,11 @@ class RrtStarDubinsConfig(Config):
     later near the incumbent: 0 is plain RRT*. With ``stop`` 'first' the search ends at the first solution,
     as the report's does, with 'optimize' after ``iterations``. A time budget makes the result depend on the
     machine; without one the same seed gives the same path.
+
+    ``clearance_m`` is kept by the robot's centre. Where a polygon is driven along the very path, the plan is
+    for its outline, which keeps ``beside_outline_m``; null: what ``clearance_m`` leaves beside the disc
+    around the polygon, and no less than 0.06 m. Edges of outlines are checked every 2 cm, and with ``stop``
+    'first' the search goes on for ``further_iterations`` after its first path, which is seldom short.
     """
 
     turning_radius_m: float | None = Field(None, gt=0.0, le=100.0)
@@ -68,6 +75,8 @@ class RrtStarDubinsConfig(Config):
     iterations: int = Field(20_000, ge=1, le=5_000_000)
     time_budget_s: float | None = Field(None, gt=0.0)
     stop: Literal["first", "optimize"] = "first"
+    beside_outline_m: float | None = Field(None, ge=0.0, le=100.0)
+    further_iterations: int = Field(1000, ge=0, le=5_000_000)
 
 
 @PLANNERS.add("rrt-star-dubins", RrtStarDubinsConfig)
@@ -91,11 +100,21 @@ class RrtStarDubinsPlanner:
         """Distance that it keeps from obstacles where a request names none."""
         return self._config.clearance_m
 
+    def outline_clearance_m(self, outline: Footprint) -> float:
+        """What it keeps beside the outline itself where that is driven along the very path."""
+        if self._config.beside_outline_m is not None:
+            return self._config.beside_outline_m
+        return max(self._config.clearance_m - outline.radius_m, BESIDE_OUTLINE_M)
+
     def plan(self, request: PlanRequest) -> PlanResult:
         """Answer one query; the path's waypoints are the nodes of the tree."""
         began = time.perf_counter()
         config = self._config
         radius_m = config.turning_radius_m or usual_radius_m(request.least_turning_radius_m)
+        if request.beside_outline:
+            beside_m = self.outline_clearance_m(request.footprint or Footprint.disc(0.0))
+            steering = Steering(radius_m, False, 1.0, 0.0)
+            return plan_for_outline(request, config, steering, clearance_of(request, beside_m))
         clearance_m = clearance_of(request, config.clearance_m)
         if not math.isfinite(request.start.theta_rad):
             raise InputError(f"plan: expected a finite start heading, found {request.start.theta_rad}")
@@ -105,13 +124,16 @@ class RrtStarDubinsPlanner:
             return failure(*blocked, time.perf_counter() - began)
         direct = self._direct(request, space, clearance_m, radius_m)
         if direct is not None:
-            took = time.perf_counter() - began
-            return PlanResult(
-                PlanStatus.FOUND, f"{direct.length_m:.2f} m directly", direct, took, took, first=direct
-            )
-        guide_path, bound, proof = _look_around(request, space, clearance_m, config)
-        if proof is not None:
-            return failure(PlanStatus.NO_PATH, proof, time.perf_counter() - began)
+            return directly(direct, began)
+        around = look_around(
+            request,
+            space,
+            clearance_m,
+            config.guide_bias > 0.0,
+            config.guide_bias > 0.0 and config.stop == "optimize",
+        )
+        if around.shut:
+            return failure(PlanStatus.NO_PATH, _shut(around, clearance_m), time.perf_counter() - began)
         search = self._search(request, space, clearance_m, radius_m)
         goal = request.goal
         goal_heading = 0.0 if goal.theta_rad is None else goal.theta_rad
@@ -124,41 +146,16 @@ class RrtStarDubinsPlanner:
         )
         if rrt_star.try_goal(tree, rrt_tree.START, space, search):
             rrt_tree.join_goal(tree)
-        first_s, checked_cost = math.nan, math.inf
-        first: Path | None = None
-        best: Path | None = None
-        done = 0
-        while True:
-            cost = float(tree.cost[rrt_tree.GOAL])
-            if cost < checked_cost - 1e-9:
-                path, failing = _extract(tree, space, clearance_m, radius_m)
-                if path is None:
-                    rrt_samples.recede_guide(tree, guide_path, int(tree.parent[failing]))
-                    rrt_tree.cut(tree, failing)
-                    continue
-                if best is None:
-                    first_s, first = time.perf_counter() - began, path
-                best, checked_cost = path, cost
-                if config.guide_bias > 0.0:
-                    guide_path = path.states[:: max(1, round(0.25 / STATE_SPACING_M))].copy()
-            elapsed = time.perf_counter() - began
-            out_of_time = config.time_budget_s is not None and elapsed > config.time_budget_s
-            if done >= config.iterations or out_of_time or (best is not None and config.stop == "first"):
-                break
-            chunk = min(CHUNK, config.iterations - done)
-            ran = rrt_star.grow(tree, space, search, bound, guide_path, request.rng, chunk, best is None)
-            done += int(ran)
-            if ran < chunk and not tree.cost[rrt_tree.GOAL] < checked_cost:
-                break
-        elapsed = time.perf_counter() - began
-        edges = _tree_edges(tree)
-        if best is None:
-            reason = f"no path found in {done} iterations"
-            if config.time_budget_s is not None and elapsed > config.time_budget_s:
-                reason += f", time budget {config.time_budget_s:g} s"
-            return PlanResult(PlanStatus.NO_PATH, reason, None, math.nan, elapsed, done, edges)
-        reason = f"{best.length_m:.2f} m after {done} iterations"
-        return PlanResult(PlanStatus.FOUND, reason, best, first_s, elapsed, done, edges, first=first)
+
+        def grow(guide_path: FloatArray, iterations: int, first: bool) -> int:
+            return rrt_star.grow(
+                tree, space, search, around.bound, guide_path, request.rng, iterations, first
+            )
+
+        def extract() -> tuple[Path | None, int]:
+            return _extract(tree, space, clearance_m, radius_m)
+
+        return grown(tree, config, around.guide_path, grow, extract, began)
 
     def _direct(self, request: PlanRequest, space: Space, clearance_m: float, radius_m: float) -> Path | None:
         """The shortest Dubins curve to the goal where it is free: no tree finds a better path."""
@@ -206,54 +203,12 @@ class RrtStarDubinsPlanner:
         )
 
 
-def _look_around(
-    request: PlanRequest, space: Space, clearance_m: float, config: RrtStarDubinsConfig
-) -> tuple[FloatArray, rrt_samples.Bound, str | None]:
-    """Rough path to the goal, lower bound of the cost-to-go, and the proof where there is no path at all."""
-    space = _fine_enough(space, clearance_m)
-    stride = max(1, int(clearance_m / (2.0 * space.resolution)))
-    cell = stride * space.resolution
-    if min(space.distance.shape) < 3 * stride:
-        return NO_GUIDE, NO_BOUND, None
-    classes = guide_moves.classify(space, stride, clearance_m)
-    start = guide.nearest_node(request.start.x_m, request.start.y_m, classes, space, stride)
-    goal = guide.nearest_node(request.goal.x_m, request.goal.y_m, classes, space, stride)
-    cost, move = guide.cost_to_go(classes, space, stride, clearance_m, guide.TIGHT_FACTOR, *goal, *start)
-    if cost[start] == guide.UNREACHED:
-        if 2.0 * clearance_m < cell * math.sqrt(5.0):
-            # Walls are thinner than the grid can tell apart: no proof.
-            return NO_GUIDE, NO_BOUND, None
-        ends = [
-            min(k * stride, n - 1)
-            for ij in (start, goal)
-            for k, n in zip(ij, space.distance.shape, strict=True)
-        ]
-        widest_m = guide.widest_way(space.distance, *ends) + space.resolution * math.sqrt(0.5)
-        at_most_m = math.ceil(widest_m * 1000.0) / 1000.0
-        proof = f"no path from start to goal keeps {clearance_m:g} m from the obstacles"
-        if at_most_m < clearance_m:
-            proof += f": the widest path needs a clearance of at most {at_most_m:g} m"
-        return NO_GUIDE, NO_BOUND, f"{proof} (clearance_m; a narrow body can do with less)"
-    guide_path = guide.trace(move, space, stride, *start, 3) if config.guide_bias > 0.0 else NO_GUIDE
-    if config.stop == "first" or config.guide_bias == 0.0:
-        return guide_path, NO_BOUND, None
-    loose, _ = guide.cost_to_go(classes, space, stride, clearance_m, 1, *goal, -1, -1)
-    metres = np.where(loose == guide.UNREACHED, np.inf, loose * (cell / guide.UNIT / 1.03) - cell)
-    return guide_path, rrt_samples.Bound(metres, space.x0, space.y0, cell), None
-
-
-def _fine_enough(space: Space, clearance_m: float) -> Space:
-    """The space with a finer field where a coarse one would let the guide pass through thin walls."""
-    if space.margin == 0.0 or space.resolution <= clearance_m / 2.0:
-        return space
-    ny, nx = space.distance.shape
-    width, height = (nx - 1) * space.resolution, (ny - 1) * space.resolution
-    spacing = max(clearance_m / 2.0, math.sqrt(width * height / MAX_GUIDE_NODES))
-    nx, ny = math.floor(width / spacing) + 1, math.floor(height / spacing) + 1
-    if spacing >= space.resolution or min(nx, ny) < 3:
-        return space
-    distance = sample_distance(space.x0, space.y0, spacing, nx, ny, space.segments, space.circles)
-    return space._replace(distance=distance, resolution=spacing)
+def _shut(around: Around, clearance_m: float) -> str:
+    """The proof that no path keeps the clearance, and what the widest one keeps."""
+    proof = f"no path from start to goal keeps {clearance_m:g} m from the obstacles"
+    if around.widest_m < clearance_m:
+        proof += f": the widest path needs a clearance of at most {around.widest_m:g} m"
+    return f"{proof} (clearance_m; a narrow body can do with less)"
 
 
 def _extract(
@@ -285,9 +240,3 @@ def _edge(
     x, y, th = tree.pose[tree.parent[node]]
     l0, l1, l2 = tree.lengths[node]
     return x, y, th, radius_m, int(tree.word[node]), l0, l1, l2
-
-
-def _tree_edges(tree: rrt_tree.Tree) -> FloatArray:
-    """Straight lines (E, 4) from the nodes' parents to the nodes."""
-    nodes = np.flatnonzero(tree.parent >= 0)
-    return np.hstack([tree.pose[tree.parent[nodes], :2], tree.pose[nodes, :2]])

@@ -1,0 +1,102 @@
+"""Planning for a robot's true outline: what kernels need of it, places where it does not fit, its curves."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from pilotage.core.angles import wrap_to_pi
+from pilotage.core.types import FloatArray
+from pilotage.kernels.rrt import hybrid, reeds_shepp
+from pilotage.maps.distance_field import DistanceField
+from pilotage.models.footprint import Footprint
+from pilotage.stack.planning.planner import PlanRequest, PlanStatus
+
+STATE_SPACING_M = 0.025
+"""Of the states of a path for an outline."""
+HEADINGS = 72
+"""Of a goal without one, so many are tried."""
+
+
+def car_of(footprint: Footprint | None, clearance_m: float, turning_m: float) -> hybrid.Car:
+    """An outline as the kernels take it; without one the robot is a point."""
+    outline = footprint or Footprint.disc(0.0)
+    points_m = np.ascontiguousarray(outline.points_m)
+    return hybrid.Car(points_m, outline.radius_m, outline.inner_radius_m, clearance_m, turning_m)
+
+
+def ground_of(field: DistanceField) -> hybrid.Ground:
+    """What stands there, as the kernels take it."""
+    return hybrid.Ground(
+        field.distance_m, *field.origin_xy_m, field.resolution_m, field.segments_m, field.circles_m
+    )
+
+
+def goal_pose(
+    request: PlanRequest, car: hybrid.Car, ground: hybrid.Ground, headings: int = HEADINGS
+) -> FloatArray:
+    """Where no heading is asked for, the one nearest to the straight line's in which the outline fits."""
+    goal, start = request.goal, request.start
+    if goal.theta_rad is not None:
+        return np.array([goal.x_m, goal.y_m, goal.theta_rad])
+    straight = math.atan2(goal.y_m - start.y_m, goal.x_m - start.x_m)
+    for number in range(headings):
+        turned = math.copysign((number + 1) // 2, 0.5 - number % 2) * 2.0 * math.pi / headings
+        if hybrid.pose_fits(goal.x_m, goal.y_m, straight + turned, car, ground):
+            return np.array([goal.x_m, goal.y_m, wrap_to_pi(straight + turned)])
+    return np.array([goal.x_m, goal.y_m, straight])
+
+
+def blocked_pose(
+    start: FloatArray, goal: FloatArray, request: PlanRequest, car: hybrid.Car, ground: hybrid.Ground
+) -> tuple[PlanStatus, str] | None:
+    """Status and reason where the outline does not fit at the start or the goal."""
+    for name, pose, status in (
+        ("start", start, PlanStatus.START_BLOCKED),
+        ("goal", goal, PlanStatus.GOAL_BLOCKED),
+    ):
+        if hybrid.pose_fits(pose[0], pose[1], pose[2], car, ground):
+            continue
+        turned = name == "goal" and request.goal.theta_rad is None
+        how = "in any heading" if turned else "as it stands there"
+        if car.clearance > 0.0:
+            less = f"leaves less than {car.clearance:g} m to a wall or an obstacle"
+            return status, f"at the {name} the outline, {how}, {less}"
+        return status, f"at the {name} the outline, {how}, lies in a wall or an obstacle"
+    return None
+
+
+def word_states(
+    start: FloatArray, word: FloatArray, turning_m: float, spacing_m: float = STATE_SPACING_M
+) -> FloatArray:
+    """(N, 3) states along a word from a pose, which is none of them.
+
+    Piece by piece: where the curvature or the direction changes there is a state.
+    """
+    x, y, theta = start.tolist()
+    states = [np.empty((0, 3))]
+    for piece in word:
+        part = piece[None, :]
+        length = reeds_shepp.word_length(part, turning_m)
+        if not length > 0.0:
+            continue
+        count = max(1, math.ceil(length / spacing_m))
+        c, s = math.cos(theta), math.sin(theta)
+        rows = np.empty((count, 3))
+        for i in range(count):
+            wx, wy, wth, _ = reeds_shepp.follow(part, length * (i + 1) / count, turning_m)
+            rows[i] = x + c * wx - s * wy, y + s * wx + c * wy, wrap_to_pi(theta + wth)
+        states.append(rows)
+        x, y, theta = rows[-1].tolist()
+    return np.concatenate(states)
+
+
+__all__ = [
+    "STATE_SPACING_M",
+    "blocked_pose",
+    "car_of",
+    "goal_pose",
+    "ground_of",
+    "word_states",
+]
