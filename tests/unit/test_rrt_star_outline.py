@@ -21,9 +21,10 @@ from pilotage.kernels.rrt.steering import (
     least_price,
     shorten,
 )
+from pilotage.maps.segment_map import SegmentMap
 from pilotage.stack.planning.driving_space import space_for
 from pilotage.stack.planning.outline import car_of, ground_of
-from pilotage.stack.planning.planner import PLANNERS, PlanRequest, PlanResult, PlanStatus
+from pilotage.stack.planning.planner import PLANNERS, SMOOTHERS, PlanRequest, PlanResult, PlanStatus
 from pilotage.stack.planning.rough_path import NO_BOUND, NO_GUIDE
 from support.yards import (
     BAY,
@@ -99,6 +100,31 @@ def test_it_backs_into_a_bay_or_drives_in_nose_first(seed: int) -> None:
     shut = plan(FORWARDS, request(BAY, start, out, 0.06, seed), iterations=300)
     assert shut.status is PlanStatus.NO_PATH
     assert shut.reason.startswith("no path found in 300 iterations, forwards only (stack.planner: rrt-star-r")
+
+
+@pytest.mark.parametrize("name", [FORWARDS, BOTH_WAYS, "hybrid-astar"])
+@pytest.mark.parametrize("world", [YARDS["a wall to go around"], BAY], ids=["wall", "bay"])
+def test_a_smoothed_path_is_one_for_the_outline_too(name: str, world: SegmentMap) -> None:
+    """Curves for the disc alone went through corners of the car, forwards where it had backed."""
+    smoother = SMOOTHERS.entry("shortcut").factory(SMOOTHERS.configure("shortcut", {}, "smoother"))
+    start, goal = Pose2(1.5, 5.5, 0.0), Goal(4.5, 8.5, -math.pi / 2)
+    if world is not BAY or name == FORWARDS:
+        goal = Goal(*((4.5, 8.0, math.pi / 2) if world is BAY else (7.5, 5.5, 2.0)))
+    shorter = 0.0
+    for seed in range(3):
+        query = request(world, start, goal, 0.06, seed)
+        settings: dict[str, Any] = {} if name == "hybrid-astar" else {"further_iterations": 0}
+        found = plan(name, query, **settings).path
+        assert found is not None
+        smooth = smoother.smooth(found, query, 0.06)
+        check_car_path(smooth, start, goal, RADIUS_M)
+        assert smooth.length_m <= found.length_m
+        assert least_clearance_m(smooth, world) >= min(0.06 - 1e-9, least_clearance_m(found, world))
+        assert (gears(smooth) < 0.0).any() == (gears(found) < 0.0).any()
+        assert np.diff(gears(smooth)).any() == np.diff(gears(found)).any()
+        shorter += found.length_m - smooth.length_m
+    one_shot = name == "hybrid-astar" and world is not BAY
+    assert one_shot or shorter > 0.05
 
 
 def test_what_reversing_costs_decides_how_much_of_it_there_is() -> None:

@@ -15,6 +15,9 @@ from pilotage.stack.planning.planner import PlanRequest, PlanStatus
 
 STATE_SPACING_M = 0.025
 """Of the states of a path for an outline."""
+FINE_M = 0.005
+"""Finished curves are looked at this close together, and keep more by what may happen in between."""
+ROUNDING_M = 1e-5
 HEADINGS = 72
 """Of a goal without one, so many are tried."""
 
@@ -92,11 +95,29 @@ def word_states(
     return np.concatenate(states)
 
 
+def skin_m(start: FloatArray, goal: FloatArray, car: hybrid.Car, ground: hybrid.Ground) -> float:
+    """What the outline's points may come nearer between two looks; less where an end has no room for it."""
+    fully_m = 0.5 * FINE_M * (1.0 + car.radius / car.turning)
+    return min(fully_m, *(hybrid.spare_at(x, y, theta, car, ground) for x, y, theta in (start, goal)))
+
+
+def distinct(states: FloatArray, last: FloatArray) -> FloatArray:
+    """States (N, 3) of curves laid end to end, that end at ``last`` (3,).
+
+    Curves end where the next ones begin but for rounding, which must not look like a change of direction.
+    """
+    moved = np.hypot(*np.diff(states[:, :2], axis=0).T) > ROUNDING_M
+    return np.concatenate([states[:1], states[1:][moved][:-1], last[None, :]])
+
+
 __all__ = [
+    "FINE_M",
     "STATE_SPACING_M",
     "blocked_pose",
     "car_of",
+    "distinct",
     "goal_pose",
     "ground_of",
+    "skin_m",
     "word_states",
 ]

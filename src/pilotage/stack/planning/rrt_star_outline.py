@@ -19,16 +19,20 @@ from pilotage.kernels.rrt.outline_star import Driver
 from pilotage.kernels.rrt.reeds_shepp import word_length
 from pilotage.kernels.rrt.steering import Steering
 from pilotage.stack.planning.driving_space import blocked_end, failure, space_for, spaced_waypoints
-from pilotage.stack.planning.outline import blocked_pose, car_of, goal_pose, ground_of, word_states
+from pilotage.stack.planning.outline import (
+    FINE_M,
+    blocked_pose,
+    car_of,
+    distinct,
+    goal_pose,
+    ground_of,
+    skin_m,
+    word_states,
+)
 from pilotage.stack.planning.planner import Path, PlanRequest, PlanResult, PlanStatus
 from pilotage.stack.planning.rough_path import look_around
 from pilotage.stack.planning.rrt_star import MAX_TREE_NODES, Effort, directly, search
 
-FINE_M = 0.005
-"""The finished path is looked at this close together, and keeps more by what may happen in between."""
-
-
-ROUNDING_M = 1e-5
 FORWARDS_ONLY = ", forwards only (stack.planner: rrt-star-reeds-shepp and hybrid-astar reverse as well)"
 
 
@@ -82,7 +86,7 @@ def plan_for_outline(
     blocked = blocked_pose(start, goal, request, car, ground) or blocked_end(request, space, inner_m)
     if blocked is not None:
         return failure(*blocked, time.perf_counter() - began)
-    car = car._replace(clearance=clearance_m + _skin_m(start, goal, car, ground))
+    car = car._replace(clearance=clearance_m + skin_m(start, goal, car, ground))
     ends = _Ends(Driver(steering, car, ground), start, goal)
     tree = rrt_tree.make_tree(
         start,
@@ -116,12 +120,6 @@ def plan_for_outline(
     if found.path is None and not steering.reverses:
         return replace(found, reason=found.reason + FORWARDS_ONLY)
     return found
-
-
-def _skin_m(start: FloatArray, goal: FloatArray, car: hybrid.Car, ground: hybrid.Ground) -> float:
-    """What the outline's points may come nearer between two looks; less where an end has no room for it."""
-    skin_m = 0.5 * FINE_M * (1.0 + car.radius / car.turning)
-    return min(skin_m, *(hybrid.spare_at(x, y, theta, car, ground) for x, y, theta in (start, goal)))
 
 
 def _sampling(settings: OutlineSettings, radius_m: float, inner_m: float) -> rrt_samples.Search:
@@ -166,8 +164,5 @@ def _extract(tree: rrt_tree.Tree, ends: _Ends) -> tuple[Path | None, int]:
             return None, int(node)
         states.append(word_states(tree.pose[before], word, steering.radius))
         length_m += word_length(word, steering.radius)
-    along = np.concatenate(states)
-    # Curves end where the next begin but for rounding, which must not look like a change of direction.
-    moved = np.hypot(*np.diff(along[:, :2], axis=0).T) > ROUNDING_M
-    along = np.concatenate([along[:1], along[1:][moved][:-1], ends.goal[None, :]])
+    along = distinct(np.concatenate(states), ends.goal)
     return Path(along, spaced_waypoints(along, 1.0), length_m, steering.radius), -1

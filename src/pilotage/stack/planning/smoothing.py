@@ -20,6 +20,7 @@ from pilotage.stack.planning.driving_space import (
     space_for,
     spaced_waypoints,
 )
+from pilotage.stack.planning.outline_smoothing import shortened
 from pilotage.stack.planning.planner import SMOOTHERS, Path, PlanRequest
 
 LEAST_RADIUS_M = 1e-3
@@ -67,6 +68,9 @@ class ShortcutSmoother:
     longer than the input: where nothing better is found, the input comes back with evenly spaced
     waypoints. It does not leave the way around obstacles that the input takes, unless a shortcut does.
 
+    A path for an outline becomes the cheapest chain of curves for it, with changes of direction and metres
+    backwards dearer; one that goes forwards only does so still.
+
     A path with tighter corners than the robot can drive (lines of a planner that knows nothing of turning
     circles) is replaced by curves that it can, wherever there is room for them; that may be longer.
     """
@@ -76,6 +80,12 @@ class ShortcutSmoother:
 
     def smooth(self, path: Path, request: PlanRequest, clearance_m: float) -> Path:
         """Return a path from the same start to the same goal that is valid and no longer than ``path``."""
+        if request.beside_outline and path.turning_radius_m > 0.0:
+            config = self._config
+            how = config.sample_spacing_m, config.max_samples, config.rounds
+            states, length_m = shortened(path, request, clearance_m, *how)
+            waypoints = spaced_waypoints(states, self._spacing_m(path, length_m))
+            return Path(states, waypoints, length_m, path.turning_radius_m)
         space = space_for(request.field, clearance_m)
         tight = path.turning_radius_m < request.least_turning_radius_m
         radius_m = max(
