@@ -8,12 +8,15 @@ import numpy as np
 import pytest
 
 from pilotage.core.types import Goal, Pose2
+from pilotage.kernels.bodies.outline import outline_clearance
 from pilotage.kernels.rrt import hybrid
+from pilotage.kernels.rrt.clearance import Space
 from pilotage.kernels.rrt.dubins import advance
 from pilotage.kernels.rrt.reeds_shepp import follow, shortest, word_length
 from pilotage.maps.distance_field import DistanceField
 from pilotage.maps.segment_map import SegmentMap
 from pilotage.stack.planning.hybrid_astar import HybridAstarConfig, HybridAstarPlanner
+from pilotage.stack.planning.outline import car_of, ground_of
 from pilotage.stack.planning.planner import PlanStatus
 from support.yards import BAY, CAR, TURNING_M, YARDS, check_car_path, gears, least_clearance_m, request, yard
 
@@ -91,13 +94,10 @@ def test_a_small_table_of_cells_finds_the_same_path() -> None:
 CLEARANCE_M = 0.06
 
 
-def car_and_ground(world: SegmentMap) -> tuple[hybrid.Car, hybrid.Ground]:
+def car_and_ground(world: SegmentMap) -> tuple[hybrid.Car, Space]:
     field = DistanceField.from_map(world)
-    outline = np.ascontiguousarray(CAR.points_m)
-    car = hybrid.Car(outline, CAR.radius_m, CAR.inner_radius_m, CLEARANCE_M, TURNING_M)
-    ground = hybrid.Ground(
-        field.distance_m, *field.origin_xy_m, field.resolution_m, field.segments_m, field.circles_m
-    )
+    car = car_of(CAR, CLEARANCE_M, TURNING_M)
+    ground = ground_of(field, car)
     return car, ground
 
 
@@ -151,6 +151,26 @@ def test_whoever_has_room_may_move_by_as_much() -> None:
         )
         roomy += spare > 0.05
     assert roomy > 300
+
+
+def test_what_is_near_tells_as_much_as_all_that_stands_there() -> None:
+    """On a map of thousands of walls each look at the outline asked them all."""
+    world = YARDS["a narrow gate"]
+    car, ground = car_and_ground(world)
+    rng = np.random.default_rng(7)
+    close = 0
+    for x, y, theta in rng.uniform([0.0, 0.0, -math.pi], [9.0, 9.0, math.pi], (3000, 3)).tolist():
+        spare = hybrid.spare_at(x, y, theta, car, ground)
+        c, s = math.cos(theta), math.sin(theta)
+        clear = outline_clearance(x, y, c, s, car.corners, car.radius, world.segments_m, world.circles_m)
+        assert (spare >= 0.0) == (clear >= CLEARANCE_M)
+        assert spare <= max(clear - CLEARANCE_M, 0.0) + 1e-9
+        close += abs(clear - CLEARANCE_M) < 0.05
+    assert close > 100
+    assert hybrid.spare_at(9.1, 4.5, 0.0, car, ground) < 0.0, "off the map nothing is known"
+    alone = ground._replace(margin=0.0)
+    assert hybrid.spare_at(1.0, 4.5, 0.0, car, alone) >= 0.0, "the disc around it is free"
+    assert hybrid.spare_at(0.5, 4.5, 0.0, car, alone) < 0.0, "a field alone knows no outline"
 
 
 HALL = yard(

@@ -22,7 +22,6 @@ from pilotage.kernels.rrt.steering import (
     shorten,
 )
 from pilotage.maps.segment_map import SegmentMap
-from pilotage.stack.planning.driving_space import space_for
 from pilotage.stack.planning.outline import car_of, ground_of
 from pilotage.stack.planning.planner import PLANNERS, SMOOTHERS, PlanRequest, PlanResult, PlanStatus
 from pilotage.stack.planning.rough_path import NO_BOUND, NO_GUIDE
@@ -185,14 +184,14 @@ def test_costs_stay_right_through_rewiring_and_cutting() -> None:
     """Each node's cost is its parent's and its curve's, with a change of direction at the parent."""
     steering = Steering(RADIUS_M, True, 1.5, 0.5)
     query = request(BAY, Pose2(1.5, 5.5, 0.0), Goal(4.5, 8.5, -math.pi / 2))
-    driver = outline_star.Driver(steering, car_of(CAR, 0.06, RADIUS_M), ground_of(query.field))
-    space = space_for(query.field, 0.26)
+    car = car_of(CAR, 0.06, RADIUS_M)
+    driver = outline_star.Driver(steering, car, ground_of(query.field, car))
     how = rrt_samples.Search(RADIUS_M, 1.5, 0.26, 0.02, 0.05, 0.0, 0.8, 0.6, 3.7, False)
     goal = np.array([4.5, 8.5, -math.pi / 2])
     tree = rrt_tree.make_tree(query.start.as_array(), goal, query.field.bounds_m, 1.5, 5000)
     costs = []
     for _ in range(5):
-        outline_star.grow(tree, space, how, driver, NO_BOUND, NO_GUIDE, query.rng, 300, False)
+        outline_star.grow(tree, how, driver, NO_BOUND, NO_GUIDE, query.rng, 300, False)
         costs.append(float(tree.cost[rrt_tree.GOAL]))
         check_costs(tree, steering)
     assert math.isfinite(costs[-1])

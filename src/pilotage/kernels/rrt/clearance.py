@@ -174,6 +174,24 @@ def exact_distance(x: float, y: float, space: Space) -> float:
 
 
 @kernel
+def near(x: float, y: float, space: Space) -> tuple[FloatArray, FloatArray]:
+    """Segments (N, 4) and discs (M, 3) among which are all within ``reach`` of a point on the grid."""
+    col = min(int((x - space.x0) / space.cell), space.cells_x - 1)
+    row = min(int((y - space.y0) / space.cell), space.cells_y - 1)
+    k = row * space.cells_x + col
+    begin, end, n = space.cell_start[k], space.cell_start[k + 1], space.segments.shape[0]
+    lines = begin  # items are in order: segments before discs
+    while lines < end and space.cell_item[lines] < n:
+        lines += 1
+    segments, circles = np.empty((lines - begin, 4)), np.empty((end - lines, 3))
+    for i in range(begin, lines):
+        segments[i - begin] = space.segments[space.cell_item[i]]
+    for i in range(lines, end):
+        circles[i - lines] = space.circles[space.cell_item[i] - n]
+    return segments, circles
+
+
+@kernel
 def slack_at(x: float, y: float, space: Space, clearance: float) -> float:
     """How far a point can surely move before it is nearer than ``clearance`` to an obstacle.
 

@@ -17,6 +17,7 @@ from pilotage.kernels.arrays import FloatArray, IntArray
 from pilotage.kernels.bodies.outline import outline_clearance
 from pilotage.kernels.geometry.field import interpolate_at
 from pilotage.kernels.jit import kernel
+from pilotage.kernels.rrt.clearance import Space, near
 from pilotage.kernels.rrt.dubins import advance
 from pilotage.kernels.rrt.reeds_shepp import follow, shortest, word_length
 
@@ -29,17 +30,6 @@ STRIDE = 16
 
 SLACK = 0.75
 """Interpolated distances of a 1-Lipschitz field are off by less than a node's diagonal: nodes apart."""
-
-
-class Ground(NamedTuple):
-    """What stands there: sampled distances for quick answers, exact geometry for close ones."""
-
-    distance: FloatArray
-    x0: float
-    y0: float
-    spacing: float
-    segments: FloatArray
-    circles: FloatArray
 
 
 class Car(NamedTuple):
@@ -66,31 +56,40 @@ class Prices(NamedTuple):
 
 
 @kernel
-def spare_at(x: float, y: float, theta: float, car: Car, ground: Ground) -> float:
+def spare_at(x: float, y: float, theta: float, car: Car, ground: Space) -> float:
     """How far the outline's points may surely move from a pose and keep the clearance; negative: they do not.
 
-    Exact geometry is asked only where the field cannot tell.
+    Exact geometry is asked only where the field cannot tell, and of it what is near (``clearance.near``).
+    Nothing is known off the grid; and of a field alone no more than that the disc around the outline is free.
     """
-    away = interpolate_at(x, y, ground.distance, ground.x0, ground.y0, ground.spacing)
-    slack = SLACK * ground.spacing
+    ny, nx = ground.distance.shape
+    if not (0.0 <= x - ground.x0 <= (nx - 1) * ground.resolution) or not (
+        0.0 <= y - ground.y0 <= (ny - 1) * ground.resolution
+    ):
+        return -1.0
+    away = interpolate_at(x, y, ground.distance, ground.x0, ground.y0, ground.resolution)
+    slack = SLACK * ground.resolution
     if away - slack >= car.radius + car.clearance:
         return float(away - slack - car.radius - car.clearance)
     if away + slack < car.inner + car.clearance:
         return float(away + slack - car.inner - car.clearance)
+    if ground.margin == 0.0:
+        return float(away - slack - car.radius - car.clearance)
     c, s = math.cos(theta), math.sin(theta)
-    clear = outline_clearance(x, y, c, s, car.corners, car.radius, ground.segments, ground.circles)
-    return float(clear - car.clearance)
+    segments, circles = near(x, y, ground)
+    clear = outline_clearance(x, y, c, s, car.corners, car.radius, segments, circles)
+    return float(min(clear, ground.reach - car.radius) - car.clearance)
 
 
 @kernel
-def pose_fits(x: float, y: float, theta: float, car: Car, ground: Ground) -> bool:
+def pose_fits(x: float, y: float, theta: float, car: Car, ground: Space) -> bool:
     """Whether the outline keeps its clearance."""
     return spare_at(x, y, theta, car, ground) >= 0.0
 
 
 @kernel
 def word_fits(
-    x: float, y: float, theta: float, word: FloatArray, car: Car, ground: Ground, look: float
+    x: float, y: float, theta: float, word: FloatArray, car: Car, ground: Space, look: float
 ) -> bool:
     """Whether a word can be driven from a pose that fits; poses are looked at ``look`` metres apart."""
     length = word_length(word, car.turning)
@@ -111,7 +110,7 @@ def word_fits(
 
 @kernel
 def arc_fits(
-    x: float, y: float, theta: float, turn: int, length: float, spare: float, car: Car, ground: Ground
+    x: float, y: float, theta: float, turn: int, length: float, spare: float, car: Car, ground: Space
 ) -> bool:
     """Whether a step, signed, can be driven from a pose with so much to spare (``spare_at``)."""
     count = max(1, math.ceil(abs(length) / CHECK_M))
@@ -127,7 +126,7 @@ def arc_fits(
 
 
 @kernel
-def path_fits(states: FloatArray, turns: bool, car: Car, ground: Ground) -> bool:
+def path_fits(states: FloatArray, turns: bool, car: Car, ground: Space) -> bool:
     """Whether the outline fits along states (N, 3) and between them; ``turns``: on the spot at bends."""
     for i in range(states.shape[0]):
         before = states[max(i - 1, 0)]
@@ -163,7 +162,7 @@ def search(
     start: FloatArray,
     goal: FloatArray,
     car: Car,
-    ground: Ground,
+    ground: Space,
     prices: Prices,
     to_go: FloatArray,
     step: float,
@@ -190,8 +189,8 @@ def search(
     """
     empty = np.zeros((5, 2))
     ny, nx = to_go.shape
-    columns = math.ceil((nx - 1) * ground.spacing / cell) + 1
-    rows = math.ceil((ny - 1) * ground.spacing / cell) + 1
+    columns = math.ceil((nx - 1) * ground.resolution / cell) + 1
+    rows = math.ceil((ny - 1) * ground.resolution / cell) + 1
     # No more cells are reached than there is room for nodes: of a large map only those are kept.
     places = columns * rows * headings
     table = 1
@@ -259,9 +258,9 @@ def search(
             best[key] = new
             if hashed:
                 keys[key] = place
-            u, v = (ex - ground.x0) / ground.spacing, (ey - ground.y0) / ground.spacing
+            u, v = (ex - ground.x0) / ground.resolution, (ey - ground.y0) / ground.resolution
             iu, iv = min(max(int(u + 0.5), 0), nx - 1), min(max(int(v + 0.5), 0), ny - 1)
-            around = to_go[iv, iu] - ground.spacing
+            around = to_go[iv, iu] - ground.resolution
             _, free = shortest(ex, ey, eth, goal[0], goal[1], goal[2], car.turning, prices.reverse)
             nodes[count, 0], nodes[count, 1], nodes[count, 2] = ex, ey, eth
             parents[count, 0], parents[count, 1], parents[count, 2] = float(node), float(turn), sign * step

@@ -21,7 +21,7 @@ import numpy as np
 from pilotage.kernels.arrays import FloatArray, IntArray
 from pilotage.kernels.jit import kernel
 from pilotage.kernels.rrt.clearance import Space
-from pilotage.kernels.rrt.hybrid import Car, Ground, pose_fits, word_fits
+from pilotage.kernels.rrt.hybrid import Car, pose_fits, word_fits
 from pilotage.kernels.rrt.reeds_shepp import follow
 from pilotage.kernels.rrt.samples import Bound, Search, advance_guide, bound_at, draw
 from pilotage.kernels.rrt.steering import (
@@ -58,7 +58,7 @@ class Driver(NamedTuple):
 
     steering: Steering
     car: Car
-    ground: Ground
+    ground: Space
 
 
 @kernel
@@ -164,7 +164,6 @@ def _best_parent(
 @kernel
 def grow(
     tree: Tree,
-    space: Space,
     search: Search,
     driver: Driver,
     bound: Bound,
@@ -175,7 +174,7 @@ def grow(
 ) -> int:
     """Run up to ``iterations`` iterations; parameters and result as of ``star.grow``.
 
-    ``space`` and ``search.clearance`` are of the disc inside the outline, for which samples are drawn.
+    ``search.clearance`` is of the disc inside the outline, for which samples are drawn.
     """
     near, away2 = np.empty(MAX_NEAR, np.int64), np.empty(MAX_NEAR)
     capacity = tree.cost.shape[0]
@@ -187,7 +186,7 @@ def grow(
         if tree.counts[N_NODES] >= capacity or (stop_at_solution and tree.cost[GOAL] < math.inf):
             return done
         tree.counts[N_ITERATIONS] += 1
-        x, y, th, free, useful = draw(tree, space, search, bound, guide, rng)
+        x, y, th, free, useful = draw(tree, driver.ground, search, bound, guide, rng)
         if not useful:
             continue
         x, y, th, source = _extend(tree, x, y, th, free, search.connection, driver.steering)

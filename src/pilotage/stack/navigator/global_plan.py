@@ -278,7 +278,7 @@ class GlobalPlan:
             return ""
         car = car_of(outline, min(BESIDE_M, clearance_m), 1.0)
         states = np.vstack([request.start.as_array(), path.states])
-        if hybrid.path_fits(states, path.turning_radius_m == 0.0, car, ground_of(request.field)):
+        if hybrid.path_fits(states, path.turning_radius_m == 0.0, car, ground_of(request.field, car)):
             return ""
         return f"the robot's outline does not fit along the path, which keeps {clearance_m:.2f} m{INSTEAD}"
 

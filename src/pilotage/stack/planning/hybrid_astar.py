@@ -12,6 +12,7 @@ from pilotage.core.config import Config
 from pilotage.core.types import FloatArray
 from pilotage.kernels.grids.travel_cost import travel_costs
 from pilotage.kernels.rrt import hybrid, reeds_shepp
+from pilotage.kernels.rrt.clearance import Space
 from pilotage.maps.distance_field import DistanceField
 from pilotage.sensors.sensor import NonNegative, Positive
 from pilotage.stack.planning.driving_space import SPARE, failure, spaced_waypoints
@@ -69,7 +70,8 @@ class HybridAstarPlanner:
         config, field = self._config, request.field
         clearance_m = config.clearance_m if request.clearance_m is None else request.clearance_m
         turning_m = config.turning_radius_m or max(SPARE * request.least_turning_radius_m, LEAST_RADIUS_M)
-        car, ground = car_of(request.footprint, clearance_m, turning_m), ground_of(field)
+        car = car_of(request.footprint, clearance_m, turning_m)
+        ground = ground_of(field, car)
         start, goal = request.start.as_array(), goal_pose(request, car, ground, config.headings)
         blocked = blocked_pose(start, goal, request, car, ground)
         if blocked is not None:
@@ -93,7 +95,7 @@ class HybridAstarPlanner:
         start: FloatArray,
         goal: FloatArray,
         car: hybrid.Car,
-        ground: hybrid.Ground,
+        ground: Space,
         to_go: FloatArray,
         nodes: FloatArray,
         parents: FloatArray,

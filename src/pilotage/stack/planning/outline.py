@@ -9,8 +9,10 @@ import numpy as np
 from pilotage.core.angles import wrap_to_pi
 from pilotage.core.types import FloatArray
 from pilotage.kernels.rrt import hybrid, reeds_shepp
+from pilotage.kernels.rrt.clearance import Space
 from pilotage.maps.distance_field import DistanceField
 from pilotage.models.footprint import Footprint
+from pilotage.stack.planning.driving_space import space_for
 from pilotage.stack.planning.planner import PlanRequest, PlanStatus
 
 STATE_SPACING_M = 0.025
@@ -29,16 +31,12 @@ def car_of(footprint: Footprint | None, clearance_m: float, turning_m: float) ->
     return hybrid.Car(points_m, outline.radius_m, outline.inner_radius_m, clearance_m, turning_m)
 
 
-def ground_of(field: DistanceField) -> hybrid.Ground:
-    """What stands there, as the kernels take it."""
-    return hybrid.Ground(
-        field.distance_m, *field.origin_xy_m, field.resolution_m, field.segments_m, field.circles_m
-    )
+def ground_of(field: DistanceField, car: hybrid.Car) -> Space:
+    """What stands there, as the kernels take it, for questions about an outline."""
+    return space_for(field, car.radius + car.clearance)
 
 
-def goal_pose(
-    request: PlanRequest, car: hybrid.Car, ground: hybrid.Ground, headings: int = HEADINGS
-) -> FloatArray:
+def goal_pose(request: PlanRequest, car: hybrid.Car, ground: Space, headings: int = HEADINGS) -> FloatArray:
     """Where no heading is asked for, the one nearest to the straight line's in which the outline fits."""
     goal, start = request.goal, request.start
     if goal.theta_rad is not None:
@@ -52,7 +50,7 @@ def goal_pose(
 
 
 def blocked_pose(
-    start: FloatArray, goal: FloatArray, request: PlanRequest, car: hybrid.Car, ground: hybrid.Ground
+    start: FloatArray, goal: FloatArray, request: PlanRequest, car: hybrid.Car, ground: Space
 ) -> tuple[PlanStatus, str] | None:
     """Status and reason where the outline does not fit at the start or the goal."""
     for name, pose, status in (
@@ -95,7 +93,7 @@ def word_states(
     return np.concatenate(states)
 
 
-def skin_m(start: FloatArray, goal: FloatArray, car: hybrid.Car, ground: hybrid.Ground) -> float:
+def skin_m(start: FloatArray, goal: FloatArray, car: hybrid.Car, ground: Space) -> float:
     """What the outline's points may come nearer between two looks; less where an end has no room for it."""
     fully_m = 0.5 * FINE_M * (1.0 + car.radius / car.turning)
     return min(fully_m, *(hybrid.spare_at(x, y, theta, car, ground) for x, y, theta in (start, goal)))

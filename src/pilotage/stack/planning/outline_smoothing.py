@@ -67,9 +67,9 @@ def shortened(
     reverses = bool((line.gears < 0).any())
     steering = Steering(path.turning_radius_m, reverses, REVERSE_COST, SWITCH_COST_M)
     car = car_of(request.footprint, clearance_m, path.turning_radius_m)
-    ground = ground_of(request.field)
-    spare_m = skin_m(path.states[0], path.states[-1], car, ground)
-    driver = Driver(steering, car._replace(clearance=clearance_m + max(spare_m, 0.0)), ground)
+    ground = ground_of(request.field, car)
+    spare_m = max(skin_m(path.states[0], path.states[-1], car, ground), 0.0)
+    driver = Driver(steering, car._replace(clearance=clearance_m + spare_m), ground)
     for _ in range(rounds):
         shorter = _once(line, driver, spacing_m, most)
         if shorter is None:

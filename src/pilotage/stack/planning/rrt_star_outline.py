@@ -18,7 +18,7 @@ from pilotage.kernels.rrt import tree as rrt_tree
 from pilotage.kernels.rrt.outline_star import Driver
 from pilotage.kernels.rrt.reeds_shepp import word_length
 from pilotage.kernels.rrt.steering import Steering
-from pilotage.stack.planning.driving_space import blocked_end, failure, space_for, spaced_waypoints
+from pilotage.stack.planning.driving_space import blocked_end, failure, spaced_waypoints
 from pilotage.stack.planning.outline import (
     FINE_M,
     blocked_pose,
@@ -78,12 +78,11 @@ def plan_for_outline(
     if not math.isfinite(request.start.theta_rad):
         raise InputError(f"plan: expected a finite start heading, found {request.start.theta_rad}")
     car = car_of(request.footprint, clearance_m, steering.radius)
-    ground = ground_of(request.field)
+    ground = ground_of(request.field, car)
     inner_m = car.inner + clearance_m
-    space = space_for(request.field, inner_m)
     start, goal = request.start.as_array(), goal_pose(request, car, ground)
     # Who fits with its outline does so with the disc inside, but off the map.
-    blocked = blocked_pose(start, goal, request, car, ground) or blocked_end(request, space, inner_m)
+    blocked = blocked_pose(start, goal, request, car, ground) or blocked_end(request, ground, inner_m)
     if blocked is not None:
         return failure(*blocked, time.perf_counter() - began)
     car = car._replace(clearance=clearance_m + skin_m(start, goal, car, ground))
@@ -103,14 +102,14 @@ def plan_for_outline(
         if path is not None and (not goes_on or _is_one_way(tree, steering)):
             return directly(path, began)
     guided = settings.guide_bias > 0.0
-    around = look_around(request, space, inner_m, guided, guided and goes_on)
+    around = look_around(request, ground, inner_m, guided, guided and goes_on)
     if around.shut:
         return failure(PlanStatus.NO_PATH, _shut(car, clearance_m), time.perf_counter() - began)
     how = _sampling(settings, steering.radius, inner_m)
 
     def grow(guide_path: FloatArray, iterations: int, first: bool) -> int:
         return outline_star.grow(
-            tree, space, how, ends.driver, around.bound, guide_path, request.rng, iterations, first
+            tree, how, ends.driver, around.bound, guide_path, request.rng, iterations, first
         )
 
     def extract() -> tuple[Path | None, int]:
