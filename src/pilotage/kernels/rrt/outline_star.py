@@ -21,7 +21,8 @@ import numpy as np
 from pilotage.kernels.arrays import FloatArray, IntArray
 from pilotage.kernels.jit import kernel
 from pilotage.kernels.rrt.clearance import Space
-from pilotage.kernels.rrt.hybrid import Car, pose_fits, word_fits
+from pilotage.kernels.rrt.dubins import advance
+from pilotage.kernels.rrt.hybrid import Car, arc_fits, pose_fits, spare_at, word_fits
 from pilotage.kernels.rrt.reeds_shepp import follow
 from pilotage.kernels.rrt.samples import Bound, Search, advance_guide, bound_at, draw
 from pilotage.kernels.rrt.steering import (
@@ -49,6 +50,8 @@ from pilotage.kernels.rrt.tree import (
 MAX_NEAR = 64
 SOURCES = 12
 """So many of the nearest nodes are asked for the shortest curve to a sample."""
+APPROACH = 3
+"""Pieces of a sample's way from the goal."""
 LOOK_M = 0.02
 """Poses along an edge are looked at this close together."""
 
@@ -103,6 +106,21 @@ def try_goal(tree: Tree, node: int, driver: Driver) -> bool:
     tree.join_lengths[count, 0], tree.join_lengths[count, 1], tree.join_lengths[count, 2] = price, 0.0, 0.0
     tree.counts[N_JOINS] += 1
     return True
+
+
+@kernel
+def _approach(tree: Tree, driver: Driver, rng: np.random.Generator) -> tuple[float, float, float]:
+    """A pose near the goal from which it can be reached: what the robot comes by when it leaves it again."""
+    x, y, th = tree.pose[GOAL, 0], tree.pose[GOAL, 1], tree.pose[GOAL, 2]
+    sign = 1.0 if driver.steering.reverses and rng.random() < 0.5 else -1.0
+    for _ in range(APPROACH):
+        turn = int(rng.random() * 3.0) - 1
+        length = sign * driver.steering.radius * (0.2 + 1.3 * rng.random())
+        spare = spare_at(x, y, th, driver.car, driver.ground)
+        if not arc_fits(x, y, th, turn, length, spare, driver.car, driver.ground):
+            break
+        x, y, th = advance(x, y, th, turn, driver.steering.radius, length)
+    return x, y, th
 
 
 @kernel
@@ -189,6 +207,9 @@ def grow(
         x, y, th, free, useful = draw(tree, driver.ground, search, bound, guide, rng)
         if not useful:
             continue
+        if not free and x == tree.pose[GOAL, 0] and y == tree.pose[GOAL, 1]:
+            # Every node tries the goal itself.
+            x, y, th = _approach(tree, driver, rng)
         x, y, th, source = _extend(tree, x, y, th, free, search.connection, driver.steering)
         if source < 0 or not pose_fits(x, y, th, driver.car, driver.ground):
             continue

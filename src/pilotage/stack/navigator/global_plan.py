@@ -276,7 +276,9 @@ class GlobalPlan:
         outline = robot.footprint
         if not self.beside_outline and clearance_m >= outline.radius_m:
             return ""
-        car = car_of(outline, min(BESIDE_M, clearance_m), 1.0)
+        # Who plans for outlines vouches for its clearance, but for what may come nearer between two looks.
+        beside_m = 0.0 if self.beside_outline else min(BESIDE_M, clearance_m)
+        car = car_of(outline, beside_m, 1.0)
         states = np.vstack([request.start.as_array(), path.states])
         if hybrid.path_fits(states, path.turning_radius_m == 0.0, car, ground_of(request.field, car)):
             return ""
