@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Callable
 
@@ -11,7 +12,7 @@ from scipy import stats
 
 from pilotage.core.types import FloatArray
 from pilotage.evaluation.drawn_studies import DrawnStudies
-from pilotage.evaluation.effects import Effect, effects, holm
+from pilotage.evaluation.effects import Effect, effects, effects_of_each, holm
 from pilotage.evaluation.rank_tests import rank_tests, signed_ranks
 
 STUDIES = 400
@@ -22,18 +23,19 @@ NOISES: dict[str, Callable[[np.random.Generator, tuple[int, ...]], np.ndarray]] 
 }
 
 
-def a_study(
+def studies_of_nothing(
     rng: np.random.Generator, shape: tuple[int, ...], noise: str, metrics: int, paired: bool
-) -> list[Effect]:
-    """All effects of a study of some metrics in which no factor does anything."""
+) -> list[list[Effect]]:
+    """All effects of each of ``STUDIES`` studies of some metrics in which no factor does anything."""
     tests = metrics * (len(shape) - 1 + math.comb(len(shape) - 1, 2))
-    found: list[Effect] = []
-    for _ in range(metrics):
+    each = []
+    for _ in range(STUDIES * metrics):
         values = NOISES[noise](rng, shape)
         if paired:
             values += 3.0 * rng.normal(size=(shape[0], *[1] * (len(shape) - 1)))
-        found += effects(values, ordered=[True] * (len(shape) - 1), paired=paired, tests=tests)
-    return found
+        each.append(values)
+    found = effects_of_each(each, ordered=[True] * (len(shape) - 1), paired=paired, tests=tests)
+    return [list(itertools.chain(*found[k : k + metrics])) for k in range(0, len(found), metrics)]
 
 
 @pytest.mark.parametrize("paired", [True, False])
@@ -43,12 +45,28 @@ def test_at_most_one_study_in_twenty_has_a_false_finding(
     shape: tuple[int, ...], noise: str, paired: bool
 ) -> None:
     """At the rate told, 5 %, more than 34 of 400 studies come once in 1000 (binomial)."""
-    rng = np.random.default_rng(5)
     alarms = 0
-    for _ in range(STUDIES):
-        found = a_study(rng, shape, noise, 2, paired)
+    for found in studies_of_nothing(np.random.default_rng(5), shape, noise, 2, paired):
         alarms += any(p < 0.05 for p in holm([effect.p_value for effect in found]))
     assert alarms <= stats.binom.isf(0.001, STUDIES, 0.05)
+
+
+@pytest.mark.parametrize("paired", [True, False])
+@pytest.mark.parametrize("shape", [(7, 2), (8, 2, 3), (15, 2, 2), (9, 3, 4)])
+def test_metrics_tested_together_are_judged_as_each_alone(shape: tuple[int, ...], paired: bool) -> None:
+    """Of two levels scipy takes another law for all that it is handed where sizes are alike in any."""
+    rng = np.random.default_rng(11)
+    metrics = [noise(rng, shape) for noise in NOISES.values()] + [
+        np.zeros(shape),
+        1e-3 * rng.normal(size=shape),
+    ]
+    ordered = [True] * (len(shape) - 1)
+    together = effects_of_each(metrics, ordered=ordered, paired=paired)
+    for values, found in zip(metrics, together, strict=True):
+        alone = effects(values, ordered=ordered, paired=paired)
+        p_values = [effect.p_value for effect in alone]
+        assert [effect.p_value for effect in found] == pytest.approx(p_values, rel=1e-12, nan_ok=True)
+        assert [effect.share for effect in found] == [effect.share for effect in alone]
 
 
 @pytest.mark.parametrize("paired", [True, False])
@@ -56,9 +74,8 @@ def test_where_one_factor_matters_the_others_are_not_blamed(paired: bool) -> Non
     """A large known effect beside a factor and an interaction of nothing; the same false-alarm rate."""
     rng = np.random.default_rng(6)
     found_it = alarms = 0
-    for _ in range(STUDIES):
-        values = rng.normal(size=(15, 3, 3)) + 3.0 * np.arange(3)[None, :, None]
-        main, other, both = effects(values, ordered=[True, True], paired=paired, tests=3)
+    each = [rng.normal(size=(15, 3, 3)) + 3.0 * np.arange(3)[None, :, None] for _ in range(STUDIES)]
+    for main, other, both in effects_of_each(each, ordered=[True, True], paired=paired, tests=3):
         p_main, p_other, p_both = holm([effect.p_value for effect in (main, other, both)])
         found_it += p_main < 0.05
         alarms += p_other < 0.05 or p_both < 0.05

@@ -114,15 +114,32 @@ def effects(values: FloatArray, *, ordered: Sequence[bool], paired: bool, tests:
     tests
         How many tests the family has, for what is told of power.
     """
-    if values.shape[0] < FEWEST:
-        return []
-    scale = float(np.abs(values).max()) or 1.0
+    (found,) = effects_of_each([values], ordered=ordered, paired=paired, tests=tests)
+    return found
+
+
+def effects_of_each(
+    metrics: Sequence[FloatArray], *, ordered: Sequence[bool], paired: bool, tests: int = 1
+) -> list[list[Effect]]:
+    """As ``effects`` of each metric of one design, all of the same shape: scipy tests them together.
+
+    What one test costs is mostly how it is called.
+    """
+    if not metrics or metrics[0].shape[0] < FEWEST:
+        return [[] for _ in metrics]
+    scales = [float(np.abs(values).max()) or 1.0 for values in metrics]
     # What averages differ by from rounding alone must not get ranks of its own.
-    values = np.round(values / scale, 12)
-    axes = range(values.ndim - 1)
-    found = [_main(values, axis, ordered[axis], paired, tests) for axis in axes]
-    found += [_interaction(values, pair, paired, tests) for pair in itertools.combinations(axes, 2)]
-    return [_scaled(effect, scale) for effect in found]
+    rounded = [np.round(values / scale, 12) for values, scale in zip(metrics, scales, strict=True)]
+    axes = range(metrics[0].ndim - 1)
+    asked = [[_main(values, axis, ordered[axis], paired, tests) for values in rounded] for axis in axes]
+    asked += [
+        [_interaction(values, pair, paired, tests) for values in rounded]
+        for pair in itertools.combinations(axes, 2)
+    ]
+    judged = zip(*map(_judged, asked), strict=True)
+    return [
+        [_scaled(effect, scale) for effect in effects] for effects, scale in zip(judged, scales, strict=True)
+    ]
 
 
 def holm(p_values: Sequence[float], parts: int = 1) -> list[float]:
@@ -166,7 +183,7 @@ def _main(values: FloatArray, axis: int, ordered: bool, paired: bool, tests: int
     ends = (0, last or means.size - 1)
     terms = means - means.mean()
     size = float((terms**2).sum()) * values.shape[0] * (values[0].size / means.size)
-    return _tested((axis,), by_level[:, None, :], means, ends, size, values, paired, tests)
+    return _asked((axis,), by_level[:, None, :], means, ends, size, values, paired, tests)
 
 
 def _interaction(values: FloatArray, pair: tuple[int, int], paired: bool, tests: int) -> Effect:
@@ -184,12 +201,12 @@ def _interaction(values: FloatArray, pair: tuple[int, int], paired: bool, tests:
     terms = means - means.mean(axis=0) - means.mean(axis=1)[:, None] + means.mean()
     size = float((terms**2).sum()) * values.shape[0] * (values[0].size / means.size)
     ends = (0, means.shape[1] - 1)
-    found = _tested((first, second), np.round(contrasts, 12), means, ends, size, values, paired, tests)
+    found = _asked((first, second), np.round(contrasts, 12), means, ends, size, values, paired, tests)
     along = both[:, -1] - both[:, 0]
     return replace(found, columns=(along[:, 0], along[:, -1]))
 
 
-def _tested(
+def _asked(
     axes: tuple[int, ...],
     contrasts: FloatArray,
     means: FloatArray,
@@ -199,11 +216,8 @@ def _tested(
     paired: bool,
     tests: int,
 ) -> Effect:
-    """Test contrasts (n, q, levels): q tests of which any may show the effect."""
+    """What is asked of contrasts (n, q, levels), q tests of which any may show the effect; not tested yet."""
     n, q, _ = contrasts.shape
-    each = rank_tests(np.moveaxis(contrasts, 1, 0), paired=paired)
-    found = each[np.isfinite(each)]
-    p_value = min(1.0, q * float(found.min())) if found.size else math.nan
     seeds = values.reshape(n, -1).mean(axis=1) if paired else np.full(n, values.mean())
     total = float(((values.reshape(n, -1) - seeds[:, None]) ** 2).sum())
     return Effect(
@@ -213,11 +227,37 @@ def _tested(
         ends=ends,
         columns=(contrasts[:, 0, ends[0]], contrasts[:, 0, ends[1]]),
         share=min(size / total, 1.0) if total > 0.0 else 0.0,
-        p_value=p_value,
+        p_value=math.nan,
         contrasts=contrasts,
         alpha=SURE / max(tests, 1) / q,
         paired=paired,
     )
+
+
+def _judged(asked: Sequence[Effect]) -> list[Effect]:
+    """The same effect on several metrics, with its p-values."""
+    count, levels = asked[0].contrasts.shape[1:]
+    each = np.empty((len(asked), count))
+    tests = np.stack([np.moveaxis(effect.contrasts, 1, 0) for effect in asked])
+    # Of two levels scipy takes the exact law only where no row that it is handed has sizes alike.
+    alike = np.array([levels == 2 and _sizes_alike(effect) for effect in asked])
+    for rows in (alike, ~alike):
+        if rows.any():
+            stacked = tests[rows].reshape(-1, *tests.shape[2:])
+            each[rows] = rank_tests(stacked, paired=asked[0].paired).reshape(-1, count)
+    out = []
+    for effect, p_values in zip(asked, each, strict=True):
+        found = p_values[np.isfinite(p_values)]
+        p_value = min(1.0, count * float(found.min())) if found.size else math.nan
+        out.append(replace(effect, p_value=p_value))
+    return out
+
+
+def _sizes_alike(effect: Effect) -> bool:
+    """Whether ranks are shared, or pairs do not differ."""
+    first, other = effect.contrasts[:, 0, 0], effect.contrasts[:, 0, 1]
+    sizes = np.append(np.abs(other - first), 0.0) if effect.paired else np.concatenate([first, other])
+    return np.unique(sizes).size < sizes.size
 
 
 def _scaled(effect: Effect, scale: float) -> Effect:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from pilotage.core.types import FloatArray, IntArray
-from pilotage.evaluation.effects import SURE, Effect, effects, holm
+from pilotage.evaluation.effects import SURE, Effect, effects_of_each, holm
 from pilotage.evaluation.intervals import Summary
 from pilotage.evaluation.judge import SUCCESS, Judgement
 from pilotage.evaluation.metrics import METRICS
@@ -97,11 +97,12 @@ def findings_of(table: StudyTable) -> list[Finding]:
     others = [metric for metric in dict.fromkeys([*table.telling, SUCCESS]) if metric != table.primary]
     out: list[Finding] = []
     for family in ([table.primary], others):
+        by_design = [(design, _effects(table, family, design)) for design in designs]
         found = [
             (metric, design, effect)
             for metric in family
-            for design in designs
-            for effect in _effects(table, metric, design)
+            for design, each in by_design
+            for effect in each[metric]
         ]
         # What never varies is no test and takes nothing from the others.
         tests = PARTS * sum(math.isfinite(effect.p_value) for _, _, effect in found)
@@ -121,11 +122,18 @@ def findings_of(table: StudyTable) -> list[Finding]:
     return out
 
 
-def _effects(table: StudyTable, metric: str, design: _Design) -> list[Effect]:
-    """The effects on one metric over the trials that give it at every setting of a design."""
-    trials = by_trial(table, metric)[:, design.cells]
-    complete = trials[np.isfinite(trials).reshape(trials.shape[0], -1).all(axis=1)]
-    return effects(complete, ordered=design.ordered, paired=table.same_seeds)
+def _effects(table: StudyTable, metrics: Sequence[str], design: _Design) -> dict[str, list[Effect]]:
+    """The effects on each metric over the trials that give it at every setting of a design."""
+    alike: dict[int, dict[str, FloatArray]] = {}
+    for metric in metrics:
+        trials = by_trial(table, metric)[:, design.cells]
+        complete = trials[np.isfinite(trials).reshape(trials.shape[0], -1).all(axis=1)]
+        alike.setdefault(len(complete), {})[metric] = complete
+    out: dict[str, list[Effect]] = {}
+    for values in alike.values():
+        found = effects_of_each([*values.values()], ordered=design.ordered, paired=table.same_seeds)
+        out |= dict(zip(values, found, strict=True))
+    return out
 
 
 def best_settings(table: StudyTable, judgement: Judgement) -> list[Best]:
