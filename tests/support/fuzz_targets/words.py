@@ -43,7 +43,7 @@ OPTIONS: tuple[tuple[str, ...], ...] = (
     ("slam", "walls.yaml", "--topic", "VALUE", "--config", "VALUE"),
     ("bench", "VALUE"),
     ("bench", "barn", "VALUE"),
-    ("bench", "controllers", *ONE_COURSE, "--set", "run.time_limit_s=1", "VALUE"),
+    ("bench", "controllers", "VALUE", *ONE_COURSE, "--set", "run.time_limit_s=1"),
     ("bench", "controllers", "doors", "--controller", "VALUE"),
     ("export", "VALUE", "--to", "csv"),
     ("export", ".", "--to", "VALUE"),
