@@ -12,7 +12,7 @@ import pytest
 
 from pilotage.cli.main import main
 from pilotage.core.errors import InputError
-from pilotage.evaluation.sheet_visits import VisitedCells, reachable_cells
+from pilotage.evaluation.sheet_visits import CLEAR_M, SAMPLES, VisitedCells, reachable_cells
 from pilotage.experiments.build.build import build
 from pilotage.experiments.build.charts import load_chart
 from pilotage.experiments.loop import run_loop, simulate
@@ -191,6 +191,28 @@ def test_reachable_cells_by_hand() -> None:
     assert np.argwhere(reachable_cells(sheet, 0.1)).tolist() == [[1, 1], [1, 2], [2, 1], [2, 2]]
     boxed = SheetFile(size_m=(0.4, 0.4), cells=(4, 4), obstacles=((0.18, 0.18, 0.22, 0.22),))
     assert not reachable_cells(boxed, 0.1).any()
+
+
+def test_reachable_cells_are_those_of_all_points_held_against_all_boxes() -> None:
+    """Boxes over the rim, within each other and without width; only points beside one are looked at."""
+    rng = np.random.default_rng(4)
+    for _ in range(8):
+        size, boxes = rng.uniform(0.5, 1.5, 2), rng.uniform(-0.2, 1.7, (5, 4))
+        boxes[0, 2] = boxes[0, 0]
+        radius_m = rng.uniform(0.02, 0.2)
+        sheet = SheetFile.model_validate(
+            {"size_m": size.tolist(), "cells": (7, 5), "obstacles": boxes.tolist()}
+        )
+        points = [(np.arange(n * SAMPLES) + 0.5) / (n * SAMPLES) for n in (7, 5)]
+        x, y = np.meshgrid(size[0] * points[0], size[1] * points[1])
+        room = np.minimum(np.minimum(x, size[0] - x), np.minimum(y, size[1] - y)) - radius_m
+        for x0, y0, x1, y1 in boxes:
+            dx = np.maximum(np.maximum(min(x0, x1) - x, x - max(x0, x1)), 0.0)
+            dy = np.maximum(np.maximum(min(y0, y1) - y, y - max(y0, y1)), 0.0)
+            room = np.minimum(room, np.hypot(dx, dy) - radius_m - CLEAR_M)
+        share = (room >= 0.0).reshape(5, SAMPLES, 7, SAMPLES).mean(axis=(1, 3))
+        found = reachable_cells(sheet, radius_m)
+        assert np.array_equal(found, share >= 0.25)
 
 
 def test_visited_cells_count_once_and_only_on_the_sheet() -> None:

@@ -53,9 +53,15 @@ def reachable_cells(sheet: SheetFile, body_radius_m: float) -> BoolArray:
     inside_x = (x >= body_radius_m) & (x <= width - body_radius_m)
     inside_y = (y >= body_radius_m) & (y <= height - body_radius_m)
     free = np.outer(inside_y, inside_x)
+    clear_m = body_radius_m + CLEAR_M
     for x0, y0, x1, y1 in sheet.obstacles:
         dx = np.maximum(np.maximum(min(x0, x1) - x, x - max(x0, x1)), 0.0)
         dy = np.maximum(np.maximum(min(y0, y1) - y, y - max(y0, y1)), 0.0)
-        free &= np.hypot(dx[None, :], dy[:, None]) >= body_radius_m + CLEAR_M
-    share = free.reshape(rows, SAMPLES, columns, SAMPLES).mean(axis=(1, 3))
+        # Farther than that along either axis nothing is in the way: a box is beside a few of the cells.
+        near_x, near_y = (np.flatnonzero(away < clear_m) for away in (dx, dy))
+        if near_x.size and near_y.size:
+            beside = np.s_[near_y[0] : near_y[-1] + 1, near_x[0] : near_x[-1] + 1]
+            free[beside] &= np.hypot(dx[None, beside[1]], dy[beside[0], None]) >= clear_m
+    points = free.reshape(rows * SAMPLES, columns, SAMPLES).sum(axis=2, dtype=np.int64)
+    share = points.reshape(rows, SAMPLES, columns).sum(axis=1) / SAMPLES**2
     return np.asarray(share >= REACHABLE_SHARE)
