@@ -10,7 +10,7 @@ from pilotage.core.types import Pose2
 from pilotage.kernels.control.disc_returns import is_near_beside
 from pilotage.stack.navigator.patrol.mates import Mates
 from pilotage.stack.patrol.last_words import LastWords
-from pilotage.stack.patrol.messages import PatrolMemory
+from pilotage.stack.patrol.messages import PatrolMemory, PatrolState
 from pilotage.stack.patrol.word import TeamWord
 
 NEWS = PatrolMemory(2, 1, 2, 0, 1.0).message(0.0)
@@ -78,3 +78,34 @@ def test_what_is_near_counts_beside_those_who_stay() -> None:
     assert not is_near_beside(near, pose, 0.9, discs, 0.2)
     assert is_near_beside(near, pose, 0.9, discs + np.array([0.6, 0.0, 0.0]), 0.2)
     assert not is_near_beside(near, pose, 0.9, discs + np.array([0.4, 0.0, 0.0]), 0.2)
+
+
+def test_news_read_together_are_what_one_after_the_other_tells() -> None:
+    """Of six robots that hear half of what is said, at first of few, asked now and then."""
+    rng, team = np.random.default_rng(8), 6
+    memories = [PatrolMemory(9, k, team, k, 1.0) for k in range(team)]
+    visited_s = np.zeros((team, 9))
+    newest: list[dict[int, PatrolState]] = [{} for _ in range(team)]
+    for step in range(1, 400):
+        sender = int(rng.integers(team))
+        vertex = int(rng.integers(9))
+        memories[sender].visit(vertex, float(step))
+        visited_s[sender, vertex] = step
+        message = memories[sender].message(float(step))
+        assert np.array_equal(message.visited_s, visited_s[sender])
+        assert {s.robot: s for s in message.states if s.robot != sender} == newest[sender]
+        for other in np.flatnonzero(rng.random(team) < 0.5).tolist():
+            if other == sender:
+                continue
+            memories[other].receive(message)
+            visited_s[other] = np.maximum(visited_s[other], message.visited_s)
+            for state in message.states:
+                known = newest[other].get(state.robot)
+                if state.robot != other and (known is None or state.t_s > known.t_s):
+                    newest[other][state.robot] = state
+    for k, memory in enumerate(memories):
+        knowledge = memory.knowledge(400.0)
+        assert np.array_equal(knowledge.visited_s, visited_s[k])
+        assert [knowledge.states[j] for j in range(team) if j != k] == [
+            newest[k].get(j) for j in range(team) if j != k
+        ]

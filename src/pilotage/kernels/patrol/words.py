@@ -3,15 +3,11 @@
 from __future__ import annotations
 
 import math
-from typing import TypeAlias
 
 import numpy as np
 
 from pilotage.kernels.arrays import FloatArray
 from pilotage.kernels.jit import kernel
-
-Place: TypeAlias = tuple[float, float, float]
-Habit: TypeAlias = tuple[float, float, float, float]
 
 SENT, X, Y, RADIUS, REACH, PERIOD, SPEED, LOSS, DUE, EXPECTED, LOST = range(11)
 """Columns of a team's words: when each robot's last one was sent, where it said it is, how large it is; how
@@ -24,22 +20,31 @@ COUNTED = 200.0
 
 @kernel
 def hear(
-    words: FloatArray, k: int, sent: float, place: Place, talk: Habit, expected: float, lost: float
+    words: FloatArray,
+    k: int,
+    sent: float,
+    x: float,
+    y: float,
+    radius: float,
+    reach: float,
+    period: float,
+    speed: float,
+    loss: float,
+    expected: float,
+    lost: float,
 ) -> None:
     """Write down a robot's new word.
 
     Parameters
     ----------
-    place
-        x, y, and its radius.
-    talk
-        Columns REACH to LOSS; all NaN where nothing is known of how it talks.
+    reach, period, speed, loss
+        NaN where nothing is known of how it talks.
     expected, lost
         What was due and lost of those before its first one.
     """
     words[k, SENT] = sent
-    words[k, X], words[k, Y], words[k, RADIUS] = place
-    if math.isnan(talk[1]):
+    words[k, X], words[k, Y], words[k, RADIUS] = x, y, radius
+    if math.isnan(period):
         words[k, REACH:] = math.nan
         return
     due = words[k, DUE]
@@ -47,7 +52,7 @@ def hear(
         kept = math.exp(-due / COUNTED)
         expected = kept * words[k, EXPECTED] + due
         lost = kept * words[k, LOST] + max(0.0, due - 1.0)
-    words[k, REACH], words[k, PERIOD], words[k, SPEED], words[k, LOSS] = talk
+    words[k, REACH], words[k, PERIOD], words[k, SPEED], words[k, LOSS] = reach, period, speed, loss
     words[k, DUE], words[k, EXPECTED], words[k, LOST] = 0.0, expected, lost
 
 

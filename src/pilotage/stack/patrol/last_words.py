@@ -32,9 +32,9 @@ class LastWords:
 
     def hear(self, number: int, sent_s: float, word: TeamWord) -> None:
         """A mate said something itself."""
-        talk, place = word.talk, (word.x_m, word.y_m, word.radius_m)
+        talk, x, y = word.talk, word.x_m, word.y_m
         habit = UNTOLD if talk is None else (talk.reach_m, talk.period_s, talk.speed_m_s, talk.loss)
-        words.hear(self._words, number, sent_s, place, habit, PRIOR_WORDS, PRIOR_LOST)
+        words.hear(self._words, number, sent_s, x, y, word.radius_m, *habit, PRIOR_WORDS, PRIOR_LOST)
 
     def of_nobody(
         self, points: FloatArray, pose: Pose2, own: int, t_s: float, told_m: float, speed_m_s: float

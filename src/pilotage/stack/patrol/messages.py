@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field
-from itertools import compress
-from operator import is_not
 
 import numpy as np
 
@@ -13,6 +12,8 @@ from pilotage.stack.patrol.shut_paths import NONE_SHUT, ShutPaths
 
 NOTHING: FloatArray = np.zeros(0)
 NOTHING.flags.writeable = False
+MOST_UNREAD = 256
+"""Messages of mates to a robot that asks itself for nothing."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -60,12 +61,15 @@ class PatrolMessage:
         The newest word of each robot that the sender knows of; its own among them.
     visited_s
         (V,) when each vertex was last visited by anybody, as far as the sender knows.
+    told_s
+        (K,) when the words were said.
     """
 
     sender: int
     sent_s: float
     states: tuple[PatrolState, ...]
     visited_s: FloatArray
+    told_s: FloatArray
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -146,8 +150,10 @@ class PatrolMemory:
         self._own_s = np.full(vertices, begin_s)
         self._visited_s = np.full(vertices, begin_s)
         self._states: list[PatrolState | None] = [None] * team_size
+        self._told_s = np.full(team_size, -np.inf)
+        self._unread: list[PatrolMessage] = []
         self._own = PatrolState(robot, begin_s, at, at, begin_s, speed_m_s)
-        self._states[robot] = self._own
+        self._states[robot], self._told_s[robot] = self._own, begin_s
 
     @property
     def own(self) -> PatrolState:
@@ -156,10 +162,12 @@ class PatrolMemory:
 
     def visited_s(self, vertex: int) -> float:
         """When anybody was last there, as far as it knows."""
+        self._read()
         return float(self._visited_s[vertex])
 
     def waits(self, robot: int) -> bool:
         """Whether a robot said that it waits where it is."""
+        self._read()
         state = self._states[robot]
         return state is not None and state.at == state.target
 
@@ -191,24 +199,46 @@ class PatrolMemory:
 
     def receive(self, message: PatrolMessage) -> None:
         """Take in what somebody else sent: the newer word of each robot, the later visit of each vertex."""
-        np.maximum(self._visited_s, message.visited_s, out=self._visited_s)
-        states, told = self._states, message.states
-        if len(told) == len(states):
-            # In the order of the robots' numbers, and of a large team nearly all has been heard before.
-            told = tuple(compress(told, map(is_not, told, states)))
-        for state in told:
-            known = states[state.robot]
-            if state.robot != self._own.robot and (known is None or state.t_s > known.t_s):
-                states[state.robot] = state
+        self._unread.append(message)
+        if len(self._unread) >= MOST_UNREAD:
+            self._read()
+
+    def _read(self) -> None:
+        """What came since it was asked last: a large team says more than it asks itself for."""
+        if not self._unread:
+            return
+        unread, self._unread = self._unread, []
+        for message in unread:
+            np.maximum(self._visited_s, message.visited_s, out=self._visited_s)
+        whole = [message for message in unread if len(message.states) == len(self._states)]
+        if whole:  # in the order of the robots' numbers, and nearly all has been heard before
+            told_s = np.array([message.told_s for message in whole])
+            newest = told_s.argmax(axis=0)
+            newer = np.flatnonzero(told_s.max(axis=0) > self._told_s)
+            self._take(
+                whole[m].states[k] for k, m in zip(newer.tolist(), newest[newer].tolist(), strict=True)
+            )
+        for message in unread:
+            if len(message.states) != len(self._states):
+                self._take(message.states)
+
+    def _take(self, states: Iterable[PatrolState]) -> None:
+        """Those words that are newer than what it knows."""
+        for state in states:
+            if state.robot != self._own.robot and state.t_s > self._told_s[state.robot]:
+                self._states[state.robot], self._told_s[state.robot] = state, state.t_s
 
     def message(self, t_s: float) -> PatrolMessage:
         """What it sends now."""
         self._tell(t_s)
+        self._read()
         states = tuple(state for state in self._states if state is not None)
-        return PatrolMessage(self._own.robot, t_s, states, self._visited_s.copy())
+        told_s = self._told_s if len(states) == len(self._told_s) else self._told_s[np.isfinite(self._told_s)]
+        return PatrolMessage(self._own.robot, t_s, states, self._visited_s.copy(), told_s.copy())
 
     def knowledge(self, t_s: float, silences_log: FloatArray | None = None) -> PatrolKnowledge:
         """What its strategy is told."""
+        self._read()
         own = self._own
         chances = np.zeros(len(self._states)) if silences_log is None else silences_log
         return PatrolKnowledge(
@@ -237,6 +267,7 @@ class PatrolMemory:
     ) -> None:
         """It says something new of itself; the rest stays."""
         old = self._own
+        self._told_s[old.robot] = t_s
         self._own = self._states[old.robot] = PatrolState(
             old.robot,
             t_s,
