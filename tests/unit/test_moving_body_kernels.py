@@ -19,6 +19,7 @@ from pilotage.kernels.control.movers import (
     X,
     Y,
     foretold,
+    off_discs,
     track_step,
 )
 from pilotage.kernels.control.scan_clusters import cut_off, scan_clusters
@@ -148,3 +149,16 @@ def test_who_drives_away_from_somebody_who_comes_closes_no_gap() -> None:
     assert closes((0.05, 0.0, 0.0), 0.0, 0.47)  # past him: he may be nearer than he is believed to be
     both = np.array([[0.58, 0.0, 0.25], [-0.5, 0.0, 0.25]])
     assert closes_in((0.0, 0.0, 0.0), (0.05, 0.0, 0.0), body.polygon, body.outer_m, both, 0.05)
+
+
+def test_points_off_all_discs_are_those_that_arrays_find() -> None:
+    rng = np.random.default_rng(8)
+    for discs_there in (0, 1, 40):
+        points = rng.uniform(-3.0, 3.0, (200, 2))
+        discs = np.column_stack(
+            [rng.uniform(-3.0, 3.0, (discs_there, 2)), rng.uniform(0.0, 0.4, discs_there)]
+        )
+        away = np.hypot(*(points[:, None] - discs[:, :2]).transpose(2, 0, 1)) - discs[:, 2]
+        wanted = (away > 0.15).all(axis=1) & (np.hypot(points[:, 0] - 0.5, points[:, 1] + 0.2) < 2.0)
+        assert 0 < np.count_nonzero(wanted) < len(points)
+        assert off_discs(points, discs, 0.5, -0.2, 2.0, 0.15) == pytest.approx(points[wanted], abs=0.0)

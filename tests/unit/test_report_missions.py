@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import shutil
 from dataclasses import replace
 from pathlib import Path
 
@@ -161,6 +162,21 @@ def test_a_team_is_shown_whole(two: Path) -> None:
         assert track.x_m[0] == pytest.approx(run.trace["true_x_m"][0])
     (goals,) = (mark for mark in scene.marks if mark.name == "goals")
     assert goals.points_m.tolist() == [[10.0, 1.5], [30.0, 20.0]]
+
+
+def test_a_teams_damage_is_told_once_and_each_view_is_as_read_alone(two: Path, tmp_path: Path) -> None:
+    folder = tmp_path / "two"
+    shutil.copytree(two, folder)
+    (folder / "events.jsonl").write_text("{", encoding="utf-8")
+    told: list[str] = []
+    first = read_run(folder, on_damage=told.append)
+    team = read_team(folder, first, told.append)
+    (line,) = told
+    assert "events.jsonl" in line
+    bert = read_run(folder, robot=1, on_damage=lambda _: None)
+    assert (team[1].robot, team[1].name, len(team[1].plans)) == (1, bert.name, len(bert.plans))
+    for name, values in bert.trace.columns.items():
+        np.testing.assert_array_equal(team[1].trace[name], values, name)
 
 
 def test_what_is_only_planned(tmp_path: Path) -> None:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, TypedDict, TypeVar
 
 import numpy as np
 
@@ -106,8 +106,13 @@ class RunData:
 
 def read_team(folder: Path, first: RunData, on_damage: OnDamage | None = None) -> tuple[RunData, ...]:
     """All robots' views of a run, ``first`` among them; one alone where there is one robot."""
-    others = range(1, len(first.robots))
-    return first, *(read_run(folder, robot=k, on_damage=on_damage) for k in others)
+    if len(first.robots) <= 1:
+        return (first,)
+    trace = read_trace(folder)
+    return first, *(
+        replace(first, robot=k, **_own(folder, k, trace, first.world, on_damage))
+        for k in range(1, len(first.robots))
+    )
 
 
 OnDamage = Callable[[str], None]
@@ -137,21 +142,13 @@ def read_run(folder: Path, *, robot: int = 0, on_damage: OnDamage | None = None)
     if missing:
         raise InputError(f"{folder}: not a run folder; expected {' and '.join(missing)} in it")
 
-    def part(read: Callable[[Path], T], empty: T, place: Path = folder) -> T:
-        try:
-            return read(place)
-        except InputError as error:
-            if on_damage is None:
-                raise
-            on_damage(str(error))
-            return empty
+    def part(read: Callable[[Path], T], empty: T) -> T:
+        return _part(read, folder, empty, on_damage)
 
     metrics, trace = read_metrics(folder), read_trace(folder)
     nothing: tuple[Mapping[str, Any], str] = ({}, "")
     mission, mission_text = part(read_mission, nothing)
-    own = robot_folder(folder, robot)
     world = part(read_world, World())
-    plans = part(read_plans, Plans(), own)
     return RunData(
         run_dir=folder,
         mission=mission,
@@ -159,22 +156,59 @@ def read_run(folder: Path, *, robot: int = 0, on_damage: OnDamage | None = None)
         metrics=metrics,
         events=part(read_events, ()),
         world=world,
-        plans=plans.plans,
-        mapped_points_m=plans.mapped_points_m,
-        shortest_path_m=plans.shortest_path_m,
-        trace=_drawable(trace.of(robot)),
-        updates=part(read_updates, (), own),
-        sightings=part(read_sightings, Sightings(), own),
-        sheet=part(lambda place: read_cells(place, world), None, own),
         terrain=part(read_terrain, None),
         grid=part(read_grid_layer, None),
-        own_map=part(read_own_map, None, own),
         people=part(read_people_tracks, PeopleTracks()),
         patrol=part(read_patrol, None),
         localizer_text=part(read_localizer, ""),
         robot=robot,
         robots=trace.robots,
+        **_own(folder, robot, trace, world, on_damage),
     )
+
+
+class _Own(TypedDict):
+    """What differs from robot to robot of a run."""
+
+    trace: Trace
+    plans: tuple[Plan, ...]
+    mapped_points_m: FloatArray
+    shortest_path_m: FloatArray
+    updates: tuple[RecordedUpdate, ...]
+    sightings: Sightings
+    sheet: SheetData | None
+    own_map: OccupancyGrid | None
+
+
+def _own(folder: Path, robot: int, trace: Trace, world: World, on_damage: OnDamage | None) -> _Own:
+    """What a run folder tells of one robot alone; ``trace`` has the rows of all."""
+    place = robot_folder(folder, robot)
+
+    def part(read: Callable[[Path], T], empty: T) -> T:
+        return _part(read, place, empty, on_damage)
+
+    plans = part(read_plans, Plans())
+    return _Own(
+        trace=_drawable(trace.of(robot)),
+        plans=plans.plans,
+        mapped_points_m=plans.mapped_points_m,
+        shortest_path_m=plans.shortest_path_m,
+        updates=part(read_updates, ()),
+        sightings=part(read_sightings, Sightings()),
+        sheet=part(lambda own: read_cells(own, world), None),
+        own_map=part(read_own_map, None),
+    )
+
+
+def _part(read: Callable[[Path], T], place: Path, empty: T, on_damage: OnDamage | None) -> T:
+    """What one file tells; ``empty`` where it is damaged and somebody wants to hear of it."""
+    try:
+        return read(place)
+    except InputError as error:
+        if on_damage is None:
+            raise
+        on_damage(str(error))
+        return empty
 
 
 def _drawable(trace: Trace) -> Trace:

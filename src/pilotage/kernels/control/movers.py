@@ -224,3 +224,25 @@ def foretold(
             variance = tracks[i, PP] + 2.0 * t * tracks[i, PV] + t * t * tracks[i, VV] + q * t**4 / 4.0
             out[k, i, 2] = radius + deviations * math.sqrt(max(variance, 0.0))
     return out
+
+
+@kernel
+def off_discs(
+    points: FloatArray, discs: FloatArray, x: float, y: float, reach: float, tolerance: float
+) -> FloatArray:
+    """Points (K, 2) nearer to (x, y) than ``reach``, and farther than ``tolerance`` from each disc (N, 3)."""
+    out = np.empty_like(points)
+    count = 0
+    for k in range(points.shape[0]):
+        px, py = points[k, 0], points[k, 1]
+        if math.hypot(px - x, py - y) >= reach:
+            continue
+        off = True
+        for i in range(discs.shape[0]):
+            if math.hypot(px - discs[i, 0], py - discs[i, 1]) - discs[i, 2] <= tolerance:
+                off = False
+                break
+        if off:
+            out[count] = points[k]
+            count += 1
+    return out[:count].copy()

@@ -7,9 +7,8 @@ import math
 import numpy as np
 from matplotlib import colormaps
 from matplotlib.axes import Axes
-from matplotlib.collections import LineCollection, PatchCollection
+from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.colors import Normalize
-from matplotlib.patches import Rectangle
 
 from pilotage.records.numbers import number
 from pilotage.records.patrol import PatrolRecord
@@ -126,10 +125,10 @@ def _age_map(run: RunData, patrol: PatrolRecord) -> Illustration:
     if axes is None:
         return Illustration(slug, title, "", "The run recorded no view of the floor.")
     norm, scale = _scale(float(np.nanquantile(patrol.age_s, 0.99)))
-    half = 0.5 * patrol.cell_m
-    cells = [Rectangle((x - half, y - half), patrol.cell_m, patrol.cell_m) for x, y in patrol.cells_xy_m]
-    tiles = PatchCollection(cells, linewidths=0.0, zorder=1, rasterized=True)
-    tiles.set_facecolor(colormaps[SCALE](norm(patrol.age_s)))
+    corners = 0.5 * patrol.cell_m * np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
+    cells = patrol.cells_xy_m[:, None] + corners
+    colours = colormaps[SCALE](norm(patrol.age_s))
+    tiles = PolyCollection(list(cells), facecolors=colours, linewidths=0.0, zorder=1, rasterized=True)
     axes.add_collection(tiles)
     caption = f"Mean time since each cell of the floor was truly in view of some robot's laser: {scale}."
     alt = f"Map of the floor's {len(cells)} cells with the mean age of their view"

@@ -46,9 +46,13 @@ class LabelPlacer:
         out = np.maximum(np.abs(_DIRECTIONS[:, :1]) * half_width, np.abs(_DIRECTIONS[:, 1:]) * half_height)
         centres = np.concatenate([_DIRECTIONS * (out + distance) for distance in reach]) + np.array([x, y])
         distances = np.repeat(reach, len(_DIRECTIONS))
-        dx = np.abs(self._occupied[:, 0] - centres[:, :1])
-        dy = np.abs(self._occupied[:, 1] - centres[:, 1:])
-        covered = ((dx < half_width + 1.5) & (dy < half_height + 1.5)) @ self._occupied[:, 2]
+        room = np.array([half_width + 1.5, half_height + 1.5])
+        low, high = centres.min(axis=0) - room, centres.max(axis=0) + room
+        places = self._occupied[:, :2]
+        # Most of a map is nowhere near.
+        near = self._occupied[((places > low) & (places < high)).all(axis=1)]
+        dx, dy = np.abs(near[:, 0] - centres[:, :1]), np.abs(near[:, 1] - centres[:, 1:])
+        covered = ((dx < room[0]) & (dy < room[1])) @ near[:, 2]
         x_min, y_min, x_max, y_max = self._limits
         outside = (
             (centres[:, 0] - half_width < x_min)

@@ -194,10 +194,7 @@ class MovingBodies:
         discs = self._movers.foretold(step_s, step_s, steps, self._config.deviations)[:, people]
         if not self.about:
             return np.ascontiguousarray(discs)
-        near = self._loose[np.hypot(*(self._loose - (pose.x_m, pose.y_m)).T) < reach_m]
-        if len(near) and len(mapped_m):
-            away = np.hypot(*(near[:, None, :] - mapped_m[None, :, :2]).transpose(2, 0, 1)) - mapped_m[:, 2]
-            near = near[away.min(axis=1) > self._config.tolerance_m]
+        near = kernels.off_discs(self._loose, mapped_m, pose.x_m, pose.y_m, reach_m, self._config.tolerance_m)
         grown = np.empty((steps, len(near), 3))
         grown[:, :, :2] = near
         grown[:, :, 2] = self._config.anyone_m_s * step_s * np.arange(1, steps + 1)[:, None]
