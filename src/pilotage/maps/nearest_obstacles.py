@@ -61,5 +61,5 @@ class NearestObstacles:
 
     def at(self, points_xy_m: FloatArray) -> FloatArray:
         """Distance (K,) at points (K, 2), also from inside a disc to its edge."""
-        points = np.ascontiguousarray(points_xy_m, dtype=np.float64).reshape(-1, 2)
-        return nearest.distances_by_node(points, self.index, *self.origin_xy_m, self.resolution_m, self.items)
+        x, y = np.array(np.reshape(points_xy_m, (-1, 2)).T, dtype=np.float64, order="C")
+        return nearest.distances_by_node(x, y, self.index, *self.origin_xy_m, self.resolution_m, self.items)

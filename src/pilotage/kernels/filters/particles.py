@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from pilotage.kernels.arrays import FloatArray, IntArray
 from pilotage.kernels.geometry.motion import exact_arc, mid_angle, wrap
-from pilotage.kernels.geometry.nearest import distance_by_node
+from pilotage.kernels.geometry.nearest import distances_by_node
 from pilotage.kernels.jit import kernel
 
 BISECTIONS = 40
@@ -55,16 +55,20 @@ def log_likelihoods(
     entry stands for all beyond and for what is off the map.
     """
     last = table.shape[0] - 1
-    beyond = last * table_step
+    x, y = np.empty(poses.shape[0]), np.empty(poses.shape[0])
+    c, s = np.empty(poses.shape[0]), np.empty(poses.shape[0])
     for i in range(poses.shape[0]):
-        x, y = poses[i, 0], poses[i, 1]
-        c, s = math.cos(poses[i, 2]), math.sin(poses[i, 2])
-        total = 0.0
-        for k in range(points.shape[0]):
-            px, py = x + c * points[k, 0] - s * points[k, 1], y + s * points[k, 0] + c * points[k, 1]
-            away = distance_by_node(px, py, nearest, x0, y0, resolution, items)
-            total += table[int(away / table_step + 0.5)] if away < beyond else table[last]
-        out[i] = total
+        c[i], s[i] = math.cos(poses[i, 2]), math.sin(poses[i, 2])
+        out[i] = 0.0
+    # Beam by beam for all particles: what is alike for many is computed for several at once.
+    for k in range(points.shape[0]):
+        u, v = points[k, 0], points[k, 1]
+        for i in range(poses.shape[0]):
+            x[i] = poses[i, 0] + c[i] * u - s[i] * v
+            y[i] = poses[i, 1] + s[i] * u + c[i] * v
+        away = distances_by_node(x, y, nearest, x0, y0, resolution, items)
+        for i in range(poses.shape[0]):
+            out[i] += table[np.int64(min(away[i] / table_step + 0.5, last))]
 
 
 @kernel

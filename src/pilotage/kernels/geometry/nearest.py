@@ -13,6 +13,8 @@ from pilotage.kernels.geometry.plane import point_segment_distance
 from pilotage.kernels.jit import kernel
 
 IndexArray = NDArray[np.int32]
+LEAST = 1e-300
+"""In place of a squared length of 0: a segment without one is a point."""
 
 
 @kernel
@@ -62,36 +64,34 @@ def nearest_items(x0: float, y0: float, resolution: float, nx: int, ny: int, ite
 
 
 @kernel
-def distance_by_node(
-    x: float,
-    y: float,
-    nearest: IndexArray,
-    x0: float,
-    y0: float,
-    resolution: float,
-    items: FloatArray,
-) -> float:
-    """Distance from a point to that of the items (N, 5) which is nearest to its node, ``nearest`` (ny, nx).
-
-    Off the grid the node at its edge counts: a noisy reading of an outer wall ends behind it.
-    """
-    ny, nx = nearest.shape
-    col = int(min(max((x - x0) / resolution + 0.5, 0.0), nx - 0.5))
-    row = int(min(max((y - y0) / resolution + 0.5, 0.0), ny - 0.5))
-    return abs(item_distance(x, y, items, nearest[row, col]))
-
-
-@kernel
 def distances_by_node(
-    points: FloatArray,
+    x: FloatArray,
+    y: FloatArray,
     nearest: IndexArray,
     x0: float,
     y0: float,
     resolution: float,
     items: FloatArray,
 ) -> FloatArray:
-    """``distance_by_node`` for points (K, 2); returns (K,)."""
-    out = np.empty(points.shape[0])
-    for k in range(points.shape[0]):
-        out[k] = distance_by_node(points[k, 0], points[k, 1], nearest, x0, y0, resolution, items)
+    """Distances (K,) from points, x (K,) and y (K,), to that of the items (N, 5) nearest to a point's node.
+
+    ``nearest`` (ny, nx) holds the items. Off the grid the node at its edge counts: a noisy reading of an
+    outer wall ends behind it.
+    """
+    ny, nx = nearest.shape
+    of_node = nearest.ravel()
+    nodes, out = np.empty(x.shape[0], np.int64), np.empty(x.shape[0])
+    # Loops that only compute, without a branch: the processor takes several points at once.
+    for k in range(x.shape[0]):
+        col = min(max((x[k] - x0) / resolution + 0.5, 0.0), nx - 0.5)
+        row = min(max((y[k] - y0) / resolution + 0.5, 0.0), ny - 0.5)
+        nodes[k] = np.int64(row) * nx + np.int64(col)
+    for k in range(x.shape[0]):
+        i = of_node[nodes[k]]
+        ax, ay = items[i, 0], items[i, 1]
+        ex, ey = items[i, 2] - ax, items[i, 3] - ay
+        length2 = max(ex * ex + ey * ey, LEAST)
+        t = min(1.0, max(0.0, ((x[k] - ax) * ex + (y[k] - ay) * ey) / length2))
+        dx, dy = x[k] - (ax + t * ex), y[k] - (ay + t * ey)
+        out[k] = abs(math.sqrt(dx * dx + dy * dy) - items[i, 4])
     return out
