@@ -24,7 +24,7 @@ from pilotage.kernels.rrt.clearance import Space
 from pilotage.kernels.rrt.dubins import advance
 from pilotage.kernels.rrt.hybrid import Car, arc_fits, pose_fits, spare_at, word_fits
 from pilotage.kernels.rrt.reeds_shepp import follow
-from pilotage.kernels.rrt.samples import Bound, Search, advance_guide, bound_at, draw
+from pilotage.kernels.rrt.samples import Bound, Search, advance_guide, bound_at, draw, edge_ahead
 from pilotage.kernels.rrt.steering import (
     Steering,
     curve_between,
@@ -196,10 +196,7 @@ def grow(
     """
     near, away2 = np.empty(MAX_NEAR, np.int64), np.empty(MAX_NEAR)
     capacity = tree.cost.shape[0]
-    ahead = 1
-    if guide.shape[0] > 1:
-        spacing = max(1e-9, math.hypot(guide[1, 0] - guide[0, 0], guide[1, 1] - guide[0, 1]))
-        ahead = int(search.connection / spacing) + 2
+    ahead = edge_ahead(guide, search.connection)
     for done in range(iterations):
         if tree.counts[N_NODES] >= capacity or (stop_at_solution and tree.cost[GOAL] < math.inf):
             return done

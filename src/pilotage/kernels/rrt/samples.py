@@ -72,6 +72,15 @@ def bound_at(bound: Bound, x: float, y: float) -> float:
 
 
 @kernel
+def edge_ahead(guide: FloatArray, connection: float) -> int:
+    """How many of the guide's states an edge reaches past, and two more; 1 where there is no guide."""
+    if guide.shape[0] < 2:
+        return 1
+    spacing = max(1e-9, math.hypot(guide[1, 0] - guide[0, 0], guide[1, 1] - guide[0, 1]))
+    return int(connection / spacing) + 2
+
+
+@kernel
 def draw(
     tree: Tree, space: Space, search: Search, bound: Bound, guide: FloatArray, rng: np.random.Generator
 ) -> tuple[float, float, float, bool, bool]:
@@ -87,8 +96,7 @@ def draw(
         u = rng.random()
         if incumbent == math.inf:
             # Half of these fall where the tree's front is, so that it keeps moving.
-            spacing = max(1e-9, math.hypot(guide[1, 0] - guide[0, 0], guide[1, 1] - guide[0, 1]))
-            ahead = int(search.connection / spacing) + 2
+            ahead = edge_ahead(guide, search.connection)
             first = max(0, tree.counts[PROGRESS] - ahead // 2) if rng.random() < 0.7 else 0
             last = min(last, tree.counts[PROGRESS] + ahead)
             k = first + int(u * (last - first + 1))

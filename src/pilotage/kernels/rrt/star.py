@@ -18,7 +18,7 @@ from pilotage.kernels.arrays import FloatArray
 from pilotage.kernels.jit import kernel
 from pilotage.kernels.rrt import dubins
 from pilotage.kernels.rrt.clearance import Space, curve_is_free, slack_at
-from pilotage.kernels.rrt.samples import Bound, Search, advance_guide, bound_at, draw
+from pilotage.kernels.rrt.samples import Bound, Search, advance_guide, bound_at, draw, edge_ahead
 from pilotage.kernels.rrt.tree import (
     GOAL,
     N_ITERATIONS,
@@ -147,10 +147,7 @@ def grow(
     words = np.empty(MAX_NEAR, np.int64)
     lengths = np.empty((MAX_NEAR, 3))
     capacity = tree.cost.shape[0]
-    ahead = 1
-    if guide.shape[0] > 1:
-        spacing = max(1e-9, math.hypot(guide[1, 0] - guide[0, 0], guide[1, 1] - guide[0, 1]))
-        ahead = int(search.connection / spacing) + 2
+    ahead = edge_ahead(guide, search.connection)
     for done in range(iterations):
         if tree.counts[N_NODES] >= capacity or (stop_at_solution and tree.cost[GOAL] < math.inf):
             return done

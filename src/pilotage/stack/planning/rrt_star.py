@@ -5,10 +5,12 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable
-from typing import Literal, Protocol
+from typing import Literal
 
 import numpy as np
+from pydantic import Field
 
+from pilotage.core.config import Config
 from pilotage.core.types import FloatArray
 from pilotage.kernels.rrt import samples as rrt_samples
 from pilotage.kernels.rrt import tree as rrt_tree
@@ -22,20 +24,23 @@ CHUNK = 256
 """Iterations between looks at the clock and at the incumbent."""
 
 
-class Effort(Protocol):
-    """Of a planner's settings, those that say how long it searches, and how it is guided."""
+class RrtStarConfig(Config):
+    """How a tree grows, whatever curves it is made of.
 
-    @property
-    def iterations(self) -> int: ...
+    What each says is told of ``rrt-star-dubins``.
+    """
 
-    @property
-    def time_budget_s(self) -> float | None: ...
-
-    @property
-    def stop(self) -> Literal["first", "optimize"]: ...
-
-    @property
-    def guide_bias(self) -> float: ...
+    max_connection_distance_m: float = Field(1.5, gt=0.0, le=1000.0)
+    goal_bias: float = Field(0.05, ge=0.0, le=1.0)
+    guide_bias: float = Field(0.6, ge=0.0, le=0.95)
+    guide_spread_m: float = Field(0.6, gt=0.0, le=100.0)
+    free_heading_share: float = Field(0.8, ge=0.0, le=1.0)
+    rewire_factor: float = Field(3.7, gt=math.e * (1.0 + 1.0 / 3.0), le=20.0)
+    iterations: int = Field(20_000, ge=1, le=5_000_000)
+    time_budget_s: float | None = Field(None, gt=0.0)
+    stop: Literal["first", "optimize"] = "first"
+    further_iterations: int = Field(1000, ge=0, le=5_000_000)
+    """Of a plan for an outline, after its first path, which is seldom short."""
 
 
 Grow = Callable[[FloatArray, int, bool], int]
@@ -47,21 +52,21 @@ Extract = Callable[[], tuple[Path | None, int]]
 
 def search(
     tree: rrt_tree.Tree,
-    effort: Effort,
+    config: RrtStarConfig,
     guide_path: FloatArray,
     grow: Grow,
     extract: Extract,
     began_s: float,
     further: int = 0,
 ) -> PlanResult:
-    """Grow a tree until its effort is spent, or for ``further`` iterations after its first path.
+    """Grow a tree until its iterations or its time are spent, or ``further`` iterations after its first path.
 
     ``began_s`` is of ``perf_counter``.
     """
     first_s, checked_cost = math.nan, math.inf
     first: Path | None = None
     best: Path | None = None
-    done, most = 0, effort.iterations
+    done, most = 0, config.iterations
     while True:
         cost = float(tree.cost[rrt_tree.GOAL])
         if cost < checked_cost - 1e-9:
@@ -72,13 +77,13 @@ def search(
                 continue
             if best is None:
                 first_s, first = time.perf_counter() - began_s, path
-                if effort.stop == "first":
+                if config.stop == "first":
                     most = min(most, done + further)
             best, checked_cost = path, cost
-            if effort.guide_bias > 0.0:
+            if config.guide_bias > 0.0:
                 guide_path = path.states[:: max(1, round(0.25 / STATE_SPACING_M))].copy()
         elapsed = time.perf_counter() - began_s
-        out_of_time = effort.time_budget_s is not None and elapsed > effort.time_budget_s
+        out_of_time = config.time_budget_s is not None and elapsed > config.time_budget_s
         if done >= most or out_of_time:
             break
         chunk = min(CHUNK, most - done)
@@ -90,8 +95,8 @@ def search(
     edges = _tree_edges(tree)
     if best is None:
         reason = f"no path found in {done} iterations"
-        if effort.time_budget_s is not None and elapsed > effort.time_budget_s:
-            reason += f", time budget {effort.time_budget_s:g} s"
+        if config.time_budget_s is not None and elapsed > config.time_budget_s:
+            reason += f", time budget {config.time_budget_s:g} s"
         return PlanResult(PlanStatus.NO_PATH, reason, None, math.nan, elapsed, done, edges)
     reason = f"{best.length_m:.2f} m after {done} iterations"
     return PlanResult(PlanStatus.FOUND, reason, best, first_s, elapsed, done, edges, first=first)

@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import math
 import time
-from typing import Literal
 
 import numpy as np
 from pydantic import Field
 
 from pilotage.core.angles import wrap_array_to_pi
-from pilotage.core.config import Config
 from pilotage.core.errors import InputError
 from pilotage.core.types import FloatArray
 from pilotage.kernels.rrt import dubins
@@ -37,7 +35,7 @@ from pilotage.stack.planning.planner import (
     PlanStatus,
 )
 from pilotage.stack.planning.rough_path import Around, look_around
-from pilotage.stack.planning.rrt_star import MAX_TREE_NODES, directly
+from pilotage.stack.planning.rrt_star import MAX_TREE_NODES, RrtStarConfig, directly
 from pilotage.stack.planning.rrt_star import search as grown
 from pilotage.stack.planning.rrt_star_outline import plan_for_outline
 
@@ -45,7 +43,7 @@ BESIDE_OUTLINE_M = 0.06
 """What a polygon keeps where the clearance of its centre leaves less."""
 
 
-class RrtStarDubinsConfig(Config):
+class RrtStarDubinsConfig(RrtStarConfig):
     """Settings of RRT*-Dubins.
 
     ``validation_distance_m`` is the largest spacing between states that are checked along an edge, but for
@@ -65,18 +63,8 @@ class RrtStarDubinsConfig(Config):
 
     turning_radius_m: float | None = Field(None, gt=0.0, le=100.0)
     validation_distance_m: float | None = Field(None, gt=0.0, le=100.0)
-    max_connection_distance_m: float = Field(1.5, gt=0.0, le=1000.0)
     clearance_m: float = Field(0.46, ge=0.0, le=100.0)
-    goal_bias: float = Field(0.05, ge=0.0, le=1.0)
-    guide_bias: float = Field(0.6, ge=0.0, le=0.95)
-    guide_spread_m: float = Field(0.6, gt=0.0, le=100.0)
-    free_heading_share: float = Field(0.8, ge=0.0, le=1.0)
-    rewire_factor: float = Field(3.7, gt=math.e * (1.0 + 1.0 / 3.0), le=20.0)
-    iterations: int = Field(20_000, ge=1, le=5_000_000)
-    time_budget_s: float | None = Field(None, gt=0.0)
-    stop: Literal["first", "optimize"] = "first"
     beside_outline_m: float | None = Field(None, ge=0.0, le=100.0)
-    further_iterations: int = Field(1000, ge=0, le=5_000_000)
 
 
 @PLANNERS.add("rrt-star-dubins", RrtStarDubinsConfig)

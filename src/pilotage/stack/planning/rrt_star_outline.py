@@ -6,7 +6,7 @@ import math
 import time
 from dataclasses import replace
 from itertools import pairwise
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 
@@ -31,31 +31,9 @@ from pilotage.stack.planning.outline import (
 )
 from pilotage.stack.planning.planner import Path, PlanRequest, PlanResult, PlanStatus
 from pilotage.stack.planning.rough_path import look_around
-from pilotage.stack.planning.rrt_star import MAX_TREE_NODES, Effort, directly, search
+from pilotage.stack.planning.rrt_star import MAX_TREE_NODES, RrtStarConfig, directly, search
 
 FORWARDS_ONLY = ", forwards only (stack.planner: rrt-star-reeds-shepp and hybrid-astar reverse as well)"
-
-
-class OutlineSettings(Effort, Protocol):
-    """Of a planner's settings, those that say how its tree grows."""
-
-    @property
-    def further_iterations(self) -> int: ...
-
-    @property
-    def max_connection_distance_m(self) -> float: ...
-
-    @property
-    def goal_bias(self) -> float: ...
-
-    @property
-    def guide_spread_m(self) -> float: ...
-
-    @property
-    def free_heading_share(self) -> float: ...
-
-    @property
-    def rewire_factor(self) -> float: ...
 
 
 class _Ends(NamedTuple):
@@ -67,7 +45,7 @@ class _Ends(NamedTuple):
 
 
 def plan_for_outline(
-    request: PlanRequest, settings: OutlineSettings, steering: Steering, clearance_m: float
+    request: PlanRequest, config: RrtStarConfig, steering: Steering, clearance_m: float
 ) -> PlanResult:
     """Answer one query; the clearance is kept beside the outline, at the path's states and between them.
 
@@ -91,21 +69,21 @@ def plan_for_outline(
         start,
         goal,
         request.field.bounds_m,
-        settings.max_connection_distance_m,
-        min(settings.iterations, MAX_TREE_NODES),
+        config.max_connection_distance_m,
+        min(config.iterations, MAX_TREE_NODES),
     )
-    goes_on = settings.stop == "optimize" or settings.further_iterations > 0
+    goes_on = config.stop == "optimize" or config.further_iterations > 0
     if outline_star.try_goal(tree, rrt_tree.START, ends.driver):
         rrt_tree.join_goal(tree)
         path, _ = _extract(tree, ends)
         # Of curves without a change of direction none is cheaper; of others one with fewer may be.
         if path is not None and (not goes_on or _is_one_way(tree, steering)):
             return directly(path, began)
-    guided = settings.guide_bias > 0.0
+    guided = config.guide_bias > 0.0
     around = look_around(request, ground, inner_m, guided, guided and goes_on)
     if around.shut:
         return failure(PlanStatus.NO_PATH, _shut(car, clearance_m), time.perf_counter() - began)
-    how = _sampling(settings, steering.radius, inner_m)
+    how = _sampling(config, steering.radius, inner_m)
 
     def grow(guide_path: FloatArray, iterations: int, first: bool) -> int:
         return outline_star.grow(
@@ -115,24 +93,24 @@ def plan_for_outline(
     def extract() -> tuple[Path | None, int]:
         return _extract(tree, ends)
 
-    found = search(tree, settings, around.guide_path, grow, extract, began, settings.further_iterations)
+    found = search(tree, config, around.guide_path, grow, extract, began, config.further_iterations)
     if found.path is None and not steering.reverses:
         return replace(found, reason=found.reason + FORWARDS_ONLY)
     return found
 
 
-def _sampling(settings: OutlineSettings, radius_m: float, inner_m: float) -> rrt_samples.Search:
+def _sampling(config: RrtStarConfig, radius_m: float, inner_m: float) -> rrt_samples.Search:
     """Settings for the kernel: samples are drawn for the disc inside the outline."""
     return rrt_samples.Search(
         radius=radius_m,
-        connection=settings.max_connection_distance_m,
+        connection=config.max_connection_distance_m,
         clearance=inner_m,
         min_step=outline_star.LOOK_M,
-        goal_bias=settings.goal_bias,
-        guide_bias=settings.guide_bias,
-        free_heading=settings.free_heading_share,
-        spread=settings.guide_spread_m,
-        rewire_factor=settings.rewire_factor,
+        goal_bias=config.goal_bias,
+        guide_bias=config.guide_bias,
+        free_heading=config.free_heading_share,
+        spread=config.guide_spread_m,
+        rewire_factor=config.rewire_factor,
         goal_heading_free=False,
     )
 

@@ -2,25 +2,24 @@
 
 from __future__ import annotations
 
-import math
-from typing import ClassVar, Literal
+from typing import ClassVar
 
 from pydantic import Field
 
-from pilotage.core.config import Config
 from pilotage.kernels.rrt.steering import Steering
 from pilotage.sensors.sensor import NonNegative, Positive
 from pilotage.stack.planning.driving_space import clearance_of, usual_radius_m
 from pilotage.stack.planning.planner import PLANNERS, PlanRequest, PlanResult
+from pilotage.stack.planning.rrt_star import RrtStarConfig
 from pilotage.stack.planning.rrt_star_outline import plan_for_outline
 
 
-class RrtStarReedsSheppConfig(Config):
+class RrtStarReedsSheppConfig(RrtStarConfig):
     """Settings of RRT* with Reeds-Shepp curves.
 
     ``clearance_m`` is kept between the outline and anything solid. A metre backwards costs ``reverse_cost``,
     a change of direction ``switch_cost_m``. With ``stop`` 'first' the search goes on for
-    ``further_iterations`` after its first path, which is seldom short. The others are as of
+    ``further_iterations`` after its first path, which is seldom short. All others are as of
     ``rrt-star-dubins``.
     """
 
@@ -28,16 +27,6 @@ class RrtStarReedsSheppConfig(Config):
     turning_radius_m: Positive | None = None
     reverse_cost: float = Field(1.5, ge=1.0, le=100.0)
     switch_cost_m: NonNegative = 0.5
-    max_connection_distance_m: float = Field(1.5, gt=0.0, le=1000.0)
-    goal_bias: float = Field(0.05, ge=0.0, le=1.0)
-    guide_bias: float = Field(0.6, ge=0.0, le=0.95)
-    guide_spread_m: float = Field(0.6, gt=0.0, le=100.0)
-    free_heading_share: float = Field(0.8, ge=0.0, le=1.0)
-    rewire_factor: float = Field(3.7, gt=math.e * (1.0 + 1.0 / 3.0), le=20.0)
-    iterations: int = Field(20_000, ge=1, le=5_000_000)
-    time_budget_s: float | None = Field(None, gt=0.0)
-    stop: Literal["first", "optimize"] = "first"
-    further_iterations: int = Field(1000, ge=0, le=5_000_000)
 
 
 @PLANNERS.add("rrt-star-reeds-shepp", RrtStarReedsSheppConfig)
