@@ -235,8 +235,8 @@ def test_plan_hands_its_query_on(lab: Lab, pilotage: Call) -> None:
     assert json.loads(answer.out)["first_solution_s"] is None
     name, start, goal, options = lab.asked["query"]
     assert (name, start, goal) == ("museum", (1.0, 1.0, 0.0), (-2.0, 2.5))
-    asked = {"planner": None, "clearance_m": 0.5, "slope_limit_deg": None, "seed": 0, "set": ["a=1"]}
-    assert options == asked
+    asked = {"planner": None, "slope_limit_deg": None, "seed": 0, "set": ["a=1"]}
+    assert options == asked | {"clearance_m": 0.5, "footprint": None}
 
 
 def test_plan_without_a_path_is_exit_code_1(lab: Lab, pilotage: Call) -> None:

@@ -31,6 +31,13 @@ def plan(
     clearance: Annotated[
         float | None, typer.Option(metavar="M", help="Distance to keep; default the planner's own.")
     ] = None,
+    footprint: Annotated[
+        str | None,
+        typer.Option(
+            metavar="R|X,Y...",
+            help="The robot's outline: a radius, or corners with spaces between.",
+        ),
+    ] = None,
     overrides: Overrides = None,
     seed: Seed = None,
     json: Json = False,
@@ -38,6 +45,7 @@ def plan(
 ) -> int:
     """Plan a path on a map and say how long it is against the shortest one."""
     from_, to = parse_pose(start, "--start"), parse_pose(goal, "--goal")
+    outline = None if footprint is None else parse_outline(footprint)
     from pilotage.face.planning import plan as planned_by
 
     tell_if_cold()
@@ -48,6 +56,7 @@ def plan(
             to,
             planner=planner,
             clearance_m=clearance,
+            footprint=outline,
             slope_limit_deg=slope_limit,
             seed=seed or 0,
             set=overrides or (),
@@ -74,6 +83,25 @@ def parse_pose(text: str, option: str) -> tuple[float, ...]:
     if len(values) not in (2, 3) or not all(math.isfinite(value) for value in values):
         raise InputError(f"{option}: expected X,Y or X,Y,TH in metres and radians, found '{text}'")
     return values
+
+
+def parse_outline(text: str) -> float | list[tuple[float, ...]]:
+    """Read ``R`` or ``X,Y X,Y X,Y ...``.
+
+    Raises
+    ------
+    InputError
+        If it is neither.
+    """
+    try:
+        corners = [tuple(float(part) for part in corner.split(",")) for corner in text.split()]
+    except ValueError:
+        corners = []
+    if len(corners) == 1 and len(corners[0]) == 1:
+        return corners[0][0]
+    if not corners or any(len(corner) != 2 for corner in corners):
+        raise InputError(f"--footprint: expected a radius or corners 'X,Y X,Y X,Y' in metres, found '{text}'")
+    return corners
 
 
 def _show(value: Any) -> str:

@@ -110,7 +110,8 @@ def shortest_for(run: FinishedRun, robot: RobotRun) -> ShortestPath | None:
     if run.chart.walls.segments_m.shape[0] > MOST_SEGMENTS:
         return None
     (x0, y0), (x1, y1) = plans[0].states[0, :2].tolist(), plans[0].states[-1, :2].tolist()
-    return shortest_path(run.chart.walls, (x0, y0), (x1, y1), plans[0].clearance_m)
+    kept_m = plans[0].clearance_m + plans[0].disc_radius_m
+    return shortest_path(run.chart.walls, (x0, y0), (x1, y1), kept_m)
 
 
 def planning_metrics(run: FinishedRun, robot: RobotRun, shortest: ShortestPath | None) -> dict[str, object]:

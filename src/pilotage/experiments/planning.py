@@ -1,4 +1,4 @@
-"""One planning query on a map, without a robot."""
+"""One planning query on a map, for a point or an outline."""
 
 from __future__ import annotations
 
@@ -14,8 +14,11 @@ from pilotage.experiments.build.charts import load_chart
 from pilotage.experiments.rehearsal import rehearsed
 from pilotage.experiments.values import parse_override
 from pilotage.maps.world_map import WorldMap
+from pilotage.models.footprint import Footprint
+from pilotage.models.motion.differential_drive import DifferentialDriveConfig
 from pilotage.stack.interface import PlannedPath
 from pilotage.stack.journal import Journal
+from pilotage.stack.knowledge import RobotKnowledge
 from pilotage.stack.navigator.global_plan import GlobalPlan
 from pilotage.stack.planning.planner import PLANNERS, SMOOTHERS, PlanResult
 
@@ -30,6 +33,7 @@ def plan_on_map(
     overrides: Sequence[str] = (),
     seed: int = 0,
     clearance_m: float | None = None,
+    footprint: Footprint | None = None,
 ) -> dict[str, Any]:
     """Plan from ``start`` to ``goal`` (x, y in m and, where given, theta in rad).
 
@@ -37,14 +41,17 @@ def plan_on_map(
     ----------
     overrides
         ``parameter=value`` for the planner, ``smoother.parameter=value`` for the smoother, or
-        ``smoother=none`` for the planner's path as it is, as that of a car's planner is in any case
-        unless a smoother is named.
+        ``smoother=none`` for the planner's path as it is.
     clearance_m
         Distance to keep from obstacles; None: the planner's own.
+    footprint
+        The outline that is to fit along the path; None: a point. Planners for outlines keep the clearance
+        beside it, others from the centre and no less than its inner radius.
 
     Returns
     -------
-    success, reason, planned_length_m, shortest_length_m (exact, at the same clearance; None of a sweep),
+    success, reason, planned_length_m, shortest_length_m (exact, at the same clearance, of a point or of the
+    disc inside an outline that keeps it; None of a sweep),
     planning_time_s, first_solution_s, path_nodes and path, a list of [x, y, theta].
 
     Raises
@@ -55,13 +62,19 @@ def plan_on_map(
     floor = load_chart(map_name_or_path)
     _check_on_map("--start", start, floor)
     _check_on_map("--goal", goal, floor)
-    # Corners cut and rounded are no car's path any more.
-    usual = "none" if getattr(PLANNERS.entry(planner).factory, "FOR_OUTLINE", False) else SMOOTHER
-    own, smoothing, smoother_name = _split(overrides, usual)
+    own, smoothing, smoother_name = _split(overrides, SMOOTHER)
     config = PLANNERS.configure(planner, own, f"planner '{planner}'")
     smoother_config = SMOOTHERS.configure(smoother_name, smoothing, f"smoother '{smoother_name}'")
     to = Goal(goal[0], goal[1], wrap_to_pi(goal[2]) if len(goal) > 2 else None)
     pose = Pose2(start[0], start[1], wrap_to_pi(start[2]) if len(start) > 2 else 0.0)
+
+    # Its arcs are the planner's own matter: they follow from no motion.
+    least_m = 0.0 if footprint is None else footprint.inner_radius_m
+    robot = (
+        None
+        if footprint is None
+        else RobotKnowledge(footprint, DifferentialDriveConfig(), {}, 0.1, RandomStreams(seed))
+    )
 
     def ask() -> tuple[GlobalPlan, Journal, float, PlanResult]:
         journal = Journal()
@@ -71,8 +84,13 @@ def plan_on_map(
             floor,
             RandomStreams(seed).stream("planner"),
             journal,
+            least_m,
+            robot,
+            as_planned=True,
         )
         kept_m = plan.clearance_m if clearance_m is None else clearance_m
+        if not plan.beside_outline:
+            kept_m = max(kept_m, least_m)
         return plan, journal, kept_m, plan.make(0.0, pose, to, floor.walls.circles_m[:0], (kept_m,))
 
     plan, journal, kept_m, result = rehearsed((planner, smoother_name), ask)
@@ -89,7 +107,8 @@ def plan_on_map(
     adopted = journal.plans[-1]
     shortest = None
     if not result.given:
-        shortest = shortest_path(floor.walls, (start[0], start[1]), (goal[0], goal[1]), kept_m)
+        ends = (start[0], start[1]), (goal[0], goal[1])
+        shortest = shortest_path(floor.walls, *ends, kept_m + plan.disc_radius_m)
     answer |= {
         "planned_length_m": adopted.length_m,
         "shortest_length_m": None if shortest is None else shortest.length_m,

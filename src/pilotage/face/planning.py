@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any, TypeAlias
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from pilotage.core import given
 from pilotage.core.errors import InputError
@@ -18,6 +19,7 @@ from pilotage.core.interruptions import interruptible
 from pilotage.core.types import FloatArray, Pose2
 from pilotage.experiments.grid_planning import is_grid_map, plan_on_grid
 from pilotage.experiments.planning import plan_on_map
+from pilotage.models.footprint import Footprint
 from pilotage.stack.planning.grid_planner import GRID_PLANNERS
 from pilotage.stack.planning.planner import PLANNERS
 
@@ -69,6 +71,7 @@ def plan(
     *,
     planner: str | None = None,
     clearance_m: float | None = None,
+    footprint: float | ArrayLike | None = None,
     slope_limit_deg: float | None = None,
     seed: int = 0,
     set: Mapping[str, Any] | Sequence[str] | None = None,  # noqa: A002 - as the command line calls it
@@ -87,6 +90,11 @@ def plan(
         all others as on a floor.
     clearance_m
         Distance to keep from obstacles; None: the planner's own on a floor, none from cell to cell.
+    footprint
+        The robot's outline, which is to fit along the path: the radius of a disc, or (K, 2) corners of a
+        polygon around its axle, x forward. Planners for outlines (``hybrid-astar``, ``rrt-star-reeds-shepp``,
+        and ``rrt-star-dubins`` of a polygon) keep the clearance beside it, others from the robot's centre.
+        None: a point.
     slope_limit_deg
         The map is an elevation model, and what is steeper is a hazard.
     seed
@@ -112,6 +120,9 @@ def plan(
     (True, True, 3)
     >>> pl.plan("museum", (1.0, 1.0), (20.0, 12.0), planner="astar", clearance_m=0.3).success
     True
+    >>> van = [[0.9, 0.3], [-0.2, 0.3], [-0.2, -0.3], [0.9, -0.3]]
+    >>> pl.plan("museum", (1.0, 1.0), (20.0, 12.0), planner="hybrid-astar", footprint=van).success
+    True
     """
     if clearance_m is not None:
         clearance_m = given.number("clearance_m", clearance_m, 0.0)
@@ -119,16 +130,22 @@ def plan(
         slope_limit_deg = given.number("slope_limit_deg", slope_limit_deg)
     if planner is not None:
         given.word("planner", planner)
+    outline = None if footprint is None else _outline(footprint)
     source, settings, seed = str(given.path("map", map)), _settings(set), given.whole("seed", seed)
     from_, to = _place("start", start), _place("goal", goal)
     if Path(source).suffix and is_grid_map(source) and not _of_floors(planner, slope_limit_deg):
+        if outline is not None:
+            raise InputError(
+                "footprint: expected a planner that knows outlines (rrt-star-dubins, hybrid-astar), found "
+                "one from cell to cell; clearance_m blocks the cells around obstacles"
+            )
         if clearance_m is not None:
             settings = [*settings, f"map.inflation_m={clearance_m!r}"]
         answer = plan_on_grid(Path(source), from_, to, planner or GRID_PLANNER, settings, slope_limit_deg)
     elif slope_limit_deg is not None:
         raise InputError(f"--slope-limit: expected an elevation model's file, found the map '{source}'")
     else:
-        answer = plan_on_map(source, from_, to, planner or WALL_PLANNER, settings, seed, clearance_m)
+        answer = plan_on_map(source, from_, to, planner or WALL_PLANNER, settings, seed, clearance_m, outline)
     path = np.array(answer.get("path", ()), dtype=np.float64)
     return Plan(
         bool(answer["success"]),
@@ -145,6 +162,13 @@ def _of_floors(planner: str | None, slope_limit_deg: float | None) -> bool:
     """Whether a planner is one that robots on a floor have, and none over cells."""
     of_cells = planner is None or slope_limit_deg is not None or planner in GRID_PLANNERS.names()
     return not of_cells and planner in PLANNERS.names()
+
+
+def _outline(footprint: float | ArrayLike) -> Footprint:
+    """A disc or a polygon."""
+    if np.ndim(footprint) == 0:
+        return Footprint.disc(given.number("footprint", footprint, above=0.0))
+    return Footprint.polygon(given.array("footprint", footprint, None, 2), "footprint")
 
 
 def _place(name: str, place: Place) -> tuple[float, ...]:

@@ -75,8 +75,9 @@ class StackStatus(StrEnum):
 @dataclass(frozen=True, slots=True)
 class PlannedPath:
     """A plan as it was adopted, for the record: when, its states (N, 3), waypoints (W, 3), tree (E, 4),
-    the clearance it was made at, whether it was prescribed, how long it took, and of the planner's first
-    solution, before smoothing, waypoints (V, 3) and length where there is one."""
+    the clearance it was made at, whether it was prescribed, how long it took, of the planner's first
+    solution, before smoothing, waypoints (V, 3) and length where there is one, and around the centre the
+    radius of a disc that keeps the clearance: 0 but in plans for an outline, whose inner disc does."""
 
     t_s: float
     states: FloatArray
@@ -89,6 +90,7 @@ class PlannedPath:
     first_solution_s: float
     first_waypoints: FloatArray | None = None
     first_length_m: float = math.nan
+    disc_radius_m: float = 0.0
 
 
 class Stack(Protocol):

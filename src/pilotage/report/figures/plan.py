@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 from matplotlib.axes import Axes
+from matplotlib.path import Path as Outline
 
 from pilotage.records.run_data import RunData
 from pilotage.report import quantities
 from pilotage.report.figures import layers
 from pilotage.report.figures.grid import draw_grid, draw_grown_grid
 from pilotage.report.figures.map_view import map_axes, view_limits
-from pilotage.report.style import BLUE, GREEN, INK, SKY, Illustration, Key, render
+from pilotage.report.style import BLUE, GREEN, INK, SKY, Illustration, Key, one_shape, render
 
 SLUG, TITLE = "plan-picture", "The plan and its waypoints"
 GROWN_COLOUR = "#e8d9c3"
@@ -34,6 +36,7 @@ def plan_figure(run: RunData) -> Illustration:
     edges = plan.tree[: layers.MOST_TREE_EDGES, :4]
     if len(edges):
         layers.segments(axes, edges, "plan-tree", color=layers.TREE_COLOUR, linewidth=0.5, zorder=5.5)
+    _draw_outlines(axes, run)
     layers.line(axes, plan.path[:, :2], "planned", color=SKY, linewidth=2.4, zorder=6)
     x, y = plan.waypoints[:, 0], plan.waypoints[:, 1]
     axes.plot(x, y, "o", color=BLUE, markersize=4.0, zorder=7, gid="layer-waypoints")
@@ -57,6 +60,17 @@ def _draw_grown(axes: Axes, run: RunData, clearance_m: float, points_per_m: floa
         layers.circles(axes, discs, "grown", facecolor=GROWN_COLOUR, edgecolor=GROWN_COLOUR, zorder=1.0)
 
 
+def _draw_outlines(axes: Axes, run: RunData) -> None:
+    """A polygon at the waypoints, where these have headings: whether it fits is seen."""
+    polygon, waypoints = run.outline.polygon_m, run.plans[0].waypoints
+    if not len(polygon) or waypoints.shape[1] < 3:
+        return
+    shapes = [layers.body_outline(x, y, theta, 0.0, polygon) for x, y, theta in waypoints]
+    rims = [Outline(shape, closed=True) for shape in shapes]
+    look: dict[str, Any] = {"facecolor": SKY, "edgecolor": BLUE, "linewidth": 0.5, "alpha": 0.25}
+    one_shape(axes, rims, gid="layer-outlines", zorder=5.8, **look)
+
+
 def _caption(run: RunData, grown: bool) -> str:
     plan = run.plans[0]
     text = f"{len(plan.waypoints)} waypoints on {quantities.length(plan.length_m)}"
@@ -78,6 +92,7 @@ def _keys(run: RunData, grown: bool) -> tuple[Key, ...]:
     candidates = (
         (True, Key("planned path", SKY, "line", "planned")),
         (True, Key("waypoints", BLUE, "spot", "waypoints")),
+        (len(run.outline.polygon_m) > 0, Key("outline there", SKY, "band", "outlines", 0.25)),
         (len(run.plans[0].tree) > 0, Key("search tree", layers.TREE_COLOUR, "line", "plan-tree")),
         (grown, Key("walls, grown", GROWN_COLOUR, "band", "grown", 1.0)),
         (run.grid is None and len(run.world.segments_m) > 0, Key("walls", INK, "line", "walls")),

@@ -104,14 +104,22 @@ class GlobalPlan:
 
     @property
     def clearance_m(self) -> float:
-        """What the planner keeps from obstacles of its own accord, and at least what the body needs."""
-        own_m = self._planner.clearance_m if self._beside_m is None else self._beside_m
-        return max(own_m, self._least_clearance_m)
+        """What the planner keeps of its own accord; from the centre at least what the body needs."""
+        if self._beside_m is not None:
+            return self._beside_m
+        return max(self._planner.clearance_m, self._least_clearance_m)
 
     @property
     def beside_outline(self) -> bool:
         """Whether that is kept beside the robot's outline, and not from its centre."""
         return self._beside_m is not None
+
+    @property
+    def disc_radius_m(self) -> float:
+        """Of the disc around the centre that keeps the clearance: an outline's inner disc, or a point."""
+        if self._robot is None or not self.beside_outline:
+            return 0.0
+        return self._robot.footprint.inner_radius_m
 
     def make(
         self,
@@ -309,6 +317,7 @@ class GlobalPlan:
                 first,
                 None if result.first is None else result.first.waypoints,
                 math.nan if result.first is None else result.first.length_m,
+                self.disc_radius_m,
             )
         )
 

@@ -20,7 +20,10 @@ class PlanOnlyConfig(Config):
 
 @NAVIGATORS.add("plan-only", PlanOnlyConfig)
 class PlanOnlyNavigator(LocalizingNavigator):
-    """Plans once from the initial belief and is done; the robot stays where it is."""
+    """Plans once from the initial belief and is done; the robot stays where it is.
+
+    A plan is one that the robot can drive: its outline fits along it, and no corner is too tight.
+    """
 
     def __init__(
         self,
@@ -39,7 +42,8 @@ class PlanOnlyNavigator(LocalizingNavigator):
             )
         super().__init__(localizer_of(parts, "plan-only"), journal)
         rng = robot.streams.stream("planner")
-        plan = GlobalPlan(parts.planner, parts.smoother, chart, rng, journal, robot=robot)
+        least_m = robot.footprint.inner_radius_m
+        plan = GlobalPlan(parts.planner, parts.smoother, chart, rng, journal, least_m, robot, as_planned=True)
         nothing = chart.walls.circles_m[:0]
         journal.result("mapped_circles_m", lambda: nothing)
         result = plan.make(0.0, self.belief.pose, goal, nothing, (plan.clearance_m,))
