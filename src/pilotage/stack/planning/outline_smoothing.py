@@ -44,6 +44,10 @@ class _Line(NamedTuple):
             np.where(ahead >= 0.0, 1, -1).astype(np.int64),
         )
 
+    def full_price_m(self) -> float:
+        """Of all steps."""
+        return self.price_m(0, len(self.gears), SWITCH_COST_M)
+
     def price_m(self, first: int, last: int, switch_cost_m: float) -> float:
         """Of the steps from state ``first`` to state ``last``."""
         steps, gears = self.steps_m[first:last], self.gears[first:last]
@@ -96,16 +100,15 @@ def _once(line: _Line, driver: Driver, spacing_m: float, most: int) -> _Line | N
     states, length_m = [line.states[:1]], 0.0
     for k in range(len(kept)):
         first, last = int(picked[chain[k]]), int(picked[chain[k + 1]])
-        if kept[k]:
+        (x, y, theta), (gx, gy, gth) = line.states[first], line.states[last]
+        word, _ = curve_between(x, y, theta, gx, gy, gth, driver.steering)
+        # One that does not fit when looked at closely leaves the path's own piece, and the other curves.
+        if kept[k] or not hybrid.word_fits(x, y, theta, word, driver.car, driver.ground, FINE_M):
             states.append(line.states[first + 1 : last + 1])
             length_m += float(s[last] - s[first])
             continue
-        (x, y, theta), (gx, gy, gth) = line.states[first], line.states[last]
-        word, _ = curve_between(x, y, theta, gx, gy, gth, driver.steering)
-        if not hybrid.word_fits(x, y, theta, word, driver.car, driver.ground, FINE_M):
-            return None
         states.append(word_states(line.states[first], word, driver.steering.radius))
         length_m += word_length(word, driver.steering.radius)
-    if length_m > line.length_m:
-        return None
-    return _Line.of(distinct(np.concatenate(states), line.states[-1]), length_m)
+    found = _Line.of(distinct(np.concatenate(states), line.states[-1]), length_m)
+    is_dearer = found.full_price_m() > line.full_price_m() + 1e-9
+    return None if is_dearer or length_m > line.length_m else found
