@@ -7,6 +7,7 @@ import math
 import numpy as np
 import pytest
 
+import pilotage as pl
 from pilotage.core.types import Goal, Pose2
 from pilotage.kernels.bodies.outline import outline_clearance
 from pilotage.kernels.rrt import hybrid
@@ -48,12 +49,31 @@ def test_what_does_not_fit_is_a_status_with_its_reason() -> None:
     planner = HybridAstarPlanner(HybridAstarConfig(most_expansions=3000))
     shut = planner.plan(request(world, Pose2(1.5, 4.5, 0.0), Goal(7.5, 5.5, 0.0)))
     assert (shut.status, shut.path) == (PlanStatus.NO_PATH, None)
-    assert "expansions" in shut.reason
+    assert "no path from start to goal is wide enough for the outline: 0.40 m" in shut.reason
+    assert shut.planning_time_s < 2.0
     at_wall = planner.plan(request(world, Pose2(0.2, 4.5, 0.0), Goal(3.0, 5.5, 0.0)))
     assert at_wall.status is PlanStatus.START_BLOCKED or at_wall.path is not None
     nose_in = planner.plan(request(world, Pose2(1.5, 4.5, 0.0), Goal(8.5, 5.5, 0.0)))
     assert nose_in.status is PlanStatus.GOAL_BLOCKED
     assert "outline" in nose_in.reason
+
+
+def test_what_the_disc_inside_cannot_show_is_searched_to_the_end() -> None:
+    """A gap that lets the disc inside pass, and in which the car cannot turn to its goal."""
+    world = yard((4.5, 2.0, 0.2, 4.0), (4.5, 7.3, 0.2, 4.2))
+    planner = HybridAstarPlanner(HybridAstarConfig(most_expansions=3000, clearance_m=0.2))
+    result = planner.plan(request(world, Pose2(1.5, 4.5, 0.0), Goal(4.5, 4.6, math.pi / 2)))
+    assert result.path is None
+    assert result.iterations > 0 or result.status is PlanStatus.GOAL_BLOCKED
+
+
+def test_a_narrow_car_knows_its_way_around_thin_walls() -> None:
+    """Estimates looked through walls for who is no thicker than the map's nodes lie apart: it gave up."""
+    foot = [[0.3, 0.1], [-0.1, 0.1], [-0.1, -0.1], [0.3, -0.1]]
+    ends = (1.0, 1.0, 0.0), (2.0, 27.0, 1.57)
+    found = pl.plan("museum", *ends, planner="hybrid-astar", footprint=foot, set={"smoother": "none"})
+    assert found.success, found.reason
+    assert found.length_m < 1.1 * found.shortest_length_m
 
 
 def test_a_goal_without_a_heading_is_reached_in_one_that_fits() -> None:

@@ -20,6 +20,7 @@ from pilotage.kernels.jit import kernel
 from pilotage.kernels.rrt.clearance import Space, near
 from pilotage.kernels.rrt.dubins import advance
 from pilotage.kernels.rrt.reeds_shepp import follow, shortest, word_length
+from pilotage.kernels.rrt.samples import Bound, bound_at
 
 FOUND, NO_PATH, EXHAUSTED = range(3)
 CHECK_M = 0.04
@@ -164,7 +165,7 @@ def search(
     car: Car,
     ground: Space,
     prices: Prices,
-    to_go: FloatArray,
+    bound: Bound,
     step: float,
     cell: float,
     headings: int,
@@ -176,8 +177,8 @@ def search(
 
     Parameters
     ----------
-    to_go
-        (ny, nx) length of the shortest path of the inner disc to the goal from each node of the field.
+    bound
+        Of the path that is left to the disc inside the outline.
     step, cell, headings
         Length of a step, side of a cell, and how many headings are told apart.
     nodes, parents
@@ -188,7 +189,7 @@ def search(
     status, last node, the word from there to the goal (5, 2), and how many nodes were expanded.
     """
     empty = np.zeros((5, 2))
-    ny, nx = to_go.shape
+    ny, nx = ground.distance.shape
     columns = math.ceil((nx - 1) * ground.resolution / cell) + 1
     rows = math.ceil((ny - 1) * ground.resolution / cell) + 1
     # No more cells are reached than there is room for nodes: of a large map only those are kept.
@@ -258,9 +259,7 @@ def search(
             best[key] = new
             if hashed:
                 keys[key] = place
-            u, v = (ex - ground.x0) / ground.resolution, (ey - ground.y0) / ground.resolution
-            iu, iv = min(max(int(u + 0.5), 0), nx - 1), min(max(int(v + 0.5), 0), ny - 1)
-            around = to_go[iv, iu] - ground.resolution
+            around = bound_at(bound, ex, ey)
             _, free = shortest(ex, ey, eth, goal[0], goal[1], goal[2], car.turning, prices.reverse)
             nodes[count, 0], nodes[count, 1], nodes[count, 2] = ex, ey, eth
             parents[count, 0], parents[count, 1], parents[count, 2] = float(node), float(turn), sign * step

@@ -10,14 +10,21 @@ from pydantic import Field
 
 from pilotage.core.config import Config
 from pilotage.core.types import FloatArray
-from pilotage.kernels.grids.travel_cost import travel_costs
 from pilotage.kernels.rrt import hybrid, reeds_shepp
 from pilotage.kernels.rrt.clearance import Space
-from pilotage.maps.distance_field import DistanceField
+from pilotage.kernels.rrt.samples import Bound
 from pilotage.sensors.sensor import NonNegative, Positive
 from pilotage.stack.planning.driving_space import SPARE, failure, spaced_waypoints
-from pilotage.stack.planning.outline import blocked_pose, car_of, goal_pose, ground_of, word_states
+from pilotage.stack.planning.outline import (
+    blocked_pose,
+    car_of,
+    goal_pose,
+    ground_of,
+    shut_for,
+    word_states,
+)
 from pilotage.stack.planning.planner import PLANNERS, Path, PlanRequest, PlanResult, PlanStatus
+from pilotage.stack.planning.rough_path import look_around
 
 LEAST_RADIUS_M = 0.3
 """Of who turns on the spot: tighter arcs would be driven slowly."""
@@ -67,20 +74,22 @@ class HybridAstarPlanner:
     def plan(self, request: PlanRequest) -> PlanResult:
         """Answer one query; without an outline the robot is a point."""
         began = time.perf_counter()
-        config, field = self._config, request.field
+        config = self._config
         clearance_m = config.clearance_m if request.clearance_m is None else request.clearance_m
         turning_m = config.turning_radius_m or max(SPARE * request.least_turning_radius_m, LEAST_RADIUS_M)
         car = car_of(request.footprint, clearance_m, turning_m)
-        ground = ground_of(field, car)
+        ground = ground_of(request.field, car)
         start, goal = request.start.as_array(), goal_pose(request, car, ground, config.headings)
         blocked = blocked_pose(start, goal, request, car, ground)
         if blocked is not None:
             return failure(*blocked, time.perf_counter() - began)
+        # The centre comes no nearer to anything than the disc inside the outline lets it.
+        around = look_around(request, ground, car.inner + clearance_m, False, True)
+        if around.shut:
+            return failure(PlanStatus.NO_PATH, shut_for(car, clearance_m), time.perf_counter() - began)
         size = 6 * config.most_expansions + 8
         nodes, parents = np.empty((size, 3)), np.empty((size, 3))
-        ended, last, word, expanded = self._searched(
-            start, goal, car, ground, _to_go(field, goal, car.inner), nodes, parents
-        )
+        ended, last, word, expanded = self._searched(start, goal, car, ground, around.bound, nodes, parents)
         took = time.perf_counter() - began
         if ended != hybrid.FOUND:
             why = "the search was exhausted" if ended == hybrid.NO_PATH else "the search was given up"
@@ -96,7 +105,7 @@ class HybridAstarPlanner:
         goal: FloatArray,
         car: hybrid.Car,
         ground: Space,
-        to_go: FloatArray,
+        bound: Bound,
         nodes: FloatArray,
         parents: FloatArray,
     ) -> tuple[int, int, FloatArray, int]:
@@ -114,7 +123,7 @@ class HybridAstarPlanner:
                 car,
                 ground,
                 prices,
-                to_go,
+                bound,
                 step_m,
                 config.cell_m,
                 config.headings,
@@ -126,20 +135,6 @@ class HybridAstarPlanner:
             if ended == hybrid.FOUND:
                 break
         return ended, last, word, expanded
-
-
-def _to_go(field: DistanceField, goal: FloatArray, inner_m: float) -> FloatArray:
-    """(ny, nx) path of the outline's inner disc to the goal, over the field's nodes."""
-    ny, nx = field.distance_m.shape
-    x0, y0 = field.origin_xy_m
-    # A node may lie half a diagonal nearer to a wall than the path past it.
-    free = field.distance_m >= inner_m - field.resolution_m
-    factor = np.where(free, 1.0, np.inf)
-    column = min(max(round((goal[0] - x0) / field.resolution_m), 0), nx - 1)
-    row = min(max(round((goal[1] - y0) / field.resolution_m), 0), ny - 1)
-    cost, _ = travel_costs(factor, row * nx + column, field.resolution_m, field.resolution_m)
-    # Steps over eight neighbours are longer than straight lines by at most this: the estimate stays below.
-    return np.asarray(cost.reshape(ny, nx) / 1.0824)
 
 
 def _states(

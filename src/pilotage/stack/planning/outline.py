@@ -68,6 +68,12 @@ def blocked_pose(
     return None
 
 
+def shut_for(car: hybrid.Car, clearance_m: float) -> str:
+    """What to say where not even the disc inside the outline has a path."""
+    to_spare = f" with {clearance_m:g} m to spare" if clearance_m > 0.0 else ""
+    return f"no path from start to goal is wide enough for the outline: {2.0 * car.inner:.2f} m{to_spare}"
+
+
 def word_states(
     start: FloatArray, word: FloatArray, turning_m: float, spacing_m: float = STATE_SPACING_M
 ) -> FloatArray:
@@ -116,6 +122,7 @@ __all__ = [
     "distinct",
     "goal_pose",
     "ground_of",
+    "shut_for",
     "skin_m",
     "word_states",
 ]

@@ -26,6 +26,7 @@ from pilotage.stack.planning.outline import (
     distinct,
     goal_pose,
     ground_of,
+    shut_for,
     skin_m,
     word_states,
 )
@@ -82,7 +83,7 @@ def plan_for_outline(
     guided = config.guide_bias > 0.0
     around = look_around(request, ground, inner_m, guided, guided and goes_on)
     if around.shut:
-        return failure(PlanStatus.NO_PATH, _shut(car, clearance_m), time.perf_counter() - began)
+        return failure(PlanStatus.NO_PATH, shut_for(car, clearance_m), time.perf_counter() - began)
     how = _sampling(config, steering.radius, inner_m)
 
     def grow(guide_path: FloatArray, iterations: int, first: bool) -> int:
@@ -120,12 +121,6 @@ def _is_one_way(tree: rrt_tree.Tree, steering: Steering) -> bool:
     x, y, theta = tree.pose[rrt_tree.GOAL]
     word, _, _ = outline_star.edge_between(tree, rrt_tree.START, x, y, theta, steering)
     return bool((word[:, 1] >= 0.0).all() or (word[:, 1] <= 0.0).all())
-
-
-def _shut(car: hybrid.Car, clearance_m: float) -> str:
-    """The proof that there is no path."""
-    to_spare = f" with {clearance_m:g} m to spare" if clearance_m > 0.0 else ""
-    return f"no path from start to goal is wide enough for the outline: {2.0 * car.inner:.2f} m{to_spare}"
 
 
 def _extract(tree: rrt_tree.Tree, ends: _Ends) -> tuple[Path | None, int]:
