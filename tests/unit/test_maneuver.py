@@ -24,6 +24,21 @@ def test_it_parks(seed: int) -> None:
     assert float(str(metrics["min_clearance_m"])) > 0.0
 
 
+def test_who_believes_to_stand_in_a_wall_looks_again_before_it_gives_up() -> None:
+    """Parked 3 cm from a wall it failed where the start's error was more, before its laser said a word."""
+    settings = ("world.start={x_m: 0.23, y_m: 2.4, theta_rad: 0.0}", "stack.initial.x_var_m2=0.01")
+    for seed in range(4):
+        metrics = run_mission(load_mission("car-park", settings, seed=seed), save=False).metrics
+        assert metrics["success"], metrics["reason"]
+        assert metrics["collisions"] == 0
+
+
+def test_who_knows_nothing_of_its_start_is_told_who_finds_out() -> None:
+    """It planned from the middle of the map, where its unknown belief had its pose."""
+    with pytest.raises(InputError, match="take navigator goal"):
+        build(load_mission("car-park", ["stack.initial={known: false}"]))
+
+
 def test_the_way_to_go_is_that_of_the_plan_and_only_grows_less() -> None:
     experiment = build(load_mission("car-park", ["run.time_limit_s=20"]))
     told = run_loop(experiment).finished.robots[0]

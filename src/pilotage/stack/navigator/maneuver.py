@@ -16,7 +16,7 @@ from pilotage.sensors.readings import Readings
 from pilotage.sensors.sensor import Positive
 from pilotage.stack.control.controller import Controller
 from pilotage.stack.control.kanayama import KanayamaConfig, KanayamaController
-from pilotage.stack.interface import NAVIGATORS, StackStatus
+from pilotage.stack.interface import NAVIGATORS, BeliefStatus, StackStatus
 from pilotage.stack.journal import Journal
 from pilotage.stack.knowledge import RobotKnowledge, TaskKnowledge
 from pilotage.stack.navigator.global_plan import GlobalPlan
@@ -29,10 +29,12 @@ from pilotage.stack.navigator.navigator import (
 )
 from pilotage.stack.navigator.timed_path import laid_out, with_turns
 from pilotage.stack.navigator.trail import Trail
-from pilotage.stack.planning.planner import Path, PlanResult
+from pilotage.stack.planning.planner import Path, PlanResult, PlanStatus
 
 MOST_REPLANS, MOST_RESTS = 8, 3
 """How often it plans anew where it went astray, and for what a path that covers a floor left of it."""
+LOOK_S = 2.0
+"""A robot that believes to stand in a wall looks around for so long before it plans anew, once."""
 BESIDE_INNER_M = (0.25, 0.2, 0.15, 0.08, 0.04, 0.01)
 """What paths planned for the centre keep beside the outline's inner disc, where they can keep no more."""
 HEADING_PER_S = 3.0
@@ -62,7 +64,7 @@ class ManeuverNavigator(LocalizingNavigator):
     A robot that turns on the spot does so at the path's corners, so that it drives the very lines of a sweep.
 
     It looks at no obstacle that is not on its map. Where it cannot keep up with the plan it plans anew; what
-    a path that covers a floor left of it, as far as the robot knows, is driven in the end.
+    a path that covers a floor left of it, as far as the robot knows, is driven in the end. Lost, it stands.
     """
 
     def __init__(
@@ -92,6 +94,12 @@ class ManeuverNavigator(LocalizingNavigator):
         self._to_go_m: FloatArray = np.zeros(0)
         self._index, self._replans, self._rests = 0, 0, 0
         self._trail: Trail | None = None
+        self._think_at_s = 0.0
+        if self.belief.status is BeliefStatus.LOST:
+            raise InputError(
+                "navigator 'maneuver': expected to be told its start (stack.initial), found it lost; it "
+                "stands while it is: take navigator goal, which drives until it has found itself"
+            )
         self._think(0.0)
         if self._plan.hopeless and self._plan.too_tight:
             raise InputError(
@@ -102,6 +110,10 @@ class ManeuverNavigator(LocalizingNavigator):
         """Plan from where it believes to be, and lay out the reference, one row a step."""
         plan = self._plan
         result = self._planned(t_s)
+        looked, self._think_at_s = self._think_at_s > 0.0, math.inf
+        if result.status is PlanStatus.START_BLOCKED and not looked:
+            self._think_at_s = t_s + LOOK_S
+            return
         if result.path is None or plan.path is None:
             self._end(t_s, StackStatus.FAILED, f"{result.status}: {result.reason}")
             return
@@ -152,9 +164,14 @@ class ManeuverNavigator(LocalizingNavigator):
 
     def step(self, readings: Readings) -> Twist:
         """Localize, move the reference on, and follow it."""
-        pose = self._localizer.step(readings).pose
-        if self._status is not StackStatus.RUNNING:
+        belief = self._localizer.step(readings)
+        if self._status is not StackStatus.RUNNING or belief.status is BeliefStatus.LOST:
             return STOP
+        if readings.t_s >= self._think_at_s:
+            self._think(readings.t_s)
+        if self._think_at_s < math.inf or self._status is not StackStatus.RUNNING:
+            return STOP
+        pose = belief.pose
         if self._trail is not None:
             self._trail.add(self.belief)
         if self._index >= len(self._references) and self._goes_for_the_rest(readings.t_s):
