@@ -40,7 +40,7 @@ class Eye:
     @staticmethod
     def of(lidar: LidarConfig) -> Eye:
         """Of its data sheet."""
-        mount = Pose2(lidar.mount.x_m, lidar.mount.y_m, lidar.mount.theta_rad)
+        mount = lidar.mount.pose
         fan = fan_of(lidar.beam_angles_rad(), lidar.max_range_m)
         return Eye(mount, fan, max(lidar.beam_step_rad, 1e-9))
 

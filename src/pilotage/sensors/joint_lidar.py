@@ -5,7 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
+import numpy as np
+
 from pilotage.core.errors import InputError
+from pilotage.core.types import FloatArray
 from pilotage.sensors.lidar import LidarConfig
 from pilotage.sensors.sensor import Mount, SensorConfig
 
@@ -61,6 +64,14 @@ def joint_lidar(sensors: Mapping[str, SensorConfig], where: str = "robot.sensors
         range_var_m2=max(sheet.range_var_m2 for sheet in sheets),
         of=tuple(lasers),
     )
+
+
+def places_of_lasers_m(sheet: LidarConfig, sensors: Mapping[str, SensorConfig]) -> FloatArray:
+    """(V, 2) of the lasers that a sheet joins, in the frame of its scan; none of a single laser."""
+    if not isinstance(sheet, JointLidarConfig):
+        return np.zeros((0, 2))
+    middle = sheet.mount.pose.inverse()
+    return np.array([middle.compose(sensors[name].mount.pose).as_array()[:2] for name in sheet.of])
 
 
 def _arc(sheets: list[LidarConfig]) -> tuple[float, float]:

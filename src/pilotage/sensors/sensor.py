@@ -10,6 +10,7 @@ from pydantic import Field
 from pilotage.core.config import Config
 from pilotage.core.errors import InputError
 from pilotage.core.registry import Registry
+from pilotage.core.types import Pose2
 
 NonNegative = Annotated[float, Field(ge=0.0)]
 Positive = Annotated[float, Field(gt=0.0)]
@@ -21,6 +22,11 @@ class Mount(Config):
     x_m: float = 0.0
     y_m: float = 0.0
     theta_rad: float = Field(default=0.0, ge=-math.pi, le=math.pi)
+
+    @property
+    def pose(self) -> Pose2:
+        """As a pose."""
+        return Pose2(self.x_m, self.y_m, self.theta_rad)
 
 
 class SensorConfig(Config):

@@ -108,7 +108,7 @@ def serve(mission: Mission, speed: float = 1.0, duration_s: float | None = None)
 
 
 def _mount(sheet: LidarConfig) -> Pose2:
-    return Pose2(sheet.mount.x_m, sheet.mount.y_m, sheet.mount.theta_rad)
+    return sheet.mount.pose
 
 
 def _odometry(readings: Readings, before: Pose2, dt_s: float) -> tuple[Pose2, ros.Fields]:

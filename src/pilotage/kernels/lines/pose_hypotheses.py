@@ -13,6 +13,8 @@ from pilotage.kernels.jit import kernel
 from pilotage.kernels.lines.wall_candidates import overlap_share
 from pilotage.kernels.scans.rays import fan_ranges
 
+EXPLAINED, OPEN, CONTRADICTED = range(3)
+
 
 @kernel
 def pair_poses(
@@ -91,24 +93,69 @@ def scan_fit(
     stride: int,
     near: float,
     beyond: float,
+    eyes: FloatArray,
     segments: FloatArray,
     circles: FloatArray,
 ) -> tuple[float, float]:
     """Shares of every ``stride``-th beam that the map explains, and that it contradicts, from a pose.
 
     Explained: within ``near`` of the map's range. Contradicted: longer than the map's by more than
-    ``beyond``, through what the map says is a wall; a shorter one may be something unexpected.
+    ``beyond``, through what the map says is a wall; a shorter one may be something unexpected. Beams of
+    which nothing is known, NaN, do not count; a scan of none but these is explained. Of a scan that several
+    scanners took, at places ``eyes`` (V, 2), x along its first beam, a beam ends where one of them saw
+    something, which a wall between may hide from the pose itself: what one of them can have seen is not
+    contradicted.
     """
     beams = (ranges.shape[0] + stride - 1) // stride
     expected = fan_ranges(x, y, first, step * stride, beams, max_range, segments, circles)
-    explained = contradicted = 0
+    explained = contradicted = known = 0
     for k in range(beams):
+        if math.isnan(ranges[k * stride]):
+            continue
+        known += 1
         measured = min(ranges[k * stride], max_range)
         if abs(measured - expected[k]) <= near:
             explained += 1
         elif measured > expected[k] + beyond:
-            contradicted += 1
-    return explained / beams, contradicted / beams
+            angle = first + k * step * stride
+            seen = _seen_from(x, y, first, angle, measured, max_range, near, beyond, eyes, segments, circles)
+            explained += int(seen == EXPLAINED)
+            contradicted += int(seen == CONTRADICTED)
+    if known == 0:
+        return 1.0, 0.0
+    return explained / known, contradicted / known
+
+
+@kernel
+def _seen_from(
+    x: float,
+    y: float,
+    first: float,
+    angle: float,
+    measured: float,
+    max_range: float,
+    near: float,
+    beyond: float,
+    eyes: FloatArray,
+    segments: FloatArray,
+    circles: FloatArray,
+) -> int:
+    """What the end of a beam is to the scanner among ``eyes`` to which it fits the map best.
+
+    ``eyes`` are told in a frame that is turned by ``first``.
+    """
+    best = CONTRADICTED
+    c, s = math.cos(first), math.sin(first)
+    for i in range(eyes.shape[0]):
+        ex, ey = x + c * eyes[i, 0] - s * eyes[i, 1], y + s * eyes[i, 0] + c * eyes[i, 1]
+        dx, dy = x + measured * math.cos(angle) - ex, y + measured * math.sin(angle) - ey
+        away = math.hypot(dx, dy)
+        met = fan_ranges(ex, ey, math.atan2(dy, dx), 1.0, 1, away + near + beyond, segments, circles)[0]
+        if abs(away - met) <= near or (measured >= max_range and met > away):
+            return EXPLAINED
+        if away <= met + beyond:
+            best = OPEN
+    return best
 
 
 @kernel
@@ -121,6 +168,7 @@ def fitting_poses(
     stride: int,
     near: float,
     beyond: float,
+    eyes: FloatArray,
     least_explained: float,
     most_contradicted: float,
     segments: FloatArray,
@@ -132,7 +180,7 @@ def fitting_poses(
     for h in range(poses.shape[0]):
         explained, contradicted = scan_fit(
             poses[h, 0], poses[h, 1], poses[h, 2] + first, step, ranges, max_range, stride, near, beyond,
-            segments, circles,
+            eyes, segments, circles,
         )  # fmt: skip
         if explained >= least_explained and contradicted <= most_contradicted:
             kept[count, 0] = h

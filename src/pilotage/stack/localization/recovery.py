@@ -10,6 +10,7 @@ from pydantic import Field
 from pilotage.core.config import Config
 from pilotage.core.types import FloatArray
 from pilotage.maps.world_map import WorldMap
+from pilotage.sensors.joint_lidar import places_of_lasers_m
 from pilotage.sensors.lidar import LidarConfig
 from pilotage.sensors.readings import OdometryIncrement
 from pilotage.sensors.sensor import Positive
@@ -66,7 +67,14 @@ class Recovery:
         prediction: OdometryPrediction,
     ) -> None:
         self._config = config
-        self._fit = ScanFit(chart.walls, lidar, max_range_m, config.near_m, config.beyond_m)
+        self._fit = ScanFit(
+            chart.walls,
+            lidar,
+            max_range_m,
+            config.near_m,
+            config.beyond_m,
+            places_of_lasers_m(lidar, robot.sensors),
+        )
         self._search = GlobalSearch(
             config.search,
             chart.walls,
@@ -159,7 +167,10 @@ class Recovery:
 
 
 def _median(values: FloatArray) -> float:
-    """Of finite values (N,), as ``np.median`` has it, whose checks take longer than the rest of an update."""
+    """As ``np.median`` of all but NaN, whose checks take longer than the rest of an update."""
+    values = values[values == values]
+    if not len(values):
+        return 0.0
     half = len(values) // 2
     if len(values) % 2:
         return float(np.partition(values, half)[half])

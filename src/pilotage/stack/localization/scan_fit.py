@@ -13,6 +13,8 @@ from pilotage.kernels.scans.missing import bodies_in_sight
 from pilotage.maps.segment_map import SegmentMap
 from pilotage.sensors.lidar import LidarConfig
 
+NO_EYES: FloatArray = np.zeros((0, 2))
+
 
 @dataclass(frozen=True, slots=True)
 class Fit:
@@ -31,10 +33,18 @@ class ScanFit:
         A reading within this of the expected one is explained.
     beyond_m
         A reading longer than expected by more than this passes through a wall of the map.
+    eyes_m
+        (V, 2) in the scanner's frame, where the lasers are whose scans are joined to it; none of one laser.
     """
 
     def __init__(
-        self, world: SegmentMap, lidar: LidarConfig, max_range_m: float, near_m: float, beyond_m: float
+        self,
+        world: SegmentMap,
+        lidar: LidarConfig,
+        max_range_m: float,
+        near_m: float,
+        beyond_m: float,
+        eyes_m: FloatArray = NO_EYES,
     ) -> None:
         self._world = world
         self._first = float(lidar.beam_angles_rad()[0])
@@ -43,6 +53,8 @@ class ScanFit:
         self._max_range = min(max_range_m, lidar.max_range_m)
         self._near = near_m
         self._beyond = beyond_m
+        c, s = math.cos(self._first), math.sin(self._first)
+        self._eyes = np.ascontiguousarray(eyes_m @ np.array([(c, -s), (s, c)]))
 
     def sensor_pose(self, pose: FloatArray) -> tuple[float, float, float]:
         """Pose of the scanner for a pose of the robot (3,)."""
@@ -75,6 +87,7 @@ class ScanFit:
             1,
             self._near + extra_m,
             self._beyond + extra_m,
+            self._eyes,
             self._world.segments_m,
             self._world.circles_m,
         )
@@ -113,6 +126,7 @@ class ScanFit:
             stride,
             self._near + extra_m,
             self._beyond + extra_m,
+            self._eyes,
             least_explained,
             most_contradicted,
             self._world.segments_m,

@@ -104,7 +104,7 @@ class FloorExplorer(LocalizingNavigator):
         self._draws = own is None
         self._grid: ScanGrid = ScanGrid(self._scanner, config.resolution_m) if own is None else own
         mount = self._scanner.mount
-        self._mount = Pose2(mount.x_m, mount.y_m, mount.theta_rad)
+        self._mount = mount.pose
         start = task.initial.pose
         self._start = np.array([start.x_m, start.y_m])
         self._doing, self._target = Doing.EXPLORE, None

@@ -8,12 +8,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from pilotage.core.types import Command, FloatArray, Pose2
+from pilotage.core.types import Command, FloatArray
 from pilotage.kernels.scans.joint import join_scan
 from pilotage.sensors.joint_lidar import JointLidarConfig, joint_lidar
 from pilotage.sensors.lidar import LidarConfig
 from pilotage.sensors.readings import LidarScan, Readings
-from pilotage.sensors.sensor import Mount, SensorConfig
+from pilotage.sensors.sensor import SensorConfig
 from pilotage.stack.interface import Belief, Stack, StackStatus
 from pilotage.stack.knowledge import RobotKnowledge
 
@@ -36,12 +36,12 @@ class JointScan:
 
     def __init__(self, sheet: JointLidarConfig, sensors: Mapping[str, SensorConfig]) -> None:
         self.name, self.sheet = "+".join(sheet.of), sheet
-        middle = _pose(sheet.mount).inverse()
+        middle = sheet.mount.pose.inverse()
         self._lasers: list[tuple[str, LidarConfig, FloatArray]] = []
         for name in sheet.of:
             laser = sensors[name]
             assert isinstance(laser, LidarConfig), "the joint sheet names lasers"
-            self._lasers.append((name, laser, middle.compose(_pose(laser.mount)).as_array()))
+            self._lasers.append((name, laser, middle.compose(laser.mount.pose).as_array()))
         self._first_rad = float(sheet.beam_angles_rad()[0])
 
     @staticmethod
@@ -114,7 +114,3 @@ def with_joint_lidar(robot: RobotKnowledge) -> tuple[RobotKnowledge, JointScan |
     if join is None:
         return robot, None
     return replace(robot, sensors={**robot.sensors, join.name: join.sheet}), join
-
-
-def _pose(mount: Mount) -> Pose2:
-    return Pose2(mount.x_m, mount.y_m, mount.theta_rad)

@@ -54,7 +54,7 @@ class LocalDrive:
         self._outline = polygon_around(robot.footprint)
         self._angles = self._scanner.beam_angles_rad()
         mount = self._scanner.mount
-        self._mount = Pose2(mount.x_m, mount.y_m, mount.theta_rad)
+        self._mount = mount.pose
         # In its own frame of the odometry it begins where it believes to be: a goal is there as on the map.
         self._pose, self._goal_there = start, goal_xy_m
         self._twist, self._command, self._moved_s = STOP, STOP, 0.0
