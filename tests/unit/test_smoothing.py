@@ -13,6 +13,7 @@ from pilotage.core.types import FloatArray
 from pilotage.evaluation.shortest_path import shortest_path
 from pilotage.kernels.rrt import dubins
 from pilotage.maps.segment_map import SegmentMap
+from pilotage.stack.planning.driving_space import spaced_waypoints
 from pilotage.stack.planning.planner import Path, PlanRequest
 from pilotage.stack.planning.rrt_star_dubins import RrtStarDubinsConfig, RrtStarDubinsPlanner
 from pilotage.stack.planning.smoothing import (
@@ -161,6 +162,13 @@ def test_a_path_that_turns_on_the_spot_is_shortened_too() -> None:
     smoothed = smooth(path, query, 0.3)
     assert smoothed.length_m == pytest.approx(math.hypot(6.0, 6.0), abs=0.01)
     assert smoothed.turning_radius_m == 0.0
+
+
+def test_no_more_waypoints_are_looked_for_than_there_are_states() -> None:
+    """A spacing of a nanometre filled the memory with places that lie between two states."""
+    states = np.column_stack([np.linspace(0.0, 10.0, 201), np.zeros(201), np.zeros(201)])
+    np.testing.assert_array_equal(spaced_waypoints(states, 1e-9), states)
+    assert len(spaced_waypoints(states, 1.5)) == 8
 
 
 def test_what_cannot_be_bettered_comes_back() -> None:

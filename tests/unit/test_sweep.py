@@ -165,6 +165,22 @@ def test_the_least_of_what_was_left_is_left_for_good() -> None:
     assert (rest_of(sought, driven, 0.8, 1.0 - 0.99 * share / 2).must <= rest).all()
 
 
+@pytest.mark.parametrize("width_m", [1e-5, 1e5])
+def test_a_pass_that_the_maps_cells_tell_nothing_of_is_refused(width_m: float) -> None:
+    """One of them was divided by no area, with a warning; the other was told that its start stood in a wall."""
+    world, _ = swept(FLOORS["a room"])
+    room = {"map": "room", "bounds_m": list(world.bounds_m), "walls_m": ROOM}
+    sweep = f"expected a width_m of 0.0566 to 8 for a map of 10 m x 8 m, found {width_m:g}"
+    changed = copy.deepcopy(MISSIONS["sweep-floor"])
+    changed["world"] |= {"map": room, "start": {"x_m": 1.0, "y_m": 1.0}}
+    changed["task"] = {"name": "sweep-floor", "width_m": width_m}
+    with pytest.raises(InputError, match=f"task 'sweep-floor': {sweep}".replace("+", r"\+")):
+        build(mission_of(changed))
+    planner = BoustrophedonPlanner(BoustrophedonConfig(width_m=width_m, overlap_m=0.0))
+    request = PlanRequest(Pose2(1.0, 1.0, 0.0), Goal(1.0, 1.0), world.field, np.random.default_rng(0))
+    assert planner.plan(request).reason == f"planner 'boustrophedon': {sweep}"
+
+
 def test_a_goal_that_is_walled_off_is_no_path() -> None:
     _, result = swept(np.array([*ROOM, [6, 0, 6, 8]], dtype=float), (8.0, 4.0))
     assert result.path is None

@@ -21,6 +21,8 @@ from pilotage.maps.world_map import WorldMap
 
 MOST_CELLS = 400_000
 """Larger floors take coarser cells: a distance costs a search over all of them."""
+CELLS_A_PASS = 4
+"""The least that tell whether a pass went beside another one."""
 SNAP_M = 0.5
 """A place whose cell is too near to a wall stands for the nearest one that is not, this near."""
 
@@ -31,6 +33,23 @@ def cell_side_m(
     """Side of the cells over bounds: the finest of which there are no more than so many."""
     xmin, ymin, xmax, ymax = bounds_m
     return max(finest_m, math.sqrt((xmax - xmin) * (ymax - ymin) / most_cells))
+
+
+def check_pass_width(bounds_m: tuple[float, float, float, float], width_m: float, where: str) -> None:
+    """Refuse a pass that a map's cells tell nothing of: wider than the map, or less than four cells wide.
+
+    Raises
+    ------
+    InputError
+        With the widths that would do.
+    """
+    xmin, ymin, xmax, ymax = bounds_m
+    least_m, most_m = CELLS_A_PASS * cell_side_m(bounds_m, 0.0), min(xmax - xmin, ymax - ymin)
+    if not least_m <= width_m <= most_m:
+        raise InputError(
+            f"{where}: expected a width_m of {least_m:.3g} to {most_m:.3g} for a map of {xmax - xmin:g} m x "
+            f"{ymax - ymin:g} m, found {width_m:g}"
+        )
 
 
 @dataclass(frozen=True, eq=False)

@@ -15,7 +15,7 @@ from pilotage.evaluation.finished import FinishedRun, RobotRun, Verdict
 from pilotage.evaluation.tasks.task import TASKS, Attempt, TaskSetting
 from pilotage.evaluation.tasks.watched import WatchedTask
 from pilotage.kernels.patrol.swept import mark_swept
-from pilotage.maps.floor import Floor, sweepable
+from pilotage.maps.floor import Floor, check_pass_width, sweepable
 from pilotage.missions.places import GoalConfig
 from pilotage.sensors.sensor import NonNegative, Positive
 
@@ -55,6 +55,7 @@ class SweepTask(WatchedTask):
         back = GoalConfig(x_m=start.x_m, y_m=start.y_m, tolerance_m=BACK_M)
         super().__init__((back,) if mission.goal_of(robot) is None else ())
         self._config, self._width_m = config, config.width_m or 2.0 * radius_m
+        check_pass_width(setting.chart.bounds_m, self._width_m, "task 'sweep-floor'")
         cell_m = self._width_m / CELLS_A_WIDTH
         place = start.x_m, start.y_m
         floor = Floor.of(setting.chart, radius_m, cell_m, place, exact=True)

@@ -84,10 +84,13 @@ def is_valid(states: FloatArray, space: Space, clearance_m: float) -> bool:
 
 
 def spaced_waypoints(states: FloatArray, spacing_m: float) -> FloatArray:
-    """Pick states about ``spacing_m`` apart along a dense path (N, 3), evenly, with both its ends."""
+    """Pick states about ``spacing_m`` apart along a dense path (N, 3), evenly, with both its ends.
+
+    No more are looked for than there are: a finer spacing takes about all of them.
+    """
     steps = np.hypot(np.diff(states[:, 0]), np.diff(states[:, 1]))
     s = np.concatenate([[0.0], np.cumsum(steps)])
-    count = max(1, round(float(s[-1]) / spacing_m))
+    count = max(1, round(min(float(s[-1]) / spacing_m, len(s))))
     picked = np.unique(np.searchsorted(s, np.linspace(0.0, s[-1], count + 1) - 1e-9).clip(0, len(s) - 1))
     return np.ascontiguousarray(states[np.unique([0, *picked[1:-1], len(s) - 1])])
 

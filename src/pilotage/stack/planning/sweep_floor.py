@@ -12,7 +12,7 @@ import scipy
 from pilotage.core.types import BoolArray, FloatArray
 from pilotage.kernels.patrol.swept import mark_swept
 from pilotage.maps.distance_field import DistanceField
-from pilotage.maps.floor import Floor, sweepable
+from pilotage.maps.floor import Floor, check_pass_width, sweepable
 from pilotage.stack.planning.sweep_room import FINE_CELLS, Keeping, path_floor
 
 STEP_M = 0.002
@@ -44,7 +44,8 @@ class Sought:
 
 
 def whole_floor(field: DistanceField, keeping: Keeping, width_m: float, overlap_m: float) -> Sought:
-    """All of the floor, and the rim that only the body reaches."""
+    """All of the floor, and the rim that only the body reaches; InputError for passes as ``check_pass_width``."""
+    check_pass_width(field.bounds_m, width_m, "planner 'boustrophedon'")
     radius_m, inside = keeping.radius_m, keeping.start_xy_m
     floor = Floor.of_field(field, field.bounds_m, radius_m, width_m / FINE_CELLS, inside, exact=True)
     inner = path_floor(field, keeping, width_m)
