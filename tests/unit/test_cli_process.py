@@ -186,6 +186,24 @@ def test_a_stream_that_was_closed_is_no_bug() -> None:
     assert done.stderr.splitlines()[-1] == "2"
 
 
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="a device that is full is Linux's")
+def test_where_standard_error_is_full_the_code_tells_alone() -> None:
+    """It was that of a task that failed in the field."""
+    with Path("/dev/full").open("w") as full:
+        done = subprocess.run([sys.executable, "-m", "pilotage", "run", "nosuch"], stderr=full, check=False)
+    assert done.returncode == 2
+
+
+def test_a_folder_that_is_gone_is_told(tmp_path: Path) -> None:
+    """It was "No such file or directory", of no file."""
+    command = f"mkdir gone; cd gone; rmdir ../gone; '{sys.executable}' -m pilotage run museum-plan --json"
+    environment = os.environ | {"PYTHONPATH": ""}
+    words = ["sh", "-c", command]
+    done = subprocess.run(words, cwd=tmp_path, env=environment, capture_output=True, text=True, check=False)
+    told = "pilotage: the current folder is gone; change into one that exists\n"
+    assert (done.returncode, done.stderr) == (2, told)
+
+
 def test_a_terminal_that_lacks_a_character_shows_a_question_mark() -> None:
     script = "import sys; from pilotage.cli.main import main; main(['run', '\u2212.yaml']); print('\u2212')"
     done = subprocess.run(

@@ -142,8 +142,7 @@ def _run(arguments: list[str], struck: list[KeyboardInterrupt]) -> int:
         if isinstance(error, SystemExit):
             raise
         if isinstance(error, OSError):
-            place = f"{error.filename}: " if error.filename else ""
-            return _say(f"{place}{error.strerror or error}", BAD_INPUT)
+            return _say(_told(error), BAD_INPUT)
         if isinstance(error, MemoryError):
             return _say("this needs more memory than there is; take a smaller or coarser input", BAD_INPUT)
         fault = consequence_of(error)
@@ -156,9 +155,20 @@ def _run(arguments: list[str], struck: list[KeyboardInterrupt]) -> int:
         return _say("this is a bug in pilotage; please report it with the lines above", BUG)
 
 
+def _told(error: OSError) -> str:
+    """What the system refused, and where; relative paths lead nowhere from a folder that was deleted."""
+    if isinstance(error, FileNotFoundError) and not error.filename:
+        return "the current folder is gone; change into one that exists"
+    place = f"{error.filename}: " if error.filename else ""
+    return f"{place}{error.strerror or error}"
+
+
 def _say(text: str, code: int) -> int:
-    """One line on standard error, without what a terminal would obey."""
+    """One line on standard error, without what a terminal would obey; where it is full, the code alone."""
+    from contextlib import suppress
+
     from pilotage.core.shown import shown
 
-    print(f"pilotage: {shown(text)}", file=sys.stderr)
+    with suppress(OSError):
+        print(f"pilotage: {shown(text)}", file=sys.stderr)
     return code
