@@ -44,7 +44,7 @@ class Sought:
 
 
 def whole_floor(field: DistanceField, keeping: Keeping, width_m: float, overlap_m: float) -> Sought:
-    """All of the floor, and the rim that only the body reaches; InputError for passes as ``check_pass_width``."""
+    """All of the floor, and the rim that only the body reaches; InputError as ``check_pass_width``."""
     check_pass_width(field.bounds_m, width_m, "planner 'boustrophedon'")
     radius_m, inside = keeping.radius_m, keeping.start_xy_m
     floor = Floor.of_field(field, field.bounds_m, radius_m, width_m / FINE_CELLS, inside, exact=True)
