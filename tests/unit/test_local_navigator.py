@@ -151,5 +151,5 @@ def test_what_it_cannot_drive_is_refused() -> None:
     with pytest.raises(InputError, match="turns on the spot"):
         navigator(Noting(), steered)
     blind = replace(told, robot=replace(told.robot, sensors={}))
-    with pytest.raises(InputError, match="expected one Lidar"):
+    with pytest.raises(InputError, match="expected one lidar"):
         navigator(Noting(), blind)

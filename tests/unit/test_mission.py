@@ -401,7 +401,7 @@ def test_parameters_of_what_was_left_out_are_those_of_its_default() -> None:
 def test_a_sensor_is_taken_off_by_null() -> None:
     mission = load_mission("museum-walls", ["robot.sensors.beacons=null"])
     assert set(load_mission("museum-walls").robot.sensors) - set(mission.robot.sensors) == {"beacons"}
-    with pytest.raises(InputError, match="expected one Beacon among"):
+    with pytest.raises(InputError, match="expected one beacons among"):
         build(load_mission("museum-1", ["robot.sensors.beacons=null"]))
 
 

@@ -275,3 +275,22 @@ def test_weak_brakes_do_not_carry_it_through_its_goal(floor: Callable[[float], s
     x_m, y_m, theta, v_m_s = (float(run.trace[name][-1]) for name in names)
     rolls_m = v_m_s * abs(v_m_s) / 0.6
     assert np.hypot(x_m + rolls_m * np.cos(theta) - 2.2, y_m + rolls_m * np.sin(theta) - 3.6) < 0.3
+
+
+def test_a_goal_too_near_a_wall_for_the_disc_says_who_drives_the_outline(
+    floor: Callable[[float], str],
+) -> None:
+    """It told a distance alone: nobody learns from that why a car that fits does not get there."""
+    near = {"y_m": 0.5}
+    goal_only = {"navigator": "goal", "planner": "rrt-star-dubins", "local_planner": "dubins"}
+    run = drive(floor(1.4), CAR, goal=near, controller="kanayama", **goal_only)
+    assert not run.success
+    assert "goal blocked" in run.reason
+    assert "maneuver with hybrid-astar drives its outline" in run.reason
+    assert drive(floor(1.4), CAR, goal=near, navigator="maneuver", planner="hybrid-astar").success
+
+
+def test_a_sensor_that_is_missing_is_called_by_the_name_that_a_mission_has_for_it() -> None:
+    """It was called by its class: WheelOdometry."""
+    with pytest.raises(pl.InputError, match="expected one wheel-odometry among"):
+        pl.run(pl.load("museum-walls", set={"robot.sensors.odometry": None}))

@@ -173,5 +173,5 @@ def test_a_slower_gyroscope_beside_the_encoders_reads_means() -> None:
 def test_an_explorer_needs_its_encoders_once(explorer: Any, config: Any, count: int) -> None:
     others = {k: s for k, s in sheet_sensors().items() if not isinstance(s, WheelEncodersConfig)}
     told = ToldOfSheet(sensors=others | {f"encoders-{k}": WheelEncodersConfig() for k in range(count)})
-    with pytest.raises(InputError, match=f"expected one WheelEncoders among robot.sensors, found {count}"):
+    with pytest.raises(InputError, match=f"expected one wheel-encoders among robot.sensors, found {count}"):
         told.explorer(explorer, config)

@@ -21,7 +21,7 @@ from pilotage.models.footprint import Footprint
 from pilotage.models.motion.motion import MotionConfig
 from pilotage.models.motion.wheel_drive import WheelDriveConfig
 from pilotage.sensors.joint_lidar import JointLidarConfig
-from pilotage.sensors.sensor import SensorConfig
+from pilotage.sensors.sensor import SENSORS, SensorConfig
 from pilotage.sensors.wheel_encoders import WheelEncodersConfig
 from pilotage.stack.interface import Belief
 
@@ -77,8 +77,9 @@ class RobotKnowledge:
         """
         found = list(self.sensors_of(kind).items())
         if len(found) != 1:
+            names = [entry.name for entry in SENSORS if issubclass(entry.config, kind)]
             raise InputError(
-                f"{needed_by}: expected one {kind.__name__.removesuffix('Config')} among robot.sensors, "
+                f"{needed_by}: expected one {' or '.join(names)} among robot.sensors, "
                 f"found {len(found)}; the robot has: {', '.join(self.sensors) or 'none'}"
             )
         return found[0]

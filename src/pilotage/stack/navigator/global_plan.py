@@ -47,6 +47,8 @@ FAR_M = 3.0
 
 INSTEAD = " (stack.planner: hybrid-astar plans for outline and arcs)"
 """What does where a path for the centre does not."""
+AROUND = ", as the disc around the robot has it (navigator maneuver with hybrid-astar drives its outline)"
+"""Where a polygon might fit that its disc does not."""
 BESIDE_M = 0.05
 """An outline that is driven along a path keeps this from walls, or what the path keeps where that is less."""
 
@@ -258,6 +260,9 @@ class GlobalPlan:
         result = self._planner.plan(request)
         self.too_tight, self.hopeless = False, False
         if result.path is None:
+            blocked = result.status in (PlanStatus.START_BLOCKED, PlanStatus.GOAL_BLOCKED)
+            if blocked and self._is_taken_for_its_disc(clearance_m):
+                result = replace(result, reason=result.reason + AROUND)
             return result, None
         paths = [result.path]
         if self._smoother is not None and not result.given:
@@ -271,6 +276,13 @@ class GlobalPlan:
         # Nearer to walls an outline fits no better; curves in place of corners may find more room there.
         self.hopeless = not (self.too_tight and len(paths) > 1)
         return replace(result, status=PlanStatus.NO_PATH, reason=why, path=None), None
+
+    def _is_taken_for_its_disc(self, clearance_m: float) -> bool:
+        """Whether the robot is a polygon, and all of the disc around it has to be clear."""
+        robot = self._robot
+        if robot is None or robot.footprint.is_disc or self.beside_outline:
+            return False
+        return clearance_m >= robot.radius_m
 
     def _cannot_drive(self, path: Path, request: PlanRequest, clearance_m: float) -> str:
         """Why the robot cannot drive the very path; nothing where it can, or need not."""
