@@ -282,7 +282,7 @@ def test_a_goal_too_near_a_wall_for_the_disc_says_who_drives_the_outline(
 ) -> None:
     """It told a distance alone: nobody learns from that why a car that fits does not get there."""
     near = {"y_m": 0.5}
-    goal_only = {"navigator": "goal", "planner": "rrt-star-dubins", "local_planner": "dubins"}
+    goal_only: dict[str, Any] = {"navigator": "goal", "planner": "rrt-star-dubins", "local_planner": "dubins"}
     run = drive(floor(1.4), CAR, goal=near, controller="kanayama", **goal_only)
     assert not run.success
     assert "goal blocked" in run.reason
