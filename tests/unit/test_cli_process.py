@@ -228,6 +228,7 @@ def test_settings_of_others_libraries_break_nothing(tmp_path: Path) -> None:
             "MPLBACKEND": "none of these",
             "MPLCONFIGDIR": "/dev/null/no-folder",
             "NUMBA_NUM_THREADS": "0",
+            "SOURCE_DATE_EPOCH": "yesterday",
         },
     )
     assert (done.returncode, done.stderr) == (0, "")

@@ -23,6 +23,7 @@ from pilotage.tracking.robot_colour import parse_hsv
 
 BOX = "{kind: bx, from_m: [1, 2], to_m: [3, 4]}"
 LINE = "{points_m: [[-1, 0], [1, 0], [2, 0]]}"
+FAR = "{name: crater, columns: 16, rows: 16, resolution_m: 1e8, craters_per_km2: 0, landmarks_per_km2: 0}"
 WALL = "{kind: box, from_m: [4, 4], to_m: [5, 4]}"
 
 
@@ -43,6 +44,30 @@ def test_missions(settings: list[str], words: str) -> None:
     with pytest.raises(InputError) as caught:
         build_source(load_mission("museum-1", ["world.obstacles=[]", *settings], 0))
     assert words in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("mission", "setting", "words"),
+    [
+        # Arrays larger than any, in a traceback.
+        ("museum-1", "stack.mapper.cell_m=1e-9", "greater than or equal to 0.001"),
+        ("museum-unknown", "stack.navigator.map_resolution_m=1e-9", "greater than or equal to 0.005"),
+        ("museum-unknown", "stack.navigator.resolution_m=1e-9", "greater than or equal to 0.005"),
+        # An arc that was followed without an end.
+        ("museum-1-fast", "stack.local_controller={name: dwa, horizon_s: 1e9}", "less than or equal to 100"),
+        # A run whose page could not be made of its own folder.
+        ("gale-pose", f"world.map={FAR}", r"found up to 1\.6e\+09; is the resolution right\?"),
+    ],
+)
+def test_what_no_memory_holds_and_no_run_ends_with(mission: str, setting: str, words: str) -> None:
+    with pytest.raises(InputError, match=words):
+        build_source(load_mission(mission, [setting], 0))
+
+
+def test_hits_are_counted_only_where_there_is_room(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("pilotage.maps.memory.available_bytes", lambda: 10**9)
+    with pytest.raises(InputError, match=r"stack\.mapper: counting hits in cells: needs about .* GB"):
+        build(load_mission("museum-1", ["stack.mapper.cell_m=0.001"], 0))
 
 
 def test_the_parts_that_a_navigator_misses_are_named() -> None:

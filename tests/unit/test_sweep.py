@@ -167,7 +167,7 @@ def test_the_least_of_what_was_left_is_left_for_good() -> None:
 
 @pytest.mark.parametrize("width_m", [1e-5, 1e5])
 def test_a_pass_that_the_maps_cells_tell_nothing_of_is_refused(width_m: float) -> None:
-    """One of them was divided by no area, with a warning; the other was told that it starts in a wall."""
+    """One was divided by no area, with a warning; the other was told that its start stood in a wall."""
     world, _ = swept(FLOORS["a room"])
     room = {"map": "room", "bounds_m": list(world.bounds_m), "walls_m": ROOM}
     sweep = f"expected a width_m of 0.0566 to 8 for a map of 10 m x 8 m, found {width_m:g}"

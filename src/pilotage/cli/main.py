@@ -100,7 +100,7 @@ def _steady_streams() -> None:
 
 
 def _steady_environment() -> None:
-    """Pictures go to files, whatever was set for a notebook; a count of threads that is none ends Numba.
+    """Pictures go to files, whatever was set for a notebook; a number that is none ends Numba and NumPy.
 
     Matplotlib's words on a folder of its own that cannot be written are nothing to who asked for a run.
     """
@@ -114,6 +114,8 @@ def _steady_environment() -> None:
     os.environ["MPLBACKEND"] = "Agg"
     if not whole_number(os.environ.get("NUMBA_NUM_THREADS", "1")):
         del os.environ["NUMBA_NUM_THREADS"]
+    if whole_number(os.environ.get("SOURCE_DATE_EPOCH", "0")) is None:
+        del os.environ["SOURCE_DATE_EPOCH"]
 
 
 def _run(arguments: list[str], struck: list[KeyboardInterrupt]) -> int:

@@ -8,6 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from pilotage.core.errors import InputError
 from pilotage.core.types import FloatArray
 from pilotage.maps.distance_field import DistanceField
 from pilotage.maps.elevation import ElevationModel
@@ -18,6 +19,7 @@ from pilotage.maps.occupancy_grid import OccupancyGrid
 from pilotage.maps.outlines import outlines
 from pilotage.maps.segment_map import SegmentMap
 
+FARTHEST_M = 1e9
 NO_LANDMARKS = Landmarks(np.zeros(0, dtype=np.int64), np.zeros((0, 2)))
 
 
@@ -55,6 +57,21 @@ class WorldMap:
     landmarks: Landmarks = NO_LANDMARKS
     picture: NDArray[np.uint8] | None = None
     open_ground: bool = False
+
+    def __post_init__(self) -> None:
+        """Refuse what no run's folder could be read of.
+
+        Raises
+        ------
+        InputError
+            Where the map reaches beyond ``FARTHEST_M``.
+        """
+        farthest_m = max(map(abs, self.bounds_m))
+        if not farthest_m <= FARTHEST_M:
+            raise InputError(
+                f"map '{self.name}': expected all of it within {FARTHEST_M:g} m of the origin, found up to "
+                f"{farthest_m:g}; is the resolution right?"
+            )
 
     @cached_property
     def walls(self) -> SegmentMap:

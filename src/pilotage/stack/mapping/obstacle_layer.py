@@ -10,6 +10,7 @@ from pydantic import Field
 from pilotage.core.config import Config
 from pilotage.core.types import FloatArray, IntArray, Pose2
 from pilotage.kernels.scans import unexpected
+from pilotage.maps.memory import require_memory
 from pilotage.maps.world_map import WorldMap
 from pilotage.sensors.lidar import LidarConfig
 from pilotage.sensors.readings import LidarScan, Readings
@@ -28,7 +29,7 @@ class ObstacleLayerConfig(Config):
 
     reach_m: Positive = 3.0
     tolerance_m: Positive = 0.15
-    cell_m: Positive = 0.05
+    cell_m: float = Field(default=0.05, ge=0.001)
     disc_m: Positive = 0.03
     """Radius of the disc that a believed cell puts on the map, around the mean of its hits."""
     hits: int = Field(default=3, ge=1, le=1000)
@@ -59,6 +60,7 @@ class ObstacleLayer:
         self.unexplained.look_to(config.reach_m)
         xmin, ymin, xmax, ymax = chart.bounds_m
         shape = (math.ceil((ymax - ymin) / config.cell_m), math.ceil((xmax - xmin) / config.cell_m))
+        require_memory(24 * shape[0] * shape[1], "stack.mapper: counting hits in cells")
         self._hits = np.zeros(shape, dtype=np.int64)
         self._sums = np.zeros((*shape, 2))
         self._origin = (xmin, ymin)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pydantic import Field
+
 from pilotage.core.config import Config
 from pilotage.sensors.sensor import NonNegative, Positive
 
@@ -33,9 +35,9 @@ class FloorExplorerConfig(Config):
     stall_s: Positive = 15.0
     arrival_m: Positive = 0.04
     """How near to the start it has to believe to be in the end."""
-    resolution_m: Positive = 0.05
+    resolution_m: float = Field(default=0.05, ge=0.005)
     """Side of a cell of the map that it drives by, where the localizer makes none,"""
-    map_resolution_m: Positive | None = None
+    map_resolution_m: float | None = Field(default=None, ge=0.005)
     """and of the map that it leaves, drawn anew from the same scans: walls are known to half a cell."""
     keyframe_m: Positive = 0.25
     keyframe_rad: Positive = 0.2

@@ -19,7 +19,7 @@ class DwaConfig(Config):
     """The window's grid, how far its arcs are looked at, and what they cost."""
 
     ground: RollingConfig = RollingConfig()
-    horizon_s: Positive = 1.2
+    horizon_s: float = Field(default=1.2, gt=0.0, le=100.0)
     window_s: Positive = 0.25
     """The window spans what can be reached in this time; the command is held until the next step."""
     speeds: int = Field(default=9, ge=2, le=101)
