@@ -214,6 +214,15 @@ def test_what_was_not_shown_is_told_with_the_trials_it_takes() -> None:
     assert effect.detectable() == pytest.approx(2.8016 * math.sqrt(math.pi / 3) / math.sqrt(20_000), rel=0.1)
 
 
+def test_what_is_more_than_chance_by_rounding_alone_needs_no_number_of_trials() -> None:
+    """It took more than any: a study of which one such effect was found ended in a traceback."""
+    ranks = ["132", "132", "321", "123", "132", "312", "123", "213", "213"]
+    values = np.array([[float(rank) for rank in row] for row in ranks])
+    (effect,) = effects(values, ordered=[True], paired=True)
+    assert math.isfinite(effect.p_value)
+    assert math.isnan(effect.needed())
+
+
 def test_a_change_that_studies_show_is_told() -> None:
     """Of these values the tries came near to what is asked from below only, and no change was told."""
     values = np.random.default_rng(34).normal(size=(25, 3))

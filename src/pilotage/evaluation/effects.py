@@ -81,14 +81,17 @@ class Effect:
 
     def needed(self) -> float:
         """Trials that show a change like the one seen in four of five studies; nan where the one seen is no
-        more than chance brings.
+        more than chance brings, or by so little that ``MOST_TRIALS`` would not show it.
         """
         seen = seen_in(self.contrasts, paired=self.paired)
         test = RankTest(self.contrasts.shape[2], self.paired, self.alpha, self.contrasts.shape[1])
         if not (math.isfinite(self.p_value) and np.any(seen)):
             return math.nan
-        fewest = max(FEWEST, self._fewest())
-        return float(max(math.ceil(_trials(lambda trials: test.power(seen, trials))), fewest))
+        trials = _trials(lambda trials: test.power(seen, trials))
+        # What is just chance is more than that by rounding alone, as ranks come in few patterns.
+        if math.isinf(trials):
+            return math.nan
+        return float(max(math.ceil(trials), FEWEST, self._fewest()))
 
     def among(self, tests: int) -> Effect:
         """The same in a family of so many tests."""
