@@ -9,7 +9,9 @@ from pathlib import Path
 import pytest
 import yaml
 
+from pilotage.report import write_report
 from support.browser import Browser, find_browser
+from support.fabricated_run import fabricate_metrics, fabricate_run
 from support.fuzz_targets import BY_NAME, QUICK, Target
 from support.outcome import run
 
@@ -120,6 +122,16 @@ def test_markup_in_names_and_paths_is_text(make: object, browser: Browser, tmp_p
             if event.get("method") == "Network.requestWillBeSent"
         ]
         assert [url for url in asked if not url.startswith(("data:", "blob:"))] == [opened.as_uri()]
+
+
+def test_a_name_without_an_end_makes_no_page_wider_than_a_telephone(browser: Browser, tmp_path: Path) -> None:
+    """Rows of the table of metrics are named by what a run's folder holds; the page was 37,000 px wide."""
+    folder = fabricate_run(tmp_path / "run", metrics=fabricate_metrics(600) | {"w" * 3000: 1.0})
+    page = write_report(folder)
+    for width in (1200, 390):
+        browser.size(width, 800)
+        browser.open(page, "document.readyState === 'complete'")
+        assert browser.js("document.documentElement.scrollWidth") <= width
 
 
 def test_the_browser_would_be_struck(browser: Browser, tmp_path: Path) -> None:
