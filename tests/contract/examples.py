@@ -31,6 +31,8 @@ from pilotage.core.types import Goal, Pose2, Twist
 from pilotage.kernels.geometry import plane
 from pilotage.maps.distance_field import DistanceField
 from pilotage.maps.near_walls import NearWalls
+from pilotage.models.motion.motion import MotionConfig
+from pilotage.models.motion.omnidirectional import OmnidirectionalConfig
 from pilotage.sensors.readings import Readings, UltrasonicReading
 from pilotage.sim.sensing.sensor import SIMULATED_SENSORS
 from pilotage.sim.source import Simulator
@@ -66,9 +68,9 @@ class Example:
     pure_numbers: frozenset[str] = frozenset()
 
 
-def simulator(configs: dict[str, Any] | None = None) -> worlds.Alone:
+def simulator(configs: dict[str, Any] | None = None, motion: MotionConfig | None = None) -> worlds.Alone:
     """The small robot in the small room."""
-    return worlds.alone(worlds.robot(configs or sensors(), start=START))
+    return worlds.alone(worlds.robot(configs or sensors(), motion, start=START))
 
 
 def sensor_reads(_: Any, config: Any) -> None:
@@ -89,19 +91,28 @@ def sensor_reads_in_any_world(_: Any, config: Any) -> None:
 
 
 def localizer_follows(factory: Any, config: Any) -> None:
-    """Driven through the room, it stays within 5 sigma of the truth and keeps its covariance positive."""
-    sim = simulator()
+    """Driven through the room, by a base that drives sideways too, it stays within 5 sigma of the truth and
+    keeps its covariance positive."""
+    for motion, lateral_m_s in ((None, 0.0), (OmnidirectionalConfig(), 0.25)):
+        localizer_follows_a_base(factory, config, motion, lateral_m_s)
+
+
+def localizer_follows_a_base(
+    factory: Any, config: Any, motion: MotionConfig | None, lateral_m_s: float
+) -> None:
+    """A bend to the left and one to the right, at a speed to the left."""
+    sim = simulator(motion=motion)
     told = told_of(start=START, variances=(1e-4, 1e-4, 1e-4))
     localizer = told.localizer(factory, config)
     for step in range(60):
-        belief = localizer.step(sim.step(Twist(0.3, 0.4 if step < 30 else -0.4)))
+        belief = localizer.step(sim.step(Twist(0.3, 0.4 if step < 30 else -0.4, lateral_m_s)))
         assert (belief.cov == belief.cov.T).all()
         assert np.linalg.eigvalsh(belief.cov).min() > 0.0
         truth = sim.truth
         error = np.hypot(truth.x_m - belief.pose.x_m, truth.y_m - belief.pose.y_m)
         assert error < 5.0 * np.sqrt(np.linalg.eigvalsh(belief.cov[:2, :2])[-1])
     handed_out = belief.cov.copy()
-    localizer.step(sim.step(Twist(0.3, 0.0)))
+    localizer.step(sim.step(Twist(0.3, 0.0, lateral_m_s)))
     assert (belief.cov == handed_out).all(), "a belief that was handed out must not change"
 
 

@@ -11,6 +11,8 @@ from hypothesis import strategies as st
 
 from pilotage.core.errors import InputError
 from pilotage.core.types import Pose2, Twist, WheelSpeeds
+from pilotage.kernels.bodies.drive import ANGLE, DISTANCE
+from pilotage.kernels.geometry.motion import exact_arc, sideways
 from pilotage.maps.occupancy_grid import OccupancyGrid
 from pilotage.maps.segment_map import SegmentMap
 from pilotage.maps.world_map import WorldMap
@@ -207,3 +209,17 @@ def test_wheel_speeds_are_for_wheel_drives(motion: MotionConfig) -> None:
     sim = simulator(robot(motion=motion), EMPTY)
     with pytest.raises(InputError, match=r"robot\.motion: expected a twist as command, found WheelSpeeds"):
         sim.step([WheelSpeeds(1.0, 1.0)])
+
+
+def test_what_wheels_of_their_own_speed_drive_is_told_with_what_is_beside_an_arc() -> None:
+    sim = simulator(robot(motion=WheelDriveConfig(motor_lag_s=0.3), start=Pose2(1.0, 2.0, 0.4)), EMPTY, 0.2)
+    body, told, aside = sim.bodies[0], Pose2(1.0, 2.0, 0.4), []
+    for k in range(30):
+        sim.step([Twist(0.3, 3.0 if k % 6 < 3 else -3.0)])
+        distance, lateral, angle = body.state[DISTANCE : ANGLE + 1].tolist()
+        x, y, theta = exact_arc(told.x_m, told.y_m, told.theta_rad, distance, angle)
+        dx, dy = sideways(theta, lateral, angle, True)
+        told = Pose2(x + dx, y + dy, theta)
+        aside.append(abs(lateral))
+    assert max(aside) > 1e-5
+    assert told.as_array() == pytest.approx(body.pose.as_array(), abs=1e-9)

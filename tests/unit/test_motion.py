@@ -11,7 +11,9 @@ from hypothesis import strategies as st
 
 from pilotage.core.angles import wrap_to_pi
 from pilotage.core.types import FloatArray, Pose2
-from pilotage.models.odometry import OdometryModel, move, move_jacobians
+from pilotage.kernels.filters.ekf import predict_sideways
+from pilotage.kernels.geometry.motion import exact_arc, sideways
+from pilotage.models.odometry import OdometryModel, chord, move, move_jacobians
 from pilotage.models.range_bearing import range_bearing
 
 angle = st.floats(-3.1, 3.1)
@@ -98,3 +100,44 @@ def test_bearing_is_measured_from_the_heading_counter_clockwise() -> None:
 def test_landmark_on_the_sensor_is_refused() -> None:
     with pytest.raises(ValueError, match="undefined"):
         range_bearing(Pose2(1.0, 1.0, 0.0), np.array([1.0, 1.0]), np.zeros(3))
+
+
+@given(angle, st.floats(-2.0, 2.0), st.floats(-2.5, 2.5), st.floats(-2.0, 2.0))
+def test_an_arc_with_a_drift_to_the_left_is_what_small_steps_add_up_to(
+    theta: float, distance: float, turn: float, lateral: float
+) -> None:
+    x, y, heading = exact_arc(1.0, -2.0, theta, distance, turn)
+    dx, dy = sideways(heading, lateral, turn, True)
+    parts = 2000
+    headings = theta + turn * (np.arange(parts) + 0.5) / parts
+    forward, left = distance / parts, lateral / parts
+    driven_x = (forward * np.cos(headings) - left * np.sin(headings)).sum()
+    driven_y = (forward * np.sin(headings) + left * np.cos(headings)).sum()
+    assert [x + dx, y + dy] == pytest.approx([1.0 + driven_x, -2.0 + driven_y], abs=1e-5)
+    length, aside = chord(distance, turn, lateral)
+    assert [length * math.cos(theta + aside), length * math.sin(theta + aside)] == pytest.approx(
+        [driven_x, driven_y], abs=1e-5
+    )
+
+
+@given(angle, st.floats(-2.5, 2.5), st.floats(-2.0, 2.0), st.booleans())
+def test_a_drift_to_the_left_moves_the_covariance_by_its_jacobians(
+    theta: float, turn: float, lateral: float, exact: bool
+) -> None:
+    root = np.random.default_rng(4).normal(size=(5, 5))
+    before, variance = root @ root.T, 0.3
+
+    def moved(state: FloatArray, left: float) -> FloatArray:
+        out = state.copy()
+        out[:2] += sideways(out[2], left, turn, exact)
+        return out
+
+    state = np.array([1.0, -2.0, theta, 0.3, 0.4])
+    F, G = np.empty((5, 5)), (moved(state, lateral + STEP) - moved(state, lateral - STEP)) / (2 * STEP)
+    for i, shift in enumerate(np.eye(5) * STEP):
+        F[:, i] = (moved(state + shift, lateral) - moved(state - shift, lateral)) / (2 * STEP)
+    there, cov = state.copy(), before.copy()
+    predict_sideways(there, cov, lateral, turn, variance, exact)
+    assert there == pytest.approx(moved(state, lateral))
+    assert cov == pytest.approx(F @ before @ F.T + variance * np.outer(G, G), abs=1e-5)
+    assert (cov == cov.T).all()

@@ -22,7 +22,7 @@ def drive(recent: RecentSightings, landmarks: tuple[int, ...], dt_s: float = 0.4
             distance, angle = 0.15, 0.2
             middle = pose[2] + 0.5 * angle
             pose = pose + np.array([distance * np.cos(middle), distance * np.sin(middle), angle])
-            recent.move(distance, angle, k * dt_s)
+            recent.move(distance, 0.0, angle, k * dt_s)
         c, s = np.cos(pose[2]), np.sin(pose[2])
         sensor = pose[:2] + np.array([[c, -s], [s, c]]) @ MOUNT[:2]
         away = POINTS[landmark] - sensor
@@ -52,7 +52,7 @@ def test_too_little_gives_no_pose() -> None:
 def test_old_sightings_and_those_before_unknown_motion_are_dropped() -> None:
     recent = RecentSightings()
     drive(recent, (0, 1, 2))
-    recent.move(0.1, 0.0, 2.0 * WINDOW_S)
+    recent.move(0.1, 0.0, 0.0, 2.0 * WINDOW_S)
     assert recent.fix(POINTS, R, least_landmarks=2) is None
     drive(recent, (0, 1, 2))
     recent.forget()

@@ -103,7 +103,7 @@ def test_the_kept_matrix_has_a_column_for_each_wall() -> None:
 
 
 def test_its_scan_heading_needs_a_compass() -> None:
-    with pytest.raises(InputError, match="Compass"):
+    with pytest.raises(InputError, match="one compass"):
         build(load_mission("museum-walls-report", ["robot.sensors.compass=null"]))
 
 

@@ -36,7 +36,7 @@ BODY_COLUMNS = ("v_true_m_s", "w_true_rad_s", "clearance_m", "collisions")
 ODOMETRY_COLUMNS = ("odom_distance_m", "odom_angle_rad")
 """The wheel odometry's readings since the row before; nan where there were none."""
 LATERAL_COLUMNS = ("odom_lateral_m",)
-"""Of readings that are told as one, and of a base that drives sideways."""
+"""Of readings that are told as one, of wheels that speed up apart, and of a base that drives sideways."""
 SIDEWAYS_COLUMNS = ("lateral_cmd_m_s",)
 
 
@@ -57,7 +57,8 @@ class Recorder:
         self._driven = OdometrySince()
         self._by_wheels = isinstance(member.known.motion, WheelDriveConfig)
         self._sideways = isinstance(member.known.motion, OmnidirectionalConfig)
-        self._lateral = self._sideways or (thinned and self._odometer is not None)
+        tells_aside = thinned or self._by_wheels  # steps that add up to no arc
+        self._lateral = self._sideways or (tells_aside and self._odometer is not None)
         self._rows = array("d")
         self.names = (
             *TRUTH_COLUMNS,

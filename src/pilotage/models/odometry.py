@@ -52,8 +52,11 @@ def increment_variances(
     )
 
 
-def chord(distance_m: float, angle_rad: float) -> tuple[float, float]:
-    """The straight line of an arc: its length, and its direction less the heading at the arc's begin."""
+def chord(distance_m: float, angle_rad: float, lateral_m: float = 0.0) -> tuple[float, float]:
+    """The straight line of an arc, along which a base may drive to its left besides: its length, and its
+    direction less the heading at the arc's begin."""
     half = 0.5 * angle_rad
     shrink = 1.0 if abs(half) < 1e-9 else math.sin(half) / half
-    return distance_m * shrink, half
+    if lateral_m == 0.0:
+        return distance_m * shrink, half
+    return math.hypot(distance_m, lateral_m) * shrink, half + math.atan2(lateral_m, distance_m)

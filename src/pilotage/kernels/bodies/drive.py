@@ -250,6 +250,12 @@ def drive(
                 break
         elif state[TOUCHING] == 1.0 and clearance >= release:
             state[TOUCHING] = 0.0
+    if count > 1 and abs(state[ANGLE]) < math.pi:
+        # Moves that turn differently add up to no arc: what is beside it is told as driven to the left.
+        dx, dy, ratio = x - state[X], y - state[Y], chord_ratio(state[ANGLE])
+        middle = state[THETA] + 0.5 * state[ANGLE]
+        c, s = math.cos(middle), math.sin(middle)
+        state[DISTANCE], state[LATERAL] = (c * dx + s * dy) / ratio, (c * dy - s * dx) / ratio
     state[X], state[Y], state[THETA], state[CLEARANCE] = x, y, theta, clearance
     if is_anybody(others):
         place_outline(state, outline, others, own)

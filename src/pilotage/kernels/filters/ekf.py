@@ -14,7 +14,7 @@ from pilotage.kernels.filters.sighting import (
     landmark_index,
     range_bearing,
 )
-from pilotage.kernels.geometry.motion import arc_jacobians, exact_arc, mid_angle, wrap
+from pilotage.kernels.geometry.motion import arc_jacobians, exact_arc, mid_angle, sideways, wrap
 from pilotage.kernels.jit import kernel
 
 
@@ -44,6 +44,34 @@ def predict(
                     value += G[i, a] * Q[a, b] * G[j, b]
             cov[i, j] = value
             cov[j, i] = value
+
+
+@kernel
+def predict_sideways(
+    pose: FloatArray, cov: FloatArray, lateral: float, angle: float, variance: float, exact: bool
+) -> None:
+    """Move ``pose`` and ``cov``, states of which the first three are x, y and theta, in place by what a base
+    drove to its left while it turned by ``angle``; after the prediction of its arc.
+
+    P <- F P F' + G q G' with F and G in the pose and the lateral distance, whose variance is ``variance``.
+    """
+    dx, dy = sideways(pose[2], lateral, angle, exact)
+    pose[0] += dx
+    pose[1] += dy
+    # F is the identity but for its third column: (-dy, dx, 1).
+    for j in range(cov.shape[0]):
+        cov[0, j] -= dy * cov[2, j]
+        cov[1, j] += dx * cov[2, j]
+    for i in range(cov.shape[0]):
+        cov[i, 0] -= dy * cov[i, 2]
+        cov[i, 1] += dx * cov[i, 2]
+    gx, gy = sideways(pose[2], 1.0, angle, exact)
+    cov[0, 0] += variance * gx * gx
+    cov[0, 1] += variance * gx * gy
+    cov[1, 1] += variance * gy * gy
+    for i in range(2):
+        for j in range(i + 1, cov.shape[0]):
+            cov[j, i] = cov[i, j]  # to the last bit
 
 
 @kernel

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pilotage.kernels.arrays import FloatArray, IntArray
-from pilotage.kernels.geometry.motion import exact_arc, mid_angle, wrap
+from pilotage.kernels.geometry.motion import exact_arc, mid_angle, sideways, wrap
 from pilotage.kernels.geometry.nearest import distances_by_node
 from pilotage.kernels.jit import kernel
 
@@ -33,6 +33,18 @@ def sample_motion(
             poses[i, 0], poses[i, 1], poses[i, 2] = exact_arc(poses[i, 0], poses[i, 1], poses[i, 2], d, a)
         else:
             poses[i, 0], poses[i, 1], poses[i, 2] = mid_angle(poses[i, 0], poses[i, 1], poses[i, 2], d, a)
+
+
+@kernel
+def sample_sideways(
+    poses: FloatArray, lateral: float, angle: float, lateral_std: float, normals: FloatArray, exact: bool
+) -> None:
+    """Move every particle (N, 3) in place by what a base drove to its left along an arc that turned by
+    ``angle``, drawn with its ``normals`` (N,); after ``sample_motion``."""
+    for i in range(poses.shape[0]):
+        dx, dy = sideways(poses[i, 2], lateral + lateral_std * normals[i], angle, exact)
+        poses[i, 0] += dx
+        poses[i, 1] += dy
 
 
 @kernel

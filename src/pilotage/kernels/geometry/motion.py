@@ -56,6 +56,18 @@ def mid_angle(x: float, y: float, theta: float, distance: float, angle: float) -
 
 
 @kernel
+def sideways(theta: float, lateral: float, angle: float, exact: bool) -> tuple[float, float]:
+    """How far x and y go besides, of a base that drives ``lateral`` to its left along an arc.
+
+    ``theta`` is its heading at the end of the arc, which turned by ``angle``: all the way the left is a
+    quarter turn from the arc's own direction, so this displacement's chord is, too.
+    """
+    chord = lateral * chord_ratio(angle) if exact else lateral
+    middle = theta - 0.5 * angle
+    return -chord * math.sin(middle), chord * math.cos(middle)
+
+
+@kernel
 def arc_jacobians(
     theta: float, distance: float, angle: float, exact: bool, F: FloatArray, G: FloatArray
 ) -> None:

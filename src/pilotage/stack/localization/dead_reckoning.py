@@ -117,8 +117,9 @@ class DeadReckoningLocalizer:
         return self.belief
 
     def _move_by_moments(self, odometry: OdometryIncrement) -> None:
-        chord_m, aside_rad = chord(odometry.distance_m, odometry.angle_rad)
+        chord_m, aside_rad = chord(odometry.distance_m, odometry.angle_rad, odometry.lateral_m)
         q_distance, q_turn = self._prediction.variances(odometry)
+        q_distance += self._prediction.lateral_variance(odometry)
         if self._path is not None:
             move = cmath.rect(chord_m, float(self._pose[2]) + aside_rad)
             self._path.add(move, float(self._cov[2, 2]), q_distance)

@@ -10,7 +10,7 @@ import numpy as np
 from pilotage.core.chi_square import chi_square_quantile, gated_mean
 from pilotage.core.errors import InputError
 from pilotage.core.types import FloatArray, Pose2
-from pilotage.kernels.filters import gauss_markov
+from pilotage.kernels.filters import ekf, gauss_markov
 from pilotage.kernels.filters.sighting import OUTCOME_ACCEPTED, OUTCOME_GATED, landmark_index
 from pilotage.maps.world_map import WorldMap
 from pilotage.models.odometry import OdometryModel
@@ -136,7 +136,7 @@ class EkfGaussMarkovLocalizer:
         self._cov[:3, :3] = initial.cov
         floor = [config.recovery_position_std_m] * 2 + [config.recovery_heading_std_rad]
         self._floor: FloatArray = np.array(floor) ** 2
-        self._pending: deque[tuple[float, float, float, float]] = deque()
+        self._pending: deque[tuple[float, float, float, float, float]] = deque()
         self._unlogged_s = 0.0
         self._recent = RecentSightings()
         self._t_s: float | None = None
@@ -163,7 +163,8 @@ class EkfGaussMarkovLocalizer:
             # What is missing is told below; here speaks what came and cannot be.
             self._watch.widen(self._cov, readings.t_s, odometry)
         if isinstance(odometry, OdometryIncrement) and readings.t_s > last:
-            self._pending.append((last, readings.t_s, odometry.distance_m, odometry.angle_rad))
+            moved = odometry.distance_m, odometry.angle_rad, odometry.lateral_m
+            self._pending.append((last, readings.t_s, *moved))
         self._move(last, readings.t_s)
         seen = readings.by_sensor.get(self._beacons)
         if isinstance(seen, BeaconReadings):
@@ -190,7 +191,7 @@ class EkfGaussMarkovLocalizer:
             if not self._pending or self._pending[0][0] + delay >= end_s:
                 self._wonder(end_s - at)
                 return
-            start, stop, distance, angle = self._pending[0]
+            start, stop, distance, angle, lateral = self._pending[0]
             if start + delay > at + 1e-9:
                 self._wonder(start + delay - at)
                 at = start + delay
@@ -198,7 +199,7 @@ class EkfGaussMarkovLocalizer:
             self._unlogged_s = 0.0
             until = min(stop + delay, end_s)
             share = (until - at) / (stop - start)
-            self._predict(share * distance, share * angle, until - at)
+            self._predict(share * distance, share * angle, until - at, share * lateral)
             at = until
 
     def _wonder(self, dt_s: float) -> None:
@@ -215,7 +216,7 @@ class EkfGaussMarkovLocalizer:
         heading = min(heading, max(MOST_HEADING_VAR - self._cov[2, 2], 0.0))
         gauss_markov.inflate(self._cov, 1.0, np.array([place, place, heading]))
 
-    def _predict(self, distance: float, angle: float, dt_s: float) -> None:
+    def _predict(self, distance: float, angle: float, dt_s: float, lateral: float = 0.0) -> None:
         if dt_s <= 0.0:
             return
         config, commands = self._config, self._config.commands
@@ -236,7 +237,10 @@ class EkfGaussMarkovLocalizer:
             self._stationary,
         )
         state = self._state
-        self._recent.move(moved, turned, self._t_s or 0.0)
+        if lateral != 0.0:  # its errors are not among the states
+            variance = self._noise.lateral_variance(OdometryIncrement(0.0, 0.0, lateral))
+            ekf.predict_sideways(state, self._cov, lateral, turned, variance, True)
+        self._recent.move(moved, lateral, turned, self._t_s or 0.0)
         self._motion[0] = moved / dt_s * (1.0 + state[gauss_markov.SPEED]) + state[gauss_markov.SPEED_OFFSET]
         self._motion[1] = turned / dt_s * (1.0 + state[gauss_markov.TURN]) + state[gauss_markov.TURN_OFFSET]
 

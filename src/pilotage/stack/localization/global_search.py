@@ -133,7 +133,7 @@ class GlobalSearch:
         turn_m = self._config.turn_counts_m_per_rad * abs(odometry.angle_rad)
         for hypothesis in self.hypotheses:
             self._prediction.move(hypothesis.pose, hypothesis.cov, odometry)
-            hypothesis.driven_m += abs(odometry.distance_m) + turn_m
+            hypothesis.driven_m += math.hypot(odometry.distance_m, odometry.lateral_m) + turn_m
 
     def look(self, lines: DetectedLines, ranges_m: FloatArray) -> Hypothesis | None:
         """Weigh the hypotheses by a scan; returns the one to be believed, if there is."""

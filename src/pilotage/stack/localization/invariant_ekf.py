@@ -105,10 +105,18 @@ class InvariantEkfLocalizer:
         """Predict by the odometry increment, then update by every landmark seen."""
         odometry = self._motion.increment(readings, self.belief)
         if odometry is not None:
-            chord_m, aside_rad = chord(odometry.distance_m, odometry.angle_rad)
-            variances = self._prediction.variances(odometry)
+            chord_m, aside_rad = chord(odometry.distance_m, odometry.angle_rad, odometry.lateral_m)
+            distance_var, angle_var = self._prediction.variances(odometry)
+            distance_var += self._prediction.lateral_variance(odometry)
             rover_filter.predict(
-                self._state, self._cov, self._anchor, chord_m, aside_rad, odometry.angle_rad, *variances
+                self._state,
+                self._cov,
+                self._anchor,
+                chord_m,
+                aside_rad,
+                odometry.angle_rad,
+                distance_var,
+                angle_var,
             )
         place, heading = self._watch.variances(readings.t_s, odometry)
         if place > 0.0 or heading > 0.0:

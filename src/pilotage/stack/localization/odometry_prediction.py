@@ -70,11 +70,20 @@ class OdometryPrediction:
 
     def variances(self, odometry: OdometryIncrement) -> tuple[float, float]:
         """Variances of an increment's distance and angle."""
-        found = increment_variances(odometry.distance_m, odometry.angle_rad, *self._densities)
+        distance, angle = increment_variances(odometry.distance_m, odometry.angle_rad, *self._densities)
+        if odometry.lateral_m != 0.0:
+            angle += increment_variances(odometry.lateral_m, 0.0, *self._densities)[1]
         own = odometry.angle_var_rad2
-        return found if own is None else (found[0], own)
+        return distance, angle if own is None else own
+
+    def lateral_variance(self, odometry: OdometryIncrement) -> float:
+        """Variance of what an increment tells of driving to the left, which errs as driving forwards does."""
+        return increment_variances(odometry.lateral_m, 0.0, *self._densities)[0]
 
     def move(self, pose: FloatArray, cov: FloatArray, odometry: OdometryIncrement) -> None:
         """Move ``pose`` (3,) and ``cov`` (3, 3) in place."""
         self._Q[0, 0], self._Q[1, 1] = self.variances(odometry)
         self._predict(pose, cov, odometry.distance_m, odometry.angle_rad, self._Q, self.exact)
+        if odometry.lateral_m != 0.0:
+            variance = self.lateral_variance(odometry)
+            ekf.predict_sideways(pose, cov, odometry.lateral_m, odometry.angle_rad, variance, self.exact)

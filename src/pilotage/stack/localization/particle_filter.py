@@ -214,7 +214,8 @@ class ParticleFilterLocalizer:
 
     def _move(self, odometry: OdometryIncrement) -> None:
         moved_m, turned_rad = self._moved
-        self._moved = (moved_m + abs(odometry.distance_m), turned_rad + abs(odometry.angle_rad))
+        driven_m = math.hypot(odometry.distance_m, odometry.lateral_m)
+        self._moved = (moved_m + driven_m, turned_rad + abs(odometry.angle_rad))
         if self._relocalization is not None:
             self._relocalization.move(odometry)
         distance_var, angle_var = self._prediction.variances(odometry)
@@ -227,6 +228,15 @@ class ParticleFilterLocalizer:
             self._rng.standard_normal((self._poses.shape[0], 2)),
             self._prediction.exact,
         )
+        if odometry.lateral_m != 0.0:
+            particles.sample_sideways(
+                self._poses,
+                odometry.lateral_m,
+                odometry.angle_rad,
+                math.sqrt(self._prediction.lateral_variance(odometry)),
+                self._rng.standard_normal((self._poses.shape[0],)),
+                self._prediction.exact,
+            )
 
     def _spread(self, place_m2: float, heading_rad2: float) -> None:
         """Move the particles apart by what the odometry has not told."""

@@ -34,13 +34,14 @@ class RecentSightings:
     def __init__(self) -> None:
         self._seen: deque[_Sighting] = deque()
 
-    def move(self, distance_m: float, angle_rad: float, t_s: float) -> None:
-        """The robot has moved along an arc; what is too old is dropped."""
+    def move(self, distance_m: float, lateral_m: float, angle_rad: float, t_s: float) -> None:
+        """The robot has moved along an arc, and to its left besides; what is too old is dropped."""
         while self._seen and self._seen[0].t_s < t_s - WINDOW_S:
             self._seen.popleft()
-        if distance_m == 0.0 and angle_rad == 0.0:
+        if distance_m == lateral_m == angle_rad == 0.0:
             return
-        dx, dy = distance_m * math.cos(0.5 * angle_rad), distance_m * math.sin(0.5 * angle_rad)
+        half_c, half_s = math.cos(0.5 * angle_rad), math.sin(0.5 * angle_rad)
+        dx, dy = distance_m * half_c - lateral_m * half_s, distance_m * half_s + lateral_m * half_c
         c, s = math.cos(angle_rad), math.sin(angle_rad)
         for sighting in self._seen:
             x, y = sighting.x_m - dx, sighting.y_m - dy

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -74,7 +75,8 @@ class Relocalization:
         """Carry everything along."""
         self._scans.move(odometry.distance_m, odometry.lateral_m, odometry.angle_rad)
         if self.trial is not None:
-            self.trial.path_m += abs(odometry.distance_m) + TURN_AS_PATH_M * abs(odometry.angle_rad)
+            driven_m = math.hypot(odometry.distance_m, odometry.lateral_m)
+            self.trial.path_m += driven_m + TURN_AS_PATH_M * abs(odometry.angle_rad)
             if self.trial.path_m > LONGEST_TRIAL_M:
                 self.trial = None
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from pilotage.core.errors import InputError
 from pilotage.core.types import STOP, FloatArray, Pose2, Twist
-from pilotage.kernels.geometry.motion import exact_arc
+from pilotage.kernels.geometry.motion import exact_arc, sideways
 from pilotage.models.footprint import Footprint
 from pilotage.models.odometry import increment_variances
 from pilotage.sensors.lidar import LidarConfig
@@ -74,7 +74,11 @@ class LocalDrive:
             return
         elapsed_s = readings.t_s - self._moved_s
         if elapsed_s > 0.0:
-            self._twist = Twist(odometry.distance_m / elapsed_s, odometry.angle_rad / elapsed_s)
+            self._twist = Twist(
+                odometry.distance_m / elapsed_s,
+                odometry.angle_rad / elapsed_s,
+                odometry.lateral_m / elapsed_s,
+            )
             wheels = self._wheels
             distance_var, angle_var = increment_variances(
                 odometry.distance_m,
@@ -87,9 +91,9 @@ class LocalDrive:
             self._twist_vars = distance_var / elapsed_s**2, angle_var / elapsed_s**2
         self._moved_s = readings.t_s
         pose = self._pose
-        self._pose = Pose2(
-            *exact_arc(pose.x_m, pose.y_m, pose.theta_rad, odometry.distance_m, odometry.angle_rad)
-        )
+        x, y, theta = exact_arc(pose.x_m, pose.y_m, pose.theta_rad, odometry.distance_m, odometry.angle_rad)
+        dx, dy = sideways(theta, odometry.lateral_m, odometry.angle_rad, True)
+        self._pose = Pose2(x + dx, y + dy, theta)
 
     def toward(
         self,
