@@ -26,7 +26,7 @@ DRIVES, STEPS, DT_S = 80, 120, 0.1
 START = Pose2(4.0, 3.0, 0.4)
 SURE = (1e-8, 1e-8, 1e-8)
 FALSE_ALARM = 1e-4
-BY_ODOMETRY = (
+BY_ODOMETRY: tuple[tuple[str, dict[str, Any]], ...] = (
     ("dead-reckoning", {}),
     ("dead-reckoning", {"covariance": "second-order"}),
     ("ekf-landmarks", {}),
