@@ -22,6 +22,7 @@ from pilotage.stack.patrol.graph import PatrolGraph
 from pilotage.stack.patrol.leg_times import LegTimes
 from pilotage.stack.patrol.messages import PatrolMemory
 from pilotage.stack.patrol.partition import Plan, annealed, even_sizes, partition
+from pilotage.stack.patrol.passages import OPEN, Passages, Stretch
 from pilotage.stack.patrol.strategies.adaptive_rounds import (
     AdaptiveRoundsConfig,
     AdaptiveRoundsStrategy,
@@ -479,8 +480,29 @@ def test_who_is_evenly_spaced_by_time_does_not_wait(places: int, late_s: float, 
 
     Of 32 places legs tell where the mate is to 4 s; a tenth of the time between the two is 13 s.
     """
+    assert waits_for_a_mate(places, late_s) is waits
+
+
+def test_nobody_waits_for_who_waits_itself() -> None:
+    """Each by what it learnt of the legs, all eight of a round stood and waited for another."""
+    assert waits_for_a_mate(8, 6.0)
+    assert not waits_for_a_mate(8, 6.0, mate_waits=True)
+
+
+@pytest.mark.parametrize(("begin_m", "waits"), [(0.0, False), (0.4, False), (0.8, True)])
+def test_nobody_waits_where_the_late_one_has_to_come_by(begin_m: float, *, waits: bool) -> None:
+    here, there = Round.best(ring()).stops[:2].tolist()
+    ahead, back = Stretch(0, 1, begin_m, 1.0), Stretch(0, 1, 2.0, 3.0 - begin_m)
+    narrow = Passages({(here, there): (ahead,), (there, here): (back,)}, 1)
+    assert waits_for_a_mate(8, 6.0, passages=narrow) is waits
+
+
+def waits_for_a_mate(
+    places: int, late_s: float, *, mate_waits: bool = False, passages: Passages = OPEN
+) -> bool:
+    """Whether a robot waits for one half of the round, by time, ahead of it, or late by some seconds."""
     graph = ring(places)
-    setting = setting_for(graph, starts=(0, 0))
+    setting = replace(setting_for(graph, starts=(0, 0)), passages=passages)
     strategy = AdaptiveRoundsStrategy(AdaptiveRoundsConfig(), setting)
     walk, memory = strategy._round, memory_at(0, graph)
     assert len(strategy._plan.sizes) == 1
@@ -496,7 +518,9 @@ def test_who_is_evenly_spaced_by_time_does_not_wait(places: int, late_s: float, 
     mate = PatrolMemory(len(graph), 1, 2, int(walk.stops[last]), SPEED_M_S)
     words = np.array([strategy.words(memory.knowledge(t_s))[0], walk.at_m[last], t_s - since_s + late_s, 0.0])
     mate.update(t_s, words=words)
+    if not mate_waits:
+        mate.bound(int(walk.stops[last + 1]), t_s, t_s + 4.0)
     memory.receive(mate.message(t_s))
     here = int(walk.stops[0])
     memory.visit(here, t_s)
-    assert (strategy.next_vertex(memory.knowledge(t_s)) == here) is waits
+    return strategy.next_vertex(memory.knowledge(t_s)) == here

@@ -78,6 +78,10 @@ class Passages:
                 pieces += len(parts)
         return Passages(found, pieces)
 
+    def vertices_in(self, beside_m: float) -> frozenset[int]:
+        """Vertices in a passage, or no farther beside one: who stands there is in the way of all others."""
+        return frozenset(a for (a, _), parts in self.stretches.items() if parts[0].begin_m <= beside_m)
+
     def passed(self, walk: Round) -> tuple[BoolArray, FloatArray]:
         """Every time that a closed walk comes through a passage.
 

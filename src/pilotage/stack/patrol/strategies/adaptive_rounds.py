@@ -40,6 +40,8 @@ class AdaptiveRoundsConfig(Config):
     those in which robots on one round are ``headway_m`` apart and do not meet in passages. A robot waits
     while it is further ahead of its place among those that share its round than ``slack`` of a mean leg
     between stops, within which nobody knows where the others are, or ``most_slack`` of the time between them.
+    At a stop in a passage that has room for one, or no farther than ``beside_passage_m`` from it, it never
+    waits: those who are late would have to come by.
     """
 
     mean_weight: NonNegative = 2.0
@@ -50,6 +52,7 @@ class AdaptiveRoundsConfig(Config):
     headway_m: NonNegative = 6.0
     slack: Positive = 0.5
     most_slack: Positive = Field(default=0.1, le=0.5)
+    beside_passage_m: NonNegative = 0.5
     silent_s: Positive = 30.0
     silent_ratio: Positive = 8.0
     """A robot is given up when its last word is so old, and so many times as old as it usually is; one that
@@ -114,6 +117,7 @@ class AdaptiveRoundsStrategy:
     def __init__(self, config: AdaptiveRoundsConfig, setting: PatrolSetting) -> None:
         self._config, self._setting, self._graph = config, setting, setting.graph
         team = setting.team_size
+        self._tight = setting.passages.vertices_in(config.beside_passage_m)
         self._side, self._shut = frozenset(range(team)), NONE_SHUT
         self._away_m = self._graph.shortest_m
         self._plan = best_plan(setting, team, config)
@@ -300,7 +304,9 @@ class AdaptiveRoundsStrategy:
         return any(state.words[KEY] == _key(self._round) for state in self._mates(knowledge))
 
     def _is_ahead(self, knowledge: PatrolKnowledge) -> bool:
-        """Whether to wait here: ahead of the even spacing, and not waited for long yet."""
+        """Whether to wait here: ahead of the even spacing, in nobody's way, and not waited for long yet."""
+        if knowledge.at in self._tight:
+            return False
         key = _key(self._round)
         mates = [state for state in self._mates(knowledge) if state.words[KEY] == key]
         size = 1 + len(mates)
@@ -314,9 +320,11 @@ class AdaptiveRoundsStrategy:
         gap_s = np.mod(gap_s - along_s[self._place], along_s[-1])
         # How much farther the others are than their places in the row say, as seen from here.
         off_s = _off_even(gap_s, apart_s, complete=len(mates) + 1 == size)
+        # Who waits itself is not late by its own account: waiting for each other, all would stand.
+        goes = np.array([state.at != state.target for state in mates])
         # Measured from the last one of all: by neighbours' gaps or the mean, small errors add up along the
         # row.
-        ahead_s = -float(off_s.min())
+        ahead_s = -float(off_s[goes].min(initial=0.0))
         leg_s, config = float(along_s[-1]) / len(self._round.stops), self._config
         slack_s = min(config.slack * leg_s, config.most_slack * apart_s)
         if ahead_s <= slack_s or self._waited_s > 0.5 * apart_s:
