@@ -81,7 +81,7 @@ def serve(mission: Mission, speed: float = 1.0, duration_s: float | None = None)
                 node.publish("/odom", ros.odometry(t_s, "odom", "base_link", reckoned, speeds))
                 frames = [ros.transform(t_s, "odom", "base_link", reckoned)]
                 if sheet is not None:
-                    frames.append(ros.transform(t_s, "base_link", "laser", _mount(sheet)))
+                    frames.append(ros.transform(t_s, "base_link", "laser", sheet.mount.pose))
                 node.publish("/tf", {"transforms": frames})
                 if duration_s is not None and t_s >= duration_s - 1e-9:
                     break
@@ -105,10 +105,6 @@ def serve(mission: Mission, speed: float = 1.0, duration_s: float | None = None)
             "collisions": sim.collisions[0],
             "end": {"x_m": sim.poses[0].x_m, "y_m": sim.poses[0].y_m, "theta_rad": sim.poses[0].theta_rad},
         }
-
-
-def _mount(sheet: LidarConfig) -> Pose2:
-    return sheet.mount.pose
 
 
 def _odometry(readings: Readings, before: Pose2, dt_s: float) -> tuple[Pose2, ros.Fields]:

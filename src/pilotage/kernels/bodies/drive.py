@@ -9,7 +9,7 @@ import math
 
 from pilotage.kernels.arrays import FloatArray, IntArray
 from pilotage.kernels.bodies.clearances import all_clearance, fixed_clearance, others_clearance
-from pilotage.kernels.geometry.motion import chord_ratio, wrap
+from pilotage.kernels.geometry.motion import chord_ratio, turned_part
 from pilotage.kernels.geometry.solids import Fixed, Others, Outline, is_anybody
 from pilotage.kernels.jit import kernel
 
@@ -40,19 +40,6 @@ GRAZE_M = 1e-3
 CONTACT_M = 1e-6
 """Bodies nearer than this touch."""
 BISECTIONS = 40
-
-
-@kernel
-def turned_part(
-    x: float, y: float, theta: float, distance: float, lateral: float, angle: float, part: float
-) -> tuple[float, float, float]:
-    """Pose after a part of a move at constant twist, without ``lateral`` an arc (Thrun et al. 2005, 5.9)."""
-    turned = part * angle
-    ratio = chord_ratio(turned)
-    chord, side = part * distance * ratio, part * lateral * ratio
-    middle = theta + 0.5 * turned
-    c, s = math.cos(middle), math.sin(middle)
-    return x + chord * c - side * s, y + chord * s + side * c, wrap(theta + turned)
 
 
 @kernel

@@ -49,6 +49,19 @@ def exact_arc(x: float, y: float, theta: float, distance: float, angle: float) -
 
 
 @kernel
+def turned_part(
+    x: float, y: float, theta: float, distance: float, lateral: float, angle: float, part: float
+) -> tuple[float, float, float]:
+    """Pose after a part of a move at constant twist, without ``lateral`` an arc (Thrun et al. 2005, 5.9)."""
+    turned = part * angle
+    ratio = chord_ratio(turned)
+    chord, side = part * distance * ratio, part * lateral * ratio
+    middle = theta + 0.5 * turned
+    c, s = math.cos(middle), math.sin(middle)
+    return x + chord * c - side * s, y + chord * s + side * c, wrap(theta + turned)
+
+
+@kernel
 def mid_angle(x: float, y: float, theta: float, distance: float, angle: float) -> tuple[float, float, float]:
     """The night-watch report's odometry model, its eq. 1-3: the arc taken for its chord."""
     middle = theta + 0.5 * angle

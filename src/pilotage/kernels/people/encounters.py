@@ -19,9 +19,9 @@ from pilotage.kernels.bodies.drive import (
     TOUCHING,
     X,
     Y,
-    turned_part,
 )
 from pilotage.kernels.bodies.outline import outline_clearance
+from pilotage.kernels.geometry.motion import turned_part
 from pilotage.kernels.jit import kernel
 
 CAUSED, SUFFERED, CLOSEST, NEAR, STEPS = range(5)

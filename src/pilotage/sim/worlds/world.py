@@ -9,6 +9,7 @@ import numpy as np
 from pilotage.core.errors import InputError
 from pilotage.core.types import BoolArray, FloatArray, IntArray, Pose2
 from pilotage.kernels.bodies import clearances, drive
+from pilotage.kernels.geometry.motion import turned_part
 from pilotage.kernels.geometry.solids import Fixed
 from pilotage.kernels.scans import mounted, sight
 from pilotage.maps.landmarks import Landmarks
@@ -274,7 +275,7 @@ class World:
             self.traffic.others,
             own,
         )
-        return Pose2(*drive.turned_part(pose.x_m, pose.y_m, pose.theta_rad, *move, part)), float(part)
+        return Pose2(*turned_part(pose.x_m, pose.y_m, pose.theta_rad, *move, part)), float(part)
 
     def landmarks_in_sight(
         self, pose: Pose2, max_range_m: float, field_of_view_rad: float, own: IntArray = NOBODY

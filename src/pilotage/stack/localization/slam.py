@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from pilotage.core.types import FloatArray, Pose2
-from pilotage.kernels.geometry.motion import exact_arc, sideways
+from pilotage.kernels.geometry.motion import turned_part
 from pilotage.kernels.slam.frames import between, composed, placed_all
 from pilotage.maps.world_map import WorldMap
 from pilotage.sensors.lidar import LidarConfig
@@ -68,9 +68,8 @@ class SlamLocalizer:
         odometry = None if self._odometry is None else readings.by_sensor.get(self._odometry)
         if isinstance(odometry, OdometryIncrement):
             x, y, theta = self._moved.tolist()
-            x, y, theta = exact_arc(x, y, theta, odometry.distance_m, odometry.angle_rad)
-            dx, dy = sideways(theta, odometry.lateral_m, odometry.angle_rad, True)
-            self._moved = np.array([x + dx, y + dy, theta])
+            moved = odometry.distance_m, odometry.lateral_m, odometry.angle_rad
+            self._moved = np.array(turned_part(x, y, theta, *moved, 1.0))
         scan = readings.by_sensor.get(self._lidar)
         if isinstance(scan, LidarScan):
             self._align(readings.t_s, scan)

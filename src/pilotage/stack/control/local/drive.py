@@ -8,7 +8,7 @@ import numpy as np
 
 from pilotage.core.errors import InputError
 from pilotage.core.types import STOP, FloatArray, Pose2, Twist
-from pilotage.kernels.geometry.motion import exact_arc, sideways
+from pilotage.kernels.geometry.motion import turned_part
 from pilotage.models.footprint import Footprint
 from pilotage.models.odometry import increment_variances
 from pilotage.sensors.lidar import LidarConfig
@@ -91,9 +91,8 @@ class LocalDrive:
             self._twist_vars = distance_var / elapsed_s**2, angle_var / elapsed_s**2
         self._moved_s = readings.t_s
         pose = self._pose
-        x, y, theta = exact_arc(pose.x_m, pose.y_m, pose.theta_rad, odometry.distance_m, odometry.angle_rad)
-        dx, dy = sideways(theta, odometry.lateral_m, odometry.angle_rad, True)
-        self._pose = Pose2(x + dx, y + dy, theta)
+        moved = odometry.distance_m, odometry.lateral_m, odometry.angle_rad
+        self._pose = Pose2(*turned_part(pose.x_m, pose.y_m, pose.theta_rad, *moved, 1.0))
 
     def toward(
         self,
