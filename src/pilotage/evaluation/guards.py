@@ -3,32 +3,31 @@
 from __future__ import annotations
 
 import math
-from functools import lru_cache
 
 import numpy as np
 import scipy
 
+from pilotage.core.content import content_of
 from pilotage.core.types import BoolArray, FloatArray
 from pilotage.kernels.patrol.cover import greedy_cover
 from pilotage.maps.floor import Floor
+from pilotage.maps.known_maps import OncePerMap
 from pilotage.maps.world_map import WorldMap
 from pilotage.stack.patrol.derive import views
 
 STAND_EVERY_M, SEE_EVERY_M = 1.0, 0.5
 BLOCK = 1024
 
+_GUARDS: OncePerMap[tuple[int, int]] = OncePerMap()
+
 
 def guards_of(chart: WorldMap, floor: Floor, reach_m: float) -> tuple[int, int]:
     """``fewest_guards`` of a floor: places a metre apart, points half a metre, all around within reach."""
-    sees = views(chart, floor, reach_m, STAND_EVERY_M, SEE_EVERY_M)[2]
-    return _fewest(np.packbits(sees).tobytes(), *sees.shape)
-
-
-@lru_cache(maxsize=8)
-def _fewest(packed: bytes, places: int, points: int) -> tuple[int, int]:
-    """All trials of a study ask of the same floor."""
-    bits = np.unpackbits(np.frombuffer(packed, dtype=np.uint8), count=places * points)
-    return fewest_guards(bits.reshape(places, points).astype(np.bool_))
+    return _GUARDS.get(
+        chart,
+        content_of(floor, reach_m),
+        lambda: fewest_guards(views(chart, floor, reach_m, STAND_EVERY_M, SEE_EVERY_M)[2]),
+    )
 
 
 def fewest_guards(sees: BoolArray) -> tuple[int, int]:

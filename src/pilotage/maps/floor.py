@@ -205,11 +205,11 @@ class Floor:
         apart = ", but no passage so wide leads there; take a smaller robot"
         return f"{clearance_m:.2f} m" + apart * (clearance_m >= self.radius_m)
 
-    def costs_from(self, point_xy_m: FloatArray, what: str = "place") -> tuple[FloatArray, IntArray]:
-        """Cells of path, by neighbours, from a place to each cell, and each one's predecessor, both flat."""
+    def costs_from(self, point_xy_m: FloatArray, what: str = "place") -> FloatArray:
+        """Cells of path, by neighbours, from a place to each cell, flat."""
         row, column = self.nearest_cell(point_xy_m, what)
         factor = np.where(self.reachable, 1.0, np.inf)
-        return travel_costs(factor, row * factor.shape[1] + column, 1.0, 1.0)
+        return travel_costs(factor, row * factor.shape[1] + column, 1.0, 1.0)[0]
 
     def regions_of(self, places_xy_m: FloatArray, what: str = "place") -> IntArray:
         """(rows, columns) which of places (P, 2) is nearest by neighbours, the first of several; -1: none.
@@ -238,7 +238,7 @@ class Floor:
         InputError
             Where the point or a place is off the reachable floor.
         """
-        costs, _ = self.costs_from(point_xy_m, what)
+        costs = self.costs_from(point_xy_m, what)
         rows, columns = np.array([self.nearest_cell(place) for place in places_xy_m]).T
         return np.asarray(self.cell_m * costs[rows * self.reachable.shape[1] + columns])
 
@@ -263,30 +263,29 @@ class Floor:
         ends = (ra + 1) * stride + ca + 1, (rb + 1) * stride + cb + 1
         return bool(line_of_sight(states, stride, *ends, False))
 
-    def path_m(self, parent: IntArray, end_xy_m: FloatArray, what: str = "place") -> FloatArray:
-        """(K, 2) corners of the path from a place to where ``costs_from`` was asked, pulled tight.
+    def paths_m(self, start_xy_m: FloatArray, ends_xy_m: FloatArray) -> list[FloatArray]:
+        """(K, 2) corners of the path from one place to each of some (P, 2), pulled tight.
 
         Raises
         ------
         InputError
-            Where the place is off the reachable floor.
+            Where a place is off the reachable floor.
         """
         columns = self.reachable.shape[1]
-        row, column = self.nearest_cell(end_xy_m, what)
-        corners = pulled_corners(*self._states, parent, columns, row * columns + column)
-        x0, y0 = self.origin_xy_m
-        return np.column_stack(
-            [x0 + (corners % columns + 0.5) * self.cell_m, y0 + (corners // columns + 0.5) * self.cell_m]
+        start, *ends = (
+            row * columns + column for row, column in map(self.nearest_cell, (start_xy_m, *ends_xy_m))
         )
-
-    def path_between_m(self, a_xy_m: FloatArray, b_xy_m: FloatArray) -> FloatArray:
-        """(K, 2) corners of the path from one place to another, pulled tight; InputError as ``path_m``."""
-        columns = self.reachable.shape[1]
-        start, end = (row * columns + column for row, column in map(self.nearest_cell, (b_xy_m, a_xy_m)))
         factor = np.where(self.reachable, 1.0, np.inf)
         nothing = np.full(factor.size, np.inf)
-        _, parent = some_travel_costs(factor, start, 1.0, 1.0, nothing, np.array([end]))
-        return self.path_m(parent, a_xy_m)
+        _, parent = some_travel_costs(factor, start, 1.0, 1.0, nothing, np.unique(ends))
+        return [self._corners_m(pulled_corners(*self._states, parent, columns, end))[::-1] for end in ends]
+
+    def _corners_m(self, cells: IntArray) -> FloatArray:
+        """(K, 2) middles of cells, by their flat indices."""
+        columns, (x0, y0) = self.reachable.shape[1], self.origin_xy_m
+        return np.column_stack(
+            [x0 + (cells % columns + 0.5) * self.cell_m, y0 + (cells // columns + 0.5) * self.cell_m]
+        )
 
     @cached_property
     def _states(self) -> tuple[ByteArray, int]:

@@ -21,6 +21,7 @@ from pilotage.maps.edge import closed
 from pilotage.maps.elevation_file import read_elevation
 from pilotage.maps.grid_file import GRID_SUFFIXES, read_grid
 from pilotage.maps.grid_image import read_grey, read_hazard_image
+from pilotage.maps.known_maps import known_map
 from pilotage.maps.landmark_image import read_landmark_image
 from pilotage.maps.landmark_table import read_landmark_table
 from pilotage.maps.landmarks import Landmarks
@@ -51,13 +52,18 @@ def shipped_maps() -> list[str]:
 
 
 def load_chart(source: MapSource, markings: MarkingsConfig = PLAIN) -> WorldMap:
-    """Load a map of any format.
+    """Load a map of any format; the same object again for one that was just met.
 
     Raises
     ------
     InputError
         Where no such map is shipped, the file is missing, or what it holds is no map.
     """
+    return known_map(_read(source, markings))
+
+
+def _read(source: MapSource, markings: MarkingsConfig) -> WorldMap:
+    """From wherever it is told of."""
     if isinstance(source, str):
         return _named(source, markings)
     if isinstance(source, MapFile):
@@ -98,7 +104,10 @@ def load_chart(source: MapSource, markings: MarkingsConfig = PLAIN) -> WorldMap:
 
 def chart_of(world: WorldConfig) -> WorldMap:
     """The chart of a mission's world, its edge closed where cells are its walls, its landmarks put on it."""
-    chart = load_chart(world.map, world.markings)
+    return known_map(_with_landmarks(_read(world.map, world.markings), world))
+
+
+def _with_landmarks(chart: WorldMap, world: WorldConfig) -> WorldMap:
     if chart.grid is not None and chart.geometry is None and not chart.open_ground:
         chart = replace(chart, grid=closed(chart.grid))  # its bounds stay: they are those of the floor
     if world.landmarks is None:
@@ -134,7 +143,7 @@ def _named(source: str, markings: MarkingsConfig) -> WorldMap:
         beside = hint_beside(path, {".yaml", ".yml", *GRID_SUFFIXES, *ELEVATION_SUFFIXES})
         raise InputError(f"map '{source}': expected a map file, found none there{beside}")
     if suffix in ELEVATION_SUFFIXES and suffix == ".json":
-        return load_chart(validate(ElevationMap, {"name": "elevation", "file": source}, "map"))
+        return _read(validate(ElevationMap, {"name": "elevation", "file": source}, "map"), markings)
     if suffix in {".yaml", ".yml"}:
         values = parse_yaml(read_text(path), str(path))
         if "image" not in values and ROS_KEYS & values.keys():

@@ -18,6 +18,7 @@ from pilotage.experiments.build.robots import footprint_of
 from pilotage.kernels.grids.blocked_distance import distance_to_blocked
 from pilotage.maps.distance_field import DistanceField
 from pilotage.maps.floor import Floor
+from pilotage.maps.known_maps import OncePerMap
 from pilotage.maps.world_map import WorldMap
 from pilotage.missions.mission import Mission
 from pilotage.missions.places import Kidnap, PoseConfig
@@ -25,6 +26,7 @@ from pilotage.missions.robot import RobotConfig
 from pilotage.models.footprint import Footprint
 
 GRID_M = 0.1
+_FIELDS: OncePerMap[DistanceField] = OncePerMap()
 DRAWS_AT_ONCE = 1000
 MAX_DRAWS = 100_000
 ROOM_M = 0.1
@@ -222,7 +224,7 @@ class OpenFloor:
 
     def __init__(self, chart: WorldMap, clearance_m: float, reachable_from: PoseConfig | None) -> None:
         self._chart, self._clearance_m = chart, clearance_m
-        self._field = chart.field if chart.geometry is None else DistanceField.from_map(chart.walls, GRID_M)
+        self._field = chart.field if chart.geometry is None else _finer_field(chart)
         self._regions, count = scipy.ndimage.label(self._field.distance_m >= clearance_m)
         if reachable_from is None:
             sizes = np.bincount(self._regions.ravel(), minlength=2)
@@ -324,3 +326,8 @@ def check_landmarks(chart: WorldMap) -> None:
             f"world.landmarks: expected landmarks that can be seen, found all {len(points)} inside walls; "
             "put them onto free cells beside walls"
         )
+
+
+def _finer_field(chart: WorldMap) -> DistanceField:
+    """Distances to walls, nearer to each other than on the map's own field."""
+    return _FIELDS.get(chart, GRID_M, lambda: DistanceField.from_map(chart.walls, GRID_M))

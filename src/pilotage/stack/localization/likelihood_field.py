@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from weakref import WeakKeyDictionary
 
 import numpy as np
 import scipy
@@ -11,6 +10,7 @@ import scipy
 from pilotage.core.errors import InputError
 from pilotage.core.types import BoolArray, FloatArray
 from pilotage.kernels.filters import particles
+from pilotage.maps.known_maps import OncePerMap
 from pilotage.maps.nearest_obstacles import NearestObstacles
 from pilotage.maps.occupancy_grid import FREE, UNKNOWN, OccupancyGrid
 from pilotage.maps.outlines import rim_lines
@@ -152,15 +152,12 @@ class LikelihoodField:
         return np.maximum(self._nearest.at(points) - self._half_m, 0.0)
 
 
-_SHARED: WeakKeyDictionary[WorldMap, dict[float, NearestObstacles]] = WeakKeyDictionary()
+_NEAREST: OncePerMap[NearestObstacles] = OncePerMap()
 
 
 def _nearest_of(chart: WorldMap, walls: SegmentMap, resolution_m: float) -> NearestObstacles:
     """What of a map's walls is nearest where; robots that are told the same map work it out once."""
-    known = _SHARED.setdefault(chart, {})
-    if resolution_m not in known:
-        known[resolution_m] = NearestObstacles.from_map(walls, resolution_m)
-    return known[resolution_m]
+    return _NEAREST.get(chart, resolution_m, lambda: NearestObstacles.from_map(walls, resolution_m))
 
 
 def _known_of(chart: WorldMap) -> OccupancyGrid | None:

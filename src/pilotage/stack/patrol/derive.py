@@ -9,11 +9,13 @@ import numpy as np
 import scipy
 
 from pilotage.core.config import Config
+from pilotage.core.content import content_of
 from pilotage.core.errors import InputError
 from pilotage.core.types import BoolArray, FloatArray, IntArray
 from pilotage.kernels.patrol.cover import greedy_cover
 from pilotage.kernels.patrol.visibility import seen_from
 from pilotage.maps.floor import Floor
+from pilotage.maps.known_maps import OncePerMap
 from pilotage.maps.world_map import WorldMap
 from pilotage.sensors.sensor import NonNegative, Positive
 from pilotage.stack.patrol.graph import PatrolGraph
@@ -71,6 +73,9 @@ class Derived:
     viewpoints: int
 
 
+_DERIVED: OncePerMap[Derived] = OncePerMap()
+
+
 def derive_graph(world: WorldMap, floor: Floor, config: DerivationConfig | None = None) -> Derived:
     """Lay a patrol graph over a floor.
 
@@ -86,6 +91,11 @@ def derive_graph(world: WorldMap, floor: Floor, config: DerivationConfig | None 
         Where the floor needs far too many vertices.
     """
     config = config or DerivationConfig()
+    return _DERIVED.get(world, content_of(floor, config), lambda: _derive_graph(world, floor, config))
+
+
+def _derive_graph(world: WorldMap, floor: Floor, config: DerivationConfig) -> Derived:
+    """The same, worked out."""
     least = np.count_nonzero(floor.swept) * floor.cell_m**2 / (math.pi * config.reach_m**2)
     if least > MOST_VERTICES:  # before the work that it would be
         raise _too_many(world, math.ceil(least))

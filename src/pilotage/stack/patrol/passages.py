@@ -63,9 +63,9 @@ class Passages:
             after = graph.neighbours(a)
             if not (after > a).any():
                 continue
-            _, parent = floor.costs_from(graph.vertices_xy_m[a])
-            for b in after[after > a].tolist():
-                corners = floor.path_m(parent, graph.vertices_xy_m[b])[::-1]
+            farther = after[after > a].tolist()
+            paths = floor.paths_m(graph.vertices_xy_m[a], graph.vertices_xy_m[farther])
+            for b, corners in zip(farther, paths, strict=True):
                 length_m = float(graph.edges_m[a, b])
                 parts = _parts(corners, length_m, passage, floor)
                 if not parts:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import copy
 import math
 from dataclasses import dataclass
-from weakref import WeakKeyDictionary
 
 import numpy as np
 import scipy
@@ -13,6 +12,7 @@ import scipy
 from pilotage.core.errors import InputError
 from pilotage.core.types import BoolArray, FloatArray, IntArray
 from pilotage.kernels.control import eikonal
+from pilotage.maps.known_maps import OncePerMap
 from pilotage.maps.world_map import WorldMap
 from pilotage.stack.patrol.nodes import Ground
 
@@ -355,7 +355,7 @@ def _farthest(free: BoolArray, away_m: FloatArray) -> int:
     return int(np.argmax(np.where(free, away_m, -np.inf)))
 
 
-_SHARED: WeakKeyDictionary[WorldMap, dict[tuple[object, ...], Roadmap]] = WeakKeyDictionary()
+_ROADMAPS: OncePerMap[Roadmap] = OncePerMap()
 
 
 def roadmap_of(
@@ -369,9 +369,9 @@ def roadmap_of(
     lane_m: float,
 ) -> Roadmap:
     """The roadmap of a map; robots that are told the same map and graph work it out once."""
-    known = _SHARED.setdefault(chart, {})
     numbers = clearance_m, speed_m_s, spacing_m, near_m, lane_m
-    key = (vertices_xy_m.tobytes(), stations_xy_m.tobytes(), *numbers)
-    if key not in known:
-        known[key] = Roadmap(chart, vertices_xy_m, stations_xy_m, *numbers)
-    return known[key]
+    return _ROADMAPS.get(
+        chart,
+        (vertices_xy_m.tobytes(), stations_xy_m.tobytes(), *numbers),
+        lambda: Roadmap(chart, vertices_xy_m, stations_xy_m, *numbers),
+    )

@@ -178,5 +178,5 @@ def _away_m(floor: Floor, places: FloatArray) -> FloatArray:
     columns = floor.reachable.shape[1]
     at = np.array([row * columns + column for row, column in (floor.nearest_cell(p) for p in places)])
     unique, first, index = np.unique(at, return_index=True, return_inverse=True)
-    table = np.array([floor.cell_m * floor.costs_from(places[k])[0][unique] for k in first])
+    table = np.array([floor.cell_m * floor.costs_from(places[k])[unique] for k in first])
     return np.asarray(table[np.ix_(index, index)])

@@ -31,7 +31,8 @@ def joined(floor: Floor, here: FloatArray, there: FloatArray) -> FloatArray:
     """(K, 2) a path between two places: straight where nothing is in the way."""
     if floor.is_clear(here, there):
         return np.array([here, there])
-    return np.vstack([here, floor.path_between_m(here, there)[1:-1], there])
+    (path,) = floor.paths_m(there, here[None])
+    return np.vstack([here, path[::-1][1:-1], there])
 
 
 def _places_for(sought: Sought, path: FloatArray, missing: BoolArray) -> FloatArray:
