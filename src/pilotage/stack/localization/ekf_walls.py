@@ -155,12 +155,12 @@ class EkfWallsLocalizer:
             else:
                 used, nis = self._update(lines, scan.ranges_m)
             seen = len(lines)
-        self._tell(seen, used, nis)
         if self._lost:
             self.belief = self._unknown
         else:
             status = BeliefStatus.LOST if self._unsure else BeliefStatus.LOCALIZED
             self.belief = Belief(Pose2.from_array(self._pose), self._cov.copy(), status)
+        self._tell(seen, used, nis)
         return self.belief
 
     @property
@@ -219,6 +219,6 @@ class EkfWallsLocalizer:
             nis,
             LINE_DOF * accepted,
             expected,
-            0.0 if self._lost or self._unsure else 1.0,
+            1.0 if self.belief.status is BeliefStatus.LOCALIZED else 0.0,
             0.0 if self._recovery is None else self._recovery.hypotheses,
         )

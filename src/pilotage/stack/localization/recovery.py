@@ -9,6 +9,7 @@ from pydantic import Field
 
 from pilotage.core.config import Config
 from pilotage.core.types import FloatArray
+from pilotage.kernels.scans.median import median_of_known
 from pilotage.maps.world_map import WorldMap
 from pilotage.sensors.joint_lidar import places_of_lasers_m
 from pilotage.sensors.lidar import LidarConfig
@@ -96,7 +97,7 @@ class Recovery:
     def gives_up(self, pose: FloatArray, cov: FloatArray, ranges_m: FloatArray, matches: Matches) -> bool:
         """Whether a scan, whose lines were matched as far as they could be, shows a belief to be wrong."""
         # What a heading that is not known moves, it moves at the distance of the walls.
-        far_m = _median(ranges_m)
+        far_m = median_of_known(ranges_m)
         spread_m = 3.0 * math.sqrt(cov[0, 0] + cov[1, 1] + far_m**2 * cov[2, 2])
         if spread_m > self._config.sure_m:
             wrong = self._places_too_few(matches)
@@ -164,16 +165,3 @@ class Recovery:
         if found is not None:
             self._search.reset()
         return found
-
-
-def _median(values: FloatArray) -> float:
-    """As ``np.median`` of all but NaN, whose checks take longer than the rest of an update."""
-    values = values[values == values]
-    if not len(values):
-        return 0.0
-    half = len(values) // 2
-    if len(values) % 2:
-        return float(np.partition(values, half)[half])
-    parted = values.copy()
-    parted.partition((half - 1, half))
-    return float(0.5 * (parted[half - 1] + parted[half]))

@@ -10,7 +10,8 @@ from pydantic import Field
 from pilotage.core.chi_square import chi_square_quantile
 from pilotage.core.config import Config
 from pilotage.core.types import FloatArray, IntArray
-from pilotage.kernels.lines import joint_association, wall_candidates
+from pilotage.kernels.lines import joint_association
+from pilotage.kernels.lines.matching import match_lines
 from pilotage.maps.segment_map import SegmentMap
 from pilotage.maps.wall_lines import WallLines
 from pilotage.sensors.sensor import NonNegative
@@ -90,45 +91,25 @@ class WallMatcher:
     def match(self, pose: FloatArray, cov: FloatArray, lines: DetectedLines) -> Matches:
         """Match lines seen from about ``pose`` (3,) with covariance ``cov`` (3, 3); changes neither."""
         config, walls = self._config, self.walls
-        count = len(lines)
-        options = np.empty((count, config.options), dtype=np.int64)
-        distances = np.empty(count)
-        counts = wall_candidates.candidates(
-            pose,
-            cov,
-            self.mount,
-            lines.rho_alpha,
-            lines.covs,
-            lines.ends_m,
-            walls.normals,
-            walls.line_of,
-            walls.segments_m,
-            self.gate,
-            config.slack_m,
-            config.sigmas,
-            config.overlap,
-            options,
-            distances,
+        return Matches(
+            *match_lines(
+                pose,
+                cov,
+                self.mount,
+                lines.rho_alpha,
+                lines.covs,
+                lines.ends_m,
+                walls.normals,
+                walls.line_of,
+                walls.segments_m,
+                self._circles,
+                self.gate,
+                self.joint_gates,
+                self._margin,
+                config.slack_m,
+                config.sigmas,
+                config.overlap,
+                config.options,
+                config.max_nodes,
+            )
         )
-        pairs = np.empty(count, dtype=np.int64)
-        joint_association.associate(
-            pose,
-            cov,
-            self.mount,
-            lines.rho_alpha,
-            lines.covs,
-            lines.ends_m,
-            walls.normals,
-            walls.segments_m,
-            self._circles,
-            options,
-            counts,
-            self.joint_gates,
-            self._margin,
-            config.slack_m,
-            config.sigmas,
-            config.overlap,
-            config.max_nodes,
-            pairs,
-        )
-        return Matches(pairs, distances, *joint_association.tally(pairs, distances))

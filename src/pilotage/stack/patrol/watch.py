@@ -46,7 +46,11 @@ class IntruderWatch:
         Where somebody now is for sure who was not before.
         """
         config = self._config
-        found, tracks = [], []
+        found: list[tuple[float, float]] = []
+        tracks: list[tuple[float, float, int]] = []
+        if not len(strange_xy_m):  # as nearly always
+            self._tracks = tracks
+            return found
         for x, y in loose_clusters(strange_xy_m, config.gap_m, config.widest_m, config.points).tolist():
             before = [
                 count for px, py, count in self._tracks if math.hypot(x - px, y - py) <= config.follows_m

@@ -11,7 +11,7 @@ from pydantic import Field
 from pilotage.core.config import Config
 from pilotage.core.types import FloatArray, IntArray
 from pilotage.kernels.lines import clustering
-from pilotage.kernels.lines import extraction as line_extraction
+from pilotage.kernels.lines.scan_lines import lines_of_scan
 from pilotage.sensors.lidar import LidarConfig
 from pilotage.sensors.sensor import NonNegative, Positive
 
@@ -108,29 +108,23 @@ class LineExtractor:
     def extract(self, ranges_m: FloatArray) -> DetectedLines:
         """Find the lines of one scan (N,)."""
         config = self._config
-        points = clustering.scan_points(ranges_m, self._directions)
-        clusters = clustering.scan_clusters(
-            ranges_m, points, self._step, self._max_range, config.cutoff_m, config.cluster_points
+        return DetectedLines(
+            *lines_of_scan(
+                ranges_m,
+                self._directions,
+                self._step,
+                self._max_range,
+                config.cutoff_m,
+                config.cluster_points,
+                self._var,
+                self._threshold,
+                config.gap_m,
+                self._end_margin,
+                config.line_points,
+                config.line_length_m,
+                self._straight_z,
+                config.iterations,
+                self._rng.random(UNIFORMS),
+                MAX_LINES,
+            )
         )
-        lines, covs = np.empty((MAX_LINES, 2)), np.empty((MAX_LINES, 2, 2))
-        ends = np.empty((MAX_LINES, 4))
-        members = np.empty(ranges_m.shape[0], dtype=np.int64)
-        count = line_extraction.extract_lines(
-            points,
-            self._directions,
-            clusters,
-            self._var,
-            self._threshold,
-            config.gap_m,
-            self._end_margin,
-            config.line_points,
-            config.line_length_m,
-            self._straight_z,
-            config.iterations,
-            self._rng.random(UNIFORMS),
-            lines,
-            covs,
-            ends,
-            members,
-        )
-        return DetectedLines(lines[:count], covs[:count], ends[:count], points, clusters, members)

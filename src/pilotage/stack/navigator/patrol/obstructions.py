@@ -64,6 +64,15 @@ class Obstructions:
         self._t_s = 0.0
 
     @property
+    def are_none(self) -> bool:
+        """Whether nothing is known, denied or planned around: a scan without bodies says nothing then."""
+        return not (self._bodies or self._denied or len(self._planned))
+
+    def pass_time(self, t_s: float) -> None:
+        """Take in a scan that says nothing."""
+        self._t_s = t_s
+
+    @property
     def known_xy_m(self) -> FloatArray:
         """(K, 2) all places."""
         return np.array([body.xy_m for body in self._bodies]).reshape(-1, 2)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -78,20 +79,29 @@ class Paths(Senses):
 
     def look_who_shuts_paths(self) -> None:
         """Plan around those who have stood for long, from where that leads anywhere."""
-        heard = dict(self.heard())
-        told = [Told(n, np.array(b[:2]), b[2]) for n, word in heard.items() for b in word.standing]
-        for _, place, _ in told:
-            if not self._may_stand(place):
-                self._obstructions.deny(place)
-        if len(self._obstructions.known_xy_m):
-            for word in heard.values():
-                self._obstructions.is_of_mate(np.array([word.x_m, word.y_m]), word.radius_m)
-        known, standing = self._obstructions.known_xy_m, self.motion.standing
-        absent = [self.sees_nothing_at(place, self.radius_m) for place in known]
-        other_bodies = self._obstructions.step(self.t_s, standing, absent, self.fell_silent(), told, heard)
+        told = [
+            Told(n, np.array(b[:2]), b[2]) for n, word in self.heard() if word.standing for b in word.standing
+        ]
+        if told or len(self.motion.standing) or not self._obstructions.are_none:
+            other_bodies = self._look_for_bodies(told)
+        else:  # as nearly always
+            other_bodies = False
+            self._obstructions.pass_time(self.t_s)
         if self._impasses.step(self.t_s) or other_bodies:
             self._shut_paths()
         self._take_what_leads_on()
+
+    def _look_for_bodies(self, told: Sequence[Told]) -> bool:
+        """Whether others are planned around than before, by what is seen and what mates tell."""
+        heard = dict(self.heard())
+        for _, place, _ in told:
+            if not self._may_stand(place):
+                self._obstructions.deny(place)
+        for word in heard.values():
+            self._obstructions.is_of_mate(np.array([word.x_m, word.y_m]), word.radius_m)
+        known, standing = self._obstructions.known_xy_m, self.motion.standing
+        absent = [self.sees_nothing_at(place, self.radius_m) for place in known]
+        return self._obstructions.step(self.t_s, standing, absent, self.fell_silent(), told, heard)
 
     def _take_what_leads_on(self) -> None:
         """The paths around bodies, from where there is one."""
