@@ -11,14 +11,14 @@ from pilotage.kernels.control.disc_returns import is_near_beside
 from pilotage.stack.navigator.patrol.mates import Mates
 from pilotage.stack.patrol.last_words import LastWords
 from pilotage.stack.patrol.messages import PatrolMemory, PatrolState
-from pilotage.stack.patrol.word import TeamWord
+from pilotage.stack.patrol.word import Talk, TeamWord
 
 NEWS = PatrolMemory(2, 1, 2, 0, 1.0).message(0.0)
 HERE = Pose2(3.0, 4.0, 0.7)
 
 
-def word(x_m: float = 0.0, y_m: float = 0.0) -> TeamWord:
-    return TeamWord(x_m, y_m, False, None, None, NEWS, 0.3)
+def word(x_m: float = 0.0, y_m: float = 0.0, radius_m: float = 0.3, talk: Talk | None = None) -> TeamWord:
+    return TeamWord(x_m, y_m, False, None, None, NEWS, radius_m, talk=talk)
 
 
 def test_who_was_heard_lately_is_what_going_through_all_would_find() -> None:
@@ -39,21 +39,23 @@ def test_who_was_heard_lately_is_what_going_through_all_would_find() -> None:
 
 
 class TestNobody:
-    """What is within 0.6 m of where a mate said it is, and 1 m/s since, is the mate."""
+    """What is within 0.3 m of a mate's body where it said it is, and 1 m/s since, is the mate."""
 
     def of_nobody(self, words: LastWords, points: np.ndarray, t_s: float = 10.0) -> np.ndarray:
-        return words.of_nobody(points, HERE, 0, t_s, 0.6, 1.0)
+        return words.of_nobody(points, HERE, 0, t_s, 0.3, 1.0)
 
     def test_is_what_no_mate_may_be(self) -> None:
         rng, words = np.random.default_rng(6), LastWords(4, (0.0, 0.0, 9.0, 9.0))
         places, sent_s = rng.uniform(0.0, 9.0, (4, 2)), np.array([0.0, 9.9, 9.5, 9.0])
+        radii_m, speeds_m_s = np.array([0.3, 0.1, 0.9]), np.array([1.0, 2.0, 0.2])
         for number in range(1, 4):
-            words.hear(number, sent_s[number], word(*places[number]))
+            talk = None if number == 1 else Talk(1.0, 60.0, 0.0, speeds_m_s[number - 1])
+            words.hear(number, sent_s[number], word(*places[number], radii_m[number - 1], talk))
         points = rng.uniform(-6.0, 6.0, (400, 2))
         c, s = math.cos(HERE.theta_rad), math.sin(HERE.theta_rad)
         there = points @ np.array([[c, s], [-s, c]]) + [HERE.x_m, HERE.y_m]
         away = np.linalg.norm(there[:, None] - places[None, 1:], axis=2)
-        expected = (away > 0.6 + 10.0 - sent_s[1:]).all(axis=1)
+        expected = (away > radii_m + 0.3 + speeds_m_s * (10.0 - sent_s[1:])).all(axis=1)
         assert 100 < expected.sum() < 390
         assert np.array_equal(self.of_nobody(words, points), points[expected])
 

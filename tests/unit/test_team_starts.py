@@ -8,10 +8,14 @@ from typing import Any
 import numpy as np
 import pytest
 
+from pilotage.core.errors import InputError
 from pilotage.experiments.build import places
-from pilotage.experiments.build.places import OpenFloor
+from pilotage.experiments.build.charts import chart_of
+from pilotage.experiments.build.places import OpenFloor, settle_places
+from pilotage.experiments.mission import load_mission
 from pilotage.maps.segment_map import SegmentMap
 from pilotage.maps.world_map import WorldMap
+from pilotage.missions.mission import Mission
 from pilotage.missions.places import PoseConfig
 
 # A room of 8 m x 5 m and one of 3 m x 5 m, a gap of 0.84 m between them.
@@ -66,5 +70,28 @@ def test_a_floor_that_is_full_is_found_so_by_arrays(monkeypatch: pytest.MonkeyPa
 
     monkeypatch.setattr(places, "room_m", lambda *_: pytest.fail("nobody fits 20 m from the middle"))
     rng = Counted(np.random.PCG64(0))
-    assert OpenFloor(WORLD, 0.4, None).draw(rng, [PoseConfig(x_m=4.0, y_m=2.0)], 20.0) is None
+    assert OpenFloor(WORLD, 0.4, None).draw(rng, [(PoseConfig(x_m=4.0, y_m=2.0), 20.0)]) is None
     assert 0 < Counted.calls <= 1000
+
+
+class TestLargeRobots:
+    """They were drawn 1.5 m apart however large they are: inside each other, and refused for it."""
+
+    def team(self, *overrides: str) -> Mission:
+        large = ("robot.footprint.radius_m=1.0", "team.size=6", *overrides)
+        mission = load_mission("museum-patrol", large, 0)
+        return settle_places(mission, chart_of(mission.world), None)
+
+    def test_stand_apart(self) -> None:
+        starts = [robot.start for robot in self.team().robots]
+        for index, start in enumerate(starts):
+            for other in starts[:index]:
+                assert start is not None
+                assert other is not None
+                assert math.hypot(start.x_m - other.x_m, start.y_m - other.y_m) >= 2.1
+
+    def test_are_refused_for_their_size_where_there_is_no_room_for_so_many(self) -> None:
+        with pytest.raises(InputError, match=r"places 5\.1 m apart .* or for smaller robots$"):
+            self.team("robot.footprint.radius_m=2.5", "team.size=16")
+        with pytest.raises(InputError, match=r"places 30 m apart .* or for less team.spacing_m$"):
+            self.team("team.spacing_m=30")

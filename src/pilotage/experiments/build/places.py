@@ -117,35 +117,42 @@ def _with_drawn_starts(mission: Mission, chart: WorldMap, about: tuple[float, fl
     near = mission.world.start
     if near is None and about is not None:
         near = PoseConfig(x_m=about[0], y_m=about[1])
-    spacing_m = mission.team.spacing_m
-    placed: list[PoseConfig] = [robot.start for robot in mission.robots if robot.start is not None]
+    radii_m = [footprint_of(robot, f"robots.{k}").radius_m for k, robot in enumerate(mission.robots)]
+    placed: list[tuple[PoseConfig, float]] = [
+        (robot.start, radius_m)
+        for robot, radius_m in zip(mission.robots, radii_m, strict=True)
+        if robot.start is not None
+    ]
     robots: list[RobotConfig] = []
     floors: dict[float, OpenFloor] = {}
     full: set[float] = set()
     for index, robot in enumerate(mission.robots):
         start = robot.start
         if start is None:
-            clear_m = footprint_of(robot, f"robots.{index}").radius_m + ROOM_M
+            clear_m = radii_m[index] + ROOM_M
+            # Bodies stand apart however little is asked for.
+            apart = [(place, max(mission.team.spacing_m, clear_m + radius_m)) for place, radius_m in placed]
             if clear_m not in floors:
                 floors[clear_m] = OpenFloor(chart, clear_m, near)
             floor = floors[clear_m]
             if clear_m not in full:
-                start = floor.draw(rng, placed, spacing_m, floor.easy)
+                start = floor.draw(rng, apart, floor.easy)
             if start is None:
                 full.add(clear_m)
-                start = floor.draw(rng, placed, spacing_m, floor.in_cells(placed[:1]))
+                start = floor.draw(rng, apart, floor.in_cells(placed[0][0] if placed else None))
             if start is None and not placed:
                 raise InputError(
                     f"robot.footprint: expected a starting place {clear_m:.2f} m from walls on "
                     f"'{chart.name}', found none; take a smaller robot or a larger map"
                 )
             if start is None:
+                farthest_m = max(spacing_m for _, spacing_m in apart)
+                less = "less team.spacing_m" if farthest_m <= mission.team.spacing_m else "smaller robots"
                 raise InputError(
-                    f"team.size: expected at most {index}, for whom starting places {spacing_m:g} m apart "
-                    f"were found on '{chart.name}', found {len(mission.robots)}; ask for fewer, or for less "
-                    f"team.spacing_m"
+                    f"team.size: expected at most {index}, for whom starting places {farthest_m:g} m apart "
+                    f"were found on '{chart.name}', found {len(mission.robots)}; ask for fewer, or for {less}"
                 )
-            placed.append(start)
+            placed.append((start, radii_m[index]))
         robots.append(robot.model_copy(update={"start": start}))
     return mission.model_copy(update={"robots": tuple(robots)})
 
@@ -248,10 +255,10 @@ class OpenFloor:
         steps = math.ceil(STEP_M / self._field.resolution_m)
         return np.asarray(home & scipy.ndimage.binary_dilation(largest, iterations=steps))
 
-    def in_cells(self, first: Sequence[PoseConfig]) -> BoolArray:
+    def in_cells(self, first: PoseConfig | None) -> BoolArray:
         """(rows, columns) of it what a task's floor, in cells, reaches from the first who was placed."""
         home = np.asarray(self._regions == self._home)
-        inside = (first[0].x_m, first[0].y_m) if first else None
+        inside = None if first is None else (first.x_m, first.y_m)
         try:
             cells = Floor.of(self._chart, self._clearance_m, inside_xy_m=inside)
         except InputError:
@@ -284,11 +291,10 @@ class OpenFloor:
     def draw(
         self,
         rng: np.random.Generator,
-        apart_from: Sequence[PoseConfig] = (),
-        spacing_m: float = 0.0,
+        apart_from: Sequence[tuple[PoseConfig, float]] = (),
         part: BoolArray | None = None,
     ) -> PoseConfig | None:
-        """Draw a pose, at least ``spacing_m`` from others, on a part of it; None where nothing is found."""
+        """Draw a pose on a part of it, so far from each of some others; None where nothing is found."""
         xmin, ymin, xmax, ymax = self._chart.bounds_m
         low, high = [xmin, ymin, -math.pi], [xmax, ymax, math.pi]
         wanted = self._regions == self._home if part is None else part & (self._regions == self._home)
@@ -296,7 +302,7 @@ class OpenFloor:
             before = rng.bit_generator.state
             drawn = rng.uniform(low, high, (DRAWS_AT_ONCE, 3))
             fit = self._at_nodes(wanted, drawn[:, :2])
-            for place in apart_from:
+            for place, spacing_m in apart_from:
                 fit &= np.hypot(drawn[:, 0] - place.x_m, drawn[:, 1] - place.y_m) >= spacing_m
             for index in np.flatnonzero(fit).tolist():
                 x, y, theta = drawn[index].tolist()

@@ -57,13 +57,20 @@ def hear(
 
 
 @kernel
+def _speed_of(words: FloatArray, k: int, otherwise: float) -> float:
+    """How fast a robot drives, by what it told."""
+    return otherwise if math.isnan(words[k, SPEED]) else words[k, SPEED]
+
+
+@kernel
 def of_nobody(
     points: FloatArray, pose: FloatArray, words: FloatArray, own: int, t: float, told: float, speed: float
 ) -> FloatArray:
     """Those of returns (M, 2), in the frame of a robot at ``pose``, that are of none of its team.
 
-    Of a mate is what is within ``told`` of where it said it is, and what it may have driven at ``speed``
-    since. While one has never been heard, or is lost, everything may be it.
+    Of a mate is what is within ``told`` of its body, where it said it is, and what it may have driven since,
+    at the speed that it tells, else at ``speed``. While one has never been heard, or is lost, everything may
+    be it.
     """
     kept = np.empty_like(points)
     count = 0
@@ -77,7 +84,7 @@ def of_nobody(
         is_of_mate = False
         for k in range(words.shape[0]):
             if k != own:
-                reach = told + speed * (t - words[k, SENT])
+                reach = words[k, RADIUS] + told + _speed_of(words, k, speed) * (t - words[k, SENT])
                 dx, dy = x - words[k, X], y - words[k, Y]
                 if reach >= 0.0 and dx * dx + dy * dy <= reach * reach:
                     is_of_mate = True
@@ -95,13 +102,13 @@ def whereabouts(
     """Fill ``out`` (N, 4) with where each robot is: x, y, within what distance of that, and its radius.
 
     NaN for who was not heard within so long, or said nothing of its place. A place is wrong by ``told``, and
-    by what may have been driven since.
+    by what may have been driven since, as of ``of_nobody``.
     """
     for k in range(words.shape[0]):
         age = t - words[k, SENT]
         if age < heard_within and math.isfinite(words[k, X]):
             out[k, 0], out[k, 1] = words[k, X], words[k, Y]
-            out[k, 2], out[k, 3] = told + speed * age, words[k, RADIUS]
+            out[k, 2], out[k, 3] = told + _speed_of(words, k, speed) * age, words[k, RADIUS]
         else:
             out[k, :] = math.nan
 

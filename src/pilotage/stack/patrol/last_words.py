@@ -58,7 +58,7 @@ class LastWords:
         """(N, 4) where each robot is: x, y, within what distance of that, and its radius (m).
 
         NaN for who does not know or was not heard within so long. Places are told ``told_m`` wrong, and
-        mates drive on at ``speed_m_s`` at most.
+        mates drive on at the speed that they tell, else at ``speed_m_s``.
         """
         found = np.empty((len(self._words), 4))
         words.whereabouts(self._words, t_s, heard_within_s, told_m, speed_m_s, found)

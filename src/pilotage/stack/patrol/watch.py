@@ -23,8 +23,9 @@ class WatchConfig(Config):
     """Seen in so many scans in a row."""
     follows_m: Positive = 0.6
     """From one scan to the next it moves no farther."""
-    mate_m: NonNegative = 0.6
-    """What is this near to where a mate says it is, farther by what it may have driven since, is the mate.
+    mate_m: NonNegative = 0.3
+    """What is this near to a mate's body, where it says it is, farther by what it may have driven since, is
+    the mate.
 
     Of a mate that was not heard for long that is everything: a broken radio makes no false alarm, and a team
     without radios raises none.

@@ -253,7 +253,9 @@ class Senses:
 
     def mate_reach_m(self, number: int) -> float:
         """Within so far of where a mate said it is, what is seen may be that mate."""
-        return self.config.watch.mate_m + self.speed_m_s * (self.t_s - self.mates[number][0])
+        sent_s, word = self.mates[number]
+        speed_m_s = self.speed_m_s if word.talk is None else word.talk.speed_m_s
+        return word.radius_m + self.config.watch.mate_m + speed_m_s * (self.t_s - sent_s)
 
     def waits_for(self) -> bool:
         """Whether a mate with a smaller number, that is blocked and near, is to go first."""
