@@ -50,7 +50,8 @@ class TestNobody:
         radii_m, speeds_m_s = np.array([0.3, 0.1, 0.9]), np.array([1.0, 2.0, 0.2])
         for number in range(1, 4):
             talk = None if number == 1 else Talk(1.0, 60.0, 0.0, speeds_m_s[number - 1])
-            words.hear(number, sent_s[number], word(*places[number], radii_m[number - 1], talk))
+            x, y = places[number].tolist()
+            words.hear(number, sent_s[number], word(x, y, float(radii_m[number - 1]), talk))
         points = rng.uniform(-6.0, 6.0, (400, 2))
         c, s = math.cos(HERE.theta_rad), math.sin(HERE.theta_rad)
         there = points @ np.array([[c, s], [-s, c]]) + [HERE.x_m, HERE.y_m]

@@ -93,6 +93,7 @@ class Senses:
         self._directions = clustering.beam_directions(
             float(lidar.beam_angles_rad()[0]), lidar.beam_step_rad, lidar.beams
         )
+        self._look_m = min(config.look_m, lidar.max_range_m)  # a beam that met nothing reads its reach
         self._mount = np.array([lidar.mount.x_m, lidar.mount.y_m, lidar.mount.theta_rad])
         self._known = chart.wall_field
         self.period_s = max(1.0 / lidar.rate_hz, robot.dt_s)
@@ -150,7 +151,7 @@ class Senses:
             self._mount,
             self.pose.as_array(),
             NEAR_M,
-            self.config.look_m,
+            self._look_m,
             self.config.tolerance_m + self.spread_m,
             spread_rad,
             self.field(lost=lost),
