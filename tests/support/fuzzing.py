@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import random
 import shutil
+from collections.abc import Callable
 from pathlib import Path
 
 from support import damage
@@ -13,21 +14,21 @@ NO_FILE_SHARE = 0.05
 
 
 class Healthy:
-    """Each use's healthy inputs, made once and copied."""
+    """Healthy inputs, made once for all uses that write the same, and copied."""
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
-        self._made: dict[str, Path] = {}
+        self._made: dict[Callable[[Path], None], Path] = {}
 
     def copy(self, target: Target, to: Path) -> Path:
         """A fresh copy; what was there before is gone."""
-        if target.name not in self._made:
+        if target.write not in self._made:
             made = self._folder / str(len(self._made))
             made.mkdir(parents=True)
             target.write(made)
-            self._made[target.name] = made
+            self._made[target.write] = made
         shutil.rmtree(to, ignore_errors=True)
-        shutil.copytree(self._made[target.name], to)
+        shutil.copytree(self._made[target.write], to)
         return to
 
 
