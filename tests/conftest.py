@@ -14,6 +14,8 @@ from collections.abc import Iterator
 import pytest
 from hypothesis import settings
 
+from support.warm_workers import WarmContext, warm_context
+
 # No test opens a window, and figures look the same on every machine.
 os.environ["MPLBACKEND"] = "Agg"
 
@@ -53,6 +55,23 @@ def _nothing_is_timed() -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
         if run is not None:
             patch.setattr(run, "warm_up", lambda _: None)
+        yield
+
+
+@pytest.fixture(autouse=True, scope="session")
+def _workers_are_forked() -> Iterator[None]:
+    """Workers that are started from this process do not import everything anew (``support.warm_workers``)."""
+    from pilotage.experiments import worker_processes
+
+    made: list[WarmContext] = []
+
+    def context() -> WarmContext:
+        if not made:
+            made.append(warm_context())
+        return made[0]
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(worker_processes, "context", context)
         yield
 
 

@@ -10,6 +10,7 @@ from typing import Any, TypeVar
 
 from pilotage.core.errors import InputError
 from pilotage.core.memory import look_seldom
+from pilotage.experiments import worker_processes
 from pilotage.experiments.worker_processes import interrupts_held, obey_the_parent
 
 J = TypeVar("J", bound=tuple[Any, ...])
@@ -28,7 +29,7 @@ def all_done(work: Callable[..., R], jobs: Sequence[J], workers: int, what: str)
         for job in jobs:
             yield job, work(*job)
         return
-    pool = ProcessPoolExecutor(min(workers, len(jobs)), multiprocessing.get_context("spawn"), _begin)
+    pool = ProcessPoolExecutor(min(workers, len(jobs)), worker_processes.context(), _begin)
     others = set(multiprocessing.active_children())
     done = False
     try:

@@ -10,6 +10,12 @@ import threading
 from collections.abc import Iterator
 from multiprocessing import resource_tracker
 from multiprocessing.connection import wait
+from multiprocessing.context import SpawnContext
+
+
+def context() -> SpawnContext:
+    """How they are started: spawned, as a fork would take the parent's threads and numba's locks along."""
+    return multiprocessing.get_context("spawn")
 
 
 @contextlib.contextmanager

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import multiprocessing
 import os
 import pickle
 import sys
@@ -16,6 +15,7 @@ from multiprocessing.context import SpawnProcess
 from typing import Any
 
 from pilotage.core.memory import look_seldom
+from pilotage.experiments import worker_processes
 from pilotage.experiments.studies.database import StudyStoppedError
 from pilotage.experiments.studies.trial import Outcome, Task, TrialRunner
 from pilotage.experiments.studies.workers import AHEAD, WAIT_S, hung
@@ -58,7 +58,7 @@ class LocalWorkers:
     def __init__(self, base: Mapping[str, Any], count: int, timeout_s: float, memory_bytes: int) -> None:
         self._base = dict(base)
         self._timeout_s, self._memory_bytes = timeout_s, memory_bytes
-        self._context = multiprocessing.get_context("spawn")
+        self._context = worker_processes.context()
         # Where nothing is compiled yet, one of them does it for all.
         self._count = count
         self._stillborn = 0
