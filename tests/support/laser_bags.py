@@ -11,6 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pilotage.logs.message_types import shipped_types
+
 FloatArray = NDArray[np.float64]
 SCAN, ODOMETRY, TRANSFORMS = "sensor_msgs/msg/LaserScan", "nav_msgs/msg/Odometry", "tf2_msgs/msg/TFMessage"
 
@@ -63,11 +65,7 @@ def with_scan(whole: Drive, k: int, **changes: Any) -> Drive:
 
 def noetic() -> Any:
     """The types of ROS 1 with those of its transforms."""
-    from rosbags.typesys import Stores, get_types_from_msg, get_typestore
-
-    store = get_typestore(Stores.ROS1_NOETIC)
-    store.register(get_types_from_msg("geometry_msgs/TransformStamped[] transforms", TRANSFORMS))
-    return store
+    return shipped_types("ROS1_NOETIC", {TRANSFORMS: "geometry_msgs/TransformStamped[] transforms"})
 
 
 class Messages:
@@ -164,9 +162,8 @@ def write_ros1(path: Path, whole: Drive, packing: str = "none") -> Path:
 def write_ros2(path: Path, whole: Drive, storage: str = "SQLITE3", packing: str = "NONE") -> Path:
     """Write the folder of a ROS 2 bag with rosbags."""
     from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
-    from rosbags.typesys import Stores, get_typestore
 
-    store = get_typestore(Stores.ROS2_HUMBLE)
+    store = shipped_types("ROS2_HUMBLE")
     writer = Writer(path, version=9, storage_plugin=StoragePlugin[storage])
     if packing != "NONE":
         writer.set_compression(CompressionMode[packing], CompressionFormat.ZSTD)
@@ -183,9 +180,8 @@ def write_foreign_mcap(path: Path, whole: Drive, packing: str = "ZSTD", chunk: i
     """Write MCAP with the libraries of Foxglove."""
     from mcap.writer import CompressionType
     from mcap_ros2.writer import Writer
-    from rosbags.typesys import Stores, get_typestore
 
-    store = get_typestore(Stores.ROS2_HUMBLE)
+    store = shipped_types("ROS2_HUMBLE")
     with path.open("wb") as file:
         writer: Any = Writer(file, chunk_size=chunk, compression=CompressionType[packing])
         schemas: dict[str, Any] = {}

@@ -6,7 +6,9 @@ import contextlib
 import math
 import os
 import sys
+from collections.abc import Callable
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +18,7 @@ import pytest
 from pilotage.core.errors import InputError
 from pilotage.logs.bags import read_bag
 from pilotage.logs.laser_log import LaserLog
+from pilotage.logs.message_types import shared, told_types
 from support.laser_bags import FORMS, Drive, Scan, drive, with_scan, write_ros1, write_ros2
 
 pytest.importorskip("rosbags")
@@ -25,6 +28,7 @@ UPSIDE_DOWN = (1.0, 0.0, 0.0, 0.0)
 """Half a turn about the axis ahead."""
 CUT_FORMS = ["ros1", "ros1-bz2", "ros1-lz4", "ros2-sqlite-file", "ros2-mcap-file", "foreign-mcap"]
 CUT_FORMS += ["foreign-mcap-lz4", "foreign-mcap-plain", "ros1-mcap"]
+LONG = drive(400, 90)
 
 
 def read(folder: Path, whole: Drive, form: str = "ros1") -> LaserLog:
@@ -220,12 +224,19 @@ def test_scans_that_no_scanner_makes(tmp_path: Path, changes: dict[str, Any]) ->
         read(tmp_path, replace(drive(), scans=impossible))
 
 
+@pytest.fixture(scope="module")
+def long_bag(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
+    """A bag of many scans in a form, written once."""
+    return cache(lambda form: FORMS[form](tmp_path_factory.mktemp(form), LONG))
+
+
 @pytest.mark.parametrize("form", CUT_FORMS)
 @pytest.mark.parametrize("share", [0.5, 0.75, 0.95])
-def test_a_bag_cut_short_is_read_as_far_as_it_goes(tmp_path: Path, form: str, share: float) -> None:
-    whole = drive(400, 90)
-    path = FORMS[form](tmp_path, whole)
-    data = path.read_bytes()
+def test_a_bag_cut_short_is_read_as_far_as_it_goes(
+    tmp_path: Path, long_bag: Callable[[str], Path], form: str, share: float
+) -> None:
+    whole, data = LONG, long_bag(form).read_bytes()
+    path = tmp_path / long_bag(form).name
     path.write_bytes(data[: int(share * len(data))])
     log = read_bag(path)
     assert len(log) > 0.4 * share * 400
@@ -233,6 +244,28 @@ def test_a_bag_cut_short_is_read_as_far_as_it_goes(tmp_path: Path, form: str, sh
     number = np.round((log.t_s - 1000.0) / 0.1).astype(int)
     assert np.array_equal(log.ranges_m, np.array([scan.ranges_m for scan in whole.scans])[number])
     assert log.mount.x_m == pytest.approx(0.2)
+
+
+@pytest.mark.parametrize("form", ["ros1", "ros2-mcap-file", "foreign-mcap"])
+def test_types_that_an_earlier_bag_told_are_not_compiled_again(
+    tmp_path: Path, form: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The library compiles them for each bag; that was half of what it takes to read a short one."""
+    path, cut = FORMS[form](tmp_path, drive()), tmp_path / "cut.bag"
+    cut.write_bytes(path.read_bytes()[:-40])
+    first = [read_bag(bag) for bag in (path, cut)]
+    monkeypatch.setattr("rosbags.typesys.store.generate_deserialize_cdr", None)
+    for before, again in zip(first, [read_bag(bag) for bag in (path, cut)], strict=True):
+        assert np.array_equal(before.ranges_m, again.ranges_m)
+        assert before.warnings == again.warnings
+
+
+def test_types_that_have_one_name_and_other_fields_are_not_taken_for_each_other() -> None:
+    one, other = told_types("float64 a", "own/msg/One"), told_types("float64 a\nfloat64 b", "own/msg/One")
+    assert len(other.types["own/msg/One"].__dataclass_fields__) > len(
+        one.types["own/msg/One"].__dataclass_fields__
+    )
+    assert shared(one) is told_types("float64  a", "own/msg/One")
 
 
 def test_a_folder_without_metadata(tmp_path: Path) -> None:

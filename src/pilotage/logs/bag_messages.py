@@ -14,6 +14,7 @@ from typing import Any, TypeAlias, TypeVar
 
 from pilotage.core.errors import InputError
 from pilotage.core.files import opened, read_yaml
+from pilotage.logs.message_types import shared, shipped_types, told_types
 from pilotage.logs.rosbags_extra import rosbags
 from pilotage.logs.salvage.found import MAGIC_OF, BagFormat, Salvage
 from pilotage.logs.salvage.pieces import unpack
@@ -116,7 +117,7 @@ def open_whole(path: Path, stack: ExitStack) -> OpenBag | None:
     InputError
         Where ``rosbags`` is not installed, or the path cannot be read or is no bag.
     """
-    highlevel, typesys = rosbags("highlevel"), rosbags("typesys")
+    highlevel = rosbags("highlevel")
     if not path.exists():
         raise InputError(f"{path}: expected a bag, found no such file")
     if not is_bag(path):
@@ -126,8 +127,9 @@ def open_whole(path: Path, stack: ExitStack) -> OpenBag | None:
     if path.is_dir() and not _sound(path):
         return None
     try:
-        reader = highlevel.AnyReader([path], default_typestore=typesys.get_typestore(typesys.Stores.LATEST))
+        reader = highlevel.AnyReader([path], default_typestore=shipped_types("LATEST"))
         stack.enter_context(reader)
+        reader.typestore = shared(reader.typestore)
         topics = _sum_up((c.topic, c.msgtype, c.msgcount) for c in reader.connections)
     except Exception:  # damaged bags make the library fail in any way; the walk then says what it finds
         return None
@@ -173,7 +175,6 @@ class _Deserializer:
 
     def __init__(self, part: Salvage) -> None:
         self._part = part
-        self._typesys = rosbags("typesys")
         self._stores: dict[str, Any] = {}
 
     def __call__(self, raw: bytes, topic: str) -> Any:
@@ -188,12 +189,8 @@ class _Deserializer:
         return store.deserialize_cdr(raw, msgtype)
 
     def _store(self, topic: str) -> Any:
-        typesys, definition = self._typesys, self._part.definitions.get(topic, "")
-        if not definition:
-            return typesys.get_typestore(typesys.Stores.LATEST)
-        store = typesys.get_typestore(typesys.Stores.EMPTY)
-        store.register(typesys.get_types_from_msg(definition, self._part.types[topic]))
-        return store
+        definition = self._part.definitions.get(topic, "")
+        return told_types(definition, self._part.types[topic]) if definition else shipped_types("LATEST")
 
 
 def _deserialized(deserialize: Callable[[bytes, str], Any], raw: bytes, key: str) -> Any:

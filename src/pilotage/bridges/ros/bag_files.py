@@ -15,6 +15,7 @@ import numpy as np
 from pilotage.bridges.ros.messages import TRANSFORMS
 from pilotage.bridges.ros.run_messages import LOG_TYPE, RunMessages, Stamped
 from pilotage.core.whole_file import draft_of
+from pilotage.logs.message_types import shipped_types
 from pilotage.logs.rosbags_extra import rosbags
 from pilotage.records.run_folder import draft_folder
 
@@ -59,11 +60,8 @@ def write_ros1(path: Path, messages: RunMessages) -> None:
 
 
 def _write(writer: Any, store_name: str, messages: RunMessages) -> None:
-    typesys = rosbags("typesys")
-    store = typesys.get_typestore(getattr(typesys.Stores, store_name))
     ros1 = store_name.startswith("ROS1")
-    for name, definition in {**messages.own_types, **(ROS1_TYPES if ros1 else {})}.items():
-        store.register(typesys.get_types_from_msg(definition, name))
+    store = shipped_types(store_name, {**messages.own_types, **(ROS1_TYPES if ros1 else {})})
     with writer:
         connections: dict[str, Any] = {}
         for message in messages.stamped:
