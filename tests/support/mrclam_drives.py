@@ -10,6 +10,7 @@ the recorded robots.
 from __future__ import annotations
 
 import math
+from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -24,6 +25,8 @@ ARENA_M = (0.3, 4.2, -4.0, 5.2)
 LANDMARKS = 15
 BARCODES = {1: 5, 2: 14, 3: 41, 4: 32, 5: 23} | {6 + i: 60 + 2 * i for i in range(LANDMARKS)}
 UNKNOWN_BARCODE = 99
+TRUTH_STDS = np.array([5e-4, 5e-4, 1e-3])
+"""Of the cameras that know the pose: m, m, rad."""
 
 
 @dataclass(frozen=True)
@@ -114,10 +117,11 @@ def drive(seed: int, robot: Robot, events: Events, places: FloatArray) -> _World
     """Simulate one robot."""
     rng = np.random.default_rng(seed)
     x0, x1, y0, y1 = ARENA_M
-    pose = np.array([rng.uniform(x0, x1), rng.uniform(y0, y1), rng.uniform(-math.pi, math.pi)])
-    goal = pose[:2].copy()
-    late = [(0.0, 0.0)] * round(robot.delay_s / DT_S)
-    before = [pose.copy()] * (round(robot.bearing_age_s / DT_S) + 1)
+    x, y, theta = rng.uniform(x0, x1), rng.uniform(y0, y1), rng.uniform(-math.pi, math.pi)
+    goal = x, y
+    late = deque([(0.0, 0.0)] * round(robot.delay_s / DT_S))
+    ages = round(robot.bearing_age_s / DT_S) + 1
+    before = deque([(x, y, theta)] * ages, maxlen=ages)
     count = len(places)
     stds = np.array(
         [robot.speed_error_std, robot.turn_error_std]
@@ -136,55 +140,66 @@ def drive(seed: int, robot: Robot, events: Events, places: FloatArray) -> _World
         if pushes and t >= pushes[0][0]:
             _, far, turn = pushes.pop(0)
             direction = rng.uniform(-math.pi, math.pi)
-            pose = pose + np.array([far * math.cos(direction), far * math.sin(direction), turn])
+            x, y, theta = x + far * math.cos(direction), y + far * math.sin(direction), theta + turn
         if not _in(events.truth_gaps_s, t):
-            world.truth.append((t, *(pose + rng.normal(0.0, [5e-4, 5e-4, 1e-3]))))
+            off_x, off_y, off_theta = (TRUTH_STDS * rng.standard_normal(3)).tolist()
+            world.truth.append((t, x + off_x, y + off_y, theta + off_theta))
         command = (0.0, 0.0)
         if not _in(events.standing_s, t) and t >= pause_until:
-            to_goal = goal - pose[:2]
+            to_goal = goal[0] - x, goal[1] - y
             if math.hypot(*to_goal) < 0.3:
-                goal = np.array([rng.uniform(x0, x1), rng.uniform(y0, y1)])
+                goal = rng.uniform(x0, x1), rng.uniform(y0, y1)
                 pause_until = t + (rng.uniform(2.0, 12.0) if rng.random() < 0.4 else 0.0)
-            off = _wrap(math.atan2(to_goal[1], to_goal[0]) - pose[2])
-            w = float(np.clip(0.8 * off, -0.45, 0.45))
+            off = _wrap(math.atan2(to_goal[1], to_goal[0]) - theta)
+            w = min(max(0.8 * off, -0.45), 0.45)
             command = (0.086 if abs(off) < 0.3 else 0.067, w if abs(off) > 0.05 else 0.0)
         if not _in(events.odometry_gaps_s, t):
             world.odometry.append((t, round(command[0], 3), round(command[1], 3)))
         late.append(command)
-        v_c, w_c = late.pop(0)
-        v = (robot.speed_gain - robot.speed_loss * min(abs(w_c), 0.45)) * v_c * (1.0 + errors[0])
-        w = robot.turn_gain * w_c * (1.0 + errors[1]) + robot.bend_rad_per_m * v
+        v_c, w_c = late.popleft()
+        faster, turns_more = errors[:2].tolist()
+        v = (robot.speed_gain - robot.speed_loss * min(abs(w_c), 0.45)) * v_c * (1.0 + faster)
+        w = robot.turn_gain * w_c * (1.0 + turns_more) + robot.bend_rad_per_m * v
         v += rng.normal(0.0, robot.speed_jerk_std) if v_c else 0.0
         jerk = robot.turn_jerk_std * (2.0 if abs(w_c) > 0.1 else 1.0)
         w += rng.normal(0.0, jerk) if v_c or w_c else 0.0
-        middle = pose[2] + robot.course_rad + 0.5 * w * DT_S
-        pose = pose + np.array([v * DT_S * math.cos(middle), v * DT_S * math.sin(middle), w * DT_S])
-        errors = keep * errors + shock * rng.normal(size=errors.shape)
-        before = [*before[1:], pose.copy()]
+        middle = theta + robot.course_rad + 0.5 * w * DT_S
+        x, y = x + v * DT_S * math.cos(middle), y + v * DT_S * math.sin(middle)
+        theta += w * DT_S
+        errors = keep * errors + shock * rng.standard_normal(len(errors))
+        before.append((x, y, theta))
         after = t + DT_S
         if after >= next_picture:
             next_picture = after + rng.choice([0.2, 0.25, 0.45])
             if not _in(events.blind_s, after):
-                _picture(world, after, before[0], pose, robot, events, places, errors[2:], rng)
+                _picture(
+                    world,
+                    after,
+                    before[0],
+                    (x, y, theta),
+                    robot,
+                    events,
+                    places.tolist(),
+                    errors[2:].tolist(),
+                    rng,
+                )
     return world
 
 
 def _picture(
     world: _World,
     t: float,
-    seen_from: FloatArray,
-    pose: FloatArray,
+    seen_from: tuple[float, float, float],
+    pose: tuple[float, float, float],
     robot: Robot,
     events: Events,
-    places: FloatArray,
-    landmark_errors: FloatArray,
+    places: list[list[float]],
+    landmark_errors: list[float],
     rng: np.random.Generator,
 ) -> None:
-    for i, place in enumerate(places):
-        away = place - pose[:2]
-        r = math.hypot(*away)
-        old = place - seen_from[:2]
-        b = _wrap(math.atan2(old[1], old[0]) - seen_from[2])
+    for i, (x, y) in enumerate(places):
+        r = math.hypot(x - pose[0], y - pose[1])
+        b = _wrap(math.atan2(y - seen_from[1], x - seen_from[0]) - seen_from[2])
         if abs(b) > 0.58 or not 0.8 < r < 7.0 or rng.random() > 0.25:
             continue
         reading = (r * robot.range_scale + robot.range_offset_m) * math.cos(b) ** robot.depth_power
