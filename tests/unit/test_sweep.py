@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import itertools
+from functools import cache
 
 import numpy as np
 import pytest
@@ -51,9 +52,15 @@ def swept(walls: FloatArray, goal: tuple[float, float] = (1.0, 1.0)) -> tuple[Wo
     return world, planner.plan(request)
 
 
+@cache
+def swept_floor(name: str) -> tuple[WorldMap, PlanResult]:
+    """One of the floors, planned once for all that look at its path."""
+    return swept(FLOORS[name])
+
+
 @pytest.mark.parametrize("name", FLOORS)
 def test_the_whole_floor_is_swept_and_nothing_is_touched(name: str) -> None:
-    world, result = swept(FLOORS[name])
+    world, result = swept_floor(name)
     assert result.path is not None
     xy = np.ascontiguousarray(result.path.states[:, :2])
     assert min(world.walls.distance_m(x, y) for x, y in xy) >= 0.399
@@ -111,7 +118,7 @@ def test_a_clearance_that_would_shut_a_door_is_kept_everywhere_else() -> None:
 
 
 def test_of_what_was_driven_the_rest_is_swept_and_no_more() -> None:
-    world, whole = swept(FLOORS["a room"])
+    world, whole = swept_floor("a room")
     planner = BoustrophedonPlanner(BoustrophedonConfig(width_m=0.8, clearance_m=0.4))
     assert whole.path is not None
 
@@ -152,7 +159,7 @@ def test_of_what_was_driven_the_rest_is_swept_and_no_more() -> None:
 
 
 def test_the_least_of_what_was_left_is_left_for_good() -> None:
-    world, whole = swept(FLOORS["a room"])
+    world, whole = swept_floor("a room")
     assert whole.path is not None
     xy = whole.path.states[:, :2]
     floor = Floor.of(world, 0.4, 0.8 / 12, (1.0, 1.0))
@@ -168,7 +175,7 @@ def test_the_least_of_what_was_left_is_left_for_good() -> None:
 @pytest.mark.parametrize("width_m", [1e-5, 1e5])
 def test_a_pass_that_the_maps_cells_tell_nothing_of_is_refused(width_m: float) -> None:
     """One was divided by no area, with a warning; the other was told that its start stood in a wall."""
-    world, _ = swept(FLOORS["a room"])
+    world, _ = swept_floor("a room")
     room = {"map": "room", "bounds_m": list(world.bounds_m), "walls_m": ROOM}
     sweep = f"expected a width_m of 0.0566 to 8 for a map of 10 m x 8 m, found {width_m:g}"
     changed = copy.deepcopy(MISSIONS["sweep-floor"])
