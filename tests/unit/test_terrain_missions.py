@@ -48,6 +48,14 @@ def run(wall: Path, *more: str, out: Path | None = None) -> dict[str, Any]:
     return run_mission(mission, out=out, save=out is not None).metrics
 
 
+@pytest.mark.parametrize("name", ["gale-pose", "gale-ekf", "gale-astar-ekf"])
+def test_no_outlines_are_made_of_hazards_that_stop_nobody(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A crater's cells have a million sides: to make them was half of what a short run took."""
+    monkeypatch.setattr("pilotage.maps.world_map.outlines", None)
+    mission = load_mission(name, ["run.time_limit_s=300", "world.map.columns=4400"])
+    assert run_mission(mission, save=False).metrics["steps"] > 20
+
+
 class TestTheRoversSecondTask:
     def test_as_the_report_has_it(self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         """Pixels by equations 3.1 and 3.2; the second run takes the terrain from the cache, bit for bit."""
