@@ -15,6 +15,7 @@ import pytest
 from pilotage.cli.main import main
 from pilotage.core.errors import InputError
 from pilotage.maps.cell_map import CellState
+from pilotage.tracking.channels import greatest_channel, least_channel
 from pilotage.tracking.opencv import opencv
 from pilotage.tracking.path import build_path
 from pilotage.tracking.robot_colour import parse_hsv
@@ -342,3 +343,17 @@ def test_a_body_that_is_no_disc_is_placed_less_surely() -> None:
     ]
     assert stated[0].max() < 0.005
     assert stated[1] == pytest.approx(np.sqrt(stated[0] ** 2 + 0.02**2))
+
+
+def test_channels_are_reduced_as_numpy_reduces_them() -> None:
+    rng = np.random.default_rng(2)
+    for picture in (
+        rng.integers(0, 256, (7, 5, 3), dtype=np.uint8),
+        rng.integers(-255, 256, (2, 7, 5, 3)).astype(np.int16),
+        rng.normal(size=(7, 5, 3)).astype(np.float32),
+    ):
+        before = picture.copy()
+        assert np.array_equal(least_channel(picture), picture.min(axis=-1))
+        assert np.array_equal(greatest_channel(picture), picture.max(axis=-1))
+        assert least_channel(picture).dtype == picture.dtype
+        assert np.array_equal(picture, before)

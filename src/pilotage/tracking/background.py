@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from pilotage.tracking.channels import greatest_channel
 from pilotage.tracking.film import Image
 from pilotage.tracking.light import Region, in_light_of, paper_colour
 from pilotage.tracking.opencv import opencv
@@ -78,13 +79,13 @@ def learn_background(samples: Sequence[Image], region: Region) -> Background:
     paper = paper_colour(region.cut(samples[len(samples) // 2]), region)
     stack = np.array([in_light_of(region.cut(sample), region, paper) for sample in samples])
     reach = _LIKE_PAPER * max(float(paper.mean()), 1.0)
-    away = np.abs(stack.astype(np.int16) - paper.astype(np.int16)).max(axis=3)
+    away = greatest_channel(np.abs(stack.astype(np.int16) - paper.astype(np.int16)))
     like_paper = away < reach
     often = like_paper.sum(axis=0) >= max(2, round(0.1 * len(samples)))
     image = np.median(stack, axis=0).astype(np.uint8)
     mixed = often & ~like_paper.all(axis=0)
     pixels = np.where(like_paper[:, mixed, None], stack[:, mixed].astype(np.float32), np.nan)
     image[mixed] = np.nanmedian(pixels, axis=0).astype(np.uint8)
-    still = np.abs(stack[:, ::4, ::4].astype(np.int16) - image[::4, ::4]).max(axis=3)
+    still = greatest_channel(np.abs(stack[:, ::4, ::4].astype(np.int16) - image[::4, ::4]))
     noise = 1.4826 * float(np.median(still[:, region.mask[::4, ::4]]))
     return Background(image, paper, float(np.clip(8.0 * noise, 24.0, 60.0)), region)

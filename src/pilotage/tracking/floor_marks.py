@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pilotage.maps.cell_map import CellMap, CellState
+from pilotage.tracking.channels import greatest_channel
 from pilotage.tracking.film import Image
 from pilotage.tracking.opencv import opencv
 
@@ -60,7 +61,7 @@ def find_marks(top_view: Image, paper: Floats, size_m: float, grid: int) -> Floo
     """
     cv2 = opencv()
     side = top_view.shape[0]
-    away = np.abs(top_view.astype(np.float32) - paper.astype(np.float32)).max(axis=2)
+    away = greatest_channel(np.abs(top_view.astype(np.float32) - paper.astype(np.float32)))
     marks = (away > _UNLIKE_PAPER * float(paper.mean())).astype(np.uint8)
     rim = max(2, round(0.004 * side))
     marks[:rim] = marks[-rim:] = 0

@@ -11,6 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from pilotage.tracking.channels import greatest_channel, least_channel
 from pilotage.tracking.film import Image
 from pilotage.tracking.opencv import opencv
 from pilotage.tracking.sheet import in_map_order, turning
@@ -78,7 +79,7 @@ def refine_corners(image: Image, corners: Floats) -> tuple[Floats, float, float]
         laid, beyond what would by chance. Corners that would move further than the searched band stay where
         they were.
     """
-    grey = opencv().GaussianBlur(image.min(axis=2), (0, 0), 1.0).astype(np.float32)
+    grey = opencv().GaussianBlur(least_channel(image), (0, 0), 1.0).astype(np.float32)
     centre = corners.mean(axis=0)
     current, deviation, support = corners, 1.0, 0.0
     for band in (0.03, 0.012):
@@ -125,8 +126,8 @@ def _quadrilaterals(image: Image) -> list[tuple[Floats, float]]:
     """Even quadrilaterals of one frame with a score of size and shape; those that are alike only once."""
     cv2 = opencv()
     found: list[tuple[Floats, float]] = []
-    light = cv2.GaussianBlur(image.min(axis=2), (5, 5), 0)
-    dark = cv2.GaussianBlur(255 - image.max(axis=2), (5, 5), 0)
+    light = cv2.GaussianBlur(least_channel(image), (5, 5), 0)
+    dark = cv2.GaussianBlur(255 - greatest_channel(image), (5, 5), 0)
     for channel in (light, dark):
         low, high = np.percentile(channel[::4, ::4], [10.0, 99.0])
         for threshold in np.linspace(low, high, _THRESHOLDS + 2)[1:-1]:
