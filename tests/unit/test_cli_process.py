@@ -232,3 +232,24 @@ def test_settings_of_others_libraries_break_nothing(tmp_path: Path) -> None:
         },
     )
     assert (done.returncode, done.stderr) == (0, "")
+
+
+@pytest.mark.parametrize("megabytes", [100, 400, 640])
+def test_little_address_space_is_told_in_one_line(megabytes: int, tmp_path: Path) -> None:
+    """Libraries that could not be loaded ended in a traceback, in words of their own or never."""
+    resource = pytest.importorskip("resource", reason="systems without such limits")
+
+    def limited() -> None:
+        resource.setrlimit(resource.RLIMIT_AS, (megabytes * 2**20, megabytes * 2**20))
+
+    done = subprocess.run(
+        [sys.executable, "-m", "pilotage", "run", "museum-1", "--set", "run.time_limit_s=1"],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=False,
+        preexec_fn=limited,
+    )
+    told = "pilotage: this needs more memory than there is; take a smaller or coarser input\n"
+    assert (done.returncode, done.stderr) == (2, told)
+    assert not list(tmp_path.iterdir())

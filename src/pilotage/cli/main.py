@@ -28,6 +28,11 @@ from pilotage.core.interruptions import (
 BAD_INPUT = 2
 BUG = 70
 BROKEN_PIPE = 141
+NO_MEMORY = "this needs more memory than there is; take a smaller or coarser input"
+UNMAPPED = ("failed to map segment", "cannot allocate memory")
+"""What the system's loader says of a library for which there is no memory."""
+LEAST_ADDRESSES = 600 * 2**20
+"""Bytes of address space below which NumPy's and SciPy's libraries end the process, or never end loading."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -42,6 +47,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         _steady_streams()
         if arguments is None:
+            if _few_addresses():
+                return _without_memory()
             _steady_environment()
         with _ended_once(for_good=arguments is None) as struck:
             return _run(sys.argv[1:] if arguments is None else list(arguments), struck)
@@ -51,6 +58,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
             sys.unraisablehook = lambda _: None
         ended = isinstance(stop, Terminated)
         return _say("ended by SIGTERM", TERMINATED) if ended else _say("interrupted", INTERRUPTED)
+    except MemoryError:
+        # Where even to tell of a fault there was none.
+        return _without_memory()
     except BrokenPipeError:
         # The interpreter flushes standard output once more at exit: give it somewhere to go.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
@@ -143,10 +153,10 @@ def _run(arguments: list[str], struck: list[KeyboardInterrupt]) -> int:
             return _say(fault.line, BAD_INPUT)
         if isinstance(error, SystemExit):
             raise
+        if _for_want_of_memory(error):
+            return _without_memory()
         if isinstance(error, OSError):
             return _say(_told(error), BAD_INPUT)
-        if isinstance(error, MemoryError):
-            return _say("this needs more memory than there is; take a smaller or coarser input", BAD_INPUT)
         fault = consequence_of(error)
         if fault is not None:
             print(fault.traceback, file=sys.stderr)
@@ -155,6 +165,33 @@ def _run(arguments: list[str], struck: list[KeyboardInterrupt]) -> int:
 
         traceback.print_exc()
         return _say("this is a bug in pilotage; please report it with the lines above", BUG)
+
+
+def _for_want_of_memory(error: BaseException) -> bool:
+    """Whether an error says that there is no memory, or that a library could not be loaded into any."""
+    if isinstance(error, MemoryError):
+        return True
+    before = error.__cause__ or error.__context__
+    told = str(error).lower() if isinstance(error, ImportError | OSError) else ""
+    return any(word in told for word in UNMAPPED) or (
+        isinstance(error, ImportError | OSError) and before is not None and _for_want_of_memory(before)
+    )
+
+
+def _few_addresses() -> bool:
+    """Whether the process was given an address space (``ulimit -v``) in which nothing can be computed."""
+    try:
+        import resource
+    except ImportError:  # a system without such limits
+        return False
+    most, _ = resource.getrlimit(resource.RLIMIT_AS)
+    return most != resource.RLIM_INFINITY and most < LEAST_ADDRESSES
+
+
+def _without_memory() -> int:
+    """One line; what the interpreter's end has no memory for either is nothing to tell."""
+    sys.unraisablehook = lambda _: None
+    return _say(NO_MEMORY, BAD_INPUT)
 
 
 def _told(error: OSError) -> str:
