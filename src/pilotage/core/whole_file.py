@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+
+from pilotage.core.drafts import clear_drafts, draft_prefix
 
 
 @contextmanager
@@ -23,11 +24,12 @@ def named(path: Path, draft: Path) -> Iterator[None]:
 @contextmanager
 def draft_of(path: Path) -> Iterator[Path]:
     """A draft that takes the place of ``path`` when it is whole: two processes may write at once."""
-    draft = path.with_name(f".{path.name}.{os.getpid()}")
+    draft = path.with_name(f"{draft_prefix(path)}draft")
     try:
         with named(path, draft):
             yield draft
             draft.replace(path)
+        clear_drafts(path)
     finally:
         draft.unlink(missing_ok=True)
 

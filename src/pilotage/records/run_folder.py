@@ -10,6 +10,7 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
+from pilotage.core.drafts import clear_drafts, draft_prefix
 from pilotage.core.types import Event
 from pilotage.core.whole_file import named
 from pilotage.maps.occupancy_grid import OccupancyGrid
@@ -127,12 +128,13 @@ def draft_folder(final: Path) -> Iterator[Path]:
     """
     made = [folder for folder in final.parents if not folder.exists()]
     final.parent.mkdir(parents=True, exist_ok=True)
-    draft = Path(tempfile.mkdtemp(prefix=f".{final.name}-", dir=final.parent))
+    draft = Path(tempfile.mkdtemp(prefix=draft_prefix(final), dir=final.parent))
     try:
         draft.chmod(0o777 & ~_umask())
         with named(final, draft):
             yield draft
             replace_folder(draft, final)
+        clear_drafts(final)
     except BaseException:
         shutil.rmtree(draft, ignore_errors=True)
         with suppress(OSError):  # another run is in one of them already
@@ -151,7 +153,7 @@ def replace_folder(draft: Path, final: Path) -> None:
     """Put ``draft`` in the place of ``final``, also where another process does the same at once."""
     for _ in range(100):
         if final.exists():
-            old = Path(tempfile.mkdtemp(prefix=f".{final.name}-old-", dir=final.parent))
+            old = Path(tempfile.mkdtemp(prefix=f"{draft_prefix(final)}old-", dir=final.parent))
             try:
                 final.rename(old / "run")
             except FileNotFoundError:  # another process was quicker

@@ -8,6 +8,8 @@ import socket
 import sqlite3
 import time
 
+from pilotage.core.drafts import is_alive
+
 STALE_S = 30.0
 """An owner elsewhere that was not heard of for so long is gone; one on this machine once its process is."""
 REUSED_S = 600.0
@@ -56,15 +58,5 @@ def is_gone(host: str, pid: int, heard_s: float) -> bool:
     if not -REUSED_S <= silent_s < math.inf:
         return True
     if host == socket.gethostname():
-        return silent_s > REUSED_S or not _alive(pid)
+        return silent_s > REUSED_S or not is_alive(pid)
     return silent_s > STALE_S
-
-
-def _alive(pid: int) -> bool:
-    try:
-        os.kill(pid, 0)
-    except ProcessLookupError:
-        return False
-    except PermissionError:
-        return True
-    return True
