@@ -12,12 +12,13 @@ from PIL import Image
 
 from pilotage.cli.main import main
 from pilotage.cli.study_page import write_study_report
+from pilotage.core.errors import InputError
 from pilotage.evaluation.metrics import METRICS
 from pilotage.experiments.given import has
 from pilotage.experiments.mission import load_mission, shipped_missions
 from pilotage.experiments.run import run_mission
 from pilotage.experiments.studies.attribution import attribution_of, attribution_study, is_attribution
-from pilotage.experiments.studies.engine import run_study
+from pilotage.experiments.studies.engine import check_asked, run_study
 from pilotage.experiments.studies.options import StudyOptions
 from pilotage.experiments.studies.rows import flat
 from pilotage.experiments.studies.sweep import sweep_study
@@ -202,3 +203,14 @@ class TestWords:
         assert "knows &lt;all&gt;" in table
         assert "collisions" not in table  # nobody changes them
         assert ranking_table([entry("mapper", duration_s=(0.0, 0.0, 0.0, False))]).html == ""
+
+
+def test_runs_within_the_start_phase_are_refused_before_the_first_trial() -> None:
+    """All of them ran, and gave no errors to compare."""
+    with pytest.raises(InputError, match=r"expected a run\.time_limit_s above run\.settle_s \(1 s\)"):
+        attribution_study("museum-1", ["run.time_limit_s=1"], 2)
+    sweep = sweep_study(
+        "museum-1", ["stack.localizer.gate=0.9,0.99"], ["run.time_limit_s=1"], 1, ("nees_mean",)
+    )
+    with pytest.raises(InputError, match=r"metric 'nees_mean': .* runs that end within it"):
+        check_asked(sweep)

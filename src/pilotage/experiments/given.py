@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from pilotage.experiments.build.charts import shipped_maps
 from pilotage.maps.map_file import MapFile
 from pilotage.maps.true_cells import SheetFile
@@ -25,6 +27,9 @@ def has(mission: Mission) -> frozenset[str]:
         found.add("clearance")  # of what is driven, or of a path over cells
     if mission.task.name == "explore" and any(stack.navigator.name == "floor-frontier" for stack in stacks):
         found.add("unknown-floor")
+    run = mission.run
+    if run.settle_s < math.ceil(run.time_limit_s / run.dt_s) * run.dt_s:
+        found.add("settled")  # errors count at all
     if mission.world.people:
         found.add("people")
     if mission.task.parameters.get("goals"):

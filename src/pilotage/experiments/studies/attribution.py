@@ -50,7 +50,13 @@ def attribution_study(mission: str, overrides: Sequence[str], trials: int) -> St
     loaded = load_mission(mission, overrides)
     own = loaded.run.oracles
     oracles = {name: text for name, text in applicable(loaded).items() if name not in (DRIVER, *own)}
-    costs = METRICS.costs_of(loaded.task.name, METRICS.given_by(loaded.task.name, has(loaded)))
+    there = has(loaded)
+    if "estimate" in there and "settled" not in there:
+        raise InputError(
+            f"attribute '{mission}': expected a run.time_limit_s above run.settle_s "
+            f"({loaded.run.settle_s:g} s), after which errors count, found {loaded.run.time_limit_s:g}"
+        )
+    costs = METRICS.costs_of(loaded.task.name, METRICS.given_by(loaded.task.name, there))
     if not oracles:
         raise InputError(f"attribute '{mission}': expected a mission with modules that an oracle can replace")
     configurations: list[dict[str, Any]] = [{"name": BASELINE, "set": {"run.oracles": list(own)}}]

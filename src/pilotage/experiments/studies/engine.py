@@ -8,7 +8,7 @@ import shutil
 import signal
 import threading
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence, Set
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -251,13 +251,15 @@ def check_asked(study: Study) -> None:
     asked = {*_asked(study), *told}
     known: set[str] = set()
     tasks: set[str] = set()
+    settled: set[str] = set()
     for cell in study.cells:
         if asked <= known:
             return
         mission = mission_of(dict(study.base), cell.overrides)
+        settled |= METRICS.given_by(mission.task.name, has(mission) | {"settled"})
         tasks.add(mission.task.name)
         known |= METRICS.given_by(mission.task.name, has(mission))
-    _refuse(sorted(asked), known, f"no mission of the task {' or '.join(sorted(tasks))} gives it")
+    _refuse(sorted(asked), known, f"no mission of the task {' or '.join(sorted(tasks))} gives it", settled)
 
 
 def _asked(study: Study) -> list[str]:
@@ -286,9 +288,15 @@ def check_metrics(study: Study, folder: Path) -> None:
     _refuse(_asked(study), given, f"no trial of the study '{study.name}' gives it")
 
 
-def _refuse(asked: Sequence[str], given: set[str], why: str) -> None:
+def _refuse(asked: Sequence[str], given: set[str], why: str, longer: Set[str] = frozenset()) -> None:
+    """Refuse a metric that is not given; those in ``longer`` would be by longer runs."""
     for metric in asked:
         if metric not in given:
+            if metric in longer:
+                raise InputError(
+                    f"metric '{metric}': expected a run.time_limit_s above run.settle_s, after which errors "
+                    "count, found runs that end within it"
+                )
             close = nearest(metric, sorted(given))
             hint = f"; did you mean '{close}'?" if close else ""
             raise InputError(f"metric '{metric}': {why}{hint}")
