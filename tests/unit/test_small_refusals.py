@@ -55,6 +55,8 @@ def test_missions(settings: list[str], words: str) -> None:
         ("museum-unknown", "stack.navigator.resolution_m=1e-9", "greater than or equal to 0.005"),
         # An arc that was followed without an end.
         ("museum-1-fast", "stack.local_controller={name: dwa, horizon_s: 1e9}", "less than or equal to 100"),
+        # 13 GB before it was refused, where there were so many.
+        ("gale-pose", "world.map={name: crater, rows: 100000}", "expected at most 1,024 MB, found 12,600 MB"),
         # A run whose page could not be made of its own folder.
         ("gale-pose", f"world.map={FAR}", r"found up to 1\.6e\+09; is the resolution right\?"),
     ],
@@ -62,6 +64,12 @@ def test_missions(settings: list[str], words: str) -> None:
 def test_what_no_memory_holds_and_no_run_ends_with(mission: str, setting: str, words: str) -> None:
     with pytest.raises(InputError, match=words):
         build_source(load_mission(mission, [setting], 0))
+
+
+def test_who_explores_nothing_is_refused_before_it_drives() -> None:
+    """It drove to the end, and then its judge missed the map."""
+    with pytest.raises(InputError, match=r"makes cells and left and visited, .* found 'open-loop'"):
+        build(load_mission("romi-explore", ["stack.navigator=open-loop", "run.oracles=[localizer]"], 0))
 
 
 def test_hits_are_counted_only_where_there_is_room(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -149,6 +157,7 @@ def test_a_landmark_beyond_all_integers_is_refused(tmp_path: Path) -> None:
             ["robot.sensors.lidar.rate_hz=7"],
             "robot.sensors.lidar.rate_hz: expected a whole fraction of 10 Hz",
         ),
+        (["robot.sensors.it=bumper", "run.dt_s=0.25"], "found 10; take 4, or run.dt_s: 0.1"),
         (["robot.motion.delay_s=0.05"], "robot.motion.delay_s: expected a multiple of run.dt_s"),
         (["robot.faults=[{name: drop, sensor: laser}]"], "robot.faults.0.sensor"),
         (

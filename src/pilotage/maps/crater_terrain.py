@@ -23,6 +23,7 @@ from pydantic import Field
 
 from pilotage.core.config import Config
 from pilotage.core.errors import InputError
+from pilotage.core.limits import DATA_BYTES, limit, too_large
 from pilotage.core.random import RandomStreams
 from pilotage.core.types import FloatArray, IntArray, Pose2
 from pilotage.maps.elevation import ElevationModel
@@ -38,6 +39,8 @@ EJECTA_RADII = 3.0
 
 COARSE = 8
 
+CELL_BYTES, MOST_BYTES = 28, 2 * DATA_BYTES
+"""What a cell takes while the terrain is made, and all of them at most: what files may be, worked on."""
 MOST_CRATERS, MOST_TIMES_OVER = 200_000, 5.0
 """How many craters are dug, and how often they may cover the ground with what they throw out: long before
 that the younger ones have erased the older ones, and digging takes minutes."""
@@ -106,8 +109,11 @@ def crater_terrain(config: CraterTerrainConfig) -> CraterTerrain:
     InputError
         Where it does not fit into memory, or its craters or the space between scarps are beyond what is dug.
     """
-    cells = config.rows * config.columns
-    require_memory(28 * cells, f"crater terrain of {config.columns} x {config.rows} cells")
+    size = CELL_BYTES * config.rows * config.columns
+    what = f"crater terrain of {config.columns} x {config.rows} cells"
+    if size > limit(MOST_BYTES):
+        raise too_large(what, limit(MOST_BYTES), size)
+    require_memory(size, what)
     if config.scarp_spacing_m > MOST_SPACING_CELLS * config.resolution_m:
         raise InputError(
             f"crater terrain: expected a scarp_spacing_m of at most {MOST_SPACING_CELLS} cells, "

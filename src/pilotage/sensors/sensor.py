@@ -47,8 +47,9 @@ class SensorConfig(Config):
         whole = round(steps)
         if whole < 1 or abs(steps - whole) > 1e-6 * steps:
             raise InputError(
-                f"{where}.rate_hz: expected a whole fraction of {1.0 / dt_s:g} Hz "
-                f"(run.dt_s = {dt_s:g} s), found {self.rate_hz:g}"
+                f"{where}.rate_hz: expected a whole fraction of {1.0 / dt_s:g} Hz (run.dt_s = {dt_s:g} s), "
+                f"found {self.rate_hz:g}; take {1.0 / (max(1, whole) * dt_s):g}, or run.dt_s: "
+                f"{1.0 / (self.rate_hz * math.ceil(steps)):g}"
             )
         return whole
 

@@ -116,6 +116,11 @@ class Journal:
         """Offer something that is wanted once, at the end of the run: a map, what was found."""
         self._results[name] = make
 
+    @property
+    def offered(self) -> frozenset[str]:
+        """The names of what is offered."""
+        return frozenset(self._results)
+
     def results(self) -> dict[str, object]:
         """Everything offered, made now."""
         return {name: make() for name, make in self._results.items()}

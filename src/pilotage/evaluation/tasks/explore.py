@@ -49,6 +49,7 @@ class ExploreTask:
         else:
             self._ground = FloorExploration(config.least_mapped, config.return_m, config.spare_m, setting)
         self.columns, self.goals = self._ground.columns, ()
+        self.wants: frozenset[str] = self._ground.WANTS
         self.events: list[Event] = self._ground.events
 
     def step(self, t_s: float, attempts: Sequence[Attempt]) -> str | None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import ClassVar
 
 from pilotage.core.errors import InputError
 from pilotage.evaluation.driving import driving_metrics, header, poses
@@ -20,6 +21,8 @@ class FloorExploration(WatchedTask):
     Over at the first collision, or when nobody explores any more; a success where the robot says that it is
     done, stands where it began, and has enough of what can be reached on its map.
     """
+
+    WANTS: ClassVar[frozenset[str]] = frozenset({"grid"})
 
     def __init__(self, least_mapped: float, return_m: float, spare_m: float, setting: TaskSetting) -> None:
         if setting.chart.open_ground or setting.chart.walls.segments_m.shape[0] == 0:

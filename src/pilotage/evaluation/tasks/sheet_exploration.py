@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import ClassVar
 
 from pilotage.core.types import Event
 from pilotage.evaluation.driving import header
@@ -21,6 +22,8 @@ class SheetExploration:
     Over when nobody explores any more, or a robot is blocked or off the sheet; a success where the robot
     says that it is done and touched nothing.
     """
+
+    WANTS: ClassVar[frozenset[str]] = frozenset({"cells", "visited", "left"})
 
     def __init__(self, blocked_s: float, markings: FloorMarkings, setting: TaskSetting) -> None:
         assert markings.source is not None, "looked at by the task"

@@ -116,6 +116,7 @@ def build(mission: Mission) -> Experiment:
         if oracles:
             # The obstacles stay where the robot without oracles meets them: only the modules differ.
             truths, team = make_team(mission, chart, sheets, obstacles, oracles, task)
+    _check_wanted(mission, task, team)
     if not task.drives:
         _check_ended(mission, team)
     for truth, body in zip(truths, simulator.bodies, strict=True):
@@ -173,6 +174,18 @@ def _check_places(mission: Mission, chart: WorldMap, sheets: Sequence[RobotKnowl
                     f"team.stations.{index}: expected room for two robots beside team.stations.{other}, "
                     f"found {apart:.2f} m between them; move one of them"
                 )
+
+
+def _check_wanted(mission: Mission, task: Task, team: Sequence[Member]) -> None:
+    """Refuse a navigator that never makes what the task judges."""
+    wanted: frozenset[str] = getattr(task, "wants", frozenset())
+    for member in team:
+        lacking = sorted(wanted - member.journal.offered)
+        if lacking:
+            raise InputError(
+                f"task '{mission.task.name}': expected a navigator that makes {' and '.join(lacking)}, "
+                f"as those that explore do, found '{member.stack_config.navigator.name}'"
+            )
 
 
 def _check_ended(mission: Mission, team: Sequence[Member]) -> None:
