@@ -77,13 +77,13 @@ def run(words: Sequence[str], folder: Path) -> Outcome:
     before = set(_below(folder))
     here = Path.cwd()
     out, err = _Stream(), _Stream()
-    _forget_peak()
-    held, begun_s = _peak_mb(), time.process_time()
+    forget_peak()
+    held, begun_s = peak_mb(), time.process_time()
     os.chdir(folder)
     try:
         with (
             _beneath(err),
-            _limited(),
+            limited(),
             contextlib.redirect_stdout(out),
             contextlib.redirect_stderr(err),
         ):
@@ -99,7 +99,7 @@ def run(words: Sequence[str], folder: Path) -> Outcome:
         os.chdir(here)
     taken_s = time.process_time() - begun_s
     new = tuple(sorted(set(_below(folder)) - before))
-    return Outcome(code, out.getvalue(), err.getvalue(), max(0.0, _peak_mb() - held), taken_s, new)
+    return Outcome(code, out.getvalue(), err.getvalue(), max(0.0, peak_mb() - held), taken_s, new)
 
 
 class _Stream(io.StringIO):
@@ -126,7 +126,7 @@ def _beneath(err: io.StringIO) -> Iterator[None]:
 
 
 @contextlib.contextmanager
-def _limited() -> Iterator[None]:
+def limited() -> Iterator[None]:
     """End what takes too long: by processor time, which others do not take away, and by the clock."""
 
     def ended(signum: int, frame: object) -> None:  # noqa: ARG001 - as signal calls it
@@ -181,13 +181,14 @@ def _below(folder: Path) -> Iterator[str]:
             yield str((Path(root) / name).relative_to(folder))
 
 
-def _forget_peak() -> None:
+def forget_peak() -> None:
     """Let the kernel count the largest size anew, where it can."""
     with contextlib.suppress(OSError):
         Path("/proc/self/clear_refs").write_text("5")
 
 
-def _peak_mb() -> float:
+def peak_mb() -> float:
+    """The largest size of this process since then."""
     try:
         for line in Path("/proc/self/status").read_text().splitlines():
             if line.startswith("VmHWM:"):

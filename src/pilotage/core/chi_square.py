@@ -16,5 +16,9 @@ def chi_square_cdf(value: float, dof: float) -> float:
 
 
 def gated_mean(gate: float, dof: float) -> float:
-    """Mean of a chi-square variable given that it passed ``gate``: n F_{n+2}(g) / F_n(g)."""
-    return dof * chi_square_cdf(gate, dof + 2) / chi_square_cdf(gate, dof)
+    """Mean of a chi-square variable given that it passed ``gate``: n F_{n+2}(g) / F_n(g).
+
+    Of a gate so small that nothing passes it, the limit of that: g n / (n + 2).
+    """
+    passes = chi_square_cdf(gate, dof)
+    return dof * chi_square_cdf(gate, dof + 2) / passes if passes > 0.0 else gate * dof / (dof + 2.0)

@@ -26,6 +26,9 @@ from pilotage.sim.sensing.sensor import SIMULATED_SENSORS, Carrier, ReadTogether
 from pilotage.sim.worlds.traffic import NO_RADII, Traffic
 from pilotage.sim.worlds.world import World
 
+MOST_SAMPLES = 100_000
+"""Of a sensor in one step."""
+
 
 @dataclass(frozen=True, slots=True)
 class RobotSpec:
@@ -249,6 +252,11 @@ def _samples(config: SensorConfig, dt_s: float, where: str) -> int:
     samples = config.rate_hz * dt_s
     if samples < 1.0 - 1e-6:
         return 1
+    if samples > MOST_SAMPLES:
+        raise InputError(
+            f"{where}.rate_hz: expected at most {MOST_SAMPLES / dt_s:g} Hz, {MOST_SAMPLES} samples in a step "
+            f"(run.dt_s = {dt_s:g} s), found {config.rate_hz:g}"
+        )
     whole = round(samples)
     if abs(samples - whole) > 1e-6 * samples:
         raise InputError(

@@ -40,6 +40,8 @@ GRAZE_M = 1e-3
 CONTACT_M = 1e-6
 """Bodies nearer than this touch."""
 BISECTIONS = 40
+MOST_LOOKS = 100_000
+"""At one move: exact along a hundred metres of a wall, coarser for what no robot does in a step."""
 
 
 @kernel
@@ -73,7 +75,7 @@ def first_contact(
         reach += radius * abs(angle)
     if clearance > reach or reach == 0.0:
         return 1.0
-    pieces = max(1, math.ceil(reach / (0.25 * inner)))
+    pieces = max(1, math.ceil(min(reach / (0.25 * inner), MOST_LOOKS)))
     length = reach / pieces
     last, last_clearance = 0.0, clearance
     for i in range(pieces):
@@ -87,7 +89,7 @@ def first_contact(
             # Both ends are clear, but there may be a contact between them.
             at, at_clearance = last, last_clearance
             while at < part:
-                ahead = min(part, at + max(at_clearance, GRAZE_M) / reach)
+                ahead = min(part, at + max(max(at_clearance, GRAZE_M) / reach, 1.0 / MOST_LOOKS))
                 px, py, ptheta = turned_part(x, y, theta, distance, lateral, angle, ahead)
                 there = all_clearance(px, py, ptheta, outline, fixed, others, own)
                 if there < -CONTACT_TOLERANCE_M and there < at_clearance:

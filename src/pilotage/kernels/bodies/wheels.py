@@ -51,7 +51,9 @@ def moves(
             roll_right * (1.0 - parameters[SLIP_RIGHT]) + slip_std * math.sqrt(abs(roll_right)) * noise[k, 1]
         )
         turn = (path_right - path_left) / parameters[SEPARATION]
-        out[k, 0] = 0.5 * (path_left + path_right) / chord_ratio(turn)
+        # Beyond half a turn in one sample a chord tells nothing of a path, and may have no length at all.
+        ratio = chord_ratio(turn) if abs(turn) < math.pi else 1.0
+        out[k, 0] = 0.5 * (path_left + path_right) / ratio
         out[k, 1] = 0.0
         out[k, 2] = turn
 

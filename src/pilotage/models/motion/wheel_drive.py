@@ -25,7 +25,7 @@ class WheelErrorsConfig(Config):
     separation_error: Shares = (0.01, 0.02)
     slip: Shares = (0.01, 0.02)
     """Each wheel rolls this much less far than it turns."""
-    slip_std_m_sqrt_m: float = Field(default=0.0015, ge=0.0)
+    slip_std_m_sqrt_m: float = Field(default=0.0015, ge=0.0, le=1.0)
     """Random slip of each wheel: standard deviation over one metre."""
 
 

@@ -10,7 +10,10 @@ from pilotage.kernels.bodies import wheels
 from pilotage.models.motion.wheel_drive import WheelDriveConfig
 from pilotage.sim.bodies.motion import SIMULATED_MOTIONS
 
+BLOCK_NUMBERS = 2_000_000
+"""Steps whose slip is drawn at once, for all wheels and samples, are so many numbers at most,"""
 BLOCK = 2048
+"""and so many steps."""
 OWN_RATE_HZ = 100.0
 """The wheels are followed this often at least, where no sensor samples them more often."""
 
@@ -41,7 +44,7 @@ class WheelDrive:
         self._parameters = true_wheels(config, streams.stream("drive"))
         self._slip_rng = streams.stream("slip")
         self._slip: FloatArray = np.zeros((0, samples, 2))
-        self._at = BLOCK
+        self._at = self._block = max(1, min(BLOCK, BLOCK_NUMBERS // (2 * samples)))
 
     @property
     def turned_rad(self) -> tuple[float, float]:
@@ -50,8 +53,8 @@ class WheelDrive:
 
     def command(self, command: Command) -> None:
         """One short move for each sample."""
-        if self._at == BLOCK:
-            self._slip = self._slip_rng.standard_normal((BLOCK, self._samples, 2))
+        if self._at == self._block:
+            self._slip = self._slip_rng.standard_normal((self._block, self._samples, 2))
             self._at = 0
         if type(command) is not WheelSpeeds:
             command = self._wheel_speeds(command)

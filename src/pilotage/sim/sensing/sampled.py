@@ -14,7 +14,8 @@ from pilotage.sensors.readings import EncoderCounts, GyroscopeRates
 from pilotage.sensors.wheel_encoders import WheelEncodersConfig
 from pilotage.sim.sensing.sensor import SIMULATED_SENSORS, Carrier
 
-BLOCK = 2048
+BLOCK, BLOCK_NUMBERS = 2048, 2_000_000
+"""Noise is drawn for so many steps at once, of few samples; in all for so many samples at most."""
 
 
 def samples_of(rate_hz: float, carrier: Carrier) -> int:
@@ -71,15 +72,16 @@ class SimulatedGyroscope:
         self._scale = 1.0 + signs[1] * config.scale_error
         self._walk, self._std = config.bias_walk_rad_s_sqrt_s, config.rate_std_rad_s
         self._rng, self._period_s = rng, carrier.period_s
-        self._at = BLOCK
+        self._at = self._block = max(1, min(BLOCK, BLOCK_NUMBERS // self._samples))
         self._noise: FloatArray = np.zeros((0, self._samples))
         self._steps: FloatArray = np.zeros(0)
 
     def read(self) -> GyroscopeRates:
         """Rates of the last step's samples."""
-        if self._at == BLOCK:
-            self._noise = self._std * self._rng.standard_normal((BLOCK, self._samples))
-            self._steps = self._walk * math.sqrt(self._period_s) * self._rng.standard_normal(BLOCK)
+        if self._at == self._block:
+            block = self._block
+            self._noise = self._std * self._rng.standard_normal((block, self._samples))
+            self._steps = self._walk * math.sqrt(self._period_s) * self._rng.standard_normal(block)
             self._at = 0
         self._bias += float(self._steps[self._at])
         rates = self._true

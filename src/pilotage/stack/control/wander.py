@@ -37,7 +37,7 @@ class WanderConfig(Config):
     """With somewhere to go to, a lane need not be longer than this."""
     gain_per_s: Positive = 1.5
     max_turn_rate_rad_s: Positive = 0.8
-    directions: int = Field(default=41, ge=3)
+    directions: int = Field(default=41, ge=3, le=10_000)
 
 
 class Wanderer:

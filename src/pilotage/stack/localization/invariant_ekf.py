@@ -36,7 +36,7 @@ from pilotage.stack.localization.self_check import NOISE_SHARE, SelfCheck
 NAME = "invariant-ekf-landmarks"
 NOTHING = np.zeros(0, dtype=np.int64), np.zeros(0), np.zeros(0)
 LEAST_VAR = 1e-12
-"""Of each coordinate (m^2) and the heading (rad^2) at the start."""
+"""Of each coordinate (m^2) and the heading (rad^2) at the start, of a range and a bearing."""
 
 
 class InvariantEkfConfig(Config):
@@ -83,7 +83,8 @@ class InvariantEkfLocalizer:
         order = np.argsort(chart.landmarks.ids)
         self._ids = np.ascontiguousarray(chart.landmarks.ids[order])
         self._points = np.ascontiguousarray(chart.landmarks.points_xy_m[order])
-        self._R = config.measurement_var_scale * np.diag([seer.range_var_m2, seer.bearing_var_rad2])
+        told = config.measurement_var_scale * np.array([seer.range_var_m2, seer.bearing_var_rad2])
+        self._R = np.diag(np.maximum(told, LEAST_VAR))
         self._gate_probability = config.gate
         self._gate = chi_square_quantile(config.gate, 2)
         self._expected_nis = gated_mean(self._gate, 2)

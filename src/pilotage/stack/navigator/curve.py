@@ -32,6 +32,8 @@ from pilotage.stack.planning.grid_planner import GridPlanner
 from pilotage.stack.planning.quintic_spline import QuinticSpline
 
 NAME = "navigator 'curve'"
+MOST_REFERENCES = 1_000_000
+"""Along a curve at a constant speed, one a step."""
 MOST_OFF_RAD = 0.35
 """A robot that cannot turn on the spot gets onto a curve that begins so far off its heading."""
 TURNS_FROM_RAD, TURN_SHARE, HEADING_PER_S = 0.1, 0.5, 3.0
@@ -153,6 +155,12 @@ class CurveNavigator:
             references = self._as_fast_as_it_can(curve)
         else:
             step_m = self._speed_m_s * self._dt_s
+            if curve.length_m > MOST_REFERENCES * step_m:
+                raise InputError(
+                    f"stack.navigator.speed_m_s: expected at most {MOST_REFERENCES} steps along the curve of "
+                    f"{curve.length_m:.1f} m, found {self._speed_m_s:g} m/s; take more than "
+                    f"{curve.length_m / MOST_REFERENCES / self._dt_s:.2g}"
+                )
             count = max(2, math.ceil(curve.length_m / step_m) + 1)
             s_m = np.minimum(np.arange(count) * step_m, curve.length_m)
             samples = curve.at(s_m)

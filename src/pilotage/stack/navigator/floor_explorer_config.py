@@ -35,9 +35,9 @@ class FloorExplorerConfig(Config):
     stall_s: Positive = 15.0
     arrival_m: Positive = 0.04
     """How near to the start it has to believe to be in the end."""
-    resolution_m: float = Field(default=0.05, ge=0.005)
+    resolution_m: float = Field(default=0.05, ge=0.005, le=10.0)
     """Side of a cell of the map that it drives by, where the localizer makes none,"""
-    map_resolution_m: float | None = Field(default=None, ge=0.005)
+    map_resolution_m: float | None = Field(default=None, ge=0.005, le=10.0)
     """and of the map that it leaves, drawn anew from the same scans: walls are known to half a cell."""
     keyframe_m: Positive = 0.25
     keyframe_rad: Positive = 0.2

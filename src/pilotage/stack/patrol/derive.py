@@ -168,6 +168,8 @@ def views(
     Points are middles of cells that the robot's body can cover, places of cells that its centre can reach;
     both are thinned to a spacing, more where there would be too many.
     """
+    # Nothing lies nearer than cells do.
+    stand_every_m, see_every_m = max(stand_every_m, floor.cell_m), max(see_every_m, floor.cell_m)
     area_m2 = np.count_nonzero(floor.swept) * floor.cell_m**2
     pairs = area_m2**2 / (stand_every_m * see_every_m) ** 2
     coarser = max(1.0, (pairs / MOST_PAIRS) ** 0.25)

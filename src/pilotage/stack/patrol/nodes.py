@@ -60,7 +60,7 @@ class Ground:
         free = distance >= self.clearance_m
         tight = np.clip(1.0 - (distance - self.clearance_m) / EASY_M, 0.0, 1.0)
         slowness = np.where(free, (1.0 + TIGHT_FACTOR * tight**2) / self.speed_m_s, np.inf)
-        size = 2 * math.ceil(self.lane_m / spacing_m) + 1
+        size = 2 * min(math.ceil(self.lane_m / spacing_m), max(distance.shape)) + 1
         room_m = scipy.ndimage.maximum_filter(distance, size=size)
         return slowness, room_m, self._half_widths(grid, distance, free)
 

@@ -75,6 +75,12 @@ class Roadmap:
         self._near_m = [near_m] * self._vertices + [STATION_M] * len(stations_xy_m)
         self._ground = Ground(chart.field, chart.bounds_m, clearance_m, speed_m_s, lane_m)
         self._finer: Roadmap | None = None
+        xmin, ymin, xmax, ymax = chart.bounds_m
+        if ((xmax - xmin) / spacing_m) * ((ymax - ymin) / spacing_m) > MOST_NODES:
+            raise InputError(
+                f"stack.navigator.spacing_m: expected at most {MOST_NODES} nodes on a map of "
+                f"{xmax - xmin:.1f} x {ymax - ymin:.1f} m, found {spacing_m:g} m between them; take more"
+            )
         for finer in FINER:
             try:
                 self._lay(spacing_m / finer)

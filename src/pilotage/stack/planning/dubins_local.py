@@ -12,7 +12,7 @@ from pilotage.core.errors import InputError
 from pilotage.core.types import FloatArray, Pose2
 from pilotage.kernels.rrt import local_path
 from pilotage.maps.near_walls import NearWalls
-from pilotage.sensors.sensor import NonNegative, Positive
+from pilotage.sensors.sensor import NonNegative
 from pilotage.stack.knowledge import RobotKnowledge
 from pilotage.stack.planning.driving_space import usual_radius_m
 from pilotage.stack.planning.local_planner import LOCAL_PLANNERS, LocalPath, RouteAhead
@@ -28,8 +28,8 @@ class DubinsLocalConfig(Config):
     waypoint lies beside or behind the robot, and the next one is taken instead.
     """
 
-    speed_m_s: Positive = 0.5
-    turning_radius_m: Positive | None = None
+    speed_m_s: float = Field(default=0.5, ge=1e-3)
+    turning_radius_m: float | None = Field(default=None, ge=1e-3, le=100.0)
     """None: 0.5 m, or where the motion needs more at this speed, a tenth more than that."""
     margin_m: NonNegative = 0.05
     """The local path keeps this, and the radius of the disc around the robot, from all on the robot's map."""

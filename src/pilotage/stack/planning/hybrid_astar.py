@@ -35,7 +35,7 @@ class HybridAstarConfig(Config):
 
     clearance_m: NonNegative = 0.06
     """Between the outline and anything solid."""
-    turning_radius_m: Positive | None = None
+    turning_radius_m: float | None = Field(default=None, ge=1e-3, le=100.0)
     """None: a tenth more than the motion's least, which leaves a follower some to steer with, or 0.3 m."""
     reverse_cost: float = Field(default=1.5, ge=1.0)
     switch_cost_m: NonNegative = 0.5
@@ -49,7 +49,7 @@ class HybridAstarConfig(Config):
     step_m: Positive = 0.25
     cell_m: Positive = 0.12
     headings: int = Field(default=72, ge=8, le=720)
-    most_expansions: int = Field(default=150_000, ge=1)
+    most_expansions: int = Field(default=150_000, ge=1, le=3_000_000)
 
 
 @PLANNERS.add("hybrid-astar", HybridAstarConfig)

@@ -7,7 +7,7 @@ from typing import ClassVar
 from pydantic import Field
 
 from pilotage.kernels.rrt.steering import Steering
-from pilotage.sensors.sensor import NonNegative, Positive
+from pilotage.sensors.sensor import NonNegative
 from pilotage.stack.planning.driving_space import clearance_of, usual_radius_m
 from pilotage.stack.planning.planner import PLANNERS, PlanRequest, PlanResult
 from pilotage.stack.planning.rrt_star import RrtStarConfig
@@ -24,7 +24,7 @@ class RrtStarReedsSheppConfig(RrtStarConfig):
     """
 
     clearance_m: NonNegative = 0.06
-    turning_radius_m: Positive | None = None
+    turning_radius_m: float | None = Field(default=None, ge=1e-3, le=100.0)
     reverse_cost: float = Field(1.5, ge=1.0, le=100.0)
     switch_cost_m: NonNegative = 0.5
 
