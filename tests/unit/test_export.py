@@ -203,7 +203,8 @@ def test_a_place_that_takes_no_files_is_one_line(
     assert main(["export", str(run.folder), "--to", to, "--out", "/proc/out"]) == 2
     said = capsys.readouterr()
     assert (said.out, said.err.count("\n")) == ("", 1)
-    assert "/proc/" in said.err
+    assert said.err.startswith("pilotage: /proc/out: "), "not of a draft that nobody asked for"
+    assert "local file" not in said.err, "in the words of the system, not of a library"
 
 
 def test_the_command_says_where(run: pl.Run, capsys: pytest.CaptureFixture[str]) -> None:

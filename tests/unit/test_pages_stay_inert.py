@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 from collections.abc import Iterator
+from importlib import resources
 from pathlib import Path
 
 import pytest
@@ -128,6 +129,30 @@ def test_a_name_without_an_end_makes_no_page_wider_than_a_telephone(browser: Bro
     """Rows of the table of metrics are named by what a run's folder holds; the page was 37,000 px wide."""
     folder = fabricate_run(tmp_path / "run", metrics=fabricate_metrics(600) | {"w" * 3000: 1.0})
     page = write_report(folder)
+    for width in (1200, 390):
+        browser.size(width, 800)
+        browser.open(page, "document.readyState === 'complete'")
+        assert browser.js("document.documentElement.scrollWidth") <= width
+
+
+@pytest.mark.parametrize(
+    "within",
+    [
+        "<h2><a href=#x>{}</a></h2>",
+        "<nav><ol><li><a href=#x>{}</a></li></ol></nav>",
+        "<figure><ul class=legend><li><label><input type=checkbox>{}</label></li></ul></figure>",
+        "<figure><figcaption>{}</figcaption></figure>",
+        "<h3>{}</h3><p>{}</p>",
+    ],
+)
+def test_words_without_an_end_are_broken_wherever_they_stand(
+    within: str, browser: Browser, tmp_path: Path
+) -> None:
+    """A robot's name in a legend and a factor's in a study's contents made pages of 100,000 px."""
+    css = resources.files("pilotage.report").joinpath("page.css").read_text(encoding="utf-8")
+    body = within.replace("{}", "w" * 3000)
+    page = tmp_path / "page.html"
+    page.write_text(f"<!DOCTYPE html><style>{css}</style><body><main>{body}</main></body>")
     for width in (1200, 390):
         browser.size(width, 800)
         browser.open(page, "document.readyState === 'complete'")

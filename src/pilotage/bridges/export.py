@@ -124,8 +124,9 @@ def _csv(run: Run, path: Path) -> None:
     import pyarrow.csv
 
     trace: Trace = run.trace
-    with draft_of(path) as draft:
-        pyarrow.csv.write_csv(trace.to_arrow(), draft)
+    # Opened here: what the system refuses is told in its words and of this file.
+    with draft_of(path) as draft, draft.open("wb") as file:
+        pyarrow.csv.write_csv(trace.to_arrow(), file)
 
 
 FORMS = {

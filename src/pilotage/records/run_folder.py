@@ -128,7 +128,9 @@ def draft_folder(final: Path) -> Iterator[Path]:
     """
     made = [folder for folder in final.parents if not folder.exists()]
     final.parent.mkdir(parents=True, exist_ok=True)
-    draft = Path(tempfile.mkdtemp(prefix=draft_prefix(final), dir=final.parent))
+    begin = draft_prefix(final)
+    with named(final, final.with_name(begin)):
+        draft = Path(tempfile.mkdtemp(prefix=begin, dir=final.parent))
     try:
         draft.chmod(0o777 & ~_umask())
         with named(final, draft):

@@ -15,7 +15,7 @@ import numpy as np
 from pilotage.bridges.ros.messages import TRANSFORMS
 from pilotage.bridges.ros.run_messages import LOG_TYPE, RunMessages, Stamped
 from pilotage.core.drafts import draft_prefix
-from pilotage.core.whole_file import draft_of
+from pilotage.core.whole_file import draft_of, named
 from pilotage.logs.message_types import shipped_types
 from pilotage.logs.rosbags_extra import rosbags
 from pilotage.records.run_folder import draft_folder
@@ -31,8 +31,12 @@ BASE, NAME = 1, 2
 def write_mcap(path: Path, messages: RunMessages) -> None:
     """Write one MCAP file, whole or not at all."""
     rosbag2 = rosbags("rosbag2")
-    within = tempfile.TemporaryDirectory(dir=path.parent, prefix=draft_prefix(path))
-    with draft_of(path) as draft, within as folder:
+    begin = draft_prefix(path)
+    with (
+        named(path, path.with_name(begin)),
+        draft_of(path) as draft,
+        tempfile.TemporaryDirectory(dir=path.parent, prefix=begin) as folder,
+    ):
         bag = Path(folder) / "bag"
         writer = rosbag2.Writer(bag, version=ROS2_VERSION, storage_plugin=rosbag2.StoragePlugin.MCAP)
         _write(writer, "LATEST", messages)
