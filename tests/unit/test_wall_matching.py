@@ -14,7 +14,7 @@ from pilotage.core.types import FloatArray, Pose2
 from pilotage.experiments.build.charts import load_chart
 from pilotage.kernels.filters.wall_line import innovation_distance, wall_innovation
 from pilotage.kernels.lines import joint_association
-from pilotage.kernels.lines.wall_candidates import overlap_share
+from pilotage.kernels.lines.wall_candidates import BESIDE_M, overlap_share
 from pilotage.maps.segment_map import SegmentMap, box_segments
 from pilotage.maps.wall_lines import WallLines, normal_form
 from pilotage.models.wall_line import wall_line
@@ -251,9 +251,31 @@ def test_matching_changes_neither_pose_nor_covariance() -> None:
     assert (cov == np.diag([0.01, 0.01, 0.01])).all()
 
 
+def _is_beside(pose: FloatArray, cov: FloatArray, normal: FloatArray, end: FloatArray) -> bool:
+    """Whether both ends of a line, in the sensor's frame, are near a wall; the sensor is at the axle."""
+    c, s = math.cos(pose[2]), math.sin(pose[2])
+    points = pose[:2] + end.reshape(2, 2) @ np.array([[c, s], [-s, c]])
+    away = np.abs(points @ [math.cos(normal[1]), math.sin(normal[1])] - normal[0]).max()
+    reach2 = (end.reshape(2, 2) ** 2).sum(axis=1).max()
+    spread = math.sqrt(cov[0, 0] + cov[1, 1] + reach2 * cov[2, 2])
+    return bool(away <= BESIDE_M + WallMatchingConfig().sigmas * spread)
+
+
+@pytest.mark.parametrize(("away", "placed"), [(1.5, 0), (0.2, 1)])
+def test_what_stands_in_a_room_is_beside_no_wall(away: float, placed: int) -> None:
+    """A box in front of a wall says nothing against a belief; a wall seen 0.2 m off does."""
+    hidden = floor_with([0.0, 0.0, 10.0, 0.0], [4.0, away, 5.0, away])
+    lines = extractor().extract(scan_of(hidden, Pose2(4.5, 3.0, 0.0), np.random.default_rng(0)))
+    sides = np.abs(lines.rho_alpha[:, 0] - (3.0 - away)) < 0.05
+    assert sides.sum() == 1
+    known = matcher(floor_with([0.0, 0.0, 10.0, 0.0])).match(np.array([4.5, 3.0, 0.0]), TIGHT, lines)
+    assert known.walls[sides] == UNMATCHED
+    assert known.placed - known.count == placed
+
+
 @pytest.mark.parametrize("seed", range(6))
 def test_walls_that_an_angle_alone_rules_out_change_no_distance(seed: int) -> None:
-    """The least of all walls that a line overlaps, beyond the gate as well, however they are ordered."""
+    """The least of all walls that a line may be or lies beside, however they are ordered."""
     rng = np.random.default_rng(seed)
     true = Pose2(1.0 + 0.3 * seed, 1.0, rng.uniform(-3.0, 3.0))
     lines = extractor(seed).extract(scan_of(MUSEUM, true, rng))
@@ -266,8 +288,9 @@ def test_walls_that_an_angle_alone_rules_out_change_no_distance(seed: int) -> No
             z, H, v = np.empty(2), np.empty((2, 3)), np.empty(2)
             wall_innovation(pose, MOUNT, normal, seen, z, H, v)
             share = overlap_share(pose, cov, MOUNT, end, normal[1], segment, config.slack_m, config.sigmas)
-            if share >= config.overlap:
-                least = min(least, innovation_distance(cov, H, v, R))
+            nis = innovation_distance(cov, H, v, R)
+            if share >= config.overlap and (nis <= found.gate or _is_beside(pose, cov, normal, end)):
+                least = min(least, nis)
         assert matches.distances[k] == least
     assert matches.count == (matches.walls >= 0).sum() > 0
     assert matches.farthest == matches.distances[matches.walls >= 0].max()

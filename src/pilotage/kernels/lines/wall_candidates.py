@@ -14,6 +14,9 @@ from pilotage.kernels.jit import kernel
 
 SIGHT_MARGIN_M = 0.1
 """A line of sight ends this far before the wall that it leads to."""
+BESIDE_M = 0.3
+"""A line that is no wall's is held against a belief only so near to one: whatever stands in a room lies in
+front of one of its walls, and that a belief is off by more the whole scan shows."""
 
 
 @kernel
@@ -108,8 +111,9 @@ def candidates(
     """Individually compatible walls of each line: fills out (L, C) and returns how many (L,).
 
     ``distance`` (L,) is filled with the least squared Mahalanobis distance to a wall that the line
-    overlaps (inf where it overlaps none). Of walls on one infinite line, which a measurement cannot tell
-    apart, the one with the greatest overlap stands for all.
+    overlaps and may be, or has both ends beside (inf where there is none): ``BESIDE_M`` and as many standard
+    deviations of the pose. Of walls on one infinite line, which a measurement cannot tell apart, the one with
+    the greatest overlap stands for all.
     """
     count = np.zeros(lines.shape[0], dtype=np.int64)
     z, H, v = np.empty(2), np.empty((2, 3)), np.empty(2)
@@ -128,6 +132,9 @@ def candidates(
         # What the angle alone, or the range alone, is off by is no more than the distance of both: first
         # those that may pass the gate, then what is only to say how far the next wall is, once one is known.
         rho_var, angle_var = place_var + covs[i, 0, 0], cov[2, 2] + covs[i, 1, 1]
+        x0, y0, x1, y1 = ends[i, 0], ends[i, 1], ends[i, 2], ends[i, 3]
+        reach2 = max(x0 * x0 + y0 * y0, x1 * x1 + y1 * y1)
+        beside = BESIDE_M + sigmas * math.sqrt(cov[0, 0] + cov[1, 1] + reach2 * cov[2, 2])
         for w in range(walls.shape[0]):
             off = abs(wrap(alphas[w] - lines[i, 1]))
             off = max(min(off, math.pi - off) - 1e-9, 0.0)
@@ -138,9 +145,15 @@ def candidates(
             for w in range(walls.shape[0]):
                 if (least[w] > gate) == within or least[w] > max(gate, distance[i]):
                     continue
+                nx, ny = math.cos(alphas[w]), math.sin(alphas[w])
+                away = max(abs(nx * x0 + ny * y0 - rhos[w]), abs(nx * x1 + ny * y1 - rhos[w]))
+                if least[w] > gate and away > beside:
+                    continue
                 wall_innovation(pose, mount, walls[w], lines[i], z, H, v)
                 nis = innovation_distance(cov, H, v, covs[i])
                 if not nis <= max(gate, distance[i]):
+                    continue
+                if nis > gate and away > beside:
                     continue
                 share = overlap_share(pose, cov, mount, ends[i], walls[w, 1], segments[w], slack, sigmas)
                 if share < least_overlap:

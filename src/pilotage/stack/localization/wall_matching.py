@@ -49,7 +49,8 @@ class Matches:
     walls
         (L,) index into the map's ``WallLines``, ``UNMATCHED`` or ``AMBIGUOUS``.
     distances
-        (L,) least squared Mahalanobis distance, before the update, to a wall that the line overlaps.
+        (L,) least squared Mahalanobis distance, before the update, to a wall that the line may be, or that it
+        lies beside; inf where there is none.
     count
         Number of matched lines.
     placed
